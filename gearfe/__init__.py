@@ -1,0 +1,35 @@
+"""gearfe: finite-element gear contact, gear-train vibration and planar mechanisms.
+
+Public names load on first use (PEP 562), so ``import gearfe`` costs milliseconds and a job loads only what it needs.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+__version__ = "0.1.0"
+
+#: Public name -> module that defines it.
+_PUBLIC: dict[str, str] = {
+    "Gear": "gear",
+    "GearPair": "gear",
+    "InputError": "errors",
+    "Material": "elasticity",
+    "StiffnessCurve": "stiffness",
+    "sweep_stiffness": "stiffness",
+}
+
+__all__ = ["__version__", *sorted(_PUBLIC)]  # noqa: PLE0604
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PUBLIC:
+        value = getattr(import_module(f".{_PUBLIC[name]}", __name__), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module 'gearfe' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_PUBLIC])

@@ -1,0 +1,12 @@
+"""Commands of the ``gearfe`` program, one module each.
+
+A command module provides ``HELP`` (one line), ``add_arguments(parser)`` and ``run(args) -> int`` (0 done, 1 done but
+some part failed and is marked as such in the output, 2 is kept for bad input). It imports what it needs inside ``run``.
+"""
+
+#: Command -> module below ``gearfe.commands``; imported only when that command runs or its help is asked.
+COMMANDS: dict[str, str] = {
+    "stiffness": "stiffness",
+    "gear": "gear",
+    "mesh": "mesh",
+}

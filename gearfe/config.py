@@ -1,0 +1,206 @@
+"""Job files: TOML tables read into frozen dataclasses, with every mistake named.
+
+A table is a frozen dataclass whose fields are made with `quantity`; the reader checks types, ranges and names. A job
+file may hold the tables of several jobs: a command asks `load_job` for the ones it needs, the others are checked for
+unknown keys only (``gearfe.tables`` says which tables exist), so a misspelt key is an error wherever it stands.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import math
+import tomllib
+import types
+import typing
+from dataclasses import MISSING
+from pathlib import Path
+from typing import Any, TypeVar
+
+from .errors import InputError, unknown_name
+
+T = TypeVar("T")
+
+#: Table name in a job file -> "module:class" of the dataclass that describes it. Each module is light (no numpy).
+TABLES: dict[str, str] = {
+    "pair": "gearfe.tables.pair:PairTable",
+    "stiffness": "gearfe.tables.stiffness:StiffnessTable",
+}
+
+
+def quantity(
+    default: Any = MISSING,
+    *,
+    doc: str,
+    low: float | None = None,
+    high: float | None = None,
+    above: float | None = None,
+    below: float | None = None,
+    choices: tuple[str, ...] | None = None,
+) -> Any:
+    """Dataclass field of a table: ``low <= value <= high`` and ``above < value < below`` are checked on reading.
+
+    `doc` is one sentence with the unit; it appears in error messages and in the generated job-file reference. A mutable
+    default (list, dict) is not accepted: use a tuple, ``None`` or a ``default_factory`` through a callable default.
+    """
+    meta = {"doc": doc, "low": low, "high": high, "above": above, "below": below, "choices": choices}
+    if callable(default):
+        return dataclasses.field(default_factory=default, metadata=meta, kw_only=True)
+    if default is MISSING:
+        return dataclasses.field(metadata=meta, kw_only=True)
+    return dataclasses.field(default=default, metadata=meta, kw_only=True)
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """Parse a TOML file.
+
+    Raises
+    ------
+    InputError
+        When the file is missing, unreadable or not TOML.
+    """
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError("job file", str(path), "there is no such file", "check the path") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError("job file", str(path), f"is not valid TOML ({error})", "mend that line") from None
+    except (OSError, ValueError) as error:
+        raise InputError("job file", str(path), f"cannot be read ({error})", "check the path and its rights") from None
+
+
+def build(cls: type[T], table: Any, where: str) -> T:
+    """Frozen dataclass `cls` from a parsed TOML table; `where` is the table's name for messages.
+
+    Understands ``int``, ``float``, ``bool``, ``str``, ``X | None``, ``tuple[X, ...]``, fixed tuples, ``dict[str, X]`` and
+    nested dataclasses. A dataclass may define ``check(self, where)`` for rules that join several fields.
+
+    Raises
+    ------
+    InputError
+        Unknown key (with the nearest known one), missing key, wrong type, value out of range.
+    """
+    if not isinstance(table, dict):
+        raise InputError(where, table, "must be a table of keys and values", f"write [{where}] and its keys below it")
+    fields = {f.name: f for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    hints = typing.get_type_hints(cls)
+    for key in table:
+        if key not in fields:
+            raise unknown_name(where, key, fields)
+    values = {}
+    for name, spec in fields.items():
+        label = f"{where}.{name}"
+        if name in table:
+            values[name] = _convert(hints[name], table[name], label, spec.metadata)
+        elif spec.default is MISSING and spec.default_factory is MISSING:
+            raise InputError(label, None, "is required", f"add it ({spec.metadata.get('doc', '')})")
+    made = cls(**values)
+    check = getattr(made, "check", None)
+    if check is not None:
+        check(where)
+    return made
+
+
+def load_job(path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Read the `needed` (and, where present, `optional`) tables of a job file; check all others for unknown keys.
+
+    Returns
+    -------
+    dict
+        Table name -> dataclass instance.
+    """
+    raw = read_toml(path)
+    for name in raw:
+        if name not in TABLES:
+            raise unknown_name(f"job file {Path(path).name}", name, TABLES)
+    for name in needed:
+        if name not in raw:
+            raise InputError(f"[{name}]", None, f"is missing in {Path(path).name}", f"add a table [{name}]")
+    made = {}
+    for name, table in raw.items():
+        value = build(table_class(name), table, name)
+        if name in needed or name in optional:
+            made[name] = value
+    return made
+
+
+def table_class(name: str) -> type:
+    """Dataclass that describes the table `name` of a job file."""
+    module, _, cls = TABLES[name].partition(":")
+    return typing.cast(type, getattr(importlib.import_module(module), cls))
+
+
+def _convert(hint: Any, value: Any, label: str, meta: Any) -> Any:
+    origin = typing.get_origin(hint)
+    if origin in (typing.Union, types.UnionType):
+        options = [a for a in typing.get_args(hint) if a is not type(None)]
+        problem: InputError | None = None
+        for option in options:
+            try:
+                return _convert(option, value, label, meta)
+            except InputError as error:
+                problem = problem or error
+        assert problem is not None
+        raise problem
+    if origin is tuple:
+        return _convert_tuple(hint, value, label, meta)
+    if origin is dict:
+        if not isinstance(value, dict):
+            raise InputError(label, value, "must be a table", f"write [{label}]")
+        inner = typing.get_args(hint)[1]
+        return {key: _convert(inner, item, f"{label}.{key}", meta) for key, item in value.items()}
+    if dataclasses.is_dataclass(hint):
+        return build(typing.cast(type, hint), value, label)
+    if hint is Any:
+        return value
+    return _convert_scalar(hint, value, label, meta)
+
+
+def _convert_tuple(hint: Any, value: Any, label: str, meta: Any) -> tuple[Any, ...]:
+    if not isinstance(value, list):
+        raise InputError(label, value, "must be a list", "write [a, b, ...]")
+    inner = typing.get_args(hint)
+    if len(inner) == 2 and inner[1] is Ellipsis:
+        return tuple(_convert(inner[0], item, f"{label}[{i}]", meta) for i, item in enumerate(value))
+    if len(value) != len(inner):
+        raise InputError(label, value, f"must have {len(inner)} entries", meta.get("doc", ""))
+    return tuple(_convert(t, item, f"{label}[{i}]", meta) for i, (t, item) in enumerate(zip(inner, value, strict=True)))
+
+
+def _convert_scalar(hint: Any, value: Any, label: str, meta: Any) -> Any:
+    doc = meta.get("doc", "")
+    if hint is bool or hint is str:
+        if not isinstance(value, hint):
+            kind = "true or false" if hint is bool else "a text in quotes"
+            raise InputError(label, value, f"must be {kind}", doc)
+        choices = meta.get("choices")
+        if choices and value not in choices:
+            raise InputError(label, value, "must be one of " + ", ".join(choices), doc)
+        return value
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise InputError(label, value, "must be a number", doc)
+    if hint is int and not isinstance(value, int):
+        raise InputError(label, value, "must be a whole number", doc)
+    try:
+        number = int(value) if hint is int else float(value)
+    except OverflowError:
+        raise InputError(label, value, "is too large", doc) from None
+    check_range(number, label, meta)
+    return number
+
+
+def check_range(number: float, label: str, meta: Any) -> None:
+    """Raise `InputError` when a number leaves the range that a field's metadata allow."""
+    low, high, above, below = (meta.get(k) for k in ("low", "high", "above", "below"))
+    outside = (
+        not math.isfinite(number)
+        or (low is not None and number < low)
+        or (high is not None and number > high)
+        or (above is not None and number <= above)
+        or (below is not None and number >= below)
+    )
+    if outside:
+        left = f">= {low:g}" if low is not None else f"> {above:g}" if above is not None else ""
+        right = f"<= {high:g}" if high is not None else f"< {below:g}" if below is not None else ""
+        allowed = " and ".join(part for part in ("finite", left, right) if part)
+        raise InputError(label, number, f"must be {allowed}", meta.get("doc", ""))
