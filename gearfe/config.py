@@ -72,8 +72,8 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 def build(cls: type[T], table: Any, where: str) -> T:
     """Frozen dataclass `cls` from a parsed TOML table; `where` is the table's name for messages.
 
-    Understands ``int``, ``float``, ``bool``, ``str``, ``X | None``, ``tuple[X, ...]``, fixed tuples, ``dict[str, X]`` and
-    nested dataclasses. A dataclass may define ``check(self, where)`` for rules that join several fields.
+    Understands ``int``, ``float``, ``bool``, ``str``, ``X | None``, ``tuple[X, ...]``, fixed tuples, ``dict[str, X]``,
+    and nested dataclasses. A dataclass may define ``check(self, where)`` for rules that join several fields.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def build(cls: type[T], table: Any, where: str) -> T:
     for key in table:
         if key not in fields:
             raise unknown_name(where, key, fields)
-    values = {}
+    values: dict[str, Any] = {}
     for name, spec in fields.items():
         label = f"{where}.{name}"
         if name in table:
@@ -118,7 +118,7 @@ def load_job(path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...
             raise InputError(f"[{name}]", None, f"is missing in {Path(path).name}", f"add a table [{name}]")
     made = {}
     for name, table in raw.items():
-        value = build(table_class(name), table, name)
+        value: Any = build(table_class(name), table, name)
         if name in needed or name in optional:
             made[name] = value
     return made
