@@ -1,0 +1,253 @@
+"""Projection onto the constraints, and passing singular positions: where they are, and the state on them.
+
+At a passing singular position (fold) a combination z^T g of the constraints loses its gradient, G^T z = 0, while the motion
+carries it through zero: B = d(G^T z)/dt != 0. Two branches cross there. The motion continues on the one its velocity
+selects: z^T G v = 0 holds the position to it, z^T g'' = 0 its velocity, and both are linear in the direction B.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def evaluate(QS, order, h, q, v):
+    """State of the series at t0 + h."""
+    for i in range(q.shape[0]):
+        q[i] = QS[order, i]
+        v[i] = 0.0
+    for j in range(order - 1, -1, -1):
+        for i in range(q.shape[0]):
+            v[i] = v[i] * h + q[i]
+            q[i] = q[i] * h + QS[j, i]
+
+
+def project(tb, t, forward, q, v, base, length, w):
+    """Onto g = 0 and G v = df/dt by the smallest change in the mass norm; w.G, w.val, w.diag belong to the new point.
+
+    Returns the first position change relative to `length` (and 1 rad), the least pivot ratio and its row.
+    """
+    time_series(tb, t, forward, 3, w.TF)  # noqa: F821
+    first = 0.0
+    for sweep in range(8):
+        trigonometry(q, w.c, w.s)  # noqa: F821
+        gradients(tb, q, w.c, w.s, w.G)  # noqa: F821
+        least, where = factorise(tb, w.G, base, w.val, w.diag)  # noqa: F821
+        residuals(tb, q, w.c, w.s, w.TF[:, 0], w.mu)  # noqa: F821
+        change = least_norm(tb, w.G, w.val, base, w.mu, w.F, q)  # noqa: F821
+        change = change / min(length, 1.0)
+        if sweep == 0:
+            first = change
+        if change < 1e-9 or not np.isfinite(change):  # the next change would be its square
+            break
+    if first > 0.0:
+        trigonometry(q, w.c, w.s)  # noqa: F821
+        gradients(tb, q, w.c, w.s, w.G)  # noqa: F821
+        least, where = factorise(tb, w.G, base, w.val, w.diag)  # noqa: F821
+    for _ in range(2):
+        times_gradients(tb, w.G, v, w.mu)  # noqa: F821
+        for r in range(w.mu.shape[0]):
+            if tb.row_time[r] >= 0:
+                w.mu[r] -= w.TF[tb.row_time[r], 1]
+        least_norm(tb, w.G, w.val, base, w.mu, w.F, v)  # noqa: F821
+    if change >= 1e-9 or not np.isfinite(change):
+        first = np.inf
+    return first, least, where
+
+
+def fold_ahead(tb, q, v, where, w):
+    """Time from here to the nearest fold, judged from z = S^-1 e_where: (time, share of G^T z that its passing removes)."""
+    m = tb.row_kind.shape[0]
+    w.mu[:] = 0.0
+    w.mu[where] = 1.0
+    solve(tb, w.val, w.mu)  # noqa: F821
+    for r in range(m):
+        w.Z[0, r] = w.mu[r] / w.mu[where] if r != where else 1.0
+    gradient_rates(tb, q, v, w.c, w.s, w.H)  # noqa: F821
+    w.F[:] = 0.0
+    add_transposed(tb, w.G, w.Z[0], 1.0, w.F)  # noqa: F821
+    w.u[:] = 0.0
+    add_transposed(tb, w.H, w.Z[0], 1.0, w.u)  # noqa: F821
+    pp = 0.0
+    pb = 0.0
+    bb = 0.0
+    for i in range(w.u.shape[0]):
+        pp += w.F[i] * w.F[i] * tb.inverse_mass[i]
+        pb += w.F[i] * w.u[i] * tb.inverse_mass[i]
+        bb += w.u[i] * w.u[i] * tb.inverse_mass[i]
+    if bb <= 0.0 or pp <= 0.0:
+        return np.inf, 0.0
+    return -pb / bb, pb * pb / (bb * pp)
+
+
+def fold_frame(tb, q, v, folds, w):
+    """At a state with the rows w.drop[:folds] left out: Z, B, the bordered system and p = G^T Z (in w.P)."""
+    m = tb.row_kind.shape[0]
+    trigonometry(q, w.c, w.s)  # noqa: F821
+    gradients(tb, q, w.c, w.s, w.G)  # noqa: F821
+    gradient_rates(tb, q, v, w.c, w.s, w.H)  # noqa: F821
+    least, where = factorise(tb, w.G, w.skip, w.val, w.diag)  # noqa: F821
+    for p in range(folds):  # z = e_drop - S_reg^-1 (S e_drop)
+        row = w.drop[p]
+        w.mu[:] = 0.0
+        w.mu[row] = 1.0
+        w.F[:] = 0.0
+        add_transposed(tb, w.G, w.mu, 1.0, w.F)  # noqa: F821
+        for i in range(w.F.shape[0]):
+            w.F[i] *= tb.inverse_mass[i]
+        times_gradients(tb, w.G, w.F, w.mu)  # noqa: F821
+        for r in range(m):
+            if w.skip[r] != 0:
+                w.mu[r] = 0.0
+        solve(tb, w.val, w.mu)  # noqa: F821
+        for r in range(m):
+            w.Z[p, r] = -w.mu[r]
+        w.Z[p, row] = 1.0
+        w.P[p, :] = 0.0
+        add_transposed(tb, w.G, w.Z[p], 1.0, w.P[p])  # noqa: F821
+        w.BR[p, :] = 0.0
+        add_transposed(tb, w.H, w.Z[p], 1.0, w.BR[p])  # noqa: F821
+    for p in range(folds):
+        for i in range(w.F.shape[0]):
+            w.F[i] = w.BR[p, i] * tb.inverse_mass[i]
+        times_gradients(tb, w.G, w.F, w.mu)  # noqa: F821
+        for r in range(m):
+            w.E[p, r] = w.mu[r] if w.skip[r] == 0 else 0.0
+            w.Y[p, r] = w.E[p, r]
+        solve(tb, w.val, w.Y[p])  # noqa: F821
+    share = 1.0
+    for p in range(folds):
+        for k in range(folds):
+            plain = 0.0
+            for i in range(w.F.shape[0]):
+                plain += w.BR[p, i] * w.BR[k, i] * tb.inverse_mass[i]
+            value = plain
+            for r in range(m):
+                value -= w.Y[p, r] * w.E[k, r]
+            w.border[p, k] = value
+            if p == k:
+                share = min(share, value / plain if plain > 0.0 else 0.0)
+    return share, least, where
+
+
+def fold_change(tb, folds, w, u):
+    """u -= the smallest change that lowers [G_reg; B] u by (w.mu, w.nu); returns its largest entry."""
+    for r in range(w.mu.shape[0]):
+        if w.skip[r] != 0:
+            w.mu[r] = 0.0
+    fold_solve(tb, w, folds)  # noqa: F821
+    w.F[:] = 0.0
+    add_transposed(tb, w.G, w.mu, 1.0, w.F)  # noqa: F821
+    biggest = 0.0
+    for i in range(u.shape[0]):
+        change = w.F[i]
+        for p in range(folds):
+            change += w.BR[p, i] * w.nu[p]
+        change *= tb.inverse_mass[i]
+        u[i] -= change
+        biggest = max(biggest, abs(change))
+    return biggest
+
+
+def fold_combination(w, p, values):
+    """z_p . values."""
+    total = 0.0
+    for r in range(values.shape[0]):
+        total += w.Z[p, r] * values[r]
+    return total
+
+
+def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, w, q, v):
+    """Time (from the point of expansion) and state of the fold near `guess`; folds = 0 when there is none.
+
+    Newton on: regular rows of g = 0, z^T G v = 0, and time such that B . G^T z = 0. It is a true crossing when z^T g
+    vanishes there too; a near miss (rod a little longer than the crank) leaves a residual and is integrated as usual.
+    """
+    m = tb.row_kind.shape[0]
+    n = q.shape[0]
+    folds = 1
+    w.drop[0] = where
+    for r in range(m):
+        w.skip[r] = base[r]
+    w.skip[where] = 1
+    w.dq[:] = 0.0
+    w.dv[:] = 0.0
+    h = guess
+    quality = np.inf
+    for sweep in range(25):
+        evaluate(QS, order, h, q, v)
+        for i in range(n):
+            q[i] += w.dq[i]
+            v[i] += w.dv[i]
+        share, least, row = fold_frame(tb, q, v, folds, w)
+        if share < 1e-8 or not np.isfinite(share):
+            return 0, h
+        time_series(tb, t + h, forward, 3, w.TF)  # noqa: F821
+        move = 0.0
+        weight = 0.0
+        scale = 0.0
+        for p in range(folds):
+            for i in range(n):
+                move -= w.P[p, i] * w.BR[p, i] * tb.inverse_mass[i]
+            weight += w.border[p, p]
+        move = move / weight
+        # position: g_reg and z^T (G v - df/dt)
+        times_gradients(tb, w.G, v, w.mu)  # noqa: F821
+        for r in range(m):
+            if tb.row_time[r] >= 0:
+                w.mu[r] -= w.TF[tb.row_time[r], 1]
+        for p in range(folds):
+            w.nu[p] = fold_combination(w, p, w.mu)
+        residuals(tb, q, w.c, w.s, w.TF[:, 0], w.mu)  # noqa: F821
+        quality = 0.0
+        for p in range(folds):
+            quality = max(quality, abs(fold_combination(w, p, w.mu)))
+            for r in range(m):
+                scale = max(scale, abs(w.Z[p, r]))
+        w.work[:] = q
+        change = fold_change(tb, folds, w, q)
+        for i in range(n):
+            w.dq[i] += q[i] - w.work[i]
+        # velocity: G_reg v - df/dt and half of z^T g'' (linear in v along B)
+        times_gradients(tb, w.H, v, w.mu)  # noqa: F821
+        for r in range(m):
+            if tb.row_time[r] >= 0:
+                w.mu[r] -= 2.0 * w.TF[tb.row_time[r], 2]
+        for p in range(folds):
+            w.nu[p] = 0.5 * fold_combination(w, p, w.mu)
+        times_gradients(tb, w.G, v, w.mu)  # noqa: F821
+        for r in range(m):
+            if tb.row_time[r] >= 0:
+                w.mu[r] -= w.TF[tb.row_time[r], 1]
+        w.work[:] = v
+        fold_change(tb, folds, w, v)
+        for i in range(n):
+            w.dv[i] += v[i] - w.work[i]
+        h += move
+        if abs(h - guess) > reach or not np.isfinite(h) or not np.isfinite(change):
+            return 0, h
+        if abs(move) < 1e-12 * reach and change < 1e-12 * min(length, 1.0):
+            if least < 1e-14 and folds < w.drop.shape[0]:  # another row passes at the same moment
+                w.drop[folds] = row
+                w.skip[row] = 1
+                folds += 1
+                continue
+            if quality > 1e-10 * max(length, 1.0) * max(scale, 1.0):
+                return 0, h
+            evaluate(QS, order, h, q, v)
+            for i in range(n):
+                q[i] += w.dq[i]
+                v[i] += w.dv[i]
+            share, least, row = fold_frame(tb, q, v, folds, w)
+            return folds, h
+    return 0, h
+
+
+FUNCTIONS = (
+    evaluate,
+    project,
+    fold_ahead,
+    fold_frame,
+    fold_change,
+    fold_combination,
+    locate_fold,
+)

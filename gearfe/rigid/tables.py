@@ -1,0 +1,300 @@
+"""A planar scene as arrays: rows of constraints, springs and loads, and the elimination plan of G M^-1 G^T.
+
+Body b has the coordinates (x, y) of its mass centre and its angle theta, in this order; the ground is body number n with
+inverse mass zero, so loops need no special case. All local points are relative to the mass centre.
+
+A constraint row is one of two kinds, with bodies a, b = row_body[r]:
+
+    0  affine in (x, y, theta, cos theta, sin theta) of both bodies:
+       sum_body kx x + ky y + kt theta + kc cos theta + ks sin theta + constant - f(t) = 0
+       (hinge, fixed, prescribed motion, slot along a line of the ground)
+    1  point of b on a line of the moving body a, with n = R(theta_a) n0 and D = P_b - X_a:
+       n . D + constant - f(t) = 0
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .ordering import Plan, elimination_plan
+from .planar import GROUND, Body, CoordinateSpring, Fixed, Gravity, Hinge, Moment, PointForce, Prescribed, Scene, Slider
+from .planar import Slot, Spring
+from .timefunctions import TimeFunction, constant
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class Tables(NamedTuple):
+    """Everything the planar kernels need; shapes with n bodies, m rows, e entries."""
+
+    inverse_mass: Array  # (3 (n + 1),) 1/m, 1/m, 1/I of each body, zero for the ground
+    row_body: Ints  # (m, 2) bodies of each row
+    row_kind: Ints  # (m,)
+    row_factor: Array  # (m, 2, 5) kx, ky, kt, kc, ks
+    row_slot: Array  # (m, 4) n0x, n0y, local x, local y of the point on b
+    row_constant: Array  # (m,)
+    row_time: Ints  # (m,) time function subtracted, -1 for none
+    slots: Ints  # (number of rows of kind 1,) their row numbers
+    ldl_start: Ints  # (m + 1,) columns of the factor L
+    ldl_row: Ints  # (nnz,) row number of each entry
+    entry: Ints  # (e, 6) target, row, side, row, side, body: products that make G M^-1 G^T
+    update_start: Ints  # (m + 1,)
+    update: Ints  # (u, 3) target, entry, entry of L
+    spring_body: Ints  # (s, 2)
+    spring_point: Array  # (s, 4) local points
+    spring_factor: Array  # (s, 3) stiffness, damping, free length
+    linear_coordinate: Ints  # (l, 2) coordinate numbers
+    linear_factor: Array  # (l, 3) stiffness, damping, reference
+    weight: Array  # (3 (n + 1),) constant generalised forces (gravity)
+    load_body: Ints  # (p,)
+    load_point: Array  # (p, 2)
+    load_time: Ints  # (p, 2) time functions of the two components
+    moment_body: Ints  # (t, 2) body and the body that carries the reaction
+    moment_time: Ints  # (t,)
+    piece_first: Ints  # (functions + 1,) pieces of each time function
+    piece_start: Array  # (pieces,)
+    piece_origin: Array  # (pieces,)
+    piece_factor: Array  # (pieces, width)
+    sine_first: Ints  # (functions + 1,)
+    sine: Array  # (sines, 3)
+
+
+class Assembly(NamedTuple):
+    """Tables of a scene with the bookkeeping that people need."""
+
+    tables: Tables
+    row_joint: tuple[int, ...]  # joint number of each row
+    row_label: tuple[str, ...]  # what the row holds, for messages
+    start_q: Array  # (3n,) start coordinates of the mass centres
+    start_v: Array  # (3n,)
+    breaks: Array  # times at which a time function changes its piece
+    length: float  # characteristic length (m)
+    centre: Array  # (n + 1, 2) mass centre in the body's frame
+
+
+def assemble(scene: Scene) -> Assembly:
+    """Arrays of `scene`; rows are numbered in the order of elimination that fills G M^-1 G^T least."""
+    n = len(scene.bodies)
+    index = scene.body_index
+    centre = np.array([*(b.centre for b in scene.bodies), (0.0, 0.0)], dtype=float)
+    q0, v0 = _start(scene.bodies)
+    functions: list[TimeFunction] = []
+
+    def time(function: TimeFunction) -> int:
+        functions.append(function)
+        return len(functions) - 1
+
+    def local(body: str, point: tuple[float, float]) -> tuple[float, float]:
+        c = centre[index[body]]
+        return float(point[0] - c[0]), float(point[1] - c[1])
+
+    rows: list[_Row] = []
+    for number, joint in enumerate(scene.joints):
+        label = f"{type(joint).__name__.lower()} {joint.name or number!r}"
+        for row in _joint_rows(joint, index, local, q0, n):
+            kind, bodies, factor, slot, const, function, what = row
+            rows.append(_Row(number, f"{label} ({what})", kind, bodies, factor, slot, const,
+                             -1 if function is None else time(function)))  # fmt: skip
+    plan = elimination_plan([(r.joint, r.bodies) for r in rows], n)
+    rows = [rows[i] for i in plan.order]
+    springs = [f for f in scene.forces if isinstance(f, Spring)]
+    linear = [f for f in scene.forces if isinstance(f, CoordinateSpring)]
+    loads = [f for f in scene.forces if isinstance(f, PointForce)]
+    moments = [f for f in scene.forces if isinstance(f, Moment)]
+    weight = np.zeros(3 * (n + 1))
+    for force in scene.forces:
+        if isinstance(force, Gravity):
+            for i, body in enumerate(scene.bodies):
+                weight[3 * i : 3 * i + 2] += body.mass * np.asarray(force.acceleration)
+    inverse = np.zeros(3 * (n + 1))
+    for i, body in enumerate(scene.bodies):
+        inverse[3 * i : 3 * i + 3] = 1 / body.mass, 1 / body.mass, 1 / body.inertia
+    load_time = [[time(f.x), time(f.y)] for f in loads]
+    moment_time = [time(f.function) for f in moments]
+    tables = Tables(
+        inverse_mass=inverse,
+        **_row_arrays(rows),
+        **_plan_arrays(plan),
+        spring_body=_ints([[index[f.a], index[f.b]] for f in springs], 2),
+        spring_point=_floats([[*local(f.a, f.point_a), *local(f.b, f.point_b)] for f in springs], 4),
+        spring_factor=_floats([[f.stiffness, f.damping, f.free_length] for f in springs], 3),
+        linear_coordinate=_ints([_coordinates(f, index) for f in linear], 2),
+        linear_factor=_floats([[f.stiffness, f.damping, f.reference] for f in linear], 3),
+        weight=weight,
+        load_body=np.array([index[f.body] for f in loads], dtype=np.int64),
+        load_point=_floats([local(f.body, f.point) for f in loads], 2),
+        load_time=_ints(load_time, 2),
+        moment_body=_ints([[index[f.body], index[f.reaction]] for f in moments], 2),
+        moment_time=np.array(moment_time, dtype=np.int64),
+        **_time_arrays(functions),
+    )
+    breaks = np.unique([t for f in functions for t in f.breaks if math.isfinite(t)]).astype(float)
+    return Assembly(
+        tables, tuple(r.joint for r in rows), tuple(r.label for r in rows), q0, v0, breaks, _length(tables, q0), centre
+    )
+
+
+class _Row(NamedTuple):
+    joint: int
+    label: str
+    kind: int
+    bodies: tuple[int, int]
+    factor: Array
+    slot: tuple[float, float, float, float]
+    constant: float
+    time: int
+
+
+def _start(bodies: tuple[Body, ...]) -> tuple[Array, Array]:
+    q, v = np.zeros(3 * len(bodies)), np.zeros(3 * len(bodies))
+    for i, b in enumerate(bodies):
+        c, s = math.cos(b.angle), math.sin(b.angle)
+        arm = np.array([c * b.centre[0] - s * b.centre[1], s * b.centre[0] + c * b.centre[1]])
+        q[3 * i : 3 * i + 2] = np.asarray(b.position) + arm
+        v[3 * i : 3 * i + 2] = np.asarray(b.velocity) + b.rate * np.array([-arm[1], arm[0]])
+        q[3 * i + 2], v[3 * i + 2] = b.angle, b.rate
+    return q, v
+
+
+def _joint_rows(joint, index, local, q0, n):  # type: ignore[no-untyped-def]
+    """Rows of one joint: kind, bodies, factors, slot data, constant, time function, name of the condition."""
+    no_slot = (0.0, 0.0, 0.0, 0.0)
+
+    def angle(body: str) -> float:
+        i = index[body]
+        return 0.0 if i == n else float(q0[3 * i + 2])
+
+    def affine(bodies, terms, const, function, what):  # type: ignore[no-untyped-def]
+        factor = np.array(terms, dtype=float)
+        for side in range(2):
+            if bodies[side] == n:  # the ground stands at x = y = theta = 0: cosine terms are constants
+                const += factor[side, 3]
+                factor[side] = 0.0
+        return 0, bodies, factor, no_slot, const, function, what
+
+    def point(body, at, sign):  # type: ignore[no-untyped-def]
+        x, y = local(body, at)
+        return (sign, 0, 0, sign * x, -sign * y), (0, sign, 0, sign * y, sign * x)
+
+    def turn(a, b, value, function):  # type: ignore[no-untyped-def]
+        return affine((index[a], index[b]), ((0, 0, 1, 0, 0), (0, 0, -1, 0, 0)), -value, function, "angle")
+
+    if isinstance(joint, Hinge | Fixed):
+        at_a = getattr(joint, "point_a", (0.0, 0.0))
+        if isinstance(joint, Fixed):
+            at_b = _seen_from(joint, index, q0, n, local)
+        else:
+            at_b = joint.point_b
+        one, two = point(joint.a, at_a, 1.0), point(joint.b, at_b, -1.0)
+        bodies = (index[joint.a], index[joint.b])
+        made = [affine(bodies, (one[k], two[k]), 0.0, None, "xy"[k]) for k in range(2)]
+        if isinstance(joint, Fixed):
+            made.append(turn(joint.a, joint.b, angle(joint.a) - angle(joint.b), None))
+        return made
+    if isinstance(joint, Slot | Slider):
+        made = [_line_row(joint, index, local, n, affine, point)]
+        if isinstance(joint, Slider):
+            held = angle(joint.body) - angle(joint.line) if joint.angle is None else joint.angle
+            made.append(turn(joint.body, joint.line, held, None))
+        return made
+    function: TimeFunction = joint.function
+    other = joint.relative_to
+    if joint.coordinate in ("angle", "rate"):
+        if joint.coordinate == "rate":
+            function = function.integral(angle(joint.body) - angle(other))
+        return [turn(joint.body, other, 0.0, function)]
+    k = "xy".index(joint.coordinate)
+    terms = (point(joint.body, joint.point, 1.0)[k], (0.0,) * 5)
+    return [affine((index[joint.body], n), terms, 0.0, function, joint.coordinate)]
+
+
+def _line_row(joint, index, local, n, affine, point):  # type: ignore[no-untyped-def]
+    length = math.hypot(*joint.direction)
+    normal = (-joint.direction[1] / length, joint.direction[0] / length)
+    start = local(joint.line, joint.origin)
+    const = -(normal[0] * start[0] + normal[1] * start[1])
+    if joint.line == GROUND:
+        ex, ey = point(joint.body, joint.point, 1.0)
+        row = tuple(normal[0] * a + normal[1] * b for a, b in zip(ex, ey, strict=True))
+        return affine((index[joint.body], n), (row, (0.0,) * 5), const, None, "across the line")
+    slot = (*normal, *local(joint.body, joint.point))
+    return 1, (index[joint.line], index[joint.body]), np.zeros((2, 5)), slot, const, None, "across the line"
+
+
+def _seen_from(joint, index, q0, n, local):  # type: ignore[no-untyped-def]
+    """Point (0, 0) of body a, written in the frame of body b, as the scene starts."""
+    i, j = index[joint.a], index[joint.b]
+    x, y = local(joint.a, (0.0, 0.0))
+    c, s = math.cos(q0[3 * i + 2]), math.sin(q0[3 * i + 2])
+    place = q0[3 * i : 3 * i + 2] + np.array([c * x - s * y, s * x + c * y])
+    if j == n:
+        return tuple(place)
+    c, s = math.cos(q0[3 * j + 2]), math.sin(q0[3 * j + 2])
+    d = place - q0[3 * j : 3 * j + 2]
+    back = local(joint.b, (0.0, 0.0))
+    return c * d[0] + s * d[1] - back[0], -s * d[0] + c * d[1] - back[1]
+
+
+def _coordinates(force: CoordinateSpring, index) -> tuple[int, int]:  # type: ignore[no-untyped-def]
+    place = ("x", "y", "angle").index(force.coordinate)
+    return 3 * index[force.body] + place, 3 * index[force.relative_to] + place
+
+
+def _row_arrays(rows: list[_Row]) -> dict[str, NDArray]:
+    m = len(rows)
+    kinds = np.array([r.kind for r in rows], dtype=np.int64)
+    return {
+        "row_body": _ints([r.bodies for r in rows], 2),
+        "row_kind": kinds,
+        "row_factor": np.array([r.factor for r in rows], dtype=float).reshape(m, 2, 5),
+        "row_slot": _floats([r.slot for r in rows], 4),
+        "row_constant": np.array([r.constant for r in rows], dtype=float),
+        "row_time": np.array([r.time for r in rows], dtype=np.int64),
+        "slots": np.flatnonzero(kinds == 1).astype(np.int64),
+    }
+
+
+def _plan_arrays(plan: Plan) -> dict[str, NDArray]:
+    return {
+        "ldl_start": plan.start,
+        "ldl_row": plan.row,
+        "entry": plan.entry,
+        "update_start": plan.update_start,
+        "update": plan.update,
+    }
+
+
+def _time_arrays(functions: list[TimeFunction]) -> dict[str, NDArray]:
+    used = functions or [constant(0.0)]
+    width = max(len(row) for f in used for row in f.coefficients)
+    return {
+        "piece_first": np.cumsum([0, *(len(f.starts) for f in used)]).astype(np.int64),
+        "piece_start": np.array([s for f in used for s in f.starts], dtype=float),
+        "piece_origin": np.array([o for f in used for o in f.origins], dtype=float),
+        "piece_factor": np.array([[*row, *[0.0] * (width - len(row))] for f in used for row in f.coefficients]),
+        "sine_first": np.cumsum([0, *(len(f.sines) for f in used)]).astype(np.int64),
+        "sine": _floats([s for f in used for s in f.sines], 3),
+    }
+
+
+def _length(tables: Tables, q0: Array) -> float:
+    arms = [np.abs(tables.row_factor[:, :, 3:]).max(initial=0.0), np.abs(tables.row_slot[:, 2:]).max(initial=0.0)]
+    arms.append(np.abs(tables.spring_point).max(initial=0.0))
+    arms.append(np.abs(tables.spring_factor[:, 2]).max(initial=0.0))
+    size = float(max(arms))
+    if size == 0.0:
+        size = float(np.abs(q0.reshape(-1, 3)[:, :2]).max(initial=0.0))
+    return size or 1.0
+
+
+def _ints(values, width: int) -> Ints:  # type: ignore[no-untyped-def]
+    return np.array(values, dtype=np.int64).reshape(-1, width)
+
+
+def _floats(values, width: int) -> Array:  # type: ignore[no-untyped-def]
+    return np.array(values, dtype=float).reshape(-1, width)
