@@ -1,3 +1,4 @@
+# mypy: ignore-errors
 """Projection onto the constraints, and passing singular positions: where they are, and the state on them.
 
 At a passing singular position (fold) a combination z^T g of the constraints loses its gradient, G^T z = 0, while the motion
@@ -8,6 +9,22 @@ selects: z^T G v = 0 holds the position to it, z^T g'' = 0 its velocity, and bot
 from __future__ import annotations
 
 import numpy as np
+
+from .kernel_rows import (
+    add_transposed,
+    copy,
+    factorise,
+    fill,
+    gradient_rates,
+    gradients,
+    least_norm,
+    residuals,
+    solve,
+    time_series,
+    times_gradients,
+    trigonometry,
+)
+from .kernel_series import fold_solve
 
 
 def evaluate(QS, order, h, q, v):
@@ -26,29 +43,30 @@ def project(tb, t, forward, q, v, base, length, w):
 
     Returns the first position change relative to `length` (and 1 rad), the least pivot ratio and its row.
     """
-    time_series(tb, t, forward, 3, w.TF)  # noqa: F821
+    rows, plan, mass = tb.rows, tb.plan, tb.mass
+    time_series(tb.times, t, forward, 3, w.TF)
     first = 0.0
     for sweep in range(8):
-        trigonometry(q, w.c, w.s)  # noqa: F821
-        gradients(tb, q, w.c, w.s, w.G)  # noqa: F821
-        least, where = factorise(tb, w.G, base, w.val, w.diag)  # noqa: F821
-        residuals(tb, q, w.c, w.s, w.TF[:, 0], w.mu)  # noqa: F821
-        change = least_norm(tb, w.G, w.val, base, w.mu, w.F, q)  # noqa: F821
+        trigonometry(q, w.c, w.s)
+        gradients(rows, q, w.c, w.s, w.G)
+        least, where = factorise(rows, plan, mass, w.G, base, w.val, w.diag)
+        residuals(rows, q, w.c, w.s, w.TF[:, 0], w.mu)
+        change = least_norm(rows, plan, mass, w.G, w.val, base, w.mu, w.F, q)
         change = change / min(length, 1.0)
         if sweep == 0:
             first = change
         if change < 1e-9 or not np.isfinite(change):  # the next change would be its square
             break
     if first > 0.0:
-        trigonometry(q, w.c, w.s)  # noqa: F821
-        gradients(tb, q, w.c, w.s, w.G)  # noqa: F821
-        least, where = factorise(tb, w.G, base, w.val, w.diag)  # noqa: F821
+        trigonometry(q, w.c, w.s)
+        gradients(rows, q, w.c, w.s, w.G)
+        least, where = factorise(rows, plan, mass, w.G, base, w.val, w.diag)
     for _ in range(2):
-        times_gradients(tb, w.G, v, w.mu)  # noqa: F821
+        times_gradients(rows, w.G, v, w.mu)
         for r in range(w.mu.shape[0]):
-            if tb.row_time[r] >= 0:
-                w.mu[r] -= w.TF[tb.row_time[r], 1]
-        least_norm(tb, w.G, w.val, base, w.mu, w.F, v)  # noqa: F821
+            if rows.time[r] >= 0:
+                w.mu[r] -= w.TF[rows.time[r], 1]
+        least_norm(rows, plan, mass, w.G, w.val, base, w.mu, w.F, v)
     if change >= 1e-9 or not np.isfinite(change):
         first = np.inf
     return first, least, where
@@ -56,103 +74,106 @@ def project(tb, t, forward, q, v, base, length, w):
 
 def fold_ahead(tb, q, v, where, w):
     """Time from here to the nearest fold, judged from z = S^-1 e_where: (time, share of G^T z that its passing removes)."""
-    m = tb.row_kind.shape[0]
-    w.mu[:] = 0.0
+    rows, plan, mass, fold = tb.rows, tb.plan, tb.mass, w.fold
+    m = rows.kind.shape[0]
+    fill(w.mu, 0.0)
     w.mu[where] = 1.0
-    solve(tb, w.val, w.mu)  # noqa: F821
+    solve(plan, w.val, w.mu)
     for r in range(m):
-        w.Z[0, r] = w.mu[r] / w.mu[where] if r != where else 1.0
-    gradient_rates(tb, q, v, w.c, w.s, w.H)  # noqa: F821
-    w.F[:] = 0.0
-    add_transposed(tb, w.G, w.Z[0], 1.0, w.F)  # noqa: F821
-    w.u[:] = 0.0
-    add_transposed(tb, w.H, w.Z[0], 1.0, w.u)  # noqa: F821
+        fold.Z[0, r] = w.mu[r] / w.mu[where] if r != where else 1.0
+    gradient_rates(rows, q, v, w.c, w.s, w.H)
+    fill(w.F, 0.0)
+    add_transposed(rows, w.G, fold.Z[0], 1.0, w.F)
+    fill(w.u, 0.0)
+    add_transposed(rows, w.H, fold.Z[0], 1.0, w.u)
     pp = 0.0
     pb = 0.0
     bb = 0.0
     for i in range(w.u.shape[0]):
-        pp += w.F[i] * w.F[i] * tb.inverse_mass[i]
-        pb += w.F[i] * w.u[i] * tb.inverse_mass[i]
-        bb += w.u[i] * w.u[i] * tb.inverse_mass[i]
+        pp += w.F[i] * w.F[i] * mass[i]
+        pb += w.F[i] * w.u[i] * mass[i]
+        bb += w.u[i] * w.u[i] * mass[i]
     if bb <= 0.0 or pp <= 0.0:
         return np.inf, 0.0
     return -pb / bb, pb * pb / (bb * pp)
 
 
 def fold_frame(tb, q, v, folds, w):
-    """At a state with the rows w.drop[:folds] left out: Z, B, the bordered system and p = G^T Z (in w.P)."""
-    m = tb.row_kind.shape[0]
-    trigonometry(q, w.c, w.s)  # noqa: F821
-    gradients(tb, q, w.c, w.s, w.G)  # noqa: F821
-    gradient_rates(tb, q, v, w.c, w.s, w.H)  # noqa: F821
-    least, where = factorise(tb, w.G, w.skip, w.val, w.diag)  # noqa: F821
+    """At a state with the rows fold.drop[:folds] left out: Z, B, the bordered system and p = G^T Z (in fold.P)."""
+    rows, plan, mass, fold = tb.rows, tb.plan, tb.mass, w.fold
+    m = rows.kind.shape[0]
+    trigonometry(q, w.c, w.s)
+    gradients(rows, q, w.c, w.s, w.G)
+    gradient_rates(rows, q, v, w.c, w.s, w.H)
+    least, where = factorise(rows, plan, mass, w.G, w.skip, w.val, w.diag)
     for p in range(folds):  # z = e_drop - S_reg^-1 (S e_drop)
-        row = w.drop[p]
-        w.mu[:] = 0.0
+        row = fold.drop[p]
+        fill(w.mu, 0.0)
         w.mu[row] = 1.0
-        w.F[:] = 0.0
-        add_transposed(tb, w.G, w.mu, 1.0, w.F)  # noqa: F821
+        fill(w.F, 0.0)
+        add_transposed(rows, w.G, w.mu, 1.0, w.F)
         for i in range(w.F.shape[0]):
-            w.F[i] *= tb.inverse_mass[i]
-        times_gradients(tb, w.G, w.F, w.mu)  # noqa: F821
+            w.F[i] *= mass[i]
+        times_gradients(rows, w.G, w.F, w.mu)
         for r in range(m):
             if w.skip[r] != 0:
                 w.mu[r] = 0.0
-        solve(tb, w.val, w.mu)  # noqa: F821
+        solve(plan, w.val, w.mu)
         for r in range(m):
-            w.Z[p, r] = -w.mu[r]
-        w.Z[p, row] = 1.0
-        w.P[p, :] = 0.0
-        add_transposed(tb, w.G, w.Z[p], 1.0, w.P[p])  # noqa: F821
-        w.BR[p, :] = 0.0
-        add_transposed(tb, w.H, w.Z[p], 1.0, w.BR[p])  # noqa: F821
+            fold.Z[p, r] = -w.mu[r]
+        fold.Z[p, row] = 1.0
+        fill(fold.P[p], 0.0)
+        add_transposed(rows, w.G, fold.Z[p], 1.0, fold.P[p])
+        fill(fold.B[p], 0.0)
+        add_transposed(rows, w.H, fold.Z[p], 1.0, fold.B[p])
     for p in range(folds):
         for i in range(w.F.shape[0]):
-            w.F[i] = w.BR[p, i] * tb.inverse_mass[i]
-        times_gradients(tb, w.G, w.F, w.mu)  # noqa: F821
+            w.F[i] = fold.B[p, i] * mass[i]
+        times_gradients(rows, w.G, w.F, w.mu)
         for r in range(m):
-            w.E[p, r] = w.mu[r] if w.skip[r] == 0 else 0.0
-            w.Y[p, r] = w.E[p, r]
-        solve(tb, w.val, w.Y[p])  # noqa: F821
+            fold.E[p, r] = w.mu[r] if w.skip[r] == 0 else 0.0
+            fold.Y[p, r] = fold.E[p, r]
+        solve(plan, w.val, fold.Y[p])
     share = 1.0
     for p in range(folds):
         for k in range(folds):
             plain = 0.0
             for i in range(w.F.shape[0]):
-                plain += w.BR[p, i] * w.BR[k, i] * tb.inverse_mass[i]
+                plain += fold.B[p, i] * fold.B[k, i] * mass[i]
             value = plain
             for r in range(m):
-                value -= w.Y[p, r] * w.E[k, r]
-            w.border[p, k] = value
+                value -= fold.Y[p, r] * fold.E[k, r]
+            fold.border[p, k] = value
             if p == k:
                 share = min(share, value / plain if plain > 0.0 else 0.0)
     return share, least, where
 
 
 def fold_change(tb, folds, w, u):
-    """u -= the smallest change that lowers [G_reg; B] u by (w.mu, w.nu); returns its largest entry."""
+    """u -= the smallest change that lowers [G_reg; B] u by (w.mu, fold.nu); returns its largest entry."""
+    rows, plan, mass, fold = tb.rows, tb.plan, tb.mass, w.fold
     for r in range(w.mu.shape[0]):
         if w.skip[r] != 0:
             w.mu[r] = 0.0
-    fold_solve(tb, w, folds)  # noqa: F821
-    w.F[:] = 0.0
-    add_transposed(tb, w.G, w.mu, 1.0, w.F)  # noqa: F821
+    fold_solve(plan, w.val, fold, w.mu, folds)
+    fill(w.F, 0.0)
+    add_transposed(rows, w.G, w.mu, 1.0, w.F)
     biggest = 0.0
     for i in range(u.shape[0]):
         change = w.F[i]
         for p in range(folds):
-            change += w.BR[p, i] * w.nu[p]
-        change *= tb.inverse_mass[i]
+            change += fold.B[p, i] * fold.nu[p]
+        change *= mass[i]
         u[i] -= change
         biggest = max(biggest, abs(change))
     return biggest
 
 
-def fold_combination(w, p, values):
+def fold_combination(fold, p, values):
     """z_p . values."""
     total = 0.0
     for r in range(values.shape[0]):
-        total += w.Z[p, r] * values[r]
+        total += fold.Z[p, r] * values[r]
     return total
 
 
@@ -162,15 +183,16 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, w,
     Newton on: regular rows of g = 0, z^T G v = 0, and time such that B . G^T z = 0. It is a true crossing when z^T g
     vanishes there too; a near miss (rod a little longer than the crank) leaves a residual and is integrated as usual.
     """
-    m = tb.row_kind.shape[0]
+    rows, mass, fold = tb.rows, tb.mass, w.fold
+    m = rows.kind.shape[0]
     n = q.shape[0]
     folds = 1
-    w.drop[0] = where
+    fold.drop[0] = where
     for r in range(m):
         w.skip[r] = base[r]
     w.skip[where] = 1
-    w.dq[:] = 0.0
-    w.dv[:] = 0.0
+    fill(w.dq, 0.0)
+    fill(w.dv, 0.0)
     h = guess
     quality = np.inf
     for sweep in range(25):
@@ -181,44 +203,44 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, w,
         share, least, row = fold_frame(tb, q, v, folds, w)
         if share < 1e-8 or not np.isfinite(share):
             return 0, h
-        time_series(tb, t + h, forward, 3, w.TF)  # noqa: F821
+        time_series(tb.times, t + h, forward, 3, w.TF)
         move = 0.0
         weight = 0.0
         scale = 0.0
         for p in range(folds):
             for i in range(n):
-                move -= w.P[p, i] * w.BR[p, i] * tb.inverse_mass[i]
-            weight += w.border[p, p]
+                move -= fold.P[p, i] * fold.B[p, i] * mass[i]
+            weight += fold.border[p, p]
         move = move / weight
         # position: g_reg and z^T (G v - df/dt)
-        times_gradients(tb, w.G, v, w.mu)  # noqa: F821
+        times_gradients(rows, w.G, v, w.mu)
         for r in range(m):
-            if tb.row_time[r] >= 0:
-                w.mu[r] -= w.TF[tb.row_time[r], 1]
+            if rows.time[r] >= 0:
+                w.mu[r] -= w.TF[rows.time[r], 1]
         for p in range(folds):
-            w.nu[p] = fold_combination(w, p, w.mu)
-        residuals(tb, q, w.c, w.s, w.TF[:, 0], w.mu)  # noqa: F821
+            fold.nu[p] = fold_combination(fold, p, w.mu)
+        residuals(rows, q, w.c, w.s, w.TF[:, 0], w.mu)
         quality = 0.0
         for p in range(folds):
-            quality = max(quality, abs(fold_combination(w, p, w.mu)))
+            quality = max(quality, abs(fold_combination(fold, p, w.mu)))
             for r in range(m):
-                scale = max(scale, abs(w.Z[p, r]))
-        w.work[:] = q
+                scale = max(scale, abs(fold.Z[p, r]))
+        copy(q, w.work)
         change = fold_change(tb, folds, w, q)
         for i in range(n):
             w.dq[i] += q[i] - w.work[i]
         # velocity: G_reg v - df/dt and half of z^T g'' (linear in v along B)
-        times_gradients(tb, w.H, v, w.mu)  # noqa: F821
+        times_gradients(rows, w.H, v, w.mu)
         for r in range(m):
-            if tb.row_time[r] >= 0:
-                w.mu[r] -= 2.0 * w.TF[tb.row_time[r], 2]
+            if rows.time[r] >= 0:
+                w.mu[r] -= 2.0 * w.TF[rows.time[r], 2]
         for p in range(folds):
-            w.nu[p] = 0.5 * fold_combination(w, p, w.mu)
-        times_gradients(tb, w.G, v, w.mu)  # noqa: F821
+            fold.nu[p] = 0.5 * fold_combination(fold, p, w.mu)
+        times_gradients(rows, w.G, v, w.mu)
         for r in range(m):
-            if tb.row_time[r] >= 0:
-                w.mu[r] -= w.TF[tb.row_time[r], 1]
-        w.work[:] = v
+            if rows.time[r] >= 0:
+                w.mu[r] -= w.TF[rows.time[r], 1]
+        copy(v, w.work)
         fold_change(tb, folds, w, v)
         for i in range(n):
             w.dv[i] += v[i] - w.work[i]
@@ -226,8 +248,8 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, w,
         if abs(h - guess) > reach or not np.isfinite(h) or not np.isfinite(change):
             return 0, h
         if abs(move) < 1e-12 * reach and change < 1e-12 * min(length, 1.0):
-            if least < 1e-14 and folds < w.drop.shape[0]:  # another row passes at the same moment
-                w.drop[folds] = row
+            if least < 1e-14 and folds < fold.drop.shape[0]:  # another row passes at the same moment
+                fold.drop[folds] = row
                 w.skip[row] = 1
                 folds += 1
                 continue

@@ -1,3 +1,4 @@
+# mypy: ignore-errors
 """Constraint rows of a planar scene: residuals, gradients, S = G M^-1 G^T = L D L^T. Plain loops, compiled when numba is.
 
 The functions here are written in the subset of Python that numba compiles; `gearfe.rigid.compiled` binds them together.
@@ -11,6 +12,18 @@ import math
 import numpy as np
 
 
+def fill(x, value):
+    """x := value (a loop compiles far faster than a slice assignment, which brings its error messages along)."""
+    for i in range(x.shape[0]):
+        x[i] = value
+
+
+def copy(x, y):
+    """y := x."""
+    for i in range(x.shape[0]):
+        y[i] = x[i]
+
+
 def trigonometry(q, c, s):
     """Cosine and sine of every angle."""
     for b in range(c.shape[0]):
@@ -18,22 +31,22 @@ def trigonometry(q, c, s):
         s[b] = math.sin(q[3 * b + 2])
 
 
-def gradients(tb, q, c, s, G):
+def gradients(rows, q, c, s, G):
     """G[r, side] = gradient of row r with respect to (x, y, theta) of its body on that side; shape (m, 2, 3)."""
-    for r in range(tb.row_kind.shape[0]):
-        if tb.row_kind[r] == 0:
+    for r in range(rows.kind.shape[0]):
+        if rows.kind[r] == 0:
             for a in range(2):
-                b = tb.row_body[r, a]
-                G[r, a, 0] = tb.row_factor[r, a, 0]
-                G[r, a, 1] = tb.row_factor[r, a, 1]
-                G[r, a, 2] = tb.row_factor[r, a, 2] - tb.row_factor[r, a, 3] * s[b] + tb.row_factor[r, a, 4] * c[b]
+                b = rows.body[r, a]
+                G[r, a, 0] = rows.factor[r, a, 0]
+                G[r, a, 1] = rows.factor[r, a, 1]
+                G[r, a, 2] = rows.factor[r, a, 2] - rows.factor[r, a, 3] * s[b] + rows.factor[r, a, 4] * c[b]
         else:
-            a = tb.row_body[r, 0]
-            b = tb.row_body[r, 1]
-            nx = c[a] * tb.row_slot[r, 0] - s[a] * tb.row_slot[r, 1]
-            ny = s[a] * tb.row_slot[r, 0] + c[a] * tb.row_slot[r, 1]
-            rx = c[b] * tb.row_slot[r, 2] - s[b] * tb.row_slot[r, 3]
-            ry = s[b] * tb.row_slot[r, 2] + c[b] * tb.row_slot[r, 3]
+            a = rows.body[r, 0]
+            b = rows.body[r, 1]
+            nx = c[a] * rows.slot[r, 0] - s[a] * rows.slot[r, 1]
+            ny = s[a] * rows.slot[r, 0] + c[a] * rows.slot[r, 1]
+            rx = c[b] * rows.slot[r, 2] - s[b] * rows.slot[r, 3]
+            ry = s[b] * rows.slot[r, 2] + c[b] * rows.slot[r, 3]
             dx = q[3 * b] + rx - q[3 * a]
             dy = q[3 * b + 1] + ry - q[3 * a + 1]
             G[r, 0, 0] = -nx
@@ -44,25 +57,25 @@ def gradients(tb, q, c, s, G):
             G[r, 1, 2] = ny * rx - nx * ry
 
 
-def gradient_rates(tb, q, v, c, s, H):
+def gradient_rates(rows, q, v, c, s, H):
     """H = dG/dt along the velocity v, same layout as G."""
-    for r in range(tb.row_kind.shape[0]):
-        if tb.row_kind[r] == 0:
+    for r in range(rows.kind.shape[0]):
+        if rows.kind[r] == 0:
             for a in range(2):
-                b = tb.row_body[r, a]
+                b = rows.body[r, a]
                 w = v[3 * b + 2]
                 H[r, a, 0] = 0.0
                 H[r, a, 1] = 0.0
-                H[r, a, 2] = -w * (tb.row_factor[r, a, 3] * c[b] + tb.row_factor[r, a, 4] * s[b])
+                H[r, a, 2] = -w * (rows.factor[r, a, 3] * c[b] + rows.factor[r, a, 4] * s[b])
         else:
-            a = tb.row_body[r, 0]
-            b = tb.row_body[r, 1]
+            a = rows.body[r, 0]
+            b = rows.body[r, 1]
             wa = v[3 * a + 2]
             wb = v[3 * b + 2]
-            nx = c[a] * tb.row_slot[r, 0] - s[a] * tb.row_slot[r, 1]
-            ny = s[a] * tb.row_slot[r, 0] + c[a] * tb.row_slot[r, 1]
-            rx = c[b] * tb.row_slot[r, 2] - s[b] * tb.row_slot[r, 3]
-            ry = s[b] * tb.row_slot[r, 2] + c[b] * tb.row_slot[r, 3]
+            nx = c[a] * rows.slot[r, 0] - s[a] * rows.slot[r, 1]
+            ny = s[a] * rows.slot[r, 0] + c[a] * rows.slot[r, 1]
+            rx = c[b] * rows.slot[r, 2] - s[b] * rows.slot[r, 3]
+            ry = s[b] * rows.slot[r, 2] + c[b] * rows.slot[r, 3]
             dx = q[3 * b] + rx - q[3 * a]
             dy = q[3 * b + 1] + ry - q[3 * a + 1]
             ux = v[3 * b] - wb * ry - v[3 * a]
@@ -75,69 +88,69 @@ def gradient_rates(tb, q, v, c, s, H):
             H[r, 1, 2] = wa * (nx * rx + ny * ry) - wb * (ny * ry + nx * rx)
 
 
-def residuals(tb, q, c, s, f, g):
+def residuals(rows, q, c, s, f, g):
     """Value of every row; f holds the value of every time function."""
-    for r in range(tb.row_kind.shape[0]):
-        a = tb.row_body[r, 0]
-        b = tb.row_body[r, 1]
-        value = tb.row_constant[r]
-        if tb.row_time[r] >= 0:
-            value -= f[tb.row_time[r]]
-        if tb.row_kind[r] == 0:
+    for r in range(rows.kind.shape[0]):
+        a = rows.body[r, 0]
+        b = rows.body[r, 1]
+        value = rows.constant[r]
+        if rows.time[r] >= 0:
+            value -= f[rows.time[r]]
+        if rows.kind[r] == 0:
             for side in range(2):
-                k = tb.row_body[r, side]
-                value += tb.row_factor[r, side, 0] * q[3 * k] + tb.row_factor[r, side, 1] * q[3 * k + 1]
-                value += tb.row_factor[r, side, 2] * q[3 * k + 2]
-                value += tb.row_factor[r, side, 3] * c[k] + tb.row_factor[r, side, 4] * s[k]
+                k = rows.body[r, side]
+                value += rows.factor[r, side, 0] * q[3 * k] + rows.factor[r, side, 1] * q[3 * k + 1]
+                value += rows.factor[r, side, 2] * q[3 * k + 2]
+                value += rows.factor[r, side, 3] * c[k] + rows.factor[r, side, 4] * s[k]
         else:
-            nx = c[a] * tb.row_slot[r, 0] - s[a] * tb.row_slot[r, 1]
-            ny = s[a] * tb.row_slot[r, 0] + c[a] * tb.row_slot[r, 1]
-            dx = q[3 * b] + c[b] * tb.row_slot[r, 2] - s[b] * tb.row_slot[r, 3] - q[3 * a]
-            dy = q[3 * b + 1] + s[b] * tb.row_slot[r, 2] + c[b] * tb.row_slot[r, 3] - q[3 * a + 1]
+            nx = c[a] * rows.slot[r, 0] - s[a] * rows.slot[r, 1]
+            ny = s[a] * rows.slot[r, 0] + c[a] * rows.slot[r, 1]
+            dx = q[3 * b] + c[b] * rows.slot[r, 2] - s[b] * rows.slot[r, 3] - q[3 * a]
+            dy = q[3 * b + 1] + s[b] * rows.slot[r, 2] + c[b] * rows.slot[r, 3] - q[3 * a + 1]
             value += nx * dx + ny * dy
         g[r] = value
 
 
-def times_gradients(tb, G, u, out):
+def times_gradients(rows, G, u, out):
     """out = G u, one number per row."""
-    for r in range(tb.row_kind.shape[0]):
-        a = 3 * tb.row_body[r, 0]
-        b = 3 * tb.row_body[r, 1]
+    for r in range(rows.kind.shape[0]):
+        a = 3 * rows.body[r, 0]
+        b = 3 * rows.body[r, 1]
         out[r] = (
             G[r, 0, 0] * u[a] + G[r, 0, 1] * u[a + 1] + G[r, 0, 2] * u[a + 2]
             + G[r, 1, 0] * u[b] + G[r, 1, 1] * u[b + 1] + G[r, 1, 2] * u[b + 2]
         )  # fmt: skip
 
 
-def add_transposed(tb, G, mu, factor, out):
+def add_transposed(rows, G, mu, factor, out):
     """out += factor G^T mu."""
-    for r in range(tb.row_kind.shape[0]):
+    for r in range(rows.kind.shape[0]):
         for side in range(2):
-            b = 3 * tb.row_body[r, side]
+            b = 3 * rows.body[r, side]
             value = factor * mu[r]
             out[b] += G[r, side, 0] * value
             out[b + 1] += G[r, side, 1] * value
             out[b + 2] += G[r, side, 2] * value
 
 
-def factorise(tb, G, skip, val, diag):
+def factorise(rows, plan, mass, G, skip, val, diag):
     """L D L^T of S in val (m diagonal numbers, then the entries of L); rows with skip != 0 become unit rows.
 
     Returns the smallest pivot relative to its diagonal of S, and its row (-1 when there is none).
     """
-    m = tb.row_kind.shape[0]
-    val[:] = 0.0
-    for e in range(tb.entry.shape[0]):
-        r = tb.entry[e, 1]
-        s = tb.entry[e, 3]
+    m = rows.kind.shape[0]
+    fill(val, 0.0)
+    for e in range(plan.entry.shape[0]):
+        r = plan.entry[e, 1]
+        s = plan.entry[e, 3]
         if skip[r] == 0 and skip[s] == 0:
-            a = tb.entry[e, 2]
-            b = tb.entry[e, 4]
-            k = 3 * tb.entry[e, 5]
-            val[tb.entry[e, 0]] += (
-                G[r, a, 0] * G[s, b, 0] * tb.inverse_mass[k]
-                + G[r, a, 1] * G[s, b, 1] * tb.inverse_mass[k + 1]
-                + G[r, a, 2] * G[s, b, 2] * tb.inverse_mass[k + 2]
+            a = plan.entry[e, 2]
+            b = plan.entry[e, 4]
+            k = 3 * plan.entry[e, 5]
+            val[plan.entry[e, 0]] += (
+                G[r, a, 0] * G[s, b, 0] * mass[k]
+                + G[r, a, 1] * G[s, b, 1] * mass[k + 1]
+                + G[r, a, 2] * G[s, b, 2] * mass[k + 2]
             )
     least = 1.0
     where = -1
@@ -156,71 +169,73 @@ def factorise(tb, G, skip, val, diag):
         if ratio < 1e-30:
             val[j] = 1e-30 * diag[j]
         d = val[j]
-        for e in range(tb.ldl_start[j], tb.ldl_start[j + 1]):
+        for e in range(plan.start[j], plan.start[j + 1]):
             val[m + e] /= d
-        for u in range(tb.update_start[j], tb.update_start[j + 1]):
-            val[tb.update[u, 0]] -= val[m + tb.update[u, 1]] * val[m + tb.update[u, 2]] * d
+        for u in range(plan.update_start[j], plan.update_start[j + 1]):
+            val[plan.update[u, 0]] -= val[m + plan.update[u, 1]] * val[m + plan.update[u, 2]] * d
     return least, where
 
 
-def solve(tb, val, x):
+def solve(plan, val, x):
     """x := S^-1 x with the factor of `factorise`."""
-    m = tb.row_kind.shape[0]
+    m = x.shape[0]
     for j in range(m):
         xj = x[j]
-        for e in range(tb.ldl_start[j], tb.ldl_start[j + 1]):
-            x[tb.ldl_row[e]] -= val[m + e] * xj
+        for e in range(plan.start[j], plan.start[j + 1]):
+            x[plan.row[e]] -= val[m + e] * xj
     for j in range(m):
         x[j] /= val[j]
     for j in range(m - 1, -1, -1):
         xj = x[j]
-        for e in range(tb.ldl_start[j], tb.ldl_start[j + 1]):
-            xj -= val[m + e] * x[tb.ldl_row[e]]
+        for e in range(plan.start[j], plan.start[j + 1]):
+            xj -= val[m + e] * x[plan.row[e]]
         x[j] = xj
 
 
-def time_series(tb, t, forward, orders, out):
+def time_series(times, t, forward, orders, out):
     """Taylor coefficients of every time function at t, on the piece ahead in the direction of travel; (functions, orders)."""
-    width = tb.piece_factor.shape[1]
-    for k in range(tb.piece_first.shape[0] - 1):
-        p = tb.piece_first[k]
+    width = times.factor.shape[1]
+    for k in range(times.first.shape[0] - 1):
+        p = times.first[k]
         slack = 1e-13 * (1.0 + abs(t))
-        for i in range(tb.piece_first[k] + 1, tb.piece_first[k + 1]):
-            begin = tb.piece_start[i]
+        for i in range(times.first[k] + 1, times.first[k + 1]):
+            begin = times.start[i]
             if (forward and t >= begin - slack) or (not forward and t > begin + slack):
                 p = i
-        d = t - tb.piece_origin[p]
+        d = t - times.origin[p]
         for j in range(orders):
             out[k, j] = 0.0
         for j in range(width - 1, -1, -1):  # Horner with a growing Taylor shift
             for i in range(min(orders - 1, width), 0, -1):
                 out[k, i] = out[k, i] * d + out[k, i - 1]
-            out[k, 0] = out[k, 0] * d + tb.piece_factor[p, j]
-        for i in range(tb.sine_first[k], tb.sine_first[k + 1]):
-            scale = tb.sine[i, 0]
-            phase = tb.sine[i, 1] * t + tb.sine[i, 2]
+            out[k, 0] = out[k, 0] * d + times.factor[p, j]
+        for i in range(times.sine_first[k], times.sine_first[k + 1]):
+            scale = times.sine[i, 0]
+            phase = times.sine[i, 1] * t + times.sine[i, 2]
             for j in range(orders):
                 out[k, j] += scale * math.sin(phase + 0.5 * math.pi * j)
-                scale *= tb.sine[i, 1] / (j + 1)
+                scale *= times.sine[i, 1] / (j + 1)
 
 
-def least_norm(tb, G, val, skip, rhs, work, u):
+def least_norm(rows, plan, mass, G, val, skip, rhs, work, u):
     """u -= M^-1 G^T S^-1 rhs: the smallest change (in the mass norm) that lowers G u by rhs. Returns its largest entry."""
     for r in range(rhs.shape[0]):
         if skip[r] != 0:
             rhs[r] = 0.0
-    solve(tb, val, rhs)
-    work[:] = 0.0
-    add_transposed(tb, G, rhs, 1.0, work)
+    solve(plan, val, rhs)
+    fill(work, 0.0)
+    add_transposed(rows, G, rhs, 1.0, work)
     biggest = 0.0
     for i in range(u.shape[0]):
-        change = work[i] * tb.inverse_mass[i]
+        change = work[i] * mass[i]
         u[i] -= change
         biggest = max(biggest, abs(change))
     return biggest
 
 
 FUNCTIONS = (
+    fill,
+    copy,
     trigonometry,
     gradients,
     gradient_rates,

@@ -1,3 +1,4 @@
+# mypy: ignore-errors
 """The integration loop of the Taylor method: expand, choose the step, land, project; land on folds rather than jump them.
 
 Step length from the last two coefficients (Jorba & Zou, Exp. Math. 14 (2005) 99): |q_N| h^N <= tolerance in units of
@@ -9,7 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-DONE, TOO_SMALL, TOO_MANY, SINGULAR, NOT_FINITE = 0, 1, 2, 3, 4
+from .kernel_fold import evaluate, fold_ahead, locate_fold, project
+from .kernel_rows import copy, factorise, fill, gradients, trigonometry
+from .kernel_series import expand
+
+DONE, TOO_SMALL, FULL, SINGULAR, NOT_FINITE = 0, 1, 2, 3, 4
 #: Pivot of S relative to its diagonal below which a fold is looked for.
 NEAR = 0.3
 
@@ -34,22 +39,22 @@ def step_length(QS, order, tolerance, length):
 
 def clear_series(w, q, v, order):
     """Series that holds position and velocity only."""
-    w.QS[0, :] = q
-    w.QS[1, :] = v
+    copy(q, w.QS[0])
+    copy(v, w.QS[1])
     for j in range(2, order + 1):
-        w.QS[j, :] = 0.0
+        fill(w.QS[j], 0.0)
 
 
-def fold_behind(tb, t, sign, q, v, order, tolerance, length, base, where, ahead, w, qn, vn):
+def fold_behind(tb, t, sign, q, v, order, tolerance, length, base, where, ahead, none, w, qn, vn):
     """A start just past a fold begins on the fold: (folds, time from the start to it)."""
     forward = sign > 0.0
-    w.skip[:] = base
+    copy(base, w.skip)
     clear_series(w, q, v, order)
-    expand(tb, t, forward, order, 0, w)  # noqa: F821
+    expand(tb, t, forward, order, none, w)
     step = step_length(w.QS, order, tolerance, length)
     if abs(ahead) > step:
         return 0, 0.0
-    folds, found = locate_fold(  # noqa: F821
+    folds, found = locate_fold(
         tb, t, forward, w.QS, order, ahead, abs(ahead), base, where, length, w, qn, vn
     )
     if folds > 0 and sign * found > 0.0:
@@ -57,45 +62,46 @@ def fold_behind(tb, t, sign, q, v, order, tolerance, length, base, where, ahead,
     return folds, found
 
 
-def begin(tb, t, sign, q, v, order, tolerance, length, base, w, qn, vn):
+def begin(tb, t, sign, q, v, order, tolerance, length, base, none, w, qn, vn):
     """Consistent start: (folds, time shift, time to the fold ahead, status); the state is in q, v."""
+    rows, plan, mass = tb.rows, tb.plan, tb.mass
     forward = sign > 0.0
-    qn[:] = q
-    vn[:] = v
-    w.skip[:] = base
-    first, least, where = project(tb, t, forward, qn, vn, base, length, w)  # noqa: F821
+    copy(q, qn)
+    copy(v, vn)
+    copy(base, w.skip)
+    first, least, where = project(tb, t, forward, qn, vn, base, length, w)
     if where < 0 or (least > NEAR and np.isfinite(first)):
-        q[:] = qn
-        v[:] = vn
+        copy(qn, q)
+        copy(vn, v)
         return 0, 0.0, np.inf, DONE
-    trigonometry(q, w.c, w.s)  # noqa: F821
-    gradients(tb, q, w.c, w.s, w.G)  # noqa: F821
-    least, where = factorise(tb, w.G, base, w.val, w.diag)  # noqa: F821
-    ahead, share = fold_ahead(tb, q, v, where, w)  # noqa: F821
+    trigonometry(q, w.c, w.s)
+    gradients(rows, q, w.c, w.s, w.G)
+    least, where = factorise(rows, plan, mass, w.G, base, w.val, w.diag)
+    ahead, share = fold_ahead(tb, q, v, where, w)
     if least < 1e-10:
         speed = 1e-300
         for i in range(v.shape[0]):
             speed = max(speed, abs(v[i]) / (1.0 if i % 3 == 2 else length))
         clear_series(w, q, v, order)
-        folds, found = locate_fold(  # noqa: F821
+        folds, found = locate_fold(
             tb, t, forward, w.QS, order, 0.0, 1e-3 / speed, base, where, length, w, qn, vn
         )
         if folds == 0:
             return 0, 0.0, np.inf, SINGULAR
-        q[:] = qn
-        v[:] = vn
+        copy(qn, q)
+        copy(vn, v)
         return folds, found, np.inf, DONE
-    first, least, where = project(tb, t, forward, q, v, base, length, w)  # noqa: F821
-    ahead, share = fold_ahead(tb, q, v, where, w)  # noqa: F821
+    first, least, where = project(tb, t, forward, q, v, base, length, w)
+    ahead, share = fold_ahead(tb, q, v, where, w)
     if share < 0.5:
         ahead = np.inf
     if sign * ahead < 0.0:
-        folds, found = fold_behind(tb, t, sign, q, v, order, tolerance, length, base, where, ahead, w, qn, vn)
+        folds, found = fold_behind(tb, t, sign, q, v, order, tolerance, length, base, where, ahead, none, w, qn, vn)
         if folds > 0:
-            q[:] = qn
-            v[:] = vn
+            copy(qn, q)
+            copy(vn, v)
             return folds, found, np.inf, DONE
-        project(tb, t, forward, q, v, base, length, w)  # noqa: F821
+        project(tb, t, forward, q, v, base, length, w)
     return 0, 0.0, ahead, DONE
 
 
@@ -103,12 +109,12 @@ def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, w, qn, vn
     """End of a step of at most |h|: (step, folds there, time to the next fold, status); the state is in qn, vn."""
     forward = sign > 0.0
     for _ in range(40):
-        evaluate(w.QS, order, h, qn, vn)  # noqa: F821
-        first, least, where = project(tb, t + h, forward, qn, vn, base, length, w)  # noqa: F821
+        evaluate(w.QS, order, h, qn, vn)
+        first, least, where = project(tb, t + h, forward, qn, vn, base, length, w)
         guess = np.inf
         tau = np.inf
         if where >= 0 and least < NEAR:
-            tau, share = fold_ahead(tb, qn, vn, where, w)  # noqa: F821
+            tau, share = fold_ahead(tb, qn, vn, where, w)
             if share > 0.5:
                 guess = h + tau
             else:
@@ -118,55 +124,55 @@ def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, w, qn, vn
         lowest = 0.05 * abs(h) if folds > 0 else 0.0
         if lowest < sign * guess < 1.3 * abs(h):
             reach = 0.5 * abs(h)
-            found_folds, found = locate_fold(  # noqa: F821
+            found_folds, found = locate_fold(
                 tb, t, forward, w.QS, order, guess, reach, base, where, length, w, qn, vn
             )
             if found_folds > 0 and lowest < sign * found:
                 if sign * found <= 1.000001 * abs(h):
                     return found, found_folds, np.inf, DONE
                 h = 0.6 * found
-                evaluate(w.QS, order, h, qn, vn)  # noqa: F821
-                w.skip[:] = base
-                first, least, where = project(tb, t + h, forward, qn, vn, base, length, w)  # noqa: F821
+                evaluate(w.QS, order, h, qn, vn)
+                copy(base, w.skip)
+                first, least, where = project(tb, t + h, forward, qn, vn, base, length, w)
                 if first < 1e3 * tolerance + 1e-10:
                     return h, 0, found - h, DONE
-            evaluate(w.QS, order, h, qn, vn)  # noqa: F821
-            w.skip[:] = base
-            first, least, where = project(tb, t + h, forward, qn, vn, base, length, w)  # noqa: F821
+            evaluate(w.QS, order, h, qn, vn)
+            copy(base, w.skip)
+            first, least, where = project(tb, t + h, forward, qn, vn, base, length, w)
         if first < 1e3 * tolerance + 1e-10 and (where < 0 or least > 1e-12):
             return h, 0, tau, DONE
         h = 0.7 * h
     return h, 0, np.inf, TOO_SMALL
 
 
-def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks, longest, most):
-    """Integrate from (q, v) at t0 to t1.
+def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks, longest, state, T, C, kind):
+    """Integrate from (q, v) to t1, or until the arrays are full; call again with the same arguments to go on.
 
-    Returns status, number of steps, step ends T (steps + 1,), coefficients C (steps, order + 1, n), folds at the start of
-    every step (steps,).
+    `state` holds (time, folds, time to the fold ahead, 1 once begun); T (room + 1,) receives step ends, C
+    (room, order + 1, n) coefficients, kind (room,) the number of folds at the start of every step.
+
+    Returns status, number of steps.
     """
-    n = q.shape[0]
-    room = 64
-    T = np.empty(room + 1)
-    C = np.empty((room, order + 1, n))
-    kind = np.zeros(room, dtype=np.int64)
-    qn = np.empty(n)
-    vn = np.empty(n)
     sign = 1.0 if t1 >= t0 else -1.0
     forward = sign > 0.0
-    t = t0
+    t = state[0]
+    folds = int(state[1])
+    ahead = state[2]
+    status = DONE
     count = 0
-    folds, shift, ahead, status = begin(tb, t, sign, q, v, order, tolerance, length, base, w, qn, vn)
-    t += shift
+    if state[3] == 0.0:
+        folds, shift, ahead, status = begin(tb, t, sign, q, v, order, tolerance, length, base, folds, w, w.qn, w.vn)
+        t += shift
+        state[3] = 1.0
     T[0] = t
     edge = 0 if forward else breaks.shape[0] - 1
     while status == DONE and sign * (t1 - t) > 0.0:
-        if count >= most:
-            status = TOO_MANY
+        if count >= kind.shape[0]:
+            status = FULL
             break
-        w.QS[0, :] = q
-        w.QS[1, :] = v
-        expand(tb, t, forward, order, folds, w)  # noqa: F821
+        copy(q, w.QS[0])
+        copy(v, w.QS[1])
+        expand(tb, t, forward, order, folds, w)
         size = min(step_length(w.QS, order, tolerance, length), longest)
         if not size > 1e-14 * max(abs(t), abs(t1 - t0)):
             status = TOO_SMALL
@@ -182,41 +188,36 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
         elif size > 0.5 * remains:
             size = 0.5 * remains
         h, next_folds, next_ahead, status = land(
-            tb, t, sign, sign * size, order, tolerance, length, base, folds, ahead, w, qn, vn
+            tb, t, sign, sign * size, order, tolerance, length, base, folds, ahead, w, w.qn, w.vn
         )
         if status != DONE:
             break
-        if count == room:
-            T2 = np.empty(2 * room + 1)
-            C2 = np.empty((2 * room, order + 1, n))
-            kind2 = np.zeros(2 * room, dtype=np.int64)
-            T2[: room + 1] = T
-            C2[:room] = C
-            kind2[:room] = kind
-            T, C, kind = T2, C2, kind2
-            room *= 2
-        C[count] = w.QS[: order + 1]
+        for j in range(order + 1):
+            copy(w.QS[j], C[count, j])
         kind[count] = folds
         if next_folds == 0:
-            w.skip[:] = base
+            copy(base, w.skip)
         t = goal if h == sign * remains else t + h
         count += 1
         T[count] = t
-        q[:] = qn
-        v[:] = vn
+        copy(w.qn, q)
+        copy(w.vn, v)
         folds = next_folds
         ahead = next_ahead
-    for i in range(n):
+    for i in range(q.shape[0]):
         if not (np.isfinite(q[i]) and np.isfinite(v[i])):
             status = NOT_FINITE
-    return status, count, T[: count + 1], C[:count], kind[:count]
+    state[0] = t
+    state[1] = folds
+    state[2] = ahead
+    return status, count
 
 
 FUNCTIONS = (step_length, clear_series, fold_behind, begin, land, integrate_series)
 NAMES = {
     "DONE": DONE,
     "TOO_SMALL": TOO_SMALL,
-    "TOO_MANY": TOO_MANY,
+    "FULL": FULL,
     "SINGULAR": SINGULAR,
     "NOT_FINITE": NOT_FINITE,
     "NEAR": NEAR,

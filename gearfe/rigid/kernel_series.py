@@ -1,3 +1,4 @@
+# mypy: ignore-errors
 """Taylor series of the index-3 equations of a planar scene about one point.
 
 With q(t) = sum_j q_j (t - t0)^j and the multipliers likewise, order k of the motion and order k + 2 of the constraints read
@@ -17,305 +18,319 @@ from __future__ import annotations
 
 import numpy as np
 
+from .kernel_rows import add_transposed, fill, solve, time_series, times_gradients, trigonometry
 
-def angle_orders(w, j, known):
+
+def angle_orders(bodies, j, known):
     """Orders j of sine and cosine from the orders of theta below `known`: what theta_j itself adds comes later."""
-    n = w.CS.shape[1]
+    n = bodies.CS.shape[1]
     for b in range(n):
-        w.SN[j, b] = 0.0
-        w.CS[j, b] = 0.0
+        bodies.SN[j, b] = 0.0
+        bodies.CS[j, b] = 0.0
     for i in range(1, known):
         for b in range(n):
-            d = w.DT[i, b]
-            w.SN[j, b] += d * w.CS[j - i, b]
-            w.CS[j, b] -= d * w.SN[j - i, b]
+            d = bodies.DT[i, b]
+            bodies.SN[j, b] += d * bodies.CS[j - i, b]
+            bodies.CS[j, b] -= d * bodies.SN[j - i, b]
     for b in range(n):
-        w.SN[j, b] /= j
-        w.CS[j, b] /= j
+        bodies.SN[j, b] /= j
+        bodies.CS[j, b] /= j
 
 
-def slot_orders(tb, w, j):
+def slot_orders(rows, QS, bodies, lines, j):
     """Orders j of the normal n and the distance D of every moving line, from the orders j of q, sine and cosine."""
-    for k in range(tb.slots.shape[0]):
-        r = tb.slots[k]
-        a = tb.row_body[r, 0]
-        b = tb.row_body[r, 1]
-        w.NX[j, k] = w.CS[j, a] * tb.row_slot[r, 0] - w.SN[j, a] * tb.row_slot[r, 1]
-        w.NY[j, k] = w.SN[j, a] * tb.row_slot[r, 0] + w.CS[j, a] * tb.row_slot[r, 1]
-        rx = w.CS[j, b] * tb.row_slot[r, 2] - w.SN[j, b] * tb.row_slot[r, 3]
-        ry = w.SN[j, b] * tb.row_slot[r, 2] + w.CS[j, b] * tb.row_slot[r, 3]
-        w.DX[j, k] = w.QS[j, 3 * b] + rx - w.QS[j, 3 * a]
-        w.DY[j, k] = w.QS[j, 3 * b + 1] + ry - w.QS[j, 3 * a + 1]
+    for k in range(rows.lines.shape[0]):
+        r = rows.lines[k]
+        a = rows.body[r, 0]
+        b = rows.body[r, 1]
+        lines.NX[j, k] = bodies.CS[j, a] * rows.slot[r, 0] - bodies.SN[j, a] * rows.slot[r, 1]
+        lines.NY[j, k] = bodies.SN[j, a] * rows.slot[r, 0] + bodies.CS[j, a] * rows.slot[r, 1]
+        rx = bodies.CS[j, b] * rows.slot[r, 2] - bodies.SN[j, b] * rows.slot[r, 3]
+        ry = bodies.SN[j, b] * rows.slot[r, 2] + bodies.CS[j, b] * rows.slot[r, 3]
+        lines.DX[j, k] = QS[j, 3 * b] + rx - QS[j, 3 * a]
+        lines.DY[j, k] = QS[j, 3 * b + 1] + ry - QS[j, 3 * a + 1]
 
 
-def row_orders(tb, w, j, out):
+def row_orders(rows, TF, bodies, lines, j, out):
     """Order j >= 2 of every constraint row without the part of q_j."""
-    for r in range(tb.row_kind.shape[0]):
+    for r in range(rows.kind.shape[0]):
         value = 0.0
-        if tb.row_time[r] >= 0:
-            value = -w.TF[tb.row_time[r], j]
-        if tb.row_kind[r] == 0:
+        if rows.time[r] >= 0:
+            value = -TF[rows.time[r], j]
+        if rows.kind[r] == 0:
             for side in range(2):
-                b = tb.row_body[r, side]
-                value += tb.row_factor[r, side, 3] * w.CS[j, b] + tb.row_factor[r, side, 4] * w.SN[j, b]
+                b = rows.body[r, side]
+                value += rows.factor[r, side, 3] * bodies.CS[j, b] + rows.factor[r, side, 4] * bodies.SN[j, b]
         out[r] = value
-    for k in range(tb.slots.shape[0]):
+    for k in range(rows.lines.shape[0]):
         value = 0.0
         for i in range(j + 1):
-            value += w.NX[i, k] * w.DX[j - i, k] + w.NY[i, k] * w.DY[j - i, k]
-        out[tb.slots[k]] += value
+            value += lines.NX[i, k] * lines.DX[j - i, k] + lines.NY[i, k] * lines.DY[j - i, k]
+        out[rows.lines[k]] += value
 
 
-def spring_orders(tb, w, j):
+def spring_orders(forces, QS, bodies, spans, j):
     """Order j of the span D, length L and 1/L of every spring."""
-    for k in range(tb.spring_body.shape[0]):
-        a = tb.spring_body[k, 0]
-        b = tb.spring_body[k, 1]
-        p = tb.spring_point[k]
-        w.EX[j, k] = (
-            w.QS[j, 3 * b] - w.QS[j, 3 * a] + w.CS[j, b] * p[2] - w.SN[j, b] * p[3] - w.CS[j, a] * p[0] + w.SN[j, a] * p[1]
+    for k in range(forces.spring_body.shape[0]):
+        a = forces.spring_body[k, 0]
+        b = forces.spring_body[k, 1]
+        p = forces.spring_point[k]
+        spans.EX[j, k] = (
+            QS[j, 3 * b] - QS[j, 3 * a] + bodies.CS[j, b] * p[2] - bodies.SN[j, b] * p[3] - bodies.CS[j, a] * p[0] + bodies.SN[j, a] * p[1]
         )
-        w.EY[j, k] = (
-            w.QS[j, 3 * b + 1] - w.QS[j, 3 * a + 1] + w.SN[j, b] * p[2] + w.CS[j, b] * p[3]
-            - w.SN[j, a] * p[0] - w.CS[j, a] * p[1]
+        spans.EY[j, k] = (
+            QS[j, 3 * b + 1] - QS[j, 3 * a + 1] + bodies.SN[j, b] * p[2] + bodies.CS[j, b] * p[3]
+            - bodies.SN[j, a] * p[0] - bodies.CS[j, a] * p[1]
         )  # fmt: skip
         square = 0.0
         for i in range(j + 1):
-            square += w.EX[i, k] * w.EX[j - i, k] + w.EY[i, k] * w.EY[j - i, k]
+            square += spans.EX[i, k] * spans.EX[j - i, k] + spans.EY[i, k] * spans.EY[j - i, k]
         if j == 0:
-            w.EL[0, k] = np.sqrt(square)
-            w.EI[0, k] = 1.0 / w.EL[0, k]
+            spans.EL[0, k] = np.sqrt(square)
+            spans.EI[0, k] = 1.0 / spans.EL[0, k]
         else:
             for i in range(1, j):
-                square -= w.EL[i, k] * w.EL[j - i, k]
-            w.EL[j, k] = 0.5 * square * w.EI[0, k]
+                square -= spans.EL[i, k] * spans.EL[j - i, k]
+            spans.EL[j, k] = 0.5 * square * spans.EI[0, k]
             inverse = 0.0
             for i in range(1, j + 1):
-                inverse += w.EL[i, k] * w.EI[j - i, k]
-            w.EI[j, k] = -inverse * w.EI[0, k]
+                inverse += spans.EL[i, k] * spans.EI[j - i, k]
+            spans.EI[j, k] = -inverse * spans.EI[0, k]
 
 
-def force_orders(tb, w, k, at, F):
+def force_orders(forces, QS, TF, bodies, spans, k, at, F):
     """Order k of all applied forces: F gets what does not turn with a body, A and B (at row `at`) what does."""
-    n = w.CS.shape[1]
+    n = bodies.CS.shape[1]
     for i in range(F.shape[0]):
-        F[i] = tb.weight[i] if k == 0 else 0.0
+        F[i] = forces.weight[i] if k == 0 else 0.0
     for b in range(n):
-        w.A[at, b] = 0.0
-        w.B[at, b] = 0.0
-    for e in range(tb.spring_body.shape[0]):
-        a = tb.spring_body[e, 0]
-        b = tb.spring_body[e, 1]
-        rigid = tb.spring_factor[e, 0]
-        loss = tb.spring_factor[e, 1]
-        value = -rigid * tb.spring_factor[e, 2] * w.EI[k, e]
+        bodies.A[at, b] = 0.0
+        bodies.B[at, b] = 0.0
+    for e in range(forces.spring_body.shape[0]):
+        a = forces.spring_body[e, 0]
+        b = forces.spring_body[e, 1]
+        rigid = forces.spring_factor[e, 0]
+        loss = forces.spring_factor[e, 1]
+        value = -rigid * forces.spring_factor[e, 2] * spans.EI[k, e]
         if k == 0:
             value += rigid
         if loss != 0.0:
             for i in range(k + 1):
-                value += loss * (i + 1) * w.EL[i + 1, e] * w.EI[k - i, e]
-        w.EF[k, e] = value
+                value += loss * (i + 1) * spans.EL[i + 1, e] * spans.EI[k - i, e]
+        spans.EF[k, e] = value
         fx = 0.0
         fy = 0.0
         for i in range(k + 1):
-            fx += w.EF[i, e] * w.EX[k - i, e]
-            fy += w.EF[i, e] * w.EY[k - i, e]
-        p = tb.spring_point[e]
+            fx += spans.EF[i, e] * spans.EX[k - i, e]
+            fy += spans.EF[i, e] * spans.EY[k - i, e]
+        p = forces.spring_point[e]
         F[3 * a] += fx
         F[3 * a + 1] += fy
         F[3 * b] -= fx
         F[3 * b + 1] -= fy
-        w.A[at, a] -= p[0] * fx + p[1] * fy
-        w.B[at, a] += p[0] * fy - p[1] * fx
-        w.A[at, b] += p[2] * fx + p[3] * fy
-        w.B[at, b] -= p[2] * fy - p[3] * fx
-    for e in range(tb.linear_coordinate.shape[0]):
-        i = tb.linear_coordinate[e, 0]
-        j = tb.linear_coordinate[e, 1]
-        value = -tb.linear_factor[e, 0] * (w.QS[k, i] - w.QS[k, j])
-        value -= tb.linear_factor[e, 1] * (k + 1) * (w.QS[k + 1, i] - w.QS[k + 1, j])
+        bodies.A[at, a] -= p[0] * fx + p[1] * fy
+        bodies.B[at, a] += p[0] * fy - p[1] * fx
+        bodies.A[at, b] += p[2] * fx + p[3] * fy
+        bodies.B[at, b] -= p[2] * fy - p[3] * fx
+    for e in range(forces.linear_coordinate.shape[0]):
+        i = forces.linear_coordinate[e, 0]
+        j = forces.linear_coordinate[e, 1]
+        value = -forces.linear_factor[e, 0] * (QS[k, i] - QS[k, j])
+        value -= forces.linear_factor[e, 1] * (k + 1) * (QS[k + 1, i] - QS[k + 1, j])
         if k == 0:
-            value += tb.linear_factor[e, 0] * tb.linear_factor[e, 2]
+            value += forces.linear_factor[e, 0] * forces.linear_factor[e, 2]
         F[i] += value
         F[j] -= value
-    for e in range(tb.load_body.shape[0]):
-        b = tb.load_body[e]
-        fx = w.TF[tb.load_time[e, 0], k]
-        fy = w.TF[tb.load_time[e, 1], k]
+    for e in range(forces.load_body.shape[0]):
+        b = forces.load_body[e]
+        fx = TF[forces.load_time[e, 0], k]
+        fy = TF[forces.load_time[e, 1], k]
         F[3 * b] += fx
         F[3 * b + 1] += fy
-        w.A[at, b] -= tb.load_point[e, 0] * fx + tb.load_point[e, 1] * fy
-        w.B[at, b] += tb.load_point[e, 0] * fy - tb.load_point[e, 1] * fx
-    for e in range(tb.moment_time.shape[0]):
-        value = w.TF[tb.moment_time[e], k]
-        F[3 * tb.moment_body[e, 0] + 2] += value
-        F[3 * tb.moment_body[e, 1] + 2] -= value
+        bodies.A[at, b] -= forces.load_point[e, 0] * fx + forces.load_point[e, 1] * fy
+        bodies.B[at, b] += forces.load_point[e, 0] * fy - forces.load_point[e, 1] * fx
+    for e in range(forces.moment_time.shape[0]):
+        value = TF[forces.moment_time[e], k]
+        F[3 * forces.moment_body[e, 0] + 2] += value
+        F[3 * forces.moment_body[e, 1] + 2] -= value
 
 
-def slot_forces(tb, w, at, F):
+def slot_forces(rows, LM, bodies, lines, at, F):
     """Known part of order `at` of the forces of moving lines, from the multipliers below that order."""
-    for k in range(tb.slots.shape[0]):
-        r = tb.slots[k]
+    for k in range(rows.lines.shape[0]):
+        r = rows.lines[k]
         fx = 0.0
         fy = 0.0
         for i in range(1, at + 1):
-            fx += w.NX[i, k] * w.LM[at - i, r]
-            fy += w.NY[i, k] * w.LM[at - i, r]
-        w.FX[at, k] = fx
-        w.FY[at, k] = fy
+            fx += lines.NX[i, k] * LM[at - i, r]
+            fy += lines.NY[i, k] * LM[at - i, r]
+        lines.FX[at, k] = fx
+        lines.FY[at, k] = fy
         turn = 0.0
         for i in range(at + 1):
-            turn += w.FX[i, k] * w.DY[at - i, k] - w.FY[i, k] * w.DX[at - i, k]
-        a = tb.row_body[r, 0]
-        b = tb.row_body[r, 1]
+            turn += lines.FX[i, k] * lines.DY[at - i, k] - lines.FY[i, k] * lines.DX[at - i, k]
+        a = rows.body[r, 0]
+        b = rows.body[r, 1]
         F[3 * a] += fx
         F[3 * a + 1] += fy
         F[3 * a + 2] -= turn
         F[3 * b] -= fx
         F[3 * b + 1] -= fy
-        slot_arms(tb, w, at, r, b, fx, fy)
+        slot_arms(rows, bodies, at, r, b, fx, fy)
 
 
-def slot_arms(tb, w, at, r, b, fx, fy):
+def slot_arms(rows, bodies, at, r, b, fx, fy):
     """Reaction (fx, fy) of the moving line r on the point of body b, in the sums A and B."""
-    x = tb.row_slot[r, 2]
-    y = tb.row_slot[r, 3]
-    w.A[at, b] += x * fx + y * fy
-    w.B[at, b] -= x * fy - y * fx
+    x = rows.slot[r, 2]
+    y = rows.slot[r, 3]
+    bodies.A[at, b] += x * fx + y * fy
+    bodies.B[at, b] -= x * fy - y * fx
 
 
-def add_multiplier(tb, w, at, r, value):
-    """Multiplier `value` of row r joins order `at`: its turning part goes into A, B (and into the force of a moving line)."""
-    w.LM[at, r] += value
-    if tb.row_kind[r] == 0:
-        for side in range(2):
-            b = tb.row_body[r, side]
-            w.A[at, b] += tb.row_factor[r, side, 3] * value
-            w.B[at, b] -= tb.row_factor[r, side, 4] * value
+def add_multipliers(rows, LM, bodies, lines, at, values):
+    """Multipliers `values` (one per row) join order `at`: what turns with a body goes into A, B, and into the lines' forces."""
+    for r in range(values.shape[0]):
+        value = values[r]
+        LM[at, r] += value
+        if rows.kind[r] == 0:
+            for side in range(2):
+                b = rows.body[r, side]
+                bodies.A[at, b] += rows.factor[r, side, 3] * value
+                bodies.B[at, b] -= rows.factor[r, side, 4] * value
+    add_line_multipliers(rows, bodies, lines, at, 0, values)
 
 
-def add_slot_multipliers(tb, w, at, i, values):
-    """The same for rows of moving lines: order `at` of the force gains n_i times the multiplier."""
-    for k in range(tb.slots.shape[0]):
-        r = tb.slots[k]
-        fx = w.NX[i, k] * values[r]
-        fy = w.NY[i, k] * values[r]
-        w.FX[at, k] += fx
-        w.FY[at, k] += fy
-        slot_arms(tb, w, at, r, tb.row_body[r, 1], fx, fy)
+def add_line_multipliers(rows, bodies, lines, at, i, values):
+    """Order `at` of the force of every moving line gains n_i times its multiplier."""
+    for k in range(rows.lines.shape[0]):
+        r = rows.lines[k]
+        fx = lines.NX[i, k] * values[r]
+        fy = lines.NY[i, k] * values[r]
+        lines.FX[at, k] += fx
+        lines.FY[at, k] += fy
+        slot_arms(rows, bodies, at, r, rows.body[r, 1], fx, fy)
 
 
-def torque_orders(w, at, F):
+def torque_orders(bodies, at, F):
     """F gains order `at` of s A + c B for every body."""
-    n = w.CS.shape[1]
+    n = bodies.CS.shape[1]
     for b in range(n):
-        w.acc[b] = 0.0
+        bodies.acc[b] = 0.0
     for i in range(at + 1):
         for b in range(n):
-            w.acc[b] += w.SN[i, b] * w.A[at - i, b] + w.CS[i, b] * w.B[at - i, b]
+            bodies.acc[b] += bodies.SN[i, b] * bodies.A[at - i, b] + bodies.CS[i, b] * bodies.B[at - i, b]
     for b in range(n):
-        F[3 * b + 2] += w.acc[b]
+        F[3 * b + 2] += bodies.acc[b]
 
 
-def finish_order(tb, w, j):
+def finish_order(rows, forces, QS, bodies, lines, spans, j):
     """Everything that follows from q_j: sine, cosine, lines, springs."""
-    n = w.CS.shape[1]
+    n = bodies.CS.shape[1]
     for b in range(n):
-        theta = w.QS[j, 3 * b + 2]
-        w.DT[j, b] = j * theta
-        w.SN[j, b] += w.CS[0, b] * theta
-        w.CS[j, b] -= w.SN[0, b] * theta
-    slot_orders(tb, w, j)
-    spring_orders(tb, w, j)
+        theta = QS[j, 3 * b + 2]
+        bodies.DT[j, b] = j * theta
+        bodies.SN[j, b] += bodies.CS[0, b] * theta
+        bodies.CS[j, b] -= bodies.SN[0, b] * theta
+    slot_orders(rows, QS, bodies, lines, j)
+    spring_orders(forces, QS, bodies, spans, j)
 
 
 def expand(tb, t, forward, order, folds, w):
-    """Fill w.QS[2..order] from w.QS[0], w.QS[1]; w.G, w.val hold gradients and factor there, w.Z, w.BR the fold's rows.
+    """Fill w.QS[2..order] from w.QS[0], w.QS[1]; w.G, w.val hold gradients and factor there, w.fold the fold's rows.
 
     `folds` is the number of singular rows: 0 at a regular position.
     """
-    n = w.CS.shape[1]
-    m = tb.row_kind.shape[0]
+    rows, plan, forces, mass = tb.rows, tb.plan, tb.forces, tb.mass
+    bodies, lines, spans, fold = w.bodies, w.lines, w.spans, w.fold
+    QS, TF, LM, G, val, skip = w.QS, w.TF, w.LM, w.G, w.val, w.skip
+    mu, rhs, F, u = w.mu, w.rhs, w.F, w.u
     shift = 1 if folds > 0 else 0
-    time_series(tb, t, forward, order + 2, w.TF)  # noqa: F821
-    w.LM[: order + 2, :] = 0.0
-    w.FX[0, :] = 0.0
-    w.FY[0, :] = 0.0
-    trigonometry(w.QS[0], w.CS[0], w.SN[0])  # noqa: F821
-    for b in range(n):
-        w.DT[0, b] = 0.0
-        w.SN[1, b] = 0.0
-        w.CS[1, b] = 0.0
-        w.A[0, b] = 0.0
-        w.B[0, b] = 0.0
-    slot_orders(tb, w, 0)
-    spring_orders(tb, w, 0)
-    for j in range(2, order + 2):
-        w.QS[j, :] = 0.0
-    finish_order(tb, w, 1)
+    time_series(tb.times, t, forward, order + 2, TF)
+    start_series(rows, forces, order, QS, LM, bodies, lines, spans)
     for k in range(order - 1):
         j = k + 2
         at = k + shift
         alpha = float(j * (j - 1))
-        force_orders(tb, w, k, at, w.F)
-        slot_forces(tb, w, at, w.F)
-        torque_orders(w, at, w.F)
-        angle_orders(w, j, j)
-        slot_orders(tb, w, j)
-        row_orders(tb, w, j, w.rhs)
-        for i in range(w.F.shape[0]):
-            w.u[i] = w.F[i] * tb.inverse_mass[i] / alpha
+        force_orders(forces, QS, TF, bodies, spans, k, at, F)
+        slot_forces(rows, LM, bodies, lines, at, F)
+        torque_orders(bodies, at, F)
+        angle_orders(bodies, j, j)
+        slot_orders(rows, QS, bodies, lines, j)
+        row_orders(rows, TF, bodies, lines, j, rhs)
+        for i in range(F.shape[0]):
+            u[i] = F[i] * mass[i] / alpha
         if folds > 0:
-            fold_rows(tb, w, j, folds)
-        times_gradients(tb, w.G, w.u, w.mu)  # noqa: F821
-        for r in range(m):
-            w.mu[r] = w.mu[r] + w.rhs[r] if w.skip[r] == 0 else 0.0
+            fold_rows(rows, QS, TF, bodies, lines, fold, mu, u, j, folds)
+        times_gradients(rows, G, u, mu)
+        for r in range(mu.shape[0]):
+            mu[r] = mu[r] + rhs[r] if skip[r] == 0 else 0.0
         if folds > 0:
-            fold_solve(tb, w, folds)
+            fold_solve(plan, val, fold, mu, folds)
         else:
-            solve(tb, w.val, w.mu)  # noqa: F821
-        w.F[:] = 0.0
-        add_transposed(tb, w.G, w.mu, 1.0, w.F)  # noqa: F821
+            solve(plan, val, mu)
+        fill(F, 0.0)
+        add_transposed(rows, G, mu, 1.0, F)
         for p in range(folds):
-            for i in range(w.F.shape[0]):
-                w.F[i] += w.BR[p, i] * w.nu[p]
-        for i in range(w.F.shape[0]):
-            w.QS[j, i] = w.u[i] - w.F[i] * tb.inverse_mass[i]
-        for r in range(m):
-            w.mu[r] *= alpha
-            add_multiplier(tb, w, at, r, w.mu[r])
-        add_slot_multipliers(tb, w, at, 0, w.mu)
-        if folds > 0:
-            fold_multipliers(tb, w, at - 1, folds, alpha)
-        finish_order(tb, w, j)
+            for i in range(F.shape[0]):
+                F[i] += fold.B[p, i] * fold.nu[p]
+        for i in range(F.shape[0]):
+            QS[j, i] = u[i] - F[i] * mass[i]
+        for r in range(mu.shape[0]):
+            mu[r] *= alpha
+        add_multipliers(rows, LM, bodies, lines, at, mu)
+        if folds > 0:  # the multipliers Z nu belong one order below the regular ones
+            for r in range(mu.shape[0]):
+                mu[r] = 0.0
+                for p in range(folds):
+                    mu[r] += alpha * fold.Z[p, r] * fold.nu[p]
+            add_multipliers(rows, LM, bodies, lines, at - 1, mu)
+            add_line_multipliers(rows, bodies, lines, at, 1, mu)
+        finish_order(rows, forces, QS, bodies, lines, spans, j)
 
 
-def fold_rows(tb, w, j, folds):
-    """Order j + 1 of Z^T g with q_j and q_{j+1} left out: w.nu; the part of q_j is B q_j."""
-    m = tb.row_kind.shape[0]
-    angle_orders(w, j + 1, j)
-    slot_orders(tb, w, j + 1)
-    row_orders(tb, w, j + 1, w.mu)
+def start_series(rows, forces, order, QS, LM, bodies, lines, spans):
+    """Orders 0 and 1 from position and velocity; all others zero."""
+    for j in range(2, order + 2):
+        fill(QS[j], 0.0)
+    for j in range(order + 2):
+        fill(LM[j], 0.0)
+    fill(lines.FX[0], 0.0)
+    fill(lines.FY[0], 0.0)
+    trigonometry(QS[0], bodies.CS[0], bodies.SN[0])
+    fill(bodies.DT[0], 0.0)
+    fill(bodies.SN[1], 0.0)
+    fill(bodies.CS[1], 0.0)
+    fill(bodies.A[0], 0.0)
+    fill(bodies.B[0], 0.0)
+    slot_orders(rows, QS, bodies, lines, 0)
+    spring_orders(forces, QS, bodies, spans, 0)
+    finish_order(rows, forces, QS, bodies, lines, spans, 1)
+
+
+def fold_rows(rows, QS, TF, bodies, lines, fold, work, u, j, folds):
+    """Order j + 1 of Z^T g with q_j and q_{j+1} left out: fold.nu; the part of q_j is B q_j."""
+    angle_orders(bodies, j + 1, j)
+    slot_orders(rows, QS, bodies, lines, j + 1)
+    row_orders(rows, TF, bodies, lines, j + 1, work)
     for p in range(folds):
         value = 0.0
-        for r in range(m):
-            value += w.Z[p, r] * w.mu[r]
-        for i in range(w.u.shape[0]):
-            value += w.BR[p, i] * w.u[i]
-        w.nu[p] = value
+        for r in range(work.shape[0]):
+            value += fold.Z[p, r] * work[r]
+        for i in range(u.shape[0]):
+            value += fold.B[p, i] * u[i]
+        fold.nu[p] = value
 
 
-def fold_solve(tb, w, folds):
-    """Bordered solve: in come the regular right-hand side in w.mu and the one of the rows B in w.nu; out the multipliers."""
-    m = tb.row_kind.shape[0]
+def fold_solve(plan, val, fold, mu, folds):
+    """Bordered solve: in come the regular right-hand side in mu and the one of the rows B in nu; out the multipliers."""
     for p in range(folds):
-        for r in range(m):
-            w.nu[p] -= w.Y[p, r] * w.mu[r]
-    small_solve(w.border, folds, w.nu, w.small)
-    solve(tb, w.val, w.mu)  # noqa: F821
+        for r in range(mu.shape[0]):
+            fold.nu[p] -= fold.Y[p, r] * mu[r]
+    small_solve(fold.border, folds, fold.nu, fold.small)
+    solve(plan, val, mu)
     for p in range(folds):
-        for r in range(m):
-            w.mu[r] -= w.Y[p, r] * w.nu[p]
+        for r in range(mu.shape[0]):
+            mu[r] -= fold.Y[p, r] * fold.nu[p]
 
 
 def small_solve(matrix, size, x, work):
@@ -347,20 +362,6 @@ def small_solve(matrix, size, x, work):
         x[i] /= work[i, i]
 
 
-def fold_multipliers(tb, w, at, folds, alpha):
-    """The multipliers Z nu belong one order below the regular ones."""
-    m = tb.row_kind.shape[0]
-    for r in range(m):
-        value = 0.0
-        for p in range(folds):
-            value += w.Z[p, r] * w.nu[p]
-        w.mu[r] = alpha * value
-        if value != 0.0:
-            add_multiplier(tb, w, at, r, w.mu[r])
-    add_slot_multipliers(tb, w, at, 0, w.mu)
-    add_slot_multipliers(tb, w, at + 1, 1, w.mu)
-
-
 FUNCTIONS = (
     angle_orders,
     slot_orders,
@@ -369,13 +370,13 @@ FUNCTIONS = (
     force_orders,
     slot_forces,
     slot_arms,
-    add_multiplier,
-    add_slot_multipliers,
+    add_multipliers,
+    add_line_multipliers,
     torque_orders,
     finish_order,
     expand,
+    start_series,
     fold_rows,
     fold_solve,
     small_solve,
-    fold_multipliers,
 )

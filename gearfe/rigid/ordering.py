@@ -16,15 +16,21 @@ from numpy.typing import NDArray
 Ints = NDArray[np.int64]
 
 
+class Factor(NamedTuple):
+    """Every index that the numeric factorisation needs, for m rows."""
+
+    start: Ints  # (m + 1,) columns of the factor L
+    row: Ints  # (nnz,) row number of each entry
+    entry: Ints  # (e, 6) target, row, side, row, side, body: products that make G M^-1 G^T
+    update_start: Ints  # (m + 1,)
+    update: Ints  # (u, 3) target, entry, entry of L
+
+
 class Plan(NamedTuple):
-    """Order of the rows and every index the numeric factorisation needs (see `Tables`)."""
+    """Order in which the rows are numbered, and the symbolic factor."""
 
     order: list[int]
-    start: Ints
-    row: Ints
-    entry: Ints
-    update_start: Ints
-    update: Ints
+    factor: Factor
 
 
 def elimination_plan(rows: list[tuple[int, tuple[int, int]]], n_bodies: int) -> Plan:
@@ -67,11 +73,13 @@ def elimination_plan(rows: list[tuple[int, tuple[int, int]]], n_bodies: int) -> 
         update_start.append(len(update))
     return Plan(
         order,
-        start,
-        np.array([i for column in columns for i in column], dtype=np.int64),
-        np.array(entry, dtype=np.int64).reshape(-1, 6),
-        np.array(update_start, dtype=np.int64),
-        np.array(update, dtype=np.int64).reshape(-1, 3),
+        Factor(
+            start,
+            np.array([i for column in columns for i in column], dtype=np.int64),
+            np.array(entry, dtype=np.int64).reshape(-1, 6),
+            np.array(update_start, dtype=np.int64),
+            np.array(update, dtype=np.int64).reshape(-1, 3),
+        ),
     )
 
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .ordering import Plan, elimination_plan
+from .ordering import Factor, elimination_plan
 from .planar import GROUND, Body, CoordinateSpring, Fixed, Gravity, Hinge, Moment, PointForce, Prescribed, Scene, Slider
 from .planar import Slot, Spring
 from .timefunctions import TimeFunction, constant
@@ -29,39 +29,53 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-class Tables(NamedTuple):
-    """Everything the planar kernels need; shapes with n bodies, m rows, e entries."""
+class Rows(NamedTuple):
+    """Constraint rows."""
 
-    inverse_mass: Array  # (3 (n + 1),) 1/m, 1/m, 1/I of each body, zero for the ground
-    row_body: Ints  # (m, 2) bodies of each row
-    row_kind: Ints  # (m,)
-    row_factor: Array  # (m, 2, 5) kx, ky, kt, kc, ks
-    row_slot: Array  # (m, 4) n0x, n0y, local x, local y of the point on b
-    row_constant: Array  # (m,)
-    row_time: Ints  # (m,) time function subtracted, -1 for none
-    slots: Ints  # (number of rows of kind 1,) their row numbers
-    ldl_start: Ints  # (m + 1,) columns of the factor L
-    ldl_row: Ints  # (nnz,) row number of each entry
-    entry: Ints  # (e, 6) target, row, side, row, side, body: products that make G M^-1 G^T
-    update_start: Ints  # (m + 1,)
-    update: Ints  # (u, 3) target, entry, entry of L
+    body: Ints  # (m, 2) bodies of each row
+    kind: Ints  # (m,)
+    factor: Array  # (m, 2, 5) kx, ky, kt, kc, ks
+    slot: Array  # (m, 4) n0x, n0y, local x, local y of the point on b
+    constant: Array  # (m,)
+    time: Ints  # (m,) time function subtracted, -1 for none
+    lines: Ints  # (rows of kind 1,) their row numbers
+
+
+class Forces(NamedTuple):
+    """Applied forces."""
+
+    weight: Array  # (3 (n + 1),) constant generalised forces (gravity)
     spring_body: Ints  # (s, 2)
     spring_point: Array  # (s, 4) local points
     spring_factor: Array  # (s, 3) stiffness, damping, free length
     linear_coordinate: Ints  # (l, 2) coordinate numbers
     linear_factor: Array  # (l, 3) stiffness, damping, reference
-    weight: Array  # (3 (n + 1),) constant generalised forces (gravity)
     load_body: Ints  # (p,)
     load_point: Array  # (p, 2)
     load_time: Ints  # (p, 2) time functions of the two components
     moment_body: Ints  # (t, 2) body and the body that carries the reaction
     moment_time: Ints  # (t,)
-    piece_first: Ints  # (functions + 1,) pieces of each time function
-    piece_start: Array  # (pieces,)
-    piece_origin: Array  # (pieces,)
-    piece_factor: Array  # (pieces, width)
+
+
+class Times(NamedTuple):
+    """Time functions: polynomial pieces and sines."""
+
+    first: Ints  # (functions + 1,) pieces of each time function
+    start: Array  # (pieces,)
+    origin: Array  # (pieces,)
+    factor: Array  # (pieces, width)
     sine_first: Ints  # (functions + 1,)
     sine: Array  # (sines, 3)
+
+
+class Tables(NamedTuple):
+    """Everything the planar kernels need, for n bodies and m rows."""
+
+    mass: Array  # (3 (n + 1),) inverse: 1/m, 1/m, 1/I of each body, zero for the ground
+    rows: Rows
+    plan: Factor
+    forces: Forces
+    times: Times
 
 
 class Assembly(NamedTuple):
@@ -116,23 +130,20 @@ def assemble(scene: Scene) -> Assembly:
         inverse[3 * i : 3 * i + 3] = 1 / body.mass, 1 / body.mass, 1 / body.inertia
     load_time = [[time(f.x), time(f.y)] for f in loads]
     moment_time = [time(f.function) for f in moments]
-    tables = Tables(
-        inverse_mass=inverse,
-        **_row_arrays(rows),
-        **_plan_arrays(plan),
+    forces = Forces(
+        weight=weight,
         spring_body=_ints([[index[f.a], index[f.b]] for f in springs], 2),
         spring_point=_floats([[*local(f.a, f.point_a), *local(f.b, f.point_b)] for f in springs], 4),
         spring_factor=_floats([[f.stiffness, f.damping, f.free_length] for f in springs], 3),
         linear_coordinate=_ints([_coordinates(f, index) for f in linear], 2),
         linear_factor=_floats([[f.stiffness, f.damping, f.reference] for f in linear], 3),
-        weight=weight,
         load_body=np.array([index[f.body] for f in loads], dtype=np.int64),
         load_point=_floats([local(f.body, f.point) for f in loads], 2),
         load_time=_ints(load_time, 2),
         moment_body=_ints([[index[f.body], index[f.reaction]] for f in moments], 2),
         moment_time=np.array(moment_time, dtype=np.int64),
-        **_time_arrays(functions),
     )
+    tables = Tables(inverse, _row_arrays(rows), plan.factor, forces, _time_arrays(functions))
     breaks = np.unique([t for f in functions for t in f.breaks if math.isfinite(t)]).astype(float)
     return Assembly(
         tables, tuple(r.joint for r in rows), tuple(r.label for r in rows), q0, v0, breaks, _length(tables, q0), centre
@@ -245,47 +256,37 @@ def _coordinates(force: CoordinateSpring, index) -> tuple[int, int]:  # type: ig
     return 3 * index[force.body] + place, 3 * index[force.relative_to] + place
 
 
-def _row_arrays(rows: list[_Row]) -> dict[str, NDArray]:
+def _row_arrays(rows: list[_Row]) -> Rows:
     m = len(rows)
     kinds = np.array([r.kind for r in rows], dtype=np.int64)
-    return {
-        "row_body": _ints([r.bodies for r in rows], 2),
-        "row_kind": kinds,
-        "row_factor": np.array([r.factor for r in rows], dtype=float).reshape(m, 2, 5),
-        "row_slot": _floats([r.slot for r in rows], 4),
-        "row_constant": np.array([r.constant for r in rows], dtype=float),
-        "row_time": np.array([r.time for r in rows], dtype=np.int64),
-        "slots": np.flatnonzero(kinds == 1).astype(np.int64),
-    }
+    return Rows(
+        body=_ints([r.bodies for r in rows], 2),
+        kind=kinds,
+        factor=np.array([r.factor for r in rows], dtype=float).reshape(m, 2, 5),
+        slot=_floats([r.slot for r in rows], 4),
+        constant=np.array([r.constant for r in rows], dtype=float),
+        time=np.array([r.time for r in rows], dtype=np.int64),
+        lines=np.flatnonzero(kinds == 1).astype(np.int64),
+    )
 
 
-def _plan_arrays(plan: Plan) -> dict[str, NDArray]:
-    return {
-        "ldl_start": plan.start,
-        "ldl_row": plan.row,
-        "entry": plan.entry,
-        "update_start": plan.update_start,
-        "update": plan.update,
-    }
-
-
-def _time_arrays(functions: list[TimeFunction]) -> dict[str, NDArray]:
+def _time_arrays(functions: list[TimeFunction]) -> Times:
     used = functions or [constant(0.0)]
     width = max(len(row) for f in used for row in f.coefficients)
-    return {
-        "piece_first": np.cumsum([0, *(len(f.starts) for f in used)]).astype(np.int64),
-        "piece_start": np.array([s for f in used for s in f.starts], dtype=float),
-        "piece_origin": np.array([o for f in used for o in f.origins], dtype=float),
-        "piece_factor": np.array([[*row, *[0.0] * (width - len(row))] for f in used for row in f.coefficients]),
-        "sine_first": np.cumsum([0, *(len(f.sines) for f in used)]).astype(np.int64),
-        "sine": _floats([s for f in used for s in f.sines], 3),
-    }
+    return Times(
+        first=np.cumsum([0, *(len(f.starts) for f in used)]).astype(np.int64),
+        start=np.array([s for f in used for s in f.starts], dtype=float),
+        origin=np.array([o for f in used for o in f.origins], dtype=float),
+        factor=np.array([[*row, *[0.0] * (width - len(row))] for f in used for row in f.coefficients]),
+        sine_first=np.cumsum([0, *(len(f.sines) for f in used)]).astype(np.int64),
+        sine=_floats([s for f in used for s in f.sines], 3),
+    )
 
 
 def _length(tables: Tables, q0: Array) -> float:
-    arms = [np.abs(tables.row_factor[:, :, 3:]).max(initial=0.0), np.abs(tables.row_slot[:, 2:]).max(initial=0.0)]
-    arms.append(np.abs(tables.spring_point).max(initial=0.0))
-    arms.append(np.abs(tables.spring_factor[:, 2]).max(initial=0.0))
+    arms = [np.abs(tables.rows.factor[:, :, 3:]).max(initial=0.0), np.abs(tables.rows.slot[:, 2:]).max(initial=0.0)]
+    arms.append(np.abs(tables.forces.spring_point).max(initial=0.0))
+    arms.append(np.abs(tables.forces.spring_factor[:, 2]).max(initial=0.0))
     size = float(max(arms))
     if size == 0.0:
         size = float(np.abs(q0.reshape(-1, 3)[:, :2]).max(initial=0.0))

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from . import compiled, kernel_fold, kernel_rows, kernel_run, kernel_series
 from .tables import Array, Assembly, Ints, Tables
@@ -18,77 +17,103 @@ NAMES = {**kernel_rows.GLOBALS, **kernel_run.NAMES}
 MOST_FOLDS = 4
 
 
-class Work(NamedTuple):
-    """Scratch arrays; n bodies with the ground, m rows, s springs, l moving lines, K orders."""
+class BodySeries(NamedTuple):
+    """Series (K, n) of the angles, their sines and cosines, and the force sums A, B; `acc` (n,) adds up."""
 
-    QS: Array  # (K, 3n) series of the coordinates
-    DT: Array  # (K, n) j theta_j
-    SN: Array  # (K, n)
+    DT: Array  # j theta_j
+    SN: Array
     CS: Array
     A: Array
     B: Array
-    LM: Array  # (K, m) multipliers
-    TF: Array  # (functions, K)
-    NX: Array  # (K, l)
+    acc: Array
+
+
+class LineSeries(NamedTuple):
+    """Series (K, lines) of the moving lines: normal, distance vector, reaction."""
+
+    NX: Array
     NY: Array
     DX: Array
     DY: Array
     FX: Array
     FY: Array
-    EX: Array  # (K, s)
+
+
+class SpanSeries(NamedTuple):
+    """Series (K, springs): span, length, 1 / length, tension / length."""
+
+    EX: Array
     EY: Array
     EL: Array
     EI: Array
     EF: Array
+
+
+class FoldFrame(NamedTuple):
+    """Rows of a passing singular position; d is the most that may pass at once."""
+
+    Z: Array  # (d, m) combinations whose gradient vanishes
+    Y: Array  # (d, m) S_reg^-1 E
+    E: Array  # (d, m) G_reg M^-1 B^T
+    P: Array  # (d, 3n) G^T Z
+    B: Array  # (d, 3n) dG^T/dt Z
+    border: Array  # (d, d) Schur complement of the rows B
+    small: Array  # (d, d)
+    nu: Array  # (d,)
+    drop: Ints  # (d,) rows left out
+
+
+class Work(NamedTuple):
+    """Scratch arrays; n bodies with the ground, m rows, K orders."""
+
+    QS: Array  # (K, 3n) series of the coordinates
+    LM: Array  # (K, m) multipliers
+    TF: Array  # (functions, K)
+    bodies: BodySeries
+    lines: LineSeries
+    spans: SpanSeries
+    fold: FoldFrame
     G: Array  # (m, 2, 3)
-    H: Array
-    val: Array  # (m + nnz,)
+    H: Array  # (m, 2, 3) dG/dt
+    val: Array  # (m + nnz,) factor
     diag: Array  # (m,)
-    mu: Array
-    rhs: Array
+    mu: Array  # (m,)
+    rhs: Array  # (m,)
     F: Array  # (3n,)
     u: Array
     work: Array
     dq: Array
     dv: Array
-    acc: Array  # (n,)
-    c: Array
+    qn: Array  # (3n,) state at the end of a step
+    vn: Array
+    c: Array  # (n,)
     s: Array
     skip: Ints  # (m,)
-    drop: Ints  # (MOST_FOLDS,)
-    Z: Array  # (MOST_FOLDS, m)
-    Y: Array
-    E: Array
-    P: Array  # (MOST_FOLDS, 3n)
-    BR: Array
-    border: Array  # (MOST_FOLDS, MOST_FOLDS)
-    small: Array
-    nu: Array  # (MOST_FOLDS,)
 
 
 def work_space(tables: Tables, order: int) -> Work:
     """Scratch arrays for series up to `order`."""
-    n = tables.inverse_mass.size // 3
-    m = tables.row_kind.size
-    size = {
-        "K": order + 3,
-        "n": n,
-        "3n": 3 * n,
-        "m": m,
-        "l": tables.slots.size,
-        "s": tables.spring_body.shape[0],
-        "f": tables.piece_first.size - 1,
-        "d": MOST_FOLDS,
-    }
-    shapes = {"QS": "K 3n", "LM": "K m", "TF": "f K", "Z": "d m", "Y": "d m", "E": "d m", "P": "d 3n", "BR": "d 3n"}
-    shapes |= dict.fromkeys(("DT", "SN", "CS", "A", "B"), "K n") | dict.fromkeys(("EX", "EY", "EL", "EI", "EF"), "K s")
-    shapes |= dict.fromkeys(("NX", "NY", "DX", "DY", "FX", "FY"), "K l") | {"border": "d d", "small": "d d", "nu": "d"}
-    shapes |= dict.fromkeys(("diag", "mu", "rhs"), "m") | dict.fromkeys(("F", "u", "work", "dq", "dv"), "3n")
-    shapes |= dict.fromkeys(("acc", "c", "s"), "n")
-    arrays: dict[str, NDArray] = {k: np.zeros([size[i] for i in v.split()]) for k, v in shapes.items()}
-    arrays |= {"G": np.zeros((m, 2, 3)), "H": np.zeros((m, 2, 3)), "val": np.zeros(m + tables.ldl_row.size)}
-    arrays |= {"skip": np.zeros(m, dtype=np.int64), "drop": np.zeros(MOST_FOLDS, dtype=np.int64)}
-    return Work(**arrays)
+    K, n3, m, d = order + 3, tables.mass.size, tables.rows.kind.size, MOST_FOLDS
+    n, lines, springs = n3 // 3, tables.rows.lines.size, tables.forces.spring_body.shape[0]
+
+    def zeros(count: int, *shape: int) -> list[Array]:
+        return [np.zeros(shape) for _ in range(count)]
+
+    return Work(
+        np.zeros((K, n3)),
+        np.zeros((K, m)),
+        np.zeros((tables.times.first.size - 1, K)),
+        BodySeries(*zeros(5, K, n), np.zeros(n)),
+        LineSeries(*zeros(6, K, lines)),
+        SpanSeries(*zeros(5, K, springs)),
+        FoldFrame(*zeros(3, d, m), *zeros(2, d, n3), *zeros(2, d, d), np.zeros(d), np.zeros(d, dtype=np.int64)),
+        *zeros(2, m, 2, 3),
+        np.zeros(m + tables.plan.row.size),
+        *zeros(3, m),
+        *zeros(7, n3),
+        *zeros(2, n),
+        np.zeros(m, dtype=np.int64),
+    )
 
 
 class Pieces(NamedTuple):
@@ -135,8 +160,24 @@ def run(
     w = work or work_space(tb, order)
     q = np.concatenate([q, np.zeros(3)])
     v = np.concatenate([v, np.zeros(3)])
-    status, _, times, coefficients, folds = kernels(jit).integrate_series(
-        tb, w, float(span[0]), float(span[1]), q, v, order, float(tolerance), assembly.length, redundant,
-        assembly.breaks, float(longest), int(most),
-    )  # fmt: skip
-    return Pieces(int(status), times, coefficients, folds)
+    t0, t1 = float(span[0]), float(span[1])
+    state = np.array([t0, 0.0, math.inf, 0.0])
+    advance = kernels(jit).integrate_series
+    parts = []
+    room, done = 64, 0
+    while True:
+        times, coefficients = np.empty(room + 1), np.empty((room, order + 1, q.size))
+        folds = np.zeros(room, dtype=np.int64)
+        status, count = advance(
+            tb, w, t0, t1, q, v, order, float(tolerance), assembly.length, redundant, assembly.breaks,
+            float(longest), state, times, coefficients, folds,
+        )  # fmt: skip
+        parts.append((times[: count + 1], coefficients[:count], folds[:count]))
+        done += count
+        if status != kernel_run.FULL or done >= most:
+            break
+        room = min(2 * room, max(64, 2_000_000 // coefficients[0].size))
+    ends = np.concatenate([parts[0][0], *(p[0][1:] for p in parts[1:])])
+    if len(parts) == 1:
+        return Pieces(int(status), ends, parts[0][1], parts[0][2])
+    return Pieces(int(status), ends, np.concatenate([p[1] for p in parts]), np.concatenate([p[2] for p in parts]))
