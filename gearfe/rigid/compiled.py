@@ -54,6 +54,7 @@ def bind(
     names: Mapping[str, Any],
     *,
     compiled: bool,
+    entries: tuple[str, ...] = (),
     replace: Mapping[str, Callable[..., Any]] | None = None,
 ) -> SimpleNamespace:
     """One namespace in which the `functions` see each other.
@@ -66,6 +67,8 @@ def bind(
         Modules and constants that they use.
     compiled
         Compile with numba; otherwise plain Python.
+    entries
+        Names of the functions that are called from Python.
     replace
         Functions to use instead of those of the same name (the NumPy forms of the hot ones).
     """
@@ -75,23 +78,27 @@ def bind(
         assert isinstance(function, FunctionType)
         scope[function.__name__] = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
     if compiled:
-        _compile(functions, scope)
+        _compile(functions, scope, entries)
     else:
         scope.update(replace or {})
     return SimpleNamespace(**{f.__name__: scope[f.__name__] for f in functions})
 
 
-def _compile(functions: tuple[Callable[..., Any], ...], scope: dict[str, Any]) -> None:
+def _compile(functions: tuple[Callable[..., Any], ...], scope: dict[str, Any], entries: tuple[str, ...]) -> None:
+    """Only the entries get Python wrappers and a place in the cache: the others end up inside them."""
     import numba
-
     folder = cache_folder(functions)
     before = numba.config.CACHE_DIR
+    common = {"fastmath": {"contract"}, "error_model": "numpy"}
     try:
         numba.config.CACHE_DIR = str(folder or "")
         for function in functions:
             name = function.__name__
             made = scope[name]
             made.__module__ = function.__module__
-            scope[name] = numba.njit(made, cache=folder is not None, fastmath={"contract"}, error_model="numpy")
+            if name in entries:
+                scope[name] = numba.njit(made, cache=folder is not None, no_cfunc_wrapper=True, **common)
+            else:
+                scope[name] = numba.njit(made, no_cpython_wrapper=True, no_cfunc_wrapper=True, **common)
     finally:
         numba.config.CACHE_DIR = before

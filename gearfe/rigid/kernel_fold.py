@@ -64,8 +64,8 @@ def project(tb, t, forward, q, v, base, length, w):
     for _ in range(2):
         times_gradients(rows, w.G, v, w.mu)
         for r in range(w.mu.shape[0]):
-            if rows.time[r] >= 0:
-                w.mu[r] -= w.TF[rows.time[r], 1]
+            if rows.index[r, 3] >= 0:
+                w.mu[r] -= w.TF[rows.index[r, 3], 1]
         least_norm(rows, plan, mass, w.G, w.val, base, w.mu, w.F, v)
     if change >= 1e-9 or not np.isfinite(change):
         first = np.inf
@@ -75,7 +75,7 @@ def project(tb, t, forward, q, v, base, length, w):
 def fold_ahead(tb, q, v, where, w):
     """Time from here to the nearest fold, judged from z = S^-1 e_where: (time, share of G^T z that its passing removes)."""
     rows, plan, mass, fold = tb.rows, tb.plan, tb.mass, w.fold
-    m = rows.kind.shape[0]
+    m = rows.index.shape[0]
     fill(w.mu, 0.0)
     w.mu[where] = 1.0
     solve(plan, w.val, w.mu)
@@ -101,7 +101,7 @@ def fold_ahead(tb, q, v, where, w):
 def fold_frame(tb, q, v, folds, w):
     """At a state with the rows fold.drop[:folds] left out: Z, B, the bordered system and p = G^T Z (in fold.P)."""
     rows, plan, mass, fold = tb.rows, tb.plan, tb.mass, w.fold
-    m = rows.kind.shape[0]
+    m = rows.index.shape[0]
     trigonometry(q, w.c, w.s)
     gradients(rows, q, w.c, w.s, w.G)
     gradient_rates(rows, q, v, w.c, w.s, w.H)
@@ -184,7 +184,7 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, w,
     vanishes there too; a near miss (rod a little longer than the crank) leaves a residual and is integrated as usual.
     """
     rows, mass, fold = tb.rows, tb.mass, w.fold
-    m = rows.kind.shape[0]
+    m = rows.index.shape[0]
     n = q.shape[0]
     folds = 1
     fold.drop[0] = where
@@ -215,8 +215,8 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, w,
         # position: g_reg and z^T (G v - df/dt)
         times_gradients(rows, w.G, v, w.mu)
         for r in range(m):
-            if rows.time[r] >= 0:
-                w.mu[r] -= w.TF[rows.time[r], 1]
+            if rows.index[r, 3] >= 0:
+                w.mu[r] -= w.TF[rows.index[r, 3], 1]
         for p in range(folds):
             fold.nu[p] = fold_combination(fold, p, w.mu)
         residuals(rows, q, w.c, w.s, w.TF[:, 0], w.mu)
@@ -232,14 +232,14 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, w,
         # velocity: G_reg v - df/dt and half of z^T g'' (linear in v along B)
         times_gradients(rows, w.H, v, w.mu)
         for r in range(m):
-            if rows.time[r] >= 0:
-                w.mu[r] -= 2.0 * w.TF[rows.time[r], 2]
+            if rows.index[r, 3] >= 0:
+                w.mu[r] -= 2.0 * w.TF[rows.index[r, 3], 2]
         for p in range(folds):
             fold.nu[p] = 0.5 * fold_combination(fold, p, w.mu)
         times_gradients(rows, w.G, v, w.mu)
         for r in range(m):
-            if rows.time[r] >= 0:
-                w.mu[r] -= w.TF[rows.time[r], 1]
+            if rows.index[r, 3] >= 0:
+                w.mu[r] -= w.TF[rows.index[r, 3], 1]
         copy(v, w.work)
         fold_change(tb, folds, w, v)
         for i in range(n):

@@ -33,20 +33,20 @@ def trigonometry(q, c, s):
 
 def gradients(rows, q, c, s, G):
     """G[r, side] = gradient of row r with respect to (x, y, theta) of its body on that side; shape (m, 2, 3)."""
-    for r in range(rows.kind.shape[0]):
-        if rows.kind[r] == 0:
+    for r in range(rows.index.shape[0]):
+        if rows.index[r, 2] == 0:
             for a in range(2):
-                b = rows.body[r, a]
-                G[r, a, 0] = rows.factor[r, a, 0]
-                G[r, a, 1] = rows.factor[r, a, 1]
-                G[r, a, 2] = rows.factor[r, a, 2] - rows.factor[r, a, 3] * s[b] + rows.factor[r, a, 4] * c[b]
+                b = rows.index[r, a]
+                G[r, a, 0] = rows.value[r, 5 * a]
+                G[r, a, 1] = rows.value[r, 5 * a + 1]
+                G[r, a, 2] = rows.value[r, 5 * a + 2] - rows.value[r, 5 * a + 3] * s[b] + rows.value[r, 5 * a + 4] * c[b]
         else:
-            a = rows.body[r, 0]
-            b = rows.body[r, 1]
-            nx = c[a] * rows.slot[r, 0] - s[a] * rows.slot[r, 1]
-            ny = s[a] * rows.slot[r, 0] + c[a] * rows.slot[r, 1]
-            rx = c[b] * rows.slot[r, 2] - s[b] * rows.slot[r, 3]
-            ry = s[b] * rows.slot[r, 2] + c[b] * rows.slot[r, 3]
+            a = rows.index[r, 0]
+            b = rows.index[r, 1]
+            nx = c[a] * rows.value[r, 10] - s[a] * rows.value[r, 11]
+            ny = s[a] * rows.value[r, 10] + c[a] * rows.value[r, 11]
+            rx = c[b] * rows.value[r, 12] - s[b] * rows.value[r, 13]
+            ry = s[b] * rows.value[r, 12] + c[b] * rows.value[r, 13]
             dx = q[3 * b] + rx - q[3 * a]
             dy = q[3 * b + 1] + ry - q[3 * a + 1]
             G[r, 0, 0] = -nx
@@ -59,23 +59,23 @@ def gradients(rows, q, c, s, G):
 
 def gradient_rates(rows, q, v, c, s, H):
     """H = dG/dt along the velocity v, same layout as G."""
-    for r in range(rows.kind.shape[0]):
-        if rows.kind[r] == 0:
+    for r in range(rows.index.shape[0]):
+        if rows.index[r, 2] == 0:
             for a in range(2):
-                b = rows.body[r, a]
+                b = rows.index[r, a]
                 w = v[3 * b + 2]
                 H[r, a, 0] = 0.0
                 H[r, a, 1] = 0.0
-                H[r, a, 2] = -w * (rows.factor[r, a, 3] * c[b] + rows.factor[r, a, 4] * s[b])
+                H[r, a, 2] = -w * (rows.value[r, 5 * a + 3] * c[b] + rows.value[r, 5 * a + 4] * s[b])
         else:
-            a = rows.body[r, 0]
-            b = rows.body[r, 1]
+            a = rows.index[r, 0]
+            b = rows.index[r, 1]
             wa = v[3 * a + 2]
             wb = v[3 * b + 2]
-            nx = c[a] * rows.slot[r, 0] - s[a] * rows.slot[r, 1]
-            ny = s[a] * rows.slot[r, 0] + c[a] * rows.slot[r, 1]
-            rx = c[b] * rows.slot[r, 2] - s[b] * rows.slot[r, 3]
-            ry = s[b] * rows.slot[r, 2] + c[b] * rows.slot[r, 3]
+            nx = c[a] * rows.value[r, 10] - s[a] * rows.value[r, 11]
+            ny = s[a] * rows.value[r, 10] + c[a] * rows.value[r, 11]
+            rx = c[b] * rows.value[r, 12] - s[b] * rows.value[r, 13]
+            ry = s[b] * rows.value[r, 12] + c[b] * rows.value[r, 13]
             dx = q[3 * b] + rx - q[3 * a]
             dy = q[3 * b + 1] + ry - q[3 * a + 1]
             ux = v[3 * b] - wb * ry - v[3 * a]
@@ -90,32 +90,32 @@ def gradient_rates(rows, q, v, c, s, H):
 
 def residuals(rows, q, c, s, f, g):
     """Value of every row; f holds the value of every time function."""
-    for r in range(rows.kind.shape[0]):
-        a = rows.body[r, 0]
-        b = rows.body[r, 1]
-        value = rows.constant[r]
-        if rows.time[r] >= 0:
-            value -= f[rows.time[r]]
-        if rows.kind[r] == 0:
+    for r in range(rows.index.shape[0]):
+        a = rows.index[r, 0]
+        b = rows.index[r, 1]
+        value = rows.value[r, 14]
+        if rows.index[r, 3] >= 0:
+            value -= f[rows.index[r, 3]]
+        if rows.index[r, 2] == 0:
             for side in range(2):
-                k = rows.body[r, side]
-                value += rows.factor[r, side, 0] * q[3 * k] + rows.factor[r, side, 1] * q[3 * k + 1]
-                value += rows.factor[r, side, 2] * q[3 * k + 2]
-                value += rows.factor[r, side, 3] * c[k] + rows.factor[r, side, 4] * s[k]
+                k = rows.index[r, side]
+                value += rows.value[r, 5 * side] * q[3 * k] + rows.value[r, 5 * side + 1] * q[3 * k + 1]
+                value += rows.value[r, 5 * side + 2] * q[3 * k + 2]
+                value += rows.value[r, 5 * side + 3] * c[k] + rows.value[r, 5 * side + 4] * s[k]
         else:
-            nx = c[a] * rows.slot[r, 0] - s[a] * rows.slot[r, 1]
-            ny = s[a] * rows.slot[r, 0] + c[a] * rows.slot[r, 1]
-            dx = q[3 * b] + c[b] * rows.slot[r, 2] - s[b] * rows.slot[r, 3] - q[3 * a]
-            dy = q[3 * b + 1] + s[b] * rows.slot[r, 2] + c[b] * rows.slot[r, 3] - q[3 * a + 1]
+            nx = c[a] * rows.value[r, 10] - s[a] * rows.value[r, 11]
+            ny = s[a] * rows.value[r, 10] + c[a] * rows.value[r, 11]
+            dx = q[3 * b] + c[b] * rows.value[r, 12] - s[b] * rows.value[r, 13] - q[3 * a]
+            dy = q[3 * b + 1] + s[b] * rows.value[r, 12] + c[b] * rows.value[r, 13] - q[3 * a + 1]
             value += nx * dx + ny * dy
         g[r] = value
 
 
 def times_gradients(rows, G, u, out):
     """out = G u, one number per row."""
-    for r in range(rows.kind.shape[0]):
-        a = 3 * rows.body[r, 0]
-        b = 3 * rows.body[r, 1]
+    for r in range(rows.index.shape[0]):
+        a = 3 * rows.index[r, 0]
+        b = 3 * rows.index[r, 1]
         out[r] = (
             G[r, 0, 0] * u[a] + G[r, 0, 1] * u[a + 1] + G[r, 0, 2] * u[a + 2]
             + G[r, 1, 0] * u[b] + G[r, 1, 1] * u[b + 1] + G[r, 1, 2] * u[b + 2]
@@ -124,9 +124,9 @@ def times_gradients(rows, G, u, out):
 
 def add_transposed(rows, G, mu, factor, out):
     """out += factor G^T mu."""
-    for r in range(rows.kind.shape[0]):
+    for r in range(rows.index.shape[0]):
         for side in range(2):
-            b = 3 * rows.body[r, side]
+            b = 3 * rows.index[r, side]
             value = factor * mu[r]
             out[b] += G[r, side, 0] * value
             out[b + 1] += G[r, side, 1] * value
@@ -134,11 +134,11 @@ def add_transposed(rows, G, mu, factor, out):
 
 
 def factorise(rows, plan, mass, G, skip, val, diag):
-    """L D L^T of S in val (m diagonal numbers, then the entries of L); rows with skip != 0 become unit rows.
+    """L D L^T of S in val (m reciprocals of D, then the entries of L); rows with skip != 0 become unit rows.
 
     Returns the smallest pivot relative to its diagonal of S, and its row (-1 when there is none).
     """
-    m = rows.kind.shape[0]
+    m = rows.index.shape[0]
     fill(val, 0.0)
     for e in range(plan.entry.shape[0]):
         r = plan.entry[e, 1]
@@ -173,6 +173,8 @@ def factorise(rows, plan, mass, G, skip, val, diag):
             val[m + e] /= d
         for u in range(plan.update_start[j], plan.update_start[j + 1]):
             val[plan.update[u, 0]] -= val[m + plan.update[u, 1]] * val[m + plan.update[u, 2]] * d
+    for j in range(m):
+        val[j] = 1.0 / val[j]
     return least, where
 
 
@@ -184,7 +186,7 @@ def solve(plan, val, x):
         for e in range(plan.start[j], plan.start[j + 1]):
             x[plan.row[e]] -= val[m + e] * xj
     for j in range(m):
-        x[j] /= val[j]
+        x[j] *= val[j]
     for j in range(m - 1, -1, -1):
         xj = x[j]
         for e in range(plan.start[j], plan.start[j + 1]):

@@ -20,219 +20,232 @@ import numpy as np
 
 from .kernel_rows import add_transposed, fill, solve, time_series, times_gradients, trigonometry
 
+#: Planes of the body series: j theta_j, sine, cosine, the sums A and B, an accumulator.
+DT, SN, CS, AS, BS, ACC = 0, 1, 2, 3, 4, 5
+#: Planes of the series of moving lines: normal, distance vector, reaction.
+NX, NY, DX, DY, FX, FY = 0, 1, 2, 3, 4, 5
+#: Planes of the series of springs: span, length, 1 / length, tension / length.
+EX, EY, EL, EI, EF = 0, 1, 2, 3, 4
+#: Kinds of force (the fourth is a moment).
+SPRING, LINEAR, LOAD = 0, 1, 2
 
-def angle_orders(bodies, j, known):
+
+def angle_orders(bs, j, known):
     """Orders j of sine and cosine from the orders of theta below `known`: what theta_j itself adds comes later."""
-    n = bodies.CS.shape[1]
+    n = bs.shape[2]
     for b in range(n):
-        bodies.SN[j, b] = 0.0
-        bodies.CS[j, b] = 0.0
+        bs[SN, j, b] = 0.0
+        bs[CS, j, b] = 0.0
     for i in range(1, known):
         for b in range(n):
-            d = bodies.DT[i, b]
-            bodies.SN[j, b] += d * bodies.CS[j - i, b]
-            bodies.CS[j, b] -= d * bodies.SN[j - i, b]
+            d = bs[DT, i, b]
+            bs[SN, j, b] += d * bs[CS, j - i, b]
+            bs[CS, j, b] -= d * bs[SN, j - i, b]
     for b in range(n):
-        bodies.SN[j, b] /= j
-        bodies.CS[j, b] /= j
+        bs[SN, j, b] /= j
+        bs[CS, j, b] /= j
 
 
-def slot_orders(rows, QS, bodies, lines, j):
+def slot_orders(rows, QS, bs, ls, j):
     """Orders j of the normal n and the distance D of every moving line, from the orders j of q, sine and cosine."""
     for k in range(rows.lines.shape[0]):
         r = rows.lines[k]
-        a = rows.body[r, 0]
-        b = rows.body[r, 1]
-        lines.NX[j, k] = bodies.CS[j, a] * rows.slot[r, 0] - bodies.SN[j, a] * rows.slot[r, 1]
-        lines.NY[j, k] = bodies.SN[j, a] * rows.slot[r, 0] + bodies.CS[j, a] * rows.slot[r, 1]
-        rx = bodies.CS[j, b] * rows.slot[r, 2] - bodies.SN[j, b] * rows.slot[r, 3]
-        ry = bodies.SN[j, b] * rows.slot[r, 2] + bodies.CS[j, b] * rows.slot[r, 3]
-        lines.DX[j, k] = QS[j, 3 * b] + rx - QS[j, 3 * a]
-        lines.DY[j, k] = QS[j, 3 * b + 1] + ry - QS[j, 3 * a + 1]
+        a = rows.index[r, 0]
+        b = rows.index[r, 1]
+        ls[NX, j, k] = bs[CS, j, a] * rows.value[r, 10] - bs[SN, j, a] * rows.value[r, 11]
+        ls[NY, j, k] = bs[SN, j, a] * rows.value[r, 10] + bs[CS, j, a] * rows.value[r, 11]
+        rx = bs[CS, j, b] * rows.value[r, 12] - bs[SN, j, b] * rows.value[r, 13]
+        ry = bs[SN, j, b] * rows.value[r, 12] + bs[CS, j, b] * rows.value[r, 13]
+        ls[DX, j, k] = QS[j, 3 * b] + rx - QS[j, 3 * a]
+        ls[DY, j, k] = QS[j, 3 * b + 1] + ry - QS[j, 3 * a + 1]
 
 
-def row_orders(rows, TF, bodies, lines, j, out):
+def row_orders(rows, TF, bs, ls, j, out):
     """Order j >= 2 of every constraint row without the part of q_j."""
-    for r in range(rows.kind.shape[0]):
+    for r in range(rows.index.shape[0]):
         value = 0.0
-        if rows.time[r] >= 0:
-            value = -TF[rows.time[r], j]
-        if rows.kind[r] == 0:
+        if rows.index[r, 3] >= 0:
+            value = -TF[rows.index[r, 3], j]
+        if rows.index[r, 2] == 0:
             for side in range(2):
-                b = rows.body[r, side]
-                value += rows.factor[r, side, 3] * bodies.CS[j, b] + rows.factor[r, side, 4] * bodies.SN[j, b]
+                b = rows.index[r, side]
+                value += rows.value[r, 5 * side + 3] * bs[CS, j, b] + rows.value[r, 5 * side + 4] * bs[SN, j, b]
         out[r] = value
     for k in range(rows.lines.shape[0]):
         value = 0.0
         for i in range(j + 1):
-            value += lines.NX[i, k] * lines.DX[j - i, k] + lines.NY[i, k] * lines.DY[j - i, k]
+            value += ls[NX, i, k] * ls[DX, j - i, k] + ls[NY, i, k] * ls[DY, j - i, k]
         out[rows.lines[k]] += value
 
 
-def spring_orders(forces, QS, bodies, spans, j):
+def spring_orders(forces, QS, bs, es, j):
     """Order j of the span D, length L and 1/L of every spring."""
-    for k in range(forces.spring_body.shape[0]):
-        a = forces.spring_body[k, 0]
-        b = forces.spring_body[k, 1]
-        p = forces.spring_point[k]
-        spans.EX[j, k] = (
-            QS[j, 3 * b] - QS[j, 3 * a] + bodies.CS[j, b] * p[2] - bodies.SN[j, b] * p[3] - bodies.CS[j, a] * p[0] + bodies.SN[j, a] * p[1]
+    for k in range(es.shape[2]):
+        a = forces.index[k, 1]
+        b = forces.index[k, 2]
+        p = forces.value[k]
+        es[EX, j, k] = (
+            QS[j, 3 * b] - QS[j, 3 * a] + bs[CS, j, b] * p[2] - bs[SN, j, b] * p[3] - bs[CS, j, a] * p[0] + bs[SN, j, a] * p[1]
         )
-        spans.EY[j, k] = (
-            QS[j, 3 * b + 1] - QS[j, 3 * a + 1] + bodies.SN[j, b] * p[2] + bodies.CS[j, b] * p[3]
-            - bodies.SN[j, a] * p[0] - bodies.CS[j, a] * p[1]
+        es[EY, j, k] = (
+            QS[j, 3 * b + 1] - QS[j, 3 * a + 1] + bs[SN, j, b] * p[2] + bs[CS, j, b] * p[3]
+            - bs[SN, j, a] * p[0] - bs[CS, j, a] * p[1]
         )  # fmt: skip
         square = 0.0
         for i in range(j + 1):
-            square += spans.EX[i, k] * spans.EX[j - i, k] + spans.EY[i, k] * spans.EY[j - i, k]
+            square += es[EX, i, k] * es[EX, j - i, k] + es[EY, i, k] * es[EY, j - i, k]
         if j == 0:
-            spans.EL[0, k] = np.sqrt(square)
-            spans.EI[0, k] = 1.0 / spans.EL[0, k]
+            es[EL, 0, k] = np.sqrt(square)
+            es[EI, 0, k] = 1.0 / es[EL, 0, k]
         else:
             for i in range(1, j):
-                square -= spans.EL[i, k] * spans.EL[j - i, k]
-            spans.EL[j, k] = 0.5 * square * spans.EI[0, k]
+                square -= es[EL, i, k] * es[EL, j - i, k]
+            es[EL, j, k] = 0.5 * square * es[EI, 0, k]
             inverse = 0.0
             for i in range(1, j + 1):
-                inverse += spans.EL[i, k] * spans.EI[j - i, k]
-            spans.EI[j, k] = -inverse * spans.EI[0, k]
+                inverse += es[EL, i, k] * es[EI, j - i, k]
+            es[EI, j, k] = -inverse * es[EI, 0, k]
 
 
-def force_orders(forces, QS, TF, bodies, spans, k, at, F):
+def force_orders(forces, QS, TF, bs, es, k, at, F):
     """Order k of all applied forces: F gets what does not turn with a body, A and B (at row `at`) what does."""
-    n = bodies.CS.shape[1]
     for i in range(F.shape[0]):
         F[i] = forces.weight[i] if k == 0 else 0.0
-    for b in range(n):
-        bodies.A[at, b] = 0.0
-        bodies.B[at, b] = 0.0
-    for e in range(forces.spring_body.shape[0]):
-        a = forces.spring_body[e, 0]
-        b = forces.spring_body[e, 1]
-        rigid = forces.spring_factor[e, 0]
-        loss = forces.spring_factor[e, 1]
-        value = -rigid * forces.spring_factor[e, 2] * spans.EI[k, e]
-        if k == 0:
-            value += rigid
-        if loss != 0.0:
-            for i in range(k + 1):
-                value += loss * (i + 1) * spans.EL[i + 1, e] * spans.EI[k - i, e]
-        spans.EF[k, e] = value
-        fx = 0.0
-        fy = 0.0
+    for b in range(bs.shape[2]):
+        bs[AS, at, b] = 0.0
+        bs[BS, at, b] = 0.0
+    for e in range(forces.index.shape[0]):
+        kind = forces.index[e, 0]
+        a = forces.index[e, 1]
+        b = forces.index[e, 2]
+        first = forces.value[e, 0]
+        second = forces.value[e, 1]
+        if kind == SPRING:
+            fx, fy = spring_force(forces, es, k, e)
+            F[3 * a] += fx
+            F[3 * a + 1] += fy
+            F[3 * b] -= fx
+            F[3 * b + 1] -= fy
+            bs[AS, at, a] -= first * fx + second * fy
+            bs[BS, at, a] += first * fy - second * fx
+            bs[AS, at, b] += forces.value[e, 2] * fx + forces.value[e, 3] * fy
+            bs[BS, at, b] -= forces.value[e, 2] * fy - forces.value[e, 3] * fx
+        elif kind == LINEAR:
+            value = -first * (QS[k, a] - QS[k, b]) - second * (k + 1) * (QS[k + 1, a] - QS[k + 1, b])
+            if k == 0:
+                value += first * forces.value[e, 2]
+            F[a] += value
+            F[b] -= value
+        elif kind == LOAD:
+            fx = TF[forces.index[e, 3], k]
+            fy = TF[forces.index[e, 4], k]
+            F[3 * a] += fx
+            F[3 * a + 1] += fy
+            bs[AS, at, a] -= first * fx + second * fy
+            bs[BS, at, a] += first * fy - second * fx
+        else:
+            value = TF[forces.index[e, 3], k]
+            F[3 * a + 2] += value
+            F[3 * b + 2] -= value
+
+
+def spring_force(forces, es, k, e):
+    """Order k of the force of spring e on its first point: (k_s (L - L0) + c L') / L times the span."""
+    stiffness = forces.value[e, 4]
+    damping = forces.value[e, 5]
+    value = -stiffness * forces.value[e, 6] * es[EI, k, e]
+    if k == 0:
+        value += stiffness
+    if damping != 0.0:
         for i in range(k + 1):
-            fx += spans.EF[i, e] * spans.EX[k - i, e]
-            fy += spans.EF[i, e] * spans.EY[k - i, e]
-        p = forces.spring_point[e]
-        F[3 * a] += fx
-        F[3 * a + 1] += fy
-        F[3 * b] -= fx
-        F[3 * b + 1] -= fy
-        bodies.A[at, a] -= p[0] * fx + p[1] * fy
-        bodies.B[at, a] += p[0] * fy - p[1] * fx
-        bodies.A[at, b] += p[2] * fx + p[3] * fy
-        bodies.B[at, b] -= p[2] * fy - p[3] * fx
-    for e in range(forces.linear_coordinate.shape[0]):
-        i = forces.linear_coordinate[e, 0]
-        j = forces.linear_coordinate[e, 1]
-        value = -forces.linear_factor[e, 0] * (QS[k, i] - QS[k, j])
-        value -= forces.linear_factor[e, 1] * (k + 1) * (QS[k + 1, i] - QS[k + 1, j])
-        if k == 0:
-            value += forces.linear_factor[e, 0] * forces.linear_factor[e, 2]
-        F[i] += value
-        F[j] -= value
-    for e in range(forces.load_body.shape[0]):
-        b = forces.load_body[e]
-        fx = TF[forces.load_time[e, 0], k]
-        fy = TF[forces.load_time[e, 1], k]
-        F[3 * b] += fx
-        F[3 * b + 1] += fy
-        bodies.A[at, b] -= forces.load_point[e, 0] * fx + forces.load_point[e, 1] * fy
-        bodies.B[at, b] += forces.load_point[e, 0] * fy - forces.load_point[e, 1] * fx
-    for e in range(forces.moment_time.shape[0]):
-        value = TF[forces.moment_time[e], k]
-        F[3 * forces.moment_body[e, 0] + 2] += value
-        F[3 * forces.moment_body[e, 1] + 2] -= value
+            value += damping * (i + 1) * es[EL, i + 1, e] * es[EI, k - i, e]
+    es[EF, k, e] = value
+    fx = 0.0
+    fy = 0.0
+    for i in range(k + 1):
+        fx += es[EF, i, e] * es[EX, k - i, e]
+        fy += es[EF, i, e] * es[EY, k - i, e]
+    return fx, fy
 
 
-def slot_forces(rows, LM, bodies, lines, at, F):
-    """Known part of order `at` of the forces of moving lines, from the multipliers below that order."""
+def slot_forces(rows, LM, bs, ls, at, F):
+    """Known part of order `at` of the forces of moving ls, from the multipliers below that order."""
     for k in range(rows.lines.shape[0]):
         r = rows.lines[k]
         fx = 0.0
         fy = 0.0
         for i in range(1, at + 1):
-            fx += lines.NX[i, k] * LM[at - i, r]
-            fy += lines.NY[i, k] * LM[at - i, r]
-        lines.FX[at, k] = fx
-        lines.FY[at, k] = fy
+            fx += ls[NX, i, k] * LM[at - i, r]
+            fy += ls[NY, i, k] * LM[at - i, r]
+        ls[FX, at, k] = fx
+        ls[FY, at, k] = fy
         turn = 0.0
         for i in range(at + 1):
-            turn += lines.FX[i, k] * lines.DY[at - i, k] - lines.FY[i, k] * lines.DX[at - i, k]
-        a = rows.body[r, 0]
-        b = rows.body[r, 1]
+            turn += ls[FX, i, k] * ls[DY, at - i, k] - ls[FY, i, k] * ls[DX, at - i, k]
+        a = rows.index[r, 0]
+        b = rows.index[r, 1]
         F[3 * a] += fx
         F[3 * a + 1] += fy
         F[3 * a + 2] -= turn
         F[3 * b] -= fx
         F[3 * b + 1] -= fy
-        slot_arms(rows, bodies, at, r, b, fx, fy)
+        slot_arms(rows, bs, at, r, b, fx, fy)
 
 
-def slot_arms(rows, bodies, at, r, b, fx, fy):
+def slot_arms(rows, bs, at, r, b, fx, fy):
     """Reaction (fx, fy) of the moving line r on the point of body b, in the sums A and B."""
-    x = rows.slot[r, 2]
-    y = rows.slot[r, 3]
-    bodies.A[at, b] += x * fx + y * fy
-    bodies.B[at, b] -= x * fy - y * fx
+    x = rows.value[r, 12]
+    y = rows.value[r, 13]
+    bs[AS, at, b] += x * fx + y * fy
+    bs[BS, at, b] -= x * fy - y * fx
 
 
-def add_multipliers(rows, LM, bodies, lines, at, values):
+def add_multipliers(rows, LM, bs, ls, at, values):
     """Multipliers `values` (one per row) join order `at`: what turns with a body goes into A, B, and into the lines' forces."""
     for r in range(values.shape[0]):
         value = values[r]
         LM[at, r] += value
-        if rows.kind[r] == 0:
+        if rows.index[r, 2] == 0:
             for side in range(2):
-                b = rows.body[r, side]
-                bodies.A[at, b] += rows.factor[r, side, 3] * value
-                bodies.B[at, b] -= rows.factor[r, side, 4] * value
-    add_line_multipliers(rows, bodies, lines, at, 0, values)
+                b = rows.index[r, side]
+                bs[AS, at, b] += rows.value[r, 5 * side + 3] * value
+                bs[BS, at, b] -= rows.value[r, 5 * side + 4] * value
+    add_line_multipliers(rows, bs, ls, at, 0, values)
 
 
-def add_line_multipliers(rows, bodies, lines, at, i, values):
+def add_line_multipliers(rows, bs, ls, at, i, values):
     """Order `at` of the force of every moving line gains n_i times its multiplier."""
     for k in range(rows.lines.shape[0]):
         r = rows.lines[k]
-        fx = lines.NX[i, k] * values[r]
-        fy = lines.NY[i, k] * values[r]
-        lines.FX[at, k] += fx
-        lines.FY[at, k] += fy
-        slot_arms(rows, bodies, at, r, rows.body[r, 1], fx, fy)
+        fx = ls[NX, i, k] * values[r]
+        fy = ls[NY, i, k] * values[r]
+        ls[FX, at, k] += fx
+        ls[FY, at, k] += fy
+        slot_arms(rows, bs, at, r, rows.index[r, 1], fx, fy)
 
 
-def torque_orders(bodies, at, F):
+def torque_orders(bs, at, F):
     """F gains order `at` of s A + c B for every body."""
-    n = bodies.CS.shape[1]
+    n = bs.shape[2]
     for b in range(n):
-        bodies.acc[b] = 0.0
+        bs[ACC, 0, b] = 0.0
     for i in range(at + 1):
         for b in range(n):
-            bodies.acc[b] += bodies.SN[i, b] * bodies.A[at - i, b] + bodies.CS[i, b] * bodies.B[at - i, b]
+            bs[ACC, 0, b] += bs[SN, i, b] * bs[AS, at - i, b] + bs[CS, i, b] * bs[BS, at - i, b]
     for b in range(n):
-        F[3 * b + 2] += bodies.acc[b]
+        F[3 * b + 2] += bs[ACC, 0, b]
 
 
-def finish_order(rows, forces, QS, bodies, lines, spans, j):
-    """Everything that follows from q_j: sine, cosine, lines, springs."""
-    n = bodies.CS.shape[1]
+def finish_order(rows, forces, QS, bs, ls, es, j):
+    """Everything that follows from q_j: sine, cosine, ls, springs."""
+    n = bs.shape[2]
     for b in range(n):
         theta = QS[j, 3 * b + 2]
-        bodies.DT[j, b] = j * theta
-        bodies.SN[j, b] += bodies.CS[0, b] * theta
-        bodies.CS[j, b] -= bodies.SN[0, b] * theta
-    slot_orders(rows, QS, bodies, lines, j)
-    spring_orders(forces, QS, bodies, spans, j)
+        bs[DT, j, b] = j * theta
+        bs[SN, j, b] += bs[CS, 0, b] * theta
+        bs[CS, j, b] -= bs[SN, 0, b] * theta
+    slot_orders(rows, QS, bs, ls, j)
+    spring_orders(forces, QS, bs, es, j)
 
 
 def expand(tb, t, forward, order, folds, w):
@@ -241,26 +254,26 @@ def expand(tb, t, forward, order, folds, w):
     `folds` is the number of singular rows: 0 at a regular position.
     """
     rows, plan, forces, mass = tb.rows, tb.plan, tb.forces, tb.mass
-    bodies, lines, spans, fold = w.bodies, w.lines, w.spans, w.fold
+    bs, ls, es, fold = w.bs, w.ls, w.es, w.fold
     QS, TF, LM, G, val, skip = w.QS, w.TF, w.LM, w.G, w.val, w.skip
     mu, rhs, F, u = w.mu, w.rhs, w.F, w.u
     shift = 1 if folds > 0 else 0
     time_series(tb.times, t, forward, order + 2, TF)
-    start_series(rows, forces, order, QS, LM, bodies, lines, spans)
+    start_series(rows, forces, order, QS, LM, bs, ls, es)
     for k in range(order - 1):
         j = k + 2
         at = k + shift
         alpha = float(j * (j - 1))
-        force_orders(forces, QS, TF, bodies, spans, k, at, F)
-        slot_forces(rows, LM, bodies, lines, at, F)
-        torque_orders(bodies, at, F)
-        angle_orders(bodies, j, j)
-        slot_orders(rows, QS, bodies, lines, j)
-        row_orders(rows, TF, bodies, lines, j, rhs)
+        force_orders(forces, QS, TF, bs, es, k, at, F)
+        slot_forces(rows, LM, bs, ls, at, F)
+        torque_orders(bs, at, F)
+        angle_orders(bs, j, j)
+        slot_orders(rows, QS, bs, ls, j)
+        row_orders(rows, TF, bs, ls, j, rhs)
         for i in range(F.shape[0]):
             u[i] = F[i] * mass[i] / alpha
         if folds > 0:
-            fold_rows(rows, QS, TF, bodies, lines, fold, mu, u, j, folds)
+            fold_rows(rows, QS, TF, bs, ls, fold, mu, u, j, folds)
         times_gradients(rows, G, u, mu)
         for r in range(mu.shape[0]):
             mu[r] = mu[r] + rhs[r] if skip[r] == 0 else 0.0
@@ -277,41 +290,41 @@ def expand(tb, t, forward, order, folds, w):
             QS[j, i] = u[i] - F[i] * mass[i]
         for r in range(mu.shape[0]):
             mu[r] *= alpha
-        add_multipliers(rows, LM, bodies, lines, at, mu)
+        add_multipliers(rows, LM, bs, ls, at, mu)
         if folds > 0:  # the multipliers Z nu belong one order below the regular ones
             for r in range(mu.shape[0]):
                 mu[r] = 0.0
                 for p in range(folds):
                     mu[r] += alpha * fold.Z[p, r] * fold.nu[p]
-            add_multipliers(rows, LM, bodies, lines, at - 1, mu)
-            add_line_multipliers(rows, bodies, lines, at, 1, mu)
-        finish_order(rows, forces, QS, bodies, lines, spans, j)
+            add_multipliers(rows, LM, bs, ls, at - 1, mu)
+            add_line_multipliers(rows, bs, ls, at, 1, mu)
+        finish_order(rows, forces, QS, bs, ls, es, j)
 
 
-def start_series(rows, forces, order, QS, LM, bodies, lines, spans):
+def start_series(rows, forces, order, QS, LM, bs, ls, es):
     """Orders 0 and 1 from position and velocity; all others zero."""
     for j in range(2, order + 2):
         fill(QS[j], 0.0)
     for j in range(order + 2):
         fill(LM[j], 0.0)
-    fill(lines.FX[0], 0.0)
-    fill(lines.FY[0], 0.0)
-    trigonometry(QS[0], bodies.CS[0], bodies.SN[0])
-    fill(bodies.DT[0], 0.0)
-    fill(bodies.SN[1], 0.0)
-    fill(bodies.CS[1], 0.0)
-    fill(bodies.A[0], 0.0)
-    fill(bodies.B[0], 0.0)
-    slot_orders(rows, QS, bodies, lines, 0)
-    spring_orders(forces, QS, bodies, spans, 0)
-    finish_order(rows, forces, QS, bodies, lines, spans, 1)
+    fill(ls[FX, 0], 0.0)
+    fill(ls[FY, 0], 0.0)
+    trigonometry(QS[0], bs[CS, 0], bs[SN, 0])
+    fill(bs[DT, 0], 0.0)
+    fill(bs[SN, 1], 0.0)
+    fill(bs[CS, 1], 0.0)
+    fill(bs[AS, 0], 0.0)
+    fill(bs[BS, 0], 0.0)
+    slot_orders(rows, QS, bs, ls, 0)
+    spring_orders(forces, QS, bs, es, 0)
+    finish_order(rows, forces, QS, bs, ls, es, 1)
 
 
-def fold_rows(rows, QS, TF, bodies, lines, fold, work, u, j, folds):
+def fold_rows(rows, QS, TF, bs, ls, fold, work, u, j, folds):
     """Order j + 1 of Z^T g with q_j and q_{j+1} left out: fold.nu; the part of q_j is B q_j."""
-    angle_orders(bodies, j + 1, j)
-    slot_orders(rows, QS, bodies, lines, j + 1)
-    row_orders(rows, TF, bodies, lines, j + 1, work)
+    angle_orders(bs, j + 1, j)
+    slot_orders(rows, QS, bs, ls, j + 1)
+    row_orders(rows, TF, bs, ls, j + 1, work)
     for p in range(folds):
         value = 0.0
         for r in range(work.shape[0]):
@@ -368,6 +381,7 @@ FUNCTIONS = (
     row_orders,
     spring_orders,
     force_orders,
+    spring_force,
     slot_forces,
     slot_arms,
     add_multipliers,
@@ -380,3 +394,9 @@ FUNCTIONS = (
     fold_solve,
     small_solve,
 )
+NAMES = {
+    "DT": DT, "SN": SN, "CS": CS, "AS": AS, "BS": BS, "ACC": ACC,
+    "NX": NX, "NY": NY, "DX": DX, "DY": DY, "FX": FX, "FY": FY,
+    "EX": EX, "EY": EY, "EL": EL, "EI": EI, "EF": EF,
+    "SPRING": SPRING, "LINEAR": LINEAR, "LOAD": LOAD,
+}  # fmt: skip

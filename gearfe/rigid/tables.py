@@ -5,10 +5,10 @@ inverse mass zero, so loops need no special case. All local points are relative 
 
 A constraint row is one of two kinds, with bodies a, b = row_body[r]:
 
-    0  affine in (x, y, theta, cos theta, sin theta) of both bodies:
+    kind 0  affine in (x, y, theta, cos theta, sin theta) of both bodies:
        sum_body kx x + ky y + kt theta + kc cos theta + ks sin theta + constant - f(t) = 0
        (hinge, fixed, prescribed motion, slot along a line of the ground)
-    1  point of b on a line of the moving body a, with n = R(theta_a) n0 and D = P_b - X_a:
+    kind 1  point of b on a line of the moving body a, with n = R(theta_a) n0 and D = P_b - X_a:
        n . D + constant - f(t) = 0
 """
 
@@ -32,29 +32,25 @@ Ints = NDArray[np.int64]
 class Rows(NamedTuple):
     """Constraint rows."""
 
-    body: Ints  # (m, 2) bodies of each row
-    kind: Ints  # (m,)
-    factor: Array  # (m, 2, 5) kx, ky, kt, kc, ks
-    slot: Array  # (m, 4) n0x, n0y, local x, local y of the point on b
-    constant: Array  # (m,)
-    time: Ints  # (m,) time function subtracted, -1 for none
+    index: Ints  # (m, 4) body a, body b, kind, time function that is subtracted (-1 for none)
+    value: Array  # (m, 15) kx, ky, kt, kc, ks of both bodies; n0x, n0y, x and y of the point on b; constant
     lines: Ints  # (rows of kind 1,) their row numbers
 
 
 class Forces(NamedTuple):
-    """Applied forces."""
+    """Applied forces; springs come first.
+
+    Columns of `index`: kind, a, b, first and second time function. Columns of `value` for each kind:
+
+    0  spring between points of the bodies a and b: x, y on a, x, y on b, stiffness, damping, free length
+    1  spring on the difference of the coordinates a and b: stiffness, damping, reference
+    2  force of two time functions at a point of body a: x, y
+    3  moment of a time function on body a, the opposite on body b
+    """
 
     weight: Array  # (3 (n + 1),) constant generalised forces (gravity)
-    spring_body: Ints  # (s, 2)
-    spring_point: Array  # (s, 4) local points
-    spring_factor: Array  # (s, 3) stiffness, damping, free length
-    linear_coordinate: Ints  # (l, 2) coordinate numbers
-    linear_factor: Array  # (l, 3) stiffness, damping, reference
-    load_body: Ints  # (p,)
-    load_point: Array  # (p, 2)
-    load_time: Ints  # (p, 2) time functions of the two components
-    moment_body: Ints  # (t, 2) body and the body that carries the reaction
-    moment_time: Ints  # (t,)
+    index: Ints  # (f, 5)
+    value: Array  # (f, 7)
 
 
 class Times(NamedTuple):
@@ -116,10 +112,6 @@ def assemble(scene: Scene) -> Assembly:
                              -1 if function is None else time(function)))  # fmt: skip
     plan = elimination_plan([(r.joint, r.bodies) for r in rows], n)
     rows = [rows[i] for i in plan.order]
-    springs = [f for f in scene.forces if isinstance(f, Spring)]
-    linear = [f for f in scene.forces if isinstance(f, CoordinateSpring)]
-    loads = [f for f in scene.forces if isinstance(f, PointForce)]
-    moments = [f for f in scene.forces if isinstance(f, Moment)]
     weight = np.zeros(3 * (n + 1))
     for force in scene.forces:
         if isinstance(force, Gravity):
@@ -128,21 +120,7 @@ def assemble(scene: Scene) -> Assembly:
     inverse = np.zeros(3 * (n + 1))
     for i, body in enumerate(scene.bodies):
         inverse[3 * i : 3 * i + 3] = 1 / body.mass, 1 / body.mass, 1 / body.inertia
-    load_time = [[time(f.x), time(f.y)] for f in loads]
-    moment_time = [time(f.function) for f in moments]
-    forces = Forces(
-        weight=weight,
-        spring_body=_ints([[index[f.a], index[f.b]] for f in springs], 2),
-        spring_point=_floats([[*local(f.a, f.point_a), *local(f.b, f.point_b)] for f in springs], 4),
-        spring_factor=_floats([[f.stiffness, f.damping, f.free_length] for f in springs], 3),
-        linear_coordinate=_ints([_coordinates(f, index) for f in linear], 2),
-        linear_factor=_floats([[f.stiffness, f.damping, f.reference] for f in linear], 3),
-        load_body=np.array([index[f.body] for f in loads], dtype=np.int64),
-        load_point=_floats([local(f.body, f.point) for f in loads], 2),
-        load_time=_ints(load_time, 2),
-        moment_body=_ints([[index[f.body], index[f.reaction]] for f in moments], 2),
-        moment_time=np.array(moment_time, dtype=np.int64),
-    )
+    forces = Forces(weight, *_force_arrays(scene, local, time))
     tables = Tables(inverse, _row_arrays(rows), plan.factor, forces, _time_arrays(functions))
     breaks = np.unique([t for f in functions for t in f.breaks if math.isfinite(t)]).astype(float)
     return Assembly(
@@ -257,17 +235,28 @@ def _coordinates(force: CoordinateSpring, index) -> tuple[int, int]:  # type: ig
 
 
 def _row_arrays(rows: list[_Row]) -> Rows:
-    m = len(rows)
-    kinds = np.array([r.kind for r in rows], dtype=np.int64)
     return Rows(
-        body=_ints([r.bodies for r in rows], 2),
-        kind=kinds,
-        factor=np.array([r.factor for r in rows], dtype=float).reshape(m, 2, 5),
-        slot=_floats([r.slot for r in rows], 4),
-        constant=np.array([r.constant for r in rows], dtype=float),
-        time=np.array([r.time for r in rows], dtype=np.int64),
-        lines=np.flatnonzero(kinds == 1).astype(np.int64),
+        index=_ints([(*r.bodies, r.kind, r.time) for r in rows], 4),
+        value=_floats([(*np.ravel(r.factor), *r.slot, r.constant) for r in rows], 15),
+        lines=np.array([i for i, r in enumerate(rows) if r.kind == 1], dtype=np.int64),
     )
+
+
+def _force_arrays(scene: Scene, local, time) -> tuple[Ints, Array]:  # type: ignore[no-untyped-def]
+    at = scene.body_index
+    rows: list[tuple[tuple[int, ...], tuple[float, ...]]] = []
+    for f in scene.forces:
+        if isinstance(f, Spring):
+            ends = (*local(f.a, f.point_a), *local(f.b, f.point_b))
+            rows.append(((0, at[f.a], at[f.b], -1, -1), (*ends, f.stiffness, f.damping, f.free_length)))
+        elif isinstance(f, CoordinateSpring):
+            rows.append(((1, *_coordinates(f, at), -1, -1), (f.stiffness, f.damping, f.reference, 0, 0, 0, 0)))
+        elif isinstance(f, PointForce):
+            rows.append(((2, at[f.body], len(scene.bodies), time(f.x), time(f.y)), (*local(f.body, f.point), 0, 0, 0, 0, 0)))
+        elif isinstance(f, Moment):
+            rows.append(((3, at[f.body], at[f.reaction], time(f.function), -1), (0.0,) * 7))
+    rows.sort(key=lambda row: row[0][0])
+    return _ints([r[0] for r in rows], 5), _floats([r[1] for r in rows], 7)
 
 
 def _time_arrays(functions: list[TimeFunction]) -> Times:
@@ -284,10 +273,9 @@ def _time_arrays(functions: list[TimeFunction]) -> Times:
 
 
 def _length(tables: Tables, q0: Array) -> float:
-    arms = [np.abs(tables.rows.factor[:, :, 3:]).max(initial=0.0), np.abs(tables.rows.slot[:, 2:]).max(initial=0.0)]
-    arms.append(np.abs(tables.forces.spring_point).max(initial=0.0))
-    arms.append(np.abs(tables.forces.spring_factor[:, 2]).max(initial=0.0))
-    size = float(max(arms))
+    springs = tables.forces.value[tables.forces.index[:, 0] == 0]
+    sizes = [tables.rows.value[:, [3, 4, 8, 9, 12, 13]], springs[:, [0, 1, 2, 3, 6]]]
+    size = max(float(np.abs(a).max(initial=0.0)) for a in sizes)
     if size == 0.0:
         size = float(np.abs(q0.reshape(-1, 3)[:, :2]).max(initial=0.0))
     return size or 1.0

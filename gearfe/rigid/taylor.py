@@ -13,40 +13,9 @@ from . import compiled, kernel_fold, kernel_rows, kernel_run, kernel_series
 from .tables import Array, Assembly, Ints, Tables
 
 FUNCTIONS = (*kernel_rows.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_fold.FUNCTIONS, *kernel_run.FUNCTIONS)
-NAMES = {**kernel_rows.GLOBALS, **kernel_run.NAMES}
+NAMES = {**kernel_rows.GLOBALS, **kernel_series.NAMES, **kernel_run.NAMES}
+ENTRIES = ("integrate_series",)
 MOST_FOLDS = 4
-
-
-class BodySeries(NamedTuple):
-    """Series (K, n) of the angles, their sines and cosines, and the force sums A, B; `acc` (n,) adds up."""
-
-    DT: Array  # j theta_j
-    SN: Array
-    CS: Array
-    A: Array
-    B: Array
-    acc: Array
-
-
-class LineSeries(NamedTuple):
-    """Series (K, lines) of the moving lines: normal, distance vector, reaction."""
-
-    NX: Array
-    NY: Array
-    DX: Array
-    DY: Array
-    FX: Array
-    FY: Array
-
-
-class SpanSeries(NamedTuple):
-    """Series (K, springs): span, length, 1 / length, tension / length."""
-
-    EX: Array
-    EY: Array
-    EL: Array
-    EI: Array
-    EF: Array
 
 
 class FoldFrame(NamedTuple):
@@ -69,9 +38,9 @@ class Work(NamedTuple):
     QS: Array  # (K, 3n) series of the coordinates
     LM: Array  # (K, m) multipliers
     TF: Array  # (functions, K)
-    bodies: BodySeries
-    lines: LineSeries
-    spans: SpanSeries
+    bs: Array  # (6, K, n) series of the bodies, see the planes in kernel_series
+    ls: Array  # (6, K, moving lines)
+    es: Array  # (5, K, springs)
     fold: FoldFrame
     G: Array  # (m, 2, 3)
     H: Array  # (m, 2, 3) dG/dt
@@ -93,8 +62,8 @@ class Work(NamedTuple):
 
 def work_space(tables: Tables, order: int) -> Work:
     """Scratch arrays for series up to `order`."""
-    K, n3, m, d = order + 3, tables.mass.size, tables.rows.kind.size, MOST_FOLDS
-    n, lines, springs = n3 // 3, tables.rows.lines.size, tables.forces.spring_body.shape[0]
+    K, n3, m, d = order + 3, tables.mass.size, len(tables.rows.index), MOST_FOLDS
+    n, lines, springs = n3 // 3, tables.rows.lines.size, int((tables.forces.index[:, 0] == kernel_series.SPRING).sum())
 
     def zeros(count: int, *shape: int) -> list[Array]:
         return [np.zeros(shape) for _ in range(count)]
@@ -103,9 +72,9 @@ def work_space(tables: Tables, order: int) -> Work:
         np.zeros((K, n3)),
         np.zeros((K, m)),
         np.zeros((tables.times.first.size - 1, K)),
-        BodySeries(*zeros(5, K, n), np.zeros(n)),
-        LineSeries(*zeros(6, K, lines)),
-        SpanSeries(*zeros(5, K, springs)),
+        np.zeros((6, K, n)),
+        np.zeros((6, K, lines)),
+        np.zeros((5, K, springs)),
         FoldFrame(*zeros(3, d, m), *zeros(2, d, n3), *zeros(2, d, d), np.zeros(d), np.zeros(d, dtype=np.int64)),
         *zeros(2, m, 2, 3),
         np.zeros(m + tables.plan.row.size),
@@ -129,7 +98,7 @@ class Pieces(NamedTuple):
 def kernels(jit: bool) -> SimpleNamespace:
     """The bound kernels, compiled or plain."""
     if jit:
-        return compiled.bind(FUNCTIONS, NAMES, compiled=True)
+        return compiled.bind(FUNCTIONS, NAMES, compiled=True, entries=ENTRIES)
     from .plain import REPLACE
 
     return compiled.bind(FUNCTIONS, NAMES, compiled=False, replace=REPLACE)
