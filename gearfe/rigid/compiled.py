@@ -89,7 +89,7 @@ def _compile(functions: tuple[Callable[..., Any], ...], scope: dict[str, Any], e
     import numba
     folder = cache_folder(functions)
     before = numba.config.CACHE_DIR
-    common = {"fastmath": {"contract"}, "error_model": "numpy"}
+    common = {"fastmath": {"contract", "reassoc", "nsz"}, "error_model": "numpy"}
     try:
         numba.config.CACHE_DIR = str(folder or "")
         for function in functions:

@@ -181,17 +181,12 @@ def factorise(rows, plan, mass, G, skip, val, diag):
 def solve(plan, val, x):
     """x := S^-1 x with the factor of `factorise`."""
     m = x.shape[0]
-    for j in range(m):
-        xj = x[j]
-        for e in range(plan.start[j], plan.start[j + 1]):
-            x[plan.row[e]] -= val[m + e] * xj
+    for e in range(plan.row.shape[0]):
+        x[plan.row[e]] -= val[m + e] * x[plan.column[e]]
     for j in range(m):
         x[j] *= val[j]
-    for j in range(m - 1, -1, -1):
-        xj = x[j]
-        for e in range(plan.start[j], plan.start[j + 1]):
-            xj -= val[m + e] * x[plan.row[e]]
-        x[j] = xj
+    for e in range(plan.row.shape[0] - 1, -1, -1):
+        x[plan.column[e]] -= val[m + e] * x[plan.row[e]]
 
 
 def time_series(times, t, forward, orders, out):

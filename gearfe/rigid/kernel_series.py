@@ -20,8 +20,8 @@ import numpy as np
 
 from .kernel_rows import add_transposed, fill, solve, time_series, times_gradients, trigonometry
 
-#: Planes of the body series: j theta_j, sine, cosine, the sums A and B, an accumulator.
-DT, SN, CS, AS, BS, ACC = 0, 1, 2, 3, 4, 5
+#: Planes of the body series: j theta_j, sine, cosine, the sums A and B.
+DT, SN, CS, AS, BS = 0, 1, 2, 3, 4
 #: Planes of the series of moving lines: normal, distance vector, reaction.
 NX, NY, DX, DY, FX, FY = 0, 1, 2, 3, 4, 5
 #: Planes of the series of springs: span, length, 1 / length, tension / length.
@@ -32,18 +32,14 @@ SPRING, LINEAR, LOAD = 0, 1, 2
 
 def angle_orders(bs, j, known):
     """Orders j of sine and cosine from the orders of theta below `known`: what theta_j itself adds comes later."""
-    n = bs.shape[2]
-    for b in range(n):
-        bs[SN, j, b] = 0.0
-        bs[CS, j, b] = 0.0
-    for i in range(1, known):
-        for b in range(n):
-            d = bs[DT, i, b]
-            bs[SN, j, b] += d * bs[CS, j - i, b]
-            bs[CS, j, b] -= d * bs[SN, j - i, b]
-    for b in range(n):
-        bs[SN, j, b] /= j
-        bs[CS, j, b] /= j
+    for b in range(bs.shape[2]):
+        sine = 0.0
+        cosine = 0.0
+        for i in range(1, known):
+            sine += bs[DT, i, b] * bs[CS, j - i, b]
+            cosine -= bs[DT, i, b] * bs[SN, j - i, b]
+        bs[SN, j, b] = sine / j
+        bs[CS, j, b] = cosine / j
 
 
 def slot_orders(rows, QS, bs, ls, j):
@@ -226,14 +222,11 @@ def add_line_multipliers(rows, bs, ls, at, i, values):
 
 def torque_orders(bs, at, F):
     """F gains order `at` of s A + c B for every body."""
-    n = bs.shape[2]
-    for b in range(n):
-        bs[ACC, 0, b] = 0.0
-    for i in range(at + 1):
-        for b in range(n):
-            bs[ACC, 0, b] += bs[SN, i, b] * bs[AS, at - i, b] + bs[CS, i, b] * bs[BS, at - i, b]
-    for b in range(n):
-        F[3 * b + 2] += bs[ACC, 0, b]
+    for b in range(bs.shape[2]):
+        torque = 0.0
+        for i in range(at + 1):
+            torque += bs[SN, i, b] * bs[AS, at - i, b] + bs[CS, i, b] * bs[BS, at - i, b]
+        F[3 * b + 2] += torque
 
 
 def finish_order(rows, forces, QS, bs, ls, es, j):
@@ -264,6 +257,7 @@ def expand(tb, t, forward, order, folds, w):
         j = k + 2
         at = k + shift
         alpha = float(j * (j - 1))
+        share = 1.0 / alpha
         force_orders(forces, QS, TF, bs, es, k, at, F)
         slot_forces(rows, LM, bs, ls, at, F)
         torque_orders(bs, at, F)
@@ -271,7 +265,7 @@ def expand(tb, t, forward, order, folds, w):
         slot_orders(rows, QS, bs, ls, j)
         row_orders(rows, TF, bs, ls, j, rhs)
         for i in range(F.shape[0]):
-            u[i] = F[i] * mass[i] / alpha
+            u[i] = F[i] * mass[i] * share
         if folds > 0:
             fold_rows(rows, QS, TF, bs, ls, fold, mu, u, j, folds)
         times_gradients(rows, G, u, mu)
@@ -395,7 +389,7 @@ FUNCTIONS = (
     small_solve,
 )
 NAMES = {
-    "DT": DT, "SN": SN, "CS": CS, "AS": AS, "BS": BS, "ACC": ACC,
+    "DT": DT, "SN": SN, "CS": CS, "AS": AS, "BS": BS,
     "NX": NX, "NY": NY, "DX": DX, "DY": DY, "FX": FX, "FY": FY,
     "EX": EX, "EY": EY, "EL": EL, "EI": EI, "EF": EF,
     "SPRING": SPRING, "LINEAR": LINEAR, "LOAD": LOAD,

@@ -20,7 +20,8 @@ class Factor(NamedTuple):
     """Every index that the numeric factorisation needs, for m rows."""
 
     start: Ints  # (m + 1,) columns of the factor L
-    row: Ints  # (nnz,) row number of each entry
+    row: NDArray[np.uint64]  # (nnz,) row number of each entry
+    column: NDArray[np.uint64]  # (nnz,) and its column (unsigned: compiled code need not ask for negative numbers)
     entry: Ints  # (e, 6) target, row, side, row, side, body: products that make G M^-1 G^T
     update_start: Ints  # (m + 1,)
     update: Ints  # (u, 3) target, entry, entry of L
@@ -75,7 +76,8 @@ def elimination_plan(rows: list[tuple[int, tuple[int, int]]], n_bodies: int) -> 
         order,
         Factor(
             start,
-            np.array([i for column in columns for i in column], dtype=np.int64),
+            np.array([i for column in columns for i in column], dtype=np.uint64),
+            np.array([j for j, column in enumerate(columns) for _ in column], dtype=np.uint64),
             np.array(entry, dtype=np.int64).reshape(-1, 6),
             np.array(update_start, dtype=np.int64),
             np.array(update, dtype=np.int64).reshape(-1, 3),

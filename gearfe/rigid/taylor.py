@@ -38,7 +38,7 @@ class Work(NamedTuple):
     QS: Array  # (K, 3n) series of the coordinates
     LM: Array  # (K, m) multipliers
     TF: Array  # (functions, K)
-    bs: Array  # (6, K, n) series of the bodies, see the planes in kernel_series
+    bs: Array  # (5, K, n) series of the bodies, see the planes in kernel_series
     ls: Array  # (6, K, moving lines)
     es: Array  # (5, K, springs)
     fold: FoldFrame
@@ -72,7 +72,7 @@ def work_space(tables: Tables, order: int) -> Work:
         np.zeros((K, n3)),
         np.zeros((K, m)),
         np.zeros((tables.times.first.size - 1, K)),
-        np.zeros((6, K, n)),
+        np.zeros((5, K, n)),
         np.zeros((6, K, lines)),
         np.zeros((5, K, springs)),
         FoldFrame(*zeros(3, d, m), *zeros(2, d, n3), *zeros(2, d, d), np.zeros(d), np.zeros(d, dtype=np.int64)),
@@ -106,7 +106,7 @@ def kernels(jit: bool) -> SimpleNamespace:
 
 def order_for(tolerance: float) -> int:
     """Order that costs least: about half the number of decimal digits times ln 10, plus a margin (measured)."""
-    return int(min(30, max(8, math.ceil(-0.55 * math.log(tolerance)) + 6)))
+    return int(min(26, max(8, math.ceil(-0.62 * math.log(tolerance)) + 7)))
 
 
 def run(
