@@ -195,6 +195,7 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, w,
     fill(w.dv, 0.0)
     h = guess
     quality = np.inf
+    near = 0
     for sweep in range(25):
         evaluate(QS, order, h, q, v)
         for i in range(n):
@@ -212,6 +213,13 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, w,
                 move -= fold.P[p, i] * fold.B[p, i] * mass[i]
             weight += fold.border[p, p]
         move = move / weight
+        if near == 0:  # first the time alone: corrections made away from the fold would push along the motion
+            h += move
+            if abs(h - guess) > reach or not np.isfinite(h):
+                return 0, h
+            if abs(move) < 1e-7 * reach:
+                near = 1
+            continue
         # position: g_reg and z^T (G v - df/dt)
         times_gradients(rows, w.G, v, w.mu)
         for r in range(m):
