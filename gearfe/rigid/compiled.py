@@ -27,7 +27,7 @@ def available() -> bool:
 
 def cache_folder(functions: Iterable[Callable[..., Any]]) -> Path | None:
     """Writable folder for the compiled forms of `functions`, named by a hash of their sources; ``None`` without one."""
-    text = sys.version + "".join(inspect.getsource(f) for f in functions)
+    text = sys.version + Path(__file__).read_text() + "".join(inspect.getsource(f) for f in functions)
     name = "kernels-" + hashlib.sha256(text.encode()).hexdigest()[:16]
     base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     user = os.getuid() if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
@@ -89,6 +89,7 @@ def _compile(functions: tuple[Callable[..., Any], ...], scope: dict[str, Any], e
     import numba
     folder = cache_folder(functions)
     before = numba.config.CACHE_DIR
+    inline = {"force_orders","finish_order","spring_orders","slot_orders","angle_orders","torque_orders","slot_forces","slot_arms","add_multipliers","add_line_multipliers","row_orders","solve","times_gradients","add_transposed","fill","copy","spring_force"}
     common = {"fastmath": {"contract", "reassoc", "nsz"}, "error_model": "numpy"}
     try:
         numba.config.CACHE_DIR = str(folder or "")
@@ -99,6 +100,6 @@ def _compile(functions: tuple[Callable[..., Any], ...], scope: dict[str, Any], e
             if name in entries:
                 scope[name] = numba.njit(made, cache=folder is not None, no_cfunc_wrapper=True, **common)
             else:
-                scope[name] = numba.njit(made, no_cpython_wrapper=True, no_cfunc_wrapper=True, **common)
+                scope[name] = numba.njit(made, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=(name in inline), **common)
     finally:
         numba.config.CACHE_DIR = before
