@@ -213,7 +213,27 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
     return status, count
 
 
-FUNCTIONS = (step_length, clear_series, fold_behind, begin, land, integrate_series)
+def sample(T, C, sign, times, derivative, out):
+    """Coordinates or a derivative of them at `times` (in order of travel) from the pieces of `integrate_series`."""
+    piece = 0
+    last = C.shape[0] - 1
+    for i in range(times.shape[0]):
+        while piece < last and sign * (times[i] - T[piece + 1]) > 0.0:
+            piece += 1
+        while piece > 0 and sign * (times[i] - T[piece]) < 0.0:
+            piece -= 1
+        h = times[i] - T[piece]
+        for c in range(out.shape[1]):
+            out[i, c] = 0.0
+        for j in range(C.shape[1] - 1, derivative - 1, -1):
+            factor = 1.0
+            for d in range(derivative):
+                factor *= j - d
+            for c in range(out.shape[1]):
+                out[i, c] = out[i, c] * h + factor * C[piece, j, c]
+
+
+FUNCTIONS = (sample, step_length, clear_series, fold_behind, begin, land, integrate_series)
 NAMES = {
     "DONE": DONE,
     "TOO_SMALL": TOO_SMALL,

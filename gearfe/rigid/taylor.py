@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -14,7 +15,7 @@ from .tables import Array, Assembly, Ints, Tables
 
 FUNCTIONS = (*kernel_rows.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_fold.FUNCTIONS, *kernel_run.FUNCTIONS)
 NAMES = {**kernel_rows.GLOBALS, **kernel_series.NAMES, **kernel_run.NAMES}
-ENTRIES = ("integrate_series",)
+ENTRIES = ("integrate_series", "sample")
 MOST_FOLDS = 4
 
 
@@ -85,13 +86,42 @@ def work_space(tables: Tables, order: int) -> Work:
     )
 
 
-class Pieces(NamedTuple):
-    """Result of the loop: status, times (steps + 1,), coefficients (steps, order + 1, 3n), folds at each start."""
+@dataclass(frozen=True)
+class Pieces:
+    """Result of the loop, and its dense output.
+
+    Parameters
+    ----------
+    times : ndarray, shape (steps + 1,)
+        Ends of the steps (s).
+    coefficients : ndarray, shape (steps, order + 1, 3n)
+        Taylor series on every step, the ground's coordinates last.
+    folds : ndarray, shape (steps,)
+        Number of singular combinations of rows at the start of every step.
+    """
 
     status: int
     times: Array
     coefficients: Array
     folds: Ints
+    jit: bool
+
+    def __call__(self, t: Array, derivative: int = 0) -> Array:
+        """Coordinates (or a derivative of them) at the times t."""
+        t = np.ascontiguousarray(t, dtype=float)
+        out = np.empty((t.size, self.coefficients.shape[2]))
+        if len(self.coefficients) == 0:
+            raise ValueError("no step was completed, so there is nothing between the times")
+        sign = 1.0 if self.times[-1] >= self.times[0] else -1.0
+        if self.jit:
+            kernels(True).sample(self.times, self.coefficients, sign, t, derivative, out)
+            return out[:, :-3]
+        k = np.clip(np.searchsorted(sign * self.times, sign * t, side="right") - 1, 0, len(self.coefficients) - 1)
+        h = (t - self.times[k])[:, None]
+        out[:] = 0.0
+        for j in range(self.coefficients.shape[1] - 1, derivative - 1, -1):
+            out = out * h + math.perm(j, derivative) * self.coefficients[k, j]
+        return out[:, :-3]
 
 
 @lru_cache(maxsize=2)
@@ -148,5 +178,5 @@ def run(
         room = min(2 * room, max(64, 2_000_000 // coefficients[0].size))
     ends = np.concatenate([parts[0][0], *(p[0][1:] for p in parts[1:])])
     if len(parts) == 1:
-        return Pieces(int(status), ends, parts[0][1], parts[0][2])
-    return Pieces(int(status), ends, np.concatenate([p[1] for p in parts]), np.concatenate([p[2] for p in parts]))
+        return Pieces(int(status), ends, parts[0][1], parts[0][2], jit)
+    return Pieces(int(status), ends, np.concatenate([p[1] for p in parts]), np.concatenate([p[2] for p in parts]), jit)
