@@ -1,7 +1,7 @@
 """Binding of the kernels: compiled by numba with a cache of their own, or left as plain Python where that is quicker.
 
 The kernel modules hold plain functions that call one another by name. `bind` puts them into one namespace, either as
-compiled functions or with NumPy replacements for the hot ones, so one text serves both. Compiled code is cached below
+compiled functions or as they are, so one text serves both. Compiled code is cached below
 the user's cache folder under a hash of all kernel sources: no stale code after an upgrade, nothing written beside the
 installed package, and a read-only home only costs the compilation again.
 """
@@ -55,7 +55,6 @@ def bind(
     *,
     compiled: bool,
     entries: tuple[str, ...] = (),
-    replace: Mapping[str, Callable[..., Any]] | None = None,
 ) -> SimpleNamespace:
     """One namespace in which the `functions` see each other.
 
@@ -69,8 +68,6 @@ def bind(
         Compile with numba; otherwise plain Python.
     entries
         Names of the functions that are called from Python.
-    replace
-        Functions to use instead of those of the same name (the NumPy forms of the hot ones).
     """
     functions = tuple(functions)
     scope: dict[str, Any] = {"__builtins__": __builtins__, "__name__": __name__, **names}
@@ -79,8 +76,6 @@ def bind(
         scope[function.__name__] = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
     if compiled:
         _compile(functions, scope, entries)
-    else:
-        scope.update(replace or {})
     return SimpleNamespace(**{f.__name__: scope[f.__name__] for f in functions})
 
 

@@ -129,9 +129,7 @@ def kernels(jit: bool) -> SimpleNamespace:
     """The bound kernels, compiled or plain."""
     if jit:
         return compiled.bind(FUNCTIONS, NAMES, compiled=True, entries=ENTRIES)
-    from .plain import REPLACE
-
-    return compiled.bind(FUNCTIONS, NAMES, compiled=False, replace=REPLACE)
+    return compiled.bind(FUNCTIONS, NAMES, compiled=False)
 
 
 def order_for(tolerance: float) -> int:
