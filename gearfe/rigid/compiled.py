@@ -55,6 +55,7 @@ def bind(
     *,
     compiled: bool,
     entries: tuple[str, ...] = (),
+    alias: Mapping[str, str] | None = None,
 ) -> SimpleNamespace:
     """One namespace in which the `functions` see each other.
 
@@ -68,6 +69,8 @@ def bind(
         Compile with numba; otherwise plain Python.
     entries
         Names of the functions that are called from Python.
+    alias
+        Further names: function -> the name under which others call it.
     """
     functions = tuple(functions)
     scope: dict[str, Any] = {"__builtins__": __builtins__, "__name__": __name__, **names}
@@ -76,6 +79,8 @@ def bind(
         scope[function.__name__] = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
     if compiled:
         _compile(functions, scope, entries)
+    for name, other in (alias or {}).items():
+        scope[other] = scope[name]
     return SimpleNamespace(**{f.__name__: scope[f.__name__] for f in functions})
 
 

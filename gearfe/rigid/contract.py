@@ -28,8 +28,9 @@ It MAY provide
    method runs when every element has one; otherwise ``method="auto"`` takes the explicit method of order 8 with
    projection, or, when the start is stiff, the implicit one.
 9. ``energy(q, v)``: (kinetic, potential) of the element. Absent: 1/2 v M v of its own coordinates, and zero.
-10. ``local_law``: a force that acts along few directions, ``f = W phi(t, W^T q, W^T v)``: W (k, p) and a function phi, see
-    `LocalForce`. Absent: the force is called as it is; the modal integrator then calls Python instead of compiled code.
+10. Being a `LocalForce`: a force along few directions, ``f = W phi(t, W^T q, W^T v)``, with a law that can be compiled.
+    Absent: the force is called as it is; the integration in modal coordinates then calls Python in every stage.
+11. ``breaks``: times at which a force or joint is not smooth. Steps of all integrators end there. Absent: none.
 
 An element has no state of its own that changes during a run: integrators call it at trial points in any order.
 """
@@ -146,12 +147,21 @@ class LocalForce(Element):
     W : ndarray, shape (k, p)
         Directions on the local coordinates.
     law
-        ``law(t, u, du) -> (p,)`` with u = W^T q. A law that numba can compile runs compiled (``compiled_law``).
+        ``law(t, u, du) -> (p,)`` with u = W^T q, du = W^T v: any callable of state and time.
+    compiled_law
+        The same law as ``compiled_law(t, u, du, parameters, out)``, a module-level function that numba can compile. When
+        every force of a linear system has the same one, the whole integration runs compiled; forces of different kinds
+        share one function that looks at its parameters.
+    parameters : ndarray
+        What `compiled_law` gets.
     """
 
     touches: tuple[Element, ...] = field()
     W: Array = field()
     law: Callable[[float, Array, Array], Array] = field()
+    compiled_law: Callable[..., None] | None = None
+    parameters: Array = field(default_factory=lambda: np.zeros(0))
+    breaks: tuple[float, ...] = ()
     name: str = "local force"
 
     def force(self, t: float, q: Array, v: Array) -> Array:
