@@ -55,6 +55,7 @@ def bind(
     *,
     compiled: bool,
     entries: tuple[str, ...] = (),
+    inline: tuple[str, ...] = (),
     alias: Mapping[str, str] | None = None,
 ) -> SimpleNamespace:
     """One namespace in which the `functions` see each other.
@@ -69,6 +70,9 @@ def bind(
         Compile with numba; otherwise plain Python.
     entries
         Names of the functions that are called from Python.
+    inline
+        Names of the functions that are copied into their callers: the small hot ones. A call costs compiled code some
+        hundred nanoseconds here, for the reference counts of the many arrays it hands over.
     alias
         Further names: function -> the name under which others call it.
     """
@@ -78,18 +82,19 @@ def bind(
         assert isinstance(function, FunctionType)
         scope[function.__name__] = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
     if compiled:
-        _compile(functions, scope, entries)
+        _compile(functions, scope, entries, inline)
     for name, other in (alias or {}).items():
         scope[other] = scope[name]
     return SimpleNamespace(**{f.__name__: scope[f.__name__] for f in functions})
 
 
-def _compile(functions: tuple[Callable[..., Any], ...], scope: dict[str, Any], entries: tuple[str, ...]) -> None:
+def _compile(
+    functions: tuple[Callable[..., Any], ...], scope: dict[str, Any], entries: tuple[str, ...], inline: tuple[str, ...]
+) -> None:
     """Only the entries get Python wrappers and a place in the cache: the others end up inside them."""
     import numba
     folder = cache_folder(functions)
     before = numba.config.CACHE_DIR
-    inline = {"force_orders","finish_order","spring_orders","slot_orders","angle_orders","torque_orders","slot_forces","slot_arms","add_multipliers","add_line_multipliers","row_orders","solve","times_gradients","add_transposed","fill","copy","spring_force"}
     common = {"fastmath": {"contract", "reassoc", "nsz"}, "error_model": "numpy"}
     try:
         numba.config.CACHE_DIR = str(folder or "")
@@ -100,6 +105,6 @@ def _compile(functions: tuple[Callable[..., Any], ...], scope: dict[str, Any], e
             if name in entries:
                 scope[name] = numba.njit(made, cache=folder is not None, no_cfunc_wrapper=True, **common)
             else:
-                scope[name] = numba.njit(made, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=(name in inline), **common)
+                scope[name] = numba.njit(made, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=name in inline, **common)
     finally:
         numba.config.CACHE_DIR = before

@@ -255,7 +255,7 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, w,
         h += move
         if abs(h - guess) > reach or not np.isfinite(h) or not np.isfinite(change):
             return 0, h
-        if abs(move) < 1e-12 * reach and change < 1e-12 * min(length, 1.0):
+        if abs(move) < 1e-10 * reach and change < 1e-10 * min(length, 1.0):  # the next change would be its square
             if least < 1e-14 and folds < fold.drop.shape[0]:  # another row passes at the same moment
                 fold.drop[folds] = row
                 w.skip[row] = 1

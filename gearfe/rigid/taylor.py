@@ -16,6 +16,11 @@ from .tables import Array, Assembly, Ints, Tables
 FUNCTIONS = (*kernel_rows.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_fold.FUNCTIONS, *kernel_run.FUNCTIONS)
 NAMES = {**kernel_rows.GLOBALS, **kernel_series.NAMES, **kernel_run.NAMES}
 ENTRIES = ("integrate_series", "sample")
+HOT = (
+    "fill", "copy", "trigonometry", "gradients", "residuals", "times_gradients", "add_transposed", "solve", "least_norm",
+    "angle_orders", "slot_orders", "row_orders", "spring_orders", "force_orders", "spring_force", "slot_forces",
+    "slot_arms", "add_multipliers", "add_line_multipliers", "torque_orders", "finish_order",
+)  # fmt: skip
 MOST_FOLDS = 4
 
 
@@ -128,7 +133,7 @@ class Pieces:
 def kernels(jit: bool) -> SimpleNamespace:
     """The bound kernels, compiled or plain."""
     if jit:
-        return compiled.bind(FUNCTIONS, NAMES, compiled=True, entries=ENTRIES)
+        return compiled.bind(FUNCTIONS, NAMES, compiled=True, entries=ENTRIES, inline=HOT)
     return compiled.bind(FUNCTIONS, NAMES, compiled=False)
 
 
