@@ -105,8 +105,12 @@ def begin(tb, t, sign, q, v, order, tolerance, length, base, none, w, qn, vn):
     return 0, 0.0, ahead, DONE
 
 
-def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, w, qn, vn):
-    """End of a step of at most |h|: (step, folds there, time to the next fold, status); the state is in qn, vn."""
+def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, close, w, qn, vn):
+    """End of a step of at most |h|: (step, folds there, time to the next fold, status); the state is in qn, vn.
+
+    A fold ahead within `close` (0.7 of the last step) is landed on even when |h| is shorter: so close to it, round-off in
+    the last coefficients and not the motion sets |h|.
+    """
     forward = sign > 0.0
     for _ in range(40):
         evaluate(w.QS, order, h, qn, vn)
@@ -119,16 +123,17 @@ def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, w, qn, vn
                 guess = h + tau
             else:
                 tau = np.inf
-        if 0.0 < sign * ahead < 1.3 * abs(h):
+        near = max(1.3 * abs(h), close)
+        if 0.0 < sign * ahead < near:
             guess = ahead
         lowest = 0.05 * abs(h) if folds > 0 else 0.0
-        if lowest < sign * guess < 1.3 * abs(h):
-            reach = 0.5 * abs(h)
+        if lowest < sign * guess < near:
+            reach = 0.5 * max(abs(h), abs(guess))
             found_folds, found = locate_fold(
                 tb, t, forward, w.QS, order, guess, reach, base, where, length, w, qn, vn
             )
             if found_folds > 0 and lowest < sign * found:
-                if sign * found <= 1.000001 * abs(h):
+                if sign * found <= max(1.000001 * abs(h), close):
                     return found, found_folds, np.inf, DONE
                 h = 0.6 * found
                 evaluate(w.QS, order, h, qn, vn)
@@ -148,7 +153,7 @@ def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, w, qn, vn
 def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks, longest, state, T, C, kind):
     """Integrate from (q, v) to t1, or until the arrays are full; call again with the same arguments to go on.
 
-    `state` holds (time, folds, time to the fold ahead, 1 once begun); T (room + 1,) receives step ends, C
+    `state` holds (time, folds, time to the fold ahead, 1 once begun, last step); T (room + 1,) receives step ends, C
     (room, order + 1, n) coefficients, kind (room,) the number of folds at the start of every step.
 
     Returns status, number of steps.
@@ -158,6 +163,7 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
     t = state[0]
     folds = int(state[1])
     ahead = state[2]
+    last = state[4]
     status = DONE
     count = 0
     if state[3] == 0.0:
@@ -188,7 +194,7 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
         elif size > 0.5 * remains:
             size = 0.5 * remains
         h, next_folds, next_ahead, status = land(
-            tb, t, sign, sign * size, order, tolerance, length, base, folds, ahead, w, w.qn, w.vn
+            tb, t, sign, sign * size, order, tolerance, length, base, folds, ahead, min(0.7 * last, remains), w, w.qn, w.vn
         )
         if status != DONE:
             break
@@ -204,12 +210,14 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
         copy(w.vn, v)
         folds = next_folds
         ahead = next_ahead
+        last = abs(h)
     for i in range(q.shape[0]):
         if not (np.isfinite(q[i]) and np.isfinite(v[i])):
             status = NOT_FINITE
     state[0] = t
     state[1] = folds
     state[2] = ahead
+    state[4] = last
     return status, count
 
 

@@ -163,7 +163,7 @@ def run(
     q = np.concatenate([q, np.zeros(3)])
     v = np.concatenate([v, np.zeros(3)])
     t0, t1 = float(span[0]), float(span[1])
-    state = np.array([t0, 0.0, math.inf, 0.0])
+    state = np.array([t0, 0.0, math.inf, 0.0, 0.0])
     advance = kernels(jit).integrate_series
     parts = []
     room, done = 64, 0
