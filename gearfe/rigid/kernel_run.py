@@ -37,6 +37,11 @@ def step_length(QS, order, tolerance, length):
     return step
 
 
+def same_moment(tolerance):
+    """Pivot below which a row passes its fold together with another, as far as the accuracy of the state can tell."""
+    return min(1e-6, max(1e-14, (300.0 * tolerance) ** 2))
+
+
 def clear_series(w, q, v, order):
     """Series that holds position and velocity only."""
     copy(q, w.QS[0])
@@ -55,7 +60,7 @@ def fold_behind(tb, t, sign, q, v, order, tolerance, length, base, where, ahead,
     if abs(ahead) > step:
         return 0, 0.0
     folds, found = locate_fold(
-        tb, t, forward, w.QS, order, ahead, abs(ahead), base, where, length, w, qn, vn
+        tb, t, forward, w.QS, order, ahead, abs(ahead), base, where, length, same_moment(tolerance), w, qn, vn
     )
     if folds > 0 and sign * found > 0.0:
         folds = 0
@@ -84,7 +89,7 @@ def begin(tb, t, sign, q, v, order, tolerance, length, base, none, w, qn, vn):
             speed = max(speed, abs(v[i]) / (1.0 if i % 3 == 2 else length))
         clear_series(w, q, v, order)
         folds, found = locate_fold(
-            tb, t, forward, w.QS, order, 0.0, 1e-3 / speed, base, where, length, w, qn, vn
+            tb, t, forward, w.QS, order, 0.0, 1e-3 / speed, base, where, length, same_moment(tolerance), w, qn, vn
         )
         if folds == 0:
             return 0, 0.0, np.inf, SINGULAR
@@ -130,7 +135,7 @@ def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, close, w,
         if lowest < sign * guess < near:
             reach = 0.5 * max(abs(h), abs(guess))
             found_folds, found = locate_fold(
-                tb, t, forward, w.QS, order, guess, reach, base, where, length, w, qn, vn
+                tb, t, forward, w.QS, order, guess, reach, base, where, length, same_moment(tolerance), w, qn, vn
             )
             if found_folds > 0 and lowest < sign * found:
                 if sign * found <= max(1.000001 * abs(h), close):
@@ -241,7 +246,7 @@ def sample(T, C, sign, times, derivative, out):
                 out[i, c] = out[i, c] * h + factor * C[piece, j, c]
 
 
-FUNCTIONS = (sample, step_length, clear_series, fold_behind, begin, land, integrate_series)
+FUNCTIONS = (sample, step_length, same_moment, clear_series, fold_behind, begin, land, integrate_series)
 NAMES = {
     "DONE": DONE,
     "TOO_SMALL": TOO_SMALL,
