@@ -22,7 +22,8 @@ def slider_crank(angle: float) -> System:
 
 
 def slider_speed(q: np.ndarray) -> np.ndarray:
-    """Velocity of B in x as a row on the velocities: x of the rod's centre, less half a metre times sin times its rate."""
+    """Velocity of B in x as a row on the velocities: x of the rod's centre, less half a metre times sin times
+    its rate."""
     row = np.zeros(6)
     row[3], row[5] = 1.0, -0.5 * sin(q[5])
     return row
@@ -35,7 +36,8 @@ def main() -> None:
     start = consistent_start(system, velocities=[speed])
     made = integrate(system, np.linspace(0.0, 10.0, 2001), tolerance=1e-10, start=start)
     passages = made.statistics["singular_passages"]
-    print(f"{made.message} in {made.statistics['steps']} steps, {len(passages)} singular passages, first at {passages[0]:.6f} s")
+    print(f"{made.message} in {made.statistics['steps']} steps")
+    print(f"{len(passages)} singular passages, the first at {passages[0]:.6f} s")
     print(f"crank at the end: {made.q[-1, 2]:.12f} rad, {made.v[-1, 2]:.12f} rad/s")
     energy = [sum(system.energy(q, v)) for q, v in zip(made.q, made.v, strict=True)]
     print(f"energy {energy[0]:.12f} J, kept within {np.ptp(energy):.1e} J")

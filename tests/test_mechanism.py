@@ -115,7 +115,9 @@ def test_errors_name_the_entry_and_the_cure(tmp_path, old, new, text):
 
 
 def test_nothing_free_to_move(tmp_path):
-    fixed = PENDULUM.replace('type = "hinge"\nbody = "rod"\npoint = "O"\nto_point = "O"', 'type = "fixed"\nbody = "rod"')
+    fixed = PENDULUM.replace(
+        'type = "hinge"\nbody = "rod"\npoint = "O"\nto_point = "O"', 'type = "fixed"\nbody = "rod"'
+    )
     with pytest.raises(InputError, match="nothing is free to move"):
         load_mechanism(write(tmp_path, fixed)).start()
 
@@ -181,7 +183,15 @@ def test_driven_crank_closes_the_energy_balance(tmp_path):
 
 
 def test_command_on_the_folding_links(tmp_path, capsys):
-    arguments = ["mechanism", str(GEOMETRY / "slider_crank.toml"), "--out", str(tmp_path), "--until", "2", "--reactions"]
+    arguments = [
+        "mechanism",
+        str(GEOMETRY / "slider_crank.toml"),
+        "--out",
+        str(tmp_path),
+        "--until",
+        "2",
+        "--reactions",
+    ]
     assert main([*arguments, "--no-figures"]) == 0
     assert "1 free" in capsys.readouterr().out
     table = np.genfromtxt(tmp_path / "trajectory.csv", delimiter=",", names=True)
@@ -252,9 +262,18 @@ def test_examples(script, tmp_path):
 
 
 def test_a_planar_run_loads_no_heavy_library(tmp_path):
+    arguments = [
+        "mechanism",
+        str(GEOMETRY / "andrews.toml"),
+        "--out",
+        str(tmp_path),
+        "--no-figures",
+        "--until",
+        "0.002",
+    ]
     code = (
         "import sys; from gearfe.cli import main; "
-        f"main(['mechanism', r'{GEOMETRY / 'andrews.toml'}', '--out', r'{tmp_path}', '--no-figures', '--until', '0.002']); "
+        f"main({arguments!r}); "
         "heavy = {'skfem', 'gmsh', 'meshio', 'pyvista', 'matplotlib', 'vtk', 'h5py'} & set(sys.modules); "
         "print('HEAVY', heavy)"
     )

@@ -9,8 +9,20 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from gearfe.rigid import Body, Element, Gravity, LinearJoint, LocalForce, ModalBlocks, PlanarScene, Scene, System
-from gearfe.rigid import consistent_start, integrate, taylor
+from gearfe.rigid import (
+    Body,
+    Element,
+    Gravity,
+    LinearJoint,
+    LocalForce,
+    ModalBlocks,
+    PlanarScene,
+    Scene,
+    System,
+    consistent_start,
+    integrate,
+    taylor,
+)
 from gearfe.rigid.compiled import available
 from gearfe.rigid.explicit import on_constraints
 from gearfe.rigid.implicit import radau_step

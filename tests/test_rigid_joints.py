@@ -273,7 +273,7 @@ def test_loop_that_cannot_close_is_named():
         Hinge("b", "ground", (0.0, 0.0), (3.0, 0.0)),
         Hinge("a", "b", (1.0, 0.0), (-1.0, 0.0), name="gap"),
     )
-    with pytest.raises(InputError, match="cannot close: a residual of 0.333"):
+    with pytest.raises(InputError, match=r"cannot close: a residual of 0\.333"):
         consistent_start(System([PlanarScene(Scene(bodies, joints))]))
 
 

@@ -1,4 +1,5 @@
-"""The two benchmark mechanisms against solutions in 18 digits, energies, residuals, reversal, error against tolerance."""
+"""The two benchmark mechanisms against solutions in 18 digits, energies, residuals, reversal, error against
+tolerance."""
 
 from __future__ import annotations
 
@@ -101,7 +102,8 @@ def test_compiled_kernels_agree_with_plain_ones(andrews):
 @pytest.mark.slow
 @pytest.mark.skipif(not available(), reason="numba is not installed")
 def test_a_thousand_seconds_of_folding_links():
-    """Energy and the phase after 565 turns; the period by the trapezoidal rule, which is exact for periodic functions."""
+    """Energy and the phase after 565 turns; the period by the trapezoidal rule, which is exact for periodic
+    functions."""
     theta, omega = np.pi / 4, 4 / (2 * np.sin(np.pi / 4))
     energy = (1 / 3 + np.sin(theta) ** 2) * omega**2 + 9.81 * np.sin(theta)
     x = 2 * np.pi * np.arange(4096) / 4096 + theta

@@ -1,8 +1,8 @@
 """Arithmetic expressions over named quantities, parsed here and never evaluated as code.
 
-    expression := term (("+" | "-") term)*        term := factor (("*" | "/") factor)*
-    factor := ("+" | "-") factor | power          power := atom ("**" factor)?
-    atom := number | name | name "(" expression ("," expression)* ")" | quantity "(" what ")" | "(" expression ")"
+expression := term (("+" | "-") term)*        term := factor (("*" | "/") factor)*
+factor := ("+" | "-") factor | power          power := atom ("**" factor)?
+atom := number | name | name "(" expression ("," expression)* ")" | quantity "(" what ")" | "(" expression ")"
 """
 
 from __future__ import annotations
@@ -34,7 +34,9 @@ OF_BODY = ("angle", "rate", "angular_acceleration")
 OF_POINT = ("x", "y", "vx", "vy", "ax", "ay")
 #: Quantities of the whole mechanism.
 PLAIN = ("time", "kinetic", "potential", "work", "total")
-_TOKEN = re.compile(r"\s*(?:(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*(?:\.\w+)?)|(\*\*|[-+*/(),]))")
+_TOKEN = re.compile(
+    r"\s*(?:(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*(?:\.\w+)?)|(\*\*|[-+*/(),]))"
+)
 _DEEPEST = 60
 
 

@@ -53,7 +53,9 @@ def run_mechanism(
     trajectory = quickest(mechanism, times, start, method or run.method, tolerance or run.tolerance)
     integrated = clock.perf_counter()
     if len(trajectory.dense.times) < 2:
-        raise InputError("start", None, trajectory.message, "give the bodies start velocities, or another start position")
+        raise InputError(
+            "start", None, trajectory.message, "give the bodies start velocities, or another start position"
+        )
     results = evaluate(mechanism, trajectory)
     write_tables(folder, mechanism, results, reactions or run.reactions)
     written = clock.perf_counter()
@@ -100,11 +102,14 @@ def quickest(mechanism: Mechanism, times: np.ndarray, start: Start, method: str,
 
 def write_tables(folder: Path, mechanism: Mechanism, results: Results, with_reactions: bool) -> None:
     """trajectory.csv, energy.csv and, when asked, reactions.csv."""
-    time = results.trajectory.time
-    write_csv(folder / "trajectory.csv", {"time_s": time, **results.outputs})
-    write_csv(folder / "energy.csv", {"time_s": time, **results.energy})
+    time: Any = results.trajectory.time
+    outputs: dict[str, Any] = {**results.outputs}
+    energy: dict[str, Any] = {**results.energy}
+    write_csv(folder / "trajectory.csv", {"time_s": time, **outputs})
+    write_csv(folder / "energy.csv", {"time_s": time, **energy})
     if with_reactions:
-        write_csv(folder / "reactions.csv", {"time_s": time, **reactions(mechanism, results.trajectory)})
+        forces: dict[str, Any] = {**reactions(mechanism, results.trajectory)}
+        write_csv(folder / "reactions.csv", {"time_s": time, **forces})
 
 
 def summarise(mechanism: Mechanism, start: Start, results: Results, tolerance: float, timings: dict) -> dict[str, Any]:

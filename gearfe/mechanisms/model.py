@@ -171,7 +171,9 @@ class Mechanism:
         def rate_slope(q):  # type: ignore[no-untyped-def]
             n = len(q)
             states = np.broadcast_to(q, (n + 1, n))
-            made = np.broadcast_to(compute(node, self.values(wanted, states, np.vstack([np.eye(n), np.zeros(n)]))), n + 1)
+            made = np.broadcast_to(
+                compute(node, self.values(wanted, states, np.vstack([np.eye(n), np.zeros(n)]))), n + 1
+            )
             return made[:n] - made[n]
 
         return Forced(text, target, position, slope if level == 0 else rate_slope)

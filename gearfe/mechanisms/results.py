@@ -84,9 +84,7 @@ def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
                         angle = trajectory.q[:, 3 * index[body] + 2]
                         work += sign * row[0] * (angle - angle[0])
                 continue
-        if isinstance(force, Moment | PointForce):
-            varying = True
-        elif isinstance(force, Spring | CoordinateSpring) and force.damping:
+        if isinstance(force, Moment | PointForce) or (isinstance(force, Spring | CoordinateSpring) and force.damping):
             varying = True
     driven = any(isinstance(j, Prescribed) for j in scene.joints)
     if not (varying or driven) or len(time) < 2:
@@ -126,7 +124,8 @@ def _steady_power(mechanism: Mechanism, v: Array) -> Array:
 def reactions(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
     """Force (N) and moment (N m) of every joint on its first body, at the joint's point.
 
-    Columns are ``JOINT_x_N, JOINT_y_N, JOINT_moment_N_m``. Redundant rows carry nothing: where there are some, the share of
+    Columns are ``JOINT_x_N, JOINT_y_N, JOINT_moment_N_m``. Redundant rows carry nothing: where there are some,
+    the share of
     the joints is not unique.
     """
     planar = mechanism.system.planar
@@ -144,7 +143,7 @@ def reactions(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
             body = scene.body_index[table.body]
             wrench = np.zeros(3)
             for r in np.flatnonzero(owner == j):
-                side = 0 if rows.index[r, 0] == body else 1
+                side = 0 if rows.ints[r, 0] == body else 1
                 wrench -= multipliers[r] * G[r, side]
             joint = scene.joints[j]
             at = getattr(joint, "point_a", getattr(joint, "point", (0.0, 0.0)))

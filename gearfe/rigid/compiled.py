@@ -93,6 +93,7 @@ def _compile(
 ) -> None:
     """Only the entries get Python wrappers and a place in the cache: the others end up inside them."""
     import numba
+
     folder = cache_folder(functions)
     before = numba.config.CACHE_DIR
     common = {"fastmath": {"contract", "reassoc", "nsz"}, "error_model": "numpy"}
@@ -105,6 +106,8 @@ def _compile(
             if name in entries:
                 scope[name] = numba.njit(made, cache=folder is not None, no_cfunc_wrapper=True, **common)
             else:
-                scope[name] = numba.njit(made, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=name in inline, **common)
+                scope[name] = numba.njit(
+                    made, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=name in inline, **common
+                )
     finally:
         numba.config.CACHE_DIR = before

@@ -1,6 +1,7 @@
 """The component contract: what a body, a joint or a force provides, and what the integrators make of it.
 
-A system is a list of elements. Element i owns `size` coordinates of the state q (a slice of it) and may look at those of
+A system is a list of elements. Element i owns `size` coordinates of the state q (a slice of it) and may look
+at those of
 other elements, named in `touches`. Every method gets the *local* coordinates: its own first, then those of the touched
 elements in that order, k numbers in all. The equations of motion are
 
@@ -8,23 +9,28 @@ elements in that order, k numbers in all. The equations of motion are
 
 1. A body (size > 0) MUST provide ``mass()``: its constant, symmetric positive definite mass matrix (size, size).
    Inertia that depends on velocity (gyroscopic terms) is a force.
-2. A force MUST provide ``force(t, q, v)``: generalised forces on the local coordinates, shape (k,). An applied force and
+2. A force MUST provide ``force(t, q, v)``: generalised forces on the local coordinates, shape (k,). An applied
+force and
    its reaction on a touched body are both entries of this one vector.
 3. A joint (rows > 0) MUST provide ``residual(t, q)`` (rows,), ``jacobian(t, q)`` (rows, k), and
-   ``velocity_terms(t, q, v)`` (rows,), the part of g'' without accelerations: g'' = G a + velocity_terms. It MUST provide
+   ``velocity_terms(t, q, v)`` (rows,), the part of g'' without accelerations: g'' = G a + velocity_terms. It
+   MUST provide
    ``rate(t, q)`` (rows,), the partial derivative of g with respect to time, if that is not zero.
    Positions enter g, never velocities; a prescribed rate is integrated to a prescribed position.
 4. ``start()`` gives start coordinates and velocities of the own coordinates (zeros by default).
 
 It MAY provide
 
-5. ``blocks()``: constant (C, K), both (k, k), with the force ``-C v - K q`` on the local coordinates: an elastic body in
+5. ``blocks()``: constant (C, K), both (k, k), with the force ``-C v - K q`` on the local coordinates: an
+elastic body in
    modal coordinates. ``force`` then holds only what is left. Absent: no linear part.
 6. ``force_jacobian(t, q, v)``: (df/dq, df/dv) of ``force``, both (k, k). Absent: finite differences, one call per
    coordinate, in the implicit integrator only.
-7. ``constant_jacobian = True`` when g is linear in q with constant coefficients and no time: such rows are eliminated at
+7. ``constant_jacobian = True`` when g is linear in q with constant coefficients and no time: such rows are
+eliminated at
    set-up by `gearfe.rigid.elimination` where an integrator profits. Absent: treated as any constraint.
-8. ``scene`` (a `Scene` and its tables): the Taylor recurrences of planar bodies known to the compiled kernels. The Taylor
+8. ``scene`` (a `Scene` and its tables): the Taylor recurrences of planar bodies known to the compiled kernels.
+The Taylor
    method runs when every element has one; otherwise ``method="auto"`` takes the explicit method of order 8 with
    projection, or, when the start is stiff, the implicit one.
 9. ``energy(q, v)``: (kinetic, potential) of the element. Absent: 1/2 v M v of its own coordinates, and zero.
@@ -149,7 +155,8 @@ class LocalForce(Element):
     law
         ``law(t, u, du) -> (p,)`` with u = W^T q, du = W^T v: any callable of state and time.
     compiled_law
-        The same law as ``compiled_law(t, u, du, parameters, out)``, a module-level function that numba can compile. When
+        The same law as ``compiled_law(t, u, du, parameters, out)``, a module-level function that numba can
+        compile. When
         every force of a linear system has the same one, the whole integration runs compiled; forces of different kinds
         share one function that looks at its parameters.
     parameters : ndarray

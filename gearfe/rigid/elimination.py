@@ -2,7 +2,8 @@
 
     q = q_p + T y,     T^T M T = 1,     T^T K T = diag(omega^2),     G T = 0
 
-so that y'' = -omega^2 y - T^T C T y' + T^T f with the remaining forces f: hinges of a gear train cost nothing afterwards.
+so that y'' = -omega^2 y - T^T C T y' + T^T f with the remaining forces f: hinges of a gear train cost nothing
+afterwards.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ class Minimal:
         q, v = self.origin + self.T @ y, self.T @ dy
         total = np.zeros(self.system.size)
         for element, index in self.system.forces:
-            np.add.at(total, index, element.force(t, q[index], v[index]))  # type: ignore[attr-defined]
+            np.add.at(total, index, element.force(t, q[index], v[index]))
         return self.T.T @ total
 
 

@@ -1,7 +1,8 @@
 """Explicit Runge-Kutta of order 8 (Dormand & Prince; Hairer, Norsett & Wanner I, Sec. II.10) with projection.
 
 Constrained systems are integrated in (q, v) with the accelerations of the index-1 form and projected onto position and
-velocity constraints after every step. Systems whose constraints are linear and constant run in minimal coordinates, where
+velocity constraints after every step. Systems whose constraints are linear and constant run in minimal
+coordinates, where
 the projection has nothing to do; there, forces with compiled laws run in a compiled loop (`gearfe.rigid.modal`).
 """
 
@@ -114,7 +115,7 @@ def on_constraints(system: System, t: float, q: Array, v: Array, active: np.ndar
 
 def step_through(
     rhs: Rhs, project: Rhs, t0: float, y0: Array, t1: float, breaks: Array, tolerance: float, longest: float, most: int
-):  # type: ignore[no-untyped-def]
+) -> tuple[Array, Array, Array, int, int]:
     """Adaptive steps from t0 to t1: (ends, states, polynomials, status, evaluations).
 
     The error is measured against the largest value that each component has had; steps end at `breaks`.
@@ -127,7 +128,8 @@ def step_through(
     n = y.size // 2
     scale = np.abs(y)
     h = first_step(y, K[0], abs(t1 - t0))
-    ends, states, polynomials = [t], [y], []
+    ends, states = [t], [y]
+    polynomials: list[Array] = []
     status, evaluations = 0, 1
     corners = sorted((b for b in breaks if sign * (b - t0) > 0 and sign * (t1 - b) > 0), key=lambda b: sign * b)
     goals = [*corners, t1]

@@ -1,7 +1,8 @@
 """Radau IIA of order 5 on the index-3 equations, for stiff and flexible systems.
 
 Three collocation stages of  M A = f(t, Q, V) - G^T Lambda,  g(t, Q) = 0  (Hairer & Wanner II, Secs. IV.8, VI.1, VII.4;
-the positions converge with order 5). After every step the velocities are projected onto G v = -dg/dt, and the multipliers
+the positions converge with order 5). After every step the velocities are projected onto G v = -dg/dt, and the
+multipliers
 follow from the accelerations, which restores the order of both. With Z = Q - q0 - c h v0 the stage accelerations are
 A^-2 Z / h^2, so Newton needs one real and one complex matrix of the size of the index-3 system:
 
@@ -131,25 +132,35 @@ class Step:
 
 
 def radau_step(
-    system: System, t: float, q: Array, v: Array, a: Array, multipliers: Array, h: float, limit: Array, active: np.ndarray
+    system: System,
+    t: float,
+    q: Array,
+    v: Array,
+    a: Array,
+    multipliers: Array,
+    h: float,
+    limit: Array,
+    active: np.ndarray,
 ) -> Step:
     """Simplified Newton on the three stages, and the embedded error estimate against `limit`."""
     n, m = system.size, int(active.sum())
-    by_q, by_v = system.force_jacobian(t, q, v)
-    curvature = joint_stiffness(system, t, q, multipliers)
-    G = system.jacobian(t, q)[active]
+    middle, middle_q, middle_v = t + h / 2, q + h / 2 * v + h * h / 8 * a, v + h / 2 * a
+    by_q, by_v = system.force_jacobian(middle, middle_q, middle_v)
+    curvature = joint_stiffness(system, middle, middle_q, multipliers)
+    G = system.jacobian(middle, middle_q)[active]
     M = system.mass
     solves = []
     for mu in MU[:2]:
         factor = mu.real if abs(mu.imag) < 1e-12 else mu
         top = factor**2 / h**2 * M - factor / h * by_v - by_q + curvature
-        solves.append(saddle_solver(top, G, h))
+        solves.append(saddle_solver(top, G))
     Z = 0.5 * (C * h)[:, None] ** 2 * a
     L = np.tile(multipliers[active], (3, 1))
     moved = math.inf
     converged = False
     iterations = 0
-    for iterations in range(1, MOST_NEWTON + 1):
+    while iterations < MOST_NEWTON:
+        iterations += 1
         V = v + INVERSE @ Z / h
         acceleration = INVERSE @ (INVERSE @ Z) / h**2
         rest, gaps = np.empty((3, n)), np.empty((3, m))
@@ -209,8 +220,8 @@ def joint_stiffness(system: System, t: float, q: Array, multipliers: Array) -> A
     return full
 
 
-def saddle_solver(top: Array, G: Array, h: float) -> Callable[[Array, Array], tuple[Array, Array]]:
-    """Solver of [[top, G^T], [G, 0]], scaled by h^2; sparse when it is large."""
+def saddle_solver(top: Array, G: Array) -> Callable[[Array, Array], tuple[Array, Array]]:
+    """Solver of [[top, G^T], [G, 0]], scaled; sparse when it is large."""
     n, m = len(top), len(G)
     scale = 1.0 / max(1e-300, float(np.abs(np.diagonal(top)).max()))
     matrix = np.zeros((n + m, n + m), dtype=top.dtype)

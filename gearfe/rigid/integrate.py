@@ -15,7 +15,8 @@ from .system import System
 from .trajectory import Trajectory
 
 METHODS = ("auto", "taylor", "explicit", "implicit")
-#: Asked tolerance -> largest last term of a Taylor step. The benchmark mechanisms amplify local errors some hundred times.
+#: Asked tolerance -> largest last term of a Taylor step. The benchmark mechanisms amplify local errors some
+#: hundred times.
 LOCAL_SHARE = 5e-4
 
 

@@ -1,7 +1,8 @@
 # mypy: ignore-errors
 """Projection onto the constraints, and passing singular positions: where they are, and the state on them.
 
-At a passing singular position (fold) a combination z^T g of the constraints loses its gradient, G^T z = 0, while the motion
+At a passing singular position (fold) a combination z^T g of the constraints loses its gradient, G^T z = 0,
+while the motion
 carries it through zero: B = d(G^T z)/dt != 0. Two branches cross there. The motion continues on the one its velocity
 selects: z^T G v = 0 holds the position to it, z^T g'' = 0 its velocity, and both are linear in the direction B.
 """
@@ -64,8 +65,8 @@ def project(tb, t, forward, q, v, base, length, w):
     for _ in range(2):
         times_gradients(rows, w.G, v, w.mu)
         for r in range(w.mu.shape[0]):
-            if rows.index[r, 3] >= 0:
-                w.mu[r] -= w.TF[rows.index[r, 3], 1]
+            if rows.ints[r, 3] >= 0:
+                w.mu[r] -= w.TF[rows.ints[r, 3], 1]
         least_norm(rows, plan, mass, w.G, w.val, base, w.mu, w.F, v)
     if change >= 1e-9 or not np.isfinite(change):
         first = np.inf
@@ -73,9 +74,10 @@ def project(tb, t, forward, q, v, base, length, w):
 
 
 def fold_ahead(tb, q, v, where, w):
-    """Time from here to the nearest fold, judged from z = S^-1 e_where: (time, share of G^T z that its passing removes)."""
+    """Time from here to the nearest fold, judged from z = S^-1 e_where: (time, share of G^T z that its passing
+    removes)."""
     rows, plan, mass, fold = tb.rows, tb.plan, tb.mass, w.fold
-    m = rows.index.shape[0]
+    m = rows.ints.shape[0]
     fill(w.mu, 0.0)
     w.mu[where] = 1.0
     solve(plan, w.val, w.mu)
@@ -101,7 +103,7 @@ def fold_ahead(tb, q, v, where, w):
 def fold_frame(tb, q, v, folds, w):
     """At a state with the rows fold.drop[:folds] left out: Z, B, the bordered system and p = G^T Z (in fold.P)."""
     rows, plan, mass, fold = tb.rows, tb.plan, tb.mass, w.fold
-    m = rows.index.shape[0]
+    m = rows.ints.shape[0]
     trigonometry(q, w.c, w.s)
     gradients(rows, q, w.c, w.s, w.G)
     gradient_rates(rows, q, v, w.c, w.s, w.H)
@@ -181,10 +183,11 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, sm
     """Time (from the point of expansion) and state of the fold near `guess`; folds = 0 when there is none.
 
     Newton on: regular rows of g = 0, z^T G v = 0, and time such that B . G^T z = 0. It is a true crossing when z^T g
-    vanishes there too (rows with pivots below `small` count as passing at the same moment); a near miss (rod a little longer than the crank) leaves a residual and is integrated as usual.
+    vanishes there too (rows with pivots below `small` count as passing at the same moment); a near miss (rod a
+    little longer than the crank) leaves a residual and is integrated as usual.
     """
     rows, mass, fold = tb.rows, tb.mass, w.fold
-    m = rows.index.shape[0]
+    m = rows.ints.shape[0]
     n = q.shape[0]
     folds = 1
     fold.drop[0] = where
@@ -196,7 +199,7 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, sm
     h = guess
     quality = np.inf
     near = 0
-    for sweep in range(25):
+    for _ in range(25):
         evaluate(QS, order, h, q, v)
         for i in range(n):
             q[i] += w.dq[i]
@@ -228,8 +231,8 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, sm
         # position: g_reg and z^T (G v - df/dt)
         times_gradients(rows, w.G, v, w.mu)
         for r in range(m):
-            if rows.index[r, 3] >= 0:
-                w.mu[r] -= w.TF[rows.index[r, 3], 1]
+            if rows.ints[r, 3] >= 0:
+                w.mu[r] -= w.TF[rows.ints[r, 3], 1]
         for p in range(folds):
             fold.nu[p] = fold_combination(fold, p, w.mu)
         residuals(rows, q, w.c, w.s, w.TF[:, 0], w.mu)
@@ -245,14 +248,14 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, sm
         # velocity: G_reg v - df/dt and half of z^T g'' (linear in v along B)
         times_gradients(rows, w.H, v, w.mu)
         for r in range(m):
-            if rows.index[r, 3] >= 0:
-                w.mu[r] -= 2.0 * w.TF[rows.index[r, 3], 2]
+            if rows.ints[r, 3] >= 0:
+                w.mu[r] -= 2.0 * w.TF[rows.ints[r, 3], 2]
         for p in range(folds):
             fold.nu[p] = 0.5 * fold_combination(fold, p, w.mu)
         times_gradients(rows, w.G, v, w.mu)
         for r in range(m):
-            if rows.index[r, 3] >= 0:
-                w.mu[r] -= w.TF[rows.index[r, 3], 1]
+            if rows.ints[r, 3] >= 0:
+                w.mu[r] -= w.TF[rows.ints[r, 3], 1]
         copy(v, w.work)
         fold_change(tb, folds, w, v)
         for i in range(n):

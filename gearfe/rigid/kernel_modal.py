@@ -1,7 +1,8 @@
 # mypy: ignore-errors
 """Compiled loop of the explicit method of order 8 in modal coordinates; the same steps as `explicit.step_through`.
 
-`law(t, u, du, parameters, out)` is bound by name: forces `out` along the directions, from u = W y + offset and du = W y'.
+`law(t, u, du, parameters, out)` is bound by name: forces `out` along the directions, from u = W y + offset and
+du = W y'.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ def modal_rhs(squares, damping, diagonal, full, constant, W, offset, first, para
 
 
 def modal_steps(
-    squares, damping, diagonal, full, constant, W, offset, first, parameters, A, B, C, E3, E5, D,
+    squares, damping, diagonal, full, constant, W, offset, first, parameters, A, C, E3, E5, D,
     t, t1, y, h, scale, breaks, tolerance, longest, T, Y, P,
 ):  # fmt: skip
     """Steps until t1 or until the arrays are full: (status, steps, time, next step, evaluations)."""
@@ -89,7 +90,7 @@ def modal_steps(
         top_q = 0.0
         top_v = 0.0
         for i in range(n2):
-            limit[i] = max(max(scale[i], abs(z[i])), step * abs(K[12, i])) * tolerance + 1e-300
+            limit[i] = max(scale[i], abs(z[i]), step * abs(K[12, i])) * tolerance + 1e-300
             if i < n:
                 top_q = max(top_q, limit[i])
             else:

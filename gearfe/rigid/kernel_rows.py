@@ -1,5 +1,6 @@
 # mypy: ignore-errors
-"""Constraint rows of a planar scene: residuals, gradients, S = G M^-1 G^T = L D L^T. Plain loops, compiled when numba is.
+"""Constraint rows of a planar scene: residuals, gradients, S = G M^-1 G^T = L D L^T. Plain loops, compiled
+when numba is.
 
 The functions here are written in the subset of Python that numba compiles; `gearfe.rigid.compiled` binds them together.
 Coordinates q hold (x, y, theta) of every body and of the ground, shape (3 (n + 1),).
@@ -33,20 +34,22 @@ def trigonometry(q, c, s):
 
 def gradients(rows, q, c, s, G):
     """G[r, side] = gradient of row r with respect to (x, y, theta) of its body on that side; shape (m, 2, 3)."""
-    for r in range(rows.index.shape[0]):
-        if rows.index[r, 2] == 0:
+    for r in range(rows.ints.shape[0]):
+        if rows.ints[r, 2] == 0:
             for a in range(2):
-                b = rows.index[r, a]
-                G[r, a, 0] = rows.value[r, 5 * a]
-                G[r, a, 1] = rows.value[r, 5 * a + 1]
-                G[r, a, 2] = rows.value[r, 5 * a + 2] - rows.value[r, 5 * a + 3] * s[b] + rows.value[r, 5 * a + 4] * c[b]
+                b = rows.ints[r, a]
+                G[r, a, 0] = rows.reals[r, 5 * a]
+                G[r, a, 1] = rows.reals[r, 5 * a + 1]
+                G[r, a, 2] = (
+                    rows.reals[r, 5 * a + 2] - rows.reals[r, 5 * a + 3] * s[b] + rows.reals[r, 5 * a + 4] * c[b]
+                )
         else:
-            a = rows.index[r, 0]
-            b = rows.index[r, 1]
-            nx = c[a] * rows.value[r, 10] - s[a] * rows.value[r, 11]
-            ny = s[a] * rows.value[r, 10] + c[a] * rows.value[r, 11]
-            rx = c[b] * rows.value[r, 12] - s[b] * rows.value[r, 13]
-            ry = s[b] * rows.value[r, 12] + c[b] * rows.value[r, 13]
+            a = rows.ints[r, 0]
+            b = rows.ints[r, 1]
+            nx = c[a] * rows.reals[r, 10] - s[a] * rows.reals[r, 11]
+            ny = s[a] * rows.reals[r, 10] + c[a] * rows.reals[r, 11]
+            rx = c[b] * rows.reals[r, 12] - s[b] * rows.reals[r, 13]
+            ry = s[b] * rows.reals[r, 12] + c[b] * rows.reals[r, 13]
             dx = q[3 * b] + rx - q[3 * a]
             dy = q[3 * b + 1] + ry - q[3 * a + 1]
             G[r, 0, 0] = -nx
@@ -59,23 +62,23 @@ def gradients(rows, q, c, s, G):
 
 def gradient_rates(rows, q, v, c, s, H):
     """H = dG/dt along the velocity v, same layout as G."""
-    for r in range(rows.index.shape[0]):
-        if rows.index[r, 2] == 0:
+    for r in range(rows.ints.shape[0]):
+        if rows.ints[r, 2] == 0:
             for a in range(2):
-                b = rows.index[r, a]
+                b = rows.ints[r, a]
                 w = v[3 * b + 2]
                 H[r, a, 0] = 0.0
                 H[r, a, 1] = 0.0
-                H[r, a, 2] = -w * (rows.value[r, 5 * a + 3] * c[b] + rows.value[r, 5 * a + 4] * s[b])
+                H[r, a, 2] = -w * (rows.reals[r, 5 * a + 3] * c[b] + rows.reals[r, 5 * a + 4] * s[b])
         else:
-            a = rows.index[r, 0]
-            b = rows.index[r, 1]
+            a = rows.ints[r, 0]
+            b = rows.ints[r, 1]
             wa = v[3 * a + 2]
             wb = v[3 * b + 2]
-            nx = c[a] * rows.value[r, 10] - s[a] * rows.value[r, 11]
-            ny = s[a] * rows.value[r, 10] + c[a] * rows.value[r, 11]
-            rx = c[b] * rows.value[r, 12] - s[b] * rows.value[r, 13]
-            ry = s[b] * rows.value[r, 12] + c[b] * rows.value[r, 13]
+            nx = c[a] * rows.reals[r, 10] - s[a] * rows.reals[r, 11]
+            ny = s[a] * rows.reals[r, 10] + c[a] * rows.reals[r, 11]
+            rx = c[b] * rows.reals[r, 12] - s[b] * rows.reals[r, 13]
+            ry = s[b] * rows.reals[r, 12] + c[b] * rows.reals[r, 13]
             dx = q[3 * b] + rx - q[3 * a]
             dy = q[3 * b + 1] + ry - q[3 * a + 1]
             ux = v[3 * b] - wb * ry - v[3 * a]
@@ -90,32 +93,32 @@ def gradient_rates(rows, q, v, c, s, H):
 
 def residuals(rows, q, c, s, f, g):
     """Value of every row; f holds the value of every time function."""
-    for r in range(rows.index.shape[0]):
-        a = rows.index[r, 0]
-        b = rows.index[r, 1]
-        value = rows.value[r, 14]
-        if rows.index[r, 3] >= 0:
-            value -= f[rows.index[r, 3]]
-        if rows.index[r, 2] == 0:
+    for r in range(rows.ints.shape[0]):
+        a = rows.ints[r, 0]
+        b = rows.ints[r, 1]
+        value = rows.reals[r, 14]
+        if rows.ints[r, 3] >= 0:
+            value -= f[rows.ints[r, 3]]
+        if rows.ints[r, 2] == 0:
             for side in range(2):
-                k = rows.index[r, side]
-                value += rows.value[r, 5 * side] * q[3 * k] + rows.value[r, 5 * side + 1] * q[3 * k + 1]
-                value += rows.value[r, 5 * side + 2] * q[3 * k + 2]
-                value += rows.value[r, 5 * side + 3] * c[k] + rows.value[r, 5 * side + 4] * s[k]
+                k = rows.ints[r, side]
+                value += rows.reals[r, 5 * side] * q[3 * k] + rows.reals[r, 5 * side + 1] * q[3 * k + 1]
+                value += rows.reals[r, 5 * side + 2] * q[3 * k + 2]
+                value += rows.reals[r, 5 * side + 3] * c[k] + rows.reals[r, 5 * side + 4] * s[k]
         else:
-            nx = c[a] * rows.value[r, 10] - s[a] * rows.value[r, 11]
-            ny = s[a] * rows.value[r, 10] + c[a] * rows.value[r, 11]
-            dx = q[3 * b] + c[b] * rows.value[r, 12] - s[b] * rows.value[r, 13] - q[3 * a]
-            dy = q[3 * b + 1] + s[b] * rows.value[r, 12] + c[b] * rows.value[r, 13] - q[3 * a + 1]
+            nx = c[a] * rows.reals[r, 10] - s[a] * rows.reals[r, 11]
+            ny = s[a] * rows.reals[r, 10] + c[a] * rows.reals[r, 11]
+            dx = q[3 * b] + c[b] * rows.reals[r, 12] - s[b] * rows.reals[r, 13] - q[3 * a]
+            dy = q[3 * b + 1] + s[b] * rows.reals[r, 12] + c[b] * rows.reals[r, 13] - q[3 * a + 1]
             value += nx * dx + ny * dy
         g[r] = value
 
 
 def times_gradients(rows, G, u, out):
     """out = G u, one number per row."""
-    for r in range(rows.index.shape[0]):
-        a = 3 * rows.index[r, 0]
-        b = 3 * rows.index[r, 1]
+    for r in range(rows.ints.shape[0]):
+        a = 3 * rows.ints[r, 0]
+        b = 3 * rows.ints[r, 1]
         out[r] = (
             G[r, 0, 0] * u[a] + G[r, 0, 1] * u[a + 1] + G[r, 0, 2] * u[a + 2]
             + G[r, 1, 0] * u[b] + G[r, 1, 1] * u[b + 1] + G[r, 1, 2] * u[b + 2]
@@ -124,9 +127,9 @@ def times_gradients(rows, G, u, out):
 
 def add_transposed(rows, G, mu, factor, out):
     """out += factor G^T mu."""
-    for r in range(rows.index.shape[0]):
+    for r in range(rows.ints.shape[0]):
         for side in range(2):
-            b = 3 * rows.index[r, side]
+            b = 3 * rows.ints[r, side]
             value = factor * mu[r]
             out[b] += G[r, side, 0] * value
             out[b + 1] += G[r, side, 1] * value
@@ -138,7 +141,7 @@ def factorise(rows, plan, mass, G, skip, val, diag):
 
     Returns the smallest pivot relative to its diagonal of S, and its row (-1 when there is none).
     """
-    m = rows.index.shape[0]
+    m = rows.ints.shape[0]
     fill(val, 0.0)
     for e in range(plan.entry.shape[0]):
         r = plan.entry[e, 1]
@@ -190,7 +193,8 @@ def solve(plan, val, x):
 
 
 def time_series(times, t, forward, orders, out):
-    """Taylor coefficients of every time function at t, on the piece ahead in the direction of travel; (functions, orders)."""
+    """Taylor coefficients of every time function at t, on the piece ahead in the direction of travel;
+    (functions, orders)."""
     width = times.factor.shape[1]
     for k in range(times.first.shape[0] - 1):
         p = times.first[k]
@@ -215,7 +219,8 @@ def time_series(times, t, forward, orders, out):
 
 
 def least_norm(rows, plan, mass, G, val, skip, rhs, work, u):
-    """u -= M^-1 G^T S^-1 rhs: the smallest change (in the mass norm) that lowers G u by rhs. Returns its largest entry."""
+    """u -= M^-1 G^T S^-1 rhs: the smallest change (in the mass norm) that lowers G u by rhs. Returns its
+    largest entry."""
     for r in range(rhs.shape[0]):
         if skip[r] != 0:
             rhs[r] = 0.0

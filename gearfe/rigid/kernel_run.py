@@ -1,8 +1,10 @@
 # mypy: ignore-errors
-"""The integration loop of the Taylor method: expand, choose the step, land, project; land on folds rather than jump them.
+"""The integration loop of the Taylor method: expand, choose the step, land, project; land on folds rather than
+jump them.
 
 Step length from the last two coefficients (Jorba & Zou, Exp. Math. 14 (2005) 99): |q_N| h^N <= tolerance in units of
-`length` and 1 rad. A series started at the distance d from a fold amplifies round-off by (h/d)^N beyond it, so a step never
+`length` and 1 rad. A series started at the distance d from a fold amplifies round-off by (h/d)^N beyond it, so
+a step never
 crosses a fold: it ends there, and the next one is expanded there with the bordered equations of `kernel_series`.
 """
 
@@ -113,7 +115,8 @@ def begin(tb, t, sign, q, v, order, tolerance, length, base, none, w, qn, vn):
 def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, close, w, qn, vn):
     """End of a step of at most |h|: (step, folds there, time to the next fold, status); the state is in qn, vn.
 
-    A fold ahead within `close` (0.7 of the last step) is landed on even when |h| is shorter: so close to it, round-off in
+    A fold ahead within `close` (0.7 of the last step) is landed on even when |h| is shorter: so close to it,
+    round-off in
     the last coefficients and not the motion sets |h|.
     """
     forward = sign > 0.0
@@ -199,7 +202,20 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
         elif size > 0.5 * remains:
             size = 0.5 * remains
         h, next_folds, next_ahead, status = land(
-            tb, t, sign, sign * size, order, tolerance, length, base, folds, ahead, min(0.7 * last, remains), w, w.qn, w.vn
+            tb,
+            t,
+            sign,
+            sign * size,
+            order,
+            tolerance,
+            length,
+            base,
+            folds,
+            ahead,
+            min(0.7 * last, remains),
+            w,
+            w.qn,
+            w.vn,
         )
         if status != DONE:
             break

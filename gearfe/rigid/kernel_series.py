@@ -1,16 +1,19 @@
 # mypy: ignore-errors
 """Taylor series of the index-3 equations of a planar scene about one point.
 
-With q(t) = sum_j q_j (t - t0)^j and the multipliers likewise, order k of the motion and order k + 2 of the constraints read
+With q(t) = sum_j q_j (t - t0)^j and the multipliers likewise, order k of the motion and order k + 2 of the
+constraints read
 
     M (k+2)(k+1) q_{k+2} + G_0^T lambda_k = f_k - sum_{i>=1} G_i^T lambda_{k-i},       G_0 q_{k+2} = -r_{k+2}
 
-with r the part of the constraint that lower orders fix. One factorisation of S = G_0 M^-1 G_0^T serves all orders. Sines and
+with r the part of the constraint that lower orders fix. One factorisation of S = G_0 M^-1 G_0^T serves all
+orders. Sines and
 cosines follow from s' = c theta', c' = -s theta' (Barrio, Appl. Math. Comput. 163 (2005) 525); every force that acts at
 a point of a body enters through two sums A, B with the torque s A + c B, so the price does not depend on the joints.
 
 At a passing singular position (fold) some rows Z^T G_0 vanish while B = Z^T dG/dt does not. There order k + 3 of Z^T g
-fixes q_{k+2} along B, and the multipliers have a simple pole: lambda = (Z nu_0)/t + ... . Both conditions together give the
+fixes q_{k+2} along B, and the multipliers have a simple pole: lambda = (Z nu_0)/t + ... . Both conditions
+together give the
 bordered system with the rows B; multipliers are then stored one order up ("shift").
 """
 
@@ -46,26 +49,26 @@ def slot_orders(rows, QS, bs, ls, j):
     """Orders j of the normal n and the distance D of every moving line, from the orders j of q, sine and cosine."""
     for k in range(rows.lines.shape[0]):
         r = rows.lines[k]
-        a = rows.index[r, 0]
-        b = rows.index[r, 1]
-        ls[NX, j, k] = bs[CS, j, a] * rows.value[r, 10] - bs[SN, j, a] * rows.value[r, 11]
-        ls[NY, j, k] = bs[SN, j, a] * rows.value[r, 10] + bs[CS, j, a] * rows.value[r, 11]
-        rx = bs[CS, j, b] * rows.value[r, 12] - bs[SN, j, b] * rows.value[r, 13]
-        ry = bs[SN, j, b] * rows.value[r, 12] + bs[CS, j, b] * rows.value[r, 13]
+        a = rows.ints[r, 0]
+        b = rows.ints[r, 1]
+        ls[NX, j, k] = bs[CS, j, a] * rows.reals[r, 10] - bs[SN, j, a] * rows.reals[r, 11]
+        ls[NY, j, k] = bs[SN, j, a] * rows.reals[r, 10] + bs[CS, j, a] * rows.reals[r, 11]
+        rx = bs[CS, j, b] * rows.reals[r, 12] - bs[SN, j, b] * rows.reals[r, 13]
+        ry = bs[SN, j, b] * rows.reals[r, 12] + bs[CS, j, b] * rows.reals[r, 13]
         ls[DX, j, k] = QS[j, 3 * b] + rx - QS[j, 3 * a]
         ls[DY, j, k] = QS[j, 3 * b + 1] + ry - QS[j, 3 * a + 1]
 
 
 def row_orders(rows, TF, bs, ls, j, out):
     """Order j >= 2 of every constraint row without the part of q_j."""
-    for r in range(rows.index.shape[0]):
+    for r in range(rows.ints.shape[0]):
         value = 0.0
-        if rows.index[r, 3] >= 0:
-            value = -TF[rows.index[r, 3], j]
-        if rows.index[r, 2] == 0:
+        if rows.ints[r, 3] >= 0:
+            value = -TF[rows.ints[r, 3], j]
+        if rows.ints[r, 2] == 0:
             for side in range(2):
-                b = rows.index[r, side]
-                value += rows.value[r, 5 * side + 3] * bs[CS, j, b] + rows.value[r, 5 * side + 4] * bs[SN, j, b]
+                b = rows.ints[r, side]
+                value += rows.reals[r, 5 * side + 3] * bs[CS, j, b] + rows.reals[r, 5 * side + 4] * bs[SN, j, b]
         out[r] = value
     for k in range(rows.lines.shape[0]):
         value = 0.0
@@ -77,11 +80,16 @@ def row_orders(rows, TF, bs, ls, j, out):
 def spring_orders(forces, QS, bs, es, j):
     """Order j of the span D, length L and 1/L of every spring."""
     for k in range(es.shape[2]):
-        a = forces.index[k, 1]
-        b = forces.index[k, 2]
-        p = forces.value[k]
+        a = forces.ints[k, 1]
+        b = forces.ints[k, 2]
+        p = forces.reals[k]
         es[EX, j, k] = (
-            QS[j, 3 * b] - QS[j, 3 * a] + bs[CS, j, b] * p[2] - bs[SN, j, b] * p[3] - bs[CS, j, a] * p[0] + bs[SN, j, a] * p[1]
+            QS[j, 3 * b]
+            - QS[j, 3 * a]
+            + bs[CS, j, b] * p[2]
+            - bs[SN, j, b] * p[3]
+            - bs[CS, j, a] * p[0]
+            + bs[SN, j, a] * p[1]
         )
         es[EY, j, k] = (
             QS[j, 3 * b + 1] - QS[j, 3 * a + 1] + bs[SN, j, b] * p[2] + bs[CS, j, b] * p[3]
@@ -110,12 +118,12 @@ def force_orders(forces, QS, TF, bs, es, k, at, F):
     for b in range(bs.shape[2]):
         bs[AS, at, b] = 0.0
         bs[BS, at, b] = 0.0
-    for e in range(forces.index.shape[0]):
-        kind = forces.index[e, 0]
-        a = forces.index[e, 1]
-        b = forces.index[e, 2]
-        first = forces.value[e, 0]
-        second = forces.value[e, 1]
+    for e in range(forces.ints.shape[0]):
+        kind = forces.ints[e, 0]
+        a = forces.ints[e, 1]
+        b = forces.ints[e, 2]
+        first = forces.reals[e, 0]
+        second = forces.reals[e, 1]
         if kind == SPRING:
             fx, fy = spring_force(forces, es, k, e)
             F[3 * a] += fx
@@ -124,32 +132,32 @@ def force_orders(forces, QS, TF, bs, es, k, at, F):
             F[3 * b + 1] -= fy
             bs[AS, at, a] -= first * fx + second * fy
             bs[BS, at, a] += first * fy - second * fx
-            bs[AS, at, b] += forces.value[e, 2] * fx + forces.value[e, 3] * fy
-            bs[BS, at, b] -= forces.value[e, 2] * fy - forces.value[e, 3] * fx
+            bs[AS, at, b] += forces.reals[e, 2] * fx + forces.reals[e, 3] * fy
+            bs[BS, at, b] -= forces.reals[e, 2] * fy - forces.reals[e, 3] * fx
         elif kind == LINEAR:
             value = -first * (QS[k, a] - QS[k, b]) - second * (k + 1) * (QS[k + 1, a] - QS[k + 1, b])
             if k == 0:
-                value += first * forces.value[e, 2]
+                value += first * forces.reals[e, 2]
             F[a] += value
             F[b] -= value
         elif kind == LOAD:
-            fx = TF[forces.index[e, 3], k]
-            fy = TF[forces.index[e, 4], k]
+            fx = TF[forces.ints[e, 3], k]
+            fy = TF[forces.ints[e, 4], k]
             F[3 * a] += fx
             F[3 * a + 1] += fy
             bs[AS, at, a] -= first * fx + second * fy
             bs[BS, at, a] += first * fy - second * fx
         else:
-            value = TF[forces.index[e, 3], k]
+            value = TF[forces.ints[e, 3], k]
             F[3 * a + 2] += value
             F[3 * b + 2] -= value
 
 
 def spring_force(forces, es, k, e):
     """Order k of the force of spring e on its first point: (k_s (L - L0) + c L') / L times the span."""
-    stiffness = forces.value[e, 4]
-    damping = forces.value[e, 5]
-    value = -stiffness * forces.value[e, 6] * es[EI, k, e]
+    stiffness = forces.reals[e, 4]
+    damping = forces.reals[e, 5]
+    value = -stiffness * forces.reals[e, 6] * es[EI, k, e]
     if k == 0:
         value += stiffness
     if damping != 0.0:
@@ -178,8 +186,8 @@ def slot_forces(rows, LM, bs, ls, at, F):
         turn = 0.0
         for i in range(at + 1):
             turn += ls[FX, i, k] * ls[DY, at - i, k] - ls[FY, i, k] * ls[DX, at - i, k]
-        a = rows.index[r, 0]
-        b = rows.index[r, 1]
+        a = rows.ints[r, 0]
+        b = rows.ints[r, 1]
         F[3 * a] += fx
         F[3 * a + 1] += fy
         F[3 * a + 2] -= turn
@@ -190,22 +198,23 @@ def slot_forces(rows, LM, bs, ls, at, F):
 
 def slot_arms(rows, bs, at, r, b, fx, fy):
     """Reaction (fx, fy) of the moving line r on the point of body b, in the sums A and B."""
-    x = rows.value[r, 12]
-    y = rows.value[r, 13]
+    x = rows.reals[r, 12]
+    y = rows.reals[r, 13]
     bs[AS, at, b] += x * fx + y * fy
     bs[BS, at, b] -= x * fy - y * fx
 
 
 def add_multipliers(rows, LM, bs, ls, at, values):
-    """Multipliers `values` (one per row) join order `at`: what turns with a body goes into A, B, and into the lines' forces."""
+    """Multipliers `values` (one per row) join order `at`: what turns with a body goes into A, B, and into the
+    lines' forces."""
     for r in range(values.shape[0]):
         value = values[r]
         LM[at, r] += value
-        if rows.index[r, 2] == 0:
+        if rows.ints[r, 2] == 0:
             for side in range(2):
-                b = rows.index[r, side]
-                bs[AS, at, b] += rows.value[r, 5 * side + 3] * value
-                bs[BS, at, b] -= rows.value[r, 5 * side + 4] * value
+                b = rows.ints[r, side]
+                bs[AS, at, b] += rows.reals[r, 5 * side + 3] * value
+                bs[BS, at, b] -= rows.reals[r, 5 * side + 4] * value
     add_line_multipliers(rows, bs, ls, at, 0, values)
 
 
@@ -217,7 +226,7 @@ def add_line_multipliers(rows, bs, ls, at, i, values):
         fy = ls[NY, i, k] * values[r]
         ls[FX, at, k] += fx
         ls[FY, at, k] += fy
-        slot_arms(rows, bs, at, r, rows.index[r, 1], fx, fy)
+        slot_arms(rows, bs, at, r, rows.ints[r, 1], fx, fy)
 
 
 def torque_orders(bs, at, F):
@@ -329,7 +338,8 @@ def fold_rows(rows, QS, TF, bs, ls, fold, work, u, j, folds):
 
 
 def fold_solve(plan, val, fold, mu, folds):
-    """Bordered solve: in come the regular right-hand side in mu and the one of the rows B in nu; out the multipliers."""
+    """Bordered solve: in come the regular right-hand side in mu and the one of the rows B in nu; out the
+    multipliers."""
     for p in range(folds):
         for r in range(mu.shape[0]):
             fold.nu[p] -= fold.Y[p, r] * mu[r]

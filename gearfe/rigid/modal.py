@@ -1,6 +1,7 @@
 """Explicit integration of order 8 in minimal (modal) coordinates: y'' = -omega^2 y - C y' + W^T phi(t, W y, W y').
 
-With forces that are all `LocalForce` with one ``compiled_law`` the whole loop is compiled; otherwise each stage calls Python.
+With forces that are all `LocalForce` with one ``compiled_law`` the whole loop is compiled; otherwise each
+stage calls Python.
 """
 
 from __future__ import annotations
@@ -82,15 +83,16 @@ def _compiled_steps(core, laws, t0, y0, t1, tolerance, longest, most, rhs):  # t
     full = not np.array_equal(core.damping, np.diag(diagonal))
     h0 = first_step(y0, rhs(t0, y0), abs(t1 - t0))
     room = 256
-    ends, states, polynomials = [np.array([t0])], [y0[None, :]], []
+    ends, states = [np.array([t0])], [y0[None, :]]
+    polynomials: list[Array] = []
     t, y, h, status, evaluations = t0, y0.copy(), h0, 2, 0
     scale = np.abs(y0)
     breaks = core.system.breaks
-    while status == 2 and sum(len(p) for p in polynomials) < most:
-        room = min(room, most - sum(len(p) for p in polynomials))
+    while status == 2 and sum(map(len, polynomials)) < most:
+        room = min(room, most - sum(map(len, polynomials)))
         T, Y, P = np.empty(room), np.empty((room, 2 * n)), np.empty((room, 7, 2 * n))
         status, count, t, h, calls = _kernels(laws[0][0].compiled_law).modal_steps(
-            core.squares, core.damping, diagonal, full, core.constant, W, offset, first, parameters, tab.A, tab.B,
+            core.squares, core.damping, diagonal, full, core.constant, W, offset, first, parameters, tab.A,
             tab.C, tab.E3, tab.E5, tab.D, t, t1, y, h, scale, breaks, tolerance, longest, T, Y, P,
         )  # fmt: skip
         evaluations += calls

@@ -1,6 +1,7 @@
 """Planar bodies, joints and forces as plain data: what a mechanism consists of, nothing about how it is solved.
 
-A body carries a frame: points, the mass centre and joint directions are written in that frame (m); the start pose is the
+A body carries a frame: points, the mass centre and joint directions are written in that frame (m); the start
+pose is the
 position of the frame's origin and its angle. The ground is the body named ``"ground"`` with its frame at rest.
 """
 
@@ -216,7 +217,11 @@ class Scene:
         object.__setattr__(self, "body_index", index)
         for k, part in enumerate((*self.joints, *self.forces)):
             label = f"{type(part).__name__.lower()} {getattr(part, 'name', '') or k}"
-            used = [getattr(part, key) for key in ("a", "b", "body", "line", "relative_to", "reaction") if hasattr(part, key)]
+            used = [
+                getattr(part, key)
+                for key in ("a", "b", "body", "line", "relative_to", "reaction")
+                if hasattr(part, key)
+            ]
             for name in used:
                 if name not in index:
                     raise unknown_name(label, name, index)

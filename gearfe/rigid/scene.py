@@ -28,8 +28,8 @@ class PlanarScene(Element):
         self.rows = len(self.assembly.row_label)
         self.row_names = self.assembly.row_label
         self.breaks = self.assembly.breaks
-        self._index = self.assembly.tables.rows.index
-        self._value = self.assembly.tables.rows.value
+        self._index = self.assembly.tables.rows.ints
+        self._value = self.assembly.tables.rows.reals
 
     def mass(self) -> Array:
         """Diagonal of masses and inertias."""
@@ -145,11 +145,11 @@ class PlanarScene(Element):
         forces = self.assembly.tables.forces
         p = _pose(q)
         full = np.append(v, np.zeros(3)).reshape(-1, 3)
-        for index, value in zip(forces.index, forces.value, strict=True):
+        for index, value in zip(forces.ints, forces.reals, strict=True):
             a, b = int(index[1]), int(index[2])
             if index[0] == 0:
                 arms = _arms(p, index, value)
-                span, length, unit, speed = _span(p, full, index, arms)
+                _, length, unit, speed = _span(p, full, index, arms)
                 k, damping, free = value[4:]
                 where = np.r_[3 * a : 3 * a + 3, 3 * b : 3 * b + 3]
                 J = np.zeros((2, 6))  # d(span)/d(poses)
@@ -188,7 +188,7 @@ class PlanarScene(Element):
         p = _pose(q)
         flat = np.append(q, np.zeros(3))
         energy = -float(forces.weight @ flat)
-        for index, value in zip(forces.index, forces.value, strict=True):
+        for index, value in zip(forces.ints, forces.reals, strict=True):
             if index[0] == 0:
                 _, length, _, _ = _span(p, None, index, _arms(p, index, value))
                 energy += 0.5 * value[4] * (length - value[6]) ** 2
@@ -203,7 +203,7 @@ class PlanarScene(Element):
         flat_q, flat = np.append(q, np.zeros(3)), np.append(v, np.zeros(3))
         full = flat.reshape(-1, 3)
         power = 0.0
-        for index, value in zip(forces.index, forces.value, strict=True):
+        for index, value in zip(forces.ints, forces.reals, strict=True):
             a, b = int(index[1]), int(index[2])
             if index[0] == 0:
                 arms = _arms(p, index, value)

@@ -1,4 +1,5 @@
-"""Consistent start and freedoms: projection onto the constraints, forced values, redundant and passing-singular rows."""
+"""Consistent start and freedoms: projection onto the constraints, forced values, redundant and
+passing-singular rows."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ DEPENDENT = 1e-7
 
 @dataclass(frozen=True)
 class Forced:
-    """A start value that must hold: ``value(q) = target`` for positions, ``gradient(q) . v = target`` for velocities."""
+    """A start value that must hold: ``value(q) = target`` for positions, ``gradient(q) . v = target`` for
+    velocities."""
 
     label: str
     target: float

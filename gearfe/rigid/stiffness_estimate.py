@@ -36,4 +36,4 @@ def _has_springs(system: System) -> bool:
     scene = system.planar
     if scene is None:
         return bool(system.forces)
-    return bool((scene.assembly.tables.forces.index[:, 0] < 2).any())
+    return bool((scene.assembly.tables.forces.ints[:, 0] < 2).any())

@@ -18,7 +18,8 @@ class System:
     Parameters
     ----------
     elements
-        Bodies, joints and forces that follow the contract in `gearfe.rigid.contract`; bodies before those that touch them.
+        Bodies, joints and forces that follow the contract in `gearfe.rigid.contract`; bodies before those that
+        touch them.
     """
 
     def __init__(self, elements: Sequence[Element]) -> None:
@@ -75,7 +76,7 @@ class System:
         """All applied forces, the linear parts included; shape (size,)."""
         total = -(self.damping @ v + self.stiffness @ q) if self.linear else np.zeros(self.size)
         for element, index in self.forces:
-            np.add.at(total, index, element.force(t, q[index], v[index]))  # type: ignore[attr-defined]
+            np.add.at(total, index, element.force(t, q[index], v[index]))
         return total
 
     def force_jacobian(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
@@ -106,7 +107,7 @@ class System:
         full = np.zeros((self.rows, self.size))
         at = 0
         for element, index in self.joints:
-            np.add.at(full[at : at + element.rows], (slice(None), index), element.jacobian(t, q[index]))  # type: ignore[attr-defined]
+            full[at : at + element.rows, index] += element.jacobian(t, q[index])  # type: ignore[attr-defined]
             at += element.rows
         return full
 
@@ -155,10 +156,10 @@ def solve_semidefinite(S: Array, right: Array) -> Array:
         factor = np.linalg.cholesky(S)
         scale = np.sqrt(np.abs(np.diagonal(S)))
         if (np.diagonal(factor) > 1e-7 * scale).all():
-            return np.linalg.solve(S, right)
+            return np.asarray(np.linalg.solve(S, right), dtype=float)
     except np.linalg.LinAlgError:
         pass
-    return np.linalg.lstsq(S, right, rcond=1e-12)[0]
+    return np.asarray(np.linalg.lstsq(S, right, rcond=1e-12)[0], dtype=float)
 
 
 def element_jacobian(element: Element, t: float, q: Array, v: Array) -> tuple[Array, Array]:

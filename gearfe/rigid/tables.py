@@ -1,6 +1,7 @@
 """A planar scene as arrays: rows of constraints, springs and loads, and the elimination plan of G M^-1 G^T.
 
-Body b has the coordinates (x, y) of its mass centre and its angle theta, in this order; the ground is body number n with
+Body b has the coordinates (x, y) of its mass centre and its angle theta, in this order; the ground is body
+number n with
 inverse mass zero, so loops need no special case. All local points are relative to the mass centre.
 
 A constraint row is one of two kinds, with bodies a, b = row_body[r]:
@@ -21,8 +22,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .ordering import Factor, elimination_plan
-from .planar import GROUND, Body, CoordinateSpring, Fixed, Gravity, Hinge, Moment, PointForce, Prescribed, Scene, Slider
-from .planar import Slot, Spring
+from .planar import (
+    GROUND,
+    Body,
+    CoordinateSpring,
+    Fixed,
+    Gravity,
+    Hinge,
+    Moment,
+    PointForce,
+    Scene,
+    Slider,
+    Slot,
+    Spring,
+)
 from .timefunctions import TimeFunction, constant
 
 Array = NDArray[np.float64]
@@ -32,15 +45,15 @@ Ints = NDArray[np.int64]
 class Rows(NamedTuple):
     """Constraint rows."""
 
-    index: Ints  # (m, 4) body a, body b, kind, time function that is subtracted (-1 for none)
-    value: Array  # (m, 15) kx, ky, kt, kc, ks of both bodies; n0x, n0y, x and y of the point on b; constant
+    ints: Ints  # (m, 4) body a, body b, kind, time function that is subtracted (-1 for none)
+    reals: Array  # (m, 15) kx, ky, kt, kc, ks of both bodies; n0x, n0y, x and y of the point on b; constant
     lines: Ints  # (rows of kind 1,) their row numbers
 
 
 class Forces(NamedTuple):
     """Applied forces; springs come first.
 
-    Columns of `index`: kind, a, b, first and second time function. Columns of `value` for each kind:
+    Columns of `ints`: kind, a, b, first and second time function. Columns of `reals` for each kind:
 
     0  spring between points of the bodies a and b: x, y on a, x, y on b, stiffness, damping, free length
     1  spring on the difference of the coordinates a and b: stiffness, damping, reference
@@ -49,8 +62,8 @@ class Forces(NamedTuple):
     """
 
     weight: Array  # (3 (n + 1),) constant generalised forces (gravity)
-    index: Ints  # (f, 5)
-    value: Array  # (f, 7)
+    ints: Ints  # (f, 5)
+    reals: Array  # (f, 7)
 
 
 class Times(NamedTuple):
@@ -236,8 +249,8 @@ def _coordinates(force: CoordinateSpring, index) -> tuple[int, int]:  # type: ig
 
 def _row_arrays(rows: list[_Row]) -> Rows:
     return Rows(
-        index=_ints([(*r.bodies, r.kind, r.time) for r in rows], 4),
-        value=_floats([(*np.ravel(r.factor), *r.slot, r.constant) for r in rows], 15),
+        ints=_ints([(*r.bodies, r.kind, r.time) for r in rows], 4),
+        reals=_floats([(*np.ravel(r.factor), *r.slot, r.constant) for r in rows], 15),
         lines=np.array([i for i, r in enumerate(rows) if r.kind == 1], dtype=np.int64),
     )
 
@@ -252,7 +265,9 @@ def _force_arrays(scene: Scene, local, time) -> tuple[Ints, Array]:  # type: ign
         elif isinstance(f, CoordinateSpring):
             rows.append(((1, *_coordinates(f, at), -1, -1), (f.stiffness, f.damping, f.reference, 0, 0, 0, 0)))
         elif isinstance(f, PointForce):
-            rows.append(((2, at[f.body], len(scene.bodies), time(f.x), time(f.y)), (*local(f.body, f.point), 0, 0, 0, 0, 0)))
+            rows.append(
+                ((2, at[f.body], len(scene.bodies), time(f.x), time(f.y)), (*local(f.body, f.point), 0, 0, 0, 0, 0))
+            )
         elif isinstance(f, Moment):
             rows.append(((3, at[f.body], at[f.reaction], time(f.function), -1), (0.0,) * 7))
     rows.sort(key=lambda row: row[0][0])
@@ -273,8 +288,8 @@ def _time_arrays(functions: list[TimeFunction]) -> Times:
 
 
 def _length(tables: Tables, q0: Array) -> float:
-    springs = tables.forces.value[tables.forces.index[:, 0] == 0]
-    sizes = [tables.rows.value[:, [3, 4, 8, 9, 12, 13]], springs[:, [0, 1, 2, 3, 6]]]
+    springs = tables.forces.reals[tables.forces.ints[:, 0] == 0]
+    sizes = [tables.rows.reals[:, [3, 4, 8, 9, 12, 13]], springs[:, [0, 1, 2, 3, 6]]]
     size = max(float(np.abs(a).max(initial=0.0)) for a in sizes)
     if size == 0.0:
         size = float(np.abs(q0.reshape(-1, 3)[:, :2]).max(initial=0.0))

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,8 @@ FUNCTIONS = (*kernel_rows.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_fold.FUNC
 NAMES = {**kernel_rows.GLOBALS, **kernel_series.NAMES, **kernel_run.NAMES}
 ENTRIES = ("integrate_series", "sample")
 HOT = (
-    "fill", "copy", "trigonometry", "gradients", "residuals", "times_gradients", "add_transposed", "solve", "least_norm",
+    "fill", "copy", "trigonometry", "gradients", "residuals", "times_gradients", "add_transposed", "solve",
+    "least_norm",
     "angle_orders", "slot_orders", "row_orders", "spring_orders", "force_orders", "spring_force", "slot_forces",
     "slot_arms", "add_multipliers", "add_line_multipliers", "torque_orders", "finish_order",
 )  # fmt: skip
@@ -68,27 +69,30 @@ class Work(NamedTuple):
 
 def work_space(tables: Tables, order: int) -> Work:
     """Scratch arrays for series up to `order`."""
-    K, n3, m, d = order + 3, tables.mass.size, len(tables.rows.index), MOST_FOLDS
-    n, lines, springs = n3 // 3, tables.rows.lines.size, int((tables.forces.index[:, 0] == kernel_series.SPRING).sum())
+    K, n3, m, d = order + 3, tables.mass.size, len(tables.rows.ints), MOST_FOLDS
+    n, lines, springs = n3 // 3, tables.rows.lines.size, int((tables.forces.ints[:, 0] == kernel_series.SPRING).sum())
 
-    def zeros(count: int, *shape: int) -> list[Array]:
+    def zeros(count: int, *shape: int) -> list[Any]:
         return [np.zeros(shape) for _ in range(count)]
 
-    return Work(
+    drop: Any = np.zeros(d, dtype=np.int64)
+    fold = [*zeros(3, d, m), *zeros(2, d, n3), *zeros(2, d, d), np.zeros(d), drop]
+    arrays: list[Any] = [
         np.zeros((K, n3)),
         np.zeros((K, m)),
         np.zeros((tables.times.first.size - 1, K)),
         np.zeros((5, K, n)),
         np.zeros((6, K, lines)),
         np.zeros((5, K, springs)),
-        FoldFrame(*zeros(3, d, m), *zeros(2, d, n3), *zeros(2, d, d), np.zeros(d), np.zeros(d, dtype=np.int64)),
+        FoldFrame._make(fold),
         *zeros(2, m, 2, 3),
         np.zeros(m + tables.plan.row.size),
         *zeros(3, m),
         *zeros(7, n3),
         *zeros(2, n),
         np.zeros(m, dtype=np.int64),
-    )
+    ]
+    return Work._make(arrays)
 
 
 @dataclass(frozen=True)

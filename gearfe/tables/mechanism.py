@@ -1,3 +1,4 @@
+# ruff: noqa: RUF009 - `quantity` makes dataclass fields
 """Tables of a mechanism file: bodies, joints, forces, start, outputs, run. See docs/mechanisms.md."""
 
 from __future__ import annotations
@@ -84,7 +85,9 @@ class JointTable:
 
     def check(self, where: str) -> None:
         """Only the keys of this type."""
-        _only(self, where, self.KEYS[self.type], ("point", "to_point", "direction", "angle_deg", "coordinate", "motion"))
+        _only(
+            self, where, self.KEYS[self.type], ("point", "to_point", "direction", "angle_deg", "coordinate", "motion")
+        )
         needs = {"slot": ("direction",), "slider": ("direction",), "prescribed": ("coordinate", "motion")}
         for key in needs.get(self.type, ()):
             if getattr(self, key) is None:
@@ -153,7 +156,7 @@ class OutputTable:
 
     def check(self, where: str) -> None:
         """A name that fits a CSV header."""
-        if not self.name or any(ch in self.name for ch in ",\"\n "):
+        if not self.name or any(ch in self.name for ch in ',"\n '):
             raise InputError(f"{where}.name", self.name, "must be a word without spaces or commas", "rename the column")
 
 
