@@ -112,3 +112,12 @@ def test_two_folds_at_the_same_moment():
     assert made.status == 0
     exact = folding_angle(1.0, 3.0, times)
     assert np.abs(made.q[:, [2, 8]] - exact[:, None]).max() <= 1e-8
+
+
+def test_start_at_rest_on_the_fold_selects_no_branch():
+    """The status says so, and the start is returned."""
+    made = integrate(folding_links(pi / 2, 0.0), [0.0, 1.0], backend="plain")
+    assert made.status == 3
+    assert made.reached == 0.0
+    assert made.q.shape == (1, 6)
+    assert made.q[0, 2] == pytest.approx(pi / 2)

@@ -72,17 +72,23 @@ class Trajectory:
     @cached_property
     def q(self) -> Array:
         """Coordinates, shape (n, size)."""
-        return self.dense(self.time, 0)
+        return self._at(0)
 
     @cached_property
     def v(self) -> Array:
         """Velocities."""
-        return self.dense(self.time, 1)
+        return self._at(1)
 
     @cached_property
     def a(self) -> Array:
         """Accelerations."""
-        return self.dense(self.time, 2)
+        return self._at(2)
+
+    def _at(self, derivative: int) -> Array:
+        if len(self.dense.times) > 1:
+            return self.dense(self.time, derivative)
+        state = (self.start.q, self.start.v, np.full_like(self.start.q, np.nan))[derivative]  # not a single step was made
+        return np.tile(state, (len(self.time), 1))
 
     @cached_property
     def multipliers(self) -> Array:
