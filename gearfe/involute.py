@@ -19,6 +19,10 @@ from .errors import InputError
 __all__ = ["Segment", "ToothForm", "ToothProfile", "inv", "inverse_inv", "tooth_profile"]
 
 
+#: Arcs of a smaller polar angle (rad) are taken for none: below 1e-9 mm on a gear of 1 m radius.
+NIL_ANGLE = 1e-12
+
+
 class Relief(Protocol):
     """Tip relief amount * ((s - s0)/length)^exponent (m, m, -)."""
 
@@ -171,7 +175,7 @@ def tooth_profile(gear: ToothForm) -> ToothProfile:
     if gear.tip_round > 0.0:
         arc, land = _tip_arc(gear, flank, round_roll)
         pieces.append(("tip_round", arc))
-    if land > 0.0:
+    if land > NIL_ANGLE:
         pieces.append(("tip", Arc((0.0, 0.0), _tip_radius(gear), land, 0.0)))
     return ToothProfile(
         segments=_joined(pieces, flank),
@@ -217,13 +221,21 @@ def _root(gear: ToothForm) -> tuple[Trochoid, float, bool]:
         problem = f"exceeds the land of the rack's tip: at this pressure angle and dedendum it must be <= {limit:g}"
         raise InputError("rack_tip_radius", gear.rack_tip_radius, problem, "use a smaller radius or less dedendum")
     offset = max(0.0, math.pi * m / 4 + 0.5 * gear.tooth_thinning - depth * math.tan(alpha) - rho / math.cos(alpha))
+    if offset < NIL_ANGLE * r:
+        offset = 0.0
     d = depth - gear.profile_shift * m
     whole = Trochoid(r, d, rho, offset, math.pi / gear.teeth, math.pi / 2 - alpha)
     form_roll = r * math.sin(alpha) - (d + rho * math.sin(alpha)) / math.sin(alpha)
     if form_roll >= 0.0:
         return whole, form_roll, False
     end, form_roll = _crossing(gear, whole)
-    return Trochoid(r, d, rho, offset, math.pi / gear.teeth, end), form_roll, True
+    cut = Trochoid(r, d, rho, offset, math.pi / gear.teeth, end)
+    if cut.point(np.linspace(0.0, 1.0, 257))[:, 1].min() <= 0.0:
+        problem = "the undercut root cuts the tooth through"
+        raise InputError(
+            "profile_shift", gear.profile_shift, problem, "use more profile shift, more teeth or less dedendum"
+        )
+    return cut, form_roll, True
 
 
 def _crossing(gear: ToothForm, root: Trochoid) -> tuple[float, float]:
@@ -267,10 +279,12 @@ def _flank(gear: ToothForm, form_roll: float) -> tuple[Flank, float]:
         return Flank(base, base_angle, form_roll, tip_roll), tip_roll
     start = tip_roll - relief.length
     if start < form_roll:
-        problem = f"is longer than the flank: must be <= {tip_roll - form_roll:.6g} m of roll length"
+        problem = f"is longer than the flank: must be <= {1e3 * (tip_roll - form_roll):.6g} mm of roll length"
         raise InputError("tip_relief.length", relief.length, problem, "use a shorter relief")
     if relief.amount * relief.exponent > 0.2 * relief.length:
-        problem = f"is too steep: must be <= {0.2 * relief.length / relief.exponent:.6g} m for this length and exponent"
+        problem = (
+            f"is too steep: must be <= {200.0 * relief.length / relief.exponent:.6g} mm for this length and exponent"
+        )
         raise InputError("tip_relief.amount", relief.amount, problem, "use less relief or a longer one")
     return Flank(base, base_angle, form_roll, tip_roll, relief.amount, start, relief.length, relief.exponent), tip_roll
 
@@ -294,11 +308,11 @@ def _round_start(gear: ToothForm, flank: Flank, tip_roll: float, end_roll: float
         raise InputError("tip_round", rho, problem, "use a smaller tip round")
     if flank.amount > 0.0:
         if flank.relief_start >= start:
-            problem = f"lies wholly inside the tip round: must be > {tip_roll - start:.6g} m of roll length"
+            problem = f"lies wholly inside the tip round: must be > {1e3 * (tip_roll - start):.6g} mm of roll length"
             raise InputError("tip_relief.length", flank.length, problem, "use a longer relief or a smaller tip round")
         above = np.nextafter(flank.relief_start, math.inf)
         start = bisect(lambda s: math.hypot(*_round_centre(gear, flank, s)) - inner, float(above), end_roll)
-    if math.atan2(*reversed(_round_centre(gear, flank, start))) < 0.0:
+    if math.atan2(*reversed(_round_centre(gear, flank, start))) < -NIL_ANGLE:
         problem = "does not fit the tip: the rounds of both flanks overlap"
         raise InputError("tip_round", rho, problem, "use a smaller tip round, less addendum or less profile shift")
     return start
