@@ -10,6 +10,7 @@ from .interference import TOLERANCE, tip_penetration
 from .involute import inv, inverse_inv
 from .mesh_geometry import MeshGeometry
 from .spur_gear import Gear
+from .tooth_root import least_shift
 
 
 def check_pair(pair: MeshGeometry) -> None:
@@ -88,8 +89,8 @@ def _check_ratio(pair: MeshGeometry) -> None:
     cuts = {name: lost for name, lost in _lost_to_form_points(pair).items() if lost > 0.0}
     name = max(cuts, key=cuts.__getitem__)
     gear: Gear = getattr(pair, name)
-    problem = f"leaves a tooth whose undercut root eats the path of contact: contact ratio {active:.4g}, must be >= 1"
-    cure = "use more profile shift, more teeth or less dedendum"
+    problem = f"leaves an undercut root that eats the path of contact: contact ratio {active:.4g}, must be >= 1"
+    cure = f"use more profile shift (no undercut from {least_shift(gear):.4g} on), more teeth or less dedendum"
     raise InputError(f"{name}.profile_shift", gear.profile_shift, problem, cure)
 
 
@@ -107,9 +108,11 @@ def _check_interference(pair: MeshGeometry, name: str, gear: Gear, mate: Gear, m
     cure = "use less addendum or more tip_shortening there, more dedendum or a smaller rack_tip_radius here"
     lost = _lost_to_form_points(pair)[name]
     if lost > 1e-7 * gear.module and not gear.undercut:
+        allowed = math.hypot(mate.base_radius, pair.tangent_length - gear.form_roll)
+        most = mate.addendum - (mate.tip_radius - allowed) / mate.module
         problem = (
             f"makes the tip reach {1e3 * lost:.4g} mm of roll length below the start of the {name}'s involute "
-            f"(form diameter {2e3 * gear.form_radius:.6g} mm), where the root is no involute"
+            f"(form diameter {2e3 * gear.form_radius:.6g} mm), where the root is no involute: must be < {most:.5g}"
         )
         raise InputError(f"{mate_name}.addendum", mate.addendum, problem, cure)
     depth = tip_penetration(gear, mate, pair.working_centre_distance, 0.5 * pair.normal_backlash / mate.base_radius)

@@ -11,7 +11,8 @@ from functools import cached_property
 from numbers import Integral, Real
 
 from .errors import InputError
-from .involute import ToothProfile, half_tooth_angle, inv, tooth_profile
+from .involute import ToothProfile, inv, tooth_profile
+from .tooth_root import half_tooth_angle
 
 #: Least rim between bore and root circle, times module.
 LEAST_RIM = 0.25
