@@ -9,52 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from .curves import Arc, Array, Flank, Point, Segment, Trochoid, bisect, inv, inverse_inv
 from .errors import InputError
+from .tooth_root import NIL_ANGLE, ToothForm, half_tooth_angle, tip_radius, tooth_root
 
 __all__ = ["Segment", "ToothForm", "ToothProfile", "inv", "inverse_inv", "tooth_profile"]
-
-
-class Relief(Protocol):
-    """Tip relief amount * ((s - s0)/length)^exponent (m, m, -)."""
-
-    @property
-    def amount(self) -> float: ...
-    @property
-    def length(self) -> float: ...
-    @property
-    def exponent(self) -> float: ...
-
-
-class ToothForm(Protocol):
-    """What of a gear decides its profile; units as in `gearfe.gear.Gear`."""
-
-    @property
-    def teeth(self) -> int: ...
-    @property
-    def module(self) -> float: ...
-    @property
-    def pressure_angle(self) -> float: ...
-    @property
-    def profile_shift(self) -> float: ...
-    @property
-    def addendum(self) -> float: ...
-    @property
-    def dedendum(self) -> float: ...
-    @property
-    def rack_tip_radius(self) -> float: ...
-    @property
-    def tip_round(self) -> float: ...
-    @property
-    def tip_shortening(self) -> float: ...
-    @property
-    def tip_relief(self) -> Relief | None: ...
-    @property
-    def tooth_thinning(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -120,26 +82,6 @@ class ToothProfile:
         return np.concatenate(parts)
 
 
-def half_tooth_angle(gear: ToothForm) -> float:
-    """Half the angular tooth thickness at the reference circle (rad).
-
-    psi = pi/(2z) + 2 x tan(alpha)/z - thinning/(2r).
-    """
-    z = gear.teeth
-    return (
-        math.pi / (2 * z)
-        + 2.0 * gear.profile_shift * math.tan(gear.pressure_angle) / z
-        - gear.tooth_thinning / (z * gear.module)
-    )
-
-
-def largest_rack_tip_radius(gear: ToothForm) -> float:
-    """Rack tip radius (times module) at which the land of the rack's tip vanishes; beyond it no such rack exists."""
-    alpha = gear.pressure_angle
-    land = math.pi / 4 + 0.5 * gear.tooth_thinning / gear.module - gear.dedendum * math.tan(alpha)
-    return land * math.cos(alpha) / (1.0 - math.sin(alpha))
-
-
 def tooth_profile(gear: ToothForm) -> ToothProfile:
     """Exact left half profile of a tooth.
 
@@ -148,13 +90,15 @@ def tooth_profile(gear: ToothForm) -> ToothProfile:
     InputError
         When the rack has no land, the tooth is pointed or cut through, or tip round or relief do not fit.
     """
-    root, form_roll, undercut = _root(gear)
+    root, form_roll, undercut = tooth_root(gear)
     flank, tip_roll = _flank(gear, form_roll)
-    end_roll = bisect(lambda s: _radius(flank, s) - _tip_radius(gear), tip_roll, tip_roll + 2.0 * flank.amount)
+    end_roll = bisect(lambda s: _radius(flank, s) - tip_radius(gear), tip_roll, tip_roll + 2.0 * flank.amount)
     tip_half_angle = _angle(flank, end_roll)
     if tip_half_angle <= 0.0:
-        pointed = "use less addendum or profile shift, or some tip_shortening"
-        raise InputError("addendum", gear.addendum, "the tooth is pointed below its tip circle", pointed)
+        peak = flank.base_radius / math.cos(inverse_inv(flank.base_angle))
+        problem = f"the tooth is pointed below its tip circle: must be < {_addendum_to(gear, peak):.5g}"
+        cure = "use less addendum or profile shift, or some tip_shortening"
+        raise InputError("addendum", gear.addendum, problem, cure)
     round_roll = _round_start(gear, flank, tip_roll, end_roll)
     flank = Flank(flank.base_radius, flank.base_angle, form_roll, round_roll, *_relief_numbers(flank))
 
@@ -171,8 +115,8 @@ def tooth_profile(gear: ToothForm) -> ToothProfile:
     if gear.tip_round > 0.0:
         arc, land = _tip_arc(gear, flank, round_roll)
         pieces.append(("tip_round", arc))
-    if land > 0.0:
-        pieces.append(("tip", Arc((0.0, 0.0), _tip_radius(gear), land, 0.0)))
+    if land > NIL_ANGLE:
+        pieces.append(("tip", Arc((0.0, 0.0), tip_radius(gear), land, 0.0)))
     return ToothProfile(
         segments=_joined(pieces, flank),
         flank=flank,
@@ -184,10 +128,6 @@ def tooth_profile(gear: ToothForm) -> ToothProfile:
         tip_half_angle=tip_half_angle,
         tip_land_half_angle=land,
     )
-
-
-def _tip_radius(gear: ToothForm) -> float:
-    return gear.module * (gear.teeth / 2 + gear.addendum + gear.profile_shift - gear.tip_shortening)
 
 
 def _radius(flank: Flank, s: float) -> float:
@@ -203,62 +143,15 @@ def _relief_numbers(flank: Flank) -> tuple[float, float, float, float]:
     return flank.amount, flank.relief_start, flank.length, flank.exponent
 
 
-def _root(gear: ToothForm) -> tuple[Trochoid, float, bool]:
-    """Trochoid up to the involute, roll length (m) of the form point, and whether it is undercut."""
-    m, alpha = gear.module, gear.pressure_angle
-    r, rho = 0.5 * m * gear.teeth, gear.rack_tip_radius * m
-    depth = gear.dedendum * m - rho
-    largest = largest_rack_tip_radius(gear)
-    if gear.rack_tip_radius > largest * (1.0 + 1e-12):
-        limit = math.floor(1e4 * max(largest, 0.0)) / 1e4
-        if largest < 0.0:
-            problem, cure = "a rack of this dedendum and pressure angle has no land at its tip", "use less dedendum"
-            raise InputError("dedendum", gear.dedendum, problem, cure)
-        problem = f"exceeds the land of the rack's tip: at this pressure angle and dedendum it must be <= {limit:g}"
-        raise InputError("rack_tip_radius", gear.rack_tip_radius, problem, "use a smaller radius or less dedendum")
-    offset = max(0.0, math.pi * m / 4 + 0.5 * gear.tooth_thinning - depth * math.tan(alpha) - rho / math.cos(alpha))
-    d = depth - gear.profile_shift * m
-    whole = Trochoid(r, d, rho, offset, math.pi / gear.teeth, math.pi / 2 - alpha)
-    form_roll = r * math.sin(alpha) - (d + rho * math.sin(alpha)) / math.sin(alpha)
-    if form_roll >= 0.0:
-        return whole, form_roll, False
-    end, form_roll = _crossing(gear, whole)
-    return Trochoid(r, d, rho, offset, math.pi / gear.teeth, end), form_roll, True
-
-
-def _crossing(gear: ToothForm, root: Trochoid) -> tuple[float, float]:
-    """Normal angle (rad) and roll length (m) where an undercutting trochoid leaves the tooth through the involute."""
-    base = root.reference_radius * math.cos(gear.pressure_angle)
-    base_angle = half_tooth_angle(gear) + inv(gear.pressure_angle)
-
-    def radius(g: float) -> float:
-        return float(np.hypot(*root.at(np.array(g))))
-
-    def roll(g: float) -> float:
-        return math.sqrt(max(0.0, (radius(g) - base) * (radius(g) + base)))
-
-    def outside(g: float) -> float:
-        x, y = root.at(np.array(g))
-        u = roll(g) / base
-        return math.atan2(y, x) - (base_angle - u + math.atan(u))
-
-    lowest = bisect(lambda g: radius(g) - base, 0.0, root.end)
-    if outside(lowest) >= 0.0:
-        return lowest, roll(lowest)
-    scan = np.linspace(lowest, root.end, 65)
-    first = next((i for i, g in enumerate(scan) if i and outside(float(g)) >= 0.0), 64)
-    end = bisect(outside, float(scan[first - 1]), float(scan[first]))
-    return end, roll(end)
-
-
 def _flank(gear: ToothForm, form_roll: float) -> tuple[Flank, float]:
     """Flank from the form point, end still open, and the roll length (m) of the tip circle."""
     base = 0.5 * gear.module * gear.teeth * math.cos(gear.pressure_angle)
     base_angle = half_tooth_angle(gear) + inv(gear.pressure_angle)
-    tip = _tip_radius(gear)
+    tip = tip_radius(gear)
     tip_roll = math.sqrt(max(0.0, (tip - base) * (tip + base)))
     if tip_roll <= form_roll:
-        problem = "the tip circle lies below the start of the involute, so no flank is left"
+        lowest = _addendum_to(gear, math.hypot(base, form_roll))
+        problem = f"the tip circle lies below the start of the involute: must be > {lowest:.5g}"
         raise InputError(
             "addendum", gear.addendum, problem, "use more addendum, teeth or profile shift, or less dedendum"
         )
@@ -267,10 +160,12 @@ def _flank(gear: ToothForm, form_roll: float) -> tuple[Flank, float]:
         return Flank(base, base_angle, form_roll, tip_roll), tip_roll
     start = tip_roll - relief.length
     if start < form_roll:
-        problem = f"is longer than the flank: must be <= {tip_roll - form_roll:.6g} m of roll length"
+        problem = f"is longer than the flank: must be <= {1e3 * (tip_roll - form_roll):.6g} mm of roll length"
         raise InputError("tip_relief.length", relief.length, problem, "use a shorter relief")
     if relief.amount * relief.exponent > 0.2 * relief.length:
-        problem = f"is too steep: must be <= {0.2 * relief.length / relief.exponent:.6g} m for this length and exponent"
+        problem = (
+            f"is too steep: must be <= {200.0 * relief.length / relief.exponent:.6g} mm for this length and exponent"
+        )
         raise InputError("tip_relief.amount", relief.amount, problem, "use less relief or a longer one")
     return Flank(base, base_angle, form_roll, tip_roll, relief.amount, start, relief.length, relief.exponent), tip_roll
 
@@ -283,25 +178,43 @@ def _round_centre(gear: ToothForm, flank: Flank, s: float) -> Point:
 
 def _round_start(gear: ToothForm, flank: Flank, tip_roll: float, end_roll: float) -> float:
     """Roll length (m) where the tip round, tangent to flank and tip circle, begins; the flank's end without one."""
-    rho, tip = gear.tip_round, _tip_radius(gear)
+    rho, tip = gear.tip_round, tip_radius(gear)
     if rho == 0.0:
         return end_roll
     inner = tip - rho
     core = (inner - flank.base_radius) * (inner + flank.base_radius)
     start = rho + math.sqrt(core) if core >= 0.0 else -math.inf
     if start <= flank.start:
-        problem = "does not fit the flank: it would begin below the start of the involute"
+        problem = f"would begin below the start of the involute: must be < {1e3 * _largest_round(gear, flank):.5g} mm"
         raise InputError("tip_round", rho, problem, "use a smaller tip round")
     if flank.amount > 0.0:
         if flank.relief_start >= start:
-            problem = f"lies wholly inside the tip round: must be > {tip_roll - start:.6g} m of roll length"
+            problem = f"lies wholly inside the tip round: must be > {1e3 * (tip_roll - start):.6g} mm of roll length"
             raise InputError("tip_relief.length", flank.length, problem, "use a longer relief or a smaller tip round")
         above = np.nextafter(flank.relief_start, math.inf)
         start = bisect(lambda s: math.hypot(*_round_centre(gear, flank, s)) - inner, float(above), end_roll)
-    if math.atan2(*reversed(_round_centre(gear, flank, start))) < 0.0:
-        problem = "does not fit the tip: the rounds of both flanks overlap"
+    if math.atan2(*reversed(_round_centre(gear, flank, start))) < -NIL_ANGLE:
+        limit = 1e3 * _largest_round(gear, flank)
+        problem = f"does not fit the tip, the rounds of both flanks overlap: must be < {limit:.5g} mm"
         raise InputError("tip_round", rho, problem, "use a smaller tip round, less addendum or less profile shift")
     return start
+
+
+def _largest_round(gear: ToothForm, flank: Flank) -> float:
+    """Largest tip round (m) that begins above the form point and leaves a tip land; relief not counted."""
+    tip, base = tip_radius(gear), flank.base_radius
+
+    def too_large(rho: float) -> float:
+        roll = math.sqrt((tip - rho - base) * (tip - rho + base))
+        land = flank.base_angle - (rho + roll) / base + math.atan(roll / base)
+        return 1.0 if land < 0.0 or rho + roll < flank.start else -1.0
+
+    return bisect(too_large, 0.0, tip - base)
+
+
+def _addendum_to(gear: ToothForm, radius: float) -> float:
+    """Addendum coefficient with which the tip circle has the given radius (m)."""
+    return radius / gear.module - gear.teeth / 2 - gear.profile_shift + gear.tip_shortening
 
 
 def _tip_arc(gear: ToothForm, flank: Flank, round_roll: float) -> tuple[Arc, float]:
