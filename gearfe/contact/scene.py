@@ -376,4 +376,3 @@ def _stress(pair: MeshingPair, windows: Sequence[Window], slaves: Sequence[Windo
             part[:, loaded.unknowns] = _turned(block, loaded.angle)
         rows.append(part)
     return np.concatenate(rows)
-

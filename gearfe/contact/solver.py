@@ -127,9 +127,7 @@ class _Linearised:
 def _linearise(scene: Scene, projection: Projection, active: IntArray, pressure: Array) -> _Linearised:
     chosen = projection.take(active)
     slave = scene.slave_nodes[active]
-    nodes, local = np.unique(
-        np.concatenate([slave, chosen.edge[:, None] + np.arange(3)], axis=1), return_inverse=True
-    )
+    nodes, local = np.unique(np.concatenate([slave, chosen.edge[:, None] + np.arange(3)], axis=1), return_inverse=True)
     local = local.reshape(len(active), 6)
     parts = gap_rows(chosen, local[:, 3:], local[:, :3], scene.slave_shapes[active], len(nodes))
     rows, tilt, slide = (part.reshape(len(part), 2 * len(nodes)) for part in parts)
@@ -313,7 +311,9 @@ def starting_pressure(pair: MeshingPair, scene: Scene) -> Array:
                 deepest = np.flatnonzero(mine)[np.argmin(gaps[mine])]
                 distance = np.linalg.norm(slave - slave[deepest], axis=1)
                 edge = pair.bodies[0 if side else 1].flank.sizes.max()
-                width = max(half_width[k], 0.25 * edge if attempt else edge, 3 * np.sort(distance[mine])[min(2, mine.sum() - 1)])
+                width = max(
+                    half_width[k], 0.25 * edge if attempt else edge, 3 * np.sort(distance[mine])[min(2, mine.sum() - 1)]
+                )
                 shapes[k] += np.where(mine, np.sqrt(np.maximum(0.0, 1 - (distance / width) ** 2)), 0.0)
         shapes /= np.maximum(shapes @ areas, 1e-300)[:, None]
         used = shapes.max(axis=0) > 0
