@@ -11,10 +11,8 @@ presses the driving flanks together.
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -32,6 +30,7 @@ from .meshing.recipe import sector_recipes
 from .meshing.tooth_sector import sector_mesh
 from .periodic import fold
 from .stiffness_curve import ErrorEstimate, StiffnessCurve
+from .stopwatch import Stopwatch
 from .torque_control import twists_for_torque
 from .unloaded import unloaded_twist
 
@@ -45,22 +44,6 @@ Progress = Callable[[int, int, str], None]
 COARSENING, ORDER, ESTIMATE_POSITIONS = 1.6, 1.5, 20
 #: Positions handed to the solver at once: enough to start from one another, few enough to stay small in memory.
 BATCH = 10
-
-
-@dataclass
-class Stopwatch:
-    """Seconds by stage."""
-
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Add the time spent inside to the stage `name`."""
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
 
 
 @dataclass(frozen=True)
