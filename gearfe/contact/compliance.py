@@ -28,6 +28,25 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class FarField:
+    """What flank and neighbours do to each other through the cut sides, in r << b numbers (their smooth modes).
+
+    Attributes
+    ----------
+    flank : ndarray, shape (f, r)
+        Flank displacements for the modes of the cut sides.
+    stress : ndarray, shape (e q, r), or None
+        Normal stress for the same.
+    driven : dict of int to ndarray, shape (r, f)
+        Step k -> modes of tooth k for flank forces on tooth 0 (1/N), for the few k that can matter.
+    """
+
+    flank: Array
+    stress: Array | None
+    driven: dict[int, Array]
+
+
+@dataclass(frozen=True)
 class GearBody:
     """An elastic gear as its mate sees it: flank geometry, compliance and, where a law asks for it, surface stress.
 
@@ -47,6 +66,8 @@ class GearBody:
         Normal stress at the quadrature points for flank forces with the cut sides held (Pa/N).
     stress_interface : ndarray, shape (e q, b), or None
         Normal stress for displacements of the cut sides (Pa/m).
+    far : FarField
+        The same cyclic part in its numerical rank.
     condensed
         The way back to the full field.
     """
@@ -61,6 +82,7 @@ class GearBody:
     coupling: Array
     stress_own: Array | None
     stress_interface: Array | None
+    far: FarField
     condensed: Condensed
 
     @property
@@ -118,9 +140,31 @@ def gear_body(
         stress = np.matmul(rows, recovered[unknowns]).reshape(-1, len(schur))
         stress_own = stress[:, :f] @ own
         stress_interface = stress[:, :f] @ interface + stress[:, f:]
+    far = _far_field(interface, stress_interface, coupling)
     return GearBody(
-        mesh, flank, material, plane, thickness, own, interface, coupling, stress_own, stress_interface, condensed
+        mesh, flank, material, plane, thickness, own, interface, coupling, stress_own, stress_interface, far, condensed
     )
+
+
+#: Neighbours whose coupling is kept at hand: teeth in contact at the same time are never further apart.
+REACH = 4
+
+
+def _far_field(interface: Array, stress: Array | None, coupling: Array) -> FarField:
+    """Compress displacements and stresses onto the side motions that reach the flank (Saint-Venant: a dozen or two)."""
+    rows = interface if stress is None else np.concatenate([interface, stress * (_norm(interface) / _norm(stress))])
+    triangular = np.linalg.qr(rows, mode="r")
+    _, values, modes = np.linalg.svd(triangular)
+    basis = modes[values > 1e-13 * values[0]].T
+    flank = interface @ basis
+    teeth = len(coupling)
+    steps = range(-REACH, REACH + 1) if teeth > 2 * REACH else range(teeth)
+    driven = {k: (basis.T @ coupling[k % teeth] @ basis) @ flank.T for k in steps}
+    return FarField(flank, None if stress is None else stress @ basis, driven)
+
+
+def _norm(matrix: Array) -> float:
+    return float(np.linalg.norm(matrix))
 
 
 def _cyclic_compliance(stiffness: Array, teeth: int) -> Array:
