@@ -2,11 +2,12 @@ r"""Closest points on chains of quadratic edges, gaps, and their variations.
 
 For a slave point :math:`x_s` and the master curve :math:`x_m(\xi)` with :math:`a = x_m'` the projection satisfies
 :math:`x_s - x_m(\xi) = g\,n(\xi)`. The normal is the edge's own, blended linearly into the mean of both neighbours' at
-each vertex: it is then continuous along the whole chain, and so are gap and forces. (With each edge's own normal a point
-that faces a vertex jumps between two solutions and Newton's method cycles.) The contact force acts along n at both
-points, so it is in equilibrium with itself whatever the blending.
+each vertex: it is then continuous along the whole chain, and so are gap and forces. (With each edge's own normal a
+point that faces a vertex jumps between two solutions and Newton's method cycles.) The contact force acts along n at
+both points, so it is in equilibrium with itself whatever the blending.
 
-With :math:`D = \delta x_s - \delta x_m` and :math:`N = n\cdot\delta x_m'` at fixed :math:`\xi`, :math:`m = a\cdot a`, and
+With :math:`D = \delta x_s - \delta x_m` and :math:`N = n\cdot\delta x_m'` at fixed :math:`\xi`, :math:`m = a\cdot a`,
+and
 :math:`\kappa = -a\cdot n'` the normal's own turning,
 
 .. math::
@@ -21,14 +22,15 @@ leaves out products of n.a, which is of the order of the kinks between edges).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .flank import edge_shapes
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+Array = NDArray[Any]
+IntArray = NDArray[Any]
 
 #: Gap (m) given to points whose projection runs off the end of the mate's surface: never in contact.
 OFF_END = 1.0
@@ -65,7 +67,7 @@ class Projection:
     tangent: Array
     curvature: Array
 
-    def take(self, index: IntArray) -> Projection:
+    def take(self, index: IntArray | slice) -> Projection:
         """The projections of the points `index`."""
         return Projection(**{name: getattr(self, name)[index] for name in self.__dataclass_fields__})
 
@@ -129,7 +131,9 @@ def nearest_places(points: Array, chain: Array) -> Array:
     return 0.5 * np.argmin(x * x + y * y, axis=1).astype(np.float64)
 
 
-def project(slave: Array, chains: Chains, place: Array, *, iterations: int = 15, tolerance: float = 1e-12) -> Projection:
+def project(
+    slave: Array, chains: Chains, place: Array, *, iterations: int = 15, tolerance: float = 1e-12
+) -> Projection:
     """Closest points by Newton's method along the chain, from the starting places `place`, shape (n,).
 
     Points whose projection runs off either end of the chain get the gap `OFF_END`.
@@ -209,7 +213,7 @@ class Rows:
     nodes : ndarray, shape (n, 6)
         Node numbers.
     normal, tilt, slide : ndarray, shape (n, 6, 2)
-        Coefficients of n.D, N and delta xi (per metre).
+        Coefficients of n.D, N and delta xi (per metre), in the axes of the tooth that each node belongs to.
     """
 
     nodes: IntArray
@@ -218,20 +222,32 @@ class Rows:
     slide: Array
 
 
-def gap_rows(projection: Projection, slave_nodes: IntArray, slave_shapes: Array) -> Rows:
+def gap_rows(projection: Projection, slave_nodes: IntArray, slave_shapes: Array, rotation: Array) -> Rows:
     """Rows of n.D, N and delta xi.
 
     Parameters
     ----------
     slave_nodes, slave_shapes : ndarray, shape (n, 3)
         Nodes of each point's own edge and its shape functions there.
+    rotation : ndarray, shape (nodes, 2, 2)
+        Tooth axes to global axes, of each node.
     """
     p = projection
-    weights = np.concatenate([slave_shapes, -p.shapes], axis=1)[:, :, None]
-    tilt = np.zeros((len(p.gap), 6, 2))
-    tilt[:, 3:] = p.slopes[:, :, None] * p.normal[:, None, :]
-    metric = p.tangent[:, 0] ** 2 + p.tangent[:, 1] ** 2
-    slide = weights * p.tangent[:, None, :] + p.gap[:, None, None] * tilt
-    slide /= (metric - p.gap * p.curvature)[:, None, None]
-    nodes = np.concatenate([slave_nodes, p.edge[:, None] + np.arange(3)], axis=1)
-    return Rows(nodes, weights * p.normal[:, None, :], tilt, slide)
+    own, mate = rotation[slave_nodes[:, 0]], rotation[p.edge]
+    vectors = np.stack([p.normal, p.tangent], axis=1)
+    on_slave, on_mate = np.matmul(vectors, own), np.matmul(vectors, mate)
+    count = len(p.gap)
+    normal, tilt, slide = np.empty((count, 6, 2)), np.zeros((count, 6, 2)), np.empty((count, 6, 2))
+    shapes = p.shapes[:, :, None]
+    np.multiply(slave_shapes[:, :, None], on_slave[:, :1], out=normal[:, :3])
+    np.multiply(-shapes, on_mate[:, :1], out=normal[:, 3:])
+    np.multiply(p.slopes[:, :, None], on_mate[:, :1], out=tilt[:, 3:])
+    scale = 1 / (p.tangent[:, 0] ** 2 + p.tangent[:, 1] ** 2 - p.gap * p.curvature)
+    on_slave, on_mate = on_slave[:, 1:] * scale[:, None, None], on_mate[:, 1:] * scale[:, None, None]
+    np.multiply(slave_shapes[:, :, None], on_slave, out=slide[:, :3])
+    np.multiply(-shapes, on_mate, out=slide[:, 3:])
+    slide[:, 3:] += (p.gap * scale)[:, None, None] * tilt[:, 3:]
+    nodes = np.empty((count, 6), dtype=np.int64)
+    nodes[:, :3] = slave_nodes
+    np.add(p.edge[:, None], np.arange(3), out=nodes[:, 3:])
+    return Rows(nodes, normal, tilt, slide)

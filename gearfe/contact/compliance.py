@@ -2,9 +2,9 @@ r"""Exact compliance between the flanks of a whole elastic gear with a rigid bor
 
 One sector is condensed onto its flank nodes F and its two cut sides B. With :math:`A = S_{FF}^{-1}` and
 :math:`P = -A S_{FB}`, flank forces f and side displacements b give :math:`u_F = A f + P b`. The sides of neighbouring
-sectors coincide, so the side displacements of all sectors follow from a block-circulant system, which a discrete Fourier
-transform over the teeth splits into one small system per harmonic (Thomas, Int. J. Numer. Meth. Eng. 14, 1979). The
-compliance between the loads on tooth i and the flank of tooth j is
+sectors coincide, so the side displacements of all sectors follow from a block-circulant system, which a discrete
+Fourier transform over the teeth splits into one small system per harmonic (Thomas, Int. J. Numer. Meth. Eng. 14,
+1979). The compliance between the loads on tooth i and the flank of tooth j is
 
 .. math:: C_{ji} = \delta_{ij} A + P\,X_{j-i}\,P^T .
 
@@ -14,6 +14,7 @@ Everything is expressed in the frame of the tooth that it belongs to.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from ..meshing.tooth_sector import SectorMesh
 from .dissection import Condensed, condense
 from .flank import Flank, flank_of, normal_stress_rows
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

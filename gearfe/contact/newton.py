@@ -9,8 +9,8 @@ compliance C of the flanks and the stress rows S (stress for forces),
 Linearised at (u, p), with the moving normals' part H of the tangent, the active points solve
 
 .. math::
-    (I + (\gamma\, \partial_u g\, C + S) G^T W)\, p = -\gamma (g - \partial_u g\, u) - (\gamma\, \partial_u g\, C + S) d,
-    \qquad d = H (u^+ - u),
+    (I + (\gamma\, \partial_u g\, C + S) G^T W)\, p = -\gamma (g - \partial_u g\, u) - (\gamma\, \partial_u g\, C + S)
+    d, \qquad d = H (u^+ - u),
 
 where d, a small correction, is iterated within the step on one factorisation (Alart & Curnier, Comput. Methods Appl.
 Mech. Eng. 92, 1991, in the few hundred unknowns that touch).
@@ -29,8 +29,8 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 from .closest import Projection, gap_rows, unreached
 from .scene import Scene
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+Array = NDArray[Any]
+IntArray = NDArray[Any]
 
 MAX_ITERATIONS = 40
 #: Newton steps taken in full before the line search watches over them.
@@ -82,7 +82,7 @@ class Linearised:
 
     def solve(self, right: Array) -> Array:
         """Pressures of the active points for a right-hand side."""
-        return dgetrs(*self.factor, right)[0]
+        return dgetrs(*self.factor, right, trans=1)[0]
 
     def bending(self, change: Array) -> Array:
         """H change: how the contact forces turn and move when the touched nodes move by `change`, shape (2t,)."""
@@ -98,39 +98,33 @@ class Linearised:
 def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: Array) -> Linearised:
     """Rows and factorised matrix of the active points."""
     chosen = projection.take(active)
-    rows = gap_rows(chosen, scene.slave_nodes[active], scene.slave_shapes[active])
+    rows = gap_rows(chosen, scene.slave_nodes[active], scene.slave_shapes[active], scene.rotation)
     touched = np.zeros(len(scene.points), dtype=bool)
     touched[rows.nodes] = True
     nodes = np.flatnonzero(touched)
     place = np.empty(len(touched), dtype=np.int64)
     place[nodes] = np.arange(len(nodes))
-    slot = (np.arange(len(active))[:, None] * len(nodes) + place[rows.nodes]).ravel()
-    rotation = scene.rotation[rows.nodes]
-    normal, tilt, slide = (
-        _dense(part, rotation, slot, len(active), len(nodes)) for part in (rows.normal, rows.tilt, rows.slide)
-    )
+    # the two edges of a point belong to different teeth: no slot of the dense rows is met twice
+    slot = np.arange(len(active))[:, None] * len(nodes) + place[rows.nodes]
+    spread = np.zeros((3, len(active) * len(nodes), 2))
+    spread[0, slot], spread[1, slot], spread[2, slot] = rows.normal, rows.tilt, rows.slide
+    normal, tilt, slide = spread.reshape(3, len(active), 2 * len(nodes))
     steep = chosen.normal[:, 0] * chosen.tangent[:, 0] + chosen.normal[:, 1] * chosen.tangent[:, 1]
     opening = normal - steep[:, None] * slide
-    unknowns = (2 * nodes[:, None] + np.arange(2)).ravel()
+    unknowns = np.empty(2 * len(nodes), dtype=np.int64)
+    unknowns[::2], unknowns[1::2] = 2 * nodes, 2 * nodes + 1
     areas, gamma = scene.areas(projection.place)[active], scene.parameter[active]
-    compliance = scene.compliance[unknowns[:, None], unknowns]
-    response = gamma[:, None] * (opening @ compliance)
+    compliance = scene.compliance.take(unknowns, axis=0).take(unknowns, axis=1)
+    response = (gamma[:, None] * opening) @ compliance
     if len(scene.stress):
-        response += scene.stress[active[:, None], unknowns]
-    weighted = normal.T * areas
+        response += scene.stress.take(active, axis=0).take(unknowns, axis=1)
+    weighted = np.ascontiguousarray((normal * areas[:, None]).T)
     matrix = response @ weighted
     matrix.flat[:: len(matrix) + 1] += 1.0
-    factor = dgetrf(matrix, overwrite_a=1)[:2]
+    # the transposed matrix is what LAPACK sees in C order: factorise that, solve transposed, and nothing is copied
+    factor = dgetrf(matrix.T, overwrite_a=1)[:2]
     loads = areas * pressure[active]
     return Linearised(unknowns, opening, weighted, tilt, slide, chosen, loads, gamma, compliance, response, factor)
-
-
-def _dense(part: Array, rotation: Array, slot: IntArray, rows: int, nodes: int) -> Array:
-    """Six-node rows in global axes, spread over all touched nodes in tooth axes."""
-    turned = np.matmul(part[:, :, None, :], rotation)[:, :, 0, :].reshape(-1, 2)
-    full = np.zeros((rows * nodes, 2))
-    full[slot] = turned  # the two edges of a point belong to different teeth: no slot is met twice
-    return full.reshape(rows, 2 * nodes)
 
 
 def asked_pressure(scene: Scene, projection: Projection, forces: Array) -> Array:

@@ -6,6 +6,7 @@ All positions of a sweep are searched in one pass.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,8 @@ from numpy.typing import NDArray
 from .closest import chains_of, nearest_places, project
 from .scene import MeshingPair, Window
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+Array = NDArray[Any]
+IntArray = NDArray[Any]
 
 #: Edges added on either side of a window.
 MARGIN = 3

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,8 @@ from .compliance import GearBody
 from .flank import edge_nodes
 from .laws import ContactLaw
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+Array = NDArray[Any]
+IntArray = NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -56,12 +57,12 @@ class MeshingPair:
         """Mesh cycle in terms of the pinion's rotation (rad)."""
         return 2 * np.pi / self.pinion.teeth
 
-    def wheel_angle(self, pinion_angle: float, twist: float) -> float:
+    def wheel_angle(self, pinion_angle: Any, twist: Any) -> Any:
         """Wheel rotation (rad): -pinion angle z1/z2 + twist."""
         return -pinion_angle * self.pinion.teeth / self.wheel.teeth + twist
 
-    def tooth_angle(self, gear: int, tooth: int, pinion_angle: float, twist: float) -> float:
-        """Angle (rad) of the frame of a tooth of the pinion (gear 0) or wheel (gear 1)."""
+    def tooth_angle(self, gear: int, tooth: Any, pinion_angle: Any, twist: Any) -> Any:
+        """Angle (rad) of the frame of a tooth of the pinion (gear 0) or wheel (gear 1); numbers or arrays."""
         if gear == 0:
             return pinion_angle + 2 * np.pi * tooth / self.pinion.teeth
         return self.wheel_angle(pinion_angle, twist) + np.pi + (2 * tooth + 1) * np.pi / self.wheel.teeth
@@ -269,7 +270,7 @@ def _contact_points(pair: MeshingPair, windows: Sequence[Window], slaves: list[i
         q = flank.shapes.shape[0]
         n = w.edges * q
         lengths = flank.weights[own].ravel()
-        gamma = pair.law.parameter(body.material.youngs_modulus, flank.sizes[own])
+        gamma = pair.law.parameter(body.material.youngs_modulus, flank.sizes)[own]
         made = {
             "slave_nodes": np.repeat(w.first_node + edge_nodes(np.arange(w.edges)), q, axis=0),
             "slave_shapes": np.tile(flank.shapes, (w.edges, 1)),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from .overlap import Overlap, overlaps, rigidly_apart, windows_of
 from .scene import MeshingPair, Scene, assemble, project_all
 from .start import starting_state
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 #: Relative residual of the contact pressures at which a position counts as converged.
 TOLERANCE = 1e-10

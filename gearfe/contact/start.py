@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .closest import gap_rows, unreached
 from .scene import MeshingPair, Scene, project_all
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 
 def starting_state(pair: MeshingPair, scene: Scene) -> tuple[Array, Array]:
@@ -35,9 +37,8 @@ def starting_state(pair: MeshingPair, scene: Scene) -> tuple[Array, Array]:
         total = np.bincount(scene.pair, weights=shape * scene.weight, minlength=scene.pairs)
         shape /= np.maximum(total, 1e-300)[scene.pair]
         used = np.flatnonzero(shape > 0)
-        rows = gap_rows(projection.take(used), scene.slave_nodes[used], scene.slave_shapes[used])
-        turned = np.matmul(rows.normal[:, :, None, :], scene.rotation[rows.nodes])[:, :, 0, :]
-        loads = turned * (shape * scene.weight)[used, None, None]
+        rows = gap_rows(projection.take(used), scene.slave_nodes[used], scene.slave_shapes[used], scene.rotation)
+        loads = rows.normal * (shape * scene.weight)[used, None, None]
         unknown = 2 * rows.nodes[:, :, None] + np.arange(2)
         size = 2 * len(scene.points)
         slot = scene.pair[used, None, None] * size + unknown
