@@ -178,9 +178,16 @@ def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
             length *= 0.5
         assert best is not None
         residual, state, projection, wanted = best
-        if residual < tolerance:
+        if residual < max(tolerance, _rounding(scene, wanted, projection)):
             return "converged", State(state.pressure, state.forces, state.displacement, projection.place), iteration
     return "not_converged", state, MAX_ITERATIONS
+
+
+def _rounding(scene: Scene, wanted: Array, projection: Projection) -> float:
+    """Smallest residual that rounding lets a law of this stiffness reach: gamma times the last bit of a coordinate."""
+    areas = scene.areas(projection.place) * (wanted > 0)
+    extent = float(np.abs(scene.points).max())
+    return float(np.finfo(float).eps * extent * (areas @ scene.parameter) / max(float(areas @ wanted), 1e-300))
 
 
 def _between(old: State, new: State, length: float) -> State:
