@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from .contact.compliance import gear_body
 from .contact.laws import ContactLaw, law_named
 from .contact.scene import MeshingPair
-from .contact.solver import Position, solve_position
+from .contact.solver import Position, solve_positions
 from .elasticity import Material, Plane
 from .errors import InputError
 from .gear import GearPair
@@ -43,7 +43,7 @@ Progress = Callable[[int, int, str], None]
 #: Coarsening, assumed order of convergence and largest number of positions of the error estimate.
 COARSENING, ORDER, ESTIMATE_POSITIONS = 1.6, 1.5, 20
 #: Positions handed to the solver at once: enough to start from one another, few enough to stay small in memory.
-BATCH = 10
+BATCH = 16
 
 
 @dataclass(frozen=True)
@@ -229,15 +229,11 @@ def _distinct(angles: Array, cycle: float) -> tuple[Array, IntArray]:
 # ---- solving ---------------------------------------------------------------------------------------------------------
 
 
-def _solve(elastic: MeshingPair, angles: Array, twists: Array) -> list[Position]:
-    return [solve_position(elastic, float(a), float(t)) for a, t in zip(angles, twists, strict=True)]
-
-
 def _at_twists(elastic: MeshingPair, angles: Array, twists: Array, progress: Progress | None) -> _Solved:
     positions: list[Position] = []
     for start in range(0, len(angles), BATCH):
         part = slice(start, start + BATCH)
-        positions += [_slim(p) for p in _solve(elastic, angles[part], twists[part])]
+        positions += _solve(elastic, angles[part], twists[part])
         if progress is not None:
             progress(len(positions), len(angles), "positions")
     iterations = np.array([p.iterations for p in positions], dtype=np.int64)
@@ -256,7 +252,7 @@ def _at_torque(
     for start, stop in zip(starts, [*starts[1:], len(angles)], strict=True):
         part = slice(start, stop)
         found = twists_for_torque(
-            lambda a, t: [_slim(p) for p in _solve(elastic, a, t)],
+            lambda a, t: _solve(elastic, a, t),
             angles[part],
             torque,
             touching=touching[part],
@@ -273,8 +269,9 @@ def _at_torque(
     return _collect(twists, positions, np.concatenate([found[2] for found in parts]), sum((f[3] for f in parts), []))
 
 
-def _slim(position: Position) -> Position:
-    return replace(position, scene=None, forces=None)
+def _solve(elastic: MeshingPair, angles: Array, twists: Array) -> list[Position]:
+    """Positions without what only fields need: a scene holds megabytes."""
+    return [replace(p, scene=None, forces=None) for p in solve_positions(elastic, angles, twists)]
 
 
 def _collect(twists: Array, positions: list[Position], iterations: IntArray, status: list[str]) -> _Solved:

@@ -43,7 +43,8 @@ class StiffnessJob:
     def law(self) -> ContactLaw:
         """Contact law with its parameter."""
         if self.table.law == "penalty":
-            return Penalty(self.table.penalty_stiffness_N_per_mm3 * 1e9)
+            stiffness = self.table.penalty_stiffness_N_per_mm3
+            return Penalty(None if stiffness is None else stiffness * 1e9)
         return Nitsche(self.table.nitsche_gamma0)
 
     @property

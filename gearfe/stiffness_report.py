@@ -134,7 +134,7 @@ def figure_arguments(job: StiffnessJob, curve: StiffnessCurve) -> dict[str, Any]
         line = (fine, interpolant(fine).value)
     load = f"twist {table.twist_deg:g}°" if table.twist_deg is not None else f"wheel torque {table.torque_Nm:g} N m"
     moduli = [material.youngs_modulus for material in job.materials]
-    levels = {"ISO 6336  c_γ · b": 1e-6 * iso_values(pair, moduli[0], moduli[1])["c_gamma_times_width_N_per_m"]}
+    levels = {r"ISO 6336 $c_\gamma b$": 1e-6 * iso_values(pair, moduli[0], moduli[1])["c_gamma_times_width_N_per_m"]}
     level = cycle_statistics(curve, table.interpolation)
     if level is not None:
         levels = {"mean over the cycle": 1e-6 * level["mean_N_per_m"], **levels}

@@ -65,7 +65,7 @@ def stiffness_figure(
     single
         Stretches of pinion angle (deg) in which rigid gears have one pair of teeth in contact, shaded.
     levels
-        Horizontal lines to compare with: label -> stiffness (N/um).
+        Horizontal lines to compare with: label -> stiffness (N/um); far ones are only named.
     shares
         For each tooth pair, pinion angle (deg) and share of the torque (-).
     """
@@ -75,8 +75,12 @@ def stiffness_figure(
     _tidy(axes)
     for number, (start, end) in enumerate(single):
         axes.axvspan(start, end, color="#f3f4f6", zorder=0, label=None if number else "single-pair contact (rigid)")
+    low, high = np.nanmin(points[1], initial=np.inf), np.nanmax(points[1], initial=-np.inf)
     for (label, level), dashes in zip(levels.items(), ((6, 3), (2, 2), (6, 2, 2, 2)), strict=False):
-        axes.axhline(level, color=GREY, linewidth=1.1, dashes=dashes, label=label)
+        if low - (high - low) <= level <= high + (high - low):
+            axes.axhline(level, color=GREY, linewidth=1.1, dashes=dashes, label=f"{label}: {level:.4g}")
+        else:
+            axes.plot([], [], " ", label=f"{label}: {level:.4g} (off the scale)")
     axes.plot(*line, color=BLUE, linewidth=2.0, label="k, interpolated")
     axes.plot(*points, "o", color=BLUE, markersize=4.5, markerfacecolor="white", label="solved positions")
     if len(failed):
@@ -86,7 +90,7 @@ def stiffness_figure(
     axes.set_title(title, fontsize=11, loc="left")
     axes.set_xlim(line[0][0], line[0][-1])
     axes.margins(y=0.12)
-    axes.legend(fontsize=8.5, framealpha=0.95, loc="best", ncols=2)
+    figure.legend(fontsize=8.5, loc="outside lower center", ncols=5, frameon=False)
     if shares:
         lower = figure.add_subplot(grid[1], sharex=axes)
         _tidy(lower)

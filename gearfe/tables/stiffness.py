@@ -33,8 +33,11 @@ class StiffnessTable:
     nitsche_gamma0: float = quantity(
         1.0, doc="parameter of the law nitsche, gamma h/E (-); 1 is the most accurate", low=1e-3, high=1e6
     )
-    penalty_stiffness_N_per_mm3: float = quantity(
-        1e9, doc="parameter of the law penalty (N/mm3); below 1e8 it softens the teeth", low=1e3, high=1e13
+    penalty_stiffness_N_per_mm3: float | None = quantity(
+        None,
+        doc="parameter of the law penalty (N/mm3), by default 300 E/h with the flank's largest element h",
+        low=1e3,
+        high=1e13,
     )
     points_per_edge: int = quantity(4, doc="contact points on each element edge of a flank", low=2, high=10)
     coarsen: float = quantity(
