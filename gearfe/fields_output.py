@@ -17,12 +17,11 @@ from .errors import InputError
 from .fields import GearField, pair_recovery, straight_triangles
 from .gear import GearPair
 from .output.figures import stress_figure
+from .output.vtkhdf import VtkHdfSeries
 from .stiffness_curve import StiffnessCurve
+from .threads import one_thread
 
 Array = NDArray[Any]
-
-#: VTK's number for a second-order triangle; its node order is ours.
-VTK_QUADRATIC_TRIANGLE = 22
 
 
 def chosen_positions(curve: StiffnessCurve, angles_deg: Sequence[float] | None) -> NDArray[np.int64]:
@@ -73,11 +72,11 @@ def write_fields(
     recovery = pair_recovery(elastic)
     names = ["fields.vtkhdf"]
     worst: tuple[float, int, tuple[GearField, GearField]] | None = None
-    with _series(folder / "fields.vtkhdf", recovery.gears) as write:
+    with VtkHdfSeries(folder / "fields.vtkhdf") as series, one_thread():
         for done, number in enumerate(chosen, start=1):
             angle, twist = float(curve.pinion_angle[number]), float(curve.twist[number] + curve.lost_motion)
             fields = recovery.at(solve_position(elastic, angle, twist), angle, twist)
-            write(math.degrees(angle), fields)
+            _add(series, math.degrees(angle), fields, first=done == 1)
             if angles_deg is not None:
                 names.append(_picture(folder, pair, fields, angle, twist))
             else:
@@ -91,6 +90,24 @@ def write_fields(
         twist = float(curve.twist[number] + curve.lost_motion)
         names.append(_picture(folder, pair, worst[2], float(curve.pinion_angle[number]), twist))
     return names
+
+
+def _add(series: VtkHdfSeries, time: float, fields: tuple[GearField, GearField], *, first: bool) -> None:
+    """Both gears as one grid; the elements are stored with the first step only."""
+    pinion, wheel = fields
+    cells = None
+    if first:
+        cells = {"triangle6": np.concatenate([pinion.triangles, wheel.triangles + len(pinion.points)])}
+    series.add(
+        time,
+        np.concatenate([f.points for f in fields]),
+        cells,
+        point_data={
+            "displacement_m": np.concatenate([f.displacement for f in fields]).astype(np.float32),
+            "von_mises_Pa": np.concatenate([f.von_mises for f in fields]).astype(np.float32),
+        },
+        cell_data={"gear": np.repeat(np.array([0, 1], dtype=np.uint8), [len(f.triangles) for f in fields])},
+    )
 
 
 def _picture(folder: Path, pair: GearPair, fields: Sequence[GearField], angle: float, twist: float) -> str:

@@ -31,6 +31,7 @@ from .meshing.tooth_sector import sector_mesh
 from .periodic import fold
 from .stiffness_curve import ErrorEstimate, StiffnessCurve
 from .stopwatch import Stopwatch
+from .threads import one_thread
 from .torque_control import twists_for_torque
 from .unloaded import unloaded_twist
 
@@ -95,7 +96,7 @@ def elastic_pair(
     with watch.stage("meshes"):
         recipes = sector_recipes(pair, coarsen=coarsen)
         meshes = [sector_mesh(gear, recipe) for gear, recipe in zip(gears, recipes, strict=True)]
-    with watch.stage("condensation"):
+    with watch.stage("condensation"), one_thread():
         bodies = [
             gear_body(
                 mesh,
@@ -176,7 +177,7 @@ def sweep_stiffness(
     solved_angles, source = (asked, np.arange(len(asked))) if solve_all else _distinct(asked, cycle)
     with watch.stage("unloaded flanks"):
         touching = unloaded_twist(pair, solved_angles)
-    with watch.stage("positions"):
+    with watch.stage("positions"), one_thread():
         if torque is None:
             solved = _at_twists(elastic, solved_angles, np.full(len(solved_angles), load), progress)
         else:
@@ -184,7 +185,7 @@ def sweep_stiffness(
     solved = _honest(solved, touching)
     error = None
     if estimate_error:
-        with watch.stage("error estimate"):
+        with watch.stage("error estimate"), one_thread():
             given = (elastic.pinion.material, elastic.wheel.material)
             common = {"plane": elastic.pinion.plane, "law": elastic.law, "points_per_edge": points_per_edge}
             coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)

@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         with watch.stage("table"):
             curve.to_csv(made / "stiffness.csv")
         if chosen is not None:
-            from ..fields import write_fields
+            from ..fields_output import write_fields
 
             angles = None if chosen == "all" else chosen
             if angles is not None and not angles:
