@@ -58,12 +58,9 @@ def from_text(text: str, column: str) -> float:
     text = text.strip()
     if text.lower() in ("", "nan"):
         return float("nan")
-    factor = factor_of(column)
-    if factor == 1:
-        return float(text)
     try:
-        return float(_EXACT.divide(Decimal(text), factor))
-    except ArithmeticError as error:
+        return float(_EXACT.divide(Decimal(text), factor_of(column)))
+    except (ArithmeticError, ValueError) as error:
         raise ValueError(text) from error
 
 

@@ -104,7 +104,8 @@ def periodic_interpolant(
     order = np.flatnonzero(known)[np.argsort(folded[known], kind="stable")]
     nodes = folded[order]
     if len(nodes):
-        order = order[np.concatenate([[True], np.diff(nodes) > 1e-9 * period])]
+        starts = np.flatnonzero(np.concatenate([[True], np.diff(nodes) > 1e-9 * period]))
+        order = np.minimum.reduceat(order, starts)
         nodes = folded[order]
     gaps = np.diff(np.append(nodes, nodes[0] + period)) if len(nodes) else np.array([period])
     k = int(np.argmax(gaps))
