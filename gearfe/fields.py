@@ -1,9 +1,9 @@
 r"""Displacement and stress on whole gears, recovered from a solved position.
 
-With the forces :math:`f_i` on the flanks of the loaded teeth, each in the frame of its tooth, the cut sides of tooth j
-move by :math:`b_j = \sum_i X_{j-i} P^T f_i` and its flank by :math:`u_j = A f_j + P b_j` (the matrices of
+With the forces :math:`f_i` on the flanks of the loaded teeth, each in the frame of its tooth, the cut sides of tooth
+j move by :math:`b_j = \sum_i X_{j-i} P^T f_i` and its flank by :math:`u_j = A f_j + P b_j` (the matrices of
 `gearfe.contact.compliance`); the interior follows from the stored elimination. Stresses are those of the elements at
-their nodes, averaged over the elements that meet there, and are linear in the displacements: one sparse matrix per gear.
+their nodes, averaged over the elements that meet there; they are linear in the displacements, one sparse matrix a gear.
 """
 
 from __future__ import annotations

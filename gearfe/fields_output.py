@@ -112,9 +112,7 @@ def _add(series: VtkHdfSeries, time: float, fields: tuple[GearField, GearField],
 
 def _picture(folder: Path, pair: GearPair, fields: Sequence[GearField], angle: float, twist: float) -> str:
     name = f"stress_{math.degrees(angle):.6g}deg.png"
-    parts = [
-        (1e3 * (f.points + f.displacement), straight_triangles(f.triangles), 1e-6 * f.von_mises) for f in fields
-    ]
+    parts = [(1e3 * (f.points + f.displacement), straight_triangles(f.triangles), 1e-6 * f.von_mises) for f in fields]
     title = (
         f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, pinion at {math.degrees(angle):.6g}°, "
         f"wheel twisted by {math.degrees(twist):.4g}°, deformation to scale"

@@ -1,8 +1,8 @@
 """Rotation sweep: from a gear pair to its mesh-stiffness curve.
 
-Conventions: pinion centre at the origin, wheel at +x; at pinion angle 0 a pinion tooth stands on the line of centres and
-a wheel space faces it; angles are counter-clockwise; wheel angle = -pinion angle z1/z2 + twist, and a positive twist
-presses the driving flanks together.
+Conventions: pinion centre at the origin, wheel at +x; at pinion angle 0 a pinion tooth stands on the line of centres
+and a wheel space faces it; angles are counter-clockwise; wheel angle = -pinion angle z1/z2 + twist, and a positive
+twist presses the driving flanks together.
 
     >>> curve = sweep_stiffness(pair, twist=math.radians(0.05))   # one mesh cycle in 20 positions
     >>> k, slope = curve.interpolate(math.radians(7.3))           # N/m and N/(m rad)
@@ -11,8 +11,7 @@ presses the driving flanks together.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -21,46 +20,33 @@ from numpy.typing import ArrayLike, NDArray
 from .contact.compliance import gear_body
 from .contact.laws import ContactLaw, law_named
 from .contact.scene import MeshingPair
-from .contact.solver import Position, solve_positions
 from .elasticity import Material, Plane
 from .errors import InputError
 from .gear import GearPair
-from .iso6336 import mesh_stiffness
 from .meshing.recipe import sector_recipes
 from .meshing.tooth_sector import sector_mesh
 from .periodic import fold
-from .stiffness_curve import ErrorEstimate, StiffnessCurve
+from .stiffness_curve import SOLVED, ErrorEstimate, StiffnessCurve
 from .stopwatch import Stopwatch
+from .sweep_positions import Progress, Solved, at_torque, at_twists, honest, load_shares
 from .threads import one_thread
-from .torque_control import twists_for_torque
 from .unloaded import unloaded_twist
 
 __all__ = ["ErrorEstimate", "StiffnessCurve", "elastic_pair", "sweep_stiffness"]
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Progress = Callable[[int, int, str], None]
+Array = NDArray[Any]
+IntArray = NDArray[Any]
+
+#: Structural steel, the material where none is given.
+STEEL = Material()
 
 #: Coarsening, assumed order of convergence and largest number of positions of the error estimate.
 COARSENING, ORDER, ESTIMATE_POSITIONS = 1.6, 1.5, 20
-#: Positions handed to the solver at once: enough to start from one another, few enough to stay small in memory.
-BATCH = 16
-
-
-@dataclass(frozen=True)
-class _Solved:
-    """Solutions of some positions, scenes dropped: arrays over positions, and what each pair carries."""
-
-    twist: Array
-    numbers: dict[str, Array]
-    pairs: list[tuple[IntArray, Array]]
-    iterations: IntArray
-    status: list[str]
 
 
 def elastic_pair(
     pair: GearPair,
-    materials: Material | tuple[Material, Material] = Material(),
+    materials: Material | tuple[Material, Material] = STEEL,
     *,
     plane: Plane = "strain",
     law: str | ContactLaw = "nitsche",
@@ -118,7 +104,7 @@ def sweep_stiffness(
     twist: float | None = None,
     torque: float | None = None,
     angles: ArrayLike | None = None,
-    materials: Material | tuple[Material, Material] = Material(),
+    materials: Material | tuple[Material, Material] = STEEL,
     plane: Plane = "strain",
     law: str | ContactLaw = "nitsche",
     twist_from: Literal["centred", "contact"] = "centred",
@@ -150,7 +136,8 @@ def sweep_stiffness(
     estimate_error
         Solve again on a coarser mesh and estimate the discretisation error.
     elastic
-        The pair from `elastic_pair`, when it is there already; materials, plane and the like are then not looked at.
+        The pair from `elastic_pair`, when it is there already; of its arguments only coarsen and points_per_edge are
+        then looked at, by the error estimate.
     progress
         Called with positions done, positions in all, and the stage's name.
 
@@ -179,10 +166,10 @@ def sweep_stiffness(
         touching = unloaded_twist(pair, solved_angles)
     with watch.stage("positions"), one_thread():
         if torque is None:
-            solved = _at_twists(elastic, solved_angles, np.full(len(solved_angles), load), progress)
+            solved = at_twists(elastic, solved_angles, np.full(len(solved_angles), load), progress)
         else:
-            solved = _at_torque(pair, elastic, solved_angles, load, touching, progress)
-    solved = _honest(solved, touching)
+            solved = at_torque(pair, elastic, solved_angles, load, touching, progress)
+    solved = honest(solved, touching)
     error = None
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
@@ -190,7 +177,7 @@ def sweep_stiffness(
             common = {"plane": elastic.pinion.plane, "law": elastic.law, "points_per_edge": points_per_edge}
             coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
             error = _estimate(coarse, solved_angles, solved)
-    curve = _assemble(pair, asked, solved_angles, source, solved, touching, lost)
+    curve = _assemble(pair, asked, solved_angles, source, solved, touching, lost, searched=torque is not None)
     return replace(curve, timings=dict(watch.seconds), error=error)
 
 
@@ -227,99 +214,35 @@ def _distinct(angles: Array, cycle: float) -> tuple[Array, IntArray]:
     return folded[order][new], source
 
 
-# ---- solving ---------------------------------------------------------------------------------------------------------
-
-
-def _at_twists(elastic: MeshingPair, angles: Array, twists: Array, progress: Progress | None) -> _Solved:
-    positions: list[Position] = []
-    for start in range(0, len(angles), BATCH):
-        part = slice(start, start + BATCH)
-        positions += _solve(elastic, angles[part], twists[part])
-        if progress is not None:
-            progress(len(positions), len(angles), "positions")
-    iterations = np.array([p.iterations for p in positions], dtype=np.int64)
-    return _collect(twists, positions, iterations, [p.status for p in positions])
-
-
-def _at_torque(
-    pair: GearPair, elastic: MeshingPair, angles: Array, torque: float, touching: Array, progress: Progress | None
-) -> _Solved:
-    # the first position starts from the standard's stiffness, the others from the compliance that it showed
-    moduli = [body.material.youngs_modulus for body in elastic.bodies]
-    guess = mesh_stiffness(pair, moduli[0], moduli[1]) * elastic.width * pair.wheel.base_radius**2
-    most = math.pi / pair.wheel.teeth
-    parts = []
-    starts = [0, *range(1, len(angles), BATCH)]
-    for start, stop in zip(starts, [*starts[1:], len(angles)], strict=True):
-        part = slice(start, stop)
-        found = twists_for_torque(
-            lambda a, t: _solve(elastic, a, t),
-            angles[part],
-            torque,
-            touching=touching[part],
-            first=touching[part] + torque / guess,
-            most=most,
-        )
-        parts.append(found)
-        if start == 0 and found[3][0] == "converged":
-            guess = torque / (found[0][0] - touching[0])
-        if progress is not None:
-            progress(stop, len(angles), "positions")
-    twists = np.concatenate([found[0] for found in parts])
-    positions = [p for found in parts for p in found[1]]
-    return _collect(twists, positions, np.concatenate([found[2] for found in parts]), sum((f[3] for f in parts), []))
-
-
-def _solve(elastic: MeshingPair, angles: Array, twists: Array) -> list[Position]:
-    """Positions without what only fields need: a scene holds megabytes."""
-    return [replace(p, scene=None, forces=None) for p in solve_positions(elastic, angles, twists)]
-
-
-def _collect(twists: Array, positions: list[Position], iterations: IntArray, status: list[str]) -> _Solved:
-    names = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "tangent", "peak_pressure")
-    numbers = {name: np.array([getattr(p, name) for p in positions], dtype=float) for name in names}
-    pairs = []
-    for p in positions:
-        carry = np.asarray(p.pair_torques) > 0
-        pairs.append((np.asarray(p.pair_numbers, dtype=np.int64)[carry], np.asarray(p.pair_torques)[carry]))
-    return _Solved(twists, numbers, pairs, iterations, status)
-
-
-def _honest(solved: _Solved, touching: Array) -> _Solved:
-    """A position without contact although the exact rigid flanks overlap is under-resolved; no number of a failed one."""
-    status = [
-        "under_resolved" if s == "no_contact" and twist > touch else s
-        for s, twist, touch in zip(solved.status, solved.twist, touching, strict=True)
-    ]
-    bad = np.array([s not in ("converged", "no_contact") for s in status])
-    numbers = {name: np.where(bad, np.nan, values) for name, values in solved.numbers.items()}
-    return replace(solved, numbers=numbers, status=status)
-
-
-def _estimate(coarse: MeshingPair, angles: Array, solved: _Solved) -> ErrorEstimate:
+def _estimate(coarse: MeshingPair, angles: Array, solved: Solved) -> ErrorEstimate:
     good = np.flatnonzero(np.array(solved.status) == "converged")
     chosen = good[np.unique(np.linspace(0, len(good) - 1, min(len(good), ESTIMATE_POSITIONS)).round().astype(int))]
-    again = _at_twists(coarse, angles[chosen], solved.twist[chosen], None)
+    again = at_twists(coarse, angles[chosen], solved.twist[chosen], None)
     fine = solved.numbers["torque_wheel"][chosen]
     other = np.where(np.array(again.status, dtype=object) == "converged", again.numbers["torque_wheel"], np.nan)
     relative = np.abs(other / fine - 1) / (COARSENING**ORDER - 1)
     return ErrorEstimate(angles[chosen], relative, COARSENING, ORDER)
 
 
-# ---- the curve -------------------------------------------------------------------------------------------------------
-
-
 def _assemble(
-    pair: GearPair, asked: Array, angles: Array, source: IntArray, solved: _Solved, touching: Array, lost: float
+    pair: GearPair,
+    asked: Array,
+    angles: Array,
+    source: IntArray,
+    solved: Solved,
+    touching: Array,
+    lost: float,
+    *,
+    searched: bool,
 ) -> StiffnessCurve:
+    """The curve at all asked angles; `searched` says that the twist is a result, not given."""
     radius = pair.wheel.base_radius
-    failed = np.array([s not in ("converged", "no_contact") for s in solved.status])
-    in_torque_mode_failed = failed & ~(np.ptp(solved.twist) == 0)
-    total = np.where(in_torque_mode_failed, np.nan, solved.twist)
+    failed = ~np.isin(solved.status, SOLVED)
+    total = np.where(failed & searched, np.nan, solved.twist)
     twist = total - lost
     torque = solved.numbers["torque_wheel"]
     cycles = np.round((asked - angles[source]) / pair.mesh_cycle).astype(np.int64)
-    leading, shares = _shares(solved.pairs, torque)
+    leading, shares = load_shares(solved.pairs, torque)
     return StiffnessCurve(
         pinion_angle=asked,
         wheel_angle=pair.wheel_angle_at(asked, total[source]),  # type: ignore[arg-type]
@@ -342,16 +265,3 @@ def _assemble(
         base_radius=radius,
         lost_motion=lost,
     )
-
-
-def _shares(pairs: list[tuple[IntArray, Array]], torque: Array) -> tuple[Array, Array]:
-    """Number of the leading pair of each position, and the shares of it and of the pairs behind it."""
-    leading = np.array([float(numbers.max()) if len(numbers) else np.nan for numbers, _ in pairs])
-    most = max((int(np.ptp(numbers)) + 1 for numbers, _ in pairs if len(numbers)), default=1)
-    shares = np.zeros((len(pairs), most))
-    for i, (numbers, torques) in enumerate(pairs):
-        if len(numbers):
-            shares[i, numbers.max() - numbers] = torques / torque[i]
-    failed = ~np.isfinite(torque)
-    shares[failed], leading[failed] = np.nan, np.nan
-    return leading, shares

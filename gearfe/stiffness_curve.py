@@ -253,9 +253,11 @@ class StiffnessCurve:
             else:
                 values[attribute] = found
         shares = [name for name in columns if name.startswith(SHARE)]
-        values["load_share"] = np.stack(
-            [curve_csv.numbers(columns, name, path) for name in shares], axis=1
-        ) if shares else np.zeros((len(values["k_mesh"]), 0))
+        values["load_share"] = (
+            np.stack([curve_csv.numbers(columns, name, path) for name in shares], axis=1)
+            if shares
+            else np.zeros((len(values["k_mesh"]), 0))
+        )
         default = ["converged" if np.isfinite(k) else "missing" for k in values["k_mesh"]]
         values["status"] = np.array([cell.strip() for cell in columns.get("status", default)])
         return cls(**values)

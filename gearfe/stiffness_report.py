@@ -106,7 +106,7 @@ def warnings(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
     apart = int(np.count_nonzero(curve.status == "no_contact"))
     if apart:
         sentence = f"{apart} positions have no contact: the twist does not take up backlash and relief there"
-        cure = "" if curve.lost_motion else " (twist_from = \"contact\" counts it from where the flanks touch)"
+        cure = "" if curve.lost_motion else ' (twist_from = "contact" counts it from where the flanks touch)'
         said.append(sentence + cure)
     if curve.failed.any():
         angles = ", ".join(f"{a:.6g}" for a in np.degrees(curve.pinion_angle[curve.failed])[:8])

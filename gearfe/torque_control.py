@@ -8,6 +8,7 @@ otherwise the interval is halved, or the twist doubled while nothing has been to
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +23,33 @@ MAX_SOLUTIONS = 40
 #: Status of a position whose torque was not found although single solutions converged.
 NOT_REACHED = "torque_not_reached"
 
+
+class TorqueSolution(NamedTuple):
+    """Twists that carry a torque.
+
+    Attributes
+    ----------
+    twist : ndarray, shape (n,)
+        rad.
+    positions : list of Position
+        Last solution of each position.
+    iterations : ndarray, shape (n,)
+        Newton iterations of all its solutions together.
+    status : list of str
+    """
+
+    twist: Array
+    positions: list[Position]
+    iterations: NDArray[np.int64]
+    status: list[str]
+
+
 Solve = Callable[[Array, Array], list[Position]]
 
 
 def twists_for_torque(
     solve: Solve, angles: Array, torque: float, *, touching: Array, first: Array, most: float
-) -> tuple[Array, list[Position], NDArray[np.int64], list[str]]:
+) -> TorqueSolution:
     """Find the twist of each position.
 
     Parameters
@@ -42,15 +64,6 @@ def twists_for_torque(
         Twists (rad) at which the rigid flanks touch, and first guesses above them.
     most
         Largest twist tried (rad).
-
-    Returns
-    -------
-    twists : ndarray, shape (n,)
-    positions : list of Position
-        Last solution of each position.
-    iterations : ndarray, shape (n,)
-        Newton iterations of all solutions together.
-    statuses : list of str
     """
     low, high = touching.copy(), np.full(len(angles), np.inf)
     twist = np.minimum(first, most)
@@ -87,5 +100,4 @@ def twists_for_torque(
             twist[i] = min(tried, most)
             still.append(i)
         open_ = np.array(still, dtype=np.int64)
-    positions = [p for p in found if p is not None]
-    return twist, positions, iterations, status
+    return TorqueSolution(twist, [p for p in found if p is not None], iterations, status)

@@ -81,7 +81,9 @@ def test_rate(method):
     counts = np.array([20, 40, 80, 160])
     for n in counts:
         nodes = np.arange(n) * PERIOD / n
-        errors.append(np.abs(periodic_interpolant(nodes, smooth(nodes), PERIOD, method=method)(x).value - smooth(x)).max())
+        errors.append(
+            np.abs(periodic_interpolant(nodes, smooth(nodes), PERIOD, method=method)(x).value - smooth(x)).max()
+        )
     assert np.polyfit(np.log(counts), np.log(errors), 1)[0] < -1.8
 
 
@@ -102,7 +104,9 @@ def test_a_repeated_phase_counts_once():
 
 
 def test_a_sample_just_below_a_whole_period_is_one_at_zero():
-    curve = periodic_interpolant([3 * PERIOD - 1e-16, 0.2 * PERIOD, 0.4 * PERIOD, 0.6 * PERIOD, 0.8 * PERIOD], range(5), PERIOD)
+    curve = periodic_interpolant(
+        [3 * PERIOD - 1e-16, 0.2 * PERIOD, 0.4 * PERIOD, 0.6 * PERIOD, 0.8 * PERIOD], range(5), PERIOD
+    )
     assert float(curve(0.0).value) == pytest.approx(0.0, abs=1e-9)
 
 

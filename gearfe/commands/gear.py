@@ -23,8 +23,8 @@ def run(args: argparse.Namespace) -> int:
     from ..derived import derived_geometry, iso_values
     from ..drawing import pair_drawing
     from ..errors import InputError
-    from ..output.files import output_folder, whole_set, write_json
     from ..output.figures import pair_figure
+    from ..output.files import output_folder, whole_set, write_json
     from ..stiffness_job import read_stiffness_job
 
     if not math.isfinite(args.angle_deg):

@@ -13,7 +13,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("job", metavar="JOB.toml", help="job file with the table [pair]")
     parser.add_argument("--out", metavar="FILE", required=True, help="file to write; its suffix chooses the format")
-    parser.add_argument("--gear", choices=("both", "pinion", "wheel"), default="both", help="which gear (default: both)")
+    parser.add_argument(
+        "--gear", choices=("both", "pinion", "wheel"), default="both", help="which gear (default: both)"
+    )
     parser.add_argument("--sector", action="store_true", help="one tooth of each gear instead of whole gears")
     parser.add_argument("--coarsen", type=float, metavar="C", help="factor on all element sizes")
 

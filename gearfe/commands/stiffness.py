@@ -51,12 +51,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compute the curve and write the files; 1 when a position failed."""
     started = time.perf_counter()
-    from ..errors import InputError
     from ..output.files import output_folder, whole_set, write_json
     from ..stiffness import elastic_pair, sweep_stiffness
-    from ..stopwatch import Stopwatch
     from ..stiffness_job import read_stiffness_job
     from ..stiffness_report import figure_arguments, summary, told, warnings
+    from ..stopwatch import Stopwatch
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("geometry"):
@@ -78,9 +77,7 @@ def run(args: argparse.Namespace) -> int:
         if chosen is not None:
             from ..fields_output import write_fields
 
-            angles = None if chosen == "all" else chosen
-            if angles is not None and not angles:
-                raise InputError("--fields", None, "names no angle", "give 'all' or angles (deg)")
+            angles = None if isinstance(chosen, str) else chosen
             with watch.stage("fields"):
                 write_fields(made, job.pair, elastic, curve, angles, progress=show)
             show.end()

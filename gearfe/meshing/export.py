@@ -125,7 +125,9 @@ def _write_abaqus(
     """meshio writes nodes, elements and sets; element type and surfaces (which it does not know) are put in here."""
     blocks = [("triangle6", nodes) for nodes in bodies.values()]
     sets = {
-        name: [np.arange(len(nodes)) if other == name else np.zeros(0, dtype=np.int64) for other, nodes in bodies.items()]
+        name: [
+            np.arange(len(nodes)) if other == name else np.zeros(0, dtype=np.int64) for other, nodes in bodies.items()
+        ]
         for name in bodies
     }
     mesh = meshio.Mesh(points, blocks, cell_sets=sets)

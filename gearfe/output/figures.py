@@ -175,7 +175,9 @@ def pair_figure(
     near.plot(marks[:, 0], marks[:, 1], color=RED, linewidth=2.4, label="path of contact A–E")
     near.plot(marks[:, 0], marks[:, 1], "o", color=RED, markersize=4)
     for letter, (px, py) in path_points.items():
-        near.annotate(letter, (px, py), xytext=(6, 5), textcoords="offset points", color=RED, weight="bold", fontsize=10)
+        near.annotate(
+            letter, (px, py), xytext=(6, 5), textcoords="offset points", color=RED, weight="bold", fontsize=10
+        )
     near.set_xlim(x - half, x + half)
     near.set_ylim(y - half, y + half)
     near.set_title("meshing zone", loc="left", fontsize=11)
