@@ -1,8 +1,8 @@
 r"""First-order effect of finite strain on the torque of a small-strain solution.
 
 With the Green strain :math:`E = \varepsilon + \eta`, :math:`\eta = \tfrac12\nabla u^T\nabla u`, a Saint
-Venant-Kirchhoff body stores :math:`\Delta W = \int \sigma(\varepsilon):\eta + \tfrac12\,\eta:C:\eta` more than the linear
-one. The equilibrium minimises the whole energy, so by the envelope theorem the energy at given twist changes by
+Venant-Kirchhoff body stores :math:`\Delta W = \int \sigma(\varepsilon):\eta + \tfrac12\,\eta:C:\eta` more than the
+linear one. The equilibrium minimises the whole energy, so by the envelope theorem the energy at given twist changes by
 :math:`\Delta W(u)` of the small-strain solution to first order, and the torque, its derivative with the twist
 :math:`\varphi`, by
 
@@ -66,24 +66,26 @@ def _energy_rate(body: GearBody, fields: Array) -> float:
     h = np.matmul(at, fields[triangles].reshape(m, 6, -1)).reshape(m, 3, 2, 2, 2 * sectors)
     # h[m, q, j, i] = d u_i / d x_j
     state, rate = h[..., :sectors], h[..., sectors:]
-    eta = (0.5 * _product(state, state, i, j) for i, j in _PAIRS)
-    eta_rate = (0.5 * (_product(state, rate, i, j) + _product(rate, state, i, j)) for i, j in _PAIRS)
     strain, strain_rate = _strain(state), _strain(rate)
-    curved, curved_rate = tuple(eta), tuple(eta_rate)
+    curved, curved_rate = _curved(state, state), _curved(state, rate)
+    curved_rate = (2 * curved_rate[0], 2 * curved_rate[1], 2 * curved_rate[2])
     density = (
         _work(lam, mu, strain_rate, curved) + _work(lam, mu, strain, curved_rate) + _work(lam, mu, curved, curved_rate)
     )
     return float(np.einsum("mq,mqs->", volume, density))
 
 
-#: Components of a plane symmetric tensor.
-_PAIRS = ((0, 0), (1, 1), (0, 1))
+#: Components 00, 11, 01 of a plane symmetric tensor.
 _Tensor = tuple[Array, Array, Array]
 
 
-def _product(a: Array, b: Array, i: int, j: int) -> Array:
-    """(grad a^T grad b)_ij = a_k,i b_k,j."""
-    return a[:, :, i, 0] * b[:, :, j, 0] + a[:, :, i, 1] * b[:, :, j, 1]
+def _curved(a: Array, b: Array) -> _Tensor:
+    """sym(grad a^T grad b) / 2."""
+
+    def product(i: int, j: int) -> Array:
+        return a[:, :, i, 0] * b[:, :, j, 0] + a[:, :, i, 1] * b[:, :, j, 1]
+
+    return 0.5 * product(0, 0), 0.5 * product(1, 1), 0.25 * (product(0, 1) + product(1, 0))
 
 
 def _strain(h: Array) -> _Tensor:

@@ -229,8 +229,9 @@ def _moment(arm: Array, force: Array) -> Array:
 
 
 def _tangent(scene: Scene, lin: Linearised, forces: Array, placed: Array) -> tuple[float, Array]:
-    """d torque / d twist and d forces / d twist. In the axes of the wheel's teeth the wheel's nodes are carried by e_z x (x - c) dphi, and
+    """d torque / d twist and d forces / d twist.
 
+    In the axes of the wheel's teeth the wheel's nodes are carried by e_z x (x - c) dphi, and
     df = G^T W dp + H dx - dphi e_z x f,  dx = carried + C df,  dp = -gamma dg - S df.
     """
     nodes = lin.unknowns[::2] // 2
