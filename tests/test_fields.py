@@ -136,7 +136,7 @@ def test_turning_the_whole_picture_changes_nothing(elastic, position, fields):
 
 
 def test_stress_below_a_line_contact(elastic, position, fields):
-    """Hertz: the largest von Mises stress in plane strain is 0.56 times the peak pressure, some way below the surface."""
+    """Hertz: the largest von Mises stress in plane strain is 0.56 times the peak pressure, below the surface."""
     for field in fields:
         assert 0.4 * position.peak_pressure < field.von_mises.max() < 1.1 * position.peak_pressure
     far = fields[0].von_mises[np.linalg.norm(fields[0].points - np.array([-20e-3, 0.0]), axis=1) < 3e-3]

@@ -26,7 +26,7 @@ def elastic(gears):
     return elastic_pair(gears, coarsen=COARSE)
 
 
-def on_the_path(gears, n=7, margin=math.radians(2.5)):
+def on_the_path(gears, n=7, margin=0.044):
     """Pinion angles at which one or two pairs touch well inside the path of contact."""
     b, d = gears.path["B"].pinion_angle, gears.path["D"].pinion_angle
     single = np.linspace(b + margin, d - margin, n)
@@ -98,7 +98,9 @@ def test_every_cycle_is_the_same(gears, elastic):
     curve = at(gears, angles, elastic, solve_all=True)
     for group in ([0, 2, 4, 5], [1, 3]):
         np.testing.assert_allclose(curve.torque_wheel[group], curve.torque_wheel[group[0]], rtol=1e-9)
-        np.testing.assert_allclose(curve.load_share[group], np.tile(curve.load_share[group[0]], (len(group), 1)), atol=1e-9)
+        np.testing.assert_allclose(
+            curve.load_share[group], np.tile(curve.load_share[group[0]], (len(group), 1)), atol=1e-9
+        )
     assert list(curve.leading_pair[[0, 2, 4, 5]]) == [0, -1, -2, 1]
 
 
@@ -107,7 +109,10 @@ def test_repeated_positions_are_solved_once(gears, elastic, monkeypatch):
 
     def counting(pair, angles, twists):
         solved.extend(angles)
-        return [solve_position(pair, float(a), float(t)) for a, t in zip(angles, np.broadcast_to(twists, len(angles)), strict=True)]
+        return [
+            solve_position(pair, float(a), float(t))
+            for a, t in zip(angles, np.broadcast_to(twists, len(angles)), strict=True)
+        ]
 
     monkeypatch.setattr("gearfe.sweep_positions.solve_positions", counting)
     angles = np.radians(np.arange(1.0, 41.0, 3.0))
@@ -124,7 +129,7 @@ def test_repeated_positions_are_solved_once(gears, elastic, monkeypatch):
 
 
 def test_swapped_gears_carry_the_same(gears, elastic):
-    """Seen from the other side (turned by 180 deg) the wheel is the pinion: the same contact, the other hub's torque."""
+    """From behind (turned by 180 deg) the wheel is the pinion: the same contact, the other hub's torque."""
     swapped = pair(30, 20, tip_round=0.1e-3)
     angles = np.radians([2.0, 5.0, 9.0, 12.0, 17.0])
     one = at(gears, angles, elastic)
@@ -133,7 +138,7 @@ def test_swapped_gears_carry_the_same(gears, elastic):
     np.testing.assert_allclose(other.torque_pinion, one.torque_wheel, rtol=1e-8)
 
 
-# ---- inputs: exact scalings, then directions ---------------------------------------------------------------------------
+# ---- inputs: exact scalings, then directions ------------------------------------------------------------------------
 
 
 def test_stiffness_scales_with_modulus_and_width(gears, elastic):
@@ -156,9 +161,7 @@ def test_stiffness_does_not_depend_on_size(gears, elastic):
 def test_two_materials(gears, elastic):
     angles = np.radians([4.0, 13.0])
     steel, soft = Material(), Material(70e9, 0.33)
-    both, one, other = (
-        at(gears, angles, materials=m).k_mesh for m in ((soft, soft), (soft, steel), (steel, soft))
-    )
+    both, one, other = (at(gears, angles, materials=m).k_mesh for m in ((soft, soft), (soft, steel), (steel, soft)))
     hard = at(gears, angles, elastic).k_mesh
     for mixed in (one, other):
         assert (both < mixed).all()
@@ -215,7 +218,7 @@ def test_relief_takes_load_off_the_entering_pair(gears, elastic):
     assert at(relieved, middle).k_mesh[0] == pytest.approx(at(gears, middle, elastic).k_mesh[0], rel=3e-3)
 
 
-# ---- torque mode -------------------------------------------------------------------------------------------------------
+# ---- torque mode ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("torque", [5.0, 100.0, 800.0])
@@ -253,13 +256,21 @@ def test_a_torque_beyond_reach_is_flagged(gears, elastic, monkeypatch):
     lost = at(gears, [0.1], elastic, twist=None, torque=100.0)
     assert lost.failed.all()
     assert lost.status[0] in ("not_converged", "torque_not_reached")
-    for name in ("twist", "torque_wheel", "torque_pinion", "k_mesh", "k_tangent", "transmission_error", "peak_pressure"):
+    for name in (
+        "twist",
+        "torque_wheel",
+        "torque_pinion",
+        "k_mesh",
+        "k_tangent",
+        "transmission_error",
+        "peak_pressure",
+    ):
         assert np.isnan(getattr(lost, name)).all(), name
     assert np.isnan(lost.wheel_angle).all()
     assert lost.teeth_in_contact[0] == -1
 
 
-# ---- backlash, zero of the twist, failures -------------------------------------------------------------------------------
+# ---- backlash, zero of the twist, failures --------------------------------------------------------------------------
 
 
 def test_backlash_and_the_zero_of_the_twist():
@@ -321,7 +332,7 @@ def test_mistakes(gears, options, message):
         sweep_stiffness(gears, **options)
 
 
-# ---- error estimate ----------------------------------------------------------------------------------------------------
+# ---- error estimate -------------------------------------------------------------------------------------------------
 
 
 def test_the_error_estimate_finds_the_error(gears, elastic):
