@@ -103,8 +103,8 @@ def tooth_root(gear: ToothForm) -> tuple[Trochoid, float, bool]:
     d = depth - gear.profile_shift * m
     whole = Trochoid(r, d, rho, offset, math.pi / gear.teeth, math.pi / 2 - alpha)
     form_roll = r * math.sin(alpha) - (d + rho * math.sin(alpha)) / math.sin(alpha)
-    if form_roll >= 0.0:
-        return whole, form_roll, False
+    if form_roll >= -NIL_ANGLE * r:
+        return whole, max(0.0, form_roll), False
     end, form_roll = _crossing(gear, whole)
     cut = Trochoid(r, d, rho, offset, math.pi / gear.teeth, end)
     if cut.point(np.linspace(0.0, 1.0, 257))[:, 1].min() <= 0.0:

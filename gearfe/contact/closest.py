@@ -2,11 +2,12 @@ r"""Closest points on chains of quadratic edges, gaps, and their variations.
 
 For a slave point :math:`x_s` and the master curve :math:`x_m(\xi)` with :math:`a = x_m'` the projection satisfies
 :math:`x_s - x_m(\xi) = g\,n(\xi)`. The normal is the edge's own, blended linearly into the mean of both neighbours' at
-each vertex: it is then continuous along the whole chain, and so are gap and forces. (With each edge's own normal a point
-that faces a vertex jumps between two solutions and Newton's method cycles.) The contact force acts along n at both
-points, so it is in equilibrium with itself whatever the blending.
+each vertex: it is then continuous along the whole chain, and so are gap and forces. (With each edge's own normal a
+point that faces a vertex jumps between two solutions and Newton's method cycles.) The contact force acts along n at
+both points, so it is in equilibrium with itself whatever the blending.
 
-With :math:`D = \delta x_s - \delta x_m` and :math:`N = n\cdot\delta x_m'` at fixed :math:`\xi`, :math:`m = a\cdot a`, and
+With :math:`D = \delta x_s - \delta x_m` and :math:`N = n\cdot\delta x_m'` at fixed :math:`\xi`, :math:`m = a\cdot a`,
+and
 :math:`\kappa = -a\cdot n'` the normal's own turning,
 
 .. math::
@@ -21,14 +22,15 @@ leaves out products of n.a, which is of the order of the kinks between edges).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .flank import edge_shapes
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+Array = NDArray[Any]
+IntArray = NDArray[Any]
 
 #: Gap (m) given to points whose projection runs off the end of the mate's surface: never in contact.
 OFF_END = 1.0
@@ -65,7 +67,7 @@ class Projection:
     tangent: Array
     curvature: Array
 
-    def take(self, index: IntArray) -> Projection:
+    def take(self, index: IntArray | slice) -> Projection:
         """The projections of the points `index`."""
         return Projection(**{name: getattr(self, name)[index] for name in self.__dataclass_fields__})
 
@@ -78,21 +80,16 @@ class Chains:
     ----------
     first, edges : ndarray, shape (n,)
         For each slave point the first edge (in the arrays below) and the number of edges of its chain.
-    start, linear, quadratic : ndarray, shape (e, 2)
-        x_m = start + xi linear + xi^2 quadratic on each edge (m).
-    bend_start, bend_end : ndarray, shape (e, 2)
-        What the blended normal adds to the edge's own at its two ends.
+    table : ndarray, shape (e, 10)
+        Of each edge: start, linear and quadratic coefficient of x_m = start + xi linear + xi^2 quadratic (m), and what
+        the blended normal adds to the edge's own at its start and at its end.
     node : ndarray, shape (e,)
         First node of each edge.
     """
 
     first: IntArray
     edges: IntArray
-    start: Array
-    linear: Array
-    quadratic: Array
-    bend_start: Array
-    bend_end: Array
+    table: Array
     node: IntArray
 
 
@@ -113,14 +110,14 @@ def chains_of(nodes: Array, counts: IntArray, chain_of: IntArray) -> Chains:
     x0, x1, x2 = nodes[node], nodes[node + 1], nodes[node + 2]
     linear, quadratic = 4 * x1 - 3 * x0 - x2, 2 * (x0 - 2 * x1 + x2)
     at_start, at_end = _normal(linear), _normal(linear + 2 * quadratic)
-    bend_start, bend_end = np.zeros_like(at_start), np.zeros_like(at_end)
+    table = np.concatenate([x0, linear, quadratic, np.zeros((len(node), 4))], axis=1)
     joint = np.ones(len(node), dtype=bool)
     joint[first_edge[1:] - 1] = False
     left = np.flatnonzero(joint)
     mean = at_end[left] + at_start[left + 1]
     mean /= np.sqrt(mean[:, :1] ** 2 + mean[:, 1:] ** 2)
-    bend_end[left], bend_start[left + 1] = mean - at_end[left], mean - at_start[left + 1]
-    return Chains(first_edge[chain_of], counts[chain_of], x0, linear, quadratic, bend_start, bend_end, node)
+    table[left, 8:], table[left + 1, 6:8] = mean - at_end[left], mean - at_start[left + 1]
+    return Chains(first_edge[chain_of], counts[chain_of], table, node)
 
 
 def _normal(tangent: Array) -> Array:
@@ -142,50 +139,64 @@ def project(
     Points whose projection runs off either end of the chain get the gap `OFF_END`.
     """
     place = place.copy()
+    moving = np.arange(len(place))
     for _ in range(iterations):
-        edge, xi, distance, a, normal, turning, _ = _evaluate(slave, chains, place)
-        metric = a[:, 0] ** 2 + a[:, 1] ** 2
-        # residual: the part of the distance across the normal, measured along a
-        across = distance[:, 0] * normal[:, 1] - distance[:, 1] * normal[:, 0]
-        slope = a[:, 0] * normal[:, 1] - a[:, 1] * normal[:, 0]
-        slope -= distance[:, 0] * turning[:, 1] - distance[:, 1] * turning[:, 0]
-        root = np.sqrt(metric)
-        slope = np.maximum(slope, 0.2 * root)
-        moved = np.clip(place + across / slope, edge - 0.999, edge + 1.999)
-        moved = np.clip(moved, 0.0, chains.edges)
-        step, place = moved - place, moved
-        if np.max(np.abs(step), initial=0.0) < tolerance:
+        at = _evaluate(slave[moving], chains, moving, place[moving])
+        # residual: the part of the distance across the normal; its slope is -|a| as long as the gap is small
+        slope = _cross(at.tangent, at.normal) - _cross(at.distance, at.turning)
+        slope = np.maximum(slope, 0.2 * at.length)
+        low, high = np.maximum(at.edge - 0.999, 0.0), np.minimum(at.edge + 1.999, chains.edges[moving])
+        moved = np.minimum(np.maximum(place[moving] + _cross(at.distance, at.normal) / slope, low), high)
+        open_ = np.abs(moved - place[moving]) > tolerance
+        place[moving] = moved
+        moving = moving[open_]
+        if len(moving) == 0:
             break
-    edge, xi, distance, a, normal, turning, number = _evaluate(slave, chains, place)
-    gap = distance[:, 0] * normal[:, 0] + distance[:, 1] * normal[:, 1]
-    across = distance[:, 0] * normal[:, 1] - distance[:, 1] * normal[:, 0]
-    length = np.sqrt(a[:, 0] ** 2 + a[:, 1] ** 2)
-    gap[((place <= 0) | (place >= chains.edges)) & (np.abs(across) > 1e-9 * length)] = OFF_END
-    shapes, slopes, _ = edge_shapes(xi)
-    curvature = -(a[:, 0] * turning[:, 0] + a[:, 1] * turning[:, 1])
-    return Projection(place, gap, normal, chains.node[number], shapes, slopes, a, curvature)
+    at = _evaluate(slave, chains, slice(None), place)
+    gap = at.distance[:, 0] * at.normal[:, 0] + at.distance[:, 1] * at.normal[:, 1]
+    ends = (place <= 0) | (place >= chains.edges)
+    gap[ends & (np.abs(_cross(at.distance, at.normal)) > 1e-9 * at.length)] = OFF_END
+    shapes, slopes, _ = edge_shapes(place - at.edge)
+    curvature = -(at.tangent[:, 0] * at.turning[:, 0] + at.tangent[:, 1] * at.turning[:, 1])
+    return Projection(place, gap, at.normal, chains.node[at.number], shapes, slopes, at.tangent, curvature)
 
 
-def _evaluate(
-    slave: Array, chains: Chains, place: Array
-) -> tuple[IntArray, Array, Array, Array, Array, Array, IntArray]:
-    """Edge, xi, x_s - x_m, tangent, blended unit normal and its derivative, and the edge's number in the arrays."""
-    edge = np.minimum(place.astype(np.int64), chains.edges - 1)
-    xi = place - edge
-    number = chains.first + edge
-    s = xi[:, None]
-    linear, quadratic = chains.linear[number], chains.quadratic[number]
-    distance = slave - chains.start[number] - s * (linear + s * quadratic)
-    b = 2 * quadratic
-    a = linear + s * b
-    length = np.sqrt(a[:, 0] ** 2 + a[:, 1] ** 2)[:, None]
-    own = np.stack([-a[:, 1], a[:, 0]], axis=1) / length
-    kappa = (own[:, 0] * b[:, 0] + own[:, 1] * b[:, 1])[:, None]
-    start, end = chains.bend_start[number], chains.bend_end[number]
-    normal = own + (1 - s) * start + s * end
-    size = np.sqrt(normal[:, 0] ** 2 + normal[:, 1] ** 2)[:, None]
-    turning = -kappa / length**2 * a + end - start
-    return edge, xi, distance, a, normal / size, turning, number
+@dataclass(frozen=True)
+class _Foot:
+    """Trial foot points: edge, x_s - x_m, a, |a|, blended unit normal and its derivative, edge number in the arrays."""
+
+    edge: IntArray
+    distance: Array
+    tangent: Array
+    length: Array
+    normal: Array
+    turning: Array
+    number: IntArray
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def _evaluate(slave: Array, chains: Chains, chosen: IntArray | slice, place: Array) -> _Foot:
+    edge = np.minimum(place.astype(np.int64), chains.edges[chosen] - 1)
+    number = chains.first[chosen] + edge
+    s = (place - edge)[:, None]
+    table = chains.table[number]
+    linear, quadratic, start, end = table[:, 2:4], table[:, 4:6], table[:, 6:8], table[:, 8:10]
+    bow = s * quadratic
+    distance = slave - table[:, :2] - s * (linear + bow)
+    a = linear + 2 * bow
+    square = a[:, 0] ** 2 + a[:, 1] ** 2
+    length = np.sqrt(square)
+    turned = np.empty_like(a)
+    np.negative(a[:, 1], out=turned[:, 0])
+    turned[:, 1] = a[:, 0]
+    blend = end - start
+    normal = turned / length[:, None] + start + s * blend
+    size = np.sqrt(normal[:, 0] ** 2 + normal[:, 1] ** 2)
+    kappa = 2 * (turned[:, 0] * quadratic[:, 0] + turned[:, 1] * quadratic[:, 1]) / (square * length)
+    return _Foot(edge, distance, a, length, normal / size[:, None], blend - kappa[:, None] * a, number)
 
 
 def unreached(gap: Array) -> NDArray[np.bool_]:
@@ -193,35 +204,50 @@ def unreached(gap: Array) -> NDArray[np.bool_]:
     return gap >= OFF_END
 
 
-def gap_rows(
-    projection: Projection, master_nodes: IntArray, slave_nodes: IntArray, slave_shapes: Array, size: int
-) -> tuple[Array, Array, Array]:
-    """Dense rows of n.D, N and dxi over the unknowns of all nodes (two a node), in the frame of the nodes.
+@dataclass(frozen=True)
+class Rows:
+    """Variations of the gaps over the six nodes of each point: three of its own edge, three of the mate's.
+
+    Attributes
+    ----------
+    nodes : ndarray, shape (n, 6)
+        Node numbers.
+    normal, tilt, slide : ndarray, shape (n, 6, 2)
+        Coefficients of n.D, N and delta xi (per metre), in the axes of the tooth that each node belongs to.
+    """
+
+    nodes: IntArray
+    normal: Array
+    tilt: Array
+    slide: Array
+
+
+def gap_rows(projection: Projection, slave_nodes: IntArray, slave_shapes: Array, rotation: Array) -> Rows:
+    """Rows of n.D, N and delta xi.
 
     Parameters
     ----------
-    master_nodes, slave_nodes : ndarray, shape (n, 3)
-        Nodes of the edge projected onto and of the point's own edge, below `size`.
-    slave_shapes : ndarray, shape (n, 3)
-        Shape functions of the slave edge at the point.
-    size
-        Number of nodes.
-
-    Returns
-    -------
-    gap, tilt, slide : ndarray, shape (n, size, 2)
-        n.D; N; delta xi (per metre).
+    slave_nodes, slave_shapes : ndarray, shape (n, 3)
+        Nodes of each point's own edge and its shape functions there.
+    rotation : ndarray, shape (nodes, 2, 2)
+        Tooth axes to global axes, of each node.
     """
     p = projection
-    rows = np.arange(len(p.gap))[:, None]
-    gap = np.zeros((len(p.gap), size, 2))
-    tilt, slide = np.zeros_like(gap), np.zeros_like(gap)
-    normal, tangent = p.normal[:, None, :], p.tangent[:, None, :]
-    gap[rows, slave_nodes] = slave_shapes[:, :, None] * normal
-    gap[rows, master_nodes] = -p.shapes[:, :, None] * normal
-    tilt[rows, master_nodes] = p.slopes[:, :, None] * normal
-    slide[rows, slave_nodes] = slave_shapes[:, :, None] * tangent
-    slide[rows, master_nodes] = -p.shapes[:, :, None] * tangent
-    metric = np.einsum("ni,ni->n", p.tangent, p.tangent)
-    slide = (slide + p.gap[:, None, None] * tilt) / (metric - p.gap * p.curvature)[:, None, None]
-    return gap, tilt, slide
+    own, mate = rotation[slave_nodes[:, 0]], rotation[p.edge]
+    vectors = np.stack([p.normal, p.tangent], axis=1)
+    on_slave, on_mate = np.matmul(vectors, own), np.matmul(vectors, mate)
+    count = len(p.gap)
+    normal, tilt, slide = np.empty((count, 6, 2)), np.zeros((count, 6, 2)), np.empty((count, 6, 2))
+    shapes = p.shapes[:, :, None]
+    np.multiply(slave_shapes[:, :, None], on_slave[:, :1], out=normal[:, :3])
+    np.multiply(-shapes, on_mate[:, :1], out=normal[:, 3:])
+    np.multiply(p.slopes[:, :, None], on_mate[:, :1], out=tilt[:, 3:])
+    scale = 1 / (p.tangent[:, 0] ** 2 + p.tangent[:, 1] ** 2 - p.gap * p.curvature)
+    on_slave, on_mate = on_slave[:, 1:] * scale[:, None, None], on_mate[:, 1:] * scale[:, None, None]
+    np.multiply(slave_shapes[:, :, None], on_slave, out=slide[:, :3])
+    np.multiply(-shapes, on_mate, out=slide[:, 3:])
+    slide[:, 3:] += (p.gap * scale)[:, None, None] * tilt[:, 3:]
+    nodes = np.empty((count, 6), dtype=np.int64)
+    nodes[:, :3] = slave_nodes
+    np.add(p.edge[:, None], np.arange(3), out=nodes[:, 3:])
+    return Rows(nodes, normal, tilt, slide)

@@ -2,9 +2,9 @@ r"""Exact compliance between the flanks of a whole elastic gear with a rigid bor
 
 One sector is condensed onto its flank nodes F and its two cut sides B. With :math:`A = S_{FF}^{-1}` and
 :math:`P = -A S_{FB}`, flank forces f and side displacements b give :math:`u_F = A f + P b`. The sides of neighbouring
-sectors coincide, so the side displacements of all sectors follow from a block-circulant system, which a discrete Fourier
-transform over the teeth splits into one small system per harmonic (Thomas, Int. J. Numer. Meth. Eng. 14, 1979). The
-compliance between the loads on tooth i and the flank of tooth j is
+sectors coincide, so the side displacements of all sectors follow from a block-circulant system, which a discrete
+Fourier transform over the teeth splits into one small system per harmonic (Thomas, Int. J. Numer. Meth. Eng. 14,
+1979). The compliance between the loads on tooth i and the flank of tooth j is
 
 .. math:: C_{ji} = \delta_{ij} A + P\,X_{j-i}\,P^T .
 
@@ -14,6 +14,7 @@ Everything is expressed in the frame of the tooth that it belongs to.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,26 @@ from ..meshing.tooth_sector import SectorMesh
 from .dissection import Condensed, condense
 from .flank import Flank, flank_of, normal_stress_rows
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class FarField:
+    """What flank and neighbours do to each other through the cut sides, in r << b numbers (their smooth modes).
+
+    Attributes
+    ----------
+    flank : ndarray, shape (f, r)
+        Flank displacements for the modes of the cut sides.
+    stress : ndarray, shape (e q, r), or None
+        Normal stress for the same.
+    driven : dict of int to ndarray, shape (r, f)
+        Step k -> modes of tooth k for flank forces on tooth 0 (1/N), for the few k that can matter.
+    """
+
+    flank: Array
+    stress: Array | None
+    driven: dict[int, Array]
 
 
 @dataclass(frozen=True)
@@ -47,6 +67,8 @@ class GearBody:
         Normal stress at the quadrature points for flank forces with the cut sides held (Pa/N).
     stress_interface : ndarray, shape (e q, b), or None
         Normal stress for displacements of the cut sides (Pa/m).
+    far : FarField
+        The same cyclic part in its numerical rank.
     condensed
         The way back to the full field.
     """
@@ -61,6 +83,7 @@ class GearBody:
     coupling: Array
     stress_own: Array | None
     stress_interface: Array | None
+    far: FarField
     condensed: Condensed
 
     @property
@@ -118,9 +141,31 @@ def gear_body(
         stress = np.matmul(rows, recovered[unknowns]).reshape(-1, len(schur))
         stress_own = stress[:, :f] @ own
         stress_interface = stress[:, :f] @ interface + stress[:, f:]
+    far = _far_field(interface, stress_interface, coupling)
     return GearBody(
-        mesh, flank, material, plane, thickness, own, interface, coupling, stress_own, stress_interface, condensed
+        mesh, flank, material, plane, thickness, own, interface, coupling, stress_own, stress_interface, far, condensed
     )
+
+
+#: Neighbours whose coupling is kept at hand: teeth in contact at the same time are never further apart.
+REACH = 4
+
+
+def _far_field(interface: Array, stress: Array | None, coupling: Array) -> FarField:
+    """Compress displacements and stresses onto the side motions that reach the flank (Saint-Venant: a dozen or two)."""
+    rows = interface if stress is None else np.concatenate([interface, stress * (_norm(interface) / _norm(stress))])
+    triangular = np.linalg.qr(rows, mode="r")
+    _, values, modes = np.linalg.svd(triangular)
+    basis = modes[values > 1e-13 * values[0]].T
+    flank = interface @ basis
+    teeth = len(coupling)
+    steps = range(-REACH, REACH + 1) if teeth > 2 * REACH else range(teeth)
+    driven = {k: (basis.T @ coupling[k % teeth] @ basis) @ flank.T for k in steps}
+    return FarField(flank, None if stress is None else stress @ basis, driven)
+
+
+def _norm(matrix: Array) -> float:
+    return float(np.linalg.norm(matrix))
 
 
 def _cyclic_compliance(stiffness: Array, teeth: int) -> Array:

@@ -9,14 +9,15 @@ for recovering the eliminated ones.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.blas import dsyrk, dtrsm
 from scipy.linalg.lapack import dpotrf
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+Array = NDArray[Any]
+IntArray = NDArray[Any]
 
 #: Elements in a leaf: below, Python's overhead per front rules; above, the dense work does.
 LEAF_ELEMENTS = 40
@@ -155,7 +156,7 @@ def _bisect(centres: Array) -> tuple[IntArray, int]:
 
 
 def _owners(elements: IntArray, leaf_of: IntArray, levels: int, nodes: int) -> IntArray:
-    """Tree node (heap numbering, root 1) at which each mesh node can go: the common ancestor of its elements' leaves."""
+    """Tree node (heap numbering, root 1) at which each mesh node can go: the ancestor that its elements' leaves share."""
     leaves = np.repeat(leaf_of + 2**levels, elements.shape[1])
     low = np.full(nodes, np.iinfo(np.int64).max)
     high = np.zeros(nodes, dtype=np.int64)

@@ -7,6 +7,7 @@ lies to the right of the chain, so the outward normal is the tangent turned by +
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,8 @@ from numpy.typing import NDArray
 from ..elasticity import Material, Plane, physical_gradients, triangle_shapes
 from ..meshing.tooth_sector import SectorMesh
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+Array = NDArray[Any]
+IntArray = NDArray[Any]
 
 
 def edge_shapes(xi: Array) -> tuple[Array, Array, Array]:

@@ -7,7 +7,9 @@ the middle elsewhere. gmsh works in millimetres; metres leave this module.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +19,8 @@ from ..involute import tooth_profile
 from .cache import cached_arrays
 from .session import gmsh_session
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+Array = NDArray[Any]
+IntArray = NDArray[Any]
 
 #: Raised whenever the recipe's meaning changes, so that stored meshes are not mistaken for new ones.
 RECIPE_NUMBER = 1
@@ -96,7 +98,8 @@ class SectorMesh:
     teeth: int
 
     def contact_edges(self) -> IntArray:
-        """Edges of the driving (left) flank that can touch the mate, from root to tip, each (root side, middle, tip side).
+        """Edges of the driving (left) flank that can touch the mate, from root to tip, each (root side, middle, tip
+        side).
 
         They are the flank with its tip round and the upper half of the fillet, which a bent mate's tip can reach; never
         the node on the cut side.
@@ -207,7 +210,7 @@ def _half_profile(gear: Gear, recipe: SectorRecipe, *, fine: bool) -> dict[str, 
     profile = tooth_profile(gear)
     segments, involute = profile.segments, profile.segment("involute")
     starts = np.cumsum([0.0, *(s.length for s in segments)])
-    place = np.unique(np.concatenate([np.linspace(a, b, 200) for a, b in zip(starts, starts[1:], strict=False)]))
+    place = np.unique(np.concatenate([np.linspace(a, b, 200) for a, b in itertools.pairwise(starts)]))
     size = np.full(len(place), recipe.root)
     flank = [i for i, s in enumerate(segments) if s.name in ("involute", "tip_round")]
     low, high = starts[flank[0]], starts[flank[-1] + 1]
@@ -258,14 +261,16 @@ def _make(gear: Gear, recipe: SectorRecipe) -> dict[str, NDArray[np.generic]]:
     chains = _outline(gear, recipe)
     ring = np.concatenate([c.ends[:-1] for c in chains.values()])
     corners, triangles = _fill(ring, recipe)
-    points, quadratic, middle_of = _second_order(corners, triangles)
+    points, quadratic, edges = _second_order(corners, triangles)
+    keys = edges[:, 0] * len(corners) + edges[:, 1]
     arrays: dict[str, NDArray[np.generic]] = {}
     first = 0
     for name, chain in chains.items():
         count = len(chain.middles)
         start = np.arange(first, first + count)
         end = (start + 1) % len(ring)
-        middle = np.array([middle_of[(min(a, b), max(a, b))] for a, b in zip(start, end, strict=True)])
+        key = np.minimum(start, end) * len(corners) + np.maximum(start, end)
+        middle = len(corners) + np.searchsorted(keys, key)
         points[middle] = chain.middles
         arrays["on_" + name] = np.stack([start, middle, end], axis=1)
         first += count
@@ -307,13 +312,19 @@ def _fill(ring: Array, recipe: SectorRecipe) -> tuple[Array, IntArray]:
     return position, triangles
 
 
-def _second_order(corners: Array, triangles: IntArray) -> tuple[Array, IntArray, dict[tuple[int, int], int]]:
-    """Add a node in the middle of each edge; also the map from corner pair to middle node."""
+def _second_order(corners: Array, triangles: IntArray) -> tuple[Array, IntArray, IntArray]:
+    """Add a node in the middle of each edge.
+
+    Returns
+    -------
+    points, triangles
+        With the new nodes after the corners.
+    edges : ndarray, shape (e, 2)
+        Corners of the edges, the smaller number first, in lexical order; edge k has the middle node len(corners) + k.
+    """
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    key = edges[:, 0] * len(corners) + edges[:, 1]
-    unique, first, inverse = np.unique(key, return_index=True, return_inverse=True)
+    _, first, inverse = np.unique(edges[:, 0] * len(corners) + edges[:, 1], return_index=True, return_inverse=True)
     pairs = edges[first]
     middles = 0.5 * (corners[pairs[:, 0]] + corners[pairs[:, 1]])
-    numbers = len(corners) + inverse.reshape(-1, 3)
-    lookup = {(int(a), int(b)): len(corners) + k for k, (a, b) in enumerate(pairs)}
-    return np.concatenate([corners, middles]), np.concatenate([triangles, numbers], axis=1), lookup
+    quadratic = np.concatenate([triangles, len(corners) + inverse.reshape(-1, 3)], axis=1)
+    return np.concatenate([corners, middles]), quadratic, pairs
