@@ -8,8 +8,9 @@ docstring of `gearfe.contact.closest` are exact.
 import numpy as np
 import pytest
 
-from gearfe.contact.closest import OFF_END, chains_of, gap_rows, nearest_places, project
+from gearfe.contact.closest import OFF_END, Projection, Rows, chains_of, gap_rows, nearest_places, project
 from gearfe.contact.flank import edge_nodes, edge_shapes
+from gearfe.contact.newton import Linearised
 
 EDGES = 4
 STEP = 1e-5
@@ -35,23 +36,36 @@ def scene() -> dict[str, np.ndarray]:
         for body in (slice(0, len(nodes) // 2), slice(len(nodes) // 2, None)):
             part[body] = np.stack([t[body] ** 0, t[body], t[body] ** 2], axis=1) @ rng.normal(size=(3, 2)) * 1e-3
         fields.append(part)
-    return {"nodes": nodes, "slave_nodes": slave_nodes, "shapes": edge_shapes(xi)[0], "u": fields[0], "v": fields[1]}
+    angles = np.repeat([0.3, -1.1], len(nodes) // 2)  # displacements are given in the axes of each body's tooth
+    rotation = np.array([[np.cos(angles), -np.sin(angles)], [np.sin(angles), np.cos(angles)]]).transpose(2, 0, 1)
+    fields = [np.einsum("nji,nj->ni", rotation, part) for part in fields]
+    return {
+        "rotation": rotation,
+        "nodes": nodes,
+        "slave_nodes": slave_nodes,
+        "shapes": edge_shapes(xi)[0],
+        "u": fields[0],
+        "v": fields[1],
+    }
 
 
-def _project(scene: dict[str, np.ndarray], nodes: np.ndarray):
+def _project(scene: dict[str, np.ndarray], nodes: np.ndarray) -> Projection:
     half = len(nodes) // 2
     slave = np.einsum("qa,qai->qi", scene["shapes"], nodes[scene["slave_nodes"]])
     chains = chains_of(nodes[:half], np.array([EDGES]), np.zeros(len(slave), dtype=np.int64))
     return project(slave, chains, nearest_places(slave, nodes[:half]))
 
 
-def _rows(scene: dict[str, np.ndarray], p) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    master = p.edge[:, None] + np.arange(3)
-    return gap_rows(p, master, scene["slave_nodes"], scene["shapes"], len(scene["nodes"]))
+def _moved(scene: dict[str, np.ndarray], step: float) -> Projection:
+    return _project(scene, scene["nodes"] + step * np.einsum("nij,nj->ni", scene["rotation"], scene["u"]))
 
 
-def _applied(rows: np.ndarray, field: np.ndarray) -> np.ndarray:
-    return np.einsum("qni,ni->q", rows, field)
+def _rows(scene: dict[str, np.ndarray], p: Projection) -> Rows:
+    return gap_rows(p, scene["slave_nodes"], scene["shapes"], scene["rotation"])
+
+
+def _applied(coefficients: np.ndarray, rows: Rows, field: np.ndarray) -> np.ndarray:
+    return np.einsum("qai,qai->q", coefficients, field[rows.nodes])
 
 
 def test_closest_point_is_the_foot_of_the_normal(scene: dict[str, np.ndarray]) -> None:
@@ -68,28 +82,30 @@ def test_closest_point_is_the_foot_of_the_normal(scene: dict[str, np.ndarray]) -
 
 
 def test_variation_of_gap_and_of_closest_place(scene: dict[str, np.ndarray]) -> None:
-    p = _project(scene, scene["nodes"])
-    gap, _, slide = _rows(scene, p)
-    after, before = (_project(scene, scene["nodes"] + s * STEP * scene["u"]) for s in (1, -1))
-    np.testing.assert_allclose(_applied(gap, scene["u"]), (after.gap - before.gap) / (2 * STEP), rtol=1e-8)
-    np.testing.assert_allclose(_applied(slide, scene["u"]), (after.place - before.place) / (2 * STEP), rtol=1e-8)
+    rows = _rows(scene, _project(scene, scene["nodes"]))
+    after, before = _moved(scene, STEP), _moved(scene, -STEP)
+    gap, slide = _applied(rows.normal, rows, scene["u"]), _applied(rows.slide, rows, scene["u"])
+    np.testing.assert_allclose(gap, (after.gap - before.gap) / (2 * STEP), rtol=1e-8)
+    np.testing.assert_allclose(slide, (after.place - before.place) / (2 * STEP), rtol=1e-8)
 
 
 def test_variation_of_the_contact_force(scene: dict[str, np.ndarray]) -> None:
-    """Delta(n.D) along u, tested with v."""
+    """Delta(n.D) along u, tested with v: what `Linearised.bending` applies for unit loads."""
     p = _project(scene, scene["nodes"])
-    _, tilt, slide = _rows(scene, p)
-    metric = np.einsum("ni,ni->n", p.tangent, p.tangent)
-    tilt_u, tilt_v = _applied(tilt, scene["u"]), _applied(tilt, scene["v"])
-    slide_u, slide_v = _applied(slide, scene["u"]), _applied(slide, scene["v"])
-    share = 1 - p.gap * p.curvature / metric
-    expected = p.gap / metric * tilt_u * tilt_v - share * (
-        tilt_u * slide_v + tilt_v * slide_u + p.curvature * slide_u * slide_v
-    )
-    after, before = (
-        _applied(_rows(scene, _project(scene, scene["nodes"] + s * STEP * scene["u"]))[0], scene["v"]) for s in (1, -1)
-    )
-    np.testing.assert_allclose(expected, (after - before) / (2 * STEP), rtol=1e-7)
+    rows = _rows(scene, p)
+    spread = np.zeros((2, len(p.gap), len(scene["nodes"]), 2))
+    points = np.arange(len(p.gap))[:, None]
+    spread[0, points, rows.nodes], spread[1, points, rows.nodes] = rows.tilt, rows.slide
+    tilt, slide = spread.reshape(2, len(p.gap), -1)
+    nothing = np.zeros(0)
+    for q in range(len(p.gap)):  # one loaded point at a time
+        loads = np.zeros(len(p.gap))
+        loads[q] = 1.0
+        lin = Linearised(nothing, nothing, nothing, tilt, slide, p, loads, nothing, nothing, nothing, None)
+        expected = lin.bending(scene["u"].ravel()) @ scene["v"].ravel()
+        after, before = (_rows(scene, _moved(scene, s * STEP)) for s in (1, -1))
+        change = _applied(after.normal, after, scene["v"]) - _applied(before.normal, before, scene["v"])
+        assert expected == pytest.approx(change[q] / (2 * STEP), rel=1e-7)
 
 
 def test_gap_is_continuous_past_a_kinked_vertex_and_off_beyond_the_ends() -> None:
