@@ -95,9 +95,7 @@ def test_lame_ring_under_inner_or_outer_pressure(plane: Plane, inner: float, out
         sizes.append(1 / n)
         of_u.append(float(np.linalg.norm(u - exact) / np.linalg.norm(exact)))
         trace = 2 * big_a * (1 + (nu if plane == "strain" else 0))
-        of_stress.append(
-            float(np.sqrt(np.mean((found[:, :3].sum(axis=1) / trace - 1) ** 2)))
-        )
+        of_stress.append(float(np.sqrt(np.mean((found[:, :3].sum(axis=1) / trace - 1) ** 2))))
     assert _slope(sizes, of_u) > 2.8
     assert _slope(sizes, of_stress) > 1.7
     assert of_u[-1] < 2e-4
