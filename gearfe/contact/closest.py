@@ -56,6 +56,9 @@ class Projection:
         a (m).
     curvature : ndarray, shape (n,)
         kappa (m).
+    beyond : ndarray of bool, shape (n,)
+        Points that run off an end, but not far, and overlap the last edge continued: where the chain is a piece of a
+        longer one, the contact has outgrown it.
     """
 
     place: Array
@@ -66,6 +69,7 @@ class Projection:
     slopes: Array
     tangent: Array
     curvature: Array
+    beyond: NDArray[np.bool_]
 
     def take(self, index: IntArray | slice) -> Projection:
         """The projections of the points `index`."""
@@ -80,6 +84,8 @@ class Chains:
     ----------
     first, edges : ndarray, shape (n,)
         For each slave point the first edge (in the arrays below) and the number of edges of its chain.
+    reach : ndarray, shape (n,)
+        How far beyond the end of its chain a point may be projected, onto the last edge continued (edges).
     table : ndarray, shape (e, 10)
         Of each edge: start, linear and quadratic coefficient of x_m = start + xi linear + xi^2 quadratic (m), and what
         the blended normal adds to the edge's own at its start and at its end.
@@ -89,11 +95,12 @@ class Chains:
 
     first: IntArray
     edges: IntArray
+    reach: Array
     table: Array
     node: IntArray
 
 
-def chains_of(nodes: Array, counts: IntArray, chain_of: IntArray) -> Chains:
+def chains_of(nodes: Array, counts: IntArray, chain_of: IntArray, reach: Array | None = None) -> Chains:
     """Prepare chains that follow one another in `nodes`.
 
     Parameters
@@ -104,6 +111,8 @@ def chains_of(nodes: Array, counts: IntArray, chain_of: IntArray) -> Chains:
         Number of edges of each chain.
     chain_of : ndarray, shape (n,)
         Chain that each slave point is projected onto.
+    reach : ndarray, shape (n,), optional
+        See `Chains`; nothing beyond the end without it.
     """
     first_edge = np.concatenate([[0], np.cumsum(counts)])
     node = 2 * np.arange(first_edge[-1]) + np.repeat(np.arange(len(counts)), counts)
@@ -117,7 +126,8 @@ def chains_of(nodes: Array, counts: IntArray, chain_of: IntArray) -> Chains:
     mean = at_end[left] + at_start[left + 1]
     mean /= np.sqrt(mean[:, :1] ** 2 + mean[:, 1:] ** 2)
     table[left, 8:], table[left + 1, 6:8] = mean - at_end[left], mean - at_start[left + 1]
-    return Chains(first_edge[chain_of], counts[chain_of], table, node)
+    beyond = np.zeros(len(chain_of)) if reach is None else reach
+    return Chains(first_edge[chain_of], counts[chain_of], beyond, table, node)
 
 
 def _normal(tangent: Array) -> Array:
@@ -139,13 +149,15 @@ def project(
     Points whose projection runs off either end of the chain get the gap `OFF_END`.
     """
     place = place.copy()
+    last = chains.edges + chains.reach
     moving = np.arange(len(place))
     for _ in range(iterations):
         at = _evaluate(slave[moving], chains, moving, place[moving])
         # residual: the part of the distance across the normal; its slope is -|a| as long as the gap is small
         slope = _cross(at.tangent, at.normal) - _cross(at.distance, at.turning)
         slope = np.maximum(slope, 0.2 * at.length)
-        low, high = np.maximum(at.edge - 0.999, 0.0), np.minimum(at.edge + 1.999, chains.edges[moving])
+        low = np.maximum(at.edge - 0.999, 0.0)
+        high = np.where(at.edge + 1 < chains.edges[moving], at.edge + 1.999, last[moving])
         moved = np.minimum(np.maximum(place[moving] + _cross(at.distance, at.normal) / slope, low), high)
         open_ = np.abs(moved - place[moving]) > tolerance
         place[moving] = moved
@@ -154,11 +166,14 @@ def project(
             break
     at = _evaluate(slave, chains, slice(None), place)
     gap = at.distance[:, 0] * at.normal[:, 0] + at.distance[:, 1] * at.normal[:, 1]
-    ends = (place <= 0) | (place >= chains.edges)
-    gap[ends & (np.abs(_cross(at.distance, at.normal)) > 1e-9 * at.length)] = OFF_END
+    ends = (place <= 0) | (place >= last)
+    sideways = np.abs(_cross(at.distance, at.normal))
+    off = ends & (sideways > 1e-9 * at.length)
+    beyond = off & (gap < 0) & (sideways < 2 * at.length)
+    gap[off] = OFF_END
     shapes, slopes, _ = edge_shapes(place - at.edge)
     curvature = -(at.tangent[:, 0] * at.turning[:, 0] + at.tangent[:, 1] * at.turning[:, 1])
-    return Projection(place, gap, at.normal, chains.node[at.number], shapes, slopes, at.tangent, curvature)
+    return Projection(place, gap, at.normal, chains.node[at.number], shapes, slopes, at.tangent, curvature, beyond)
 
 
 @dataclass(frozen=True)

@@ -159,8 +159,7 @@ def _far_field(interface: Array, stress: Array | None, coupling: Array) -> FarFi
     basis = modes[values > 1e-13 * values[0]].T
     flank = interface @ basis
     teeth = len(coupling)
-    steps = range(-REACH, REACH + 1) if teeth > 2 * REACH else range(teeth)
-    driven = {k: (basis.T @ coupling[k % teeth] @ basis) @ flank.T for k in steps}
+    driven = {k: (basis.T @ coupling[k % teeth] @ basis) @ flank.T for k in range(-REACH, REACH + 1)}
     return FarField(flank, None if stress is None else stress @ basis, driven)
 
 

@@ -156,7 +156,7 @@ def _bisect(centres: Array) -> tuple[IntArray, int]:
 
 
 def _owners(elements: IntArray, leaf_of: IntArray, levels: int, nodes: int) -> IntArray:
-    """Tree node (heap numbering, root 1) at which each mesh node can go: the ancestor that its elements' leaves share."""
+    """Tree node (heap numbering, root 1) at which each mesh node can go: the ancestor its elements' leaves share."""
     leaves = np.repeat(leaf_of + 2**levels, elements.shape[1])
     low = np.full(nodes, np.iinfo(np.int64).max)
     high = np.zeros(nodes, dtype=np.int64)

@@ -116,21 +116,29 @@ def windows_of(
     windows: list[Window] = []
     node = 0
     for number, overlap in enumerate(found):
+        # a tip that digs in slides along its mate as the teeth bend: nothing is narrowed there
+        kept = 1.0 if any(_near_tip(pair.bodies[gear].flank.sizes, overlap.ranges[gear]) for gear in (0, 1)) else share
         for gear, tooth in ((0, overlap.tooth), (1, -1 - overlap.tooth)):
             flank = pair.bodies[gear].flank
-            first, end = _narrowed(flank.sizes, overlap.ranges[gear], overlap.deepest[gear], share)
+            first, end = _narrowed(flank.sizes, overlap.ranges[gear], overlap.deepest[gear], kept, overlap.depth)
             placed = pair.tooth_angle(gear, tooth, angle, twist)
             windows.append(Window(gear, number, tooth, first, end - first, node, placed))
             node += 2 * (end - first) + 1
     return windows
 
 
-def _narrowed(sizes: Array, span: tuple[int, int], deepest: int, share: float) -> tuple[int, int]:
+def _near_tip(sizes: Array, span: tuple[int, int]) -> bool:
+    """Whether an overlap comes as close to the tip as a fifth of its own length."""
+    return bool(sizes[span[1] :].sum() < 0.2 * sizes[span[0] : span[1]].sum())
+
+
+def _narrowed(sizes: Array, span: tuple[int, int], deepest: int, share: float, depth: float) -> tuple[int, int]:
+    """Range of edges about the deepest one; bending moves the contact along the flank by no more than the overlap."""
     first, end = span
     arc = np.concatenate([[0.0], np.cumsum(sizes)])
-    reach = share * max(arc[end] - arc[deepest], arc[deepest] - arc[first])
-    low = max(first, int(np.searchsorted(arc, arc[deepest] - reach)) - 1)
-    high = min(end, int(np.searchsorted(arc, arc[deepest] + reach)) + 1)
+    reach = share * max(arc[end] - arc[deepest], arc[deepest] - arc[first]) + depth
+    low = int(np.searchsorted(arc, arc[deepest] - reach)) - 1
+    high = int(np.searchsorted(arc, arc[deepest] + reach)) + 1
     return max(0, low - MARGIN), min(len(sizes), high + MARGIN)
 
 

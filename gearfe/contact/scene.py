@@ -147,8 +147,9 @@ class Scene:
     weight : ndarray, shape (q,)
         Area of each contact point (m2).
     fade : ndarray, shape (q,)
-        Half of the point's own stretch of surface, in edges of the mate: over this last bit before the end of the
-        mate's surface (a sharp tip) the point's share fades out, so that sliding past the corner is continuous.
+        Half of the point's own stretch of surface, in edges of the mate. Where a stretch lies across the end of the
+        mate's surface (a sharp tip), the part that is past it does not count, so that sliding past the corner is
+        continuous.
     parameter : ndarray, shape (q,)
         The law's gamma (Pa/m).
     owner : ndarray, shape (q,)
@@ -193,13 +194,14 @@ class Scene:
         return np.matmul(self.slave_shapes[:, None, :], corners)[:, 0, :]
 
     def areas(self, place: Array) -> Array:
-        """Areas of the contact points (m2), faded out towards the end of the mate's surface."""
-        return self.weight * np.clip((self.counts[self.mate] - place) / self.fade, 0.0, 1.0)
+        """Areas of the contact points (m2) as far as they lie before the end of the mate's surface."""
+        return self.weight * np.clip(0.5 + (self.counts[self.mate] - place) / (2 * self.fade), 0.0, 1.0)
 
 
 def project_all(scenes: Sequence[Scene], nodes: Sequence[Array], places: Sequence[Array]) -> list[Projection]:
     """Closest points of several scenes in one pass (numpy's cost per call is then shared)."""
     counts, mates, offset, windows = [], [], [], 0
+    reach = np.concatenate([scene.fade for scene in scenes])
     node = 0
     for scene in scenes:
         counts.append(scene.counts)
@@ -207,7 +209,7 @@ def project_all(scenes: Sequence[Scene], nodes: Sequence[Array], places: Sequenc
         windows += len(scene.counts)
         offset.append(node)
         node += len(scene.points)
-    chains: Chains = chains_of(np.concatenate(nodes), np.concatenate(counts), np.concatenate(mates))
+    chains: Chains = chains_of(np.concatenate(nodes), np.concatenate(counts), np.concatenate(mates), reach)
     slave = np.concatenate([scene.slaves(x) for scene, x in zip(scenes, nodes, strict=True)])
     found = project(slave, chains, np.concatenate(places))
     made, first = [], 0
@@ -243,7 +245,7 @@ def assemble(pair: MeshingPair, windows: Sequence[Window]) -> Scene:
     for i in slaves:
         rows = columns["owner"] == i
         start[rows] = nearest_places(slave[rows], points[windows[i ^ 1].nodes])
-    rigid = project(slave, chains_of(points, counts, columns["mate"]), start)
+    rigid = project(slave, chains_of(points, counts, columns["mate"], columns["fade"]), start)
     return Scene(
         windows=tuple(windows),
         counts=counts,

@@ -25,6 +25,8 @@ Array = NDArray[Any]
 TOLERANCE = 1e-10
 #: Positions solved side by side.
 BATCH = 16
+#: Newton steps spent on one difficult position before it is given up.
+MAX_STEPS = 240
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,9 @@ class Position:
         Largest pressure at a contact point (Pa).
     iterations
         Newton steps.
-    scene, forces
-        Pieces of flank, and the nodal forces on them in tooth axes (N), for recovering fields; None without a solution.
+    scene, forces, force_rate
+        Pieces of flank, the nodal forces on them in tooth axes (N) and their derivatives with respect to the twist
+        (N/rad), for recovering fields; None without a solution.
     """
 
     status: str
@@ -65,6 +68,7 @@ class Position:
     iterations: int
     scene: Scene | None = None
     forces: Array | None = None
+    force_rate: Array | None = None
 
 
 def solve_position(pair: MeshingPair, pinion_angle: float, twist: float, *, tolerance: float = TOLERANCE) -> Position:
@@ -142,15 +146,18 @@ def _side_by_side(scenes: Sequence[Scene], dialogues: Sequence[Dialogue]) -> lis
 
 
 def _outgrown(pair: MeshingPair, scene: Scene, state: State) -> bool:
-    """Whether the contact reaches the rim of a window that could be larger."""
+    """Whether the contact reaches the rim of a window that could be larger, or what lies behind it."""
     loaded = state.pressure > 0
+    found = project_all([scene], [scene.placed(state.displacement)], [state.place])[0]
     for i, w in enumerate(scene.windows):
         mine = np.flatnonzero(scene.owner == i)
-        if len(mine) == 0 or not loaded[mine].any():
-            continue
-        q = len(mine) // w.edges
-        last = w.first_edge + w.edges < pair.bodies[w.gear].flank.edges
-        if (w.first_edge > 0 and loaded[mine[:q]].any()) or (last and loaded[mine[-q:]].any()):
+        first, last = w.first_edge > 0, w.first_edge + w.edges < pair.bodies[w.gear].flank.edges
+        if len(mine):
+            q = len(mine) // w.edges
+            if (first and loaded[mine[:q]].any()) or (last and loaded[mine[-q:]].any()):
+                return True
+        facing = (scene.mate == i) & found.beyond
+        if (first and (found.place[facing] <= 0).any()) or (last and (found.place[facing] >= w.edges).any()):
             return True
     return False
 
@@ -159,11 +166,11 @@ def _with_care(
     pair: MeshingPair, angle: float, twist: float, found: list[Overlap], steps: int, tolerance: float
 ) -> Position:
     """Second attempt on the whole overlap; where that fails too, the twist is raised in steps, each from the last."""
-    scene = assemble(pair, windows_of(pair, found, angle, twist, share=1.0))
+    scene = assemble(pair, windows_of(pair, found, angle, twist, share=1.5))
     status, state, more = _alone(scene, _start(pair, scene), tolerance)
     steps += more
     done, step, last = 0.0, 0.25, None
-    while status != "converged" and step > 0.01:
+    while status != "converged" and step > 0.01 and steps < MAX_STEPS:
         share = min(1.0, done + step)
         turned = tuple(replace(w, angle=pair.tooth_angle(w.gear, w.tooth, angle, share * twist)) for w in scene.windows)
         part = assemble(pair, turned)
@@ -200,18 +207,20 @@ def _finish(scene: Scene, state: State, iterations: int) -> Position:
     about_wheel = -_moment(placed - scene.wheel_centre, force)
     reaction = -_moment(scene.points - scene.wheel_centre, force)
     of_pair = scene.windows[1::2]
+    tangent, force_rate = _tangent(scene, lin, forces, placed)
     return Position(
         status="converged",
         torque_wheel=float(about_wheel[wheel].sum()),
         torque_pinion=-float(_moment(placed, force)[~wheel].sum()),
         torque_wheel_reaction=float(reaction[wheel].sum()),
-        tangent=_tangent(scene, lin, forces, placed),
+        tangent=tangent,
         pair_numbers=tuple(-1 - w.tooth for w in of_pair),
         pair_torques=np.array([about_wheel[w.nodes].sum() for w in of_pair]),
         peak_pressure=float(state.pressure.max()),
         iterations=iterations,
         scene=scene,
         forces=forces,
+        force_rate=force_rate,
     )
 
 
@@ -219,9 +228,10 @@ def _moment(arm: Array, force: Array) -> Array:
     return arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]
 
 
-def _tangent(scene: Scene, lin: Linearised, forces: Array, placed: Array) -> float:
-    """d torque / d twist. In the axes of the wheel's teeth the wheel's nodes are carried by e_z x (x - c) dphi, and
+def _tangent(scene: Scene, lin: Linearised, forces: Array, placed: Array) -> tuple[float, Array]:
+    """d torque / d twist and d forces / d twist.
 
+    In the axes of the wheel's teeth the wheel's nodes are carried by e_z x (x - c) dphi, and
     df = G^T W dp + H dx - dphi e_z x f,  dx = carried + C df,  dp = -gamma dg - S df.
     """
     nodes = lin.unknowns[::2] // 2
@@ -238,7 +248,9 @@ def _tangent(scene: Scene, lin: Linearised, forces: Array, placed: Array) -> flo
         moved = carried + lin.compliance @ (rate - frame)
         bend = lin.bending(moved)
     change = _moment(arm, (rate - frame).reshape(-1, 2)) + _moment((moved - carried).reshape(-1, 2), force)
-    return -float(change[wheel[:, 0]].sum())
+    spread = np.zeros_like(forces)
+    spread[lin.unknowns] = rate - frame
+    return -float(change[wheel[:, 0]].sum()), spread
 
 
 def _quarter_turn(vectors: Array) -> Array:

@@ -21,30 +21,30 @@ def starting_state(pair: MeshingPair, scene: Scene) -> tuple[Array, Array]:
     overlap, reach^2 = 2 rho depth.
     """
     projection = project_all([scene], [scene.points], [scene.place])[0]
-    overlapped = scene.rigid_gap < 0
+    areas = scene.areas(scene.place)
+    overlapped = (scene.rigid_gap < 0) & (scene.place <= scene.counts[scene.mate])
     slave = scene.slaves(scene.points)
     effective = 1 / sum(b.material.contact_compliance(b.plane) for b in pair.bodies)
     centre, depth, radius = _geometry(scene, slave, overlapped)
-    share = np.maximum(scene.weight, 1e-300)
     nearest = np.array([_third_nearest(slave[scene.owner == i], centre[i]) for i in range(len(scene.windows))])
     distance = np.linalg.norm(slave - centre[scene.owner], axis=1)
     reachable = ~unreached(scene.rigid_gap)
     half_width = np.sqrt(0.12 * radius * np.maximum(depth, 0.0))
-    forces, pressure = np.zeros(scene.pairs), np.zeros(len(share))
+    forces, pressure = np.zeros(scene.pairs), np.zeros(len(areas))
     for _ in range(2):
         width = np.maximum(half_width[scene.pair], 1.2 * nearest[scene.owner])
         shape = np.where(reachable, np.sqrt(np.maximum(0.0, 1 - (distance / width) ** 2)), 0.0)
-        total = np.bincount(scene.pair, weights=shape * scene.weight, minlength=scene.pairs)
+        total = np.bincount(scene.pair, weights=shape * areas, minlength=scene.pairs)
         shape /= np.maximum(total, 1e-300)[scene.pair]
         used = np.flatnonzero(shape > 0)
         rows = gap_rows(projection.take(used), scene.slave_nodes[used], scene.slave_shapes[used], scene.rotation)
-        loads = rows.normal * (shape * scene.weight)[used, None, None]
+        loads = rows.normal * (shape * areas)[used, None, None]
         unknown = 2 * rows.nodes[:, :, None] + np.arange(2)
         size = 2 * len(scene.points)
         slot = scene.pair[used, None, None] * size + unknown
         unit = np.bincount(slot.ravel(), weights=loads.ravel(), minlength=scene.pairs * size).reshape(-1, size)
         mutual = unit @ scene.compliance @ unit.T
-        overlap = -np.bincount(scene.pair, weights=shape * scene.weight * scene.rigid_gap, minlength=scene.pairs)
+        overlap = -np.bincount(scene.pair, weights=shape * areas * scene.rigid_gap, minlength=scene.pairs)
         forces = _carried(mutual, overlap)
         half_width = np.sqrt(4 * forces * radius / (np.pi * effective * pair.width))
         pressure = forces[scene.pair] * shape

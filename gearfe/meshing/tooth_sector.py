@@ -23,7 +23,7 @@ Array = NDArray[Any]
 IntArray = NDArray[Any]
 
 #: Raised whenever the recipe's meaning changes, so that stored meshes are not mistaken for new ones.
-RECIPE_NUMBER = 1
+RECIPE_NUMBER = 2
 
 #: Fewer second-order edges round the whole bore stiffen the gear measurably (0.3 % with seven).
 MINIMUM_BORE_EDGES = 24
@@ -47,6 +47,8 @@ class SectorRecipe:
         On the flank that carries nothing.
     root, body, bore
         On root fillet and root circle, inside the gear body, round the bore.
+    deepening
+        Growth of the size inside the body per depth below the root circle (-): far from the teeth the field is smooth.
     growth
         Largest change of size per length along the outline (-).
     fine
@@ -62,6 +64,7 @@ class SectorRecipe:
     body: float
     bore: float
     growth: float = 0.35
+    deepening: float = 0.2
     fine: str = "left"
 
     def scaled(self, factor: float) -> SectorRecipe:
@@ -178,13 +181,10 @@ def _outline(gear: Gear, recipe: SectorRecipe) -> dict[str, _Chain]:
     edges = max(1, round(2 * half * inner / recipe.bore), int(np.ceil(MINIMUM_BORE_EDGES / gear.teeth)))
     angles = np.linspace(half, -half, 2 * edges + 1)
     depth = gear.root_radius - inner
-    chord = min(recipe.bore, 2 * half * inner / edges)
-    sizes = _limited(
-        np.linspace(0, depth, 400),
-        np.r_[min(recipe.root, depth), np.full(398, recipe.body), min(chord, depth)],
-        2 * recipe.growth,
-    )
-    cut = _polar_chain(gear.root_radius - _nodes(np.linspace(0, depth, 400), sizes), half)
+    place = np.linspace(0, depth, 400)
+    size = np.minimum(recipe.body + recipe.deepening * place, depth)
+    size[0], size[-1] = min(recipe.root, depth), min(recipe.bore, 2 * half * inner / edges, depth)
+    cut = _polar_chain(gear.root_radius - _nodes(place, _limited(place, size, 2 * recipe.growth)), half)
     return {
         "cut_right": cut.mirrored().reversed(),
         "root_right": right["root"].mirrored(),
@@ -260,7 +260,7 @@ def _make(gear: Gear, recipe: SectorRecipe) -> dict[str, NDArray[np.generic]]:
     """Mesh the sector: name -> array, the boundaries under ``on_<name>``."""
     chains = _outline(gear, recipe)
     ring = np.concatenate([c.ends[:-1] for c in chains.values()])
-    corners, triangles = _fill(ring, recipe)
+    corners, triangles = _fill(ring, recipe.body + recipe.deepening * (gear.root_radius - gear.bore_diameter / 2))
     points, quadratic, edges = _second_order(corners, triangles)
     keys = edges[:, 0] * len(corners) + edges[:, 1]
     arrays: dict[str, NDArray[np.generic]] = {}
@@ -277,8 +277,9 @@ def _make(gear: Gear, recipe: SectorRecipe) -> dict[str, NDArray[np.generic]]:
     return {"points": points, "triangles": quadratic, **arrays}
 
 
-def _fill(ring: Array, recipe: SectorRecipe) -> tuple[Array, IntArray]:
-    """Straight triangles inside a closed ring of points; ring points keep their places and come first.
+def _fill(ring: Array, largest: float) -> tuple[Array, IntArray]:
+    """Straight triangles of sizes up to `largest` (m) inside a closed ring of points, which keep their places and come
+    first.
 
     Returns
     -------
@@ -290,7 +291,7 @@ def _fill(ring: Array, recipe: SectorRecipe) -> tuple[Array, IntArray]:
     with gmsh_session("tooth sector") as gmsh:
         gmsh.option.setNumber("Mesh.Algorithm", 6)
         gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 1)
-        gmsh.option.setNumber("Mesh.MeshSizeMax", 1e3 * recipe.body)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 1e3 * largest)
         geo = gmsh.model.geo
         tags = [geo.addPoint(x, y, 0.0) for x, y in (1e3 * ring).tolist()]
         lines = [geo.addLine(a, b) for a, b in zip(tags, tags[1:] + tags[:1], strict=True)]
