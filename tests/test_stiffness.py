@@ -98,7 +98,9 @@ def test_every_cycle_is_the_same(gears, elastic):
     curve = at(gears, angles, elastic, solve_all=True)
     for group in ([0, 2, 4, 5], [1, 3]):
         np.testing.assert_allclose(curve.torque_wheel[group], curve.torque_wheel[group[0]], rtol=1e-9)
-        np.testing.assert_allclose(curve.load_share[group], np.tile(curve.load_share[group[0]], (len(group), 1)), atol=1e-9)
+        np.testing.assert_allclose(
+            curve.load_share[group], np.tile(curve.load_share[group[0]], (len(group), 1)), atol=1e-9
+        )
     assert list(curve.leading_pair[[0, 2, 4, 5]]) == [0, -1, -2, 1]
 
 
@@ -107,7 +109,10 @@ def test_repeated_positions_are_solved_once(gears, elastic, monkeypatch):
 
     def counting(pair, angles, twists):
         solved.extend(angles)
-        return [solve_position(pair, float(a), float(t)) for a, t in zip(angles, np.broadcast_to(twists, len(angles)), strict=True)]
+        return [
+            solve_position(pair, float(a), float(t))
+            for a, t in zip(angles, np.broadcast_to(twists, len(angles)), strict=True)
+        ]
 
     monkeypatch.setattr("gearfe.sweep_positions.solve_positions", counting)
     angles = np.radians(np.arange(1.0, 41.0, 3.0))
@@ -156,9 +161,7 @@ def test_stiffness_does_not_depend_on_size(gears, elastic):
 def test_two_materials(gears, elastic):
     angles = np.radians([4.0, 13.0])
     steel, soft = Material(), Material(70e9, 0.33)
-    both, one, other = (
-        at(gears, angles, materials=m).k_mesh for m in ((soft, soft), (soft, steel), (steel, soft))
-    )
+    both, one, other = (at(gears, angles, materials=m).k_mesh for m in ((soft, soft), (soft, steel), (steel, soft)))
     hard = at(gears, angles, elastic).k_mesh
     for mixed in (one, other):
         assert (both < mixed).all()
@@ -253,7 +256,15 @@ def test_a_torque_beyond_reach_is_flagged(gears, elastic, monkeypatch):
     lost = at(gears, [0.1], elastic, twist=None, torque=100.0)
     assert lost.failed.all()
     assert lost.status[0] in ("not_converged", "torque_not_reached")
-    for name in ("twist", "torque_wheel", "torque_pinion", "k_mesh", "k_tangent", "transmission_error", "peak_pressure"):
+    for name in (
+        "twist",
+        "torque_wheel",
+        "torque_pinion",
+        "k_mesh",
+        "k_tangent",
+        "transmission_error",
+        "peak_pressure",
+    ):
         assert np.isnan(getattr(lost, name)).all(), name
     assert np.isnan(lost.wheel_angle).all()
     assert lost.teeth_in_contact[0] == -1
