@@ -164,7 +164,7 @@ def _contact(points: ContactPoints, u: Array, place: Array | None) -> _State:
         for k, chain in enumerate(points.chains):
             own = points.mate == k
             place[own] = nearest_places(where[own], nodes[chain])
-    projection = project(where, chains_of(nodes, points.counts, points.mate), place)
+    projection = project(where, chains_of(nodes, points.counts, points.mate, points.fade), place)
     elements, local, tangent = points.on_mate(projection)
     mate = point_basis(points.mesh, elements, local, points.weight)
     stress = _normal_stress(moved, points.fields)[:, 0]

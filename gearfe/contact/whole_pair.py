@@ -207,8 +207,8 @@ class ContactPoints:
         return elements, start + xi * (end - start), np.einsum("na,ina->in", projection.slopes, corners)
 
     def share(self, place: Array) -> Array:
-        """1, fading to 0 at the end of the mate's flank."""
-        return np.clip((self.counts[self.mate] - place) / self.fade, 0.0, 1.0)
+        """Part of each point's stretch of surface that lies before the end of the mate's flank."""
+        return np.clip(0.5 + (self.counts[self.mate] - place) / (2 * self.fade), 0.0, 1.0)
 
 
 def _corner(mesh: Any, elements: IntArray, vertices: IntArray) -> Array:
