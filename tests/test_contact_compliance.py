@@ -65,11 +65,11 @@ def test_cyclic_compliance_is_that_of_the_whole_gear(gear: int) -> None:
     rng = np.random.default_rng(2)
     loads = rng.normal(size=(2 * len(body.flank.nodes), 3))
     force = np.zeros((2 * len(whole.points), 3))
-    force[_unknowns(whole.node_of[0][body.flank.nodes])] = loads
+    force[_unknowns(whole.numbers[0][body.flank.nodes])] = loads
     displacement = np.zeros_like(force)
     displacement[free] = splu(stiffness[free][:, free]).solve(force[free])
     for tooth in (0, 1, 4, body.teeth - 1):
-        expected = displacement[_unknowns(whole.node_of[tooth][body.flank.nodes])].reshape(-1, 2, 3)
+        expected = displacement[_unknowns(whole.numbers[tooth][body.flank.nodes])].reshape(-1, 2, 3)
         angle = 2 * np.pi * tooth / body.teeth
         c, s = np.cos(angle), np.sin(angle)
         expected = np.einsum("ji,njk->nik", np.array([[c, -s], [s, c]]), expected).reshape(-1, 3)
@@ -111,11 +111,11 @@ def test_condensed_stress_follows_the_recovered_field() -> None:
     stiffness = _sparse(whole.points, whole.triangles, STEEL, "stress")
     free = np.setdiff1d(np.arange(2 * len(whole.points)), _unknowns(np.unique(whole.boundaries["bore"])))
     force = np.zeros(2 * len(whole.points))
-    force[_unknowns(whole.node_of[0][body.flank.nodes])] = loads
+    force[_unknowns(whole.numbers[0][body.flank.nodes])] = loads
     u = np.zeros_like(force)
     u[free] = splu(stiffness[free][:, free]).solve(force[free])
     unknowns, rows = normal_stress_rows(body.mesh, STEEL, "stress", 4)
-    on_sector = u[_unknowns(whole.node_of[0])]
+    on_sector = u[_unknowns(whole.numbers[0])]
     expected = np.einsum("eqi,ei->eq", rows, on_sector[unknowns]).ravel()
     assert body.stress_own is not None
     assert body.stress_interface is not None

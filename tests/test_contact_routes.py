@@ -59,7 +59,7 @@ def test_whole_gear_is_closed_and_made_of_turned_sectors() -> None:
     outline = sum(len(edges) for edges in gear.boundaries.values())
     assert np.count_nonzero(owners == 1) == outline
     assert owners.max() == 2
-    turned = gear.points[gear.node_of[3]]
+    turned = gear.points[gear.numbers[3]]
     angle = 3 * 2 * math.pi / sector.teeth
     rotation = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     np.testing.assert_allclose(turned, sector.points @ rotation.T, rtol=0, atol=1e-15)
