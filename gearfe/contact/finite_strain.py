@@ -31,48 +31,51 @@ Array = NDArray[Any]
 
 #: Sectors on either side of a loaded tooth that take part: the effect is cubic in the strain and dies out fast.
 NEIGHBOURS = 1
-#: Positions at which a sweep evaluates the share; it is smooth between them.
+#: Positions at which a sweep evaluates the share; over a mesh cycle it varies by about a third of itself.
 SAMPLES = 9
 
 
-def with_finite_strain(pair: MeshingPair, angles: Array, positions: Sequence[Position]) -> list[Position]:
-    """The positions with torques raised by their finite-strain share c = Delta T / T.
+def sample_numbers(angles: Array, cycle: float) -> NDArray[np.int64]:
+    """At most `SAMPLES` of the positions at `angles` (rad), spread evenly over the mesh cycle (rad): their numbers."""
+    order = np.argsort(np.mod(angles, cycle), kind="stable")
+    return order[np.unique(np.linspace(0, len(order) - 1, min(SAMPLES, len(order))).round().astype(np.int64))]
+
+
+def interpolated_shares(angles: Array, samples: Array, shares: Array, cycle: float) -> Array:
+    """Shares at `angles` from those at the angles `samples` (rad), linear in the phase; not-a-numbers are left out."""
+    good = np.isfinite(shares)
+    if not good.any():
+        return np.zeros(len(angles))
+    return np.interp(np.mod(angles, cycle), np.mod(samples[good], cycle), shares[good], period=cycle)
+
+
+def with_share(position: Position, share: float) -> Position:
+    """The position with its torques raised by the finite-strain share c = Delta T / T.
 
     Both hubs' torques take the same factor: the force changes, not its line. The share grows with the twist about as
-    the torque does, so the tangent takes 1 + 2 c. Of more than `SAMPLES` positions, so many spread over the mesh cycle
-    are evaluated and the share is interpolated linearly in the phase; it varies by a third of itself over a cycle.
-
-    Parameters
-    ----------
-    angles : ndarray, shape (n,)
-        Pinion angles (rad).
+    the torque does, so the tangent takes 1 + 2 c.
     """
-    good = np.array([i for i, p in enumerate(positions) if p.status == "converged"], dtype=np.int64)
-    if len(good) == 0:
-        return list(positions)
-    phase = np.mod(np.asarray(angles, dtype=float)[good], pair.pitch_angle)
-    order = np.argsort(phase, kind="stable")
-    chosen = order[np.unique(np.linspace(0, len(order) - 1, min(SAMPLES, len(order))).round().astype(np.int64))]
-    sampled = finite_strain_shares(pair, [positions[good[i]] for i in chosen])
-    share = np.interp(phase, phase[chosen], sampled, period=pair.pitch_angle)
-    made = list(positions)
-    for i, c in zip(good, share, strict=True):
-        p = made[i]
-        made[i] = replace(
-            p,
-            torque_wheel=p.torque_wheel * (1 + c),
-            torque_pinion=p.torque_pinion * (1 + c),
-            torque_wheel_reaction=p.torque_wheel_reaction * (1 + c),
-            pair_torques=p.pair_torques * (1 + c),
-            tangent=p.tangent * (1 + 2 * c),
-        )
-    return made
+    if position.status != "converged":
+        return position
+    return replace(
+        position,
+        torque_wheel=position.torque_wheel * (1 + share),
+        torque_pinion=position.torque_pinion * (1 + share),
+        torque_wheel_reaction=position.torque_wheel_reaction * (1 + share),
+        pair_torques=position.pair_torques * (1 + share),
+        tangent=position.tangent * (1 + 2 * share),
+    )
 
 
 def finite_strain_shares(pair: MeshingPair, positions: Sequence[Position]) -> Array:
-    """Delta T / T of converged positions, shape (n,)."""
-    extra = sum(_extra_torques(pair, gear, positions) for gear in (0, 1))
-    return np.asarray(extra) / np.array([p.torque_wheel for p in positions])
+    """Delta T / T of each position, shape (n,); not-a-number where it has no solution."""
+    good = [p for p in positions if p.status == "converged"]
+    shares = np.full(len(positions), np.nan)
+    if good:
+        extra = sum(_extra_torques(pair, gear, good) for gear in (0, 1))
+        solved = np.array([p.status == "converged" for p in positions])
+        shares[solved] = np.asarray(extra) / np.array([p.torque_wheel for p in good])
+    return shares
 
 
 def _extra_torques(pair: MeshingPair, gear: int, positions: Sequence[Position]) -> Array:
