@@ -75,7 +75,7 @@ def triangle_shapes(r: Array, s: Array) -> tuple[Array, Array]:
     return values, np.stack([d_r, d_s], axis=-1)
 
 
-def _triangle_rule() -> tuple[Array, Array, Array]:
+def triangle_rule() -> tuple[Array, Array, Array]:
     """Six-point rule, exact to degree 4 (Dunavant 1985): reference points r, s and weights that sum to 1/2."""
     a, b = 0.445948490915965, 0.091576213509771
     wa, wb = 0.223381589678011 / 2, 0.109951743655322 / 2
@@ -131,7 +131,7 @@ def element_stiffness(coordinates: Array, material: Material, plane: Plane, thic
         N/m; rows are node-major (node 0 x, node 0 y, node 1 x, ...).
     """
     lam, mu = material.lame(plane)
-    r, s, weights = _triangle_rule()
+    r, s, weights = triangle_rule()
     gradients, det = physical_gradients(coordinates, triangle_shapes(r, s)[1])
     m = len(coordinates)
     grad = gradients.reshape(m, len(r), 12)

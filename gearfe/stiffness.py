@@ -107,6 +107,7 @@ def sweep_stiffness(
     materials: Material | tuple[Material, Material] = STEEL,
     plane: Plane = "strain",
     law: str | ContactLaw = "nitsche",
+    kinematics: Literal["small", "finite"] = "finite",
     twist_from: Literal["centred", "contact"] = "centred",
     solve_all: bool = False,
     coarsen: float = 1.0,
@@ -128,6 +129,9 @@ def sweep_stiffness(
         solved once.
     materials, plane, law, coarsen, points_per_edge
         See `elastic_pair`.
+    kinematics
+        ``small``: small strain in each hub's frame; ``finite`` (default) adds the first-order effect of finite strain
+        on the torque, see `gearfe.contact.finite_strain`.
     twist_from
         Where the twist counts from: ``centred``, a wheel space faces the pinion tooth; ``contact``, half the backlash
         further, where unmodified flanks touch.
@@ -151,13 +155,15 @@ def sweep_stiffness(
     InputError
         For neither or both of twist and torque, or values out of range.
     """
+    if kinematics not in ("small", "finite"):
+        raise InputError("kinematics", kinematics, "must be small or finite")
     lost = _lost_motion(pair, twist_from)
     load = _checked_load(pair, twist, torque, lost)
     cycle = pair.mesh_cycle
     asked = np.arange(20) * cycle / 20 if angles is None else np.atleast_1d(np.asarray(angles, dtype=float))
     if asked.ndim != 1 or len(asked) == 0 or not np.isfinite(asked).all():
         raise InputError("angles", angles, "must be a list of finite angles (rad)", "give at least one angle")
-    watch = Stopwatch()
+    watch, finite = Stopwatch(), kinematics == "finite"
     common: dict[str, Any] = {"plane": plane, "law": law, "points_per_edge": points_per_edge}
     if elastic is None:
         elastic = elastic_pair(pair, materials, coarsen=coarsen, watch=watch, **common)
@@ -166,9 +172,9 @@ def sweep_stiffness(
         touching = unloaded_twist(pair, solved_angles)
     with watch.stage("positions"), one_thread():
         if torque is None:
-            solved = at_twists(elastic, solved_angles, np.full(len(solved_angles), load), progress)
+            solved = at_twists(elastic, solved_angles, np.full(len(solved_angles), load), progress, finite=finite)
         else:
-            solved = at_torque(pair, elastic, solved_angles, load, touching, progress)
+            solved = at_torque(pair, elastic, solved_angles, load, touching, progress, finite=finite)
     solved = honest(solved, touching)
     error = None
     if estimate_error:
@@ -176,7 +182,7 @@ def sweep_stiffness(
             given = (elastic.pinion.material, elastic.wheel.material)
             common = {"plane": elastic.pinion.plane, "law": elastic.law, "points_per_edge": points_per_edge}
             coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
-            error = _estimate(coarse, solved_angles, solved)
+            error = _estimate(coarse, solved_angles, solved, finite=finite)
     curve = _assemble(pair, asked, solved_angles, source, solved, touching, lost, searched=torque is not None)
     return replace(curve, timings=dict(watch.seconds), error=error)
 
@@ -214,10 +220,10 @@ def _distinct(angles: Array, cycle: float) -> tuple[Array, IntArray]:
     return folded[order][new], source
 
 
-def _estimate(coarse: MeshingPair, angles: Array, solved: Solved) -> ErrorEstimate:
+def _estimate(coarse: MeshingPair, angles: Array, solved: Solved, *, finite: bool) -> ErrorEstimate:
     good = np.flatnonzero(np.array(solved.status) == "converged")
     chosen = good[np.unique(np.linspace(0, len(good) - 1, min(len(good), ESTIMATE_POSITIONS)).round().astype(int))]
-    again = at_twists(coarse, angles[chosen], solved.twist[chosen], None)
+    again = at_twists(coarse, angles[chosen], solved.twist[chosen], None, finite=finite)
     fine = solved.numbers["torque_wheel"][chosen]
     other = np.where(np.array(again.status, dtype=object) == "converged", again.numbers["torque_wheel"], np.nan)
     relative = np.abs(other / fine - 1) / (COARSENING**ORDER - 1)

@@ -77,6 +77,7 @@ class StiffnessJob:
             "twist": None if t.twist_deg is None else _radians(t.twist_deg),
             "torque": t.torque_Nm,
             "angles": np.array([_radians(angle) for angle in t.angles_deg(math.degrees(self.pair.mesh_cycle))]),
+            "kinematics": t.kinematics,
             "twist_from": t.twist_from,
             "solve_all": t.solve_all,
         }

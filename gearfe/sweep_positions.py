@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .contact.finite_strain import finite_strain_shares, interpolated_shares, sample_numbers, with_share
 from .contact.scene import MeshingPair
 from .contact.solver import Position, solve_positions
 from .gear import GearPair
@@ -48,29 +49,66 @@ class Solved:
     status: list[str]
 
 
-def at_twists(elastic: MeshingPair, angles: Array, twists: Array, progress: Progress | None) -> Solved:
-    """Solve positions at given pinion angles and twists, both of shape (n,) (rad)."""
+def at_twists(
+    elastic: MeshingPair, angles: Array, twists: Array, progress: Progress | None, *, finite: bool = False
+) -> Solved:
+    """Solve positions at given pinion angles and twists, both of shape (n,) (rad); with or without finite strain."""
+    sampled = sample_numbers(angles, elastic.pitch_angle) if finite else np.zeros(0, dtype=np.int64)
     positions: list[Position] = []
     for start in range(0, len(angles), BATCH):
         part = slice(start, start + BATCH)
-        positions += _solve(elastic, angles[part], twists[part])
+        positions += _solve(elastic, angles[part], twists[part], sampled - start)
         if progress is not None:
             progress(len(positions), len(angles), "positions")
+    if finite:
+        shares = finite_strain_shares(elastic, [positions[i] for i in sampled])
+        every = interpolated_shares(angles, angles[sampled], shares, elastic.pitch_angle)
+        positions = [_bare(with_share(p, c)) for p, c in zip(positions, every, strict=True)]
     iterations = np.array([p.iterations for p in positions], dtype=np.int64)
     return _collect(twists, positions, iterations, [p.status for p in positions])
 
 
 def at_torque(
-    pair: GearPair, elastic: MeshingPair, angles: Array, torque: float, touching: Array, progress: Progress | None
+    pair: GearPair,
+    elastic: MeshingPair,
+    angles: Array,
+    torque: float,
+    touching: Array,
+    progress: Progress | None,
+    *,
+    finite: bool = False,
 ) -> Solved:
     """Find the twists at which positions carry `torque` (N m), and solve them.
 
     The first position starts from the standard's stiffness, the others from the compliance that it showed. `touching`
-    are the twists (rad), shape (n,), at which the rigid flanks touch.
+    are the twists (rad), shape (n,), at which the rigid flanks touch. With finite strain the share of the torque is
+    evaluated at the twists so found, which then move by that share.
     """
     moduli = [body.material.youngs_modulus for body in elastic.bodies]
     guess = mesh_stiffness(pair, moduli[0], moduli[1]) * elastic.width * pair.wheel.base_radius**2
-    most = math.pi / pair.wheel.teeth
+    goal = np.full(len(angles), torque)
+    found = _search(pair, elastic, angles, goal, touching, touching + torque / guess, progress)
+    if finite:
+        sampled = sample_numbers(angles, elastic.pitch_angle)
+        positions = _solve(elastic, angles[sampled], found.twist[sampled], np.arange(len(sampled)))
+        shares = finite_strain_shares(elastic, positions)
+        every = interpolated_shares(angles, angles[sampled], shares, elastic.pitch_angle)
+        again = _search(pair, elastic, angles, goal / (1 + every), touching, found.twist, None)
+        raised = [with_share(p, c) for p, c in zip(again.positions, every, strict=True)]
+        found = again._replace(positions=raised, iterations=found.iterations + again.iterations)
+    return _collect(found.twist, found.positions, found.iterations, found.status)
+
+
+def _search(
+    pair: GearPair,
+    elastic: MeshingPair,
+    angles: Array,
+    goal: Array,
+    touching: Array,
+    first: Array,
+    progress: Progress | None,
+) -> TorqueSolution:
+    """Twists that carry the torques `goal` (N m), the first position ahead of the others to improve their guesses."""
     parts: list[TorqueSolution] = []
     starts = [0, *range(1, len(angles), BATCH)]
     for start, stop in zip(starts, [*starts[1:], len(angles)], strict=True):
@@ -78,25 +116,33 @@ def at_torque(
         found = twists_for_torque(
             lambda a, t: _solve(elastic, a, t),
             angles[part],
-            torque,
+            goal[part],
             touching=touching[part],
-            first=touching[part] + torque / guess,
-            most=most,
+            first=first[part],
+            most=math.pi / pair.wheel.teeth,
         )
         parts.append(found)
         if start == 0 and found.status[0] == "converged":
-            guess = torque / (found.twist[0] - touching[0])
+            first = touching + (found.twist[0] - touching[0]) / (first[0] - touching[0]) * (first - touching)
         if progress is not None:
             progress(stop, len(angles), "positions")
-    positions = [position for found in parts for position in found.positions]
-    status = [one for found in parts for one in found.status]
-    twists, iterations = (np.concatenate([getattr(f, name) for f in parts]) for name in ("twist", "iterations"))
-    return _collect(twists, positions, iterations, status)
+    return TorqueSolution(
+        np.concatenate([f.twist for f in parts]),
+        [position for f in parts for position in f.positions],
+        np.concatenate([f.iterations for f in parts]),
+        [one for f in parts for one in f.status],
+    )
 
 
-def _solve(elastic: MeshingPair, angles: Array, twists: Array) -> list[Position]:
-    """Positions without what only fields need: a scene holds megabytes."""
-    return [replace(p, scene=None, forces=None) for p in solve_positions(elastic, angles, twists)]
+def _solve(elastic: MeshingPair, angles: Array, twists: Array, kept: IntArray | None = None) -> list[Position]:
+    """Positions, all but those numbered in `kept` without what only fields need: a scene holds megabytes."""
+    made = solve_positions(elastic, angles, twists)
+    keep = set() if kept is None else set(kept.tolist())
+    return [p if i in keep else _bare(p) for i, p in enumerate(made)]
+
+
+def _bare(position: Position) -> Position:
+    return replace(position, scene=None, forces=None, force_rate=None)
 
 
 def _collect(twists: Array, positions: list[Position], iterations: IntArray, status: list[str]) -> Solved:

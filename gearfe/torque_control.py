@@ -48,7 +48,7 @@ Solve = Callable[[Array, Array], list[Position]]
 
 
 def twists_for_torque(
-    solve: Solve, angles: Array, torque: float, *, touching: Array, first: Array, most: float
+    solve: Solve, angles: Array, torque: Array, *, touching: Array, first: Array, most: float
 ) -> TorqueSolution:
     """Find the twist of each position.
 
@@ -58,8 +58,8 @@ def twists_for_torque(
         ``solve(angles, twists)`` gives the positions.
     angles : ndarray, shape (n,)
         Pinion angles (rad).
-    torque
-        Torque at the wheel's hub, > 0 (N m).
+    torque : ndarray, shape (n,)
+        Torques at the wheel's hub, > 0 (N m).
     touching, first : ndarray, shape (n,)
         Twists (rad) at which the rigid flanks touch, and first guesses above them.
     most
@@ -81,8 +81,8 @@ def twists_for_torque(
             status[i] = NOT_REACHED if position.status in ("converged", "no_contact") else position.status
             step = 0.0
             if position.status == "converged":
-                excess = position.torque_wheel - torque
-                if abs(excess) <= TOLERANCE * torque:
+                excess = position.torque_wheel - torque[i]
+                if abs(excess) <= TOLERANCE * torque[i]:
                     status[i] = "converged"
                     continue
                 low[i], high[i] = (twist[i], high[i]) if excess < 0 else (low[i], twist[i])

@@ -69,7 +69,8 @@ def test_whole_mesh_cycle(name: str, law: ContactLaw) -> None:
 
 
 def test_out_of_reach_and_below_the_mesh() -> None:
-    """Backlash not taken up is no contact (zero torque); an overlap that no contact point sees is never a silent zero."""
+    """Backlash not taken up is no contact (zero torque); an overlap that no contact point sees is never a silent
+    zero."""
     gears, pair = build("backlash", Nitsche())
     angles = np.linspace(0, pair.pitch_angle, 5)
     apart = solve_positions(pair, angles, 0.9 * gears.contact_twist)

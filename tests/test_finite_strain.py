@@ -71,12 +71,26 @@ def test_share_is_the_rate_of_the_extra_energy(angle_deg: float, monkeypatch: py
 
 
 def test_few_neighbours_suffice(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The effect is cubic in the strain: two sectors either side of the loaded ones carry all but a few parts in 1e5."""
+    """The effect is cubic in the strain: the loaded teeth and their neighbours carry all but a few parts in 1e5."""
     _, pair = meshing_pair(coarsen=2.0)
     position = solve_position(pair, math.radians(13), math.radians(0.05))
     near = finite_strain.finite_strain_shares(pair, [position])[0]
     monkeypatch.setattr(finite_strain, "NEIGHBOURS", 15)
     assert near == pytest.approx(finite_strain.finite_strain_shares(pair, [position])[0], abs=5e-5)
+
+
+def test_sampled_shares_follow_the_curve() -> None:
+    """A sweep's shares, interpolated between few positions, differ from each position's own by little of the curve."""
+    _, pair = meshing_pair(coarsen=2.0)
+    angles = np.linspace(0, pair.pitch_angle, 25)[:-1]
+    small = solve_positions(pair, angles, math.radians(0.05))
+    shares = finite_strain.finite_strain_shares(pair, small)
+    chosen = finite_strain.sample_numbers(angles, pair.pitch_angle)
+    assert len(chosen) == finite_strain.SAMPLES
+    applied = finite_strain.interpolated_shares(angles, angles[chosen], shares[chosen], pair.pitch_angle)
+    assert (applied < 0).all()
+    assert np.abs(applied - shares).max() < 3e-4
+    assert np.median(np.abs(applied - shares)) < 5e-5
 
 
 def test_against_a_finite_strain_program() -> None:

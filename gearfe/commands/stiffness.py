@@ -20,6 +20,7 @@ OVERRIDES = {
     "torque_Nm": "torque_Nm",
     "law": "law",
     "plane": "plane",
+    "kinematics": "kinematics",
     "twist_from": "twist_from",
     "coarsen": "coarsen",
 }
@@ -35,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--angles", type=float, nargs=3, metavar=("START", "STEP", "STOP"), help="pinion angles (deg)")
     parser.add_argument("--law", metavar="LAW", help="contact law: nitsche or penalty")
     parser.add_argument("--plane", metavar="STATE", help="plane state: strain or stress")
+    parser.add_argument("--kinematics", metavar="STRAIN", help="small or finite strain")
     parser.add_argument("--twist-from", metavar="ZERO", dest="twist_from", help="zero of the twist: centred or contact")
     parser.add_argument("--coarsen", type=float, metavar="C", help="factor on all element sizes")
     parser.add_argument("--solve-all", action="store_true", help="solve positions of later mesh cycles too")

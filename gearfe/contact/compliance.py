@@ -148,7 +148,7 @@ def gear_body(
 
 
 #: Neighbours whose coupling is kept at hand: teeth in contact at the same time are never further apart.
-REACH = 4
+REACH = 12
 
 
 def _far_field(interface: Array, stress: Array | None, coupling: Array) -> FarField:

@@ -15,6 +15,7 @@ linear one. The equilibrium minimises the whole energy, so by the envelope theor
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,33 +30,73 @@ from .solver import Position
 Array = NDArray[Any]
 
 #: Sectors on either side of a loaded tooth that take part: the effect is cubic in the strain and dies out fast.
-NEIGHBOURS = 2
+NEIGHBOURS = 1
+#: Positions at which a sweep evaluates the share; over a mesh cycle it varies by about a third of itself.
+SAMPLES = 9
+
+
+def sample_numbers(angles: Array, cycle: float) -> NDArray[np.int64]:
+    """At most `SAMPLES` of the positions at `angles` (rad), spread evenly over the mesh cycle (rad): their numbers."""
+    order = np.argsort(np.mod(angles, cycle), kind="stable")
+    return order[np.unique(np.linspace(0, len(order) - 1, min(SAMPLES, len(order))).round().astype(np.int64))]
+
+
+def interpolated_shares(angles: Array, samples: Array, shares: Array, cycle: float) -> Array:
+    """Shares at `angles` from those at the angles `samples` (rad), linear in the phase; not-a-numbers are left out."""
+    good = np.isfinite(shares)
+    if not good.any():
+        return np.zeros(len(angles))
+    return np.interp(np.mod(angles, cycle), np.mod(samples[good], cycle), shares[good], period=cycle)
+
+
+def with_share(position: Position, share: float) -> Position:
+    """The position with its torques raised by the finite-strain share c = Delta T / T.
+
+    Both hubs' torques take the same factor: the force changes, not its line. The share grows with the twist about as
+    the torque does, so the tangent takes 1 + 2 c.
+    """
+    if position.status != "converged":
+        return position
+    return replace(
+        position,
+        torque_wheel=position.torque_wheel * (1 + share),
+        torque_pinion=position.torque_pinion * (1 + share),
+        torque_wheel_reaction=position.torque_wheel_reaction * (1 + share),
+        pair_torques=position.pair_torques * (1 + share),
+        tangent=position.tangent * (1 + 2 * share),
+    )
 
 
 def finite_strain_shares(pair: MeshingPair, positions: Sequence[Position]) -> Array:
-    """Delta T / T of each position (not-a-number where it has no solution), shape (n,)."""
+    """Delta T / T of each position, shape (n,); not-a-number where it has no solution."""
+    good = [p for p in positions if p.status == "converged"]
     shares = np.full(len(positions), np.nan)
-    for i, position in enumerate(positions):
-        if position.status == "converged":
-            shares[i] = sum(_extra_torque(pair, gear, position) for gear in (0, 1)) / position.torque_wheel
+    if good:
+        extra = sum(_extra_torques(pair, gear, good) for gear in (0, 1))
+        solved = np.array([p.status == "converged" for p in positions])
+        shares[solved] = np.asarray(extra) / np.array([p.torque_wheel for p in good])
     return shares
 
 
-def _extra_torque(pair: MeshingPair, gear: int, position: Position) -> float:
-    """Delta T from one gear (N m)."""
-    assert position.scene is not None
-    assert position.forces is not None
-    assert position.force_rate is not None
+def _extra_torques(pair: MeshingPair, gear: int, positions: Sequence[Position]) -> Array:
+    """Delta T from one gear (N m), shape (n,)."""
     body = pair.bodies[gear]
-    loads = flank_forces(body, gear, position.scene.windows, position.forces)
-    rates = flank_forces(body, gear, position.scene.windows, position.force_rate)
-    teeth = {(t + k) % body.teeth for t in loads for k in range(-NEIGHBOURS, NEIGHBOURS + 1)}
-    cases = [(case, tooth) for case in (loads, rates) for tooth in sorted(teeth)]
-    return _energy_rate(body, sector_displacements(body, cases))
+    cases, counts = [], []
+    for position in positions:
+        assert position.scene is not None
+        assert position.forces is not None
+        assert position.force_rate is not None
+        loads = flank_forces(body, gear, position.scene.windows, position.forces)
+        rates = flank_forces(body, gear, position.scene.windows, position.force_rate)
+        teeth = sorted({(t + k) % body.teeth for t in loads for k in range(-NEIGHBOURS, NEIGHBOURS + 1)})
+        cases += [(case, tooth) for tooth in teeth for case in (loads, rates)]
+        counts.append(len(teeth))
+    energy = _energy_rates(body, sector_displacements(body, cases))
+    return np.add.reduceat(energy, np.concatenate([[0], np.cumsum(counts)[:-1]]))
 
 
-def _energy_rate(body: GearBody, fields: Array) -> float:
-    """d Delta W / d twist over the sectors whose displacements, then displacement rates, are given, (nodes, 2, 2s)."""
+def _energy_rates(body: GearBody, fields: Array) -> Array:
+    """d Delta W / d twist of s sectors, from displacements and displacement rates in turn, shape (nodes, 2, 2s)."""
     r, s = np.array([1, 4, 1]) / 6, np.array([1, 1, 4]) / 6  # three points, exact to degree 2
     triangles = body.mesh.triangles
     gradients, det = physical_gradients(body.mesh.points[triangles], triangle_shapes(r, s)[1])
@@ -65,14 +106,14 @@ def _energy_rate(body: GearBody, fields: Array) -> float:
     at = gradients.transpose(0, 1, 3, 2).reshape(m, 6, 6)  # (point, derivative) x node
     h = np.matmul(at, fields[triangles].reshape(m, 6, -1)).reshape(m, 3, 2, 2, 2 * sectors)
     # h[m, q, j, i] = d u_i / d x_j
-    state, rate = h[..., :sectors], h[..., sectors:]
+    state, rate = h[..., ::2], h[..., 1::2]
     strain, strain_rate = _strain(state), _strain(rate)
     curved, curved_rate = _curved(state, state), _curved(state, rate)
     curved_rate = (2 * curved_rate[0], 2 * curved_rate[1], 2 * curved_rate[2])
     density = (
         _work(lam, mu, strain_rate, curved) + _work(lam, mu, strain, curved_rate) + _work(lam, mu, curved, curved_rate)
     )
-    return float(np.einsum("mq,mqs->", volume, density))
+    return volume.ravel() @ density.reshape(-1, sectors)
 
 
 #: Components 00, 11, 01 of a plane symmetric tensor.

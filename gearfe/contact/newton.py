@@ -160,6 +160,7 @@ def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
             return "under_resolved", state, iteration
         lin = linearise(scene, projection, active, state.pressure)
         aim = _step(scene, lin, active, projection, state)
+        before = scene.areas(projection.place)
         total = float(scene.weight @ np.abs(aim.pressure))
         if not np.isfinite(total) or total > limit:
             return "not_converged", state, iteration
@@ -170,7 +171,8 @@ def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
             asked = asked_pressure(scene, found, tried.forces)
             areas = scene.areas(found.place)
             scale = max(float(areas @ asked), 1e-12 * total)
-            error = float(areas @ np.abs(tried.pressure - asked)) / scale
+            # sliding past a sharp end changes the areas behind the forces as well
+            error = float(areas @ np.abs(tried.pressure - asked) + np.abs(areas - before) @ asked) / scale
             if best is None or error < best[0]:
                 best = (error, tried, found, asked)
             if error < (1 - 0.1 * length) * residual or iteration <= FREE_ITERATIONS:

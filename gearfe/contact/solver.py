@@ -25,6 +25,8 @@ Array = NDArray[Any]
 TOLERANCE = 1e-10
 #: Positions solved side by side.
 BATCH = 16
+#: Memory for the matrices of positions that are solved side by side.
+GROUP_BYTES = 60e6
 #: Newton steps spent on one difficult position before it is given up.
 MAX_STEPS = 240
 
@@ -53,7 +55,7 @@ class Position:
     iterations
         Newton steps.
     scene, forces, force_rate
-        Pieces of flank, the nodal forces on them in tooth axes (N) and their derivatives with respect to the twist
+        Pieces of flank (without their matrices), the nodal forces on them in tooth axes (N) and their derivatives with respect to the twist
         (N/rad), for recovering fields; None without a solution.
     """
 
@@ -101,26 +103,42 @@ def solve_positions(
 
 def _solve_batch(pair: MeshingPair, angles: Array, twists: Array, tolerance: float) -> list[Position]:
     found = overlaps(pair, angles, twists)
+    windows = [windows_of(pair, one, a, t) for one, a, t in zip(found, angles, twists, strict=True)]
     positions: list[Position | None] = [None] * len(angles)
-    scenes, places = [], []
-    for i, overlap in enumerate(found):
-        if not overlap:
-            clear = rigidly_apart(pair, angles[i], twists[i])
-            positions[i] = _unsolved("no_contact" if clear else "under_resolved")
-            continue
-        scene = assemble(pair, windows_of(pair, overlap, angles[i], twists[i]))
-        if not (scene.rigid_gap < 0).any():
-            positions[i] = _unsolved("under_resolved")
-            continue
-        scenes.append(scene)
-        places.append(i)
-    outcomes = _side_by_side(scenes, [newton(s, _start(pair, s), tolerance) for s in scenes])
-    for i, scene, (status, state, steps) in zip(places, scenes, outcomes, strict=True):
-        if status != "converged" or _outgrown(pair, scene, state):
-            positions[i] = _with_care(pair, angles[i], twists[i], found[i], steps, tolerance)
-        else:
-            positions[i] = _finish(scene, state, steps)
+    for group in _groups([w[-1].nodes.stop if w else 0 for w in windows]):
+        scenes, places = [], []
+        for i in group:
+            if not windows[i]:
+                clear = rigidly_apart(pair, angles[i], twists[i])
+                positions[i] = _unsolved("no_contact" if clear else "under_resolved")
+                continue
+            scene = assemble(pair, windows[i])
+            if not (scene.rigid_gap < 0).any():
+                positions[i] = _unsolved("under_resolved")
+                continue
+            scenes.append(scene)
+            places.append(i)
+        outcomes = _side_by_side(scenes, [newton(s, _start(pair, s), tolerance) for s in scenes])
+        for i, scene, (status, state, steps) in zip(places, scenes, outcomes, strict=True):
+            if status != "converged" or _outgrown(pair, scene, state):
+                positions[i] = _with_care(pair, angles[i], twists[i], found[i], steps, tolerance)
+            else:
+                positions[i] = _finish(scene, state, steps)
     return [p for p in positions if p is not None]
+
+
+def _groups(nodes: Sequence[int]) -> list[list[int]]:
+    """Consecutive positions whose dense matrices, of `nodes` nodes each, fit into `GROUP_BYTES` together."""
+    groups: list[list[int]] = [[]]
+    held = 0
+    for i, count in enumerate(nodes):
+        size = 8 * 3 * (2 * count) ** 2  # compliance, and about twice as many stress rows
+        if groups[-1] and held + size > GROUP_BYTES:
+            groups.append([])
+            held = 0
+        groups[-1].append(i)
+        held += size
+    return groups
 
 
 def _start(pair: MeshingPair, scene: Scene) -> State:
@@ -218,7 +236,7 @@ def _finish(scene: Scene, state: State, iterations: int) -> Position:
         pair_torques=np.array([about_wheel[w.nodes].sum() for w in of_pair]),
         peak_pressure=float(state.pressure.max()),
         iterations=iterations,
-        scene=scene,
+        scene=replace(scene, compliance=np.zeros((0, 0)), stress=np.zeros((0, 0))),  # the megabytes
         forces=forces,
         force_rate=force_rate,
     )

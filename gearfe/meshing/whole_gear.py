@@ -26,6 +26,8 @@ class WholeGear:
         Corner nodes counter-clockwise, then the nodes in the middle of edges 01, 12, 20; tooth by tooth.
     boundaries : dict of str to ndarray, shape (k, 3)
         Outline edges (start, middle, end node): ``bore``, ``root``, ``flank_right``, ``flank_left``, ``tip``.
+    contact : ndarray, shape (z, e, 3)
+        `SectorMesh.contact_edges` of each tooth.
     numbers : ndarray, shape (z, s)
         Node of the whole gear for each tooth and each node of the sector.
     """
@@ -33,6 +35,7 @@ class WholeGear:
     points: Array
     triangles: IntArray
     boundaries: dict[str, IntArray]
+    contact: IntArray
     numbers: IntArray
 
 
@@ -56,4 +59,5 @@ def whole_gear(mesh: SectorMesh) -> WholeGear:
         parts = [mesh.boundaries[key] for key in (name, f"{name}_right", f"{name}_left") if key in mesh.boundaries]
         if parts:
             boundaries[name] = numbers[:, np.concatenate(parts)].reshape(-1, 3)
-    return WholeGear(points, numbers[:, mesh.triangles].reshape(-1, 6), boundaries, numbers)
+    contact = numbers[:, mesh.contact_edges()]
+    return WholeGear(points, numbers[:, mesh.triangles].reshape(-1, 6), boundaries, contact, numbers)

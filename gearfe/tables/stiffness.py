@@ -30,6 +30,11 @@ class StiffnessTable:
     angle_stop_deg: float | None = quantity(None, doc="last pinion angle (deg); without it, one mesh cycle")
     plane: str = quantity("strain", doc="plane strain or plane stress", choices=("strain", "stress"))
     law: str = quantity("nitsche", doc="contact law", choices=("nitsche", "penalty"))
+    kinematics: str = quantity(
+        "finite",
+        doc="small (small strain) or finite (with the first-order effect of finite strain on the torque)",
+        choices=("small", "finite"),
+    )
     nitsche_gamma0: float = quantity(
         1.0, doc="parameter of the law nitsche, gamma h/E (-); 1 is the most accurate", low=1e-3, high=1e6
     )
