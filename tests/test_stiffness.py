@@ -26,7 +26,7 @@ def elastic(gears):
     return elastic_pair(gears, coarsen=COARSE)
 
 
-def on_the_path(gears, n=7, margin=math.radians(2.5)):
+def on_the_path(gears, n=7, margin=0.044):
     """Pinion angles at which one or two pairs touch well inside the path of contact."""
     b, d = gears.path["B"].pinion_angle, gears.path["D"].pinion_angle
     single = np.linspace(b + margin, d - margin, n)
@@ -129,7 +129,7 @@ def test_repeated_positions_are_solved_once(gears, elastic, monkeypatch):
 
 
 def test_swapped_gears_carry_the_same(gears, elastic):
-    """Seen from the other side (turned by 180 deg) the wheel is the pinion: the same contact, the other hub's torque."""
+    """From behind (turned by 180 deg) the wheel is the pinion: the same contact, the other hub's torque."""
     swapped = pair(30, 20, tip_round=0.1e-3)
     angles = np.radians([2.0, 5.0, 9.0, 12.0, 17.0])
     one = at(gears, angles, elastic)
@@ -138,7 +138,7 @@ def test_swapped_gears_carry_the_same(gears, elastic):
     np.testing.assert_allclose(other.torque_pinion, one.torque_wheel, rtol=1e-8)
 
 
-# ---- inputs: exact scalings, then directions ---------------------------------------------------------------------------
+# ---- inputs: exact scalings, then directions ------------------------------------------------------------------------
 
 
 def test_stiffness_scales_with_modulus_and_width(gears, elastic):
@@ -218,7 +218,7 @@ def test_relief_takes_load_off_the_entering_pair(gears, elastic):
     assert at(relieved, middle).k_mesh[0] == pytest.approx(at(gears, middle, elastic).k_mesh[0], rel=3e-3)
 
 
-# ---- torque mode -------------------------------------------------------------------------------------------------------
+# ---- torque mode ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("torque", [5.0, 100.0, 800.0])
@@ -270,7 +270,7 @@ def test_a_torque_beyond_reach_is_flagged(gears, elastic, monkeypatch):
     assert lost.teeth_in_contact[0] == -1
 
 
-# ---- backlash, zero of the twist, failures -------------------------------------------------------------------------------
+# ---- backlash, zero of the twist, failures --------------------------------------------------------------------------
 
 
 def test_backlash_and_the_zero_of_the_twist():
@@ -332,7 +332,7 @@ def test_mistakes(gears, options, message):
         sweep_stiffness(gears, **options)
 
 
-# ---- error estimate ----------------------------------------------------------------------------------------------------
+# ---- error estimate -------------------------------------------------------------------------------------------------
 
 
 def test_the_error_estimate_finds_the_error(gears, elastic):
