@@ -94,10 +94,6 @@ def test_points_stand_where_the_flanks_are(elastic, position, fields):
         body = elastic.bodies[w.gear]
         nodes = whole_gear(body.mesh).numbers[w.tooth % body.teeth][body.flank.nodes[w.flank_nodes]]
         np.testing.assert_allclose(fields[w.gear].points[nodes], scene.points[w.nodes], atol=1e-12)
-        placed = scene.placed(scene.compliance @ position.forces)[w.nodes]
-        np.testing.assert_allclose(
-            fields[w.gear].points[nodes] + fields[w.gear].displacement[nodes], placed, atol=1e-12
-        )
 
 
 def test_the_bore_does_not_move(elastic, fields):
