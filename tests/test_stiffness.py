@@ -35,7 +35,8 @@ def on_the_path(gears, n=7, margin=0.044):
 
 
 def at(gears, angles, elastic=None, **options):
-    options = {"twist": TWIST} | options
+    # small strain, where the invariants hold to rounding; finite strain has its own tests below
+    options = {"twist": TWIST, "kinematics": "small"} | options
     if elastic is None:
         options = {"coarsen": COARSE} | options
     return sweep_stiffness(gears, angles=angles, elastic=elastic, **options)
@@ -273,6 +274,32 @@ def test_a_torque_beyond_reach_is_flagged(gears, elastic, monkeypatch):
         assert np.isnan(getattr(lost, name)).all(), name
     assert np.isnan(lost.wheel_angle).all()
     assert lost.teeth_in_contact[0] == -1
+
+
+@pytest.mark.parametrize("torque", [5.0, 800.0])
+def test_torque_mode_with_finite_strain(gears, elastic, torque):
+    angles = np.radians(np.arange(0.0, 18.0, 1.0))
+    small, finite = (at(gears, angles, elastic, twist=None, torque=torque, kinematics=k) for k in ("small", "finite"))
+    np.testing.assert_allclose(finite.torque_wheel, torque, rtol=1e-9)
+    np.testing.assert_allclose(finite.torque_pinion / finite.torque_wheel, small.torque_pinion / torque, rtol=1e-3)
+    given = at(gears, angles[5:6], elastic, twist=float(finite.twist[5]), kinematics="finite")
+    assert given.torque_wheel[0] == pytest.approx(torque, rel=1e-4)
+    # it softens the teeth, more so under load
+    assert (finite.twist > small.twist).all()
+    assert (finite.twist < 1.02 * small.twist).all()
+
+
+def test_finite_strain_counts_more_under_load(gears, elastic):
+    angles = np.concatenate(on_the_path(gears, 2))
+
+    def share(degrees):
+        small, finite = (
+            at(gears, angles, elastic, twist=math.radians(degrees), kinematics=k).k_mesh for k in ("small", "finite")
+        )
+        return 1 - finite / small
+
+    assert (share(0.05) > 0).all()
+    assert (share(0.2) > 2 * share(0.05)).all()
 
 
 # ---- backlash, zero of the twist, failures --------------------------------------------------------------------------
