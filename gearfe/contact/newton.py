@@ -136,19 +136,32 @@ def asked_pressure(scene: Scene, projection: Projection, forces: Array) -> Array
     return np.maximum(trial, 0.0)
 
 
+@dataclass(frozen=True)
+class Outcome:
+    """End of an iteration: ``converged``, ``not_converged`` or ``under_resolved`` (no point is left in contact).
+
+    Attributes
+    ----------
+    state, projection
+        Last state and the closest points at its displacements.
+    iterations
+        Newton steps.
+    """
+
+    status: str
+    state: State
+    projection: Projection
+    iterations: int
+
+
 #: A solver yields (node places, foot points) and is sent the projection of its scene's contact points.
-Dialogue = Generator[tuple[Array, Array], Projection, tuple[str, State, int]]
+Dialogue = Generator[tuple[Array, Array], Projection, Outcome]
 
 
 def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
     """Solve one position from `state`, asking for projections by `yield` so that several positions can share them.
 
     A backtracking line search on the weighted pressure residual watches over all but the first steps.
-
-    Returns
-    -------
-    status, state, iterations
-        Status ``converged``, ``not_converged`` or ``under_resolved`` (no contact point is left in contact).
     """
     residual = np.inf
     projection = yield scene.placed(state.displacement), state.place
@@ -157,13 +170,13 @@ def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
     for iteration in range(1, MAX_ITERATIONS + 1):
         active = np.flatnonzero((wanted > 0) & ~unreached(projection.gap))
         if len(active) == 0:
-            return "under_resolved", state, iteration
+            return Outcome("under_resolved", state, projection, iteration)
         lin = linearise(scene, projection, active, state.pressure)
         aim = _step(scene, lin, active, projection, state)
         before = scene.areas(projection.place)
         total = float(scene.weight @ np.abs(aim.pressure))
         if not np.isfinite(total) or total > limit:
-            return "not_converged", state, iteration
+            return Outcome("not_converged", state, projection, iteration)
         length, best = 1.0, None
         for _ in range(6):
             tried = _between(state, aim, length)
@@ -181,8 +194,8 @@ def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
         assert best is not None
         residual, state, projection, wanted = best
         if residual < max(tolerance, _rounding(scene, wanted, projection)):
-            return "converged", State(state.pressure, state.forces, state.displacement, projection.place), iteration
-    return "not_converged", state, MAX_ITERATIONS
+            return Outcome("converged", state, projection, iteration)
+    return Outcome("not_converged", state, projection, MAX_ITERATIONS)
 
 
 def _rounding(scene: Scene, wanted: Array, projection: Projection) -> float:
