@@ -66,6 +66,10 @@ class Linearised:
         G^T W.
     response : ndarray, shape (a, 2t)
         gamma dg/du C + S.
+    normal : ndarray, shape (a, 2t)
+        G.
+    cut : ndarray, shape (a,)
+        Change of each point's load per unit of the foot point, where its stretch lies across a sharp end (N).
     """
 
     unknowns: IntArray
@@ -79,6 +83,8 @@ class Linearised:
     compliance: Array
     response: Array
     factor: Any
+    normal: Array
+    cut: Array
 
     def solve(self, right: Array) -> Array:
         """Pressures of the active points for a right-hand side."""
@@ -92,7 +98,8 @@ class Linearised:
         share = 1 - p.gap * p.curvature / metric
         to_slide = -share * (tilt + p.curvature * slide)
         to_tilt = -share * slide + p.gap / metric * tilt
-        return (self.loads * to_slide) @ self.slide + (self.loads * to_tilt) @ self.tilt
+        bent = (self.loads * to_slide) @ self.slide + (self.loads * to_tilt) @ self.tilt
+        return bent + (self.cut * slide) @ self.normal if self.cut.any() else bent
 
 
 def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: Array) -> Linearised:
@@ -124,7 +131,11 @@ def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: 
     # the transposed matrix is what LAPACK sees in C order: factorise that, solve transposed, and nothing is copied
     factor = dgetrf(matrix.T, overwrite_a=1)[:2]
     loads = areas * pressure[active]
-    return Linearised(unknowns, opening, weighted, tilt, slide, chosen, loads, gamma, compliance, response, factor)
+    across = (areas > 0) & (areas < scene.weight[active])
+    cut = np.where(across, -scene.weight[active] / (2 * scene.fade[active]) * pressure[active], 0.0)
+    return Linearised(
+        unknowns, opening, weighted, tilt, slide, chosen, loads, gamma, compliance, response, factor, normal, cut
+    )
 
 
 def asked_pressure(scene: Scene, projection: Projection, forces: Array) -> Array:
