@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse.linalg import splu
 
 from gearfe import StiffnessCurve
-from gearfe.contact.scene import turn
+from gearfe.contact.scene import assemble, turn
 from gearfe.contact.solver import solve_position
 from gearfe.elasticity import element_stiffness
 from gearfe.errors import InputError
@@ -94,6 +94,11 @@ def test_points_stand_where_the_flanks_are(elastic, position, fields):
         body = elastic.bodies[w.gear]
         nodes = whole_gear(body.mesh).numbers[w.tooth % body.teeth][body.flank.nodes[w.flank_nodes]]
         np.testing.assert_allclose(fields[w.gear].points[nodes], scene.points[w.nodes], atol=1e-12)
+        compliance = assemble(elastic, scene.windows).compliance
+        placed = scene.placed(compliance @ position.forces)[w.nodes]
+        np.testing.assert_allclose(
+            fields[w.gear].points[nodes] + fields[w.gear].displacement[nodes], placed, atol=1e-12
+        )
 
 
 def test_the_bore_does_not_move(elastic, fields):

@@ -130,13 +130,18 @@ def test_repeated_positions_are_solved_once(gears, elastic, monkeypatch):
 
 
 def test_swapped_gears_carry_the_same(gears, elastic):
-    """From behind (turned by 180 deg) the wheel is the pinion: the same contact, the other hub's torque."""
+    """From behind (turned by 180 deg) the wheel is the pinion: the same contact, the other hub's torque.
+
+    Exact in small strain; the first-order share of finite strain is that of the force, common to both hubs, which
+    leaves out what the energy changes with the phase of the mesh.
+    """
     swapped = pair(30, 20, tip_round=0.1e-3)
     angles = np.radians([2.0, 5.0, 9.0, 12.0, 17.0])
-    one = at(gears, angles, elastic)
-    other = at(swapped, one.wheel_angle + math.pi / 30, twist=1.5 * TWIST)
-    np.testing.assert_allclose(other.torque_wheel, one.torque_pinion, rtol=1e-8)
-    np.testing.assert_allclose(other.torque_pinion, one.torque_wheel, rtol=1e-8)
+    for kinematics, accuracy in (("small", 1e-8), ("finite", 1e-5)):
+        one = at(gears, angles, elastic, kinematics=kinematics)
+        other = at(swapped, one.wheel_angle + math.pi / 30, twist=1.5 * TWIST, kinematics=kinematics)
+        np.testing.assert_allclose(other.torque_wheel, one.torque_pinion, rtol=accuracy)
+        np.testing.assert_allclose(other.torque_pinion, one.torque_wheel, rtol=accuracy)
 
 
 # ---- inputs: exact scalings, then directions ------------------------------------------------------------------------
