@@ -87,7 +87,9 @@ class Trajectory:
     def _at(self, derivative: int) -> Array:
         if len(self.dense.times) > 1:
             return self.dense(self.time, derivative)
-        state = (self.start.q, self.start.v, np.full_like(self.start.q, np.nan))[derivative]  # not a single step was made
+        state = (self.start.q, self.start.v, np.full_like(self.start.q, np.nan))[
+            derivative
+        ]  # not a single step was made
         return np.tile(state, (len(self.time), 1))
 
     @cached_property
