@@ -16,7 +16,7 @@ from .kernel_fold import evaluate, fold_ahead, locate_fold, project
 from .kernel_rows import copy, factorise, fill, gradients, trigonometry
 from .kernel_series import expand
 
-DONE, TOO_SMALL, FULL, SINGULAR, NOT_FINITE = 0, 1, 2, 3, 4
+DONE, TOO_SMALL, FULL, SINGULAR, NOT_FINITE, AT_FOLD = 0, 1, 2, 3, 4, 6
 #: Pivot of S relative to its diagonal below which a fold is looked for.
 NEAR = 0.3
 
@@ -164,7 +164,7 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
     `state` holds (time, folds, time to the fold ahead, 1 once begun, last step); T (room + 1,) receives step ends, C
     (room, order + 1, n) coefficients, kind (room,) the number of folds at the start of every step.
 
-    Returns status, number of steps.
+    Returns status, number of steps. AT_FOLD asks for `begin` (rare, so it stays in Python) before the next call.
     """
     sign = 1.0 if t1 >= t0 else -1.0
     forward = sign > 0.0
@@ -175,8 +175,18 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
     status = DONE
     count = 0
     if state[3] == 0.0:
-        folds, shift, ahead, status = begin(tb, t, sign, q, v, order, tolerance, length, base, folds, w, w.qn, w.vn)
-        t += shift
+        copy(q, w.qn)
+        copy(v, w.vn)
+        copy(base, w.skip)
+        first, least, where = project(tb, t, forward, q, v, base, length, w)
+        if where >= 0 and (least < 1e-6 or not np.isfinite(first)):
+            copy(w.qn, q)
+            copy(w.vn, v)
+            return AT_FOLD, 0
+        if where >= 0 and least < NEAR:
+            tau, share = fold_ahead(tb, q, v, where, w)
+            if share > 0.5:
+                ahead = tau
         state[3] = 1.0
     T[0] = t
     edge = 0 if forward else breaks.shape[0] - 1
@@ -262,12 +272,14 @@ def sample(T, C, sign, times, derivative, out):
                 out[i, c] = out[i, c] * h + factor * C[piece, j, c]
 
 
-FUNCTIONS = (sample, step_length, same_moment, clear_series, fold_behind, begin, land, integrate_series)
+FUNCTIONS = (sample, step_length, same_moment, land, integrate_series)
+STARTERS = (clear_series, fold_behind, begin)
 NAMES = {
     "DONE": DONE,
     "TOO_SMALL": TOO_SMALL,
     "FULL": FULL,
     "SINGULAR": SINGULAR,
     "NOT_FINITE": NOT_FINITE,
+    "AT_FOLD": AT_FOLD,
     "NEAR": NEAR,
 }

@@ -138,7 +138,7 @@ def kernels(jit: bool) -> SimpleNamespace:
     """The bound kernels, compiled or plain."""
     if jit:
         return compiled.bind(FUNCTIONS, NAMES, compiled=True, entries=ENTRIES, inline=HOT)
-    return compiled.bind(FUNCTIONS, NAMES, compiled=False)
+    return compiled.bind((*FUNCTIONS, *kernel_run.STARTERS), NAMES, compiled=False)
 
 
 def order_for(tolerance: float) -> int:
@@ -178,6 +178,15 @@ def run(
             tb, w, t0, t1, q, v, order, float(tolerance), assembly.length, redundant, assembly.breaks,
             float(longest), state, times, coefficients, folds,
         )  # fmt: skip
+        if status == kernel_run.AT_FOLD:
+            sign = 1.0 if t1 >= t0 else -1.0
+            folds_here, shift, ahead, status = kernels(False).begin(
+                tb, t0, sign, q, v, order, float(tolerance), assembly.length, redundant, 0, w, w.qn, w.vn
+            )
+            state[:4] = t0 + shift, folds_here, ahead, 1.0
+            if status == kernel_run.DONE:
+                continue
+            times[0] = t0
         parts.append((times[: count + 1], coefficients[:count], folds[:count]))
         done += count
         if status != kernel_run.FULL or done >= most:
