@@ -105,7 +105,10 @@ def _with_shares(
         positions = _solve(elastic, angles[sampled], found.twist[sampled], np.arange(len(sampled)))
         shares = finite_strain_shares(elastic, positions)
         every = interpolated_shares(angles, angles[sampled], shares, elastic.pitch_angle)
-        found = _search(pair, elastic, angles, goal / (1 + every), touching, found.twist, None)
+        reached, tangent = (np.array([getattr(p, n) for p in found.positions]) for n in ("torque_wheel", "tangent"))
+        good = np.array(found.status) == "converged"
+        step = np.divide(goal / (1 + every) - reached, tangent, out=np.zeros(len(goal)), where=good & (tangent > 0))
+        found = _search(pair, elastic, angles, goal / (1 + every), touching, found.twist + step, None)
         iterations = iterations + found.iterations
         if np.max(np.abs(every - before)) <= SHARE_TOLERANCE:
             break

@@ -17,9 +17,12 @@ from .contact.solver import Position
 
 Array = NDArray[np.float64]
 
-#: Relative accuracy of the torque.
-TOLERANCE = 1e-10
-MAX_SOLUTIONS = 40
+#: Relative accuracy of the torque, and the rounding of the gears' angles (rad) below which no twist can be told apart.
+TOLERANCE, ANGLE_ROUNDING = 1e-10, 2e-15
+#: Solutions of a position, and failed ones among them, after which it is given up.
+MAX_SOLUTIONS, MAX_FAILURES = 40, 3
+#: Relative width of the interval in which the torque is taken to jump past its goal.
+JUMP = 1e-3
 #: Status of a position whose torque was not found although single solutions converged.
 NOT_REACHED = "torque_not_reached"
 
@@ -69,7 +72,8 @@ def twists_for_torque(
     twist = np.minimum(first, most)
     found: list[Position | None] = [None] * len(angles)
     status = [NOT_REACHED] * len(angles)
-    iterations = np.zeros(len(angles), dtype=np.int64)
+    iterations, failures = np.zeros(len(angles), dtype=np.int64), np.zeros(len(angles), dtype=np.int64)
+    missed = np.zeros(len(angles), dtype=bool)
     open_ = np.arange(len(angles))
     for _ in range(MAX_SOLUTIONS):
         if len(open_) == 0:
@@ -82,20 +86,28 @@ def twists_for_torque(
             step = 0.0
             if position.status == "converged":
                 excess = position.torque_wheel - torque[i]
-                if abs(excess) <= TOLERANCE * torque[i]:
+                if abs(excess) <= max(TOLERANCE * torque[i], ANGLE_ROUNDING * position.tangent):
                     status[i] = "converged"
                     continue
                 low[i], high[i] = (twist[i], high[i]) if excess < 0 else (low[i], twist[i])
+                missed[i] &= excess >= 0
                 step = -excess / position.tangent if position.tangent > 0 else 0.0
             elif position.status == "not_converged":
+                failures[i] += 1
+                if failures[i] == MAX_FAILURES:
+                    continue
                 high[i] = twist[i]
             else:
-                low[i] = twist[i]
+                low[i], missed[i] = twist[i], position.status == "under_resolved"
             tried = twist[i] + step
             if not low[i] < tried < high[i]:
                 tried = 0.5 * (low[i] + high[i]) if np.isfinite(high[i]) else 2 * twist[i] - touching[i]
-            closed = np.isfinite(high[i]) and high[i] - low[i] <= 1e-14 * high[i]
-            if tried == twist[i] or closed or twist[i] >= most:
+            # between a contact that the mesh misses and one that carries too much lies nothing to be found
+            width = JUMP if missed[i] else 1e-14
+            if np.isfinite(high[i]) and high[i] - low[i] <= width * high[i]:
+                status[i] = "under_resolved" if missed[i] else status[i]
+                continue
+            if tried == twist[i] or twist[i] >= most:
                 continue
             twist[i] = min(tried, most)
             still.append(i)
