@@ -1,0 +1,94 @@
+"""The one way to gmsh: a context manager that opens a quiet session with an empty model and always closes it.
+
+gmsh keeps its state in globals of a shared library: one session at a time (a lock holds a second thread back), nothing
+left behind. Geometry is built in millimetres, because gmsh's CAD kernel has an absolute tolerance of 1e-7.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import metadata
+from types import ModuleType
+from typing import Any
+
+from ..errors import MissingLibraryError
+
+#: Debian and Ubuntu packages whose shared libraries the gmsh wheel opens on import.
+DEBIAN_PACKAGES = "libglu1-mesa libgl1 libegl1 libxft2 libxcursor1 libxinerama1 libgomp1"
+
+_LOCK = threading.RLock()
+
+
+def import_gmsh() -> ModuleType:
+    """Import gmsh, with an error that says how to mend a bare system.
+
+    Raises
+    ------
+    MissingLibraryError
+        When the package is absent or a shared library that it opens is.
+    """
+    try:
+        import gmsh
+    except ImportError as error:
+        raise MissingLibraryError(f"gmsh cannot be imported ({error}); install it: pip install gmsh") from error
+    except OSError as error:
+        raise MissingLibraryError(
+            f"gmsh is installed but a system library is missing ({error}); on Debian or Ubuntu: "
+            f"apt-get install {DEBIAN_PACKAGES}"
+        ) from error
+    return gmsh
+
+
+@contextmanager
+def gmsh_session(name: str = "gearfe", *, threads: int = 1) -> Iterator[Any]:
+    """Yield the gmsh module with a fresh model called `name`; quiet, deterministic, closed again on the way out.
+
+    Where the caller's own program has gmsh open already, only the model is added and removed again, and that
+    session's options are left as they were found.
+
+    Parameters
+    ----------
+    name
+        Name of the model.
+    threads
+        Threads gmsh may use. One is the default: meshes are then the same on every run.
+
+    Raises
+    ------
+    MissingLibraryError
+        When gmsh cannot be imported.
+    """
+    gmsh = import_gmsh()
+    with _LOCK:
+        ours = not gmsh.isInitialized()
+        if ours:
+            gmsh.initialize(interruptible=False, readConfigFiles=False)
+        options = {
+            "General.Terminal": 0.0,
+            "General.Verbosity": 1.0,
+            "General.NumThreads": float(threads),
+            "Mesh.RandomSeed": 1.0,
+        }
+        before = {} if ours else {key: gmsh.option.getNumber(key) for key in options}
+        try:
+            for key, value in options.items():
+                gmsh.option.setNumber(key, value)
+            gmsh.model.add(name)
+            yield gmsh
+        finally:
+            if ours:
+                gmsh.finalize()
+            else:
+                gmsh.model.remove()
+                for key, value in before.items():
+                    gmsh.option.setNumber(key, value)
+
+
+def gmsh_version() -> str:
+    """Version of the installed gmsh package, read without importing it (the import alone costs tenths of a second)."""
+    try:
+        return metadata.version("gmsh")
+    except metadata.PackageNotFoundError:
+        return str(import_gmsh().__version__)

@@ -1,0 +1,129 @@
+"""Mesh cache and gmsh session: stored once, read back, never trusted when damaged."""
+
+from __future__ import annotations
+
+import dataclasses
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe.errors import MissingLibraryError
+from gearfe.meshing import session
+from gearfe.meshing.cache import cache_folder, cache_key, cached_arrays
+
+
+@dataclasses.dataclass(frozen=True)
+class Recipe:
+    size_mm: float
+    order: int = 2
+
+
+def test_made_once_then_read(tmp_path: Path) -> None:
+    calls: list[int] = []
+
+    def make() -> dict[str, np.ndarray]:
+        calls.append(1)
+        return {"points": np.arange(12.0).reshape(4, 3), "tets": np.array([[0, 1, 2, 3]])}
+
+    first = cached_arrays("thing", Recipe(3.0), make, tmp_path)
+    second = cached_arrays("thing", Recipe(3.0), make, tmp_path)
+    assert len(calls) == 1
+    assert set(second) == {"points", "tets"}
+    for name in first:
+        np.testing.assert_array_equal(first[name], second[name])
+        assert first[name].dtype == second[name].dtype
+    cached_arrays("thing", Recipe(3.0, order=1), make, tmp_path)
+    assert len(calls) == 2
+
+
+@pytest.mark.parametrize("damage", ["cut", "rubbish", "flip", "empty", "other key"])
+def test_damaged_file_is_ignored_and_rewritten(tmp_path: Path, damage: str) -> None:
+    recipe = {"a": 1.0}
+    cached_arrays("thing", recipe, lambda: {"x": np.arange(1000.0)}, tmp_path)
+    (path,) = tmp_path.iterdir()
+    data = bytearray(path.read_bytes())
+    if damage == "cut":
+        path.write_bytes(bytes(data[: len(data) // 2]))
+    elif damage == "rubbish":
+        path.write_bytes(b"not a zip file")
+    elif damage == "empty":
+        path.write_bytes(b"")
+    elif damage == "flip":
+        data[len(data) // 2] ^= 0xFF
+        path.write_bytes(bytes(data))
+    else:
+        np.savez(path, _key=np.array("someone else"), x=np.zeros(3))
+    again = cached_arrays("thing", recipe, lambda: {"x": np.arange(1000.0)}, tmp_path)
+    np.testing.assert_array_equal(again["x"], np.arange(1000.0))
+    stored = cached_arrays("thing", recipe, lambda: pytest.fail("made again"), tmp_path)
+    np.testing.assert_array_equal(stored["x"], np.arange(1000.0))
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_unwritable_folder_costs_only_the_storing(tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("a file, not a folder")
+    assert cached_arrays("thing", 1, lambda: {"x": np.ones(2)}, blocked)["x"].sum() == 2.0
+
+
+def test_key_sees_every_digit_and_the_class() -> None:
+    assert cache_key("k", Recipe(1.0)) != cache_key("k", Recipe(1.0 + 1e-15))
+    assert cache_key("k", Recipe(1.0)) == cache_key("k", Recipe(1.0))
+    assert cache_key("k", np.zeros(3)) != cache_key("k", np.zeros(4))
+    with pytest.raises(TypeError, match="plain data"):
+        cache_key("k", object())
+
+
+def test_folder_from_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("GEARFE_CACHE", str(tmp_path))
+    assert cache_folder() == tmp_path
+    monkeypatch.setenv("GEARFE_CACHE", "off")
+    assert cache_folder() is None
+    monkeypatch.delenv("GEARFE_CACHE")
+    folder = cache_folder()
+    assert folder is not None
+    assert folder.name == "gearfe"
+
+
+def test_session_leaves_nothing_behind_even_after_an_error() -> None:
+    gmsh = session.import_gmsh()
+
+    def fail() -> None:
+        with session.gmsh_session() as inner:
+            assert inner.isInitialized()
+            raise RuntimeError("inside")
+
+    with pytest.raises(RuntimeError, match="inside"):
+        fail()
+    assert not gmsh.isInitialized()
+
+
+def test_session_inside_someone_elses_gmsh() -> None:
+    gmsh = session.import_gmsh()
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.add("theirs")
+        with session.gmsh_session("ours"):
+            assert gmsh.model.getCurrent() == "ours"
+        assert gmsh.isInitialized()
+        assert "theirs" in gmsh.model.list()
+        assert "ours" not in gmsh.model.list()
+    finally:
+        gmsh.finalize()
+
+
+def test_missing_system_library_names_the_packages(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "gmsh.py").write_text("raise OSError('libGLU.so.1: cannot open shared object file')")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "gmsh", raising=False)
+    with pytest.raises(MissingLibraryError, match="libglu1-mesa"):
+        session.import_gmsh()
+
+
+def test_cache_module_imports_no_mesher() -> None:
+    code = "import sys, gearfe.meshing.cache; assert not {'gmsh', 'meshio', 'skfem'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
