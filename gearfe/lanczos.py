@@ -53,6 +53,7 @@ def lowest_modes(
     *,
     count: int | None = None,
     limit: float = math.inf,
+    at_least: int = 0,
     shift: float = 0.0,
     block: int = 6,
     seed: int = 1,
@@ -69,6 +70,8 @@ def lowest_modes(
         How many modes; ``None`` for all up to `limit`.
     limit
         Upper end of the wanted eigenvalues (rad^2/s^2); with `count` given the smaller set is returned.
+    at_least
+        Modes wanted even when they lie above the limit.
     shift
         s >= 0 (rad^2/s^2), for pairs whose K is singular.
     block
@@ -106,9 +109,11 @@ def lowest_modes(
         eigenvalues = 1.0 / np.maximum(theta, 1e-300) - shift
         found = residual <= TOLERANCE * np.abs(theta)
         near = residual <= NEAR * np.abs(theta)
-        inside = min(wanted, int(np.searchsorted(eigenvalues, limit, side="right")))
+        inside = min(wanted, max(at_least, int(np.searchsorted(eigenvalues, limit, side="right"))))
         exhausted = basis.size == done or done >= n
+        inside = min(inside, n)
         if exhausted or (inside < done and bool(np.all(found[:inside])) and bool(near[inside])):
+            inside = min(inside, done)
             following = float(eigenvalues[inside]) if inside < done else math.inf
             return Modes(eigenvalues[:inside].copy(), basis.vectors[:, :done] @ s[:, :inside], following, columns)
 

@@ -88,6 +88,7 @@ def reduce_model(
     *,
     count: int | None = None,
     below_hz: float = math.inf,
+    at_least: int = 0,
     corrections: int = 1,
     free: bool = False,
     solver: str = "auto",
@@ -104,6 +105,8 @@ def reduce_model(
         Rows that are free and in no interface.
     count, below_hz
         Number of modes with the interfaces held, and their highest frequency (Hz): whichever ends first.
+    at_least
+        Number of modes kept in any case, when they are chosen by frequency.
     corrections
         Levels of correction vectors; 0 gives plain Craig-Bampton.
     free
@@ -123,12 +126,12 @@ def reduce_model(
     k_ii, m_ii = k_rows[:, internal], m_rows[:, internal]
     k_ib, m_ib = ((rows @ boundary).toarray() for rows in (k_rows, m_rows))
     del k_rows, m_rows
-    shift = _rigid_shift(k_ii, m_ii) if m == 0 and free else 0.0
+    shift = rigid_shift(k_ii, m_ii) if m == 0 and free else 0.0
     factor = factorize(k_ii + shift * m_ii if shift else k_ii, solver=solver)
     psi = -factor.solve(k_ib) if m else k_ib
     coupling = m_ii @ psi + m_ib
     limit = (2.0 * math.pi * below_hz) ** 2
-    modes = lowest_modes(factor.solve, m_ii, count=count, limit=limit, shift=shift)
+    modes = lowest_modes(factor.solve, m_ii, count=count, limit=limit, at_least=at_least if count is None else 0, shift=shift)
     added, stiffnesses, tail, columns = _corrections(factor, m_ii, modes, coupling, corrections if m else 0)
     inner = np.concatenate([modes.vectors, added], axis=1)
     eigenvalues = np.concatenate([modes.eigenvalues, stiffnesses])
@@ -222,7 +225,7 @@ def _symmetric(matrix: Floats) -> Floats:
     return np.asarray(0.5 * (matrix + matrix.T))
 
 
-def _rigid_shift(stiffness: Any, mass: Any) -> float:
+def rigid_shift(stiffness: Any, mass: Any) -> float:
     """A shift far below the elastic modes and far above rounding, for a body that is held nowhere (rad^2/s^2)."""
     return float(1e-9 * np.max(stiffness.diagonal() / mass.diagonal()))
 
