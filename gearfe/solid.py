@@ -206,7 +206,7 @@ def jacobian_determinants(nodes: Floats, tets: Ints) -> Floats:
 
     Corners only for linear elements. A value that is not positive marks an inverted or collapsed element.
     """
-    gradients = _node_gradients(tets.shape[1])  # (points, a, 3)
+    gradients = node_gradients(tets.shape[1])  # (points, a, 3)
     jacobian = np.einsum("maj,pak->mpjk", nodes[tets], gradients, optimize=True)
     return np.asarray(np.linalg.det(jacobian))
 
@@ -228,7 +228,7 @@ def _pattern(tets: Ints, n: int) -> _Pattern:
 
 
 @cache
-def _shapes(a: int, order: int) -> tuple[Floats, Floats, Floats]:
+def shape_functions(a: int, order: int) -> tuple[Floats, Floats, Floats]:
     """Shape functions (a, p), their gradients (a, 3, p) and weights (p,) at quadrature points of the given degree."""
     from skfem import ElementTetP1, ElementTetP2
     from skfem.quadrature import get_quadrature_tet
@@ -242,7 +242,7 @@ def _shapes(a: int, order: int) -> tuple[Floats, Floats, Floats]:
 
 
 @cache
-def _node_gradients(a: int) -> Floats:
+def node_gradients(a: int) -> Floats:
     """(points, a, 3) gradients of the shape functions at the nodes (at the first corner for linear elements)."""
     from skfem import ElementTetP1, ElementTetP2
 
@@ -282,13 +282,13 @@ def _by_blocks(nodes: Floats, tets: Ints, material: SolidMaterial, mass_rule: Ma
     """
     a = tets.shape[1]
     curved = bool(curved_elements(nodes, tets[:1])[0])
-    _, gradients, weights = _shapes(a, CURVED_DEGREE if curved else 2)
+    _, gradients, weights = shape_functions(a, CURVED_DEGREE if curved else 2)
     if curved:
         products = np.einsum("amp,bnp,p->pmnab", gradients, gradients, weights).reshape(-1, a * a)
-        det, inverse = _maps(nodes, tets, gradients)
+        det, inverse = maps(nodes, tets, gradients)
     else:
         products = np.einsum("amp,bnp,p->mnab", gradients, gradients, weights).reshape(-1, a * a)
-        det, inverse = _maps(nodes, tets[:, :4], _shapes(4, 1)[1])
+        det, inverse = maps(nodes, tets[:, :4], shape_functions(4, 1)[1])
     c = np.empty((len(tets), 3, 3, det.shape[1], 3, 3))
     total = np.einsum("epmk,epnk->epmn", inverse, inverse)
     for i in range(3):
@@ -297,16 +297,16 @@ def _by_blocks(nodes: Floats, tets: Ints, material: SolidMaterial, mass_rule: Ma
             c[:, i, j] = material.lame_lambda * direct + material.shear_modulus * direct.swapaxes(-1, -2)
         c[:, i, i] += material.shear_modulus * total
     c *= det[:, None, None, :, None, None]
-    phi, slopes, weights = _shapes(a, 2 if mass_rule == "4-point" else (7 if curved else 6))
+    phi, slopes, weights = shape_functions(a, 2 if mass_rule == "4-point" else (7 if curved else 6))
     if curved:
         phi_phi = np.einsum("ap,bp,p->pab", phi, phi, weights).reshape(-1, a * a)
-        det, _ = _maps(nodes, tets, slopes)
+        det, _ = maps(nodes, tets, slopes)
     else:
         phi_phi = np.einsum("ap,bp,p->ab", phi, phi, weights).reshape(-1, a * a)
     return _Blocks(c.reshape(len(tets), 3, 3, -1), products, material.density * det, phi_phi)
 
 
-def _maps(nodes: Floats, tets: Ints, gradients: Floats) -> tuple[Floats, Floats]:
+def maps(nodes: Floats, tets: Ints, gradients: Floats) -> tuple[Floats, Floats]:
     """(m, p) volume ratio, and (m, p, 3, 3) gradient of the inverse map [xi axis, x axis] at the points of `gradients`."""
     forward = np.einsum("eak,amp->epkm", nodes[tets], gradients, optimize=True)
     return np.linalg.det(forward), np.linalg.inv(forward)

@@ -25,18 +25,21 @@ def housing_from_table(table: HousingTable) -> Housing:
     """
     table.check("housing")
     mesh = housing_mesh(table)
-    material = SolidMaterial(
-        1e9 * table.material.youngs_modulus_GPa, table.material.poissons_ratio, table.material.density_kg_per_m3
-    )
     return Housing.from_arrays(
         mesh.nodes,
         mesh.tets,
         bores(table),
         foot_nodes(table, mesh.nodes) if table.feet.fixed else None,
-        material=material,
+        material=material(table),
         mass=cast(MassRule, table.mesh.mass),
         outer=lambda centres: ~inside_faces(table, centres),
     )
+
+
+def material(table: HousingTable) -> SolidMaterial:
+    """The housing's material in SI units."""
+    given = table.material
+    return SolidMaterial(1e9 * given.youngs_modulus_GPa, given.poissons_ratio, given.density_kg_per_m3)
 
 
 def bores(table: HousingTable) -> list[Bore]:
