@@ -74,13 +74,17 @@ def _mesh_recipe(table: HousingTable) -> dict[str, object]:
 
 
 def _make(table: HousingTable) -> TetMesh:
-    with gmsh_session("housing") as gmsh:
+    options = {
+        # faces in one plane stay apart: the bottoms of the feet, which are held, end where the feet end
+        "Geometry.OCCUnionUnify": 0.0,
+        "Mesh.MeshSizeMax": table.mesh.size_mm,
+        "Mesh.MeshSizeFromCurvature": table.mesh.bore_edges,
+        "Mesh.SecondOrderLinear": 0.0,
+    }
+    with gmsh_session("housing", options=options) as gmsh:
         try:
             _build(gmsh.model.occ, table)
             gmsh.model.occ.synchronize()
-            gmsh.option.setNumber("Mesh.MeshSizeMax", table.mesh.size_mm)
-            gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", table.mesh.bore_edges)
-            gmsh.option.setNumber("Mesh.SecondOrderLinear", 0)
             gmsh.model.mesh.generate(3)
             if table.mesh.order == 2:
                 gmsh.model.mesh.setOrder(2)
