@@ -160,7 +160,7 @@ class _Basis:
         for _ in range(2):
             gram = w.T @ mw
             size, directions = np.linalg.eigh(0.5 * (gram + gram.T))
-            keep = size > max(floor, 1e-14 * float(size[-1]))
+            keep = size > max(floor, 1e-14 * float(np.max(size, initial=0.0)))
             root = np.sqrt(size[keep])
             w, mw = w @ (directions[:, keep] / root), mw @ (directions[:, keep] / root)
             spill = (directions[:, keep] * root).T @ spill

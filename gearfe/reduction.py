@@ -31,14 +31,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from .errors import InputError
-from .lanczos import Modes, lowest_modes
+from .lanczos import lowest_modes
 from .sparse_solver import Factorization, factorize
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: Part of its own size below which a correction vector counts as contained in the others.
-DEPENDENT = 1e-10
+DEPENDENT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Reduction:
     shapes : (n, m + k)
         Full unknowns ``u = shapes @ q``.
     eigenvalues : (k,)
-        Diagonal of the internal stiffness (rad^2/s^2): modes first, then corrections.
+        Diagonal of the internal stiffness (rad^2/s^2), ascending: modes first, then corrections.
     modes
         How many of the k internal coordinates are modes.
     tail : (m, m)
@@ -132,9 +132,11 @@ def reduce_model(
     coupling = m_ii @ psi + m_ib
     limit = (2.0 * math.pi * below_hz) ** 2
     modes = lowest_modes(factor.solve, m_ii, count=count, limit=limit, at_least=at_least if count is None else 0, shift=shift)
-    added, stiffnesses, tail, columns = _corrections(factor, m_ii, modes, coupling, corrections if m else 0)
+    added, tail, columns = _corrections(factor, m_ii, modes.vectors, coupling, corrections if m else 0)
     inner = np.concatenate([modes.vectors, added], axis=1)
-    eigenvalues = np.concatenate([modes.eigenvalues, stiffnesses])
+    # principal axes of the whole inner space: the projection is exact whatever the modes' last digits are
+    eigenvalues, axes = np.linalg.eigh(_symmetric(inner.T @ (k_ii @ inner)))
+    inner = inner @ axes
     size = m + len(eigenvalues)
     k_red, m_red = np.zeros((size, size)), np.eye(size)
     k_red[:m, :m] = _symmetric((boundary.T @ (stiffness @ boundary)).toarray() + psi.T @ k_ib) if m else 0.0
@@ -162,63 +164,35 @@ def reduce_model(
     )
 
 
-@dataclass(frozen=True)
-class _Vectors:
-    """Columns x beside their products M x and K x: combinations of columns need no further sparse products."""
-
-    x: Floats
-    mass: Floats
-    stiffness: Floats
-
-    def __matmul__(self, t: Floats) -> _Vectors:
-        return _Vectors(self.x @ t, self.mass @ t, self.stiffness @ t)
-
-    def freed(self, basis: _Vectors) -> _Vectors:
-        """The part that is M-orthogonal to the M-orthonormal `basis`."""
-        c = basis.mass.T @ self.x
-        return _Vectors(self.x - basis.x @ c, self.mass - basis.mass @ c, self.stiffness - basis.stiffness @ c)
-
-    def beside(self, other: _Vectors) -> _Vectors:
-        pairs = ((self.x, other.x), (self.mass, other.mass), (self.stiffness, other.stiffness))
-        return _Vectors(*(np.concatenate(pair, axis=1) for pair in pairs))
-
-    def principal(self) -> tuple[_Vectors, Floats]:
-        """The same space of M-orthonormal columns on the principal axes of its stiffness, and these stiffnesses."""
-        eigenvalues, axes = np.linalg.eigh(_symmetric(self.x.T @ self.stiffness))
-        return self @ axes, eigenvalues
-
-
 def _corrections(
-    factor: Factorization, m_ii: Any, modes: Modes, coupling: Floats, wanted: int
-) -> tuple[Floats, Floats, Floats, int]:
-    """Correction vectors, their stiffnesses, the tail S of the error bound, and the number of right-hand sides.
+    factor: Factorization, m_ii: Any, modes: Floats, coupling: Floats, wanted: int
+) -> tuple[Floats, Floats, int]:
+    """M-orthonormal correction vectors, the tail S of the error bound, and the number of right-hand sides.
 
-    ``X_1 = K^-1 b``, ``X_l = K^-1 M X_{l-1}``: all freed of the modes. S is ``X_L^T M X_L``, or ``X_1^T K X_1`` for L = 0.
+    ``X_1 = K^-1 b``, ``X_l = K^-1 M X_{l-1}``: all freed of the modes. S is ``X_L^T M X_L``, or ``X_1^T b`` for L = 0.
     """
-    m = coupling.shape[1]
-    m_phi = np.asarray(m_ii @ modes.vectors)
-    phi = _Vectors(modes.vectors, m_phi, m_phi * modes.eigenvalues)
+    m_modes = np.asarray(m_ii @ modes)
+    found = [modes]
     x = factor.solve(coupling)
-    raw = _Vectors(x, m_ii @ x, coupling).freed(phi)
-    tail = _symmetric(raw.x.T @ raw.stiffness)
-    columns, found = m, phi
+    x = x - modes @ (m_modes.T @ x)
+    columns, tail = coupling.shape[1], _symmetric(x.T @ coupling)
     for number in range(1, wanted + 1):
+        mx = np.asarray(m_ii @ x)
         if number > 1:
-            x = factor.solve(raw.mass)
-            raw = _Vectors(x, m_ii @ x, raw.mass).freed(phi)
-            columns += m
-        tail = _symmetric(raw.x.T @ raw.mass)
-        new = raw @ np.diag(1.0 / np.maximum(np.sqrt(np.diag(tail)), 1e-300))
+            x = factor.solve(mx)
+            x = x - modes @ (m_modes.T @ x)
+            mx = np.asarray(m_ii @ x)
+            columns += coupling.shape[1]
+        tail = _symmetric(x.T @ mx)
+        new = x / np.maximum(np.sqrt(np.diag(tail)), 1e-300)
         for _ in range(2):
-            new = new.freed(found)
-            size, directions = np.linalg.eigh(_symmetric(new.x.T @ new.mass))
+            m_new = m_ii @ new
+            new = new - sum(basis @ (basis.T @ m_new) for basis in found)
+            size, directions = np.linalg.eigh(_symmetric(new.T @ (m_ii @ new)))
             keep = size > DEPENDENT**2
             new = new @ (directions[:, keep] / np.sqrt(size[keep]))
-        found = found.beside(new)
-    first = modes.vectors.shape[1]
-    added = _Vectors(found.x[:, first:], found.mass[:, first:], found.stiffness[:, first:])
-    added, eigenvalues = added.principal()
-    return added.x, eigenvalues, tail, columns
+        found.append(new)
+    return np.concatenate([np.zeros((len(modes), 0)), *found[1:]], axis=1), tail, columns
 
 
 def _symmetric(matrix: Floats) -> Floats:

@@ -51,6 +51,9 @@ PACKAGES: dict[str, str | None] = {
 }
 #: Number of unknowns above which ``auto`` looks for the fastest factorisation first.
 LARGE = 150_000
+#: Response to a random load, against the stiffest unknown's, above which a body counts as free to move. Bodies that are
+#: held, slender ones too, stay below 1e10; rounding alone holds a free one at 1e13 and more.
+UNBOUNDED = 1e12
 #: Environment variable that names the solver to use instead of ``auto``.
 SOLVER_VARIABLE = "GEARFE_SPARSE_SOLVER"
 
@@ -130,6 +133,7 @@ def factorize(matrix: Any, *, solver: str = "auto", block: int = 3) -> Factoriza
         solve = _cholmod(matrix)
     else:
         solve = _superlu_minimum_degree(matrix)
+    _check_definite(matrix, solve)
     return Factorization(name, matrix.shape[0], solve)
 
 
@@ -231,6 +235,18 @@ def _cholmod(matrix: Any) -> Callable[[Floats], Floats]:
         return np.array(x).reshape(b.shape)
 
     return solve
+
+
+def _check_definite(matrix: Any, solve: Callable[[Floats], Floats]) -> None:
+    """One solve with a random right-hand side: an answer without bound, or against the load, tells a free part."""
+    b = np.random.default_rng(0).standard_normal(matrix.shape[0])
+    try:
+        x = solve(b)
+    except ArithmeticError as error:
+        raise _not_definite() from error
+    growth = float(np.max(np.abs(matrix.diagonal()))) * float(np.linalg.norm(x)) / float(np.linalg.norm(b))
+    if not (growth < UNBOUNDED and float(b @ x) > 0.0):
+        raise _not_definite()
 
 
 def _not_definite() -> InputError:

@@ -53,8 +53,9 @@ class HousingMaterialTable:
 class HousingMeshTable:
     """Elements and their size."""
 
-    size_mm: float = quantity(7.0, above=0.0, doc="edge length away from the bores (mm)")
-    bore_edges: int = quantity(12, low=6, high=400, doc="element edges round a bore at least")
+    size_mm: float = quantity(7.0, above=0.0, doc="edge length in the walls (mm)")
+    graded: bool = quantity(True, doc="coarser in the base, finer in inner corners and at the feet; false: one size")
+    bore_edges: int = quantity(8, low=6, high=400, doc="element edges round a bore at least")
     order: int = quantity(2, low=1, high=2, doc="2: curved second-order tetrahedra; 1: linear ones, 15-45 % too stiff")
     mass: str = quantity("exact", choices=("exact", "4-point"), doc="mass integration; 4-point as in CalculiX")
 
