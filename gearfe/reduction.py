@@ -1,7 +1,7 @@
 r"""Craig-Bampton reduction of a sparse pair (K, M) with interface rows, corrected for what the left-out modes carry.
 
-The unknowns of the full model are ``u = B q_b + E u_i``: the interface coordinates ``q_b`` (rigid attachments: six each)
-move their rows through the constant matrix B, the internal unknowns ``u_i`` are free, all other rows are held. Then
+The unknowns of the full model are ``u = B q_b + E u_i``: the interface coordinates ``q_b`` (rigid attachments: six
+each) move their rows through the constant matrix B, the internal unknowns ``u_i`` are free, all other rows are held.
 
 .. math::
     u_i = \Psi q_b + \Phi \eta + \tilde X \xi,\qquad
@@ -9,15 +9,15 @@ move their rows through the constant matrix B, the internal unknowns ``u_i`` are
     X = K_{ii}^{-1}(M_{ii}\Psi + M_{ib}) .
 
 ``Psi`` are the static shapes (the static response at the interfaces is exact), ``Phi`` the lowest modes with the
-interfaces held (Craig, Bampton, AIAA J. 6, 1968), ``X`` the first-order inertia corrections: the quasi-static part of all
-modes that are left out. ``X`` is freed of ``Phi``, made M-orthonormal and turned to its own principal axes, so that all
-internal coordinates have unit mass and diagonal stiffness. One more level repeats ``K^-1 M`` on the last one. All
-approximations are Galerkin projections: frequencies converge from above. One factorisation serves all of it.
+interfaces held (Craig, Bampton, AIAA J. 6, 1968), ``X`` the first-order inertia corrections: the quasi-static part of
+all modes that are left out. ``X`` is freed of ``Phi`` and made M-orthonormal, and both are turned to the principal axes
+of their stiffness: all internal coordinates have unit mass and diagonal stiffness. One more level repeats ``K^-1 M`` on
+the last one. All this is Galerkin projection: frequencies converge from above. One factorisation serves all of it.
 
 **Error bound.** The interfaces see the internal unknowns through the dynamic stiffness
 ``D(w) = K_bb - w^2 M_bb - w^4 b^T (K_ii - w^2 M_ii)^{-1} b``, ``b = M_ii Psi + M_ib``. With exact modes and L levels of
-corrections the Galerkin error is at most ``w^{4 L + 4} S / (w_next^2 - w^2)``, ``S = X_L^T M X_L`` (freed of the modes; for
-L = 0 it is ``w^4 S w_next^2 / (w_next^2 - w^2)`` with ``S = X^T K X``), ``w_next`` the first frequency that is left out.
+corrections the Galerkin error is at most ``w^{4 L + 4} S / (w_next^2 - w^2)``, ``S = X_L^T M X_L`` freed of the modes;
+for L = 0 it is ``w^4 S w_next^2 / (w_next^2 - w^2)`` with ``S = X^T K X``. ``w_next`` is the first one left out.
 """
 
 from __future__ import annotations
@@ -131,7 +131,9 @@ def reduce_model(
     psi = -factor.solve(k_ib) if m else k_ib
     coupling = m_ii @ psi + m_ib
     limit = (2.0 * math.pi * below_hz) ** 2
-    modes = lowest_modes(factor.solve, m_ii, count=count, limit=limit, at_least=at_least if count is None else 0, shift=shift)
+    modes = lowest_modes(
+        factor.solve, m_ii, count=count, limit=limit, at_least=at_least if count is None else 0, shift=shift
+    )
     added, tail, columns = _corrections(factor, m_ii, modes.vectors, coupling, corrections if m else 0)
     inner = np.concatenate([modes.vectors, added], axis=1)
     # principal axes of the whole inner space: the projection is exact whatever the modes' last digits are
@@ -210,6 +212,8 @@ def _check(count: int | None, below_hz: float, corrections: int) -> None:
     if not below_hz > 0.0:
         raise InputError("below_hz", below_hz, "must be > 0", "give a frequency in Hz")
     if count is None and math.isinf(below_hz):
-        raise InputError("modes", None, "neither a number of modes nor a highest frequency is given", "give one of them")
+        raise InputError(
+            "modes", None, "neither a number of modes nor a highest frequency is given", "give one of them"
+        )
     if corrections < 0:
         raise InputError("corrections", corrections, "must be 0 or more", "1 is the default")

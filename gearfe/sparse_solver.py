@@ -28,6 +28,7 @@ a mesh node stay together: orderings are found on the graph of nodes, a third of
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import os
 from collections.abc import Callable
@@ -139,7 +140,7 @@ def factorize(matrix: Any, *, solver: str = "auto", block: int = 3) -> Factoriza
 
 def metis_order(matrix: Any, block: int = 3) -> NDArray[np.int64]:
     """Fill-reducing order of the unknowns by nested dissection of the graph of blocks (METIS through pymetis)."""
-    import pymetis
+    pymetis: Any = importlib.import_module("pymetis")
 
     n = matrix.shape[0]
     block = block if n % block == 0 else 1
@@ -188,7 +189,7 @@ def _checked(splu: Any, matrix: Any, ordering: str) -> Any:
 
 
 def _pardiso(matrix: Any) -> Callable[[Floats], Floats]:
-    import pypardiso
+    pypardiso: Any = importlib.import_module("pypardiso")
 
     upper = sparse.csr_matrix(sparse.triu(matrix, format="csr"))
     solver = pypardiso.PyPardisoSolver(mtype=2)
@@ -206,8 +207,8 @@ def _pardiso(matrix: Any) -> Callable[[Floats], Floats]:
 
 
 def _cholmod(matrix: Any) -> Callable[[Floats], Floats]:
-    import kvxopt
-    from kvxopt import cholmod
+    kvxopt: Any = importlib.import_module("kvxopt")
+    cholmod: Any = importlib.import_module("kvxopt.cholmod")
 
     lower = sparse.tril(matrix, format="coo")
     spread = kvxopt.spmatrix(

@@ -31,7 +31,9 @@ def beam(nu: float = 0.3, cells: tuple[int, int, int] = (6, 2, 2), *, ends: int 
     names = ["right", "left"][:ends]
     places = [SIZE[0], 0.0][:ends]
     attachments = [
-        Attachment(name, middle + [x, 0, 0], np.array([1.0, 0, 0]), np.flatnonzero(np.abs(nodes[:, 0] - x) < 1e-9))
+        Attachment(
+            name, middle + np.array([x, 0, 0]), np.array([1.0, 0, 0]), np.flatnonzero(np.abs(nodes[:, 0] - x) < 1e-9)
+        )
         for name, x in zip(names, places, strict=True)
     ]
     fixed = None if free or ends == 2 else Plane((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
@@ -267,7 +269,9 @@ def test_loading_is_quick_and_light(tmp_path: Path) -> None:
         "assert body.reconstruct(numpy.ones(body.size)).shape == (len(body.nodes), 3)\n"
         "print(spent)"
     )
-    done = subprocess.run([sys.executable, "-c", code, str(tmp_path / "body.npz")], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "body.npz")], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     assert float(done.stdout) < 0.2
 
@@ -303,8 +307,8 @@ def test_bad_requests_are_named(body: ModalBody) -> None:
         body.attachment("rihgt")
     with pytest.raises(InputError, match="coordinates"):
         body.reconstruct(np.zeros(3))
+    housing = beam(cells=(1, 1, 1))
     with pytest.raises(InputError, match="neither"):
-        housing = beam(cells=(1, 1, 1))
         reduce_model(housing.matrices.stiffness, housing.matrices.mass, np.zeros((0, 0)), housing.internal)
     assert body.attachment("right") == slice(0, 6)
 
