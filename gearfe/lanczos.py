@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 #: Residual of a mode, relative to theta, at which it counts as found; its frequency is then right to about its square.
-TOLERANCE = 1e-6
+TOLERANCE = 1e-5
 #: The same for the first mode left out, whose frequency is only estimated.
 NEAR = 1e-3
 
@@ -55,7 +55,7 @@ def lowest_modes(
     limit: float = math.inf,
     at_least: int = 0,
     shift: float = 0.0,
-    block: int = 6,
+    block: int = 4,
     seed: int = 1,
 ) -> Modes:
     """Modes with the lowest eigenvalues: the first `count` of them, or all with ``lambda <= limit``.

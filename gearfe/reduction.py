@@ -186,13 +186,14 @@ def _corrections(
             mx = np.asarray(m_ii @ x)
             columns += coupling.shape[1]
         tail = _symmetric(x.T @ mx)
-        new = x / np.maximum(np.sqrt(np.diag(tail)), 1e-300)
-        for _ in range(2):
-            m_new = m_ii @ new
+        scale = np.maximum(np.sqrt(np.diag(tail)), 1e-300)
+        new, m_new = x / scale, mx / scale
+        for again in (True, False):
             new = new - sum(basis @ (basis.T @ m_new) for basis in found)
             size, directions = np.linalg.eigh(_symmetric(new.T @ (m_ii @ new)))
             keep = size > DEPENDENT**2
             new = new @ (directions[:, keep] / np.sqrt(size[keep]))
+            m_new = m_ii @ new if again else m_new
         found.append(new)
     return np.concatenate([np.zeros((len(modes), 0)), *found[1:]], axis=1), tail, columns
 

@@ -163,7 +163,8 @@ def _superlu_natural(matrix: Any, order: NDArray[np.int64]) -> Callable[[Floats]
     from scipy.sparse.linalg import splu
 
     csr = sparse.csr_array(matrix)
-    permuted = csr[order][:, order].tocsc()
+    rows = csr[order][:, order]
+    permuted = sparse.csc_array((rows.data, rows.indices, rows.indptr), shape=rows.shape)  # symmetric: rows are columns
     lu = _checked(splu, permuted, "NATURAL")
 
     def solve(b: Floats) -> Floats:
