@@ -96,7 +96,7 @@ def test_lanczos_finds_repeated_modes(block: int) -> None:
     assert found.next_eigenvalue == pytest.approx(truth[25], rel=1e-4)
     v = found.vectors
     np.testing.assert_allclose(v.T @ (m @ v), np.eye(25), atol=1e-11)
-    # the promise of the docstring, in the norm of the operator that is iterated: |K^-1 M v - v / lambda| <= tol / lambda
+    # the docstring's promise, in the norm of the iterated operator: |K^-1 M v - v / lambda| <= tol / lambda
     residual = (factorize(k).solve(m @ v) - v / found.eigenvalues) * found.eigenvalues
     assert np.sqrt(np.max(np.einsum("ij,ij->j", residual, m @ residual))) < 2e-5
 
