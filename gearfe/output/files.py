@@ -92,3 +92,13 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and value in (float("inf"), float("-inf")):
         return None
     return value
+
+
+@contextmanager
+def whole_set(folder: Path) -> Iterator[Path]:
+    """Yield a temporary folder inside `folder`; its files move to `folder` when all of them are written, else none."""
+    with tempfile.TemporaryDirectory(prefix=".writing-", dir=folder) as name:
+        made = Path(name)
+        yield made
+        for path in sorted(made.iterdir()):
+            path.replace(folder / path.name)

@@ -1,0 +1,62 @@
+"""``gearfe mesh JOB.toml --out FILE``: the meshes of a gear pair for another program."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+HELP = "meshes of a gear pair with named boundaries, as .msh, .vtu or .inp"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("job", metavar="JOB.toml", help="job file with the table [pair]")
+    parser.add_argument("--out", metavar="FILE", required=True, help="file to write; its suffix chooses the format")
+    parser.add_argument(
+        "--gear", choices=("both", "pinion", "wheel"), default="both", help="which gear (default: both)"
+    )
+    parser.add_argument("--sector", action="store_true", help="one tooth of each gear instead of whole gears")
+    parser.add_argument("--coarsen", type=float, metavar="C", help="factor on all element sizes")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the file and name its groups."""
+    from ..errors import InputError
+    from ..meshing.export import export_mesh, format_of
+    from ..meshing.recipe import sector_recipes
+    from ..meshing.tooth_sector import sector_mesh
+    from ..output.files import output_folder
+    from ..stiffness_job import read_stiffness_job
+
+    format_of(args.out)
+    job = read_stiffness_job(args.job)
+    coarsen = job.table.coarsen if args.coarsen is None else args.coarsen
+    if not 0.2 <= coarsen <= 5.0:
+        raise InputError("--coarsen", coarsen, "must be >= 0.2 and <= 5", "1 is the default mesh, 2 twice its sizes")
+    output_folder(Path(args.out).parent)
+    recipes = sector_recipes(job.pair, coarsen=coarsen)
+    parts: dict[str, Any] = {}
+    for number, name in enumerate(("pinion", "wheel")):
+        if args.gear in ("both", name):
+            gear = (job.pair.pinion, job.pair.wheel)[number]
+            angle, place = (job.pair.wheel_phase, job.pair.working_centre_distance) if number else (0.0, 0.0)
+            parts[name] = _part(sector_mesh(gear, recipes[number]), angle, place, sector=args.sector)
+    counts = export_mesh(args.out, parts, plane=job.table.plane)
+    nodes = sum(len(part.points) for part in parts.values())
+    print(f"written to {args.out}: {nodes} nodes, millimetres, groups with their elements or edges:")
+    for name, count in counts.items():
+        print(f"  {name:<24} {count}")
+    return 0
+
+
+def _part(mesh: Any, angle: float, x: float, *, sector: bool) -> Any:
+    import numpy as np
+
+    from ..meshing.export import MeshPart
+    from ..meshing.whole_gear import whole_gear
+
+    whole = mesh if sector else whole_gear(mesh)
+    c, s = np.cos(angle), np.sin(angle)
+    points = whole.points @ np.array([[c, s], [-s, c]]) + np.array([x, 0.0])
+    return MeshPart(points, whole.triangles, whole.boundaries)

@@ -1,0 +1,166 @@
+"""``gearfe stiffness JOB.toml --out DIR``: the mesh-stiffness curve of a gear pair."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..stiffness_job import StiffnessJob
+
+HELP = "mesh stiffness of a gear pair over its rotation: table, picture, summary, fields"
+
+#: Option -> key of the [stiffness] table that it overrides.
+OVERRIDES = {
+    "twist_deg": "twist_deg",
+    "torque_Nm": "torque_Nm",
+    "law": "law",
+    "plane": "plane",
+    "kinematics": "kinematics",
+    "twist_from": "twist_from",
+    "coarsen": "coarsen",
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("job", metavar="JOB.toml", help="job file with the tables [pair] and [stiffness]")
+    parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
+    load = parser.add_mutually_exclusive_group()
+    load.add_argument("--twist-deg", type=float, metavar="X", dest="twist_deg", help="twist of the wheel (deg)")
+    load.add_argument("--torque-Nm", type=float, metavar="X", dest="torque_Nm", help="torque at the wheel's hub (N m)")
+    parser.add_argument("--angles", type=float, nargs=3, metavar=("START", "STEP", "STOP"), help="pinion angles (deg)")
+    parser.add_argument("--law", metavar="LAW", help="contact law: nitsche or penalty")
+    parser.add_argument("--plane", metavar="STATE", help="plane state: strain or stress")
+    parser.add_argument("--kinematics", metavar="STRAIN", help="small or finite strain")
+    parser.add_argument("--twist-from", metavar="ZERO", dest="twist_from", help="zero of the twist: centred or contact")
+    parser.add_argument("--coarsen", type=float, metavar="C", help="factor on all element sizes")
+    parser.add_argument("--solve-all", action="store_true", help="solve positions of later mesh cycles too")
+    parser.add_argument("--no-estimate", action="store_true", help="leave out the error estimate")
+    parser.add_argument("--no-picture", action="store_true", help="leave out the picture")
+    parser.add_argument(
+        "--fields",
+        nargs="*",
+        metavar="ANGLE",
+        help="write displacement and stress of whole gears: 'all' (also without a value), or pinion angles (deg)",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compute the curve and write the files; 1 when a position failed."""
+    started = time.perf_counter()
+    from ..output.files import output_folder, whole_set, write_json
+    from ..stiffness import elastic_pair, sweep_stiffness
+    from ..stiffness_job import read_stiffness_job
+    from ..stiffness_report import figure_arguments, summary, told, warnings
+    from ..stopwatch import Stopwatch
+
+    watch = Stopwatch({"program start": time.perf_counter() - started})
+    with watch.stage("geometry"):
+        job = overridden(read_stiffness_job(args.job), args)
+        sweep = job.sweep
+        chosen = None if args.fields is None else _field_angles(args.fields)
+    folder = output_folder(args.out or Path("out") / Path(args.job).stem)
+    elastic = elastic_pair(job.pair, watch=watch, **job.model)
+    show = Progress()
+    curve = sweep_stiffness(
+        job.pair, elastic=elastic, estimate_error=not args.no_estimate, progress=show, **sweep, **_points(job)
+    )
+    show.end()
+    for stage, seconds in curve.timings.items():
+        watch.seconds[stage] = watch.seconds.get(stage, 0.0) + seconds
+    with whole_set(folder) as made:
+        with watch.stage("table"):
+            curve.to_csv(made / "stiffness.csv")
+        if chosen is not None:
+            from ..fields_output import write_fields
+
+            angles = None if isinstance(chosen, str) else chosen
+            with watch.stage("fields"):
+                write_fields(made, job.pair, elastic, curve, angles, progress=show)
+            show.end()
+        if not args.no_picture:
+            with watch.stage("picture"):
+                from ..output.figures import stiffness_figure
+
+                stiffness_figure(made / "stiffness.png", **figure_arguments(job, curve))
+        watch.seconds["total"] = time.perf_counter() - started
+        write_json(made / "summary.json", summary(job, curve, watch.seconds))
+        names = sorted(path.name for path in made.iterdir())
+    for line in told(job, curve):
+        print(line)
+    print(f"written to {folder}: " + ", ".join(names))
+    print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
+    for sentence in warnings(job, curve):
+        print(f"gearfe: warning: {sentence}", file=sys.stderr)
+    return 1 if curve.failed.any() else 0
+
+
+def _points(job: StiffnessJob) -> dict[str, Any]:
+    return {"points_per_edge": job.table.points_per_edge, "coarsen": job.table.coarsen}
+
+
+def _field_angles(given: list[str]) -> str | list[float]:
+    from ..errors import InputError
+
+    if given in ([], ["all"]):
+        return "all"
+    try:
+        return [float(text) for text in given]
+    except ValueError:
+        raise InputError("--fields", " ".join(given), "must be 'all' or pinion angles (deg)") from None
+
+
+def overridden(job: StiffnessJob, args: argparse.Namespace) -> StiffnessJob:
+    """The job with the command's options in place of the file's values, checked like these."""
+    from ..config import check_range
+    from ..errors import InputError
+    from ..tables.stiffness import StiffnessTable
+
+    known = {f.name: f.metadata for f in fields(StiffnessTable)}
+    changes: dict[str, Any] = {}
+
+    def put(option: str, key: str, value: Any) -> None:
+        if isinstance(value, float):
+            check_range(value, option, known[key])
+        elif known[key]["choices"] and value not in known[key]["choices"]:
+            raise InputError(option, value, "must be one of " + ", ".join(known[key]["choices"]))
+        changes[key] = value
+
+    for name, key in OVERRIDES.items():
+        if getattr(args, name) is not None:
+            put("--" + name.replace("_", "-"), key, getattr(args, name))
+    if "twist_deg" in changes:
+        changes["torque_Nm"] = None
+    elif "torque_Nm" in changes:
+        changes["twist_deg"] = None
+    if args.angles is not None:
+        for key, value in zip(("angle_start_deg", "angle_step_deg", "angle_stop_deg"), args.angles, strict=True):
+            put("--angles START STEP STOP", key, value)
+    if args.solve_all:
+        changes["solve_all"] = True
+    table = replace(job.table, **changes)
+    table.check("--angles" if args.angles is not None else "stiffness")
+    return replace(job, table=table)
+
+
+class Progress:
+    """One line that counts positions, on a terminal only."""
+
+    def __init__(self) -> None:
+        self._shown = False
+
+    def __call__(self, done: int, total: int, what: str) -> None:
+        if sys.stderr.isatty():
+            print(f"\r{what}: {done} of {total} ", end="", file=sys.stderr, flush=True)
+            self._shown = True
+
+    def end(self) -> None:
+        """Clear the line."""
+        if self._shown:
+            print("\r\033[K", end="", file=sys.stderr, flush=True)
+            self._shown = False

@@ -1,0 +1,2 @@
+"""Contact of two elastic gears: flank surfaces and closest points, condensed compliance, contact laws, Newton
+solver."""

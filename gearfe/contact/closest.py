@@ -1,0 +1,268 @@
+r"""Closest points on chains of quadratic edges, gaps, and their variations.
+
+For a slave point :math:`x_s` and the master curve :math:`x_m(\xi)` with :math:`a = x_m'` the projection satisfies
+:math:`x_s - x_m(\xi) = g\,n(\xi)`. The normal is the edge's own, blended linearly into the mean of both neighbours' at
+each vertex: it is then continuous along the whole chain, and so are gap and forces. (With each edge's own normal a
+point that faces a vertex jumps between two solutions and Newton's method cycles.) The contact force acts along n at
+both points, so it is in equilibrium with itself whatever the blending.
+
+With :math:`D = \delta x_s - \delta x_m` and :math:`N = n\cdot\delta x_m'` at fixed :math:`\xi`, :math:`m = a\cdot a`,
+and
+:math:`\kappa = -a\cdot n'` the normal's own turning,
+
+.. math::
+    \delta g = n\cdot D - (n\cdot a)\,\delta\xi, \qquad \delta\xi = \frac{a\cdot D + g N}{m - g\kappa}, \qquad
+    \Delta(n\cdot D) = -(1 - g\kappa/m)(N_\Delta\,\delta\xi + N_\delta\,\Delta\xi + \kappa\,\delta\xi\,\Delta\xi)
+    + \frac{g}{m} N_\Delta N_\delta
+
+(Laursen, *Computational Contact and Impact Mechanics*, 2002, ch. 5, written out for two dimensions; the last expression
+leaves out products of n.a, which is of the order of the kinks between edges).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .flank import edge_shapes
+
+Array = NDArray[Any]
+IntArray = NDArray[Any]
+
+#: Gap (m) given to points whose projection runs off the end of the mate's surface: never in contact.
+OFF_END = 1.0
+
+
+@dataclass(frozen=True)
+class Projection:
+    """Closest points of n slave points.
+
+    Attributes
+    ----------
+    place : ndarray, shape (n,)
+        Edge number plus xi on the master chain.
+    gap : ndarray, shape (n,)
+        m, negative where the bodies overlap.
+    normal : ndarray, shape (n, 2)
+        Outward unit normal of the master there.
+    edge : ndarray, shape (n,)
+        First node of the master edge.
+    shapes, slopes : ndarray, shape (n, 3)
+        Edge shape functions and their derivatives at the closest point.
+    tangent : ndarray, shape (n, 2)
+        a (m).
+    curvature : ndarray, shape (n,)
+        kappa (m).
+    beyond : ndarray of bool, shape (n,)
+        Points that run off an end, but not far, and overlap the last edge continued: where the chain is a piece of a
+        longer one, the contact has outgrown it.
+    """
+
+    place: Array
+    gap: Array
+    normal: Array
+    edge: IntArray
+    shapes: Array
+    slopes: Array
+    tangent: Array
+    curvature: Array
+    beyond: NDArray[np.bool_]
+
+    def take(self, index: IntArray | slice) -> Projection:
+        """The projections of the points `index`."""
+        return Projection(**{name: getattr(self, name)[index] for name in self.__dataclass_fields__})
+
+
+@dataclass(frozen=True)
+class Chains:
+    """Master curves: edges of all chains, prepared for projection.
+
+    Attributes
+    ----------
+    first, edges : ndarray, shape (n,)
+        For each slave point the first edge (in the arrays below) and the number of edges of its chain.
+    reach : ndarray, shape (n,)
+        How far beyond the end of its chain a point may be projected, onto the last edge continued (edges).
+    table : ndarray, shape (e, 10)
+        Of each edge: start, linear and quadratic coefficient of x_m = start + xi linear + xi^2 quadratic (m), and what
+        the blended normal adds to the edge's own at its start and at its end.
+    node : ndarray, shape (e,)
+        First node of each edge.
+    """
+
+    first: IntArray
+    edges: IntArray
+    reach: Array
+    table: Array
+    node: IntArray
+
+
+def chains_of(nodes: Array, counts: IntArray, chain_of: IntArray, reach: Array | None = None) -> Chains:
+    """Prepare chains that follow one another in `nodes`.
+
+    Parameters
+    ----------
+    nodes : ndarray, shape (k, 2)
+        Nodes of all chains (m); a chain of e edges has 2 e + 1 of them.
+    counts : ndarray, shape (c,)
+        Number of edges of each chain.
+    chain_of : ndarray, shape (n,)
+        Chain that each slave point is projected onto.
+    reach : ndarray, shape (n,), optional
+        See `Chains`; nothing beyond the end without it.
+    """
+    first_edge = np.concatenate([[0], np.cumsum(counts)])
+    node = 2 * np.arange(first_edge[-1]) + np.repeat(np.arange(len(counts)), counts)
+    x0, x1, x2 = nodes[node], nodes[node + 1], nodes[node + 2]
+    linear, quadratic = 4 * x1 - 3 * x0 - x2, 2 * (x0 - 2 * x1 + x2)
+    at_start, at_end = _normal(linear), _normal(linear + 2 * quadratic)
+    table = np.concatenate([x0, linear, quadratic, np.zeros((len(node), 4))], axis=1)
+    joint = np.ones(len(node), dtype=bool)
+    joint[first_edge[1:] - 1] = False
+    left = np.flatnonzero(joint)
+    mean = at_end[left] + at_start[left + 1]
+    mean /= np.sqrt(mean[:, :1] ** 2 + mean[:, 1:] ** 2)
+    table[left, 8:], table[left + 1, 6:8] = mean - at_end[left], mean - at_start[left + 1]
+    beyond = np.zeros(len(chain_of)) if reach is None else reach
+    return Chains(first_edge[chain_of], counts[chain_of], beyond, table, node)
+
+
+def _normal(tangent: Array) -> Array:
+    length = np.sqrt(tangent[:, 0] ** 2 + tangent[:, 1] ** 2)
+    return np.stack([-tangent[:, 1] / length, tangent[:, 0] / length], axis=1)
+
+
+def nearest_places(points: Array, chain: Array) -> Array:
+    """Starting places on a chain of 2 e + 1 nodes: the nearest node of each point, shape (n,)."""
+    x, y = points[:, 0, None] - chain[:, 0], points[:, 1, None] - chain[:, 1]
+    return 0.5 * np.argmin(x * x + y * y, axis=1).astype(np.float64)
+
+
+def project(
+    slave: Array, chains: Chains, place: Array, *, iterations: int = 15, tolerance: float = 1e-12
+) -> Projection:
+    """Closest points by Newton's method along the chain, from the starting places `place`, shape (n,).
+
+    Points whose projection runs off either end of the chain get the gap `OFF_END`.
+    """
+    place = place.copy()
+    last = chains.edges + chains.reach
+    moving = np.arange(len(place))
+    for _ in range(iterations):
+        at = _evaluate(slave[moving], chains, moving, place[moving])
+        # residual: the part of the distance across the normal; its slope is -|a| as long as the gap is small
+        slope = _cross(at.tangent, at.normal) - _cross(at.distance, at.turning)
+        slope = np.maximum(slope, 0.2 * at.length)
+        low = np.maximum(at.edge - 0.999, 0.0)
+        high = np.where(at.edge + 1 < chains.edges[moving], at.edge + 1.999, last[moving])
+        moved = np.minimum(np.maximum(place[moving] + _cross(at.distance, at.normal) / slope, low), high)
+        open_ = np.abs(moved - place[moving]) > tolerance
+        place[moving] = moved
+        moving = moving[open_]
+        if len(moving) == 0:
+            break
+    at = _evaluate(slave, chains, slice(None), place)
+    gap = at.distance[:, 0] * at.normal[:, 0] + at.distance[:, 1] * at.normal[:, 1]
+    ends = (place <= 0) | (place >= last)
+    sideways = np.abs(_cross(at.distance, at.normal))
+    off = ends & (sideways > 1e-9 * at.length)
+    beyond = off & (gap < 0) & (sideways < 2 * at.length)
+    gap[off] = OFF_END
+    shapes, slopes, _ = edge_shapes(place - at.edge)
+    curvature = -(at.tangent[:, 0] * at.turning[:, 0] + at.tangent[:, 1] * at.turning[:, 1])
+    return Projection(place, gap, at.normal, chains.node[at.number], shapes, slopes, at.tangent, curvature, beyond)
+
+
+@dataclass(frozen=True)
+class _Foot:
+    """Trial foot points: edge, x_s - x_m, a, |a|, blended unit normal and its derivative, edge number in the arrays."""
+
+    edge: IntArray
+    distance: Array
+    tangent: Array
+    length: Array
+    normal: Array
+    turning: Array
+    number: IntArray
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def _evaluate(slave: Array, chains: Chains, chosen: IntArray | slice, place: Array) -> _Foot:
+    edge = np.minimum(place.astype(np.int64), chains.edges[chosen] - 1)
+    number = chains.first[chosen] + edge
+    s = (place - edge)[:, None]
+    table = chains.table[number]
+    linear, quadratic, start, end = table[:, 2:4], table[:, 4:6], table[:, 6:8], table[:, 8:10]
+    bow = s * quadratic
+    distance = slave - table[:, :2] - s * (linear + bow)
+    a = linear + 2 * bow
+    square = a[:, 0] ** 2 + a[:, 1] ** 2
+    length = np.sqrt(square)
+    turned = np.empty_like(a)
+    np.negative(a[:, 1], out=turned[:, 0])
+    turned[:, 1] = a[:, 0]
+    blend = end - start
+    normal = turned / length[:, None] + start + s * blend
+    size = np.sqrt(normal[:, 0] ** 2 + normal[:, 1] ** 2)
+    kappa = 2 * (turned[:, 0] * quadratic[:, 0] + turned[:, 1] * quadratic[:, 1]) / (square * length)
+    return _Foot(edge, distance, a, length, normal / size[:, None], blend - kappa[:, None] * a, number)
+
+
+def unreached(gap: Array) -> NDArray[np.bool_]:
+    """Points whose projection runs off the end of the mate's surface."""
+    return gap >= OFF_END
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Variations of the gaps over the six nodes of each point: three of its own edge, three of the mate's.
+
+    Attributes
+    ----------
+    nodes : ndarray, shape (n, 6)
+        Node numbers.
+    normal, tilt, slide : ndarray, shape (n, 6, 2)
+        Coefficients of n.D, N and delta xi (per metre), in the axes of the tooth that each node belongs to.
+    """
+
+    nodes: IntArray
+    normal: Array
+    tilt: Array
+    slide: Array
+
+
+def gap_rows(projection: Projection, slave_nodes: IntArray, slave_shapes: Array, rotation: Array) -> Rows:
+    """Rows of n.D, N and delta xi.
+
+    Parameters
+    ----------
+    slave_nodes, slave_shapes : ndarray, shape (n, 3)
+        Nodes of each point's own edge and its shape functions there.
+    rotation : ndarray, shape (nodes, 2, 2)
+        Tooth axes to global axes, of each node.
+    """
+    p = projection
+    own, mate = rotation[slave_nodes[:, 0]], rotation[p.edge]
+    vectors = np.stack([p.normal, p.tangent], axis=1)
+    on_slave, on_mate = np.matmul(vectors, own), np.matmul(vectors, mate)
+    count = len(p.gap)
+    normal, tilt, slide = np.empty((count, 6, 2)), np.zeros((count, 6, 2)), np.empty((count, 6, 2))
+    shapes = p.shapes[:, :, None]
+    np.multiply(slave_shapes[:, :, None], on_slave[:, :1], out=normal[:, :3])
+    np.multiply(-shapes, on_mate[:, :1], out=normal[:, 3:])
+    np.multiply(p.slopes[:, :, None], on_mate[:, :1], out=tilt[:, 3:])
+    scale = 1 / (p.tangent[:, 0] ** 2 + p.tangent[:, 1] ** 2 - p.gap * p.curvature)
+    on_slave, on_mate = on_slave[:, 1:] * scale[:, None, None], on_mate[:, 1:] * scale[:, None, None]
+    np.multiply(slave_shapes[:, :, None], on_slave, out=slide[:, :3])
+    np.multiply(-shapes, on_mate, out=slide[:, 3:])
+    slide[:, 3:] += (p.gap * scale)[:, None, None] * tilt[:, 3:]
+    nodes = np.empty((count, 6), dtype=np.int64)
+    nodes[:, :3] = slave_nodes
+    np.add(p.edge[:, None], np.arange(3), out=nodes[:, 3:])
+    return Rows(nodes, normal, tilt, slide)

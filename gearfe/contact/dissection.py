@@ -1,0 +1,209 @@
+"""Static condensation of a finite-element body onto a few retained unknowns by nested dissection.
+
+The elements are bisected into small leaves. Every node is eliminated as soon as all elements round it have been joined,
+with dense Cholesky kernels on each front (the multifrontal method: Duff & Reid, ACM TOMS 9, 1983; nested dissection:
+George, SIAM J. Numer. Anal. 10, 1973). The root front is the Schur complement on the retained unknowns; the fronts stay
+for recovering the eliminated ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.blas import dsyrk, dtrsm
+from scipy.linalg.lapack import dpotrf
+
+Array = NDArray[Any]
+IntArray = NDArray[Any]
+
+#: Elements in a leaf: below, Python's overhead per front rules; above, the dense work does.
+LEAF_ELEMENTS = 40
+
+
+@dataclass(frozen=True)
+class _Front:
+    """One front: eliminated unknowns `inner`, remaining ones `outer`, K_ii = L L^T and L^-1 K_io."""
+
+    inner: IntArray
+    outer: IntArray
+    factor: Array
+    coupling: Array
+
+
+@dataclass(frozen=True)
+class Condensed:
+    """Schur complement on the retained unknowns with the way back to the eliminated ones.
+
+    Attributes
+    ----------
+    schur : ndarray, shape (r, r)
+        K_rr - K_re K_ee^-1 K_er (N/m), in the order of `retained`.
+    retained : ndarray, shape (r,)
+        Retained unknowns (numbers in the full vector).
+    size
+        Length of the full vector.
+    fronts
+        In the order of elimination; recovery runs backwards.
+    """
+
+    schur: Array
+    retained: IntArray
+    size: int
+    fronts: tuple[_Front, ...]
+
+    def recover(self, values: Array, wanted: IntArray | None = None) -> Array:
+        """Full displacement of a body without loads on its eliminated unknowns.
+
+        Parameters
+        ----------
+        values : ndarray, shape (r, k)
+            Displacements of the retained unknowns, k cases (m).
+        wanted : ndarray, optional
+            Unknowns that are needed; fronts that lead to none of them are skipped and their rows stay zero.
+
+        Returns
+        -------
+        ndarray, shape (size, k)
+        """
+        full = np.zeros((self.size, values.shape[1]))
+        full[self.retained] = values
+        for front in _leading_to(self.fronts, wanted, self.size):
+            right = front.coupling @ full[front.outer]
+            full[front.inner] = -dtrsm(1.0, front.factor, right, lower=1, trans_a=1)
+        return full
+
+
+def _leading_to(fronts: tuple[_Front, ...], wanted: IntArray | None, size: int) -> list[_Front]:
+    """Fronts to run through backwards so that the `wanted` unknowns come out."""
+    if wanted is None:
+        return list(reversed(fronts))
+    needed = np.zeros(size, dtype=bool)
+    needed[wanted] = True
+    chosen = []
+    for front in fronts:
+        if needed[front.inner].any():
+            needed[front.outer] = True
+            chosen.append(front)
+    return chosen[::-1]
+
+
+def condense(
+    elements: IntArray, matrices: Array, centres: Array, *, nodes: int, retained: IntArray, fixed: IntArray
+) -> Condensed:
+    """Condense a plane body with two unknowns a node (2 node, 2 node + 1).
+
+    Parameters
+    ----------
+    elements : ndarray, shape (m, a)
+        Node numbers of each element.
+    matrices : ndarray, shape (m, 2a, 2a)
+        Symmetric element stiffness (N/m), node-major.
+    centres : ndarray, shape (m, 2)
+        Element centres, for the bisection (m).
+    nodes
+        Number of nodes.
+    retained : ndarray
+        Node numbers to keep; the Schur complement has them in this order.
+    fixed : ndarray
+        Nodes held at zero.
+    """
+    free = np.ones(nodes, dtype=bool)
+    free[fixed] = False
+    leaf_of, levels = _bisect(centres)
+    owner = _owners(elements, leaf_of, levels, nodes)
+    owner[retained] = 0  # above the root, which is 1
+    owner[~free] = -1
+    fronts: list[_Front] = []
+    pending: dict[int, tuple[IntArray, Array]] = {}
+    for leaf in range(2**levels):
+        pending[2**levels + leaf] = _leaf(elements[leaf_of == leaf], matrices[leaf_of == leaf], free)
+    for number in range(2 ** (levels + 1) - 1, 0, -1):
+        if number >= 2**levels:
+            members, matrix = pending.pop(number)
+        else:
+            members, matrix = _merge(pending.pop(2 * number), pending.pop(2 * number + 1))
+        pending[number] = _eliminate(members, matrix, owner[members] == number, fronts)
+    members, matrix = pending[1]
+    place = np.empty(nodes, dtype=np.int64)
+    place[members] = np.arange(len(members))
+    order = _unknowns(place[retained])
+    return Condensed(np.ascontiguousarray(matrix[np.ix_(order, order)]), _unknowns(retained), 2 * nodes, tuple(fronts))
+
+
+def _unknowns(node_numbers: IntArray) -> IntArray:
+    return (2 * node_numbers[:, None] + np.arange(2)).ravel()
+
+
+def _bisect(centres: Array) -> tuple[IntArray, int]:
+    """Leaf number of each element and the number of levels, by halving along the longer side each time."""
+    levels = max(0, int(np.ceil(np.log2(len(centres) / LEAF_ELEMENTS))))
+    leaf = np.zeros(len(centres), dtype=np.int64)
+    groups = [np.arange(len(centres))]
+    for _ in range(levels):
+        halves = []
+        for group in groups:
+            spread = np.ptp(centres[group], axis=0)
+            rank = np.argsort(centres[group, int(np.argmax(spread))], kind="stable")
+            middle = len(group) // 2
+            halves += [group[rank[:middle]], group[rank[middle:]]]
+        groups = halves
+    for number, group in enumerate(groups):
+        leaf[group] = number
+    return leaf, levels
+
+
+def _owners(elements: IntArray, leaf_of: IntArray, levels: int, nodes: int) -> IntArray:
+    """Tree node (heap numbering, root 1) at which each mesh node can go: the ancestor its elements' leaves share."""
+    leaves = np.repeat(leaf_of + 2**levels, elements.shape[1])
+    low = np.full(nodes, np.iinfo(np.int64).max)
+    high = np.zeros(nodes, dtype=np.int64)
+    np.minimum.at(low, elements.ravel(), leaves)
+    np.maximum.at(high, elements.ravel(), leaves)
+    for _ in range(levels + 1):  # leaves of a heap share a level: shift both until they meet
+        apart = (low != high) & (high > 0)
+        low[apart] >>= 1
+        high[apart] >>= 1
+    return high
+
+
+def _leaf(elements: IntArray, matrices: Array, free: NDArray[np.bool_]) -> tuple[IntArray, Array]:
+    """Assemble a leaf densely on its free nodes."""
+    members, local = np.unique(elements, return_inverse=True)
+    local = local.reshape(elements.shape)
+    rows = (2 * local[:, :, None] + np.arange(2)).reshape(len(elements), -1)
+    size = 2 * len(members)
+    flat = rows[:, :, None] * size + rows[:, None, :]
+    matrix = np.bincount(flat.ravel(), weights=matrices.ravel(), minlength=size * size).reshape(size, size)
+    keep = free[members]
+    if not keep.all():
+        index = _unknowns(np.flatnonzero(keep))
+        matrix, members = matrix[np.ix_(index, index)], members[keep]
+    return members, matrix
+
+
+def _merge(left: tuple[IntArray, Array], right: tuple[IntArray, Array]) -> tuple[IntArray, Array]:
+    members = np.union1d(left[0], right[0])
+    matrix = np.zeros((2 * len(members), 2 * len(members)))
+    for nodes, part in (left, right):
+        index = _unknowns(np.searchsorted(members, nodes))
+        matrix[np.ix_(index, index)] += part
+    return members, matrix
+
+
+def _eliminate(
+    members: IntArray, matrix: Array, inner: NDArray[np.bool_], fronts: list[_Front]
+) -> tuple[IntArray, Array]:
+    if not inner.any():
+        return members, matrix
+    inside, outside = _unknowns(np.flatnonzero(inner)), _unknowns(np.flatnonzero(~inner))
+    factor, info = dpotrf(matrix[np.ix_(inside, inside)], lower=1, clean=0)
+    if info != 0:
+        raise np.linalg.LinAlgError("the body is not held or an element is inside out")
+    coupling = dtrsm(1.0, factor, matrix[np.ix_(inside, outside)], lower=1)
+    update = dsyrk(-1.0, coupling, beta=1.0, c=matrix[np.ix_(outside, outside)], trans=1, lower=1)
+    update = np.tril(update) + np.tril(update, -1).T
+    fronts.append(_Front(_unknowns(members[inner]), _unknowns(members[~inner]), factor, coupling))
+    return members[~inner], update

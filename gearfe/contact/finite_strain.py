@@ -1,0 +1,138 @@
+r"""First-order effect of finite strain on the torque of a small-strain solution.
+
+With the Green strain :math:`E = \varepsilon + \eta`, :math:`\eta = \tfrac12\nabla u^T\nabla u`, a Saint
+Venant-Kirchhoff body stores :math:`\Delta W = \int \sigma(\varepsilon):\eta + \tfrac12\,\eta:C:\eta` more than the
+linear one. The equilibrium minimises the whole energy, so by the envelope theorem the energy at given twist changes by
+:math:`\Delta W(u)` of the small-strain solution to first order, and the torque, its derivative with the twist
+:math:`\varphi`, by
+
+.. math::
+    \Delta T = \frac{d}{d\varphi}\Delta W(u(\varphi))
+    = \int \sigma(\varepsilon'):\eta + \sigma(\varepsilon):\eta' + \eta:C:\eta',
+    \qquad \eta' = \mathrm{sym}(\nabla u^T\nabla u').
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..elasticity import physical_gradients, triangle_shapes
+from .compliance import GearBody
+from .recovery import flank_forces, sector_displacements
+from .scene import MeshingPair
+from .solver import Position
+
+Array = NDArray[Any]
+
+#: Sectors on either side of a loaded tooth that take part: the effect is cubic in the strain and dies out fast.
+NEIGHBOURS = 1
+#: Positions at which a sweep evaluates the share; over a mesh cycle it varies by about a third of itself.
+SAMPLES = 9
+
+
+def sample_numbers(angles: Array, cycle: float) -> NDArray[np.int64]:
+    """At most `SAMPLES` of the positions at `angles` (rad), spread evenly over the mesh cycle (rad): their numbers."""
+    order = np.argsort(np.mod(angles, cycle), kind="stable")
+    return order[np.unique(np.linspace(0, len(order) - 1, min(SAMPLES, len(order))).round().astype(np.int64))]
+
+
+def interpolated_shares(angles: Array, samples: Array, shares: Array, cycle: float) -> Array:
+    """Shares at `angles` from those at the angles `samples` (rad), linear in the phase; not-a-numbers are left out."""
+    good = np.isfinite(shares)
+    if not good.any():
+        return np.zeros(len(angles))
+    return np.interp(np.mod(angles, cycle), np.mod(samples[good], cycle), shares[good], period=cycle)
+
+
+def with_share(position: Position, share: float) -> Position:
+    """The position with its torques raised by the finite-strain share c = Delta T / T.
+
+    Both hubs' torques take the same factor: the force changes, not its line. The share grows with the twist about as
+    the torque does, so the tangent takes 1 + 2 c.
+    """
+    if position.status != "converged":
+        return position
+    return replace(
+        position,
+        torque_wheel=position.torque_wheel * (1 + share),
+        torque_pinion=position.torque_pinion * (1 + share),
+        torque_wheel_reaction=position.torque_wheel_reaction * (1 + share),
+        pair_torques=position.pair_torques * (1 + share),
+        tangent=position.tangent * (1 + 2 * share),
+    )
+
+
+def finite_strain_shares(pair: MeshingPair, positions: Sequence[Position]) -> Array:
+    """Delta T / T of each position, shape (n,); not-a-number where it has no solution."""
+    good = [p for p in positions if p.status == "converged"]
+    shares = np.full(len(positions), np.nan)
+    if good:
+        extra = sum(_extra_torques(pair, gear, good) for gear in (0, 1))
+        solved = np.array([p.status == "converged" for p in positions])
+        shares[solved] = np.asarray(extra) / np.array([p.torque_wheel for p in good])
+    return shares
+
+
+def _extra_torques(pair: MeshingPair, gear: int, positions: Sequence[Position]) -> Array:
+    """Delta T from one gear (N m), shape (n,)."""
+    body = pair.bodies[gear]
+    cases, counts = [], []
+    for position in positions:
+        assert position.scene is not None
+        assert position.forces is not None
+        assert position.force_rate is not None
+        loads = flank_forces(body, gear, position.scene.windows, position.forces)
+        rates = flank_forces(body, gear, position.scene.windows, position.force_rate)
+        teeth = sorted({(t + k) % body.teeth for t in loads for k in range(-NEIGHBOURS, NEIGHBOURS + 1)})
+        cases += [(case, tooth) for tooth in teeth for case in (loads, rates)]
+        counts.append(len(teeth))
+    energy = _energy_rates(body, sector_displacements(body, cases))
+    return np.add.reduceat(energy, np.concatenate([[0], np.cumsum(counts)[:-1]]))
+
+
+def _energy_rates(body: GearBody, fields: Array) -> Array:
+    """d Delta W / d twist of s sectors, from displacements and displacement rates in turn, shape (nodes, 2, 2s)."""
+    r, s = np.array([1, 4, 1]) / 6, np.array([1, 1, 4]) / 6  # three points, exact to degree 2
+    triangles = body.mesh.triangles
+    gradients, det = physical_gradients(body.mesh.points[triangles], triangle_shapes(r, s)[1])
+    volume = body.thickness * det / 6
+    lam, mu = body.material.lame(body.plane)
+    m, sectors = len(triangles), fields.shape[2] // 2
+    at = gradients.transpose(0, 1, 3, 2).reshape(m, 6, 6)  # (point, derivative) x node
+    h = np.matmul(at, fields[triangles].reshape(m, 6, -1)).reshape(m, 3, 2, 2, 2 * sectors)
+    # h[m, q, j, i] = d u_i / d x_j
+    state, rate = h[..., ::2], h[..., 1::2]
+    strain, strain_rate = _strain(state), _strain(rate)
+    curved, curved_rate = _curved(state, state), _curved(state, rate)
+    curved_rate = (2 * curved_rate[0], 2 * curved_rate[1], 2 * curved_rate[2])
+    density = (
+        _work(lam, mu, strain_rate, curved) + _work(lam, mu, strain, curved_rate) + _work(lam, mu, curved, curved_rate)
+    )
+    return volume.ravel() @ density.reshape(-1, sectors)
+
+
+#: Components 00, 11, 01 of a plane symmetric tensor.
+_Tensor = tuple[Array, Array, Array]
+
+
+def _curved(a: Array, b: Array) -> _Tensor:
+    """sym(grad a^T grad b) / 2."""
+
+    def product(i: int, j: int) -> Array:
+        return a[:, :, i, 0] * b[:, :, j, 0] + a[:, :, i, 1] * b[:, :, j, 1]
+
+    return 0.5 * product(0, 0), 0.5 * product(1, 1), 0.25 * (product(0, 1) + product(1, 0))
+
+
+def _strain(h: Array) -> _Tensor:
+    return h[:, :, 0, 0], h[:, :, 1, 1], 0.5 * (h[:, :, 0, 1] + h[:, :, 1, 0])
+
+
+def _work(lam: float, mu: float, a: _Tensor, b: _Tensor) -> Array:
+    """a : C : b = lam tr(a) tr(b) + 2 mu a : b."""
+    return lam * (a[0] + a[1]) * (b[0] + b[1]) + 2 * mu * (a[0] * b[0] + a[1] * b[1] + 2 * a[2] * b[2])

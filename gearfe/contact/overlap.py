@@ -1,0 +1,164 @@
+"""Which teeth overlap when the gears are rigid, and where: the windows in which contact is then sought.
+
+All positions of a sweep are searched in one pass.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .closest import chains_of, nearest_places, project
+from .scene import MeshingPair, Window
+
+Array = NDArray[Any]
+IntArray = NDArray[Any]
+
+#: Edges added on either side of a window.
+MARGIN = 3
+#: Window half width as a share of the overlap's. A line contact that closes the overlap delta is narrower: with
+#: F <= 0.25 E* w delta (a tooth pair is at most that stiff) b^2 = 4 F rho/(pi E* w) <= (0.4)^2 2 rho delta.
+SHARE = 0.45
+#: Every so many nodes of the mate's flank the search for the closest point tries one.
+STRIDE = 3
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """Overlap of one tooth pair when rigid.
+
+    Attributes
+    ----------
+    tooth
+        Pair number k: pinion tooth k, wheel tooth -1 - k.
+    depth
+        Largest overlap (m).
+    ranges
+        Edges (first, end) of pinion and wheel flank that overlap.
+    deepest
+        Edge of pinion and of wheel flank at the largest overlap.
+    """
+
+    tooth: int
+    depth: float
+    ranges: tuple[tuple[int, int], tuple[int, int]]
+    deepest: tuple[int, int]
+
+
+def overlaps(pair: MeshingPair, angles: Array, twists: Array) -> list[list[Overlap]]:
+    """Overlapping tooth pairs at each pinion angle (rad) and twist (rad)."""
+    one, two = pair.pinion.flank.points[::2], pair.wheel.flank.points
+    found: list[list[Overlap]] = [[] for _ in angles]
+    position, teeth = _candidates(pair, angles, one)
+    if len(position) == 0:
+        return found
+    # pinion vertices in the frame of the mate's tooth
+    angle1 = pair.tooth_angle(0, teeth, angles[position], twists[position])
+    angle2 = pair.tooth_angle(1, -1 - teeth, angles[position], twists[position])
+    placed = _rotated(one, angle1) - pair.centre(1)
+    local = np.stack(
+        [
+            np.cos(angle2)[:, None] * placed[..., 0] + np.sin(angle2)[:, None] * placed[..., 1],
+            -np.sin(angle2)[:, None] * placed[..., 0] + np.cos(angle2)[:, None] * placed[..., 1],
+        ],
+        axis=-1,
+    )
+    low, high, reach = two.min(axis=0), two.max(axis=0), np.linalg.norm(two[-1])
+    near = ((local >= low) & (local <= high)).all(axis=-1) & (np.linalg.norm(local, axis=-1) <= reach * (1 + 1e-9))
+    where = np.argwhere(near)
+    if len(where) == 0:
+        return found
+    points = local[near]
+    chain = chains_of(two, np.array([(len(two) - 1) // 2]), np.zeros(len(points), dtype=np.int64))
+    result = project(points, chain, STRIDE * nearest_places(points, two[::STRIDE]), iterations=8, tolerance=1e-6)
+    inside = result.gap < 0
+    for case in np.unique(where[inside, 0]):
+        mine = np.flatnonzero(inside & (where[:, 0] == case))
+        vertex, place, gap = where[mine, 1], result.place[mine], result.gap[mine]
+        bottom = int(np.argmin(gap))
+        found[position[case]].append(
+            Overlap(
+                tooth=int(teeth[case]),
+                depth=float(-gap[bottom]),
+                ranges=((int(vertex.min()), int(vertex.max())), (int(place.min()), int(place.max()) + 1)),
+                deepest=(int(vertex[bottom]), int(place[bottom])),
+            )
+        )
+    return found
+
+
+def _candidates(pair: MeshingPair, angles: Array, flank: Array) -> tuple[IntArray, IntArray]:
+    """Positions and pair numbers whose pinion flank reaches into the wheel's tip circle."""
+    central = np.round(-angles / pair.pitch_angle).astype(np.int64)
+    half = int(np.ceil(min(pair.pinion.teeth, 12) / 4))
+    teeth = (central[:, None] + np.arange(-half, half + 1)).ravel()
+    position = np.repeat(np.arange(len(angles)), 2 * half + 1)
+    placed = _rotated(flank[:: max(1, len(flank) // 8)], pair.tooth_angle(0, teeth, angles[position], 0.0))
+    reach = np.linalg.norm(pair.wheel.flank.points[-1])
+    spacing = np.linalg.norm(flank[-1] - flank[0]) / 6
+    close = (np.linalg.norm(placed - pair.centre(1), axis=-1) < reach + spacing).any(axis=1)
+    return position[close], teeth[close]
+
+
+def _rotated(points: Array, angles: Array) -> Array:
+    """Points, shape (n, 2), turned by each of the angles, shape (c,): shape (c, n, 2)."""
+    c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    return np.stack([c * points[:, 0] - s * points[:, 1], s * points[:, 0] + c * points[:, 1]], axis=-1)
+
+
+def windows_of(
+    pair: MeshingPair, found: list[Overlap], angle: float, twist: float, *, share: float = SHARE
+) -> list[Window]:
+    """Windows about the deepest points of the overlaps; `share` 1 takes the whole overlap."""
+    windows: list[Window] = []
+    node = 0
+    for number, overlap in enumerate(found):
+        # a tip that digs in slides along its mate as the teeth bend: nothing is narrowed there
+        kept = 1.0 if any(_near_tip(pair.bodies[gear].flank.sizes, overlap.ranges[gear]) for gear in (0, 1)) else share
+        for gear, tooth in ((0, overlap.tooth), (1, -1 - overlap.tooth)):
+            flank = pair.bodies[gear].flank
+            first, end = _narrowed(flank.sizes, overlap.ranges[gear], overlap.deepest[gear], kept, overlap.depth)
+            placed = pair.tooth_angle(gear, tooth, angle, twist)
+            windows.append(Window(gear, number, tooth, first, end - first, node, placed))
+            node += 2 * (end - first) + 1
+    return windows
+
+
+def _near_tip(sizes: Array, span: tuple[int, int]) -> bool:
+    """Whether an overlap comes as close to the tip as a fifth of its own length."""
+    return bool(sizes[span[1] :].sum() < 0.2 * sizes[span[0] : span[1]].sum())
+
+
+def _narrowed(sizes: Array, span: tuple[int, int], deepest: int, share: float, depth: float) -> tuple[int, int]:
+    """Range of edges about the deepest one; bending moves the contact along the flank by no more than the overlap."""
+    first, end = span
+    arc = np.concatenate([[0.0], np.cumsum(sizes)])
+    reach = share * max(arc[end] - arc[deepest], arc[deepest] - arc[first]) + depth
+    low = int(np.searchsorted(arc, arc[deepest] - reach)) - 1
+    high = int(np.searchsorted(arc, arc[deepest] + reach)) + 1
+    return max(0, low - MARGIN), min(len(sizes), high + MARGIN)
+
+
+def rigidly_apart(pair: MeshingPair, angle: float, twist: float, *, samples: int = 24) -> bool:
+    """Whether the undeformed flanks are clear of each other, judged on their curves and not only on their vertices."""
+    one, two = pair.pinion.flank, pair.wheel.flank
+    position, teeth = _candidates(pair, np.array([angle]), one.points[::2])
+    dense = _dense(one.points, samples)
+    chain = chains_of(two.points, np.array([two.edges]), np.zeros(len(dense), dtype=np.int64))
+    for k in teeth[: len(position)]:
+        placed = _rotated(dense, np.array([pair.tooth_angle(0, int(k), angle, twist)]))[0] - pair.centre(1)
+        local = _rotated(placed, np.array([-pair.tooth_angle(1, -1 - int(k), angle, twist)]))[0]
+        gap = project(local, chain, nearest_places(local, two.points)).gap
+        if (gap < 0).any():
+            return False
+    return True
+
+
+def _dense(nodes: Array, samples: int) -> Array:
+    xi = np.linspace(0, 1, samples, endpoint=False)[:, None]
+    x0, x1, x2 = nodes[:-2:2, None], nodes[1:-1:2, None], nodes[2::2, None]
+    values = x0 * (1 - xi) * (1 - 2 * xi) + 4 * x1 * xi * (1 - xi) + x2 * xi * (2 * xi - 1)
+    return values.reshape(-1, 2)

@@ -1,0 +1,189 @@
+r"""Plane linear elasticity of second-order triangles.
+
+Find :math:`u` with :math:`-\nabla\cdot\sigma(u) = 0`,
+:math:`\sigma = \lambda\,\mathrm{tr}(\varepsilon) I + 2\mu\,\varepsilon`,
+:math:`\varepsilon = \tfrac12(\nabla u + \nabla u^T)`, where in plane stress :math:`\lambda` is replaced by
+:math:`2\lambda\mu/(\lambda+2\mu)` (Zienkiewicz, Taylor & Zhu, *The Finite Element Method*, sec. 2.2). The weak
+form is a plain scikit-fem form; `element_stiffness` is the same in one batch of dense products, for the sweep.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+IntArray = NDArray[Any]
+Plane = Literal["strain", "stress"]
+
+
+@dataclass(frozen=True)
+class Material:
+    """Isotropic linear elastic material.
+
+    Parameters
+    ----------
+    youngs_modulus
+        E (Pa).
+    poisson_ratio
+        nu (-), below 0.5.
+    density
+        rho (kg/m3).
+    """
+
+    youngs_modulus: float = 200e9
+    poisson_ratio: float = 0.30
+    density: float = field(default=7850.0, kw_only=True)
+
+    @property
+    def shear_modulus(self) -> float:
+        """mu = E / (2 (1 + nu)) (Pa)."""
+        return self.youngs_modulus / (2 * (1 + self.poisson_ratio))
+
+    def lame(self, plane: Plane) -> tuple[float, float]:
+        """(lambda, mu) (Pa) of the two-dimensional law in the given plane state."""
+        mu, nu = self.shear_modulus, self.poisson_ratio
+        lam = 2 * mu * nu / (1 - 2 * nu)
+        return (lam, mu) if plane == "strain" else (2 * lam * mu / (lam + 2 * mu), mu)
+
+    def contact_compliance(self, plane: Plane) -> float:
+        """(1 - nu^2)/E in plane strain, 1/E in plane stress (1/Pa): the body's share of 1/E* in a line contact."""
+        nu = self.poisson_ratio
+        return (1 - nu**2 if plane == "strain" else 1.0) / self.youngs_modulus
+
+
+# ---- second-order triangle: nodes 0, 1, 2 at the corners, 3 on edge 01, 4 on edge 12, 5 on edge 20 -------------------
+
+
+def triangle_shapes(r: Array, s: Array) -> tuple[Array, Array]:
+    """Shape functions of the six-node triangle at reference points (r, s), each of shape (q,).
+
+    Returns
+    -------
+    values : ndarray, shape (q, 6)
+    gradients : ndarray, shape (q, 6, 2)
+        Derivatives with respect to r and s.
+    """
+    t = 1 - r - s
+    values = np.stack([t * (2 * t - 1), r * (2 * r - 1), s * (2 * s - 1), 4 * r * t, 4 * r * s, 4 * s * t], axis=-1)
+    zero = np.zeros_like(r)
+    d_r = np.stack([1 - 4 * t, 4 * r - 1, zero, 4 * (t - r), 4 * s, -4 * s], axis=-1)
+    d_s = np.stack([1 - 4 * t, zero, 4 * s - 1, -4 * r, 4 * r, 4 * (t - s)], axis=-1)
+    return values, np.stack([d_r, d_s], axis=-1)
+
+
+def triangle_rule() -> tuple[Array, Array, Array]:
+    """Six-point rule, exact to degree 4 (Dunavant 1985): reference points r, s and weights that sum to 1/2."""
+    a, b = 0.445948490915965, 0.091576213509771
+    wa, wb = 0.223381589678011 / 2, 0.109951743655322 / 2
+    r = np.array([a, 1 - 2 * a, a, b, 1 - 2 * b, b])
+    s = np.array([a, a, 1 - 2 * a, b, b, 1 - 2 * b])
+    return r, s, np.array([wa, wa, wa, wb, wb, wb])
+
+
+def physical_gradients(coordinates: Array, reference_gradients: Array) -> tuple[Array, Array]:
+    """Gradients in space of the shape functions of curved triangles.
+
+    Parameters
+    ----------
+    coordinates : ndarray, shape (m, 6, 2)
+        Node positions of each triangle (m).
+    reference_gradients : ndarray, shape (q, 6, 2) or (m, q, 6, 2)
+
+    Returns
+    -------
+    gradients : ndarray, shape (m, q, 6, 2)
+        d N_a / d x_i (1/m).
+    determinant : ndarray, shape (m, q)
+        Jacobian determinant (m2).
+    """
+    if reference_gradients.ndim == 3:
+        jac = np.einsum("mai,qar->mqir", coordinates, reference_gradients, optimize=True)
+        reference_gradients = np.broadcast_to(reference_gradients, (len(coordinates), *reference_gradients.shape))
+    else:
+        jac = np.einsum("mai,mqar->mqir", coordinates, reference_gradients, optimize=True)
+    det = jac[..., 0, 0] * jac[..., 1, 1] - jac[..., 0, 1] * jac[..., 1, 0]
+    inverse = np.empty_like(jac)
+    inverse[..., 0, 0], inverse[..., 1, 1] = jac[..., 1, 1], jac[..., 0, 0]
+    inverse[..., 0, 1], inverse[..., 1, 0] = -jac[..., 0, 1], -jac[..., 1, 0]
+    inverse /= det[..., None, None]
+    return np.matmul(reference_gradients, inverse), det
+
+
+def element_stiffness(coordinates: Array, material: Material, plane: Plane, thickness: float) -> Array:
+    """Stiffness matrices of curved six-node triangles.
+
+    k_aibj = int w (lam N_a,i N_b,j + mu N_a,j N_b,i + mu delta_ij N_a,k N_b,k).
+
+    Parameters
+    ----------
+    coordinates : ndarray, shape (m, 6, 2)
+        Node positions (m).
+    thickness
+        w (m).
+
+    Returns
+    -------
+    ndarray, shape (m, 12, 12)
+        N/m; rows are node-major (node 0 x, node 0 y, node 1 x, ...).
+    """
+    lam, mu = material.lame(plane)
+    r, s, weights = triangle_rule()
+    gradients, det = physical_gradients(coordinates, triangle_shapes(r, s)[1])
+    m = len(coordinates)
+    grad = gradients.reshape(m, len(r), 12)
+    scaled = grad * (thickness * weights * det)[:, :, None]
+    outer = np.matmul(scaled.transpose(0, 2, 1), grad).reshape(m, 6, 2, 6, 2)  # int N_a,i N_b,j
+    stiffness = lam * outer + mu * outer.transpose(0, 1, 4, 3, 2)
+    laplace = mu * (outer[:, :, 0, :, 0] + outer[:, :, 1, :, 1])
+    stiffness[:, :, 0, :, 0] += laplace
+    stiffness[:, :, 1, :, 1] += laplace
+    return stiffness.reshape(m, 12, 12)
+
+
+def stress(gradients: Array, displacement: Array, material: Material, plane: Plane) -> Array:
+    """Stresses (xx, yy, zz, xy) from shape-function gradients.
+
+    Parameters
+    ----------
+    gradients : ndarray, shape (m, q, 6, 2)
+        d N_a / d x_i (1/m).
+    displacement : ndarray, shape (m, 6, 2)
+        Nodal displacements (m).
+
+    Returns
+    -------
+    ndarray, shape (m, q, 4)
+        Pa; zz is nu (xx + yy) in plane strain and 0 in plane stress.
+    """
+    lam, mu = material.lame(plane)
+    h = np.einsum("mai,mqaj->mqij", displacement, gradients, optimize=True)
+    trace = lam * (h[..., 0, 0] + h[..., 1, 1])
+    xx, yy = trace + 2 * mu * h[..., 0, 0], trace + 2 * mu * h[..., 1, 1]
+    zz = material.poisson_ratio * (xx + yy) if plane == "strain" else np.zeros_like(xx)
+    return np.stack([xx, yy, zz, mu * (h[..., 0, 1] + h[..., 1, 0])], axis=-1)
+
+
+def von_mises(stresses: Array) -> Array:
+    """Von Mises stress (Pa) of stresses (..., 4) ordered xx, yy, zz, xy."""
+    xx, yy, zz, xy = np.moveaxis(stresses, -1, 0)
+    return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3 * xy**2)
+
+
+# ---- the same as scikit-fem forms ------------------------------------------------------------------------------------
+
+
+def stiffness_form(material: Material, plane: Plane, thickness: float) -> Any:
+    """scikit-fem bilinear form w int sigma(u) : eps(v)."""
+    from skfem import BilinearForm
+    from skfem.helpers import ddot, eye, sym_grad, trace
+
+    lam, mu = material.lame(plane)
+
+    def sigma(u: Any) -> Any:
+        return lam * eye(trace(sym_grad(u)), 2) + 2 * mu * sym_grad(u)
+
+    return BilinearForm(lambda u, v, _: thickness * ddot(sigma(u), sym_grad(v)))

@@ -1,0 +1,121 @@
+"""Fields of chosen positions of a sweep as files: a VTKHDF series and pictures of the stress in the meshing zone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .contact.scene import MeshingPair
+from .contact.solver import solve_position
+from .drawing import zone
+from .errors import InputError
+from .fields import GearField, pair_recovery, straight_triangles
+from .gear import GearPair
+from .output.figures import stress_figure
+from .output.vtkhdf import VtkHdfSeries
+from .stiffness_curve import StiffnessCurve
+from .threads import one_thread
+
+Array = NDArray[Any]
+
+
+def chosen_positions(curve: StiffnessCurve, angles_deg: Sequence[float] | None) -> NDArray[np.int64]:
+    """Numbers of the positions of a curve at given pinion angles (deg); all that have a solution without them.
+
+    Raises
+    ------
+    InputError
+        For an angle that is not among the curve's, or whose position has no contact or failed.
+    """
+    solved = curve.status == "converged"
+    if angles_deg is None:
+        if not solved.any():
+            raise InputError("--fields", "all", "no position has a solution with contact", "use more load")
+        return np.flatnonzero(solved)
+    known = np.degrees(curve.pinion_angle)
+    found = []
+    for angle in angles_deg:
+        nearest = int(np.argmin(np.abs(known - angle)))
+        if not abs(known[nearest] - angle) <= 1e-6:
+            problem = f"is none of the sweep's angles; the nearest is {known[nearest]:.6g} deg"
+            raise InputError("--fields", angle, problem, "choose one of them, or change --angles")
+        if not solved[nearest]:
+            raise InputError("--fields", angle, f"has no solution: {curve.status[nearest]}", "choose another angle")
+        found.append(nearest)
+    return np.array(found)
+
+
+def write_fields(
+    folder: Path,
+    pair: GearPair,
+    elastic: MeshingPair,
+    curve: StiffnessCurve,
+    angles_deg: Sequence[float] | None,
+    *,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> list[str]:
+    """Write ``fields.vtkhdf`` (time: pinion angle in deg) and pictures; return the files' names.
+
+    Parameters
+    ----------
+    folder
+        Where to write.
+    angles_deg
+        Pinion angles (deg) out of the curve's; None writes all, and the picture of the most stressed one only.
+    """
+    chosen = chosen_positions(curve, angles_deg)
+    recovery = pair_recovery(elastic)
+    names = ["fields.vtkhdf"]
+    worst: tuple[float, int, tuple[GearField, GearField]] | None = None
+    with VtkHdfSeries(folder / "fields.vtkhdf") as series, one_thread():
+        for done, number in enumerate(chosen, start=1):
+            angle, twist = float(curve.pinion_angle[number]), float(curve.twist[number] + curve.lost_motion)
+            fields = recovery.at(solve_position(elastic, angle, twist), angle, twist)
+            _add(series, math.degrees(angle), fields, first=done == 1)
+            if angles_deg is not None:
+                names.append(_picture(folder, pair, fields, angle, twist))
+            else:
+                peak = max(float(f.von_mises.max()) for f in fields)
+                if worst is None or peak > worst[0]:
+                    worst = (peak, int(number), fields)
+            if progress is not None:
+                progress(done, len(chosen), "fields")
+    if worst is not None:
+        number = worst[1]
+        twist = float(curve.twist[number] + curve.lost_motion)
+        names.append(_picture(folder, pair, worst[2], float(curve.pinion_angle[number]), twist))
+    return names
+
+
+def _add(series: VtkHdfSeries, time: float, fields: tuple[GearField, GearField], *, first: bool) -> None:
+    """Both gears as one grid; the elements are stored with the first step only."""
+    pinion, wheel = fields
+    cells = None
+    if first:
+        cells = {"triangle6": np.concatenate([pinion.triangles, wheel.triangles + len(pinion.points)])}
+    series.add(
+        time,
+        np.concatenate([f.points for f in fields]),
+        cells,
+        point_data={
+            "displacement_m": np.concatenate([f.displacement for f in fields]).astype(np.float32),
+            "von_mises_Pa": np.concatenate([f.von_mises for f in fields]).astype(np.float32),
+        },
+        cell_data={"gear": np.repeat(np.array([0, 1], dtype=np.uint8), [len(f.triangles) for f in fields])},
+    )
+
+
+def _picture(folder: Path, pair: GearPair, fields: Sequence[GearField], angle: float, twist: float) -> str:
+    name = f"stress_{math.degrees(angle):.6g}deg.png"
+    parts = [(1e3 * (f.points + f.displacement), straight_triangles(f.triangles), 1e-6 * f.von_mises) for f in fields]
+    title = (
+        f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, pinion at {math.degrees(angle):.6g}°, "
+        f"wheel twisted by {math.degrees(twist):.4g}°, deformation to scale"
+    )
+    stress_figure(folder / name, title=title, parts=parts, zoom=zone(pair, modules=1.5))
+    return name

@@ -1,0 +1,31 @@
+"""Default element sizes of a gear pair's tooth sectors, in proportion to the module."""
+
+from __future__ import annotations
+
+import math
+
+from ..gear import GearPair
+from .tooth_sector import MINIMUM_BORE_EDGES, SectorRecipe
+
+
+def sector_recipes(pair: GearPair, *, coarsen: float = 1.0) -> tuple[SectorRecipe, SectorRecipe]:
+    """Recipes for pinion and wheel; `coarsen` multiplies every size (2 is about a quarter of the unknowns).
+
+    The sizes are those at which the stiffness of common pairs lies within 0.1 % of its limit at operating loads.
+    """
+    module = pair.pinion.module
+    starts = (pair.path["A"].pinion_roll, pair.path["E"].wheel_roll)
+    made = []
+    for gear, start in zip((pair.pinion, pair.wheel), starts, strict=True):
+        recipe = SectorRecipe(
+            flank=0.028 * module,
+            strip=0.008 * module,
+            strip_length=0.16 * module,
+            active_start=start,
+            back=0.16 * module,
+            root=0.12 * module,
+            body=0.6 * module,
+            bore=math.pi * gear.bore_diameter / MINIMUM_BORE_EDGES,
+        )
+        made.append(recipe.scaled(coarsen))
+    return made[0], made[1]

@@ -1,0 +1,194 @@
+"""Positions of a sweep solved in batches, at given twists or at a given torque, and gathered into arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .contact.finite_strain import finite_strain_shares, interpolated_shares, sample_numbers, with_share
+from .contact.scene import MeshingPair
+from .contact.solver import Position, solve_positions
+from .gear import GearPair
+from .iso6336 import mesh_stiffness
+from .stiffness_curve import SOLVED
+from .torque_control import TorqueSolution, twists_for_torque
+
+Array = NDArray[Any]
+IntArray = NDArray[Any]
+Progress = Callable[[int, int, str], None]
+
+#: Positions handed to the solver at once: enough to work side by side, few enough to stay small in memory.
+BATCH = 16
+#: Torque mode: the finite-strain share changes with the twist that it moves, by about a hundredth of itself each pass.
+SHARE_PASSES, SHARE_TOLERANCE = 6, 1e-10
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Solutions of n positions, without what only fields need.
+
+    Attributes
+    ----------
+    twist : ndarray, shape (n,)
+        Twist in all, lost motion included (rad).
+    numbers : dict of str to ndarray, shape (n,)
+        ``torque_wheel``, ``torque_pinion``, ``torque_wheel_reaction``, ``tangent``, ``peak_pressure``, see `Position`.
+    pairs : list of (ndarray, ndarray)
+        For each position the numbers of the tooth pairs that carry load, and their torques (N m).
+    iterations : ndarray, shape (n,)
+    status : list of str
+    """
+
+    twist: Array
+    numbers: dict[str, Array]
+    pairs: list[tuple[IntArray, Array]]
+    iterations: IntArray
+    status: list[str]
+
+
+def at_twists(
+    elastic: MeshingPair, angles: Array, twists: Array, progress: Progress | None, *, finite: bool = False
+) -> Solved:
+    """Solve positions at given pinion angles and twists, both of shape (n,) (rad); with or without finite strain."""
+    sampled = sample_numbers(angles, elastic.pitch_angle) if finite else np.zeros(0, dtype=np.int64)
+    positions: list[Position] = []
+    for start in range(0, len(angles), BATCH):
+        part = slice(start, start + BATCH)
+        positions += _solve(elastic, angles[part], twists[part], sampled - start)
+        if progress is not None:
+            progress(len(positions), len(angles), "positions")
+    if finite:
+        shares = finite_strain_shares(elastic, [positions[i] for i in sampled])
+        every = interpolated_shares(angles, angles[sampled], shares, elastic.pitch_angle)
+        positions = [_bare(with_share(p, c)) for p, c in zip(positions, every, strict=True)]
+    iterations = np.array([p.iterations for p in positions], dtype=np.int64)
+    return _collect(twists, positions, iterations, [p.status for p in positions])
+
+
+def at_torque(
+    pair: GearPair,
+    elastic: MeshingPair,
+    angles: Array,
+    torque: float,
+    touching: Array,
+    progress: Progress | None,
+    *,
+    finite: bool = False,
+) -> Solved:
+    """Find the twists at which positions carry `torque` (N m), and solve them.
+
+    The first position starts from the standard's stiffness, the others from the compliance that it showed. `touching`
+    are the twists (rad), shape (n,), at which the rigid flanks touch. With finite strain the share of the torque is
+    evaluated at the twists so found, which then move by that share.
+    """
+    moduli = [body.material.youngs_modulus for body in elastic.bodies]
+    guess = mesh_stiffness(pair, moduli[0], moduli[1]) * elastic.width * pair.wheel.base_radius**2
+    goal = np.full(len(angles), torque)
+    found = _search(pair, elastic, angles, goal, touching, touching + torque / guess, progress)
+    if finite:
+        found = _with_shares(pair, elastic, angles, goal, touching, found)
+    return _collect(found.twist, found.positions, found.iterations, found.status)
+
+
+def _with_shares(
+    pair: GearPair, elastic: MeshingPair, angles: Array, goal: Array, touching: Array, found: TorqueSolution
+) -> TorqueSolution:
+    """Move the twists until torque and finite-strain share at the same twist make the goal."""
+    sampled = sample_numbers(angles, elastic.pitch_angle)
+    iterations, before = found.iterations, np.zeros(len(angles))
+    for _ in range(SHARE_PASSES):
+        positions = _solve(elastic, angles[sampled], found.twist[sampled], np.arange(len(sampled)))
+        shares = finite_strain_shares(elastic, positions)
+        every = interpolated_shares(angles, angles[sampled], shares, elastic.pitch_angle)
+        found = _search(pair, elastic, angles, goal / (1 + every), touching, found.twist, None)
+        iterations = iterations + found.iterations
+        if np.max(np.abs(every - before)) <= SHARE_TOLERANCE:
+            break
+        before = every
+    raised = [with_share(p, c) for p, c in zip(found.positions, every, strict=True)]
+    return found._replace(positions=raised, iterations=iterations)
+
+
+def _search(
+    pair: GearPair,
+    elastic: MeshingPair,
+    angles: Array,
+    goal: Array,
+    touching: Array,
+    first: Array,
+    progress: Progress | None,
+) -> TorqueSolution:
+    """Twists that carry the torques `goal` (N m), the first position ahead of the others to improve their guesses."""
+    parts: list[TorqueSolution] = []
+    starts = [0, *range(1, len(angles), BATCH)]
+    for start, stop in zip(starts, [*starts[1:], len(angles)], strict=True):
+        part = slice(start, stop)
+        found = twists_for_torque(
+            lambda a, t: _solve(elastic, a, t),
+            angles[part],
+            goal[part],
+            touching=touching[part],
+            first=first[part],
+            most=math.pi / pair.wheel.teeth,
+        )
+        parts.append(found)
+        if start == 0 and found.status[0] == "converged":
+            first = touching + (found.twist[0] - touching[0]) / (first[0] - touching[0]) * (first - touching)
+        if progress is not None:
+            progress(stop, len(angles), "positions")
+    return TorqueSolution(
+        np.concatenate([f.twist for f in parts]),
+        [position for f in parts for position in f.positions],
+        np.concatenate([f.iterations for f in parts]),
+        [one for f in parts for one in f.status],
+    )
+
+
+def _solve(elastic: MeshingPair, angles: Array, twists: Array, kept: IntArray | None = None) -> list[Position]:
+    """Positions, all but those numbered in `kept` without what only fields need: a scene holds megabytes."""
+    made = solve_positions(elastic, angles, twists)
+    keep = set() if kept is None else set(kept.tolist())
+    return [p if i in keep else _bare(p) for i, p in enumerate(made)]
+
+
+def _bare(position: Position) -> Position:
+    return replace(position, scene=None, forces=None, force_rate=None)
+
+
+def _collect(twists: Array, positions: list[Position], iterations: IntArray, status: list[str]) -> Solved:
+    names = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "tangent", "peak_pressure")
+    numbers = {name: np.array([getattr(p, name) for p in positions], dtype=float) for name in names}
+    pairs = []
+    for p in positions:
+        carry = np.asarray(p.pair_torques) > 0
+        pairs.append((np.asarray(p.pair_numbers, dtype=np.int64)[carry], np.asarray(p.pair_torques)[carry]))
+    return Solved(twists, numbers, pairs, iterations, status)
+
+
+def honest(solved: Solved, touching: Array) -> Solved:
+    """Mark positions without contact whose exact rigid flanks overlap, and take all numbers off failed ones."""
+    status = [
+        "under_resolved" if s == "no_contact" and twist > touch else s
+        for s, twist, touch in zip(solved.status, solved.twist, touching, strict=True)
+    ]
+    bad = ~np.isin(status, SOLVED)
+    numbers = {name: np.where(bad, np.nan, values) for name, values in solved.numbers.items()}
+    return replace(solved, numbers=numbers, status=status)
+
+
+def load_shares(pairs: list[tuple[IntArray, Array]], torque: Array) -> tuple[Array, Array]:
+    """Number of the leading pair of each position, and the shares of it and of the pairs behind it."""
+    leading = np.array([float(numbers.max()) if len(numbers) else np.nan for numbers, _ in pairs])
+    most = max((int(np.ptp(numbers)) + 1 for numbers, _ in pairs if len(numbers)), default=1)
+    shares = np.zeros((len(pairs), most))
+    for i, (numbers, torques) in enumerate(pairs):
+        if len(numbers):
+            shares[i, numbers.max() - numbers] = torques / torque[i]
+    failed = ~np.isfinite(torque)
+    shares[failed], leading[failed] = np.nan, np.nan
+    return leading, shares

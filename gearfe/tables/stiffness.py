@@ -1,0 +1,75 @@
+"""The [stiffness] table: how a gear pair's mesh stiffness is computed, in everyday units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..config import quantity
+from ..errors import InputError
+
+#: More positions than this are a slip of the keyboard.
+MOST_POSITIONS = 100_000
+
+
+@dataclass(frozen=True)
+class StiffnessTable:
+    """Load, positions, model and mesh of a rotation sweep."""
+
+    twist_deg: float | None = quantity(
+        None, doc="twist of the wheel against the pinion (deg), or give torque_Nm", above=0.0, below=36.0
+    )
+    torque_Nm: float | None = quantity(None, doc="torque at the wheel's hub (N m), or give twist_deg", above=0.0)
+    twist_from: str = quantity(
+        "centred",
+        doc="where the twist counts from: centred (a wheel space faces the pinion tooth) or contact (half the backlash "
+        "further, where unmodified flanks touch)",
+        choices=("centred", "contact"),
+    )
+    angle_start_deg: float = quantity(0.0, doc="first pinion angle (deg)")
+    angle_step_deg: float = quantity(1.0, doc="step of the pinion angle (deg)", above=0.0)
+    angle_stop_deg: float | None = quantity(None, doc="last pinion angle (deg); without it, one mesh cycle")
+    plane: str = quantity("strain", doc="plane strain or plane stress", choices=("strain", "stress"))
+    law: str = quantity("nitsche", doc="contact law", choices=("nitsche", "penalty"))
+    kinematics: str = quantity(
+        "finite",
+        doc="small (small strain) or finite (with the first-order effect of finite strain on the torque)",
+        choices=("small", "finite"),
+    )
+    nitsche_gamma0: float = quantity(
+        1.0, doc="parameter of the law nitsche, gamma h/E (-); 1 is the most accurate", low=1e-3, high=1e6
+    )
+    penalty_stiffness_N_per_mm3: float | None = quantity(
+        None,
+        doc="parameter of the law penalty (N/mm3), by default 300 E/h with the flank's largest element h",
+        low=1e3,
+        high=1e13,
+    )
+    points_per_edge: int = quantity(4, doc="contact points on each element edge of a flank", low=2, high=10)
+    coarsen: float = quantity(
+        1.0, doc="factor on all element sizes; 2 is faster and about four times less accurate", low=0.2, high=5.0
+    )
+    solve_all: bool = quantity(False, doc="true: solve also positions that differ by whole mesh cycles")
+    interpolation: str = quantity(
+        "cubic", doc="how the curve runs between its positions: cubic (monotone) or linear", choices=("cubic", "linear")
+    )
+
+    def check(self, where: str) -> None:
+        """Raise `InputError` for keys that contradict each other."""
+        if self.twist_deg is not None and self.torque_Nm is not None:
+            raise InputError(f"{where}.torque_Nm", self.torque_Nm, "stands beside twist_deg", "leave one of them out")
+        if self.angle_stop_deg is None:
+            return
+        if self.angle_stop_deg < self.angle_start_deg:
+            problem = f"must be >= angle_start_deg = {self.angle_start_deg:g}"
+            raise InputError(f"{where}.angle_stop_deg", self.angle_stop_deg, problem, "swap them")
+        if (self.angle_stop_deg - self.angle_start_deg) / self.angle_step_deg > MOST_POSITIONS:
+            problem = f"makes more than {MOST_POSITIONS} positions"
+            raise InputError(f"{where}.angle_step_deg", self.angle_step_deg, problem, "use a larger step")
+
+    def angles_deg(self, mesh_cycle_deg: float) -> list[float]:
+        """Pinion angles (deg), the last one included."""
+        start, step, stop = self.angle_start_deg, self.angle_step_deg, self.angle_stop_deg
+        if stop is None:
+            count = max(1, round(mesh_cycle_deg / step))
+            return [start + mesh_cycle_deg * i / count for i in range(count)]
+        return [start + step * i for i in range(int((stop - start) / step + 1e-9) + 1)]

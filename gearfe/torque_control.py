@@ -1,0 +1,103 @@
+"""The twist at which a gear pair carries a given torque: safeguarded Newton's method on many positions at once.
+
+The torque rises with the twist, from nothing where the rigid flanks just touch. Newton's step with the solver's own
+tangent is taken where it stays between the largest twist that was too little and the smallest that was too much;
+otherwise the interval is halved, or the twist doubled while nothing has been too much yet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .contact.solver import Position
+
+Array = NDArray[np.float64]
+
+#: Relative accuracy of the torque.
+TOLERANCE = 1e-10
+MAX_SOLUTIONS = 40
+#: Status of a position whose torque was not found although single solutions converged.
+NOT_REACHED = "torque_not_reached"
+
+
+class TorqueSolution(NamedTuple):
+    """Twists that carry a torque.
+
+    Attributes
+    ----------
+    twist : ndarray, shape (n,)
+        rad.
+    positions : list of Position
+        Last solution of each position.
+    iterations : ndarray, shape (n,)
+        Newton iterations of all its solutions together.
+    status : list of str
+    """
+
+    twist: Array
+    positions: list[Position]
+    iterations: NDArray[np.int64]
+    status: list[str]
+
+
+Solve = Callable[[Array, Array], list[Position]]
+
+
+def twists_for_torque(
+    solve: Solve, angles: Array, torque: Array, *, touching: Array, first: Array, most: float
+) -> TorqueSolution:
+    """Find the twist of each position.
+
+    Parameters
+    ----------
+    solve
+        ``solve(angles, twists)`` gives the positions.
+    angles : ndarray, shape (n,)
+        Pinion angles (rad).
+    torque : ndarray, shape (n,)
+        Torques at the wheel's hub, > 0 (N m).
+    touching, first : ndarray, shape (n,)
+        Twists (rad) at which the rigid flanks touch, and first guesses above them.
+    most
+        Largest twist tried (rad).
+    """
+    low, high = touching.copy(), np.full(len(angles), np.inf)
+    twist = np.minimum(first, most)
+    found: list[Position | None] = [None] * len(angles)
+    status = [NOT_REACHED] * len(angles)
+    iterations = np.zeros(len(angles), dtype=np.int64)
+    open_ = np.arange(len(angles))
+    for _ in range(MAX_SOLUTIONS):
+        if len(open_) == 0:
+            break
+        still = []
+        for i, position in zip(open_, solve(angles[open_], twist[open_]), strict=True):
+            found[i] = position
+            iterations[i] += position.iterations
+            status[i] = NOT_REACHED if position.status in ("converged", "no_contact") else position.status
+            step = 0.0
+            if position.status == "converged":
+                excess = position.torque_wheel - torque[i]
+                if abs(excess) <= TOLERANCE * torque[i]:
+                    status[i] = "converged"
+                    continue
+                low[i], high[i] = (twist[i], high[i]) if excess < 0 else (low[i], twist[i])
+                step = -excess / position.tangent if position.tangent > 0 else 0.0
+            elif position.status == "not_converged":
+                high[i] = twist[i]
+            else:
+                low[i] = twist[i]
+            tried = twist[i] + step
+            if not low[i] < tried < high[i]:
+                tried = 0.5 * (low[i] + high[i]) if np.isfinite(high[i]) else 2 * twist[i] - touching[i]
+            closed = np.isfinite(high[i]) and high[i] - low[i] <= 1e-14 * high[i]
+            if tried == twist[i] or closed or twist[i] >= most:
+                continue
+            twist[i] = min(tried, most)
+            still.append(i)
+        open_ = np.array(still, dtype=np.int64)
+    return TorqueSolution(twist, [p for p in found if p is not None], iterations, status)

@@ -1,0 +1,147 @@
+"""The curve as a table: exact round trips, foreign files, mistakes."""
+
+import csv
+import math
+
+import numpy as np
+import pytest
+
+from gearfe import StiffnessCurve
+from gearfe.curve_csv import from_text, to_text
+from gearfe.errors import InputError
+
+#: The first columns of the file, in the order that is promised to readers.
+PROMISED = (
+    "pinion_angle_deg,wheel_angle_deg,twist_deg,torque_wheel_Nm,torque_pinion_Nm,k_torsional_Nm_per_rad,k_mesh_N_per_m,"
+    "transmission_error_um,teeth_in_contact,peak_pressure_MPa,iterations,status"
+)
+
+
+def invented(n=20, failed=()):
+    """A curve of random numbers with all 53 bits in use."""
+    rng = np.random.default_rng(7)
+    status = np.array(["converged"] * n, dtype="<U20")
+    status[list(failed)] = "not_converged"
+    bad = status != "converged"
+
+    def numbers(scale):
+        return np.where(bad, np.nan, scale * rng.uniform(0.1, 1.0, n))
+
+    share = rng.uniform(0, 1, n)
+    return StiffnessCurve(
+        pinion_angle=np.arange(n) * math.radians(18) / n,
+        wheel_angle=-rng.uniform(0, 1, n),
+        twist=numbers(1e-3),
+        torque_wheel=numbers(100),
+        torque_pinion=numbers(70),
+        torque_wheel_reaction=numbers(100),
+        k_torsional=numbers(1e5),
+        k_mesh=numbers(1e8),
+        k_tangent=numbers(1e8),
+        transmission_error=numbers(1e-5),
+        transmission_error_unloaded=rng.uniform(0, 1e-6, n),
+        leading_pair=np.where(bad, np.nan, np.arange(n) % 3 - 1.0),
+        load_share=np.where(bad[:, None], np.nan, np.stack([share, 1 - share], axis=1)),
+        teeth_in_contact=np.where(bad, -1, 2),
+        peak_pressure=numbers(1e9),
+        iterations=rng.integers(1, 9, n),
+        status=status,
+        mesh_cycle=math.radians(18),
+        base_radius=33.98654e-3,
+        lost_motion=1.234e-4,
+    )
+
+
+def same(one, two):
+    for name in StiffnessCurve.__dataclass_fields__:
+        if name in ("timings", "error"):
+            continue
+        a, b = getattr(one, name), getattr(two, name)
+        np.testing.assert_array_equal(a, b, err_msg=name, strict=name in ("teeth_in_contact", "iterations"))
+
+
+@pytest.mark.parametrize("failed", [(), (3, 11)])
+def test_csv_round_trip_is_exact(tmp_path, failed):
+    curve = invented(failed=failed)
+    curve.to_csv(tmp_path / "curve.csv")
+    back = StiffnessCurve.from_csv(tmp_path / "curve.csv")
+    same(curve, back)
+    back.to_csv(tmp_path / "again.csv")
+    assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "curve.csv").read_bytes()
+
+
+def test_promised_columns_come_first(tmp_path):
+    invented(failed=(2,)).to_csv(tmp_path / "curve.csv")
+    header, *rows = (tmp_path / "curve.csv").read_text().splitlines()
+    assert header.startswith(PROMISED + ",")
+    with open(tmp_path / "curve.csv", newline="") as stream:
+        table = list(csv.DictReader(stream))
+    assert len(rows) == len(table) == 20
+    assert table[2]["status"] == "not_converged"
+    assert math.isnan(float(table[2]["k_mesh_N_per_m"]))
+    assert math.isnan(float(table[2]["teeth_in_contact"]))
+    assert table[3]["teeth_in_contact"] == "2"
+
+
+@pytest.mark.parametrize("column", ["angle_deg", "error_um", "radius_mm", "pressure_MPa", "torque_Nm"])
+def test_any_double_survives_its_unit(column):
+    rng = np.random.default_rng(3)
+    for x in np.concatenate([rng.uniform(-1, 1, 300) * 10.0 ** rng.integers(-12, 12, 300), [0.0, math.radians(0.5)]]):
+        text = to_text(x, column)
+        assert from_text(text, column) == x
+        assert len(text.strip("-0.").split("e")[0].replace(".", "")) <= 17
+
+
+def test_everyday_numbers_read_as_such():
+    assert to_text(math.radians(0.5), "twist_deg") == "0.5"
+    assert to_text(math.radians(17.0), "pinion_angle_deg") == "17"
+    assert to_text(25e-6, "error_um") == "25"
+
+
+def test_a_foreign_table(tmp_path):
+    path = tmp_path / "measured.csv"
+    path.write_text("k_mesh_N_per_m,pinion_angle_deg\n1e8,0\n1.2e8,4.5\n,9\n1.1e8,13.5\n")
+    with pytest.raises(InputError, match="mesh cycle"):
+        StiffnessCurve.from_csv(path)
+    curve = StiffnessCurve.from_csv(path, mesh_cycle=math.radians(18))
+    assert list(curve.failed) == [False, False, True, False]
+    with pytest.raises(InputError, match="does not cover"):
+        curve.interpolate(0.0)
+    path.write_text(path.read_text().replace("1.1e8,13.5", "1.3e8,9.0\n1.1e8,13.5"))
+    curve = StiffnessCurve.from_csv(path, mesh_cycle=math.radians(18))
+    value = curve.interpolate(np.radians([4.5, 22.5, 9.0])).value
+    np.testing.assert_allclose(value, [1.2e8, 1.2e8, 1.3e8], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "cannot be read"),
+        ("pinion_angle_deg,k_mesh_N_per_m\n", "has no rows"),
+        ("pinion_angle_deg,k\n1,2\n", "has no column k_mesh_N_per_m"),
+        ("pinion_angle_deg,k_mesh_N_per_m\n1,2,3\n", "line 2 has 3 cells"),
+        ("pinion_angle_deg,k_mesh_N_per_m\n1,stiff\n", "'stiff', which is no number"),
+        ("pinion_angle_deg,k_mesh_N_per_m\none,1\n", "'one', which is no number"),
+    ],
+)
+def test_mistakes_in_a_table(tmp_path, content, message):
+    path = tmp_path / "curve.csv"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(InputError, match=message):
+        StiffnessCurve.from_csv(path, mesh_cycle=0.3)
+
+
+def test_interpolation_leaves_failed_positions_out():
+    curve = invented(failed=(5,))
+    interpolant = curve.interpolant()
+    assert interpolant.left_out == pytest.approx([curve.pinion_angle[5]])
+    assert np.isfinite(interpolant(np.linspace(0, 1, 100)).value).all()
+    value, slope = curve.interpolate(curve.pinion_angle[8] + 4 * curve.mesh_cycle, "torque_wheel")
+    assert float(value) == pytest.approx(curve.torque_wheel[8])
+    assert np.shape(slope) == ()
+
+
+def test_unknown_quantity():
+    with pytest.raises(InputError, match="did you mean 'k_mesh'"):
+        invented().interpolate(0.0, "k_mehs")

@@ -1,0 +1,116 @@
+"""Every key of [pair] and [stiffness] that can change the curve does change it: none is read and then forgotten."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe.config import build
+from gearfe.gear import GearPair
+from gearfe.stiffness import sweep_stiffness
+from gearfe.stiffness_job import StiffnessJob
+from gearfe.tables.pair import PairTable
+from gearfe.tables.stiffness import StiffnessTable
+
+ROOT = Path(__file__).parents[1]
+
+#: A pair in which every feature is on, so that each change is a small step from it.
+BASE = {
+    "pressure_angle_deg": 22.0,
+    "face_width_mm": 10.0,
+    "module_mm": 2.5,
+    "addendum": 1.0,
+    "dedendum": 1.25,
+    "rack_tip_radius": 0.25,
+    "profile_shift": 0.1,
+    "tip_shortening": 0.02,
+    "tip_round_mm": 0.1,
+    "tip_relief_amount_um": 8.0,
+    "tip_relief_length_mm": 2.0,
+    "tip_relief_exponent": 1.5,
+    "tooth_thinning_um": 10.0,
+    "centre_distance_mm": 63.05,
+    "pinion": {"teeth": 20, "bore_diameter_mm": 12.0},
+    "wheel": {"teeth": 30, "bore_diameter_mm": 18.0},
+    "material": {"youngs_modulus_GPa": 200.0, "poisson_ratio": 0.3},
+}
+SWEEP = {"torque_Nm": 150.0, "law": "penalty", "coarsen": 3.0, "angle_start_deg": 1.0, "angle_step_deg": 3.5}
+
+PAIR_CHANGES = {
+    "pressure_angle_deg": 22.5,
+    "face_width_mm": 11.0,
+    "addendum": 1.03,
+    "dedendum": 1.3,
+    "rack_tip_radius": 0.2,
+    "profile_shift": 0.08,
+    "tip_shortening": 0.06,
+    "tip_round_mm": 0.2,
+    "tip_relief_amount_um": 10.0,
+    "tip_relief_length_mm": 2.5,
+    "tip_relief_exponent": 1.0,
+    "tooth_thinning_um": 20.0,
+    "centre_distance_mm": 63.08,
+    "module_mm": None,  # given as pitch diameters, the wrong key for both would fail
+    "pinion.bore_diameter_mm": 15.0,
+    "wheel.bore_diameter_mm": 22.0,
+    "wheel.teeth": 29,
+    "pinion.profile_shift": 0.13,
+    "wheel.tip_relief_amount_um": 12.0,
+    "material.youngs_modulus_GPa": 210.0,
+    "material.poisson_ratio": 0.27,
+    "wheel.material": {"youngs_modulus_GPa": 180.0},
+}
+SWEEP_CHANGES = {
+    "torque_Nm": 170.0,
+    "plane": "stress",
+    "law": "nitsche",
+    "kinematics": "small",
+    "penalty_stiffness_N_per_mm3": 1e7,
+    "coarsen": 2.5,
+    "twist_from": "contact",
+    "points_per_edge": 3,
+    "angle_start_deg": 1.2,
+}
+
+
+def curve(pair_changes=None, sweep_changes=None):
+    data = {key: dict(value) if isinstance(value, dict) else value for key, value in BASE.items()}
+    for key, value in (pair_changes or {}).items():
+        table, _, name = key.rpartition(".")
+        (data[table] if table else data)[name] = value
+    if data["module_mm"] is None:
+        del data["module_mm"]
+        data["pinion"]["pitch_diameter_mm"], data["wheel"]["pitch_diameter_mm"] = 50.02, 75.03
+    table = build(PairTable, data, "pair")
+    job = StiffnessJob(
+        table, build(StiffnessTable, SWEEP | (sweep_changes or {}), "stiffness"), GearPair.from_table(table)
+    )
+    found = sweep_stiffness(job.pair, **job.model, **job.sweep)
+    assert set(found.status) == {"converged"}
+    return found
+
+
+@pytest.fixture(scope="module")
+def base():
+    return curve()
+
+
+@pytest.mark.parametrize("key", PAIR_CHANGES)
+def test_each_key_of_the_pair_counts(key, base):
+    changed = curve({key: PAIR_CHANGES[key]})
+    assert len(changed) == len(base)
+    assert np.abs(changed.k_mesh / base.k_mesh - 1).max() > 1e-4
+
+
+@pytest.mark.parametrize("key", SWEEP_CHANGES)
+def test_each_key_of_the_sweep_counts(key, base):
+    changed = curve(None, {key: SWEEP_CHANGES[key]})
+    assert np.abs(changed.k_mesh / base.k_mesh - 1).max() > 1e-6
+
+
+def test_every_key_is_in_this_file():
+    given = {key.rpartition(".")[2] for key in (*PAIR_CHANGES, *BASE)}
+    per_gear = {"material", "pinion", "wheel", "teeth", "bore_diameter_mm", "pitch_diameter_mm", "density_kg_per_m3"}
+    assert set(PairTable.__dataclass_fields__) <= given | per_gear
+    elsewhere = {"twist_deg", "nitsche_gamma0", "solve_all", "interpolation", "angle_stop_deg", "angle_step_deg"}
+    assert set(StiffnessTable.__dataclass_fields__) <= {*SWEEP_CHANGES, *elsewhere}
