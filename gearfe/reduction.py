@@ -33,6 +33,7 @@ from scipy import sparse
 from .errors import InputError
 from .lanczos import lowest_modes
 from .sparse_solver import Factorization, factorize
+from .threads import one_thread
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -80,6 +81,7 @@ class Reduction:
     solved_columns: int
 
 
+@one_thread()
 def reduce_model(
     stiffness: Any,
     mass: Any,

@@ -194,6 +194,9 @@ def _pardiso(matrix: Any) -> Callable[[Floats], Floats]:
 
     upper = sparse.csr_matrix(sparse.triu(matrix, format="csr"))
     solver = pypardiso.PyPardisoSolver(mtype=2)
+    limit = getattr(solver.libmkl, "MKL_Set_Num_Threads", None)
+    if limit is not None:
+        limit(1)  # two threads on two busy cores were slower
     try:
         solver.factorize(upper)
     except Exception as error:

@@ -20,6 +20,7 @@ from scipy import sparse
 
 from .errors import InputError
 from .sparse_solver import factorize
+from .threads import one_thread
 
 Floats = NDArray[np.float64]
 
@@ -42,6 +43,7 @@ class Transient:
     acceleration: Floats
 
 
+@one_thread()
 def newmark(
     mass: Any,
     damping: Any,

@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..lanczos import lowest_modes
 from ..reduction import rigid_shift
 from ..sparse_solver import factorize
+from ..threads import one_thread
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -44,6 +45,7 @@ class FullModel:
     held: bool
     solver: str = "auto"
 
+    @one_thread()
     def static(self, loads: Floats) -> Floats:
         """Displacement (N,) or (N, k) under loads on the attachments (6 a,) or (6 a, k), with one refinement step."""
         if not self.held:
@@ -55,6 +57,7 @@ class FullModel:
         found = factor.solve(force)
         return found + factor.solve(force - self.stiffness @ found)
 
+    @one_thread()
     def frequencies_hz(self, count: int = 20) -> Floats:
         """Lowest natural frequencies (Hz) with the attachments free to move, rigid-body modes (zero) included."""
         shift = 0.0 if self.held else rigid_shift(self.stiffness, self.mass)
