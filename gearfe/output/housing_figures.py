@@ -121,7 +121,7 @@ def _draw(job: Path, target: Path) -> None:
                 plotter.add_points(stored["marked"], color="crimson", point_size=5, render_points_as_spheres=True)
         plotter.add_text(str(title), font_size=9, color="black")
         centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        plotter.camera_position = [centre + size * np.array([0.9, 1.5, 0.9]), centre, (0.0, 0.0, 1.0)]
+        plotter.camera_position = [centre + size * np.array([0.75, 1.25, 0.75]), centre, (0.0, 0.0, 1.0)]
     with whole_file(target) as temporary:
         plotter.screenshot(str(temporary))
     plotter.close()
