@@ -97,8 +97,10 @@ def twists_for_torque(
                 failures[i] += 1
                 if failures[i] == MAX_FAILURES:
                     continue
-                if below[i]:  # otherwise first guesses are low rather than high: the twist is doubled
+                if below[i]:
                     high[i] = twist[i]
+                else:  # first guesses are low rather than high: double the twist
+                    step = twist[i] - touching[i]
             else:
                 low[i], missed[i] = twist[i], position.status == "under_resolved"
             tried = twist[i] + step
