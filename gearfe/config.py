@@ -193,7 +193,7 @@ def check_range(number: float, label: str, meta: Any) -> None:
     """Raise `InputError` when a number leaves the range that a field's metadata allow."""
     low, high, above, below = (meta.get(k) for k in ("low", "high", "above", "below"))
     outside = (
-        not math.isfinite(number)
+        (isinstance(number, float) and not math.isfinite(number))
         or (low is not None and number < low)
         or (high is not None and number > high)
         or (above is not None and number <= above)

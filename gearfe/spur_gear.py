@@ -172,8 +172,10 @@ class Gear:
         return math.sqrt(max(0.0, (radius - self.base_radius) * (radius + self.base_radius)))
 
     def _check_numbers(self) -> None:
-        if isinstance(self.teeth, bool) or not isinstance(self.teeth, Integral) or self.teeth < 5:
-            raise InputError("teeth", self.teeth, "must be a whole number >= 5", "use more teeth")
+        if isinstance(self.teeth, bool) or not isinstance(self.teeth, Integral) or not 5 <= self.teeth <= 1000:
+            raise InputError(
+                "teeth", self.teeth, "must be a whole number >= 5 and <= 1000", "use another number of teeth"
+            )
         ranges = {
             "module": (0.0, math.inf, False),
             "pressure_angle": (math.radians(5.0), math.radians(45.0), True),

@@ -101,7 +101,21 @@ def test_variation_of_the_contact_force(scene: dict[str, np.ndarray]) -> None:
     for q in range(len(p.gap)):  # one loaded point at a time
         loads = np.zeros(len(p.gap))
         loads[q] = 1.0
-        lin = Linearised(nothing, nothing, nothing, tilt, slide, p, loads, nothing, nothing, nothing, None)
+        lin = Linearised(
+            unknowns=nothing,
+            opening=nothing,
+            weighted=nothing,
+            tilt=tilt,
+            slide=slide,
+            projection=p,
+            loads=loads,
+            parameter=nothing,
+            compliance=nothing,
+            response=nothing,
+            factor=None,
+            normal=nothing,
+            cut=nothing,
+        )
         expected = lin.bending(scene["u"].ravel()) @ scene["v"].ravel()
         after, before = (_rows(scene, _moved(scene, s * STEP)) for s in (1, -1))
         change = _applied(after.normal, after, scene["v"]) - _applied(before.normal, before, scene["v"])

@@ -11,7 +11,9 @@ deformed mate, n its normal there and sigma_n the normal stress at x_s. Newton's
 of `gearfe.contact.closest`,
 
 .. math::
-    \int_{\Gamma_s} H(p)\,(\gamma\,\delta g(u) + s\,\sigma_n(u))\; n\cdot[v] \;-\; p\,\Delta(n\cdot[v]).
+    \int_{\Gamma_s} H(p)\,(\gamma\,\delta g(u) + s\,\sigma_n(u))\; n\cdot[v] \;-\; p\,\Delta(n\cdot[v])
+
+and the change of the area of points whose stretch of surface lies across the mate's sharp end.
 
 Nothing but the closest-point search is shared with the condensed route: no compliance, no cyclic symmetry, no windows
 of flank. On the same mesh and quadrature points both must give the same torques; what they cost differs a hundredfold.
@@ -171,6 +173,7 @@ def _contact(points: ContactPoints, u: Array, place: Array | None) -> _State:
     pressure = np.maximum(0.0, -points.parameter * projection.gap - points.stress_share * stress)
     pressure[unreached(projection.gap)] = 0.0
     metric = np.einsum("ni,ni->n", projection.tangent, projection.tangent)
+    share = points.share(projection.place)
     numbers = {
         "p": pressure,
         "g": projection.gap,
@@ -179,7 +182,8 @@ def _contact(points: ContactPoints, u: Array, place: Array | None) -> _State:
         "undeformed_a": tangent,
         "kappa": projection.curvature,
         "m": metric,
-        "share": points.share(projection.place),
+        "share": share,
+        "share_slope": np.where((share > 0) & (share < 1), -0.5 / points.fade, 0.0),
         "gamma": points.parameter,
         "s": points.stress_share,
         "active": (pressure > 0).astype(float),
@@ -235,7 +239,8 @@ def _tangent(points: ContactPoints, state: _State) -> Any:
         turning = w.g / w.m * tilt_u * tilt_v - (1 - w.g * w.kappa / w.m) * (
             tilt_u * slide_v + tilt_v * slide_u + w.kappa * slide_u * slide_v
         )
-        return w.share * (w.active * relief * dot(w.n, _jump(v, of_v)) - w.p * turning)
+        opposed = w.share * w.active * relief - w.share_slope * slide_u * w.p
+        return opposed * dot(w.n, _jump(v, of_v)) - w.share * w.p * turning
 
     both = [points.slave, state.mate]
     return asm(form, both, both, **state.fields)

@@ -66,6 +66,10 @@ class Linearised:
         G^T W.
     response : ndarray, shape (a, 2t)
         gamma dg/du C + S.
+    normal : ndarray, shape (a, 2t)
+        G.
+    cut : ndarray, shape (a,)
+        Change of each point's load per unit of the foot point, where its stretch lies across a sharp end (N).
     """
 
     unknowns: IntArray
@@ -79,6 +83,8 @@ class Linearised:
     compliance: Array
     response: Array
     factor: Any
+    normal: Array
+    cut: Array
 
     def solve(self, right: Array) -> Array:
         """Pressures of the active points for a right-hand side."""
@@ -92,7 +98,8 @@ class Linearised:
         share = 1 - p.gap * p.curvature / metric
         to_slide = -share * (tilt + p.curvature * slide)
         to_tilt = -share * slide + p.gap / metric * tilt
-        return (self.loads * to_slide) @ self.slide + (self.loads * to_tilt) @ self.tilt
+        bent = (self.loads * to_slide) @ self.slide + (self.loads * to_tilt) @ self.tilt
+        return bent + (self.cut * slide) @ self.normal if self.cut.any() else bent
 
 
 def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: Array) -> Linearised:
@@ -124,7 +131,11 @@ def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: 
     # the transposed matrix is what LAPACK sees in C order: factorise that, solve transposed, and nothing is copied
     factor = dgetrf(matrix.T, overwrite_a=1)[:2]
     loads = areas * pressure[active]
-    return Linearised(unknowns, opening, weighted, tilt, slide, chosen, loads, gamma, compliance, response, factor)
+    across = (areas > 0) & (areas < scene.weight[active])
+    cut = np.where(across, -scene.weight[active] / (2 * scene.fade[active]) * pressure[active], 0.0)
+    return Linearised(
+        unknowns, opening, weighted, tilt, slide, chosen, loads, gamma, compliance, response, factor, normal, cut
+    )
 
 
 def asked_pressure(scene: Scene, projection: Projection, forces: Array) -> Array:
@@ -136,19 +147,32 @@ def asked_pressure(scene: Scene, projection: Projection, forces: Array) -> Array
     return np.maximum(trial, 0.0)
 
 
+@dataclass(frozen=True)
+class Outcome:
+    """End of an iteration: ``converged``, ``not_converged`` or ``under_resolved`` (no point is left in contact).
+
+    Attributes
+    ----------
+    state, projection
+        Last state and the closest points at its displacements.
+    iterations
+        Newton steps.
+    """
+
+    status: str
+    state: State
+    projection: Projection
+    iterations: int
+
+
 #: A solver yields (node places, foot points) and is sent the projection of its scene's contact points.
-Dialogue = Generator[tuple[Array, Array], Projection, tuple[str, State, int]]
+Dialogue = Generator[tuple[Array, Array], Projection, Outcome]
 
 
 def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
     """Solve one position from `state`, asking for projections by `yield` so that several positions can share them.
 
     A backtracking line search on the weighted pressure residual watches over all but the first steps.
-
-    Returns
-    -------
-    status, state, iterations
-        Status ``converged``, ``not_converged`` or ``under_resolved`` (no contact point is left in contact).
     """
     residual = np.inf
     projection = yield scene.placed(state.displacement), state.place
@@ -157,13 +181,13 @@ def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
     for iteration in range(1, MAX_ITERATIONS + 1):
         active = np.flatnonzero((wanted > 0) & ~unreached(projection.gap))
         if len(active) == 0:
-            return "under_resolved", state, iteration
+            return Outcome("under_resolved", state, projection, iteration)
         lin = linearise(scene, projection, active, state.pressure)
         aim = _step(scene, lin, active, projection, state)
         before = scene.areas(projection.place)
         total = float(scene.weight @ np.abs(aim.pressure))
         if not np.isfinite(total) or total > limit:
-            return "not_converged", state, iteration
+            return Outcome("not_converged", state, projection, iteration)
         length, best = 1.0, None
         for _ in range(6):
             tried = _between(state, aim, length)
@@ -181,8 +205,8 @@ def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
         assert best is not None
         residual, state, projection, wanted = best
         if residual < max(tolerance, _rounding(scene, wanted, projection)):
-            return "converged", State(state.pressure, state.forces, state.displacement, projection.place), iteration
-    return "not_converged", state, MAX_ITERATIONS
+            return Outcome("converged", state, projection, iteration)
+    return Outcome("not_converged", state, projection, MAX_ITERATIONS)
 
 
 def _rounding(scene: Scene, wanted: Array, projection: Projection) -> float:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .closest import Chains, Projection, chains_of, nearest_places, project
+from .closest import Projection, chains_of, nearest_places, project
 from .compliance import GearBody
 from .flank import edge_nodes
 from .laws import ContactLaw
@@ -156,8 +156,8 @@ class Scene:
         Window that carries each contact point.
     pair : ndarray, shape (q,)
         Tooth pair of each contact point.
-    rigid_gap, place : ndarray, shape (q,)
-        Gap (m) and closest place of the undeformed bodies.
+    rigid : Projection
+        Closest points of the undeformed bodies.
     """
 
     windows: tuple[Window, ...]
@@ -176,8 +176,7 @@ class Scene:
     parameter: Array
     owner: IntArray
     pair: IntArray
-    rigid_gap: Array
-    place: Array
+    rigid: Projection
 
     @property
     def pairs(self) -> int:
@@ -198,25 +197,42 @@ class Scene:
         return self.weight * np.clip(0.5 + (self.counts[self.mate] - place) / (2 * self.fade), 0.0, 1.0)
 
 
+@dataclass(frozen=True)
+class _Chained:
+    """What a scene gives to a common search for closest points."""
+
+    counts: IntArray
+    mate: IntArray
+    fade: Array
+
+
 def project_all(scenes: Sequence[Scene], nodes: Sequence[Array], places: Sequence[Array]) -> list[Projection]:
-    """Closest points of several scenes in one pass (numpy's cost per call is then shared)."""
-    counts, mates, offset, windows = [], [], [], 0
-    reach = np.concatenate([scene.fade for scene in scenes])
-    node = 0
-    for scene in scenes:
-        counts.append(scene.counts)
-        mates.append(scene.mate + windows)
-        windows += len(scene.counts)
-        offset.append(node)
-        node += len(scene.points)
-    chains: Chains = chains_of(np.concatenate(nodes), np.concatenate(counts), np.concatenate(mates), reach)
-    slave = np.concatenate([scene.slaves(x) for scene, x in zip(scenes, nodes, strict=True)])
-    found = project(slave, chains, np.concatenate(places))
-    made, first = [], 0
-    for scene, start in zip(scenes, offset, strict=True):
-        part = found.take(slice(first, first + len(scene.mate)))
-        made.append(replace(part, edge=part.edge - start))
-        first += len(scene.mate)
+    """Closest points of several scenes in one pass (numpy's cost per call is then shared).
+
+    Parameters
+    ----------
+    nodes, places
+        For each scene the places of its nodes (m) and where to start on the mates' chains.
+    """
+    slaves = [scene.slaves(x) for scene, x in zip(scenes, nodes, strict=True)]
+    return _project([_Chained(s.counts, s.mate, s.fade) for s in scenes], nodes, slaves, places)
+
+
+def _project(
+    parts: Sequence[_Chained], nodes: Sequence[Array], slaves: Sequence[Array], places: Sequence[Array]
+) -> list[Projection]:
+    windows = np.cumsum([0, *(len(p.counts) for p in parts)])
+    mates = [p.mate + first for p, first in zip(parts, windows, strict=False)]
+    reach = np.concatenate([p.fade for p in parts])
+    counts = np.concatenate([p.counts for p in parts])
+    chains = chains_of(np.concatenate(nodes), counts, np.concatenate(mates), reach)
+    found = project(np.concatenate(slaves), chains, np.concatenate(places))
+    made, first, node = [], 0, 0
+    for part, own in zip(parts, nodes, strict=True):
+        one = found.take(slice(first, first + len(part.mate)))
+        made.append(replace(one, edge=one.edge - node))
+        first += len(part.mate)
+        node += len(own)
     return made
 
 
@@ -228,6 +244,30 @@ def turn(angle: float) -> Array:
 
 def assemble(pair: MeshingPair, windows: Sequence[Window]) -> Scene:
     """Gather places, contact points and compliances of the given pieces of flank."""
+    return assemble_all(pair, [windows])[0]
+
+
+def assemble_all(pair: MeshingPair, positions: Sequence[Sequence[Window]]) -> list[Scene]:
+    """Scenes of several positions, given by their windows; see `assemble`."""
+    parts = [_gathered(pair, windows) for windows in positions]
+    chained = [_Chained(p["counts"], p["mate"], p["fade"]) for p in parts]
+    slaves = [np.matmul(p["slave_shapes"][:, None, :], p["points"][p["slave_nodes"]])[:, 0, :] for p in parts]
+    starts = []
+    for windows, part, slave in zip(positions, parts, slaves, strict=True):
+        start = np.empty(len(slave))
+        for i in np.unique(part["owner"]):
+            rows = part["owner"] == i
+            start[rows] = nearest_places(slave[rows], part["points"][windows[i ^ 1].nodes])
+        starts.append(start)
+    rigid = _project(chained, [p["points"] for p in parts], slaves, starts)
+    return [
+        Scene(windows=tuple(windows), rigid=one, **part)
+        for windows, part, one in zip(positions, parts, rigid, strict=True)
+    ]
+
+
+def _gathered(pair: MeshingPair, windows: Sequence[Window]) -> dict[str, NDArray]:
+    """Attributes of a scene except its windows and closest points."""
     count = windows[-1].nodes.stop
     points, rotation = np.empty((count, 2)), np.empty((count, 2, 2))
     of_wheel = np.zeros(count, dtype=bool)
@@ -238,27 +278,16 @@ def assemble(pair: MeshingPair, windows: Sequence[Window]) -> Scene:
         of_wheel[w.nodes] = bool(w.gear)
     sides = pair.law.sides
     slaves = [i for i, w in enumerate(windows) if sides == "both" or (sides == "pinion") == (w.gear == 0)]
-    columns = _contact_points(pair, windows, slaves)
-    counts = np.array([w.edges for w in windows])
-    slave = np.matmul(columns["slave_shapes"][:, None, :], points[columns["slave_nodes"]])[:, 0, :]
-    start = np.empty(len(slave))
-    for i in slaves:
-        rows = columns["owner"] == i
-        start[rows] = nearest_places(slave[rows], points[windows[i ^ 1].nodes])
-    rigid = project(slave, chains_of(points, counts, columns["mate"], columns["fade"]), start)
-    return Scene(
-        windows=tuple(windows),
-        counts=counts,
-        points=points,
-        rotation=rotation,
-        of_wheel=of_wheel,
-        wheel_centre=pair.centre(1),
-        compliance=_compliance(pair, windows, count),
-        stress=_stress(pair, windows, slaves, count),
-        rigid_gap=rigid.gap,
-        place=rigid.place,
-        **columns,
-    )
+    return {
+        "counts": np.array([w.edges for w in windows]),
+        "points": points,
+        "rotation": rotation,
+        "of_wheel": of_wheel,
+        "wheel_centre": pair.centre(1),
+        "compliance": _compliance(pair, windows, count),
+        "stress": _stress(pair, windows, slaves, count),
+        **_contact_points(pair, windows, slaves),
+    }
 
 
 def _contact_points(pair: MeshingPair, windows: Sequence[Window], slaves: list[int]) -> dict[str, NDArray]:

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .closest import Projection
-from .newton import Dialogue, Linearised, State, linearise, newton
+from .newton import Dialogue, Linearised, Outcome, State, linearise, newton
 from .overlap import Overlap, overlaps, rigidly_apart, windows_of
-from .scene import MeshingPair, Scene, assemble, project_all
+from .scene import MeshingPair, Scene, assemble, assemble_all, project_all
 from .start import starting_state
 
 Array = NDArray[Any]
@@ -105,31 +105,30 @@ def _solve_batch(pair: MeshingPair, angles: Array, twists: Array, tolerance: flo
     found = overlaps(pair, angles, twists)
     windows = [windows_of(pair, one, a, t) for one, a, t in zip(found, angles, twists, strict=True)]
     positions: list[Position | None] = [None] * len(angles)
-    for group in _groups([w[-1].nodes.stop if w else 0 for w in windows]):
-        scenes, places = [], []
-        for i in group:
-            if not windows[i]:
-                clear = rigidly_apart(pair, angles[i], twists[i])
-                positions[i] = _unsolved("no_contact" if clear else "under_resolved")
-                continue
-            scene = assemble(pair, windows[i])
-            if not (scene.rigid_gap < 0).any():
-                positions[i] = _unsolved("under_resolved")
-                continue
-            scenes.append(scene)
-            places.append(i)
+    for i in (i for i, w in enumerate(windows) if not w):
+        clear = rigidly_apart(pair, angles[i], twists[i])
+        positions[i] = _unsolved("no_contact" if clear else "under_resolved")
+    facing = [i for i, w in enumerate(windows) if w]
+    for group in _groups([windows[i][-1].nodes.stop for i in facing]):
+        places = [facing[k] for k in group]
+        scenes = assemble_all(pair, [windows[i] for i in places])
+        seen = [(scene.rigid.gap < 0).any() for scene in scenes]
+        for i in (i for i, one in zip(places, seen, strict=True) if not one):
+            positions[i] = _unsolved("under_resolved")
+        places = [i for i, one in zip(places, seen, strict=True) if one]
+        scenes = [scene for scene, one in zip(scenes, seen, strict=True) if one]
         outcomes = _side_by_side(scenes, [newton(s, _start(pair, s), tolerance) for s in scenes])
-        for i, scene, (status, state, steps) in zip(places, scenes, outcomes, strict=True):
-            if status != "converged" or _outgrown(pair, scene, state):
-                positions[i] = _with_care(pair, angles[i], twists[i], found[i], steps, tolerance)
+        for i, scene, outcome in zip(places, scenes, outcomes, strict=True):
+            if outcome.status != "converged" or _outgrown(pair, scene, outcome):
+                positions[i] = _with_care(pair, angles[i], twists[i], found[i], outcome.iterations, tolerance)
             else:
-                positions[i] = _finish(scene, state, steps)
+                positions[i] = _finish(scene, outcome, outcome.iterations)
     return [p for p in positions if p is not None]
 
 
 def _groups(nodes: Sequence[int]) -> list[list[int]]:
     """Consecutive positions whose dense matrices, of `nodes` nodes each, fit into `GROUP_BYTES` together."""
-    groups: list[list[int]] = [[]]
+    groups: list[list[int]] = [[]] if nodes else []
     held = 0
     for i, count in enumerate(nodes):
         size = 8 * 3 * (2 * count) ** 2  # compliance, and about twice as many stress rows
@@ -143,12 +142,12 @@ def _groups(nodes: Sequence[int]) -> list[list[int]]:
 
 def _start(pair: MeshingPair, scene: Scene) -> State:
     pressure, forces = starting_state(pair, scene)
-    return State(pressure, forces, scene.compliance @ forces, scene.place)
+    return State(pressure, forces, scene.compliance @ forces, scene.rigid.place)
 
 
-def _side_by_side(scenes: Sequence[Scene], dialogues: Sequence[Dialogue]) -> list[tuple[str, State, int]]:
+def _side_by_side(scenes: Sequence[Scene], dialogues: Sequence[Dialogue]) -> list[Outcome]:
     """Run all iterations to their ends, answering their requests for projections together."""
-    outcomes: dict[int, tuple[str, State, int]] = {}
+    outcomes: dict[int, Outcome] = {}
     requests: dict[int, tuple[Array, Array]] = {i: next(d) for i, d in enumerate(dialogues)}
     while requests:
         waiting = list(requests)
@@ -163,10 +162,9 @@ def _side_by_side(scenes: Sequence[Scene], dialogues: Sequence[Dialogue]) -> lis
     return [outcomes[i] for i in range(len(scenes))]
 
 
-def _outgrown(pair: MeshingPair, scene: Scene, state: State) -> bool:
+def _outgrown(pair: MeshingPair, scene: Scene, outcome: Outcome) -> bool:
     """Whether the contact reaches the rim of a window that could be larger, or what lies behind it."""
-    loaded = state.pressure > 0
-    found = project_all([scene], [scene.placed(state.displacement)], [state.place])[0]
+    loaded, found = outcome.state.pressure > 0, outcome.projection
     for i, w in enumerate(scene.windows):
         mine = np.flatnonzero(scene.owner == i)
         first, last = w.first_edge > 0, w.first_edge + w.edges < pair.bodies[w.gear].flank.edges
@@ -185,39 +183,39 @@ def _with_care(
 ) -> Position:
     """Second attempt on the whole overlap; where that fails too, the twist is raised in steps, each from the last."""
     scene = assemble(pair, windows_of(pair, found, angle, twist, share=1.5))
-    status, state, more = _alone(scene, _start(pair, scene), tolerance)
-    steps += more
+    outcome = _alone(scene, _start(pair, scene), tolerance)
+    steps += outcome.iterations
     done, step, last = 0.0, 0.25, None
-    while status != "converged" and step > 0.01 and steps < MAX_STEPS:
+    while outcome.status != "converged" and step > 0.01 and steps < MAX_STEPS:
         share = min(1.0, done + step)
         turned = tuple(replace(w, angle=pair.tooth_angle(w.gear, w.tooth, angle, share * twist)) for w in scene.windows)
         part = assemble(pair, turned)
-        if not (part.rigid_gap < 0).any():
+        if not (part.rigid.gap < 0).any():
             done = share
             if share >= 1.0:
                 break
             continue
-        start = _start(pair, part) if last is None else last.scaled(share / done)
-        outcome, state, more = _alone(part, start, tolerance)
-        steps += more
-        if outcome == "converged":
-            done, last, step = share, state, 1.5 * step
+        tried = _alone(part, _start(pair, part) if last is None else last.scaled(share / done), tolerance)
+        steps += tried.iterations
+        if tried.status == "converged":
+            done, step = share, 1.5 * step
+            last = replace(tried.state, place=tried.projection.place)
             if share >= 1.0:
-                scene, status = part, outcome
+                scene, outcome = part, tried
         else:
             step *= 0.5
-    return _finish(scene, state, steps) if status == "converged" else _unsolved(status, steps)
+    return _finish(scene, outcome, steps) if outcome.status == "converged" else _unsolved(outcome.status, steps)
 
 
-def _alone(scene: Scene, start: State, tolerance: float) -> tuple[str, State, int]:
+def _alone(scene: Scene, start: State, tolerance: float) -> Outcome:
     return _side_by_side([scene], [newton(scene, start, tolerance)])[0]
 
 
-def _finish(scene: Scene, state: State, iterations: int) -> Position:
+def _finish(scene: Scene, outcome: Outcome, iterations: int) -> Position:
+    state = outcome.state
     active = np.flatnonzero(state.pressure > 0)
     placed = scene.placed(state.displacement)
-    projection = project_all([scene], [placed], [state.place])[0]
-    lin = linearise(scene, projection, active, state.pressure)
+    lin = linearise(scene, outcome.projection, active, state.pressure)
     forces = np.zeros(2 * len(scene.points))
     forces[lin.unknowns] = lin.weighted @ state.pressure[active]
     force = np.matmul(scene.rotation, forces.reshape(-1, 2, 1))[:, :, 0]

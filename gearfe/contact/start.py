@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .closest import gap_rows, unreached
-from .scene import MeshingPair, Scene, project_all
+from .scene import MeshingPair, Scene
 
 Array = NDArray[Any]
 
@@ -20,15 +20,15 @@ def starting_state(pair: MeshingPair, scene: Scene) -> tuple[Array, Array]:
     follows from the force, b^2 = 4 F rho/(pi E* w) (Johnson, *Contact Mechanics*, 1985, eq. 4.43), with rho from the
     overlap, reach^2 = 2 rho depth.
     """
-    projection = project_all([scene], [scene.points], [scene.place])[0]
-    areas = scene.areas(scene.place)
-    overlapped = (scene.rigid_gap < 0) & (scene.place <= scene.counts[scene.mate])
+    projection = scene.rigid
+    areas = scene.areas(projection.place)
+    overlapped = (projection.gap < 0) & (projection.place <= scene.counts[scene.mate])
     slave = scene.slaves(scene.points)
     effective = 1 / sum(b.material.contact_compliance(b.plane) for b in pair.bodies)
     centre, depth, radius = _geometry(scene, slave, overlapped)
     nearest = np.array([_third_nearest(slave[scene.owner == i], centre[i]) for i in range(len(scene.windows))])
     distance = np.linalg.norm(slave - centre[scene.owner], axis=1)
-    reachable = ~unreached(scene.rigid_gap)
+    reachable = ~unreached(scene.rigid.gap)
     half_width = np.sqrt(0.12 * radius * np.maximum(depth, 0.0))
     forces, pressure = np.zeros(scene.pairs), np.zeros(len(areas))
     for _ in range(2):
@@ -44,7 +44,7 @@ def starting_state(pair: MeshingPair, scene: Scene) -> tuple[Array, Array]:
         slot = scene.pair[used, None, None] * size + unknown
         unit = np.bincount(slot.ravel(), weights=loads.ravel(), minlength=scene.pairs * size).reshape(-1, size)
         mutual = unit @ scene.compliance @ unit.T
-        overlap = -np.bincount(scene.pair, weights=shape * areas * scene.rigid_gap, minlength=scene.pairs)
+        overlap = -np.bincount(scene.pair, weights=shape * areas * scene.rigid.gap, minlength=scene.pairs)
         forces = _carried(mutual, overlap)
         half_width = np.sqrt(4 * forces * radius / (np.pi * effective * pair.width))
         pressure = forces[scene.pair] * shape
@@ -60,15 +60,15 @@ def _geometry(scene: Scene, slave: Array, overlapped: NDArray[np.bool_]) -> tupl
         if len(mine) == 0:
             own = np.flatnonzero(scene.owner == i)
             if len(own):
-                centre[i] = slave[own[np.argmin(scene.rigid_gap[own])]]
+                centre[i] = slave[own[np.argmin(scene.rigid.gap[own])]]
             continue
-        bottom = mine[np.argmin(scene.rigid_gap[mine])]
+        bottom = mine[np.argmin(scene.rigid.gap[mine])]
         centre[i] = slave[bottom]
         k = window.pair
-        depth[k] = max(depth[k], -scene.rigid_gap[bottom])
+        depth[k] = max(depth[k], -scene.rigid.gap[bottom])
         # curvature of the gap: least squares of gap + depth = s^2 / (2 rho) over the overlapped points
         square = np.sum((slave[mine] - slave[bottom]) ** 2, axis=1)
-        rise = scene.rigid_gap[mine] - scene.rigid_gap[bottom]
+        rise = scene.rigid.gap[mine] - scene.rigid.gap[bottom]
         slope = float(square @ rise)
         radius[k] = max(radius[k], float(square @ square) / (2 * slope) if slope > 0 else 0.0)
     return centre, depth, radius
