@@ -73,7 +73,7 @@ def twists_for_torque(
     found: list[Position | None] = [None] * len(angles)
     status = [NOT_REACHED] * len(angles)
     iterations, failures = np.zeros(len(angles), dtype=np.int64), np.zeros(len(angles), dtype=np.int64)
-    missed = np.zeros(len(angles), dtype=bool)
+    missed, below = np.zeros(len(angles), dtype=bool), np.zeros(len(angles), dtype=bool)
     open_ = np.arange(len(angles))
     for _ in range(MAX_SOLUTIONS):
         if len(open_) == 0:
@@ -91,12 +91,16 @@ def twists_for_torque(
                     continue
                 low[i], high[i] = (twist[i], high[i]) if excess < 0 else (low[i], twist[i])
                 missed[i] &= excess >= 0
+                below[i] |= excess < 0
                 step = -excess / position.tangent if position.tangent > 0 else 0.0
             elif position.status == "not_converged":
                 failures[i] += 1
                 if failures[i] == MAX_FAILURES:
                     continue
-                high[i] = twist[i]
+                if below[i]:
+                    high[i] = twist[i]
+                else:  # first guesses are low rather than high: double the twist
+                    step = twist[i] - touching[i]
             else:
                 low[i], missed[i] = twist[i], position.status == "under_resolved"
             tried = twist[i] + step
