@@ -141,12 +141,11 @@ def nearest_places(points: Array, chain: Array) -> Array:
     return 0.5 * np.argmin(x * x + y * y, axis=1).astype(np.float64)
 
 
-def project(
-    slave: Array, chains: Chains, place: Array, *, iterations: int = 15, tolerance: float = 1e-12
-) -> Projection:
+def project(slave: Array, chains: Chains, place: Array, *, iterations: int = 15, tolerance: float = 1e-7) -> Projection:
     """Closest points by Newton's method along the chain, from the starting places `place`, shape (n,).
 
-    Points whose projection runs off either end of the chain get the gap `OFF_END`.
+    Points whose projection runs off either end of the chain get the gap `OFF_END`. `tolerance` is on the last step along
+    the chain (edges); what is left after it is of its square.
     """
     place = place.copy()
     last = chains.edges + chains.reach
