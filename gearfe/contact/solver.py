@@ -28,7 +28,7 @@ BATCH = 16
 #: Memory for the matrices of positions that are solved side by side.
 GROUP_BYTES = 60e6
 #: Newton steps spent on one difficult position before it is given up.
-MAX_STEPS = 160
+MAX_STEPS = 320
 
 
 @dataclass(frozen=True)
