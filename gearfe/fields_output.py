@@ -25,29 +25,34 @@ Array = NDArray[Any]
 
 
 def chosen_positions(curve: StiffnessCurve, angles_deg: Sequence[float] | None) -> NDArray[np.int64]:
-    """Numbers of the positions of a curve at given pinion angles (deg); all that have a solution without them.
+    """Numbers of the positions of a curve at given pinion angles (deg), all without them, in the order of the angles.
+
+    Positions without a solution are left out.
+    """
+    if angles_deg is None:
+        found = np.arange(len(curve.pinion_angle))
+    else:
+        found = np.unique(angle_numbers(np.degrees(curve.pinion_angle), angles_deg))
+    found = found[curve.status[found] == "converged"]
+    return found[np.argsort(curve.pinion_angle[found], kind="stable")]
+
+
+def angle_numbers(known_deg: Array, angles_deg: Sequence[float]) -> NDArray[np.int64]:
+    """Numbers of given angles among the sweep's angles (deg).
 
     Raises
     ------
     InputError
-        For an angle that is not among the curve's, or whose position has no contact or failed.
+        For an angle that is none of them.
     """
-    solved = curve.status == "converged"
-    if angles_deg is None:
-        if not solved.any():
-            raise InputError("--fields", "all", "no position has a solution with contact", "use more load")
-        return np.flatnonzero(solved)
-    known = np.degrees(curve.pinion_angle)
     found = []
     for angle in angles_deg:
-        nearest = int(np.argmin(np.abs(known - angle)))
-        if not abs(known[nearest] - angle) <= 1e-6:
-            problem = f"is none of the sweep's angles; the nearest is {known[nearest]:.6g} deg"
+        nearest = int(np.argmin(np.abs(known_deg - angle)))
+        if not abs(known_deg[nearest] - angle) <= 1e-6:
+            problem = f"is none of the sweep's angles; the nearest is {known_deg[nearest]:.6g} deg"
             raise InputError("--fields", angle, problem, "choose one of them, or change --angles")
-        if not solved[nearest]:
-            raise InputError("--fields", angle, f"has no solution: {curve.status[nearest]}", "choose another angle")
         found.append(nearest)
-    return np.array(found)
+    return np.array(found, dtype=np.int64)
 
 
 def write_fields(
@@ -61,6 +66,8 @@ def write_fields(
 ) -> list[str]:
     """Write ``fields.vtkhdf`` (time: pinion angle in deg) and pictures; return the files' names.
 
+    Without a single solution nothing is written.
+
     Parameters
     ----------
     folder
@@ -69,6 +76,8 @@ def write_fields(
         Pinion angles (deg) out of the curve's; None writes all, and the picture of the most stressed one only.
     """
     chosen = chosen_positions(curve, angles_deg)
+    if len(chosen) == 0:
+        return []
     recovery = pair_recovery(elastic)
     names = ["fields.vtkhdf"]
     worst: tuple[float, int, tuple[GearField, GearField]] | None = None

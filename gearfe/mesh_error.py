@@ -68,7 +68,7 @@ def _stress(slope: Floats, material: SolidMaterial) -> Floats:
 
 def _energy(stress: Floats, material: SolidMaterial) -> Floats:
     """Twice the energy density ``sigma : C^-1 : sigma`` (Pa)."""
-    nu, e = material.poissons_ratio, material.youngs_modulus
+    nu, e = material.poisson_ratio, material.youngs_modulus
     trace = stress[..., :3].sum(axis=-1)
     squares = (stress[..., :3] ** 2).sum(axis=-1) + 2.0 * (stress[..., 3:] ** 2).sum(axis=-1)
     return np.asarray(((1.0 + nu) * squares - nu * trace**2) / e)

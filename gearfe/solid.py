@@ -47,20 +47,20 @@ class SolidMaterial:
     ----------
     youngs_modulus
         Young's modulus E (Pa).
-    poissons_ratio
+    poisson_ratio
         Poisson's ratio nu, between -1 and 0.5.
     density
         Density rho (kg/m3).
     """
 
     youngs_modulus: float = 200e9
-    poissons_ratio: float = 0.3
+    poisson_ratio: float = 0.3
     density: float = 7850.0
 
     def __post_init__(self) -> None:
         for name, low, high in (
             ("youngs_modulus", 0.0, math.inf),
-            ("poissons_ratio", -1.0, 0.5),
+            ("poisson_ratio", -1.0, 0.5),
             ("density", 0.0, math.inf),
         ):
             value = getattr(self, name)
@@ -71,15 +71,13 @@ class SolidMaterial:
     def lame_lambda(self) -> float:
         """First Lame constant (Pa)."""
         return (
-            self.youngs_modulus
-            * self.poissons_ratio
-            / ((1.0 + self.poissons_ratio) * (1.0 - 2.0 * self.poissons_ratio))
+            self.youngs_modulus * self.poisson_ratio / ((1.0 + self.poisson_ratio) * (1.0 - 2.0 * self.poisson_ratio))
         )
 
     @property
     def shear_modulus(self) -> float:
         """Shear modulus mu = G (Pa)."""
-        return self.youngs_modulus / (2.0 * (1.0 + self.poissons_ratio))
+        return self.youngs_modulus / (2.0 * (1.0 + self.poisson_ratio))
 
 
 class SolidMatrices(NamedTuple):

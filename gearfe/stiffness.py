@@ -73,7 +73,8 @@ def elastic_pair(
     """
     if plane not in ("strain", "stress"):
         raise InputError("plane", plane, "must be strain or stress")
-    if not (math.isfinite(coarsen) and 0.2 <= coarsen <= 5.0):
+    # the error estimate of a mesh at the limit is coarser by COARSENING
+    if not (math.isfinite(coarsen) and 0.2 <= coarsen <= 5.0 * COARSENING):
         raise InputError("coarsen", coarsen, "must be >= 0.2 and <= 5", "1 is the default mesh, 2 twice its sizes")
     chosen = law_named(law) if isinstance(law, str) else law
     both = (materials, materials) if isinstance(materials, Material) else materials

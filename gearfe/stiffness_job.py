@@ -73,6 +73,12 @@ class StiffnessJob:
         if t.twist_deg is None and t.torque_Nm is None:
             cure = "add twist_deg or torque_Nm to [stiffness], or give --twist-deg or --torque-Nm"
             raise InputError("stiffness.twist_deg", None, "no load: neither twist_deg nor torque_Nm is given", cure)
+        if t.twist_deg is not None:
+            lost = math.degrees(self.pair.contact_twist) if t.twist_from == "contact" else 0.0
+            most = 180.0 / self.pair.wheel.teeth - lost
+            if not t.twist_deg < most:
+                problem = f"must be < {most:.6g} deg, half a pitch of the wheel"
+                raise InputError("stiffness.twist_deg", t.twist_deg, problem, "0.01 to 0.5 deg is usual")
         return {
             "twist": None if t.twist_deg is None else _radians(t.twist_deg),
             "torque": t.torque_Nm,

@@ -111,9 +111,16 @@ def warnings(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
     if curve.failed.any():
         angles = ", ".join(f"{a:.6g}" for a in np.degrees(curve.pinion_angle[curve.failed])[:8])
         more = " ..." if curve.failed.sum() > 8 else ""
+        cure = "use less load or a finer mesh (coarsen below 1)"
+        if set(curve.status[curve.failed]) == {"under_resolved"}:
+            cure = "no contact point overlaps there: use another load (more, if it is small) or a finer mesh"
         said.append(
             f"{int(curve.failed.sum())} positions failed and have no numbers, only their status (pinion angle {angles}"
-            f"{more} deg): use less load or a finer mesh (coarsen below 1)"
+            f"{more} deg): {cure}"
+        )
+    if job.table.law == "penalty":
+        said.append(
+            "peak pressures of the penalty law oscillate from point to point and are too high: use nitsche for them"
         )
     return said
 

@@ -146,7 +146,7 @@ def test_stress_below_a_line_contact(elastic, position, fields):
 
 def test_choosing_positions(gears, elastic):
     curve: StiffnessCurve = sweep_stiffness(gears, twist=TWIST, angles=np.radians([1.0, 2.0, 3.0]), elastic=elastic)
-    assert list(chosen_positions(curve, [3.0, 1.0])) == [2, 0]
+    assert list(chosen_positions(curve, [3.0, 1.0, 3.0])) == [0, 2]
     assert list(chosen_positions(curve, None)) == [0, 1, 2]
     with pytest.raises(InputError, match=r"none of the sweep's angles; the nearest is 3 deg"):
         chosen_positions(curve, [3.4])

@@ -181,7 +181,7 @@ def test_free_housing() -> None:
         ({"wall_thicknes_mm": [6.0, 4.5]}, "did you mean 'wall_thickness_mm'"),
         ({"mesh": {"order": 3}}, "order"),
         ({"mesh": {"size": 3}}, "size_mm"),
-        ({"material": {"poissons_ratio": 0.5}}, "poissons_ratio"),
+        ({"material": {"poisson_ratio": 0.5}}, "poisson_ratio"),
         ({"damping": {"ratio": -0.01}}, "ratio"),
         ({"reduction": {"solver": "mumps"}, "mesh": {"size_mm": 30.0}}, "solver"),
     ],

@@ -133,7 +133,7 @@ def lame_errors(divisions: int) -> tuple[float, float]:
     u = np.zeros(nodes.size)
     u[free] = spsolve(k[free][:, free].tocsc(), force.ravel()[free])
     # Timoshenko, Goodier, Theory of Elasticity, 3rd ed., art. 28, plane strain
-    nu, e = STEEL.poissons_ratio, STEEL.youngs_modulus
+    nu, e = STEEL.poisson_ratio, STEEL.youngs_modulus
     exact = (1 + nu) / e * pressure * inner**2 / (outer**2 - inner**2) * ((1 - 2 * nu) * inner + outer**2 / inner)
     work = pressure * exact * 0.3 * inner * np.pi / 2
     radial = u.reshape(-1, 3)[np.abs(nodes[:, 1]) + np.abs(nodes[:, 0] - inner) < 1e-9, 0]
@@ -236,7 +236,7 @@ def test_mesh_error_estimate_follows_the_true_error() -> None:
 
 @pytest.mark.parametrize(
     ("values", "name"),
-    [((0.0, 0.3, 1.0), "youngs_modulus"), ((1.0, 0.5, 1.0), "poissons_ratio"), ((1.0, 0.3, -1.0), "density")],
+    [((0.0, 0.3, 1.0), "youngs_modulus"), ((1.0, 0.5, 1.0), "poisson_ratio"), ((1.0, 0.3, -1.0), "density")],
 )
 def test_impossible_materials_are_named(values: tuple[float, float, float], name: str) -> None:
     with pytest.raises(InputError, match=name):

@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     from ..errors import InputError
     from ..housing.build import material, reduced_housing
     from ..mesh_error import frequency_errors
-    from ..output.files import output_folder
+    from ..output.files import output_folder, whole_set
     from ..reduction_error import reduction_error
 
     if args.modes < 1:
@@ -48,8 +48,9 @@ def run(args: argparse.Namespace) -> int:
     mesh[body.coupled.frequencies_hz[:shown] <= 0.0] = 0.0
     left_out = reduction_error(body, table.reduction.band_Hz)
     _report(body, mesh, left_out, seconds)
-    _write(folder, body, fields, mesh, left_out)
-    problem = "" if args.no_pictures else _draw(folder, body, fields)
+    with whole_set(folder) as made:
+        _write(made, body, fields, mesh, left_out)
+        problem = "" if args.no_pictures else _draw(made, body, fields)
     if problem:
         print(f"warning: no pictures: {problem}")
     print(f"results in {folder}")

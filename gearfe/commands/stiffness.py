@@ -53,6 +53,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compute the curve and write the files; 1 when a position failed."""
     started = time.perf_counter()
+    import numpy as np
+
     from ..output.files import output_folder, whole_set, write_json
     from ..stiffness import elastic_pair, sweep_stiffness
     from ..stiffness_job import read_stiffness_job
@@ -64,6 +66,10 @@ def run(args: argparse.Namespace) -> int:
         job = overridden(read_stiffness_job(args.job), args)
         sweep = job.sweep
         chosen = None if args.fields is None else _field_angles(args.fields)
+        if isinstance(chosen, list):
+            from ..fields_output import angle_numbers
+
+            angle_numbers(np.degrees(sweep["angles"]), chosen)
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
     elastic = elastic_pair(job.pair, watch=watch, **job.model)
     show = Progress()

@@ -144,8 +144,8 @@ def nearest_places(points: Array, chain: Array) -> Array:
 def project(slave: Array, chains: Chains, place: Array, *, iterations: int = 15, tolerance: float = 1e-7) -> Projection:
     """Closest points by Newton's method along the chain, from the starting places `place`, shape (n,).
 
-    Points whose projection runs off either end of the chain get the gap `OFF_END`. `tolerance` is on the last step along
-    the chain (edges); what is left after it is of its square.
+    Points whose projection runs off either end of the chain get the gap `OFF_END`. `tolerance` is on the last step
+    along the chain (edges); what is left after it is of its square.
     """
     place = place.copy()
     last = chains.edges + chains.reach

@@ -119,6 +119,13 @@ def bore_attachment(bore: Bore | Sequence[Any], number: int, nodes: Floats) -> t
         )
         problem = f"no node lies within {made.radius:g} m of the axis: {nearest}"
         raise InputError(field, None, problem, "check point, direction, radius and range (metres)")
+    deep = radial[chosen] < 0.8 * made.radius  # nodes on chords of six edges a circle stand at 0.87 of it
+    if deep.any():
+        problem = (
+            f"{int(deep.sum())} of its {len(chosen)} nodes lie deep inside the radius (the nearest "
+            f"{radial[chosen].min():.6g} m from the axis): that is material, not a bore"
+        )
+        raise InputError(f"{field}.radius", made.radius, problem, "give the bore's own radius in metres, and its axis")
     begin, end = float(height[chosen].min()), float(height[chosen].max())
     notes: tuple[str, ...] = ()
     if not (math.isfinite(first) and math.isfinite(last)):

@@ -39,7 +39,7 @@ def housing_from_table(table: HousingTable) -> Housing:
 def material(table: HousingTable) -> SolidMaterial:
     """The housing's material in SI units."""
     given = table.material
-    return SolidMaterial(1e9 * given.youngs_modulus_GPa, given.poissons_ratio, given.density_kg_per_m3)
+    return SolidMaterial(1e9 * given.youngs_modulus_GPa, given.poisson_ratio, given.density_kg_per_m3)
 
 
 def bores(table: HousingTable) -> list[Bore]:

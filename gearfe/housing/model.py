@@ -224,6 +224,8 @@ class Housing:
             free=len(self.fixed) == 0,
             solver=solver,
         )
+        if len(found.mass) == 0:
+            raise InputError("modes", modes, "leaves no coordinate: there is no attachment either", "keep a mode")
         motions = rigid_motions(self.nodes)
         count = len(self.attachments)
         return ModalBody(
