@@ -301,3 +301,33 @@ def test_the_script(tmp_path):
     assert done.returncode == 0, done.stderr
     curve = StiffnessCurve.from_csv(tmp_path / "k.csv")
     assert list(np.round(np.degrees(curve.pinion_angle), 9)) == [1, 2, 3, 4]
+
+
+def test_the_estimate_reaches_beyond_the_coarsest_mesh(tmp_path, capsys):
+    options = ("--twist-deg", "0.05", "--angles", "2", "6", "8", "--coarsen", "4.5", "--no-picture")
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path), *options]) == 0
+    assert "discretisation error" in capsys.readouterr().out
+
+
+def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
+    """Angles are sorted; one without a solution is left out of the series, and the table has its status."""
+    solve = solver.solve_positions
+
+    def one_fails(pair, angles, twists, **options):
+        made = solve(pair, angles, twists, **options)
+        bad = np.isclose(np.degrees(angles), 6.0)
+        return [solver._unsolved("not_converged", 40) if b else p for p, b in zip(made, bad, strict=True)]
+
+    monkeypatch.setattr("gearfe.sweep_positions.solve_positions", one_fails)
+    options = ("--twist-deg", "0.05", "--angles", "3", "3", "9", "--fields", "9", "6", "3", "--no-picture")
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options]) == 1
+    assert [r["status"] for r in rows(tmp_path)] == ["converged", "not_converged", "converged"]
+    assert {p.name for p in tmp_path.glob("stress_*.png")} == {"stress_3deg.png", "stress_9deg.png"}
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options[:6], "--fields", "5.3"]) == 2
+    assert "none of the sweep's angles" in capsys.readouterr().err
+
+
+def test_penalty_says_that_its_pressures_are_rough(tmp_path, capsys):
+    options = ("--twist-deg", "0.05", "--angles", "3", "3", "6", "--law", "penalty", "--no-picture")
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options]) == 0
+    assert "use nitsche" in capsys.readouterr().err
