@@ -178,6 +178,8 @@ def test_free_housing() -> None:
         ({"mesh": {"order": 3}}, "order"),
         ({"mesh": {"size": 3}}, "size_mm"),
         ({"material": {"poisson_ratio": 0.5}}, "poisson_ratio"),
+        ({"mesh": {"size_mm": 1e-3}}, "more than 2000000 elements"),
+        ({"reduction": {"modes": 100000}}, "modes"),
         ({"damping": {"ratio": -0.01}}, "ratio"),
         ({"reduction": {"solver": "mumps"}, "mesh": {"size_mm": 30.0}}, "solver"),
     ],

@@ -64,13 +64,19 @@ class HousingMeshTable:
     mass: str = quantity("exact", choices=("exact", "4-point"), doc="mass integration; 4-point as in CalculiX")
 
 
+#: Elements beyond which a mesh is taken for a mistake.
+MOST_ELEMENTS = 2_000_000
+
+
 @dataclass(frozen=True)
 class HousingReductionTable:
     """What is kept of the full model."""
 
-    modes: int | None = quantity(None, low=0, doc="number of modes with the bores held; left out: by frequency")
+    modes: int | None = quantity(
+        None, low=0, high=2000, doc="number of modes with the bores held; left out: by frequency"
+    )
     modes_below_Hz: float = quantity(10000.0, above=0.0, doc="highest frequency of the modes kept (Hz)")
-    least_modes: int = quantity(40, low=0, doc="modes kept at least when they are chosen by frequency")
+    least_modes: int = quantity(40, low=0, high=2000, doc="modes kept at least when they are chosen by frequency")
     quasi_static_levels: int = quantity(1, low=0, high=6, doc="levels of quasi-static corrections; 0 for none")
     band_Hz: float = quantity(5000.0, above=0.0, doc="highest frequency of interest, for the error estimate (Hz)")
     solver: str = quantity("auto", doc="sparse solver: auto, metis-superlu, pardiso, cholmod, superlu")
@@ -122,6 +128,18 @@ class HousingTable:
             self._check_shaft(shaft, f"{where}.shafts[{number}]")
         for first, second in itertools.combinations(self.shafts, 2):
             _check_apart(first, second, where)
+        self._check_size(f"{where}.mesh")
+
+    def _check_size(self, where: str) -> None:
+        """A size that makes more elements than any machine here holds is a slip of the unit."""
+        length, height = (b - a for a, b in (self.wall_x_mm, self.wall_z_mm))
+        depth = self.inner_gap_mm + sum(self.wall_thickness_mm)
+        walls = height * (length * sum(self.wall_thickness_mm) + depth * sum(self.end_wall_thickness_mm))
+        volume = walls + length * depth * (self.base_thickness_mm + self.cover_thickness_mm)
+        least = (volume / (0.12 * MOST_ELEMENTS)) ** (1 / 3)  # a tetrahedron of edge h fills about 0.12 h^3
+        if self.mesh.size_mm < least:
+            problem = f"makes more than {MOST_ELEMENTS} elements of this housing: must be >= {least:.3g}"
+            raise InputError(f"{where}.size_mm", self.mesh.size_mm, problem, "choose a larger size (mm)")
 
     def _check_feet(self, where: str) -> None:
         feet, depth = self.feet, self.inner_gap_mm + sum(self.wall_thickness_mm)
