@@ -9,4 +9,5 @@ COMMANDS: dict[str, str] = {
     "stiffness": "stiffness",
     "gear": "gear",
     "mesh": "mesh",
+    "mechanism": "mechanism",
 }

@@ -1,0 +1,167 @@
+"""One mechanism file from start to files: what ``gearfe mechanism`` does."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time as clock
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..output.files import output_folder, write_csv, write_json
+from ..rigid import Start, Trajectory, integrate
+from ..rigid.backend import affordable_steps, compiled_is_ready
+from .model import Mechanism, load_mechanism
+from .results import Results, evaluate, reactions
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What was done: whether the end was reached, a text for people, the summary."""
+
+    complete: bool
+    text: str
+    summary: dict[str, Any]
+
+
+def run_mechanism(
+    path: str | Path,
+    out: str | Path,
+    *,
+    tolerance: float | None = None,
+    method: str | None = None,
+    until: float | None = None,
+    reactions: bool = False,
+    figures: bool = True,
+    animation: bool = False,
+) -> Outcome:
+    """Read the file, integrate, write ``trajectory.csv``, ``energy.csv``, ``summary.json`` and what else is asked."""
+    began = clock.perf_counter()
+    mechanism = load_mechanism(path)
+    run = mechanism.file.run
+    end = run.end_s if until is None else until
+    if not (math.isfinite(end) and end > 0.0):
+        raise InputError("--until", end, "must be finite and > 0 s", "give the end of the run")
+    folder = output_folder(out)
+    start = mechanism.start()
+    read = clock.perf_counter()
+    times = output_times(end, run.step_s)
+    trajectory = quickest(mechanism, times, start, method or run.method, tolerance or run.tolerance)
+    integrated = clock.perf_counter()
+    if len(trajectory.dense.times) < 2:
+        raise InputError("start", None, trajectory.message, "give the bodies start velocities, or another start position")
+    results = evaluate(mechanism, trajectory)
+    write_tables(folder, mechanism, results, reactions or run.reactions)
+    written = clock.perf_counter()
+    if figures:
+        from ..output.mechanism_figures import draw_figures
+
+        draw_figures(folder, mechanism, results)
+    if animation:
+        from ..output.mechanism_figures import draw_animation
+
+        draw_animation(folder, mechanism, trajectory)
+    timings = {
+        "read_s": read - began,
+        "integrate_s": integrated - read,
+        "tables_s": written - integrated,
+        "pictures_s": clock.perf_counter() - written,
+    }
+    summary = summarise(mechanism, start, results, tolerance or run.tolerance, timings)
+    write_json(folder / "summary.json", summary)
+    return Outcome(trajectory.status == 0, _text(summary, folder), summary)
+
+
+def output_times(end: float, step: float) -> np.ndarray:
+    """0, step, 2 step, ... and the end."""
+    count = round(end / step)
+    if abs(count * step - end) <= 1e-9 * end:
+        times = step * np.arange(count + 1)
+        times[-1] = end
+        return times
+    return np.append(step * np.arange(math.floor(end / step) + 1), end)
+
+
+def quickest(mechanism: Mechanism, times: np.ndarray, start: Start, method: str, tolerance: float) -> Trajectory:
+    """Compiled kernels when they wait in the cache; else plain Python for as long as compiling would take."""
+    options: dict[str, Any] = {"start": start, "method": method, "tolerance": tolerance}
+    if not compiled_is_ready():
+        steps = affordable_steps(mechanism.system)
+        made = integrate(mechanism.system, times, backend="plain", most_steps=steps, **options)
+        if made.status != 2 or made.method != "taylor":
+            return made
+        print("gearfe: a long run: compiling the kernels once (about half a minute)", file=sys.stderr)
+    return integrate(mechanism.system, times, **options)
+
+
+def write_tables(folder: Path, mechanism: Mechanism, results: Results, with_reactions: bool) -> None:
+    """trajectory.csv, energy.csv and, when asked, reactions.csv."""
+    time = results.trajectory.time
+    write_csv(folder / "trajectory.csv", {"time_s": time, **results.outputs})
+    write_csv(folder / "energy.csv", {"time_s": time, **results.energy})
+    if with_reactions:
+        write_csv(folder / "reactions.csv", {"time_s": time, **reactions(mechanism, results.trajectory)})
+
+
+def summarise(mechanism: Mechanism, start: Start, results: Results, tolerance: float, timings: dict) -> dict[str, Any]:
+    """Content of summary.json."""
+    planar = mechanism.system.planar
+    assert planar is not None
+    trajectory = results.trajectory
+    freedoms = start.freedoms
+    label = planar.assembly.row_label
+    owner = np.array(planar.assembly.row_joint)
+    joints = [
+        {
+            "name": name,
+            "type": table.type,
+            "bodies": [table.body, table.to],
+            "constraints": int((owner == j).sum()),
+            "redundant": [label[r] for r in freedoms.redundant if owner[r] == j],
+        }
+        for j, (name, table) in enumerate(mechanism.file.joints.items())
+    ]
+    total = results.energy["total_J"]
+    statistics = dict(trajectory.statistics)
+    passages = np.asarray(statistics.pop("singular_passages", []), dtype=float)
+    inside = passages[passages <= trajectory.reached]
+    residual = np.array([mechanism.system.residual(t, q) for t, q in zip(trajectory.time, trajectory.q, strict=True)])
+    return {
+        "title": mechanism.file.title,
+        "status": trajectory.message,
+        "reached_s": trajectory.reached,
+        "method": trajectory.method,
+        "tolerance": tolerance,
+        **statistics,
+        "freedoms": {
+            "bodies": len(mechanism.scene.bodies),
+            "coordinates": freedoms.coordinates,
+            "constraints": freedoms.constraints,
+            "redundant": len(freedoms.redundant),
+            "net": freedoms.net,
+            "redundant_constraints": [label[r] for r in freedoms.redundant],
+            "singular_at_start": [label[r] for r in freedoms.passing],
+        },
+        "joints": joints,
+        "singular_passages": {"count": len(inside), "first_times_s": inside[:100]},
+        "constraint_residual": float(np.abs(residual).max(initial=0.0)),
+        "energy_drift_J": float(np.abs(total - total[0]).max(initial=0.0)),
+        "timings": timings,
+    }
+
+
+def _text(summary: dict[str, Any], folder: Path) -> str:
+    f = summary["freedoms"]
+    lines = [
+        f"{f['bodies']} bodies, {f['coordinates']} coordinates - {f['constraints']} constraints"
+        f" + {f['redundant']} redundant = {f['net']} free",
+        *(f"redundant: {name}" for name in f["redundant_constraints"]),
+        f"{summary['method']}: {summary['status']} at {summary['reached_s']:g} s in {summary['steps']} steps,"
+        f" {summary['timings']['integrate_s']:.3f} s; singular passages: {summary['singular_passages']['count']}",
+        f"results in {folder}",
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,285 @@
+"""A mechanism file becomes a rigid system with names."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..config import build, read_toml
+from ..errors import InputError, unknown_name
+from ..rigid import (
+    GROUND,
+    Body,
+    CoordinateSpring,
+    Fixed,
+    Forced,
+    Gravity,
+    Hinge,
+    Moment,
+    PlanarScene,
+    PointForce,
+    Prescribed,
+    Scene,
+    Slider,
+    Slot,
+    Spring,
+    Start,
+    System,
+    TimeFunction,
+    consistent_start,
+    constant,
+    polynomial,
+    sine,
+    smoothed_step,
+)
+from ..tables.mechanism import ForceTable, Function, FunctionTable, JointTable, MechanismFile
+from .expressions import OF_POINT, PLAIN, Node, compute, parse, quantities
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A planar mechanism with its named points, outputs and run.
+
+    Parameters
+    ----------
+    file : MechanismFile
+        The tables as read.
+    system : System
+        One planar scene.
+    outputs : dict
+        Column name -> parsed expression.
+    """
+
+    file: MechanismFile
+    system: System
+    outputs: Mapping[str, Node] = field(repr=False)
+    path: Path = Path()
+
+    @property
+    def scene(self) -> Scene:
+        """Bodies, joints and forces."""
+        assert self.system.planar is not None
+        return self.system.planar.scene
+
+    def point(self, where: str, label: str = "point") -> tuple[int, Point]:
+        """Body number and coordinates relative to the mass centre of ``body.point``, ``body.centre`` or ``body``."""
+        body, _, name = where.partition(".")
+        index = self.scene.body_index
+        if body not in index:
+            raise unknown_name(label, body, index)
+        at = (0.0, 0.0) if name in ("", "origin") else None
+        planar = self.system.planar
+        assert planar is not None
+        centre = planar.assembly.centre[index[body]]
+        if name == "centre":
+            return index[body], (0.0, 0.0)
+        if at is None:
+            points = self.file.ground.points_m if body == GROUND else self.file.bodies[body].points_m
+            if name not in points:
+                raise unknown_name(f"{label}: points of {body}", name, [*points, "origin", "centre"])
+            at = points[name]
+        return index[body], (at[0] - centre[0], at[1] - centre[1])
+
+    def values(self, wanted: set[tuple[str, str | None]], q, v=None, a=None):  # type: ignore[no-untyped-def]
+        """Quantities of bodies, joints and points for states of shape (n, size)."""
+        found = {}
+        for kind, what in wanted:
+            if kind in PLAIN:
+                continue
+            assert what is not None
+            if kind in OF_POINT:
+                x, y = self._point_values(kind, what, q, v, a)
+                found[kind, what] = x if kind.endswith("x") else y
+            else:
+                source = {"angle": q, "rate": v, "angular_acceleration": a}[kind]
+                found[kind, what] = self._angle(what, source)
+        return found
+
+    def _angle(self, what: str, source):  # type: ignore[no-untyped-def]
+        index = self.scene.body_index
+
+        def of(body: str):  # type: ignore[no-untyped-def]
+            i = index[body]
+            return np.zeros(len(source)) if body == GROUND else source[:, 3 * i + 2]
+
+        if what in index:
+            return of(what)
+        if what in self.file.joints:
+            joint = self.file.joints[what]
+            return of(joint.body) - of(joint.to)
+        raise unknown_name("expression", what, [*index, *self.file.joints])
+
+    def _point_values(self, kind: str, where: str, q, v, a):  # type: ignore[no-untyped-def]
+        body, (lx, ly) = self.point(where, "expression")
+        if body == len(self.scene.bodies):
+            zero = np.zeros(len(q))
+            return (zero + lx, zero + ly) if kind in ("x", "y") else (zero, zero)
+        k = 3 * body
+        c, s = np.cos(q[:, k + 2]), np.sin(q[:, k + 2])
+        rx, ry = c * lx - s * ly, s * lx + c * ly
+        if kind in ("x", "y"):
+            return q[:, k] + rx, q[:, k + 1] + ry
+        w = v[:, k + 2]
+        if kind in ("vx", "vy"):
+            return v[:, k] - w * ry, v[:, k + 1] + w * rx
+        d = a[:, k + 2]
+        return a[:, k] - d * ry - w * w * rx, a[:, k + 1] + d * rx - w * w * ry
+
+    def start(self, time: float = 0.0) -> Start:
+        """Consistent start state with the forced values of the file.
+
+        Raises
+        ------
+        InputError
+            When a loop cannot close, forced values contradict the joints, or nothing is free to move.
+        """
+        positions = [self._forced(text, target, 0) for text, target in self.file.start.positions.items()]
+        velocities = [self._forced(text, target, 1) for text, target in self.file.start.velocities.items()]
+        made = consistent_start(self.system, time, positions=positions, velocities=velocities)
+        driven = any(isinstance(j, Prescribed) for j in self.scene.joints)
+        if made.freedoms.net <= 0 and not driven:
+            count = f"{made.freedoms.coordinates} coordinates, {made.freedoms.constraints} constraints"
+            cure = "remove a joint, or prescribe a motion"
+            raise InputError("joints", None, f"nothing is free to move ({count})", cure)
+        return made
+
+    def _forced(self, text: str, target: float, level: int) -> Forced:
+        label = f"start.{('positions', 'velocities')[level]} {text!r}"
+        node = parse(text, label)
+        wanted = quantities(node)
+        allowed = (("angle", "x", "y"), ("rate", "vx", "vy"))[level]
+        for kind, _ in wanted:
+            if kind not in allowed:
+                problem = f"uses {kind}; only {', '.join(allowed)} can be forced here"
+                raise InputError(label, None, problem, "use one of these")
+
+        def position(q):  # type: ignore[no-untyped-def]
+            return float(np.asarray(compute(node, self.values(wanted, q[None, :]))).reshape(-1)[0])
+
+        def slope(q):  # type: ignore[no-untyped-def]
+            steps = 1e-6 * np.eye(len(q))
+            states = np.concatenate([q + steps, q - steps])
+            ends = np.broadcast_to(compute(node, self.values(wanted, states)), len(states))
+            return (ends[: len(q)] - ends[len(q) :]) / 2e-6
+
+        def rate_slope(q):  # type: ignore[no-untyped-def]
+            n = len(q)
+            states = np.broadcast_to(q, (n + 1, n))
+            made = np.broadcast_to(compute(node, self.values(wanted, states, np.vstack([np.eye(n), np.zeros(n)]))), n + 1)
+            return made[:n] - made[n]
+
+        return Forced(label, target, position, slope if level == 0 else rate_slope)
+
+
+def load_mechanism(path: str | Path) -> Mechanism:
+    """Read a mechanism file.
+
+    Raises
+    ------
+    InputError
+        For anything that the file has wrong, with the name of the entry and the cure.
+    """
+    file: MechanismFile = build(MechanismFile, read_toml(path), "mechanism")
+    return make_mechanism(file, Path(path))
+
+
+def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
+    """Mechanism from its tables."""
+    bodies = tuple(_body(name, table) for name, table in file.bodies.items())
+    if not bodies:
+        raise InputError("bodies", None, "there is none", "add a table [bodies.NAME]")
+    joints = tuple(_joint(file, name, table) for name, table in file.joints.items())
+    forces = tuple(_force(file, name, table) for name, table in file.forces.items())
+    system = System([PlanarScene(Scene(bodies, joints, forces))])
+    outputs: dict[str, Node] = {}
+    made = Mechanism(file, system, outputs, path)
+    zero = np.zeros((1, system.size))
+    for i, output in enumerate(file.outputs):
+        if output.name in outputs or output.name == "time_s":
+            raise InputError(f"outputs[{i}].name", output.name, "is used twice", "rename the column")
+        node = parse(output.value, f"outputs[{i}].value")
+        made.values(quantities(node), zero, zero, zero)  # names exist
+        outputs[output.name] = node
+    for path_table in file.paths:
+        if isinstance(path_table.point, str):
+            made.point(f"{path_table.body}.{path_table.point}", "paths")
+    for name in (*file.figure.curves, *file.figure.reference_columns):
+        if name not in outputs:
+            raise unknown_name("figure", name, outputs)
+    return made
+
+
+def _body(name: str, t) -> Body:  # type: ignore[no-untyped-def]
+    angle = t.angle_rad if t.angle_rad is not None else math.radians(t.angle_deg or 0.0)
+    return Body(name, t.mass_kg, t.inertia_kg_m2, t.centre_m, t.position_m, angle, t.velocity_m_per_s, t.rate_rad_per_s)
+
+
+def _place(file: MechanismFile, body: str, point: str | Point | None, label: str) -> Point:
+    if point is None:
+        return (0.0, 0.0)
+    if not isinstance(point, str):
+        return point
+    points = file.ground.points_m if body == GROUND else file.bodies[body].points_m
+    if point == "centre" and body != GROUND:
+        return file.bodies[body].centre_m
+    if point not in points:
+        raise unknown_name(f"{label}: points of {body}", point, points)
+    return points[point]
+
+
+def _joint(file: MechanismFile, name: str, t: JointTable):  # type: ignore[no-untyped-def]
+    here = _place(file, t.body, t.point, f"joints.{name}.point")
+    there = _place(file, t.to, t.to_point, f"joints.{name}.to_point")
+    if t.type == "hinge":
+        return Hinge(t.body, t.to, here, there, name)
+    if t.type == "fixed":
+        return Fixed(t.body, t.to, name)
+    if t.type == "prescribed":
+        assert t.motion is not None
+        assert t.coordinate is not None
+        motion = time_function(t.motion)
+        return Prescribed(t.body, t.coordinate, motion, t.to, here, name)
+    assert t.direction is not None
+    if t.type == "slot":
+        return Slot(t.body, t.to, here, there, t.direction, name)
+    angle = None if t.angle_deg is None else math.radians(t.angle_deg)
+    return Slider(t.body, t.to, here, there, t.direction, angle, name)
+
+
+def _force(file: MechanismFile, name: str, t: ForceTable):  # type: ignore[no-untyped-def]
+    if t.type == "gravity":
+        assert t.acceleration_m_per_s2 is not None
+        return Gravity(t.acceleration_m_per_s2, name)
+    assert t.body is not None
+    here = _place(file, t.body, t.point, f"forces.{name}.point")
+    there = _place(file, t.to, t.to_point, f"forces.{name}.to_point")
+    if t.type == "spring":
+        return Spring(t.body, t.to, here, there, t.stiffness, t.damping, t.free_length_m, name)
+    if t.type == "coordinate_spring":
+        assert t.coordinate is not None
+        return CoordinateSpring(t.body, t.coordinate, t.stiffness, t.damping, t.reference, t.to, name)
+    if t.type == "force":
+        return PointForce(t.body, here, time_function(t.x_N or 0.0), time_function(t.y_N or 0.0), name)
+    assert t.moment_N_m is not None
+    return Moment(t.body, time_function(t.moment_N_m), t.to, name)
+
+
+def time_function(table: Function) -> TimeFunction:
+    """Function of time from a number or a table."""
+    if not isinstance(table, FunctionTable):
+        return constant(float(table))
+    made = constant(table.constant)
+    if table.polynomial:
+        made = made + polynomial(table.polynomial, table.origin_s)
+    if table.step is not None:
+        assert table.step_width_s is not None
+        made = made + smoothed_step(table.step_centre_s, table.step_width_s, table.step)
+    if table.sine is not None:
+        made = made + sine(table.sine, 2 * math.pi * table.frequency_hz, math.radians(table.phase_deg))
+    return made

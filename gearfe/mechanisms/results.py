@@ -1,0 +1,158 @@
+"""What a run of a mechanism yields: named outputs, energies, joint reactions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..rigid import Moment, PointForce, Prescribed, Spring, Trajectory
+from ..rigid.contract import Array
+from ..rigid.planar import CoordinateSpring
+from .expressions import compute, quantities
+from .model import Mechanism
+
+
+@dataclass(frozen=True)
+class Results:
+    """Columns of the result tables, one entry per output time.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The run.
+    outputs : dict
+        Named outputs of the file.
+    energy : dict
+        kinetic_J, potential_J (gravity with datum y = 0, springs), work_J (of moments, point forces, dampers and
+        prescribed motions, from the start), total_J = kinetic + potential - work.
+    """
+
+    trajectory: Trajectory
+    outputs: dict[str, Array] = field(repr=False)
+    energy: dict[str, Array] = field(repr=False)
+
+
+def evaluate(mechanism: Mechanism, trajectory: Trajectory) -> Results:
+    """Outputs and energies at the times of the trajectory."""
+    energy = energies(mechanism, trajectory)
+    wanted = set().union(*(quantities(node) for node in mechanism.outputs.values())) if mechanism.outputs else set()
+    needs = {kind for kind, _ in wanted}
+    v = trajectory.v if needs & {"rate", "vx", "vy", "angular_acceleration", "ax", "ay"} else None
+    a = trajectory.a if needs & {"angular_acceleration", "ax", "ay"} else None
+    values = mechanism.values(wanted, trajectory.q, v, a)
+    values["time", None] = trajectory.time
+    for name in ("kinetic", "potential", "work", "total"):
+        values[name, None] = energy[f"{name}_J"]
+    outputs = {}
+    for table in mechanism.file.outputs:
+        column = np.broadcast_to(compute(mechanism.outputs[table.name], values), trajectory.time.shape).astype(float)
+        outputs[table.name] = column if table.wrap is None else np.mod(column, table.wrap)
+    return Results(trajectory, outputs, energy)
+
+
+def energies(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
+    """Kinetic, potential, work and total energy (J) at the output times."""
+    system = mechanism.system
+    scene = system.planar
+    assert scene is not None
+    q, v = trajectory.q, trajectory.v
+    kinetic = 0.5 * (v**2 * np.diagonal(system.mass)).sum(axis=1)
+    potential = np.array([scene.potential(state) for state in q])
+    work = _work(mechanism, trajectory)
+    return {
+        "kinetic_J": kinetic,
+        "potential_J": potential,
+        "work_J": work,
+        "total_J": kinetic + potential - work,
+    }
+
+
+def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
+    """Work since the start: closed form for constant moments, else Gauss quadrature of the power on every interval."""
+    scene = mechanism.scene
+    time = trajectory.time
+    work = np.zeros(len(time))
+    index = scene.body_index
+    varying = False
+    for force in scene.forces:
+        if isinstance(force, Moment) and not force.function.breaks and not force.function.sines:
+            row = force.function.coefficients[0]
+            if len(row) == 1:
+                for body, sign in ((force.body, 1.0), (force.reaction, -1.0)):
+                    if index[body] < len(scene.bodies):
+                        angle = trajectory.q[:, 3 * index[body] + 2]
+                        work += sign * row[0] * (angle - angle[0])
+                continue
+        if isinstance(force, Moment | PointForce):
+            varying = True
+        elif isinstance(force, Spring | CoordinateSpring) and force.damping:
+            varying = True
+    driven = any(isinstance(j, Prescribed) for j in scene.joints)
+    if not (varying or driven) or len(time) < 2:
+        return work
+    planar = mechanism.system.planar
+    assert planar is not None
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    half = 0.5 * np.diff(time)
+    at = (0.5 * (time[1:] + time[:-1])[:, None] + half[:, None] * nodes).ravel()
+    states = trajectory.dense(at, 0), trajectory.dense(at, 1)
+    power = np.array([planar.power(t, q, v) for t, q, v in zip(at, *states, strict=True)])
+    if driven:
+        multipliers = trajectory.multipliers_at(at)
+        rates = np.array([planar.rate(t, q) for t, q in zip(at, states[0], strict=True)])
+        power = power + (multipliers * rates).sum(axis=1)
+    steady = _steady_power(mechanism, states[1])
+    gained = ((power - steady).reshape(len(half), -1) @ weights) * half
+    work[1:] += np.cumsum(gained)
+    return work
+
+
+def _steady_power(mechanism: Mechanism, v: Array) -> Array:
+    """Power of the constant moments, which have a closed form."""
+    scene = mechanism.scene
+    index = scene.body_index
+    power = np.zeros(len(v))
+    for force in scene.forces:
+        if isinstance(force, Moment) and not force.function.breaks and not force.function.sines:
+            row = force.function.coefficients[0]
+            if len(row) == 1:
+                for body, sign in ((force.body, 1.0), (force.reaction, -1.0)):
+                    if index[body] < len(scene.bodies):
+                        power += sign * row[0] * v[:, 3 * index[body] + 2]
+    return power
+
+
+def reactions(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
+    """Force (N) and moment (N m) of every joint on its first body, at the joint's point.
+
+    Columns are ``JOINT_x_N, JOINT_y_N, JOINT_moment_N_m``. Redundant rows carry nothing: where there are some, the share of
+    the joints is not unique.
+    """
+    planar = mechanism.system.planar
+    assert planar is not None
+    scene = mechanism.scene
+    names = list(mechanism.file.joints)
+    rows = planar.assembly.tables.rows
+    owner = np.array(planar.assembly.row_joint)
+    out = {f"{n}_{c}": np.zeros(len(trajectory.time)) for n in names for c in ("x_N", "y_N", "moment_N_m")}
+    q = trajectory.q
+    for i, multipliers in enumerate(trajectory.multipliers):
+        G = planar.gradients(q[i])
+        for j, name in enumerate(names):
+            table = mechanism.file.joints[name]
+            body = scene.body_index[table.body]
+            wrench = np.zeros(3)
+            for r in np.flatnonzero(owner == j):
+                side = 0 if rows.index[r, 0] == body else 1
+                wrench -= multipliers[r] * G[r, side]
+            joint = scene.joints[j]
+            at = getattr(joint, "point_a", getattr(joint, "point", (0.0, 0.0)))
+            centre = planar.assembly.centre[body]
+            angle = q[i, 3 * body + 2] if body < len(scene.bodies) else 0.0
+            c, s = np.cos(angle), np.sin(angle)
+            dx, dy = at[0] - centre[0], at[1] - centre[1]
+            arm = c * dx - s * dy, s * dx + c * dy
+            out[f"{name}_x_N"][i], out[f"{name}_y_N"][i] = wrench[:2]
+            out[f"{name}_moment_N_m"][i] = wrench[2] - (arm[0] * wrench[1] - arm[1] * wrench[0])
+    return out

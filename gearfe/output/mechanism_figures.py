@@ -1,0 +1,167 @@
+"""Pictures of planar mechanisms: curves over time, a picture with paths, an animation (GIF, written by Pillow)."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from .files import whole_file
+
+
+def draw_figures(folder: Path, mechanism: Any, results: Any) -> None:
+    """curves.png (outputs over time, with reference markers where the file names a table) and picture.png."""
+    plt = _pyplot()
+    _curves(plt, folder / "curves.png", mechanism, results)
+    trajectory = results.trajectory
+    asked = mechanism.file.run.picture_s
+    time = trajectory.time[-1] if asked is None else min(asked, trajectory.time[-1])
+    figure, axes = plt.subplots(figsize=(7, 6))
+    _paths(axes, mechanism, trajectory.q)
+    q = trajectory.dense(np.array([time]))
+    _draw(axes, mechanism, q)
+    _frame(axes, mechanism, trajectory.q)
+    axes.set_title(f"{mechanism.file.title or 'mechanism'} at {time:g} s")
+    _save(plt, figure, folder / "picture.png")
+
+
+def draw_animation(folder: Path, mechanism: Any, trajectory: Any) -> None:
+    """animation.gif with the number of frames that the file asks for."""
+    plt = _pyplot()
+    from matplotlib.animation import PillowWriter
+
+    frames = mechanism.file.run.frames
+    times = np.linspace(trajectory.time[0], trajectory.time[-1], frames)
+    states = trajectory.dense(times)
+    figure, axes = plt.subplots(figsize=(4.8, 4.2), dpi=80)
+    writer = PillowWriter(fps=25)
+    with whole_file(folder / "animation.gif") as temporary, writer.saving(figure, str(temporary), dpi=80):
+        for time, q in zip(times, states, strict=True):
+            axes.clear()
+            _paths(axes, mechanism, trajectory.q)
+            _draw(axes, mechanism, q[None, :])
+            _frame(axes, mechanism, trajectory.q)
+            axes.set_title(f"{time:.4g} s", fontsize=9)
+            writer.grab_frame()
+    plt.close(figure)
+
+
+def _curves(plt: Any, path: Path, mechanism: Any, results: Any) -> None:
+    table = mechanism.file.figure
+    names = table.curves or tuple(results.outputs)
+    if not names:
+        return
+    time = results.trajectory.time
+    reference = _reference(mechanism)
+    figure, all_axes = plt.subplots(len(names), 1, sharex=True, figsize=(8, 1.2 + 1.7 * len(names)), squeeze=False)
+    for axes, name in zip(all_axes[:, 0], names, strict=True):
+        axes.plot(time, results.outputs[name], lw=1.2)
+        column = table.reference_columns.get(name)
+        if reference is not None and column is not None:
+            period = next(o.wrap for o in mechanism.file.outputs if o.name == name)
+            value = reference[column] if period is None else np.mod(reference[column], period)
+            axes.plot(reference["t"][:: table.every], value[:: table.every], "o", ms=3, mfc="none", label="reference")
+            axes.legend(loc="upper right", fontsize=7)
+        axes.set_ylabel(name, fontsize=7)
+        axes.grid(alpha=0.3)
+    all_axes[-1, 0].set_xlabel("time in s")
+    _save(plt, figure, path)
+
+
+def _reference(mechanism: Any) -> dict[str, np.ndarray] | None:
+    table = mechanism.file.figure
+    if table.reference is None:
+        return None
+    source = mechanism.path.parent / table.reference
+    try:
+        with source.open(encoding="utf-8", newline="") as handle:
+            lines = [line for line in handle if not line.startswith("#")]
+        rows = list(csv.DictReader(lines))
+        made = {name: np.array([float(row[name]) for row in rows]) for name in (rows[0] if rows else {})}
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError("figure.reference", str(source), f"cannot be read ({error})", "give a CSV table") from None
+    for name in ("t", *table.reference_columns.values()):
+        if name not in made:
+            raise InputError("figure.reference", str(source), f"has no column {name!r}", "check its header")
+    return made
+
+
+def _points(mechanism: Any) -> list[tuple[int, list[tuple[float, float]]]]:
+    """Body number and the named points of each body, relative to the mass centre."""
+    return [
+        (mechanism.scene.body_index[name], [mechanism.point(f"{name}.{p}")[1] for p in table.points_m])
+        for name, table in mechanism.file.bodies.items()
+    ]
+
+
+def _place(q: np.ndarray, body: int, point: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+    c, s = np.cos(q[:, 3 * body + 2]), np.sin(q[:, 3 * body + 2])
+    x, y = point
+    return q[:, 3 * body] + c * x - s * y, q[:, 3 * body + 1] + s * x + c * y
+
+
+def _paths(axes: Any, mechanism: Any, q: np.ndarray) -> None:
+    for path in mechanism.file.paths:
+        body = mechanism.scene.body_index[path.body]
+        if body == len(mechanism.scene.bodies):
+            continue
+        if isinstance(path.point, str):
+            label = f"{path.body}.{path.point}"
+            point = mechanism.point(label)[1]
+        else:
+            label = f"{path.body} {path.point}"
+            centre = mechanism.file.bodies[path.body].centre_m
+            point = (path.point[0] - centre[0], path.point[1] - centre[1])
+        axes.plot(*_place(q, body, point), lw=0.7, alpha=0.6, label=label)
+
+
+def _draw(axes: Any, mechanism: Any, q: np.ndarray) -> None:
+    """Bodies as outlines of their points, mass centres, points at rest."""
+    for body, points in _points(mechanism):
+        ends = np.array([[float(a[0]) for a in _place(q, body, p)] for p in points]).reshape(-1, 2)
+        centre = np.array([float(a[0]) for a in _place(q, body, (0.0, 0.0))])
+        if len(ends) == 1:
+            ends = np.vstack([ends, centre])
+        loop = ends if len(ends) < 3 else np.vstack([ends, ends[:1]])
+        (line,) = axes.plot(loop[:, 0], loop[:, 1], "-o", lw=2, ms=3.5)
+        axes.plot(*centre, "+", color=line.get_color(), ms=8)
+    for x, y in mechanism.file.ground.points_m.values():
+        axes.plot(x, y, "k^", ms=6, mfc="none")
+
+
+def _frame(axes: Any, mechanism: Any, q: np.ndarray) -> None:
+    x, y = [], []
+    for body, points in _points(mechanism):
+        for point in [*points, (0.0, 0.0)]:
+            a, b = _place(q, body, point)
+            x += [a.min(), a.max()]
+            y += [b.min(), b.max()]
+    for a, b in mechanism.file.ground.points_m.values():
+        x.append(a)
+        y.append(b)
+    pad = 0.06 * max(max(x) - min(x), max(y) - min(y), 1e-9)
+    axes.set_xlim(min(x) - pad, max(x) + pad)
+    axes.set_ylim(min(y) - pad, max(y) + pad)
+    axes.set_aspect("equal")
+    axes.grid(alpha=0.3)
+    axes.set_xlabel("x in m")
+    axes.set_ylabel("y in m")
+
+
+def _pyplot() -> Any:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    return plt
+
+
+def _save(plt: Any, figure: Any, path: Path) -> None:
+    figure.tight_layout()
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, dpi=130)
+    plt.close(figure)

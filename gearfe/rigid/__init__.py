@@ -1,0 +1,61 @@
+"""The rigid core: bodies, joints and forces (data), a system, a consistent start, integrators, a trajectory.
+
+Nothing here knows which mechanism it runs. The component contract is in `gearfe.rigid.contract`.
+"""
+
+from .contract import Element, LinearJoint, LocalForce, ModalBlocks
+from .integrate import integrate
+from .planar import (
+    GROUND,
+    Body,
+    CoordinateSpring,
+    Fixed,
+    Gravity,
+    Hinge,
+    Moment,
+    PointForce,
+    Prescribed,
+    Scene,
+    Slider,
+    Slot,
+    Spring,
+)
+from .scene import PlanarScene
+from .start import Forced, Freedoms, Start, consistent_start, count_freedoms
+from .system import System
+from .timefunctions import TimeFunction, constant, polynomial, sine, smoothed_step
+from .trajectory import Trajectory
+
+__all__ = [
+    "GROUND",
+    "Body",
+    "CoordinateSpring",
+    "Element",
+    "Fixed",
+    "Forced",
+    "Freedoms",
+    "Gravity",
+    "Hinge",
+    "LinearJoint",
+    "LocalForce",
+    "ModalBlocks",
+    "Moment",
+    "PlanarScene",
+    "PointForce",
+    "Prescribed",
+    "Scene",
+    "Slider",
+    "Slot",
+    "Spring",
+    "Start",
+    "System",
+    "TimeFunction",
+    "Trajectory",
+    "consistent_start",
+    "constant",
+    "count_freedoms",
+    "integrate",
+    "polynomial",
+    "sine",
+    "smoothed_step",
+]

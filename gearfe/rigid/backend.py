@@ -1,0 +1,25 @@
+"""Whether compiled kernels are at hand, and how much plain Python a one-off run may spend before compiling pays."""
+
+from __future__ import annotations
+
+from . import compiled, taylor
+from .system import System
+
+#: Measured on the reference machine: seconds that compiling takes, and of one plain step for a mechanism of n bodies.
+COMPILE_SECONDS = 25.0
+STEP_SECONDS = (1.2e-3, 0.9e-3)
+
+
+def compiled_is_ready() -> bool:
+    """Whether compiled kernels are loaded already or wait in the cache."""
+    if not compiled.available():
+        return False
+    return taylor.kernels.cache_info().currsize > 0 or compiled.is_cached(taylor.FUNCTIONS, "integrate_series")
+
+
+def affordable_steps(system: System) -> int:
+    """Plain steps that take about as long as compiling would; without numba there is no limit."""
+    if not compiled.available():
+        return 1_000_000
+    bodies = system.size // 3
+    return int(COMPILE_SECONDS / (STEP_SECONDS[0] + STEP_SECONDS[1] * bodies))

@@ -1,0 +1,169 @@
+"""The component contract: what a body, a joint or a force provides, and what the integrators make of it.
+
+A system is a list of elements. Element i owns `size` coordinates of the state q (a slice of it) and may look at those of
+other elements, named in `touches`. Every method gets the *local* coordinates: its own first, then those of the touched
+elements in that order, k numbers in all. The equations of motion are
+
+    M q'' = f(t, q, q') - G(t, q)^T lambda,        g(t, q) = 0,        G = dg/dq
+
+1. A body (size > 0) MUST provide ``mass()``: its constant, symmetric positive definite mass matrix (size, size).
+   Inertia that depends on velocity (gyroscopic terms) is a force.
+2. A force MUST provide ``force(t, q, v)``: generalised forces on the local coordinates, shape (k,). An applied force and
+   its reaction on a touched body are both entries of this one vector.
+3. A joint (rows > 0) MUST provide ``residual(t, q)`` (rows,), ``jacobian(t, q)`` (rows, k), and
+   ``velocity_terms(t, q, v)`` (rows,), the part of g'' without accelerations: g'' = G a + velocity_terms. It MUST provide
+   ``rate(t, q)`` (rows,), the partial derivative of g with respect to time, if that is not zero.
+   Positions enter g, never velocities; a prescribed rate is integrated to a prescribed position.
+4. ``start()`` gives start coordinates and velocities of the own coordinates (zeros by default).
+
+It MAY provide
+
+5. ``blocks()``: constant (C, K), both (k, k), with the force ``-C v - K q`` on the local coordinates: an elastic body in
+   modal coordinates. ``force`` then holds only what is left. Absent: no linear part.
+6. ``force_jacobian(t, q, v)``: (df/dq, df/dv) of ``force``, both (k, k). Absent: finite differences, one call per
+   coordinate, in the implicit integrator only.
+7. ``constant_jacobian = True`` when g is linear in q with constant coefficients and no time: such rows are eliminated at
+   set-up by `gearfe.rigid.elimination` where an integrator profits. Absent: treated as any constraint.
+8. ``scene`` (a `Scene` and its tables): the Taylor recurrences of planar bodies known to the compiled kernels. The Taylor
+   method runs when every element has one; otherwise ``method="auto"`` takes the explicit method of order 8 with
+   projection, or, when the start is stiff, the implicit one.
+9. ``energy(q, v)``: (kinetic, potential) of the element. Absent: 1/2 v M v of its own coordinates, and zero.
+10. Being a `LocalForce`: a force along few directions, ``f = W phi(t, W^T q, W^T v)``, with a law that can be compiled.
+    Absent: the force is called as it is; the integration in modal coordinates then calls Python in every stage.
+11. ``breaks``: times at which a force or joint is not smooth. Steps of all integrators end there. Absent: none.
+
+An element has no state of its own that changes during a run: integrators call it at trial points in any order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Element:
+    """Base of all components: no coordinates, no force, no rows. See the module's docstring for the contract."""
+
+    size: int = 0
+    rows: int = 0
+    name: str = ""
+    touches: tuple[Element, ...] = ()
+    constant_jacobian: bool = False
+
+    def mass(self) -> Array:
+        """Mass matrix of the own coordinates."""
+        return np.eye(self.size)
+
+    def start(self) -> tuple[Array, Array]:
+        """Start coordinates and velocities of the own coordinates."""
+        return np.zeros(self.size), np.zeros(self.size)
+
+    def blocks(self) -> tuple[Array, Array] | None:
+        """Constant damping and stiffness on the local coordinates."""
+        return None
+
+    def rate(self, t: float, q: Array) -> Array:  # noqa: ARG002
+        """Partial derivative of the residual with respect to time."""
+        return np.zeros(self.rows)
+
+    def velocity_terms(self, t: float, q: Array, v: Array) -> Array:  # noqa: ARG002
+        """Second time derivative of the residual without its acceleration part."""
+        return np.zeros(self.rows)
+
+
+@dataclass(frozen=True, eq=False)
+class ModalBlocks(Element):
+    """A body given by constant matrices: coordinates eta with M eta'' + C eta' + K eta = forces.
+
+    Parameters
+    ----------
+    M, C, K : ndarray, shape (r, r)
+        Mass, damping and stiffness (any consistent units).
+    """
+
+    M: Array
+    C: Array
+    K: Array
+    name: str = "modal body"
+    q0: Array | None = None
+    v0: Array | None = None
+
+    @property
+    def size(self) -> int:  # type: ignore[override]
+        """Number of coordinates."""
+        return len(self.M)
+
+    def mass(self) -> Array:
+        """M."""
+        return self.M
+
+    def start(self) -> tuple[Array, Array]:
+        """Start state, zero when not given."""
+        zero = np.zeros(len(self.M))
+        return (zero if self.q0 is None else self.q0), (zero if self.v0 is None else self.v0)
+
+    def blocks(self) -> tuple[Array, Array]:
+        """(C, K)."""
+        return self.C, self.K
+
+
+@dataclass(frozen=True, eq=False)
+class LinearJoint(Element):
+    """Constant linear constraints ``A q = b`` on the coordinates of the touched elements; A has the shape (rows, k)."""
+
+    touches: tuple[Element, ...] = field()
+    A: Array = field()
+    b: Array = field()
+    name: str = "linear joint"
+    constant_jacobian: bool = True
+
+    @property
+    def rows(self) -> int:  # type: ignore[override]
+        """Number of constraints."""
+        return len(self.A)
+
+    def residual(self, t: float, q: Array) -> Array:  # noqa: ARG002
+        """A q - b."""
+        return self.A @ q - self.b
+
+    def jacobian(self, t: float, q: Array) -> Array:  # noqa: ARG002
+        """A."""
+        return self.A
+
+
+@dataclass(frozen=True, eq=False)
+class LocalForce(Element):
+    """Force along few directions: ``f = W law(t, W^T q, W^T v)``, the law being any callable of state and time.
+
+    Parameters
+    ----------
+    touches
+        Elements whose coordinates the directions are written in.
+    W : ndarray, shape (k, p)
+        Directions on the local coordinates.
+    law
+        ``law(t, u, du) -> (p,)`` with u = W^T q, du = W^T v: any callable of state and time.
+    compiled_law
+        The same law as ``compiled_law(t, u, du, parameters, out)``, a module-level function that numba can compile. When
+        every force of a linear system has the same one, the whole integration runs compiled; forces of different kinds
+        share one function that looks at its parameters.
+    parameters : ndarray
+        What `compiled_law` gets.
+    """
+
+    touches: tuple[Element, ...] = field()
+    W: Array = field()
+    law: Callable[[float, Array, Array], Array] = field()
+    compiled_law: Callable[..., None] | None = None
+    parameters: Array = field(default_factory=lambda: np.zeros(0))
+    breaks: tuple[float, ...] = ()
+    name: str = "local force"
+
+    def force(self, t: float, q: Array, v: Array) -> Array:
+        """W law."""
+        return self.W @ np.atleast_1d(self.law(t, self.W.T @ q, self.W.T @ v))

@@ -1,0 +1,79 @@
+"""Systems whose constraints are linear and constant: minimal coordinates in which mass is 1 and stiffness diagonal.
+
+    q = q_p + T y,     T^T M T = 1,     T^T K T = diag(omega^2),     G T = 0
+
+so that y'' = -omega^2 y - T^T C T y' + T^T f with the remaining forces f: hinges of a gear train cost nothing afterwards.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .contract import Array
+from .system import System
+
+
+@dataclass(frozen=True)
+class Minimal:
+    """Minimal (modal) coordinates of a system.
+
+    Parameters
+    ----------
+    T : ndarray, shape (size, free)
+        Columns that the constraints leave free.
+    origin : ndarray, shape (size,)
+        A state on the constraints.
+    squares : ndarray, shape (free,)
+        omega^2 (rad2/s2).
+    damping : ndarray, shape (free, free)
+        T^T C T.
+    constant : ndarray, shape (free,)
+        T^T of the constant force -K q_p.
+    """
+
+    system: System
+    T: Array
+    origin: Array
+    squares: Array
+    damping: Array
+    constant: Array
+
+    def reduce(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """Minimal coordinates and velocities of a state on the constraints."""
+        back = self.T.T @ self.system.mass
+        return back @ (q - self.origin), back @ v
+
+    def force(self, t: float, y: Array, dy: Array) -> Array:
+        """T^T f of everything but the constant blocks."""
+        if not self.system.forces:
+            return np.zeros(self.T.shape[1])
+        q, v = self.origin + self.T @ y, self.T @ dy
+        total = np.zeros(self.system.size)
+        for element, index in self.system.forces:
+            np.add.at(total, index, element.force(t, q[index], v[index]))  # type: ignore[attr-defined]
+        return self.T.T @ total
+
+
+def is_linear(system: System) -> bool:
+    """Whether every joint is linear with constant coefficients."""
+    return all(e.constant_jacobian for e, _ in system.joints)
+
+
+def minimal(system: System) -> Minimal:
+    """Minimal coordinates of a system whose joints are all linear and constant; redundant rows do no harm."""
+    root = np.linalg.cholesky(system.inverse_mass)  # root root^T = M^-1
+    zero = np.zeros(system.size)
+    G = system.jacobian(0.0, zero)
+    g = system.residual(0.0, zero)
+    if len(G):
+        _, sizes, right = np.linalg.svd(G @ root, full_matrices=True)
+        rank = int((sizes > 1e-10 * sizes.max(initial=0.0)).sum())
+        origin = -root @ np.linalg.lstsq(G @ root, g, rcond=1e-12)[0]
+        T = root @ right[rank:].T
+    else:
+        origin, T = zero, root
+    squares, turn = np.linalg.eigh(T.T @ system.stiffness @ T)
+    T = T @ turn
+    return Minimal(system, T, origin, squares, T.T @ system.damping @ T, -T.T @ (system.stiffness @ origin))

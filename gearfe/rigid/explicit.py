@@ -1,0 +1,196 @@
+"""Explicit Runge-Kutta of order 8 (Dormand & Prince; Hairer, Norsett & Wanner I, Sec. II.10) with projection.
+
+Constrained systems are integrated in (q, v) with the accelerations of the index-1 form and projected onto position and
+velocity constraints after every step. Systems whose constraints are linear and constant run in minimal coordinates, where
+the projection has nothing to do; there, forces with compiled laws run in a compiled loop (`gearfe.rigid.modal`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .contract import Array
+from .elimination import is_linear, minimal
+from .start import Start, least_change
+from .system import System
+
+Rhs = Callable[[float, Array], Array]
+
+
+class Tableau(NamedTuple):
+    """Coefficients: A (16, 16) with the three stages of the dense output, B (12,), C (16,), E3, E5 (13,), D (4, 16)."""
+
+    A: Array
+    B: Array
+    C: Array
+    E3: Array
+    E5: Array
+    D: Array
+
+
+@lru_cache(maxsize=1)
+def tableau() -> Tableau:
+    """Coefficients as scipy publishes them on its DOP853 class."""
+    from scipy.integrate import DOP853
+
+    A = np.zeros((16, 16))
+    A[:12, :12] = DOP853.A
+    A[12, :12] = DOP853.B
+    A[13:, : DOP853.A_EXTRA.shape[1]] = DOP853.A_EXTRA
+    C = np.concatenate([DOP853.C, [1.0], DOP853.C_EXTRA])
+    return Tableau(A, DOP853.B, C, DOP853.E3, DOP853.E5, DOP853.D)
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Dense output: on every step the polynomial of order 7; `expand` turns the state into (q, v, a)."""
+
+    times: Array
+    states: Array
+    polynomials: Array  # (steps, 7, 2n)
+    expand: Callable[[float, Array], tuple[Array, Array, Array]]
+
+    def state(self, t: Array) -> Array:
+        """Integrated state at the times t, (times, 2n)."""
+        sign = 1.0 if self.times[-1] >= self.times[0] else -1.0
+        k = np.clip(np.searchsorted(sign * self.times, sign * t, side="right") - 1, 0, len(self.polynomials) - 1)
+        x = ((t - self.times[k]) / (self.times[k + 1] - self.times[k]))[:, None]
+        y = np.zeros((len(t), self.states.shape[1]))
+        for i in range(7):
+            y += self.polynomials[k, 6 - i]
+            y *= x if i % 2 == 0 else 1.0 - x
+        return y + self.states[k]
+
+    def __call__(self, t: Array, derivative: int = 0) -> Array:
+        """Coordinates, velocities or accelerations at the times t."""
+        t = np.atleast_1d(np.asarray(t, dtype=float))
+        return np.array([self.expand(ti, yi)[derivative] for ti, yi in zip(t, self.state(t), strict=True)])
+
+
+def run_explicit(system: System, start: Start, times: Array, *, tolerance: float, longest: float, most: int):  # type: ignore[no-untyped-def]
+    """Integrate; returns (dense output, status, statistics)."""
+    if is_linear(system):
+        from .modal import run_minimal
+
+        return run_minimal(minimal(system), start, times, tolerance=tolerance, longest=longest, most=most)
+    n = system.size
+    active = start.active
+
+    def rhs(t: float, y: Array) -> Array:
+        return np.concatenate([y[n:], system.acceleration(t, y[:n], y[n:], active)[0]])
+
+    def project(t: float, y: Array) -> Array:
+        return on_constraints(system, t, y[:n], y[n:], active)
+
+    def expand(t: float, y: Array) -> tuple[Array, Array, Array]:
+        return y[:n], y[n:], system.acceleration(t, y[:n], y[n:], active)[0]
+
+    y0 = np.concatenate([start.q, start.v])
+    made = step_through(rhs, project, start.time, y0, times[-1], system.breaks, tolerance, longest, most)
+    ends, states, polynomials, status, evaluations = made
+    statistics: dict[str, Any] = {"steps": len(polynomials), "evaluations": evaluations}
+    return Pieces(ends, states, polynomials, expand), status, statistics
+
+
+def on_constraints(system: System, t: float, q: Array, v: Array, active: np.ndarray) -> Array:
+    """State projected onto g = 0 and G v = -dg/dt; rows that are redundant follow by themselves."""
+    if system.rows == 0:
+        return np.concatenate([q, v])
+    for _ in range(5):
+        gap = system.residual(t, q)[active]
+        if np.abs(gap).max(initial=0.0) < 1e-14:
+            break
+        G = system.jacobian(t, q)[active]
+        q = q - least_change(system, G, gap)
+    G = system.jacobian(t, q)[active]
+    return np.concatenate([q, v - least_change(system, G, G @ v + system.rate(t, q)[active])])
+
+
+def step_through(
+    rhs: Rhs, project: Rhs, t0: float, y0: Array, t1: float, breaks: Array, tolerance: float, longest: float, most: int
+):  # type: ignore[no-untyped-def]
+    """Adaptive steps from t0 to t1: (ends, states, polynomials, status, evaluations).
+
+    The error is measured against the largest value that each component has had; steps end at `breaks`.
+    """
+    tab = tableau()
+    sign = 1.0 if t1 >= t0 else -1.0
+    t, y = t0, np.array(y0, dtype=float)
+    K = np.zeros((16, y.size))
+    K[0] = rhs(t, y)
+    n = y.size // 2
+    scale = np.abs(y)
+    h = first_step(y, K[0], abs(t1 - t0))
+    ends, states, polynomials = [t], [y], []
+    status, evaluations = 0, 1
+    corners = sorted((b for b in breaks if sign * (b - t0) > 0 and sign * (t1 - b) > 0), key=lambda b: sign * b)
+    goals = [*corners, t1]
+    fixed = False
+    while sign * (t1 - t) > 0.0:
+        if len(polynomials) >= most:
+            status = 2
+            break
+        while sign * (goals[0] - t) <= 1e-14 * max(1.0, abs(t)):
+            goals.pop(0)
+        step = min(h, longest, abs(goals[0] - t))
+        fixed = step == abs(goals[0] - t)
+        if step < 1e-14 * max(abs(t), abs(t1 - t0)):
+            status = 1
+            break
+        d = sign * step
+        for s in range(1, 12):
+            K[s] = rhs(t + tab.C[s] * d, y + d * (tab.A[s, :s] @ K[:s]))
+        new = y + d * (tab.B @ K[:12])
+        K[12] = rhs(t + d, new)
+        evaluations += 12
+        reach = np.maximum(scale, np.abs(new))
+        limit = np.maximum(reach, step * np.abs(K[12])) * tolerance + 1e-300
+        limit = limit + 1e-6 * tolerance * np.repeat([limit[:n].max(), limit[n:].max()], n) / tolerance
+        five, three = (tab.E5 @ K[:13]) / limit, (tab.E3 @ K[:13]) / limit
+        big, small = float(five @ five), float(three @ three)
+        error = step * big / math.sqrt((big + 0.01 * small) * y.size) if big > 0.0 else 0.0
+        if not np.isfinite(error):
+            h = 0.2 * step
+            if step < 1e-12 * max(1e-300, abs(t1 - t0)):
+                status = 4
+                break
+            continue
+        if error > 1.0:
+            h = step * max(0.2, 0.9 * error ** (-1 / 8))
+            continue
+        for s in range(13, 16):
+            K[s] = rhs(t + tab.C[s] * d, y + d * (tab.A[s, :s] @ K[:s]))
+        evaluations += 3
+        change = new - y
+        F = np.empty((7, y.size))
+        F[0] = change
+        F[1] = d * K[0] - change
+        F[2] = 2 * change - d * (K[12] + K[0])
+        F[3:] = d * (tab.D @ K)
+        t = goals[0] if fixed else t + d
+        polynomials.append(F)
+        y = project(t, new)
+        scale = np.maximum(scale, np.abs(y))
+        K[0] = rhs(t, y)
+        evaluations += 1
+        ends.append(t)
+        states.append(y)
+        h = step * min(6.0, 0.9 * max(error, 1e-12) ** (-1 / 8)) if not fixed or error > 0.01 else max(h, step)
+    shape = (len(polynomials), 7, y.size)
+    return np.array(ends), np.array(states), np.array(polynomials).reshape(shape), status, evaluations
+
+
+def first_step(y: Array, dy: Array, span: float) -> float:
+    """A careful first step: a hundredth of the time in which the state changes by itself."""
+    n = y.size // 2
+    speed, pull = float(np.abs(dy[:n]).max(initial=0.0)), float(np.abs(dy[n:]).max(initial=0.0))
+    guess = 1e-3 * span
+    if pull > 0.0:
+        guess = min(guess, 0.01 * max(speed, float(np.abs(y).max(initial=0.0)) * 1e-3, 1e-12) / pull)
+    return max(guess, 1e-9 * span)

@@ -1,0 +1,162 @@
+# mypy: ignore-errors
+"""Compiled loop of the explicit method of order 8 in modal coordinates; the same steps as `explicit.step_through`.
+
+`law(t, u, du, parameters, out)` is bound by name: forces `out` along the directions, from u = W y + offset and du = W y'.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+
+def modal_rhs(squares, damping, diagonal, full, constant, W, offset, first, parameters, t, y, dy, u, du, out):
+    """dy of the state y = (coordinates, velocities)."""
+    n = squares.shape[0]
+    for i in range(n):
+        dy[i] = y[n + i]
+        dy[n + i] = constant[i] - squares[i] * y[i] - diagonal[i] * y[n + i]
+    if full:
+        for i in range(n):
+            value = 0.0
+            for j in range(n):
+                value += damping[i, j] * y[n + j]
+            dy[n + i] -= value - diagonal[i] * y[n + i]
+    for p in range(W.shape[0]):
+        place = offset[p]
+        speed = 0.0
+        for i in range(n):
+            place += W[p, i] * y[i]
+            speed += W[p, i] * y[n + i]
+        u[p] = place
+        du[p] = speed
+    for k in range(first.shape[0] - 1):
+        a = first[k]
+        b = first[k + 1]
+        law(t, u[a:b], du[a:b], parameters[k], out[a:b])  # noqa: F821
+    for p in range(W.shape[0]):
+        for i in range(n):
+            dy[n + i] += W[p, i] * out[p]
+
+
+def modal_steps(
+    squares, damping, diagonal, full, constant, W, offset, first, parameters, A, B, C, E3, E5, D,
+    t, t1, y, h, scale, breaks, tolerance, longest, T, Y, P,
+):  # fmt: skip
+    """Steps until t1 or until the arrays are full: (status, steps, time, next step, evaluations)."""
+    n2 = y.shape[0]
+    n = n2 // 2
+    K = np.zeros((16, n2))
+    z = np.empty(n2)
+    u = np.empty(W.shape[0])
+    du = np.empty(W.shape[0])
+    out = np.zeros(W.shape[0])
+    limit = np.empty(n2)
+    sign = 1.0 if t1 >= t else -1.0
+    begin = t
+    modal_rhs(squares, damping, diagonal, full, constant, W, offset, first, parameters, t, y, K[0], u, du, out)
+    calls = 1
+    count = 0
+    status = 0
+    while sign * (t1 - t) > 0.0:
+        if count >= T.shape[0]:
+            status = 2
+            break
+        goal = t1
+        for i in range(breaks.shape[0]):
+            if sign * (breaks[i] - t) > 1e-14 * max(1.0, abs(t)) and sign * (goal - breaks[i]) > 0.0:
+                goal = breaks[i]
+        step = min(h, longest, abs(goal - t))
+        fixed = step == abs(goal - t)
+        if step < 1e-14 * max(abs(t), abs(t1 - begin)):
+            status = 1
+            break
+        d = sign * step
+        for s in range(1, 13):
+            for i in range(n2):
+                z[i] = y[i]
+            for r in range(s):
+                factor = d * A[s, r]
+                if factor != 0.0:
+                    for i in range(n2):
+                        z[i] += factor * K[r, i]
+            modal_rhs(
+                squares, damping, diagonal, full, constant, W, offset, first, parameters,
+                t + C[s] * d, z, K[s], u, du, out,
+            )  # fmt: skip
+        calls += 12
+        top_q = 0.0
+        top_v = 0.0
+        for i in range(n2):
+            limit[i] = max(max(scale[i], abs(z[i])), step * abs(K[12, i])) * tolerance + 1e-300
+            if i < n:
+                top_q = max(top_q, limit[i])
+            else:
+                top_v = max(top_v, limit[i])
+        big = 0.0
+        small = 0.0
+        for i in range(n2):
+            five = 0.0
+            three = 0.0
+            for s in range(13):
+                five += E5[s] * K[s, i]
+                three += E3[s] * K[s, i]
+            reach = limit[i] + 1e-6 * (top_q if i < n else top_v)
+            big += (five / reach) ** 2
+            small += (three / reach) ** 2
+        error = 0.0
+        if big > 0.0:
+            error = step * big / math.sqrt((big + 0.01 * small) * n2)
+        if not np.isfinite(error):
+            h = 0.2 * step
+            if step < 1e-12 * abs(t1 - begin):
+                status = 4
+                break
+            continue
+        if error > 1.0:
+            h = step * max(0.2, 0.9 * error ** (-0.125))
+            continue
+        for i in range(n2):
+            Y[count, i] = z[i]
+        for s in range(13, 16):
+            for i in range(n2):
+                z[i] = y[i]
+            for r in range(s):
+                factor = d * A[s, r]
+                if factor != 0.0:
+                    for i in range(n2):
+                        z[i] += factor * K[r, i]
+            modal_rhs(
+                squares, damping, diagonal, full, constant, W, offset, first, parameters,
+                t + C[s] * d, z, K[s], u, du, out,
+            )  # fmt: skip
+        calls += 3
+        for i in range(n2):
+            change = Y[count, i] - y[i]
+            P[count, 0, i] = change
+            P[count, 1, i] = d * K[0, i] - change
+            P[count, 2, i] = 2.0 * change - d * (K[12, i] + K[0, i])
+            for k in range(4):
+                value = 0.0
+                for s in range(16):
+                    value += D[k, s] * K[s, i]
+                P[count, 3 + k, i] = d * value
+        t = goal if fixed else t + d
+        T[count] = t
+        for i in range(n2):
+            y[i] = Y[count, i]
+            scale[i] = max(scale[i], abs(y[i]))
+            K[0, i] = K[12, i]
+        if fixed:  # a time function may change its piece here
+            modal_rhs(squares, damping, diagonal, full, constant, W, offset, first, parameters, t, y, K[0], u, du, out)
+            calls += 1
+        count += 1
+        if not fixed or error > 0.01:
+            h = step * min(6.0, 0.9 * max(error, 1e-12) ** (-0.125))
+        else:
+            h = max(h, step)
+    return status, count, t, h, calls
+
+
+FUNCTIONS = (modal_rhs, modal_steps)

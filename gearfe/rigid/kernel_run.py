@@ -1,0 +1,244 @@
+# mypy: ignore-errors
+"""The integration loop of the Taylor method: expand, choose the step, land, project; land on folds rather than jump them.
+
+Step length from the last two coefficients (Jorba & Zou, Exp. Math. 14 (2005) 99): |q_N| h^N <= tolerance in units of
+`length` and 1 rad. A series started at the distance d from a fold amplifies round-off by (h/d)^N beyond it, so a step never
+crosses a fold: it ends there, and the next one is expanded there with the bordered equations of `kernel_series`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .kernel_fold import evaluate, fold_ahead, locate_fold, project
+from .kernel_rows import copy, factorise, fill, gradients, trigonometry
+from .kernel_series import expand
+
+DONE, TOO_SMALL, FULL, SINGULAR, NOT_FINITE = 0, 1, 2, 3, 4
+#: Pivot of S relative to its diagonal below which a fold is looked for.
+NEAR = 0.3
+
+
+def step_length(QS, order, tolerance, length):
+    """Longest step whose last two terms stay below the tolerance."""
+    last = 0.0
+    before = 0.0
+    for i in range(QS.shape[1]):
+        unit = 1.0 if i % 3 == 2 else length
+        last = max(last, abs(QS[order, i]) / unit)
+        before = max(before, abs(QS[order - 1, i]) / unit)
+    step = np.inf
+    if last > 0.0:
+        step = min(step, (tolerance / last) ** (1.0 / order))
+    if before > 0.0:
+        step = min(step, (tolerance / before) ** (1.0 / (order - 1)))
+    if not (np.isfinite(last) and np.isfinite(before)):
+        step = 0.0
+    return step
+
+
+def clear_series(w, q, v, order):
+    """Series that holds position and velocity only."""
+    copy(q, w.QS[0])
+    copy(v, w.QS[1])
+    for j in range(2, order + 1):
+        fill(w.QS[j], 0.0)
+
+
+def fold_behind(tb, t, sign, q, v, order, tolerance, length, base, where, ahead, none, w, qn, vn):
+    """A start just past a fold begins on the fold: (folds, time from the start to it)."""
+    forward = sign > 0.0
+    copy(base, w.skip)
+    clear_series(w, q, v, order)
+    expand(tb, t, forward, order, none, w)
+    step = step_length(w.QS, order, tolerance, length)
+    if abs(ahead) > step:
+        return 0, 0.0
+    folds, found = locate_fold(
+        tb, t, forward, w.QS, order, ahead, abs(ahead), base, where, length, w, qn, vn
+    )
+    if folds > 0 and sign * found > 0.0:
+        folds = 0
+    return folds, found
+
+
+def begin(tb, t, sign, q, v, order, tolerance, length, base, none, w, qn, vn):
+    """Consistent start: (folds, time shift, time to the fold ahead, status); the state is in q, v."""
+    rows, plan, mass = tb.rows, tb.plan, tb.mass
+    forward = sign > 0.0
+    copy(q, qn)
+    copy(v, vn)
+    copy(base, w.skip)
+    first, least, where = project(tb, t, forward, qn, vn, base, length, w)
+    if where < 0 or (least > NEAR and np.isfinite(first)):
+        copy(qn, q)
+        copy(vn, v)
+        return 0, 0.0, np.inf, DONE
+    trigonometry(q, w.c, w.s)
+    gradients(rows, q, w.c, w.s, w.G)
+    least, where = factorise(rows, plan, mass, w.G, base, w.val, w.diag)
+    ahead, share = fold_ahead(tb, q, v, where, w)
+    if least < 1e-10:
+        speed = 1e-300
+        for i in range(v.shape[0]):
+            speed = max(speed, abs(v[i]) / (1.0 if i % 3 == 2 else length))
+        clear_series(w, q, v, order)
+        folds, found = locate_fold(
+            tb, t, forward, w.QS, order, 0.0, 1e-3 / speed, base, where, length, w, qn, vn
+        )
+        if folds == 0:
+            return 0, 0.0, np.inf, SINGULAR
+        copy(qn, q)
+        copy(vn, v)
+        return folds, found, np.inf, DONE
+    first, least, where = project(tb, t, forward, q, v, base, length, w)
+    ahead, share = fold_ahead(tb, q, v, where, w)
+    if share < 0.5:
+        ahead = np.inf
+    if sign * ahead < 0.0:
+        folds, found = fold_behind(tb, t, sign, q, v, order, tolerance, length, base, where, ahead, none, w, qn, vn)
+        if folds > 0:
+            copy(qn, q)
+            copy(vn, v)
+            return folds, found, np.inf, DONE
+        project(tb, t, forward, q, v, base, length, w)
+    return 0, 0.0, ahead, DONE
+
+
+def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, w, qn, vn):
+    """End of a step of at most |h|: (step, folds there, time to the next fold, status); the state is in qn, vn."""
+    forward = sign > 0.0
+    for _ in range(40):
+        evaluate(w.QS, order, h, qn, vn)
+        first, least, where = project(tb, t + h, forward, qn, vn, base, length, w)
+        guess = np.inf
+        tau = np.inf
+        if where >= 0 and least < NEAR:
+            tau, share = fold_ahead(tb, qn, vn, where, w)
+            if share > 0.5:
+                guess = h + tau
+            else:
+                tau = np.inf
+        if 0.0 < sign * ahead < 1.3 * abs(h):
+            guess = ahead
+        lowest = 0.05 * abs(h) if folds > 0 else 0.0
+        if lowest < sign * guess < 1.3 * abs(h):
+            reach = 0.5 * abs(h)
+            found_folds, found = locate_fold(
+                tb, t, forward, w.QS, order, guess, reach, base, where, length, w, qn, vn
+            )
+            if found_folds > 0 and lowest < sign * found:
+                if sign * found <= 1.000001 * abs(h):
+                    return found, found_folds, np.inf, DONE
+                h = 0.6 * found
+                evaluate(w.QS, order, h, qn, vn)
+                copy(base, w.skip)
+                first, least, where = project(tb, t + h, forward, qn, vn, base, length, w)
+                if first < 1e3 * tolerance + 1e-10:
+                    return h, 0, found - h, DONE
+            evaluate(w.QS, order, h, qn, vn)
+            copy(base, w.skip)
+            first, least, where = project(tb, t + h, forward, qn, vn, base, length, w)
+        if first < 1e3 * tolerance + 1e-10 and (where < 0 or least > 1e-12):
+            return h, 0, tau, DONE
+        h = 0.7 * h
+    return h, 0, np.inf, TOO_SMALL
+
+
+def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks, longest, state, T, C, kind):
+    """Integrate from (q, v) to t1, or until the arrays are full; call again with the same arguments to go on.
+
+    `state` holds (time, folds, time to the fold ahead, 1 once begun); T (room + 1,) receives step ends, C
+    (room, order + 1, n) coefficients, kind (room,) the number of folds at the start of every step.
+
+    Returns status, number of steps.
+    """
+    sign = 1.0 if t1 >= t0 else -1.0
+    forward = sign > 0.0
+    t = state[0]
+    folds = int(state[1])
+    ahead = state[2]
+    status = DONE
+    count = 0
+    if state[3] == 0.0:
+        folds, shift, ahead, status = begin(tb, t, sign, q, v, order, tolerance, length, base, folds, w, w.qn, w.vn)
+        t += shift
+        state[3] = 1.0
+    T[0] = t
+    edge = 0 if forward else breaks.shape[0] - 1
+    while status == DONE and sign * (t1 - t) > 0.0:
+        if count >= kind.shape[0]:
+            status = FULL
+            break
+        copy(q, w.QS[0])
+        copy(v, w.QS[1])
+        expand(tb, t, forward, order, folds, w)
+        size = min(step_length(w.QS, order, tolerance, length), longest)
+        if not size > 1e-14 * max(abs(t), abs(t1 - t0)):
+            status = TOO_SMALL
+            break
+        while 0 <= edge < breaks.shape[0] and sign * (breaks[edge] - t) <= 1e-13 * (1.0 + abs(t)):
+            edge += 1 if forward else -1
+        goal = t1
+        if 0 <= edge < breaks.shape[0] and sign * (t1 - breaks[edge]) > 0.0:
+            goal = breaks[edge]
+        remains = sign * (goal - t)
+        if size >= remains:
+            size = remains
+        elif size > 0.5 * remains:
+            size = 0.5 * remains
+        h, next_folds, next_ahead, status = land(
+            tb, t, sign, sign * size, order, tolerance, length, base, folds, ahead, w, w.qn, w.vn
+        )
+        if status != DONE:
+            break
+        for j in range(order + 1):
+            copy(w.QS[j], C[count, j])
+        kind[count] = folds
+        if next_folds == 0:
+            copy(base, w.skip)
+        t = goal if h == sign * remains else t + h
+        count += 1
+        T[count] = t
+        copy(w.qn, q)
+        copy(w.vn, v)
+        folds = next_folds
+        ahead = next_ahead
+    for i in range(q.shape[0]):
+        if not (np.isfinite(q[i]) and np.isfinite(v[i])):
+            status = NOT_FINITE
+    state[0] = t
+    state[1] = folds
+    state[2] = ahead
+    return status, count
+
+
+def sample(T, C, sign, times, derivative, out):
+    """Coordinates or a derivative of them at `times` (in order of travel) from the pieces of `integrate_series`."""
+    piece = 0
+    last = C.shape[0] - 1
+    for i in range(times.shape[0]):
+        while piece < last and sign * (times[i] - T[piece + 1]) > 0.0:
+            piece += 1
+        while piece > 0 and sign * (times[i] - T[piece]) < 0.0:
+            piece -= 1
+        h = times[i] - T[piece]
+        for c in range(out.shape[1]):
+            out[i, c] = 0.0
+        for j in range(C.shape[1] - 1, derivative - 1, -1):
+            factor = 1.0
+            for d in range(derivative):
+                factor *= j - d
+            for c in range(out.shape[1]):
+                out[i, c] = out[i, c] * h + factor * C[piece, j, c]
+
+
+FUNCTIONS = (sample, step_length, clear_series, fold_behind, begin, land, integrate_series)
+NAMES = {
+    "DONE": DONE,
+    "TOO_SMALL": TOO_SMALL,
+    "FULL": FULL,
+    "SINGULAR": SINGULAR,
+    "NOT_FINITE": NOT_FINITE,
+    "NEAR": NEAR,
+}

@@ -1,0 +1,396 @@
+# mypy: ignore-errors
+"""Taylor series of the index-3 equations of a planar scene about one point.
+
+With q(t) = sum_j q_j (t - t0)^j and the multipliers likewise, order k of the motion and order k + 2 of the constraints read
+
+    M (k+2)(k+1) q_{k+2} + G_0^T lambda_k = f_k - sum_{i>=1} G_i^T lambda_{k-i},       G_0 q_{k+2} = -r_{k+2}
+
+with r the part of the constraint that lower orders fix. One factorisation of S = G_0 M^-1 G_0^T serves all orders. Sines and
+cosines follow from s' = c theta', c' = -s theta' (Barrio, Appl. Math. Comput. 163 (2005) 525); every force that acts at
+a point of a body enters through two sums A, B with the torque s A + c B, so the price does not depend on the joints.
+
+At a passing singular position (fold) some rows Z^T G_0 vanish while B = Z^T dG/dt does not. There order k + 3 of Z^T g
+fixes q_{k+2} along B, and the multipliers have a simple pole: lambda = (Z nu_0)/t + ... . Both conditions together give the
+bordered system with the rows B; multipliers are then stored one order up ("shift").
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .kernel_rows import add_transposed, fill, solve, time_series, times_gradients, trigonometry
+
+#: Planes of the body series: j theta_j, sine, cosine, the sums A and B.
+DT, SN, CS, AS, BS = 0, 1, 2, 3, 4
+#: Planes of the series of moving lines: normal, distance vector, reaction.
+NX, NY, DX, DY, FX, FY = 0, 1, 2, 3, 4, 5
+#: Planes of the series of springs: span, length, 1 / length, tension / length.
+EX, EY, EL, EI, EF = 0, 1, 2, 3, 4
+#: Kinds of force (the fourth is a moment).
+SPRING, LINEAR, LOAD = 0, 1, 2
+
+
+def angle_orders(bs, j, known):
+    """Orders j of sine and cosine from the orders of theta below `known`: what theta_j itself adds comes later."""
+    for b in range(bs.shape[2]):
+        sine = 0.0
+        cosine = 0.0
+        for i in range(1, known):
+            sine += bs[DT, i, b] * bs[CS, j - i, b]
+            cosine -= bs[DT, i, b] * bs[SN, j - i, b]
+        bs[SN, j, b] = sine / j
+        bs[CS, j, b] = cosine / j
+
+
+def slot_orders(rows, QS, bs, ls, j):
+    """Orders j of the normal n and the distance D of every moving line, from the orders j of q, sine and cosine."""
+    for k in range(rows.lines.shape[0]):
+        r = rows.lines[k]
+        a = rows.index[r, 0]
+        b = rows.index[r, 1]
+        ls[NX, j, k] = bs[CS, j, a] * rows.value[r, 10] - bs[SN, j, a] * rows.value[r, 11]
+        ls[NY, j, k] = bs[SN, j, a] * rows.value[r, 10] + bs[CS, j, a] * rows.value[r, 11]
+        rx = bs[CS, j, b] * rows.value[r, 12] - bs[SN, j, b] * rows.value[r, 13]
+        ry = bs[SN, j, b] * rows.value[r, 12] + bs[CS, j, b] * rows.value[r, 13]
+        ls[DX, j, k] = QS[j, 3 * b] + rx - QS[j, 3 * a]
+        ls[DY, j, k] = QS[j, 3 * b + 1] + ry - QS[j, 3 * a + 1]
+
+
+def row_orders(rows, TF, bs, ls, j, out):
+    """Order j >= 2 of every constraint row without the part of q_j."""
+    for r in range(rows.index.shape[0]):
+        value = 0.0
+        if rows.index[r, 3] >= 0:
+            value = -TF[rows.index[r, 3], j]
+        if rows.index[r, 2] == 0:
+            for side in range(2):
+                b = rows.index[r, side]
+                value += rows.value[r, 5 * side + 3] * bs[CS, j, b] + rows.value[r, 5 * side + 4] * bs[SN, j, b]
+        out[r] = value
+    for k in range(rows.lines.shape[0]):
+        value = 0.0
+        for i in range(j + 1):
+            value += ls[NX, i, k] * ls[DX, j - i, k] + ls[NY, i, k] * ls[DY, j - i, k]
+        out[rows.lines[k]] += value
+
+
+def spring_orders(forces, QS, bs, es, j):
+    """Order j of the span D, length L and 1/L of every spring."""
+    for k in range(es.shape[2]):
+        a = forces.index[k, 1]
+        b = forces.index[k, 2]
+        p = forces.value[k]
+        es[EX, j, k] = (
+            QS[j, 3 * b] - QS[j, 3 * a] + bs[CS, j, b] * p[2] - bs[SN, j, b] * p[3] - bs[CS, j, a] * p[0] + bs[SN, j, a] * p[1]
+        )
+        es[EY, j, k] = (
+            QS[j, 3 * b + 1] - QS[j, 3 * a + 1] + bs[SN, j, b] * p[2] + bs[CS, j, b] * p[3]
+            - bs[SN, j, a] * p[0] - bs[CS, j, a] * p[1]
+        )  # fmt: skip
+        square = 0.0
+        for i in range(j + 1):
+            square += es[EX, i, k] * es[EX, j - i, k] + es[EY, i, k] * es[EY, j - i, k]
+        if j == 0:
+            es[EL, 0, k] = np.sqrt(square)
+            es[EI, 0, k] = 1.0 / es[EL, 0, k]
+        else:
+            for i in range(1, j):
+                square -= es[EL, i, k] * es[EL, j - i, k]
+            es[EL, j, k] = 0.5 * square * es[EI, 0, k]
+            inverse = 0.0
+            for i in range(1, j + 1):
+                inverse += es[EL, i, k] * es[EI, j - i, k]
+            es[EI, j, k] = -inverse * es[EI, 0, k]
+
+
+def force_orders(forces, QS, TF, bs, es, k, at, F):
+    """Order k of all applied forces: F gets what does not turn with a body, A and B (at row `at`) what does."""
+    for i in range(F.shape[0]):
+        F[i] = forces.weight[i] if k == 0 else 0.0
+    for b in range(bs.shape[2]):
+        bs[AS, at, b] = 0.0
+        bs[BS, at, b] = 0.0
+    for e in range(forces.index.shape[0]):
+        kind = forces.index[e, 0]
+        a = forces.index[e, 1]
+        b = forces.index[e, 2]
+        first = forces.value[e, 0]
+        second = forces.value[e, 1]
+        if kind == SPRING:
+            fx, fy = spring_force(forces, es, k, e)
+            F[3 * a] += fx
+            F[3 * a + 1] += fy
+            F[3 * b] -= fx
+            F[3 * b + 1] -= fy
+            bs[AS, at, a] -= first * fx + second * fy
+            bs[BS, at, a] += first * fy - second * fx
+            bs[AS, at, b] += forces.value[e, 2] * fx + forces.value[e, 3] * fy
+            bs[BS, at, b] -= forces.value[e, 2] * fy - forces.value[e, 3] * fx
+        elif kind == LINEAR:
+            value = -first * (QS[k, a] - QS[k, b]) - second * (k + 1) * (QS[k + 1, a] - QS[k + 1, b])
+            if k == 0:
+                value += first * forces.value[e, 2]
+            F[a] += value
+            F[b] -= value
+        elif kind == LOAD:
+            fx = TF[forces.index[e, 3], k]
+            fy = TF[forces.index[e, 4], k]
+            F[3 * a] += fx
+            F[3 * a + 1] += fy
+            bs[AS, at, a] -= first * fx + second * fy
+            bs[BS, at, a] += first * fy - second * fx
+        else:
+            value = TF[forces.index[e, 3], k]
+            F[3 * a + 2] += value
+            F[3 * b + 2] -= value
+
+
+def spring_force(forces, es, k, e):
+    """Order k of the force of spring e on its first point: (k_s (L - L0) + c L') / L times the span."""
+    stiffness = forces.value[e, 4]
+    damping = forces.value[e, 5]
+    value = -stiffness * forces.value[e, 6] * es[EI, k, e]
+    if k == 0:
+        value += stiffness
+    if damping != 0.0:
+        for i in range(k + 1):
+            value += damping * (i + 1) * es[EL, i + 1, e] * es[EI, k - i, e]
+    es[EF, k, e] = value
+    fx = 0.0
+    fy = 0.0
+    for i in range(k + 1):
+        fx += es[EF, i, e] * es[EX, k - i, e]
+        fy += es[EF, i, e] * es[EY, k - i, e]
+    return fx, fy
+
+
+def slot_forces(rows, LM, bs, ls, at, F):
+    """Known part of order `at` of the forces of moving ls, from the multipliers below that order."""
+    for k in range(rows.lines.shape[0]):
+        r = rows.lines[k]
+        fx = 0.0
+        fy = 0.0
+        for i in range(1, at + 1):
+            fx += ls[NX, i, k] * LM[at - i, r]
+            fy += ls[NY, i, k] * LM[at - i, r]
+        ls[FX, at, k] = fx
+        ls[FY, at, k] = fy
+        turn = 0.0
+        for i in range(at + 1):
+            turn += ls[FX, i, k] * ls[DY, at - i, k] - ls[FY, i, k] * ls[DX, at - i, k]
+        a = rows.index[r, 0]
+        b = rows.index[r, 1]
+        F[3 * a] += fx
+        F[3 * a + 1] += fy
+        F[3 * a + 2] -= turn
+        F[3 * b] -= fx
+        F[3 * b + 1] -= fy
+        slot_arms(rows, bs, at, r, b, fx, fy)
+
+
+def slot_arms(rows, bs, at, r, b, fx, fy):
+    """Reaction (fx, fy) of the moving line r on the point of body b, in the sums A and B."""
+    x = rows.value[r, 12]
+    y = rows.value[r, 13]
+    bs[AS, at, b] += x * fx + y * fy
+    bs[BS, at, b] -= x * fy - y * fx
+
+
+def add_multipliers(rows, LM, bs, ls, at, values):
+    """Multipliers `values` (one per row) join order `at`: what turns with a body goes into A, B, and into the lines' forces."""
+    for r in range(values.shape[0]):
+        value = values[r]
+        LM[at, r] += value
+        if rows.index[r, 2] == 0:
+            for side in range(2):
+                b = rows.index[r, side]
+                bs[AS, at, b] += rows.value[r, 5 * side + 3] * value
+                bs[BS, at, b] -= rows.value[r, 5 * side + 4] * value
+    add_line_multipliers(rows, bs, ls, at, 0, values)
+
+
+def add_line_multipliers(rows, bs, ls, at, i, values):
+    """Order `at` of the force of every moving line gains n_i times its multiplier."""
+    for k in range(rows.lines.shape[0]):
+        r = rows.lines[k]
+        fx = ls[NX, i, k] * values[r]
+        fy = ls[NY, i, k] * values[r]
+        ls[FX, at, k] += fx
+        ls[FY, at, k] += fy
+        slot_arms(rows, bs, at, r, rows.index[r, 1], fx, fy)
+
+
+def torque_orders(bs, at, F):
+    """F gains order `at` of s A + c B for every body."""
+    for b in range(bs.shape[2]):
+        torque = 0.0
+        for i in range(at + 1):
+            torque += bs[SN, i, b] * bs[AS, at - i, b] + bs[CS, i, b] * bs[BS, at - i, b]
+        F[3 * b + 2] += torque
+
+
+def finish_order(rows, forces, QS, bs, ls, es, j):
+    """Everything that follows from q_j: sine, cosine, ls, springs."""
+    n = bs.shape[2]
+    for b in range(n):
+        theta = QS[j, 3 * b + 2]
+        bs[DT, j, b] = j * theta
+        bs[SN, j, b] += bs[CS, 0, b] * theta
+        bs[CS, j, b] -= bs[SN, 0, b] * theta
+    slot_orders(rows, QS, bs, ls, j)
+    spring_orders(forces, QS, bs, es, j)
+
+
+def expand(tb, t, forward, order, folds, w):
+    """Fill w.QS[2..order] from w.QS[0], w.QS[1]; w.G, w.val hold gradients and factor there, w.fold the fold's rows.
+
+    `folds` is the number of singular rows: 0 at a regular position.
+    """
+    rows, plan, forces, mass = tb.rows, tb.plan, tb.forces, tb.mass
+    bs, ls, es, fold = w.bs, w.ls, w.es, w.fold
+    QS, TF, LM, G, val, skip = w.QS, w.TF, w.LM, w.G, w.val, w.skip
+    mu, rhs, F, u = w.mu, w.rhs, w.F, w.u
+    shift = 1 if folds > 0 else 0
+    time_series(tb.times, t, forward, order + 2, TF)
+    start_series(rows, forces, order, QS, LM, bs, ls, es)
+    for k in range(order - 1):
+        j = k + 2
+        at = k + shift
+        alpha = float(j * (j - 1))
+        share = 1.0 / alpha
+        force_orders(forces, QS, TF, bs, es, k, at, F)
+        slot_forces(rows, LM, bs, ls, at, F)
+        torque_orders(bs, at, F)
+        angle_orders(bs, j, j)
+        slot_orders(rows, QS, bs, ls, j)
+        row_orders(rows, TF, bs, ls, j, rhs)
+        for i in range(F.shape[0]):
+            u[i] = F[i] * mass[i] * share
+        if folds > 0:
+            fold_rows(rows, QS, TF, bs, ls, fold, mu, u, j, folds)
+        times_gradients(rows, G, u, mu)
+        for r in range(mu.shape[0]):
+            mu[r] = mu[r] + rhs[r] if skip[r] == 0 else 0.0
+        if folds > 0:
+            fold_solve(plan, val, fold, mu, folds)
+        else:
+            solve(plan, val, mu)
+        fill(F, 0.0)
+        add_transposed(rows, G, mu, 1.0, F)
+        for p in range(folds):
+            for i in range(F.shape[0]):
+                F[i] += fold.B[p, i] * fold.nu[p]
+        for i in range(F.shape[0]):
+            QS[j, i] = u[i] - F[i] * mass[i]
+        for r in range(mu.shape[0]):
+            mu[r] *= alpha
+        add_multipliers(rows, LM, bs, ls, at, mu)
+        if folds > 0:  # the multipliers Z nu belong one order below the regular ones
+            for r in range(mu.shape[0]):
+                mu[r] = 0.0
+                for p in range(folds):
+                    mu[r] += alpha * fold.Z[p, r] * fold.nu[p]
+            add_multipliers(rows, LM, bs, ls, at - 1, mu)
+            add_line_multipliers(rows, bs, ls, at, 1, mu)
+        finish_order(rows, forces, QS, bs, ls, es, j)
+
+
+def start_series(rows, forces, order, QS, LM, bs, ls, es):
+    """Orders 0 and 1 from position and velocity; all others zero."""
+    for j in range(2, order + 2):
+        fill(QS[j], 0.0)
+    for j in range(order + 2):
+        fill(LM[j], 0.0)
+    fill(ls[FX, 0], 0.0)
+    fill(ls[FY, 0], 0.0)
+    trigonometry(QS[0], bs[CS, 0], bs[SN, 0])
+    fill(bs[DT, 0], 0.0)
+    fill(bs[SN, 1], 0.0)
+    fill(bs[CS, 1], 0.0)
+    fill(bs[AS, 0], 0.0)
+    fill(bs[BS, 0], 0.0)
+    slot_orders(rows, QS, bs, ls, 0)
+    spring_orders(forces, QS, bs, es, 0)
+    finish_order(rows, forces, QS, bs, ls, es, 1)
+
+
+def fold_rows(rows, QS, TF, bs, ls, fold, work, u, j, folds):
+    """Order j + 1 of Z^T g with q_j and q_{j+1} left out: fold.nu; the part of q_j is B q_j."""
+    angle_orders(bs, j + 1, j)
+    slot_orders(rows, QS, bs, ls, j + 1)
+    row_orders(rows, TF, bs, ls, j + 1, work)
+    for p in range(folds):
+        value = 0.0
+        for r in range(work.shape[0]):
+            value += fold.Z[p, r] * work[r]
+        for i in range(u.shape[0]):
+            value += fold.B[p, i] * u[i]
+        fold.nu[p] = value
+
+
+def fold_solve(plan, val, fold, mu, folds):
+    """Bordered solve: in come the regular right-hand side in mu and the one of the rows B in nu; out the multipliers."""
+    for p in range(folds):
+        for r in range(mu.shape[0]):
+            fold.nu[p] -= fold.Y[p, r] * mu[r]
+    small_solve(fold.border, folds, fold.nu, fold.small)
+    solve(plan, val, mu)
+    for p in range(folds):
+        for r in range(mu.shape[0]):
+            mu[r] -= fold.Y[p, r] * fold.nu[p]
+
+
+def small_solve(matrix, size, x, work):
+    """x := matrix^-1 x by Gaussian elimination with row pivots (a few unknowns)."""
+    for i in range(size):
+        for j in range(size):
+            work[i, j] = matrix[i, j]
+    for i in range(size):
+        best = i
+        for k in range(i + 1, size):
+            if abs(work[k, i]) > abs(work[best, i]):
+                best = k
+        if best != i:
+            for j in range(size):
+                keep = work[i, j]
+                work[i, j] = work[best, j]
+                work[best, j] = keep
+            keep = x[i]
+            x[i] = x[best]
+            x[best] = keep
+        for k in range(i + 1, size):
+            factor = work[k, i] / work[i, i]
+            x[k] -= factor * x[i]
+            for j in range(i, size):
+                work[k, j] -= factor * work[i, j]
+    for i in range(size - 1, -1, -1):
+        for j in range(i + 1, size):
+            x[i] -= work[i, j] * x[j]
+        x[i] /= work[i, i]
+
+
+FUNCTIONS = (
+    angle_orders,
+    slot_orders,
+    row_orders,
+    spring_orders,
+    force_orders,
+    spring_force,
+    slot_forces,
+    slot_arms,
+    add_multipliers,
+    add_line_multipliers,
+    torque_orders,
+    finish_order,
+    expand,
+    start_series,
+    fold_rows,
+    fold_solve,
+    small_solve,
+)
+NAMES = {
+    "DT": DT, "SN": SN, "CS": CS, "AS": AS, "BS": BS,
+    "NX": NX, "NY": NY, "DX": DX, "DY": DY, "FX": FX, "FY": FY,
+    "EX": EX, "EY": EY, "EL": EL, "EI": EI, "EF": EF,
+    "SPRING": SPRING, "LINEAR": LINEAR, "LOAD": LOAD,
+}  # fmt: skip

@@ -1,0 +1,116 @@
+"""Elimination order of the constraint rows and the symbolic factorisation of S = G M^-1 G^T = L D L^T.
+
+Two rows couple in S when they share a moving body. The order is minimum degree on the graph of the joints (George & Liu,
+SIAM Review 31 (1989)): chains and trees fill nothing, so the cost of a factorisation grows as the number of joints.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections import defaultdict
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Ints = NDArray[np.int64]
+
+
+class Factor(NamedTuple):
+    """Every index that the numeric factorisation needs, for m rows."""
+
+    start: Ints  # (m + 1,) columns of the factor L
+    row: NDArray[np.uint64]  # (nnz,) row number of each entry
+    column: NDArray[np.uint64]  # (nnz,) and its column (unsigned: compiled code need not ask for negative numbers)
+    entry: Ints  # (e, 6) target, row, side, row, side, body: products that make G M^-1 G^T
+    update_start: Ints  # (m + 1,)
+    update: Ints  # (u, 3) target, entry, entry of L
+
+
+class Plan(NamedTuple):
+    """Order in which the rows are numbered, and the symbolic factor."""
+
+    order: list[int]
+    factor: Factor
+
+
+def elimination_plan(rows: list[tuple[int, tuple[int, int]]], n_bodies: int) -> Plan:
+    """Plan for rows given as (joint, (body, body)); body `n_bodies` is the ground and couples nothing."""
+    order = _minimum_degree(rows, n_bodies)
+    bodies = [rows[i][1] for i in order]
+    m = len(bodies)
+    holders: dict[int, list[tuple[int, int]]] = defaultdict(list)
+    for r, pair in enumerate(bodies):
+        for side, body in enumerate(pair):
+            if body != n_bodies:
+                holders[body].append((r, side))
+    below: list[set[int]] = [set() for _ in range(m)]
+    for users in holders.values():
+        for r, _ in users:
+            below[r].update(s for s, _ in users if s > r)
+    for j in range(m):  # fill: the first row below the diagonal inherits the rest of the column
+        if below[j]:
+            first = min(below[j])
+            below[first].update(i for i in below[j] if i > first)
+    start = np.zeros(m + 1, dtype=np.int64)
+    start[1:] = np.cumsum([len(b) for b in below])
+    columns = [sorted(b) for b in below]
+    place = {(i, j): int(start[j]) + k for j, column in enumerate(columns) for k, i in enumerate(column)}
+
+    def target(r: int, s: int) -> int:
+        return r if r == s else m + place[(max(r, s), min(r, s))]
+
+    entry = [
+        (target(r, s), r, side, s, other, body)
+        for body, users in holders.items()
+        for u, (r, side) in enumerate(users)
+        for s, other in users[u:]
+    ]
+    update, update_start = [], [0]
+    for j, column in enumerate(columns):
+        first = int(start[j])
+        for b, k in enumerate(column):
+            update += [(target(i, k), first + a, first + b) for a, i in enumerate(column) if i >= k]
+        update_start.append(len(update))
+    return Plan(
+        order,
+        Factor(
+            start,
+            np.array([i for column in columns for i in column], dtype=np.uint64),
+            np.array([j for j, column in enumerate(columns) for _ in column], dtype=np.uint64),
+            np.array(entry, dtype=np.int64).reshape(-1, 6),
+            np.array(update_start, dtype=np.int64),
+            np.array(update, dtype=np.int64).reshape(-1, 3),
+        ),
+    )
+
+
+def _minimum_degree(rows: list[tuple[int, tuple[int, int]]], n_bodies: int) -> list[int]:
+    """Rows, joint by joint, always next the joint with the fewest neighbours left."""
+    members: dict[int, list[int]] = defaultdict(list)
+    on_body: dict[int, set[int]] = defaultdict(set)
+    for i, (joint, pair) in enumerate(rows):
+        members[joint].append(i)
+        for body in pair:
+            if body != n_bodies:
+                on_body[body].add(joint)
+    near: dict[int, set[int]] = {joint: set() for joint in members}
+    for joints in on_body.values():
+        for joint in joints:
+            near[joint] |= joints - {joint}
+    heap = [(len(near[joint]), joint) for joint in members]
+    heapq.heapify(heap)
+    order: list[int] = []
+    done: set[int] = set()
+    while heap:
+        degree, joint = heapq.heappop(heap)
+        if joint in done or degree != len(near[joint]):
+            continue
+        done.add(joint)
+        order += members[joint]
+        ring = near.pop(joint)
+        for other in ring:
+            near[other] |= ring
+            near[other] -= {other, joint}
+            heapq.heappush(heap, (len(near[other]), other))
+    return order

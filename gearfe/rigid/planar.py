@@ -1,0 +1,225 @@
+"""Planar bodies, joints and forces as plain data: what a mechanism consists of, nothing about how it is solved.
+
+A body carries a frame: points, the mass centre and joint directions are written in that frame (m); the start pose is the
+position of the frame's origin and its angle. The ground is the body named ``"ground"`` with its frame at rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ..errors import InputError
+from .timefunctions import TimeFunction, constant
+
+GROUND = "ground"
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body that moves in the plane.
+
+    Parameters
+    ----------
+    name : str
+        Name used by joints and forces.
+    mass : float
+        Mass (kg), > 0.
+    inertia : float
+        Moment of inertia about the mass centre (kg m2), > 0.
+    centre : (float, float)
+        Mass centre in the body's frame (m).
+    position, angle : (float, float), float
+        Start position of the frame's origin (m) and start angle (rad).
+    velocity, rate : (float, float), float
+        Start velocity of the frame's origin (m/s) and start angular velocity (rad/s).
+    """
+
+    name: str
+    mass: float
+    inertia: float
+    centre: Point = (0.0, 0.0)
+    position: Point = (0.0, 0.0)
+    angle: float = 0.0
+    velocity: Point = (0.0, 0.0)
+    rate: float = 0.0
+
+    def __post_init__(self) -> None:
+        for key in ("mass", "inertia"):
+            value = getattr(self, key)
+            if not (math.isfinite(value) and value > 0.0):
+                unit = "kg" if key == "mass" else "kg m2"
+                cure = f"give a positive number in {unit}; a massless slider is a slot joint, not a body"
+                raise InputError(f"body {self.name!r} {key}", value, "must be finite and > 0", cure)
+
+
+@dataclass(frozen=True)
+class Hinge:
+    """Point `point_a` of body `a` stays on point `point_b` of body `b`: two constraints."""
+
+    a: str
+    b: str
+    point_a: Point = (0.0, 0.0)
+    point_b: Point = (0.0, 0.0)
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Slot:
+    """Point `point` of body `body` stays on a line of body `line`: one constraint (the slider itself has no mass)."""
+
+    body: str
+    line: str
+    point: Point = (0.0, 0.0)
+    origin: Point = (0.0, 0.0)
+    direction: Point = (1.0, 0.0)
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Slider:
+    """Body `body` slides along a line of body `line` without turning against it: two constraints.
+
+    `angle` is the angle of `body` minus that of `line` (rad); ``None`` keeps the one it starts with.
+    """
+
+    body: str
+    line: str
+    point: Point = (0.0, 0.0)
+    origin: Point = (0.0, 0.0)
+    direction: Point = (1.0, 0.0)
+    angle: float | None = None
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """Body `a` stands still in the frame of body `b`, as it starts: three constraints."""
+
+    a: str
+    b: str = GROUND
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """A motion given as a function of time: one constraint.
+
+    `coordinate` is ``"angle"`` (rad, relative to body `relative_to`), ``"rate"`` (rad/s, likewise; the angle starts
+    from the start pose), or ``"x"`` or ``"y"`` (m, of the point `point`, in the ground's frame).
+    """
+
+    body: str
+    coordinate: str
+    function: TimeFunction
+    relative_to: str = GROUND
+    point: Point = (0.0, 0.0)
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if self.coordinate not in ("angle", "rate", "x", "y"):
+            where = f"prescribed motion {self.name!r} coordinate"
+            raise InputError(where, self.coordinate, "must be one of angle, rate, x, y", "choose one of these")
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """Uniform field (m/s2) on every body."""
+
+    acceleration: Point = (0.0, -9.81)
+    name: str = "gravity"
+
+
+@dataclass(frozen=True)
+class Spring:
+    """Spring-damper between two points: tension ``k (L - L0) + c L'`` along the line that joins them."""
+
+    a: str
+    b: str
+    point_a: Point = (0.0, 0.0)
+    point_b: Point = (0.0, 0.0)
+    stiffness: float = 0.0
+    damping: float = 0.0
+    free_length: float = 0.0
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class CoordinateSpring:
+    """Spring and damper on one coordinate of a body's mass centre or angle: ``-k (u - u0) - c u'``.
+
+    `coordinate` is ``"x"``, ``"y"`` (m, of the mass centre, against the ground) or ``"angle"`` (rad, against the body
+    `relative_to`: a torsional spring).
+    """
+
+    body: str
+    coordinate: str
+    stiffness: float = 0.0
+    damping: float = 0.0
+    reference: float = 0.0
+    relative_to: str = GROUND
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if self.coordinate not in ("angle", "x", "y"):
+            where = f"coordinate spring {self.name!r} coordinate"
+            raise InputError(where, self.coordinate, "must be one of angle, x, y", "choose one of these")
+        if self.coordinate != "angle" and self.relative_to != GROUND:
+            where = f"coordinate spring {self.name!r} relative_to"
+            raise InputError(where, self.relative_to, "only an angle can be relative to a body", "use a spring")
+
+
+@dataclass(frozen=True)
+class PointForce:
+    """Force (N) with directions fixed in the ground, acting at a point that moves with the body."""
+
+    body: str
+    point: Point = (0.0, 0.0)
+    x: TimeFunction = field(default_factory=lambda: constant(0.0))
+    y: TimeFunction = field(default_factory=lambda: constant(0.0))
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Moment (N m) on a body, with the opposite one on body `reaction` (the ground by default)."""
+
+    body: str
+    function: TimeFunction
+    reaction: str = GROUND
+    name: str = ""
+
+
+Joint = Hinge | Slot | Slider | Fixed | Prescribed
+Force = Gravity | Spring | CoordinateSpring | PointForce | Moment
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A planar mechanism: bodies, joints and forces, with every name checked."""
+
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...] = ()
+    forces: tuple[Force, ...] = ()
+    body_index: Mapping[str, int] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        from ..errors import unknown_name
+
+        index: dict[str, int] = {GROUND: len(self.bodies)}
+        for i, body in enumerate(self.bodies):
+            if body.name in index:
+                raise InputError("body name", body.name, "is used twice", "give every body a name of its own")
+            index[body.name] = i
+        object.__setattr__(self, "body_index", index)
+        for k, part in enumerate((*self.joints, *self.forces)):
+            label = f"{type(part).__name__.lower()} {getattr(part, 'name', '') or k}"
+            used = [getattr(part, key) for key in ("a", "b", "body", "line", "relative_to", "reaction") if hasattr(part, key)]
+            for name in used:
+                if name not in index:
+                    raise unknown_name(label, name, index)
+            if len(used) == 2 and used[0] == used[1]:
+                cure = "name two different bodies (or the ground)"
+                raise InputError(label, used[0], "joins a body to itself", cure)

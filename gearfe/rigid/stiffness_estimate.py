@@ -1,0 +1,39 @@
+"""How fast the fastest part of a system is at its start: decides between explicit and implicit integration."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .start import Start
+from .system import System
+
+
+def fastest_rate(system: System, start: Start) -> tuple[float, float]:
+    """Fastest decay (1/s) and fastest vibration (rad/s) of the free motion at the start.
+
+    The linear part of forces is projected onto the directions that the constraints leave free.
+    """
+    if not (system.linear or _has_springs(system)):
+        return 0.0, 0.0
+    by_q, by_v = system.force_jacobian(start.time, start.q, start.v)
+    G = system.jacobian(start.time, start.q)[start.active]
+    if system.diagonal_mass:
+        root = np.diag(np.sqrt(np.diagonal(system.inverse_mass)))
+    else:
+        root = np.linalg.cholesky(system.inverse_mass)
+    if len(G):
+        basis = np.linalg.qr((G @ root).T, mode="complete")[0][:, len(G) :]
+        root = root @ basis
+    K, C = -root.T @ by_q @ root, -root.T @ by_v @ root
+    if K.size == 0:
+        return 0.0, 0.0
+    decay = float(np.abs(np.linalg.eigvals(C)).max()) if C.any() else 0.0
+    omega = float(np.sqrt(np.abs(np.linalg.eigvals(K)).max()))
+    return decay, omega
+
+
+def _has_springs(system: System) -> bool:
+    scene = system.planar
+    if scene is None:
+        return bool(system.forces)
+    return bool((scene.assembly.tables.forces.index[:, 0] < 2).any())

@@ -1,0 +1,180 @@
+"""A system of elements: slices of the state, and the sums of their mass, forces and constraints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from .contract import Array, Element
+from .scene import PlanarScene
+
+
+class System:
+    """Elements that share one state q of `size` coordinates, under `rows` constraints.
+
+    Parameters
+    ----------
+    elements
+        Bodies, joints and forces that follow the contract in `gearfe.rigid.contract`; bodies before those that touch them.
+    """
+
+    def __init__(self, elements: Sequence[Element]) -> None:
+        self.elements = tuple(elements)
+        place: dict[int, np.ndarray] = {}
+        total = 0
+        for element in self.elements:
+            place[id(element)] = np.arange(total, total + element.size)
+            total += element.size
+        self.size = total
+        self.index: list[np.ndarray] = []
+        for element in self.elements:
+            for other in element.touches:
+                if id(other) not in place:
+                    name = element.name or type(element).__name__
+                    cure = "list every touched element in the system"
+                    raise InputError(f"element {name!r}", None, "touches an element that is not in the system", cure)
+            self.index.append(np.concatenate([place[id(e)] for e in (element, *element.touches)]).astype(int))
+        self.forces = [(e, i) for e, i in zip(self.elements, self.index, strict=True) if hasattr(e, "force")]
+        self.joints = [(e, i) for e, i in zip(self.elements, self.index, strict=True) if e.rows]
+        self.rows = sum(e.rows for e, _ in self.joints)
+        self.mass = np.zeros((total, total))
+        self.damping = np.zeros((total, total))
+        self.stiffness = np.zeros((total, total))
+        for element, index in zip(self.elements, self.index, strict=True):
+            own = place[id(element)]
+            if element.size:
+                self.mass[np.ix_(own, own)] += element.mass()
+            blocks = element.blocks()
+            if blocks is not None:
+                self.damping[np.ix_(index, index)] += blocks[0]
+                self.stiffness[np.ix_(index, index)] += blocks[1]
+        self.linear = bool(self.damping.any() or self.stiffness.any())
+        diagonal = np.diagonal(self.mass)
+        self.diagonal_mass = bool(np.array_equal(self.mass, np.diag(diagonal)))
+        self.inverse_mass = np.diag(1.0 / diagonal) if self.diagonal_mass else np.linalg.inv(self.mass)
+        starts = [e.start() for e in self.elements]
+        self.start_q = np.concatenate([s[0] for s in starts]) if starts else np.zeros(0)
+        self.start_v = np.concatenate([s[1] for s in starts]) if starts else np.zeros(0)
+        breaks = [getattr(e, "breaks", ()) for e in self.elements]
+        self.breaks = np.unique(np.concatenate([np.asarray(b, dtype=float) for b in breaks])) if breaks else np.zeros(0)
+
+    @property
+    def planar(self) -> PlanarScene | None:
+        """The planar scene when the system is nothing else: the Taylor kernels can run it."""
+        one = self.elements[0] if len(self.elements) == 1 else None
+        return one if isinstance(one, PlanarScene) else None
+
+    def coordinates(self, element: Element) -> np.ndarray:
+        """Numbers of the coordinates that `element` owns."""
+        return self.index[self.elements.index(element)][: element.size]
+
+    def force(self, t: float, q: Array, v: Array) -> Array:
+        """All applied forces, the linear parts included; shape (size,)."""
+        total = -(self.damping @ v + self.stiffness @ q) if self.linear else np.zeros(self.size)
+        for element, index in self.forces:
+            np.add.at(total, index, element.force(t, q[index], v[index]))  # type: ignore[attr-defined]
+        return total
+
+    def force_jacobian(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
+        """(df/dq, df/dv); finite differences for elements that do not provide theirs."""
+        by_q, by_v = -self.stiffness, -self.damping
+        for element, index in self.forces:
+            local = element_jacobian(element, t, q[index], v[index])
+            by_q, by_v = by_q.copy(), by_v.copy()
+            np.add.at(by_q, np.ix_(index, index), local[0])
+            np.add.at(by_v, np.ix_(index, index), local[1])
+        return by_q, by_v
+
+    def residual(self, t: float, q: Array) -> Array:
+        """g, shape (rows,)."""
+        return self._stack("residual", t, q)
+
+    def rate(self, t: float, q: Array) -> Array:
+        """Partial time derivative of g."""
+        return self._stack("rate", t, q)
+
+    def velocity_terms(self, t: float, q: Array, v: Array) -> Array:
+        """g'' without its acceleration part."""
+        parts = [e.velocity_terms(t, q[i], v[i]) for e, i in self.joints]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def jacobian(self, t: float, q: Array) -> Array:
+        """G, shape (rows, size)."""
+        full = np.zeros((self.rows, self.size))
+        at = 0
+        for element, index in self.joints:
+            np.add.at(full[at : at + element.rows], (slice(None), index), element.jacobian(t, q[index]))  # type: ignore[attr-defined]
+            at += element.rows
+        return full
+
+    def row_names(self) -> list[str]:
+        """What each constraint holds, for messages."""
+        names: list[str] = []
+        for element, _ in self.joints:
+            own: Any = getattr(element, "row_names", None)
+            label = element.name or type(element).__name__
+            names += list(own) if own else [f"{label} ({k})" for k in range(element.rows)]
+        return names
+
+    def acceleration(self, t: float, q: Array, v: Array, active: np.ndarray | None = None) -> tuple[Array, Array]:
+        """Accelerations and multipliers at a consistent state; rows that are not `active` carry none."""
+        f = self.force(t, q, v)
+        if self.rows == 0:
+            return self.inverse_mass @ f, np.zeros(0)
+        keep = np.ones(self.rows, dtype=bool) if active is None else active
+        G = self.jacobian(t, q)[keep]
+        right = G @ (self.inverse_mass @ f) + self.velocity_terms(t, q, v)[keep]
+        S = G @ self.inverse_mass @ G.T
+        multipliers = np.zeros(self.rows)
+        multipliers[keep] = solve_semidefinite(S, right)
+        return self.inverse_mass @ (f - G.T @ multipliers[keep]), multipliers
+
+    def energy(self, q: Array, v: Array) -> tuple[float, float]:
+        """Kinetic and potential energy (J)."""
+        kinetic = 0.5 * float(v @ self.mass @ v)
+        potential = 0.5 * float(q @ self.stiffness @ q)
+        for element, index in zip(self.elements, self.index, strict=True):
+            own = getattr(element, "potential", None)
+            if own is not None:
+                potential += float(own(q[index]))
+        return kinetic, potential
+
+    def _stack(self, name: str, t: float, q: Array) -> Array:
+        parts = [getattr(e, name)(t, q[i]) for e, i in self.joints]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def solve_semidefinite(S: Array, right: Array) -> Array:
+    """Solution of S x = right; the one of least norm where S has lost rank."""
+    if len(S) == 0:
+        return np.zeros(0)
+    try:
+        factor = np.linalg.cholesky(S)
+        scale = np.sqrt(np.abs(np.diagonal(S)))
+        if (np.diagonal(factor) > 1e-7 * scale).all():
+            return np.linalg.solve(S, right)
+    except np.linalg.LinAlgError:
+        pass
+    return np.linalg.lstsq(S, right, rcond=1e-12)[0]
+
+
+def element_jacobian(element: Element, t: float, q: Array, v: Array) -> tuple[Array, Array]:
+    """(df/dq, df/dv) of one element, by central differences when it has none."""
+    own: Any = getattr(element, "force_jacobian", None)
+    if own is not None:
+        return own(t, q, v)
+    force: Any = element.force  # type: ignore[attr-defined]
+    k = len(q)
+    by = np.zeros((2, k, k))
+    for j in range(k):
+        for part, state in enumerate((q, v)):
+            step = 1e-6 * max(1.0, abs(state[j]))
+            up, down = state.copy(), state.copy()
+            up[j] += step
+            down[j] -= step
+            ends = (force(t, up, v), force(t, down, v)) if part == 0 else (force(t, q, up), force(t, q, down))
+            by[part][:, j] = (ends[0] - ends[1]) / (2 * step)
+    return by[0], by[1]

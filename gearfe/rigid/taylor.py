@@ -1,0 +1,185 @@
+"""Taylor integration of planar scenes: orders, work space, backend; the loops are in the kernel modules."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+
+from . import compiled, kernel_fold, kernel_rows, kernel_run, kernel_series
+from .tables import Array, Assembly, Ints, Tables
+
+FUNCTIONS = (*kernel_rows.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_fold.FUNCTIONS, *kernel_run.FUNCTIONS)
+NAMES = {**kernel_rows.GLOBALS, **kernel_series.NAMES, **kernel_run.NAMES}
+ENTRIES = ("integrate_series", "sample")
+HOT = (
+    "fill", "copy", "trigonometry", "gradients", "residuals", "times_gradients", "add_transposed", "solve", "least_norm",
+    "angle_orders", "slot_orders", "row_orders", "spring_orders", "force_orders", "spring_force", "slot_forces",
+    "slot_arms", "add_multipliers", "add_line_multipliers", "torque_orders", "finish_order",
+)  # fmt: skip
+MOST_FOLDS = 4
+
+
+class FoldFrame(NamedTuple):
+    """Rows of a passing singular position; d is the most that may pass at once."""
+
+    Z: Array  # (d, m) combinations whose gradient vanishes
+    Y: Array  # (d, m) S_reg^-1 E
+    E: Array  # (d, m) G_reg M^-1 B^T
+    P: Array  # (d, 3n) G^T Z
+    B: Array  # (d, 3n) dG^T/dt Z
+    border: Array  # (d, d) Schur complement of the rows B
+    small: Array  # (d, d)
+    nu: Array  # (d,)
+    drop: Ints  # (d,) rows left out
+
+
+class Work(NamedTuple):
+    """Scratch arrays; n bodies with the ground, m rows, K orders."""
+
+    QS: Array  # (K, 3n) series of the coordinates
+    LM: Array  # (K, m) multipliers
+    TF: Array  # (functions, K)
+    bs: Array  # (5, K, n) series of the bodies, see the planes in kernel_series
+    ls: Array  # (6, K, moving lines)
+    es: Array  # (5, K, springs)
+    fold: FoldFrame
+    G: Array  # (m, 2, 3)
+    H: Array  # (m, 2, 3) dG/dt
+    val: Array  # (m + nnz,) factor
+    diag: Array  # (m,)
+    mu: Array  # (m,)
+    rhs: Array  # (m,)
+    F: Array  # (3n,)
+    u: Array
+    work: Array
+    dq: Array
+    dv: Array
+    qn: Array  # (3n,) state at the end of a step
+    vn: Array
+    c: Array  # (n,)
+    s: Array
+    skip: Ints  # (m,)
+
+
+def work_space(tables: Tables, order: int) -> Work:
+    """Scratch arrays for series up to `order`."""
+    K, n3, m, d = order + 3, tables.mass.size, len(tables.rows.index), MOST_FOLDS
+    n, lines, springs = n3 // 3, tables.rows.lines.size, int((tables.forces.index[:, 0] == kernel_series.SPRING).sum())
+
+    def zeros(count: int, *shape: int) -> list[Array]:
+        return [np.zeros(shape) for _ in range(count)]
+
+    return Work(
+        np.zeros((K, n3)),
+        np.zeros((K, m)),
+        np.zeros((tables.times.first.size - 1, K)),
+        np.zeros((5, K, n)),
+        np.zeros((6, K, lines)),
+        np.zeros((5, K, springs)),
+        FoldFrame(*zeros(3, d, m), *zeros(2, d, n3), *zeros(2, d, d), np.zeros(d), np.zeros(d, dtype=np.int64)),
+        *zeros(2, m, 2, 3),
+        np.zeros(m + tables.plan.row.size),
+        *zeros(3, m),
+        *zeros(7, n3),
+        *zeros(2, n),
+        np.zeros(m, dtype=np.int64),
+    )
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Result of the loop, and its dense output.
+
+    Parameters
+    ----------
+    times : ndarray, shape (steps + 1,)
+        Ends of the steps (s).
+    coefficients : ndarray, shape (steps, order + 1, 3n)
+        Taylor series on every step, the ground's coordinates last.
+    folds : ndarray, shape (steps,)
+        Number of singular combinations of rows at the start of every step.
+    """
+
+    status: int
+    times: Array
+    coefficients: Array
+    folds: Ints
+    jit: bool
+
+    def __call__(self, t: Array, derivative: int = 0) -> Array:
+        """Coordinates (or a derivative of them) at the times t."""
+        t = np.ascontiguousarray(t, dtype=float)
+        out = np.empty((t.size, self.coefficients.shape[2]))
+        if len(self.coefficients) == 0:
+            raise ValueError("no step was completed, so there is nothing between the times")
+        sign = 1.0 if self.times[-1] >= self.times[0] else -1.0
+        if self.jit:
+            kernels(True).sample(self.times, self.coefficients, sign, t, derivative, out)
+            return out[:, :-3]
+        k = np.clip(np.searchsorted(sign * self.times, sign * t, side="right") - 1, 0, len(self.coefficients) - 1)
+        h = (t - self.times[k])[:, None]
+        out[:] = 0.0
+        for j in range(self.coefficients.shape[1] - 1, derivative - 1, -1):
+            out = out * h + math.perm(j, derivative) * self.coefficients[k, j]
+        return out[:, :-3]
+
+
+@lru_cache(maxsize=2)
+def kernels(jit: bool) -> SimpleNamespace:
+    """The bound kernels, compiled or plain."""
+    if jit:
+        return compiled.bind(FUNCTIONS, NAMES, compiled=True, entries=ENTRIES, inline=HOT)
+    return compiled.bind(FUNCTIONS, NAMES, compiled=False)
+
+
+def order_for(tolerance: float) -> int:
+    """Order that costs least: about half the number of decimal digits times ln 10, plus a margin (measured)."""
+    return int(min(26, max(8, math.ceil(-0.62 * math.log(tolerance)) + 7)))
+
+
+def run(
+    assembly: Assembly,
+    q: Array,
+    v: Array,
+    span: tuple[float, float],
+    *,
+    tolerance: float,
+    redundant: Ints,
+    order: int | None = None,
+    longest: float = math.inf,
+    most: int = 1_000_000,
+    jit: bool = True,
+    work: Work | None = None,
+) -> Pieces:
+    """Integrate the scene from the consistent state (q, v) of its moving bodies over `span`."""
+    order = order or order_for(tolerance)
+    tb = assembly.tables
+    w = work or work_space(tb, order)
+    q = np.concatenate([q, np.zeros(3)])
+    v = np.concatenate([v, np.zeros(3)])
+    t0, t1 = float(span[0]), float(span[1])
+    state = np.array([t0, 0.0, math.inf, 0.0])
+    advance = kernels(jit).integrate_series
+    parts = []
+    room, done = 64, 0
+    while True:
+        times, coefficients = np.empty(room + 1), np.empty((room, order + 1, q.size))
+        folds = np.zeros(room, dtype=np.int64)
+        status, count = advance(
+            tb, w, t0, t1, q, v, order, float(tolerance), assembly.length, redundant, assembly.breaks,
+            float(longest), state, times, coefficients, folds,
+        )  # fmt: skip
+        parts.append((times[: count + 1], coefficients[:count], folds[:count]))
+        done += count
+        if status != kernel_run.FULL or done >= most:
+            break
+        room = min(2 * room, max(64, 2_000_000 // coefficients[0].size))
+    ends = np.concatenate([parts[0][0], *(p[0][1:] for p in parts[1:])])
+    if len(parts) == 1:
+        return Pieces(int(status), ends, parts[0][1], parts[0][2], jit)
+    return Pieces(int(status), ends, np.concatenate([p[1] for p in parts]), np.concatenate([p[2] for p in parts]), jit)

@@ -1,0 +1,130 @@
+"""Functions of time that the integrators can differentiate and integrate exactly: pieces of polynomials plus sines.
+
+    f(t) = sum_j c_j (t - o)^j  on the piece that holds t,   plus   sum_i A_i sin(w_i t + p_i)
+
+Steps of the integrators end where a piece ends, so a piecewise function costs no accuracy.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+
+
+@dataclass(frozen=True)
+class TimeFunction:
+    """A piecewise polynomial of time plus harmonic terms; add with ``+``, scale with ``*``.
+
+    Parameters
+    ----------
+    starts : tuple of float
+        Time at which each piece begins (s); the first is minus infinity.
+    origins : tuple of float
+        Time about which the polynomial of each piece is written (s).
+    coefficients : tuple of tuple of float
+        Polynomial of each piece, lowest power first.
+    sines : tuple of (amplitude, angular frequency in rad/s, phase in rad)
+        Terms ``A sin(w t + p)``.
+    """
+
+    starts: tuple[float, ...] = (-math.inf,)
+    origins: tuple[float, ...] = (0.0,)
+    coefficients: tuple[tuple[float, ...], ...] = ((0.0,),)
+    sines: tuple[tuple[float, float, float], ...] = ()
+
+    def __call__(self, t: ArrayLike, derivative: int = 0) -> NDArray[np.float64]:
+        """Value (or derivative of that order) at the times `t` (s)."""
+        time = np.asarray(t, dtype=float)
+        piece = np.searchsorted(np.asarray(self.starts), time, side="right") - 1
+        out = np.zeros_like(time)
+        for i, (origin, row) in enumerate(zip(self.origins, self.coefficients, strict=True)):
+            here = piece == i
+            if here.any():
+                poly = np.polynomial.Polynomial(row)
+                out = np.where(here, (poly.deriv(derivative) if derivative else poly)(time - origin), out)
+        for amplitude, omega, phase in self.sines:
+            out = out + amplitude * omega**derivative * np.sin(omega * time + phase + derivative * math.pi / 2)
+        return out
+
+    def __add__(self, other: TimeFunction) -> TimeFunction:
+        starts = tuple(sorted({*self.starts, *other.starts}))
+        origins, rows = [], []
+        for start in starts:
+            first, second = self._piece(start), other._piece(start)
+            origin = first[0] if len(first[1]) > 1 else second[0]
+            one, two = _moved(first, origin), _moved(second, origin)
+            width = max(len(one), len(two))
+            rows.append(tuple(sum(c[j] if j < len(c) else 0.0 for c in (one, two)) for j in range(width)))
+            origins.append(origin)
+        return TimeFunction(starts, tuple(origins), tuple(rows), self.sines + other.sines)
+
+    def __mul__(self, factor: float) -> TimeFunction:
+        rows = tuple(tuple(factor * c for c in row) for row in self.coefficients)
+        return TimeFunction(self.starts, self.origins, rows, tuple((factor * a, w, p) for a, w, p in self.sines))
+
+    __rmul__ = __mul__
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Times at which one piece hands over to the next (s)."""
+        return self.starts[1:]
+
+    def integral(self, value: float = 0.0, at: float = 0.0) -> TimeFunction:
+        """Antiderivative that takes `value` at the time `at`: a prescribed rate becomes a prescribed angle."""
+        rows: list[tuple[float, ...]] = []
+        level = 0.0
+        for i, (origin, row) in enumerate(zip(self.origins, self.coefficients, strict=True)):
+            raised = [0.0, *(c / (j + 1) for j, c in enumerate(row))]
+            if i:  # continuous where the pieces meet
+                before = np.polynomial.Polynomial(rows[-1])(self.starts[i] - self.origins[i - 1])
+                level = float(before - np.polynomial.Polynomial(raised)(self.starts[i] - origin))
+            raised[0] += level
+            rows.append(tuple(raised))
+        sines = tuple((a / w, w, p - math.pi / 2) for a, w, p in self.sines if w != 0.0)
+        made = TimeFunction(self.starts, self.origins, tuple(rows), sines)
+        offset = value - float(made(at))
+        return made + constant(offset)
+
+    def _piece(self, start: float) -> tuple[float, tuple[float, ...]]:
+        i = max(k for k, s in enumerate(self.starts) if s <= start)
+        return self.origins[i], self.coefficients[i]
+
+
+def constant(value: float) -> TimeFunction:
+    """The same `value` at all times."""
+    return TimeFunction(coefficients=((float(value),),))
+
+
+def polynomial(coefficients: tuple[float, ...], origin: float = 0.0) -> TimeFunction:
+    """``sum_j c_j (t - origin)^j``, lowest power first."""
+    return TimeFunction(origins=(float(origin),), coefficients=(tuple(float(c) for c in coefficients),))
+
+
+def sine(amplitude: float, omega: float, phase: float = 0.0) -> TimeFunction:
+    """``amplitude sin(omega t + phase)`` with omega in rad/s and phase in rad."""
+    if omega == 0.0:
+        return constant(amplitude * math.sin(phase))
+    return TimeFunction(sines=((float(amplitude), float(omega), float(phase)),))
+
+
+def smoothed_step(centre: float, width: float, height: float = 1.0) -> TimeFunction:
+    """Step from 0 to `height`: ``10 x^3 - 15 x^4 + 6 x^5`` with ``x = (t - centre + width/2) / width``."""
+    if not (width > 0.0 and math.isfinite(width)):
+        raise InputError("smoothed step width", width, "must be finite and > 0 s", "give the duration of the rise")
+    begin = centre - width / 2
+    rise = (0.0, 0.0, 0.0, 10.0 * height / width**3, -15.0 * height / width**4, 6.0 * height / width**5)
+    return TimeFunction((-math.inf, begin, begin + width), (begin, begin, begin + width), ((0.0,), rise, (height,)))
+
+
+def _moved(piece: tuple[float, tuple[float, ...]], origin: float) -> tuple[float, ...]:
+    """Coefficients of the same polynomial about another origin."""
+    shift = origin - piece[0]
+    if shift == 0.0 or len(piece[1]) == 1:
+        return piece[1]
+    moved = np.polynomial.Polynomial(piece[1])(np.polynomial.Polynomial([shift, 1.0]))
+    return tuple(float(c) for c in moved.coef)

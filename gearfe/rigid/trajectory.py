@@ -1,0 +1,105 @@
+"""What an integration returns: times, states, status, statistics, and dense output between the steps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+
+from .contract import Array
+from .start import Start
+from .system import System
+
+#: Status -> message. Failure is data: what was computed up to the time reached is returned.
+STATUS = {
+    0: "done",
+    1: "the step became too small for the tolerance",
+    2: "the largest number of steps was reached",
+    3: "the start is a singular position and its velocity selects no branch",
+    4: "the state is not finite",
+    5: "the equations could not be solved in a step",
+}
+
+
+class Dense(Protocol):
+    """Coordinates at any time within the run."""
+
+    times: Array
+
+    def __call__(self, t: Array, derivative: int = 0) -> Array:
+        """Coordinates (derivative 0), velocities (1), accelerations (2) at the times t; shape (times, size)."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Result of `integrate`.
+
+    Parameters
+    ----------
+    system, start
+        What was integrated, and its consistent start.
+    time : ndarray, shape (n,)
+        Asked times (s), up to the time reached.
+    status : int
+        0 when the end was reached, see `STATUS`; `message` says it in words.
+    statistics
+        Steps, order or evaluations, singular passages.
+    dense
+        Coordinates at any time of the run, by derivative.
+    """
+
+    system: System
+    start: Start
+    time: Array
+    status: int
+    method: str
+    statistics: Mapping[str, Any]
+    dense: Dense = field(repr=False)
+
+    @property
+    def message(self) -> str:
+        """The status in words."""
+        return STATUS[self.status]
+
+    @property
+    def reached(self) -> float:
+        """Time at which the integration ended (s)."""
+        return float(self.dense.times[-1])
+
+    @cached_property
+    def q(self) -> Array:
+        """Coordinates, shape (n, size)."""
+        return self.dense(self.time, 0)
+
+    @cached_property
+    def v(self) -> Array:
+        """Velocities."""
+        return self.dense(self.time, 1)
+
+    @cached_property
+    def a(self) -> Array:
+        """Accelerations."""
+        return self.dense(self.time, 2)
+
+    @cached_property
+    def multipliers(self) -> Array:
+        """Constraint forces (generalised), shape (n, rows); zero for redundant rows, not unique where there are any."""
+        return self.multipliers_at(self.time)
+
+    def multipliers_at(self, times: Array) -> Array:
+        """Multipliers from M a = f - G^T lambda at the given times."""
+        states = [self.dense(times, k) for k in range(3)]
+        out = np.zeros((len(times), self.system.rows))
+        keep = self.start.active
+        if not keep.any():
+            return out
+        for i, t in enumerate(times):
+            q, v, a = (s[i] for s in states)
+            G = self.system.jacobian(t, q)[keep]
+            right = G @ (self.system.inverse_mass @ (self.system.force(t, q, v)) - a)
+            S = G @ self.system.inverse_mass @ G.T
+            out[i, keep] = np.linalg.lstsq(S, right, rcond=1e-14)[0]
+        return out

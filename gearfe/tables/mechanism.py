@@ -1,0 +1,236 @@
+"""Tables of a mechanism file: bodies, joints, forces, start, outputs, run. See docs/mechanisms.md."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..config import quantity
+from ..errors import InputError, unknown_name
+
+Pair = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class BodyTable:
+    """[bodies.NAME]"""
+
+    mass_kg: float = quantity(above=0.0, doc="mass in kg, > 0; a massless slider is a joint of type 'slot'")
+    inertia_kg_m2: float = quantity(above=0.0, doc="moment of inertia about the mass centre in kg m2, > 0")
+    centre_m: Pair = quantity((0.0, 0.0), doc="mass centre in the body's frame, [x, y] in m")
+    position_m: Pair = quantity((0.0, 0.0), doc="start position of the frame's origin, [x, y] in m")
+    angle_deg: float | None = quantity(None, doc="start angle in degrees (or give angle_rad)")
+    angle_rad: float | None = quantity(None, doc="start angle in rad (or give angle_deg)")
+    velocity_m_per_s: Pair = quantity((0.0, 0.0), doc="start velocity of the frame's origin, [x, y] in m/s")
+    rate_rad_per_s: float = quantity(0.0, doc="start angular velocity in rad/s")
+    points_m: dict[str, Pair] = quantity(dict, doc="named points in the body's frame, [x, y] in m")
+
+    def check(self, where: str) -> None:
+        """At most one of the two angles."""
+        if self.angle_deg is not None and self.angle_rad is not None:
+            raise InputError(where, None, "has angle_deg and angle_rad", "keep one of them")
+
+
+@dataclass(frozen=True)
+class GroundTable:
+    """[ground]"""
+
+    points_m: dict[str, Pair] = quantity(dict, doc="named points at rest, [x, y] in m")
+
+
+@dataclass(frozen=True)
+class FunctionTable:
+    """A function of time: terms that add up."""
+
+    constant: float = quantity(0.0, doc="constant part")
+    polynomial: tuple[float, ...] = quantity((), doc="coefficients of powers of (t - origin_s), lowest first")
+    origin_s: float = quantity(0.0, doc="origin of the polynomial in s")
+    step: float | None = quantity(None, doc="height of a smoothed step 10x^3 - 15x^4 + 6x^5")
+    step_centre_s: float = quantity(0.0, doc="time at the middle of the step in s")
+    step_width_s: float | None = quantity(None, above=0.0, doc="duration of the step in s, > 0")
+    sine: float | None = quantity(None, doc="amplitude of a sine term")
+    frequency_hz: float = quantity(0.0, low=0.0, doc="frequency of the sine in Hz")
+    phase_deg: float = quantity(0.0, doc="phase of the sine in degrees")
+
+    def check(self, where: str) -> None:
+        """A step needs its width."""
+        if self.step is not None and self.step_width_s is None:
+            raise InputError(f"{where}.step_width_s", None, "is required with a step", "give its duration in s")
+
+
+Function = float | FunctionTable
+
+
+@dataclass(frozen=True)
+class JointTable:
+    """[joints.NAME]; which keys belong to which type is in `KEYS`."""
+
+    type: str = quantity(choices=("hinge", "slot", "slider", "fixed", "prescribed"), doc="type of joint")
+    body: str = quantity(doc="body that the joint holds")
+    to: str = quantity("ground", doc="the other body, or 'ground'")
+    point: str | Pair | None = quantity(None, doc="point of the body: a name or [x, y] in m")
+    to_point: str | Pair | None = quantity(None, doc="point of the other body: a name or [x, y] in m")
+    direction: Pair | None = quantity(None, doc="direction of the line in the other body's frame, [x, y]")
+    angle_deg: float | None = quantity(None, doc="angle of body minus 'to' that a slider keeps, in degrees")
+    coordinate: str | None = quantity(None, choices=("angle", "rate", "x", "y"), doc="what is prescribed")
+    motion: Function | None = quantity(None, doc="rad, rad/s or m: a number or a function of time")
+
+    KEYS = {  # noqa: RUF012 - a plain class attribute, not a field
+        "hinge": {"point", "to_point"},
+        "slot": {"point", "to_point", "direction"},
+        "slider": {"point", "to_point", "direction", "angle_deg"},
+        "fixed": set(),
+        "prescribed": {"point", "coordinate", "motion"},
+    }
+
+    def check(self, where: str) -> None:
+        """Only the keys of this type."""
+        _only(self, where, self.KEYS[self.type], ("point", "to_point", "direction", "angle_deg", "coordinate", "motion"))
+        needs = {"slot": ("direction",), "slider": ("direction",), "prescribed": ("coordinate", "motion")}
+        for key in needs.get(self.type, ()):
+            if getattr(self, key) is None:
+                raise InputError(f"{where}.{key}", None, f"is required by a {self.type} joint", "add it")
+        if self.direction is not None and self.direction == (0.0, 0.0):
+            raise InputError(f"{where}.direction", [0.0, 0.0], "must not be zero", "give the direction of the line")
+        if self.body == self.to:
+            raise InputError(f"{where}.to", self.to, "joins a body to itself", "name another body or 'ground'")
+
+
+@dataclass(frozen=True)
+class ForceTable:
+    """[forces.NAME]; which keys belong to which type is in `KEYS`."""
+
+    type: str = quantity(choices=("gravity", "spring", "coordinate_spring", "force", "moment"), doc="type of force")
+    body: str | None = quantity(None, doc="body on which it acts")
+    to: str = quantity("ground", doc="the other body, or 'ground', that carries the reaction")
+    point: str | Pair | None = quantity(None, doc="point of the body: a name or [x, y] in m")
+    to_point: str | Pair | None = quantity(None, doc="point of the other body: a name or [x, y] in m")
+    acceleration_m_per_s2: Pair | None = quantity(None, doc="gravity [x, y] in m/s2")
+    stiffness: float = quantity(0.0, low=0.0, doc="stiffness in N/m, or N m/rad on an angle, >= 0")
+    damping: float = quantity(0.0, low=0.0, doc="damping in N s/m, or N m s/rad on an angle, >= 0")
+    free_length_m: float = quantity(0.0, low=0.0, doc="length of the spring without force in m, >= 0")
+    coordinate: str | None = quantity(None, choices=("angle", "x", "y"), doc="coordinate that the spring acts on")
+    reference: float = quantity(0.0, doc="coordinate at which the spring is free, in m or rad")
+    x_N: Function | None = quantity(None, doc="force in x in N: a number or a function of time")
+    y_N: Function | None = quantity(None, doc="force in y in N: a number or a function of time")
+    moment_N_m: Function | None = quantity(None, doc="moment in N m: a number or a function of time")
+
+    KEYS = {  # noqa: RUF012
+        "gravity": {"acceleration_m_per_s2"},
+        "spring": {"body", "point", "to_point", "stiffness", "damping", "free_length_m"},
+        "coordinate_spring": {"body", "coordinate", "stiffness", "damping", "reference"},
+        "force": {"body", "point", "x_N", "y_N"},
+        "moment": {"body", "moment_N_m"},
+    }
+
+    def check(self, where: str) -> None:
+        """Only the keys of this type."""
+        every = {key for keys in self.KEYS.values() for key in keys}
+        _only(self, where, self.KEYS[self.type], sorted(every))
+        needs = {"gravity": ("acceleration_m_per_s2",), "moment": ("body", "moment_N_m"), "spring": ("body",)}
+        needs |= {"coordinate_spring": ("body", "coordinate"), "force": ("body",)}
+        for key in needs[self.type]:
+            if getattr(self, key) is None:
+                raise InputError(f"{where}.{key}", None, f"is required by a force of type {self.type}", "add it")
+        if self.body is not None and self.body == self.to:
+            raise InputError(f"{where}.to", self.to, "joins a body to itself", "name another body or 'ground'")
+
+
+@dataclass(frozen=True)
+class StartTable:
+    """[start]: expressions that must hold at the start; the rest is made consistent."""
+
+    positions: dict[str, float] = quantity(dict, doc="expression = value in rad or m")
+    velocities: dict[str, float] = quantity(dict, doc="expression = value in rad/s or m/s")
+
+
+@dataclass(frozen=True)
+class OutputTable:
+    """[[outputs]]: a column of trajectory.csv."""
+
+    name: str = quantity(doc="column name with its unit, such as crank_angle_rad")
+    value: str = quantity(doc="arithmetic expression over quantities of the mechanism")
+    wrap: float | None = quantity(None, above=0.0, doc="period to wrap to (6.283185307179586 for an angle)")
+
+    def check(self, where: str) -> None:
+        """A name that fits a CSV header."""
+        if not self.name or any(ch in self.name for ch in ",\"\n "):
+            raise InputError(f"{where}.name", self.name, "must be a word without spaces or commas", "rename the column")
+
+
+@dataclass(frozen=True)
+class PathTable:
+    """[[paths]]: a point whose path is drawn."""
+
+    body: str = quantity(doc="body of the point")
+    point: str | Pair = quantity(doc="name of the point, or [x, y] in the body's frame in m")
+
+
+@dataclass(frozen=True)
+class RunTable:
+    """[run]"""
+
+    end_s: float = quantity(above=0.0, doc="end of the run in s, > 0")
+    step_s: float = quantity(above=0.0, doc="distance of the output times in s, > 0")
+    tolerance: float = quantity(1e-9, low=1e-13, high=0.1, doc="accuracy relative to 1 rad and the mechanism's size")
+    method: str = quantity("auto", choices=("auto", "taylor", "explicit", "implicit"), doc="integrator")
+    reactions: bool = quantity(False, doc="write reactions.csv")
+    picture_s: float | None = quantity(None, low=0.0, doc="time of the picture in s (default: the end)")
+    frames: int = quantity(100, low=2, high=10000, doc="frames of the animation")
+
+    def check(self, where: str) -> None:
+        """A sane number of rows."""
+        if self.end_s / self.step_s > 5e6:
+            raise InputError(f"{where}.step_s", self.step_s, "gives more than five million rows", "take a longer step")
+
+
+@dataclass(frozen=True)
+class FigureTable:
+    """[figure]: curves over time, with markers from a reference table."""
+
+    curves: tuple[str, ...] = quantity((), doc="names of outputs to draw (default: all)")
+    reference: str | None = quantity(None, doc="CSV file with a column t and reference columns, beside the job file")
+    reference_columns: dict[str, str] = quantity(dict, doc="output name = column of the reference file")
+    every: int = quantity(10, low=1, doc="draw each so manyth reference point")
+
+
+@dataclass(frozen=True)
+class MechanismFile:
+    """A whole mechanism file."""
+
+    run: RunTable = quantity(doc="the run")
+    bodies: dict[str, BodyTable] = quantity(doc="moving bodies by name")
+    ground: GroundTable = quantity(GroundTable, doc="points at rest")
+    joints: dict[str, JointTable] = quantity(dict, doc="joints by name")
+    forces: dict[str, ForceTable] = quantity(dict, doc="forces by name")
+    start: StartTable = quantity(StartTable, doc="start values that must hold")
+    outputs: tuple[OutputTable, ...] = quantity((), doc="columns of trajectory.csv")
+    paths: tuple[PathTable, ...] = quantity((), doc="points whose paths are drawn")
+    figure: FigureTable = quantity(FigureTable, doc="figure over time")
+    title: str = quantity("", doc="title of the mechanism")
+
+    def check(self, where: str) -> None:  # noqa: ARG002
+        """Names that joints, forces and paths use exist."""
+        known = {*self.bodies, "ground"}
+        if "ground" in self.bodies:
+            raise InputError("bodies.ground", None, "is the name of the ground", "rename the body")
+        for name in self.bodies:
+            if not name.isidentifier():
+                problem = "must be a word of letters, digits and _ (it is used in expressions)"
+                raise InputError("bodies", name, problem, "rename the body")
+        for kind in ("joints", "forces"):
+            for name, part in getattr(self, kind).items():
+                for key in ("body", "to"):
+                    value = getattr(part, key)
+                    if value is not None and value not in known:
+                        raise unknown_name(f"{kind}.{name}.{key}", value, known)
+        for i, path in enumerate(self.paths):
+            if path.body not in known:
+                raise unknown_name(f"paths[{i}].body", path.body, known)
+
+
+def _only(table: object, where: str, allowed: set[str], checked: tuple[str, ...] | list[str]) -> None:
+    fields = type(table).__dataclass_fields__  # type: ignore[attr-defined]
+    kind = table.type  # type: ignore[attr-defined]
+    for key in checked:
+        if key not in allowed and getattr(table, key) != fields[key].default:
+            raise InputError(f"{where}.{key}", None, f"does not belong to type {kind!r}", "remove it")
