@@ -14,8 +14,10 @@ __version__ = "0.1.0"
 _PUBLIC: dict[str, str] = {
     "Gear": "gear",
     "GearPair": "gear",
+    "Housing": "housing",
     "InputError": "errors",
     "Material": "elasticity",
+    "ModalBody": "modal_body",
     "StiffnessCurve": "stiffness",
     "sweep_stiffness": "stiffness",
 }

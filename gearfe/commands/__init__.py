@@ -10,4 +10,5 @@ COMMANDS: dict[str, str] = {
     "gear": "gear",
     "mesh": "mesh",
     "mechanism": "mechanism",
+    "housing": "housing",
 }

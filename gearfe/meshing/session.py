@@ -7,7 +7,7 @@ left behind. Geometry is built in millimetres, because gmsh's CAD kernel has an 
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
 from types import ModuleType
@@ -42,7 +42,9 @@ def import_gmsh() -> ModuleType:
 
 
 @contextmanager
-def gmsh_session(name: str = "gearfe", *, threads: int = 1) -> Iterator[Any]:
+def gmsh_session(
+    name: str = "gearfe", *, threads: int = 1, options: Mapping[str, float] | None = None
+) -> Iterator[Any]:
     """Yield the gmsh module with a fresh model called `name`; quiet, deterministic, closed again on the way out.
 
     Where the caller's own program has gmsh open already, only the model is added and removed again, and that
@@ -54,6 +56,8 @@ def gmsh_session(name: str = "gearfe", *, threads: int = 1) -> Iterator[Any]:
         Name of the model.
     threads
         Threads gmsh may use. One is the default: meshes are then the same on every run.
+    options
+        gmsh's numeric options for this session.
 
     Raises
     ------
@@ -65,15 +69,16 @@ def gmsh_session(name: str = "gearfe", *, threads: int = 1) -> Iterator[Any]:
         ours = not gmsh.isInitialized()
         if ours:
             gmsh.initialize(interruptible=False, readConfigFiles=False)
-        options = {
+        wanted = {
             "General.Terminal": 0.0,
             "General.Verbosity": 1.0,
             "General.NumThreads": float(threads),
             "Mesh.RandomSeed": 1.0,
+            **(options or {}),
         }
-        before = {} if ours else {key: gmsh.option.getNumber(key) for key in options}
+        before = {} if ours else {key: gmsh.option.getNumber(key) for key in wanted}
         try:
-            for key, value in options.items():
+            for key, value in wanted.items():
                 gmsh.option.setNumber(key, value)
             gmsh.model.add(name)
             yield gmsh

@@ -1,0 +1,139 @@
+"""``gearfe housing JOB.toml``: mesh, reduce, and show the housing of a job file."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..modal_body import ModalBody
+    from ..reduction_error import ReductionError
+
+HELP = "reduce a housing to a small elastic body: mass, bores, frequencies, mode shapes"
+
+#: Modes drawn.
+_DRAWN = 6
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("job", help="job file with a table [housing]")
+    parser.add_argument("--out", default="out/housing", help="folder for the results (default: %(default)s)")
+    parser.add_argument("--modes", type=int, default=20, help="modes to list and to write (default: %(default)s)")
+    parser.add_argument("--no-pictures", action="store_true", help="write no pictures")
+
+
+def run(args: argparse.Namespace) -> int:
+    import numpy as np
+
+    from ..config import load_job
+    from ..errors import InputError
+    from ..housing.build import material, reduced_housing
+    from ..mesh_error import frequency_errors
+    from ..output.files import output_folder
+    from ..reduction_error import reduction_error
+
+    if args.modes < 1:
+        raise InputError("--modes", args.modes, "must be 1 or more", "20 is the default")
+    table = load_job(args.job, ("housing",))["housing"]
+    folder = output_folder(args.out)
+    started = time.perf_counter()
+    body = reduced_housing(table)
+    seconds = time.perf_counter() - started
+    shown = min(args.modes, body.size)
+    fields = body.reconstruct(body.coupled.vectors[:, :shown].T)
+    mesh = frequency_errors(body.nodes, body.elements, material(table), fields)
+    mesh[body.coupled.frequencies_hz[:shown] <= 0.0] = 0.0
+    left_out = reduction_error(body, table.reduction.band_Hz)
+    _report(body, mesh, left_out, seconds)
+    _write(folder, body, fields, mesh, left_out)
+    problem = "" if args.no_pictures else _draw(folder, body, fields)
+    if problem:
+        print(f"warning: no pictures: {problem}")
+    print(f"results in {folder}")
+    return int(bool(problem) or not np.all(np.isfinite(body.coupled.frequencies_hz)))
+
+
+def _report(body: ModalBody, mesh: Any, left_out: ReductionError, seconds: float) -> None:
+    for note in body.notes:
+        print(f"note: {note}")
+    print(f"mass            {body.rigid_mass[0, 0]:.4f} kg")
+    print(f"mesh            {len(body.elements)} tetrahedra, {body.nodes.size} unknowns")
+    kept = f"{body.modes} modes to {body.internal_hz[body.modes - 1]:.0f} Hz" if body.modes else "no modes"
+    extra = len(body.internal_hz) - body.modes
+    print(f"reduced to      {body.size} coordinates: {6 * len(body.attachment_names)} of attachments, {kept},")
+    print(f"                {extra} quasi-static corrections; sparse solver {body.solver}; {seconds:.2f} s")
+    for name, point in zip(body.attachment_names, body.attachment_points, strict=True):
+        x, y, z = 1e3 * point
+        print(f"bore {name:<10} reference point x {x:8.3f}  y {y:8.3f}  z {z:8.3f} mm")
+    print("frequencies, bores rigid and free to move; estimated errors of mesh and reduction (both towards too high):")
+    for number, estimate in enumerate(mesh):
+        frequency = body.coupled.frequencies_hz[number]
+        lost = left_out.frequency_errors[number] if number < len(left_out.frequency_errors) else math.nan
+        reduction = f"{100.0 * lost:9.1e} %" if math.isfinite(lost) else "  beyond the band"
+        print(f"  {number + 1:3d} {frequency:10.2f} Hz   mesh {100.0 * estimate:5.2f} %   reduction <= {reduction}")
+    bound = f"{100.0 * left_out.response:.2g} %" if math.isfinite(left_out.response) else "unknown: keep more modes"
+    print(f"response of the bores up to {left_out.band_hz:.0f} Hz (1 % damping): reduction error <= {bound} rms")
+
+
+def _write(folder: Path, body: ModalBody, fields: Any, mesh: Any, left_out: ReductionError) -> None:
+    import numpy as np
+
+    from ..output.files import write_csv, write_json
+    from ..output.vtkhdf import write_vtkhdf
+
+    body.save(folder / "housing.npz")
+    shown = len(fields)
+    vectors = body.coupled.vectors[:, :shown]
+    participation = body.momentum @ vectors
+    bounds = np.full(shown, np.nan)
+    bounds[: len(left_out.frequency_errors)] = left_out.frequency_errors[:shown]
+    columns: dict[str, Any] = {"number": np.arange(1, shown + 1), "frequency_Hz": body.coupled.frequencies_hz[:shown]}
+    for axis, name in enumerate("xyz"):
+        columns[f"effective_mass_{name}_kg"] = participation[axis] ** 2
+    for axis, name in enumerate("xyz"):
+        columns[f"effective_inertia_{name}_kg_m2"] = participation[3 + axis] ** 2
+    columns["mesh_error_estimate_percent"] = 100.0 * mesh
+    columns["reduction_error_bound_percent"] = 100.0 * bounds
+    write_csv(folder / "modes.csv", columns)
+    cells = {"tetra" if body.elements.shape[1] == 4 else "tetra10": body.elements}
+    names = [f"mode_{k + 1:02d}_{body.coupled.frequencies_hz[k]:.1f}_Hz" for k in range(shown)]
+    write_vtkhdf(folder / "modes.vtkhdf", body.nodes, cells, point_data=dict(zip(names, fields, strict=True)))
+    summary = {
+        "mass_kg": body.rigid_mass[0, 0],
+        "unknowns": body.nodes.size,
+        "coordinates": body.size,
+        "modes": body.modes,
+        "corrections": len(body.internal_hz) - body.modes,
+        "sparse_solver": body.solver,
+        "fixed": body.held,
+        "frequencies_free_attachments_Hz": body.coupled.frequencies_hz[:shown],
+        "frequencies_held_attachments_Hz": body.internal_hz[: body.modes],
+        "band_Hz": left_out.band_hz,
+        "reduction_response_error_bound": left_out.response,
+        "mesh_frequency_error_estimates": mesh,
+        "attachments": {n: list(p) for n, p in zip(body.attachment_names, body.attachment_points, strict=True)},
+        "notes": list(body.notes),
+    }
+    write_json(folder / "summary.json", summary)
+
+
+def _draw(folder: Path, body: ModalBody, fields: Any) -> str:
+    import numpy as np
+
+    from ..housing.mesh_checks import boundary_faces
+    from ..output.housing_figures import draw_modes
+
+    faces = boundary_faces(body.elements)
+    rigid = int(np.sum(body.coupled.frequencies_hz[: len(fields)] <= 0.0))
+    chosen = range(rigid, min(rigid + _DRAWN, len(fields)))
+    titles = [f"mode {k + 1}: {body.coupled.frequencies_hz[k]:.1f} Hz" for k in chosen]
+    bores = np.flatnonzero(np.any(body.shapes[::3, : 6 * len(body.attachment_names) : 6] == 1.0, axis=1))
+    problem = draw_modes(
+        folder / "housing.png", body.nodes, faces, np.zeros((1, len(body.nodes), 3)), ["housing"], marked=bores
+    )
+    if problem or not titles:
+        return problem
+    return draw_modes(folder / "modes.png", body.nodes, faces, fields[list(chosen)], titles)

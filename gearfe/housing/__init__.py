@@ -1,0 +1,11 @@
+"""Elastic housings: description or arrays -> mesh -> full model -> reduced body (`gearfe.modal_body.ModalBody`).
+
+    housing = Housing.from_job("geometry/housing.toml")
+    body = housing.reduce()
+    body.save("housing.npz")
+"""
+
+from .attachments import Attachment, Bore, Plane
+from .model import Housing
+
+__all__ = ["Attachment", "Bore", "Housing", "Plane"]

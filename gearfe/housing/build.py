@@ -1,0 +1,117 @@
+"""From a ``[housing]`` table to a housing, and to its reduced body through the cache."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import cast
+
+import numpy as np
+
+from .. import __version__
+from ..errors import InputError
+from ..meshing.cache import cache_folder, cache_key
+from ..meshing.housing_mesh import RECIPE, bore_ranges, housing_mesh
+from ..modal_body import FORMAT, ModalBody
+from ..solid import MassRule, SolidMaterial
+from ..tables.housing import HousingDampingTable, HousingReductionTable, HousingTable
+from .attachments import PLACE_TOLERANCE, Bore
+from .model import Housing
+
+
+def housing_from_table(table: HousingTable) -> Housing:
+    """Mesh (from the cache when it is there) with the bores as attachments 1, 2, ... and the feet held.
+
+    Bores are numbered shaft by shaft, the +y wall before the -y wall.
+    """
+    table.check("housing")
+    mesh = housing_mesh(table)
+    return Housing.from_arrays(
+        mesh.nodes,
+        mesh.tets,
+        bores(table),
+        foot_nodes(table, mesh.nodes) if table.feet.fixed else None,
+        material=material(table),
+        mass=cast(MassRule, table.mesh.mass),
+        outer=lambda centres: ~inside_faces(table, centres),
+    )
+
+
+def material(table: HousingTable) -> SolidMaterial:
+    """The housing's material in SI units."""
+    given = table.material
+    return SolidMaterial(1e9 * given.youngs_modulus_GPa, given.poissons_ratio, given.density_kg_per_m3)
+
+
+def bores(table: HousingTable) -> list[Bore]:
+    """The bores (SI), in the order of the attachments."""
+    found = []
+    for shaft in table.shafts:
+        for low, high in bore_ranges(table, shaft).values():
+            point = (1e-3 * shaft.x_mm, 0.0, 1e-3 * shaft.z_mm)
+            along = (1e-3 * low, 1e-3 * high)
+            found.append(Bore(point, (0.0, 1.0, 0.0), 1e-3 * shaft.bore_radius_mm, along))
+    return found
+
+
+def foot_nodes(table: HousingTable, nodes: np.ndarray) -> np.ndarray:
+    """(n,) mask of the nodes on the bottoms of the feet."""
+    x, z = 1e3 * nodes[:, 0], 1e3 * nodes[:, 2]
+    slack = 1e3 * PLACE_TOLERANCE * float(np.ptp(nodes, axis=0).max())
+    bottom = table.wall_z_mm[0] - table.base_thickness_mm
+    outboard = (x <= table.wall_x_mm[0] + slack) | (x >= table.wall_x_mm[1] - slack)
+    return np.asarray((np.abs(z - bottom) <= slack) & outboard)
+
+
+def inside_faces(table: HousingTable, centres: np.ndarray) -> np.ndarray:
+    """(f,) whether faces with these centres (m) bound the inner space between walls, base, end walls and cover."""
+    (x0, x1), (z0, z1), half = table.wall_x_mm, table.wall_z_mm, 0.5 * table.inner_gap_mm
+    first, last = table.end_wall_thickness_mm
+    slack = 1e-6 * (x1 - x0)
+    low = np.array([x0 + first, -half, z0]) - slack
+    high = np.array([x1 - last, half, z1]) + slack
+    place = 1e3 * centres
+    return np.asarray(np.all((place >= low) & (place <= high), axis=1))
+
+
+def reduced_housing(table: HousingTable) -> ModalBody:
+    """Reduced body of a ``[housing]`` table with its damping: from the cache when it was made before.
+
+    A second run then starts neither gmsh nor the finite elements.
+    """
+    table.check("housing")
+    recipe = dataclasses.replace(table, damping=HousingDampingTable())
+    folder = cache_folder()
+    path = None if folder is None else folder / f"body-{cache_key('body', [recipe, RECIPE, FORMAT, __version__])[:32]}.npz"
+    body = None
+    if path is not None and path.exists():
+        try:
+            body = ModalBody.load(path, verify=True)
+        except InputError:
+            body = None
+    if body is None:
+        body = reduced(housing_from_table(table), table.reduction)
+        if path is not None:
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                body.save(path)
+            except OSError:
+                pass
+    return damped(body, table)
+
+
+def reduced(housing: Housing, table: HousingReductionTable) -> ModalBody:
+    """Reduced body with what a ``[housing.reduction]`` table asks for."""
+    return housing.reduce(
+        table.modes,
+        below_hz=table.modes_below_Hz,
+        least_modes=table.least_modes,
+        quasi_static=table.quasi_static_levels,
+        solver=table.solver,
+    )
+
+
+def damped(body: ModalBody, table: HousingTable) -> ModalBody:
+    """The body with the damping of its ``[housing.damping]`` table."""
+    given = table.damping
+    ratio = given.ratio if isinstance(given.ratio, float) else np.array(given.ratio or (0.0,))
+    return body.with_damping(ratio=ratio, alpha=given.rayleigh_alpha_per_s, beta=given.rayleigh_beta_s)

@@ -1,0 +1,78 @@
+"""The full finite-element model of a body over [attachments | internal unknowns]: the truth a reduction is held against."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..errors import InputError
+from ..lanczos import lowest_modes
+from ..reduction import rigid_shift
+from ..sparse_solver import factorize
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class FullModel:
+    """Sparse matrices over ``[attachments (6 each) | internal unknowns]``.
+
+    Attributes
+    ----------
+    mass, stiffness : (N, N) sparse
+        M (kg), K (N/m).
+    transform : (3 n, N) sparse
+        Nodal displacement for unit unknowns.
+    interfaces
+        Number of attachment coordinates, which come first.
+    held
+        Whether a part of the body is fixed.
+    solver
+        Sparse solver, see `gearfe.sparse_solver`.
+    """
+
+    mass: Any
+    stiffness: Any
+    transform: Any
+    interfaces: int
+    held: bool
+    solver: str = "auto"
+
+    def static(self, loads: Floats) -> Floats:
+        """Displacement (N,) or (N, k) under loads on the attachments (6 a,) or (6 a, k), with one refinement step."""
+        if not self.held:
+            raise InputError("fixed", None, "a free housing has no static response", "hold a part of it")
+        loads = np.asarray(loads, dtype=float)
+        force = np.zeros((self.mass.shape[0], *loads.shape[1:]))
+        force[: self.interfaces] = loads
+        factor = factorize(self.stiffness, solver=self.solver)
+        found = factor.solve(force)
+        return found + factor.solve(force - self.stiffness @ found)
+
+    def frequencies_hz(self, count: int = 20) -> Floats:
+        """Lowest natural frequencies (Hz) with the attachments free to move, rigid-body modes (zero) included."""
+        shift = 0.0 if self.held else rigid_shift(self.stiffness, self.mass)
+        factor = factorize(self.stiffness + shift * self.mass if shift else self.stiffness, solver=self.solver)
+        values = lowest_modes(factor.solve, self.mass, count=count, shift=shift).eigenvalues
+        if shift:
+            values = np.where(np.abs(values) < 1e-3 * shift, 0.0, values)
+        return np.asarray(np.sqrt(np.maximum(values, 0.0)) / (2.0 * math.pi))
+
+    def reconstruct(self, q: Floats) -> Floats:
+        """Nodal field (n, 3) of unknowns (N,)."""
+        return np.asarray((self.transform @ q).reshape(-1, 3))
+
+
+def full_model(stiffness: Any, mass: Any, interface: Any, internal: Ints, *, held: bool, solver: str) -> FullModel:
+    """Model of a body from its nodal matrices, its interface rows and its internal rows (see `gearfe.reduction`)."""
+    count = len(internal)
+    unit = sparse.csc_array((np.ones(count), (internal, np.arange(count))), shape=(stiffness.shape[0], count))
+    transform = sparse.hstack([interface, unit], format="csc")
+    k, m = (sparse.csr_array(transform.T @ (matrix @ transform)) for matrix in (stiffness, mass))
+    return FullModel(m, k, transform, interface.shape[1], held, solver)

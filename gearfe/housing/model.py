@@ -1,0 +1,311 @@
+"""A housing: mesh, material, attachments and held nodes; from a job file or from anyone's arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..config import load_job
+from ..errors import InputError
+from ..modal_body import ModalBody
+from ..reduction import reduce_model
+from ..solid import MassRule, SolidMaterial, SolidMatrices, assemble
+from ..tables.housing import HousingTable
+from .attachments import (
+    Attachment,
+    Bore,
+    Plane,
+    bore_attachment,
+    check_attachments,
+    interface_matrix,
+    plane_nodes,
+)
+from .full import FullModel, full_model
+from .mesh_checks import boundary_faces, checked_mesh
+from .surface import nodal_normals, radiation_matrix
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Said whenever linear tetrahedra are chosen.
+LINEAR_NOTE = (
+    "linear tetrahedra are far too stiff: natural frequencies 15-45 % too high at usual sizes; take second-order ones"
+)
+FREE_NOTE = "nothing is fixed: the housing is free and has six rigid-body modes"
+STEEL = SolidMaterial()
+
+
+@dataclass(frozen=True, eq=False)
+class Housing:
+    """An elastic body with rigid attachments.
+
+    Attributes
+    ----------
+    nodes : (n, 3)
+        Coordinates (m).
+    tets : (m, 4) or (m, 10)
+        Elements, midside nodes in the order of `gearfe.solid.EDGES`.
+    attachments
+        Rigid attachments; their order is that of the coordinates of the reduced body.
+    fixed : (k,)
+        Numbers of the held nodes; none for a free body.
+    material
+        Of the whole body.
+    mass_rule
+        Integration of the mass.
+    faces : (f, 3) or (f, 6)
+        Outer surface: what radiates sound and is shown.
+    original : (n,)
+        Number that each node had in the arrays that were given.
+    notes
+        What the user should know.
+    """
+
+    nodes: Floats
+    tets: Ints
+    attachments: tuple[Attachment, ...]
+    fixed: Ints
+    material: SolidMaterial
+    mass_rule: MassRule
+    faces: Ints
+    original: Ints
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def from_arrays(
+        cls,
+        nodes: Any,
+        tets: Any,
+        bores: Sequence[Bore | Sequence[Any]] = (),
+        fixed: Any = None,
+        *,
+        material: SolidMaterial = STEEL,
+        attachments: Sequence[Attachment] = (),
+        mass: MassRule = "exact",
+        outer: Callable[[Floats], NDArray[np.bool_]] | None = None,
+    ) -> Housing:
+        """Housing from a mesh of any origin (gmsh, meshio, arrays).
+
+        Parameters
+        ----------
+        nodes : (n, 3)
+            Coordinates (m).
+        tets : (m, 4) or (m, 10)
+            Node numbers from 0; midside nodes in VTK's or gmsh's order.
+        bores
+            `Bore` objects or tuples ``(axis point, axis direction, radius, (begin, end) along the axis from that point)``
+            in metres. Each becomes an attachment; its nodes are those at or inside the radius.
+        fixed
+            Held nodes: a `Plane`, a pair (point, normal), node numbers, or a mask of n flags; ``None`` for a free body.
+        material
+            Steel by default.
+        attachments
+            Further attachments with node numbers of their own, after the bores.
+        mass
+            ``"exact"`` or ``"4-point"``.
+        outer
+            Picks the outer surface (which radiates sound and is shown) from the surface without bores and held faces:
+            a function of the faces' centres (f, 3) (m) that returns f flags. By default all of it.
+
+        Raises
+        ------
+        InputError
+            Names what is wrong with the mesh, a bore, an attachment or the held nodes.
+        """
+        if mass not in ("exact", "4-point"):
+            raise InputError("mass", mass, "must be 'exact' or '4-point'", "take 'exact'")
+        mesh = checked_mesh(nodes, tets)
+        new_number = np.full(len(np.asarray(nodes)), -1)
+        new_number[mesh.original] = np.arange(len(mesh.original))
+        notes = list(mesh.notes)
+        made = []
+        for number, bore in enumerate(bores, start=1):
+            attachment, remarks = bore_attachment(bore, number, mesh.nodes)
+            made.append(attachment)
+            notes += remarks
+        for given in attachments:
+            made.append(replace(given, nodes=_renumbered(f"attachment {given.name!r}", given.nodes, new_number)))
+        held = _fixed_nodes(fixed, mesh.nodes, new_number)
+        check_attachments(made, held, mesh.nodes)
+        notes += [LINEAR_NOTE] if mesh.tets.shape[1] == 4 else []
+        notes += [FREE_NOTE] if len(held) == 0 else []
+        faces = boundary_faces(mesh.tets)
+        faces = _without(faces, [held, *(a.nodes for a in made)], len(mesh.nodes))
+        if outer is not None:
+            faces = faces[np.asarray(outer(mesh.nodes[faces[:, :3]].mean(axis=1)), dtype=bool)]
+        return cls(
+            nodes=mesh.nodes,
+            tets=mesh.tets,
+            attachments=tuple(made),
+            fixed=held,
+            material=material,
+            mass_rule=mass,
+            faces=faces,
+            original=mesh.original,
+            notes=tuple(notes),
+        )
+
+    @classmethod
+    def from_table(cls, table: HousingTable) -> Housing:
+        """Housing that a ``[housing]`` table describes; gmsh runs unless the mesh is in the cache."""
+        from .build import housing_from_table
+
+        return housing_from_table(table)
+
+    @classmethod
+    def from_job(cls, path: str | Path) -> Housing:
+        """Housing of a job file's ``[housing]`` table."""
+        return cls.from_table(load_job(path, ("housing",))["housing"])
+
+    @cached_property
+    def matrices(self) -> SolidMatrices:
+        """Nodal stiffness and mass, assembled on first use."""
+        return assemble(self.nodes, self.tets, self.material, mass_rule=self.mass_rule)
+
+    @cached_property
+    def internal(self) -> Ints:
+        """Rows that are neither held nor in an attachment, ``3 node + axis``."""
+        free = np.ones(len(self.nodes), dtype=bool)
+        free[self.fixed] = False
+        for attachment in self.attachments:
+            free[attachment.nodes] = False
+        return np.asarray((3 * np.flatnonzero(free)[:, None] + np.arange(3)).ravel())
+
+    @property
+    def unknowns(self) -> int:
+        """Three for each node."""
+        return 3 * len(self.nodes)
+
+    @property
+    def mass_kg(self) -> float:
+        """Mass (kg)."""
+        return float(self.matrices.nodal_mass.sum())
+
+    def reduce(
+        self,
+        modes: int | None = None,
+        *,
+        below_hz: float = 10_000.0,
+        least_modes: int = 40,
+        quasi_static: int = 1,
+        solver: str = "auto",
+    ) -> ModalBody:
+        """Reduced body: static shapes, modes with the attachments held, quasi-static corrections.
+
+        Parameters
+        ----------
+        modes
+            Their number; ``None`` for all below `below_hz`, but no fewer than `least_modes`.
+        below_hz
+            Highest frequency of the modes (Hz). Twice the highest frequency of interest is a good choice.
+        least_modes
+            See `modes`.
+        quasi_static
+            Levels of correction vectors; 0 for none.
+        solver
+            Sparse solver, see `gearfe.sparse_solver`.
+        """
+        stiffness, mass = self.matrices.stiffness, self.matrices.mass
+        found = reduce_model(
+            stiffness,
+            mass,
+            interface_matrix(self.attachments, self.nodes),
+            self.internal,
+            count=modes,
+            below_hz=below_hz if modes is None else np.inf,
+            at_least=least_modes,
+            corrections=quasi_static,
+            free=len(self.fixed) == 0,
+            solver=solver,
+        )
+        motions = rigid_motions(self.nodes)
+        count = len(self.attachments)
+        return ModalBody(
+            mass=found.mass,
+            damping=np.zeros_like(found.mass),
+            stiffness=found.stiffness,
+            attachment_names=tuple(a.name for a in self.attachments),
+            attachment_points=np.array([a.point for a in self.attachments]).reshape(count, 3),
+            attachment_axes=np.array([a.axis for a in self.attachments]).reshape(count, 3),
+            internal_hz=np.sqrt(np.maximum(found.eigenvalues, 0.0)) / (2.0 * np.pi),
+            modes=found.modes,
+            nodes=self.nodes,
+            elements=self.tets,
+            shapes=found.shapes,
+            faces=self.faces,
+            normals=nodal_normals(self.nodes, self.faces),
+            radiation=radiation_matrix(self.nodes, self.faces, found.shapes),
+            momentum=np.asarray((mass @ motions).T @ found.shapes),
+            rigid_mass=motions.T @ (mass @ motions),
+            tail=found.tail,
+            levels=found.levels,
+            next_hz=float(np.sqrt(max(found.next_eigenvalue, 0.0)) / (2.0 * np.pi)),
+            held=len(self.fixed) > 0,
+            solver=found.solver,
+            notes=self.notes,
+        )
+
+    def full_model(self, solver: str = "auto") -> FullModel:
+        """The same body without reduction, over [attachments | all internal unknowns]."""
+        interface = interface_matrix(self.attachments, self.nodes)
+        k, m = self.matrices.stiffness, self.matrices.mass
+        return full_model(k, m, interface, self.internal, held=len(self.fixed) > 0, solver=solver)
+
+
+def rigid_motions(nodes: Floats) -> Floats:
+    """(3 n, 6) nodal displacement for unit translations and small rotations about the origin."""
+    motions = np.zeros((len(nodes), 3, 6))
+    motions[:, range(3), range(3)] = 1.0
+    for axis in range(3):
+        unit = np.zeros(3)
+        unit[axis] = 1.0
+        motions[:, :, 3 + axis] = np.cross(unit, nodes)
+    return motions.reshape(-1, 6)
+
+
+def _fixed_nodes(fixed: Any, nodes: Floats, new_number: Ints) -> Ints:
+    """Held nodes from a plane, a pair (point, normal), node numbers or a mask."""
+    if fixed is None:
+        return np.zeros(0, dtype=np.int64)
+    if isinstance(fixed, Plane):
+        return plane_nodes(fixed, nodes)
+    given = np.asarray(fixed)
+    if given.shape == (2, 3):
+        return plane_nodes(Plane(tuple(given[0]), tuple(given[1])), nodes)
+    return _renumbered("fixed", given, new_number)
+
+
+def _renumbered(field: str, chosen: Any, new_number: Ints) -> Ints:
+    """Node numbers of the given mesh (or a mask) as numbers of the checked one."""
+    given = np.asarray(chosen)
+    n = len(new_number)
+    if given.dtype == bool:
+        if given.shape != (n,):
+            raise InputError(field, given.shape, f"a mask must have one flag for each of the {n} nodes", "")
+        given = np.flatnonzero(given)
+    if given.ndim != 1 or (len(given) and given.dtype.kind not in "iu"):
+        problem = "must be node numbers, a mask, a Plane or a pair (point, normal)"
+        raise InputError(field, None, problem, "see Housing.from_arrays")
+    if len(given) and (given.min() < 0 or given.max() >= n):
+        raise InputError(field, [int(given.min()), int(given.max())], f"node numbers lie in 0..{n - 1}", "")
+    found = np.unique(new_number[given.astype(np.int64)])
+    found = found[found >= 0]
+    if not len(found):
+        raise InputError(field, None, "names no node that belongs to an element", "give nodes, or None for none")
+    return np.asarray(found)
+
+
+def _without(faces: Ints, sets: list[Ints], n: int) -> Ints:
+    """Faces that do not lie wholly within one of the node sets."""
+    keep = np.ones(len(faces), dtype=bool)
+    for chosen in sets:
+        flags = np.zeros(n, dtype=bool)
+        flags[chosen] = True
+        keep &= ~flags[faces].all(axis=1)
+    return faces[keep]

@@ -1,0 +1,72 @@
+r"""Outer surface of a tetrahedral body: faces, normals, and the integral of the squared normal velocity.
+
+``integral of (v . n)^2 dA`` over faces with six nodes: with the shape functions N_a on a face this is
+``v^T G^T G v``, one row of G for each quadrature point, ``sqrt(w dA) N_a n_k`` in the column of node a, axis k.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class SurfaceQuadrature(NamedTuple):
+    """Values at the quadrature points of ``f`` faces, ``p`` points each."""
+
+    #: (p, a) shape functions
+    values: Floats
+    #: (f, p, 3) outward normals times the area that belongs to the point (m2)
+    areas: Floats
+
+
+def surface_quadrature(nodes: Floats, faces: Ints) -> SurfaceQuadrature:
+    """Shape functions and area vectors of (f, 3) or (f, 6) faces, curved or flat; exact for squares on flat faces."""
+    from skfem import ElementTriP1, ElementTriP2
+    from skfem.quadrature import get_quadrature_tri
+
+    element, order = (ElementTriP1(), 2) if faces.shape[1] == 3 else (ElementTriP2(), 4)
+    points, weights = get_quadrature_tri(order)
+    basis = [element.lbasis(points, k) for k in range(faces.shape[1])]
+    values = np.array([np.broadcast_to(v, weights.shape) for v, _ in basis]).T
+    slopes = np.array([np.broadcast_to(g, (2, len(weights))) for _, g in basis])
+    first, second = (np.einsum("fak,ap->fpk", nodes[faces], slopes[:, axis]) for axis in range(2))
+    return SurfaceQuadrature(values, np.cross(first, second) * weights[:, None])
+
+
+def surface_area(nodes: Floats, faces: Ints) -> float:
+    """Area of faces (m2)."""
+    return float(np.linalg.norm(surface_quadrature(nodes, faces).areas, axis=2).sum())
+
+
+def nodal_normals(nodes: Floats, faces: Ints) -> Floats:
+    """(n, 3) outward unit normals at the nodes of the faces, weighted by area; zero at all other nodes."""
+    quadrature = surface_quadrature(nodes, faces)
+    total = np.zeros_like(nodes)
+    weight = np.abs(quadrature.values) / np.abs(quadrature.values).sum(axis=1, keepdims=True)
+    parts = np.einsum("pa,fpk->fak", weight, quadrature.areas)
+    for axis in range(3):
+        total[:, axis] = np.bincount(faces.ravel(), weights=parts[:, :, axis].ravel(), minlength=len(nodes))
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.divide(total, length, out=np.zeros_like(total), where=length > 0.0)
+
+
+def radiation_matrix(nodes: Floats, faces: Ints, shapes: Floats) -> Floats:
+    """(N, N) matrix R with ``qdot^T R qdot`` the integral of the squared normal velocity over the faces (m4/s2)."""
+    if len(faces) == 0:
+        return np.zeros((shapes.shape[1], shapes.shape[1]))
+    quadrature = surface_quadrature(nodes, faces)
+    size = np.linalg.norm(quadrature.areas, axis=2)
+    scaled = quadrature.areas / np.sqrt(np.maximum(size, 1e-300))[..., None]
+    entries = np.einsum("pa,fpk->fpak", quadrature.values, scaled)
+    f, p, a, _ = entries.shape
+    columns = np.broadcast_to(3 * faces[:, None, :, None] + np.arange(3), entries.shape)
+    starts = np.arange(0, f * p * a * 3 + 1, a * 3)
+    g = sparse.csr_array((entries.ravel(), columns.ravel(), starts), shape=(f * p, 3 * len(nodes)))
+    rows = g @ shapes
+    return np.asarray(rows.T @ rows)

@@ -1,0 +1,129 @@
+"""Pictures of a housing and of its modes, drawn by VTK in a process of its own.
+
+Off-screen drawing crashes the interpreter where a machine lacks the graphics libraries: in a second process that costs a
+picture and a message, not the results.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arrays import load_arrays, save_arrays
+from .files import whole_file
+
+#: Largest displacement in a picture of a mode, in parts of the body's size.
+EXAGGERATION = 0.06
+_SECONDS = 120.0
+
+
+def draw_modes(
+    path: str | Path,
+    points: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    fields: NDArray[np.float64],
+    titles: Sequence[str],
+    *,
+    marked: NDArray[np.int64] | None = None,
+) -> str:
+    """Draw deformed surfaces side by side into one picture.
+
+    Parameters
+    ----------
+    path
+        Picture to write (``.png``).
+    points : (n, 3)
+        Coordinates (m).
+    faces : (f, 3) or (f, 6)
+        Triangles of the surface.
+    fields : (k, n, 3)
+        Displacements, one picture each, scaled to be seen; a field of zeros draws the body as it is.
+    titles
+        One a picture.
+    marked
+        Numbers of points to mark (the attachments' nodes).
+
+    Returns
+    -------
+    str
+        Empty when the picture was drawn, else why not.
+    """
+    used, renumbered = np.unique(faces, return_inverse=True)
+    keep = np.isin(np.arange(len(points)), [] if marked is None else marked)
+    with tempfile.TemporaryDirectory() as folder:
+        job = Path(folder) / "job.npz"
+        arrays = {
+            "points": points[used],
+            "faces": renumbered.reshape(faces.shape),
+            "fields": fields[:, used],
+            "titles": np.array(list(titles)),
+            "marked": points[keep],
+        }
+        save_arrays(job, arrays)
+        environment = dict(os.environ)
+        if sys.platform.startswith("linux"):
+            environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+        command = [sys.executable, "-m", __name__, str(job), str(path)]
+        environment["PYTHONPATH"] = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
+        try:
+            done = subprocess.run(
+                command, env=environment, capture_output=True, text=True, timeout=_SECONDS, check=False
+            )
+        except subprocess.TimeoutExpired:
+            return f"drawing took longer than {_SECONDS:g} s"
+    if done.returncode != 0:
+        last = done.stderr.strip().splitlines()[-1:] or [f"the drawing process ended with code {done.returncode}"]
+        return f"{last[0]} (off-screen drawing needs EGL or Mesa: apt-get install libegl1 libgl1)"
+    return ""
+
+
+def _draw(job: Path, target: Path) -> None:
+    """Draw what a job file holds; runs in the process of its own."""
+    import pyvista
+
+    stored: dict[str, Any] = load_arrays(job)
+    points, faces, fields = stored["points"], stored["faces"], stored["fields"]
+    corners = faces[:, :3]
+    if faces.shape[1] == 6:
+        a, b, c, ab, bc, ca = faces.T
+        corners = np.concatenate([np.column_stack(t) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    cells = np.column_stack([np.full(len(corners), 3), corners]).ravel()
+    size = float(np.ptp(points, axis=0).max())
+    columns = min(3, len(fields))
+    rows = math.ceil(len(fields) / columns)
+    plotter = pyvista.Plotter(off_screen=True, shape=(rows, columns), window_size=(520 * columns, 400 * rows), border=False)
+    plotter.set_background("white")
+    for number, (field, title) in enumerate(zip(fields, stored["titles"], strict=True)):
+        plotter.subplot(number // columns, number % columns)
+        magnitude = np.linalg.norm(field, axis=1)
+        most = float(magnitude.max())
+        moved = points + field * (EXAGGERATION * size / most) if most > 0.0 else points
+        surface = pyvista.PolyData(moved, cells)
+        if most > 0.0:
+            surface["size"] = magnitude / most
+            plotter.add_mesh(surface, scalars="size", cmap="viridis", show_scalar_bar=False, smooth_shading=False)
+        else:
+            plotter.add_mesh(surface, color="lightsteelblue", smooth_shading=False)
+            edges = surface.extract_feature_edges(feature_angle=30.0)
+            plotter.add_mesh(edges, color="black", line_width=1.5)
+            if len(stored["marked"]):
+                plotter.add_points(stored["marked"], color="crimson", point_size=5, render_points_as_spheres=True)
+        plotter.add_text(str(title), font_size=9, color="black")
+        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        plotter.camera_position = [centre + size * np.array([0.9, 1.5, 0.9]), centre, (0.0, 0.0, 1.0)]
+    with whole_file(target) as temporary:
+        plotter.screenshot(str(temporary))
+    plotter.close()
+
+
+if __name__ == "__main__":
+    _draw(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -1,0 +1,312 @@
+r"""Small-strain elasticity on tetrahedra: stiffness and mass, fast where the elements are straight.
+
+Find ``u`` with, for all ``v`` (zero where the body is held),
+
+.. math::
+    \int_\Omega \rho\,\ddot u\cdot v + \int_\Omega \lambda\,\mathrm{div}\,u\,\mathrm{div}\,v
+        + 2\mu\,\varepsilon(u):\varepsilon(v) = \int_\Omega f\cdot v ,
+    \qquad \lambda = \frac{E\nu}{(1+\nu)(1-2\nu)},\quad \mu = \frac{E}{2(1+\nu)} .
+
+On a straight-sided element the gradient of the map from the reference element is constant, so all element matrices are
+one small product: (element coefficients) x (integrals over the reference element, computed once). Curved elements, and
+the check of the fast route, go through scikit-fem's forms. Nodes carry three unknowns each, numbered ``3 node + axis``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from .errors import InputError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+MassRule = Literal["exact", "4-point"]
+
+#: Corner pairs of the edges in the order of the midside nodes (VTK, Abaqus, CalculiX; scikit-fem's too).
+EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
+#: Corner triples of the faces, each seen anticlockwise from outside, and their midside nodes in the same order.
+FACES = np.array([[0, 2, 1, 6, 5, 4], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6]])
+#: A midside node further than this part of the edge's length from the edge's middle makes its element a curved one.
+STRAIGHT = 1e-9
+#: Degree of the quadrature rule for the stiffness of curved elements (14 points, all weights positive).
+CURVED_DEGREE = 5
+
+
+@dataclass(frozen=True)
+class SolidMaterial:
+    """Isotropic linear elastic solid.
+
+    Parameters
+    ----------
+    youngs_modulus
+        Young's modulus E (Pa).
+    poissons_ratio
+        Poisson's ratio nu, between -1 and 0.5.
+    density
+        Density rho (kg/m3).
+    """
+
+    youngs_modulus: float = 200e9
+    poissons_ratio: float = 0.3
+    density: float = 7850.0
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("youngs_modulus", 0.0, math.inf),
+            ("poissons_ratio", -1.0, 0.5),
+            ("density", 0.0, math.inf),
+        ):
+            value = getattr(self, name)
+            if not low < value < high:
+                raise InputError(name, value, f"must lie between {low:g} and {high:g} (both excluded)", "use SI units")
+
+    @property
+    def lame_lambda(self) -> float:
+        """First Lame constant (Pa)."""
+        return (
+            self.youngs_modulus * self.poissons_ratio / ((1.0 + self.poissons_ratio) * (1.0 - 2.0 * self.poissons_ratio))
+        )
+
+    @property
+    def shear_modulus(self) -> float:
+        """Shear modulus mu = G (Pa)."""
+        return self.youngs_modulus / (2.0 * (1.0 + self.poissons_ratio))
+
+
+class SolidMatrices(NamedTuple):
+    """Assembled matrices of a body; ``n`` nodes."""
+
+    #: (3n, 3n) stiffness (N/m), symmetric, CSR
+    stiffness: sparse.csr_array
+    #: (n, n) mass of one axis (kg), CSR; the full mass is ``kron(mass, eye(3))``
+    nodal_mass: sparse.csr_array
+
+    @property
+    def mass(self) -> sparse.csr_array:
+        """(3n, 3n) consistent mass (kg)."""
+        return expand_nodal(self.nodal_mass)
+
+
+def expand_nodal(nodal: sparse.csr_array) -> sparse.csr_array:
+    """``kron(nodal, eye(3))`` in CSR: the same scalar matrix on each of the three axes."""
+    return sparse.kron(nodal, sparse.eye_array(3), format="csr")
+
+
+def assemble(nodes: Floats, tets: Ints, material: SolidMaterial, *, mass_rule: MassRule = "exact") -> SolidMatrices:
+    """Stiffness and consistent mass of a tetrahedral mesh.
+
+    Parameters
+    ----------
+    nodes : (n, 3)
+        Coordinates (m).
+    tets : (m, 4) or (m, 10)
+        Node numbers, corners first, midside nodes in the order of `EDGES`.
+    material
+        The solid.
+    mass_rule
+        ``"exact"``, or ``"4-point"``: the under-integrated mass of second-order tetrahedra that CalculiX and others use.
+    """
+    curved = curved_elements(nodes, tets)
+    tets = np.concatenate([tets[~curved], tets[curved]])
+    straight, bent = np.split(tets, [int((~curved).sum())])
+    parts = [_by_blocks(nodes, part, material, mass_rule) for part in (straight, bent) if len(part)]
+    pattern = _pattern(tets, len(nodes))
+
+    def summed(local: list[Floats]) -> Floats:
+        weights = np.concatenate([entries.ravel() for entries in local])
+        return np.bincount(pattern.place, weights=weights, minlength=len(pattern.columns))
+
+    mass = summed([part.mass() for part in parts])
+    blocks = np.empty((len(pattern.columns), 3, 3))
+    for i in range(3):
+        for j in range(3):
+            blocks[:, i, j] = summed([part.stiffness(i, j) for part in parts])
+    n = len(nodes)
+    stiffness = sparse.bsr_array((blocks, pattern.columns, pattern.starts), shape=(3 * n, 3 * n)).tocsr()
+    return SolidMatrices(stiffness, sparse.csr_array((mass, pattern.columns, pattern.starts), shape=(n, n)))
+
+
+class ElementMatrices(NamedTuple):
+    """Element matrices of ``m`` elements with ``a`` nodes each."""
+
+    #: (m, a, 3, a, 3) stiffness (N/m)
+    stiffness: Floats
+    #: (m, a, a) mass of one axis (kg)
+    mass: Floats
+
+
+def general_element_matrices(
+    nodes: Floats, tets: Ints, material: SolidMaterial, *, mass_rule: MassRule = "exact"
+) -> ElementMatrices:
+    """Element matrices of any tetrahedra, curved or not, by scikit-fem's weak forms and isoparametric maps.
+
+    The exact mass of a curved second-order element needs degree 7 (4 from the product, 3 from the volume ratio).
+    """
+    from skfem import Basis, BilinearForm, ElementTetP1, ElementTetP2, ElementVector
+    from skfem.helpers import ddot, div, sym_grad
+
+    lam, mu = material.lame_lambda, material.shear_modulus
+
+    @BilinearForm
+    def stiffness(u: Any, v: Any, _: Any) -> Any:
+        return lam * div(u) * div(v) + 2.0 * mu * ddot(sym_grad(u), sym_grad(v))
+
+    @BilinearForm
+    def mass(u: Any, v: Any, _: Any) -> Any:
+        return material.density * u * v
+
+    scalar = ElementTetP1() if tets.shape[1] == 4 else ElementTetP2()
+    mesh = skfem_mesh(nodes, tets)
+    a = tets.shape[1]
+    exact_order = 2 if a == 4 else 7
+    k = stiffness.coo_data(Basis(mesh, ElementVector(scalar), intorder=1 if a == 4 else CURVED_DEGREE)).tolocal()
+    m = mass.coo_data(Basis(mesh, scalar, intorder=exact_order if mass_rule == "exact" else 2)).tolocal()
+    return ElementMatrices(k.reshape(len(tets), a, 3, a, 3), m)
+
+
+def skfem_mesh(nodes: Floats, tets: Ints) -> Any:
+    """scikit-fem mesh of the elements, geometry of the same order as the elements (``MeshTet1`` or ``MeshTet2``).
+
+    scikit-fem numbers vertices first and midside nodes by its own edges, so node numbers change; element order and the
+    order of nodes within an element stay.
+    """
+    from skfem import ElementTetP2, MeshTet1, MeshTet2
+    from skfem.assembly import Dofs
+
+    corners, renumbered = np.unique(tets[:, :4], return_inverse=True)
+    linear = MeshTet1(
+        np.ascontiguousarray(nodes[corners].T), np.ascontiguousarray(renumbered.reshape(-1, 4).T), validate=False
+    )
+    if tets.shape[1] == 4:
+        return linear
+    dofs = Dofs(linear, ElementTetP2())
+    locations = np.zeros((3, dofs.N))
+    locations[:, dofs.element_dofs.T] = nodes[tets].transpose(2, 0, 1)
+    return MeshTet2(locations, linear.t, validate=False)
+
+
+def curved_elements(nodes: Floats, tets: Ints) -> NDArray[np.bool_]:
+    """(m,) whether a midside node lies off the middle of its edge."""
+    if tets.shape[1] == 4:
+        return np.zeros(len(tets), dtype=bool)
+    first, second = nodes[tets[:, EDGES[:, 0]]], nodes[tets[:, EDGES[:, 1]]]
+    offset = np.linalg.norm(nodes[tets[:, 4:]] - 0.5 * (first + second), axis=2)
+    return np.asarray(np.any(offset > STRAIGHT * np.linalg.norm(second - first, axis=2), axis=1))
+
+
+def jacobian_determinants(nodes: Floats, tets: Ints) -> Floats:
+    """(m, points) volume ratio against the reference element (six times the volume where straight) at all nodes.
+
+    Corners only for linear elements. A value that is not positive marks an inverted or collapsed element.
+    """
+    gradients = node_gradients(tets.shape[1])  # (points, a, 3)
+    jacobian = np.einsum("maj,pak->mpjk", nodes[tets], gradients, optimize=True)
+    return np.asarray(np.linalg.det(jacobian))
+
+
+class _Pattern(NamedTuple):
+    """Where each element entry goes in the node-by-node sparse matrix."""
+
+    starts: NDArray[np.int32]
+    columns: NDArray[np.int32]
+    place: Ints
+
+
+def _pattern(tets: Ints, n: int) -> _Pattern:
+    a = tets.shape[1]
+    keys = (np.repeat(tets, a, axis=1).astype(np.int64) * n + np.tile(tets, (1, a))).ravel()
+    found, place = np.unique(keys, return_inverse=True)
+    starts = np.searchsorted(found, np.arange(n + 1, dtype=np.int64) * n).astype(np.int32)
+    return _Pattern(starts, (found % n).astype(np.int32), place)
+
+
+@cache
+def shape_functions(a: int, order: int) -> tuple[Floats, Floats, Floats]:
+    """Shape functions (a, p), their gradients (a, 3, p) and weights (p,) at quadrature points of the given degree."""
+    from skfem import ElementTetP1, ElementTetP2
+    from skfem.quadrature import get_quadrature_tet
+
+    element = ElementTetP1() if a == 4 else ElementTetP2()
+    points, weights = get_quadrature_tet(order)
+    values = [element.lbasis(points, k) for k in range(a)]
+    phi = np.array([np.broadcast_to(v, weights.shape) for v, _ in values])
+    gradients = np.array([np.broadcast_to(g, (3, len(weights))) for _, g in values])
+    return phi, gradients, weights
+
+
+@cache
+def node_gradients(a: int) -> Floats:
+    """(points, a, 3) gradients of the shape functions at the nodes (at the first corner for linear elements)."""
+    from skfem import ElementTetP1, ElementTetP2
+
+    element = ElementTetP1() if a == 4 else ElementTetP2()
+    points = element.doflocs[:1].T if a == 4 else element.doflocs.T
+    values = [np.broadcast_to(element.lbasis(points, k)[1], points.shape) for k in range(a)]
+    return np.array(values).transpose(2, 0, 1)
+
+
+@dataclass(frozen=True)
+class _Blocks:
+    """Element matrices of ``m`` elements as (coefficients of each element) @ (integrals over the reference element)."""
+
+    #: (m, 3, 3, 9 p) coefficients of the stiffness blocks; p quadrature points (straight: one set for all)
+    coefficients: Floats
+    #: (9 p, a a) of d phi_a / d xi_m  d phi_b / d xi_n
+    gradients: Floats
+    #: (m, q) density times volume ratio, and (q, a a) of phi_a phi_b
+    density: Floats
+    products: Floats
+
+    def stiffness(self, i: int, j: int) -> Floats:
+        """(m, a a) block that couples axes i and j."""
+        return np.asarray(self.coefficients[:, i, j] @ self.gradients)
+
+    def mass(self) -> Floats:
+        """(m, a a) mass of one axis."""
+        return np.asarray(self.density @ self.products)
+
+
+def _by_blocks(nodes: Floats, tets: Ints, material: SolidMaterial, mass_rule: MassRule) -> _Blocks:
+    """Factors of the element matrices of elements that are all straight or all curved.
+
+    With J the gradient of the inverse map, ``d phi_a/d x_i = J[m, i] d phi_a/d xi_m``, block (i, j) of the element
+    stiffness is the sum over quadrature points of ``w det (lambda J[m,i] J[n,j] + mu J[m,j] J[n,i] + mu delta_ij
+    J[m,k] J[n,k])`` times ``d phi_a/d xi_m d phi_b/d xi_n``. On straight elements all but the last factor is constant.
+    """
+    a = tets.shape[1]
+    curved = bool(curved_elements(nodes, tets[:1])[0])
+    _, gradients, weights = shape_functions(a, CURVED_DEGREE if curved else 2)
+    if curved:
+        products = np.einsum("amp,bnp,p->pmnab", gradients, gradients, weights).reshape(-1, a * a)
+        det, inverse = maps(nodes, tets, gradients)
+    else:
+        products = np.einsum("amp,bnp,p->mnab", gradients, gradients, weights).reshape(-1, a * a)
+        det, inverse = maps(nodes, tets[:, :4], shape_functions(4, 1)[1])
+    c = np.empty((len(tets), 3, 3, det.shape[1], 3, 3))
+    total = np.einsum("epmk,epnk->epmn", inverse, inverse)
+    for i in range(3):
+        for j in range(3):
+            direct = np.einsum("epm,epn->epmn", inverse[..., i], inverse[..., j])
+            c[:, i, j] = material.lame_lambda * direct + material.shear_modulus * direct.swapaxes(-1, -2)
+        c[:, i, i] += material.shear_modulus * total
+    c *= det[:, None, None, :, None, None]
+    phi, slopes, weights = shape_functions(a, 2 if mass_rule == "4-point" else (7 if curved else 6))
+    if curved:
+        phi_phi = np.einsum("ap,bp,p->pab", phi, phi, weights).reshape(-1, a * a)
+        det, _ = maps(nodes, tets, slopes)
+    else:
+        phi_phi = np.einsum("ap,bp,p->ab", phi, phi, weights).reshape(-1, a * a)
+    return _Blocks(c.reshape(len(tets), 3, 3, -1), products, material.density * det, phi_phi)
+
+
+def maps(nodes: Floats, tets: Ints, gradients: Floats) -> tuple[Floats, Floats]:
+    """(m, p) volume ratio, and (m, p, 3, 3) gradient of the inverse map [xi axis, x axis] at the points of `gradients`."""
+    forward = np.einsum("eak,amp->epkm", nodes[tets], gradients, optimize=True)
+    return np.linalg.det(forward), np.linalg.inv(forward)

@@ -1,0 +1,152 @@
+"""Table ``[housing]``: a gearbox housing of two bored walls on a base plate with four feet, and what is made of it.
+
+All lengths in millimetres, in one frame: shafts run along y, z points up, the gap between the walls is centred on y = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..config import quantity
+from ..errors import InputError
+
+
+@dataclass(frozen=True)
+class ShaftAxisTable:
+    """One shaft axis, parallel to y, and its bores in the walls."""
+
+    x_mm: float = quantity(doc="x of the shaft axis (mm)")
+    z_mm: float = quantity(0.0, doc="z of the shaft axis (mm)")
+    bore_radius_mm: float = quantity(10.0, above=0.0, doc="radius of the bores (mm)")
+    boss_radius_mm: float = quantity(15.0, above=0.0, doc="outer radius of the bosses round the bores (mm)")
+    boss_height_mm: float = quantity(10.0, low=0.0, doc="how far the bosses stand proud of the outer wall faces (mm)")
+    walls: str = quantity("both", choices=("both", "plus", "minus"), doc="walls that are bored: both, plus (+y), minus (-y)")
+
+    def check(self, where: str) -> None:
+        """A boss is wider than its bore."""
+        if self.boss_height_mm > 0.0 and self.boss_radius_mm <= self.bore_radius_mm:
+            problem = f"must be larger than the bore radius {self.bore_radius_mm:g}"
+            raise InputError(f"{where}.boss_radius_mm", self.boss_radius_mm, problem, "or set boss_height_mm = 0")
+
+
+@dataclass(frozen=True)
+class FeetTable:
+    """Four feet outboard of the ends of the base plate; their bottoms lie in its bottom plane."""
+
+    length_x_mm: float = quantity(30.0, above=0.0, doc="length of a foot along x, outboard of the wall ends (mm)")
+    width_y_mm: float = quantity(22.0, above=0.0, doc="width of a foot along y (mm)")
+    height_mm: float = quantity(15.0, above=0.0, doc="height of a foot above the bottom plane (mm)")
+    inset_y_mm: float = quantity(0.0, low=0.0, doc="distance of a foot's outer side from the outer wall face (mm)")
+    fixed: bool = quantity(True, doc="whether the bottoms of the feet are held; false gives a free housing")
+
+
+@dataclass(frozen=True)
+class HousingMaterialTable:
+    """The housing's material."""
+
+    youngs_modulus_GPa: float = quantity(200.0, above=0.0, doc="Young's modulus (GPa)")
+    poissons_ratio: float = quantity(0.3, above=-1.0, below=0.5, doc="Poisson's ratio")
+    density_kg_per_m3: float = quantity(7850.0, above=0.0, doc="density (kg/m3)")
+
+
+@dataclass(frozen=True)
+class HousingMeshTable:
+    """Elements and their size."""
+
+    size_mm: float = quantity(7.0, above=0.0, doc="edge length away from the bores (mm)")
+    bore_edges: int = quantity(12, low=6, high=400, doc="element edges round a bore at least")
+    order: int = quantity(2, low=1, high=2, doc="2: curved second-order tetrahedra; 1: linear ones, 15-45 % too stiff")
+    mass: str = quantity("exact", choices=("exact", "4-point"), doc="mass integration; 4-point as in CalculiX")
+
+
+@dataclass(frozen=True)
+class HousingReductionTable:
+    """What is kept of the full model."""
+
+    modes: int | None = quantity(None, low=0, doc="number of modes with the bores held; left out: by frequency")
+    modes_below_Hz: float = quantity(10000.0, above=0.0, doc="highest frequency of the modes kept (Hz)")
+    least_modes: int = quantity(40, low=0, doc="modes kept at least when they are chosen by frequency")
+    quasi_static_levels: int = quantity(1, low=0, high=6, doc="levels of quasi-static corrections; 0 for none")
+    band_Hz: float = quantity(5000.0, above=0.0, doc="highest frequency of interest, for the error estimate (Hz)")
+    solver: str = quantity("auto", doc="sparse solver: auto, metis-superlu, pardiso, cholmod, superlu")
+
+
+@dataclass(frozen=True)
+class HousingDampingTable:
+    """Damping of the housing; all zero by default."""
+
+    ratio: float | tuple[float, ...] = quantity(0.0, low=0.0, below=1.0, doc="modal damping ratio, one or one a mode")
+    rayleigh_alpha_per_s: float = quantity(0.0, low=0.0, doc="Rayleigh damping: factor of the mass (1/s)")
+    rayleigh_beta_s: float = quantity(0.0, low=0.0, doc="Rayleigh damping: factor of the stiffness (s)")
+
+
+@dataclass(frozen=True)
+class HousingTable:
+    """The whole ``[housing]`` table."""
+
+    wall_x_mm: tuple[float, float] = quantity((-45.0, 180.0), doc="ends of the walls along x (mm)")
+    wall_z_mm: tuple[float, float] = quantity((-72.0, 25.0), doc="bottom and top of the walls (mm)")
+    inner_gap_mm: float = quantity(50.0, above=0.0, doc="gap between the walls, centred on y = 0 (mm)")
+    wall_thickness_mm: tuple[float, float] = quantity((6.0, 4.5), above=0.0, doc="thickness of the +y and -y wall (mm)")
+    base_thickness_mm: float = quantity(18.0, above=0.0, doc="thickness of the base plate under the walls (mm)")
+    end_wall_thickness_mm: tuple[float, float] = quantity(
+        (0.0, 0.0), low=0.0, doc="thickness of the end walls at low and high x, 0 for none (mm)"
+    )
+    cover_thickness_mm: float = quantity(0.0, low=0.0, doc="thickness of the cover on the walls, 0 for none (mm)")
+    shafts: tuple[ShaftAxisTable, ...] = quantity(
+        (ShaftAxisTable(x_mm=0.0), ShaftAxisTable(x_mm=62.5), ShaftAxisTable(x_mm=125.0)), doc="[[housing.shafts]]"
+    )
+    feet: FeetTable = quantity(FeetTable(), doc="[housing.feet]")
+    material: HousingMaterialTable = quantity(HousingMaterialTable(), doc="[housing.material]")
+    mesh: HousingMeshTable = quantity(HousingMeshTable(), doc="[housing.mesh]")
+    reduction: HousingReductionTable = quantity(HousingReductionTable(), doc="[housing.reduction]")
+    damping: HousingDampingTable = quantity(HousingDampingTable(), doc="[housing.damping]")
+
+    def check(self, where: str) -> None:
+        """Rules that join several dimensions: everything lies where it can be joined to the rest."""
+        for name, (low, high) in (("wall_x_mm", self.wall_x_mm), ("wall_z_mm", self.wall_z_mm)):
+            if low >= high:
+                raise InputError(f"{where}.{name}", [low, high], "must be [low, high] with low < high", "swap them")
+        if sum(self.end_wall_thickness_mm) >= self.wall_x_mm[1] - self.wall_x_mm[0]:
+            problem = "the end walls fill the whole length between the wall ends"
+            raise InputError(f"{where}.end_wall_thickness_mm", list(self.end_wall_thickness_mm), problem, "thinner ones")
+        self._check_feet(f"{where}.feet")
+        for number, shaft in enumerate(self.shafts):
+            self._check_shaft(shaft, f"{where}.shafts[{number}]")
+        for number, (first, second) in enumerate(_pairs(self.shafts)):
+            _check_apart(first, second, where, number)
+
+    def _check_feet(self, where: str) -> None:
+        feet, depth = self.feet, self.inner_gap_mm + sum(self.wall_thickness_mm)
+        if feet.height_mm > self.base_thickness_mm:
+            problem = f"the feet reach above the base plate, which is {self.base_thickness_mm:g} mm thick"
+            raise InputError(f"{where}.height_mm", feet.height_mm, problem, "lower feet or a thicker base")
+        if feet.inset_y_mm >= depth:
+            problem = f"the feet lie outside the base, which is {depth:g} mm wide"
+            raise InputError(f"{where}.inset_y_mm", feet.inset_y_mm, problem, "choose a smaller inset")
+        if 2.0 * (feet.inset_y_mm + feet.width_y_mm) > depth:
+            problem = f"two feet side by side (with their insets) are wider than the base, {depth:g} mm: they overlap"
+            raise InputError(f"{where}.width_y_mm", feet.width_y_mm, problem, "narrower feet or a smaller inset")
+
+    def _check_shaft(self, shaft: ShaftAxisTable, where: str) -> None:
+        (x0, x1), (z0, z1), r = self.wall_x_mm, self.wall_z_mm, shaft.bore_radius_mm
+        x0, x1 = x0 + self.end_wall_thickness_mm[0], x1 - self.end_wall_thickness_mm[1]
+        place = f"bore of radius {r:g} mm at x = {shaft.x_mm:g}, z = {shaft.z_mm:g}"
+        cure = f"its centre must lie within x {x0 + r:g}..{x1 - r:g} and z {z0 + r:g}..{z1 - r:g} mm"
+        if not (x0 - r < shaft.x_mm < x1 + r and z0 - r < shaft.z_mm < z1 + r):
+            raise InputError(where, None, f"{place} misses every wall", cure)
+        if not (x0 + r < shaft.x_mm < x1 - r and z0 + r < shaft.z_mm < z1 - r):
+            raise InputError(where, None, f"{place} cuts the edge of the walls or an end wall", cure)
+
+
+def _pairs(shafts: tuple[ShaftAxisTable, ...]) -> list[tuple[ShaftAxisTable, ShaftAxisTable]]:
+    return [(a, b) for i, a in enumerate(shafts) for b in shafts[i + 1 :]]
+
+
+def _check_apart(first: ShaftAxisTable, second: ShaftAxisTable, where: str, _: int) -> None:
+    distance = ((first.x_mm - second.x_mm) ** 2 + (first.z_mm - second.z_mm) ** 2) ** 0.5
+    shared = {"both"} & {first.walls, second.walls} or first.walls == second.walls
+    if shared and distance <= first.bore_radius_mm + second.bore_radius_mm:
+        problem = f"the bores at x = {first.x_mm:g} and x = {second.x_mm:g} mm overlap: their axes are {distance:g} mm apart"
+        cure = f"keep more than {first.bore_radius_mm + second.bore_radius_mm:g} mm between them"
+        raise InputError(f"{where}.shafts", None, problem, cure)
