@@ -1,8 +1,6 @@
 r"""Displacement and stress on whole gears, recovered from a solved position.
 
-With the forces :math:`f_i` on the flanks of the loaded teeth, each in the frame of its tooth, the cut sides of tooth
-j move by :math:`b_j = \sum_i X_{j-i} P^T f_i` and its flank by :math:`u_j = A f_j + P b_j` (the matrices of
-`gearfe.contact.compliance`); the interior follows from the stored elimination. Stresses are those of the elements at
+The displacements of each sector come from `gearfe.contact.recovery`. Stresses are those of the elements at
 their nodes, averaged over the elements that meet there; they are linear in the displacements, one sparse matrix a gear.
 """
 
@@ -15,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .contact.compliance import GearBody
+from .contact.recovery import flank_forces, sector_displacements
 from .contact.scene import MeshingPair, turn
 from .contact.solver import Position
 from .elasticity import physical_gradients, triangle_shapes, von_mises
@@ -101,31 +100,6 @@ def _stress_rows(body: GearBody) -> Any:
     return csr_array((rows.ravel(), (row.ravel(), column.ravel())), shape=(3 * size, 2 * size))
 
 
-def sector_displacements(body: GearBody, loads: dict[int, Array]) -> Array:
-    """Displacements of all sectors, each in the frame of its tooth.
-
-    Parameters
-    ----------
-    loads : dict of int to ndarray, shape (f,)
-        Forces on the flank of each loaded tooth, in the frame of that tooth (N).
-
-    Returns
-    -------
-    ndarray, shape (2 s, z)
-        m.
-    """
-    teeth = body.teeth
-    sides = np.zeros((body.interface.shape[1], teeth))
-    for tooth, force in loads.items():
-        drive = body.interface.T @ force
-        steps = (np.arange(teeth) - tooth) % teeth
-        sides += np.einsum("zab,b->az", body.coupling[steps], drive, optimize=True)
-    flank = body.interface @ sides
-    for tooth, force in loads.items():
-        flank[:, tooth % teeth] += body.own @ force
-    return body.condensed.recover(np.concatenate([flank, sides]))
-
-
 def gear_field(recovery: GearRecovery, pair: MeshingPair, position: Position, angle: float, gear: int) -> GearField:
     """Fields of one gear.
 
@@ -142,19 +116,15 @@ def gear_field(recovery: GearRecovery, pair: MeshingPair, position: Position, an
     scene, forces = position.scene, position.forces
     if scene is None or forces is None:
         raise ValueError(f"a position without a solution has no fields: {position.status}")
-    loads: dict[int, Array] = {}
-    for window in scene.windows:
-        if window.gear == gear:
-            load = loads.setdefault(window.tooth % body.teeth, np.zeros(len(body.own)))
-            load[window.flank_unknowns] += forces[window.unknowns]
-    local = sector_displacements(body, loads)
+    loads = flank_forces(body, gear, scene.windows, forces)
+    local = sector_displacements(body, [(loads, tooth) for tooth in range(body.teeth)])  # (s, 2, z)
     teeth = body.teeth
     turns = angle + 2 * np.pi * np.arange(teeth) / teeth
     c, s = np.cos(turns), np.sin(turns)
-    x, y = local[0::2], local[1::2]
+    x, y = local[:, 0], local[:, 1]
     displacement = np.empty((len(whole.points), 2))
     displacement[whole.numbers.T] = np.stack([c * x - s * y, s * x + c * y], axis=-1)
-    sums = (recovery.stress_rows @ local).reshape(-1, 3, teeth)
+    sums = (recovery.stress_rows @ local.reshape(-1, teeth)).reshape(-1, 3, teeth)
     xx, yy, xy = sums[:, 0], sums[:, 1], sums[:, 2]
     turned = np.stack(
         [

@@ -11,6 +11,7 @@ import numpy as np
 
 from .config import load_job
 from .contact.laws import ContactLaw, Nitsche, Penalty
+from .curve_csv import from_text
 from .elasticity import Material
 from .errors import InputError
 from .gear import GearPair
@@ -73,13 +74,18 @@ class StiffnessJob:
             cure = "add twist_deg or torque_Nm to [stiffness], or give --twist-deg or --torque-Nm"
             raise InputError("stiffness.twist_deg", None, "no load: neither twist_deg nor torque_Nm is given", cure)
         return {
-            "twist": None if t.twist_deg is None else math.radians(t.twist_deg),
+            "twist": None if t.twist_deg is None else _radians(t.twist_deg),
             "torque": t.torque_Nm,
-            "angles": np.radians(t.angles_deg(math.degrees(self.pair.mesh_cycle))),
+            "angles": np.array([_radians(angle) for angle in t.angles_deg(math.degrees(self.pair.mesh_cycle))]),
             "kinematics": t.kinematics,
             "twist_from": t.twist_from,
             "solve_all": t.solve_all,
         }
+
+
+def _radians(degrees: float) -> float:
+    """Angle rounded once, so that the table shows 15 deg as 15."""
+    return from_text(repr(degrees), "_deg")
 
 
 def _material(table: MaterialTable) -> Material:

@@ -25,8 +25,8 @@ CASES = [
     ("sharp", "strain", Nitsche(2.0, sides="wheel"), 9.0, 0.05, 2),
     ("sharp", "strain", Penalty(1e15), 6.0, 0.05, 2),
     ("modified", "strain", Nitsche(), 5.0, 0.05, 2),  # on relief and tip round
-    ("modified", "stress", Nitsche(), 13.75, 0.3, 2),
-    ("modified", "stress", Penalty(1e15), 5.0, 0.3, 2),
+    ("modified", "stress", Nitsche(), 10.0, 0.3, 2),
+    ("modified", "stress", Penalty(1e15), 25.0, 0.15, 1),
     ("modified", "strain", Penalty(1e15, sides="pinion"), 20.0, 0.05, 1),
 ]
 

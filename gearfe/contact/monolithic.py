@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 
 #: Out-of-balance forces relative to the contact forces at which a position counts as converged.
 TOLERANCE = 1e-10
-MAX_ITERATIONS = 20
+MAX_ITERATIONS = 15
 #: Newton steps taken in full before the line search watches over them.
 FREE_ITERATIONS = 3
 

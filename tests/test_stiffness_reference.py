@@ -1,0 +1,72 @@
+"""Mesh stiffness against other programs (tests/data/README.md says which), default settings.
+
+Off the tooth-pair changes the small-strain curve is expected 0.1 % above the finite-strain reference; rows at pair
+changes (0, 9, 17 deg) react to the last micrometre.
+"""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe import sweep_stiffness
+
+from .gears import pair
+
+DATA = Path(__file__).parent / "data" / "gear_pair_20_30.csv"
+CHANGES = (0.0, 9.0, 17.0)
+
+
+def reference(plane, twist_deg):
+    """Pinion angles (deg) and stiffness (N/m)."""
+    with DATA.open(newline="") as stream:
+        rows = [r for r in csv.DictReader(stream) if r["plane_state"] == f"plane_{plane}"]
+    chosen = [r for r in rows if float(r["twist_deg"]) == twist_deg]
+    return (np.array([float(r[name]) for r in chosen]) for name in ("pinion_angle_deg", "k_mesh_N_per_m"))
+
+
+def computed(plane, twist_deg, angles):
+    gears = pair(bore=0.35)
+    curve = sweep_stiffness(gears, twist=math.radians(twist_deg), angles=np.radians(angles), plane=plane)
+    assert set(curve.status) == {"converged"}
+    return curve
+
+
+def test_a_few_positions():
+    angles, k = reference("strain", 0.05)
+    few = np.isin(angles, [4.0, 12.0])
+    assert few.sum() == 2
+    curve = computed("strain", 0.05, angles[few])
+    np.testing.assert_allclose(curve.k_mesh, k[few], rtol=2.5e-3)
+    # small strain is above finite strain
+    assert (curve.k_mesh > k[few]).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("plane", "twist_deg", "on_path", "at_changes"),
+    [("strain", 0.05, 0.25e-2, 0.8e-2), ("stress", 0.05, 0.25e-2, 0.8e-2), ("strain", 0.01, 0.35e-2, 1.5e-2)],
+)
+def test_the_full_cycle(plane, twist_deg, on_path, at_changes):
+    angles, k = reference(plane, twist_deg)
+    curve = computed(plane, twist_deg, angles)
+    off = curve.k_mesh / k - 1
+    change = np.isin(angles, CHANGES)
+    # 10 deg stands at the end of the pinion's tip contact for 0.05 deg: it counts as a change there
+    if twist_deg == 0.05:
+        change |= angles == 10.0
+    worst = {"path": np.abs(off[~change]).max(), "changes": np.abs(off[change]).max()}
+    assert worst["path"] <= on_path, dict(zip(angles, off, strict=True))
+    assert worst["changes"] <= at_changes, dict(zip(angles, off, strict=True))
+
+
+@pytest.mark.slow
+def test_torque_ratio_on_the_path():
+    angles, _ = reference("strain", 0.05)
+    curve = computed("strain", 0.05, angles)
+    path = ~np.isin(angles, [*CHANGES, 8.0, 10.0])
+    np.testing.assert_allclose((curve.torque_wheel / curve.torque_pinion)[path], 1.5, rtol=1e-3)
+    change = ~path
+    assert np.abs((curve.torque_wheel / curve.torque_pinion)[change] / 1.5 - 1).max() > 1e-3  # tips bear off the path
