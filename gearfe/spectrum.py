@@ -227,7 +227,7 @@ def band_rms(spectrum: Spectrum, low: float = 0.0, high: float = math.inf) -> An
 
 
 def order_lines(fundamentals: Mapping[str, float], highest: float, *, orders: int = 1000) -> tuple[OrderLine, ...]:
-    """Multiples of named frequencies (Hz) up to `highest` (Hz), ascending.
+    """Multiples of named frequencies (Hz) up to `highest` (Hz), ascending; of equal ones the lower order first.
 
     Parameters
     ----------
@@ -242,7 +242,7 @@ def order_lines(fundamentals: Mapping[str, float], highest: float, *, orders: in
         if f != 0.0
         for k in range(1, min(orders, int(highest / abs(f) * (1.0 + 1e-12))) + 1)
     ]
-    return tuple(sorted(lines, key=lambda line: line.frequency))
+    return tuple(sorted(lines, key=lambda line: (float(f"{line.frequency:.9g}"), line.order)))
 
 
 def nearest_line(frequency: float, lines: Iterable[OrderLine], within: float) -> OrderLine | None:
@@ -278,7 +278,9 @@ def line_amplitudes(values: ArrayLike, step: float, frequencies: ArrayLike) -> N
     angle = 2.0 * math.pi * np.outer(step * np.arange(len(x)), f)
     basis = np.column_stack([np.ones(len(x)), np.cos(angle), np.sin(angle)])
     if basis.shape[1] > len(x) or np.linalg.cond(basis) > 1e6:
-        raise InputError("frequencies", f.tolist(), "are too close for this record", "take a longer one, or fewer lines")
+        raise InputError(
+            "frequencies", f.tolist(), "are too close for this record", "take a longer one, or fewer lines"
+        )
     found = np.linalg.lstsq(basis, x, rcond=None)[0]
     return np.asarray(found[1 : 1 + len(f)] - 1j * found[1 + len(f) :])
 
@@ -296,7 +298,9 @@ def aliasing_warning(frequencies: ArrayLike, step: float) -> str:
     )
 
 
-def waterfall(values: ArrayLike, step: float, length: int, *, hop: int | None = None, window: str = "hann") -> Waterfall:
+def waterfall(
+    values: ArrayLike, step: float, length: int, *, hop: int | None = None, window: str = "hann"
+) -> Waterfall:
     """Spectra of pieces of `length` samples, `hop` samples apart (default: half of it)."""
     x = np.asarray(values, dtype=float)
     advance = max(1, length // 2) if hop is None else hop
