@@ -9,9 +9,9 @@ velocity :math:`v_n` of the outer surface S and the impedance :math:`\rho c` of 
 
 where R is the surface matrix of the reduced body (`gearfe.modal_body.ModalBody.radiation`) and a hat marks complex
 amplitudes: no field is needed. The constant and, with an even number of samples, the Nyquist line count twice as much
-(the mean of their square is the amplitude's square itself), so without a window the lines sum to the mean power. Levels
-are :math:`10\lg(P/10^{-12}\,\mathrm W)` (ISO 3744). At low frequencies a surface radiates less than this: the estimate is
-an upper one.
+(the mean of their square is the amplitude's square itself), so without a window the lines sum to the mean power.
+Levels are :math:`10\lg(P/10^{-12}\,\mathrm W)` (ISO 3744). At low frequencies a surface radiates less than this: the
+estimate is an upper one.
 """
 
 from __future__ import annotations

@@ -277,7 +277,7 @@ def line_amplitudes(values: ArrayLike, step: float, frequencies: ArrayLike) -> N
         raise InputError("frequencies", f.tolist(), f"must lie between 0 and {0.5 / step:g} Hz", "leave the others out")
     angle = 2.0 * math.pi * np.outer(step * np.arange(len(x)), f)
     basis = np.column_stack([np.ones(len(x)), np.cos(angle), np.sin(angle)])
-    if basis.shape[1] > len(x) or np.linalg.cond(basis) > 1e6:
+    if basis.shape[1] > len(x) or np.linalg.cond(basis) > 1e3:
         raise InputError(
             "frequencies", f.tolist(), "are too close for this record", "take a longer one, or fewer lines"
         )
