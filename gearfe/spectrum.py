@@ -246,7 +246,7 @@ def order_lines(fundamentals: Mapping[str, float], highest: float, *, orders: in
 
 
 def nearest_line(frequency: float, lines: Iterable[OrderLine], within: float) -> OrderLine | None:
-    """Line nearest to a frequency (Hz), no farther than `within` (Hz); of equally near ones that of the lowest order."""
+    """Line nearest to a frequency (Hz), no farther than `within` (Hz); of equally near ones the lowest order."""
     near = [line for line in lines if abs(line.frequency - frequency) <= within]
     return min(near, key=lambda line: (round(abs(line.frequency - frequency), 6), line.order), default=None)
 
@@ -292,9 +292,9 @@ def aliasing_warning(frequencies: ArrayLike, step: float) -> str:
     if not len(above):
         return ""
     return (
-        f"{len(above)} of {len(f)} modes lie above {nyquist:.6g} Hz, half the output's sampling frequency (the highest at "
-        f"{above.max():.6g} Hz): their vibration is folded into the spectrum; a step of {0.5 / above.max():.3g} s shows "
-        "them where they are"
+        f"{len(above)} of {len(f)} modes lie above {nyquist:.6g} Hz, half the output's sampling frequency (the highest "
+        f"at {above.max():.6g} Hz): their vibration is folded into the spectrum; a step of {0.5 / above.max():.3g} s "
+        "shows them where they are"
     )
 
 
