@@ -1,9 +1,9 @@
 r"""Lowest modes of ``K phi = lambda M phi`` by block Lanczos on ``A = (K + s M)^-1 M``.
 
-The operator is self-adjoint in the M inner product, its largest values ``theta = 1 / (lambda + s)`` belong to the lowest
-modes, and one factorisation serves all steps. Several columns at a time make better use of a factorisation than one
-(half the time a column), and find repeated frequencies up to the block's width. All vectors are kept and every new block
-is made orthogonal to all of them, so no spurious copies appear (Golub, Van Loan, Matrix Computations, 4th ed.,
+The operator is self-adjoint in the M inner product, its largest values ``theta = 1 / (lambda + s)`` belong to the
+lowest modes, and one factorisation serves all steps. Several columns at a time make better use of a factorisation than
+one (half the time a column), and find repeated frequencies up to the block's width. All vectors are kept and every new
+block is made orthogonal to all of them, so no spurious copies appear (Golub, Van Loan, Matrix Computations, 4th ed.,
 sec. 10.3; Grimes, Lewis, Simon, SIAM J. Matrix Anal. Appl. 15, 1994).
 """
 
@@ -160,7 +160,7 @@ class _Basis:
         for _ in range(2):
             gram = w.T @ mw
             size, directions = np.linalg.eigh(0.5 * (gram + gram.T))
-            keep = size > max(floor, 1e-14 * float(size[-1]))
+            keep = size > max(floor, 1e-14 * float(np.max(size, initial=0.0)))
             root = np.sqrt(size[keep])
             w, mw = w @ (directions[:, keep] / root), mw @ (directions[:, keep] / root)
             spill = (directions[:, keep] * root).T @ spill

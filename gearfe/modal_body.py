@@ -152,9 +152,7 @@ class ModalBody:
         rates = np.asarray(rates)
         return np.asarray(np.einsum("...i,ij,...j->...", rates.conj(), self.radiation, rates, optimize=True).real)
 
-    def with_damping(
-        self, *, ratio: float | Floats | None = None, alpha: float = 0.0, beta: float = 0.0
-    ) -> ModalBody:
+    def with_damping(self, *, ratio: float | Floats | None = None, alpha: float = 0.0, beta: float = 0.0) -> ModalBody:
         """The same body with another damping block.
 
         Parameters

@@ -1,7 +1,7 @@
 r"""Craig-Bampton reduction of a sparse pair (K, M) with interface rows, corrected for what the left-out modes carry.
 
-The unknowns of the full model are ``u = B q_b + E u_i``: the interface coordinates ``q_b`` (rigid attachments: six each)
-move their rows through the constant matrix B, the internal unknowns ``u_i`` are free, all other rows are held. Then
+The unknowns of the full model are ``u = B q_b + E u_i``: the interface coordinates ``q_b`` (rigid attachments: six
+each) move their rows through the constant matrix B, the internal unknowns ``u_i`` are free, all other rows are held.
 
 .. math::
     u_i = \Psi q_b + \Phi \eta + \tilde X \xi,\qquad
@@ -9,15 +9,15 @@ move their rows through the constant matrix B, the internal unknowns ``u_i`` are
     X = K_{ii}^{-1}(M_{ii}\Psi + M_{ib}) .
 
 ``Psi`` are the static shapes (the static response at the interfaces is exact), ``Phi`` the lowest modes with the
-interfaces held (Craig, Bampton, AIAA J. 6, 1968), ``X`` the first-order inertia corrections: the quasi-static part of all
-modes that are left out. ``X`` is freed of ``Phi``, made M-orthonormal and turned to its own principal axes, so that all
-internal coordinates have unit mass and diagonal stiffness. One more level repeats ``K^-1 M`` on the last one. All
-approximations are Galerkin projections: frequencies converge from above. One factorisation serves all of it.
+interfaces held (Craig, Bampton, AIAA J. 6, 1968), ``X`` the first-order inertia corrections: the quasi-static part of
+all modes that are left out. ``X`` is freed of ``Phi`` and made M-orthonormal, and both are turned to the principal axes
+of their stiffness: all internal coordinates have unit mass and diagonal stiffness. One more level repeats ``K^-1 M`` on
+the last one. All this is Galerkin projection: frequencies converge from above. One factorisation serves all of it.
 
 **Error bound.** The interfaces see the internal unknowns through the dynamic stiffness
 ``D(w) = K_bb - w^2 M_bb - w^4 b^T (K_ii - w^2 M_ii)^{-1} b``, ``b = M_ii Psi + M_ib``. With exact modes and L levels of
-corrections the Galerkin error is at most ``w^{4 L + 4} S / (w_next^2 - w^2)``, ``S = X_L^T M X_L`` (freed of the modes; for
-L = 0 it is ``w^4 S w_next^2 / (w_next^2 - w^2)`` with ``S = X^T K X``), ``w_next`` the first frequency that is left out.
+corrections the Galerkin error is at most ``w^{4 L + 4} S / (w_next^2 - w^2)``, ``S = X_L^T M X_L`` freed of the modes;
+for L = 0 it is ``w^4 S w_next^2 / (w_next^2 - w^2)`` with ``S = X^T K X``. ``w_next`` is the first one left out.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from .errors import InputError
-from .lanczos import Modes, lowest_modes
+from .lanczos import lowest_modes
 from .sparse_solver import Factorization, factorize
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: Part of its own size below which a correction vector counts as contained in the others.
-DEPENDENT = 1e-10
+DEPENDENT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Reduction:
     shapes : (n, m + k)
         Full unknowns ``u = shapes @ q``.
     eigenvalues : (k,)
-        Diagonal of the internal stiffness (rad^2/s^2): modes first, then corrections.
+        Diagonal of the internal stiffness (rad^2/s^2), ascending: modes first, then corrections.
     modes
         How many of the k internal coordinates are modes.
     tail : (m, m)
@@ -131,10 +131,14 @@ def reduce_model(
     psi = -factor.solve(k_ib) if m else k_ib
     coupling = m_ii @ psi + m_ib
     limit = (2.0 * math.pi * below_hz) ** 2
-    modes = lowest_modes(factor.solve, m_ii, count=count, limit=limit, at_least=at_least if count is None else 0, shift=shift)
-    added, stiffnesses, tail, columns = _corrections(factor, m_ii, modes, coupling, corrections if m else 0)
+    modes = lowest_modes(
+        factor.solve, m_ii, count=count, limit=limit, at_least=at_least if count is None else 0, shift=shift
+    )
+    added, tail, columns = _corrections(factor, m_ii, modes.vectors, coupling, corrections if m else 0)
     inner = np.concatenate([modes.vectors, added], axis=1)
-    eigenvalues = np.concatenate([modes.eigenvalues, stiffnesses])
+    # principal axes of the whole inner space: the projection is exact whatever the modes' last digits are
+    eigenvalues, axes = np.linalg.eigh(_symmetric(inner.T @ (k_ii @ inner)))
+    inner = inner @ axes
     size = m + len(eigenvalues)
     k_red, m_red = np.zeros((size, size)), np.eye(size)
     k_red[:m, :m] = _symmetric((boundary.T @ (stiffness @ boundary)).toarray() + psi.T @ k_ib) if m else 0.0
@@ -162,63 +166,35 @@ def reduce_model(
     )
 
 
-@dataclass(frozen=True)
-class _Vectors:
-    """Columns x beside their products M x and K x: combinations of columns need no further sparse products."""
-
-    x: Floats
-    mass: Floats
-    stiffness: Floats
-
-    def __matmul__(self, t: Floats) -> _Vectors:
-        return _Vectors(self.x @ t, self.mass @ t, self.stiffness @ t)
-
-    def freed(self, basis: _Vectors) -> _Vectors:
-        """The part that is M-orthogonal to the M-orthonormal `basis`."""
-        c = basis.mass.T @ self.x
-        return _Vectors(self.x - basis.x @ c, self.mass - basis.mass @ c, self.stiffness - basis.stiffness @ c)
-
-    def beside(self, other: _Vectors) -> _Vectors:
-        pairs = ((self.x, other.x), (self.mass, other.mass), (self.stiffness, other.stiffness))
-        return _Vectors(*(np.concatenate(pair, axis=1) for pair in pairs))
-
-    def principal(self) -> tuple[_Vectors, Floats]:
-        """The same space of M-orthonormal columns on the principal axes of its stiffness, and these stiffnesses."""
-        eigenvalues, axes = np.linalg.eigh(_symmetric(self.x.T @ self.stiffness))
-        return self @ axes, eigenvalues
-
-
 def _corrections(
-    factor: Factorization, m_ii: Any, modes: Modes, coupling: Floats, wanted: int
-) -> tuple[Floats, Floats, Floats, int]:
-    """Correction vectors, their stiffnesses, the tail S of the error bound, and the number of right-hand sides.
+    factor: Factorization, m_ii: Any, modes: Floats, coupling: Floats, wanted: int
+) -> tuple[Floats, Floats, int]:
+    """M-orthonormal correction vectors, the tail S of the error bound, and the number of right-hand sides.
 
-    ``X_1 = K^-1 b``, ``X_l = K^-1 M X_{l-1}``: all freed of the modes. S is ``X_L^T M X_L``, or ``X_1^T K X_1`` for L = 0.
+    ``X_1 = K^-1 b``, ``X_l = K^-1 M X_{l-1}``: all freed of the modes. S is ``X_L^T M X_L``, or ``X_1^T b`` for L = 0.
     """
-    m = coupling.shape[1]
-    m_phi = np.asarray(m_ii @ modes.vectors)
-    phi = _Vectors(modes.vectors, m_phi, m_phi * modes.eigenvalues)
+    m_modes = np.asarray(m_ii @ modes)
+    found = [modes]
     x = factor.solve(coupling)
-    raw = _Vectors(x, m_ii @ x, coupling).freed(phi)
-    tail = _symmetric(raw.x.T @ raw.stiffness)
-    columns, found = m, phi
+    x = x - modes @ (m_modes.T @ x)
+    columns, tail = coupling.shape[1], _symmetric(x.T @ coupling)
     for number in range(1, wanted + 1):
+        mx = np.asarray(m_ii @ x)
         if number > 1:
-            x = factor.solve(raw.mass)
-            raw = _Vectors(x, m_ii @ x, raw.mass).freed(phi)
-            columns += m
-        tail = _symmetric(raw.x.T @ raw.mass)
-        new = raw @ np.diag(1.0 / np.maximum(np.sqrt(np.diag(tail)), 1e-300))
+            x = factor.solve(mx)
+            x = x - modes @ (m_modes.T @ x)
+            mx = np.asarray(m_ii @ x)
+            columns += coupling.shape[1]
+        tail = _symmetric(x.T @ mx)
+        new = x / np.maximum(np.sqrt(np.diag(tail)), 1e-300)
         for _ in range(2):
-            new = new.freed(found)
-            size, directions = np.linalg.eigh(_symmetric(new.x.T @ new.mass))
+            m_new = m_ii @ new
+            new = new - sum(basis @ (basis.T @ m_new) for basis in found)
+            size, directions = np.linalg.eigh(_symmetric(new.T @ (m_ii @ new)))
             keep = size > DEPENDENT**2
             new = new @ (directions[:, keep] / np.sqrt(size[keep]))
-        found = found.beside(new)
-    first = modes.vectors.shape[1]
-    added = _Vectors(found.x[:, first:], found.mass[:, first:], found.stiffness[:, first:])
-    added, eigenvalues = added.principal()
-    return added.x, eigenvalues, tail, columns
+        found.append(new)
+    return np.concatenate([np.zeros((len(modes), 0)), *found[1:]], axis=1), tail, columns
 
 
 def _symmetric(matrix: Floats) -> Floats:
@@ -236,6 +212,8 @@ def _check(count: int | None, below_hz: float, corrections: int) -> None:
     if not below_hz > 0.0:
         raise InputError("below_hz", below_hz, "must be > 0", "give a frequency in Hz")
     if count is None and math.isinf(below_hz):
-        raise InputError("modes", None, "neither a number of modes nor a highest frequency is given", "give one of them")
+        raise InputError(
+            "modes", None, "neither a number of modes nor a highest frequency is given", "give one of them"
+        )
     if corrections < 0:
         raise InputError("corrections", corrections, "must be 0 or more", "1 is the default")

@@ -1,9 +1,9 @@
 r"""What a reduced body leaves out, bounded without the full model.
 
-With the error bound of `gearfe.reduction` on the interfaces' dynamic stiffness, ``dD(w) <= e(w) S``, two figures follow:
+With the error bound of `gearfe.reduction` on the interfaces' dynamic stiffness, ``dD(w) <= e(w) S``, follow
 
-- natural frequencies with free attachments: ``d lambda_k <= v_b^T dD(w_k) v_b`` for the mode's attachment part v_b of unit
-  modal mass, so ``d f_k / f_k <= v_b^T dD v_b / (2 w_k^2)``;
+- natural frequencies with free attachments: ``d lambda_k <= v_b^T dD(w_k) v_b``, v_b the attachment part of the mode of
+  unit modal mass, so ``d f_k / f_k <= v_b^T dD v_b / (2 w_k^2)``;
 - the response of the attachments to forces on them: ``dH = H dD H`` with ``H = D^-1``, compared with H over the band.
 """
 
@@ -57,7 +57,7 @@ def reduction_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, poi
     points
         Number of frequencies, evenly spaced in the band.
     """
-    if not 0.0 < band_hz:
+    if not band_hz > 0.0:
         raise InputError("band_hz", band_hz, "must be > 0", "give a frequency in Hz")
     coupled = body.coupled
     inside = coupled.frequencies_hz <= band_hz

@@ -71,7 +71,9 @@ class SolidMaterial:
     def lame_lambda(self) -> float:
         """First Lame constant (Pa)."""
         return (
-            self.youngs_modulus * self.poissons_ratio / ((1.0 + self.poissons_ratio) * (1.0 - 2.0 * self.poissons_ratio))
+            self.youngs_modulus
+            * self.poissons_ratio
+            / ((1.0 + self.poissons_ratio) * (1.0 - 2.0 * self.poissons_ratio))
         )
 
     @property
@@ -111,7 +113,7 @@ def assemble(nodes: Floats, tets: Ints, material: SolidMaterial, *, mass_rule: M
     material
         The solid.
     mass_rule
-        ``"exact"``, or ``"4-point"``: the under-integrated mass of second-order tetrahedra that CalculiX and others use.
+        ``"exact"``, or ``"4-point"``: the under-integrated mass of second-order tetrahedra of CalculiX and others.
     """
     curved = curved_elements(nodes, tets)
     tets = np.concatenate([tets[~curved], tets[curved]])
@@ -121,7 +123,7 @@ def assemble(nodes: Floats, tets: Ints, material: SolidMaterial, *, mass_rule: M
 
     def summed(local: list[Floats]) -> Floats:
         weights = np.concatenate([entries.ravel() for entries in local])
-        return np.bincount(pattern.place, weights=weights, minlength=len(pattern.columns))
+        return np.asarray(np.bincount(pattern.place, weights=weights, minlength=len(pattern.columns)), dtype=float)
 
     mass = summed([part.mass() for part in parts])
     blocks = np.empty((len(pattern.columns), 3, 3))
@@ -201,14 +203,48 @@ def curved_elements(nodes: Floats, tets: Ints) -> NDArray[np.bool_]:
     return np.asarray(np.any(offset > STRAIGHT * np.linalg.norm(second - first, axis=2), axis=1))
 
 
-def jacobian_determinants(nodes: Floats, tets: Ints) -> Floats:
-    """(m, points) volume ratio against the reference element (six times the volume where straight) at all nodes.
+def jacobian_determinants(nodes: Floats, tets: Ints, *, inside: bool = False) -> Floats:
+    """(m, points) volume ratio against the reference element: six times the volume where edges are straight.
 
-    Corners only for linear elements. A value that is not positive marks an inverted or collapsed element.
+    At all nodes of the element, or `inside` at the quadrature points. One value for each linear element. A value that
+    is not positive marks an inverted or collapsed element.
     """
-    gradients = node_gradients(tets.shape[1])  # (points, a, 3)
-    jacobian = np.einsum("maj,pak->mpjk", nodes[tets], gradients, optimize=True)
-    return np.asarray(np.linalg.det(jacobian))
+    a = tets.shape[1]
+    gradients = node_gradients(a).transpose(1, 2, 0)
+    if inside and a == 10:
+        gradients = np.concatenate([shape_functions(a, degree)[1] for degree in (CURVED_DEGREE, 7)], axis=2)
+    return maps(nodes, tets, gradients)[0]
+
+
+class Unfolded(NamedTuple):
+    """Nodes after `unfolded`, and how many elements were changed."""
+
+    nodes: Floats
+    changed: int
+
+
+def unfolded(nodes: Floats, tets: Ints, *, least: float = 0.0) -> Unfolded:
+    """Straighten the edges of second-order elements that their curved edges fold.
+
+    An element counts as folded when its volume ratio at a quadrature point is not above `least` times its mean. Meshers
+    leave a few of these at coarsely meshed bores.
+    """
+    if tets.shape[1] == 4:
+        return Unfolded(nodes, 0)
+    changed = np.zeros(len(tets), dtype=bool)
+    suspects = curved_elements(nodes, tets)
+    for _ in range(10):
+        chosen = np.flatnonzero(suspects)
+        ratio = jacobian_determinants(nodes, tets[chosen], inside=True)
+        folded = chosen[ratio.min(axis=1) <= least * np.abs(ratio).mean(axis=1)]
+        if not len(folded):
+            break
+        changed[folded] = True
+        bad = tets[folded]
+        nodes = nodes.copy()
+        nodes[bad[:, 4:]] = 0.5 * (nodes[bad[:, EDGES[:, 0]]] + nodes[bad[:, EDGES[:, 1]]])
+        suspects = curved_elements(nodes, tets)
+    return Unfolded(nodes, int(changed.sum()))
 
 
 class _Pattern(NamedTuple):
@@ -307,6 +343,8 @@ def _by_blocks(nodes: Floats, tets: Ints, material: SolidMaterial, mass_rule: Ma
 
 
 def maps(nodes: Floats, tets: Ints, gradients: Floats) -> tuple[Floats, Floats]:
-    """(m, p) volume ratio, and (m, p, 3, 3) gradient of the inverse map [xi axis, x axis] at the points of `gradients`."""
+    """(m, p) volume ratio and (m, p, 3, 3) gradient of the inverse map [xi axis, x axis] where `gradients` are."""
     forward = np.einsum("eak,amp->epkm", nodes[tets], gradients, optimize=True)
-    return np.linalg.det(forward), np.linalg.inv(forward)
+    det = np.asarray(np.linalg.det(forward))
+    solvable = np.where((det != 0.0)[..., None, None], forward, np.eye(3))
+    return det, np.asarray(np.linalg.inv(solvable))

@@ -28,6 +28,7 @@ a mesh node stay together: orderings are found on the graph of nodes, a third of
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import os
 from collections.abc import Callable
@@ -51,6 +52,9 @@ PACKAGES: dict[str, str | None] = {
 }
 #: Number of unknowns above which ``auto`` looks for the fastest factorisation first.
 LARGE = 150_000
+#: Response to a random load, against the stiffest unknown's, above which a body counts as free to move. Bodies that are
+#: held, slender ones too, stay below 1e10; rounding alone holds a free one at 1e13 and more.
+UNBOUNDED = 1e12
 #: Environment variable that names the solver to use instead of ``auto``.
 SOLVER_VARIABLE = "GEARFE_SPARSE_SOLVER"
 
@@ -130,12 +134,13 @@ def factorize(matrix: Any, *, solver: str = "auto", block: int = 3) -> Factoriza
         solve = _cholmod(matrix)
     else:
         solve = _superlu_minimum_degree(matrix)
+    _check_definite(matrix, solve)
     return Factorization(name, matrix.shape[0], solve)
 
 
 def metis_order(matrix: Any, block: int = 3) -> NDArray[np.int64]:
     """Fill-reducing order of the unknowns by nested dissection of the graph of blocks (METIS through pymetis)."""
-    import pymetis
+    pymetis: Any = importlib.import_module("pymetis")
 
     n = matrix.shape[0]
     block = block if n % block == 0 else 1
@@ -184,7 +189,7 @@ def _checked(splu: Any, matrix: Any, ordering: str) -> Any:
 
 
 def _pardiso(matrix: Any) -> Callable[[Floats], Floats]:
-    import pypardiso
+    pypardiso: Any = importlib.import_module("pypardiso")
 
     upper = sparse.csr_matrix(sparse.triu(matrix, format="csr"))
     solver = pypardiso.PyPardisoSolver(mtype=2)
@@ -202,8 +207,8 @@ def _pardiso(matrix: Any) -> Callable[[Floats], Floats]:
 
 
 def _cholmod(matrix: Any) -> Callable[[Floats], Floats]:
-    import kvxopt
-    from kvxopt import cholmod
+    kvxopt: Any = importlib.import_module("kvxopt")
+    cholmod: Any = importlib.import_module("kvxopt.cholmod")
 
     lower = sparse.tril(matrix, format="coo")
     spread = kvxopt.spmatrix(
@@ -231,6 +236,18 @@ def _cholmod(matrix: Any) -> Callable[[Floats], Floats]:
         return np.array(x).reshape(b.shape)
 
     return solve
+
+
+def _check_definite(matrix: Any, solve: Callable[[Floats], Floats]) -> None:
+    """One solve with a random right-hand side: an answer without bound, or against the load, tells a free part."""
+    b = np.random.default_rng(0).standard_normal(matrix.shape[0])
+    try:
+        x = solve(b)
+    except ArithmeticError as error:
+        raise _not_definite() from error
+    growth = float(np.max(np.abs(matrix.diagonal()))) * float(np.linalg.norm(x)) / float(np.linalg.norm(b))
+    if not (growth < UNBOUNDED and float(b @ x) > 0.0):
+        raise _not_definite()
 
 
 def _not_definite() -> InputError:

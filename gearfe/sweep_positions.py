@@ -24,6 +24,8 @@ Progress = Callable[[int, int, str], None]
 
 #: Positions handed to the solver at once: enough to work side by side, few enough to stay small in memory.
 BATCH = 16
+#: Torque mode: the finite-strain share changes with the twist that it moves, by about a hundredth of itself each pass.
+SHARE_PASSES, SHARE_TOLERANCE = 6, 1e-10
 
 
 @dataclass(frozen=True)
@@ -89,14 +91,27 @@ def at_torque(
     goal = np.full(len(angles), torque)
     found = _search(pair, elastic, angles, goal, touching, touching + torque / guess, progress)
     if finite:
-        sampled = sample_numbers(angles, elastic.pitch_angle)
+        found = _with_shares(pair, elastic, angles, goal, touching, found)
+    return _collect(found.twist, found.positions, found.iterations, found.status)
+
+
+def _with_shares(
+    pair: GearPair, elastic: MeshingPair, angles: Array, goal: Array, touching: Array, found: TorqueSolution
+) -> TorqueSolution:
+    """Move the twists until torque and finite-strain share at the same twist make the goal."""
+    sampled = sample_numbers(angles, elastic.pitch_angle)
+    iterations, before = found.iterations, np.zeros(len(angles))
+    for _ in range(SHARE_PASSES):
         positions = _solve(elastic, angles[sampled], found.twist[sampled], np.arange(len(sampled)))
         shares = finite_strain_shares(elastic, positions)
         every = interpolated_shares(angles, angles[sampled], shares, elastic.pitch_angle)
-        again = _search(pair, elastic, angles, goal / (1 + every), touching, found.twist, None)
-        raised = [with_share(p, c) for p, c in zip(again.positions, every, strict=True)]
-        found = again._replace(positions=raised, iterations=found.iterations + again.iterations)
-    return _collect(found.twist, found.positions, found.iterations, found.status)
+        found = _search(pair, elastic, angles, goal / (1 + every), touching, found.twist, None)
+        iterations = iterations + found.iterations
+        if np.max(np.abs(every - before)) <= SHARE_TOLERANCE:
+            break
+        before = every
+    raised = [with_share(p, c) for p, c in zip(found.positions, every, strict=True)]
+    return found._replace(positions=raised, iterations=iterations)
 
 
 def _search(

@@ -87,7 +87,7 @@ def newmark(
         u, v = u_free + 0.25 * step**2 * a, v_free + 0.5 * step * a
         kept.append((u[watch], v[watch], a[watch]))
     history = np.array(kept)
-    return Transient(step * np.arange(steps + 1), history[:, 0], history[:, 1], history[:, 2])
+    return Transient(step * np.arange(steps + 1, dtype=float), history[:, 0], history[:, 1], history[:, 2])
 
 
 def smooth_ramp(time: float, duration: float) -> float:

@@ -19,9 +19,11 @@ def box(
     order: int = 2,
     mapped: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and tetrahedra of the box 0..size; `mapped` takes (n, 3) points, midside nodes included, to their places."""
+    """Nodes and tetrahedra of the box 0..size; `mapped` takes all (n, 3) points, midside nodes too, to their places."""
     nx, ny, nz = cells
-    grid = np.stack(np.meshgrid(*(np.linspace(0, s, c + 1) for s, c in zip(size, cells, strict=True)), indexing="ij"), -1)
+    grid = np.stack(
+        np.meshgrid(*(np.linspace(0, s, c + 1) for s, c in zip(size, cells, strict=True)), indexing="ij"), -1
+    )
     nodes = grid.reshape(-1, 3)
 
     def number(i: np.ndarray, j: np.ndarray, k: np.ndarray) -> np.ndarray:

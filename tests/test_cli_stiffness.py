@@ -79,7 +79,14 @@ def test_fields(tmp_path):
     options = ["--twist-deg", "0.1", "--angles", "2", "1", "5", "--fields", "2", "5", *QUICK]
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *options]) == 0
     names = sorted(p.name for p in tmp_path.iterdir())
-    assert names == ["fields.vtkhdf", "stiffness.csv", "stiffness.png", "stress_2deg.png", "stress_5deg.png", "summary.json"]
+    assert names == [
+        "fields.vtkhdf",
+        "stiffness.csv",
+        "stiffness.png",
+        "stress_2deg.png",
+        "stress_5deg.png",
+        "summary.json",
+    ]
     with h5py.File(tmp_path / "fields.vtkhdf") as file:
         assert list(file["VTKHDF/Steps/Values"]) == pytest.approx([2.0, 5.0])
         count = int(file["VTKHDF/NumberOfPoints"][0])
@@ -152,7 +159,7 @@ def test_a_position_without_contact_is_told(tmp_path, capsys):
     assert capsys.readouterr().err == ""
 
 
-# ---- bad input -----------------------------------------------------------------------------------------------------------
+# ---- bad input ------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -196,7 +203,9 @@ def test_mistakes_in_the_file(tmp_path, capsys, changes, message):
     ],
 )
 def test_mistakes_in_the_options(tmp_path, capsys, options, message):
-    assert main(["stiffness", str(JOB), "--out", str(tmp_path / "out"), *options, "--coarsen", "4", "--no-estimate"]) == 2
+    assert (
+        main(["stiffness", str(JOB), "--out", str(tmp_path / "out"), *options, "--coarsen", "4", "--no-estimate"]) == 2
+    )
     assert message in capsys.readouterr().err
     assert not list((tmp_path / "out").glob("*"))
 
@@ -235,7 +244,7 @@ def test_interrupted_output_leaves_nothing(tmp_path, monkeypatch, problem):
     assert not list(tmp_path.iterdir())
 
 
-# ---- other commands ------------------------------------------------------------------------------------------------------
+# ---- other commands -------------------------------------------------------------------------------------------------
 
 
 def test_gear(tmp_path, capsys):
@@ -264,8 +273,19 @@ def test_mesh_mistakes(tmp_path, capsys):
 
 
 def test_as_a_process(tmp_path):
-    command = [sys.executable, "-m", "gearfe", "stiffness", str(JOB), "--out", str(tmp_path), "--twist-deg", "0.05", *QUICK]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=os.environ)
+    command = [
+        sys.executable,
+        "-m",
+        "gearfe",
+        "stiffness",
+        str(JOB),
+        "--out",
+        str(tmp_path),
+        "--twist-deg",
+        "0.05",
+        *QUICK,
+    ]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=os.environ, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     assert len(rows(tmp_path)) == 40
@@ -275,7 +295,9 @@ def test_the_script(tmp_path):
     script = [sys.executable, str(ROOT / "scripts" / "stiffness_sweep.py")]
     job = job_with(tmp_path, twist_deg=0.05, coarsen=3, angle_stop_deg=4)
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run([*script, str(job), str(tmp_path / "k.csv")], capture_output=True, text=True, env=environment)
+    done = subprocess.run(
+        [*script, str(job), str(tmp_path / "k.csv")], capture_output=True, text=True, env=environment, check=False
+    )
     assert done.returncode == 0, done.stderr
     curve = StiffnessCurve.from_csv(tmp_path / "k.csv")
     assert list(np.round(np.degrees(curve.pinion_angle), 9)) == [1, 2, 3, 4]

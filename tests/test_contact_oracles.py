@@ -5,10 +5,13 @@ import math
 import numpy as np
 import pytest
 
+from gearfe.contact.compliance import gear_body
+from gearfe.contact.finite_strain import finite_strain_shares
 from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
+from gearfe.contact.scene import MeshingPair
 from gearfe.contact.solver import Position, solve_position, solve_positions
 
-from .contact_cases import IRON, STEEL, WIDTH, condensed, gears
+from .contact_cases import IRON, STEEL, WIDTH, condensed, gears, meshes
 
 TWIST = math.radians(0.05)
 #: Pinion angles of the 20/30 pair (deg) with one and with two tooth pairs, away from the changes.
@@ -107,3 +110,15 @@ def test_peak_pressure_is_hertzs(law: ContactLaw, angle: float) -> None:
     modulus = 1 / (STEEL.contact_compliance("strain") + IRON.contact_compliance("strain"))
     force = found.torque_wheel / pair.wheel.base_radius
     assert found.peak_pressure == pytest.approx(math.sqrt(force * modulus / (math.pi * radius * WIDTH)), rel=0.02)
+
+
+@pytest.mark.parametrize(("angle", "stiffness", "tolerance"), [(17.0, 1.5259e8, 2e-3), (10.0, 1.3837e8, 4e-3)])
+def test_where_a_sharp_corner_bears_calculix_agrees(angle: float, stiffness: float, tolerance: float) -> None:
+    """CalculiX 2.20, surface to surface, NLGEOM, corner strips of 0.01 mm: see docs/verification.md."""
+    pair = gears("reference")
+    elastic = [gear_body(mesh, STEEL, "strain", WIDTH) for mesh in meshes("reference", 1.0)]
+    both = MeshingPair(elastic[0], elastic[1], pair.working_centre_distance, WIDTH, Nitsche())
+    found = solve_position(both, math.radians(angle), TWIST)
+    share = float(finite_strain_shares(both, [found])[0])
+    k_mesh = found.torque_wheel * (1 + share) / TWIST / pair.wheel.base_radius**2
+    assert k_mesh == pytest.approx(stiffness, rel=tolerance)

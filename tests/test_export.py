@@ -47,11 +47,13 @@ def test_msh(tmp_path, parts):
     np.testing.assert_allclose(mesh.points[:, :2], points, atol=1e-12)
     for name, (tag, dimension) in mesh.field_data.items():
         kind = "triangle6" if dimension == 2 else "line3"
-        found = np.concatenate([
-            c.data[t == tag]
-            for c, t in zip(mesh.cells, mesh.cell_data["gmsh:physical"], strict=True)
-            if c.type == kind
-        ])
+        found = np.concatenate(
+            [
+                c.data[t == tag]
+                for c, t in zip(mesh.cells, mesh.cell_data["gmsh:physical"], strict=True)
+                if c.type == kind
+            ]
+        )
         expected = bodies[name] if dimension == 2 else edges[name][:, [0, 2, 1]]
         np.testing.assert_array_equal(found, expected, err_msg=name)
     assert set(mesh.field_data) == set(counts)

@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse.linalg import splu
 
 from gearfe import StiffnessCurve
-from gearfe.contact.scene import turn
+from gearfe.contact.scene import assemble, turn
 from gearfe.contact.solver import solve_position
 from gearfe.elasticity import element_stiffness
 from gearfe.errors import InputError
@@ -94,7 +94,8 @@ def test_points_stand_where_the_flanks_are(elastic, position, fields):
         body = elastic.bodies[w.gear]
         nodes = whole_gear(body.mesh).numbers[w.tooth % body.teeth][body.flank.nodes[w.flank_nodes]]
         np.testing.assert_allclose(fields[w.gear].points[nodes], scene.points[w.nodes], atol=1e-12)
-        placed = scene.placed(scene.compliance @ position.forces)[w.nodes]
+        compliance = assemble(elastic, scene.windows).compliance
+        placed = scene.placed(compliance @ position.forces)[w.nodes]
         np.testing.assert_allclose(
             fields[w.gear].points[nodes] + fields[w.gear].displacement[nodes], placed, atol=1e-12
         )
@@ -136,7 +137,7 @@ def test_turning_the_whole_picture_changes_nothing(elastic, position, fields):
 
 
 def test_stress_below_a_line_contact(elastic, position, fields):
-    """Hertz: the largest von Mises stress in plane strain is 0.56 times the peak pressure, some way below the surface."""
+    """Hertz: the largest von Mises stress in plane strain is 0.56 times the peak pressure, below the surface."""
     for field in fields:
         assert 0.4 * position.peak_pressure < field.von_mises.max() < 1.1 * position.peak_pressure
     far = fields[0].von_mises[np.linalg.norm(fields[0].points - np.array([-20e-3, 0.0]), axis=1) < 3e-3]

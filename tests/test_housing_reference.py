@@ -1,8 +1,8 @@
 """Against the stored three-shaft housing that CalculiX 2.20 computed on the same mesh (tests/data/gearbox_housing*).
 
 The json holds natural frequencies with clamped bores and with rigid, free ones, printed with seven digits. CalculiX
-integrates the mass of second-order tetrahedra with 4 points: 5e-7 (print precision) with that rule, 1.3e-4 with the exact
-mass.
+integrates the mass of second-order tetrahedra with 4 points: 5e-7 (print precision) with that rule, 1.3e-4 with the
+exact mass.
 """
 
 from __future__ import annotations

@@ -12,7 +12,9 @@ HEAVY = ("gmsh", "meshio", "skfem", "matplotlib", "pyvista", "vtk", "h5py")
 def loaded_after(code):
     """Names of top-level modules in a fresh interpreter that has run `code`."""
     code += "\nimport sys; print('LOADED', *sorted({name.partition('.')[0] for name in sys.modules}))"
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True, env=os.environ)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True, env=os.environ
+    )
     return set(done.stdout.rpartition("LOADED")[2].split())
 
 

@@ -1,7 +1,6 @@
 """Mesh stiffness against other programs (tests/data/README.md says which), default settings.
 
-Off the tooth-pair changes the small-strain curve is expected 0.1 % above the finite-strain reference; rows at pair
-changes (0, 9, 17 deg) react to the last micrometre.
+Rows at pair changes (0, 9, 17 deg) react to the last micrometre.
 """
 
 import csv
@@ -27,9 +26,9 @@ def reference(plane, twist_deg):
     return (np.array([float(r[name]) for r in chosen]) for name in ("pinion_angle_deg", "k_mesh_N_per_m"))
 
 
-def computed(plane, twist_deg, angles):
+def computed(plane, twist_deg, angles, **options):
     gears = pair(bore=0.35)
-    curve = sweep_stiffness(gears, twist=math.radians(twist_deg), angles=np.radians(angles), plane=plane)
+    curve = sweep_stiffness(gears, twist=math.radians(twist_deg), angles=np.radians(angles), plane=plane, **options)
     assert set(curve.status) == {"converged"}
     return curve
 
@@ -39,15 +38,16 @@ def test_a_few_positions():
     few = np.isin(angles, [4.0, 12.0])
     assert few.sum() == 2
     curve = computed("strain", 0.05, angles[few])
-    np.testing.assert_allclose(curve.k_mesh, k[few], rtol=2.5e-3)
-    # small strain is above finite strain
-    assert (curve.k_mesh > k[few]).all()
+    np.testing.assert_allclose(curve.k_mesh, k[few], rtol=2e-3)
+    # small strain is stiffer: 0.1 % at this load, for which the reference's bodies are the finite-strain ones
+    small = computed("strain", 0.05, angles[few], kinematics="small")
+    assert (small.k_mesh > 1.0004 * curve.k_mesh).all()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("plane", "twist_deg", "on_path", "at_changes"),
-    [("strain", 0.05, 0.25e-2, 0.8e-2), ("stress", 0.05, 0.25e-2, 0.8e-2), ("strain", 0.01, 0.35e-2, 1.5e-2)],
+    [("strain", 0.05, 0.2e-2, 0.8e-2), ("stress", 0.05, 0.2e-2, 0.8e-2), ("strain", 0.01, 0.3e-2, 1.5e-2)],
 )
 def test_the_full_cycle(plane, twist_deg, on_path, at_changes):
     angles, k = reference(plane, twist_deg)

@@ -55,8 +55,8 @@ class Position:
     iterations
         Newton steps.
     scene, forces, force_rate
-        Pieces of flank (without their matrices), the nodal forces on them in tooth axes (N) and their derivatives with respect to the twist
-        (N/rad), for recovering fields; None without a solution.
+        Pieces of flank (without their matrices), the nodal forces on them in tooth axes (N) and their derivatives with
+        respect to the twist (N/rad), for recovering fields; None without a solution.
     """
 
     status: str

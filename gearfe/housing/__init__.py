@@ -1,8 +1,8 @@
 """Elastic housings: description or arrays -> mesh -> full model -> reduced body (`gearfe.modal_body.ModalBody`).
 
-    housing = Housing.from_job("geometry/housing.toml")
-    body = housing.reduce()
-    body.save("housing.npz")
+housing = Housing.from_job("geometry/housing.toml")
+body = housing.reduce()
+body.save("housing.npz")
 """
 
 from .attachments import Attachment, Bore, Plane

@@ -112,8 +112,10 @@ def bore_attachment(bore: Bore | Sequence[Any], number: int, nodes: Floats) -> t
     within = (height >= first - slack) & (height <= last + slack)
     chosen = np.flatnonzero(within & (radial <= made.radius * (1.0 + RADIUS_TOLERANCE)))
     if not len(chosen):
-        nearest = f"the nearest node there is {radial[within].min():.6g} m from the axis" if within.any() else (
-            f"the mesh lies between {height.min():.6g} and {height.max():.6g} m along the axis"
+        nearest = (
+            f"the nearest node there is {radial[within].min():.6g} m from the axis"
+            if within.any()
+            else (f"the mesh lies between {height.min():.6g} and {height.max():.6g} m along the axis")
         )
         problem = f"no node lies within {made.radius:g} m of the axis: {nearest}"
         raise InputError(field, None, problem, "check point, direction, radius and range (metres)")

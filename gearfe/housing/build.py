@@ -81,7 +81,9 @@ def reduced_housing(table: HousingTable) -> ModalBody:
     table.check("housing")
     recipe = dataclasses.replace(table, damping=HousingDampingTable())
     folder = cache_folder()
-    path = None if folder is None else folder / f"body-{cache_key('body', [recipe, RECIPE, FORMAT, __version__])[:32]}.npz"
+    path = (
+        None if folder is None else folder / f"body-{cache_key('body', [recipe, RECIPE, FORMAT, __version__])[:32]}.npz"
+    )
     body = None
     if path is not None and path.exists():
         try:

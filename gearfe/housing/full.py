@@ -1,4 +1,4 @@
-"""The full finite-element model of a body over [attachments | internal unknowns]: the truth a reduction is held against."""
+"""The full model of a body over [attachments | internal unknowns]: the truth that a reduction is held against."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import InputError
-from ..solid import EDGES, FACES, jacobian_determinants
+from ..solid import EDGES, FACES, jacobian_determinants, unfolded
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -37,13 +37,13 @@ def checked_mesh(nodes: object, tets: object) -> CheckedMesh:
     Raises
     ------
     InputError
-        Wrong shape, node numbers out of range, coordinates not finite, inverted or collapsed elements, parts that do not
-        hang together face to face.
+        Wrong shape, node numbers out of range, coordinates not finite, inverted or collapsed elements, parts that do
+        not hang together face to face.
     """
     points = np.asarray(nodes, dtype=float)
     if points.ndim != 2 or points.shape[1] != 3:
         raise InputError("nodes", points.shape, "must have the shape (n, 3), in metres", "transpose it?")
-    cells = np.asarray(tets)
+    cells: Any = np.asarray(tets)
     if cells.ndim != 2 or cells.shape[1] not in (4, 10) or len(cells) == 0:
         raise InputError("tets", cells.shape, "must have the shape (m, 4) or (m, 10)", "bring tetrahedra only")
     if cells.dtype.kind not in "iu":
@@ -57,13 +57,18 @@ def checked_mesh(nodes: object, tets: object) -> CheckedMesh:
         raise InputError("nodes", bad, "this node has a coordinate that is not a finite number", "mend it")
     notes = []
     original, renumbered = np.unique(cells, return_inverse=True)
-    cells = renumbered.reshape(cells.shape)
+    cells = renumbered.reshape(cells.shape).astype(np.int64)
     if len(original) < len(points):
         notes.append(f"{len(points) - len(original)} nodes belong to no element and are left out")
     points = points[original]
     if cells.shape[1] == 10:
         cells = _ordered(points, cells)
     _check_volumes(points, cells)
+    points, folded = unfolded(points, cells)
+    if folded:
+        notes.append(
+            f"curved edges folded {folded} elements; their midside nodes were moved to the middles of the edges"
+        )
     _check_connected(points, cells)
     return CheckedMesh(points, cells, original, tuple(notes))
 
@@ -77,7 +82,7 @@ def boundary_faces(tets: Ints) -> Ints:
 
 
 def _ordered(nodes: Floats, tets: Ints) -> Ints:
-    """Midside nodes in the order of `EDGES`, told by where they lie (VTK's, Abaqus' and gmsh's orders are understood)."""
+    """Midside nodes in the order of `EDGES`, told by where they lie: VTK's, Abaqus' and gmsh's orders are known."""
     middles = 0.5 * (nodes[tets[:, EDGES[:, 0]]] + nodes[tets[:, EDGES[:, 1]]])
     lengths = np.linalg.norm(nodes[tets[:, EDGES[:, 0]]] - nodes[tets[:, EDGES[:, 1]]], axis=2)
     for order in ([4, 5, 6, 7, 8, 9], [4, 5, 6, 7, 9, 8]):
@@ -90,19 +95,15 @@ def _ordered(nodes: Floats, tets: Ints) -> Ints:
 
 
 def _check_volumes(nodes: Floats, tets: Ints) -> None:
-    ratio = jacobian_determinants(nodes, tets)
-    scale = float(np.abs(ratio).mean())
-    bad = np.flatnonzero(ratio.min(axis=1) <= _FLAT * scale)
+    volume = jacobian_determinants(nodes, tets[:, :4])[:, 0]
+    scale = float(np.abs(volume).mean())
+    bad = np.flatnonzero(volume <= _FLAT * scale)
     if not len(bad):
         return
-    corners = jacobian_determinants(nodes, tets[:, :4])[:, 0]
     shown = ", ".join(str(e) for e in bad[:5]) + (", ..." if len(bad) > 5 else "")
-    if np.all(corners < -_FLAT * scale):
+    cure = "swap two corners of those with negative volume, remove those with none"
+    if np.all(volume < -_FLAT * scale):
         cure = "all elements are mirrored: swap their second and third corner (and the midside nodes that go with them)"
-    elif np.all(corners[bad] > _FLAT * scale):
-        cure = "their curved edges fold them: move their midside nodes towards the middles of the edges"
-    else:
-        cure = "swap two corners of those with negative volume, remove those with none"
     raise InputError("tets", None, f"{len(bad)} inverted or collapsed elements ({shown})", cure)
 
 
@@ -123,5 +124,6 @@ def _check_connected(nodes: Floats, tets: Ints) -> None:
     small = int(np.argmin(sizes))
     place = nodes[tets[label == small, :4]].mean(axis=(0, 1))
     where = ", ".join(f"{v:.6g}" for v in place)
-    problem = f"the mesh falls into {parts} parts that share no face; the smallest has {sizes[small]} elements near ({where}) m"
+    smallest = f"the smallest has {sizes[small]} elements near ({where}) m"
+    problem = f"the mesh falls into {parts} parts that share no face; {smallest}"
     raise InputError("tets", None, problem, "merge nodes that coincide, or remove the loose part")

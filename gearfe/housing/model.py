@@ -99,8 +99,8 @@ class Housing:
         tets : (m, 4) or (m, 10)
             Node numbers from 0; midside nodes in VTK's or gmsh's order.
         bores
-            `Bore` objects or tuples ``(axis point, axis direction, radius, (begin, end) along the axis from that point)``
-            in metres. Each becomes an attachment; its nodes are those at or inside the radius.
+            `Bore` objects or tuples ``(axis point, axis direction, radius, (begin, end) along the axis from that
+            point)`` in metres. Each becomes an attachment; its nodes are those at or inside the radius.
         fixed
             Held nodes: a `Plane`, a pair (point, normal), node numbers, or a mask of n flags; ``None`` for a free body.
         material

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..output.files import output_folder, write_csv, write_json
-from ..rigid import Start, Trajectory, integrate
+from ..rigid import Start, Trajectory, compiled, integrate
 from ..rigid.backend import affordable_steps, compiled_is_ready
 from .model import Mechanism, load_mechanism
 from .results import Results, evaluate, reactions
@@ -87,15 +87,15 @@ def output_times(end: float, step: float) -> np.ndarray:
 
 
 def quickest(mechanism: Mechanism, times: np.ndarray, start: Start, method: str, tolerance: float) -> Trajectory:
-    """Compiled kernels when they wait in the cache; else plain Python for as long as compiling would take."""
+    """Plain Python for as long as loading (or compiling) the kernels would take, then the kernels."""
     options: dict[str, Any] = {"start": start, "method": method, "tolerance": tolerance}
+    steps = affordable_steps(mechanism.system)
+    made = integrate(mechanism.system, times, backend="plain", most_steps=steps, **options)
+    if made.status != 2 or made.method != "taylor" or not compiled.available():
+        return made
     if not compiled_is_ready():
-        steps = affordable_steps(mechanism.system)
-        made = integrate(mechanism.system, times, backend="plain", most_steps=steps, **options)
-        if made.status != 2 or made.method != "taylor":
-            return made
         print("gearfe: a long run: compiling the kernels once (about half a minute)", file=sys.stderr)
-    return integrate(mechanism.system, times, **options)
+    return integrate(mechanism.system, times, backend="compiled", **options)
 
 
 def write_tables(folder: Path, mechanism: Mechanism, results: Results, with_reactions: bool) -> None:

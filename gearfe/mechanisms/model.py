@@ -174,7 +174,7 @@ class Mechanism:
             made = np.broadcast_to(compute(node, self.values(wanted, states, np.vstack([np.eye(n), np.zeros(n)]))), n + 1)
             return made[:n] - made[n]
 
-        return Forced(label, target, position, slope if level == 0 else rate_slope)
+        return Forced(text, target, position, slope if level == 0 else rate_slope)
 
 
 def load_mechanism(path: str | Path) -> Mechanism:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..solid import EDGES, jacobian_determinants
+from ..solid import unfolded
 from ..tables.housing import HousingTable, ShaftAxisTable
 from .cache import cached_arrays
 from .session import gmsh_session
@@ -20,11 +20,17 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: Raise when anything below changes the meshes that come out.
-RECIPE = 1
+RECIPE = 2
 #: gmsh's element types of four and ten nodes; the last two midside nodes of the latter change places on the way out.
 _TET4, _TET10 = 4, 11
-#: Smallest volume ratio of a curved element, against its mean, before its midside nodes go back to straight edges.
+#: Smallest volume ratio in a curved element, against its mean, before its midside nodes go back to straight edges.
 _LEAST_RATIO = 0.1
+#: Bounding boxes of gmsh are a little larger than what they hold (mm).
+_NEAR = 1e-3
+#: Element sizes in parts of `size_mm`: base plate and feet; inner lines where walls meet the base, where the feet do.
+_BASE, _WALL_LINE, _FOOT_LINE = 1.43, 0.57, 0.43
+#: Over these lengths, in parts of `size_mm`, the sizes pass into each other: from such lines, and below the walls.
+_LINE_REACH, _BASE_REACH = 0.57, 1.43
 
 
 class TetMesh(NamedTuple):
@@ -70,6 +76,7 @@ def _mesh_recipe(table: HousingTable) -> dict[str, object]:
         "size": mesh.size_mm,
         "bore_edges": mesh.bore_edges,
         "order": mesh.order,
+        "graded": mesh.graded,
     }
 
 
@@ -77,7 +84,7 @@ def _make(table: HousingTable) -> TetMesh:
     options = {
         # faces in one plane stay apart: the bottoms of the feet, which are held, end where the feet end
         "Geometry.OCCUnionUnify": 0.0,
-        "Mesh.MeshSizeMax": table.mesh.size_mm,
+        "Mesh.MeshSizeMax": table.mesh.size_mm * (_BASE if table.mesh.graded else 1.0),
         "Mesh.MeshSizeFromCurvature": table.mesh.bore_edges,
         "Mesh.SecondOrderLinear": 0.0,
     }
@@ -85,6 +92,8 @@ def _make(table: HousingTable) -> TetMesh:
         try:
             _build(gmsh.model.occ, table)
             gmsh.model.occ.synchronize()
+            if table.mesh.graded:
+                _grade(gmsh.model, table)
             gmsh.model.mesh.generate(3)
             if table.mesh.order == 2:
                 gmsh.model.mesh.setOrder(2)
@@ -94,7 +103,7 @@ def _make(table: HousingTable) -> TetMesh:
         except Exception as error:  # gmsh raises bare Exception with its log line
             cure = "check that the dimensions fit each other, or choose another size_mm"
             raise InputError("housing", None, f"gmsh could not mesh this geometry ({error})", cure) from error
-    nodes = mesh.nodes if table.mesh.order == 1 else _untangled(mesh.nodes, mesh.tets)
+    nodes, _ = unfolded(mesh.nodes, mesh.tets, least=_LEAST_RATIO)
     return TetMesh(1e-3 * nodes, mesh.tets)
 
 
@@ -129,13 +138,53 @@ def _build(occ: Any, table: HousingTable) -> None:
             inner = half if side == "plus" else -half
             outer = end if side == "plus" else start
             if shaft.boss_height_mm > 0.0:
-                parts.append((3, occ.addCylinder(shaft.x_mm, inner, shaft.z_mm, 0, outer - inner, 0, shaft.boss_radius_mm)))
+                parts.append(
+                    (3, occ.addCylinder(shaft.x_mm, inner, shaft.z_mm, 0, outer - inner, 0, shaft.boss_radius_mm))
+                )
             holes.append((3, occ.addCylinder(shaft.x_mm, inner, shaft.z_mm, 0, outer - inner, 0, shaft.bore_radius_mm)))
     body, _ = occ.fuse(parts[:1], parts[1:])
     if holes:
         body, _ = occ.cut(body, holes)
     if len(body) != 1:
         raise InputError("housing", len(body), "the parts do not form one body", "check the dimensions")
+
+
+def _grade(model: Any, table: HousingTable) -> None:
+    """Sizes where they pay: fine where stress is singular (inner corners, ends of held feet), coarse in the base."""
+    size, field = table.mesh.size_mm, model.mesh.field
+    (x0, x1), (z0, z1), half = table.wall_x_mm, table.wall_z_mm, 0.5 * table.inner_gap_mm
+    first, last = table.end_wall_thickness_mm
+    top_of_feet = z0 - table.base_thickness_mm + table.feet.height_mm
+    wall_lines, foot_lines = [], []
+    for _, tag in model.getEntities(1):
+        low_x, low_y, low_z, high_x, high_y, high_z = model.getBoundingBox(1, tag)
+
+        def within(low: float, high: float, *places: float) -> bool:
+            return any(max(abs(low - place), abs(high - place)) < _NEAR for place in places)
+
+        inner = within(low_y, high_y, -half, half) or within(low_x, high_x, *([x0 + first] if first else []), x1 - last)
+        if within(low_z, high_z, z0) and inner:
+            wall_lines.append(tag)
+        if within(low_x, high_x, x0, x1) and high_z < top_of_feet + _NEAR:
+            foot_lines.append(tag)
+    found = []
+    for lines, part in ((wall_lines, _WALL_LINE), (foot_lines, _FOOT_LINE)):
+        distance, threshold = field.add("Distance"), field.add("Threshold")
+        field.setNumbers(distance, "CurvesList", lines)
+        field.setNumber(distance, "Sampling", 100)
+        limits = {"SizeMin": part, "SizeMax": _BASE, "DistMin": 0.5 * part, "DistMax": _LINE_REACH}
+        for key, value in ({"InField": distance} | {key: size * value for key, value in limits.items()}).items():
+            field.setNumber(threshold, key, value)
+        found.append(threshold)
+    walls = field.add("Box")
+    margin = table.inner_gap_mm + sum(table.wall_thickness_mm) + sum(s.boss_height_mm for s in table.shafts)
+    limits = {"VIn": size, "VOut": _BASE * size, "Thickness": _BASE_REACH * size, "XMin": x0, "XMax": x1}
+    limits |= {"YMin": -margin, "YMax": margin, "ZMin": z0, "ZMax": z1 + table.cover_thickness_mm + size}
+    for key, value in limits.items():
+        field.setNumber(walls, key, value)
+    least = field.add("Min")
+    field.setNumbers(least, "FieldsList", [*found, walls])
+    field.setAsBackgroundMesh(least)
 
 
 def bore_ranges(table: HousingTable, shaft: ShaftAxisTable) -> dict[str, tuple[float, float]]:
@@ -152,7 +201,9 @@ def _arrays(gmsh: Any) -> TetMesh:
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     kinds, _, element_nodes = gmsh.model.mesh.getElements(3)
     if len(kinds) != 1 or kinds[0] not in (_TET4, _TET10):
-        raise InputError("housing.mesh", list(kinds), "gmsh made other elements than tetrahedra", "report this geometry")
+        raise InputError(
+            "housing.mesh", list(kinds), "gmsh made other elements than tetrahedra", "report this geometry"
+        )
     tets = element_nodes[0].reshape(-1, 10 if kinds[0] == _TET10 else 4).astype(np.int64)
     if kinds[0] == _TET10:
         tets[:, [8, 9]] = tets[:, [9, 8]]
@@ -160,16 +211,3 @@ def _arrays(gmsh: Any) -> TetMesh:
     place = np.empty(int(tags.max()) + 1, dtype=np.int64)
     place[tags.astype(np.int64)] = np.arange(len(tags))
     return TetMesh(coordinates.reshape(-1, 3)[place[used]], renumbered.reshape(tets.shape).astype(np.int64))
-
-
-def _untangled(nodes: Floats, tets: Ints) -> Floats:
-    """Straighten the edges of curved elements that are nearly folded (none in an ordinary mesh)."""
-    nodes = nodes.copy()
-    for _ in range(3):
-        ratio = jacobian_determinants(nodes, tets)
-        folded = ratio.min(axis=1) < _LEAST_RATIO * np.abs(ratio).mean(axis=1)
-        if not folded.any():
-            break
-        bad = tets[folded]
-        nodes[bad[:, 4:]] = 0.5 * (nodes[bad[:, EDGES[:, 0]]] + nodes[bad[:, EDGES[:, 1]]])
-    return nodes

@@ -23,7 +23,7 @@ def save_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write arrays (no object arrays) to one uncompressed ``.npz`` file."""
     target = Path(path)
     with whole_file(target) as temporary, temporary.open("wb") as stream:
-        np.savez(stream, allow_pickle=False, **arrays)  # type: ignore[arg-type]
+        np.savez(stream, allow_pickle=False, **arrays)
 
 
 def load_arrays(path: str | Path, *, verify: bool = False) -> dict[str, NDArray[Any]]:

@@ -90,7 +90,7 @@ def stiffness_figure(
     axes.set_title(title, fontsize=11, loc="left")
     axes.set_xlim(line[0][0], line[0][-1])
     axes.margins(y=0.12)
-    figure.legend(fontsize=8.5, loc="outside lower center", ncols=5, frameon=False)
+    figure.legend(fontsize=8.5, loc="outside lower center", ncols=3, frameon=False)
     if shares:
         lower = figure.add_subplot(grid[1], sharex=axes)
         _tidy(lower)
@@ -251,7 +251,7 @@ def stress_figure(
     bar.set_label("von Mises stress (MPa)")
     bar.locator = MaxNLocator(8)
     bar.update_ticks()
-    save(figure, path, dpi=150)
+    save(figure, path, dpi=110)
 
 
 def _lines(segments: Array) -> Any:

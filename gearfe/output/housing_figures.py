@@ -1,7 +1,7 @@
 """Pictures of a housing and of its modes, drawn by VTK in a process of its own.
 
-Off-screen drawing crashes the interpreter where a machine lacks the graphics libraries: in a second process that costs a
-picture and a message, not the results.
+Off-screen drawing crashes the interpreter where a machine lacks the graphics libraries: in a second process that costs
+a picture and a message, not the results.
 """
 
 from __future__ import annotations
@@ -100,7 +100,9 @@ def _draw(job: Path, target: Path) -> None:
     size = float(np.ptp(points, axis=0).max())
     columns = min(3, len(fields))
     rows = math.ceil(len(fields) / columns)
-    plotter = pyvista.Plotter(off_screen=True, shape=(rows, columns), window_size=(520 * columns, 400 * rows), border=False)
+    plotter = pyvista.Plotter(
+        off_screen=True, shape=(rows, columns), window_size=(520 * columns, 400 * rows), border=False
+    )
     plotter.set_background("white")
     for number, (field, title) in enumerate(zip(fields, stored["titles"], strict=True)):
         plotter.subplot(number // columns, number % columns)

@@ -114,7 +114,9 @@ class VtkHdfSeries:
             raise InputError("points", None, "the first step needs points and cells", "give both")
         names = (frozenset(point_data or {}), frozenset(cell_data or {}))
         if self._field_names not in (None, names):
-            raise InputError("fields", None, "every step must have the same fields as the first", "add the missing ones")
+            raise InputError(
+                "fields", None, "every step must have the same fields as the first", "add the missing ones"
+            )
         self._field_names = names
         times.append(float(time))
         if points is not None:

@@ -38,7 +38,7 @@ ORDER = np.argsort(np.abs(MU.imag))  # the real one first, then a conjugate pair
 MU, BASIS = MU[ORDER], BASIS[:, ORDER]
 BACK = np.linalg.inv(BASIS)
 ERROR = np.array([-13 - 7 * ROOT6, -13 + 7 * ROOT6, -1.0]) / 3
-MOST_NEWTON = 8
+MOST_NEWTON = 10
 
 
 @dataclass(frozen=True)

@@ -177,11 +177,11 @@ def fold_combination(fold, p, values):
     return total
 
 
-def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, w, q, v):
+def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, small, w, q, v):
     """Time (from the point of expansion) and state of the fold near `guess`; folds = 0 when there is none.
 
     Newton on: regular rows of g = 0, z^T G v = 0, and time such that B . G^T z = 0. It is a true crossing when z^T g
-    vanishes there too; a near miss (rod a little longer than the crank) leaves a residual and is integrated as usual.
+    vanishes there too (rows with pivots below `small` count as passing at the same moment); a near miss (rod a little longer than the crank) leaves a residual and is integrated as usual.
     """
     rows, mass, fold = tb.rows, tb.mass, w.fold
     m = rows.index.shape[0]
@@ -219,6 +219,11 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, w,
                 return 0, h
             if abs(move) < 1e-7 * reach:
                 near = 1
+                if least < small and folds < fold.drop.shape[0]:  # another row passes at the same moment
+                    fold.drop[folds] = row
+                    w.skip[row] = 1
+                    folds += 1
+                    near = 0
             continue
         # position: g_reg and z^T (G v - df/dt)
         times_gradients(rows, w.G, v, w.mu)
@@ -256,11 +261,6 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, w,
         if abs(h - guess) > reach or not np.isfinite(h) or not np.isfinite(change):
             return 0, h
         if abs(move) < 1e-10 * reach and change < 1e-10 * min(length, 1.0):  # the next change would be its square
-            if least < 1e-14 and folds < fold.drop.shape[0]:  # another row passes at the same moment
-                fold.drop[folds] = row
-                w.skip[row] = 1
-                folds += 1
-                continue
             if quality > 1e-10 * max(length, 1.0) * max(scale, 1.0):
                 return 0, h
             evaluate(QS, order, h, q, v)

@@ -37,6 +37,11 @@ def step_length(QS, order, tolerance, length):
     return step
 
 
+def same_moment(tolerance):
+    """Pivot below which a row passes its fold together with another, as far as the accuracy of the state can tell."""
+    return min(1e-6, max(1e-14, (300.0 * tolerance) ** 2))
+
+
 def clear_series(w, q, v, order):
     """Series that holds position and velocity only."""
     copy(q, w.QS[0])
@@ -55,7 +60,7 @@ def fold_behind(tb, t, sign, q, v, order, tolerance, length, base, where, ahead,
     if abs(ahead) > step:
         return 0, 0.0
     folds, found = locate_fold(
-        tb, t, forward, w.QS, order, ahead, abs(ahead), base, where, length, w, qn, vn
+        tb, t, forward, w.QS, order, ahead, abs(ahead), base, where, length, same_moment(tolerance), w, qn, vn
     )
     if folds > 0 and sign * found > 0.0:
         folds = 0
@@ -84,7 +89,7 @@ def begin(tb, t, sign, q, v, order, tolerance, length, base, none, w, qn, vn):
             speed = max(speed, abs(v[i]) / (1.0 if i % 3 == 2 else length))
         clear_series(w, q, v, order)
         folds, found = locate_fold(
-            tb, t, forward, w.QS, order, 0.0, 1e-3 / speed, base, where, length, w, qn, vn
+            tb, t, forward, w.QS, order, 0.0, 1e-3 / speed, base, where, length, same_moment(tolerance), w, qn, vn
         )
         if folds == 0:
             return 0, 0.0, np.inf, SINGULAR
@@ -105,8 +110,12 @@ def begin(tb, t, sign, q, v, order, tolerance, length, base, none, w, qn, vn):
     return 0, 0.0, ahead, DONE
 
 
-def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, w, qn, vn):
-    """End of a step of at most |h|: (step, folds there, time to the next fold, status); the state is in qn, vn."""
+def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, close, w, qn, vn):
+    """End of a step of at most |h|: (step, folds there, time to the next fold, status); the state is in qn, vn.
+
+    A fold ahead within `close` (0.7 of the last step) is landed on even when |h| is shorter: so close to it, round-off in
+    the last coefficients and not the motion sets |h|.
+    """
     forward = sign > 0.0
     for _ in range(40):
         evaluate(w.QS, order, h, qn, vn)
@@ -119,16 +128,17 @@ def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, w, qn, vn
                 guess = h + tau
             else:
                 tau = np.inf
-        if 0.0 < sign * ahead < 1.3 * abs(h):
+        near = max(1.3 * abs(h), close)
+        if 0.0 < sign * ahead < near:
             guess = ahead
         lowest = 0.05 * abs(h) if folds > 0 else 0.0
-        if lowest < sign * guess < 1.3 * abs(h):
-            reach = 0.5 * abs(h)
+        if lowest < sign * guess < near:
+            reach = 0.5 * max(abs(h), abs(guess))
             found_folds, found = locate_fold(
-                tb, t, forward, w.QS, order, guess, reach, base, where, length, w, qn, vn
+                tb, t, forward, w.QS, order, guess, reach, base, where, length, same_moment(tolerance), w, qn, vn
             )
             if found_folds > 0 and lowest < sign * found:
-                if sign * found <= 1.000001 * abs(h):
+                if sign * found <= max(1.000001 * abs(h), close):
                     return found, found_folds, np.inf, DONE
                 h = 0.6 * found
                 evaluate(w.QS, order, h, qn, vn)
@@ -148,7 +158,7 @@ def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, w, qn, vn
 def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks, longest, state, T, C, kind):
     """Integrate from (q, v) to t1, or until the arrays are full; call again with the same arguments to go on.
 
-    `state` holds (time, folds, time to the fold ahead, 1 once begun); T (room + 1,) receives step ends, C
+    `state` holds (time, folds, time to the fold ahead, 1 once begun, last step); T (room + 1,) receives step ends, C
     (room, order + 1, n) coefficients, kind (room,) the number of folds at the start of every step.
 
     Returns status, number of steps.
@@ -158,6 +168,7 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
     t = state[0]
     folds = int(state[1])
     ahead = state[2]
+    last = state[4]
     status = DONE
     count = 0
     if state[3] == 0.0:
@@ -188,7 +199,7 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
         elif size > 0.5 * remains:
             size = 0.5 * remains
         h, next_folds, next_ahead, status = land(
-            tb, t, sign, sign * size, order, tolerance, length, base, folds, ahead, w, w.qn, w.vn
+            tb, t, sign, sign * size, order, tolerance, length, base, folds, ahead, min(0.7 * last, remains), w, w.qn, w.vn
         )
         if status != DONE:
             break
@@ -204,12 +215,14 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
         copy(w.vn, v)
         folds = next_folds
         ahead = next_ahead
+        last = abs(h)
     for i in range(q.shape[0]):
         if not (np.isfinite(q[i]) and np.isfinite(v[i])):
             status = NOT_FINITE
     state[0] = t
     state[1] = folds
     state[2] = ahead
+    state[4] = last
     return status, count
 
 
@@ -233,7 +246,7 @@ def sample(T, C, sign, times, derivative, out):
                 out[i, c] = out[i, c] * h + factor * C[piece, j, c]
 
 
-FUNCTIONS = (sample, step_length, clear_series, fold_behind, begin, land, integrate_series)
+FUNCTIONS = (sample, step_length, same_moment, clear_series, fold_behind, begin, land, integrate_series)
 NAMES = {
     "DONE": DONE,
     "TOO_SMALL": TOO_SMALL,

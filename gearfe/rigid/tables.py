@@ -105,7 +105,7 @@ def assemble(scene: Scene) -> Assembly:
 
     rows: list[_Row] = []
     for number, joint in enumerate(scene.joints):
-        label = f"{type(joint).__name__.lower()} {joint.name or number!r}"
+        label = f"{type(joint).__name__.lower()} {joint.name or number}"
         for row in _joint_rows(joint, index, local, q0, n):
             kind, bodies, factor, slot, const, function, what = row
             rows.append(_Row(number, f"{label} ({what})", kind, bodies, factor, slot, const,

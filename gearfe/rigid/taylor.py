@@ -163,10 +163,10 @@ def run(
     q = np.concatenate([q, np.zeros(3)])
     v = np.concatenate([v, np.zeros(3)])
     t0, t1 = float(span[0]), float(span[1])
-    state = np.array([t0, 0.0, math.inf, 0.0])
+    state = np.array([t0, 0.0, math.inf, 0.0, 0.0])
     advance = kernels(jit).integrate_series
     parts = []
-    room, done = 64, 0
+    room, done = min(64, most), 0
     while True:
         times, coefficients = np.empty(room + 1), np.empty((room, order + 1, q.size))
         folds = np.zeros(room, dtype=np.int64)
@@ -178,7 +178,7 @@ def run(
         done += count
         if status != kernel_run.FULL or done >= most:
             break
-        room = min(2 * room, max(64, 2_000_000 // coefficients[0].size))
+        room = min(2 * room, max(64, 2_000_000 // coefficients[0].size), most - done)
     ends = np.concatenate([parts[0][0], *(p[0][1:] for p in parts[1:])])
     if len(parts) == 1:
         return Pieces(int(status), ends, parts[0][1], parts[0][2], jit)

@@ -1,10 +1,12 @@
 """Table ``[housing]``: a gearbox housing of two bored walls on a base plate with four feet, and what is made of it.
 
-All lengths in millimetres, in one frame: shafts run along y, z points up, the gap between the walls is centred on y = 0.
+All lengths in millimetres, in one frame: shafts run along y, z points up, the gap between the walls is centred on
+y = 0.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 from ..config import quantity
@@ -20,7 +22,9 @@ class ShaftAxisTable:
     bore_radius_mm: float = quantity(10.0, above=0.0, doc="radius of the bores (mm)")
     boss_radius_mm: float = quantity(15.0, above=0.0, doc="outer radius of the bosses round the bores (mm)")
     boss_height_mm: float = quantity(10.0, low=0.0, doc="how far the bosses stand proud of the outer wall faces (mm)")
-    walls: str = quantity("both", choices=("both", "plus", "minus"), doc="walls that are bored: both, plus (+y), minus (-y)")
+    walls: str = quantity(
+        "both", choices=("both", "plus", "minus"), doc="walls that are bored: both, plus (+y), minus (-y)"
+    )
 
     def check(self, where: str) -> None:
         """A boss is wider than its bore."""
@@ -53,8 +57,9 @@ class HousingMaterialTable:
 class HousingMeshTable:
     """Elements and their size."""
 
-    size_mm: float = quantity(7.0, above=0.0, doc="edge length away from the bores (mm)")
-    bore_edges: int = quantity(12, low=6, high=400, doc="element edges round a bore at least")
+    size_mm: float = quantity(7.0, above=0.0, doc="edge length in the walls (mm)")
+    graded: bool = quantity(True, doc="coarser in the base, finer in inner corners and at the feet; false: one size")
+    bore_edges: int = quantity(8, low=6, high=400, doc="element edges round a bore at least")
     order: int = quantity(2, low=1, high=2, doc="2: curved second-order tetrahedra; 1: linear ones, 15-45 % too stiff")
     mass: str = quantity("exact", choices=("exact", "4-point"), doc="mass integration; 4-point as in CalculiX")
 
@@ -96,11 +101,11 @@ class HousingTable:
     shafts: tuple[ShaftAxisTable, ...] = quantity(
         (ShaftAxisTable(x_mm=0.0), ShaftAxisTable(x_mm=62.5), ShaftAxisTable(x_mm=125.0)), doc="[[housing.shafts]]"
     )
-    feet: FeetTable = quantity(FeetTable(), doc="[housing.feet]")
-    material: HousingMaterialTable = quantity(HousingMaterialTable(), doc="[housing.material]")
-    mesh: HousingMeshTable = quantity(HousingMeshTable(), doc="[housing.mesh]")
-    reduction: HousingReductionTable = quantity(HousingReductionTable(), doc="[housing.reduction]")
-    damping: HousingDampingTable = quantity(HousingDampingTable(), doc="[housing.damping]")
+    feet: FeetTable = quantity(FeetTable, doc="[housing.feet]")  # noqa: RUF009
+    material: HousingMaterialTable = quantity(HousingMaterialTable, doc="[housing.material]")  # noqa: RUF009
+    mesh: HousingMeshTable = quantity(HousingMeshTable, doc="[housing.mesh]")  # noqa: RUF009
+    reduction: HousingReductionTable = quantity(HousingReductionTable, doc="[housing.reduction]")  # noqa: RUF009
+    damping: HousingDampingTable = quantity(HousingDampingTable, doc="[housing.damping]")  # noqa: RUF009
 
     def check(self, where: str) -> None:
         """Rules that join several dimensions: everything lies where it can be joined to the rest."""
@@ -109,12 +114,14 @@ class HousingTable:
                 raise InputError(f"{where}.{name}", [low, high], "must be [low, high] with low < high", "swap them")
         if sum(self.end_wall_thickness_mm) >= self.wall_x_mm[1] - self.wall_x_mm[0]:
             problem = "the end walls fill the whole length between the wall ends"
-            raise InputError(f"{where}.end_wall_thickness_mm", list(self.end_wall_thickness_mm), problem, "thinner ones")
+            raise InputError(
+                f"{where}.end_wall_thickness_mm", list(self.end_wall_thickness_mm), problem, "thinner ones"
+            )
         self._check_feet(f"{where}.feet")
         for number, shaft in enumerate(self.shafts):
             self._check_shaft(shaft, f"{where}.shafts[{number}]")
-        for number, (first, second) in enumerate(_pairs(self.shafts)):
-            _check_apart(first, second, where, number)
+        for first, second in itertools.combinations(self.shafts, 2):
+            _check_apart(first, second, where)
 
     def _check_feet(self, where: str) -> None:
         feet, depth = self.feet, self.inner_gap_mm + sum(self.wall_thickness_mm)
@@ -139,14 +146,12 @@ class HousingTable:
             raise InputError(where, None, f"{place} cuts the edge of the walls or an end wall", cure)
 
 
-def _pairs(shafts: tuple[ShaftAxisTable, ...]) -> list[tuple[ShaftAxisTable, ShaftAxisTable]]:
-    return [(a, b) for i, a in enumerate(shafts) for b in shafts[i + 1 :]]
-
-
-def _check_apart(first: ShaftAxisTable, second: ShaftAxisTable, where: str, _: int) -> None:
+def _check_apart(first: ShaftAxisTable, second: ShaftAxisTable, where: str) -> None:
     distance = ((first.x_mm - second.x_mm) ** 2 + (first.z_mm - second.z_mm) ** 2) ** 0.5
-    shared = {"both"} & {first.walls, second.walls} or first.walls == second.walls
+    shared = "both" in (first.walls, second.walls) or first.walls == second.walls
     if shared and distance <= first.bore_radius_mm + second.bore_radius_mm:
-        problem = f"the bores at x = {first.x_mm:g} and x = {second.x_mm:g} mm overlap: their axes are {distance:g} mm apart"
+        problem = (
+            f"the bores at x = {first.x_mm:g} and x = {second.x_mm:g} mm overlap: their axes are {distance:g} mm apart"
+        )
         cure = f"keep more than {first.bore_radius_mm + second.bore_radius_mm:g} mm between them"
         raise InputError(f"{where}.shafts", None, problem, cure)

@@ -1,0 +1,101 @@
+"""``gearfe housing``: what it prints, what it writes, what it says to bad input."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe.cli import main
+from gearfe.modal_body import ModalBody
+from gearfe.output.housing_figures import draw_modes
+
+JOB = """
+[housing]
+[housing.mesh]
+size_mm = 16.0
+graded = false
+[housing.reduction]
+modes = 10
+"""
+
+
+@pytest.fixture
+def job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("GEARFE_CACHE", str(tmp_path / "cache"))
+    path = tmp_path / "job.toml"
+    path.write_text(JOB)
+    return path
+
+
+def test_command_writes_its_files(job: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert main(["housing", str(job), "--out", str(out), "--modes", "8"]) == 0
+    printed = capsys.readouterr().out
+    for word in ("mass            4.14", "bore 6", "sparse solver", "mesh", "reduction error", "10 modes"):
+        assert word in printed, word
+    for name in ("modes.csv", "modes.vtkhdf", "housing.npz", "summary.json", "housing.png", "modes.png"):
+        assert (out / name).stat().st_size > 500, name
+    with (out / "modes.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    body = ModalBody.load(out / "housing.npz")
+    assert [int(row["number"]) for row in rows] == list(range(1, 9))
+    np.testing.assert_allclose(
+        [float(row["frequency_Hz"]) for row in rows], body.coupled.frequencies_hz[:8], rtol=1e-12
+    )
+    # effective masses of all modes together are the mass that is not held
+    masses = (body.momentum[:3] @ body.coupled.vectors) ** 2
+    np.testing.assert_allclose([float(row["effective_mass_y_kg"]) for row in rows], masses[1, :8], rtol=1e-9)
+    assert np.all(masses.sum(axis=1) < body.rigid_mass[0, 0])
+    assert np.all(masses.sum(axis=1) > 0.8 * body.rigid_mass[0, 0])
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["mass_kg"] == pytest.approx(body.rigid_mass[0, 0])
+    assert len(summary["attachments"]) == 6
+
+
+def test_second_run_needs_no_mesher(job: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert main(["housing", str(job), "--out", str(out), "--no-pictures"]) == 0
+    first = (out / "modes.csv").read_bytes()
+    code = (
+        "import sys\n"
+        "from gearfe.cli import main\n"
+        "assert main(sys.argv[1:]) == 0\n"
+        "assert not {'gmsh', 'meshio'} & set(sys.modules)\n"
+    )
+    command = [sys.executable, "-c", code, "housing", str(job), "--out", str(out), "--no-pictures"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (out / "modes.csv").read_bytes() == first
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[housing]\nwall_thickness_mm = [-1.0, 4.0]\n", "wall_thickness_mm"),
+        ("[housing]\nwals = 1\n", "unknown name 'wals'"),
+        ("[housing]\n[[housing.shafts]]\nx_mm = 500.0\n", "misses every wall"),
+        ("[pair]\n", "[housing]"),
+    ],
+)
+def test_bad_jobs(job: Path, tmp_path: Path, text: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    job.write_text(text)
+    if text.startswith("[pair]"):
+        job.write_text("")
+    assert main(["housing", str(job), "--out", str(tmp_path / "out")]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_picture_that_cannot_be_drawn_costs_a_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "pyvista.py").write_text("raise ImportError('no graphics here')")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    points, faces = np.eye(3), np.array([[0, 1, 2]])
+    said = draw_modes(tmp_path / "x.png", points, faces, np.zeros((1, 3, 3)), ["x"])
+    assert "no graphics here" in said
+    assert "libegl1" in said
+    assert not (tmp_path / "x.png").exists()

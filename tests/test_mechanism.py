@@ -1,0 +1,274 @@
+"""Mechanism files: expressions, errors, outputs, energies, reactions, the command, the examples."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe.cli import main
+from gearfe.errors import InputError
+from gearfe.mechanisms import evaluate, load_mechanism
+from gearfe.mechanisms.expressions import compute, parse, quantities
+from gearfe.mechanisms.results import reactions
+from gearfe.rigid import integrate
+
+from .rigid_cases import reference
+
+ROOT = Path(__file__).resolve().parents[1]
+GEOMETRY = ROOT / "geometry"
+
+PENDULUM = """
+[run]
+end_s = 1.0
+step_s = 0.1
+[ground.points_m]
+O = [0.0, 0.0]
+[bodies.rod]
+mass_kg = 2.0
+inertia_kg_m2 = 0.1
+centre_m = [0.5, 0.0]
+angle_deg = -60.0
+points_m = { O = [0.0, 0.0], tip = [1.0, 0.0] }
+[joints.O]
+type = "hinge"
+body = "rod"
+point = "O"
+to_point = "O"
+[forces.gravity]
+type = "gravity"
+acceleration_m_per_s2 = [0.0, -9.81]
+[[outputs]]
+name = "tip_height_m"
+value = "y(rod.tip) + 1"
+"""
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "mechanism.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1 + 2 * 3 - 4 / 2", 5.0),
+        ("-2 ** 2", -4.0),
+        ("2 ** 3 ** 2", 512.0),
+        ("(1 + 2) * -3", -9.0),
+        ("sqrt(16) + hypot(3, 4) - abs(-2)", 7.0),
+        ("atan2(1, 0) * 2 / pi", 1.0),
+        ("1.5e1 + .5", 15.5),
+        ("sin(time) ** 2 + cos(time) ** 2", 1.0),
+    ],
+)
+def test_arithmetic(text, value):
+    assert compute(parse(text, "x"), {("time", None): 0.7}) == pytest.approx(value, rel=1e-15)
+
+
+def test_quantities_of_an_expression():
+    assert quantities(parse("angle(rod) - 2 * ax(rod.tip) + kinetic", "x")) == {
+        ("angle", "rod"),
+        ("ax", "rod.tip"),
+        ("kinetic", None),
+    }
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "1 +", "(1", "1 2", "__import__('os')", "angle()", "angle(1)", "f(x)", "sin(1, 2)", "a = 1", "lambda: 1",
+     "x(rod).real", "kinetics", "(" * 200 + "1" + ")" * 200, "'a'", "[1]", "1 if 1 else 2"],
+)  # fmt: skip
+def test_what_is_not_arithmetic_is_refused(text):
+    with pytest.raises(InputError):
+        parse(text, "outputs[0].value")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        ("mass_kg = 2.0", "mass_kg = -2.0", "mass_kg = -2.0"),
+        ("mass_kg = 2.0", "mas_kg = 2.0", "did you mean 'mass_kg'"),
+        ("[forces.gravity]", "[force.gravity]", "did you mean 'forces'"),
+        ('body = "rod"', 'body = "rot"', "did you mean 'rod'"),
+        ('point = "O"\nto_point', 'point = "tipp"\nto_point', "did you mean 'tip'"),
+        ("y(rod.tip)", "y(rod.tap)", "did you mean 'tip'"),
+        ("y(rod.tip)", "y(rot.tip)", "did you mean 'rod'"),
+        ("y(rod.tip) + 1", "y(rod.tip) +", "is not an expression"),
+        ('to_point = "O"', 'to_point = "O"\nto = "rod"', "joins a body to itself"),
+        ('type = "hinge"', 'type = "hinge"\ndirection = [1.0, 0.0]', "does not belong to type 'hinge'"),
+        ("end_s = 1.0", "end_s = 0.0", "end_s = 0.0"),
+        ("step_s = 0.1", "step_s = 0.1\ntolerance = 2.0", "tolerance = 2.0"),
+        ('type = "hinge"', 'type = "fixed"', "does not belong|nothing is free"),
+        ('name = "tip_height_m"', 'name = "tip height"', "without spaces"),
+    ],
+)
+def test_errors_name_the_entry_and_the_cure(tmp_path, old, new, text):
+    assert old in PENDULUM
+    with pytest.raises(InputError, match=text):
+        load_mechanism(write(tmp_path, PENDULUM.replace(old, new))).start()
+
+
+def test_nothing_free_to_move(tmp_path):
+    fixed = PENDULUM.replace('type = "hinge"\nbody = "rod"\npoint = "O"\nto_point = "O"', 'type = "fixed"\nbody = "rod"')
+    with pytest.raises(InputError, match="nothing is free to move"):
+        load_mechanism(write(tmp_path, fixed)).start()
+
+
+def test_forced_values_and_contradictions(tmp_path):
+    forced = PENDULUM + '[start.velocities]\n"vx(rod.tip)" = 1.0\n[start.positions]\n"angle(rod)" = -1.2\n'
+    start = load_mechanism(write(tmp_path, forced)).start()
+    assert start.q[2] == pytest.approx(-1.2, abs=1e-12)
+    assert start.v[2] == pytest.approx(1.0 / -np.sin(-1.2), rel=1e-10)  # vx of the tip = -sin(angle) rate
+    wrong = PENDULUM + '[start.velocities]\n"vx(rod.O)" = 1.0\n'
+    with pytest.raises(InputError, match=r"start velocity .*vx\(rod.O\).* = 1.0: contradicts hinge O"):
+        load_mechanism(write(tmp_path, wrong)).start()
+    far = PENDULUM + '[start.positions]\n"x(rod.tip)" = 3.0\n'
+    with pytest.raises(InputError, match="contradicts hinge O"):
+        load_mechanism(write(tmp_path, far)).start()
+
+
+def test_reactions_balance_the_weight_and_the_motion(tmp_path):
+    """Force of the hinge = m (a + g): a = acceleration of the mass centre."""
+    mechanism = load_mechanism(write(tmp_path, PENDULUM))
+    made = integrate(mechanism.system, np.linspace(0, 1, 11), start=mechanism.start(), backend="plain")
+    table = reactions(mechanism, made)
+    assert np.abs(table["O_x_N"] - 2.0 * made.a[:, 0]).max() <= 1e-7
+    assert np.abs(table["O_y_N"] - 2.0 * (made.a[:, 1] + 9.81)).max() <= 1e-7
+    assert np.abs(table["O_moment_N_m"]).max() <= 1e-7
+
+
+def test_work_closes_the_energy_balance(tmp_path):
+    """Drive, damper and a moving force: kinetic + potential - work stays at its start value."""
+    extra = """
+[forces.push]
+type = "force"
+body = "rod"
+point = "tip"
+x_N = { sine = 3.0, frequency_hz = 0.7 }
+[forces.turn]
+type = "moment"
+body = "rod"
+moment_N_m = { step = 2.0, step_centre_s = 0.4, step_width_s = 0.3, constant = 0.5 }
+[forces.brake]
+type = "coordinate_spring"
+body = "rod"
+coordinate = "angle"
+stiffness = 1.0
+damping = 0.3
+"""
+    mechanism = load_mechanism(write(tmp_path, PENDULUM + extra))
+    times = np.linspace(0, 1, 41)
+    made = integrate(mechanism.system, times, start=mechanism.start(), tolerance=1e-11, backend="plain")
+    results = evaluate(mechanism, made)
+    assert np.ptp(results.energy["total_J"]) <= 1e-7
+    assert np.abs(results.energy["work_J"]).max() > 0.1
+
+
+def test_driven_crank_closes_the_energy_balance(tmp_path):
+    """The work of a prescribed motion is the multiplier times the rate."""
+    driven = PENDULUM + '[joints.drive]\ntype = "prescribed"\nbody = "rod"\ncoordinate = "rate"\nmotion = 4.0\n'
+    mechanism = load_mechanism(write(tmp_path, driven))
+    made = integrate(mechanism.system, np.linspace(0, 1, 41), start=mechanism.start(), tolerance=1e-11, backend="plain")
+    results = evaluate(mechanism, made)
+    assert np.abs(made.v[:, 2] - 4.0).max() <= 1e-10
+    assert np.ptp(results.energy["total_J"]) <= 1e-8
+
+
+def test_command_on_the_folding_links(tmp_path, capsys):
+    arguments = ["mechanism", str(GEOMETRY / "slider_crank.toml"), "--out", str(tmp_path), "--until", "2", "--reactions"]
+    assert main([*arguments, "--no-figures"]) == 0
+    assert "1 free" in capsys.readouterr().out
+    table = np.genfromtxt(tmp_path / "trajectory.csv", delimiter=",", names=True)
+    header = (tmp_path / "trajectory.csv").read_text().splitlines()[0].split(",")
+    assert header[0] == "time_s"
+    assert next(h for h in header if h.startswith("a_")) == "a_x_A_m_per_s2"
+    truth = reference("slider_crank_reference.csv")[:41]
+    rows = table[::10]
+    for name, column, allowed in (
+        ("crank_angle_rad", "theta", 1e-8),
+        ("crank_rate_rad_per_s", "omega", 1e-7),
+        ("a_x_A_m_per_s2", "axA", 1e-6),
+        ("x_B_m", "xB", 1e-8),
+        ("v_B_m_per_s", "vxB", 1e-7),
+    ):
+        assert np.abs(rows[name] - truth[column]).max() <= allowed
+    energy = np.genfromtxt(tmp_path / "energy.csv", delimiter=",", names=True)
+    assert energy.dtype.names == ("time_s", "kinetic_J", "potential_J", "work_J", "total_J")
+    assert np.abs(energy["total_J"] - truth["E"][0]).max() <= 1e-8
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["freedoms"]["net"] == 1
+    assert summary["singular_passages"]["count"] == 2
+    assert (tmp_path / "reactions.csv").exists()
+
+
+def test_command_on_andrews(tmp_path):
+    assert main(["mechanism", str(GEOMETRY / "andrews.toml"), "--out", str(tmp_path), "--no-figures"]) == 0
+    table = np.genfromtxt(tmp_path / "trajectory.csv", delimiter=",", names=True)
+    names = ("beta", "theta", "gamma", "phi", "delta", "omega", "epsilon")
+    expected = ("time_s", *(f"{n}_rad" for n in names), "beta_wrapped_rad", "theta_wrapped_rad")
+    assert table.dtype.names == expected
+    truth = reference("andrews_reference.csv")
+    columns = dict(zip(names, ("beta", "Theta", "gamma", "Phi", "delta", "Omega", "epsilon"), strict=True))
+    for name, column in columns.items():
+        assert np.abs(table[f"{name}_rad"][::5] - truth[column]).max() <= 1e-9
+    wrapped = np.mod(table["beta_rad"], 2 * np.pi)
+    assert np.abs(table["beta_wrapped_rad"] - wrapped).max() <= 1e-12
+
+
+@pytest.mark.slow
+def test_figures_and_animation(tmp_path):
+    assert main(["mechanism", str(GEOMETRY / "andrews.toml"), "--out", str(tmp_path), "--animation"]) == 0
+    from PIL import Image
+
+    with Image.open(tmp_path / "animation.gif") as picture:
+        assert picture.n_frames == 100
+    for name in ("curves.png", "picture.png"):
+        with Image.open(tmp_path / name) as picture:
+            assert min(picture.size) > 500
+
+
+def test_bad_file_is_one_line_and_exit_code_two(tmp_path, capsys):
+    bad = write(tmp_path, PENDULUM.replace("mass_kg = 2.0", "mass_kg = 0.0"))
+    assert main(["mechanism", str(bad), "--out", str(tmp_path / "out")]) == 2
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1
+    assert "mass_kg = 0.0" in message
+
+
+@pytest.mark.parametrize("script", ["andrews.py", "slider_crank.py"])
+def test_examples(script, tmp_path):
+    path = ROOT / "scripts" / script
+    assert len(path.read_text().splitlines()) < 60
+    made = subprocess.run([sys.executable, str(path)], cwd=ROOT, capture_output=True, text=True, check=False,
+                          env={"PYTHONPATH": str(ROOT), "GEARFE_NO_NUMBA": "1", "PATH": "/usr/bin:/bin"})  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    assert "rad" in made.stdout
+
+
+def test_a_planar_run_loads_no_heavy_library(tmp_path):
+    code = (
+        "import sys; from gearfe.cli import main; "
+        f"main(['mechanism', r'{GEOMETRY / 'andrews.toml'}', '--out', r'{tmp_path}', '--no-figures', '--until', '0.002']); "
+        "heavy = {'skfem', 'gmsh', 'meshio', 'pyvista', 'matplotlib', 'vtk', 'h5py'} & set(sys.modules); "
+        "print('HEAVY', heavy)"
+    )
+    made = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert "HEAVY set()" in made.stdout
+
+
+def test_the_core_knows_no_mechanism():
+    """The names of the benchmarks stand in no line of code of the package."""
+    import io
+    import tokenize
+
+    for path in (ROOT / "gearfe").rglob("*.py"):
+        for token in tokenize.generate_tokens(io.StringIO(path.read_text()).readline):
+            if token.type in (tokenize.NAME, tokenize.OP):
+                assert "andrews" not in token.string.lower()
+                assert "slidercrank" not in token.string.lower().replace("_", "")

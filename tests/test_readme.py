@@ -1,0 +1,45 @@
+"""The README's promises: its example runs, its tables name every key, column, option and file that exists."""
+
+import argparse
+import re
+from dataclasses import fields
+from pathlib import Path
+
+from gearfe.commands import stiffness
+from gearfe.stiffness_curve import COLUMNS, CONSTANTS
+from gearfe.tables.pair import GearTable, MaterialTable, PairTable, ToothFormTable
+from gearfe.tables.stiffness import StiffnessTable
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_example_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    example = re.search(r"```python\n(.*?)```", README, re.S).group(1)
+    names = {}
+    exec(compile(example, "README.md", "exec"), names)
+    assert 0.9e8 < names["k"] < 1.3e8
+    assert (names["same"].k_mesh == names["curve"].k_mesh).all()
+
+
+def test_every_key_and_column_is_there():
+    keys = [
+        f.name for table in (GearTable, PairTable, MaterialTable, ToothFormTable, StiffnessTable) for f in fields(table)
+    ]
+    for name in {*keys, *COLUMNS, *CONSTANTS} - {"pinion", "wheel", "material"}:
+        assert f"`{name}`" in README, name
+
+
+def test_every_option_is_there():
+    parser = argparse.ArgumentParser()
+    stiffness.add_arguments(parser)
+    for action in parser._actions:
+        for option in action.option_strings:
+            if option.startswith("--") and option != "--help":
+                assert option in README, option
+
+
+def test_scripts_and_pictures_exist():
+    for name in re.findall(r"(?:bash |\]\()((?:scripts|docs)/[\w.]+)", README):
+        assert (ROOT / name).exists(), name

@@ -1,0 +1,120 @@
+"""Every installed sparse solver against numpy; the choice among them; matrices that are not positive definite."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from gearfe import sparse_solver
+from gearfe.errors import InputError, MissingLibraryError
+from gearfe.lanczos import lowest_modes
+from gearfe.solid import SolidMaterial, assemble
+from gearfe.sparse_solver import PACKAGES, choose_solver, factorize, installed_solvers
+from tests.housing_meshes import box
+
+
+def cantilever() -> tuple[sparse.csr_array, sparse.csr_array]:
+    nodes, tets = box((5, 2, 2), (0.5, 0.1, 0.1))
+    found = assemble(nodes, tets, SolidMaterial())
+    free = (3 * np.flatnonzero(nodes[:, 0] > 1e-9)[:, None] + np.arange(3)).ravel()
+    return found.stiffness[free][:, free], found.mass[free][:, free]
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_solves_like_numpy(name: str) -> None:
+    if name not in installed_solvers():
+        pytest.skip(f"{PACKAGES[name]} is not installed")
+    k, _ = cantilever()
+    factor = factorize(k, solver=name)
+    assert (factor.solver, factor.unknowns) == (name, k.shape[0])
+    rng = np.random.default_rng(0)
+    for shape in ((k.shape[0],), (k.shape[0], 1), (k.shape[0], 7)):
+        b = rng.standard_normal(shape)
+        kept = b.copy()
+        x = factor.solve(b)
+        assert x.shape == b.shape
+        np.testing.assert_array_equal(b, kept)
+        truth = np.linalg.solve(k.toarray(), b)
+        np.testing.assert_allclose(x, truth, atol=1e-10 * np.abs(truth).max())
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_two_factorisations_do_not_disturb_each_other(name: str) -> None:
+    if name not in installed_solvers():
+        pytest.skip(f"{PACKAGES[name]} is not installed")
+    k, m = cantilever()
+    first = factorize(k, solver=name)
+    second = factorize(k + 1e6 * m, solver=name)
+    b = np.ones(k.shape[0])
+    for factor, matrix in ((first, k), (second, k + 1e6 * m), (first, k)):
+        np.testing.assert_allclose(factor.solve(b), np.linalg.solve(matrix.toarray(), b), rtol=1e-7, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_a_body_that_can_move_is_refused(name: str) -> None:
+    if name not in installed_solvers():
+        pytest.skip(f"{PACKAGES[name]} is not installed")
+    free = assemble(*box((2, 1, 1), (0.2, 0.1, 0.1)), SolidMaterial()).stiffness
+    for matrix in (free, -cantilever()[0]):
+        with pytest.raises(InputError, match="positive definite"):
+            factorize(matrix, solver=name)
+
+
+def test_scipy_alone_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sparse_solver.importlib.util, "find_spec", lambda name: None)
+    assert installed_solvers() == ("superlu",)
+    for unknowns in (10, 1_000_000):
+        assert choose_solver(unknowns) == "superlu"
+    with pytest.raises(MissingLibraryError, match="pip install pymetis"):
+        choose_solver(10, "metis-superlu")
+
+
+def test_choice_can_be_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GEARFE_SPARSE_SOLVER", "superlu")
+    assert choose_solver(10) == "superlu"
+    with pytest.raises(InputError, match="choose one"):
+        choose_solver(10, "umfpack")
+
+
+def test_blocks_that_do_not_divide_the_order() -> None:
+    matrix = sparse.diags_array([4.0 * np.ones(10), -np.ones(9), -np.ones(9)], offsets=[0, 1, -1]).tocsr()  # type: ignore[arg-type]
+    np.testing.assert_allclose(matrix @ factorize(matrix).solve(np.ones(10)), np.ones(10), rtol=1e-13)
+    assert factorize(sparse.csr_array((0, 0))).solve(np.zeros(0)).shape == (0,)
+
+
+@pytest.mark.parametrize("block", [1, 2, 6, 20])
+def test_lanczos_finds_repeated_modes(block: int) -> None:
+    """A square section bends in two directions at the same frequency: held against scipy's dense solver."""
+    from scipy.linalg import eigh
+
+    k, m = cantilever()
+    truth = eigh(k.toarray(), m.toarray(), eigvals_only=True)
+    assert truth[1] / truth[0] - 1.0 < 0.02
+    found = lowest_modes(factorize(k).solve, m, count=25, block=block)
+    np.testing.assert_allclose(found.eigenvalues, truth[:25], rtol=1e-9)
+    assert found.next_eigenvalue == pytest.approx(truth[25], rel=1e-4)
+    v = found.vectors
+    np.testing.assert_allclose(v.T @ (m @ v), np.eye(25), atol=1e-11)
+    residual = k @ v - (m @ v) * found.eigenvalues
+    assert np.abs(residual).max() < 1e-5 * np.abs(k @ v).max()
+
+
+def test_lanczos_by_limit_and_to_the_last_mode() -> None:
+    from scipy.linalg import eigh
+
+    nodes, tets = box((2, 1, 1), (0.2, 0.1, 0.1))
+    body = assemble(nodes, tets, SolidMaterial())
+    free = (3 * np.flatnonzero(nodes[:, 0] > 1e-9)[:, None] + np.arange(3)).ravel()
+    k, m = body.stiffness[free][:, free], body.mass[free][:, free]
+    truth = eigh(k.toarray(), m.toarray(), eigvals_only=True)
+    solve = factorize(k).solve
+    for inside in (0, 1, 7):
+        limit = 0.5 * (truth[inside] + (truth[inside - 1] if inside else 0.0))
+        np.testing.assert_allclose(lowest_modes(solve, m, limit=limit).eigenvalues, truth[:inside], rtol=1e-9)
+    assert len(lowest_modes(solve, m, limit=0.0, at_least=5).eigenvalues) == 5
+    assert len(lowest_modes(solve, m, count=3, limit=truth[10]).eigenvalues) == 3
+    everything = lowest_modes(solve, m, count=10_000)
+    np.testing.assert_allclose(everything.eigenvalues, truth, rtol=1e-6)
+    assert everything.next_eigenvalue == np.inf
+    assert len(lowest_modes(solve, m, count=0).eigenvalues) == 0
