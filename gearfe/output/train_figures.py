@@ -17,7 +17,7 @@ from .figures import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save
 Array = NDArray[np.float64]
 
 COLOURS = (BLUE, ORANGE, GREEN, RED, "#6d4c9f", "#0f766e", "#8a5a2b")
-#: More curves than these share a legend outside of the panel.
+#: Lines of the meshes.
 _DASHES = ((0, (6, 3)), (0, (2, 2)), (0, (6, 2, 2, 2)))
 
 
@@ -76,7 +76,7 @@ def response_figure(
         middle = 0.5 * float(values.max() + values.min())
         part.set_ylim(middle - 1.15 * half, middle + 1.15 * half)
         part.yaxis.get_major_formatter().set_useOffset(False)
-        part.text(0.99, 0.9, label, transform=part.transAxes, fontsize=8.5, color=colour, ha="right", va="top")
+        part.text(1.0, 1.02, label, transform=part.transAxes, fontsize=8.5, color=colour, ha="right", va="bottom")
         if number == len(speeds) // 2:
             part.set_ylabel("speed  (rad/s)")
         axes.append(part)
@@ -128,12 +128,12 @@ def spectrum_figure(
     shaft
         Name and frequency (kHz) of the shaft whose orders are on top.
     note
-        Text in the corner: resolution and window.
+        Small text above: resolution, window, mean.
     highest
         End of the axis (kHz).
     """
     figure = new_figure(10.5, 4.9)
-    axes = _frequency_axes(figure, title, marks, shaft, highest)
+    axes = _frequency_axes(figure, title, marks, shaft, highest, note)
     axes.vlines(frequency, 0.0, amplitude, color=BLUE, linewidth=2.2)
     axes.plot(frequency, amplitude, "o", color=BLUE, markersize=3.4, markerfacecolor="white")
     shown = (frequency <= highest) & (frequency > 0.0)
@@ -155,7 +155,6 @@ def spectrum_figure(
             bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 0.6},
         )
     axes.set_ylabel(quantity)
-    _note(axes, note)
     save(figure, path)
 
 
@@ -178,7 +177,7 @@ def power_figure(
         dB re 1e-12 W; minus infinity where nothing is radiated.
     """
     figure = new_figure(10.5, 4.6)
-    axes = _frequency_axes(figure, title, marks, shaft, highest)
+    axes = _frequency_axes(figure, title, marks, shaft, highest, note)
     shown = (frequency <= highest) & (frequency > 0.0) & np.isfinite(level)
     top = float(level[shown].max(initial=-300.0)) if shown.any() else 0.0
     bottom = max(top - 60.0, float(level[shown].min(initial=300.0)) - 3.0) if shown.any() else -10.0
@@ -186,19 +185,21 @@ def power_figure(
     axes.bar(frequency[shown], level[shown] - bottom, width=width, bottom=bottom, color=BLUE, linewidth=0)
     axes.set_ylim(bottom, top + 0.18 * (top - bottom) + 1.0)
     axes.set_ylabel("radiated power level  (dB re 1 pW)")
-    _note(axes, note)
     save(figure, path)
 
 
-def _frequency_axes(figure: Any, title: str, marks: Sequence[Mark], shaft: tuple[str, float], highest: float) -> Any:
+def _frequency_axes(
+    figure: Any, title: str, marks: Sequence[Mark], shaft: tuple[str, float], highest: float, note: str
+) -> Any:
     axes = figure.add_subplot()
     _panel(axes, "", "", "")
     axes.set_title(title, fontsize=11, loc="left", pad=34)
+    axes.set_title(note, fontsize=8.5, loc="right", pad=34, color="#374151")
     axes.set_xlim(0.0, highest)
     axes.set_xlabel("frequency  (kHz)")
-    groups = list(dict.fromkeys(mark.group for mark in marks))
+    groups = sorted({mark.group for mark in marks})
     named: set[str] = set()
-    for mark in marks:
+    for mark in sorted(marks):
         if mark.frequency > highest:
             continue
         number = groups.index(mark.group)
@@ -236,13 +237,6 @@ def _panel(axes: Any, ylabel: str, letter: str, title: str) -> Any:
     if title:
         axes.set_title(f"({letter})  {title}", fontsize=10.5, loc="left")
     return axes
-
-
-def _note(axes: Any, text: str) -> None:
-    axes.text(
-        0.99, 0.9, text, transform=axes.transAxes, fontsize=8.5, ha="right", va="top", color="#374151",
-        bbox={"facecolor": "white", "alpha": 0.85, "edgecolor": "none"},
-    )  # fmt: skip
 
 
 def _cycle() -> Sequence[str]:
