@@ -3,3 +3,23 @@
 The path of a job: `gearfe.train_job` reads the tables and makes a `TrainScene`; `build_train` turns it into a `TrainModel`
 (a `gearfe.rigid` system with its hinges eliminated); `simulate` integrates it and returns a `TrainResponse`.
 """
+
+from .model import TrainModel, build_train
+from .response import TrainResponse
+from .scene import Bearing, Damping, Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
+from .simulate import simulate
+
+__all__ = [
+    "Bearing",
+    "Damping",
+    "Drive",
+    "GearMesh",
+    "Load",
+    "Shaft",
+    "ShaftGear",
+    "TrainModel",
+    "TrainResponse",
+    "TrainScene",
+    "build_train",
+    "simulate",
+]

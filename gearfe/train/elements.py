@@ -7,7 +7,7 @@ internal ones. Forces of second order in the small motions (torque times tilt) a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,9 +55,9 @@ class RigidShaft(Element):
 class LinearForce(Element):
     """Constant springs and dampers between elements: force ``-C v - K q`` on their coordinates, (k, k) each."""
 
-    touches: tuple[Element, ...]
-    C: Array
-    K: Array
+    touches: tuple[Element, ...] = field()
+    C: Array = field()
+    K: Array = field()
     name: str = "springs and dampers"
 
     def blocks(self) -> tuple[Array, Array]:

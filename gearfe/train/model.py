@@ -76,6 +76,8 @@ class TrainModel:
         Bodies.
     meshes
         Lines of action.
+    torques
+        Pairs (direction in the system, torque over time): loads, and the shafts' inertia under a changing drive.
     first : (shafts,)
         Number of each shaft's first coordinate in the system.
     spin_reference : (shafts, system size)
@@ -95,6 +97,7 @@ class TrainModel:
     shafts: tuple[RigidShaft, ...]
     housing: ModalBlocks | None
     meshes: tuple[MeshLine, ...]
+    torques: tuple[tuple[Array, TimeFunction], ...]
     first: NDArray[np.int64]
     spin_reference: Array
     axial: Array
@@ -152,42 +155,49 @@ def build_train(scene: TrainScene) -> TrainModel:
     size = sum(b.size for b in bodies)
     joints, meshes = _supports(scene, shafts, housing), []
     lines = []
-    for number, mesh in enumerate(scene.meshes):
+    for mesh in scene.meshes:
         element, line = _mesh(scene, mesh, shafts, first, ratios, angle, size)
         meshes.append(element)
         lines.append(line)
-        _ = number
     moving = derivative(derivative(angle))
-    forces = [
-        torque(shaft, -g * shaft.rotor.polar * moving, None, f"inertia of {shaft.name} under the drive")
-        for shaft, g in zip(shafts, ratios, strict=True)
-        if any(any(row) for row in moving.coefficients) or moving.sines
-    ]
-    if scene.damping.gyroscopic:
-        forces += [gyroscopic(shaft, g, angle) for shaft, g in zip(shafts, ratios, strict=True)]
+    torques = []
+    for shaft, g in zip(shafts, ratios, strict=True):
+        if any(any(row) for row in moving.coefficients) or moving.sines:
+            function = -g * shaft.rotor.polar * moving
+            torques.append((torque(shaft, function, None, f"inertia of {shaft.name} under the drive"), function))
     for load in scene.loads:
         shaft = shafts[[s.name for s in scene.shafts].index(load.shaft)]
         reaction = None
         if housing is not None and load.bore is not None:
             reaction = (housing, bore_selector(scene, load.bore)[:, 3:] @ frame[2])
-        forces.append(torque(shaft, load.torque, reaction, f"load on {shaft.name}"))
-    elements = [*bodies, *joints, *meshes, *forces]
+        torques.append((torque(shaft, load.torque, reaction, f"load on {shaft.name}"), load.torque))
+    turning = [gyroscopic(shaft, g, angle) for shaft, g in zip(shafts, ratios, strict=True)]
+    turning = turning if scene.damping.gyroscopic else []
+    elements = [*bodies, *joints, *meshes, *turning, *(element for element, _ in torques)]
     system, core = _damped(scene, elements, bodies)
     return TrainModel(
         scene=scene,
         rolling=kinematics,
         system=system,
         core=core,
-        start=_start(scene, system),
+        start=consistent_start(system, 0.0),
         angle=angle,
         shafts=shafts,
         housing=housing,
         meshes=tuple(lines),
+        torques=tuple((_direction(system, element), function) for element, function in torques),
         first=first,
         spin_reference=_spin_reference(scene, size, first),
         axial=_axial(scene, size),
         bores=_used_bores(scene),
     )
+
+
+def _direction(system: System, element: LocalForce) -> Array:
+    """Direction of a force on the whole system's coordinates."""
+    found = np.zeros(system.size)
+    np.add.at(found, system.index[system.elements.index(element)], element.W[:, 0])
+    return found
 
 
 def bore_selector(scene: TrainScene, bore: str) -> Array:
@@ -309,13 +319,10 @@ def _damped(scene: TrainScene, elements: list[Element], bodies: list[Element]) -
     factors = 2.0 * per_mode * np.sqrt(np.maximum(core.squares, 0.0))
     back = core.T.T @ system.mass
     whole = LinearForce(tuple(bodies), back.T @ (factors[:, None] * back), np.zeros_like(system.mass), "modal damping")
-    return System([*elements, whole]), replace(
-        core, system=System([*elements, whole]), damping=core.damping + np.diag(factors)
-    )
-
-
-def _start(scene: TrainScene, system: System) -> Start:
-    return consistent_start(system, 0.0)
+    damped = System([*elements, whole])
+    made = replace(core, system=damped, damping=core.damping + np.diag(factors))
+    damped.__dict__["_minimal"] = made  # the modes are those without damping, and its matrix stays exactly diagonal
+    return damped, made
 
 
 def _used_bores(scene: TrainScene) -> tuple[str, ...]:

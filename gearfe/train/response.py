@@ -24,6 +24,8 @@ class TrainResponse:
         Rotation of the driving shaft relative to the bore of its drive (rad), positive about the axis of the train.
     mesh_names : tuple of m names
         Gear meshes, ``driver-driven``.
+    drive_torque : (n,)
+        Torque of the drive on its shaft (N m), about the axis.
     contact_force : (n, m)
         Force of each mesh along its line of action (N); positive presses the flanks together.
     shaft_names : tuple of s names
@@ -61,7 +63,8 @@ class TrainResponse:
     load_end_s : float
         Time at which all load ramps have ended (s).
     statistics, estimates : mapping
-        Steps and evaluations; error estimates (``integration``, ``reduction``), as far as they were asked for.
+        ``steps``, ``evaluations``, ``method``, ``seconds``, ``free_coordinates``, ``redundant_constraints`` (names),
+        ``smallest_contact_force_N``; error estimates (``integration``, ``reduction``), as far as they were asked for.
     warnings : tuple of str
     """
 
@@ -69,6 +72,7 @@ class TrainResponse:
     drive_angle: Array
     mesh_names: tuple[str, ...]
     contact_force: Array
+    drive_torque: Array
     shaft_names: tuple[str, ...]
     speed: Array
     speed_absolute: Array
