@@ -112,7 +112,7 @@ def tooth_angles(scene: TrainScene, senses: Sequence[float]) -> dict[str, float]
     return {gear.name: found.get(gear.name, 0.0) for gear in scene.gears}
 
 
-def solids(scene: TrainScene, response: TrainResponse, *, per_segment: int = 3) -> tuple[Solid, ...]:
+def solids(scene: TrainScene, response: TrainResponse, *, per_segment: int = 2) -> tuple[Solid, ...]:
     """Surfaces of all gears and of the shafts that carry them, where they stand at the start."""
     frame = scene.frame
     first = {gear.name: _spin(response, response.gear_names.index(gear.name), frame) for gear in scene.gears}

@@ -36,6 +36,7 @@ def made_up(**changes: Any) -> TrainResponse:
     values: dict[str, Any] = {
         "time": time,
         "drive_angle": 600.0 * time,
+        "drive_torque": 49.0 + tone(time, 13, 4.0),
         "mesh_names": ("gear1-gear2", "gear3-gear4"),
         "contact_force": np.column_stack([2000 + tone(time, 13, 150.0), 3000 + tone(time, 9, 200.0)]),
         "shaft_names": ("drive", "intermediate", "output"),

@@ -23,7 +23,8 @@ from .files import whole_file
 _SECONDS = 300.0
 #: Milliseconds a frame.
 _FRAME = 80
-_WINDOW = (1000, 720)
+#: Pixels of a still (before it is reduced) and of a film.
+_STILL, _FILM = (2000, 1440), (720, 520)
 
 
 def draw_scene(path: str | Path, arrays: Mapping[str, NDArray[Any]], title: str) -> str:
@@ -58,73 +59,89 @@ def _draw(job: Path, target: Path) -> None:
 
     stored: dict[str, Any] = load_arrays(job)
     count = len(stored["time"])
-    window = _WINDOW if count == 1 else (720, 520)
-    plotter = pyvista.Plotter(off_screen=True, window_size=list(window), border=False)
+    # a still is drawn twice as large and reduced: smooth edges without a filter that upsets translucent surfaces
+    plotter = pyvista.Plotter(off_screen=True, window_size=list(_STILL if count == 1 else _FILM), border=False)
     plotter.set_background("white")
-    if count == 1:
-        plotter.enable_anti_aliasing("ssaa")
+    large = 2 if count == 1 else 1
+    bar = {"title_font_size": 15 * large, "label_font_size": 13 * large, "color": "black", "width": 0.36, "n_labels": 5}
+    bar |= {"height": 0.055, "position_y": 0.02, "fmt": "%.3g"}
     surfaces = []
-    bar = {"title_font_size": 15, "label_font_size": 13, "color": "black", "width": 0.36, "height": 0.07, "n_labels": 5}
     if "housing_points" in stored:
-        values = stored["housing_values"]
+        values, name = stored["housing_values"], "normal acceleration (m/s2)"
         most = float(np.quantile(np.abs(values), 0.9995)) or 1.0
-        housing = pyvista.PolyData(stored["housing_points"][0], _cells(_flat(stored["housing_faces"])))
-        housing["normal acceleration (m/s2)"] = values[0]
-        near = {"title": "housing: normal acceleration (m/s2)\n", "position_x": 0.06, "position_y": 0.03, "fmt": "%.3g"}
-        plotter.add_mesh(
-            housing, cmap="RdBu_r", clim=(-most, most), opacity=0.62, smooth_shading=False, scalar_bar_args=bar | near,
-            ambient=0.25,
-        )  # fmt: skip
-        surfaces.append((housing, stored["housing_points"], values, "normal acceleration (m/s2)"))
-        edges = housing.extract_feature_edges(feature_angle=35.0)
-        plotter.add_mesh(edges, color="#374151", line_width=1.2)
+        faces = _flat(stored["housing_faces"]) if count == 1 else stored["housing_faces"][:, :3]
+        housing = pyvista.PolyData(stored["housing_points"][0], _cells(faces))
+        housing[name] = values[0]
+        outline = pyvista.PolyData(stored["housing_points"][0], lines=_cells(sharp_edges(housing.points, faces)))
+        near = bar | {"title": "housing: normal acceleration (m/s2)\n", "position_x": 0.06}
+        look = {"cmap": "RdBu_r", "clim": (-most, most), "opacity": 0.62, "ambient": 0.3, "scalar_bar_args": near}
+        plotter.add_mesh(housing, smooth_shading=False, **look)
+        plotter.add_mesh(outline, color="#374151", line_width=1.3 * large)
+        surfaces += [(housing, stored["housing_points"], values, name), (outline, stored["housing_points"], None, "")]
     cells = np.concatenate([_cells(stored["gear_quads"]), _cells(stored["gear_triangles"])])
+    values, name = stored["gear_values"], "displacement (mm)"
     gears = pyvista.PolyData(stored["gear_points"][0], cells)
-    gears["displacement (mm)"] = stored["gear_values"][0]
-    far = {"title": "gears: displacement (mm)\n", "position_x": 0.58, "position_y": 0.03, "fmt": "%.3g"}
-    top = float(stored["gear_values"].max()) or 1.0
-    plotter.add_mesh(gears, cmap="viridis", clim=(0.0, top), smooth_shading=False, scalar_bar_args=bar | far, ambient=0.2)
-    surfaces.append((gears, stored["gear_points"], stored["gear_values"], "displacement (mm)"))
-    every = stored["gear_points"][0] if len(surfaces) == 1 else stored["housing_points"][0]
-    centre, size = 0.5 * (every.min(axis=0) + every.max(axis=0)), float(np.ptp(every, axis=0).max())
-    view = centre + size * np.array([-0.75, -1.15, 1.15])
-    plotter.camera_position = [view, centre - size * np.array([0.0, 0.0, 0.06]), (0.0, 0.0, 1.0)]
-    plotter.camera.zoom(1.12)
-    factor = float(stored["exaggeration"])
-    if count == 1:
-        _caption(plotter, stored, 0, factor)
-        with whole_file(target) as temporary:
-            plotter.screenshot(str(temporary))
-        plotter.close()
-        return
+    gears[name] = values[0]
+    far = bar | {"title": "gears: displacement (mm)\n", "position_x": 0.58}
+    look = {"cmap": "viridis", "clim": (0.0, float(values.max()) or 1.0), "ambient": 0.2, "scalar_bar_args": far}
+    plotter.add_mesh(gears, smooth_shading=False, **look)
+    surfaces.append((gears, stored["gear_points"], values, name))
+    _aim(plotter, surfaces[0][1][0])
     pictures = []
     for step in range(count):
-        for surface, points, values, name in surfaces:
+        for surface, points, values, name in surfaces if step else ():
             surface.points = points[step]
-            surface[name] = values[step]
-        if len(surfaces) == 2:
-            edges.points = housing.extract_feature_edges(feature_angle=35.0).points
-        _caption(plotter, stored, step, factor)
+            if values is not None:
+                surface[name] = values[step]
+        _caption(plotter, stored, step, 10 * large)
         plotter.render()
         pictures.append(plotter.screenshot(return_img=True))
     plotter.close()
-    _write_gif(target, pictures)
+    _write(target, pictures)
 
 
-def _caption(plotter: Any, stored: Mapping[str, Any], step: int, factor: float) -> None:
+def _aim(plotter: Any, points: NDArray[np.float64]) -> None:
+    """Look from the front, above and left; the body in the upper part of the window."""
+    centre, size = 0.5 * (points.min(axis=0) + points.max(axis=0)), float(np.ptp(points, axis=0).max())
+    focus = centre - size * np.array([0.0, 0.0, 0.1])
+    plotter.camera_position = [focus + size * np.array([-0.8, -1.25, 1.25]), focus, (0.0, 0.0, 1.0)]
+
+
+def sharp_edges(points: NDArray[Any], triangles: NDArray[np.int64], angle_deg: float = 35.0) -> NDArray[np.int64]:
+    """(k, 2) edges at which two triangles meet at more than an angle, and edges of one triangle only."""
+    a, b, c = (points[triangles[:, i]].astype(float) for i in range(3))
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    owner = np.tile(np.arange(len(triangles)), 3)
+    order = np.lexsort((edges[:, 1], edges[:, 0]))
+    edges, owner = edges[order], owner[order]
+    twin = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
+    bent = (normal[owner[twin]] * normal[owner[twin + 1]]).sum(axis=1) < np.cos(np.radians(angle_deg))
+    alone = np.ones(len(edges), dtype=bool)
+    alone[twin] = alone[twin + 1] = False
+    return np.concatenate([edges[twin[bent]], edges[alone]])
+
+
+def _caption(plotter: Any, stored: Mapping[str, Any], step: int, size: int) -> None:
+    factor = float(stored["exaggeration"])
     scale = "" if factor == 1.0 else f", vibration drawn {factor:g} times"
     text = f"{stored['title']}\nt = {1e3 * float(stored['time'][step]):.3f} ms{scale}"
-    plotter.add_text(text, font_size=10, color="black", name="caption", position="upper_left")
+    plotter.add_text(text, font_size=size, color="black", name="caption", position="upper_left")
 
 
-def _write_gif(target: Path, pictures: list[NDArray[np.uint8]]) -> None:
-    """All frames with the palette of the one in the middle."""
+def _write(target: Path, pictures: list[NDArray[np.uint8]]) -> None:
+    """One picture at half its size, several as a film with one palette."""
     from PIL import Image
 
     images = [Image.fromarray(picture) for picture in pictures]
-    palette = images[len(images) // 2].quantize(200)
-    made = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
     with whole_file(target) as temporary:
+        if len(images) == 1:
+            images[0].resize((_STILL[0] // 2, _STILL[1] // 2), Image.Resampling.LANCZOS).save(temporary)
+            return
+        some = np.concatenate(pictures[:: max(1, len(pictures) // 5)])
+        palette = Image.fromarray(some).quantize(255)
+        made = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
         made[0].save(temporary, save_all=True, append_images=made[1:], duration=_FRAME, loop=0, optimize=False)
 
 
