@@ -1,4 +1,4 @@
-r"""Elements of a train for the rigid core: shaft, gear mesh, gyroscopic moment, torque, hinge, bearing.
+r"""Elements of a train for the rigid core: shaft, hinge, bearing, constant springs and dampers.
 
 Coordinates of a shaft: displacement of its mass centre along x, y, z (m), small tilts about e1 and e2 (rad), and the rest of
 its spin about the axis a beside rolling with the drive (rad). A housing has the six coordinates of each bore, then its
@@ -12,9 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rigid import Element, LinearJoint, LocalForce, ModalBlocks, TimeFunction
+from ..rigid import Element, LinearJoint, ModalBlocks
 from .inertia import Rotor
-from .law import GYRO, TIME, packed, python_law, train_law
 
 Array = NDArray[np.float64]
 
@@ -65,49 +64,6 @@ class LinearForce(Element):
         return self.C, self.K
 
 
-@dataclass(frozen=True, eq=False)
-class MeshForce(LocalForce):
-    r"""Force of a gear mesh, :math:`F = k(\varphi)\,\delta + d\,\dot\delta`, along ``W[:, 0]`` with the sign -1.
-
-    The approach delta is ``W[:, 0]`` times the coordinates of driver and driven shaft. The mean stiffness and the damping are
-    constant blocks, what is left of k is the compiled law (`gearfe.train.law`). What joins later stands apart: a transmission
-    error is a second curve taken off delta, backlash a law of delta in place of the product, friction a further direction.
-    """
-
-    mean: float = 0.0
-    damping: float = 0.0
-
-    def blocks(self) -> tuple[Array, Array]:
-        """Damping and mean stiffness."""
-        square = np.outer(self.W[:, 0], self.W[:, 0])
-        return self.damping * square, self.mean * square
-
-
-def gyroscopic(shaft: RigidShaft, ratio: float, angle: TimeFunction) -> LocalForce:
-    """Moments ``-J_p Omega (rate of e2-tilt, -rate of e1-tilt)``: the axis of a spinning body gives way sideways."""
-    parameters = packed(GYRO, angle, np.array([ratio, shaft.rotor.polar]))
-    return LocalForce(
-        (shaft,),
-        np.eye(6)[:, 3:],
-        python_law(parameters, 3),
-        train_law,
-        parameters,
-        angle.breaks,
-        name=f"gyroscopic moments of {shaft.name}",
-    )
-
-
-def torque(shaft: RigidShaft, function: TimeFunction, reaction: tuple[Element, Array] | None, name: str) -> LocalForce:
-    """Torque about the axis on a shaft; `reaction` holds a housing and the direction of the bore's rotation in it."""
-    touches: tuple[Element, ...] = (shaft,)
-    W = np.eye(6)[:, 5:]
-    if reaction is not None:
-        touches = (shaft, reaction[0])
-        W = np.vstack([W, -reaction[1][:, None]])
-    parameters = packed(TIME, function)
-    return LocalForce(touches, W, python_law(parameters, 1), train_law, parameters, function.breaks, name=name)
-
-
 def bore_rows(shaft: RigidShaft, point: Array, frame: Array, bore: Array | None) -> Array:
     """Motion of shaft against bore: along e1, a, e2 and tilt about e1, e2; shape (5, 6 or 6 + N).
 
@@ -143,5 +99,3 @@ def bearing(
     """Springs and dampers along the five rows."""
     touches: tuple[Element, ...] = (shaft,) if housing is None else (shaft, housing)
     return LinearForce(touches, rows.T @ (damping[:, None] * rows), rows.T @ (stiffness[:, None] * rows), name)
-
-

@@ -7,7 +7,7 @@ The multipliers are the eigenvalues of the monodromy matrix, the map of (y, v) o
 instability (Nayfeh & Mook, Nonlinear Oscillations, Sec. 5.2). The constant part is solved exactly (exponentials of its
 eigenvalues), the periodic part changes v by an amount that depends on y only, so both alternate in the splitting of order
 4 with six stages for such systems (Blanes & Moan, J. Comput. Appl. Math. 142, 2002, SRKN6b); steps are halved until the
-monodromy matrix stands still.
+moduli stand still.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ MOST_STEPS = 1 << 14
 
 def multipliers(
     squares: Array, damping: Array, directions: Array, gains: Callable[[Array], Array], period: float, *,
-    tolerance: float = 1e-7, first: int = 64,
+    tolerance: float = 1e-6, first: int = 64,
 ) -> Complex:  # fmt: skip
     """Floquet multipliers, largest modulus first.
 
@@ -53,7 +53,7 @@ def multipliers(
     period
         T (s).
     tolerance
-        Change of the monodromy matrix, relative to its largest entry, from one number of steps to the next.
+        Change of any multiplier's modulus from one number of steps to the next, relative to the largest.
     first
         Fewest steps.
 
@@ -61,19 +61,20 @@ def multipliers(
     -------
     ndarray of complex, shape (2n,)
     """
-    before, steps = _monodromy(squares, damping, directions, gains, period, first), first
+    steps = first
+    before = _sorted(np.linalg.eigvals(_monodromy(squares, damping, directions, gains, period, steps)))
     while steps < MOST_STEPS:
         steps *= 2
-        now = _monodromy(squares, damping, directions, gains, period, steps)
-        if not np.isfinite(now).all():
-            break
-        change = np.abs(now - before).max() / np.abs(now).max()
-        before = now + (now - before) / 15.0  # order 4
-        if change / 15.0 < tolerance:
-            break
+        now = _sorted(np.linalg.eigvals(_monodromy(squares, damping, directions, gains, period, steps)))
+        change = np.abs(np.abs(now) - np.abs(before)).max() / np.abs(now).max()
         before = now
-    found = np.linalg.eigvals(before)
-    return np.asarray(found[np.argsort(-np.abs(found), kind="stable")])
+        if change < tolerance:
+            break
+    return before
+
+
+def _sorted(values: Complex) -> Complex:
+    return np.asarray(values[np.argsort(-np.abs(values), kind="stable")])
 
 
 def _monodromy(
@@ -125,10 +126,6 @@ def train_multipliers(model: TrainModel) -> tuple[Complex | None, str]:
     directions = np.array([line.row @ core.T for line in lines]).reshape(len(lines), -1).T
 
     def gains(t: Array) -> Array:
-        return np.array([line.mean - _stiffness(line, speed * t) for line in lines]).reshape(len(lines), -1).T
+        return np.array([line.mean - line.stiffness(speed * t) for line in lines]).reshape(len(lines), -1).T
 
     return multipliers(core.squares, damping, directions, gains, period), ""
-
-
-def _stiffness(line, angle: Array) -> Array:  # type: ignore[no-untyped-def]
-    return np.asarray(line.curve(line.sense * line.ratio * angle + line.phase).value)

@@ -14,50 +14,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..periodic import PeriodicInterpolant
 from ..rigid import Element, LinearJoint, LocalForce, ModalBlocks, Start, System, TimeFunction, consistent_start
 from ..rigid.elimination import Minimal, minimal
-from .checks import check_scene, interpolant
-from .elements import LinearForce, MeshForce, RigidShaft, bearing, bore_rows, gyroscopic, hinge, torque
+from .checks import check_scene
+from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge
 from .inertia import rotor
 from .kinematics import Rolling, rolling
-from .law import MESH, derivative, mesh_numbers, packed, python_law, train_law
-from .scene import GearMesh, TrainScene
+from .law import angle_block, derivative, gyro_block, joined, python_law, torque_block, train_law
+from .mesh_element import MeshLine, mesh_line
+from .scene import TrainScene
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class MeshLine:
-    """Where and how a mesh acts.
-
-    Attributes
-    ----------
-    name
-    row : (system size,)
-        Approach for unit coordinates of the system.
-    curve
-        Stiffness over the driver's rotation; None for a rigid mesh.
-    damping
-        N s/m, the Rayleigh part included.
-    driver
-        Number of the driver's shaft.
-    ratio, sense, phase
-        Ratio of the driver's shaft to the drive, its driving sense (+1, -1), start of the curve (rad).
-    module
-        m.
-    """
-
-    name: str
-    row: Array
-    curve: PeriodicInterpolant | None
-    mean: float
-    damping: float
-    driver: int
-    ratio: float
-    sense: float
-    phase: float
-    module: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,27 +120,10 @@ def build_train(scene: TrainScene) -> TrainModel:
     bodies: list[Element] = [*shafts] if housing is None else [housing, *shafts]
     first = np.array([0 if housing is None else housing.size] + [6] * (len(shafts) - 1)).cumsum()
     size = sum(b.size for b in bodies)
-    joints, meshes = _supports(scene, shafts, housing), []
-    lines = []
-    for mesh in scene.meshes:
-        element, line = _mesh(scene, mesh, shafts, first, ratios, angle, size)
-        meshes.append(element)
-        lines.append(line)
-    moving = derivative(derivative(angle))
-    torques = []
-    for shaft, g in zip(shafts, ratios, strict=True):
-        if any(any(row) for row in moving.coefficients) or moving.sines:
-            function = -g * shaft.rotor.polar * moving
-            torques.append((torque(shaft, function, None, f"inertia of {shaft.name} under the drive"), function))
-    for load in scene.loads:
-        shaft = shafts[[s.name for s in scene.shafts].index(load.shaft)]
-        reaction = None
-        if housing is not None and load.bore is not None:
-            reaction = (housing, bore_selector(scene, load.bore)[:, 3:] @ frame[2])
-        torques.append((torque(shaft, load.torque, reaction, f"load on {shaft.name}"), load.torque))
-    turning = [gyroscopic(shaft, g, angle) for shaft, g in zip(shafts, ratios, strict=True)]
-    turning = turning if scene.damping.gyroscopic else []
-    elements = [*bodies, *joints, *meshes, *turning, *(element for element, _ in torques)]
+    lines = tuple(mesh_line(scene, mesh, shafts, first, ratios, size) for mesh in scene.meshes)
+    torques = _torques(scene, shafts, first, ratios, angle, size)
+    forces = _forces(scene, bodies, lines, torques, angle, first, ratios, shafts)
+    elements = [*bodies, *_supports(scene, shafts, housing), *(line.element(bodies) for line in lines), forces]
     system, core = _damped(scene, elements, bodies)
     return TrainModel(
         scene=scene,
@@ -184,8 +134,8 @@ def build_train(scene: TrainScene) -> TrainModel:
         angle=angle,
         shafts=shafts,
         housing=housing,
-        meshes=tuple(lines),
-        torques=tuple((_direction(system, element), function) for element, function in torques),
+        meshes=lines,
+        torques=torques,
         first=first,
         spin_reference=_spin_reference(scene, size, first),
         axial=_axial(scene, size),
@@ -193,11 +143,54 @@ def build_train(scene: TrainScene) -> TrainModel:
     )
 
 
-def _direction(system: System, element: LocalForce) -> Array:
-    """Direction of a force on the whole system's coordinates."""
-    found = np.zeros(system.size)
-    np.add.at(found, system.index[system.elements.index(element)], element.W[:, 0])
-    return found
+def _torques(
+    scene: TrainScene, shafts: tuple[RigidShaft, ...], first: NDArray[np.int64], ratios: list[float],
+    angle: TimeFunction, size: int,
+) -> tuple[tuple[Array, TimeFunction], ...]:  # fmt: skip
+    """Directions in the system with torques over time: loads, and the shafts' inertia under a drive of changing speed."""
+    made = []
+    change = derivative(derivative(angle))
+    for i, (shaft, ratio) in enumerate(zip(shafts, ratios, strict=True)):
+        if change.sines or any(any(row) for row in change.coefficients):
+            direction = np.zeros(size)
+            direction[first[i] + 5] = 1.0
+            made.append((direction, -ratio * shaft.rotor.polar * change))
+    for load in scene.loads:
+        i = [s.name for s in scene.shafts].index(load.shaft)
+        direction = np.zeros(size)
+        direction[first[i] + 5] = 1.0
+        if scene.housing is not None and load.bore is not None:
+            direction[: scene.housing.size] -= bore_selector(scene, load.bore)[:, 3:] @ scene.frame[2]
+        made.append((direction, load.torque))
+    return tuple(made)
+
+
+def _forces(
+    scene: TrainScene, bodies: list[Element], lines: tuple[MeshLine, ...],
+    torques: tuple[tuple[Array, TimeFunction], ...], angle: TimeFunction, first: NDArray[np.int64], ratios: list[float],
+    shafts: tuple[RigidShaft, ...],
+) -> LocalForce:  # fmt: skip
+    """All that is not constant, as one force: three directions a shaft (tilts, spin), one a mesh, one a torque."""
+    size = sum(b.size for b in bodies)
+    unit = np.eye(size)
+    columns = [unit[:, i + 3 : i + 6] for i in first]
+    blocks = [angle_block(angle)]
+    if scene.damping.gyroscopic:
+        blocks += [gyro_block(3 * i, g, s.rotor.polar) for i, (g, s) in enumerate(zip(ratios, shafts, strict=True))]
+    at = 3 * len(shafts)
+    for line in lines:
+        if line.curve is not None:
+            columns.append(line.row[:, None])
+            blocks.append(line.block(at, 3 * line.driver + 2))
+            at += 1
+    for direction, function in torques:
+        columns.append(direction[:, None])
+        blocks.append(torque_block(at, function))
+        at += 1
+    parameters = joined(blocks)
+    breaks = tuple(sorted({*angle.breaks, *(b for _, function in torques for b in function.breaks)}))
+    law = python_law(parameters, at)
+    return LocalForce(tuple(bodies), np.hstack(columns), law, train_law, parameters, breaks, name="forces of the train")
 
 
 def bore_selector(scene: TrainScene, bore: str) -> Array:
@@ -239,72 +232,6 @@ def _supports(scene: TrainScene, shafts: tuple[RigidShaft, ...], housing: ModalB
                 touches = (body, housing)
             made.append(LinearJoint(touches, row, np.zeros(1), name="drive"))
     return made
-
-
-def _mesh(
-    scene: TrainScene,
-    mesh: GearMesh,
-    shafts: tuple[RigidShaft, ...],
-    first: NDArray[np.int64],
-    ratios: list[float],
-    angle: TimeFunction,
-    size: int,
-) -> tuple[Element, MeshLine]:
-    """Element and line of action of one mesh."""
-    from ..gear import GearPair
-
-    assert scene.drive is not None
-    names = [s.name for s in scene.shafts]
-    one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
-    i, j = names.index(one.shaft), names.index(two.shaft)
-    a = scene.frame[2]
-    sense = math.copysign(1.0, ratios[i] * _drive_sense(scene.drive.speed))
-    pair = GearPair(one.gear, two.gear, mesh.centre_distance)
-    alpha = pair.working_pressure_angle
-    arm = np.array(scene.shaft(two.shaft).point) - np.array(scene.shaft(one.shaft).point)
-    arm = arm - (arm @ a) * a
-    across = arm / np.linalg.norm(arm)
-    line = math.cos(alpha) * sense * np.cross(a, across) + math.sin(alpha) * across
-    low = max(g.along - 0.5 * g.gear.face_width for g in (one, two))
-    high = min(g.along + 0.5 * g.gear.face_width for g in (one, two))
-    base = np.array(scene.shaft(one.shaft).point)
-    point = base + (0.5 * (low + high) - float(base @ a)) * a + pair.pinion_working_radius * across
-    rows = [line @ shafts[i].point_rows(point, scene.frame), -line @ shafts[j].point_rows(point, scene.frame)]
-    W = np.zeros((12, 2))
-    W[:, 0] = np.concatenate(rows)
-    W[5, 1] = 1.0
-    row = np.zeros(size)
-    row[first[i] : first[i] + 6] += rows[0]
-    row[first[j] : first[j] + 6] += rows[1]
-    bodies = (shafts[i], shafts[j])
-    if mesh.stiffness is None:
-        described = MeshLine(mesh.name, row, None, math.inf, 0.0, i, ratios[i], sense, 0.0, one.gear.module)
-        return LinearJoint(bodies, W[:, :1].T, np.zeros(1), name=f"mesh {mesh.name}"), described
-    curve = interpolant(mesh)
-    mean = mean_value(curve)
-    damping = mesh.damping + scene.damping.beta * mean
-    described = MeshLine(mesh.name, row, curve, mean, damping, i, ratios[i], sense, mesh.phase, one.gear.module)
-    parameters = packed(MESH, angle, mesh_numbers(ratios[i], sense, mesh.phase, mean, curve))
-    element = MeshForce(
-        bodies, W, python_law(parameters, 2), train_law, parameters, angle.breaks, f"mesh {mesh.name}", mean, damping
-    )
-    return element, described
-
-
-def mean_value(curve: PeriodicInterpolant) -> float:
-    """Mean of a curve over its period: the trapezium rule, and for cubics its correction with the slopes."""
-    h = np.diff(curve.nodes)
-    area = 0.5 * h @ (curve.values[:-1] + curve.values[1:])
-    if curve.method == "cubic":
-        area += (h * h / 12.0) @ (curve.slopes[:-1] - curve.slopes[1:])
-    return float(area / curve.period)
-
-
-def _drive_sense(speed: TimeFunction) -> float:
-    """Sense in which the drive turns: its first speed that is not zero."""
-    times = [0.0, *speed.breaks, *(0.5 * (a + b) for a, b in zip((0.0, *speed.breaks), speed.breaks, strict=False))]
-    found = [float(speed(t)) for t in sorted(times)]
-    return next((math.copysign(1.0, s) for s in found if s != 0.0), 1.0)
 
 
 def _damped(scene: TrainScene, elements: list[Element], bodies: list[Element]) -> tuple[System, Minimal]:

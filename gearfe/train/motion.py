@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rigid import Trajectory
-from .model import MeshLine, TrainModel
+from .model import TrainModel
 
 Array = NDArray[np.float64]
 
@@ -52,19 +52,12 @@ def motion(model: TrainModel, trajectory: Trajectory) -> Motion:
     return Motion(t, q, v, a, contact_forces(model, t, q, v, multipliers), -multipliers["drive"][:, 0])
 
 
-def stiffness_at(model: TrainModel, line: MeshLine, t: Array, rest: Array | float = 0.0) -> Array:
-    """k(phase) (N/m) at the times t, with the driver's rotation beside rolling `rest` (rad)."""
-    assert line.curve is not None
-    rotation = line.ratio * model.angle(t) + rest
-    return line.curve(line.sense * rotation + line.phase).value
-
-
 def forces(model: TrainModel, t: Array, q: Array, v: Array) -> Array:
     """All forces but the constant blocks on the system's coordinates, shape (n, size)."""
     total = np.zeros_like(q)
     for line in model.meshes:
         if line.curve is not None:
-            k = stiffness_at(model, line, t, q[:, model.first[line.driver] + 5])
+            k = line.stiffness(model.angle(t), q[:, model.first[line.driver] + 5])
             total -= ((k - line.mean) * (q @ line.row))[:, None] * line.row
     speed = model.angle(t, 1)
     if model.scene.damping.gyroscopic:
@@ -84,7 +77,7 @@ def contact_forces(model: TrainModel, t: Array, q: Array, v: Array, multipliers:
         if line.curve is None:
             out[:, i] = multipliers[f"mesh {line.name}"][:, 0]
         else:
-            k = stiffness_at(model, line, t, q[:, model.first[line.driver] + 5])
+            k = line.stiffness(model.angle(t), q[:, model.first[line.driver] + 5])
             out[:, i] = k * (q @ line.row) + line.damping * (v @ line.row)
     return out
 
