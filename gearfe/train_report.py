@@ -110,15 +110,7 @@ def spectra(
         A record that is longer than the response or has fewer than two samples.
     """
     step = uniform_step(response.time)
-    available = len(response.time) - 1
-    first = round((start - float(response.time[0])) / step)
-    if not 0 <= first <= available - 2:
-        problem = f"must leave two samples at least of 0..{response.time[-1]:g} s"
-        raise InputError("spectrum start", start, problem, "begin earlier")
-    count = available - first if length is None else round(length / step)
-    if count > available - first:
-        problem = f"the window is longer than the signal, which has {(available - first) * step:g} s from its start"
-        raise InputError("window length", length, problem, "shorten the window or compute for longer")
+    first, count = record(response.time, start, length)
     columns = {n: v for n, v in response_columns(response).items() if n not in NO_SIGNALS}
     options: dict[str, Any] = {"window": window, "start": first, "length": count}
     spectrum = amplitude_spectrum(np.column_stack(list(columns.values())), step, **options)
@@ -126,6 +118,23 @@ def spectra(
     if radiation is not None and response.modal_velocity is not None:
         power = radiated_power(radiation, response.modal_velocity, step, **options)
     return TrainSpectra(tuple(columns), spectrum, power, float(response.time[first]), step)
+
+
+def record(time: Array, start: float = 0.0, length: float | None = None) -> tuple[int, int]:
+    """First sample and number of samples of the record of a spectrum; see `spectra`."""
+    step = uniform_step(time)
+    available = len(time) - 1
+    first = round((start - float(time[0])) / step)
+    if not 0 <= first <= available - 2:
+        problem = f"must leave two samples at least of {time[0]:g}..{time[-1]:g} s"
+        raise InputError("spectrum start", start, problem, "begin earlier")
+    count = available - first if length is None else round(length / step)
+    if count > available - first:
+        problem = f"the window is longer than the signal, which has {(available - first) * step:g} s from its start"
+        raise InputError("window length", length, problem, "shorten the window or compute for longer")
+    if count < 2:
+        raise InputError("window length", length, f"is less than two steps of {step:g} s", "lengthen the window")
+    return first, count
 
 
 def mean_over_periods(time: Array, values: Array, begin: float, period: float | None) -> tuple[Array, int]:
