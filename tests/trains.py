@@ -11,7 +11,7 @@ import numpy as np
 from gearfe.gear import Gear
 from gearfe.modal_body import ModalBody
 from gearfe.periodic import PeriodicInterpolant, periodic_interpolant
-from gearfe.rigid import constant, smoothed_step
+from gearfe.rigid import TimeFunction, constant, smoothed_step
 from gearfe.train import Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
 
 MODULE, ALPHA = 2.5e-3, math.radians(25.0)
@@ -32,6 +32,11 @@ def curve(teeth: int, mean: float = 1e8, swing: float = 0.1, method: str = "cubi
     period = 2.0 * math.pi / teeth
     phase = period * np.arange(count) / count
     return periodic_interpolant(phase, mean * (1 + swing * np.cos(teeth * phase)), period, method=method)
+
+
+def braking(stages: int) -> TimeFunction:
+    """Torque that brakes the last shaft: it turns with the drive after an even number of stages."""
+    return smoothed_step(0.5e-3, 1e-3, TORQUE * (-1) ** stages)
 
 
 def train(stages: list[tuple[int, int]], *, stiffness: Any = 1e8, ys: list[float] | None = None, **changes: Any) -> TrainScene:
@@ -55,7 +60,7 @@ def train(stages: list[tuple[int, int]], *, stiffness: Any = 1e8, ys: list[float
         gears=tuple(gears),
         meshes=tuple(meshes),
         drive=Drive("s0", "s0+", constant(SPEED)),
-        loads=(Load(names[-1], f"{names[-1]}+", smoothed_step(0.5e-3, 1e-3, TORQUE)),),
+        loads=(Load(names[-1], f"{names[-1]}+", braking(len(stages))),),
         rigid_bores=bores,
     )
     return dataclasses.replace(scene, **changes)
