@@ -53,6 +53,8 @@ def modal_steps(
     du = np.empty(W.shape[0])
     out = np.zeros(W.shape[0])
     limit = np.empty(n2)
+    five = np.empty(n2)
+    three = np.empty(n2)
     sign = 1.0 if t1 >= t else -1.0
     begin = t
     modal_rhs(squares, damping, diagonal, full, constant, W, offset, first, parameters, t, y, K[0], u, du, out)
@@ -94,17 +96,23 @@ def modal_steps(
                 top_q = max(top_q, limit[i])
             else:
                 top_v = max(top_v, limit[i])
+        for i in range(n2):
+            five[i] = 0.0
+            three[i] = 0.0
+        for s in range(13):
+            if E5[s] != 0.0 or E3[s] != 0.0:
+                for i in range(n2):
+                    five[i] += E5[s] * K[s, i]
+                    three[i] += E3[s] * K[s, i]
+        for i in range(n2):
+            reach = 1.0 / (limit[i] + 1e-6 * (top_q if i < n else top_v))
+            five[i] *= reach
+            three[i] *= reach
         big = 0.0
         small = 0.0
         for i in range(n2):
-            five = 0.0
-            three = 0.0
-            for s in range(13):
-                five += E5[s] * K[s, i]
-                three += E3[s] * K[s, i]
-            reach = limit[i] + 1e-6 * (top_q if i < n else top_v)
-            big += (five / reach) ** 2
-            small += (three / reach) ** 2
+            big += five[i] * five[i]
+            small += three[i] * three[i]
         error = 0.0
         if big > 0.0:
             error = step * big / math.sqrt((big + 0.01 * small) * n2)
@@ -137,11 +145,14 @@ def modal_steps(
             P[count, 0, i] = change
             P[count, 1, i] = d * K[0, i] - change
             P[count, 2, i] = 2.0 * change - d * (K[12, i] + K[0, i])
-            for k in range(4):
-                value = 0.0
-                for s in range(16):
-                    value += D[k, s] * K[s, i]
-                P[count, 3 + k, i] = d * value
+        for k in range(4):
+            for i in range(n2):
+                P[count, 3 + k, i] = 0.0
+            for s in range(16):
+                factor = d * D[k, s]
+                if factor != 0.0:
+                    for i in range(n2):
+                        P[count, 3 + k, i] += factor * K[s, i]
         t = goal if fixed else t + d
         T[count] = t
         for i in range(n2):

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..rigid.timefunctions import TimeFunction
 from .scene import TrainScene
 
 Array = NDArray[np.float64]
@@ -90,3 +91,33 @@ def _common(cycles: tuple[Fraction, ...]) -> tuple[Fraction | None, str]:
         note = f"the meshes share a period of {count} mesh cycles only, more than {MOST_CYCLES}: none within reason"
         return None, note
     return turns, ""
+
+
+def steady_forces(scene: TrainScene) -> Array:
+    """Force of each mesh (N) under the final torques of the loads, without inertia; shape (meshes,).
+
+    At every shaft that is not driven the moments about the axis balance, base radius times force at each mesh. In a loop
+    of gears the forces of least squares are returned: statics alone do not tell them.
+    """
+    assert scene.drive is not None
+    kinematics = rolling(scene)
+    names = [s.name for s in scene.shafts]
+    arms = np.zeros((len(names), len(scene.meshes)))
+    for column, mesh in enumerate(scene.meshes):
+        one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
+        i = names.index(one.shaft)
+        sense = math.copysign(1.0, kinematics.ratios[i] * drive_sense(scene.drive.speed))
+        arms[i, column] += sense * one.gear.base_radius
+        arms[names.index(two.shaft), column] += sense * two.gear.base_radius
+    torque = np.zeros(len(names))
+    for load in scene.loads:
+        torque[names.index(load.shaft)] += float(load.torque(max(load.torque.breaks, default=0.0)))
+    free = [k for k, name in enumerate(names) if name != scene.drive.shaft]
+    return np.asarray(np.linalg.lstsq(arms[free], torque[free], rcond=None)[0])
+
+
+def drive_sense(speed: TimeFunction) -> float:
+    """Sense in which the drive turns: its first speed that is not zero."""
+    times = [0.0, *speed.breaks, *(0.5 * (a + b) for a, b in zip((0.0, *speed.breaks), speed.breaks, strict=False))]
+    found = [float(speed(t)) for t in sorted(times)]
+    return next((math.copysign(1.0, s) for s in found if s != 0.0), 1.0)

@@ -26,9 +26,10 @@ from numpy.typing import NDArray
 
 from ..gear import GearPair
 from ..periodic import PeriodicInterpolant
-from ..rigid import Element, LinearJoint, TimeFunction
+from ..rigid import Element, LinearJoint
 from .checks import interpolant
 from .elements import LinearForce, RigidShaft
+from .kinematics import drive_sense
 from .law import mesh_block
 from .scene import GearMesh, TrainScene
 
@@ -131,10 +132,3 @@ def mean_value(curve: PeriodicInterpolant) -> float:
     if curve.method == "cubic":
         area += (h * h / 12.0) @ (curve.slopes[:-1] - curve.slopes[1:])
     return float(area / curve.period)
-
-
-def drive_sense(speed: TimeFunction) -> float:
-    """Sense in which the drive turns: its first speed that is not zero."""
-    times = [0.0, *speed.breaks, *(0.5 * (a + b) for a, b in zip((0.0, *speed.breaks), speed.breaks, strict=False))]
-    found = [float(speed(t)) for t in sorted(times)]
-    return next((math.copysign(1.0, s) for s in found if s != 0.0), 1.0)
