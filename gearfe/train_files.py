@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -89,10 +90,12 @@ def write_all(
     watch: Stopwatch,
     further: Mapping[str, Any] | None = None,
     progress: Callable[[int, int, str], None] | None = None,
+    started: float | None = None,
 ) -> Written:
     """Write ``response.csv``, ``spectrum.csv``, ``summary.json`` and what else is chosen.
 
-    A run that ended early gets the same files, as far as it came.
+    A run that ended early gets the same files, as far as it came. With `started` (of `time.perf_counter`) the watch gets
+    the total.
     """
     radiation = None if scene.housing is None else scene.housing.radiation
     made = None
@@ -114,6 +117,8 @@ def write_all(
         if choice.fields:
             with watch.stage("fields"):
                 problems += _fields(target, scene, response, choice, title, progress)
+        if started is not None:
+            watch.seconds["total"] = time.perf_counter() - started
         summary = train_summary(response, made, watch.seconds, **(further or {}))
         write_json(target / "summary.json", summary)
         names = tuple(sorted(path.name for path in target.iterdir()))

@@ -21,7 +21,9 @@ from .spectrum import (
     peaks,
     uniform_step,
 )
+from .stiffness_curve import StiffnessCurve
 from .train.response import TrainResponse
+from .train.scene import TrainScene
 
 Array = NDArray[np.float64]
 
@@ -250,6 +252,19 @@ def train_summary(
         "timings_s": dict(timings),
     }
     return summary
+
+
+def stiffness_ranges(scene: TrainScene) -> dict[str, tuple[float | None, float | None]]:
+    """Mesh -> smallest and largest stiffness (N/m); None for a rigid mesh."""
+    found: dict[str, tuple[float | None, float | None]] = {}
+    for mesh in scene.meshes:
+        given = mesh.stiffness
+        if given is None or isinstance(given, float | int):
+            found[mesh.name] = (given, given)
+        else:
+            values = given.k_mesh if isinstance(given, StiffnessCurve) else given.values
+            found[mesh.name] = (float(np.nanmin(values)), float(np.nanmax(values)))
+    return found
 
 
 def all_warnings(response: TrainResponse, made: TrainSpectra | None) -> list[str]:
