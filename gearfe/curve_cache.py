@@ -22,6 +22,21 @@ from .meshing.cache import cache_folder, cache_key
 from .stiffness_curve import StiffnessCurve
 from .stopwatch import Stopwatch
 
+#: Modules beside those of contact and meshing that decide a curve.
+MODULES = (
+    "curves",
+    "elasticity",
+    "gear",
+    "involute",
+    "mesh_geometry",
+    "spur_gear",
+    "stiffness",
+    "stiffness_curve",
+    "sweep_positions",
+    "torque_control",
+    "unloaded",
+)
+
 
 def cached_curve(
     pair: GearPair, model: dict[str, Any], sweep: dict[str, Any], *, watch: Stopwatch | None = None, progress: Any = None
@@ -80,10 +95,11 @@ def _stored(path: Path, pair: GearPair) -> StiffnessCurve | None:
 
 @cache
 def _source() -> str:
-    """Hash of the modules that compute curves: those beside this one, of contact and of meshing."""
+    """Hash of the text of the modules that compute curves."""
     here = Path(__file__).parent
+    files = [here / f"{name}.py" for name in MODULES]
+    files += [file for folder in ("contact", "meshing") for file in sorted((here / folder).glob("*.py"))]
     text = hashlib.sha256()
-    for place in (here, here / "contact", here / "meshing"):
-        for file in sorted(place.glob("*.py")):
-            text.update(file.name.encode() + file.read_bytes())
+    for file in files:
+        text.update(file.name.encode() + file.read_bytes())
     return text.hexdigest()

@@ -12,11 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .figures import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save
+from .figures import BLUE, GREEN, GREY, ORANGE, RED, new_figure
+from .files import whole_file
 
 Array = NDArray[np.float64]
 
 COLOURS = (BLUE, ORANGE, GREEN, RED, "#6d4c9f", "#0f766e", "#8a5a2b")
+_DPI = 130
 #: Lines of the meshes.
 _DASHES = ((0, (6, 3)), (0, (2, 2)), (0, (6, 2, 2, 2)))
 
@@ -95,7 +97,7 @@ def response_figure(
         part.tick_params(labelbottom=False)
     for part in (axes[0], axes[-3], turning, normal):
         part.set_xlabel("rotation of the drive  (deg)")
-    save(figure, path)
+    _save(figure, path)
 
 
 def spectrum_figure(
@@ -155,7 +157,7 @@ def spectrum_figure(
             bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 0.6},
         )
     axes.set_ylabel(quantity)
-    save(figure, path)
+    _save(figure, path)
 
 
 def power_figure(
@@ -185,7 +187,7 @@ def power_figure(
     axes.bar(frequency[shown], level[shown] - bottom, width=width, bottom=bottom, color=BLUE, linewidth=0)
     axes.set_ylim(bottom, top + 0.18 * (top - bottom) + 1.0)
     axes.set_ylabel("radiated power level  (dB re 1 pW)")
-    save(figure, path)
+    _save(figure, path)
 
 
 def _frequency_axes(
@@ -233,6 +235,13 @@ def _fixed(width: float, height: float) -> Any:
     figure = new_figure(width, height)
     figure.set_layout_engine("none")
     return figure
+
+
+def _save(figure: Any, path: str | Path) -> None:
+    """Write a PNG whole. The canvas is drawn once; `savefig` draws it twice."""
+    figure.set_dpi(_DPI)
+    with whole_file(path) as temporary:
+        figure.canvas.print_png(temporary, pil_kwargs={"compress_level": 4})
 
 
 def _panel(axes: Any, ylabel: str, letter: str, title: str) -> Any:
