@@ -175,7 +175,7 @@ def job_scene(
         tuple(Bearing(str(b.attachment), b.stiffness, b.damping) for b in t.bearings),
         damping,
     )
-    if geometry_only or body is not None:
+    if geometry_only:
         from .train.checks import check_scene
 
         check_scene(scene)
