@@ -121,7 +121,7 @@ def title(job: TrainJob) -> str:
     parts = [f"{len(table.shafts)} shafts, {len(table.meshes)} gear meshes"]
     if table.drive is not None:
         parts.append(f"drive {table.drive.speed_rad_per_s:g} rad/s")
-    parts += [f"load {load.torque_Nm:g} N m on {load.shaft}" for load in table.loads[:1]]
+    parts += [f"load {load.torque_Nm:g} N m on {load.shaft}".replace("-", "−", 1) for load in table.loads[:1]]
     if table.variant:
         parts.append(f"variant {table.variant}")
     return ", ".join(parts)

@@ -129,6 +129,8 @@ def spectrum_figure(
         Lines of the meshes.
     shaft
         Name and frequency (kHz) of the shaft whose orders are on top.
+    title
+        First line: what is shown; second line: of what.
     note
         Small text above: resolution, window, mean.
     highest
@@ -193,10 +195,12 @@ def power_figure(
 def _frequency_axes(
     figure: Any, title: str, marks: Sequence[Mark], shaft: tuple[str, float], highest: float, note: str
 ) -> Any:
-    axes = figure.add_axes((0.062, 0.175, 0.925, 0.645))
+    axes = figure.add_axes((0.062, 0.175, 0.925, 0.615))
     _panel(axes, "", "", "")
-    axes.set_title(title, fontsize=11, loc="left", pad=34)
-    axes.set_title(note, fontsize=8.5, loc="right", pad=34, color="#374151")
+    head, _, scene = title.partition("\n")
+    figure.text(0.062, 0.945, head, fontsize=11)
+    figure.text(0.062, 0.9, scene, fontsize=8.5, color="#374151")
+    figure.text(0.987, 0.945, note, fontsize=8.5, color="#374151", ha="right")
     axes.set_xlim(0.0, highest)
     axes.set_xlabel("frequency  (kHz)")
     groups = sorted({mark.group for mark in marks})

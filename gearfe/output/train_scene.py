@@ -68,7 +68,7 @@ def _draw(job: Path, target: Path) -> None:
     surfaces = []
     if "housing_points" in stored:
         values, name = stored["housing_values"], "normal acceleration (m/s2)"
-        most = float(np.quantile(np.abs(values), 0.9995)) or 1.0
+        most = float(np.quantile(np.abs(values[values != 0.0]), 0.97)) if values.any() else 1.0
         faces = _flat(stored["housing_faces"]) if count == 1 else stored["housing_faces"][:, :3]
         housing = pyvista.PolyData(stored["housing_points"][0], _cells(faces))
         housing[name] = values[0]
@@ -93,7 +93,7 @@ def _draw(job: Path, target: Path) -> None:
             surface.points = points[step]
             if values is not None:
                 surface[name] = values[step]
-        _caption(plotter, stored, step, 10 * large)
+        _caption(plotter, stored, step, 9 * large)
         plotter.render()
         pictures.append(plotter.screenshot(return_img=True))
     plotter.close()
@@ -127,7 +127,7 @@ def _caption(plotter: Any, stored: Mapping[str, Any], step: int, size: int) -> N
     factor = float(stored["exaggeration"])
     scale = "" if factor == 1.0 else f", vibration drawn {factor:g} times"
     text = f"{stored['title']}\nt = {1e3 * float(stored['time'][step]):.3f} ms{scale}"
-    plotter.add_text(text, font_size=size, color="black", name="caption", position="upper_left")
+    plotter.add_text(text.replace("−", "-"), font_size=size, color="black", name="caption", position="upper_left")
 
 
 def _write(target: Path, pictures: list[NDArray[np.uint8]]) -> None:
@@ -140,8 +140,8 @@ def _write(target: Path, pictures: list[NDArray[np.uint8]]) -> None:
             images[0].resize((_STILL[0] // 2, _STILL[1] // 2), Image.Resampling.LANCZOS).save(temporary)
             return
         some = np.concatenate(pictures[:: max(1, len(pictures) // 5)])
-        palette = Image.fromarray(some).quantize(255)
-        made = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+        palette = Image.fromarray(some).quantize(255, method=Image.Quantize.MAXCOVERAGE)
+        made = [image.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG) for image in images]
         made[0].save(temporary, save_all=True, append_images=made[1:], duration=_FRAME, loop=0, optimize=False)
 
 
