@@ -152,7 +152,8 @@ def job_scene(
     drive = None
     if t.drive is not None:
         speed = _ramp(t.drive.speed_rad_per_s, t.drive.ramp_centre_ms, t.drive.ramp_width_ms)
-        drive = Drive(t.drive.shaft, str(t.drive.attachment), speed)
+        coupling = (t.drive.stiffness_Nm_per_rad, t.drive.damping_Nm_s_per_rad)
+        drive = Drive(t.drive.shaft, str(t.drive.attachment), speed, *coupling)
     loads = tuple(
         Load(
             x.shaft,

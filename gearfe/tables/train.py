@@ -84,6 +84,8 @@ class TrainDriveTable:
     speed_rad_per_s: float = quantity(doc="speed about +y (rad/s)")
     ramp_centre_ms: float = quantity(0.0, doc="middle of the smoothed step from rest to the speed (ms)")
     ramp_width_ms: float | None = quantity(None, above=0.0, doc="duration of that step (ms); left out: constant speed")
+    stiffness_Nm_per_rad: float | None = quantity(None, above=0.0, doc="of an elastic coupling (N m/rad); left out: rigid")
+    damping_Nm_s_per_rad: float = quantity(0.0, low=0.0, doc="of that coupling (N m s/rad)")
 
 
 @dataclass(frozen=True)

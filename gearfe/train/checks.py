@@ -95,6 +95,10 @@ def _check_ends(scene: TrainScene) -> None:
     if scene.drive is None:
         problem = "nothing holds the train: no shaft is driven, so any torque would spin it up without end"
         raise InputError("train.drive", None, problem, "prescribe the speed of one shaft relative to one of its bores")
+    if scene.drive.stiffness is not None and not (math.isfinite(scene.drive.stiffness) and scene.drive.stiffness > 0.0):
+        raise InputError("drive stiffness", scene.drive.stiffness, "must be finite and > 0 N m/rad", "None for a rigid drive")
+    if not (math.isfinite(scene.drive.damping) and scene.drive.damping >= 0.0):
+        raise InputError("drive damping", scene.drive.damping, "must be finite and >= 0", "negative damping feeds energy in")
     shafts = {s.name: s for s in scene.shafts}
     for label, part in (("drive", scene.drive), *((f"load on {x.shaft!r}", x) for x in scene.loads)):
         _known(label, "shaft", part.shaft, shafts)

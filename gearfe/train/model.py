@@ -22,7 +22,7 @@ from .inertia import rotor
 from .kinematics import Rolling, rolling
 from .law import angle_block, derivative, gyro_block, joined, python_law, torque_block, train_law
 from .mesh_element import MeshLine, mesh_line
-from .scene import TrainScene
+from .scene import Drive, TrainScene
 
 Array = NDArray[np.float64]
 
@@ -230,8 +230,16 @@ def _supports(scene: TrainScene, shafts: tuple[RigidShaft, ...], housing: ModalB
             if housing is not None:
                 row = np.hstack([row, -(bore_selector(scene, scene.drive.bore)[:, 3:] @ scene.frame[2])[None, :]])
                 touches = (body, housing)
-            made.append(LinearJoint(touches, row, np.zeros(1), name="drive"))
+            made.append(_drive(scene.drive, touches, row))
     return made
+
+
+def _drive(drive: Drive, touches: tuple[Element, ...], row: Array) -> Element:
+    """Rigid drive: a constraint on the relative rotation beside rolling; with a coupling: spring and damper on it."""
+    if drive.stiffness is None:
+        return LinearJoint(touches, row, np.zeros(1), name="drive")
+    square = row.T @ row
+    return LinearForce(touches, drive.damping * square, drive.stiffness * square, "drive")
 
 
 def _damped(scene: TrainScene, elements: list[Element], bodies: list[Element]) -> tuple[System, Minimal]:

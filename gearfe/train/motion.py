@@ -49,7 +49,14 @@ def motion(model: TrainModel, trajectory: Trajectory) -> Motion:
     else:
         q, v, a = trajectory.q, trajectory.v, trajectory.a
     multipliers = joint_multipliers(model, t, q, v, a)
-    return Motion(t, q, v, a, contact_forces(model, t, q, v, multipliers), -multipliers["drive"][:, 0])
+    drive = model.scene.drive
+    assert drive is not None
+    if drive.stiffness is None:
+        push = -multipliers["drive"][:, 0]
+    else:
+        row = model.spin_reference[[s.name for s in model.scene.shafts].index(drive.shaft)]
+        push = -drive.stiffness * (q @ row) - drive.damping * (v @ row)
+    return Motion(t, q, v, a, contact_forces(model, t, q, v, multipliers), push)
 
 
 def forces(model: TrainModel, t: Array, q: Array, v: Array) -> Array:

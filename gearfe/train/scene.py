@@ -132,11 +132,21 @@ class Bearing:
 
 @dataclass(frozen=True)
 class Drive:
-    """Rotation of a shaft relative to one of its bores as a function of time: the integral of `speed` (rad/s)."""
+    """Rotation of a shaft relative to one of its bores as a function of time.
+
+    Parameters
+    ----------
+    speed
+        Relative speed (rad/s); the rotation is its integral from time 0.
+    stiffness, damping
+        Of an elastic coupling between the prescribed rotation and the shaft (N m/rad, N m s/rad); None: rigid.
+    """
 
     shaft: str
     bore: str
     speed: TimeFunction
+    stiffness: float | None = None
+    damping: float = 0.0
 
 
 @dataclass(frozen=True)
