@@ -1,8 +1,8 @@
 """Stiffness curves kept on disk: a second run with the same gears, load and mesh sizes reads its curve.
 
-A stored curve is the CSV file of `gearfe.stiffness_curve.StiffnessCurve` (exact in both directions) in the folder of the
-mesh cache, named by a hash of all that decides it: the pair, materials, contact law, sizes and positions, the versions of
-numpy, scipy and gmsh, and the text of this package's own modules that compute it.
+A stored curve is the CSV file of `gearfe.stiffness_curve.StiffnessCurve` (exact in both directions) in the folder of
+the mesh cache, named by a hash of all that decides it: the pair, materials, contact law, sizes and positions, the
+versions of numpy, scipy and gmsh, and the text of this package's own modules that compute it.
 """
 
 from __future__ import annotations
@@ -39,7 +39,12 @@ MODULES = (
 
 
 def cached_curve(
-    pair: GearPair, model: dict[str, Any], sweep: dict[str, Any], *, watch: Stopwatch | None = None, progress: Any = None
+    pair: GearPair,
+    model: dict[str, Any],
+    sweep: dict[str, Any],
+    *,
+    watch: Stopwatch | None = None,
+    progress: Any = None,
 ) -> StiffnessCurve:
     """Curve of `gearfe.stiffness.sweep_stiffness`, from disk when it was computed before. Failed curves are not kept.
 

@@ -87,14 +87,14 @@ MECHANISM: dict[str, Any] = {
 #: Kind -> what the file is about, and its tables.
 JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]]]] = {
     "stiffness": (
-        "Mesh stiffness of a gear pair. Run it: gearfe stiffness FILE --out DIR. Lines that begin with # are optional keys "
-        "with their defaults.",
+        "Mesh stiffness of a gear pair. Run it: gearfe stiffness FILE --out DIR. Lines that begin with # are optional "
+        "keys with their defaults.",
         {"pair": PAIR, "stiffness": STIFFNESS},
     ),
     "vibration": (
-        "A gear train in its housing: two shafts with one gear pair. Run it: gearfe vibration FILE --out DIR. Lines that "
-        "begin with # are optional keys with their defaults. Shafts run along y; speeds and torques count positive "
-        "about +y.",
+        "A gear train in its housing: two shafts with one gear pair. Run it: gearfe vibration FILE --out DIR. Lines "
+        "that begin with # are optional keys with their defaults. Shafts run along y; speeds and torques count "
+        "positive about +y.",
         {"pair": PAIR, "stiffness": {"twist_deg": 0.05}, "train": TRAIN, "housing": HOUSING},
     ),
 }

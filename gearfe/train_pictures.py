@@ -1,4 +1,4 @@
-"""From the response of a train to the arguments of `gearfe.output.train_figures`: units, signs, labels, what is marked."""
+"""From the response of a train to the arguments of `gearfe.output.train_figures`: units, signs, labels, marks."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def attachment_to_draw(response: TrainResponse, asked: str | None, loaded: str |
         raise unknown_name("--attachment", asked, names)
     if asked is not None:
         return asked
-    return loaded if loaded in names else names[-1]  # type: ignore[return-value]
+    return loaded if loaded is not None and loaded in names else names[-1]
 
 
 def _acceleration(response: TrainResponse, attachment: str) -> np.ndarray:

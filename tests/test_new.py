@@ -28,7 +28,7 @@ def test_the_file_is_read_without_a_mistake(tmp_path, capsys, kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_optional_key_can_be_switched_on(kind):
-    """Taking the # off a key with a default gives the same job: the keys stand in the right table with true defaults."""
+    """Taking the # off a key with a default gives the same job: the keys stand in the right table."""
     lines = job_file(kind).splitlines()
     plain, changed = tomllib.loads("\n".join(lines)), 0
     for number, line in enumerate(lines):
@@ -90,10 +90,10 @@ def test_kinds_of_keys():
 
     @dataclass(frozen=True)
     class Outer:
-        flag: bool = quantity(True, doc="a flag")
-        pair: tuple[float, float] = quantity((0.0, 1.0), doc="two")
+        flag: bool = quantity(True, doc="a flag")  # noqa: RUF009
+        pair: tuple[float, float] = quantity((0.0, 1.0), doc="two")  # noqa: RUF009
         names: dict[str, float] = quantity(dict, doc="numbers by name")
-        one: Inner = quantity(Inner, doc="the one")
+        one: Inner = quantity(Inner, doc="the one")  # noqa: RUF009
         many: tuple[Inner, ...] = quantity((), doc="[[outer.many]]")
         named: dict[str, Inner] = quantity(dict, doc="[outer.named.NAME]")
 
@@ -107,5 +107,5 @@ def test_kinds_of_keys():
     }
     text = table_text(Outer, example, "outer")
     assert tomllib.loads(text) == {"outer": example}
-    assert '# flag = true ' in text
+    assert "# flag = true " in text
     assert "# first (m)" in text

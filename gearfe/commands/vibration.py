@@ -1,4 +1,4 @@
-"""``gearfe vibration JOB.toml --out DIR``: a gear train in its housing, from stiffness curves to spectrum and pictures."""
+"""``gearfe vibration JOB.toml --out DIR``: a gear train in its housing, from stiffness curve to spectrum."""
 
 from __future__ import annotations
 
@@ -24,10 +24,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("job", metavar="JOB.toml", help="job file with the table [train]")
     parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
     parser.add_argument("--variant", metavar="NAME", help="a variant that the job file describes")
-    parser.add_argument("--curve", nargs="+", metavar="FILE", default=(), help="stiffness curves (CSV): one, or one a mesh")
+    parser.add_argument(
+        "--curve", nargs="+", metavar="FILE", default=(), help="stiffness curves (CSV): one, or one a mesh"
+    )
     parser.add_argument("--tolerance", type=float, metavar="X", help="of the integration (default: the file's)")
     parser.add_argument("--window", metavar="NAME", default="none", help="none, hann, hamming, blackman or flattop")
-    parser.add_argument("--spectrum-from-ms", type=float, metavar="T", default=0.0, help="begin of the spectrum's record")
+    parser.add_argument(
+        "--spectrum-from-ms", type=float, metavar="T", default=0.0, help="begin of the spectrum's record"
+    )
     parser.add_argument("--spectrum-ms", type=float, metavar="T", help="its duration (default: to the end)")
     parser.add_argument("--attachment", metavar="NAME", help="attachment in the pictures (default: that of the load)")
     parser.add_argument("--no-pictures", action="store_true", help="tables and summary only")
@@ -169,7 +173,9 @@ def told(response: TrainResponse, scene: TrainScene, written: Written, choice: O
         lines.append(f"mesh {i + 1} ({name}): {frequency:.1f} Hz, {k}{force}")
     if response.common_period_s:
         count = summary.get("mean_over_common_periods", 0)
-        lines.append(f"common mesh period {1e3 * response.common_period_s:.4g} ms; means are over the last {count} of them")
+        lines.append(
+            f"common mesh period {1e3 * response.common_period_s:.4g} ms; means are over the last {count} of them"
+        )
     shown = ", ".join(f"{f:.0f}" for f in response.coupled_frequencies_Hz[:10])
     lines.append(f"natural frequencies of the coupled system: {shown} Hz ...")
     statistics = response.statistics

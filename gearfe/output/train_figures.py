@@ -82,7 +82,9 @@ def response_figure(
         if number == len(speeds) // 2:
             part.set_ylabel("speed  (rad/s)")
         axes.append(part)
-    turning = _panel(figure.add_subplot(grid[1, 0]), "angular acceleration  (1000 rad/s²)", "c", "angular accelerations")
+    turning = _panel(
+        figure.add_subplot(grid[1, 0]), "angular acceleration  (1000 rad/s²)", "c", "angular accelerations"
+    )
     for colour, (label, values) in zip(_cycle(), accelerations.items(), strict=False):
         turning.plot(angle, values, color=colour, linewidth=1.1, label=label)
     turning.legend(fontsize=8.5, frameon=False, ncols=max(1, min(4, len(accelerations))), loc="upper right")

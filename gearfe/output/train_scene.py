@@ -1,7 +1,7 @@
 """Picture and animation of gears in their housing, drawn by VTK in a process of its own.
 
-Off-screen drawing crashes the interpreter where a machine lacks the graphics libraries: in a second process that costs a
-picture and a message, not the results. The animation is a GIF, put together by Pillow.
+Off-screen drawing crashes the interpreter where a machine lacks the graphics libraries: in a second process that costs
+a picture and a message, not the results. The animation is a GIF, put together by Pillow.
 """
 
 from __future__ import annotations
@@ -44,7 +44,9 @@ def draw_scene(path: str | Path, arrays: Mapping[str, NDArray[Any]], title: str)
         environment["PYTHONPATH"] = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
         command = [sys.executable, "-m", __name__, str(job), str(path)]
         try:
-            done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=_SECONDS, check=False)
+            done = subprocess.run(
+                command, env=environment, capture_output=True, text=True, timeout=_SECONDS, check=False
+            )
         except subprocess.TimeoutExpired:
             return f"drawing took longer than {_SECONDS:g} s"
     if done.returncode != 0:
