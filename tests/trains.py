@@ -27,7 +27,9 @@ def base_radius(teeth: int) -> float:
     return 0.5 * teeth * MODULE * math.cos(ALPHA)
 
 
-def curve(teeth: int, mean: float = 1e8, swing: float = 0.1, method: str = "cubic", count: int = 40) -> PeriodicInterpolant:
+def curve(
+    teeth: int, mean: float = 1e8, swing: float = 0.1, method: str = "cubic", count: int = 40
+) -> PeriodicInterpolant:
     """A smooth curve over one mesh cycle of a driver."""
     period = 2.0 * math.pi / teeth
     phase = period * np.arange(count) / count
@@ -39,7 +41,9 @@ def braking(stages: int) -> TimeFunction:
     return smoothed_step(0.5e-3, 1e-3, TORQUE * (-1) ** stages)
 
 
-def train(stages: list[tuple[int, int]], *, stiffness: Any = 1e8, ys: list[float] | None = None, **changes: Any) -> TrainScene:
+def train(
+    stages: list[tuple[int, int]], *, stiffness: Any = 1e8, ys: list[float] | None = None, **changes: Any
+) -> TrainScene:
     """Shafts in an x row; stage i joins shaft i and i + 1 by (driver teeth, driven teeth).
 
     `stiffness` is a constant, None (rigid), or a function of the driver's teeth.
@@ -54,7 +58,9 @@ def train(stages: list[tuple[int, int]], *, stiffness: Any = 1e8, ys: list[float
     for i, ((one, two), y) in enumerate(zip(stages, ys, strict=True)):
         gears += [ShaftGear(f"d{i}", names[i], y, gear(one)), ShaftGear(f"g{i}", names[i + 1], y, gear(two))]
         meshes.append(GearMesh(f"d{i}", f"g{i}", stiffness(one) if callable(stiffness) else stiffness))
-    bores = {f"{n}{s}": (x, y, 0.0) for n, x in zip(names, places, strict=True) for s, y in (("+", 0.033), ("-", -0.033))}
+    bores = {
+        f"{n}{s}": (x, y, 0.0) for n, x in zip(names, places, strict=True) for s, y in (("+", 0.033), ("-", -0.033))
+    }
     scene = TrainScene(
         shafts=tuple(shafts),
         gears=tuple(gears),
@@ -72,7 +78,7 @@ SHIPPED = [(20, 30), (20, 30)]
 def frame_body(scene: TrainScene, *, uneven: float = 0.0, skew: float = 0.0) -> ModalBody:
     """An elastic frame in place of the scene's rigid housing: each bore on springs to ground and to its neighbours.
 
-    It is mirror-symmetric about y = 0 and z = 0; `uneven` stiffens the bores at +y, `skew` couples x, y and z of each bore.
+    It is mirror-symmetric about y = 0 and z = 0; `uneven` stiffens the bores at +y, `skew` couples x, y, z of a bore.
     """
     names, points = tuple(scene.rigid_bores), np.array(list(scene.rigid_bores.values()))
     n = len(names)
@@ -103,8 +109,8 @@ def frame_body(scene: TrainScene, *, uneven: float = 0.0, skew: float = 0.0) -> 
         mass=M, damping=np.zeros_like(M), stiffness=K, attachment_names=names, attachment_points=points,
         attachment_axes=np.tile([0.0, 1.0, 0.0], (n, 1)), internal_hz=np.array([3000.0, 5200.0]), modes=2, nodes=points,
         elements=np.zeros((0, 4), dtype=np.int64), shapes=shapes, faces=none, normals=np.zeros((n, 3)),
-        radiation=np.zeros_like(M), momentum=np.zeros((6, size)), rigid_mass=np.eye(6), tail=np.zeros((6 * n, 6 * n)), levels=1,
-        next_hz=math.inf, held=True, solver="none",
+        radiation=np.zeros_like(M), momentum=np.zeros((6, size)), rigid_mass=np.eye(6),
+        tail=np.zeros((6 * n, 6 * n)), levels=1, next_hz=math.inf, held=True, solver="none",
     )  # fmt: skip
 
 

@@ -26,9 +26,13 @@ class TrainShaftTable:
     radius_mm: float = quantity(above=0.0, doc="radius (mm)")
     attachments: tuple[int | str, ...] = quantity(doc='attachments that carry it, as ["1", "2"]')
     density_kg_per_m3: float = quantity(7850.0, above=0.0, doc="density (kg/m3)")
-    initial_speed_rad_per_s: float | None = quantity(None, doc="spin at the start (rad/s); left out: rolling with the drive")
+    initial_speed_rad_per_s: float | None = quantity(
+        None, doc="spin at the start (rad/s); left out: rolling with the drive"
+    )
     mass_kg: float | None = quantity(None, above=0.0, doc="mass with gears (kg); left out: from the geometry")
-    polar_inertia_kg_m2: float | None = quantity(None, above=0.0, doc="inertia about the axis with gears; left out: computed")
+    polar_inertia_kg_m2: float | None = quantity(
+        None, above=0.0, doc="inertia about the axis with gears; left out: computed"
+    )
     transverse_inertia_kg_m2: float | None = quantity(
         None, above=0.0, doc="inertia about a transverse line through the mass centre, with gears; left out: computed"
     )
@@ -44,15 +48,25 @@ class TrainGearTable(ToothFormTable):
     gear: str = quantity("", choices=("pinion", "wheel", ""), doc="pinion or wheel of [pair]; left out: give teeth")
     teeth: int | None = quantity(None, low=5, doc="number of teeth, for a gear of its own")
     bore_diameter_mm: float | None = quantity(None, above=0.0, doc="bore (mm); left out: 0.2 times the pitch diameter")
-    density_kg_per_m3: float | None = quantity(None, above=0.0, doc="density (kg/m3); left out: of [pair.material], or steel")
+    density_kg_per_m3: float | None = quantity(
+        None, above=0.0, doc="density (kg/m3); left out: of [pair.material], or steel"
+    )
 
     def check(self, where: str) -> None:
         """Either a gear of [pair] or one of its own."""
-        own = [key for key in (*ToothFormTable.__dataclass_fields__, "teeth", "bore_diameter_mm") if getattr(self, key) is not None]
+        own = [
+            key
+            for key in (*ToothFormTable.__dataclass_fields__, "teeth", "bore_diameter_mm")
+            if getattr(self, key) is not None
+        ]
         if self.gear and own:
-            raise InputError(f"{where}.{own[0]}", getattr(self, own[0]), f"stands beside gear = {self.gear!r}", "leave one out")
+            raise InputError(
+                f"{where}.{own[0]}", getattr(self, own[0]), f"stands beside gear = {self.gear!r}", "leave one out"
+            )
         if not self.gear and self.teeth is None:
-            raise InputError(f"{where}.teeth", None, "is required", 'give the number of teeth, or gear = "pinion" or "wheel"')
+            raise InputError(
+                f"{where}.teeth", None, "is required", 'give the number of teeth, or gear = "pinion" or "wheel"'
+            )
 
 
 @dataclass(frozen=True)
@@ -61,9 +75,13 @@ class TrainMeshTable:
 
     driver: str = quantity(doc="name of the driving gear")
     driven: str = quantity(doc="name of the driven gear")
-    phase_deg: float = quantity(0.0, doc="rotation of the driver, in its driving sense, at which the curve starts (deg)")
+    phase_deg: float = quantity(
+        0.0, doc="rotation of the driver, in its driving sense, at which the curve starts (deg)"
+    )
     damping_N_s_per_m: float = quantity(0.0, low=0.0, doc="damping along the line of action (N s/m)")
-    centre_distance_mm: float | None = quantity(None, above=0.0, doc="working centre distance (mm); left out: no backlash")
+    centre_distance_mm: float | None = quantity(
+        None, above=0.0, doc="working centre distance (mm); left out: no backlash"
+    )
     curve: str | None = quantity(None, doc="CSV file with pinion_angle_deg and k_mesh_N_per_m, beside the job file")
     stiffness_N_per_m: float | None = quantity(None, above=0.0, doc="constant stiffness (N/m)")
     rigid: bool = quantity(False, doc="true: an ideal rigid mesh, a constraint")
@@ -72,7 +90,9 @@ class TrainMeshTable:
         """At most one source of the stiffness."""
         given = [k for k in ("curve", "stiffness_N_per_m", "rigid") if getattr(self, k) not in (None, False)]
         if len(given) > 1:
-            raise InputError(f"{where}.{given[1]}", getattr(self, given[1]), f"stands beside {given[0]}", "leave one out")
+            raise InputError(
+                f"{where}.{given[1]}", getattr(self, given[1]), f"stands beside {given[0]}", "leave one out"
+            )
 
 
 @dataclass(frozen=True)
@@ -84,7 +104,9 @@ class TrainDriveTable:
     speed_rad_per_s: float = quantity(doc="speed about +y (rad/s)")
     ramp_centre_ms: float = quantity(0.0, doc="middle of the smoothed step from rest to the speed (ms)")
     ramp_width_ms: float | None = quantity(None, above=0.0, doc="duration of that step (ms); left out: constant speed")
-    stiffness_Nm_per_rad: float | None = quantity(None, above=0.0, doc="of an elastic coupling (N m/rad); left out: rigid")
+    stiffness_Nm_per_rad: float | None = quantity(
+        None, above=0.0, doc="of an elastic coupling (N m/rad); left out: rigid"
+    )
     damping_Nm_s_per_rad: float = quantity(0.0, low=0.0, doc="of that coupling (N m s/rad)")
 
 
@@ -104,8 +126,8 @@ class TrainBearingTable:
     """Springs between a shaft and a bore instead of a hinge."""
 
     attachment: int | str = quantity(doc="bore")
-    stiffness: Five = quantity(low=0.0, doc="along x, y, z (N/m) and for tilt about x, z (N m/rad)")
-    damping: Five = quantity((0.0, 0.0, 0.0, 0.0, 0.0), low=0.0, doc="the same in N s/m and N m s/rad")
+    stiffness: Five = quantity(low=0.0, doc="along x, y, z (N/m) and for tilt about x, z (N m/rad)")  # noqa: RUF009
+    damping: Five = quantity((0.0, 0.0, 0.0, 0.0, 0.0), low=0.0, doc="the same in N s/m and N m s/rad")  # noqa: RUF009
 
 
 @dataclass(frozen=True)
@@ -123,10 +145,14 @@ class TrainCurvesTable:
     """How the stiffness curves are computed and read."""
 
     load: str = quantity(
-        "stiffness", choices=("stiffness", "torque"), doc="load and angles of [stiffness], or the torque that each mesh carries"
+        "stiffness",
+        choices=("stiffness", "torque"),
+        doc="load and angles of [stiffness], or the torque that each mesh carries",
     )
     positions: int = quantity(36, low=8, high=10_000, doc='positions in one mesh cycle, for load = "torque"')
-    interpolation: str = quantity("cubic", choices=("cubic", "linear"), doc="between the positions: cubic (monotone) or linear")
+    interpolation: str = quantity(
+        "cubic", choices=("cubic", "linear"), doc="between the positions: cubic (monotone) or linear"
+    )
 
 
 @dataclass(frozen=True)
@@ -143,8 +169,8 @@ class TrainDampingTable:
 class TrainVariantTable:
     """A named alternative to [train.curves] and [train.damping]."""
 
-    curves: TrainCurvesTable = quantity(TrainCurvesTable, doc="[train.variants.NAME.curves]")
-    damping: TrainDampingTable = quantity(TrainDampingTable, doc="[train.variants.NAME.damping]")
+    curves: TrainCurvesTable = quantity(TrainCurvesTable, doc="[train.variants.NAME.curves]")  # noqa: RUF009
+    damping: TrainDampingTable = quantity(TrainDampingTable, doc="[train.variants.NAME.damping]")  # noqa: RUF009
 
 
 @dataclass(frozen=True)
@@ -159,14 +185,14 @@ class TrainTable:
     shafts: tuple[TrainShaftTable, ...] = quantity(doc="[[train.shafts]]")
     gears: tuple[TrainGearTable, ...] = quantity(doc="[[train.gears]]")
     meshes: tuple[TrainMeshTable, ...] = quantity((), doc="[[train.meshes]]")
-    drive: TrainDriveTable | None = quantity(None, doc="[train.drive]")
+    drive: TrainDriveTable | None = quantity(None, doc="[train.drive]")  # noqa: RUF009
     loads: tuple[TrainLoadTable, ...] = quantity((), doc="[[train.loads]]")
     bearings: tuple[TrainBearingTable, ...] = quantity((), doc="[[train.bearings]]")
     rigid_bores: tuple[TrainRigidBoreTable, ...] = quantity((), doc="[[train.rigid_bores]]")
-    curves: TrainCurvesTable = quantity(TrainCurvesTable, doc="[train.curves]")
-    damping: TrainDampingTable = quantity(TrainDampingTable, doc="[train.damping]")
+    curves: TrainCurvesTable = quantity(TrainCurvesTable, doc="[train.curves]")  # noqa: RUF009
+    damping: TrainDampingTable = quantity(TrainDampingTable, doc="[train.damping]")  # noqa: RUF009
     variant: str = quantity("", doc="variant that is simulated when none is asked for; left out: [train] as it stands")
-    variants: dict[str, TrainVariantTable] = quantity(dict, doc="[train.variants.NAME]")
+    variants: dict[str, TrainVariantTable] = quantity(dict, doc="[train.variants.NAME]")  # noqa: RUF009
 
     def check(self, where: str) -> None:
         """Rules that join several keys."""

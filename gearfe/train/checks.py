@@ -11,7 +11,7 @@ from ..errors import InputError, unknown_name
 from ..gear import GearPair
 from ..periodic import PeriodicInterpolant
 from ..stiffness_curve import StiffnessCurve
-from .scene import GearMesh, Shaft, ShaftGear, TrainScene
+from .scene import Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
 
 #: Agreement of lengths and angles that count as equal (relative).
 SAME = 1e-6
@@ -75,7 +75,9 @@ def _check_shafts(scene: TrainScene) -> None:
             values = getattr(bearing, key)
             if len(values) != 5 or not all(math.isfinite(x) and x >= 0.0 for x in values):
                 problem = "must be five numbers >= 0: three translations, two tilts"
-                raise InputError(f"bearing at {bearing.bore!r} {key}", values, problem, "see the documentation of Bearing")
+                raise InputError(
+                    f"bearing at {bearing.bore!r} {key}", values, problem, "see the documentation of Bearing"
+                )
 
 
 def _check_bore(scene: TrainScene, shaft: Shaft, bore: str, a: np.ndarray) -> None:
@@ -96,11 +98,17 @@ def _check_ends(scene: TrainScene) -> None:
         problem = "nothing holds the train: no shaft is driven, so any torque would spin it up without end"
         raise InputError("train.drive", None, problem, "prescribe the speed of one shaft relative to one of its bores")
     if scene.drive.stiffness is not None and not (math.isfinite(scene.drive.stiffness) and scene.drive.stiffness > 0.0):
-        raise InputError("drive stiffness", scene.drive.stiffness, "must be finite and > 0 N m/rad", "None for a rigid drive")
+        raise InputError(
+            "drive stiffness", scene.drive.stiffness, "must be finite and > 0 N m/rad", "None for a rigid drive"
+        )
     if not (math.isfinite(scene.drive.damping) and scene.drive.damping >= 0.0):
-        raise InputError("drive damping", scene.drive.damping, "must be finite and >= 0", "negative damping feeds energy in")
+        raise InputError(
+            "drive damping", scene.drive.damping, "must be finite and >= 0", "negative damping feeds energy in"
+        )
     shafts = {s.name: s for s in scene.shafts}
-    for label, part in (("drive", scene.drive), *((f"load on {x.shaft!r}", x) for x in scene.loads)):
+    parts: list[tuple[str, Drive | Load]] = [("drive", scene.drive)]
+    parts += [(f"load on {x.shaft!r}", x) for x in scene.loads]
+    for label, part in parts:
         _known(label, "shaft", part.shaft, shafts)
         if part.bore is not None:
             _known(label, "attachment", part.bore, scene.bore_points)
@@ -139,14 +147,17 @@ def _check_mesh(scene: TrainScene, mesh: GearMesh) -> None:
         raise InputError(label, error.value, f"{error.field}: {error.problem}", error.cure) from None
     distance = shaft_distance(scene, one.shaft, two.shaft)
     if abs(distance - wanted) > SAME * wanted:
-        problem = f"shafts {one.shaft!r} and {two.shaft!r} are {1e3 * distance:.9g} mm apart, the gears need {1e3 * wanted:.9g} mm"
+        apart = f"shafts {one.shaft!r} and {two.shaft!r} are {1e3 * distance:.9g} mm apart"
+        problem = f"{apart}, the gears need {1e3 * wanted:.9g} mm"
         cure = "move a shaft, change the gears, or give the gears another centre distance (with backlash)"
         raise InputError(label, None, problem, cure)
     if overlap(one, two) <= 0.0:
         problem = f"the gears do not face each other: {1e3 * -overlap(one, two):.6g} mm lie between them along the axis"
         raise InputError(label, None, problem, "move one along its shaft")
     if not (math.isfinite(mesh.damping) and mesh.damping >= 0.0):
-        raise InputError(f"{label} damping", mesh.damping, "must be finite and >= 0 N s/m", "negative damping feeds energy in")
+        raise InputError(
+            f"{label} damping", mesh.damping, "must be finite and >= 0 N s/m", "negative damping feeds energy in"
+        )
     check_curve(mesh, one.gear.teeth)
 
 
@@ -162,7 +173,8 @@ def check_curve(mesh: GearMesh, teeth: int) -> None:
     period = curve.mesh_cycle if isinstance(curve, StiffnessCurve) else curve.period
     wanted = 2.0 * math.pi / teeth
     if abs(period - wanted) > SAME * wanted:
-        problem = f"has a period of {math.degrees(period):.9g} deg, the driver of {teeth} teeth needs {math.degrees(wanted):.9g} deg"
+        needs = f"the driver of {teeth} teeth needs {math.degrees(wanted):.9g} deg"
+        problem = f"has a period of {math.degrees(period):.9g} deg, {needs}"
         raise InputError(label, None, problem, "take the curve of these gears, the driver as pinion")
     table = interpolant(mesh)
     gaps = np.diff(table.nodes)
@@ -172,7 +184,9 @@ def check_curve(mesh: GearMesh, teeth: int) -> None:
         problem = f"has a gap: no value from {start:.6g} deg on over {360.0 * widest / teeth:.6g} deg"
         raise InputError(label, None, problem, "compute the missing positions of the curve")
     if not table.values.min() > 0.0:
-        raise InputError(label, float(table.values.min()), "must be > 0 N/m everywhere", "look for positions without contact")
+        raise InputError(
+            label, float(table.values.min()), "must be > 0 N/m everywhere", "look for positions without contact"
+        )
 
 
 def interpolant(mesh: GearMesh) -> PeriodicInterpolant:
@@ -187,7 +201,9 @@ def interpolant(mesh: GearMesh) -> PeriodicInterpolant:
             raise InputError(f"mesh {mesh.name!r} stiffness", error.value, error.problem, error.cure) from None
     flat = 0.0 if curve is None else float(curve)
     nothing = np.zeros(0)
-    return PeriodicInterpolant(2 * math.pi, np.array([0.0, 2 * math.pi]), np.full(2, flat), np.zeros(2), "linear", nothing)
+    return PeriodicInterpolant(
+        2 * math.pi, np.array([0.0, 2 * math.pi]), np.full(2, flat), np.zeros(2), "linear", nothing
+    )
 
 
 def shaft_distance(scene: TrainScene, one: str, two: str) -> float:
@@ -227,8 +243,14 @@ def _check_room(scene: TrainScene) -> None:
 
 def _check_damping(scene: TrainScene) -> None:
     ratios = np.atleast_1d(np.asarray(scene.damping.ratio, dtype=float))
-    for name, value in (("ratio", ratios.min(initial=0.0)), ("alpha", scene.damping.alpha), ("beta", scene.damping.beta)):
+    for name, value in (
+        ("ratio", ratios.min(initial=0.0)),
+        ("alpha", scene.damping.alpha),
+        ("beta", scene.damping.beta),
+    ):
         if not (np.isfinite(value) and value >= 0.0):
-            raise InputError(f"damping {name}", float(value), "must be finite and >= 0", "negative damping feeds energy in")
+            raise InputError(
+                f"damping {name}", float(value), "must be finite and >= 0", "negative damping feeds energy in"
+            )
     if ratios.max(initial=0.0) >= 1.0:
         raise InputError("damping ratio", float(ratios.max()), "must be < 1", "0.01 is 1 % of critical damping")

@@ -1,8 +1,8 @@
 r"""Elements of a train for the rigid core: shaft, hinge, bearing, constant springs and dampers.
 
-Coordinates of a shaft: displacement of its mass centre along x, y, z (m), small tilts about e1 and e2 (rad), and the rest of
-its spin about the axis a beside rolling with the drive (rad). A housing has the six coordinates of each bore, then its
-internal ones. Forces of second order in the small motions (torque times tilt) are left out.
+Coordinates of a shaft: displacement of its mass centre along x, y, z (m), small tilts about e1 and e2 (rad), and the
+rest of its spin about the axis a beside rolling with the drive (rad). A housing has the six coordinates of each bore,
+then its internal ones. Forces of second order in the small motions (torque times tilt) are left out.
 """
 
 from __future__ import annotations

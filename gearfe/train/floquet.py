@@ -3,18 +3,18 @@ r"""Floquet multipliers: does a periodic linear system grow from one period to t
 .. math::
     \dot y = v,\qquad \dot v = -\Omega^2 y - D v + \sum_m p_m(t)\, w_m w_m^T y ,\qquad p_m(t + T) = p_m(t)
 
-The multipliers are the eigenvalues of the monodromy matrix, the map of (y, v) over T; one of modulus > 1 means parametric
-instability (Nayfeh & Mook, Nonlinear Oscillations, Sec. 5.2). The constant part is solved exactly (exponentials of its
-eigenvalues), the periodic part changes v by an amount that depends on y only, so both alternate in the splitting of order
-4 with six stages for such systems (Blanes & Moan, J. Comput. Appl. Math. 142, 2002, SRKN6b); steps are halved until the
-moduli stand still.
+The multipliers are the eigenvalues of the monodromy matrix, the map of (y, v) over T; one of modulus > 1 means
+parametric instability (Nayfeh & Mook, Nonlinear Oscillations, Sec. 5.2). The constant part is solved exactly
+(exponentials of its eigenvalues), the periodic part changes v by an amount that depends on y only, so both alternate
+in the splitting of order 4 with six stages for such systems (Blanes & Moan, J. Comput. Appl. Math. 142, 2002, SRKN6b);
+steps are halved until the moduli stand still.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +73,7 @@ def multipliers(
     return before
 
 
-def _sorted(values: Complex) -> Complex:
+def _sorted(values: NDArray[Any]) -> Complex:
     return np.asarray(values[np.argsort(-np.abs(values), kind="stable")])
 
 

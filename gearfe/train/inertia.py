@@ -1,9 +1,9 @@
 r"""Mass and inertia of a shaft with its gears, from geometry and density.
 
 A gear is its exact tooth outline of width b outside the shaft (or its bore, where that is wider); with the polygon's
-:math:`A = \tfrac12\sum c_i`, :math:`J = \tfrac1{12}\sum c_i(|p_i|^2 + p_i\cdot p_{i+1} + |p_{i+1}|^2)`,
-:math:`c_i = p_i \times p_{i+1}` (Green's theorem), its mass is :math:`\rho b A`, its polar inertia :math:`\rho b J`, its
-transverse one :math:`\rho b J/2 + m b^2/12`. All are summed about the common mass centre.
+:math:`A = \tfrac12\sum c_i`, :math:`J = \tfrac1{12}\sum c_i(|p_i|^2 + p_i\cdot p_{i+1} + |p_{i+1}|^2)`, :math:`c_i =
+p_i \times p_{i+1}` (Green's theorem), its mass is :math:`\rho b A`, its polar inertia :math:`\rho b J`, its transverse
+one :math:`\rho b J/2 + m b^2/12`. All are summed about the common mass centre.
 """
 
 from __future__ import annotations

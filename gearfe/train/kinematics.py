@@ -1,8 +1,8 @@
 r"""Rolling of a train: ratios of the shafts to the drive, mesh frequencies, the common period of all meshes.
 
-With :math:`\Delta\varphi_2 = -(z_1/z_2)\,\Delta\varphi_1` at each mesh all ratios are rational, so the common period is exact:
-a mesh repeats after :math:`1/(|g| z)` turns of the drive (g the ratio of its driver, z the driver's teeth), and fractions
-have a least common multiple.
+With :math:`\Delta\varphi_2 = -(z_1/z_2)\,\Delta\varphi_1` at each mesh all ratios are rational, so the common period
+is exact: a mesh repeats after :math:`1/(|g| z)` turns of the drive (g the ratio of its driver, z the driver's teeth),
+and fractions have a least common multiple.
 """
 
 from __future__ import annotations
@@ -61,14 +61,16 @@ def rolling(scene: TrainScene) -> Rolling:
         one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
         links.append((mesh.name, one.shaft, two.shaft, Fraction(-one.gear.teeth, two.gear.teeth)))
     for _ in scene.shafts:
-        for name, one, two, ratio in links:
-            for first, second, factor in ((one, two, ratio), (two, one, 1 / ratio)):
+        for name, driver, driven, ratio in links:
+            for first, second, factor in ((driver, driven, ratio), (driven, driver, 1 / ratio)):
                 if first not in known:
                     continue
                 made = known[first] * factor
                 if known.setdefault(second, made) != made:
                     problem = f"closes a loop that cannot turn: shaft {second!r} would need two speeds"
-                    raise InputError(f"mesh {name!r}", None, problem, "take a gear out of the loop, or change its teeth")
+                    raise InputError(
+                        f"mesh {name!r}", None, problem, "take a gear out of the loop, or change its teeth"
+                    )
     for shaft in scene.shafts:
         if shaft.name not in known:
             problem = "is held by nothing: neither the drive nor a mesh connects it to the train"
@@ -96,8 +98,8 @@ def _common(cycles: tuple[Fraction, ...]) -> tuple[Fraction | None, str]:
 def steady_forces(scene: TrainScene) -> Array:
     """Force of each mesh (N) under the final torques of the loads, without inertia; shape (meshes,).
 
-    At every shaft that is not driven the moments about the axis balance, base radius times force at each mesh. In a loop
-    of gears the forces of least squares are returned: statics alone do not tell them.
+    At every shaft that is not driven the moments about the axis balance, base radius times force at each mesh. In a
+    loop of gears the forces of least squares are returned: statics alone do not tell them.
     """
     assert scene.drive is not None
     kinematics = rolling(scene)

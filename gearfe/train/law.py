@@ -1,7 +1,7 @@
 r"""All forces of a train as one law that can be compiled: blocks of numbers say what acts along which directions.
 
-The train's motion is split into rolling and a small rest, rotation of a shaft :math:`= g\,\psi(t) + u`: psi is the drive's
-angle, g the shaft's ratio to it, u a coordinate. The parameters are
+The train's motion is split into rolling and a small rest, rotation of a shaft :math:`= g\,\psi(t) + u`: psi is the
+drive's angle, g the shaft's ratio to it, u a coordinate. The parameters are
 
     [number of blocks | offset of each | blocks]
 
@@ -9,11 +9,11 @@ and each block is ``[kind, own numbers ...]``; a function of time is ``[pieces p
 origins (p) | polynomials (p c) | sines (3 s)]``. The kinds, with the numbers of the directions they use:
 
 - ``ANGLE``: psi(t), for the blocks after it. ``[function of time]``.
-- ``MESH``: force along the approach d: :math:`-(k(\varphi) - k_0)\,u_d`, :math:`\varphi = s(g\psi + u_r) + \varphi_0`, r the
-  rest of the driver's rotation. The part with the mean :math:`k_0` is constant and stands in the system's stiffness.
+- ``MESH``: force along the approach d: :math:`-(k(\varphi) - k_0)\,u_d`, :math:`\varphi = s(g\psi + u_r) + \varphi_0`,
+  r the rest of the driver's rotation. The part with the mean :math:`k_0` stands in the system's stiffness.
   ``[d, r, g, s, phi0, k0, n, nodes (n+1), cubics (4 n)]``.
-- ``GYRO``: moments :math:`-J_p\Omega\,(\dot u_{d+1}, -\dot u_d)`, :math:`\Omega = g\dot\psi + \dot u_{d+2}`, on the tilts d, d + 1 of
-  a shaft with the spin d + 2. ``[d, g, J_p]``.
+- ``GYRO``: moments :math:`-J_p\Omega\,(\dot u_{d+1}, -\dot u_d)`, :math:`\Omega = g\dot\psi + \dot u_{d+2}`, on the
+  tilts d, d + 1 of a shaft with the spin d + 2. ``[d, g, J_p]``.
 - ``TORQUE``: a function of time along d. ``[d, function of time]``.
 """
 

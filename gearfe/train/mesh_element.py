@@ -1,18 +1,19 @@
 r"""The gear mesh: a spring and a damper between two shafts along the line of action, or the ideal rigid mesh.
 
-With t the direction of the driver's velocity at the pitch point P, c the unit vector from driver to driven centre and the
-working pressure angle :math:`\alpha_w`, the driven gear feels the force
+With t the direction of the driver's velocity at the pitch point P, c the unit vector from driver to driven centre and
+the working pressure angle :math:`\alpha_w`, the driven gear feels the force
 
 .. math::
     F\,n,\quad n = \cos\alpha_w\,t + \sin\alpha_w\,c,\qquad F = k(\varphi)\,\delta + d\,\dot\delta,\qquad
     \delta = n\cdot\big(u_1(P) - u_2(P)\big) ,
 
-the driver its opposite, u the displacements at P beside rolling: from rotations, housing motion and tilt. F > 0 presses. The
-phase :math:`\varphi` follows the driver's actual rotation in its driving sense; the derivative of k makes no force. P lies in
-the middle of the face that both gears share. A rigid mesh is the constraint :math:`\delta = 0`, F its multiplier.
+the driver its opposite, u the displacements at P beside rolling: from rotations, housing motion and tilt. F > 0
+presses. The phase :math:`\varphi` follows the driver's actual rotation in its driving sense; the derivative of k makes
+no force. P lies in the middle of the face that both gears share. A rigid mesh is the constraint :math:`\delta = 0`, F
+its multiplier.
 
-What joins later stands apart: a transmission error is a second curve over the phase taken off delta, backlash with loss of
-contact a function of delta in place of the product k delta, friction a force along a direction of its own.
+What joins later stands apart: a transmission error is a second curve over the phase taken off delta, backlash with
+loss of contact a function of delta in place of the product k delta, friction a force along a direction of its own.
 """
 
 from __future__ import annotations
@@ -120,9 +121,7 @@ def mesh_line(
         curve = interpolant(mesh)
         mean = mean_value(curve)
         damping = mesh.damping + scene.damping.beta * mean
-    return MeshLine(
-        mesh.name, row, line, point, curve, mean, damping, i, ratios[i], sense, mesh.phase, one.gear.module
-    )
+    return MeshLine(mesh.name, row, line, point, curve, mean, damping, i, ratios[i], sense, mesh.phase, one.gear.module)
 
 
 def mean_value(curve: PeriodicInterpolant) -> float:

@@ -1,9 +1,9 @@
 r"""From a `TrainScene` to a system of the rigid core, with all hinges eliminated at set-up.
 
-The rotation of shaft i is :math:`\varphi_i = g_i\psi(t) + u_i`: rolling with the drive, :math:`\psi = \int\Omega\,dt`, and a small
-coordinate. So every constraint is linear and constant, the drive's too: :math:`u_d - a\cdot\theta_b = 0` makes the rotation
-relative to the bore b equal to psi, and its multiplier is the torque that reacts on that bore. A drive of changing speed
-adds :math:`-J_p g_i\ddot\psi` on every shaft.
+The rotation of shaft i is :math:`\varphi_i = g_i\psi(t) + u_i`: rolling with the drive, :math:`\psi = \int\Omega\,dt`,
+and a small coordinate. So every constraint is linear and constant, the drive's too: :math:`u_d - a\cdot\theta_b = 0`
+makes the rotation relative to the bore b equal to psi, and its multiplier is the torque that reacts on that bore. A
+drive of changing speed adds :math:`-J_p g_i\ddot\psi` on every shaft.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ def _torques(
     scene: TrainScene, shafts: tuple[RigidShaft, ...], first: NDArray[np.int64], ratios: list[float],
     angle: TimeFunction, size: int,
 ) -> tuple[tuple[Array, TimeFunction], ...]:  # fmt: skip
-    """Directions in the system with torques over time: loads, and the shafts' inertia under a drive of changing speed."""
+    """Directions in the system with torques over time: loads, and the shafts' inertia when the drive changes speed."""
     made = []
     change = derivative(derivative(angle))
     for i, (shaft, ratio) in enumerate(zip(shafts, ratios, strict=True)):
@@ -217,13 +217,17 @@ def _supports(scene: TrainScene, shafts: tuple[RigidShaft, ...], housing: ModalB
             chosen = None if housing is None else bore_selector(scene, bore)
             rows = bore_rows(body, scene.bore_points[bore], scene.frame, chosen)
             if bore in bearings:
-                stiffness, damping = (np.array(x, dtype=float) for x in (bearings[bore].stiffness, bearings[bore].damping))
+                stiffness, damping = (
+                    np.array(x, dtype=float) for x in (bearings[bore].stiffness, bearings[bore].damping)
+                )
                 damping = damping + scene.damping.beta * stiffness
                 made.append(bearing(body, housing, rows, stiffness, damping, f"bearing {bore}"))
             else:
                 made.append(hinge(body, housing, rows, f"hinge {bore}"))
         if scene.damping.alpha > 0.0:
-            made.append(LinearForce((body,), scene.damping.alpha * body.mass(), np.zeros((6, 6)), f"damping of {body.name}"))
+            made.append(
+                LinearForce((body,), scene.damping.alpha * body.mass(), np.zeros((6, 6)), f"damping of {body.name}")
+            )
         if shaft.name == scene.drive.shaft:
             row = np.eye(6)[5:]
             touches: tuple[Element, ...] = (body,)

@@ -39,8 +39,8 @@ class TrainResponse:
         Acceleration along the shaft axis at each bore's reference point (m/s2).
     gear_names : tuple of g names
     gear_pose : (n, g, 6)
-        Displacement of each gear's centre (m) and its rotation (rad) about x, y, z; the part about the axis of the train
-        is the whole angle turned since the start, the others are small.
+        Displacement of each gear's centre (m) and its rotation (rad) about x, y, z; the part about the axis of the
+        train is the whole angle turned since the start, the others are small.
     gear_centres : (g, 3)
         Where the gears' centres are at rest (m).
     modal, modal_velocity, modal_acceleration : (n, N) or None

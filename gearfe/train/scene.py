@@ -39,7 +39,8 @@ class Shaft:
     initial_speed
         Spin at the start (rad/s); None: rolling with the drive.
     mass, polar_inertia, transverse_inertia
-        Of shaft and gears together (kg, kg m2 about the mass centre), where they are known better than from the geometry.
+        Of shaft and gears together (kg, kg m2 about the mass centre), where they are known better than from the
+        geometry.
     """
 
     name: str
@@ -87,8 +88,8 @@ class GearMesh:
         Curve over the driver's rotation, its interpolant (N/m over rad), a constant (N/m), or None for the ideal rigid
         mesh: a constraint whose multiplier is the contact force.
     phase
-        Angle of the driver (rad), counted in its driving sense, at which it starts; 0: a driver's tooth stands on the line
-        of centres.
+        Angle of the driver (rad), counted in its driving sense, at which it starts; 0: a driver's tooth stands on the
+        line of centres.
     damping
         N s/m along the line of action.
     interpolation
@@ -121,8 +122,8 @@ class Bearing:
         Name of the attachment.
     stiffness, damping : five numbers
         Diagonal: along the first transverse direction, the axis, the second transverse direction (N/m, N s/m), and for
-        tilt about the first and second transverse direction (N m/rad, N m s/rad). For shafts along y these are x, y, z and
-        tilts about x and z.
+        tilt about the first and second transverse direction (N m/rad, N m s/rad). For shafts along y these are x, y, z
+        and tilts about x and z.
     """
 
     bore: str
@@ -165,10 +166,11 @@ class Damping:
     Parameters
     ----------
     ratio
-        Modal damping ratio of the modes of the coupled system (mean mesh stiffnesses): one, or one a mode from the lowest
-        up, the last one holding for all above.
+        Modal damping ratio of the modes of the coupled system (mean mesh stiffnesses): one, or one a mode from the
+        lowest up, the last one holding for all above.
     alpha, beta
-        Rayleigh damping ``alpha M + beta K`` (1/s, s) of all bodies, bearings and meshes, for motion beside the rolling.
+        Rayleigh damping ``alpha M + beta K`` (1/s, s) of all bodies, bearings and meshes, for motion beside the
+        rolling.
     gyroscopic
         Whether the shafts' gyroscopic moments act (they do no work; off for comparison only).
     """
@@ -219,7 +221,7 @@ class TrainScene:
 
     @property
     def frame(self) -> Array:
-        """Rows e1, e2, a: a right-handed frame with the axis last, e1 nearest to a coordinate direction; shape (3, 3)."""
+        """Rows e1, e2, a: a right-handed frame, the axis last, e1 nearest to a coordinate direction; shape (3, 3)."""
         a = np.array(self.axis, dtype=float) / np.linalg.norm(self.axis)
         e1 = np.array([1.0, 0.0, 0.0]) if abs(a[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
         e1 = e1 - (e1 @ a) * a
