@@ -1,8 +1,8 @@
 """Stiffness curves kept on disk: a second run with the same gears, load and mesh sizes reads its curve.
 
-A stored curve is the CSV file of `gearfe.stiffness_curve.StiffnessCurve` (exact in both directions) in the folder of the
-mesh cache, named by a hash of all that decides it: the pair, materials, contact law, sizes and positions, the versions of
-numpy, scipy and gmsh, and the text of this package's own modules that compute it.
+A stored curve is the CSV file of `gearfe.stiffness_curve.StiffnessCurve` (exact in both directions) in the folder of
+the mesh cache, named by a hash of all that decides it: the pair, materials, contact law, sizes and positions, the
+versions of numpy, scipy and gmsh, and the text of this package's own modules that compute it.
 """
 
 from __future__ import annotations
@@ -22,9 +22,29 @@ from .meshing.cache import cache_folder, cache_key
 from .stiffness_curve import StiffnessCurve
 from .stopwatch import Stopwatch
 
+#: Modules beside those of contact and meshing that decide a curve.
+MODULES = (
+    "curves",
+    "elasticity",
+    "gear",
+    "involute",
+    "mesh_geometry",
+    "spur_gear",
+    "stiffness",
+    "stiffness_curve",
+    "sweep_positions",
+    "torque_control",
+    "unloaded",
+)
+
 
 def cached_curve(
-    pair: GearPair, model: dict[str, Any], sweep: dict[str, Any], *, watch: Stopwatch | None = None, progress: Any = None
+    pair: GearPair,
+    model: dict[str, Any],
+    sweep: dict[str, Any],
+    *,
+    watch: Stopwatch | None = None,
+    progress: Any = None,
 ) -> StiffnessCurve:
     """Curve of `gearfe.stiffness.sweep_stiffness`, from disk when it was computed before. Failed curves are not kept.
 
@@ -80,10 +100,11 @@ def _stored(path: Path, pair: GearPair) -> StiffnessCurve | None:
 
 @cache
 def _source() -> str:
-    """Hash of the modules that compute curves: those beside this one, of contact and of meshing."""
+    """Hash of the text of the modules that compute curves."""
     here = Path(__file__).parent
+    files = [here / f"{name}.py" for name in MODULES]
+    files += [file for folder in ("contact", "meshing") for file in sorted((here / folder).glob("*.py"))]
     text = hashlib.sha256()
-    for place in (here, here / "contact", here / "meshing"):
-        for file in sorted(place.glob("*.py")):
-            text.update(file.name.encode() + file.read_bytes())
+    for file in files:
+        text.update(file.name.encode() + file.read_bytes())
     return text.hexdigest()

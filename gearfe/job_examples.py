@@ -24,6 +24,38 @@ PAIR: dict[str, Any] = {
 
 STIFFNESS: dict[str, Any] = {"twist_deg": 0.5, "angle_start_deg": 1.0, "angle_step_deg": 1.0, "angle_stop_deg": 40.0}
 
+TRAIN: dict[str, Any] = {
+    "duration_ms": 7.0,
+    "step_us": 35.0,
+    "shafts": [
+        {"name": "drive", "x_mm": 0.0, "length_mm": 82.0, "radius_mm": 10.0, "attachments": ["1", "2"]},
+        {"name": "output", "x_mm": 62.5, "length_mm": 82.0, "radius_mm": 10.0, "attachments": ["3", "4"]},
+    ],
+    "gears": [
+        {"name": "pinion", "shaft": "drive", "y_mm": 5.0, "gear": "pinion"},
+        {"name": "wheel", "shaft": "output", "y_mm": 5.0, "gear": "wheel"},
+    ],
+    "meshes": [{"driver": "pinion", "driven": "wheel"}],
+    "drive": {"shaft": "drive", "attachment": "1", "speed_rad_per_s": 600.0},
+    "loads": [
+        {
+            "shaft": "output", "attachment": "3", "torque_Nm": 75.0, "ramp_centre_ms": 0.5, "ramp_width_ms": 1.0,
+        },
+    ],
+    "curves": {"load": "torque"},
+    "damping": {"ratio": 0.01},
+}  # fmt: skip
+
+HOUSING: dict[str, Any] = {
+    "wall_x_mm": [-45.0, 117.5],
+    "wall_z_mm": [-72.0, 25.0],
+    "inner_gap_mm": 50.0,
+    "wall_thickness_mm": [6.0, 4.5],
+    "base_thickness_mm": 18.0,
+    "shafts": [{"x_mm": 0.0, "bore_radius_mm": 10.0}, {"x_mm": 62.5, "bore_radius_mm": 10.0}],
+    "feet": {"length_x_mm": 30.0, "width_y_mm": 22.0, "height_mm": 15.0},
+}
+
 MECHANISM: dict[str, Any] = {
     "title": "Slider crank",
     "run": {"end_s": 10.0, "step_s": 0.005, "tolerance": 1e-9},
@@ -55,9 +87,15 @@ MECHANISM: dict[str, Any] = {
 #: Kind -> what the file is about, and its tables.
 JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]]]] = {
     "stiffness": (
-        "Mesh stiffness of a gear pair. Run it: gearfe stiffness FILE --out DIR. Lines that begin with # are optional keys "
-        "with their defaults.",
+        "Mesh stiffness of a gear pair. Run it: gearfe stiffness FILE --out DIR. Lines that begin with # are optional "
+        "keys with their defaults.",
         {"pair": PAIR, "stiffness": STIFFNESS},
+    ),
+    "vibration": (
+        "A gear train in its housing: two shafts with one gear pair. Run it: gearfe vibration FILE --out DIR. Lines "
+        "that begin with # are optional keys with their defaults. Shafts run along y; speeds and torques count "
+        "positive about +y.",
+        {"pair": PAIR, "stiffness": {"twist_deg": 0.05}, "train": TRAIN, "housing": HOUSING},
     ),
 }
 

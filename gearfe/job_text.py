@@ -89,18 +89,19 @@ def _line(field: Any, example: Mapping[str, Any], doc: str, brief: bool) -> str:
 
 def _inner(hint: Any) -> tuple[type | None, str]:
     """Dataclass that a field holds, if it does, and whether as a ``list`` or a ``dict``."""
-    origin = typing.get_origin(hint)
+    origin, inside = typing.get_origin(hint), typing.get_args(hint)
     if origin in (typing.Union, types.UnionType):
-        found = [_inner(option) for option in typing.get_args(hint)]
-        scalar = any(inner is None and option is not type(None) for (inner, _), option in zip(found, typing.get_args(hint)))
-        return (None, "") if scalar else next((pair for pair in found if pair[0] is not None), (None, ""))
-    if origin is tuple and len(typing.get_args(hint)) == 2 and typing.get_args(hint)[1] is Ellipsis:
-        inner = typing.get_args(hint)[0]
-        return (inner, "list") if dataclasses.is_dataclass(inner) else (None, "")
+        found = [_inner(option) for option in inside if option is not type(None)]
+        return (None, "") if any(inner is None for inner, _ in found) else found[0]
+    if origin is tuple and len(inside) == 2 and inside[1] is Ellipsis:
+        return _table(inside[0]), "list"
     if origin is dict:
-        inner = typing.get_args(hint)[1]
-        return (inner, "dict") if dataclasses.is_dataclass(inner) else (None, "")
-    return (hint, "") if dataclasses.is_dataclass(hint) and isinstance(hint, type) else (None, "")
+        return _table(inside[1]), "dict"
+    return _table(hint), ""
+
+
+def _table(hint: Any) -> type | None:
+    return hint if isinstance(hint, type) and dataclasses.is_dataclass(hint) else None
 
 
 def _value(value: Any) -> str:
@@ -111,7 +112,9 @@ def _value(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(_value(item) for item in value) + "]"
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + " }" if value else "{}"
+        return (
+            "{ " + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + " }" if value else "{}"
+        )
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return _value({f.name: v for f in dataclasses.fields(value) if (v := getattr(value, f.name)) is not None})
     return repr(value)

@@ -1,7 +1,7 @@
 r"""Fields of a gear train over time: the housing's vibration and the turning gears, as VTKHDF series and as pictures.
 
-A point of a gear or shaft at :math:`X_0`, with c the gear's centre at rest, d its displacement, :math:`\varphi` the angle
-turned about the axis a and :math:`\theta` the small tilt, is at
+A point of a gear or shaft at :math:`X_0`, with c the gear's centre at rest, d its displacement, :math:`\varphi` the
+angle turned about the axis a and :math:`\theta` the small tilt, is at
 
 .. math:: X = c + d + (I + \theta\times)\, R(a, \varphi)\,(X_0 - c) .
 """
@@ -132,7 +132,7 @@ def solids(scene: TrainScene, response: TrainResponse, *, per_segment: int = 2) 
 
 
 def moved(solid: Solid, response: TrainResponse, frame: Array, step: int, exaggeration: float = 1.0) -> Array:
-    """(n, 3) points of a surface at an output step; displacement and tilt times `exaggeration`, the turning as it is."""
+    """(n, 3) points of a surface at an output step; displacement and tilt times `exaggeration`, the turning not."""
     pose, centre = response.gear_pose[step, solid.gear], response.gear_centres[solid.gear]
     angle = float(pose[3:] @ frame[2])
     tilt = exaggeration * (pose[3:] - angle * frame[2])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,7 +77,7 @@ def check_choice(choice: OutputChoice, times: np.ndarray, attachments: tuple[str
     time = choice.picture_time
     if time is not None and not times[0] <= time <= times[-1]:
         problem = f"lies outside of the run, {1e3 * times[0]:g}..{1e3 * times[-1]:g} ms"
-        raise InputError("--picture-ms", 1e3 * time, problem, "choose another time")
+        raise InputError("--picture-ms", float(f"{1e3 * time:.12g}"), problem, "choose another time")
 
 
 def write_all(
@@ -89,10 +90,12 @@ def write_all(
     watch: Stopwatch,
     further: Mapping[str, Any] | None = None,
     progress: Callable[[int, int, str], None] | None = None,
+    started: float | None = None,
 ) -> Written:
     """Write ``response.csv``, ``spectrum.csv``, ``summary.json`` and what else is chosen.
 
-    A run that ended early gets the same files, as far as it came.
+    A run that ended early gets the same files, as far as it came. With `started` (of `time.perf_counter`) the watch
+    gets the total.
     """
     radiation = None if scene.housing is None else scene.housing.radiation
     made = None
@@ -105,19 +108,25 @@ def write_all(
     problems: list[str] = []
     with whole_set(folder) as target:
         with watch.stage("tables"):
-            write_csv(target / "response.csv", response_columns(response, radiation))
+            write_csv(target / "response.csv", _lists(response_columns(response, radiation)))
             if made is not None:
-                write_csv(target / "spectrum.csv", made.columns())
+                write_csv(target / "spectrum.csv", _lists(made.columns()))
         if choice.pictures and made is not None:
             with watch.stage("pictures"):
                 _pictures(target, scene, response, made, choice, title)
         if choice.fields:
             with watch.stage("fields"):
                 problems += _fields(target, scene, response, choice, title, progress)
+        if started is not None:
+            watch.seconds["total"] = time.perf_counter() - started
         summary = train_summary(response, made, watch.seconds, **(further or {}))
         write_json(target / "summary.json", summary)
         names = tuple(sorted(path.name for path in target.iterdir()))
     return Written(names, made, tuple(problems), summary)
+
+
+def _lists(columns: Mapping[str, np.ndarray]) -> dict[str, list[float]]:
+    return {name: values.tolist() for name, values in columns.items()}
 
 
 def _pictures(

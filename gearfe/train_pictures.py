@@ -1,4 +1,4 @@
-"""From the response of a train to the arguments of `gearfe.output.train_figures`: units, signs, labels, what is marked."""
+"""From the response of a train to the arguments of `gearfe.output.train_figures`: units, signs, labels, marks."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def draw_spectrum(path: Path, response: TrainResponse, made: TrainSpectra, attac
     window = "no window" if spectrum.window == "none" else f"window: {spectrum.window}"
     spectrum_figure(
         path,
-        title=f"{title}: acceleration along the shaft at attachment {attachment}",
+        title=f"Acceleration along the shaft at attachment {attachment}\n{title}",
         frequency=1e-3 * spectrum.frequency,
         amplitude=amplitude,
         quantity="amplitude  (m/s²)",
@@ -77,7 +77,7 @@ def draw_power(path: Path, response: TrainResponse, made: TrainSpectra, title: s
     found = peaks(made.power.frequency, made.power.power, 3)
     power_figure(
         path,
-        title=f"{title}: equivalent radiated power of the housing",
+        title=f"Equivalent radiated power of the housing\n{title}",
         frequency=1e-3 * made.power.frequency,
         level=made.power.level,
         marks=_marks(response, made),
@@ -94,7 +94,7 @@ def attachment_to_draw(response: TrainResponse, asked: str | None, loaded: str |
         raise unknown_name("--attachment", asked, names)
     if asked is not None:
         return asked
-    return loaded if loaded in names else names[-1]  # type: ignore[return-value]
+    return loaded if loaded is not None and loaded in names else names[-1]
 
 
 def _acceleration(response: TrainResponse, attachment: str) -> np.ndarray:

@@ -21,7 +21,9 @@ from .spectrum import (
     peaks,
     uniform_step,
 )
+from .stiffness_curve import StiffnessCurve
 from .train.response import TrainResponse
+from .train.scene import TrainScene
 
 Array = NDArray[np.float64]
 
@@ -29,6 +31,8 @@ Array = NDArray[np.float64]
 NO_SIGNALS = ("time_s", "drive_angle_deg", "instantaneous_radiated_power_W")
 #: Lines that the summary names for each signal.
 NAMED = 5
+#: Lines smaller than this part of the largest one are round-off.
+LEAST = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +98,8 @@ def spectra(
 ) -> TrainSpectra:
     """Spectra of all signals of a response.
 
-    The record holds its first sample and not its last: n steps are n samples, as a period that repeats has them, so 7 ms
-    in 200 steps give lines 1/(7 ms) apart.
+    The record holds its first sample and not its last: n steps are n samples, as a period that repeats has them, so
+    7 ms in 200 steps give lines 1/(7 ms) apart.
 
     Parameters
     ----------
@@ -176,7 +180,7 @@ def dominant(spectra: TrainSpectra, response: TrainResponse, name: str, count: i
     lines = lines_of(response, spectrum.nyquist)
     drive = float(abs(response.shaft_frequencies_Hz[0]))
     found = []
-    for peak in peaks(spectrum.frequency, spectra.amplitude(name), count):
+    for peak in peaks(spectrum.frequency, spectra.amplitude(name), count, above=LEAST):
         line = nearest_line(peak.frequency, lines, spectrum.resolution)
         found.append(
             {
@@ -250,6 +254,19 @@ def train_summary(
         "timings_s": dict(timings),
     }
     return summary
+
+
+def stiffness_ranges(scene: TrainScene) -> dict[str, tuple[float | None, float | None]]:
+    """Mesh -> smallest and largest stiffness (N/m); None for a rigid mesh."""
+    found: dict[str, tuple[float | None, float | None]] = {}
+    for mesh in scene.meshes:
+        given = mesh.stiffness
+        if given is None or isinstance(given, float | int):
+            found[mesh.name] = (given, given)
+        else:
+            values = given.k_mesh if isinstance(given, StiffnessCurve) else given.values
+            found[mesh.name] = (float(np.nanmin(values)), float(np.nanmax(values)))
+    return found
 
 
 def all_warnings(response: TrainResponse, made: TrainSpectra | None) -> list[str]:

@@ -12,11 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .figures import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save
+from .figures import BLUE, GREEN, GREY, ORANGE, RED, new_figure
+from .files import whole_file
 
 Array = NDArray[np.float64]
 
 COLOURS = (BLUE, ORANGE, GREEN, RED, "#6d4c9f", "#0f766e", "#8a5a2b")
+_DPI = 130
 #: Lines of the meshes.
 _DASHES = ((0, (6, 3)), (0, (2, 2)), (0, (6, 2, 2, 2)))
 
@@ -55,9 +57,9 @@ def response_figure(
     means
         Label of a force -> its mean after the start (kN), drawn as a level.
     """
-    figure = new_figure(11.5, 7.6)
-    figure.suptitle(title, fontsize=12, x=0.01, ha="left")
-    grid = figure.add_gridspec(2, 2)
+    figure = _fixed(11.5, 7.6)
+    figure.suptitle(title, fontsize=12, x=0.012, y=0.985, ha="left")
+    grid = figure.add_gridspec(2, 2, left=0.062, right=0.985, top=0.905, bottom=0.068, hspace=0.3, wspace=0.16)
     axes = [_panel(figure.add_subplot(grid[0, 0]), "contact force  (kN)", "a", "contact forces")]
     for colour, (label, values) in zip(_cycle(), forces.items(), strict=False):
         axes[0].plot(angle, values, color=colour, linewidth=1.3, label=label)
@@ -67,7 +69,7 @@ def response_figure(
     top = max(float(np.max(v)) for v in forces.values())
     low = min(0.0, *(float(np.min(v)) for v in forces.values()))
     axes[0].set_ylim(low - 0.04 * (top - low), top + 0.22 * (top - low))
-    rows = grid[0, 1].subgridspec(len(speeds), 1, hspace=0.12)
+    rows = grid[0, 1].subgridspec(len(speeds), 1, hspace=0.35)
     for number, (colour, (label, values)) in enumerate(zip(_cycle(), speeds.items(), strict=False)):
         part = figure.add_subplot(rows[number])
         _panel(part, "", "b" if number == 0 else "", "shaft speeds" if number == 0 else "")
@@ -80,7 +82,9 @@ def response_figure(
         if number == len(speeds) // 2:
             part.set_ylabel("speed  (rad/s)")
         axes.append(part)
-    turning = _panel(figure.add_subplot(grid[1, 0]), "angular acceleration  (1000 rad/s²)", "c", "angular accelerations")
+    turning = _panel(
+        figure.add_subplot(grid[1, 0]), "angular acceleration  (1000 rad/s²)", "c", "angular accelerations"
+    )
     for colour, (label, values) in zip(_cycle(), accelerations.items(), strict=False):
         turning.plot(angle, values, color=colour, linewidth=1.1, label=label)
     turning.legend(fontsize=8.5, frameon=False, ncols=max(1, min(4, len(accelerations))), loc="upper right")
@@ -95,7 +99,7 @@ def response_figure(
         part.tick_params(labelbottom=False)
     for part in (axes[0], axes[-3], turning, normal):
         part.set_xlabel("rotation of the drive  (deg)")
-    save(figure, path)
+    _save(figure, path)
 
 
 def spectrum_figure(
@@ -127,12 +131,14 @@ def spectrum_figure(
         Lines of the meshes.
     shaft
         Name and frequency (kHz) of the shaft whose orders are on top.
+    title
+        First line: what is shown; second line: of what.
     note
         Small text above: resolution, window, mean.
     highest
         End of the axis (kHz).
     """
-    figure = new_figure(10.5, 4.9)
+    figure = _fixed(10.5, 4.9)
     axes = _frequency_axes(figure, title, marks, shaft, highest, note)
     axes.vlines(frequency, 0.0, amplitude, color=BLUE, linewidth=2.2)
     axes.plot(frequency, amplitude, "o", color=BLUE, markersize=3.4, markerfacecolor="white")
@@ -155,7 +161,7 @@ def spectrum_figure(
             bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 0.6},
         )
     axes.set_ylabel(quantity)
-    save(figure, path)
+    _save(figure, path)
 
 
 def power_figure(
@@ -176,7 +182,7 @@ def power_figure(
     level : (m,)
         dB re 1e-12 W; minus infinity where nothing is radiated.
     """
-    figure = new_figure(10.5, 4.6)
+    figure = _fixed(10.5, 4.6)
     axes = _frequency_axes(figure, title, marks, shaft, highest, note)
     shown = (frequency <= highest) & (frequency > 0.0) & np.isfinite(level)
     top = float(level[shown].max(initial=-300.0)) if shown.any() else 0.0
@@ -185,16 +191,18 @@ def power_figure(
     axes.bar(frequency[shown], level[shown] - bottom, width=width, bottom=bottom, color=BLUE, linewidth=0)
     axes.set_ylim(bottom, top + 0.18 * (top - bottom) + 1.0)
     axes.set_ylabel("radiated power level  (dB re 1 pW)")
-    save(figure, path)
+    _save(figure, path)
 
 
 def _frequency_axes(
     figure: Any, title: str, marks: Sequence[Mark], shaft: tuple[str, float], highest: float, note: str
 ) -> Any:
-    axes = figure.add_subplot()
+    axes = figure.add_axes((0.062, 0.175, 0.925, 0.615))
     _panel(axes, "", "", "")
-    axes.set_title(title, fontsize=11, loc="left", pad=34)
-    axes.set_title(note, fontsize=8.5, loc="right", pad=34, color="#374151")
+    head, _, scene = title.partition("\n")
+    figure.text(0.062, 0.945, head, fontsize=11)
+    figure.text(0.062, 0.9, scene, fontsize=8.5, color="#374151")
+    figure.text(0.987, 0.945, note, fontsize=8.5, color="#374151", ha="right")
     axes.set_xlim(0.0, highest)
     axes.set_xlabel("frequency  (kHz)")
     groups = sorted({mark.group for mark in marks})
@@ -219,13 +227,27 @@ def _frequency_axes(
             va="top",
         )
     if named:
-        figure.legend(fontsize=8.5, loc="outside lower center", ncols=4, frameon=False)
+        figure.legend(fontsize=8.5, loc="lower center", ncols=4, frameon=False)
     name, turns = shaft
     if turns > 0.0:
         above = axes.secondary_xaxis("top", functions=(lambda f: f / turns, lambda order: order * turns))
         above.set_xlabel(f"order of the shaft {name}", fontsize=9)
         above.tick_params(labelsize=8.5)
     return axes
+
+
+def _fixed(width: float, height: float) -> Any:
+    """Empty figure (inches) whose axes are placed by hand: twice as fast as a layout that is solved for."""
+    figure = new_figure(width, height)
+    figure.set_layout_engine("none")
+    return figure
+
+
+def _save(figure: Any, path: str | Path) -> None:
+    """Write a PNG whole. The canvas is drawn once; `savefig` draws it twice."""
+    figure.set_dpi(_DPI)
+    with whole_file(path) as temporary:
+        figure.canvas.print_png(temporary, pil_kwargs={"compress_level": 4})
 
 
 def _panel(axes: Any, ylabel: str, letter: str, title: str) -> Any:

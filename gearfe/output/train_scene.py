@@ -1,7 +1,7 @@
 """Picture and animation of gears in their housing, drawn by VTK in a process of its own.
 
-Off-screen drawing crashes the interpreter where a machine lacks the graphics libraries: in a second process that costs a
-picture and a message, not the results. The animation is a GIF, put together by Pillow.
+Off-screen drawing crashes the interpreter where a machine lacks the graphics libraries: in a second process that costs
+a picture and a message, not the results. The animation is a GIF, put together by Pillow.
 """
 
 from __future__ import annotations
@@ -44,7 +44,9 @@ def draw_scene(path: str | Path, arrays: Mapping[str, NDArray[Any]], title: str)
         environment["PYTHONPATH"] = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
         command = [sys.executable, "-m", __name__, str(job), str(path)]
         try:
-            done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=_SECONDS, check=False)
+            done = subprocess.run(
+                command, env=environment, capture_output=True, text=True, timeout=_SECONDS, check=False
+            )
         except subprocess.TimeoutExpired:
             return f"drawing took longer than {_SECONDS:g} s"
     if done.returncode != 0:
@@ -68,7 +70,7 @@ def _draw(job: Path, target: Path) -> None:
     surfaces = []
     if "housing_points" in stored:
         values, name = stored["housing_values"], "normal acceleration (m/s2)"
-        most = float(np.quantile(np.abs(values), 0.9995)) or 1.0
+        most = float(np.quantile(np.abs(values[values != 0.0]), 0.97)) if values.any() else 1.0
         faces = _flat(stored["housing_faces"]) if count == 1 else stored["housing_faces"][:, :3]
         housing = pyvista.PolyData(stored["housing_points"][0], _cells(faces))
         housing[name] = values[0]
@@ -93,7 +95,7 @@ def _draw(job: Path, target: Path) -> None:
             surface.points = points[step]
             if values is not None:
                 surface[name] = values[step]
-        _caption(plotter, stored, step, 10 * large)
+        _caption(plotter, stored, step, 9 * large)
         plotter.render()
         pictures.append(plotter.screenshot(return_img=True))
     plotter.close()
@@ -127,7 +129,7 @@ def _caption(plotter: Any, stored: Mapping[str, Any], step: int, size: int) -> N
     factor = float(stored["exaggeration"])
     scale = "" if factor == 1.0 else f", vibration drawn {factor:g} times"
     text = f"{stored['title']}\nt = {1e3 * float(stored['time'][step]):.3f} ms{scale}"
-    plotter.add_text(text, font_size=size, color="black", name="caption", position="upper_left")
+    plotter.add_text(text.replace("−", "-"), font_size=size, color="black", name="caption", position="upper_left")
 
 
 def _write(target: Path, pictures: list[NDArray[np.uint8]]) -> None:
@@ -140,8 +142,8 @@ def _write(target: Path, pictures: list[NDArray[np.uint8]]) -> None:
             images[0].resize((_STILL[0] // 2, _STILL[1] // 2), Image.Resampling.LANCZOS).save(temporary)
             return
         some = np.concatenate(pictures[:: max(1, len(pictures) // 5)])
-        palette = Image.fromarray(some).quantize(255)
-        made = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+        palette = Image.fromarray(some).quantize(255, method=Image.Quantize.MAXCOVERAGE)
+        made = [image.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG) for image in images]
         made[0].save(temporary, save_all=True, append_images=made[1:], duration=_FRAME, loop=0, optimize=False)
 
 
