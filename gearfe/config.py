@@ -26,6 +26,7 @@ TABLES: dict[str, str] = {
     "pair": "gearfe.tables.pair:PairTable",
     "stiffness": "gearfe.tables.stiffness:StiffnessTable",
     "housing": "gearfe.tables.housing:HousingTable",
+    "train": "gearfe.tables.train:TrainTable",
 }
 
 

@@ -11,4 +11,6 @@ COMMANDS: dict[str, str] = {
     "mesh": "mesh",
     "mechanism": "mechanism",
     "housing": "housing",
+    "vibration": "vibration",
+    "new": "new",
 }

@@ -63,7 +63,17 @@ def is_linear(system: System) -> bool:
 
 
 def minimal(system: System) -> Minimal:
-    """Minimal coordinates of a system whose joints are all linear and constant; redundant rows do no harm."""
+    """Minimal coordinates of a system whose joints are all linear and constant; redundant rows do no harm.
+
+    They are made once and stay with the system.
+    """
+    known: Minimal | None = system.__dict__.get("_minimal")
+    if known is None:
+        known = system.__dict__["_minimal"] = _minimal(system)
+    return known
+
+
+def _minimal(system: System) -> Minimal:
     root = np.linalg.cholesky(system.inverse_mass)  # root root^T = M^-1
     zero = np.zeros(system.size)
     G = system.jacobian(0.0, zero)

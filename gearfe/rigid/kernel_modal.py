@@ -24,7 +24,25 @@ def modal_rhs(squares, damping, diagonal, full, constant, W, offset, first, para
             for j in range(n):
                 value += damping[i, j] * y[n + j]
             dy[n + i] -= value - diagonal[i] * y[n + i]
-    for p in range(W.shape[0]):
+    rows = W.shape[0]
+    p = 0
+    while p + 3 < rows:  # four directions at a time: y and dy are read once for all
+        a0, a1, a2, a3 = offset[p], offset[p + 1], offset[p + 2], offset[p + 3]
+        b0, b1, b2, b3 = 0.0, 0.0, 0.0, 0.0
+        for i in range(n):
+            value, rate = y[i], y[n + i]
+            a0 += W[p, i] * value
+            a1 += W[p + 1, i] * value
+            a2 += W[p + 2, i] * value
+            a3 += W[p + 3, i] * value
+            b0 += W[p, i] * rate
+            b1 += W[p + 1, i] * rate
+            b2 += W[p + 2, i] * rate
+            b3 += W[p + 3, i] * rate
+        u[p], u[p + 1], u[p + 2], u[p + 3] = a0, a1, a2, a3
+        du[p], du[p + 1], du[p + 2], du[p + 3] = b0, b1, b2, b3
+        p += 4
+    while p < rows:
         place = offset[p]
         speed = 0.0
         for i in range(n):
@@ -32,13 +50,21 @@ def modal_rhs(squares, damping, diagonal, full, constant, W, offset, first, para
             speed += W[p, i] * y[n + i]
         u[p] = place
         du[p] = speed
+        p += 1
     for k in range(first.shape[0] - 1):
         a = first[k]
         b = first[k + 1]
         law(t, u[a:b], du[a:b], parameters[k], out[a:b])  # noqa: F821
-    for p in range(W.shape[0]):
+    p = 0
+    while p + 3 < rows:
+        f0, f1, f2, f3 = out[p], out[p + 1], out[p + 2], out[p + 3]
+        for i in range(n):
+            dy[n + i] += W[p, i] * f0 + W[p + 1, i] * f1 + W[p + 2, i] * f2 + W[p + 3, i] * f3
+        p += 4
+    while p < rows:
         for i in range(n):
             dy[n + i] += W[p, i] * out[p]
+        p += 1
 
 
 def modal_steps(
@@ -54,6 +80,8 @@ def modal_steps(
     du = np.empty(W.shape[0])
     out = np.zeros(W.shape[0])
     limit = np.empty(n2)
+    five = np.empty(n2)
+    three = np.empty(n2)
     sign = 1.0 if t1 >= t else -1.0
     begin = t
     modal_rhs(squares, damping, diagonal, full, constant, W, offset, first, parameters, t, y, K[0], u, du, out)
@@ -95,17 +123,23 @@ def modal_steps(
                 top_q = max(top_q, limit[i])
             else:
                 top_v = max(top_v, limit[i])
+        for i in range(n2):
+            five[i] = 0.0
+            three[i] = 0.0
+        for s in range(13):
+            if E5[s] != 0.0 or E3[s] != 0.0:
+                for i in range(n2):
+                    five[i] += E5[s] * K[s, i]
+                    three[i] += E3[s] * K[s, i]
+        for i in range(n2):
+            reach = 1.0 / (limit[i] + 1e-6 * (top_q if i < n else top_v))
+            five[i] *= reach
+            three[i] *= reach
         big = 0.0
         small = 0.0
         for i in range(n2):
-            five = 0.0
-            three = 0.0
-            for s in range(13):
-                five += E5[s] * K[s, i]
-                three += E3[s] * K[s, i]
-            reach = limit[i] + 1e-6 * (top_q if i < n else top_v)
-            big += (five / reach) ** 2
-            small += (three / reach) ** 2
+            big += five[i] * five[i]
+            small += three[i] * three[i]
         error = 0.0
         if big > 0.0:
             error = step * big / math.sqrt((big + 0.01 * small) * n2)
@@ -138,11 +172,14 @@ def modal_steps(
             P[count, 0, i] = change
             P[count, 1, i] = d * K[0, i] - change
             P[count, 2, i] = 2.0 * change - d * (K[12, i] + K[0, i])
-            for k in range(4):
-                value = 0.0
-                for s in range(16):
-                    value += D[k, s] * K[s, i]
-                P[count, 3 + k, i] = d * value
+        for k in range(4):
+            for i in range(n2):
+                P[count, 3 + k, i] = 0.0
+            for s in range(16):
+                factor = d * D[k, s]
+                if factor != 0.0:
+                    for i in range(n2):
+                        P[count, 3 + k, i] += factor * K[s, i]
         t = goal if fixed else t + d
         T[count] = t
         for i in range(n2):

@@ -1,0 +1,203 @@
+"""``gearfe vibration JOB.toml --out DIR``: a gear train in its housing, from stiffness curve to spectrum."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..train.response import TrainResponse
+    from ..train.scene import TrainScene
+    from ..train_files import OutputChoice, Written
+    from ..train_job import TrainJob
+
+HELP = "gear train in its housing: contact forces, speeds, vibration, spectrum, radiated power"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("job", metavar="JOB.toml", help="job file with the table [train]")
+    parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
+    parser.add_argument("--variant", metavar="NAME", help="a variant that the job file describes")
+    parser.add_argument(
+        "--curve", nargs="+", metavar="FILE", default=(), help="stiffness curves (CSV): one, or one a mesh"
+    )
+    parser.add_argument("--tolerance", type=float, metavar="X", help="of the integration (default: the file's)")
+    parser.add_argument("--window", metavar="NAME", default="none", help="none, hann, hamming, blackman or flattop")
+    parser.add_argument(
+        "--spectrum-from-ms", type=float, metavar="T", default=0.0, help="begin of the spectrum's record"
+    )
+    parser.add_argument("--spectrum-ms", type=float, metavar="T", help="its duration (default: to the end)")
+    parser.add_argument("--attachment", metavar="NAME", help="attachment in the pictures (default: that of the load)")
+    parser.add_argument("--no-pictures", action="store_true", help="tables and summary only")
+    parser.add_argument("--no-floquet", action="store_true", help="leave out the stability analysis")
+    parser.add_argument("--no-estimate", action="store_true", help="leave out the error estimates")
+    parser.add_argument(
+        "--fields", action="store_true", help="write housing and gears over time (VTKHDF), a picture and an animation"
+    )
+    parser.add_argument("--picture-ms", type=float, metavar="T", help="time of the fields' picture (default: 4.55)")
+    parser.add_argument("--no-animation", action="store_true", help="leave out the animation of --fields")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compute and write; 1 when the run ended early or a picture could not be drawn."""
+    started = time.perf_counter()
+    from ..config import check_range
+    from ..output.files import output_folder
+    from ..stopwatch import Stopwatch
+    from ..tables.train import TrainTable
+    from ..train_files import OutputChoice, check_choice, write_all
+    from ..train_job import read_train_job
+    from .stiffness import Progress
+
+    watch = Stopwatch({"program start": time.perf_counter() - started})
+    with watch.stage("reading"):
+        job = read_train_job(args.job, args.variant)
+        if args.tolerance is not None:
+            check_range(args.tolerance, "--tolerance", TrainTable.__dataclass_fields__["tolerance"].metadata)
+            job = replace(job, table=replace(job.table, tolerance=args.tolerance))
+        choice = OutputChoice(
+            pictures=not args.no_pictures,
+            fields=args.fields,
+            animation=not args.no_animation,
+            attachment=args.attachment,
+            picture_time=None if args.picture_ms is None else 1e-3 * args.picture_ms,
+            window=args.window,
+            spectrum_start=1e-3 * args.spectrum_from_ms,
+            spectrum_length=None if args.spectrum_ms is None else 1e-3 * args.spectrum_ms,
+        )
+        check_choice(choice, job.times, tuple(str(a) for s in job.table.shafts for a in s.attachments))
+        folder = output_folder(args.out or Path("out") / Path(args.job).stem)
+    show = Progress()
+    scene, response = simulated(
+        job, args.curve, watch=watch, progress=show, floquet=not args.no_floquet, estimate=not args.no_estimate
+    )
+    written = write_all(
+        folder,
+        scene,
+        response,
+        choice,
+        title=title(job),
+        watch=watch,
+        further=described(job, scene),
+        progress=show,
+        started=started,
+    )
+    show.end()
+    for line in told(response, scene, written, choice):
+        print(line)
+    print(f"written to {folder}: " + ", ".join(written.names))
+    print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
+    for sentence in (*written.summary["warnings"], *written.problems):
+        print(f"gearfe: warning: {sentence}", file=sys.stderr)
+    return 0 if response.status == "done" and not written.problems else 1
+
+
+def simulated(
+    job: TrainJob, curves: Sequence[str], *, watch: Any, progress: Any = None, floquet: bool, estimate: bool
+) -> tuple[TrainScene, TrainResponse]:
+    """Curves, housing and transient of a job, each from the cache where it can be."""
+    from ..train import build_train, simulate
+    from ..train_job import job_scene, train_body, train_curves
+
+    with watch.stage("curves"):
+        stiffness = train_curves(job, curves, progress=progress)
+    with watch.stage("housing"):
+        body = train_body(job)
+    with watch.stage("model"):
+        scene = job_scene(job, stiffness, body)
+        model = build_train(scene)
+    with watch.stage("transient"):
+        options: dict[str, Any] = {"tolerance": job.table.tolerance, "method": job.table.method}
+        band = 5000.0 if job.housing is None else job.housing.reduction.band_Hz
+        response = simulate(model, job.times, floquet=floquet, estimate=estimate, band_hz=band, **options)
+    return scene, response
+
+
+def title(job: TrainJob) -> str:
+    """Line above the pictures."""
+    table = job.table
+    parts = [f"{len(table.shafts)} shafts, {len(table.meshes)} gear meshes"]
+    if table.drive is not None:
+        parts.append(f"drive {table.drive.speed_rad_per_s:g} rad/s")
+    parts += [f"load {load.torque_Nm:g} N m on {load.shaft}".replace("-", "−", 1) for load in table.loads[:1]]
+    if table.variant:
+        parts.append(f"variant {table.variant}")
+    return ", ".join(parts)
+
+
+def described(job: TrainJob, scene: TrainScene) -> dict[str, Any]:
+    """What was computed: entries of the summary."""
+    from dataclasses import asdict
+
+    from ..stiffness_report import versions
+    from ..train_report import stiffness_ranges
+
+    body = scene.housing
+    housing = None
+    if body is not None:
+        housing = {
+            "mass_kg": body.rigid_mass[0, 0],
+            "coordinates": body.size,
+            "modes": body.modes,
+            "unknowns": body.nodes.size,
+            "notes": list(body.notes),
+        }
+    return {
+        "variant": job.table.variant,
+        "housing": housing or "rigid",
+        "mesh_stiffness_N_per_m": stiffness_ranges(scene),
+        "job": {"train": asdict(job.table), "stiffness": asdict(job.stiffness)},
+        "versions": versions(),
+    }
+
+
+def told(response: TrainResponse, scene: TrainScene, written: Written, choice: OutputChoice) -> list[str]:
+    """Lines for the terminal."""
+    from ..train_pictures import attachment_to_draw
+    from ..train_report import dominant
+
+    summary = written.summary
+    stiffness = summary["mesh_stiffness_N_per_m"]
+    lines = []
+    for i, (name, frequency) in enumerate(zip(response.mesh_names, response.mesh_frequencies_Hz, strict=True)):
+        low, high = stiffness[name]
+        k = "rigid" if low is None else f"k {low / 1e6:.4g} to {high / 1e6:.4g} N/um"
+        mean = summary.get("mean_contact_forces_N")
+        force = "" if mean is None else f", mean contact force {mean[i]:.1f} N"
+        lines.append(f"mesh {i + 1} ({name}): {frequency:.1f} Hz, {k}{force}")
+    if response.common_period_s:
+        count = summary.get("mean_over_common_periods", 0)
+        lines.append(
+            f"common mesh period {1e3 * response.common_period_s:.4g} ms; means are over the last {count} of them"
+        )
+    shown = ", ".join(f"{f:.0f}" for f in response.coupled_frequencies_Hz[:10])
+    lines.append(f"natural frequencies of the coupled system: {shown} Hz ...")
+    statistics = response.statistics
+    lines.append(
+        f"transient: {response.status}, {1e3 * response.time_reached:.4g} ms in {statistics.get('steps', '?')} steps "
+        f"({statistics.get('method', '')}), {statistics.get('seconds', 0.0):.3f} s; "
+        f"{statistics.get('free_coordinates', '?')} unknowns"
+    )
+    if response.floquet is not None:
+        lines.append(f"largest Floquet multiplier over the common period: {abs(response.floquet[0]):.4f}")
+    elif response.floquet_note:
+        lines.append(f"Floquet multipliers: {response.floquet_note}")
+    for name, value in response.estimates.items():
+        lines.append(f"error estimate, {name}: {value:.2g}")
+    if written.spectra is not None:
+        made = written.spectra
+        lines.append(f"spectrum: resolution {made.spectrum.resolution:.4g} Hz, {made.spectrum.samples} samples")
+        loaded = next((load.bore for load in scene.loads if load.bore is not None), None)
+        attachment = attachment_to_draw(response, choice.attachment, loaded)
+        found = dominant(made, response, f"attachment_{attachment}_acceleration_m_per_s2", 4)
+        texts = [f"{x['frequency_Hz']:.0f} Hz {x['amplitude']:.3g}" for x in found]
+        lines.append(f"acceleration along the shaft at attachment {attachment} (m/s2): " + ", ".join(texts))
+        if made.power is not None:
+            lines.append(f"radiated power: mean {made.power.mean_level:.1f} dB re 1e-12 W")
+    return lines

@@ -1,0 +1,163 @@
+"""Picture and animation of gears in their housing, drawn by VTK in a process of its own.
+
+Off-screen drawing crashes the interpreter where a machine lacks the graphics libraries: in a second process that costs
+a picture and a message, not the results. The animation is a GIF, put together by Pillow.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arrays import load_arrays, save_arrays
+from .files import whole_file
+
+_SECONDS = 300.0
+#: Milliseconds a frame.
+_FRAME = 80
+#: Pixels of a still (before it is reduced) and of a film.
+_STILL, _FILM = (2000, 1440), (720, 520)
+
+
+def draw_scene(path: str | Path, arrays: Mapping[str, NDArray[Any]], title: str) -> str:
+    """Draw what `gearfe.train_fields.frames` gives: one step into a ``.png``, several into an animated ``.gif``.
+
+    Returns
+    -------
+    str
+        Empty when it was drawn, else why not.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        job = Path(folder) / "job.npz"
+        save_arrays(job, {**arrays, "title": np.array(title)})
+        environment = dict(os.environ)
+        if sys.platform.startswith("linux"):
+            environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+        environment["PYTHONPATH"] = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
+        command = [sys.executable, "-m", __name__, str(job), str(path)]
+        try:
+            done = subprocess.run(
+                command, env=environment, capture_output=True, text=True, timeout=_SECONDS, check=False
+            )
+        except subprocess.TimeoutExpired:
+            return f"drawing took longer than {_SECONDS:g} s"
+    if done.returncode != 0:
+        last = done.stderr.strip().splitlines()[-1:] or [f"the drawing process ended with code {done.returncode}"]
+        return f"{last[0]} (off-screen drawing needs EGL or Mesa: apt-get install libegl1 libgl1)"
+    return ""
+
+
+def _draw(job: Path, target: Path) -> None:
+    """Draw what a job file holds; runs in the process of its own."""
+    import pyvista
+
+    stored: dict[str, Any] = load_arrays(job)
+    count = len(stored["time"])
+    # a still is drawn twice as large and reduced: smooth edges without a filter that upsets translucent surfaces
+    plotter = pyvista.Plotter(off_screen=True, window_size=list(_STILL if count == 1 else _FILM), border=False)
+    plotter.set_background("white")
+    large = 2 if count == 1 else 1
+    bar = {"title_font_size": 15 * large, "label_font_size": 13 * large, "color": "black", "width": 0.36, "n_labels": 5}
+    bar |= {"height": 0.055, "position_y": 0.02, "fmt": "%.3g"}
+    surfaces = []
+    if "housing_points" in stored:
+        values, name = stored["housing_values"], "normal acceleration (m/s2)"
+        most = float(np.quantile(np.abs(values[values != 0.0]), 0.97)) if values.any() else 1.0
+        faces = _flat(stored["housing_faces"]) if count == 1 else stored["housing_faces"][:, :3]
+        housing = pyvista.PolyData(stored["housing_points"][0], _cells(faces))
+        housing[name] = values[0]
+        outline = pyvista.PolyData(stored["housing_points"][0], lines=_cells(sharp_edges(housing.points, faces)))
+        near = bar | {"title": "housing: normal acceleration (m/s2)\n", "position_x": 0.06}
+        look = {"cmap": "RdBu_r", "clim": (-most, most), "opacity": 0.62, "ambient": 0.3, "scalar_bar_args": near}
+        plotter.add_mesh(housing, smooth_shading=False, **look)
+        plotter.add_mesh(outline, color="#374151", line_width=1.3 * large)
+        surfaces += [(housing, stored["housing_points"], values, name), (outline, stored["housing_points"], None, "")]
+    cells = np.concatenate([_cells(stored["gear_quads"]), _cells(stored["gear_triangles"])])
+    values, name = stored["gear_values"], "displacement (mm)"
+    gears = pyvista.PolyData(stored["gear_points"][0], cells)
+    gears[name] = values[0]
+    far = bar | {"title": "gears: displacement (mm)\n", "position_x": 0.58}
+    look = {"cmap": "viridis", "clim": (0.0, float(values.max()) or 1.0), "ambient": 0.2, "scalar_bar_args": far}
+    plotter.add_mesh(gears, smooth_shading=False, **look)
+    surfaces.append((gears, stored["gear_points"], values, name))
+    _aim(plotter, surfaces[0][1][0])
+    pictures = []
+    for step in range(count):
+        for surface, points, values, name in surfaces if step else ():
+            surface.points = points[step]
+            if values is not None:
+                surface[name] = values[step]
+        _caption(plotter, stored, step, 9 * large)
+        plotter.render()
+        pictures.append(plotter.screenshot(return_img=True))
+    plotter.close()
+    _write(target, pictures)
+
+
+def _aim(plotter: Any, points: NDArray[np.float64]) -> None:
+    """Look from the front, above and left; the body in the upper part of the window."""
+    centre, size = 0.5 * (points.min(axis=0) + points.max(axis=0)), float(np.ptp(points, axis=0).max())
+    focus = centre - size * np.array([0.0, 0.0, 0.1])
+    plotter.camera_position = [focus + size * np.array([-0.8, -1.25, 1.25]), focus, (0.0, 0.0, 1.0)]
+
+
+def sharp_edges(points: NDArray[Any], triangles: NDArray[np.int64], angle_deg: float = 35.0) -> NDArray[np.int64]:
+    """(k, 2) edges at which two triangles meet at more than an angle, and edges of one triangle only."""
+    a, b, c = (points[triangles[:, i]].astype(float) for i in range(3))
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    owner = np.tile(np.arange(len(triangles)), 3)
+    order = np.lexsort((edges[:, 1], edges[:, 0]))
+    edges, owner = edges[order], owner[order]
+    twin = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
+    bent = (normal[owner[twin]] * normal[owner[twin + 1]]).sum(axis=1) < np.cos(np.radians(angle_deg))
+    alone = np.ones(len(edges), dtype=bool)
+    alone[twin] = alone[twin + 1] = False
+    return np.concatenate([edges[twin[bent]], edges[alone]])
+
+
+def _caption(plotter: Any, stored: Mapping[str, Any], step: int, size: int) -> None:
+    factor = float(stored["exaggeration"])
+    scale = "" if factor == 1.0 else f", vibration drawn {factor:g} times"
+    text = f"{stored['title']}\nt = {1e3 * float(stored['time'][step]):.3f} ms{scale}"
+    plotter.add_text(text.replace("−", "-"), font_size=size, color="black", name="caption", position="upper_left")
+
+
+def _write(target: Path, pictures: list[NDArray[np.uint8]]) -> None:
+    """One picture at half its size, several as a film with one palette."""
+    from PIL import Image
+
+    images = [Image.fromarray(picture) for picture in pictures]
+    with whole_file(target) as temporary:
+        if len(images) == 1:
+            images[0].resize((_STILL[0] // 2, _STILL[1] // 2), Image.Resampling.LANCZOS).save(temporary)
+            return
+        some = np.concatenate(pictures[:: max(1, len(pictures) // 5)])
+        palette = Image.fromarray(some).quantize(255, method=Image.Quantize.MAXCOVERAGE)
+        made = [image.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG) for image in images]
+        made[0].save(temporary, save_all=True, append_images=made[1:], duration=_FRAME, loop=0, optimize=False)
+
+
+def _flat(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Corner triangles; a face with six nodes becomes four."""
+    if faces.shape[1] == 3:
+        return faces
+    a, b, c, ab, bc, ca = faces.T
+    return np.concatenate([np.column_stack(t) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+
+
+def _cells(table: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.column_stack([np.full(len(table), table.shape[1]), table]).ravel()
+
+
+if __name__ == "__main__":
+    _draw(Path(sys.argv[1]), Path(sys.argv[2]))

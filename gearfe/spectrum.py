@@ -1,0 +1,312 @@
+r"""Spectra of equally spaced samples: one-sided amplitudes, windows, peaks, orders, band levels, waterfall.
+
+For N samples :math:`x_n` at the step h and a window :math:`w_n` with mean :math:`\bar w`,
+
+.. math::
+    \hat x_k = \frac{c_k}{N \bar w}\sum_{n=0}^{N-1} w_n x_n e^{-2\pi i k n/N}, \qquad f_k = \frac{k}{N h},
+    \qquad k = 0 \ldots \lfloor N/2 \rfloor,
+
+with :math:`c_k = 2`, but 1 for the constant (k = 0) and, when N is even, for the Nyquist frequency (k = N/2): a constant
+c gives c at 0 Hz, a sine of amplitude A on a bin gives A there. Dividing by :math:`\bar w` keeps amplitudes right for
+every window (coherent gain); sums of squares over a band are divided by the window's noise bandwidth
+:math:`B = \overline{w^2}/\bar w^2` in bins (F. J. Harris, Proc. IEEE 66, 1978, Sec. IV).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import InputError
+
+Floats = NDArray[np.float64]
+
+#: Window -> coefficients a_j of ``w_n = sum_j (-1)^j a_j cos(2 pi j n/N)``; periodic (no repeated end sample).
+#: Hann, Hamming, Blackman: Harris 1978, Table I; flat top: ISO 18431-2:2004.
+WINDOWS: dict[str, tuple[float, ...]] = {
+    "none": (1.0,),
+    "hann": (0.5, 0.5),
+    "hamming": (0.54, 0.46),
+    "blackman": (0.42, 0.5, 0.08),
+    "flattop": (1.0, 1.933, 1.286, 0.388, 0.0322),
+}
+#: Largest deviation of a step from the mean one, in parts of it.
+UNEVEN = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """One-sided amplitude spectrum of one or several signals.
+
+    Attributes
+    ----------
+    frequency : ndarray, shape (m,)
+        Frequencies of the bins (Hz), 0 first.
+    value : ndarray of complex, shape (m,) or (m, s)
+        Complex amplitudes: the part at f is ``Re(value exp(2 pi i f (t - t0)))``, t0 the first sample's time.
+    samples
+        N.
+    window
+        Name of the window.
+    noise_bandwidth
+        B, bins (1 without a window).
+    """
+
+    frequency: Floats
+    value: NDArray[np.complex128]
+    samples: int
+    window: str
+    noise_bandwidth: float
+
+    @property
+    def amplitude(self) -> Floats:
+        """Amplitudes, shape of `value`, in the signal's unit."""
+        return np.abs(self.value)
+
+    @property
+    def resolution(self) -> float:
+        """Distance of the bins (Hz), 1/(N h)."""
+        return float(self.frequency[1])
+
+    @property
+    def nyquist(self) -> float:
+        """Half the sampling frequency (Hz)."""
+        return 0.5 * self.samples * self.resolution
+
+    @property
+    def weight(self) -> Floats:
+        """(m,) share of the squared amplitude in the mean square: 1/2, but 1 for the constant and at Nyquist."""
+        weight = np.full(len(self.frequency), 0.5)
+        weight[0] = 1.0
+        if self.samples % 2 == 0:
+            weight[-1] = 1.0
+        return weight
+
+
+@dataclass(frozen=True)
+class Peak:
+    """A local maximum of a spectrum: its bin's number, frequency (Hz) and amplitude (the signal's unit)."""
+
+    bin: int
+    frequency: float
+    amplitude: float
+
+
+@dataclass(frozen=True)
+class OrderLine:
+    """A multiple of a shaft's or mesh's frequency: its name, the order and the frequency (Hz)."""
+
+    name: str
+    order: int
+    frequency: float
+
+
+@dataclass(frozen=True, eq=False)
+class Waterfall:
+    """Spectra of overlapping pieces: middle times (k,) in s, frequencies (m,) in Hz, amplitudes (k, m)."""
+
+    time: Floats
+    frequency: Floats
+    amplitude: Floats
+
+
+def uniform_step(time: ArrayLike) -> float:
+    """Step of equally spaced times (s).
+
+    Raises
+    ------
+    InputError
+        For fewer than two times, or steps that differ.
+    """
+    t = np.asarray(time, dtype=float)
+    if t.ndim != 1 or len(t) < 2:
+        raise InputError("time", t.shape, "needs two samples at least", "take a longer signal")
+    step = float((t[-1] - t[0]) / (len(t) - 1))
+    if not (step > 0.0 and np.all(np.abs(np.diff(t) - step) <= UNEVEN * step)):
+        raise InputError("time", None, "must increase in equal steps", "resample the signal")
+    return step
+
+
+def window_values(name: str, length: int) -> Floats:
+    """(length,) values of a window; see `WINDOWS`."""
+    if name not in WINDOWS:
+        raise InputError("window", name, "must be one of " + ", ".join(WINDOWS), "")
+    angle = 2.0 * math.pi * np.arange(length) / length
+    return np.asarray(sum((-1) ** j * a * np.cos(j * angle) for j, a in enumerate(WINDOWS[name])))
+
+
+def amplitude_spectrum(
+    values: ArrayLike, step: float, *, window: str = "none", start: int = 0, length: int | None = None
+) -> Spectrum:
+    """One-sided amplitude spectrum; see the module for its scaling.
+
+    Parameters
+    ----------
+    values : (n,) or (n, s)
+        Samples of one or s signals.
+    step
+        Time between samples (s).
+    window
+        ``none``, ``hann``, ``hamming``, ``blackman`` or ``flattop``.
+    start, length
+        First sample and number of samples of the window; by default all that follow `start`.
+
+    Raises
+    ------
+    InputError
+        Unknown window, a window longer than the signal, values that are not finite, a step that is not positive.
+    """
+    x = np.asarray(values, dtype=float)
+    if x.ndim not in (1, 2) or len(x) < 2:
+        raise InputError("signal", x.shape, "must hold two samples at least, (n,) or (n, signals)", "")
+    if not (step > 0.0 and math.isfinite(step)):
+        raise InputError("step", step, "must be finite and > 0 s", "give the time between samples")
+    if not 0 <= start <= len(x) - 2:
+        raise InputError("start", start, f"the signal has {len(x)} samples", f"choose 0..{len(x) - 2}")
+    count = len(x) - start if length is None else length
+    if count < 2:
+        raise InputError("window length", count, "must be two samples at least", "take a longer window")
+    if start + count > len(x):
+        problem = f"the window is longer than the signal, which has {len(x) - start} samples from its start"
+        raise InputError("window length", count, problem, "shorten the window or take a longer signal")
+    x = x[start : start + count]
+    if not np.all(np.isfinite(x)):
+        raise InputError("signal", None, "holds values that are not finite", "cut them off")
+    w = window_values(window, count)
+    gain = float(w.mean())
+    scale = np.full(count // 2 + 1, 2.0 / (count * gain))
+    scale[0] *= 0.5
+    if count % 2 == 0:
+        scale[-1] *= 0.5
+    shape = (-1,) + (1,) * (x.ndim - 1)
+    value = np.fft.rfft(x * w.reshape(shape), axis=0) * scale.reshape(shape)
+    frequency = np.arange(len(value)) / (count * step)
+    return Spectrum(frequency, value, count, window, float(np.mean(w**2)) / gain**2)
+
+
+def peaks(frequency: ArrayLike, amplitude: ArrayLike, count: int = 5, *, above: float = 0.0) -> tuple[Peak, ...]:
+    """Largest local maxima, the largest first; the constant is none.
+
+    Parameters
+    ----------
+    frequency, amplitude : (m,)
+        A spectrum.
+    count
+        How many at most.
+    above
+        Least amplitude, in parts of the largest one.
+    """
+    f, a = np.asarray(frequency, dtype=float), np.asarray(amplitude, dtype=float)
+    inner = a[1:]
+    left = np.concatenate([[-np.inf], inner[:-1]])
+    right = np.concatenate([inner[1:], [-np.inf]])
+    found = 1 + np.flatnonzero((inner > left) & (inner >= right) & (inner > 0.0))
+    found = found[np.argsort(-a[found], kind="stable")]
+    if len(found):
+        found = found[a[found] >= above * a[found[0]]]
+    return tuple(Peak(int(k), float(f[k]), float(a[k])) for k in found[:count])
+
+
+def band_rms(spectrum: Spectrum, low: float = 0.0, high: float = math.inf) -> Any:
+    """Root mean square of the part between two frequencies (Hz, both included): a number, or (s,) for s signals.
+
+    Over the whole range and without a window it is the rms of the samples (Parseval).
+    """
+    if not 0.0 <= low <= high:
+        raise InputError("band", [low, high], "must be 0 <= low <= high (Hz)", "swap them")
+    inside = (spectrum.frequency >= low) & (spectrum.frequency <= high)
+    weight = np.where(inside, spectrum.weight, 0.0)
+    square = np.tensordot(weight, spectrum.amplitude**2, axes=1) / spectrum.noise_bandwidth
+    root = np.sqrt(square)
+    return float(root) if root.ndim == 0 else root
+
+
+def order_lines(fundamentals: Mapping[str, float], highest: float, *, orders: int = 1000) -> tuple[OrderLine, ...]:
+    """Multiples of named frequencies (Hz) up to `highest` (Hz), ascending; of equal ones the lower order first.
+
+    Parameters
+    ----------
+    fundamentals
+        Name -> frequency, for example those of the shafts and of the meshes.
+    orders
+        Largest order.
+    """
+    lines = [
+        OrderLine(name, k, k * abs(f))
+        for name, f in fundamentals.items()
+        if f != 0.0
+        for k in range(1, min(orders, int(highest / abs(f) * (1.0 + 1e-12))) + 1)
+    ]
+    return tuple(sorted(lines, key=lambda line: (float(f"{line.frequency:.9g}"), line.order)))
+
+
+def nearest_line(frequency: float, lines: Iterable[OrderLine], within: float) -> OrderLine | None:
+    """Line nearest to a frequency (Hz), no farther than `within` (Hz); of equally near ones the lowest order."""
+    near = [line for line in lines if abs(line.frequency - frequency) <= within]
+    return min(near, key=lambda line: (round(abs(line.frequency - frequency), 6), line.order), default=None)
+
+
+def line_amplitudes(values: ArrayLike, step: float, frequencies: ArrayLike) -> NDArray[np.complex128]:
+    """Complex amplitudes at given frequencies that need not lie on bins, by least squares with a constant.
+
+    Parameters
+    ----------
+    values : (n,) or (n, s)
+        Samples.
+    step
+        Time between samples (s).
+    frequencies : (k,)
+        Frequencies (Hz), > 0 and below Nyquist, farther apart than about one bin.
+
+    Returns
+    -------
+    ndarray of complex, shape (k,) or (k, s)
+
+    Raises
+    ------
+    InputError
+        Frequencies out of range, or too close to be told apart in this record.
+    """
+    x, f = np.asarray(values, dtype=float), np.atleast_1d(np.asarray(frequencies, dtype=float))
+    if not (np.all(f > 0.0) and np.all(f < 0.5 / step)):
+        raise InputError("frequencies", f.tolist(), f"must lie between 0 and {0.5 / step:g} Hz", "leave the others out")
+    angle = 2.0 * math.pi * np.outer(step * np.arange(len(x)), f)
+    basis = np.column_stack([np.ones(len(x)), np.cos(angle), np.sin(angle)])
+    if basis.shape[1] > len(x) or np.linalg.cond(basis) > 1e3:
+        raise InputError(
+            "frequencies", f.tolist(), "are too close for this record", "take a longer one, or fewer lines"
+        )
+    found = np.linalg.lstsq(basis, x, rcond=None)[0]
+    return np.asarray(found[1 : 1 + len(f)] - 1j * found[1 + len(f) :])
+
+
+def aliasing_warning(frequencies: ArrayLike, step: float) -> str:
+    """A sentence when natural frequencies (Hz) lie above the Nyquist frequency of the step (s), else empty."""
+    f, nyquist = np.asarray(frequencies, dtype=float), 0.5 / step
+    above = f[f > nyquist]
+    if not len(above):
+        return ""
+    return (
+        f"{len(above)} of {len(f)} modes lie above {nyquist:.6g} Hz, half the output's sampling frequency (the highest "
+        f"at {above.max():.6g} Hz): their vibration is folded into the spectrum; a step of {0.5 / above.max():.3g} s "
+        "shows them where they are"
+    )
+
+
+def waterfall(
+    values: ArrayLike, step: float, length: int, *, hop: int | None = None, window: str = "hann"
+) -> Waterfall:
+    """Spectra of pieces of `length` samples, `hop` samples apart (default: half of it)."""
+    x = np.asarray(values, dtype=float)
+    advance = max(1, length // 2) if hop is None else hop
+    if x.ndim != 1 or advance < 1:
+        raise InputError("waterfall", None, "needs one signal and a hop of one sample at least", "")
+    starts = range(0, max(1, len(x) - length + 1), advance)
+    parts = [amplitude_spectrum(x, step, window=window, start=s, length=length) for s in starts]
+    middle = step * (np.array(starts) + 0.5 * (length - 1))
+    return Waterfall(middle, parts[0].frequency, np.array([p.amplitude for p in parts]))

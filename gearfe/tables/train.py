@@ -1,0 +1,213 @@
+"""Table ``[train]``: shafts, gears, meshes, drive and loads of a gear train, and how it is simulated.
+
+All shafts run along y, in the frame of the housing. Lengths in millimetres; speeds and torques count positive about +y.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from ..config import quantity
+from ..errors import InputError, unknown_name
+from .pair import ToothFormTable
+
+Five = tuple[float, float, float, float, float]
+
+
+@dataclass(frozen=True)
+class TrainShaftTable:
+    """A round shaft along y and the attachments (bores) that carry it."""
+
+    name: str = quantity(doc="name of the shaft, used in the names of columns")
+    x_mm: float = quantity(doc="x of the axis (mm)")
+    z_mm: float = quantity(0.0, doc="z of the axis (mm)")
+    y_mm: float = quantity(0.0, doc="y of the middle of the shaft (mm)")
+    length_mm: float = quantity(above=0.0, doc="length (mm)")
+    radius_mm: float = quantity(above=0.0, doc="radius (mm)")
+    attachments: tuple[int | str, ...] = quantity(doc='attachments that carry it, as ["1", "2"]')
+    density_kg_per_m3: float = quantity(7850.0, above=0.0, doc="density (kg/m3)")
+    initial_speed_rad_per_s: float | None = quantity(
+        None, doc="spin at the start (rad/s); left out: rolling with the drive"
+    )
+    mass_kg: float | None = quantity(None, above=0.0, doc="mass with gears (kg); left out: from the geometry")
+    polar_inertia_kg_m2: float | None = quantity(
+        None, above=0.0, doc="inertia about the axis with gears; left out: computed"
+    )
+    transverse_inertia_kg_m2: float | None = quantity(
+        None, above=0.0, doc="inertia about a transverse line through the mass centre, with gears; left out: computed"
+    )
+
+
+@dataclass(frozen=True)
+class TrainGearTable(ToothFormTable):
+    """A gear on a shaft: one of [pair], or one of its own; keys it does not give come from [pair]'s shared ones."""
+
+    name: str = quantity(doc="name of the gear")
+    shaft: str = quantity(doc="shaft that carries it")
+    y_mm: float = quantity(doc="y of its middle plane (mm)")
+    gear: str = quantity("", choices=("pinion", "wheel", ""), doc="pinion or wheel of [pair]; left out: give teeth")
+    teeth: int | None = quantity(None, low=5, doc="number of teeth, for a gear of its own")
+    bore_diameter_mm: float | None = quantity(None, above=0.0, doc="bore (mm); left out: 0.2 times the pitch diameter")
+    density_kg_per_m3: float | None = quantity(
+        None, above=0.0, doc="density (kg/m3); left out: of [pair.material], or steel"
+    )
+
+    def check(self, where: str) -> None:
+        """Either a gear of [pair] or one of its own."""
+        own = [
+            key
+            for key in (*ToothFormTable.__dataclass_fields__, "teeth", "bore_diameter_mm")
+            if getattr(self, key) is not None
+        ]
+        if self.gear and own:
+            raise InputError(
+                f"{where}.{own[0]}", getattr(self, own[0]), f"stands beside gear = {self.gear!r}", "leave one out"
+            )
+        if not self.gear and self.teeth is None:
+            raise InputError(
+                f"{where}.teeth", None, "is required", 'give the number of teeth, or gear = "pinion" or "wheel"'
+            )
+
+
+@dataclass(frozen=True)
+class TrainMeshTable:
+    """Two gears in mesh. Its stiffness is computed with [stiffness] unless one of the keys below gives it."""
+
+    driver: str = quantity(doc="name of the driving gear")
+    driven: str = quantity(doc="name of the driven gear")
+    phase_deg: float = quantity(
+        0.0, doc="rotation of the driver, in its driving sense, at which the curve starts (deg)"
+    )
+    damping_N_s_per_m: float = quantity(0.0, low=0.0, doc="damping along the line of action (N s/m)")
+    centre_distance_mm: float | None = quantity(
+        None, above=0.0, doc="working centre distance (mm); left out: no backlash"
+    )
+    curve: str | None = quantity(None, doc="CSV file with pinion_angle_deg and k_mesh_N_per_m, beside the job file")
+    stiffness_N_per_m: float | None = quantity(None, above=0.0, doc="constant stiffness (N/m)")
+    rigid: bool = quantity(False, doc="true: an ideal rigid mesh, a constraint")
+
+    def check(self, where: str) -> None:
+        """At most one source of the stiffness."""
+        given = [k for k in ("curve", "stiffness_N_per_m", "rigid") if getattr(self, k) not in (None, False)]
+        if len(given) > 1:
+            raise InputError(
+                f"{where}.{given[1]}", getattr(self, given[1]), f"stands beside {given[0]}", "leave one out"
+            )
+
+
+@dataclass(frozen=True)
+class TrainDriveTable:
+    """Rotation of a shaft relative to one of its bores, prescribed."""
+
+    shaft: str = quantity(doc="shaft that is driven")
+    attachment: int | str = quantity(doc="bore against which its rotation is prescribed")
+    speed_rad_per_s: float = quantity(doc="speed about +y (rad/s)")
+    ramp_centre_ms: float = quantity(0.0, doc="middle of the smoothed step from rest to the speed (ms)")
+    ramp_width_ms: float | None = quantity(None, above=0.0, doc="duration of that step (ms); left out: constant speed")
+    stiffness_Nm_per_rad: float | None = quantity(
+        None, above=0.0, doc="of an elastic coupling (N m/rad); left out: rigid"
+    )
+    damping_Nm_s_per_rad: float = quantity(0.0, low=0.0, doc="of that coupling (N m s/rad)")
+
+
+@dataclass(frozen=True)
+class TrainLoadTable:
+    """Torque on a shaft and its reaction on a bore."""
+
+    shaft: str = quantity(doc="shaft that is loaded")
+    attachment: int | str | None = quantity(None, doc="bore on which the torque reacts; left out: outside of the train")
+    torque_Nm: float = quantity(doc="torque about +y on the shaft (N m)")
+    ramp_centre_ms: float = quantity(0.0, doc="middle of the smoothed step from 0 to the torque (ms)")
+    ramp_width_ms: float | None = quantity(None, above=0.0, doc="duration of that step (ms); left out: constant torque")
+
+
+@dataclass(frozen=True)
+class TrainBearingTable:
+    """Springs between a shaft and a bore instead of a hinge."""
+
+    attachment: int | str = quantity(doc="bore")
+    stiffness: Five = quantity(low=0.0, doc="along x, y, z (N/m) and for tilt about x, z (N m/rad)")  # noqa: RUF009
+    damping: Five = quantity((0.0, 0.0, 0.0, 0.0, 0.0), low=0.0, doc="the same in N s/m and N m s/rad")  # noqa: RUF009
+
+
+@dataclass(frozen=True)
+class TrainRigidBoreTable:
+    """A bore of a rigid housing, for trains without a table [housing]."""
+
+    attachment: int | str = quantity(doc="name of the bore")
+    x_mm: float = quantity(doc="x of its axis (mm)")
+    y_mm: float = quantity(doc="y of its reference point (mm)")
+    z_mm: float = quantity(0.0, doc="z of its axis (mm)")
+
+
+@dataclass(frozen=True)
+class TrainCurvesTable:
+    """How the stiffness curves are computed and read."""
+
+    load: str = quantity(
+        "stiffness",
+        choices=("stiffness", "torque"),
+        doc="load and angles of [stiffness], or the torque that each mesh carries",
+    )
+    positions: int = quantity(36, low=8, high=10_000, doc='positions in one mesh cycle, for load = "torque"')
+    interpolation: str = quantity(
+        "cubic", choices=("cubic", "linear"), doc="between the positions: cubic (monotone) or linear"
+    )
+
+
+@dataclass(frozen=True)
+class TrainDampingTable:
+    """Damping of the whole coupled system, beside [housing.damping], bearings and meshes."""
+
+    ratio: float | tuple[float, ...] = quantity(0.0, low=0.0, below=1.0, doc="modal damping ratio, one or one a mode")
+    rayleigh_alpha_per_s: float = quantity(0.0, low=0.0, doc="Rayleigh damping: factor of the mass (1/s)")
+    rayleigh_beta_s: float = quantity(0.0, low=0.0, doc="Rayleigh damping: factor of the stiffness (s)")
+    gyroscopic: bool = quantity(True, doc="false: leave the gyroscopic moments out, for comparison")
+
+
+@dataclass(frozen=True)
+class TrainVariantTable:
+    """A named alternative to [train.curves] and [train.damping]."""
+
+    curves: TrainCurvesTable = quantity(TrainCurvesTable, doc="[train.variants.NAME.curves]")  # noqa: RUF009
+    damping: TrainDampingTable = quantity(TrainDampingTable, doc="[train.variants.NAME.damping]")  # noqa: RUF009
+
+
+@dataclass(frozen=True)
+class TrainTable:
+    """The whole ``[train]`` table."""
+
+    housing: str = quantity("elastic", choices=("elastic", "rigid"), doc="elastic ([housing]) or rigid")
+    duration_ms: float = quantity(7.0, above=0.0, doc="end of the simulation (ms)")
+    step_us: float = quantity(35.0, above=0.0, doc="step of the output (us)")
+    tolerance: float = quantity(1e-6, low=1e-12, high=0.1, doc="relative tolerance of the integration")
+    method: str = quantity("auto", choices=("auto", "explicit", "implicit"), doc="integrator")
+    shafts: tuple[TrainShaftTable, ...] = quantity(doc="[[train.shafts]]")
+    gears: tuple[TrainGearTable, ...] = quantity(doc="[[train.gears]]")
+    meshes: tuple[TrainMeshTable, ...] = quantity((), doc="[[train.meshes]]")
+    drive: TrainDriveTable | None = quantity(None, doc="[train.drive]")  # noqa: RUF009
+    loads: tuple[TrainLoadTable, ...] = quantity((), doc="[[train.loads]]")
+    bearings: tuple[TrainBearingTable, ...] = quantity((), doc="[[train.bearings]]")
+    rigid_bores: tuple[TrainRigidBoreTable, ...] = quantity((), doc="[[train.rigid_bores]]")
+    curves: TrainCurvesTable = quantity(TrainCurvesTable, doc="[train.curves]")  # noqa: RUF009
+    damping: TrainDampingTable = quantity(TrainDampingTable, doc="[train.damping]")  # noqa: RUF009
+    variant: str = quantity("", doc="variant that is simulated when none is asked for; left out: [train] as it stands")
+    variants: dict[str, TrainVariantTable] = quantity(dict, doc="[train.variants.NAME]")  # noqa: RUF009
+
+    def check(self, where: str) -> None:
+        """Rules that join several keys."""
+        if self.step_us * 1e-3 > self.duration_ms * (1 + 1e-12):
+            problem = f"is longer than duration_ms = {self.duration_ms:g}"
+            raise InputError(f"{where}.step_us", self.step_us, problem, "use a smaller step")
+        if self.duration_ms / (self.step_us * 1e-3) > 5e6:
+            raise InputError(f"{where}.step_us", self.step_us, "makes more than 5 million outputs", "use a larger step")
+        if self.variant:
+            self.chosen(self.variant)
+
+    def chosen(self, name: str) -> TrainTable:
+        """The table with the curves and damping of a variant; an empty name leaves it as it stands."""
+        if not name:
+            return self
+        if name not in self.variants:
+            raise unknown_name("variant", name, self.variants)
+        return replace(self, curves=self.variants[name].curves, damping=self.variants[name].damping, variant=name)

@@ -1,0 +1,256 @@
+"""Does a train hold together? Every mistake is named, with the cure; rules on kinematics are in `kinematics`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from ..errors import InputError, unknown_name
+from ..gear import GearPair
+from ..periodic import PeriodicInterpolant
+from ..stiffness_curve import StiffnessCurve
+from .scene import Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
+
+#: Agreement of lengths and angles that count as equal (relative).
+SAME = 1e-6
+#: Longest stretch without a sample that a curve may have, as a share of its period.
+WIDEST_GAP = 0.15
+
+
+def check_scene(scene: TrainScene) -> None:
+    """Raise `InputError` for the first mistake."""
+    _names("shaft", [s.name for s in scene.shafts])
+    _names("gear", [g.name for g in scene.gears])
+    _names("mesh", [m.name for m in scene.meshes])
+    _check_shafts(scene)
+    _check_ends(scene)
+    for gear in scene.gears:
+        _known("gear " + repr(gear.name), "shaft", gear.shaft, [s.name for s in scene.shafts])
+        _check_on_shaft(scene, gear)
+    for mesh in scene.meshes:
+        _check_mesh(scene, mesh)
+    _check_room(scene)
+    _check_damping(scene)
+
+
+def _names(kind: str, names: list[str]) -> None:
+    if not names and kind != "mesh":
+        raise InputError(f"train.{kind}s", None, f"the train has no {kind}", f"add a {kind}")
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise InputError(f"{kind} {twice[0]!r}", None, "is named twice", "give each its own name")
+
+
+def _known(field: str, what: str, name: str, names: Iterable[str]) -> None:
+    names = list(names)
+    if name not in names:
+        made = unknown_name(field, name, names)
+        raise InputError(field, None, f"names an unknown {what} {name!r}", made.cure)
+
+
+def _check_shafts(scene: TrainScene) -> None:
+    points, a = scene.bore_points, scene.frame[2]
+    taken: dict[str, str] = {}
+    for shaft in scene.shafts:
+        label = f"shaft {shaft.name!r}"
+        for key in ("length", "radius", "density", "mass", "polar_inertia", "transverse_inertia"):
+            value = getattr(shaft, key)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"{label} {key}", value, "must be finite and > 0", "give it in SI units")
+        if not shaft.bores:
+            raise InputError(f"{label} bores", None, "no bore holds the shaft", "name the attachments that carry it")
+        for bore in shaft.bores:
+            _known(f"{label} bores", "attachment", bore, points)
+            if bore in taken:
+                problem = f"holds shaft {taken[bore]!r} and shaft {shaft.name!r}"
+                raise InputError(f"attachment {bore!r}", None, problem, "a bore carries one shaft")
+            taken[bore] = shaft.name
+            _check_bore(scene, shaft, bore, a)
+    for bearing in scene.bearings:
+        if bearing.bore not in taken:
+            raise unknown_name("bearing", bearing.bore, taken)
+        for key in ("stiffness", "damping"):
+            values = getattr(bearing, key)
+            if len(values) != 5 or not all(math.isfinite(x) and x >= 0.0 for x in values):
+                problem = "must be five numbers >= 0: three translations, two tilts"
+                raise InputError(
+                    f"bearing at {bearing.bore!r} {key}", values, problem, "see the documentation of Bearing"
+                )
+
+
+def _check_bore(scene: TrainScene, shaft: Shaft, bore: str, a: np.ndarray) -> None:
+    arm = scene.bore_points[bore] - np.array(shaft.point)
+    off = float(np.linalg.norm(arm - (arm @ a) * a))
+    if off > SAME * max(shaft.length, 1e-3):
+        problem = f"lies {1e3 * off:.6g} mm off the axis of shaft {shaft.name!r}"
+        raise InputError(f"attachment {bore!r}", None, problem, "name the bores on that axis, or move the shaft")
+    if scene.housing is not None:
+        own = scene.housing.attachment_axes[scene.housing.attachment_names.index(bore)]
+        if abs(abs(float(own @ a)) - 1.0) > SAME:
+            problem = "its bore is not parallel to the train's axis"
+            raise InputError(f"attachment {bore!r}", list(map(float, own)), problem, "all shafts must be parallel")
+
+
+def _check_ends(scene: TrainScene) -> None:
+    if scene.drive is None:
+        problem = "nothing holds the train: no shaft is driven, so any torque would spin it up without end"
+        raise InputError("train.drive", None, problem, "prescribe the speed of one shaft relative to one of its bores")
+    if scene.drive.stiffness is not None and not (math.isfinite(scene.drive.stiffness) and scene.drive.stiffness > 0.0):
+        raise InputError(
+            "drive stiffness", scene.drive.stiffness, "must be finite and > 0 N m/rad", "None for a rigid drive"
+        )
+    if not (math.isfinite(scene.drive.damping) and scene.drive.damping >= 0.0):
+        raise InputError(
+            "drive damping", scene.drive.damping, "must be finite and >= 0", "negative damping feeds energy in"
+        )
+    shafts = {s.name: s for s in scene.shafts}
+    parts: list[tuple[str, Drive | Load]] = [("drive", scene.drive)]
+    parts += [(f"load on {x.shaft!r}", x) for x in scene.loads]
+    for label, part in parts:
+        _known(label, "shaft", part.shaft, shafts)
+        if part.bore is not None:
+            _known(label, "attachment", part.bore, scene.bore_points)
+            if part.bore not in shafts[part.shaft].bores:
+                problem = f"attachment {part.bore!r} does not carry shaft {part.shaft!r}"
+                raise InputError(label, part.bore, problem, f"choose one of {', '.join(shafts[part.shaft].bores)}")
+    if not scene.meshes and len(scene.shafts) > 1:
+        raise InputError("train.meshes", None, "no gear is driven: the train has no mesh", "add a mesh")
+
+
+def _check_on_shaft(scene: TrainScene, item: ShaftGear) -> None:
+    shaft = scene.shaft(item.shaft)
+    middle = float(np.array(shaft.point) @ scene.frame[2])
+    reach = abs(item.along - middle) + 0.5 * item.gear.face_width
+    if reach > 0.5 * shaft.length * (1 + SAME):
+        problem = f"reaches {1e3 * (reach - 0.5 * shaft.length):.6g} mm beyond the end of shaft {shaft.name!r}"
+        raise InputError(f"gear {item.name!r}", None, problem, "move the gear, or lengthen the shaft")
+
+
+def _check_mesh(scene: TrainScene, mesh: GearMesh) -> None:
+    label = f"mesh {mesh.name!r}"
+    for name in (mesh.driver, mesh.driven):
+        _known(label, "gear", name, [g.name for g in scene.gears])
+    one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
+    if one.shaft == two.shaft:
+        raise InputError(label, None, f"both gears are on shaft {one.shaft!r}", "mesh gears of two shafts")
+    for name, unit, symbol in (("module", 1e3, "mm"), ("pressure_angle", 180.0 / math.pi, "deg")):
+        first, second = getattr(one.gear, name), getattr(two.gear, name)
+        if abs(first - second) > SAME * first:
+            what = name.replace("_", " ")
+            problem = f"the gears do not mesh: {what} {unit * first:.9g} and {unit * second:.9g} {symbol}"
+            raise InputError(label, None, problem, f"give both the same {what}")
+    try:
+        wanted = GearPair(one.gear, two.gear, mesh.centre_distance).working_centre_distance
+    except InputError as error:
+        raise InputError(label, error.value, f"{error.field}: {error.problem}", error.cure) from None
+    distance = shaft_distance(scene, one.shaft, two.shaft)
+    if abs(distance - wanted) > SAME * wanted:
+        apart = f"shafts {one.shaft!r} and {two.shaft!r} are {1e3 * distance:.9g} mm apart"
+        problem = f"{apart}, the gears need {1e3 * wanted:.9g} mm"
+        cure = "move a shaft, change the gears, or give the gears another centre distance (with backlash)"
+        raise InputError(label, None, problem, cure)
+    if overlap(one, two) <= 0.0:
+        problem = f"the gears do not face each other: {1e3 * -overlap(one, two):.6g} mm lie between them along the axis"
+        raise InputError(label, None, problem, "move one along its shaft")
+    if not (math.isfinite(mesh.damping) and mesh.damping >= 0.0):
+        raise InputError(
+            f"{label} damping", mesh.damping, "must be finite and >= 0 N s/m", "negative damping feeds energy in"
+        )
+    check_curve(mesh, one.gear.teeth)
+
+
+def check_curve(mesh: GearMesh, teeth: int) -> None:
+    """The curve of a mesh covers one cycle of its driver, with positive values."""
+    label, curve = f"mesh {mesh.name!r} stiffness", mesh.stiffness
+    if curve is None:
+        return
+    if isinstance(curve, (int, float)):
+        if not (math.isfinite(curve) and curve > 0.0):
+            raise InputError(label, curve, "must be finite and > 0 N/m", "or None for a rigid mesh")
+        return
+    period = curve.mesh_cycle if isinstance(curve, StiffnessCurve) else curve.period
+    wanted = 2.0 * math.pi / teeth
+    if abs(period - wanted) > SAME * wanted:
+        needs = f"the driver of {teeth} teeth needs {math.degrees(wanted):.9g} deg"
+        problem = f"has a period of {math.degrees(period):.9g} deg, {needs}"
+        raise InputError(label, None, problem, "take the curve of these gears, the driver as pinion")
+    table = interpolant(mesh)
+    gaps = np.diff(table.nodes)
+    widest = float(gaps.max()) / table.period
+    if widest > max(WIDEST_GAP, 1.5 * float(np.median(gaps)) / table.period):
+        start = math.degrees(table.nodes[int(gaps.argmax())])
+        problem = f"has a gap: no value from {start:.6g} deg on over {360.0 * widest / teeth:.6g} deg"
+        raise InputError(label, None, problem, "compute the missing positions of the curve")
+    if not table.values.min() > 0.0:
+        raise InputError(
+            label, float(table.values.min()), "must be > 0 N/m everywhere", "look for positions without contact"
+        )
+
+
+def interpolant(mesh: GearMesh) -> PeriodicInterpolant:
+    """The mesh's stiffness over the driver's rotation; a constant becomes a flat curve."""
+    curve = mesh.stiffness
+    if isinstance(curve, PeriodicInterpolant):
+        return curve
+    if isinstance(curve, StiffnessCurve):
+        try:
+            return curve.interpolant("k_mesh", method=mesh.interpolation)
+        except InputError as error:
+            raise InputError(f"mesh {mesh.name!r} stiffness", error.value, error.problem, error.cure) from None
+    flat = 0.0 if curve is None else float(curve)
+    nothing = np.zeros(0)
+    return PeriodicInterpolant(
+        2 * math.pi, np.array([0.0, 2 * math.pi]), np.full(2, flat), np.zeros(2), "linear", nothing
+    )
+
+
+def shaft_distance(scene: TrainScene, one: str, two: str) -> float:
+    """Distance of two shafts' axes (m)."""
+    a = scene.frame[2]
+    arm = np.array(scene.shaft(two).point) - np.array(scene.shaft(one).point)
+    return float(np.linalg.norm(arm - (arm @ a) * a))
+
+
+def overlap(one: ShaftGear, two: ShaftGear) -> float:
+    """Length along the axis that two gears share (m); negative: the gap between them."""
+    high = min(one.along + 0.5 * one.gear.face_width, two.along + 0.5 * two.gear.face_width)
+    return high - max(one.along - 0.5 * one.gear.face_width, two.along - 0.5 * two.gear.face_width)
+
+
+def _check_room(scene: TrainScene) -> None:
+    """No two gears in one place, and no gear in another shaft."""
+    meshing = {frozenset((m.driver, m.driven)) for m in scene.meshes}
+    for i, one in enumerate(scene.gears):
+        for two in scene.gears[i + 1 :]:
+            if overlap(one, two) <= SAME * one.gear.face_width or frozenset((one.name, two.name)) in meshing:
+                continue
+            room = 0.0 if one.shaft == two.shaft else shaft_distance(scene, one.shaft, two.shaft)
+            if one.shaft == two.shaft or room < one.gear.tip_radius + two.gear.tip_radius:
+                problem = f"overlaps gear {two.name!r} over {1e3 * overlap(one, two):.6g} mm along the axis"
+                raise InputError(f"gear {one.name!r}", None, problem, "move one along its shaft, or let them mesh")
+        for shaft in scene.shafts:
+            middle = float(np.array(shaft.point) @ scene.frame[2])
+            beside = abs(one.along - middle) - 0.5 * (shaft.length + one.gear.face_width) >= 0.0
+            if shaft.name == one.shaft or beside:
+                continue
+            room = shaft_distance(scene, one.shaft, shaft.name) - shaft.radius
+            if one.gear.tip_radius > room:
+                problem = f"its tip cuts {1e3 * (one.gear.tip_radius - room):.4g} mm into shaft {shaft.name!r}"
+                raise InputError(f"gear {one.name!r}", None, problem, "thinner shaft, smaller gear, or a shorter shaft")
+
+
+def _check_damping(scene: TrainScene) -> None:
+    ratios = np.atleast_1d(np.asarray(scene.damping.ratio, dtype=float))
+    for name, value in (
+        ("ratio", ratios.min(initial=0.0)),
+        ("alpha", scene.damping.alpha),
+        ("beta", scene.damping.beta),
+    ):
+        if not (np.isfinite(value) and value >= 0.0):
+            raise InputError(
+                f"damping {name}", float(value), "must be finite and >= 0", "negative damping feeds energy in"
+            )
+    if ratios.max(initial=0.0) >= 1.0:
+        raise InputError("damping ratio", float(ratios.max()), "must be < 1", "0.01 is 1 % of critical damping")

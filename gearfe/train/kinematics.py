@@ -1,0 +1,125 @@
+r"""Rolling of a train: ratios of the shafts to the drive, mesh frequencies, the common period of all meshes.
+
+With :math:`\Delta\varphi_2 = -(z_1/z_2)\,\Delta\varphi_1` at each mesh all ratios are rational, so the common period
+is exact: a mesh repeats after :math:`1/(|g| z)` turns of the drive (g the ratio of its driver, z the driver's teeth),
+and fractions have a least common multiple.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..rigid.timefunctions import TimeFunction
+from .scene import TrainScene
+
+Array = NDArray[np.float64]
+
+#: A common period of more cycles of the fastest mesh than this is of no practical use.
+MOST_CYCLES = 200
+
+
+@dataclass(frozen=True)
+class Rolling:
+    """Kinematics of a train.
+
+    Attributes
+    ----------
+    ratios
+        Speed of each shaft for unit speed of the drive, in the order of the shafts.
+    cycles
+        Mesh cycles in one turn of the drive, one a mesh.
+    common_turns
+        Turns of the drive after which all meshes are in phase again; None beyond `MOST_CYCLES`.
+    note
+        Why there is none.
+    """
+
+    ratios: tuple[Fraction, ...]
+    cycles: tuple[Fraction, ...]
+    common_turns: Fraction | None
+    note: str = ""
+
+
+def rolling(scene: TrainScene) -> Rolling:
+    """Ratios and common period.
+
+    Raises
+    ------
+    InputError
+        For shafts that neither drive nor mesh hold, and for loops of gears whose ratios contradict each other.
+    """
+    assert scene.drive is not None
+    known = {scene.drive.shaft: Fraction(1)}
+    links = []
+    for mesh in scene.meshes:
+        one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
+        links.append((mesh.name, one.shaft, two.shaft, Fraction(-one.gear.teeth, two.gear.teeth)))
+    for _ in scene.shafts:
+        for name, driver, driven, ratio in links:
+            for first, second, factor in ((driver, driven, ratio), (driven, driver, 1 / ratio)):
+                if first not in known:
+                    continue
+                made = known[first] * factor
+                if known.setdefault(second, made) != made:
+                    problem = f"closes a loop that cannot turn: shaft {second!r} would need two speeds"
+                    raise InputError(
+                        f"mesh {name!r}", None, problem, "take a gear out of the loop, or change its teeth"
+                    )
+    for shaft in scene.shafts:
+        if shaft.name not in known:
+            problem = "is held by nothing: neither the drive nor a mesh connects it to the train"
+            raise InputError(f"shaft {shaft.name!r}", None, problem, "add a mesh between its gears and the train's")
+    cycles = tuple(
+        abs(known[scene.gear(mesh.driver).shaft]) * scene.gear(mesh.driver).gear.teeth for mesh in scene.meshes
+    )
+    common, note = _common(cycles)
+    return Rolling(tuple(known[s.name] for s in scene.shafts), cycles, common, note)
+
+
+def _common(cycles: tuple[Fraction, ...]) -> tuple[Fraction | None, str]:
+    if not cycles:
+        return None, "the train has no meshes"
+    periods = [1 / c for c in cycles]
+    top = math.lcm(*(p.numerator for p in periods))
+    turns = Fraction(top, math.gcd(*(p.denominator for p in periods)))
+    if turns / min(periods) > MOST_CYCLES:
+        count = int(turns / min(periods))
+        note = f"the meshes share a period of {count} mesh cycles only, more than {MOST_CYCLES}: none within reason"
+        return None, note
+    return turns, ""
+
+
+def steady_forces(scene: TrainScene) -> Array:
+    """Force of each mesh (N) under the final torques of the loads, without inertia; shape (meshes,).
+
+    At every shaft that is not driven the moments about the axis balance, base radius times force at each mesh. In a
+    loop of gears the forces of least squares are returned: statics alone do not tell them.
+    """
+    assert scene.drive is not None
+    kinematics = rolling(scene)
+    names = [s.name for s in scene.shafts]
+    arms = np.zeros((len(names), len(scene.meshes)))
+    for column, mesh in enumerate(scene.meshes):
+        one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
+        i = names.index(one.shaft)
+        sense = math.copysign(1.0, kinematics.ratios[i] * drive_sense(scene.drive.speed))
+        arms[i, column] += sense * one.gear.base_radius
+        arms[names.index(two.shaft), column] += sense * two.gear.base_radius
+    torque = np.zeros(len(names))
+    for load in scene.loads:
+        torque[names.index(load.shaft)] += float(load.torque(max(load.torque.breaks, default=0.0)))
+    free = [k for k, name in enumerate(names) if name != scene.drive.shaft]
+    return np.asarray(np.linalg.lstsq(arms[free], torque[free], rcond=None)[0])
+
+
+def drive_sense(speed: TimeFunction) -> float:
+    """Sense in which the drive turns: its first speed that is not zero."""
+    times = [0.0, *speed.breaks, *(0.5 * (a + b) for a, b in zip((0.0, *speed.breaks), speed.breaks, strict=False))]
+    found = [float(speed(t)) for t in sorted(times)]
+    return next((math.copysign(1.0, s) for s in found if s != 0.0), 1.0)

@@ -1,0 +1,309 @@
+r"""From a `TrainScene` to a system of the rigid core, with all hinges eliminated at set-up.
+
+The rotation of shaft i is :math:`\varphi_i = g_i\psi(t) + u_i`: rolling with the drive, :math:`\psi = \int\Omega\,dt`,
+and a small coordinate. So every constraint is linear and constant, the drive's too: :math:`u_d - a\cdot\theta_b = 0`
+makes the rotation relative to the bore b equal to psi, and its multiplier is the torque that reacts on that bore. A
+drive of changing speed adds :math:`-J_p g_i\ddot\psi` on every shaft.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..rigid import Element, LinearJoint, LocalForce, ModalBlocks, Start, System, TimeFunction, consistent_start
+from ..rigid.elimination import Minimal, minimal
+from .checks import check_scene
+from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge
+from .inertia import rotor
+from .kinematics import Rolling, rolling
+from .law import angle_block, derivative, gyro_block, joined, python_law, torque_block, train_law
+from .mesh_element import MeshLine, mesh_line
+from .scene import Drive, TrainScene
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class TrainModel:
+    """A train ready to be simulated.
+
+    Attributes
+    ----------
+    scene, rolling
+        What it was made from; its kinematics.
+    system, core, start
+        System of the rigid core, its minimal coordinates, its start.
+    angle
+        psi(t), rotation of the drive (rad).
+    shafts, housing
+        Bodies.
+    meshes
+        Lines of action.
+    torques
+        Pairs (direction in the system, torque over time): loads, and the shafts' inertia under a changing drive.
+    first : (shafts,)
+        Number of each shaft's first coordinate in the system.
+    spin_reference : (shafts, system size)
+        Rotation of each shaft relative to the bore it is measured against, beside rolling.
+    axial : (bores, system size)
+        Displacement along the axis of each bore's reference point.
+    bores
+        Names of the bores that carry shafts, in the housing's order.
+    """
+
+    scene: TrainScene
+    rolling: Rolling
+    system: System
+    core: Minimal
+    start: Start
+    angle: TimeFunction
+    shafts: tuple[RigidShaft, ...]
+    housing: ModalBlocks | None
+    meshes: tuple[MeshLine, ...]
+    torques: tuple[tuple[Array, TimeFunction], ...]
+    first: NDArray[np.int64]
+    spin_reference: Array
+    axial: Array
+    bores: tuple[str, ...]
+
+    @property
+    def ratios(self) -> Array:
+        """Speed of each shaft for unit speed of the drive."""
+        return np.array([float(r) for r in self.rolling.ratios])
+
+    @property
+    def steady_speed(self) -> float:
+        """Speed of the drive once its function of time has ended (rad/s)."""
+        assert self.scene.drive is not None
+        breaks = self.scene.drive.speed.breaks
+        return float(self.scene.drive.speed(max(breaks, default=0.0)))
+
+    @property
+    def load_end(self) -> float:
+        """Time at which all ramps have ended (s)."""
+        return max((b for load in self.scene.loads for b in load.torque.breaks), default=0.0)
+
+    @property
+    def coupled_frequencies_hz(self) -> Array:
+        """Natural frequencies with mean mesh stiffness (Hz)."""
+        return np.sqrt(np.maximum(self.core.squares, 0.0)) / (2.0 * math.pi)
+
+
+def build_train(scene: TrainScene) -> TrainModel:
+    """Check a scene and set up its system.
+
+    Raises
+    ------
+    InputError
+        For the first thing in the scene that does not fit, with the cure.
+    """
+    check_scene(scene)
+    kinematics = rolling(scene)
+    assert scene.drive is not None
+    frame = scene.frame
+    angle = scene.drive.speed.integral(0.0, 0.0)
+    housing = _housing(scene)
+    ratios = [float(r) for r in kinematics.ratios]
+    begin = float(scene.drive.speed(0.0))
+    shafts = tuple(
+        RigidShaft(
+            rotor(shaft, tuple(g for g in scene.gears if g.shaft == shaft.name), frame[2]),
+            0.0 if shaft.initial_speed is None else shaft.initial_speed - g * begin,
+            name=f"shaft {shaft.name}",
+        )
+        for shaft, g in zip(scene.shafts, ratios, strict=True)
+    )
+    bodies: list[Element] = [*shafts] if housing is None else [housing, *shafts]
+    first = np.array([0 if housing is None else housing.size] + [6] * (len(shafts) - 1)).cumsum()
+    size = sum(b.size for b in bodies)
+    lines = tuple(mesh_line(scene, mesh, shafts, first, ratios, size) for mesh in scene.meshes)
+    torques = _torques(scene, shafts, first, ratios, angle, size)
+    forces = _forces(scene, bodies, lines, torques, angle, first, ratios, shafts)
+    elements = [*bodies, *_supports(scene, shafts, housing), *(line.element(bodies) for line in lines), forces]
+    system, core = _damped(scene, elements, bodies)
+    return TrainModel(
+        scene=scene,
+        rolling=kinematics,
+        system=system,
+        core=core,
+        start=_start(scene, system, shafts, first),
+        angle=angle,
+        shafts=shafts,
+        housing=housing,
+        meshes=lines,
+        torques=torques,
+        first=first,
+        spin_reference=_spin_reference(scene, size, first),
+        axial=_axial(scene, size),
+        bores=_used_bores(scene),
+    )
+
+
+def _torques(
+    scene: TrainScene, shafts: tuple[RigidShaft, ...], first: NDArray[np.int64], ratios: list[float],
+    angle: TimeFunction, size: int,
+) -> tuple[tuple[Array, TimeFunction], ...]:  # fmt: skip
+    """Directions in the system with torques over time: loads, and the shafts' inertia when the drive changes speed."""
+    made = []
+    change = derivative(derivative(angle))
+    for i, (shaft, ratio) in enumerate(zip(shafts, ratios, strict=True)):
+        if change.sines or any(any(row) for row in change.coefficients):
+            direction = np.zeros(size)
+            direction[first[i] + 5] = 1.0
+            made.append((direction, -ratio * shaft.rotor.polar * change))
+    for load in scene.loads:
+        i = [s.name for s in scene.shafts].index(load.shaft)
+        direction = np.zeros(size)
+        direction[first[i] + 5] = 1.0
+        if scene.housing is not None and load.bore is not None:
+            direction[: scene.housing.size] -= bore_selector(scene, load.bore)[:, 3:] @ scene.frame[2]
+        made.append((direction, load.torque))
+    return tuple(made)
+
+
+def _forces(
+    scene: TrainScene, bodies: list[Element], lines: tuple[MeshLine, ...],
+    torques: tuple[tuple[Array, TimeFunction], ...], angle: TimeFunction, first: NDArray[np.int64], ratios: list[float],
+    shafts: tuple[RigidShaft, ...],
+) -> LocalForce:  # fmt: skip
+    """All that is not constant, as one force: three directions a shaft (tilts, spin), one a mesh, one a torque."""
+    size = sum(b.size for b in bodies)
+    unit = np.eye(size)
+    columns = [unit[:, i + 3 : i + 6] for i in first]
+    blocks = [angle_block(angle)]
+    if scene.damping.gyroscopic:
+        blocks += [gyro_block(3 * i, g, s.rotor.polar) for i, (g, s) in enumerate(zip(ratios, shafts, strict=True))]
+    at = 3 * len(shafts)
+    for line in lines:
+        if line.curve is not None:
+            columns.append(line.row[:, None])
+            blocks.append(line.block(at, 3 * line.driver + 2))
+            at += 1
+    for direction, function in torques:
+        columns.append(direction[:, None])
+        blocks.append(torque_block(at, function))
+        at += 1
+    parameters = joined(blocks)
+    breaks = tuple(sorted({*angle.breaks, *(b for _, function in torques for b in function.breaks)}))
+    law = python_law(parameters, at)
+    return LocalForce(tuple(bodies), np.hstack(columns), law, train_law, parameters, breaks, name="forces of the train")
+
+
+def bore_selector(scene: TrainScene, bore: str) -> Array:
+    """Columns that pick a bore's six coordinates from the housing's, shape (N, 6)."""
+    assert scene.housing is not None
+    return np.eye(scene.housing.size)[:, scene.housing.attachment(bore)]
+
+
+def _housing(scene: TrainScene) -> ModalBlocks | None:
+    body = scene.housing
+    if body is None:
+        return None
+    damping = body.damping + scene.damping.alpha * body.mass + scene.damping.beta * body.stiffness
+    return ModalBlocks(body.mass, damping, body.stiffness, name="housing")
+
+
+def _supports(scene: TrainScene, shafts: tuple[RigidShaft, ...], housing: ModalBlocks | None) -> list[Element]:
+    """Hinges or bearings of all bores, and the drive."""
+    assert scene.drive is not None
+    made: list[Element] = []
+    bearings = {b.bore: b for b in scene.bearings}
+    for shaft, body in zip(scene.shafts, shafts, strict=True):
+        for bore in shaft.bores:
+            chosen = None if housing is None else bore_selector(scene, bore)
+            rows = bore_rows(body, scene.bore_points[bore], scene.frame, chosen)
+            if bore in bearings:
+                stiffness, damping = (
+                    np.array(x, dtype=float) for x in (bearings[bore].stiffness, bearings[bore].damping)
+                )
+                damping = damping + scene.damping.beta * stiffness
+                made.append(bearing(body, housing, rows, stiffness, damping, f"bearing {bore}"))
+            else:
+                made.append(hinge(body, housing, rows, f"hinge {bore}"))
+        if scene.damping.alpha > 0.0:
+            made.append(
+                LinearForce((body,), scene.damping.alpha * body.mass(), np.zeros((6, 6)), f"damping of {body.name}")
+            )
+        if shaft.name == scene.drive.shaft:
+            row = np.eye(6)[5:]
+            touches: tuple[Element, ...] = (body,)
+            if housing is not None:
+                row = np.hstack([row, -(bore_selector(scene, scene.drive.bore)[:, 3:] @ scene.frame[2])[None, :]])
+                touches = (body, housing)
+            made.append(_drive(scene.drive, touches, row))
+    return made
+
+
+def _drive(drive: Drive, touches: tuple[Element, ...], row: Array) -> Element:
+    """Rigid drive: a constraint on the relative rotation beside rolling; with a coupling: spring and damper on it."""
+    if drive.stiffness is None:
+        return LinearJoint(touches, row, np.zeros(1), name="drive")
+    square = row.T @ row
+    return LinearForce(touches, drive.damping * square, drive.stiffness * square, "drive")
+
+
+def _damped(scene: TrainScene, elements: list[Element], bodies: list[Element]) -> tuple[System, Minimal]:
+    """System and minimal coordinates; modal damping is written in the modes of the coupled system itself."""
+    system = System(elements)
+    core = minimal(system)
+    ratios = np.atleast_1d(np.asarray(scene.damping.ratio, dtype=float))
+    if not ratios.any():
+        return system, core
+    count = len(core.squares)
+    per_mode = np.append(ratios, np.full(max(0, count - len(ratios)), ratios[-1]))[:count]
+    factors = 2.0 * per_mode * np.sqrt(np.maximum(core.squares, 0.0))
+    back = core.T.T @ system.mass
+    whole = LinearForce(tuple(bodies), back.T @ (factors[:, None] * back), np.zeros_like(system.mass), "modal damping")
+    damped = System([*elements, whole])
+    made = replace(core, system=damped, damping=core.damping + np.diag(factors))
+    damped.__dict__["_minimal"] = made  # the modes are those without damping, and its matrix stays exactly diagonal
+    return damped, made
+
+
+def _start(scene: TrainScene, system: System, shafts: tuple[RigidShaft, ...], first: NDArray[np.int64]) -> Start:
+    """At rest beside rolling but for the asked speeds, which the constraints must allow."""
+    start = consistent_start(system, 0.0)
+    for shaft, body, i in zip(scene.shafts, shafts, first, strict=True):
+        off = float(start.v[i + 5]) - body.start_rate
+        if shaft.initial_speed is not None and abs(off) > 1e-6 * max(1.0, abs(shaft.initial_speed)):
+            problem = f"contradicts the drive and the rigid parts, which make it {shaft.initial_speed + off:.9g} rad/s"
+            cure = "leave it out, or give the drive or the mesh an elastic coupling"
+            raise InputError(f"shaft {shaft.name!r} initial speed", shaft.initial_speed, problem, cure)
+    return start
+
+
+def _used_bores(scene: TrainScene) -> tuple[str, ...]:
+    used = {b for s in scene.shafts for b in s.bores}
+    return tuple(name for name in scene.bore_points if name in used)
+
+
+def _measured_against(scene: TrainScene, name: str) -> str:
+    """Bore against which a shaft's rotation is measured: the drive's, the load's, or its first."""
+    assert scene.drive is not None
+    ends = [(scene.drive.shaft, scene.drive.bore), *((x.shaft, x.bore) for x in scene.loads)]
+    return next((bore for shaft, bore in ends if shaft == name and bore is not None), scene.shaft(name).bores[0])
+
+
+def _spin_reference(scene: TrainScene, size: int, first: NDArray[np.int64]) -> Array:
+    rows = np.zeros((len(scene.shafts), size))
+    for i, shaft in enumerate(scene.shafts):
+        rows[i, first[i] + 5] = 1.0
+        if scene.housing is not None:
+            bore = bore_selector(scene, _measured_against(scene, shaft.name))
+            rows[i, : len(bore)] -= bore[:, 3:] @ scene.frame[2]
+    return rows
+
+
+def _axial(scene: TrainScene, size: int) -> Array:
+    bores = _used_bores(scene)
+    rows = np.zeros((len(bores), size))
+    if scene.housing is not None:
+        for i, bore in enumerate(bores):
+            selector = bore_selector(scene, bore)
+            rows[i, : len(selector)] = selector[:, :3] @ scene.frame[2]
+    return rows

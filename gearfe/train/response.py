@@ -1,0 +1,100 @@
+"""What a simulated gear train tells: contact forces, speeds, accelerations and the way back to the housing's field."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class TrainResponse:
+    """Response of a gear train at n output times; SI units.
+
+    Attributes
+    ----------
+    time : (n,)
+        Times up to the time reached (s).
+    drive_angle : (n,)
+        Rotation of the driving shaft relative to the bore of its drive (rad), positive about the axis of the train.
+    mesh_names : tuple of m names
+        Gear meshes, ``driver-driven``.
+    drive_torque : (n,)
+        Torque of the drive on its shaft (N m), about the axis.
+    contact_force : (n, m)
+        Force of each mesh along its line of action (N); positive presses the flanks together.
+    shaft_names : tuple of s names
+    speed, speed_absolute : (n, s)
+        Spin of each shaft about the axis (rad/s): relative to its first bore, as a hinge measures it, and absolute.
+    acceleration, acceleration_absolute : (n, s)
+        Their time derivatives (rad/s2).
+    attachment_names : tuple of b names
+        Bores that carry a shaft, in the housing's order.
+    attachment_acceleration : (n, b)
+        Acceleration along the shaft axis at each bore's reference point (m/s2).
+    gear_names : tuple of g names
+    gear_pose : (n, g, 6)
+        Displacement of each gear's centre (m) and its rotation (rad) about x, y, z; the part about the axis of the
+        train is the whole angle turned since the start, the others are small.
+    gear_centres : (g, 3)
+        Where the gears' centres are at rest (m).
+    modal, modal_velocity, modal_acceleration : (n, N) or None
+        Coordinates of the reduced housing and their rates; None for a rigid housing.
+    mesh_frequencies_Hz : (m,)
+        Tooth-mesh frequencies at the drive's nominal speed.
+    shaft_frequencies_Hz : (s,)
+        Turns per second of the shafts at that speed.
+    common_period_s : float or None
+        Shortest time after which all meshes are in phase again; None when there is none within reason.
+    coupled_frequencies_Hz : (c,)
+        Natural frequencies of the whole system with the mean mesh stiffnesses, without damping and gyroscopic terms.
+    floquet : ndarray of complex, or None
+        Multipliers over the common period, largest first; None when not computed, `floquet_note` says why.
+    floquet_note : str
+    status : str
+        ``done``, ``diverged``, or what stopped the integration.
+    time_reached : float
+        Time up to which the results hold (s).
+    load_end_s : float
+        Time at which all load ramps have ended (s).
+    statistics, estimates : mapping
+        ``steps``, ``evaluations``, ``method``, ``seconds``, ``free_coordinates``, ``redundant_constraints`` (names),
+        ``smallest_contact_force_N``; error estimates (``integration``, ``reduction``), as far as they were asked for.
+    warnings : tuple of str
+    """
+
+    time: Array
+    drive_angle: Array
+    mesh_names: tuple[str, ...]
+    contact_force: Array
+    drive_torque: Array
+    shaft_names: tuple[str, ...]
+    speed: Array
+    speed_absolute: Array
+    acceleration: Array
+    acceleration_absolute: Array
+    attachment_names: tuple[str, ...]
+    attachment_acceleration: Array
+    gear_names: tuple[str, ...]
+    gear_pose: Array
+    gear_centres: Array
+    modal: Array | None
+    modal_velocity: Array | None
+    modal_acceleration: Array | None
+    mesh_frequencies_Hz: Array
+    shaft_frequencies_Hz: Array
+    common_period_s: float | None
+    coupled_frequencies_Hz: Array
+    floquet: NDArray[np.complex128] | None
+    floquet_note: str
+    status: str
+    time_reached: float
+    load_end_s: float
+    statistics: Mapping[str, Any] = field(default_factory=dict)
+    estimates: Mapping[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()

@@ -1,0 +1,237 @@
+"""What a gear train is made of: plain descriptions in SI units, checked by `gearfe.train.checks`.
+
+All shafts are parallel to one unit vector `axis`; angles, speeds and torques count positive about it (right-hand rule).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..gear import Gear
+from ..modal_body import ModalBody
+from ..periodic import PeriodicInterpolant
+from ..rigid.timefunctions import TimeFunction
+from ..stiffness_curve import StiffnessCurve
+
+Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Shaft:
+    """A rigid round shaft; its gears become part of it.
+
+    Parameters
+    ----------
+    name
+        How other parts call it.
+    point
+        Middle of the shaft (m).
+    length, radius
+        Of the cylinder (m).
+    bores
+        Names of the attachments (bores) that carry it; two hinges are usual.
+    density
+        kg/m3.
+    initial_speed
+        Spin at the start (rad/s); None: rolling with the drive.
+    mass, polar_inertia, transverse_inertia
+        Of shaft and gears together (kg, kg m2 about the mass centre), where they are known better than from the
+        geometry.
+    """
+
+    name: str
+    point: Vector
+    length: float
+    radius: float
+    bores: tuple[str, ...]
+    density: float = 7850.0
+    initial_speed: float | None = None
+    mass: float | None = None
+    polar_inertia: float | None = None
+    transverse_inertia: float | None = None
+
+
+@dataclass(frozen=True)
+class ShaftGear:
+    """A gear fixed on a shaft.
+
+    Parameters
+    ----------
+    along
+        Coordinate of its middle plane along the train's axis (m).
+    gear
+        Teeth and sizes.
+    density
+        kg/m3.
+    """
+
+    name: str
+    shaft: str
+    along: float
+    gear: Gear
+    density: float = 7850.0
+
+
+@dataclass(frozen=True)
+class GearMesh:
+    """Two gears in mesh.
+
+    Parameters
+    ----------
+    driver, driven
+        Names of gears.
+    stiffness
+        Curve over the driver's rotation, its interpolant (N/m over rad), a constant (N/m), or None for the ideal rigid
+        mesh: a constraint whose multiplier is the contact force.
+    phase
+        Angle of the driver (rad), counted in its driving sense, at which it starts; 0: a driver's tooth stands on the
+        line of centres.
+    damping
+        N s/m along the line of action.
+    interpolation
+        ``cubic`` (monotone) or ``linear``, for a curve.
+    centre_distance
+        Working centre distance of the gears (m); None: the one without backlash.
+    """
+
+    driver: str
+    driven: str
+    stiffness: StiffnessCurve | PeriodicInterpolant | float | None
+    phase: float = 0.0
+    damping: float = 0.0
+    interpolation: str = "cubic"
+    centre_distance: float | None = None
+
+    @property
+    def name(self) -> str:
+        """``driver-driven``."""
+        return f"{self.driver}-{self.driven}"
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """Springs and dampers between a shaft and a bore, instead of a hinge.
+
+    Parameters
+    ----------
+    bore
+        Name of the attachment.
+    stiffness, damping : five numbers
+        Diagonal: along the first transverse direction, the axis, the second transverse direction (N/m, N s/m), and for
+        tilt about the first and second transverse direction (N m/rad, N m s/rad). For shafts along y these are x, y, z
+        and tilts about x and z.
+    """
+
+    bore: str
+    stiffness: tuple[float, float, float, float, float]
+    damping: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Rotation of a shaft relative to one of its bores as a function of time.
+
+    Parameters
+    ----------
+    speed
+        Relative speed (rad/s); the rotation is its integral from time 0.
+    stiffness, damping
+        Of an elastic coupling between the prescribed rotation and the shaft (N m/rad, N m s/rad); None: rigid.
+    """
+
+    shaft: str
+    bore: str
+    speed: TimeFunction
+    stiffness: float | None = None
+    damping: float = 0.0
+
+
+@dataclass(frozen=True)
+class Load:
+    """Torque on a shaft (N m), and its reaction on a bore; `bore` None: it reacts outside of the train."""
+
+    shaft: str
+    bore: str | None
+    torque: TimeFunction
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Damping of the whole coupled system, beside that of housing, bearings and meshes.
+
+    Parameters
+    ----------
+    ratio
+        Modal damping ratio of the modes of the coupled system (mean mesh stiffnesses): one, or one a mode from the
+        lowest up, the last one holding for all above.
+    alpha, beta
+        Rayleigh damping ``alpha M + beta K`` (1/s, s) of all bodies, bearings and meshes, for motion beside the
+        rolling.
+    gyroscopic
+        Whether the shafts' gyroscopic moments act (they do no work; off for comparison only).
+    """
+
+    ratio: float | tuple[float, ...] = 0.0
+    alpha: float = 0.0
+    beta: float = 0.0
+    gyroscopic: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class TrainScene:
+    """A whole gear train.
+
+    Parameters
+    ----------
+    shafts, gears, meshes, drive, loads
+        The train.
+    housing
+        Reduced elastic housing, whose attachments are the bores; None: a rigid one with the bores `rigid_bores`.
+    rigid_bores
+        Name -> point on the bore's axis (m), for a rigid housing.
+    bearings
+        For bores whose shaft is not held by a hinge.
+    damping
+        Of the coupled system.
+    axis
+        Direction of all shafts.
+    """
+
+    shafts: tuple[Shaft, ...]
+    gears: tuple[ShaftGear, ...]
+    meshes: tuple[GearMesh, ...]
+    drive: Drive | None
+    loads: tuple[Load, ...] = ()
+    housing: ModalBody | None = None
+    rigid_bores: dict[str, Vector] = field(default_factory=dict)
+    bearings: tuple[Bearing, ...] = ()
+    damping: Damping = Damping()
+    axis: Vector = (0.0, 1.0, 0.0)
+
+    @property
+    def bore_points(self) -> dict[str, Array]:
+        """Name -> reference point of each bore (m)."""
+        if self.housing is None:
+            return {name: np.array(point, dtype=float) for name, point in self.rigid_bores.items()}
+        return dict(zip(self.housing.attachment_names, self.housing.attachment_points, strict=True))
+
+    @property
+    def frame(self) -> Array:
+        """Rows e1, e2, a: a right-handed frame, the axis last, e1 nearest to a coordinate direction; shape (3, 3)."""
+        a = np.array(self.axis, dtype=float) / np.linalg.norm(self.axis)
+        e1 = np.array([1.0, 0.0, 0.0]) if abs(a[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+        e1 = e1 - (e1 @ a) * a
+        e1 = e1 / np.linalg.norm(e1)
+        return np.array([e1, np.cross(a, e1), a])
+
+    def shaft(self, name: str) -> Shaft:
+        """The shaft of that name."""
+        return next(s for s in self.shafts if s.name == name)
+
+    def gear(self, name: str) -> ShaftGear:
+        """The gear of that name."""
+        return next(g for g in self.gears if g.name == name)

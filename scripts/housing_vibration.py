@@ -1,0 +1,36 @@
+#!/usr/bin/env python3
+"""A gear train in its housing in a few lines of Python: what ``gearfe vibration`` does, without its options.
+
+Usage: python scripts/housing_vibration.py [JOB.toml [OUT_DIR [VARIANT]]]
+"""
+
+from __future__ import annotations
+
+import sys
+
+from gearfe.output.files import output_folder, write_csv
+from gearfe.train import build_train, simulate
+from gearfe.train_job import job_scene, read_train_job, train_body, train_curves
+from gearfe.train_report import mean_over_periods, response_columns, spectra
+
+
+def main(job_file: str = "geometry/gear_train.toml", out: str = "out/vibration", variant: str | None = None) -> int:
+    """Simulate, write response.csv and spectrum.csv, print the mean contact forces."""
+    job = read_train_job(job_file, variant)
+    scene = job_scene(job, train_curves(job), train_body(job))
+    response = simulate(build_train(scene), job.times, tolerance=job.table.tolerance)
+    radiation = None if scene.housing is None else scene.housing.radiation
+    folder = output_folder(out)
+    write_csv(folder / "response.csv", response_columns(response, radiation))
+    write_csv(folder / "spectrum.csv", spectra(response, radiation).columns())
+    force, periods = mean_over_periods(
+        response.time, response.contact_force, response.load_end_s, response.common_period_s
+    )
+    for name, mean in zip(response.mesh_names, force, strict=True):
+        print(f"mean contact force {name}: {mean:.6g} N over {periods} common mesh periods")
+    print(f"written to {folder}: response.csv, spectrum.csv")
+    return int(response.status != "done")
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:4]))

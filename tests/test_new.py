@@ -1,0 +1,111 @@
+"""Job files that ``gearfe new`` writes: they run as they are, and every optional key in them is a key."""
+
+import re
+import tomllib
+
+import pytest
+
+from gearfe.cli import main
+from gearfe.config import build, load_job, quantity, table_class
+from gearfe.job_examples import JOBS, job_file
+from gearfe.job_text import table_text
+from gearfe.tables.mechanism import MechanismFile
+
+KINDS = ("stiffness", "vibration", "mechanism")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_file_is_read_without_a_mistake(tmp_path, capsys, kind):
+    path = tmp_path / "job.toml"
+    assert main(["new", kind, str(path)]) == 0
+    assert f"gearfe {kind} {path}" in capsys.readouterr().out
+    if kind == "mechanism":
+        build(MechanismFile, tomllib.loads(path.read_text()), "")
+    else:
+        assert set(load_job(path, tuple(JOBS[kind][1]))) == set(JOBS[kind][1])
+    assert max(len(line) for line in path.read_text().splitlines()) <= 120
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_optional_key_can_be_switched_on(kind):
+    """Taking the # off a key with a default gives the same job: the keys stand in the right table."""
+    lines = job_file(kind).splitlines()
+    plain, changed = tomllib.loads("\n".join(lines)), 0
+    for number, line in enumerate(lines):
+        if not re.match(r"# [A-Za-z_0-9]+ = \S", line):
+            continue
+        changed += 1
+        text = tomllib.loads("\n".join([*lines[:number], line[2:], *lines[number + 1 :]]))
+        if kind == "mechanism":
+            assert build(MechanismFile, text, "") == build(MechanismFile, plain, ""), line
+            continue
+        for name, table in text.items():
+            assert build(table_class(name), table, name) == build(table_class(name), plain[name], name), line
+    assert changed > 5
+
+
+def test_every_line_tells_its_unit_or_meaning():
+    for line in job_file("vibration").splitlines():
+        if "=" in line and not line.startswith("# ") and len(line) <= 110:
+            assert "#" in line, line
+
+
+def test_the_stiffness_job_runs(tmp_path):
+    path = tmp_path / "job.toml"
+    assert main(["new", "stiffness", str(path)]) == 0
+    options = ["--angles", "1", "8", "17", "--coarsen", "3", "--no-estimate", "--no-picture"]
+    assert main(["stiffness", str(path), "--out", str(tmp_path / "out"), *options]) == 0
+    assert (tmp_path / "out" / "stiffness.csv").exists()
+
+
+def test_the_mechanism_job_runs(tmp_path):
+    path = tmp_path / "job.toml"
+    assert main(["new", "mechanism", str(path)]) == 0
+    assert main(["mechanism", str(path), "--out", str(tmp_path / "out"), "--until", "0.2", "--no-figures"]) == 0
+    assert (tmp_path / "out" / "trajectory.csv").exists()
+
+
+def test_mistakes(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "vibrations"]) == 2
+    assert "did you mean 'vibration'?" in capsys.readouterr().err
+    assert main(["new", "stiffness"]) == 0
+    assert (tmp_path / "stiffness.toml").exists()
+    (tmp_path / "stiffness.toml").write_text("mine")
+    assert main(["new", "stiffness"]) == 2
+    assert "exists" in capsys.readouterr().err
+    assert (tmp_path / "stiffness.toml").read_text() == "mine"
+    assert main(["new", "stiffness", "--force"]) == 0
+    assert main(["new", "stiffness", "no/such/folder/job.toml"]) == 2
+
+
+def test_kinds_of_keys():
+    """Texts, flags, lists, tables in a line, numbers, nested tables, lists of tables, named tables."""
+    from dataclasses import dataclass
+
+    @dataclass(frozen=True)
+    class Inner:
+        a: float = quantity(1.0, doc="first (m)")
+        b: str | None = quantity(None, doc="second", choices=("x", "y"))
+
+    @dataclass(frozen=True)
+    class Outer:
+        flag: bool = quantity(True, doc="a flag")  # noqa: RUF009
+        pair: tuple[float, float] = quantity((0.0, 1.0), doc="two")  # noqa: RUF009
+        names: dict[str, float] = quantity(dict, doc="numbers by name")
+        one: Inner = quantity(Inner, doc="the one")  # noqa: RUF009
+        many: tuple[Inner, ...] = quantity((), doc="[[outer.many]]")
+        named: dict[str, Inner] = quantity(dict, doc="[outer.named.NAME]")
+
+    globals()["Inner"] = Inner
+    example = {
+        "pair": [2.0, 3.5],
+        "names": {"angle(x)": -1.0},
+        "one": {"b": 'say "x"'},
+        "many": [{"a": 2.0}, {"b": "y"}],
+        "named": {"left arm": {"a": 1e-9}},
+    }
+    text = table_text(Outer, example, "outer")
+    assert tomllib.loads(text) == {"outer": example}
+    assert "# flag = true " in text
+    assert "# first (m)" in text

@@ -1,0 +1,497 @@
+"""Gear trains against theory: statics, energy, rotor dynamics, symmetries, and high-precision solutions."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy.integrate import cumulative_simpson, solve_ivp
+
+from gearfe.errors import InputError
+from gearfe.rigid import constant, integrate, smoothed_step
+from gearfe.train import Bearing, Damping, Drive, GearMesh, Load, Shaft, TrainScene, build_train, simulate
+from gearfe.train.inertia import outline_moments
+from gearfe.train.kinematics import rolling, steady_forces
+from gearfe.train.motion import forces, motion
+
+from .trains import ALPHA, SHIPPED, SPEED, TORQUE, base_radius, braking, changed, curve, elastic, gear, train
+
+PERIOD = 0.15 * 2 * math.pi / SPEED  # common mesh period of two 20/30 stages
+
+
+def uniform(end: float, count: int) -> np.ndarray:
+    return np.linspace(0.0, end, count)
+
+
+@pytest.mark.parametrize("stages", [[(20, 30)], SHIPPED, [(20, 30), (19, 31), (24, 36)]], ids=["two", "three", "four"])
+def test_mean_forces_and_their_ratio_over_whole_periods(stages: list[tuple[int, int]]) -> None:
+    """Once the vibration is periodic no shaft accelerates on average: F = torque/base radius, stage by stage.
+
+    The four-shaft train repeats after many mesh cycles; there the constant stiffness decays to the static forces.
+    """
+    expected, torque = [], abs(TORQUE)
+    for one, two in reversed(stages):
+        expected.insert(0, torque / base_radius(two))
+        torque *= one / two
+    periodic = len(stages) < 3
+    stiffness = (lambda z: curve(z, swing=0.15)) if periodic else 1e8
+    scene = elastic(
+        train(stages, stiffness=stiffness, damping=Damping(ratio=0.03), ys=[0.012, -0.0, -0.012][: len(stages)])
+    )
+    model = build_train(scene)
+    assert steady_forces(scene) == pytest.approx(expected, rel=1e-12)
+    cycles = model.rolling.common_turns
+    assert cycles is not None or not periodic
+    period = float(cycles) * 2 * math.pi / SPEED if cycles is not None and periodic else 1e-3
+    count = math.ceil((0.03 if periodic else 0.09) / period)
+    times = np.concatenate([[0.0], np.linspace(count * period, (count + 1) * period, 801)])
+    response = simulate(model, times, tolerance=1e-9)
+    mean = response.contact_force[1:-1].mean(axis=0)
+    assert mean == pytest.approx(expected, rel=1e-5)
+    assert response.status == "done"
+    assert not response.warnings
+
+
+def test_initial_speeds() -> None:
+    """A free shaft may start at another speed: with the mesh as spring it swings about rolling."""
+    base = train([(20, 30)], loads=())
+    omega = 2 * math.pi * build_train(base).coupled_frequencies_hz[-1]
+    shafts = (base.shafts[0], dataclasses.replace(base.shafts[1], initial_speed=-390.0))
+    response = simulate(build_train(changed(base, shafts=shafts)), uniform(2e-3, 41), tolerance=1e-9)
+    assert response.speed[:, 1] == pytest.approx(-400 + 10 * np.cos(omega * response.time), abs=1e-6)
+    shafts = (dataclasses.replace(base.shafts[0], initial_speed=500.0), base.shafts[1])
+    with pytest.raises(InputError, match="contradicts the drive"):
+        build_train(changed(base, shafts=shafts))
+
+
+def test_rolling_of_the_shipped_train() -> None:
+    model = build_train(train(SHIPPED))
+    assert model.system.breaks == pytest.approx([0.0, 1e-3])  # steps end where the load's ramp does
+    assert model.load_end == 1e-3
+    response = simulate(model, uniform(1e-3, 11))
+    assert model.ratios == pytest.approx([1, -2 / 3, 4 / 9])
+    assert response.common_period_s == pytest.approx(1.5707963e-3, rel=1e-7)
+    assert response.mesh_frequencies_Hz == pytest.approx([20 * 600 / (2 * math.pi), 20 * 400 / (2 * math.pi)])
+    assert response.speed[0] == pytest.approx([600.0, -400.0, 800 / 3])
+
+
+def test_mass_and_inertia_of_a_gear_lie_between_those_of_its_circles() -> None:
+    item = gear(30)
+    area, second = outline_moments(item)
+    assert math.pi * item.root_radius**2 < area < math.pi * item.tip_radius**2
+    assert 0.5 * math.pi * item.root_radius**4 < second < 0.5 * math.pi * item.tip_radius**4
+    slim = dataclasses.replace(item, teeth=60, module=item.module / 2, tip_round=5e-5)
+    assert outline_moments(slim)[0] == pytest.approx(math.pi * slim.reference_radius**2, rel=0.03)
+
+
+def test_law_for_one_state_equals_law_for_whole_arrays() -> None:
+    """The compiled law, called in Python, against the vectorised forces: speed ramp, curves, gyroscopic moments."""
+    speed = constant(600.0) + smoothed_step(1e-3, 1e-3, 50.0)
+    for method in ("cubic", "linear"):
+        scene = elastic(
+            train(SHIPPED, stiffness=lambda z, m=method: curve(z, method=m), drive=Drive("s0", "s0+", speed))
+        )
+        system = (model := build_train(scene)).system
+        rng = np.random.default_rng(1)
+        t = rng.uniform(0, 0.01, 7)
+        q, v = 1e-3 * rng.standard_normal((2, 7, system.size))
+        many = forces(model, t, q, v)
+        for i in range(7):
+            one = system.force(t[i], q[i], v[i]) + system.damping @ v[i] + system.stiffness @ q[i]
+            scale = np.abs(system.stiffness @ q[i]).max()
+            assert np.abs(one - many[i]).max() < 1e-13 * scale
+
+
+def energies(model, moved) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[no-untyped-def]
+    """Whole energy with absolute speeds, and the power of drive and loads."""
+    v = moved.v.copy()
+    spin = [int(i) + 5 for i in model.first]
+    v[:, spin] += model.angle(moved.time, 1)[:, None] * model.ratios
+    kinetic = 0.5 * np.einsum("ni,ij,nj->n", v, model.system.mass, v)
+    potential = 0.5 * np.einsum("ni,ij,nj->n", moved.q, model.system.stiffness, moved.q)
+    drive = model.scene.drive
+    row = [s.name for s in model.scene.shafts].index(drive.shaft)
+    relative = v @ model.spin_reference[row]
+    power = moved.drive_torque * relative
+    for direction, function in model.torques:
+        power = power + function(moved.time) * (v @ direction)
+    return kinetic + potential, power
+
+
+def test_energy_balance_of_the_undamped_train() -> None:
+    """Constant stiffness, no damping: what drive and load put in is kinetic and elastic energy."""
+    model = build_train(elastic(train(SHIPPED), skew=0.4, uneven=0.2))
+    trajectory = integrate(model.system, uniform(0.006, 6001), method="explicit", tolerance=1e-11, start=model.start)
+    moved = motion(model, trajectory)
+    energy, power = energies(model, moved)
+    work = cumulative_simpson(power, x=moved.time, initial=0.0)
+    through = cumulative_simpson(moved.drive_torque * SPEED, x=moved.time, initial=0.0)
+    assert np.abs(energy - energy[0] - work).max() < 1e-8 * np.abs(through).max()
+
+
+@pytest.mark.parametrize("rigid_housing", [True, False])
+def test_ideal_rigid_mesh(rigid_housing: bool) -> None:
+    """A rigid housing leaves nothing free: F is exact statics. In an elastic one it is a stiff spring's limit."""
+    if rigid_housing:
+        response = simulate(build_train(train(SHIPPED, stiffness=None)), uniform(2e-3, 41))
+        force = -smoothed_step(0.5e-3, 1e-3, TORQUE)(response.time) / base_radius(30)
+        assert response.contact_force[:, 1] == pytest.approx(force, abs=1e-6)
+        assert response.contact_force[:, 0] == pytest.approx(force * 2 / 3, abs=1e-6)
+        return
+    damping = Damping(beta=2e-6)
+    stiff = [
+        elastic(train(SHIPPED, stiffness=k, damping=dataclasses.replace(damping, beta=2e-6)), skew=0.2)
+        for k in (None, 2e10, 4e10)
+    ]
+    ideal, one, two = (simulate(build_train(s), uniform(3e-3, 61), tolerance=1e-8, method="explicit") for s in stiff)
+    extrapolated = 2 * two.contact_force - one.contact_force  # the error falls with 1/k
+    assert np.abs(extrapolated - ideal.contact_force).max() < 2e-3 * np.abs(ideal.contact_force).max()
+    assert (
+        np.abs(two.contact_force - ideal.contact_force).max()
+        < 0.7 * np.abs(one.contact_force - ideal.contact_force).max()
+    )
+
+
+def test_drive_of_changing_speed() -> None:
+    """Rigid meshes in a rigid housing: the drive's torque is the reduced inertia times its acceleration."""
+    speed = smoothed_step(1e-3, 2e-3, SPEED)
+    model = build_train(train(SHIPPED, stiffness=None, drive=Drive("s0", "s0+", speed), loads=()))
+    response = simulate(model, uniform(3e-3, 61))
+    reduced = sum(s.rotor.polar * g**2 for s, g in zip(model.shafts, model.ratios, strict=True))
+    assert response.drive_torque == pytest.approx(
+        reduced * speed(response.time, 1), abs=1e-9 * 600 / 2e-3 * reduced * 1e3
+    )
+    last = model.shafts[2].rotor.polar * model.ratios[2] * speed(response.time, 1)
+    assert response.contact_force[:, 1] == pytest.approx(last / base_radius(30), abs=1e-6)
+    assert response.speed[:, 1] == pytest.approx(-2 / 3 * speed(response.time), abs=1e-9)
+    assert response.acceleration[:, 2] == pytest.approx(4 / 9 * speed(response.time, 1), abs=1e-6)
+
+
+def test_static_deflection_with_bearings() -> None:
+    """One stage on bearings: spin, shift and tilt of the driven shaft under the static force, by hand."""
+    k, kb, kt = 1e8, 5e7, 3e3
+    scene = train([(20, 30)], stiffness=k, ys=[0.012], damping=Damping(ratio=0.3))
+    scene = changed(scene, bearings=tuple(Bearing(b, (kb, 2 * kb, 1.5 * kb, kt, 2 * kt)) for b in ("s1+", "s1-")))
+    model = build_train(scene)
+    moved = motion(
+        model, integrate(model.system, [0.0, 0.05, 0.08], method="explicit", tolerance=1e-10, start=model.start)
+    )
+    q = moved.q[-1, model.first[1] : model.first[1] + 6]
+    F = abs(TORQUE) / base_radius(30)
+    # the driver turns about +y, its pitch point at +x moves towards -z: t = -z, c = +x
+    n = np.array([math.sin(ALPHA), 0.0, -math.cos(ALPHA)])
+    y0 = model.shafts[1].rotor.centre[1]
+    K = np.zeros((2, 2))  # shift along x and tilt about z: bores at +-33 mm, both of stiffness kb
+    for y in (0.033, -0.033):
+        arm = np.array([1.0, -(y - y0)])  # x-shift at height y: u_x - theta_z (y - y0)
+        K += kb * np.outer(arm, arm) + np.diag([0.0, 2 * kt])
+    shift, tilt = np.linalg.solve(K, F * n[0] * np.array([1.0, -(0.012 - y0)]))
+    assert q[0] == pytest.approx(shift, rel=1e-6)
+    frame = model.scene.frame
+    assert frame == pytest.approx(np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]))  # e2 = a x e1 = -z
+    assert -q[4] == pytest.approx(tilt, rel=1e-6)  # the tilt coordinate about e2 = -z
+    assert q[1] == pytest.approx(0.0, abs=1e-12)
+    delta = moved.q[-1] @ model.meshes[0].row
+    assert k * delta == pytest.approx(F, rel=1e-6)
+    assert moved.contact_force[-1, 0] == pytest.approx(F, rel=1e-6)
+
+
+def test_stiff_bearings_are_hinges() -> None:
+    """In an elastic housing: the coupled frequencies approach those with hinges from below, as 1/stiffness."""
+    scene = elastic(train(SHIPPED), skew=0.3)
+    hinged = build_train(scene).coupled_frequencies_hz[:12]
+    off = []
+    for k in (1e11, 2e11):
+        bearings = tuple(Bearing(b, (k, k, k, 1e-2 * k, 1e-2 * k)) for b in scene.bore_points)
+        off.append(hinged - build_train(changed(scene, bearings=bearings)).coupled_frequencies_hz[:12])
+    assert (off[1] > 0.0).all()
+    assert (off[1] < 5e-3 * hinged).all()
+    assert off[0] / off[1] == pytest.approx(2.0, rel=0.02)
+
+
+def lone_rotor(**changes: object) -> TrainScene:
+    """One driven shaft with a disc in the middle, both bores isotropic bearings."""
+    from gearfe.train import ShaftGear
+
+    shaft = Shaft("rotor", (0.0, 0.0, 0.0), 0.2, 0.01, ("a", "b"))
+    scene = TrainScene(
+        (shaft,), (ShaftGear("disc", "rotor", 0.0, gear(60, 0.02)),), (), Drive("rotor", "a", constant(4000.0)),
+        rigid_bores={"a": (0.0, 0.09, 0.0), "b": (0.0, -0.09, 0.0)},
+        bearings=tuple(Bearing(b, (2e6, 1e7, 2e6, 0.0, 0.0)) for b in "ab"),
+    )  # fmt: skip
+    return dataclasses.replace(scene, **changes)  # type: ignore[arg-type]
+
+
+def test_gyroscopic_splitting() -> None:
+    """Jt w^2 -+ Jp Omega w - k = 0: a tilted spinning rotor precesses forward and backward at two frequencies."""
+    model = build_train(lone_rotor())
+    body = model.shafts[0].rotor
+    k, lever = 2 * 2e6 * 0.09**2, body.polar * 4000.0 / (2 * body.transverse)
+    root = math.hypot(lever, math.sqrt(k / body.transverse))
+    forward, backward = root + lever, root - lever
+    assert forward / backward > 1.5
+    times = uniform(0.02, 401)
+    tilt = 1e-4
+    start = dataclasses.replace(model.start, q=tilt * np.eye(6)[3], v=np.zeros(6))
+    moved = integrate(model.system, times, method="explicit", tolerance=1e-11, start=start)
+    # z = theta_1 + i theta_2: Jt z'' - i Jp Omega z' + k z = 0, so z = A e^(i w_f t) + B e^(-i w_b t)
+    a = tilt * backward / (forward + backward)
+    z = a * np.exp(1j * forward * times) + (tilt - a) * np.exp(-1j * backward * times)
+    assert np.abs(moved.q[:, 3] + 1j * moved.q[:, 4] - z).max() < 1e-8 * tilt
+    still = build_train(lone_rotor(damping=Damping(gyroscopic=False)))
+    plain = integrate(
+        still.system, times, method="explicit", tolerance=1e-11, start=dataclasses.replace(still.start, q=start.q)
+    )
+    assert np.abs(plain.q[:, 3] - tilt * np.cos(math.sqrt(k / body.transverse) * times)).max() < 1e-8 * tilt
+
+
+def test_modal_damping_decays_as_it_should() -> None:
+    """A free vibration of the one mode of a single stage: exp(-zeta omega t) cos(omega_d t)."""
+    model = build_train(train([(20, 30)], damping=Damping(ratio=0.02), loads=()))
+    omega = 2 * math.pi * model.coupled_frequencies_hz[-1]
+    inertia = model.shafts[1].rotor.polar
+    assert omega == pytest.approx(math.sqrt(1e8 * base_radius(30) ** 2 / inertia), rel=1e-9)
+    v = np.zeros(12)
+    v[11] = 1e-3
+    times = uniform(0.004, 201)
+    moved = integrate(
+        model.system, times, method="explicit", tolerance=1e-11, start=dataclasses.replace(model.start, v=v)
+    )
+    damped = omega * math.sqrt(1 - 0.02**2)
+    expected = 1e-3 / damped * np.exp(-0.02 * omega * times) * np.sin(damped * times)
+    assert np.abs(moved.q[:, 11] - expected).max() < 1e-8 * 1e-3 / omega
+
+
+def pair_scene() -> TrainScene:
+    """Two spins, one bearing translation, a torsional spring at the drive, mesh damping, periodic stiffness."""
+    one = Shaft("s0", (0.0, 0.0, 0.0), 0.06, 0.01, ("a",))
+    two = Shaft("s1", (0.0625, 0.0, 0.0), 0.06, 0.01, ("b",))
+    base = train([(20, 30)], ys=[0.0])
+    mesh = GearMesh("d0", "g0", curve(20, swing=0.12), damping=300.0)
+    return changed(
+        base, shafts=(one, two), meshes=(mesh,), rigid_bores={"a": (0.0, 0.0, 0.0), "b": (0.0625, 0.0, 0.0)},
+        bearings=(Bearing("b", (4e7, 0.0, 6e7, 1.0, 1.0), (50.0, 0.0, 80.0, 0.0, 0.0)),),
+        drive=Drive("s0", "a", constant(SPEED), 2e4, 0.3), loads=(Load("s1", "b", braking(1)),),
+    )  # fmt: skip
+
+
+def test_single_pair_against_a_high_precision_solution() -> None:
+    """Written out by hand for the two spins and the bearing's two translations, integrated to 1e-13."""
+    model = build_train(pair_scene())
+    J1, J2, m = (model.shafts[0].rotor.polar, model.shafts[1].rotor.polar, model.shafts[1].rotor.mass)
+    r1, r2 = base_radius(20), base_radius(30)
+    table, load = curve(20, swing=0.12), braking(1)
+    s, c = math.sin(ALPHA), math.cos(ALPHA)
+
+    def rhs(t: float, y: np.ndarray) -> np.ndarray:
+        p1, p2, x, z, w1, w2, vx, vz = y  # rests of the rotations, translation of the driven gear
+        # n = (sin, 0, -cos); delta = r1 phi1 + r2 phi2 - n . u
+        delta, rate = r1 * p1 + r2 * p2 - (s * x - c * z), r1 * w1 + r2 * w2 - (s * vx - c * vz)
+        F = float(table(SPEED * t + p1).value) * delta + 300.0 * rate
+        return np.array([
+            w1, w2, vx, vz,
+            (-2e4 * p1 - 0.3 * w1 - r1 * F) / J1,
+            (float(load(t)) - r2 * F) / J2,
+            (-4e7 * x - 50.0 * vx + s * F) / m,
+            (-6e7 * z - 80.0 * vz - c * F) / m,
+        ])  # fmt: skip
+
+    times = uniform(4e-3, 161)
+    y = np.zeros((161, 8))
+    for begin, end in ((0.0, 1e-3), (1e-3, 4e-3)):  # the load's ramp ends at 1 ms
+        part = (times >= begin) & (times <= end)
+        state = y[np.flatnonzero(part)[0]]
+        # the curve has kinks of its second derivative every 0.45 deg: short steps
+        found = solve_ivp(rhs, (begin, end), state, "DOP853", times[part], rtol=1e-13, atol=1e-18, max_step=2e-6)
+        y[part] = found.y.T
+    trajectory = integrate(model.system, times, method="explicit", tolerance=1e-12, start=model.start)
+    q = trajectory.q
+    mine = np.stack([q[:, 5], q[:, 11], q[:, 6], q[:, 8]], axis=1)
+    assert np.abs(mine - y[:, :4]).max(axis=0) == pytest.approx(0.0, abs=1e-9 * np.abs(y[:, :4]).max(axis=0).min())
+    v = trajectory.v
+    speeds = np.stack([v[:, 5], v[:, 11], v[:, 6], v[:, 8]], axis=1)
+    assert (np.abs(speeds - y[:, 4:]).max(axis=0) < 1e-9 * np.abs(y[:, 4:]).max(axis=0)).all()
+
+
+def test_phase_follows_the_state_not_the_nominal_angle() -> None:
+    """A soft coupling lets the driver lag behind: the stiffness is that of its actual rotation."""
+    scene = changed(pair_scene(), drive=Drive("s0", "a", constant(SPEED), 5e2, 0.3))
+    model = build_train(scene)
+    times = uniform(4e-3, 81)
+    moved = motion(model, integrate(model.system, times, method="explicit", tolerance=1e-9, start=model.start))
+    line = model.meshes[0]
+    lag = moved.q[:, 5]
+    assert np.abs(lag).max() > 0.02
+    delta, rate = moved.q @ line.row, moved.v @ line.row
+    actual = curve(20, swing=0.12)(SPEED * times + lag).value * delta + 300.0 * rate
+    assert moved.contact_force[:, 0] == pytest.approx(actual, rel=1e-12, abs=1e-9)
+
+
+def test_tolerance_one_millionth() -> None:
+    scene = elastic(
+        train(SHIPPED, stiffness=lambda z: curve(z, swing=0.12), damping=Damping(ratio=0.01)), skew=0.3, uneven=0.2
+    )
+    model = build_train(scene)
+    coarse, fine = (simulate(model, uniform(7e-3, 201), tolerance=tol) for tol in (1e-6, 1e-12))
+    for name in ("contact_force", "speed", "acceleration", "attachment_acceleration"):
+        one, two = getattr(coarse, name), getattr(fine, name)
+        least = 1e-6 * np.abs(two).max()  # the drive's own acceleration relative to its bore is zero
+        assert (np.abs(one - two).max(axis=0) <= 1e-5 * np.maximum(np.abs(two).max(axis=0), least)).all(), name
+    assert simulate(model, uniform(7e-3, 11), estimate=True).estimates["integration"] < 1e-5
+
+
+def test_explicit_and_implicit_agree() -> None:
+    scene = elastic(train([(20, 30)], stiffness=lambda z: curve(z, swing=0.1), damping=Damping(beta=1e-6)))
+    model = build_train(scene)
+    one = simulate(model, uniform(1e-3, 21), method="explicit", tolerance=1e-9)
+    two = simulate(model, uniform(1e-3, 21), method="implicit", tolerance=1e-6)
+    assert np.abs(one.contact_force - two.contact_force).max() < 1e-3 * np.abs(one.contact_force).max()
+    assert two.statistics["method"] == "implicit"
+
+
+def test_symmetric_scene_has_no_axial_motion() -> None:
+    scene = elastic(train(SHIPPED, stiffness=curve, ys=[0.0, 0.0], gears=()))
+    base = train(SHIPPED, stiffness=curve)
+    # both gears of the middle shaft straddle its middle symmetrically: two equal halves of each at +-y
+    halves, meshes = [], []
+    for item in base.gears:
+        distance = 0.006 if item.name.endswith("0") else 0.018
+        for sign in (1, -1):
+            halves.append(
+                dataclasses.replace(item, name=f"{item.name}{'+' if sign > 0 else '-'}", along=sign * distance)
+            )
+    for mesh in base.meshes:
+        meshes += [GearMesh(mesh.driver + s, mesh.driven + s, mesh.stiffness) for s in "+-"]
+    scene = changed(scene, gears=tuple(halves), meshes=tuple(meshes))
+    response = simulate(build_train(scene), uniform(5e-3, 101))
+    across = np.abs(response.modal_acceleration[:, [6 * i for i in range(6)]]).max()  # type: ignore[index]
+    assert across > 10.0
+    assert np.abs(response.attachment_acceleration).max() < 1e-9 * across
+    lopsided = simulate(build_train(elastic(base, uneven=0.3, skew=0.3)), uniform(5e-3, 101))
+    assert np.abs(lopsided.attachment_acceleration).max() > 0.1
+
+
+def test_reversing_speeds_and_torques_mirrors_the_result() -> None:
+    """The mirror is the plane of the axes: forces equal, rotations opposite, z opposite, x and y equal."""
+    scene = elastic(train(SHIPPED, stiffness=curve), uneven=0.3)
+    model = build_train(scene)
+    back = changed(scene, drive=Drive("s0", "s0+", constant(-SPEED)), loads=(Load("s2", "s2+", -1.0 * braking(2)),))
+    one, two = (simulate(m, uniform(5e-3, 101), tolerance=1e-9) for m in (model, build_train(back)))
+    assert np.abs(one.contact_force - two.contact_force).max() < 1e-7 * one.contact_force.max()
+    assert np.abs(one.speed + two.speed).max() < 1e-7 * 600
+    a, b = one.modal_acceleration, two.modal_acceleration
+    assert a is not None
+    assert b is not None
+    sign = np.append(np.tile([1.0, 1.0, -1.0, -1.0, -1.0, 1.0], 6), [1.0, -1.0])
+    assert np.abs(a - sign * b).max() < 1e-6 * np.abs(a).max()
+    assert one.contact_force[20:].min() > 0.0  # F > 0 presses in both senses
+
+
+def test_rigid_housing_reports_redundant_hinges() -> None:
+    response = simulate(build_train(train(SHIPPED)), uniform(1e-3, 11))
+    assert len(response.statistics["redundant_constraints"]) == 3 * 5
+    assert all("hinge" in name for name in response.statistics["redundant_constraints"])
+    assert response.modal is None
+    assert not response.attachment_acceleration.any()
+    assert simulate(build_train(elastic(train(SHIPPED))), uniform(1e-3, 11)).statistics["redundant_constraints"] == []
+
+
+def test_speeds_are_relative_to_the_bore() -> None:
+    response = simulate(build_train(elastic(train(SHIPPED), skew=0.3)), uniform(3e-3, 61))
+    assert response.speed[:, 0] == pytest.approx(SPEED, abs=1e-9)
+    assert np.abs(response.speed_absolute[:, 0] - SPEED).max() > 1e-3
+    assert response.drive_angle == pytest.approx(SPEED * response.time)
+    own = response.modal_velocity[:, 6 * 4 + 4]  # type: ignore[index]  # bore s2+: rotation about y
+    assert response.speed_absolute[:, 2] - response.speed[:, 2] == pytest.approx(own, abs=1e-9)
+
+
+def test_what_is_left_out_shows() -> None:
+    """Removing a bore, the gyroscopic moments or the reaction torque changes the result; a fixed number each."""
+    scene = elastic(train(SHIPPED, stiffness=curve), skew=0.3, uneven=0.3)
+    times = uniform(4e-3, 81)
+    whole = simulate(build_train(scene), times)
+    size = np.abs(whole.attachment_acceleration).max()
+    shafts = (*scene.shafts[:2], dataclasses.replace(scene.shafts[2], bores=("s2+",)))
+    bore = simulate(build_train(changed(scene, shafts=shafts)), times)
+    assert np.abs(bore.contact_force - whole.contact_force).max() > 0.01 * whole.contact_force.max()
+    assert bore.attachment_names == ("s0+", "s0-", "s1+", "s1-", "s2+")
+    still = simulate(build_train(changed(scene, damping=Damping(gyroscopic=False))), times)
+    assert np.abs(still.attachment_acceleration - whole.attachment_acceleration).max() > 1e-4 * size
+    outside = changed(scene, loads=(Load("s2", None, scene.loads[0].torque),))
+    free = simulate(build_train(outside), times)
+    assert np.abs(free.attachment_acceleration - whole.attachment_acceleration).max() > 1e-3 * size
+    # the reaction is the whole torque on the bore: statics of its rotation about y
+    slow = Damping(ratio=0.5)
+    turned = []
+    for loads in (scene.loads, outside.loads):
+        model = build_train(changed(scene, damping=slow, loads=loads, meshes=train(SHIPPED).meshes))
+        end = motion(
+            model, integrate(model.system, [0.0, 0.05, 0.06], method="explicit", tolerance=1e-9, start=model.start)
+        )
+        turned.append(end.q[-1, : scene.housing.size])  # type: ignore[union-attr]
+    push = np.zeros(scene.housing.size)  # type: ignore[union-attr]
+    push[6 * 4 + 4] = -TORQUE
+    response = build_train(changed(scene, loads=scene.loads)).core
+    T, squares = response.T, response.squares
+    direction = T[: len(push)].T @ push
+    assert turned[0] - turned[1] == pytest.approx((T @ (direction / squares))[: len(push)], rel=1e-5, abs=1e-12)
+
+
+def test_instability_ends_with_a_status() -> None:
+    scene = train([(20, 30)], stiffness=lambda z: curve(z, 1e8, 0.6))
+    frequency = build_train(scene).coupled_frequencies_hz[-1]
+    fast = changed(scene, drive=Drive("s0", "s0+", constant(2 * frequency * 2 * math.pi / 20)))
+    times = uniform(0.05, 1001)
+    response = simulate(build_train(fast), times, floquet=True)
+    assert response.status == "diverged"
+    assert 0.0 < response.time_reached < 0.05
+    assert len(response.time) == len(response.contact_force) < 1001
+    assert np.isfinite(response.contact_force).all()
+    text = " ".join(response.warnings)
+    for piece in ("parametrically unstable", "the run ended at", "pulls"):
+        assert piece in text
+
+
+def test_a_rigid_housing_loads_no_finite_elements() -> None:
+    code = (
+        "import sys; from tests.trains import *; from gearfe.train import build_train, simulate;"
+        "simulate(build_train(train(SHIPPED)), np.linspace(0, 1e-4, 3), backend='plain');"
+        "print([m for m in ('skfem', 'gmsh', 'meshio', 'pyvista', 'matplotlib', 'h5py') if m in sys.modules])"
+    )
+    made = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert made.stdout.strip() == "[]"
+
+
+@pytest.mark.slow
+def test_reduced_against_full_housing_in_the_coupled_transient() -> None:
+    """Same Newmark steps on the whole finite-element model of the reference housing and on its default reduction."""
+    from .test_housing_reference import reference_housing
+    from .train_full import coupled_transient, low_pass
+
+    housing = reference_housing()
+    base, body = train(SHIPPED, stiffness=curve), housing.reduce()
+    names = {old: str(i + 1) for i, old in enumerate(base.rigid_bores)}
+    shafts = tuple(
+        dataclasses.replace(s, point=(float(p[0]), 0.0, float(p[2])), bores=tuple(names[b] for b in s.bores))
+        for s, p in zip(base.shafts, body.attachment_points[::2], strict=True)
+    )
+    scene = changed(
+        base, shafts=shafts, housing=body, rigid_bores={}, drive=Drive("s0", "1", constant(SPEED)),
+        loads=(Load("s2", "5", braking(2)),), damping=Damping(beta=1.6e-6, gyroscopic=False),
+    )  # fmt: skip
+    model, full, step = build_train(scene), housing.full_model(), 5e-6
+    options = {"beta": 1.6e-6, "step": step, "steps": 1400}
+    _, force, acceleration = coupled_transient(model, full.mass, full.stiffness, **options)
+    _, less_force, less = coupled_transient(model, body.mass, body.stiffness, **options)
+    assert (np.abs(force - less_force).max(axis=0) <= 1e-3 * np.abs(force).max(axis=0)).all()
+    one, two = low_pass(acceleration, step, 5000.0), low_pass(less, step, 5000.0)
+    assert (np.sqrt(((one - two) ** 2).sum(axis=0) / (one**2).sum(axis=0)) <= 1e-3).all()
+
+
+def test_periods_of_other_trains() -> None:
+    assert rolling(train([(17, 34)])).common_turns == pytest.approx(1 / 17)
+    assert rolling(train([(20, 30), (30, 20)])).common_turns == pytest.approx(1 / 20)

@@ -1,0 +1,169 @@
+"""From job files to trains: the shipped file, its variants, and mistakes in the tables."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe.config import load_job
+from gearfe.errors import InputError
+from gearfe.stiffness_curve import StiffnessCurve
+from gearfe.train import build_train, simulate
+from gearfe.train.kinematics import steady_forces
+from gearfe.train_job import bore_places, job_scene, read_train_job, train_curves
+
+SHIPPED = Path(__file__).parent.parent / "geometry" / "gear_train.toml"
+
+SMALL = """
+[train]
+housing = "rigid"
+duration_ms = 2.0
+step_us = 100.0
+[[train.shafts]]
+name = "in"
+x_mm = 0.0
+length_mm = 60.0
+radius_mm = 8.0
+attachments = [1, 2]
+[[train.shafts]]
+name = "out"
+x_mm = 45.0
+length_mm = 60.0
+radius_mm = 8.0
+attachments = [3, 4]
+[[train.gears]]
+name = "a"
+shaft = "in"
+y_mm = 0.0
+teeth = 18
+module_mm = 2.0
+pressure_angle_deg = 20.0
+face_width_mm = 12.0
+[[train.gears]]
+name = "b"
+shaft = "out"
+y_mm = 0.0
+teeth = 27
+module_mm = 2.0
+pressure_angle_deg = 20.0
+face_width_mm = 12.0
+[[train.meshes]]
+driver = "a"
+driven = "b"
+stiffness_N_per_m = 2e8
+[train.drive]
+shaft = "in"
+attachment = 1
+speed_rad_per_s = -300.0
+[[train.loads]]
+shaft = "out"
+attachment = 3
+torque_Nm = -30.0
+ramp_centre_ms = 0.5
+ramp_width_ms = 1.0
+[train.damping]
+ratio = 0.05
+"""
+BORES = "".join(
+    f"[[train.rigid_bores]]\nattachment = {i + 1}\nx_mm = {45.0 * (i // 2)}\ny_mm = {20.0 - 40.0 * (i % 2)}\n"
+    for i in range(4)
+)
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "job.toml"
+    path.write_text(text)
+    return path
+
+
+def test_the_shipped_job_is_what_it_says() -> None:
+    job = read_train_job(SHIPPED)
+    assert job.table.variant == "tutorial"
+    assert len(job.times) == 201
+    assert job.times[-1] == pytest.approx(7e-3)
+    scene = job_scene(job, [1e8, 1e8], None, geometry_only=True)
+    assert steady_forces(scene) == pytest.approx([1961.56, 2942.34], rel=1e-5)  # 100 N m/33.987 mm, and 2/3 of it
+    assert [g.along for g in scene.gears] == [0.010, 0.010, -0.002, -0.002]
+    model = build_train(scene)
+    assert model.rolling.common_turns == pytest.approx(0.15)
+    assert simulate(model, job.times).speed[0] == pytest.approx([600.0, -400.0, 266.6667], rel=1e-6)
+
+
+def test_variants_differ_in_curves_and_damping() -> None:
+    tutorial, operating = (read_train_job(SHIPPED, name).table for name in ("tutorial", "operating"))
+    assert (tutorial.curves.interpolation, tutorial.curves.load, tutorial.damping.ratio) == ("linear", "stiffness", 0.0)
+    assert (operating.curves.interpolation, operating.curves.load, operating.damping.ratio) == ("cubic", "torque", 0.01)
+    with pytest.raises(InputError, match="did you mean 'tutorial'"):
+        read_train_job(SHIPPED, "tutorals")
+
+
+def test_the_other_commands_read_the_same_file() -> None:
+    tables = load_job(SHIPPED, ("pair", "stiffness", "housing", "train"))
+    alone = load_job(SHIPPED.parent / "housing.toml", ("housing",))
+    assert dataclasses.replace(tables["housing"], reduction=alone["housing"].reduction) == alone["housing"]
+    places = bore_places(tables["housing"])
+    assert places["1"] == pytest.approx((0.0, 0.033, 0.0))
+    assert places["6"] == pytest.approx((0.125, -0.03225, 0.0))
+
+
+def test_a_train_with_its_own_gears_runs(tmp_path: Path) -> None:
+    job = read_train_job(written(tmp_path, SMALL + BORES))
+    model = build_train(job_scene(job, train_curves(job), None))
+    response = simulate(model, job.times, tolerance=job.table.tolerance)
+    assert response.status == "done"
+    # driven by -300 rad/s, the second shaft turns with +200 and is braked by -30 N m
+    assert response.speed[0] == pytest.approx([-300.0, 200.0])
+    assert response.contact_force[-1, 0] == pytest.approx(30.0 / (0.027 * math.cos(math.radians(20.0))), rel=0.2)
+
+
+def test_files_for_curves(tmp_path: Path) -> None:
+    angles = np.arange(20.0)
+    rows = "\n".join(f"{a},{1.5e8 + 1e7 * math.cos(math.radians(18 * a))}" for a in angles)
+    (tmp_path / "k.csv").write_text("pinion_angle_deg,k_mesh_N_per_m\n" + rows + "\n")
+    text = SMALL.replace("stiffness_N_per_m = 2e8", 'curve = "k.csv"') + BORES
+    (found,) = train_curves(read_train_job(written(tmp_path, text)))
+    assert isinstance(found, StiffnessCurve)
+    assert found.mesh_cycle == pytest.approx(2 * math.pi / 18)  # the driver's
+    job = read_train_job(written(tmp_path, SMALL + BORES))
+    assert isinstance(train_curves(job, [tmp_path / "k.csv"])[0], StiffnessCurve)
+    with pytest.raises(InputError, match="2 files for 1 meshes"):
+        train_curves(job, [tmp_path / "k.csv"] * 2)
+    with pytest.raises(InputError, match=r"no such|cannot be read"):
+        train_curves(job, [tmp_path / "none.csv"])
+
+
+def built(path: Path) -> None:
+    job = read_train_job(path)
+    build_train(job_scene(job, train_curves(job), None))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("x_mm = 45.0\nlength", "x_mm = 46.0\nlength", "off the axis|46 mm apart"),
+        ('shaft = "out"\ny_mm', 'shaft = "oat"\ny_mm', "unknown shaft 'oat'; did you mean 'out'"),
+        ("teeth = 27", "tooth = 27", "did you mean 'teeth'"),
+        ("module_mm = 2.0", "", "module_mm.*is required"),
+        ("stiffness_N_per_m = 2e8", "", "has no stiffness: there is no table"),
+        ("stiffness_N_per_m = 2e8", "stiffness_N_per_m = 2e8\nrigid = true", "stands beside"),
+        ("ratio = 0.05", "ratio = -0.05", "must be finite and >= 0"),
+        ("step_us = 100.0", "step_us = 3000.0", "is longer than duration_ms"),
+        ('housing = "rigid"', 'housing = "elastic"', "needs a table \\[housing\\]"),
+        ("attachments = [3, 4]", "attachments = [3, 5]", "unknown attachment '5'"),
+        ("teeth = 27\n", 'gear = "wheel"\n', "stands beside gear"),
+    ],
+)
+def test_mistakes_in_a_file(tmp_path: Path, old: str, new: str, words: str) -> None:
+    assert old in SMALL
+    path = written(tmp_path, SMALL.replace(old, new, 1) + BORES)
+    with pytest.raises(InputError, match=words):
+        built(path)
+
+
+def test_missing_bores_are_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"neither .*rigid_bores.* nor"):
+        built(written(tmp_path, SMALL))
