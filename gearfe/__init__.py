@@ -19,6 +19,11 @@ _PUBLIC: dict[str, str] = {
     "Material": "elasticity",
     "ModalBody": "modal_body",
     "StiffnessCurve": "stiffness",
+    "TrainModel": "train",
+    "TrainResponse": "train",
+    "TrainScene": "train",
+    "build_train": "train",
+    "simulate": "train",
     "sweep_stiffness": "stiffness",
 }
 

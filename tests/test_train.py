@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_simpson, solve_ivp
 
+from gearfe.errors import InputError
 from gearfe.rigid import constant, integrate, smoothed_step
 from gearfe.train import Bearing, Damping, Drive, GearMesh, Load, Shaft, TrainScene, build_train, simulate
 from gearfe.train.inertia import outline_moments
@@ -55,8 +56,22 @@ def test_mean_forces_and_their_ratio_over_whole_periods(stages: list[tuple[int, 
     assert not response.warnings
 
 
+def test_initial_speeds() -> None:
+    """A free shaft may start at another speed: with the mesh as spring it swings about rolling."""
+    base = train([(20, 30)], loads=())
+    omega = 2 * math.pi * build_train(base).coupled_frequencies_hz[-1]
+    shafts = (base.shafts[0], dataclasses.replace(base.shafts[1], initial_speed=-390.0))
+    response = simulate(build_train(changed(base, shafts=shafts)), uniform(2e-3, 41), tolerance=1e-9)
+    assert response.speed[:, 1] == pytest.approx(-400 + 10 * np.cos(omega * response.time), abs=1e-6)
+    shafts = (dataclasses.replace(base.shafts[0], initial_speed=500.0), base.shafts[1])
+    with pytest.raises(InputError, match="contradicts the drive"):
+        build_train(changed(base, shafts=shafts))
+
+
 def test_rolling_of_the_shipped_train() -> None:
     model = build_train(train(SHIPPED))
+    assert model.system.breaks == pytest.approx([0.0, 1e-3])  # steps end where the load's ramp does
+    assert model.load_end == 1e-3
     response = simulate(model, uniform(1e-3, 11))
     assert model.ratios == pytest.approx([1, -2 / 3, 4 / 9])
     assert response.common_period_s == pytest.approx(1.5707963e-3, rel=1e-7)
@@ -436,6 +451,32 @@ def test_a_rigid_housing_loads_no_finite_elements() -> None:
     )
     made = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert made.stdout.strip() == "[]"
+
+
+@pytest.mark.slow
+def test_reduced_against_full_housing_in_the_coupled_transient() -> None:
+    """Same Newmark steps on the whole finite-element model of the reference housing and on its default reduction."""
+    from .test_housing_reference import reference_housing
+    from .train_full import coupled_transient, low_pass
+
+    housing = reference_housing()
+    base, body = train(SHIPPED, stiffness=curve), housing.reduce()
+    names = {old: str(i + 1) for i, old in enumerate(base.rigid_bores)}
+    shafts = tuple(
+        dataclasses.replace(s, point=(float(p[0]), 0.0, float(p[2])), bores=tuple(names[b] for b in s.bores))
+        for s, p in zip(base.shafts, body.attachment_points[::2], strict=True)
+    )
+    scene = changed(
+        base, shafts=shafts, housing=body, rigid_bores={}, drive=Drive("s0", "1", constant(SPEED)),
+        loads=(Load("s2", "5", braking(2)),), damping=Damping(beta=1.6e-6, gyroscopic=False),
+    )  # fmt: skip
+    model, full, step = build_train(scene), housing.full_model(), 5e-6
+    options = {"beta": 1.6e-6, "step": step, "steps": 1400}
+    _, force, acceleration = coupled_transient(model, full.mass, full.stiffness, **options)
+    _, less_force, less = coupled_transient(model, body.mass, body.stiffness, **options)
+    assert (np.abs(force - less_force).max(axis=0) <= 1e-3 * np.abs(force).max(axis=0)).all()
+    one, two = low_pass(acceleration, step, 5000.0), low_pass(less, step, 5000.0)
+    assert (np.sqrt(((one - two) ** 2).sum(axis=0) / (one**2).sum(axis=0)) <= 1e-3).all()
 
 
 def test_periods_of_other_trains() -> None:

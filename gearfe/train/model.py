@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from ..rigid import Element, LinearJoint, LocalForce, ModalBlocks, Start, System, TimeFunction, consistent_start
 from ..rigid.elimination import Minimal, minimal
 from .checks import check_scene
@@ -130,7 +131,7 @@ def build_train(scene: TrainScene) -> TrainModel:
         rolling=kinematics,
         system=system,
         core=core,
-        start=consistent_start(system, 0.0),
+        start=_start(scene, system, shafts, first),
         angle=angle,
         shafts=shafts,
         housing=housing,
@@ -262,6 +263,18 @@ def _damped(scene: TrainScene, elements: list[Element], bodies: list[Element]) -
     made = replace(core, system=damped, damping=core.damping + np.diag(factors))
     damped.__dict__["_minimal"] = made  # the modes are those without damping, and its matrix stays exactly diagonal
     return damped, made
+
+
+def _start(scene: TrainScene, system: System, shafts: tuple[RigidShaft, ...], first: NDArray[np.int64]) -> Start:
+    """At rest beside rolling but for the asked speeds, which the constraints must allow."""
+    start = consistent_start(system, 0.0)
+    for shaft, body, i in zip(scene.shafts, shafts, first, strict=True):
+        off = float(start.v[i + 5]) - body.start_rate
+        if shaft.initial_speed is not None and abs(off) > 1e-6 * max(1.0, abs(shaft.initial_speed)):
+            problem = f"contradicts the drive and the rigid parts, which make it {shaft.initial_speed + off:.9g} rad/s"
+            cure = "leave it out, or give the drive or the mesh an elastic coupling"
+            raise InputError(f"shaft {shaft.name!r} initial speed", shaft.initial_speed, problem, cure)
+    return start
 
 
 def _used_bores(scene: TrainScene) -> tuple[str, ...]:
