@@ -2,9 +2,9 @@ r"""The coupled transient with the full housing, the truth that a reduced one is
 
 Over [attachments | internal] coordinates of a housing, full (sparse) or reduced (dense), the hinges are eliminated
 from the interface coordinates alone. Newmark's average acceleration with one factorisation of
-:math:`A = M + \tfrac h2 C + \tfrac{h^2}4 K`, K with the mean mesh stiffnesses; what changes of them has the rank of the
-number of meshes and enters by the formula of Sherman, Morrison and Woodbury. The phases are the nominal ones and there are
-no gyroscopic moments, in both alike.
+:math:`A = M + \tfrac h2 C + \tfrac{h^2}4 K`, K with the mean mesh stiffnesses; what changes of them has the rank of
+the number of meshes and enters by the formula of Sherman, Morrison and Woodbury. The phases are the nominal ones and
+there are no gyroscopic moments, in both alike.
 """
 
 from __future__ import annotations
