@@ -200,6 +200,19 @@ def test_static_deflection_with_bearings() -> None:
     assert moved.contact_force[-1, 0] == pytest.approx(F, rel=1e-6)
 
 
+def test_stiff_bearings_are_hinges() -> None:
+    """In an elastic housing: the coupled frequencies approach those with hinges from below, as 1/stiffness."""
+    scene = elastic(train(SHIPPED), skew=0.3)
+    hinged = build_train(scene).coupled_frequencies_hz[:12]
+    off = []
+    for k in (1e11, 2e11):
+        bearings = tuple(Bearing(b, (k, k, k, 1e-2 * k, 1e-2 * k)) for b in scene.bore_points)
+        off.append(hinged - build_train(changed(scene, bearings=bearings)).coupled_frequencies_hz[:12])
+    assert (off[1] > 0.0).all()
+    assert (off[1] < 5e-3 * hinged).all()
+    assert off[0] / off[1] == pytest.approx(2.0, rel=0.02)
+
+
 def lone_rotor(**changes: object) -> TrainScene:
     """One driven shaft with a disc in the middle, both bores isotropic bearings."""
     from gearfe.train import ShaftGear
