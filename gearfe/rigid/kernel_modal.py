@@ -23,7 +23,25 @@ def modal_rhs(squares, damping, diagonal, full, constant, W, offset, first, para
             for j in range(n):
                 value += damping[i, j] * y[n + j]
             dy[n + i] -= value - diagonal[i] * y[n + i]
-    for p in range(W.shape[0]):
+    rows = W.shape[0]
+    p = 0
+    while p + 3 < rows:  # four directions at a time: y and dy are read once for all
+        a0, a1, a2, a3 = offset[p], offset[p + 1], offset[p + 2], offset[p + 3]
+        b0, b1, b2, b3 = 0.0, 0.0, 0.0, 0.0
+        for i in range(n):
+            value, rate = y[i], y[n + i]
+            a0 += W[p, i] * value
+            a1 += W[p + 1, i] * value
+            a2 += W[p + 2, i] * value
+            a3 += W[p + 3, i] * value
+            b0 += W[p, i] * rate
+            b1 += W[p + 1, i] * rate
+            b2 += W[p + 2, i] * rate
+            b3 += W[p + 3, i] * rate
+        u[p], u[p + 1], u[p + 2], u[p + 3] = a0, a1, a2, a3
+        du[p], du[p + 1], du[p + 2], du[p + 3] = b0, b1, b2, b3
+        p += 4
+    while p < rows:
         place = offset[p]
         speed = 0.0
         for i in range(n):
@@ -31,13 +49,21 @@ def modal_rhs(squares, damping, diagonal, full, constant, W, offset, first, para
             speed += W[p, i] * y[n + i]
         u[p] = place
         du[p] = speed
+        p += 1
     for k in range(first.shape[0] - 1):
         a = first[k]
         b = first[k + 1]
         law(t, u[a:b], du[a:b], parameters[k], out[a:b])  # noqa: F821
-    for p in range(W.shape[0]):
+    p = 0
+    while p + 3 < rows:
+        f0, f1, f2, f3 = out[p], out[p + 1], out[p + 2], out[p + 3]
+        for i in range(n):
+            dy[n + i] += W[p, i] * f0 + W[p + 1, i] * f1 + W[p + 2, i] * f2 + W[p + 3, i] * f3
+        p += 4
+    while p < rows:
         for i in range(n):
             dy[n + i] += W[p, i] * out[p]
+        p += 1
 
 
 def modal_steps(
