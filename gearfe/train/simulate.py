@@ -20,7 +20,7 @@ from .response import TrainResponse
 Array = NDArray[np.float64]
 
 #: Asked tolerance -> that of the integrator: accelerations weigh the fast modes more than the state does. Measured on
-#: 119 coordinates: asked for 1e-6, all signals then agree with a run at 1e-12 to 1e-5 of their largest value.
+#: 119 coordinates: asked for 1e-6, all signals agree with a run at 1e-12 to 1.1e-5 of their largest value.
 LOCAL_SHARE = 0.03
 #: An approach or a bore's displacement beyond this part of the module means that nothing holds any more.
 DIVERGED = 0.25
