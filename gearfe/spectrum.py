@@ -6,9 +6,9 @@ For N samples :math:`x_n` at the step h and a window :math:`w_n` with mean :math
     \hat x_k = \frac{c_k}{N \bar w}\sum_{n=0}^{N-1} w_n x_n e^{-2\pi i k n/N}, \qquad f_k = \frac{k}{N h},
     \qquad k = 0 \ldots \lfloor N/2 \rfloor,
 
-with :math:`c_k = 2`, but 1 for the constant (k = 0) and, when N is even, for the Nyquist frequency (k = N/2): a constant
-c gives c at 0 Hz, a sine of amplitude A on a bin gives A there. Dividing by :math:`\bar w` keeps amplitudes right for
-every window (coherent gain); sums of squares over a band are divided by the window's noise bandwidth
+with :math:`c_k = 2`, but 1 for the constant (k = 0) and, when N is even, for the Nyquist frequency (k = N/2): a
+constant c gives c at 0 Hz, a sine of amplitude A on a bin gives A there. Dividing by :math:`\bar w` keeps amplitudes
+right for every window (coherent gain); sums of squares over a band are divided by the window's noise bandwidth
 :math:`B = \overline{w^2}/\bar w^2` in bins (F. J. Harris, Proc. IEEE 66, 1978, Sec. IV).
 """
 

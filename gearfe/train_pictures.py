@@ -41,7 +41,7 @@ def draw_response(path: Path, response: TrainResponse, attachment: str, title: s
         forces=dict(zip(names, 1e-3 * response.contact_force.T, strict=True)),
         speeds=dict(zip(labels, (response.speed * signs).T, strict=True)),
         accelerations=dict(zip(labels, 1e-3 * (response.acceleration * signs).T, strict=True)),
-        attachment=(f"acceleration along the shaft at attachment {attachment}", _acceleration(response, attachment)),
+        attachment=(f"normal acceleration at attachment {attachment}", _acceleration(response, attachment)),
         means=means,
     )
 
@@ -59,7 +59,7 @@ def draw_spectrum(path: Path, response: TrainResponse, made: TrainSpectra, attac
     window = "no window" if spectrum.window == "none" else f"window: {spectrum.window}"
     spectrum_figure(
         path,
-        title=f"Acceleration along the shaft at attachment {attachment}\n{title}",
+        title=f"Normal acceleration at attachment {attachment}\n{title}",
         frequency=1e-3 * spectrum.frequency,
         amplitude=amplitude,
         quantity="amplitude  (m/s²)",

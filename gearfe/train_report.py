@@ -216,11 +216,13 @@ def train_summary(
         },
     }
     if len(response.time) >= 4:
+        loaded = response.time >= response.load_end_s
         force, count = mean_over_periods(response.time, response.contact_force, response.load_end_s, period)
         summary |= {
             "mean_contact_forces_N": force,
             "mean_over_common_periods": count,
             "smallest_contact_forces_N": response.contact_force.min(axis=0),
+            "smallest_contact_forces_under_load_N": response.contact_force[loaded if loaded.any() else ...].min(axis=0),
             "largest_contact_forces_N": response.contact_force.max(axis=0),
             "peak_attachment_accelerations_m_per_s2": dict(
                 zip(response.attachment_names, np.abs(response.attachment_acceleration).max(axis=0), strict=True)

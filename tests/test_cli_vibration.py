@@ -8,6 +8,7 @@ import math
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,14 +16,16 @@ import pytest
 
 from gearfe.cli import main
 from gearfe.errors import InputError
-from gearfe.output.train_scene import sharp_edges
+from gearfe.housing import Attachment, Housing
+from gearfe.output.train_scene import draw_scene, sharp_edges
 from gearfe.stopwatch import Stopwatch
 from gearfe.train import GearMesh, Shaft, ShaftGear, TrainScene
-from gearfe.train_fields import gear_surface, moved, solids, step_at, tooth_angles, write_gears
+from gearfe.train_fields import frames, gear_surface, moved, solids, step_at, tooth_angles, write_gears, write_housing
 from gearfe.train_files import OutputChoice, write_all
 from gearfe.train_report import mean_over_periods, response_columns, spectra
 
 from .gears import pair
+from .housing_meshes import box
 from .train_responses import COUNT, STEP, made_up, tone
 
 ROOT = Path(__file__).parents[1]
@@ -318,6 +321,62 @@ def test_the_series_of_the_gears(tmp_path, scene):
         assert shift[0] == pytest.approx(0.0, abs=0)
         assert shift[2] == pytest.approx(points[2] - points[0], abs=1e-8)
         assert set(file["VTKHDF/PointData/gear"][:count]) == {1, 2, 3, 4}
+
+
+@pytest.fixture(scope="module")
+def block():
+    """A free block, two ends of which are attachments, reduced."""
+    size = np.array([0.15, 0.06, 0.03])
+    nodes, tets = box((4, 2, 1), tuple(size))
+    ends = [
+        Attachment(name, np.array([x, 0.03, 0.015]), np.array([1.0, 0.0, 0.0]), np.flatnonzero(nodes[:, 0] == x))
+        for name, x in (("1", nodes[:, 0].min()), ("2", nodes[:, 0].max()))
+    ]
+    return Housing.from_arrays(nodes, tets, attachments=ends).reduce(4)
+
+
+def test_the_series_of_the_housing(tmp_path, block):
+    """Displacement and acceleration of all nodes; on the upper side the normal acceleration is the one along z."""
+    import h5py
+
+    rng = np.random.default_rng(2)
+    q, a = (1e-6 * rng.standard_normal((COUNT, block.size)) for _ in range(2))
+    response = made_up(modal=q, modal_velocity=q, modal_acceleration=a)
+    write_housing(tmp_path / "housing.vtkhdf", block, response, [0, 7, 200])
+    with h5py.File(tmp_path / "housing.vtkhdf") as file:
+        assert list(file["VTKHDF/Steps/Values"]) == list(response.time[[0, 7, 200]])
+        shift = file["VTKHDF/PointData/displacement_m"][...].reshape(3, -1, 3)
+        normal = file["VTKHDF/PointData/normal_acceleration_m_per_s2"][...].reshape(3, -1)
+    nodes = block.nodes
+    for i, step in enumerate((0, 7, 200)):
+        field = (block.shapes @ q[step]).reshape(-1, 3)
+        assert shift[i] == pytest.approx(field, rel=1e-6, abs=1e-7 * np.abs(field).max())
+        push = (block.shapes @ a[step]).reshape(-1, 3)
+        inside = (nodes[:, 0] > 0) & (nodes[:, 0] < 0.15) & (nodes[:, 1] > 0) & (nodes[:, 1] < 0.06)
+        for side, sign in ((nodes[:, 2] == nodes[:, 2].max(), 1.0), (nodes[:, 2] == 0.0, -1.0)):
+            there = side & inside
+            assert normal[i][there] == pytest.approx(sign * push[there, 2], rel=1e-5, abs=1e-6 * np.abs(push).max())
+
+
+def test_a_picture_and_a_film(tmp_path, scene, block):
+    from PIL import Image
+
+    rng = np.random.default_rng(2)
+    q, a = (1e-6 * rng.standard_normal((COUNT, block.size)) for _ in range(2))
+    response = made_up(modal=q, modal_velocity=q, modal_acceleration=a)
+    housed = replace(scene, housing=block)
+    assert draw_scene(tmp_path / "one.png", frames(housed, response, [130]), "a block") == ""
+    assert draw_scene(tmp_path / "film.gif", frames(housed, response, [0, 50, 100]), "a block") == ""
+    with Image.open(tmp_path / "one.png") as picture:
+        colours = np.asarray(picture.convert("RGB").resize((100, 72))).reshape(-1, 3)
+        assert len(np.unique(colours, axis=0)) > 50  # something was drawn
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.n_frames == 3
+
+
+def test_a_scene_that_cannot_be_drawn_says_why(tmp_path):
+    assert "apt-get install" in draw_scene(tmp_path / "none.png", {"time": np.zeros(1)}, "nothing")
+    assert not list(tmp_path.iterdir())
 
 
 def test_instants(scene):

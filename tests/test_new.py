@@ -90,12 +90,12 @@ def test_kinds_of_keys():
 
     @dataclass(frozen=True)
     class Outer:
-        flag: bool = quantity(True, doc="a flag")  # noqa: RUF009
-        pair: tuple[float, float] = quantity((0.0, 1.0), doc="two")  # noqa: RUF009
-        names: dict[str, float] = quantity(dict, doc="numbers by name")
+        flag: bool = quantity(True, doc="a flag")
+        pair: tuple[float, float] = quantity((0.0, 1.0), doc="two")
+        names: dict[str, float] = quantity(dict, doc="numbers by name")  # noqa: RUF009
         one: Inner = quantity(Inner, doc="the one")  # noqa: RUF009
         many: tuple[Inner, ...] = quantity((), doc="[[outer.many]]")
-        named: dict[str, Inner] = quantity(dict, doc="[outer.named.NAME]")
+        named: dict[str, Inner] = quantity(dict, doc="[outer.named.NAME]")  # noqa: RUF009
 
     globals()["Inner"] = Inner
     example = {

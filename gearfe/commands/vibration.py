@@ -197,7 +197,7 @@ def told(response: TrainResponse, scene: TrainScene, written: Written, choice: O
         attachment = attachment_to_draw(response, choice.attachment, loaded)
         found = dominant(made, response, f"attachment_{attachment}_acceleration_m_per_s2", 4)
         texts = [f"{x['frequency_Hz']:.0f} Hz {x['amplitude']:.3g}" for x in found]
-        lines.append(f"acceleration along the shaft at attachment {attachment} (m/s2): " + ", ".join(texts))
+        lines.append(f"normal acceleration at attachment {attachment} (m/s2): " + ", ".join(texts))
         if made.power is not None:
             lines.append(f"radiated power: mean {made.power.mean_level:.1f} dB re 1e-12 W")
     return lines

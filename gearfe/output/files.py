@@ -77,7 +77,7 @@ def _cell(value: Any) -> str:
 
 
 def _is_integer(value: Any) -> bool:
-    return isinstance(value, int) or getattr(getattr(value, "dtype", None), "kind", "") in "iu"
+    return isinstance(value, int) or getattr(getattr(value, "dtype", None), "kind", "") in ("i", "u")
 
 
 def _plain(value: Any) -> Any:

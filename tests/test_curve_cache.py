@@ -1,0 +1,75 @@
+"""Stored stiffness curves: read instead of computed, and never for other gears, loads or sizes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearfe import curve_cache
+from gearfe.contact.laws import Nitsche, Penalty
+from gearfe.curve_cache import cached_curve, curve_key
+from gearfe.elasticity import Material
+
+from .gears import pair
+
+STEEL = Material(200e9, 0.3, density=7850.0)
+MODEL = {"materials": (STEEL, STEEL), "plane": "strain", "law": Nitsche(1.0), "coarsen": 4.0, "points_per_edge": 4}
+SWEEP = {"twist": 1e-3, "angles": np.radians([0.0, 6.0, 12.0]), "kinematics": "small"}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(curve_cache, "cache_folder", lambda: tmp_path)
+    return tmp_path
+
+
+def test_the_second_time_nothing_is_computed(folder, monkeypatch):
+    gears = pair(20, 30)
+    first = cached_curve(gears, MODEL, SWEEP)
+    assert len(list(folder.glob("curve-*.csv"))) == 1
+
+    def computes(*args, **options):
+        raise AssertionError("computed again")
+
+    monkeypatch.setattr("gearfe.stiffness.elastic_pair", computes)
+    second = cached_curve(gears, MODEL, SWEEP)
+    for name in ("k_mesh", "torque_wheel", "pinion_angle", "twist", "load_share"):
+        np.testing.assert_array_equal(getattr(second, name), getattr(first, name))
+    with pytest.raises(AssertionError, match="computed again"):
+        cached_curve(gears, MODEL, SWEEP | {"twist": 1.1e-3})
+
+
+def test_everything_that_decides_a_curve_is_in_its_key():
+    gears = pair(20, 30)
+    other = replace(STEEL, youngs_modulus=210e9)
+    keys = [
+        curve_key(gears, MODEL, SWEEP),
+        curve_key(pair(20, 31), MODEL, SWEEP),
+        curve_key(pair(20, 30, centre_distance=62.51e-3), MODEL, SWEEP),
+        curve_key(pair(20, 30, tip_round=1e-5), MODEL, SWEEP),
+        curve_key(gears, MODEL | {"materials": (STEEL, other)}, SWEEP),
+        curve_key(gears, MODEL | {"plane": "stress"}, SWEEP),
+        curve_key(gears, MODEL | {"law": Nitsche(2.0)}, SWEEP),
+        curve_key(gears, MODEL | {"law": Penalty()}, SWEEP),
+        curve_key(gears, MODEL | {"coarsen": 3.0}, SWEEP),
+        curve_key(gears, MODEL, SWEEP | {"twist": np.nextafter(1e-3, 1)}),
+        curve_key(gears, MODEL, SWEEP | {"angles": np.radians([0.0, 6.0, 12.5])}),
+        curve_key(gears, MODEL, SWEEP | {"kinematics": "finite"}),
+    ]
+    assert len(set(keys)) == len(keys)
+    assert curve_key(pair(20, 30), dict(MODEL), dict(SWEEP)) == keys[0]
+
+
+def test_a_damaged_file_is_made_anew(folder):
+    gears = pair(20, 30)
+    first = cached_curve(gears, MODEL, SWEEP)
+    (path,) = folder.glob("curve-*.csv")
+    path.write_text(path.read_text()[:300])
+    again = cached_curve(gears, MODEL, SWEEP)
+    np.testing.assert_array_equal(again.k_mesh, first.k_mesh)
+    assert path.read_text().count("\n") == 4
+
+
+def test_without_a_cache(monkeypatch):
+    monkeypatch.setattr(curve_cache, "cache_folder", lambda: None)
+    assert len(cached_curve(pair(20, 30), MODEL, SWEEP)) == 3
