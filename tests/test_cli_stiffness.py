@@ -28,11 +28,12 @@ def rows(folder):
 def job_with(tmp_path, **changes):
     """The shipped job with lines of [stiffness] replaced (None takes a line out)."""
     text = JOB.read_text()
-    head, _, table = text.partition("[stiffness]")
+    head, _, table = text.partition("\n[stiffness]\n")
+    table = table.partition("\n[")[0]  # the tables of other jobs are left out
     lines = [line for line in table.splitlines() if line.partition("=")[0].strip() not in changes]
     lines += [f"{key} = {value}" for key, value in changes.items() if value is not None]
     path = tmp_path / "job.toml"
-    path.write_text(head + "[stiffness]" + "\n".join(lines) + "\n")
+    path.write_text(head + "\n[stiffness]\n" + "\n".join(lines) + "\n")
     return path
 
 
@@ -151,7 +152,7 @@ def test_a_failed_position_is_told_and_in_the_table(tmp_path, capsys, monkeypatc
 
 def test_a_position_without_contact_is_told(tmp_path, capsys):
     job = tmp_path / "job.toml"
-    job.write_text(JOB.read_text().replace("[pair]\n", "[pair]\ncentre_distance_mm = 62.6\n"))
+    job.write_text(JOB.read_text().replace("\n[pair]\n", "\n[pair]\ncentre_distance_mm = 62.6\n"))
     options = ["--twist-deg", "0.02", "--angles", "3", "1", "4", *QUICK]
     assert main(["stiffness", str(job), "--out", str(tmp_path), *options]) == 0
     assert "2 positions have no contact" in capsys.readouterr().err
