@@ -52,7 +52,7 @@ class Body:
             value = getattr(self, key)
             if not (math.isfinite(value) and value > 0.0):
                 unit = "kg" if key == "mass" else "kg m2"
-                cure = f"give a positive number in {unit}; a massless slider is a slot joint, not a body"
+                cure = f"give a positive number in {unit}; a massless point on a line is a slot joint, not a body"
                 raise InputError(f"body {self.name!r} {key}", value, "must be finite and > 0", cure)
 
 
@@ -69,7 +69,7 @@ class Hinge:
 
 @dataclass(frozen=True)
 class Slot:
-    """Point `point` of body `body` stays on a line of body `line`: one constraint (the slider itself has no mass)."""
+    """Point `point` of body `body` stays on a line of body `line`: one constraint (nothing of the joint has mass)."""
 
     body: str
     line: str
@@ -80,7 +80,7 @@ class Slot:
 
 
 @dataclass(frozen=True)
-class Slider:
+class Prismatic:
     """Body `body` slides along a line of body `line` without turning against it: two constraints.
 
     `angle` is the angle of `body` minus that of `line` (rad); ``None`` keeps the one it starts with.
@@ -193,7 +193,7 @@ class Moment:
     name: str = ""
 
 
-Joint = Hinge | Slot | Slider | Fixed | Prescribed
+Joint = Hinge | Slot | Prismatic | Fixed | Prescribed
 Force = Gravity | Spring | CoordinateSpring | PointForce | Moment
 
 
