@@ -300,3 +300,23 @@ def test_a_run_that_cannot_go_on_returns_what_it_has():
     assert made.status == 2
     assert 0.0 < made.reached < 5.0
     assert len(made.time) == len(made.q) < 51
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Scene((Body("a", 1.0, 0.1),), (Slot("a", "ground", direction=(0, 0)),)),
+        lambda: Scene((Body("a", 1.0, 0.1),), (), (CoordinateSpring("a", "x", stiffness=float("nan")),)),
+        lambda: Scene((Body("a", 1.0, 0.1),), (), (Moment("a", sin),)),  # type: ignore[arg-type]
+        lambda: System([]),
+    ],
+)
+def test_what_cannot_be_a_mechanism(make):
+    with pytest.raises(InputError):
+        make()
+
+
+def test_a_number_is_a_constant_moment():
+    """Angle M t^2 / (2 I)."""
+    made = run(Scene((Body("a", 1.0, 0.1),), (), (Moment("a", 0.5),)), [0.0, 1.0])  # type: ignore[arg-type]
+    assert made.q[-1, 2] == pytest.approx(2.5, abs=1e-12)

@@ -46,6 +46,8 @@ def run_mechanism(
     end = run.end_s if until is None else until
     if not (math.isfinite(end) and end > 0.0):
         raise InputError("--until", end, "must be finite and > 0 s", "give the end of the run")
+    if end / run.step_s > 5e6:
+        raise InputError("--until", end, "gives more than five million rows", "take a longer step_s or an earlier end")
     folder = output_folder(out)
     start = mechanism.start()
     read = clock.perf_counter()

@@ -73,7 +73,7 @@ def project(tb, t, forward, q, v, base, length, w):
     return first, least, where
 
 
-def exchange(tb, base, least, where, w):
+def exchange(tb, base, where, w):
     """Leave the row with the least pivot out instead of a redundant one where that makes the others more independent.
 
     Any row of a permanent dependency may be the one to leave out, but not the same one everywhere: three parallel

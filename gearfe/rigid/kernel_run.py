@@ -162,7 +162,7 @@ def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, close, w,
             evaluate(w.QS, order, h, qn, vn)
         first, least, where = project(tb, t + h, forward, qn, vn, base, length, w)
         if least < NEAR and spare(base):
-            least, where = exchange(tb, base, least, where, w)
+            least, where = exchange(tb, base, where, w)
         guess = np.inf
         tau = np.inf
         if where >= 0 and least < NEAR:
@@ -223,7 +223,7 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
         copy(base, w.skip)
         first, least, where = project(tb, t, forward, q, v, base, length, w)
         if least < NEAR and spare(base):
-            least, where = exchange(tb, base, least, where, w)
+            least, where = exchange(tb, base, where, w)
         if where >= 0 and (least < 1e-6 or not np.isfinite(first)):
             copy(w.qn, q)
             copy(w.vn, v)

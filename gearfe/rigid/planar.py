@@ -225,6 +225,17 @@ class Scene:
             for name in used:
                 if name not in index:
                     raise unknown_name(label, name, index)
+            for key, value in vars(part).items():
+                values = value if isinstance(value, tuple) else (value,)
+                if any(isinstance(x, float) and not math.isfinite(x) for x in values):
+                    raise InputError(f"{label} {key}", value, "must be finite", "give a number")
+                if key in ("function", "x", "y") and not isinstance(value, TimeFunction):
+                    if not isinstance(value, int | float):
+                        cure = "use constant, polynomial, sine or smoothed_step"
+                        raise InputError(f"{label} {key}", None, "must be a function of time", cure)
+                    object.__setattr__(part, key, constant(float(value)))
+            if getattr(part, "direction", None) == (0, 0):
+                raise InputError(f"{label} direction", (0, 0), "must not be zero", "give the direction of the line")
             if len(used) == 2 and used[0] == used[1]:
                 cure = "name two different bodies (or the ground)"
                 raise InputError(label, used[0], "joins a body to itself", cure)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..config import quantity
@@ -15,9 +16,7 @@ Pair = tuple[float, float]
 class BodyTable:
     """[bodies.NAME]"""
 
-    mass_kg: float = quantity(
-        above=0.0, doc="mass in kg, > 0; a massless point on a line is a joint, 'slot'"
-    )
+    mass_kg: float = quantity(above=0.0, doc="mass in kg, > 0; a massless point on a line is a joint, 'slot'")
     inertia_kg_m2: float = quantity(above=0.0, doc="moment of inertia about the mass centre in kg m2, > 0")
     centre_m: Pair = quantity((0.0, 0.0), doc="mass centre in the body's frame, [x, y] in m")
     position_m: Pair = quantity((0.0, 0.0), doc="start position of the frame's origin, [x, y] in m")
@@ -218,7 +217,7 @@ class MechanismFile:
         known = {*self.bodies, "ground"}
         if "ground" in self.bodies:
             raise InputError("bodies.ground", None, "is the name of the ground", "rename the body")
-        named = {"bodies": self.bodies, "joints": self.joints, "forces": self.forces}
+        named: dict[str, Iterable[str]] = {"bodies": self.bodies, "joints": self.joints, "forces": self.forces}
         named["ground.points_m"] = self.ground.points_m
         named |= {f"bodies.{name}.points_m": body.points_m for name, body in self.bodies.items()}
         for kind, names in named.items():
