@@ -20,8 +20,8 @@ from gearfe.rigid import (
     PlanarScene,
     PointForce,
     Prescribed,
+    Prismatic,
     Scene,
-    Slider,
     Slot,
     Spring,
     System,
@@ -101,12 +101,12 @@ def test_double_pendulum_against_the_textbook_equations():
 
 
 def test_damped_spring_between_points():
-    """m x'' + c x' + k x = 0 along the line of a slider, with the free length as its place of rest."""
+    """m x'' + c x' + k x = 0 along the line of a prismatic joint, with the free length as its place of rest."""
     m, k, c, x0 = 2.0, 50.0, 3.0, 0.3
     body = Body("m", m, 1.0, position=(1.0 + x0, 0.0))
     scene = Scene(
         (body,),
-        (Slider("m", "ground"),),
+        (Prismatic("m", "ground"),),
         (Spring("ground", "m", stiffness=k, damping=c, free_length=1.0),),
     )
     times = np.linspace(0, 3, 31)
@@ -198,12 +198,12 @@ def test_slot_on_a_turning_line():
 
 
 @pytest.mark.parametrize("method", ["taylor", "explicit", "implicit"])
-def test_slider_between_two_moving_bodies(method):
+def test_prismatic_joint_between_two_moving_bodies(method):
     """A rod that slides along a free arm on a spring: the Lagrangian in arm angle and displacement, by scipy."""
     arm, rod, k, s0 = 0.7, 0.2, 40.0, 0.5
     bodies = (Body("arm", 1.0, arm), Body("rod", 1.5, rod, position=(s0, 0.0), velocity=(0.0, 0.4 * s0), rate=0.4))
     bodies = (Body("arm", 1.0, arm, rate=0.4), bodies[1])
-    joints = (Hinge("arm", "ground"), Slider("rod", "arm"))
+    joints = (Hinge("arm", "ground"), Prismatic("rod", "arm"))
     forces = (Spring("arm", "rod", stiffness=k, free_length=0.4), GRAVITY)
 
     def rhs(_t, y):  # type: ignore[no-untyped-def]
@@ -300,3 +300,23 @@ def test_a_run_that_cannot_go_on_returns_what_it_has():
     assert made.status == 2
     assert 0.0 < made.reached < 5.0
     assert len(made.time) == len(made.q) < 51
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Scene((Body("a", 1.0, 0.1),), (Slot("a", "ground", direction=(0, 0)),)),
+        lambda: Scene((Body("a", 1.0, 0.1),), (), (CoordinateSpring("a", "x", stiffness=float("nan")),)),
+        lambda: Scene((Body("a", 1.0, 0.1),), (), (Moment("a", sin),)),  # type: ignore[arg-type]
+        lambda: System([]),
+    ],
+)
+def test_what_cannot_be_a_mechanism(make):
+    with pytest.raises(InputError):
+        make()
+
+
+def test_a_number_is_a_constant_moment():
+    """Angle M t^2 / (2 I)."""
+    made = run(Scene((Body("a", 1.0, 0.1),), (), (Moment("a", 0.5),)), [0.0, 1.0])  # type: ignore[arg-type]
+    assert made.q[-1, 2] == pytest.approx(2.5, abs=1e-12)

@@ -6,8 +6,23 @@ from math import cos, pi, sin
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
-from gearfe.rigid import Body, Gravity, Hinge, PlanarScene, Scene, System, consistent_start, integrate
+from gearfe.errors import InputError
+from gearfe.rigid import (
+    Body,
+    Forced,
+    Gravity,
+    Hinge,
+    PlanarScene,
+    Prescribed,
+    Scene,
+    Start,
+    System,
+    consistent_start,
+    integrate,
+    polynomial,
+)
 
 from .rigid_cases import G, folding_angle, folding_links, total_energy
 
@@ -79,8 +94,6 @@ def test_redundant_constraint_is_found_and_harmless():
     assert start.freedoms.net == 1
     times = np.linspace(0.0, 1.0, 11)
     made = integrate(system, times, tolerance=1e-10, start=start, backend="plain")
-    from scipy.integrate import solve_ivp
-
     exact = solve_ivp(
         lambda _t, y: [y[1], -(1.5 + 2.0) * G * np.cos(y[0]) / (1.0 + 2.0)],
         (0.0, 1.0), [0.4, 3.0], "DOP853", t_eval=times, rtol=1e-13, atol=1e-13,
@@ -121,3 +134,117 @@ def test_start_at_rest_on_the_fold_selects_no_branch():
     assert made.reached == 0.0
     assert made.q.shape == (1, 6)
     assert made.q[0, 2] == pytest.approx(pi / 2)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-9, 1e-11, 1e-12])
+@pytest.mark.parametrize("count", [2, 3])
+def test_parallel_cranks_turn_through_their_folds(count, tolerance):
+    """(count m/3 + M) l a = -(count m/2 + M) g cos; the coupler keeps its angle, also past the flat positions."""
+    random = np.random.default_rng(3)
+    times = np.linspace(0.0, 3.0, 31)
+    for _ in range(2):
+        angle, rate = random.uniform(0, 2 * pi), random.choice([-1, 1]) * random.uniform(7, 9)
+        made = integrate(parallel_cranks(count, angle, rate), times, tolerance=tolerance, backend="plain")
+        pull = (count / 2 + 2.0) * G / (count / 3 + 2.0)
+        exact = solve_ivp(
+            lambda _t, y, pull=pull: [y[1], -pull * cos(y[0])],
+            (0.0, 3.0), [angle, rate], "DOP853", t_eval=times, rtol=1e-13, atol=1e-13,
+        ).y[0]  # fmt: skip
+        assert made.status == 0
+        passages = len(made.statistics["singular_passages"])
+        assert passages > 0  # long steps at coarse tolerances may pass some unseen
+        assert tolerance > 1e-8 or passages >= int(np.ptp(exact) / pi)
+        assert np.abs(made.q[:, 3 * count + 2]).max() <= max(10 * tolerance, 1e-10)
+        assert np.abs(made.q[:, 2] - exact).max() <= max(100 * tolerance, 1e-9)
+
+
+class FourBar:
+    """Crank a, coupler b, rocker c, ground d with a + d = b + c: flat when the crank points away, theta = pi.
+
+    With L the distance of the hinges A and D, (b + c)^2 - L^2 = 4 a d cos^2(theta/2): the height of B over AD changes
+    its sign with cos(theta/2) on a branch that passes the flat position smoothly.
+    """
+
+    masses = (1.0, 1.3, 0.8)
+
+    def __init__(self, a: float, b: float, c: float, d: float) -> None:
+        self.sides = a, b, c, d
+
+    def points(self, theta):  # type: ignore[no-untyped-def]
+        """A and B, also for complex theta."""
+        a, b, c, d = self.sides
+        A = np.array([a * np.cos(theta), a * np.sin(theta)])
+        to = np.array([d - A[0], -A[1]])
+        square = to[0] ** 2 + to[1] ** 2
+        length = np.sqrt(square)
+        along = (square + b * b - c * c) / (2 * length)
+        other = np.sqrt(square - (b - c) ** 2)
+        if d - a == abs(b - c):  # flat at theta = 0 as well: square - (b - c)^2 = 4 a d sin^2(theta/2)
+            other = 2 * np.sqrt(a * d) * np.sin(theta / 2)
+        height = np.sqrt(a * d) * np.cos(theta / 2) * other / length
+        return A, A + (along * to + height * np.array([-to[1], to[0]])) / length
+
+    def inertia_and_height(self, theta: float) -> tuple[float, float]:
+        """I of the kinetic energy I theta'^2 / 2, and the sum of m y."""
+        D = np.array([self.sides[3], 0.0])
+        A, B = self.points(theta + 1e-30j)
+        inertia, height = 0.0, 0.0
+        for mass, p, q in zip(self.masses, (0 * A, A, D + 0 * A), (A, B, B), strict=True):
+            middle, along = (p + q) / 2, q - p
+            inertia += mass * (middle.imag @ middle.imag + along.imag @ along.imag / 12) * 1e60
+            height += mass * middle[1].real
+        return inertia, height
+
+    def start(self, theta: float, rate: float) -> tuple[System, Start]:
+        """Three uniform rods, hinged."""
+        a, b, c, d = self.sides
+        A, B = self.points(theta)
+        angles = theta, np.arctan2(B[1] - A[1], B[0] - A[0]), np.arctan2(B[1], B[0] - d)
+        rods = zip("abc", self.masses, (a, b, c), angles, ((0.0, 0.0), tuple(A), (d, 0.0)), strict=True)
+        bodies = tuple(Body(n, m, m * r * r / 12, (r / 2, 0.0), place, angle) for n, m, r, angle, place in rods)
+        joints = (Hinge("a", "ground"), Hinge("b", "a", (0.0, 0.0), (a, 0.0)),
+                  Hinge("c", "ground", (0.0, 0.0), (d, 0.0)), Hinge("b", "c", (b, 0.0), (c, 0.0)))  # fmt: skip
+        system = System([PlanarScene(Scene(bodies, joints, (Gravity((0.0, -G)),)))])
+        turn = Forced("rate", rate, lambda _q: 0.0, lambda _q: np.eye(9)[2])
+        return system, consistent_start(system, velocities=[turn])
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-9, 1e-11, 1e-12])
+@pytest.mark.parametrize("sides", [(1.0, 2.0, 2.0, 3.0), (1.0, 1.7, 2.3, 3.0), (1.0, 3.0, 1.0, 3.0)])
+def test_four_bars_pass_their_flat_position(sides, tolerance):
+    """Random starts that turn over: theta' = sqrt(2 (E - V) / I) of the closed-form branch, by scipy."""
+    bar = FourBar(*sides)
+    highest = max(bar.inertia_and_height(x)[1] for x in np.linspace(0, 4 * pi, 400))
+    random = np.random.default_rng(1)
+    times = np.linspace(0.0, 2.0, 21)
+    for _ in range(2):
+        theta, sign = random.uniform(0.3, 2.8), random.choice([-1, 1])
+        inertia, height = bar.inertia_and_height(theta)
+        energy = G * highest + random.uniform(10, 30)
+        system, start = bar.start(theta, sign * np.sqrt(2 * (energy - G * height) / inertia))
+
+        def rate(_t, y, sign=sign, energy=energy):  # type: ignore[no-untyped-def]
+            inertia, height = bar.inertia_and_height(y[0])
+            return [sign * np.sqrt(2 * (energy - G * height) / inertia)]
+
+        exact = solve_ivp(rate, (0.0, 2.0), [theta], "DOP853", t_eval=times, rtol=1e-13, atol=1e-13).y[0]
+        made = integrate(system, times, tolerance=tolerance, start=start, backend="plain")
+        assert made.status == 0
+        turns = np.floor((exact - pi) / (2 * pi))
+        assert len(made.statistics["singular_passages"]) >= np.ptp(turns) > 0
+        coupler = np.array([B - A for A, B in map(bar.points, exact)])
+        pointed = sides[1] * np.column_stack([np.cos(made.q[:, 5]), np.sin(made.q[:, 5])])
+        assert np.abs(made.q[:, 2] - exact).max() <= max(100 * tolerance, 1e-9)
+        assert np.abs(pointed - coupler).max() <= max(300 * tolerance, 3e-9)
+
+
+def test_prescribed_motions_that_contradict_each_other_later():
+    """Both hold x = 0 at the start; the second moves away by t^2 / 2: no status "done"."""
+    body = Body("a", 1.0, 0.1)
+    motions = (Prescribed("a", "x", polynomial((0.0,))), Prescribed("a", "x", polynomial((0.0, 0.0, 0.5))))
+    system = System([PlanarScene(Scene((body,), motions, ()))])
+    try:
+        made = integrate(system, [0.0, 1.0], backend="plain")
+    except InputError:
+        return
+    assert made.status != 0

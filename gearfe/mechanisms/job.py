@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 import time as clock
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,8 @@ import numpy as np
 from ..errors import InputError
 from ..output.files import output_folder, write_csv, write_json
 from ..rigid import Start, Trajectory, compiled, integrate
-from ..rigid.backend import affordable_steps, compiled_is_ready
+from ..rigid.backend import affordable_steps
+from ..rigid.integrate import choose_method
 from .model import Mechanism, load_mechanism
 from .results import Results, evaluate, reactions
 
@@ -46,11 +46,15 @@ def run_mechanism(
     end = run.end_s if until is None else until
     if not (math.isfinite(end) and end > 0.0):
         raise InputError("--until", end, "must be finite and > 0 s", "give the end of the run")
+    if end / run.step_s > 5e6:
+        raise InputError("--until", end, "gives more than five million rows", "take a longer step_s or an earlier end")
     folder = output_folder(out)
     start = mechanism.start()
     read = clock.perf_counter()
     times = output_times(end, run.step_s)
-    trajectory = quickest(mechanism, times, start, method or run.method, tolerance or run.tolerance)
+    method = run.method if method is None else method
+    tolerance = run.tolerance if tolerance is None else tolerance
+    trajectory = quickest(mechanism, times, start, method, tolerance)
     integrated = clock.perf_counter()
     if len(trajectory.dense.times) < 2:
         raise InputError(
@@ -73,7 +77,7 @@ def run_mechanism(
         "tables_s": written - integrated,
         "pictures_s": clock.perf_counter() - written,
     }
-    summary = summarise(mechanism, start, results, tolerance or run.tolerance, timings)
+    summary = summarise(mechanism, start, results, tolerance, timings)
     write_json(folder / "summary.json", summary)
     return Outcome(trajectory.status == 0, _text(summary, folder), summary)
 
@@ -89,14 +93,16 @@ def output_times(end: float, step: float) -> np.ndarray:
 
 
 def quickest(mechanism: Mechanism, times: np.ndarray, start: Start, method: str, tolerance: float) -> Trajectory:
-    """Plain Python for as long as loading (or compiling) the kernels would take, then the kernels."""
+    """Series: plain Python for as long as loading (or compiling) the kernels would take, then the kernels."""
+    if method == "auto":
+        method = choose_method(mechanism.system, start, float(times[-1] - times[0]))
     options: dict[str, Any] = {"start": start, "method": method, "tolerance": tolerance}
+    if method != "taylor":
+        return integrate(mechanism.system, times, **options)
     steps = affordable_steps(mechanism.system)
     made = integrate(mechanism.system, times, backend="plain", most_steps=steps, **options)
-    if made.status != 2 or made.method != "taylor" or not compiled.available():
+    if made.status != 2 or not compiled.available():
         return made
-    if not compiled_is_ready():
-        print("gearfe: a long run: compiling the kernels once (about half a minute)", file=sys.stderr)
     return integrate(mechanism.system, times, backend="compiled", **options)
 
 

@@ -23,8 +23,8 @@ from ..rigid import (
     PlanarScene,
     PointForce,
     Prescribed,
+    Prismatic,
     Scene,
-    Slider,
     Slot,
     Spring,
     Start,
@@ -176,7 +176,23 @@ class Mechanism:
             )
             return made[:n] - made[n]
 
-        return Forced(text, target, position, slope if level == 0 else rate_slope)
+        if level == 0:
+            return Forced(text, target, position, slope)
+        offset = self._offset(node, wanted, label)
+        return Forced(text, target - offset, position, rate_slope)
+
+    def _offset(self, node: Node, wanted: set[tuple[str, str | None]], label: str) -> float:
+        """What the expression of a velocity adds to its linear part; refuses one that is not linear."""
+        random = np.random.default_rng(2)
+        q = np.broadcast_to(self.system.start_q, (5, self.system.size))
+        v = random.standard_normal((5, self.system.size))
+        v[0], v[3], v[4] = 0.0, 2.0 * v[1] - 3.0 * v[2], -v[1]
+        at = np.broadcast_to(compute(node, self.values(wanted, q, v)), 5)
+        part = at - at[0]
+        rest = max(abs(part[3] - 2.0 * part[1] + 3.0 * part[2]), abs(part[4] + part[1]))
+        if not np.isfinite(at).all() or rest > 1e-9 * max(1.0, float(np.abs(at).max())):
+            raise InputError(label, None, "is not linear in the velocities", "force a sum of multiples of velocities")
+        return float(at[0])
 
 
 def load_mechanism(path: str | Path) -> Mechanism:
@@ -251,7 +267,7 @@ def _joint(file: MechanismFile, name: str, t: JointTable):  # type: ignore[no-un
     if t.type == "slot":
         return Slot(t.body, t.to, here, there, t.direction, name)
     angle = None if t.angle_deg is None else math.radians(t.angle_deg)
-    return Slider(t.body, t.to, here, there, t.direction, angle, name)
+    return Prismatic(t.body, t.to, here, there, t.direction, angle, name)
 
 
 def _force(file: MechanismFile, name: str, t: ForceTable):  # type: ignore[no-untyped-def]

@@ -47,8 +47,14 @@ def evaluate(mechanism: Mechanism, trajectory: Trajectory) -> Results:
     outputs = {}
     for table in mechanism.file.outputs:
         column = np.broadcast_to(compute(mechanism.outputs[table.name], values), trajectory.time.shape).astype(float)
-        outputs[table.name] = column if table.wrap is None else np.mod(column, table.wrap)
+        outputs[table.name] = column if table.wrap is None else wrapped(column, table.wrap)
     return Results(trajectory, outputs, energy)
+
+
+def wrapped(values: Array, period: float) -> Array:
+    """Remainder in [0, period); what rounding leaves just below the period is 0."""
+    rest = np.mod(values, period)
+    return np.where(rest >= period * (1.0 - 1e-12), 0.0, rest)
 
 
 def energies(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:

@@ -15,7 +15,7 @@ def compiled_is_ready() -> bool:
     """Whether compiled kernels are loaded already or wait in the cache."""
     if not compiled.available():
         return False
-    return taylor.kernels.cache_info().currsize > 0 or compiled.is_cached(taylor.FUNCTIONS, "integrate_series")
+    return taylor.kernels_loaded() or compiled.is_cached(taylor.FUNCTIONS, "integrate_series")
 
 
 def affordable_steps(system: System) -> int:

@@ -73,9 +73,53 @@ def project(tb, t, forward, q, v, base, length, w):
     return first, least, where
 
 
-def fold_ahead(tb, q, v, where, w):
+def exchange(tb, base, where, w):
+    """Leave the row with the least pivot out instead of a redundant one where that makes the others more independent.
+
+    Any row of a permanent dependency may be the one to leave out, but not the same one everywhere: three parallel
+    cranks need the other direction of a hinge after a quarter turn. w.G is given, w.val belongs to the result.
+    """
+    rows, plan, mass = tb.rows, tb.plan, tb.mass
+    m = rows.ints.shape[0]
+    held = volume(w.val, w.diag)
+    for _ in range(m):
+        best = held + 1.0
+        better = -1
+        for r in range(m):
+            if base[r] != 0 and where >= 0:
+                base[r] = 0
+                base[where] = 1
+                factorise(rows, plan, mass, w.G, base, w.val, w.diag)
+                base[r] = 1
+                base[where] = 0
+                found = volume(w.val, w.diag)
+                if found > best:
+                    best = found
+                    better = r
+        if better < 0:
+            break
+        base[better] = 0
+        base[where] = 1
+        _, where = factorise(rows, plan, mass, w.G, base, w.val, w.diag)
+        held = best
+    return factorise(rows, plan, mass, w.G, base, w.val, w.diag)
+
+
+def volume(val, diag):
+    """Logarithm of det S of the rows scaled to length one, from the factor."""
+    total = 0.0
+    for j in range(diag.shape[0]):
+        total -= np.log(val[j] * diag[j])
+    return total
+
+
+def fold_ahead(tb, q, v, base, where, w):
     """Time from here to the nearest fold, judged from z = S^-1 e_where: (time, share of G^T z that its passing
-    removes)."""
+    removes).
+
+    p = G^T z stands on the gradients of all other rows, so only the part of B = dG^T/dt z across them moves it: what is
+    left of B without all rows, and the part along p.
+    """
     rows, plan, mass, fold = tb.rows, tb.plan, tb.mass, w.fold
     m = rows.ints.shape[0]
     fill(w.mu, 0.0)
@@ -90,14 +134,24 @@ def fold_ahead(tb, q, v, where, w):
     add_transposed(rows, w.H, fold.Z[0], 1.0, w.u)
     pp = 0.0
     pb = 0.0
-    bb = 0.0
     for i in range(w.u.shape[0]):
         pp += w.F[i] * w.F[i] * mass[i]
         pb += w.F[i] * w.u[i] * mass[i]
-        bb += w.u[i] * w.u[i] * mass[i]
-    if bb <= 0.0 or pp <= 0.0:
+    if pp <= 0.0 or pb == 0.0:
         return np.inf, 0.0
-    return -pb / bb, pb * pb / (bb * pp)
+    for i in range(w.u.shape[0]):
+        w.F[i] = w.u[i] * mass[i]
+    times_gradients(rows, w.G, w.F, w.mu)
+    for r in range(m):
+        if base[r] != 0:  # redundant rows take no part
+            w.mu[r] = 0.0
+    solve(plan, w.val, w.mu)
+    add_transposed(rows, w.G, w.mu, -1.0, w.u)
+    rest = 0.0
+    for i in range(w.u.shape[0]):
+        rest += w.u[i] * w.u[i] * mass[i]
+    along = pb * pb / pp
+    return -pp / pb, along / (along + rest)
 
 
 def fold_frame(tb, q, v, folds, w):
@@ -278,6 +332,8 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, sm
 FUNCTIONS = (
     evaluate,
     project,
+    exchange,
+    volume,
     fold_ahead,
     fold_frame,
     fold_change,

@@ -12,13 +12,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kernel_fold import evaluate, fold_ahead, locate_fold, project
+from .kernel_fold import evaluate, exchange, fold_ahead, locate_fold, project
 from .kernel_rows import copy, factorise, fill, gradients, trigonometry
 from .kernel_series import expand
 
 DONE, TOO_SMALL, FULL, SINGULAR, NOT_FINITE, AT_FOLD = 0, 1, 2, 3, 4, 6
 #: Pivot of S relative to its diagonal below which a fold is looked for.
 NEAR = 0.3
+#: Angle (rad) from which on a step is looked at within, too: it could jump a fold.
+FAR = 0.6
 
 
 def step_length(QS, order, tolerance, length):
@@ -84,7 +86,7 @@ def begin(tb, t, sign, q, v, order, tolerance, length, base, none, w, qn, vn):
     trigonometry(q, w.c, w.s)
     gradients(rows, q, w.c, w.s, w.G)
     least, where = factorise(rows, plan, mass, w.G, base, w.val, w.diag)
-    ahead, share = fold_ahead(tb, q, v, where, w)
+    ahead, share = fold_ahead(tb, q, v, base, where, w)
     if least < 1e-10:
         speed = 1e-300
         for i in range(v.shape[0]):
@@ -99,7 +101,7 @@ def begin(tb, t, sign, q, v, order, tolerance, length, base, none, w, qn, vn):
         copy(vn, v)
         return folds, found, np.inf, DONE
     first, least, where = project(tb, t, forward, q, v, base, length, w)
-    ahead, share = fold_ahead(tb, q, v, where, w)
+    ahead, share = fold_ahead(tb, q, v, base, where, w)
     if share < 0.5:
         ahead = np.inf
     if sign * ahead < 0.0:
@@ -112,6 +114,38 @@ def begin(tb, t, sign, q, v, order, tolerance, length, base, none, w, qn, vn):
     return 0, 0.0, ahead, DONE
 
 
+def spare(base):
+    """Whether any row is left out as redundant."""
+    count = 0
+    for r in range(base.shape[0]):
+        count += base[r]
+    return count > 0
+
+
+def turned(QS, q):
+    """Largest angle by which a body turned since the point of expansion."""
+    most = 0.0
+    for i in range(2, q.shape[0], 3):
+        most = max(most, abs(q[i] - QS[0, i]))
+    return most
+
+
+def fold_between(tb, h, order, base, w, q, v):
+    """A fold inside a long step, judged from two points within: (time from its beginning, row), infinite without."""
+    for third in range(1, 3):
+        place = h * third / 3.0
+        evaluate(w.QS, order, place, q, v)
+        trigonometry(q, w.c, w.s)
+        gradients(tb.rows, q, w.c, w.s, w.G)
+        least, where = factorise(tb.rows, tb.plan, tb.mass, w.G, base, w.val, w.diag)
+        if where >= 0 and least < NEAR:
+            tau, share = fold_ahead(tb, q, v, base, where, w)
+            found = (place + tau) / h
+            if share > 0.5 and abs(tau) < 0.5 * abs(h) and 0.0 < found < 1.0:
+                return place + tau, where
+    return np.inf, -1
+
+
 def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, close, w, qn, vn):
     """End of a step of at most |h|: (step, folds there, time to the next fold, status); the state is in qn, vn.
 
@@ -122,17 +156,26 @@ def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, close, w,
     forward = sign > 0.0
     for _ in range(40):
         evaluate(w.QS, order, h, qn, vn)
+        between, through = np.inf, -1
+        if turned(w.QS, qn) > FAR:
+            between, through = fold_between(tb, h, order, base, w, qn, vn)
+            evaluate(w.QS, order, h, qn, vn)
         first, least, where = project(tb, t + h, forward, qn, vn, base, length, w)
+        if least < NEAR and spare(base):
+            least, where = exchange(tb, base, where, w)
         guess = np.inf
         tau = np.inf
         if where >= 0 and least < NEAR:
-            tau, share = fold_ahead(tb, qn, vn, where, w)
+            tau, share = fold_ahead(tb, qn, vn, base, where, w)
             if share > 0.5:
                 guess = h + tau
             else:
                 tau = np.inf
+        if through >= 0 and base[through] == 0 and not 0.0 < sign * guess < abs(h):
+            guess = between
+            where = through
         near = max(1.3 * abs(h), close)
-        if 0.0 < sign * ahead < near:
+        if through < 0 and 0.0 < sign * ahead < near:
             guess = ahead
         lowest = 0.05 * abs(h) if folds > 0 else 0.0
         if lowest < sign * guess < near:
@@ -179,12 +222,14 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
         copy(v, w.vn)
         copy(base, w.skip)
         first, least, where = project(tb, t, forward, q, v, base, length, w)
+        if least < NEAR and spare(base):
+            least, where = exchange(tb, base, where, w)
         if where >= 0 and (least < 1e-6 or not np.isfinite(first)):
             copy(w.qn, q)
             copy(w.vn, v)
             return AT_FOLD, 0
         if where >= 0 and least < NEAR:
-            tau, share = fold_ahead(tb, q, v, where, w)
+            tau, share = fold_ahead(tb, q, v, base, where, w)
             if share > 0.5:
                 ahead = tau
         state[3] = 1.0
@@ -272,7 +317,7 @@ def sample(T, C, sign, times, derivative, out):
                 out[i, c] = out[i, c] * h + factor * C[piece, j, c]
 
 
-FUNCTIONS = (sample, step_length, same_moment, land, integrate_series)
+FUNCTIONS = (sample, step_length, same_moment, spare, turned, fold_between, land, integrate_series)
 STARTERS = (clear_series, fold_behind, begin)
 NAMES = {
     "DONE": DONE,
@@ -282,4 +327,5 @@ NAMES = {
     "NOT_FINITE": NOT_FINITE,
     "AT_FOLD": AT_FOLD,
     "NEAR": NEAR,
+    "FAR": FAR,
 }

@@ -52,7 +52,7 @@ class Body:
             value = getattr(self, key)
             if not (math.isfinite(value) and value > 0.0):
                 unit = "kg" if key == "mass" else "kg m2"
-                cure = f"give a positive number in {unit}; a massless slider is a slot joint, not a body"
+                cure = f"give a positive number in {unit}; a massless point on a line is a slot joint, not a body"
                 raise InputError(f"body {self.name!r} {key}", value, "must be finite and > 0", cure)
 
 
@@ -69,7 +69,7 @@ class Hinge:
 
 @dataclass(frozen=True)
 class Slot:
-    """Point `point` of body `body` stays on a line of body `line`: one constraint (the slider itself has no mass)."""
+    """Point `point` of body `body` stays on a line of body `line`: one constraint (nothing of the joint has mass)."""
 
     body: str
     line: str
@@ -80,7 +80,7 @@ class Slot:
 
 
 @dataclass(frozen=True)
-class Slider:
+class Prismatic:
     """Body `body` slides along a line of body `line` without turning against it: two constraints.
 
     `angle` is the angle of `body` minus that of `line` (rad); ``None`` keeps the one it starts with.
@@ -193,7 +193,7 @@ class Moment:
     name: str = ""
 
 
-Joint = Hinge | Slot | Slider | Fixed | Prescribed
+Joint = Hinge | Slot | Prismatic | Fixed | Prescribed
 Force = Gravity | Spring | CoordinateSpring | PointForce | Moment
 
 
@@ -225,6 +225,17 @@ class Scene:
             for name in used:
                 if name not in index:
                     raise unknown_name(label, name, index)
+            for key, value in vars(part).items():
+                values = value if isinstance(value, tuple) else (value,)
+                if any(isinstance(x, float) and not math.isfinite(x) for x in values):
+                    raise InputError(f"{label} {key}", value, "must be finite", "give a number")
+                if key in ("function", "x", "y") and not isinstance(value, TimeFunction):
+                    if not isinstance(value, int | float):
+                        cure = "use constant, polynomial, sine or smoothed_step"
+                        raise InputError(f"{label} {key}", None, "must be a function of time", cure)
+                    object.__setattr__(part, key, constant(float(value)))
+            if getattr(part, "direction", None) == (0, 0):
+                raise InputError(f"{label} direction", (0, 0), "must not be zero", "give the direction of the line")
             if len(used) == 2 and used[0] == used[1]:
                 cure = "name two different bodies (or the ground)"
                 raise InputError(label, used[0], "joins a body to itself", cure)

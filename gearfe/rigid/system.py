@@ -24,6 +24,8 @@ class System:
 
     def __init__(self, elements: Sequence[Element]) -> None:
         self.elements = tuple(elements)
+        if not any(e.size for e in self.elements):
+            raise InputError("elements", None, "nothing can move", "give the system at least one body")
         place: dict[int, np.ndarray] = {}
         total = 0
         for element in self.elements:

@@ -31,8 +31,8 @@ from .planar import (
     Hinge,
     Moment,
     PointForce,
+    Prismatic,
     Scene,
-    Slider,
     Slot,
     Spring,
 )
@@ -198,9 +198,9 @@ def _joint_rows(joint, index, local, q0, n):  # type: ignore[no-untyped-def]
         if isinstance(joint, Fixed):
             made.append(turn(joint.a, joint.b, angle(joint.a) - angle(joint.b), None))
         return made
-    if isinstance(joint, Slot | Slider):
+    if isinstance(joint, Slot | Prismatic):
         made = [_line_row(joint, index, local, n, affine, point)]
-        if isinstance(joint, Slider):
+        if isinstance(joint, Prismatic):
             held = angle(joint.body) - angle(joint.line) if joint.angle is None else joint.angle
             made.append(turn(joint.body, joint.line, held, None))
         return made

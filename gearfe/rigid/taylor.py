@@ -133,10 +133,19 @@ class Pieces:
         return out[:, :-3]
 
 
+_LOADED: list[bool] = []
+
+
+def kernels_loaded() -> bool:
+    """Whether the compiled kernels are in this process."""
+    return bool(_LOADED)
+
+
 @lru_cache(maxsize=2)
 def kernels(jit: bool) -> SimpleNamespace:
     """The bound kernels, compiled or plain."""
     if jit:
+        _LOADED.append(True)
         return compiled.bind(FUNCTIONS, NAMES, compiled=True, entries=ENTRIES, inline=HOT)
     return compiled.bind((*FUNCTIONS, *kernel_run.STARTERS), NAMES, compiled=False)
 

@@ -21,6 +21,7 @@ STATUS = {
     3: "the start is a singular position and its velocity selects no branch",
     4: "the state is not finite",
     5: "the equations could not be solved in a step",
+    6: "constraints that were taken for redundant at the start are not met by the motion",
 }
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..config import quantity
@@ -15,7 +16,7 @@ Pair = tuple[float, float]
 class BodyTable:
     """[bodies.NAME]"""
 
-    mass_kg: float = quantity(above=0.0, doc="mass in kg, > 0; a massless slider is a joint of type 'slot'")
+    mass_kg: float = quantity(above=0.0, doc="mass in kg, > 0; a massless point on a line is a joint, 'slot'")
     inertia_kg_m2: float = quantity(above=0.0, doc="moment of inertia about the mass centre in kg m2, > 0")
     centre_m: Pair = quantity((0.0, 0.0), doc="mass centre in the body's frame, [x, y] in m")
     position_m: Pair = quantity((0.0, 0.0), doc="start position of the frame's origin, [x, y] in m")
@@ -65,20 +66,20 @@ Function = float | FunctionTable
 class JointTable:
     """[joints.NAME]; which keys belong to which type is in `KEYS`."""
 
-    type: str = quantity(choices=("hinge", "slot", "slider", "fixed", "prescribed"), doc="type of joint")
+    type: str = quantity(choices=("hinge", "slot", "prismatic", "fixed", "prescribed"), doc="type of joint")
     body: str = quantity(doc="body that the joint holds")
     to: str = quantity("ground", doc="the other body, or 'ground'")
     point: str | Pair | None = quantity(None, doc="point of the body: a name or [x, y] in m")
     to_point: str | Pair | None = quantity(None, doc="point of the other body: a name or [x, y] in m")
     direction: Pair | None = quantity(None, doc="direction of the line in the other body's frame, [x, y]")
-    angle_deg: float | None = quantity(None, doc="angle of body minus 'to' that a slider keeps, in degrees")
+    angle_deg: float | None = quantity(None, doc="angle of body minus 'to' that a prismatic joint keeps, in degrees")
     coordinate: str | None = quantity(None, choices=("angle", "rate", "x", "y"), doc="what is prescribed")
     motion: Function | None = quantity(None, doc="rad, rad/s or m: a number or a function of time")
 
     KEYS = {  # noqa: RUF012 - a plain class attribute, not a field
         "hinge": {"point", "to_point"},
         "slot": {"point", "to_point", "direction"},
-        "slider": {"point", "to_point", "direction", "angle_deg"},
+        "prismatic": {"point", "to_point", "direction", "angle_deg"},
         "fixed": set(),
         "prescribed": {"point", "coordinate", "motion"},
     }
@@ -88,7 +89,7 @@ class JointTable:
         _only(
             self, where, self.KEYS[self.type], ("point", "to_point", "direction", "angle_deg", "coordinate", "motion")
         )
-        needs = {"slot": ("direction",), "slider": ("direction",), "prescribed": ("coordinate", "motion")}
+        needs = {"slot": ("direction",), "prismatic": ("direction",), "prescribed": ("coordinate", "motion")}
         for key in needs.get(self.type, ()):
             if getattr(self, key) is None:
                 raise InputError(f"{where}.{key}", None, f"is required by a {self.type} joint", "add it")
@@ -216,10 +217,17 @@ class MechanismFile:
         known = {*self.bodies, "ground"}
         if "ground" in self.bodies:
             raise InputError("bodies.ground", None, "is the name of the ground", "rename the body")
-        for name in self.bodies:
-            if not name.isidentifier():
-                problem = "must be a word of letters, digits and _ (it is used in expressions)"
-                raise InputError("bodies", name, problem, "rename the body")
+        named: dict[str, Iterable[str]] = {"bodies": self.bodies, "joints": self.joints, "forces": self.forces}
+        named["ground.points_m"] = self.ground.points_m
+        named |= {f"bodies.{name}.points_m": body.points_m for name, body in self.bodies.items()}
+        for kind, names in named.items():
+            for name in names:
+                if not name.isidentifier():
+                    problem = "must be a word of letters, digits and _ (it is used in expressions and columns)"
+                    raise InputError(kind, name, problem, "rename it")
+        for name in self.joints:
+            if name in known:
+                raise InputError("joints", name, "is the name of a body, too", "rename the joint")
         for kind in ("joints", "forces"):
             for name, part in getattr(self, kind).items():
                 for key in ("body", "to"):
