@@ -57,7 +57,7 @@ HOUSING: dict[str, Any] = {
 }
 
 MECHANISM: dict[str, Any] = {
-    "title": "Slider crank",
+    "title": "Crank and rod",
     "run": {"end_s": 10.0, "step_s": 0.005, "tolerance": 1e-9},
     "ground": {"points_m": {"O": [0.0, 0.0]}},
     "bodies": {

@@ -73,46 +73,6 @@ def project(tb, t, forward, q, v, base, length, w):
     return first, least, where
 
 
-def exchange(tb, base, where, w):
-    """Leave the row with the least pivot out instead of a redundant one where that makes the others more independent.
-
-    Any row of a permanent dependency may be the one to leave out, but not the same one everywhere: three parallel
-    cranks need the other direction of a hinge after a quarter turn. w.G is given, w.val belongs to the result.
-    """
-    rows, plan, mass = tb.rows, tb.plan, tb.mass
-    m = rows.ints.shape[0]
-    held = volume(w.val, w.diag)
-    for _ in range(m):
-        best = held + 1.0
-        better = -1
-        for r in range(m):
-            if base[r] != 0 and where >= 0:
-                base[r] = 0
-                base[where] = 1
-                factorise(rows, plan, mass, w.G, base, w.val, w.diag)
-                base[r] = 1
-                base[where] = 0
-                found = volume(w.val, w.diag)
-                if found > best:
-                    best = found
-                    better = r
-        if better < 0:
-            break
-        base[better] = 0
-        base[where] = 1
-        _, where = factorise(rows, plan, mass, w.G, base, w.val, w.diag)
-        held = best
-    return factorise(rows, plan, mass, w.G, base, w.val, w.diag)
-
-
-def volume(val, diag):
-    """Logarithm of det S of the rows scaled to length one, from the factor."""
-    total = 0.0
-    for j in range(diag.shape[0]):
-        total -= np.log(val[j] * diag[j])
-    return total
-
-
 def fold_ahead(tb, q, v, base, where, w):
     """Time from here to the nearest fold, judged from z = S^-1 e_where: (time, share of G^T z that its passing
     removes).
@@ -332,8 +292,6 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, sm
 FUNCTIONS = (
     evaluate,
     project,
-    exchange,
-    volume,
     fold_ahead,
     fold_frame,
     fold_change,

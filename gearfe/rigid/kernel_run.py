@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kernel_fold import evaluate, exchange, fold_ahead, locate_fold, project
+from .kernel_fold import evaluate, fold_ahead, locate_fold, project
 from .kernel_rows import copy, factorise, fill, gradients, trigonometry
 from .kernel_series import expand
 
@@ -114,14 +114,6 @@ def begin(tb, t, sign, q, v, order, tolerance, length, base, none, w, qn, vn):
     return 0, 0.0, ahead, DONE
 
 
-def spare(base):
-    """Whether any row is left out as redundant."""
-    count = 0
-    for r in range(base.shape[0]):
-        count += base[r]
-    return count > 0
-
-
 def turned(QS, q):
     """Largest angle by which a body turned since the point of expansion."""
     most = 0.0
@@ -161,8 +153,6 @@ def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, close, w,
             between, through = fold_between(tb, h, order, base, w, qn, vn)
             evaluate(w.QS, order, h, qn, vn)
         first, least, where = project(tb, t + h, forward, qn, vn, base, length, w)
-        if least < NEAR and spare(base):
-            least, where = exchange(tb, base, where, w)
         guess = np.inf
         tau = np.inf
         if where >= 0 and least < NEAR:
@@ -222,8 +212,6 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
         copy(v, w.vn)
         copy(base, w.skip)
         first, least, where = project(tb, t, forward, q, v, base, length, w)
-        if least < NEAR and spare(base):
-            least, where = exchange(tb, base, where, w)
         if where >= 0 and (least < 1e-6 or not np.isfinite(first)):
             copy(w.qn, q)
             copy(w.vn, v)
@@ -317,7 +305,7 @@ def sample(T, C, sign, times, derivative, out):
                 out[i, c] = out[i, c] * h + factor * C[piece, j, c]
 
 
-FUNCTIONS = (sample, step_length, same_moment, spare, turned, fold_between, land, integrate_series)
+FUNCTIONS = (sample, step_length, same_moment, turned, fold_between, land, integrate_series)
 STARTERS = (clear_series, fold_behind, begin)
 NAMES = {
     "DONE": DONE,
