@@ -320,3 +320,10 @@ def test_a_number_is_a_constant_moment():
     """Angle M t^2 / (2 I)."""
     made = run(Scene((Body("a", 1.0, 0.1),), (), (Moment("a", 0.5),)), [0.0, 1.0])  # type: ignore[arg-type]
     assert made.q[-1, 2] == pytest.approx(2.5, abs=1e-12)
+
+
+def test_a_spring_between_coincident_points_is_named():
+    """Its force has no direction: said so, instead of a division by zero somewhere below."""
+    scene = Scene((Body("m", 2.0, 0.1),), (), (Spring("ground", "m", stiffness=5.0, free_length=1.0),))
+    with pytest.raises(InputError, match="two points that coincide"):
+        integrate(System((PlanarScene(scene),)), [0.0, 1.0], backend="plain")

@@ -61,6 +61,8 @@ def parse(text: str, label: str) -> Node:
     stripped = text.rstrip()
     if len(stripped) > 2000:
         raise InputError(label, None, "is longer than 2000 characters", "split it into several outputs")
+    if sum(stripped.count(sign) for sign in "+-*/(") > 200:
+        raise InputError(label, None, "has more than 200 operations", "split it into several outputs")
     while at < len(stripped):
         match = _TOKEN.match(stripped, at)
         if match is None:

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..errors import InputError
 from .contract import Array, Element
 from .planar import Scene
 from .tables import Assembly, assemble
@@ -275,6 +276,9 @@ def _span(p, full, index, arms):  # type: ignore[no-untyped-def]
     a, b = index[1], index[2]
     span = np.array([p[0][b] - p[0][a], p[1][b] - p[1][a]]) + arms[1] - arms[0]
     length = float(np.hypot(*span))
+    if length == 0.0:
+        problem = "joins two points that coincide, so its force has no direction"
+        raise InputError("spring-damper", None, problem, "start with its points apart, or use springs along x and y")
     speed = None
     if full is not None:
         turn = [w * np.array([-r[1], r[0]]) for w, r in zip(full[[a, b], 2], arms, strict=True)]
