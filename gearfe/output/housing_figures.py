@@ -7,10 +7,7 @@ a picture and a message, not the results.
 from __future__ import annotations
 
 import math
-import os
-import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -18,8 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import load_arrays, save_arrays
+from .arrays import load_arrays
 from .files import whole_file
+from .offscreen import draw_apart
 
 #: Largest displacement in a picture of a mode, in parts of the body's size.
 EXAGGERATION = 0.06
@@ -59,31 +57,14 @@ def draw_modes(
     """
     used, renumbered = np.unique(faces, return_inverse=True)
     keep = np.isin(np.arange(len(points)), [] if marked is None else marked)
-    with tempfile.TemporaryDirectory() as folder:
-        job = Path(folder) / "job.npz"
-        arrays = {
-            "points": points[used],
-            "faces": renumbered.reshape(faces.shape),
-            "fields": fields[:, used],
-            "titles": np.array(list(titles)),
-            "marked": points[keep],
-        }
-        save_arrays(job, arrays)
-        environment = dict(os.environ)
-        if sys.platform.startswith("linux"):
-            environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-        command = [sys.executable, "-m", __name__, str(job), str(path)]
-        environment["PYTHONPATH"] = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
-        try:
-            done = subprocess.run(
-                command, env=environment, capture_output=True, text=True, timeout=_SECONDS, check=False
-            )
-        except subprocess.TimeoutExpired:
-            return f"drawing took longer than {_SECONDS:g} s"
-    if done.returncode != 0:
-        last = done.stderr.strip().splitlines()[-1:] or [f"the drawing process ended with code {done.returncode}"]
-        return f"{last[0]} (off-screen drawing needs EGL or Mesa: apt-get install libegl1 libgl1)"
-    return ""
+    arrays = {
+        "points": points[used],
+        "faces": renumbered.reshape(faces.shape),
+        "fields": fields[:, used],
+        "titles": np.array(list(titles)),
+        "marked": points[keep],
+    }
+    return draw_apart(__name__, path, arrays, seconds=_SECONDS)
 
 
 def _draw(job: Path, target: Path) -> None:

@@ -6,10 +6,7 @@ a picture and a message, not the results. The animation is a GIF, put together b
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import load_arrays, save_arrays
+from .arrays import load_arrays
 from .files import whole_file
+from .offscreen import draw_apart
 
 _SECONDS = 300.0
 #: Milliseconds a frame.
@@ -35,24 +33,7 @@ def draw_scene(path: str | Path, arrays: Mapping[str, NDArray[Any]], title: str)
     str
         Empty when it was drawn, else why not.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        job = Path(folder) / "job.npz"
-        save_arrays(job, {**arrays, "title": np.array(title)})
-        environment = dict(os.environ)
-        if sys.platform.startswith("linux"):
-            environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-        environment["PYTHONPATH"] = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
-        command = [sys.executable, "-m", __name__, str(job), str(path)]
-        try:
-            done = subprocess.run(
-                command, env=environment, capture_output=True, text=True, timeout=_SECONDS, check=False
-            )
-        except subprocess.TimeoutExpired:
-            return f"drawing took longer than {_SECONDS:g} s"
-    if done.returncode != 0:
-        last = done.stderr.strip().splitlines()[-1:] or [f"the drawing process ended with code {done.returncode}"]
-        return f"{last[0]} (off-screen drawing needs EGL or Mesa: apt-get install libegl1 libgl1)"
-    return ""
+    return draw_apart(__name__, path, {**arrays, "title": np.array(title)}, seconds=_SECONDS)
 
 
 def _draw(job: Path, target: Path) -> None:

@@ -1,0 +1,49 @@
+"""Drawing with VTK in a process of its own.
+
+Off-screen drawing crashes the interpreter where a machine lacks the graphics libraries: in a second process that costs
+a picture and a message, not the results.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from .arrays import save_arrays
+
+
+def draw_apart(module: str, path: str | Path, arrays: Mapping[str, NDArray[Any]], *, seconds: float) -> str:
+    """Run ``python -m module JOB PATH`` on stored arrays; return an empty text, or why nothing was drawn.
+
+    Parameters
+    ----------
+    module
+        Drawing module; run as a program it takes the file of arrays and the picture to write.
+    seconds
+        How long it may take.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        job = Path(folder) / "job.npz"
+        save_arrays(job, arrays)
+        environment = dict(os.environ)
+        if sys.platform.startswith("linux"):
+            environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+        environment["PYTHONPATH"] = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
+        command = [sys.executable, "-m", module, str(job), str(path)]
+        try:
+            done = subprocess.run(
+                command, env=environment, capture_output=True, text=True, timeout=seconds, check=False
+            )
+        except subprocess.TimeoutExpired:
+            return f"drawing took longer than {seconds:g} s"
+    if done.returncode != 0:
+        last = done.stderr.strip().splitlines()[-1:] or [f"the drawing process ended with code {done.returncode}"]
+        return f"{last[0]} (off-screen drawing needs EGL or Mesa: apt-get install libegl1 libgl1)"
+    return ""
