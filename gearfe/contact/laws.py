@@ -41,7 +41,7 @@ from typing import Any, Literal, Protocol, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError
 
 Array = NDArray[Any]
 Sides = Literal["both", "pinion", "wheel"]
@@ -216,5 +216,5 @@ LAWS: dict[str, type[Penalty] | type[Nitsche] | type[Exact]] = {"nitsche": Nitsc
 def law_named(name: str) -> ContactLaw:
     """The law called `name` with its default parameter."""
     if name not in LAWS:
-        raise unknown_name("law", name, LAWS)
+        raise InputError("law", name, "must be one of " + ", ".join(LAWS))
     return LAWS[name]()

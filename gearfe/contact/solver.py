@@ -213,11 +213,11 @@ def _alone(scene: Scene, start: State, tolerance: float) -> Outcome:
 
 def _finish(scene: Scene, outcome: Outcome, iterations: int) -> Position:
     state = outcome.state
-    active = np.flatnonzero(state.pressure > 0)
+    active = np.flatnonzero(state.unknown > 0)
     placed = scene.placed(state.displacement)
     lin = linearise(scene, outcome.projection, active, state.pressure)
     forces = np.zeros(2 * len(scene.points))
-    forces[lin.unknowns] = lin.weighted @ state.pressure[active]
+    forces[lin.unknowns] = lin.weighted @ state.unknown[active]
     force = np.matmul(scene.rotation, forces.reshape(-1, 2, 1))[:, :, 0]
     wheel = scene.of_wheel
     about_wheel = -_moment(placed - scene.wheel_centre, force)
@@ -260,8 +260,9 @@ def _tangent(scene: Scene, lin: Linearised, forces: Array, placed: Array) -> tup
     right = lin.response @ frame - lin.parameter * (lin.opening @ carried)
     bend = np.zeros(len(frame))
     for _ in range(5):
-        rate = lin.weighted @ lin.solve(right - lin.response @ bend) + bend
-        moved = carried + lin.compliance @ (rate - frame)
+        solved = lin.solve(right - lin.response @ bend)
+        rate = lin.weighted @ solved + bend
+        moved = carried + lin.moved(solved, rate - frame)
         bend = lin.bending(moved)
     change = _moment(arm, (rate - frame).reshape(-1, 2)) + _moment((moved - carried).reshape(-1, 2), force)
     spread = np.zeros_like(forces)
