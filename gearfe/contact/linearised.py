@@ -18,7 +18,7 @@ IntArray = NDArray[Any]
 
 @dataclass(frozen=True)
 class Linearised:
-    """The active unknowns (pressures at points, or multipliers) at one state, on the 2t unknowns of the nodes they touch.
+    """The active pressures or multipliers at one state, on the 2t unknowns of the nodes that they touch.
 
     Attributes
     ----------

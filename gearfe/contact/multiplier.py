@@ -1,6 +1,6 @@
-r"""The multiplier space of the exact law: hats on the vertices of the quadratic edges of the slave's flank.
+r"""The multiplier space of the exact law: hats on the halves of the quadratic edges of the slave's flank.
 
-With the hats :math:`\psi_i`, the pressure is :math:`p = \sum_i \lambda_i \psi_i`, the mean gap of a hat
+Each vertex and each middle of the slave's edges has a hat, linear on either side of it. With the hats :math:`\psi_i`, the pressure is :math:`p = \sum_i \lambda_i \psi_i`, the mean gap of a hat
 :math:`\bar g_i = \int\psi_i g / \int\psi_i`, and the conditions are
 
 .. math:: \lambda_i = \max(0,\; \lambda_i - c\,\bar g_i), \qquad c > 0
@@ -8,6 +8,13 @@ With the hats :math:`\psi_i`, the pressure is :math:`p = \sum_i \lambda_i \psi_i
 (Alart & Curnier, Comput. Methods Appl. Mech. Eng. 92, 1991; Hueeber & Wohlmuth, Comput. Methods Appl. Mech. Eng. 194,
 2005). Integrals run over the part of the surface that faces the mate: hats that a sharp end of the mate cuts weigh what
 is left of them.
+
+Stability. There are as many hats as the edges have displacement nodes. For :math:`\lambda = \sum \lambda_i \psi_i` take
+the displacement v with the same nodal values, :math:`v = \sum \lambda_i N_i`: on each edge the symmetric part of
+:math:`\int \psi_i N_j` is positive definite, so :math:`\int \lambda v \ge c \lVert\lambda\rVert^2` with one c for all
+meshes, and the inf-sup condition follows (Wohlmuth, *Acta Numerica* 20, 2011, sec. 3; linear multipliers on halves of
+quadratic edges: Puso, Laursen & Solberg, Comput. Methods Appl. Mech. Eng. 197, 2008; quadratic elements in unilateral
+contact: Hild & Laborde, *Appl. Numer. Math.* 41, 2002).
 """
 
 from __future__ import annotations
@@ -24,14 +31,14 @@ IntArray = NDArray[Any]
 
 @dataclass(frozen=True)
 class Hats:
-    """Hat functions on chains of edges, at their contact points.
+    """Hat functions on chains of half edges, at their contact points.
 
     Attributes
     ----------
     count
         Number of multipliers.
     numbers : ndarray, shape (q, 2)
-        The two multipliers at each point's edge: its start's and its end's.
+        The two multipliers at each point's half edge: its start's and its end's.
     values : ndarray, shape (q, 2)
         Their hats there.
     """
@@ -65,12 +72,15 @@ class Hats:
 
 
 def hats_on(edge: IntArray, xi: Array) -> Hats:
-    """Hats for points at xi in [0, 1] of the edges `edge`, numbered through all chains with a gap between chains.
+    """Hats for points at xi in [0, 1] of edges.
 
     Parameters
     ----------
     edge : ndarray, shape (q,)
-        Number of the vertex at which each point's edge starts; the next vertex is where it ends.
+        Number of the vertex at which each point's edge starts; the next vertex is where it ends. A chain of n edges has
+        n + 1 vertices, so the numbers leave one out between chains.
     """
-    numbers = np.stack([edge, edge + 1], axis=1)
-    return Hats(int(edge.max()) + 2 if len(edge) else 0, numbers, np.stack([1 - xi, xi], axis=1))
+    late = (xi > 0.5).astype(np.int64)
+    first, along = 2 * edge + late, 2 * xi - late
+    count = 2 * int(edge.max()) + 3 if len(edge) else 0
+    return Hats(count, np.stack([first, first + 1], axis=1), np.stack([1 - along, along], axis=1))

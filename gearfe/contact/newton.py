@@ -12,10 +12,12 @@ Linearised at (u, p), with the moving normals' part H of the tangent, the active
     (I + (\gamma\, \partial_u g\, C + S) G^T W)\, p = -\gamma (g - \partial_u g\, u) - (\gamma\, \partial_u g\, C + S)
     d, \qquad d = H (u^+ - u),
 
-with :math:`u = C f + S^T z` and :math:`\sigma_n = S f + T z` where a law's theta makes stress loads :math:`z = \theta
-W \gamma^{-1} p`. On a multiplier space (`gearfe.contact.multiplier`) the unknowns are its multipliers, :math:`p =
-\Psi \lambda`, and the active ones solve :math:`\Psi^T W g = 0`. Above d, a small correction, is iterated within the step on one factorisation (Alart & Curnier, Comput. Methods Appl.
+where d, a small correction, is iterated within the step on one factorisation (Alart & Curnier, Comput. Methods Appl.
 Mech. Eng. 92, 1991, in the few hundred unknowns that touch).
+
+Where a law's theta makes stress loads :math:`z = \theta W \gamma^{-1} p`, they join in, :math:`u = C f + S^T z` and
+:math:`\sigma_n = S f + T z`. On a multiplier space (`gearfe.contact.multiplier`) the unknowns are its multipliers,
+:math:`p = \Psi \lambda`, and the active ones solve :math:`\Psi^T W g = 0`.
 """
 
 from __future__ import annotations

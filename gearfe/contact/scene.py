@@ -314,10 +314,12 @@ def _of_law(pair: MeshingPair, windows: Sequence[Window], slaves: list[int]) -> 
     if pair.law.theta:
         return {"theta": pair.law.theta, "stress_stress": stress_for_stress_loads(pair.bodies, windows, slaves)}
     if pair.law.multiplier:
-        rule = [pair.bodies[windows[i].gear].flank.shapes for i in slaves]
-        starts = np.cumsum([0] + [windows[i].edges + 1 for i in slaves])  # a chain has one vertex more than edges
-        edge = [np.repeat(a + np.arange(windows[i].edges), len(r)) for a, i, r in zip(starts, slaves, rule)]
-        xi = [np.tile(r @ [0.0, 0.5, 1.0], windows[i].edges) for i, r in zip(slaves, rule)]
+        edge, xi, vertex = [], [], 0
+        for w in (windows[i] for i in slaves):
+            shapes = pair.bodies[w.gear].flank.shapes
+            edge.append(np.repeat(vertex + np.arange(w.edges), len(shapes)))
+            xi.append(np.tile(shapes @ [0.0, 0.5, 1.0], w.edges))
+            vertex += w.edges + 1
         return {"hats": hats_on(np.concatenate(edge), np.concatenate(xi))}
     return {}
 
