@@ -169,7 +169,7 @@ class Nitsche:
 
 @dataclass(frozen=True)
 class Exact:
-    """No overlap in the mean, no tension: multipliers on one gear's flank, continuous, linear on the halves of its edges.
+    """No overlap in the mean, no tension: multipliers on one gear's flank, continuous and linear on half edges.
 
     The space P1(h/2) on second-order edges is stable (why: `gearfe.contact.multiplier`) and its hats are not negative,
     so neither are the pressures. It has one condition for each displacement node, where a stiff penalty at four

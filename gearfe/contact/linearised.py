@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -31,14 +31,14 @@ class Linearised:
         gamma; 1 for multipliers.
     response : ndarray, shape (a, 2t)
         gamma dg/du C + S.
-    flex : ndarray, shape (2t, a), or None
-        Displacements for the stress loads of the active unknowns, S^T theta W/gamma.
-    relief : ndarray, shape (a,)
-        theta W/gamma: stress loads for the active unknowns (m3/Pa).
     normal, tilt, slide, projection, loads
         Rows G, N and delta xi (`closest.Rows`), projection and loads (N) of the points behind the active unknowns.
     cut : ndarray
         Change of each of these points' loads per unit of the foot point, where its stretch lies across a sharp end (N).
+    flex : ndarray, shape (2t, a), or None
+        Displacements for the stress loads of the active unknowns, S^T theta W/gamma.
+    relief : ndarray, shape (a,)
+        theta W/gamma: stress loads for the active unknowns (m3/Pa).
     """
 
     unknowns: IntArray
@@ -49,14 +49,14 @@ class Linearised:
     compliance: Array
     response: Array
     factor: Any
-    flex: Array | None
-    relief: Array
     normal: Array
     tilt: Array
     slide: Array
     projection: Projection
     loads: Array
     cut: Array
+    flex: Array | None = None
+    relief: Array = field(default_factory=lambda: np.zeros(0))
 
     def solve(self, right: Array) -> Array:
         """Active unknowns for a right-hand side."""

@@ -1,6 +1,7 @@
 r"""The multiplier space of the exact law: hats on the halves of the quadratic edges of the slave's flank.
 
-Each vertex and each middle of the slave's edges has a hat, linear on either side of it. With the hats :math:`\psi_i`, the pressure is :math:`p = \sum_i \lambda_i \psi_i`, the mean gap of a hat
+Each vertex and each middle of the slave's edges has a hat, linear on either side of it. With the hats
+:math:`\psi_i`, the pressure is :math:`p = \sum_i \lambda_i \psi_i`, the mean gap of a hat
 :math:`\bar g_i = \int\psi_i g / \int\psi_i`, and the conditions are
 
 .. math:: \lambda_i = \max(0,\; \lambda_i - c\,\bar g_i), \qquad c > 0
