@@ -83,6 +83,7 @@ def elastic_pair(
     with watch.stage("meshes"):
         recipes = sector_recipes(pair, coarsen=coarsen)
         meshes = [sector_mesh(gear, recipe) for gear, recipe in zip(gears, recipes, strict=True)]
+    width = min(gear.face_width for gear in gears)
     with watch.stage("condensation"), one_thread():
         bodies = [
             gear_body(
@@ -92,10 +93,12 @@ def elastic_pair(
                 gear.face_width,
                 points_per_edge=points_per_edge,
                 with_stress=chosen.uses_stress,
+                law=chosen,
+                gear=number,
+                width=width,
             )
-            for mesh, material, gear in zip(meshes, both, gears, strict=True)
+            for number, (mesh, material, gear) in enumerate(zip(meshes, both, gears, strict=True))
         ]
-    width = min(gear.face_width for gear in gears)
     return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen)
 
 
