@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .contact.compliance import gear_body
-from .contact.laws import ContactLaw, law_named
+from .contact.laws import ContactLaw, law_named, law_text
 from .contact.scene import MeshingPair
 from .elasticity import Material, Plane
 from .errors import InputError
@@ -188,7 +188,7 @@ def sweep_stiffness(
             coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
             error = _estimate(coarse, solved_angles, solved, finite=finite)
     curve = _assemble(pair, asked, solved_angles, source, solved, touching, lost, searched=torque is not None)
-    return replace(curve, timings=dict(watch.seconds), error=error)
+    return replace(curve, law=law_text(elastic.law), timings=dict(watch.seconds), error=error)
 
 
 def _lost_motion(pair: GearPair, twist_from: str) -> float:

@@ -249,7 +249,12 @@ def _not_coercive(law: ContactLaw, stiffness: Array, stress: Array, term: Array)
     bound = float(np.linalg.eigvalsh(scaled @ np.linalg.solve(stiffness, scaled.T))[-1])
     gamma0 = float(getattr(law, "gamma0", 1.0))
     problem = f"with theta = 1 it must be > {bound * gamma0:.3g} on this mesh, or the bodies lose their stiffness"
-    return InputError("gamma0", gamma0, problem, "raise it, or take theta = -1 or 0, which have no such bound")
+    return InputError(
+        "gamma0",
+        gamma0,
+        problem,
+        "raise it (nitsche_gamma0 in a job file), or take theta = -1 or 0, which have no such bound",
+    )
 
 
 #: Neighbours whose coupling is kept at hand: teeth in contact at the same time are never further apart.

@@ -71,6 +71,17 @@ def side_share(law: ContactLaw, gear: int) -> float:
     return float((law.sides == "pinion") == (gear == 0))
 
 
+def law_text(law: ContactLaw) -> str:
+    """Name and parameters in one line without commas, for tables and reports."""
+    if isinstance(law, Nitsche):
+        return f"nitsche theta={law.theta} gamma0={law.gamma0:.12g} sides={law.sides}"
+    if isinstance(law, Penalty):
+        stiffness = "300E/h" if law.stiffness is None else f"{law.stiffness * 1e-9:.12g}N/mm3"
+        return f"penalty stiffness={stiffness} sides={law.sides}"
+    space = f" multipliers={law.multiplier}" if law.multiplier else ""
+    return f"{law.name} sides={law.sides}{space}"
+
+
 def _check_sides(sides: str, allowed: tuple[str, ...]) -> None:
     if sides not in allowed:
         raise InputError("sides", sides, "must be one of " + ", ".join(allowed))
