@@ -39,7 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     load.add_argument("--torque-Nm", type=float, metavar="X", dest="torque_Nm", help="torque at the wheel's hub (N m)")
     parser.add_argument("--angles", type=float, nargs=3, metavar=("START", "STEP", "STOP"), help="pinion angles (deg)")
     parser.add_argument("--law", metavar="LAW", help="contact law: nitsche, penalty or exact")
-    parser.add_argument("--law-sides", metavar="GEAR", help="flanks that the law is integrated on: both, pinion, wheel")
+    parser.add_argument(
+        "--law-sides", metavar="GEAR", help="flanks that the law is integrated on: both, pinion, wheel, tip"
+    )
     parser.add_argument("--nitsche-theta", type=int, metavar="T", help="variant of the law nitsche: 0, 1 or -1")
     parser.add_argument("--nitsche-gamma0", type=float, metavar="G", help="parameter gamma h/E of the law nitsche")
     parser.add_argument(

@@ -29,7 +29,9 @@ A law provides, and nothing else needs to be touched to add one:
 4. ``multiplier``: name of the multiplier space, or None for laws at points;
 5. ``parameter(youngs_modulus, sizes)``: gamma at the edges of a flank, from the body's modulus (Pa) and its edge
 lengths (m); of a multiplier law the complementarity parameter, which moves no solution;
-6. ``sides``: ``both`` (unbiased: each flank carries half of the pressure), ``pinion`` or ``wheel``.
+6. ``sides``: ``both`` (unbiased: each flank carries half of the pressure), ``pinion``, ``wheel``, or ``tip``: of each
+tooth pair the gear whose tip is nearer to the contact. A corner that digs into the other flank then lies on the side
+that is integrated, which nothing cuts. Routes that do not tell tooth pairs apart take the pinion for it.
 """
 
 from __future__ import annotations
@@ -44,7 +46,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 
 Array = NDArray[Any]
-Sides = Literal["both", "pinion", "wheel"]
+Sides = Literal["both", "pinion", "wheel", "tip"]
 Theta = Literal[1, 0, -1]
 
 
@@ -68,7 +70,7 @@ def side_share(law: ContactLaw, gear: int) -> float:
     """Part of the pressure's integral that runs over the pinion (gear 0) or the wheel (gear 1): 0, 1/2 or 1."""
     if law.sides == "both":
         return 0.5
-    return float((law.sides == "pinion") == (gear == 0))
+    return float((law.sides == "wheel") == (gear == 1))
 
 
 def law_text(law: ContactLaw) -> str:
@@ -103,7 +105,7 @@ class Penalty:
         0.07 mm then overlaps by 2 nm at 1.5 GPa. Far stiffer, the points over-constrain the edges and rounding shows
         in the pressures.
     sides
-        One side by default: two would ask twice for the same thing.
+        One side by default: two would ask twice for the same thing. ``tip`` is the safest with sharp tips.
     """
 
     stiffness: float | None = None
@@ -156,7 +158,7 @@ class Nitsche:
     theta: Theta = 0
 
     def __post_init__(self) -> None:
-        _check_sides(self.sides, get_args(Sides))
+        _check_sides(self.sides, ("both", "pinion", "wheel"))
         _check_positive("gamma0", self.gamma0, "gamma h/E")
         if self.theta not in get_args(Theta):
             raise InputError("theta", self.theta, "must be 1, 0 or -1", "0 is the cheapest, -1 the most robust")
@@ -190,13 +192,14 @@ class Exact:
     Parameters
     ----------
     sides
-        The gear that carries the multipliers; ``both`` would ask twice for the same thing and is not offered.
+        The gear that carries the multipliers, by default the one whose tip is nearer, for each tooth pair. ``both``
+        would ask twice for the same thing and is not offered.
     """
 
-    sides: Sides = "pinion"
+    sides: Sides = "tip"
 
     def __post_init__(self) -> None:
-        _check_sides(self.sides, ("pinion", "wheel"))
+        _check_sides(self.sides, ("tip", "pinion", "wheel"))
 
     @property
     def name(self) -> str:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from .closest import Projection, chains_of, nearest_places, project, unreached
 from .compliance import GearBody
 from .flank import edge_nodes
-from .laws import ContactLaw
+from .laws import ContactLaw, side_share
 from .multiplier import Hats, hats_on
 from .stress_loads import check_stress_loads, stress_for_stress_loads
 
@@ -294,8 +294,7 @@ def _gathered(pair: MeshingPair, windows: Sequence[Window]) -> dict[str, Any]:
         points[w.nodes] = pair.bodies[w.gear].flank.points[w.flank_nodes] @ matrix.T + pair.centre(w.gear)
         rotation[w.nodes] = matrix
         of_wheel[w.nodes] = bool(w.gear)
-    sides = pair.law.sides
-    slaves = [i for i, w in enumerate(windows) if sides == "both" or (sides == "pinion") == (w.gear == 0)]
+    slaves = _slaves(pair, windows)
     return {
         "counts": np.array([w.edges for w in windows]),
         "points": points,
@@ -307,6 +306,17 @@ def _gathered(pair: MeshingPair, windows: Sequence[Window]) -> dict[str, Any]:
         **_contact_points(pair, windows, slaves),
         **_of_law(pair, windows, slaves),
     }
+
+
+def _slaves(pair: MeshingPair, windows: Sequence[Window]) -> list[int]:
+    """Numbers of the windows that the law is integrated on."""
+    if pair.law.sides != "tip":
+        return [i for i, w in enumerate(windows) if side_share(pair.law, w.gear) > 0]
+
+    def to_tip(w: Window) -> float:
+        return float(pair.bodies[w.gear].flank.sizes[w.first_edge + w.edges // 2 :].sum())
+
+    return [i if to_tip(windows[i]) <= to_tip(windows[i + 1]) else i + 1 for i in range(0, len(windows), 2)]
 
 
 def _of_law(pair: MeshingPair, windows: Sequence[Window], slaves: list[int]) -> dict[str, Any]:

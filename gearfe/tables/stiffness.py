@@ -32,8 +32,9 @@ class StiffnessTable:
     law: str = quantity("nitsche", doc="contact law", choices=("nitsche", "penalty", "exact"))
     law_sides: str | None = quantity(
         None,
-        doc="flanks that the law is integrated on, by default both for nitsche and pinion for penalty and exact",
-        choices=("both", "pinion", "wheel"),
+        doc="flanks that the law is integrated on: tip takes, of each tooth pair, the gear whose tip is nearer; by "
+        "default both for nitsche, pinion for penalty, tip for exact",
+        choices=("both", "pinion", "wheel", "tip"),
     )
     kinematics: str = quantity(
         "finite",
@@ -81,8 +82,11 @@ class StiffnessTable:
     def check_law(self, where: str) -> None:
         """Raise `InputError` for keys that the contact law cannot take."""
         if self.law == "exact" and self.law_sides == "both":
-            problem = "must be pinion or wheel with the law exact: its multipliers lie on one gear"
+            problem = "must be tip, pinion or wheel with the law exact: its multipliers lie on one gear"
             raise InputError(f"{where}.law_sides", self.law_sides, problem, "leave it out")
+        if self.law == "nitsche" and self.law_sides == "tip":
+            problem = "must be both, pinion or wheel with the law nitsche"
+            raise InputError(f"{where}.law_sides", self.law_sides, problem, "leave it out (both)")
         if self.law == "exact" and self.points_per_edge < 3:
             problem = "must be >= 3 with the law exact: it has two multipliers an edge"
             raise InputError(f"{where}.points_per_edge", self.points_per_edge, problem, "leave it out (4)")
