@@ -39,6 +39,12 @@ Array = NDArray[Any]
 IntArray = NDArray[Any]
 
 MAX_ITERATIONS = 40
+#: Steps beyond are granted where the residual is below `NEAR`: where a sharp corner dents an edge deeply, kinks between
+#: edges, which the tangent leaves out, make the convergence linear.
+PATIENCE, NEAR = 120, 1e-4
+#: The line search asks for less than the largest of so many residuals: an active set that is nearly settled may need
+#: steps that go up before they go down (Grippo, Lampariello & Lucidi, SIAM J. Numer. Anal. 23, 1986).
+MEMORY = 4
 #: Newton steps taken in full before the line search watches over them.
 FREE_ITERATIONS = 3
 #: Inner corrections of each step for the moving normals; each gains two to three digits.
@@ -129,12 +135,14 @@ def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
 
     A backtracking line search on the weighted pressure residual watches over all but the first steps.
     """
-    residual = np.inf
+    residual, past = np.inf, [np.inf]
     projection = yield scene.placed(state.displacement), state.place
     state = _of_law(scene, projection, state)
     wanted = state.unknown  # the guess chooses the first active set; afterwards the law does
     limit = 1e3 * float(scene.weight @ state.pressure)
-    for iteration in range(1, MAX_ITERATIONS + 1):
+    for iteration in range(1, PATIENCE + 1):
+        if iteration > MAX_ITERATIONS and residual > NEAR:
+            return Outcome("not_converged", state, projection, iteration - 1)
         active = _active(scene, projection, wanted)
         if len(active) == 0:
             return Outcome("under_resolved", state, projection, iteration)
@@ -157,14 +165,15 @@ def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
             error = float(shares @ np.abs(tried.unknown - wish) + slid) / scale
             if best is None or error < best[0]:
                 best = (error, tried, found, wish)
-            if error < (1 - 0.1 * length) * residual or iteration <= FREE_ITERATIONS:
+            if error < (1 - 0.1 * length) * max(past) or iteration <= FREE_ITERATIONS:
                 break
             length *= 0.5
         assert best is not None
         residual, state, projection, wanted = best
+        past = [*past[-MEMORY + 1 :], residual]
         if residual < max(tolerance, _rounding(scene, state.pressure, projection)):
             return Outcome("converged", state, projection, iteration)
-    return Outcome("not_converged", state, projection, MAX_ITERATIONS)
+    return Outcome("not_converged", state, projection, PATIENCE)
 
 
 def _of_law(scene: Scene, projection: Projection, state: State) -> State:

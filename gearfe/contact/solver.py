@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .closest import Projection
+from .closest import Projection, unreached
 from .newton import Dialogue, Linearised, Outcome, State, linearise, newton
 from .overlap import Overlap, overlaps, rigidly_apart, windows_of
 from .scene import MeshingPair, Scene, assemble, assemble_all, project_all
@@ -239,7 +239,7 @@ def _finish(scene: Scene, outcome: Outcome, iterations: int) -> Position:
         tangent=tangent,
         pair_numbers=tuple(-1 - w.tooth for w in of_pair),
         pair_torques=np.array([about_wheel[w.nodes].sum() for w in of_pair]),
-        peak_pressure=float(state.pressure.max()),
+        peak_pressure=float(state.pressure[~unreached(outcome.projection.gap)].max()),
         iterations=iterations,
         scene=replace(  # without the megabytes
             scene, compliance=np.zeros((0, 0)), stress=np.zeros((0, 0)), stress_stress=np.zeros((0, 0))
