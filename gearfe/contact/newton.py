@@ -41,10 +41,11 @@ IntArray = NDArray[Any]
 MAX_ITERATIONS = 40
 #: Steps beyond are granted where the residual is below `NEAR`: where a sharp corner dents an edge deeply, kinks between
 #: edges, which the tangent leaves out, make the convergence linear.
-PATIENCE, NEAR = 120, 1e-4
+PATIENCE, NEAR = 120, 1e-3
 #: The line search asks for less than the largest of so many residuals: an active set that is nearly settled may need
-#: steps that go up before they go down (Grippo, Lampariello & Lucidi, SIAM J. Numer. Anal. 23, 1986).
-MEMORY = 4
+#: steps that go up before they go down (Grippo, Lampariello & Lucidi, SIAM J. Numer. Anal. 23, 1986). Later than
+#: `MEMORY_UNTIL` it is the linear convergence that is left, which such steps only disturb.
+MEMORY, MEMORY_UNTIL = 4, 20
 #: Newton steps taken in full before the line search watches over them.
 FREE_ITERATIONS = 3
 #: Inner corrections of each step for the moving normals; each gains two to three digits.
@@ -170,7 +171,7 @@ def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
             length *= 0.5
         assert best is not None
         residual, state, projection, wanted = best
-        past = [*past[-MEMORY + 1 :], residual]
+        past = [*past[-MEMORY + 1 :], residual] if iteration < MEMORY_UNTIL else [residual]
         if residual < max(tolerance, _rounding(scene, state.pressure, projection)):
             return Outcome("converged", state, projection, iteration)
     return Outcome("not_converged", state, projection, PATIENCE)
