@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from .closest import Projection, chains_of, nearest_places, project, unreached
 from .compliance import GearBody
 from .flank import edge_nodes
-from .laws import ContactLaw, side_share
-from .multiplier import Hats, hats_on
-from .stress_loads import check_stress_loads, stress_for_stress_loads
+from .law_data import check_stress_loads, law_data, slave_windows
+from .laws import ContactLaw
+from .multiplier import Hats
 
 Array = NDArray[Any]
 IntArray = NDArray[Any]
@@ -294,7 +294,7 @@ def _gathered(pair: MeshingPair, windows: Sequence[Window]) -> dict[str, Any]:
         points[w.nodes] = pair.bodies[w.gear].flank.points[w.flank_nodes] @ matrix.T + pair.centre(w.gear)
         rotation[w.nodes] = matrix
         of_wheel[w.nodes] = bool(w.gear)
-    slaves = _slaves(pair, windows)
+    slaves = slave_windows(pair, windows)
     return {
         "counts": np.array([w.edges for w in windows]),
         "points": points,
@@ -304,34 +304,8 @@ def _gathered(pair: MeshingPair, windows: Sequence[Window]) -> dict[str, Any]:
         "compliance": _compliance(pair, windows, count),
         "stress": _stress(pair, windows, slaves, count),
         **_contact_points(pair, windows, slaves),
-        **_of_law(pair, windows, slaves),
+        **law_data(pair, windows, slaves),
     }
-
-
-def _slaves(pair: MeshingPair, windows: Sequence[Window]) -> list[int]:
-    """Numbers of the windows that the law is integrated on."""
-    if pair.law.sides != "tip":
-        return [i for i, w in enumerate(windows) if side_share(pair.law, w.gear) > 0]
-
-    def to_tip(w: Window) -> float:
-        return float(pair.bodies[w.gear].flank.sizes[w.first_edge + w.edges // 2 :].sum())
-
-    return [i if to_tip(windows[i]) <= to_tip(windows[i + 1]) else i + 1 for i in range(0, len(windows), 2)]
-
-
-def _of_law(pair: MeshingPair, windows: Sequence[Window], slaves: list[int]) -> dict[str, Any]:
-    """What only some laws ask for: stress for stress loads, the multiplier space."""
-    if pair.law.theta:
-        return {"theta": pair.law.theta, "stress_stress": stress_for_stress_loads(pair.bodies, windows, slaves)}
-    if pair.law.multiplier:
-        edge, xi, vertex = [], [], 0
-        for w in (windows[i] for i in slaves):
-            shapes = pair.bodies[w.gear].flank.shapes
-            edge.append(np.repeat(vertex + np.arange(w.edges), len(shapes)))
-            xi.append(np.tile(shapes @ [0.0, 0.5, 1.0], w.edges))
-            vertex += w.edges + 1
-        return {"hats": hats_on(np.concatenate(edge), np.concatenate(xi))}
-    return {}
 
 
 def _contact_points(pair: MeshingPair, windows: Sequence[Window], slaves: list[int]) -> dict[str, NDArray]:

@@ -1,4 +1,4 @@
-"""Normal stress for stress loads between the contact points of a position, for laws with theta other than 0."""
+"""What a position needs for its contact law: where the law is integrated, stress for stress loads, multipliers."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .compliance import GearBody
 from .laws import ContactLaw, side_share
+from .multiplier import hats_on
 
 if TYPE_CHECKING:
-    from .scene import Window
+    from .scene import MeshingPair, Window
 
 Array = NDArray[Any]
 
@@ -33,7 +34,36 @@ def check_stress_loads(bodies: Sequence[GearBody], law: ContactLaw, width: float
             )
 
 
-def stress_for_stress_loads(bodies: Sequence[GearBody], windows: Sequence[Window], slaves: Sequence[int]) -> Array:
+def slave_windows(pair: MeshingPair, windows: Sequence[Window]) -> list[int]:
+    """Numbers of the windows that the law is integrated on."""
+    if pair.law.sides != "tip":
+        return [i for i, w in enumerate(windows) if side_share(pair.law, w.gear) > 0]
+
+    def to_tip(w: Window) -> float:
+        return float(pair.bodies[w.gear].flank.sizes[w.first_edge + w.edges // 2 :].sum())
+
+    return [i if to_tip(windows[i]) <= to_tip(windows[i + 1]) else i + 1 for i in range(0, len(windows), 2)]
+
+
+def law_data(pair: MeshingPair, windows: Sequence[Window], slaves: list[int]) -> dict[str, Any]:
+    """What only some laws ask for: stress for stress loads, the multiplier space."""
+    if pair.law.theta:
+        return {"theta": pair.law.theta, "stress_stress": _stress_for_stress_loads(pair.bodies, windows, slaves)}
+    if pair.law.multiplier:
+        edge, xi, vertex = [], [], 0
+        for w in (windows[i] for i in slaves):
+            shapes = pair.bodies[w.gear].flank.shapes
+            if len(shapes) < 3:
+                problem = "must be >= 3 with the law exact: it has two multipliers an edge"
+                raise InputError("points_per_edge", len(shapes), problem, "4 are usual")
+            edge.append(np.repeat(vertex + np.arange(w.edges), len(shapes)))
+            xi.append(np.tile(shapes @ [0.0, 0.5, 1.0], w.edges))
+            vertex += w.edges + 1
+        return {"hats": hats_on(np.concatenate(edge), np.concatenate(xi))}
+    return {}
+
+
+def _stress_for_stress_loads(bodies: Sequence[GearBody], windows: Sequence[Window], slaves: Sequence[int]) -> Array:
     """T: normal stress at all contact points for stress loads at them (Pa/(N m2)), shape (q, q)."""
     points, ends = [], [0]
     for i in slaves:
