@@ -1,19 +1,23 @@
-r"""The verification route: contact of whole gears as plain scikit-fem forms, solved in all unknowns at once.
+r"""The verification route: contact of elastic bodies as plain scikit-fem forms, solved in all unknowns at once.
 
-Find the displacements u of both gears, zero at the bores, such that for all v
-
-.. math::
-    a(u, v) = \int_{\Gamma_s} p\; n\cdot[v], \qquad [v] = v(x_s) - v(x_m), \qquad
-    p = \max(0,\; -\gamma g(u) - s\,\sigma_n(u)),
-
-with a the elastic energy's bilinear form on the undeformed gears in their present places, x_m the closest point of the
-deformed mate, n its normal there and sigma_n the normal stress at x_s. Newton's tangent adds, with the variations
-of `gearfe.contact.closest`,
+Find the displacements u of all bodies, with prescribed values, such that for all v
 
 .. math::
-    \int_{\Gamma_s} H(p)\,(\gamma\,\delta g(u) + s\,\sigma_n(u))\; n\cdot[v] \;-\; p\,\Delta(n\cdot[v])
+    a(u, v) - \int_{\Gamma_C} \frac{\theta}{\gamma}\,\sigma_n(u)\,\sigma_n(v)
+    = \ell(v) + \int_{\Gamma_s} p\; n\cdot[v] + \int_{\Gamma_s} \frac{\theta}{\gamma}\, p\, \sigma_n(v), \qquad
+    [v] = v(x_s) - v(x_m), \qquad p = \max(0,\; -\gamma g(u) - s\,\sigma_n(u)),
 
-and the change of the area of points whose stretch of surface lies across the mate's sharp end.
+with a the elastic energy's form on the undeformed bodies in their present places (or its finite-strain counterpart,
+`gearfe.contact.constitution`), x_m the closest point of the deformed mate, n its normal there and sigma_n the normal
+stress at x_s. Newton's tangent adds, with the variations of `gearfe.contact.closest`,
+
+.. math::
+    \int_{\Gamma_s} H(p)\,(\gamma\,\delta g(u) + s\,\sigma_n(u))\,(n\cdot[v] + \tfrac{\theta}{\gamma}\sigma_n(v))
+    \;-\; p\,\Delta(n\cdot[v])
+
+and the change of the area of points whose stretch of surface lies across the mate's sharp end. A law on a multiplier
+space has :math:`p = \sum_i \lambda_i\psi_i` instead, and one more equation for each of its active functions (a
+primal-dual active set: Hueeber & Wohlmuth, *Comput. Methods Appl. Mech. Eng.* 194, 2005).
 
 Nothing but the closest-point search is shared with the condensed route: no compliance, no cyclic symmetry, no windows
 of flank. On the same mesh and quadrature points both must give the same torques; what they cost differs a hundredfold.
@@ -26,20 +30,147 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_matrix
+from scipy.sparse import csc_matrix, diags
 from scipy.sparse.linalg import splu
 
-from .closest import Projection, chains_of, nearest_places, project, unreached
+from .contact_state import ContactState, contact_at, contact_rows, contact_tangent, hat_functions
 from .laws import ContactLaw
-from .whole_pair import ContactPoints, WholePair, contact_points, point_basis
+from .problem import ContactProblem
+from .whole_pair import WholePair
 
 Array = NDArray[np.float64]
 
 #: Out-of-balance forces relative to the contact forces at which a position counts as converged.
 TOLERANCE = 1e-10
-MAX_ITERATIONS = 15
+MAX_ITERATIONS = 25
 #: Newton steps taken in full before the line search watches over them.
 FREE_ITERATIONS = 3
+#: Smallest step of the twist, as a share of it, when it is raised in steps.
+SMALLEST_STEP = 0.02
+
+
+@dataclass(frozen=True)
+class ContactSolution:
+    """Bodies in contact.
+
+    Attributes
+    ----------
+    status
+        ``converged`` or ``not_converged``.
+    state
+        Contact at the last displacement; its `u` are the displacements (m).
+    internal : ndarray
+        Internal forces (N); at prescribed unknowns they are the reactions.
+    iterations
+        Newton iterations.
+    residuals
+        Out-of-balance after each, relative to the contact forces.
+    """
+
+    status: str
+    state: ContactState
+    internal: Array
+    iterations: int
+    residuals: tuple[float, ...]
+
+    @property
+    def u(self) -> Array:
+        """Displacements of all unknowns (m)."""
+        return self.state.u
+
+
+def solve_contact(
+    problem: ContactProblem, start: ContactState | None = None, *, tolerance: float = TOLERANCE
+) -> ContactSolution:
+    """Solve a contact problem by a semi-smooth Newton method with a backtracking line search.
+
+    Parameters
+    ----------
+    start
+        State to start from; without one the bodies are undeformed and their contact is the rigid one.
+    tolerance
+        Out-of-balance forces relative to the contact forces (or loads, where those are larger).
+    """
+    size = problem.unknowns.size
+    state = contact_at(problem, np.zeros(size), closing=problem.closing) if start is None else start
+    free = np.setdiff1d(np.arange(size), problem.fixed)
+    residual, history = np.inf, list[float]()
+    for iteration in range(1, MAX_ITERATIONS + 1):
+        step, aim = _step(problem, state, free)
+        length, best = 1.0, None
+        for _ in range(6):
+            multipliers = state.multipliers + length * (aim - state.multipliers)
+            tried = contact_at(problem, state.u + length * step, state, multipliers)
+            internal = problem.constitution.forces(tried.u)
+            error = _out_of_balance(problem, tried, internal, free)
+            if best is None or error < best[0]:
+                best = (error, tried, internal)
+            if error < (1 - 0.1 * length) * residual or iteration <= FREE_ITERATIONS:
+                break
+            length *= 0.5
+        assert best is not None
+        residual, state, internal = best
+        history.append(residual)
+        if not np.isfinite(residual):
+            break
+        if residual < tolerance:
+            return ContactSolution("converged", state, internal, iteration, tuple(history))
+    return ContactSolution("not_converged", state, internal, iteration, tuple(history))
+
+
+def _out_of_balance(problem: ContactProblem, state: ContactState, internal: Array, free: Array) -> float:
+    """Forces that nothing balances, and what is left of the complementarity, relative to the contact forces."""
+    scale = max(float(np.abs(state.contact).sum()), float(np.abs(problem.loads).sum()))
+    left = float(np.abs((state.forces + problem.loads - internal)[free]).sum())
+    if problem.law.multiplier is not None:
+        hats, areas, gaps, parameter = _mean_gaps(problem, state)
+        asked = np.maximum(0.0, state.multipliers - parameter * gaps)
+        left += float(areas @ np.abs(state.multipliers - asked))
+    return left / scale if scale > 0 else np.inf
+
+
+def _step(problem: ContactProblem, state: ContactState, free: Array) -> tuple[Array, Array]:
+    """Newton's step of the displacements and the multipliers that it aims at."""
+    matrix = problem.constitution.tangent(state.u) + contact_tangent(problem, state)
+    step = np.zeros(len(state.u))
+    step[problem.fixed] = problem.values - state.u[problem.fixed]
+    out = problem.loads - problem.constitution.forces(state.u) - matrix @ step
+    factor = splu(csc_matrix(matrix[free][:, free]), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    if problem.law.multiplier is None:
+        step[free] = factor.solve((out + state.forces)[free])
+        return step, state.multipliers
+    hats, areas, gaps, parameter = _mean_gaps(problem, state)
+    active = np.flatnonzero((state.multipliers - parameter * gaps > 0) & (areas > 0))
+    push, opening = contact_rows(state)
+    weights = diags(state.points.weight * _reached_share(state))
+    push_rows = (hats.T @ weights @ push)[active].tocsc()
+    gap_rows = (hats.T @ weights @ opening)[active].tocsc()
+    loose = factor.solve(out[free])
+    moved = factor.solve(push_rows[:, free].T.toarray())
+    rows = gap_rows[:, free]
+    present = areas[active] * gaps[active] + gap_rows @ step
+    aim = np.zeros(len(state.multipliers))
+    aim[active] = np.linalg.solve(rows @ moved, -present - rows @ loose)
+    step[free] = loose + moved @ aim[active]
+    return step, aim
+
+
+def _reached_share(state: ContactState) -> Array:
+    from .closest import unreached
+
+    return np.where(unreached(state.projection.gap), 0.0, np.asarray(state.fields["share"])[:, 0])
+
+
+def _mean_gaps(problem: ContactProblem, state: ContactState) -> tuple[Any, Array, Array, Array]:
+    """Multiplier functions at the points, their areas (m2), mean gaps (m) and the law's parameter (Pa/m)."""
+    hats, parameter = hat_functions(problem, state.points)
+    weight = state.points.weight * _reached_share(state)
+    areas = hats.T @ weight
+    gaps = np.divide(hats.T @ (weight * state.projection.gap), areas, out=np.ones(len(areas)), where=areas > 0)
+    return hats, areas, gaps, parameter
+
+
+# ---- whole gears ------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -53,7 +184,7 @@ class MonolithicPosition:
     mesh
         scikit-fem mesh of both gears in their present places (pinion's triangles first).
     displacement : ndarray
-        Unknowns on ``WholePair.element`` (m).
+        Unknowns on second-order vector elements (m).
     pressure, place : ndarray, shape (q,)
         Pressure at the contact points (Pa) and where they are (edge of the mate's flank plus xi).
     """
@@ -70,28 +201,13 @@ class MonolithicPosition:
     place: Array
 
 
-@dataclass(frozen=True)
-class _State:
-    """Contact at the displacement u: closest points, the mate's basis there, pressures and contact forces."""
-
-    u: Array
-    projection: Projection
-    mate: Any
-    fields: dict[str, Any]
-    pressure: Array
-    forces: Array
-
-
 def solve_monolithic(
-    pair: WholePair,
-    law: ContactLaw,
-    pinion_angle: float,
-    twist: float,
-    *,
-    tolerance: float = TOLERANCE,
-    halvings: int = 3,
+    pair: WholePair, law: ContactLaw, pinion_angle: float, twist: float, *, tolerance: float = TOLERANCE
 ) -> MonolithicPosition:
     """Solve the contact of two whole gears at one pinion angle (rad) and wheel twist (rad).
+
+    Where Newton's method fails from the rigid gears, the twist is raised in steps, each from the last solution; a step
+    that fails is cut in half.
 
     Parameters
     ----------
@@ -101,164 +217,56 @@ def solve_monolithic(
         Contact law.
     tolerance
         Out-of-balance forces relative to the contact forces.
-    halvings
-        How often the twist may be halved to reach a start from which Newton's method converges.
     """
-    points = contact_points(pair, law, pinion_angle, twist)
-    if points is None:
+    problem = pair.problem(law, pinion_angle, twist)
+    if problem is None:
         return _empty("no_contact", None)
-    stiffness = pair.stiffness_at(pinion_angle, twist)
-    start = _contact(points, np.zeros(stiffness.shape[0]), None)
-    if not (start.pressure > 0).any():
-        return _empty("under_resolved" if points.rigid_overlap else "no_contact", points.mesh)
-    state, iterations = _newton(points, stiffness, start, tolerance)
-    if state is None and halvings:
-        part = solve_monolithic(pair, law, pinion_angle, 0.5 * twist, tolerance=1e-4, halvings=halvings - 1)
-        iterations += part.iterations
-        if part.status == "converged":
-            state, more = _newton(points, stiffness, _contact(points, 2 * part.displacement, None), tolerance)
-            iterations += more
-    if state is None:
-        return _empty("not_converged", points.mesh, iterations)
-    return _finish(points, state, stiffness, iterations)
+    start = contact_at(problem, np.zeros(problem.unknowns.size))
+    if not (start.projection.gap < 0).any():
+        return _empty("under_resolved" if pair.rigid_overlap(problem) else "no_contact", problem.mesh)
+    solution = solve_contact(problem, start, tolerance=tolerance)
+    iterations = solution.iterations
+    done, step, last = 0.0, 0.25, np.zeros(problem.unknowns.size)
+    while solution.status != "converged" and step > SMALLEST_STEP:
+        share = min(1.0, done + step)
+        part = problem if share == 1.0 else pair.problem(law, pinion_angle, share * twist)
+        guess = None
+        if part is not None:
+            guess = contact_at(part, last * (share / done if done else 0.0))
+        if part is None or guess is None or not (guess.projection.gap < 0).any():
+            done = share  # nothing touches yet
+            if share == 1.0:
+                break
+            continue
+        tried = solve_contact(part, guess, tolerance=tolerance if share == 1.0 else 1e-4)
+        iterations += tried.iterations
+        if tried.status != "converged":
+            step *= 0.5
+        elif share == 1.0:
+            solution = tried
+        else:
+            done, step, last = share, 1.5 * step, tried.u
+    if solution.status != "converged":
+        return _empty("not_converged", problem.mesh, iterations)
+    return _finish(pair, problem, solution, iterations)
 
 
-def _newton(points: ContactPoints, stiffness: Any, state: _State, tolerance: float) -> tuple[_State | None, int]:
-    """Semi-smooth Newton with a backtracking line search on the out-of-balance forces; None when it fails."""
-    free = np.setdiff1d(np.arange(len(state.u)), points.fixed)
-    surface = points.unknowns[points.chain_nodes].ravel()  # inside, a step leaves nothing but round-off
-    residual = np.inf
-    for iteration in range(1, MAX_ITERATIONS + 1):
-        matrix = csc_matrix((stiffness + _tangent(points, state))[free][:, free])
-        factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-        step = np.zeros(len(state.u))
-        step[free] = factor.solve((state.forces - stiffness @ state.u)[free])
-        length, best = 1.0, None
-        for _ in range(6):
-            tried = _contact(points, state.u + length * step, state.projection.place)
-            scale = float(np.sum(np.abs(tried.forces)))
-            if scale > 0:
-                error = float(np.sum(np.abs((tried.forces - stiffness @ tried.u)[surface]))) / scale
-                if best is None or error < best[0]:
-                    best = (error, tried)
-                if error < (1 - 0.1 * length) * residual or iteration <= FREE_ITERATIONS:
-                    break
-            length *= 0.5
-        if best is None:
-            return None, iteration
-        residual, state = best
-        if residual < tolerance:
-            return state, iteration
-    return None, MAX_ITERATIONS
-
-
-def _contact(points: ContactPoints, u: Array, place: Array | None) -> _State:
-    """Closest points, pressures and contact forces at the displacement u."""
-    from skfem import DiscreteField, LinearForm, asm
-    from skfem.helpers import dot
-
-    placed = points.mesh.doflocs.T + u[points.unknowns]
-    nodes = placed[points.chain_nodes]
-    moved = points.slave.interpolate(u)
-    where = (points.slave.global_coordinates() + moved)[:, :, 0].T
-    if place is None:
-        place = np.empty(len(where))
-        for k, chain in enumerate(points.chains):
-            own = points.mate == k
-            place[own] = nearest_places(where[own], nodes[chain])
-    projection = project(where, chains_of(nodes, points.counts, points.mate, points.fade), place)
-    elements, local, tangent = points.on_mate(projection)
-    mate = point_basis(points.mesh, elements, local, points.weight)
-    stress = _normal_stress(moved, points.fields)[:, 0]
-    pressure = np.maximum(0.0, -points.parameter * projection.gap - points.stress_share * stress)
-    pressure[unreached(projection.gap)] = 0.0
-    metric = np.einsum("ni,ni->n", projection.tangent, projection.tangent)
-    share = points.share(projection.place)
-    numbers = {
-        "p": pressure,
-        "g": projection.gap,
-        "n": projection.normal.T,
-        "a": projection.tangent.T,
-        "undeformed_a": tangent,
-        "kappa": projection.curvature,
-        "m": metric,
-        "share": share,
-        "share_slope": np.where((share > 0) & (share < 1), -0.5 / points.fade, 0.0),
-        "gamma": points.parameter,
-        "s": points.stress_share,
-        "active": (pressure > 0).astype(float),
-    }
-    fields = {name: DiscreteField(value[..., None]) for name, value in numbers.items()} | points.fields
-
-    @LinearForm
-    def push(v: Any, w: Any) -> Any:
-        return w.share * w.p * dot(w.n, _jump(v, w.idx[0]))
-
-    return _State(u, projection, mate, fields, pressure, asm(push, [points.slave, mate], **fields))
-
-
-def _jump(v: Any, side: int) -> Any:
-    """[v]: v at the slave point (side 0), -v at the closest point of the mate (side 1)."""
-    return v if side == 0 else -v
-
-
-def _tilt(v: Any, side: int, w: Any) -> Any:
-    """N = n . dv/dxi on the mate."""
-    from skfem.helpers import dot, grad, mul
-
-    return dot(w.n, mul(grad(v), w.undeformed_a)) if side == 1 else 0.0 * w.g
-
-
-def _slide(v: Any, side: int, w: Any) -> Any:
-    """Variation of the closest point's xi."""
-    from skfem.helpers import dot
-
-    return (dot(w.a, _jump(v, side)) + w.g * _tilt(v, side, w)) / (w.m - w.g * w.kappa)
-
-
-def _normal_stress(u: Any, w: Any) -> Any:
-    """n0 . sigma(u) n0 with the normal n0 of the undeformed flank."""
-    from skfem.helpers import dot, grad, mul, trace
-
-    n0, lam, mu = (w[name] for name in ("slave_normal", "lam", "mu"))
-    return lam * trace(grad(u)) + 2 * mu * dot(n0, mul(grad(u), n0))
-
-
-def _tangent(points: ContactPoints, state: _State) -> Any:
-    """Contact part of Newton's matrix."""
-    from skfem import BilinearForm, asm
-    from skfem.helpers import dot
-
-    @BilinearForm
-    def form(u: Any, v: Any, w: Any) -> Any:
-        of_u, of_v = w.idx
-        opening = dot(w.n, _jump(u, of_u)) - dot(w.n, w.a) * _slide(u, of_u, w)
-        relief = w.gamma * opening + (w.s * _normal_stress(u, w) if of_u == 0 else 0.0)
-        tilt_u, tilt_v = _tilt(u, of_u, w), _tilt(v, of_v, w)
-        slide_u, slide_v = _slide(u, of_u, w), _slide(v, of_v, w)
-        turning = w.g / w.m * tilt_u * tilt_v - (1 - w.g * w.kappa / w.m) * (
-            tilt_u * slide_v + tilt_v * slide_u + w.kappa * slide_u * slide_v
-        )
-        opposed = w.share * w.active * relief - w.share_slope * slide_u * w.p
-        return opposed * dot(w.n, _jump(v, of_v)) - w.share * w.p * turning
-
-    both = [points.slave, state.mate]
-    return asm(form, both, both, **state.fields)
-
-
-def _finish(points: ContactPoints, state: _State, stiffness: Any, iterations: int) -> MonolithicPosition:
-    placed = points.mesh.doflocs.T + state.u[points.unknowns]
-    force, internal = state.forces[points.unknowns], (stiffness @ state.u)[points.unknowns]
-    wheel = points.of_wheel
-    bore = wheel & np.isin(points.unknowns[:, 0], points.fixed)
+def _finish(pair: WholePair, problem: ContactProblem, solution: ContactSolution, iterations: int) -> MonolithicPosition:
+    state = solution.state
+    placed = problem.mesh.doflocs.T + state.u[problem.unknowns]
+    force, internal = state.contact[problem.unknowns], solution.internal[problem.unknowns]
+    wheel = np.zeros(len(placed), dtype=bool)
+    wheel[pair.node_of[1]] = True
+    centre = np.array([pair.centre_distance, 0.0])
+    bore = wheel & np.isin(problem.unknowns[:, 0], problem.fixed)
     return MonolithicPosition(
         status="converged",
-        torque_wheel=-_moment((placed - points.wheel_centre)[wheel], force[wheel]),
+        torque_wheel=-_moment((placed - centre)[wheel], force[wheel]),
         torque_pinion=-_moment(placed[~wheel], force[~wheel]),
-        torque_wheel_reaction=_moment((placed - points.wheel_centre)[bore], internal[bore]),
+        torque_wheel_reaction=_moment((placed - centre)[bore], internal[bore]),
         peak_pressure=float(state.pressure.max()),
         iterations=iterations,
-        mesh=points.mesh,
+        mesh=problem.mesh,
         displacement=state.u,
         pressure=state.pressure,
         place=state.projection.place,

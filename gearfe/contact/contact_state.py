@@ -1,0 +1,260 @@
+r"""Contact of a `ContactProblem` at one displacement: closest points, pressures, forces and their tangent.
+
+All integrals are sums over the contact points, each a scikit-fem element of its own (`bodies.point_basis`), once on the
+slave's side and once at the closest points of the mate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix, csr_matrix
+
+from .bodies import point_basis
+from .closest import Projection, chains_of, nearest_places, project, unreached
+from .flank import edge_shapes
+from .problem import ContactProblem, Points
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ContactState:
+    """Contact at the displacement u.
+
+    Attributes
+    ----------
+    u : ndarray
+        Displacements of all unknowns (m).
+    points, projection
+        Contact points and their closest points.
+    slave, mate
+        scikit-fem bases at both.
+    fields
+        Numbers at the points by name, as the forms use them.
+    pressure : ndarray, shape (q,)
+        Pa.
+    contact : ndarray
+        Nodal forces of the pressures (N); `stress_loads` are those of (theta/gamma) p sigma_n(v).
+    multipliers : ndarray, shape (m,)
+        Pressures at the vertices (Pa) of a law on a multiplier space; else none.
+    """
+
+    u: Array
+    points: Points
+    projection: Projection
+    slave: Any
+    mate: Any
+    fields: dict[str, Any]
+    pressure: Array
+    contact: Array
+    stress_loads: Array
+    multipliers: Array
+
+    @property
+    def forces(self) -> Array:
+        """Nodal forces of the contact (N)."""
+        return self.contact + self.stress_loads
+
+
+def contact_at(
+    problem: ContactProblem,
+    u: Array,
+    before: ContactState | None = None,
+    multipliers: Array | None = None,
+    closing: float = 0.0,
+) -> ContactState:
+    """Closest points, pressures and contact forces at the displacement u; `before` is a state near by."""
+    from skfem import DiscreteField, LinearForm, asm
+    from skfem.helpers import dot
+
+    nodes = (problem.mesh.doflocs.T + u[problem.unknowns])[problem.chain_nodes]
+    fixed_points = problem.quadrature == "points" and before is not None
+    if fixed_points:
+        assert before is not None
+        points, slave, place = before.points, before.slave, before.projection.place
+        fields = {name: before.fields[name] for name in CONSTANT}
+    else:
+        points = problem.points(nodes)
+        slave, fields = _slave_side(problem, points)
+        place = np.empty(len(points.edge))
+    moved = slave.interpolate(u)
+    where = (slave.global_coordinates() + moved)[:, :, 0].T
+    mate_of = problem.slaves.mate[points.edge]
+    if not fixed_points:
+        for k in np.unique(mate_of):
+            own = mate_of == k
+            place[own] = nearest_places(where[own], nodes[problem.chains[k]])
+    projection = project(where, chains_of(nodes, problem.counts, mate_of, points.fade), place)
+    elements, local, tangent = problem.on_mate(projection)
+    mate = point_basis(problem.mesh, elements, local, points.weight)
+    share = np.clip(0.5 + (problem.counts[mate_of] - projection.place) / (2 * points.fade), 0.0, 1.0)
+    numbers = {
+        "g": projection.gap,
+        "n": projection.normal.T,
+        "a": projection.tangent.T,
+        "undeformed_a": tangent,
+        "kappa": projection.curvature,
+        "m": np.einsum("ni,ni->n", projection.tangent, projection.tangent),
+        "share": share,
+        "share_slope": np.where((share > 0) & (share < 1), -0.5 / points.fade, 0.0),
+    }
+    fields = fields | {name: DiscreteField(value[..., None]) for name, value in numbers.items()} | {"state": moved}
+    reached = ~unreached(projection.gap)
+    if problem.law.multiplier is None:
+        multipliers = np.zeros(0)
+        pressure = -problem.slaves.parameter[points.edge] * projection.gap
+        if problem.law.uses_stress:
+            pressure = pressure - problem.constitution.normal_stress(moved, fields)[:, 0]
+        active = reached & ((pressure > 0) | (projection.gap < closing))
+    else:
+        hats, _ = hat_functions(problem, points)
+        multipliers = np.zeros(hats.shape[1]) if multipliers is None else multipliers
+        pressure, active = hats @ multipliers, np.zeros(len(reached), dtype=bool)
+    pressure = np.where(reached & (active | (problem.law.multiplier is not None)), pressure, 0.0)
+    fields |= {"p": DiscreteField(pressure[:, None]), "active": DiscreteField(active.astype(float)[:, None])}
+
+    @LinearForm
+    def push(v: Any, w: Any) -> Any:
+        return w.share * w.p * dot(w.n, jump(v, w.idx[0]))
+
+    stress_loads = np.zeros(len(u))
+    if problem.law.theta:
+        rate = problem.constitution.normal_stress_rate
+        form = LinearForm(lambda v, w: w.share * w.p * w.theta_by_gamma * rate(v, w))
+        stress_loads = asm(form, slave, **fields)
+    return ContactState(
+        u=u,
+        points=points,
+        projection=projection,
+        slave=slave,
+        mate=mate,
+        fields=fields,
+        pressure=pressure,
+        contact=asm(push, [slave, mate], **fields),
+        stress_loads=stress_loads,
+        multipliers=multipliers,
+    )
+
+
+#: Fields that depend on the points alone.
+CONSTANT = ("slave_normal", "lam", "mu", "gamma", "theta_by_gamma")
+
+
+def _slave_side(problem: ContactProblem, points: Points) -> tuple[Any, dict[str, Any]]:
+    """Basis at the contact points and the fields that go with them."""
+    from skfem import DiscreteField
+
+    slaves, edge = problem.slaves, points.edge
+    local = slaves.start[:, edge] + points.xi * (slaves.end - slaves.start)[:, edge]
+    _, slopes, _ = edge_shapes(points.xi)
+    slope = np.einsum("qa,qai->iq", slopes, problem.mesh.doflocs.T[slaves.nodes[edge]])
+    gamma = slaves.parameter[edge]
+    numbers = {
+        "slave_normal": np.stack([-slope[1], slope[0]]) / np.linalg.norm(slope, axis=0),
+        "lam": slaves.lam[edge],
+        "mu": slaves.mu[edge],
+        "gamma": gamma,
+        "theta_by_gamma": problem.law.theta / gamma,
+    }
+    fields = {name: DiscreteField(value[..., None]) for name, value in numbers.items()}
+    return point_basis(problem.mesh, slaves.element[edge], local, points.weight), fields
+
+
+def jump(v: Any, side: int) -> Any:
+    """[v]: v at the slave point (side 0), -v at the closest point of the mate (side 1)."""
+    return v if side == 0 else -v
+
+
+def _tilt(v: Any, side: int, w: Any) -> Any:
+    """N = n . dv/dxi on the mate."""
+    from skfem.helpers import dot, grad, mul
+
+    return dot(w.n, mul(grad(v), w.undeformed_a)) if side == 1 else 0.0 * w.g
+
+
+def _slide(v: Any, side: int, w: Any) -> Any:
+    """Variation of the closest point's xi."""
+    from skfem.helpers import dot
+
+    return (dot(w.a, jump(v, side)) + w.g * _tilt(v, side, w)) / (w.m - w.g * w.kappa)
+
+
+def _opening(v: Any, side: int, w: Any) -> Any:
+    """Variation of the gap."""
+    from skfem.helpers import dot
+
+    return dot(w.n, jump(v, side)) - dot(w.n, w.a) * _slide(v, side, w)
+
+
+def contact_tangent(problem: ContactProblem, state: ContactState) -> Any:
+    """Minus the derivative of the contact forces, sparse (N/m); of a multiplier law that at given multipliers."""
+    from skfem import BilinearForm, asm
+    from skfem.helpers import dot
+
+    rate = problem.constitution.normal_stress_rate
+    share_of_stress, theta = float(problem.law.uses_stress), problem.law.theta
+
+    @BilinearForm
+    def form(u: Any, v: Any, w: Any) -> Any:
+        of_u, of_v = w.idx
+        relief = w.gamma * _opening(u, of_u, w)
+        if share_of_stress and of_u == 0:
+            relief = relief + rate(u, w)
+        tilt_u, tilt_v = _tilt(u, of_u, w), _tilt(v, of_v, w)
+        slide_u, slide_v = _slide(u, of_u, w), _slide(v, of_v, w)
+        turning = w.g / w.m * tilt_u * tilt_v - (1 - w.g * w.kappa / w.m) * (
+            tilt_u * slide_v + tilt_v * slide_u + w.kappa * slide_u * slide_v
+        )
+        opposed = w.share * w.active * relief - w.share_slope * slide_u * w.p
+        virtual = dot(w.n, jump(v, of_v))
+        if theta and of_v == 0:
+            virtual = virtual + w.theta_by_gamma * rate(v, w)
+        return opposed * virtual - w.share * w.p * turning
+
+    both = [state.slave, state.mate]
+    return asm(form, both, both, **state.fields)
+
+
+def hat_functions(problem: ContactProblem, points: Points) -> tuple[csr_matrix, Array]:
+    """Values of the multiplier space's functions at the points, shape (q, m), and the law's parameter of each (Pa/m).
+
+    A vertex that two couples share counts once for each.
+    """
+    slaves = problem.slaves
+    ends = np.stack([slaves.nodes[:, 0], slaves.nodes[:, 2]], axis=1)
+    keys = slaves.mate[:, None] * len(problem.unknowns) + ends
+    _, number = np.unique(keys, return_inverse=True)
+    number = number.reshape(keys.shape)
+    rows = np.repeat(np.arange(len(points.edge)), 2)
+    values = np.stack([1 - points.xi, points.xi], axis=1)
+    shape = (len(points.edge), int(number.max()) + 1)
+    parameter = np.zeros(shape[1])
+    np.maximum.at(parameter, number, slaves.parameter[:, None])
+    return coo_matrix((values.ravel(), (rows, number[points.edge].ravel())), shape=shape).tocsr(), parameter
+
+
+def contact_rows(state: ContactState) -> tuple[csr_matrix, csr_matrix]:
+    """n . [v] and the gap's variation at every point, shape (q, unknowns)."""
+    from skfem.helpers import dot
+
+    virtual = _rows(state, lambda v, side, w: dot(w.n, jump(v, side)))
+    return virtual, _rows(state, _opening)
+
+
+def _rows(state: ContactState, value: Any) -> csr_matrix:
+    """A quantity linear in v at every point: element vectors of one-point elements, divided by their areas."""
+    from skfem import LinearForm
+
+    total: Any = 0
+    for side, basis in ((0, state.slave), (1, state.mate)):
+        local = LinearForm(lambda v, w, side=side: value(v, side, w)).elemental(basis, **state.fields)
+        dofs = basis.element_dofs  # (functions, points); the element vectors are stored function by function
+        entries = local.data.reshape(dofs.shape) / state.points.weight
+        points = np.broadcast_to(np.arange(dofs.shape[1]), dofs.shape)
+        shape = (dofs.shape[1], len(state.u))
+        total = total + coo_matrix((entries.ravel(), (points.ravel(), dofs.ravel())), shape=shape).tocsr()
+    return total
