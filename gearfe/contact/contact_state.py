@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse import coo_matrix, csr_matrix, diags
 
 from .bodies import point_basis
 from .closest import Projection, chains_of, nearest_places, project, unreached
@@ -190,33 +190,29 @@ def _opening(v: Any, side: int, w: Any) -> Any:
     return dot(w.n, jump(v, side)) - dot(w.n, w.a) * _slide(v, side, w)
 
 
-def contact_tangent(problem: ContactProblem, state: ContactState) -> Any:
+def contact_tangent(problem: ContactProblem, state: ContactState) -> csr_matrix:
     """Minus the derivative of the contact forces, sparse (N/m); of a multiplier law that at given multipliers."""
-    from skfem import BilinearForm, asm
-    from skfem.helpers import dot
-
-    rate = problem.constitution.normal_stress_rate
-    share_of_stress, theta = float(problem.law.uses_stress), problem.law.theta
-
-    @BilinearForm
-    def form(u: Any, v: Any, w: Any) -> Any:
-        of_u, of_v = w.idx
-        relief = w.gamma * _opening(u, of_u, w)
-        if share_of_stress and of_u == 0:
-            relief = relief + rate(u, w)
-        tilt_u, tilt_v = _tilt(u, of_u, w), _tilt(v, of_v, w)
-        slide_u, slide_v = _slide(u, of_u, w), _slide(v, of_v, w)
-        turning = w.g / w.m * tilt_u * tilt_v - (1 - w.g * w.kappa / w.m) * (
-            tilt_u * slide_v + tilt_v * slide_u + w.kappa * slide_u * slide_v
-        )
-        opposed = w.share * w.active * relief - w.share_slope * slide_u * w.p
-        virtual = dot(w.n, jump(v, of_v))
-        if theta and of_v == 0:
-            virtual = virtual + w.theta_by_gamma * rate(v, w)
-        return opposed * virtual - w.share * w.p * turning
-
-    both = [state.slave, state.mate]
-    return asm(form, both, both, **state.fields)
+    p, f, w = state.projection, state.fields, state.points.weight
+    share, active, pressure = (np.asarray(f[name])[:, 0] for name in ("share", "active", "p"))
+    metric = np.asarray(f["m"])[:, 0]
+    virtual, opening = contact_rows(state)
+    tilt, slide = _rows(state, _tilt), _rows(state, _slide)
+    relief = diags(np.asarray(f["gamma"])[:, 0]) @ opening
+    tested = virtual
+    if problem.law.uses_stress:
+        stress = _rows(state, lambda v, _, w: problem.constitution.normal_stress_rate(v, w), one_sided=True)
+        relief = relief + stress
+        if problem.law.theta:
+            tested = virtual + diags(np.asarray(f["theta_by_gamma"])[:, 0]) @ stress
+    opposed = diags(w * share * active) @ relief
+    cut = w * np.asarray(f["share_slope"])[:, 0] * pressure
+    if cut.any():
+        opposed = opposed - diags(cut) @ slide
+    load = w * share * pressure
+    bent = load * (1 - p.gap * p.curvature / metric)
+    turning = tilt.T @ (diags(load * p.gap / metric) @ tilt - diags(bent) @ slide)
+    turning = turning - slide.T @ (diags(bent) @ tilt + diags(bent * p.curvature) @ slide)
+    return tested.T @ opposed - turning
 
 
 def hat_functions(problem: ContactProblem, points: Points) -> tuple[csr_matrix, Array]:
@@ -245,12 +241,17 @@ def contact_rows(state: ContactState) -> tuple[csr_matrix, csr_matrix]:
     return virtual, _rows(state, _opening)
 
 
-def _rows(state: ContactState, value: Any) -> csr_matrix:
-    """A quantity linear in v at every point: element vectors of one-point elements, divided by their areas."""
+def _rows(state: ContactState, value: Any, *, one_sided: bool = False) -> csr_matrix:
+    """A quantity linear in v at every point: element vectors of one-point elements, divided by their areas.
+
+    `value(v, side, w)` is the integrand; with `one_sided` it lives on the slave's side only.
+    """
     from skfem import LinearForm
 
     total: Any = 0
     for side, basis in ((0, state.slave), (1, state.mate)):
+        if side == 1 and one_sided:
+            continue
         local = LinearForm(lambda v, w, side=side: value(v, side, w)).elemental(basis, **state.fields)
         dofs = basis.element_dofs  # (functions, points); the element vectors are stored function by function
         entries = local.data.reshape(dofs.shape) / state.points.weight

@@ -96,7 +96,8 @@ def solve_contact(
     free = np.setdiff1d(np.arange(size), problem.fixed)
     residual, history = np.inf, list[float]()
     for iteration in range(1, MAX_ITERATIONS + 1):
-        step, aim = _step(problem, state, free)
+        closing = problem.closing if iteration == 1 and start is None else 0.0
+        step, aim, diagonal = _step(problem, state, free, closing)
         length, best = 1.0, None
         for _ in range(6):
             multipliers = state.multipliers + length * (aim - state.multipliers)
@@ -111,16 +112,28 @@ def solve_contact(
         assert best is not None
         residual, state, internal = best
         history.append(residual)
-        if not np.isfinite(residual):
+        if np.isnan(residual):
             break
-        if residual < tolerance:
+        if residual < max(tolerance, _rounding(problem, state, diagonal)):
             return ContactSolution("converged", state, internal, iteration, tuple(history))
     return ContactSolution("not_converged", state, internal, iteration, tuple(history))
 
 
+def _scale(problem: ContactProblem, state: ContactState) -> float:
+    return max(float(np.abs(state.contact).sum()), float(np.abs(problem.loads).sum()))
+
+
+def _rounding(problem: ContactProblem, state: ContactState, diagonal: Array) -> float:
+    """Smallest residual that rounding lets through: last bits of places times gamma, of displacements times stiffness."""
+    parameter = problem.slaves.parameter[state.points.edge] * (state.pressure > 0)
+    extent = float(np.abs(problem.mesh.doflocs).max())
+    forces = extent * float(state.points.weight @ parameter) + float(np.abs(diagonal) @ np.abs(state.u))
+    return 4 * float(np.finfo(float).eps) * forces / max(_scale(problem, state), 1e-300)
+
+
 def _out_of_balance(problem: ContactProblem, state: ContactState, internal: Array, free: Array) -> float:
     """Forces that nothing balances, and what is left of the complementarity, relative to the contact forces."""
-    scale = max(float(np.abs(state.contact).sum()), float(np.abs(problem.loads).sum()))
+    scale = _scale(problem, state)
     left = float(np.abs((state.forces + problem.loads - internal)[free]).sum())
     if problem.law.multiplier is not None:
         hats, areas, gaps, parameter = _mean_gaps(problem, state)
@@ -129,8 +142,10 @@ def _out_of_balance(problem: ContactProblem, state: ContactState, internal: Arra
     return left / scale if scale > 0 else np.inf
 
 
-def _step(problem: ContactProblem, state: ContactState, free: Array) -> tuple[Array, Array]:
-    """Newton's step of the displacements and the multipliers that it aims at."""
+def _step(
+    problem: ContactProblem, state: ContactState, free: Array, closing: float
+) -> tuple[Array, Array, Array]:
+    """Newton's step of the displacements, the multipliers that it aims at, and the matrix' diagonal."""
     matrix = problem.constitution.tangent(state.u) + contact_tangent(problem, state)
     step = np.zeros(len(state.u))
     step[problem.fixed] = problem.values - state.u[problem.fixed]
@@ -138,9 +153,9 @@ def _step(problem: ContactProblem, state: ContactState, free: Array) -> tuple[Ar
     factor = splu(csc_matrix(matrix[free][:, free]), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
     if problem.law.multiplier is None:
         step[free] = factor.solve((out + state.forces)[free])
-        return step, state.multipliers
+        return step, state.multipliers, matrix.diagonal()
     hats, areas, gaps, parameter = _mean_gaps(problem, state)
-    active = np.flatnonzero((state.multipliers - parameter * gaps > 0) & (areas > 0))
+    active = np.flatnonzero((state.multipliers - parameter * (gaps - closing) > 0) & (areas > 0))
     push, opening = contact_rows(state)
     weights = diags(state.points.weight * _reached_share(state))
     push_rows = (hats.T @ weights @ push)[active].tocsc()
@@ -152,7 +167,7 @@ def _step(problem: ContactProblem, state: ContactState, free: Array) -> tuple[Ar
     aim = np.zeros(len(state.multipliers))
     aim[active] = np.linalg.solve(rows @ moved, -present - rows @ loose)
     step[free] = loose + moved @ aim[active]
-    return step, aim
+    return step, aim, matrix.diagonal()
 
 
 def _reached_share(state: ContactState) -> Array:
