@@ -124,9 +124,7 @@ def test_plain_points_fail_on_the_flat_interface(law: ContactLaw) -> None:
 def test_flat_interface_is_exact_at_finite_strain(law: ContactLaw) -> None:
     """Confined Saint Venant-Kirchhoff blocks at 2 GPa: F = diag(1, f) with p = -(lam + 2 mu) f (f^2 - 1)/2."""
     pressure = 2e9
-    problem = two_blocks(
-        law, "segments", load={"tractions": {(0, "top"): (0.0, -pressure)}}, kinematics="finite"
-    )
+    problem = two_blocks(law, "segments", load={"tractions": {(0, "top"): (0.0, -pressure)}}, kinematics="finite")
     solution = solve_contact(problem, tolerance=1e-12)
     assert solution.status == "converged"
     stretches = []

@@ -123,9 +123,9 @@ class SaintVenantKirchhoff:
                 blocks[:, :, i, :, k] = block if j == 0 else blocks[:, :, i, :, k] + block
             dofs = basis.element_dofs.T
             rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None, :])
-            total = total + coo_matrix(
-                (blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(len(u), len(u))
-            ).tocsr()
+            total = (
+                total + coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(len(u), len(u))).tocsr()
+            )
         return total
 
     def normal_stress(self, u: Any, w: Any) -> Any:

@@ -142,9 +142,7 @@ def _out_of_balance(problem: ContactProblem, state: ContactState, internal: Arra
     return left / scale if scale > 0 else np.inf
 
 
-def _step(
-    problem: ContactProblem, state: ContactState, free: Array, closing: float
-) -> tuple[Array, Array, Array]:
+def _step(problem: ContactProblem, state: ContactState, free: Array, closing: float) -> tuple[Array, Array, Array]:
     """Newton's step of the displacements, the multipliers that it aims at, and the matrix' diagonal."""
     matrix = problem.constitution.tangent(state.u) + contact_tangent(problem, state)
     step = np.zeros(len(state.u))
