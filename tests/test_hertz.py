@@ -24,8 +24,8 @@ import pytest
 from numpy.typing import NDArray
 
 from gearfe.contact.bodies import Bodies, ElasticBody
+from gearfe.contact.body_contact import solve_contact
 from gearfe.contact.laws import ContactLaw, Exact, Nitsche, Penalty
-from gearfe.contact.monolithic import solve_contact
 from gearfe.contact.problem import ContactProblem, contact_problem
 from gearfe.elasticity import Material
 

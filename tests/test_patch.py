@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from gearfe.contact.bodies import Bodies
+from gearfe.contact.body_contact import ContactSolution, solve_contact
 from gearfe.contact.laws import ContactLaw, Exact, Nitsche, Penalty
-from gearfe.contact.monolithic import ContactSolution, solve_contact
 from gearfe.contact.problem import ContactProblem, contact_problem
 from gearfe.elasticity import Material
 from gearfe.errors import InputError
@@ -35,7 +35,7 @@ def name_of(law: ContactLaw) -> str:
     return f"{law.name}, theta {law.theta}, {law.sides}"
 
 
-# ---- flat: two blocks between smooth rigid walls ----------------------------------------------------------------------
+# ---- flat: two blocks between smooth rigid walls -------------------------------------------------------------------
 
 HEIGHTS = (0.6, 0.5)  # of the upper and the lower block (m)
 
@@ -148,7 +148,7 @@ def test_finite_strain_takes_theta_0_only() -> None:
         two_blocks(Nitsche(theta=-1), "segments", load=PRESS, kinematics="finite")
 
 
-# ---- curved: a ring under pressure inside another, Lame's solution ----------------------------------------------------
+# ---- curved: a ring under pressure inside another, Lame's solution -------------------------------------------------
 
 INNER, MIDDLE, OUTER = 0.5, 1.0, 1.5  # m
 INSIDE = 2e8  # Pa; the interface carries about half of it

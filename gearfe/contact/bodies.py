@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -105,7 +106,7 @@ class Bodies:
     def elements(self) -> tuple[IntArray, ...]:
         """Triangles of each body."""
         ends = np.cumsum([0, *(len(part.triangles) for part in self.parts)])
-        return tuple(np.arange(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True))
+        return tuple(np.arange(a, b) for a, b in itertools.pairwise(ends))
 
     @cached_property
     def unknowns(self) -> IntArray:

@@ -53,7 +53,7 @@ class SmallStrain:
         """Internal forces (N)."""
         return np.asarray(self.stiffness @ u)
 
-    def tangent(self, u: Array) -> Any:
+    def tangent(self, u: Array) -> Any:  # noqa: ARG002 (the protocol's)
         """Their derivative, sparse (N/m)."""
         return self.stiffness
 

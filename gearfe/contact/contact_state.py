@@ -218,19 +218,22 @@ def contact_tangent(problem: ContactProblem, state: ContactState) -> csr_matrix:
 def hat_functions(problem: ContactProblem, points: Points) -> tuple[csr_matrix, Array]:
     """Values of the multiplier space's functions at the points, shape (q, m), and the law's parameter of each (Pa/m).
 
-    A vertex that two couples share counts once for each.
+    Hats on half edges, one for each node (`gearfe.contact.multiplier`). A node that two couples share counts once for
+    each.
     """
     slaves = problem.slaves
-    ends = np.stack([slaves.nodes[:, 0], slaves.nodes[:, 2]], axis=1)
-    keys = slaves.mate[:, None] * len(problem.unknowns) + ends
+    keys = slaves.mate[:, None] * len(problem.unknowns) + slaves.nodes
     _, number = np.unique(keys, return_inverse=True)
     number = number.reshape(keys.shape)
-    rows = np.repeat(np.arange(len(points.edge)), 2)
-    values = np.stack([1 - points.xi, points.xi], axis=1)
-    shape = (len(points.edge), int(number.max()) + 1)
+    late = (points.xi > 0.5).astype(np.int64)
+    along = 2 * points.xi - late
+    columns = number[points.edge[:, None], np.stack([late, late + 1], axis=1)]
+    rows = np.repeat(np.arange(len(late)), 2)
+    shape = (len(late), int(number.max()) + 1)
     parameter = np.zeros(shape[1])
     np.maximum.at(parameter, number, slaves.parameter[:, None])
-    return coo_matrix((values.ravel(), (rows, number[points.edge].ravel())), shape=shape).tocsr(), parameter
+    values = np.stack([1 - along, along], axis=1)
+    return coo_matrix((values.ravel(), (rows, columns.ravel())), shape=shape).tocsr(), parameter
 
 
 def contact_rows(state: ContactState) -> tuple[csr_matrix, csr_matrix]:

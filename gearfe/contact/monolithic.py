@@ -1,189 +1,29 @@
-r"""The verification route: contact of elastic bodies as plain scikit-fem forms, solved in all unknowns at once.
+r"""The verification route: two whole gears in contact, solved in all unknowns at once.
 
-Find the displacements u of all bodies, with prescribed values, such that for all v
-
-.. math::
-    a(u, v) - \int_{\Gamma_C} \frac{\theta}{\gamma}\,\sigma_n(u)\,\sigma_n(v)
-    = \ell(v) + \int_{\Gamma_s} p\; n\cdot[v] + \int_{\Gamma_s} \frac{\theta}{\gamma}\, p\, \sigma_n(v), \qquad
-    [v] = v(x_s) - v(x_m), \qquad p = \max(0,\; -\gamma g(u) - s\,\sigma_n(u)),
-
-with a the elastic energy's form on the undeformed bodies in their present places (or its finite-strain counterpart,
-`gearfe.contact.constitution`), x_m the closest point of the deformed mate, n its normal there and sigma_n the normal
-stress at x_s. Newton's tangent adds, with the variations of `gearfe.contact.closest`,
-
-.. math::
-    \int_{\Gamma_s} H(p)\,(\gamma\,\delta g(u) + s\,\sigma_n(u))\,(n\cdot[v] + \tfrac{\theta}{\gamma}\sigma_n(v))
-    \;-\; p\,\Delta(n\cdot[v])
-
-and the change of the area of points whose stretch of surface lies across the mate's sharp end. A law on a multiplier
-space has :math:`p = \sum_i \lambda_i\psi_i` instead, and one more equation for each of its active functions (a
-primal-dual active set: Hueeber & Wohlmuth, *Comput. Methods Appl. Mech. Eng.* 194, 2005).
-
-Nothing but the closest-point search is shared with the condensed route: no compliance, no cyclic symmetry, no windows
-of flank. On the same mesh and quadrature points both must give the same torques; what they cost differs a hundredfold.
+The gears are a `ContactProblem` like any other bodies' (the blocks and rings of the patch tests, those of Hertz), and
+`gearfe.contact.body_contact` solves it, with strains small or of Saint Venant-Kirchhoff bodies. Nothing but the
+closest-point search is shared with the condensed route: no compliance, no cyclic symmetry, no windows of flank. On the
+same mesh and quadrature points both must give the same torques; what they cost differs a hundredfold.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_matrix, diags
-from scipy.sparse.linalg import splu
 
-from .contact_state import ContactState, contact_at, contact_rows, contact_tangent, hat_functions
+from .body_contact import TOLERANCE, ContactSolution, solve_contact
+from .contact_state import contact_at
 from .laws import ContactLaw
 from .problem import ContactProblem
 from .whole_pair import WholePair
 
 Array = NDArray[np.float64]
 
-#: Out-of-balance forces relative to the contact forces at which a position counts as converged.
-TOLERANCE = 1e-10
-MAX_ITERATIONS = 25
-#: Newton steps taken in full before the line search watches over them.
-FREE_ITERATIONS = 3
 #: Smallest step of the twist, as a share of it, when it is raised in steps.
 SMALLEST_STEP = 0.02
-
-
-@dataclass(frozen=True)
-class ContactSolution:
-    """Bodies in contact.
-
-    Attributes
-    ----------
-    status
-        ``converged`` or ``not_converged``.
-    state
-        Contact at the last displacement; its `u` are the displacements (m).
-    internal : ndarray
-        Internal forces (N); at prescribed unknowns they are the reactions.
-    iterations
-        Newton iterations.
-    residuals
-        Out-of-balance after each, relative to the contact forces.
-    """
-
-    status: str
-    state: ContactState
-    internal: Array
-    iterations: int
-    residuals: tuple[float, ...]
-
-    @property
-    def u(self) -> Array:
-        """Displacements of all unknowns (m)."""
-        return self.state.u
-
-
-def solve_contact(
-    problem: ContactProblem, start: ContactState | None = None, *, tolerance: float = TOLERANCE
-) -> ContactSolution:
-    """Solve a contact problem by a semi-smooth Newton method with a backtracking line search.
-
-    Parameters
-    ----------
-    start
-        State to start from; without one the bodies are undeformed and their contact is the rigid one.
-    tolerance
-        Out-of-balance forces relative to the contact forces (or loads, where those are larger).
-    """
-    size = problem.unknowns.size
-    state = contact_at(problem, np.zeros(size), closing=problem.closing) if start is None else start
-    free = np.setdiff1d(np.arange(size), problem.fixed)
-    residual, history = np.inf, list[float]()
-    for iteration in range(1, MAX_ITERATIONS + 1):
-        closing = problem.closing if iteration == 1 and start is None else 0.0
-        step, aim, diagonal = _step(problem, state, free, closing)
-        length, best = 1.0, None
-        for _ in range(6):
-            multipliers = state.multipliers + length * (aim - state.multipliers)
-            tried = contact_at(problem, state.u + length * step, state, multipliers)
-            internal = problem.constitution.forces(tried.u)
-            error = _out_of_balance(problem, tried, internal, free)
-            if best is None or error < best[0]:
-                best = (error, tried, internal)
-            if error < (1 - 0.1 * length) * residual or iteration <= FREE_ITERATIONS:
-                break
-            length *= 0.5
-        assert best is not None
-        residual, state, internal = best
-        history.append(residual)
-        if np.isnan(residual):
-            break
-        if residual < max(tolerance, _rounding(problem, state, diagonal)):
-            return ContactSolution("converged", state, internal, iteration, tuple(history))
-    return ContactSolution("not_converged", state, internal, iteration, tuple(history))
-
-
-def _scale(problem: ContactProblem, state: ContactState) -> float:
-    return max(float(np.abs(state.contact).sum()), float(np.abs(problem.loads).sum()))
-
-
-def _rounding(problem: ContactProblem, state: ContactState, diagonal: Array) -> float:
-    """Smallest residual that rounding lets through: last bits of places times gamma, of displacements times stiffness."""
-    parameter = problem.slaves.parameter[state.points.edge] * (state.pressure > 0)
-    extent = float(np.abs(problem.mesh.doflocs).max())
-    forces = extent * float(state.points.weight @ parameter) + float(np.abs(diagonal) @ np.abs(state.u))
-    return 4 * float(np.finfo(float).eps) * forces / max(_scale(problem, state), 1e-300)
-
-
-def _out_of_balance(problem: ContactProblem, state: ContactState, internal: Array, free: Array) -> float:
-    """Forces that nothing balances, and what is left of the complementarity, relative to the contact forces."""
-    scale = _scale(problem, state)
-    left = float(np.abs((state.forces + problem.loads - internal)[free]).sum())
-    if problem.law.multiplier is not None:
-        hats, areas, gaps, parameter = _mean_gaps(problem, state)
-        asked = np.maximum(0.0, state.multipliers - parameter * gaps)
-        left += float(areas @ np.abs(state.multipliers - asked))
-    return left / scale if scale > 0 else np.inf
-
-
-def _step(problem: ContactProblem, state: ContactState, free: Array, closing: float) -> tuple[Array, Array, Array]:
-    """Newton's step of the displacements, the multipliers that it aims at, and the matrix' diagonal."""
-    matrix = problem.constitution.tangent(state.u) + contact_tangent(problem, state)
-    step = np.zeros(len(state.u))
-    step[problem.fixed] = problem.values - state.u[problem.fixed]
-    out = problem.loads - problem.constitution.forces(state.u) - matrix @ step
-    factor = splu(csc_matrix(matrix[free][:, free]), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-    if problem.law.multiplier is None:
-        step[free] = factor.solve((out + state.forces)[free])
-        return step, state.multipliers, matrix.diagonal()
-    hats, areas, gaps, parameter = _mean_gaps(problem, state)
-    active = np.flatnonzero((state.multipliers - parameter * (gaps - closing) > 0) & (areas > 0))
-    push, opening = contact_rows(state)
-    weights = diags(state.points.weight * _reached_share(state))
-    push_rows = (hats.T @ weights @ push)[active].tocsc()
-    gap_rows = (hats.T @ weights @ opening)[active].tocsc()
-    loose = factor.solve(out[free])
-    moved = factor.solve(push_rows[:, free].T.toarray())
-    rows = gap_rows[:, free]
-    present = areas[active] * gaps[active] + gap_rows @ step
-    aim = np.zeros(len(state.multipliers))
-    aim[active] = np.linalg.solve(rows @ moved, -present - rows @ loose)
-    step[free] = loose + moved @ aim[active]
-    return step, aim, matrix.diagonal()
-
-
-def _reached_share(state: ContactState) -> Array:
-    from .closest import unreached
-
-    return np.where(unreached(state.projection.gap), 0.0, np.asarray(state.fields["share"])[:, 0])
-
-
-def _mean_gaps(problem: ContactProblem, state: ContactState) -> tuple[Any, Array, Array, Array]:
-    """Multiplier functions at the points, their areas (m2), mean gaps (m) and the law's parameter (Pa/m)."""
-    hats, parameter = hat_functions(problem, state.points)
-    weight = state.points.weight * _reached_share(state)
-    areas = hats.T @ weight
-    gaps = np.divide(hats.T @ (weight * state.projection.gap), areas, out=np.ones(len(areas)), where=areas > 0)
-    return hats, areas, gaps, parameter
-
-
-# ---- whole gears ------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -237,31 +77,47 @@ def solve_monolithic(
     start = contact_at(problem, np.zeros(problem.unknowns.size))
     if not (start.projection.gap < 0).any():
         return _empty("under_resolved" if pair.rigid_overlap(problem) else "no_contact", problem.mesh)
-    solution = solve_contact(problem, start, tolerance=tolerance)
+    if problem.kinematics == "finite":
+        # strains of the rigid overlap are out of all proportion: start from the solution of small strain
+        small = solve_monolithic(replace(pair, kinematics="small"), law, pinion_angle, twist, tolerance=1e-4)
+        if small.status == "converged":
+            start = contact_at(problem, small.displacement)
+    solution: ContactSolution | None = solve_contact(problem, start, tolerance=tolerance)
+    assert solution is not None
     iterations = solution.iterations
-    done, step, last = 0.0, 0.25, np.zeros(problem.unknowns.size)
-    while solution.status != "converged" and step > SMALLEST_STEP:
+    if solution.status != "converged":
+        solution, more = _raised(pair, law, pinion_angle, twist, tolerance)
+        iterations += more
+    if solution is None or solution.status != "converged":
+        return _empty("not_converged", problem.mesh, iterations)
+    return _finish(pair, problem, solution, iterations)
+
+
+def _raised(
+    pair: WholePair, law: ContactLaw, pinion_angle: float, twist: float, tolerance: float
+) -> tuple[ContactSolution | None, int]:
+    """Solution at the end of steps of the twist, and the iterations of all of them."""
+    done, step, iterations = 0.0, 0.25, 0
+    last: Array | None = None
+    while step > SMALLEST_STEP:
         share = min(1.0, done + step)
-        part = problem if share == 1.0 else pair.problem(law, pinion_angle, share * twist)
-        guess = None
-        if part is not None:
-            guess = contact_at(part, last * (share / done if done else 0.0))
-        if part is None or guess is None or not (guess.projection.gap < 0).any():
-            done = share  # nothing touches yet
-            if share == 1.0:
-                break
+        part = pair.problem(law, pinion_angle, share * twist)
+        if part is None:  # nothing touches yet
+            done = share
+            continue
+        guess = contact_at(part, np.zeros(part.unknowns.size) if last is None else last * (share / done))
+        if not (guess.projection.gap < 0).any() and share < 1.0:
+            done = share
             continue
         tried = solve_contact(part, guess, tolerance=tolerance if share == 1.0 else 1e-4)
         iterations += tried.iterations
         if tried.status != "converged":
             step *= 0.5
         elif share == 1.0:
-            solution = tried
+            return tried, iterations
         else:
             done, step, last = share, 1.5 * step, tried.u
-    if solution.status != "converged":
-        return _empty("not_converged", problem.mesh, iterations)
-    return _finish(pair, problem, solution, iterations)
+    return None, iterations
 
 
 def _finish(pair: WholePair, problem: ContactProblem, solution: ContactSolution, iterations: int) -> MonolithicPosition:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .bodies import Bodies, Value
-from .closest import Projection
+from .closest import Projection, chains_of, nearest_places, project
 from .constitution import Constitution, Kinematics, SaintVenantKirchhoff, SmallStrain
 from .flank import edge_shapes, gauss_rule
 from .laws import ContactLaw, side_share
@@ -129,8 +129,8 @@ class ContactProblem:
     stiffness
         Small-strain stiffness in the mesh's places (N/m); assembled when left out.
     skins
-        Body, side and edges of the whole contact surfaces for the stress term of theta = 1 and -1; the facing surfaces of
-        the law's sides when left out.
+        Body, side and edges of the whole contact surfaces for the stress term of theta = 1 and -1; the facing
+        surfaces of the law's sides when left out.
     closing
         Gap (m) below which a point counts as closed before the first step; for bodies that contact alone holds.
     """
@@ -189,10 +189,12 @@ class ContactProblem:
     @cached_property
     def slaves(self) -> SlaveEdges:
         """Edges that carry contact points."""
-        columns: dict[str, list[Array]] = {}
+        columns: dict[str, list[NDArray[Any]]] = {}
         for couple, surfaces in enumerate(self.facing):
-            for side, surface in enumerate(surfaces):
-                share = side_share(self.law, side)
+            shares = [side_share(self.law, side) for side in (0, 1)]
+            if self.law.sides == "tip":
+                shares = [1.0, 0.0] if self._ends_nearer(*surfaces) else [0.0, 1.0]
+            for side, (surface, share) in enumerate(zip(surfaces, shares, strict=True)):
                 if share == 0 or not surface.near.any():
                     continue
                 made = self.edge_data(surface.part, surface.edges)
@@ -200,9 +202,20 @@ class ContactProblem:
                 made["width"] = np.full(len(surface.edges), share * self.width)
                 for name, value in made.items():
                     columns.setdefault(name, []).append(value[..., surface.near])
-        joined = {name: np.concatenate(parts, axis=-1) for name, parts in columns.items()}
+        joined: dict[str, Any] = {name: np.concatenate(parts, axis=-1) for name, parts in columns.items()}
         joined["nodes"] = joined["nodes"].T
         return SlaveEdges(**joined)
+
+    def _ends_nearer(self, one: Surface, two: Surface) -> bool:
+        """Whether the first surface ends (in a tooth's tip) nearer to where the undeformed bodies overlap."""
+        places, left = self.mesh.doflocs.T, []
+        for own, mate in ((one, two), (two, one)):
+            points, nodes = places[own.nodes[::2]], places[mate.nodes]
+            chain = chains_of(nodes, np.array([len(mate.edges)]), np.zeros(len(points), dtype=np.int64))
+            inside = np.flatnonzero(project(points, chain, nearest_places(points, nodes)).gap < 0)
+            middle = int(inside.mean()) if len(inside) else len(own.edges)
+            left.append(float(edge_lengths(places[own.edges], self.points_per_edge)[middle:].sum()))
+        return left[0] <= left[1]
 
     def edge_data(self, part: int, edges: IntArray) -> dict[str, Any]:
         """Geometry and constants of a body's surface edges, edges last."""

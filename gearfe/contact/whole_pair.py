@@ -116,7 +116,7 @@ class WholePair:
         """Both gears in their present places."""
         places = np.einsum("nij,jn->in", self._turns(pinion_angle, twist), self.bodies.mesh.doflocs)
         places[0, self.node_of[1]] += self.centre_distance
-        return self.bodies.moved(places)
+        return self.bodies.moved(np.ascontiguousarray(places))
 
     def stiffness_at(self, pinion_angle: float, twist: float) -> Any:
         """Stiffness in global axes (N/m)."""
