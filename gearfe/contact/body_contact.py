@@ -41,6 +41,8 @@ TOLERANCE = 1e-10
 MAX_ITERATIONS = 25
 #: Newton steps taken in full before the line search watches over them.
 FREE_ITERATIONS = 3
+#: After so many steps without contact forces near balance (residual above 1/2) a start is given up.
+PATIENCE = 12
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,7 @@ def solve_contact(
         assert best is not None
         residual, state, internal = best
         history.append(residual)
-        if np.isnan(residual):
+        if np.isnan(residual) or (iteration >= PATIENCE and residual > 0.5):
             break
         if residual < max(tolerance, _rounding(problem, state, diagonal)):
             return ContactSolution("converged", state, internal, iteration, tuple(history))
