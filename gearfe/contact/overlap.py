@@ -110,17 +110,17 @@ def _rotated(points: Array, angles: Array) -> Array:
 
 
 def windows_of(
-    pair: MeshingPair, found: list[Overlap], angle: float, twist: float, *, share: float = SHARE
+    pair: MeshingPair, found: list[Overlap], angle: float, twist: float, *, share: float = SHARE, margin: int = MARGIN, whole_tips: bool = True
 ) -> list[Window]:
     """Windows about the deepest points of the overlaps; `share` 1 takes the whole overlap."""
     windows: list[Window] = []
     node = 0
     for number, overlap in enumerate(found):
         # a tip that digs in slides along its mate as the teeth bend: nothing is narrowed there
-        kept = 1.0 if any(_near_tip(pair.bodies[gear].flank.sizes, overlap.ranges[gear]) for gear in (0, 1)) else share
+        kept = 1.0 if whole_tips and any(_near_tip(pair.bodies[gear].flank.sizes, overlap.ranges[gear]) for gear in (0, 1)) else share
         for gear, tooth in ((0, overlap.tooth), (1, -1 - overlap.tooth)):
             flank = pair.bodies[gear].flank
-            first, end = _narrowed(flank.sizes, overlap.ranges[gear], overlap.deepest[gear], kept, overlap.depth)
+            first, end = _narrowed(flank.sizes, overlap.ranges[gear], overlap.deepest[gear], kept, overlap.depth, margin)
             placed = pair.tooth_angle(gear, tooth, angle, twist)
             windows.append(Window(gear, number, tooth, first, end - first, node, placed))
             node += 2 * (end - first) + 1
@@ -132,14 +132,14 @@ def _near_tip(sizes: Array, span: tuple[int, int]) -> bool:
     return bool(sizes[span[1] :].sum() < 0.2 * sizes[span[0] : span[1]].sum())
 
 
-def _narrowed(sizes: Array, span: tuple[int, int], deepest: int, share: float, depth: float) -> tuple[int, int]:
+def _narrowed(sizes: Array, span: tuple[int, int], deepest: int, share: float, depth: float, margin: int) -> tuple[int, int]:
     """Range of edges about the deepest one; bending moves the contact along the flank by no more than the overlap."""
     first, end = span
     arc = np.concatenate([[0.0], np.cumsum(sizes)])
     reach = share * max(arc[end] - arc[deepest], arc[deepest] - arc[first]) + depth
     low = int(np.searchsorted(arc, arc[deepest] - reach)) - 1
     high = int(np.searchsorted(arc, arc[deepest] + reach)) + 1
-    return max(0, low - MARGIN), min(len(sizes), high + MARGIN)
+    return max(0, low - margin), min(len(sizes), high + margin)
 
 
 def rigidly_apart(pair: MeshingPair, angle: float, twist: float, *, samples: int = 24) -> bool:

@@ -14,9 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .closest import Projection
+from .group import gather, rigid_projection
+from .group_newton import iterate
+from .group_results import outgrown, results_of, scenes_of
+from .group_start import starting_states
 from .newton import Dialogue, Linearised, Outcome, State, linearise, newton
 from .overlap import Overlap, overlaps, rigidly_apart, windows_of
-from .scene import MeshingPair, Scene, assemble, assemble_all, project_all
+from .laws import ContactLaw
+from .scene import MeshingPair, Scene, Window, assemble, assemble_all, project_all
 from .start import starting_state
 
 Array = NDArray[Any]
@@ -24,7 +29,7 @@ Array = NDArray[Any]
 #: Relative residual of the contact pressures at which a position counts as converged.
 TOLERANCE = 1e-10
 #: Positions solved side by side.
-BATCH = 16
+BATCH = 64
 #: Memory for the matrices of positions that are solved side by side.
 GROUP_BYTES = 60e6
 #: Newton steps spent on one difficult position before it is given up.
@@ -103,12 +108,14 @@ def solve_positions(
 
 def _solve_batch(pair: MeshingPair, angles: Array, twists: Array, tolerance: float) -> list[Position]:
     found = overlaps(pair, angles, twists)
-    windows = [windows_of(pair, one, a, t) for one, a, t in zip(found, angles, twists, strict=True)]
     positions: list[Position | None] = [None] * len(angles)
-    for i in (i for i, w in enumerate(windows) if not w):
+    for i in (i for i, overlapping in enumerate(found) if not overlapping):
         clear = rigidly_apart(pair, angles[i], twists[i])
         positions[i] = _unsolved("no_contact" if clear else "under_resolved")
-    facing = [i for i, w in enumerate(windows) if w]
+    facing = [i for i, overlapping in enumerate(found) if overlapping]
+    if serves(pair.law):
+        facing = _quickly(pair, angles, twists, found, facing, positions, tolerance)
+    windows = {i: windows_of(pair, found[i], angles[i], twists[i]) for i in facing}
     for group in _groups([windows[i][-1].nodes.stop for i in facing]):
         places = [facing[k] for k in group]
         scenes = assemble_all(pair, [windows[i] for i in places])
@@ -124,6 +131,71 @@ def _solve_batch(pair: MeshingPair, angles: Array, twists: Array, tolerance: flo
             else:
                 positions[i] = _finish(scene, outcome, outcome.iterations)
     return [p for p in positions if p is not None]
+
+
+def _quickly(
+    pair: MeshingPair,
+    angles: Array,
+    twists: Array,
+    found: Sequence[list[Overlap]],
+    facing: Sequence[int],
+    positions: list[Position | None],
+    tolerance: float,
+) -> list[int]:
+    """Solve the positions `facing` in lockstep on close windows; the answer are those for which that was not enough."""
+    windows = {i: windows_of(pair, found[i], angles[i], twists[i], share=CLOSE_SHARE, margin=CLOSE_MARGIN, whole_tips=False) for i in facing}
+    for group in _groups([windows[i][-1].nodes.stop for i in facing]):
+        places = [facing[k] for k in group]
+        made = solve_group(pair, [windows[i] for i in places], [found[i] for i in places], tolerance)
+        for i, position in zip(places, made, strict=True):
+            positions[i] = position
+    return [i for i in facing if positions[i] is None]
+
+
+def solve_group(
+    pair: MeshingPair, windows: Sequence[Sequence[Window]], found: Sequence[list[Overlap]], tolerance: float
+) -> list[Position | None]:
+    """Positions with these windows, solved in lockstep; None where that did not converge or outgrew its windows."""
+    group = gather(pair, windows)
+    deepest = np.array([one.deepest[g] for overlapping in found for g in (0, 1) for one in overlapping])
+    rigid = rigid_projection(pair, group, deepest)
+    outcomes = iterate(group, *starting_states(pair, group, rigid), rigid, tolerance)
+    outcomes = replace(outcomes, converged=outcomes.converged & ~outgrown(group, outcomes.motion))
+    results = results_of(pair, group, outcomes)
+    scenes = scenes_of(pair, group, rigid, (results.forces, results.force_rate))
+    made: list[Position | None] = []
+    for b, (scene, forces, rate) in enumerate(scenes):
+        if not outcomes.converged[b]:
+            made.append(None)
+            continue
+        first, end = group.first_window[b : b + 2].tolist()
+        made.append(
+            Position(
+                status="converged",
+                torque_wheel=float(results.torque_wheel[b]),
+                torque_pinion=float(results.torque_pinion[b]),
+                torque_wheel_reaction=float(results.torque_wheel_reaction[b]),
+                tangent=float(results.tangent[b]),
+                pair_numbers=tuple(-1 - w.tooth for w in scene.windows[1::2]),
+                pair_torques=results.window_torque[(first + end) // 2 : end],
+                peak_pressure=float(results.peak_pressure[b]),
+                iterations=int(outcomes.iterations[b]),
+                scene=scene,
+                forces=forces,
+                force_rate=rate,
+            )
+        )
+    return made
+
+
+def serves(law: ContactLaw) -> bool:
+    """Whether the lockstep iteration knows the law: p = max(0, -gamma g - s sigma_n), no term in the stress's variation.
+    """
+    return getattr(law, "theta", 0) == 0 and not FAST_OFF
+
+
+FAST_OFF = False
+CLOSE_SHARE, CLOSE_MARGIN = 0.36, 1
 
 
 def _groups(nodes: Sequence[int]) -> list[list[int]]:
