@@ -154,9 +154,7 @@ def project(slave: Array, chains: Chains, place: Array, *, iterations: int = 15,
     moving: IntArray | None = None  # all of them
     for _ in range(iterations):
         now, edges, ends = (
-            (place, chains.edges, last)
-            if moving is None
-            else (place[moving], chains.edges[moving], last[moving])
+            (place, chains.edges, last) if moving is None else (place[moving], chains.edges[moving], last[moving])
         )
         at = _evaluate(x, y, chains, now) if moving is None else _evaluate(x[moving], y[moving], chains, now, moving)
         # residual: the part of the distance across the normal; its slope is -|a| as long as the gap is small

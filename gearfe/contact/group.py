@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -103,6 +104,12 @@ class Group:
     extendable: NDArray[np.bool_]
     rotation: Array
 
+    @cached_property
+    def block_window(self) -> IntArray:
+        """First window of each block, shape (2B,)."""
+        half = self.first_window[:-1] + np.diff(self.first_window) // 2
+        return np.stack([self.first_window[:-1], half], axis=1).ravel()
+
     @property
     def size(self) -> int:
         """Number of positions."""
@@ -168,10 +175,8 @@ def gather(pair: MeshingPair, positions: Sequence[Sequence[Window]]) -> Group:
     flanks = [body.flank for body in pair.bodies]
     made = _geometry(pair, flat, gear, first_edge, counts)
     made |= _contact_points(pair, gear, position, first_edge, counts, mate, made["first_node"])
-    first_node, first_point = made["first_node"], made["first_point"]
-    operators = [
-        _operator(pair, gear, windows[gear::2]) for windows in positions for gear in (0, 1)
-    ]
+    first_node, _first_point = made["first_node"], made["first_point"]
+    operators = [_operator(pair, gear, windows[gear::2]) for windows in positions for gear in (0, 1)]
     edges_of = np.array([flank.edges for flank in flanks])[gear]
     extendable = np.stack([first_edge > 0, first_edge + counts < edges_of], axis=1)
     # stretches of nodes, points and responses of each block
@@ -181,9 +186,7 @@ def gather(pair: MeshingPair, positions: Sequence[Sequence[Window]]) -> Group:
     offset = np.concatenate([[0], np.cumsum(rows)])
     loads, response = np.zeros(unknowns.sum()), np.zeros(offset[-1])
     at = np.concatenate([[0], np.cumsum(unknowns)])
-    blocks = [
-        Block(m, loads[at[i] : at[i + 1]], response[offset[i] : offset[i + 1]]) for i, m in enumerate(operators)
-    ]
+    blocks = [Block(m, loads[at[i] : at[i + 1]], response[offset[i] : offset[i + 1]]) for i, m in enumerate(operators)]
     moved = ranges(offset[:-1], unknowns)
     stressed = ranges(offset[:-1] + unknowns, rows - unknowns) if pair.law.uses_stress else None
     return Group(

@@ -1,14 +1,13 @@
 r"""Newton's method of `gearfe.contact.newton` for many positions in lockstep.
 
-The same equations, arranged for speed. With the rows taken at the present state u, a step seeks p, f, u^+ with
+With the rows taken at the present state u, a step solves on the active points
 
 .. math::
-    f = G^T W p + d, \quad u^+ = C f, \quad p = -\gamma\,(g + \partial_u g\,(u^+ - u)) - S f, \quad d = H (u^+ - u)
+    f = G^T W p + d, \quad u^+ = C f, \quad p = -\gamma\,(g + \partial_u g\,(u^+ - u)) - S f, \quad d = H (u^+ - u),
 
-on the active points. The residual r of the third equation is evaluated on the elastic response itself, and
-:math:`p \leftarrow p + M^{-1} r` with the factorised :math:`M = I + (\gamma\,\partial_u g\,C + S) G^T W` repeats until
-the step is solved. So M may be somewhat out of date: it is kept until the active set changes or until the repetitions
-converge slowly.
+d by repetition on one factorisation, as often as the step is worth. A position has converged when its pressures are
+those that the law asks for *and* its forces are those of the pressures at the places reached: the second closes only
+with the square of the last step.
 """
 
 from __future__ import annotations
@@ -22,13 +21,17 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from .closest import Projection, gap_rows, unreached
 from .group import Group
-from .newton import FREE_ITERATIONS, MAX_ITERATIONS
+from .newton import FREE_ITERATIONS
 
 Array = NDArray[Any]
 IntArray = NDArray[Any]
 
-#: Largest number of repetitions within each step, and the number above which M counts as out of date.
-REPEATS, SLOW = 12, 7
+#: Newton steps after which a position is left to the solver of single positions: most need four to ten.
+MAX_ITERATIONS = 16
+#: Largest number of repetitions for the forces' turning; each gains two to three digits.
+REPEATS = 8
+#: Relative accuracy of the repetitions where there is no step to compare with.
+EXACT = 1e-12
 
 
 @dataclass
@@ -103,7 +106,9 @@ class Rows:
         tilt, slide = _dot(self.tilt, moved), _dot(self.slide, moved)
         to_slide = -self.loads * self.share * (tilt + self.curvature * slide)
         to_tilt = self.loads * (self.thin * tilt - self.share * slide)
-        parts = to_slide[:, None] * self.slide + to_tilt[:, None] * self.tilt + (self.cut * slide)[:, None] * self.normal
+        parts = (
+            to_slide[:, None] * self.slide + to_tilt[:, None] * self.tilt + (self.cut * slide)[:, None] * self.normal
+        )
         return np.bincount(self.unknowns.ravel(), weights=parts.ravel(), minlength=len(change))
 
     def forces(self, pressure: Array, size: int) -> Array:
@@ -116,22 +121,61 @@ def _dot(a: Array, b: Array) -> Array:
     return np.einsum("ij,ij->i", a, b)
 
 
-@dataclass
-class Factors:
-    """Factorised M of each position, and the active set it was made for."""
+@dataclass(frozen=True)
+class Piece:
+    """Matrices of one position on the unknowns that its active points touch.
 
-    made: list[tuple[Array, IntArray] | None]
-    active: NDArray[np.bool_]
+    Attributes
+    ----------
+    factor
+        Of the transposed M = I + R G^T W.
+    response : ndarray, shape (a, t)
+        R = gamma dg/du C + S.
+    compliance : tuple of (ndarray, ndarray)
+        C of the pinion and of the wheel.
+    points, unknowns : slice
+        Where its active points and touched unknowns stand among those of all positions.
+    """
 
-    def solve(self, right: Array, at: IntArray, positions: IntArray) -> Array:
-        """M^-1 right for the active points in order of position."""
+    factor: tuple[Array, IntArray]
+    response: Array
+    compliance: tuple[Array, Array]
+    points: slice
+    unknowns: slice
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Linearised contact of several positions: their pieces and, one after the other, the unknowns that they touch."""
+
+    pieces: list[Piece]
+    touched: IntArray
+
+    def solve(self, right: Array) -> Array:
+        """M^-1 right, shape (a,)."""
         out = np.zeros_like(right)
-        ends = np.cumsum(np.bincount(at, minlength=len(self.made))).tolist()
-        for b in positions.tolist():
-            factor = self.made[b]
-            assert factor is not None
-            mine = slice(ends[b] - len(factor[1]), ends[b])
-            out[mine] = dgetrs(factor[0], factor[1], right[mine], trans=1)[0]
+        for piece in self.pieces:
+            out[piece.points] = dgetrs(*piece.factor, right[piece.points], trans=1)[0]
+        return out
+
+    def pressures(self, forces: Array, count: int) -> Array:
+        """R forces, shape (count,)."""
+        loads, out = forces[self.touched], np.zeros(count)
+        for piece in self.pieces:
+            np.dot(piece.response, loads[piece.unknowns], out=out[piece.points])
+        return out
+
+    def displacements(self, forces: Array) -> Array:
+        """C forces, shape (2n,); only the touched unknowns are computed."""
+        loads, out = forces[self.touched], np.zeros(len(forces))
+        moved = np.empty_like(loads)
+        for piece in self.pieces:
+            pinion, wheel = piece.compliance
+            first, end = piece.unknowns.start, piece.unknowns.stop
+            middle = first + len(pinion)
+            np.dot(pinion, loads[first:middle], out=moved[first:middle])
+            np.dot(wheel, loads[middle:end], out=moved[middle:end])
+        out[self.touched] = moved
         return out
 
 
@@ -162,69 +206,65 @@ def rows_of(group: Group, motion: Motion, active: IntArray) -> Rows:
     )
 
 
-def refactor(group: Group, factors: Factors, rows: Rows, wanted: NDArray[np.bool_]) -> None:
-    """Factorise M anew for the positions where `wanted`, shape (B,)."""
-    mine = np.flatnonzero(wanted[rows.at])
-    at, unknowns = rows.at[mine], rows.unknowns[mine]
-    points = rows.points[mine]
+def linearised(group: Group, rows: Rows) -> Linear:
+    """Matrices of the active points, factorised."""
+    at, unknowns, points = rows.at, rows.unknowns, rows.points
     touched = np.zeros(len(group.points), dtype=bool)
     touched[unknowns[:, ::2] // 2] = True
     nodes = np.flatnonzero(touched)
     window = group.node_window[nodes]
-    count = np.bincount(2 * group.position[window] + group.gear[window], minlength=2 * group.size)
-    per_position = count[::2] + count[1::2]
-    first = np.cumsum(per_position) - per_position
+    block = 2 * group.position[window] + group.gear[window]
+    count = np.bincount(block, minlength=2 * group.size)
+    length = 2 * (count[::2] + count[1::2])  # touched unknowns of each position
     column = np.empty(len(touched), dtype=np.int64)
-    column[nodes] = 2 * (np.arange(len(nodes)) - first[group.position[window]])
+    column[nodes] = 2 * np.arange(len(nodes)) - (np.cumsum(length) - length)[group.position[window]]
     active = np.bincount(at, minlength=group.size)
-    row = np.arange(len(mine)) - (np.cumsum(active) - active)[at]
-    length = 2 * per_position
+    row = np.arange(len(at)) - (np.cumsum(active) - active)[at]
     area = active * length
     slot = (np.cumsum(area) - area)[at] + row * length[at]
     slots = slot[:, None] + column[unknowns // 2] + np.tile([0, 1], 6)
     opening, weighted = np.zeros(area.sum()), np.zeros(area.sum())
-    opening[slots] = group.parameter[points][:, None] * rows.opening[mine]
-    weighted[slots] = rows.area[mine][:, None] * rows.normal[mine]
+    opening[slots] = group.parameter[points][:, None] * rows.opening
+    weighted[slots] = rows.area[:, None] * rows.normal
     # unknowns and stress rows within their blocks
-    half = group.first_window[:-1] + np.diff(group.first_window) // 2
-    block_window = np.stack([group.first_window[:-1], half], axis=1).ravel()
-    block_node, block_point = group.first_node[block_window], group.first_point[block_window]
-    block = 2 * group.position[window] + group.gear[window]
-    local = (2 * (nodes - block_node[block]))[:, None] + np.arange(2)
-    local = local.ravel()
-    own_block = 2 * at + group.gear[group.owner[points]]
-    stress_row = points - block_point[own_block]
-    of_block = np.bincount(own_block, minlength=2 * group.size).tolist()
-    counts, actives = (2 * count).tolist(), active.tolist()
-    a0 = c0 = m0 = 0
-    for b in np.flatnonzero(wanted).tolist():
-        a, t = actives[b], counts[2 * b] + counts[2 * b + 1]
-        o, w = opening[m0 : m0 + a * t].reshape(a, t), weighted[m0 : m0 + a * t].reshape(a, t)
-        response = np.empty((a, t))
-        left, top = 0, 0
+    local = ((2 * (nodes - group.first_node[group.block_window[block]]))[:, None] + np.arange(2)).ravel()
+    own = 2 * at + group.gear[group.owner[points]]
+    stress = points - group.first_point[group.block_window[own]]
+    rows_of_block, columns_of_block = np.bincount(own, minlength=2 * group.size).tolist(), (2 * count).tolist()
+    pieces: list[Piece] = []
+    top = left = start = 0
+    for b in np.flatnonzero(active).tolist():
+        a, t = rows_of_block[2 * b] + rows_of_block[2 * b + 1], columns_of_block[2 * b] + columns_of_block[2 * b + 1]
+        part = slice(start, start + a * t)
+        scaled, loads = opening[part].reshape(a, t), weighted[part].reshape(a, t)
+        response, compliance = np.empty((a, t)), []
+        r = c = 0
         for k in (2 * b, 2 * b + 1):
-            right, bottom = left + counts[k], top + of_block[k]
-            used, matrix = local[c0 + left : c0 + right], group.blocks[k].matrix
-            np.matmul(o[:, left:right], matrix[used[:, None], used], out=response[:, left:right])
-            if group.stressed is not None and bottom > top:
-                stress = stress_row[a0 + top : a0 + bottom] + len(group.blocks[k].forces)
-                response[top:bottom, left:right] += matrix[stress[:, None], used]
-            left, top = right, bottom
-        m = response @ w.T
+            matrix, rr, cc = group.blocks[k].matrix, r + rows_of_block[k], c + columns_of_block[k]
+            used = local[left + c : left + cc]
+            compliance.append(matrix[used[:, None], used])
+            np.matmul(scaled[:, c:cc], compliance[-1], out=response[:, c:cc])
+            if group.stressed is not None and rr > r:
+                chosen = stress[top + r : top + rr] + len(group.blocks[k].forces)
+                response[r:rr, c:cc] += matrix[chosen[:, None], used]
+            r, c = rr, cc
+        m = response @ loads.T
         m.flat[:: a + 1] += 1.0
         # the transposed matrix is what LAPACK sees in C order: factorise that, solve transposed, and nothing is copied
-        factors.made[b] = dgetrf(m.T, overwrite_a=1)[:2]
-        a0, c0, m0 = a0 + a, c0 + t, m0 + a * t
+        factor = dgetrf(m.T, overwrite_a=1)[:2]
+        both = (compliance[0], compliance[1])
+        pieces.append(Piece(factor, response, both, slice(top, top + a), slice(left, left + t)))
+        top, left, start = top + a, left + t, start + a * t
+    return Linear(pieces, (2 * nodes[:, None] + np.arange(2)).ravel())
 
 
 @dataclass(frozen=True)
 class Outcomes:
-    """Last states, whether each position converged, shape (B,), its Newton steps, and the factors left over."""
+    """Last states, whether each position converged, shape (B,), and its Newton steps."""
 
     motion: Motion
     converged: NDArray[np.bool_]
     iterations: IntArray
-    factors: Factors
 
 
 def evaluate(group: Group, motion: Motion, start: Array, before: Array, of: IntArray, points: IntArray) -> None:
@@ -267,8 +307,6 @@ def iterate(group: Group, pressure: Array, forces: Array, rigid: Projection, tol
     motion.residual[:] = np.inf
     motion.asked = pressure  # the guess chooses the first active set; afterwards the law does
     limit = 1e3 * np.bincount(group.at, weights=group.weight * pressure, minlength=size)
-    factors = Factors([None] * size, np.zeros(len(pressure), dtype=bool))
-    slow = np.ones(size, dtype=bool)
     live, converged = np.ones(size, dtype=bool), np.zeros(size, dtype=bool)
     iterations = np.zeros(size, dtype=np.int64)
     for iteration in range(1, MAX_ITERATIONS + 2):
@@ -276,7 +314,7 @@ def iterate(group: Group, pressure: Array, forces: Array, rigid: Projection, tol
         rows = rows_of(group, motion, np.flatnonzero(active))
         enough = np.maximum(tolerance, _rounding(group, motion))
         done = live & (motion.residual < enough)
-        done &= _unbalanced(group, motion, rows) < tolerance
+        done &= _unbalanced(group, motion, rows) < 10 * tolerance
         converged |= done
         live &= ~done & (np.bincount(rows.at, minlength=size) > 0)
         if iteration > MAX_ITERATIONS or not live.any():
@@ -284,17 +322,11 @@ def iterate(group: Group, pressure: Array, forces: Array, rigid: Projection, tol
         iterations[live] = iteration
         if not live[rows.at].all():
             rows = rows.take(live[rows.at])
-            active &= live[group.at]
-        stale = live & (slow | (np.bincount(group.at, weights=active != factors.active, minlength=size) > 0))
-        if stale.any():
-            refactor(group, factors, rows, stale)
-            factors.active = np.where(stale[group.at], active, factors.active)
-        aim, slow = _step(group, motion, rows, factors, live)
-        slow &= ~stale
+        aim = _step(group, motion, rows, live)
         total = np.bincount(group.at, weights=group.weight * np.abs(aim.pressure), minlength=size)
         live &= np.isfinite(total) & (total <= limit)
         motion = _searched(group, motion, aim, live, iteration, enough)
-    return Outcomes(motion, converged, iterations, factors)
+    return Outcomes(motion, converged, iterations)
 
 
 def _unbalanced(group: Group, motion: Motion, rows: Rows) -> Array:
@@ -314,95 +346,57 @@ def _rounding(group: Group, motion: Motion) -> Array:
     return np.finfo(float).eps * extent * stiff / np.maximum(load, 1e-300)
 
 
-def _step(
-    group: Group, motion: Motion, rows: Rows, factors: Factors, live: NDArray[np.bool_]
-) -> tuple[Motion, NDArray[np.bool_]]:
-    """Solve the step; the second answer says where the repetitions converged slowly."""
+def _step(group: Group, motion: Motion, rows: Rows, live: NDArray[np.bool_]) -> Motion:
+    """Solution of the contact linearised at the present state."""
     points = rows.points
-    gap = motion.found.gap[points]
-    guess = motion.pressure[points]
-    right = -group.parameter[points] * gap - motion.stress[points] - guess
-    at_rest = np.zeros_like(motion.forces)
-    solved = equilibrium(
-        group, rows, factors, live, gap, -motion.displacement, at_rest, guess, right=right, tolerance=None
-    )
+    before = np.einsum("ij,ij->i", rows.opening, motion.displacement[rows.unknowns])
+    right = -group.parameter[points] * (motion.found.gap[points] - before)
+    solved = equilibrium(group, rows, right, motion.displacement, motion.pressure[points])
     whole = np.zeros(len(motion.pressure))
-    whole[points] = solved.pressure
-    aim = Motion(whole, solved.stress, whole, solved.forces, solved.displacement, motion.found, motion.residual)
-    return aim, solved.repeats > SLOW
-
-
-@dataclass(frozen=True)
-class Equilibrium:
-    """Pressures of the active points, forces, displacements and stresses that belong together, and repetitions."""
-
-    pressure: Array
-    forces: Array
-    displacement: Array
-    stress: Array
-    repeats: IntArray
+    whole[points] = solved[0]
+    displaced, stress = group.respond(solved[1], np.flatnonzero(live).tolist())
+    return Motion(whole, stress, whole, solved[1], displaced, motion.found, motion.residual)
 
 
 def equilibrium(
-    group: Group,
-    rows: Rows,
-    factors: Factors,
-    live: NDArray[np.bool_],
-    gap: Array,
-    carried: Array,
-    fixed: Array,
-    pressure: Array,
-    *,
-    right: Array | None,
-    tolerance: float | None,
-) -> Equilibrium:
-    """Solve f = G^T W p + H(v) + fixed,  v = C f + carried,  p = -gamma (gap + dg/du v) - S f  for the active points.
+    group: Group, rows: Rows, right: Array, origin: Array, guess: Array | None, fixed: Array | None = None
+) -> tuple[Array, Array]:
+    """Pressures p of the active points and forces f, shape (2n,), with
+
+    p = right - R (f - G^T W p) - R G^T W p  for f = G^T W p + H(C f - origin) + fixed.
 
     Parameters
     ----------
-    live : ndarray of bool, shape (B,)
-        Positions that take part.
-    gap, pressure : ndarray, shape (a,)
-        Gaps (m), and the guess of the pressures (Pa).
-    carried, fixed : ndarray, shape (2n,)
+    right : ndarray, shape (a,)
+        Pa.
+    origin, fixed : ndarray, shape (2n,)
         Displacements (m) and forces (N).
-    right
-        What the third equation lacks for the guess, where that is known.
-    tolerance
-        On the last repetition, relative; None: a tenth of the square of the first, as much as a Newton step is worth.
+    guess : ndarray, shape (a,), optional
+        What the pressures were: repeated as often as a step from there is worth, to a tenth of its relative square.
+        Without it, to `EXACT`.
     """
-    points, size = rows.points, len(fixed)
-    gamma = group.parameter[points]
+    size, linear = len(origin), linearised(group, rows)
     node_at = np.repeat(group.position[group.node_window], 2)
-    open_, turned = live.copy(), np.zeros(size)
-    limit = np.full(group.size, tolerance or 0.0)
-    repeats = np.zeros(group.size, dtype=np.int64)
-    for repeat in range(REPEATS):
-        bent = 0.0
-        if repeat or right is None:
-            forces = rows.forces(pressure, size) + turned + fixed
-            displaced, stress = group.respond(forces, np.flatnonzero(open_).tolist())
-            change = displaced + carried
-            right = -gamma * (gap + _dot(rows.opening, change[rows.unknowns])) - stress[points] - pressure
-            now = np.where(open_[node_at], rows.bending(change), turned)
-            bent = np.bincount(node_at, weights=np.abs(now - turned), minlength=group.size)
-            bent = bent / np.bincount(node_at, weights=np.abs(forces), minlength=group.size).clip(1e-300)
-            turned = now
-        correction = factors.solve(right, rows.at, np.flatnonzero(open_))
-        pressure = pressure + correction
-        moved = np.bincount(rows.at, weights=rows.area * np.abs(correction), minlength=group.size)
+    open_, limit = np.ones(group.size, dtype=bool), np.full(group.size, EXACT)
+    still = np.zeros(size) if fixed is None else fixed
+    added = still
+    pressure = linear.solve(right if fixed is None else right - linear.pressures(fixed, len(right)))
+    if guess is not None:
+        moved = np.bincount(rows.at, weights=rows.area * np.abs(pressure - guess), minlength=group.size)
         whole = np.bincount(rows.at, weights=rows.area * np.abs(pressure), minlength=group.size)
-        moved = moved / np.maximum(whole, 1e-300)
-        repeats += open_
-        if repeat == 0:
-            limit = np.clip(0.1 * moved**2, 1e-13, 1e-3) if tolerance is None else limit
-            continue  # how the forces turn is known only from the next
-        open_ &= ~(np.maximum(moved, bent) <= limit)
+        limit = np.clip(0.1 * (moved / np.maximum(whole, 1e-300)) ** 2, 1e-13, 1e-3)
+    for _ in range(REPEATS):
+        forces = rows.forces(pressure, size) + added
+        now = still + rows.bending(linear.displacements(forces) - origin)
+        bent = np.bincount(node_at, weights=np.abs(now - added), minlength=group.size)
+        whole = np.bincount(node_at, weights=np.abs(forces), minlength=group.size)
+        open_ &= bent > limit * whole
         if not open_.any():
             break
-    forces = rows.forces(pressure, size) + turned + fixed
-    displaced, stress = group.respond(forces, np.flatnonzero(live).tolist())
-    return Equilibrium(pressure, forces, displaced, stress, repeats)
+        # positions that are done keep their numbers, whatever their company needs
+        added = np.where(open_[node_at], now, added)
+        pressure = np.where(open_[rows.at], linear.solve(right - linear.pressures(added, len(right))), pressure)
+    return pressure, rows.forces(pressure, size) + added
 
 
 def _searched(
@@ -420,11 +414,9 @@ def _searched(
         tried = aim if trial == 0 else _between(motion, aim, length[group.at], length[node_at])
         evaluate(group, tried, motion.found.place, before, of, points)
         if trial == 0:
-            best = Motion(
-                *(x.copy() for x in (tried.pressure, tried.stress, tried.asked, tried.forces, tried.displacement)),
-                tried.found,
-                tried.residual.copy(),
-            )
+            arrays = (tried.pressure, tried.stress, tried.asked, tried.forces, tried.displacement)
+            p, sigma, asked, f, u = (x.copy() for x in arrays)
+            best = Motion(p, sigma, asked, f, u, tried.found, tried.residual.copy())
         else:
             better = open_ & (tried.residual < best.residual)
             best.accept(tried, better, np.flatnonzero(better[group.at]), np.flatnonzero(better[node_at]))

@@ -11,14 +11,11 @@ from numpy.typing import NDArray
 
 from .closest import Projection
 from .group import Group, ranges
-from .group_newton import Factors, Motion, Outcomes, Rows, equilibrium, refactor, rows_of
+from .group_newton import Motion, Outcomes, Rows, equilibrium, rows_of
 from .scene import MeshingPair, Scene
 
 Array = NDArray[Any]
 IntArray = NDArray[Any]
-
-#: Relative accuracy of the tangent.
-TANGENT_TOLERANCE = 1e-11
 
 
 @dataclass(frozen=True)
@@ -49,12 +46,6 @@ def results_of(pair: MeshingPair, group: Group, outcomes: Outcomes) -> Results:
     """Evaluate the converged positions."""
     motion, good = outcomes.motion, outcomes.converged
     rows = rows_of(group, motion, np.flatnonzero((motion.pressure > 0) & good[group.at]))
-    active = np.zeros(len(motion.pressure), dtype=bool)
-    active[rows.points] = True
-    factors = outcomes.factors
-    other = np.bincount(group.at, weights=active != factors.active, minlength=group.size) > 0
-    if (other & good).any():
-        refactor(group, factors, rows, other & good)
     forces = rows.forces(motion.pressure[rows.points], len(motion.forces))
     placed = group.placed(motion.displacement)
     centre = pair.centre(1)
@@ -66,7 +57,7 @@ def results_of(pair: MeshingPair, group: Group, outcomes: Outcomes) -> Results:
     about = np.bincount(window, weights=-_moment(placed - centre, force), minlength=windows)
     rigid = np.bincount(window, weights=-_moment(group.points - centre, force), minlength=windows)
     pinion = np.bincount(window, weights=-_moment(placed, force), minlength=windows)
-    rate = _force_rates(group, motion, rows, factors, forces, placed - centre, good)
+    rate = _force_rates(group, rows, forces, placed - centre, good)
     peak = np.zeros(group.size)
     np.maximum.at(peak, group.at, motion.pressure)
     wheel = group.gear == 1
@@ -91,15 +82,12 @@ def _moment(arm: Array, force: Array) -> Array:
     return arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]
 
 
-def _force_rates(
-    group: Group, motion: Motion, rows: Rows, factors: Factors, forces: Array, arm: Array, good: NDArray[np.bool_]
-) -> tuple[Array, Array]:
+def _force_rates(group: Group, rows: Rows, forces: Array, arm: Array, good: NDArray[np.bool_]) -> tuple[Array, Array]:
     """d forces / d twist (N/rad), and of each node the rate of its moment about the wheel's centre (N m/rad).
 
     In the axes of the wheel's teeth the wheel's nodes are carried by e_z x (x - c) dphi, and
     df = G^T W dp + H dx - dphi e_z x f,  dx = carried + C df,  dp = -gamma dg - S df.
     """
-    size = len(forces)
     wheel = (group.gear[group.node_window] == 1)[:, None]
     local = np.stack(
         [group.cosine * arm[:, 0] + group.sine * arm[:, 1], -group.sine * arm[:, 0] + group.cosine * arm[:, 1]], axis=1
@@ -107,11 +95,9 @@ def _force_rates(
     force = forces.reshape(-1, 2)
     carried = np.where(wheel, _quarter_turn(local), 0.0).ravel()
     frame = np.where(wheel, _quarter_turn(force), 0.0).ravel()
-    solved = equilibrium(
-        group, rows, factors, good, np.zeros(len(rows.points)), carried, -frame, np.zeros(len(rows.points)),
-        right=None, tolerance=TANGENT_TOLERANCE,
-    )  # fmt: skip
-    rate, moved = solved.forces, solved.displacement.reshape(-1, 2)  # C df = dx - carried
+    opened = np.einsum("ij,ij->i", rows.opening, carried[rows.unknowns])
+    rate = equilibrium(group, rows, -group.parameter[rows.points] * opened, -carried, None, -frame)[1]
+    moved = group.respond(rate, np.flatnonzero(good).tolist())[0].reshape(-1, 2)  # C df = dx - carried
     return rate, _moment(local, rate.reshape(-1, 2)) + _moment(moved, force)
 
 

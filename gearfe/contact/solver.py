@@ -18,9 +18,9 @@ from .group import gather, rigid_projection
 from .group_newton import iterate
 from .group_results import outgrown, results_of, scenes_of
 from .group_start import starting_states
-from .newton import Dialogue, Linearised, Outcome, State, linearise, newton
-from .overlap import Overlap, overlaps, rigidly_apart, windows_of
 from .laws import ContactLaw
+from .newton import Dialogue, Linearised, Outcome, State, linearise, newton
+from .overlap import CLOSE, REACH, WHOLE, Overlap, overlaps, rigidly_apart, windows_of
 from .scene import MeshingPair, Scene, Window, assemble, assemble_all, project_all
 from .start import starting_state
 
@@ -34,6 +34,8 @@ BATCH = 64
 GROUP_BYTES = 60e6
 #: Newton steps spent on one difficult position before it is given up.
 MAX_STEPS = 320
+#: Largest number of repetitions for the tangent; on a smooth flank each gains two to three digits, at a corner one.
+TANGENT_REPEATS = 24
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,7 @@ def _solve_batch(pair: MeshingPair, angles: Array, twists: Array, tolerance: flo
         clear = rigidly_apart(pair, angles[i], twists[i])
         positions[i] = _unsolved("no_contact" if clear else "under_resolved")
     facing = [i for i, overlapping in enumerate(found) if overlapping]
-    if serves(pair.law):
+    if in_lockstep(pair.law):
         facing = _quickly(pair, angles, twists, found, facing, positions, tolerance)
     windows = {i: windows_of(pair, found[i], angles[i], twists[i]) for i in facing}
     for group in _groups([windows[i][-1].nodes.stop for i in facing]):
@@ -142,31 +144,41 @@ def _quickly(
     positions: list[Position | None],
     tolerance: float,
 ) -> list[int]:
-    """Solve the positions `facing` in lockstep on close windows; the answer are those for which that was not enough."""
-    windows = {i: windows_of(pair, found[i], angles[i], twists[i], share=CLOSE_SHARE, margin=CLOSE_MARGIN, whole_tips=False) for i in facing}
-    for group in _groups([windows[i][-1].nodes.stop for i in facing]):
-        places = [facing[k] for k in group]
-        made = solve_group(pair, [windows[i] for i in places], [found[i] for i in places], tolerance)
-        for i, position in zip(places, made, strict=True):
-            positions[i] = position
-    return [i for i in facing if positions[i] is None]
+    """Solve the positions `facing` in lockstep; the answer are those for which that was not enough."""
+    left: list[int] = []
+    waiting = list(facing)
+    for reach in (CLOSE, REACH):
+        windows = {i: windows_of(pair, found[i], angles[i], twists[i], reach) for i in waiting}
+        outgrew: list[int] = []
+        for group in _groups([windows[i][-1].nodes.stop for i in waiting]):
+            places = [waiting[k] for k in group]
+            made = solve_group(pair, [windows[i] for i in places], [found[i] for i in places], tolerance)
+            for i, position in zip(places, made, strict=True):
+                if position.status == "converged":
+                    positions[i] = position
+                else:
+                    (outgrew if position.status == "outgrown" else left).append(i)
+        waiting = outgrew
+    return sorted(left + waiting)
 
 
 def solve_group(
     pair: MeshingPair, windows: Sequence[Sequence[Window]], found: Sequence[list[Overlap]], tolerance: float
-) -> list[Position | None]:
-    """Positions with these windows, solved in lockstep; None where that did not converge or outgrew its windows."""
+) -> list[Position]:
+    """Positions with these windows, solved in lockstep: ``converged``, ``not_converged`` or ``outgrown``."""
     group = gather(pair, windows)
     deepest = np.array([one.deepest[g] for overlapping in found for g in (0, 1) for one in overlapping])
     rigid = rigid_projection(pair, group, deepest)
     outcomes = iterate(group, *starting_states(pair, group, rigid), rigid, tolerance)
-    outcomes = replace(outcomes, converged=outcomes.converged & ~outgrown(group, outcomes.motion))
+    beyond = outgrown(group, outcomes.motion)
+    outcomes = replace(outcomes, converged=outcomes.converged & ~beyond)
     results = results_of(pair, group, outcomes)
     scenes = scenes_of(pair, group, rigid, (results.forces, results.force_rate))
-    made: list[Position | None] = []
+    made: list[Position] = []
     for b, (scene, forces, rate) in enumerate(scenes):
+        steps = int(outcomes.iterations[b])
         if not outcomes.converged[b]:
-            made.append(None)
+            made.append(_unsolved("outgrown" if beyond[b] else "not_converged", steps))
             continue
         first, end = group.first_window[b : b + 2].tolist()
         made.append(
@@ -179,7 +191,7 @@ def solve_group(
                 pair_numbers=tuple(-1 - w.tooth for w in scene.windows[1::2]),
                 pair_torques=results.window_torque[(first + end) // 2 : end],
                 peak_pressure=float(results.peak_pressure[b]),
-                iterations=int(outcomes.iterations[b]),
+                iterations=steps,
                 scene=scene,
                 forces=forces,
                 force_rate=rate,
@@ -188,14 +200,11 @@ def solve_group(
     return made
 
 
-def serves(law: ContactLaw) -> bool:
-    """Whether the lockstep iteration knows the law: p = max(0, -gamma g - s sigma_n), no term in the stress's variation.
+def in_lockstep(law: ContactLaw) -> bool:
+    """Whether the lockstep iteration serves the law: p = max(0, -gamma g - s sigma_n), and no term in the variation of
+    the stress.
     """
-    return getattr(law, "theta", 0) == 0 and not FAST_OFF
-
-
-FAST_OFF = False
-CLOSE_SHARE, CLOSE_MARGIN = 0.36, 1
+    return getattr(law, "theta", 0) == 0
 
 
 def _groups(nodes: Sequence[int]) -> list[list[int]]:
@@ -254,7 +263,7 @@ def _with_care(
     pair: MeshingPair, angle: float, twist: float, found: list[Overlap], steps: int, tolerance: float
 ) -> Position:
     """Second attempt on the whole overlap; where that fails too, the twist is raised in steps, each from the last."""
-    scene = assemble(pair, windows_of(pair, found, angle, twist, share=1.5))
+    scene = assemble(pair, windows_of(pair, found, angle, twist, WHOLE))
     outcome = _alone(scene, _start(pair, scene), tolerance)
     steps += outcome.iterations
     done, step, last = 0.0, 0.25, None
@@ -331,10 +340,12 @@ def _tangent(scene: Scene, lin: Linearised, forces: Array, placed: Array) -> tup
     frame = np.where(wheel, _quarter_turn(force), 0.0).ravel()
     right = lin.response @ frame - lin.parameter * (lin.opening @ carried)
     bend = np.zeros(len(frame))
-    for _ in range(5):
+    for _ in range(TANGENT_REPEATS):
         rate = lin.weighted @ lin.solve(right - lin.response @ bend) + bend
         moved = carried + lin.compliance @ (rate - frame)
-        bend = lin.bending(moved)
+        before, bend = bend, lin.bending(moved)
+        if np.abs(bend - before).sum() <= 1e-12 * np.abs(rate).sum():
+            break
     change = _moment(arm, (rate - frame).reshape(-1, 2)) + _moment((moved - carried).reshape(-1, 2), force)
     spread = np.zeros_like(forces)
     spread[lin.unknowns] = rate - frame
