@@ -112,7 +112,8 @@ def test_scene_forces_and_their_rates_are_those_of_the_position() -> None:
         assert [w.first_node for w in scene.windows] == sorted(w.first_node for w in scene.windows)
         if [(w.first_edge, w.edges) for w in scene.windows] == [(w.first_edge, w.edges) for w in other.scene.windows]:
             change = (other.forces - one.forces) / step
-            assert np.abs(change - one.force_rate).max() < 2e-3 * np.abs(one.force_rate).max()
+            # the linearisation leaves out products of n.a, of the order of the kinks between (coarse) edges
+            assert np.abs(change - one.force_rate).max() < 1e-2 * np.abs(one.force_rate).max()
 
 
 def test_a_window_that_is_too_small_is_noticed() -> None:

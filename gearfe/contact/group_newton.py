@@ -133,6 +133,7 @@ class Piece:
         R = gamma dg/du C + S.
     compliance : tuple of (ndarray, ndarray)
         C of the pinion and of the wheel.
+    position : int
     points, unknowns : slice
         Where its active points and touched unknowns stand among those of all positions.
     """
@@ -140,6 +141,7 @@ class Piece:
     factor: tuple[Array, IntArray]
     response: Array
     compliance: tuple[Array, Array]
+    position: int
     points: slice
     unknowns: slice
 
@@ -150,6 +152,10 @@ class Linear:
 
     pieces: list[Piece]
     touched: IntArray
+
+    def of(self, chosen: NDArray[np.bool_]) -> Linear:
+        """The positions `chosen`, shape (B,); of the others nothing is computed any more."""
+        return Linear([piece for piece in self.pieces if chosen[piece.position]], self.touched)
 
     def solve(self, right: Array) -> Array:
         """M^-1 right, shape (a,)."""
@@ -168,7 +174,7 @@ class Linear:
     def displacements(self, forces: Array) -> Array:
         """C forces, shape (2n,); only the touched unknowns are computed."""
         loads, out = forces[self.touched], np.zeros(len(forces))
-        moved = np.empty_like(loads)
+        moved = np.zeros_like(loads)
         for piece in self.pieces:
             pinion, wheel = piece.compliance
             first, end = piece.unknowns.start, piece.unknowns.stop
@@ -253,7 +259,7 @@ def linearised(group: Group, rows: Rows) -> Linear:
         # the transposed matrix is what LAPACK sees in C order: factorise that, solve transposed, and nothing is copied
         factor = dgetrf(m.T, overwrite_a=1)[:2]
         both = (compliance[0], compliance[1])
-        pieces.append(Piece(factor, response, both, slice(top, top + a), slice(left, left + t)))
+        pieces.append(Piece(factor, response, both, b, slice(top, top + a), slice(left, left + t)))
         top, left, start = top + a, left + t, start + a * t
     return Linear(pieces, (2 * nodes[:, None] + np.arange(2)).ravel())
 
@@ -372,7 +378,7 @@ def equilibrium(
     origin, fixed : ndarray, shape (2n,)
         Displacements (m) and forces (N).
     guess : ndarray, shape (a,), optional
-        What the pressures were: repeated as often as a step from there is worth, to a tenth of its relative square.
+        What the pressures were: repeated as often as a step from there is worth, to a third of its relative square.
         Without it, to `EXACT`.
     """
     size, linear = len(origin), linearised(group, rows)
@@ -384,7 +390,7 @@ def equilibrium(
     if guess is not None:
         moved = np.bincount(rows.at, weights=rows.area * np.abs(pressure - guess), minlength=group.size)
         whole = np.bincount(rows.at, weights=rows.area * np.abs(pressure), minlength=group.size)
-        limit = np.clip(0.1 * (moved / np.maximum(whole, 1e-300)) ** 2, 1e-13, 1e-3)
+        limit = np.clip(0.3 * (moved / np.maximum(whole, 1e-300)) ** 2, 1e-13, 1e-3)
     for _ in range(REPEATS):
         forces = rows.forces(pressure, size) + added
         now = still + rows.bending(linear.displacements(forces) - origin)
@@ -393,6 +399,7 @@ def equilibrium(
         open_ &= bent > limit * whole
         if not open_.any():
             break
+        linear = linear.of(open_)
         # positions that are done keep their numbers, whatever their company needs
         added = np.where(open_[node_at], now, added)
         pressure = np.where(open_[rows.at], linear.solve(right - linear.pressures(added, len(right))), pressure)

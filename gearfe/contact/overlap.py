@@ -138,16 +138,14 @@ def windows_of(
     """Windows about the deepest points of the overlaps."""
     windows: list[Window] = []
     node = 0
+    arcs = [np.concatenate([[0.0], np.cumsum(body.flank.sizes)]) for body in pair.bodies]
     for number, overlap in enumerate(found):
         # a tip that digs in slides along its mate as the teeth bend: nothing is narrowed there
-        whole = reach.whole_tips and any(
-            _near_tip(pair.bodies[gear].flank.sizes, overlap.ranges[gear]) for gear in (0, 1)
-        )
+        whole = reach.whole_tips and any(_near_tip(arcs[gear], overlap.ranges[gear]) for gear in (0, 1))
         kept = max(1.0, reach.share) if whole else reach.share
         for gear, tooth in ((0, overlap.tooth), (1, -1 - overlap.tooth)):
-            flank = pair.bodies[gear].flank
             first, end = _narrowed(
-                flank.sizes, overlap.ranges[gear], overlap.deepest[gear], kept, overlap.depth, reach.margin
+                arcs[gear], overlap.ranges[gear], overlap.deepest[gear], kept, overlap.depth, reach.margin
             )
             placed = pair.tooth_angle(gear, tooth, angle, twist)
             windows.append(Window(gear, number, tooth, first, end - first, node, placed))
@@ -155,21 +153,20 @@ def windows_of(
     return windows
 
 
-def _near_tip(sizes: Array, span: tuple[int, int]) -> bool:
+def _near_tip(arc: Array, span: tuple[int, int]) -> bool:
     """Whether an overlap comes as close to the tip as a fifth of its own length."""
-    return bool(sizes[span[1] :].sum() < 0.2 * sizes[span[0] : span[1]].sum())
+    return bool(arc[-1] - arc[span[1]] < 0.2 * (arc[span[1]] - arc[span[0]]))
 
 
 def _narrowed(
-    sizes: Array, span: tuple[int, int], deepest: int, share: float, depth: float, margin: int
+    arc: Array, span: tuple[int, int], deepest: int, share: float, depth: float, margin: int
 ) -> tuple[int, int]:
     """Range of edges about the deepest one; bending moves the contact along the flank by no more than the overlap."""
     first, end = span
-    arc = np.concatenate([[0.0], np.cumsum(sizes)])
     reach = share * max(arc[end] - arc[deepest], arc[deepest] - arc[first]) + depth
     low = int(np.searchsorted(arc, arc[deepest] - reach)) - 1
     high = int(np.searchsorted(arc, arc[deepest] + reach)) + 1
-    return max(0, low - margin), min(len(sizes), high + margin)
+    return max(0, low - margin), min(len(arc) - 1, high + margin)
 
 
 def rigidly_apart(pair: MeshingPair, angle: float, twist: float, *, samples: int = 24) -> bool:
