@@ -28,6 +28,8 @@ IntArray = NDArray[Any]
 
 #: Newton steps after which a position is left to the solver of single positions: most need four to ten.
 MAX_ITERATIONS = 16
+#: Newton steps after which a position whose residual does not even halve is given up here.
+PATIENCE = 7
 #: Largest number of repetitions for the forces' turning; each gains two to three digits.
 REPEATS = 8
 #: Relative accuracy of the repetitions where there is no step to compare with.
@@ -331,7 +333,10 @@ def iterate(group: Group, pressure: Array, forces: Array, rigid: Projection, tol
         aim = _step(group, motion, rows, live)
         total = np.bincount(group.at, weights=group.weight * np.abs(aim.pressure), minlength=size)
         live &= np.isfinite(total) & (total <= limit)
+        before = motion.residual
         motion = _searched(group, motion, aim, live, iteration, enough)
+        if iteration >= PATIENCE:  # the solver of single positions may do better: do not hold the others up
+            live &= ~(motion.residual > np.maximum(0.5 * before, enough))
     return Outcomes(motion, converged, iterations)
 
 
@@ -391,17 +396,28 @@ def equilibrium(
         moved = np.bincount(rows.at, weights=rows.area * np.abs(pressure - guess), minlength=group.size)
         whole = np.bincount(rows.at, weights=rows.area * np.abs(pressure), minlength=group.size)
         limit = np.clip(0.3 * (moved / np.maximum(whole, 1e-300)) ** 2, 1e-13, 1e-3)
+    past: tuple[Array, Array] | None = None
     for _ in range(REPEATS):
         forces = rows.forces(pressure, size) + added
         now = still + rows.bending(linear.displacements(forces) - origin)
-        bent = np.bincount(node_at, weights=np.abs(now - added), minlength=group.size)
+        gone = now - added
+        bent = np.bincount(node_at, weights=np.abs(gone), minlength=group.size)
         whole = np.bincount(node_at, weights=np.abs(forces), minlength=group.size)
         open_ &= bent > limit * whole
         if not open_.any():
             break
         linear = linear.of(open_)
+        mixed = now
+        if past is not None:
+            # Anderson's mixing with the repetition before: at a corner a single motion decays slowly by itself
+            change = gone - past[1]
+            product = np.bincount(node_at, weights=gone * change, minlength=group.size)
+            square = np.bincount(node_at, weights=change * change, minlength=group.size)
+            share = np.divide(product, square, out=np.zeros(group.size), where=square > 0)
+            mixed = now - np.clip(share, -2.0, 2.0)[node_at] * (now - past[0])
+        past = now, gone
         # positions that are done keep their numbers, whatever their company needs
-        added = np.where(open_[node_at], now, added)
+        added = np.where(open_[node_at], mixed, added)
         pressure = np.where(open_[rows.at], linear.solve(right - linear.pressures(added, len(right))), pressure)
     return pressure, rows.forces(pressure, size) + added
 
