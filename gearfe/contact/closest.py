@@ -138,8 +138,12 @@ def _normal(tangent: Array) -> Array:
 
 def nearest_places(points: Array, chain: Array) -> Array:
     """Starting places on a chain of 2 e + 1 nodes: the nearest node of each point, shape (n,)."""
-    x, y = points[:, 0, None] - chain[:, 0], points[:, 1, None] - chain[:, 1]
-    return 0.5 * np.argmin(x * x + y * y, axis=1).astype(np.float64)
+    nearest = np.empty(len(points))
+    for first in range(0, len(points), 256):  # blocks that stay in the cache
+        part = slice(first, first + 256)
+        x, y = points[part, 0, None] - chain[:, 0], points[part, 1, None] - chain[:, 1]
+        nearest[part] = 0.5 * np.argmin(x * x + y * y, axis=1)
+    return nearest
 
 
 def project(slave: Array, chains: Chains, place: Array, *, iterations: int = 15, tolerance: float = 1e-7) -> Projection:

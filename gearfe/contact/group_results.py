@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from .closest import Projection
 from .group import Group, ranges
-from .group_newton import Motion, Outcomes, Rows, equilibrium, rows_of
+from .group_newton import Motion, Outcomes, equilibrium
+from .group_rows import Rows, rows_of
 from .scene import MeshingPair, Scene
 
 Array = NDArray[Any]
@@ -45,7 +46,7 @@ class Results:
 def results_of(pair: MeshingPair, group: Group, outcomes: Outcomes) -> Results:
     """Evaluate the converged positions."""
     motion, good = outcomes.motion, outcomes.converged
-    rows = rows_of(group, motion, np.flatnonzero((motion.pressure > 0) & good[group.at]))
+    rows = rows_of(group, motion.found, motion.pressure, np.flatnonzero((motion.pressure > 0) & good[group.at]))
     forces = rows.forces(motion.pressure[rows.points], len(motion.forces))
     placed = group.placed(motion.displacement)
     centre = pair.centre(1)
