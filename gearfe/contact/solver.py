@@ -1,7 +1,9 @@
 """Positions of a gear pair in contact: search for the teeth that overlap, Newton's method, torques and tangent.
 
-The positions of a sweep are solved side by side: each keeps its own Newton iteration, their closest-point searches run
-as one array operation.
+Two iterations solve the same equations. Most positions are solved in lockstep, on windows that just hold the contact
+(`gearfe.contact.group_newton`); those that outgrow them once more on larger ones. What does not converge there, or has
+a law that the lockstep does not know, goes to the general iteration (`gearfe.contact.newton`), and where that fails
+too the twist is raised in steps.
 """
 
 from __future__ import annotations
