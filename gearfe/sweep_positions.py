@@ -23,7 +23,7 @@ IntArray = NDArray[Any]
 Progress = Callable[[int, int, str], None]
 
 #: Positions handed to the solver at once: enough to work side by side, few enough to stay small in memory.
-BATCH = 16
+BATCH = 64
 #: Torque mode: the finite-strain share changes with the twist that it moves, by about a hundredth of itself each pass.
 SHARE_PASSES, SHARE_TOLERANCE = 6, 1e-10
 
