@@ -139,7 +139,8 @@ class Scene:
     compliance : ndarray, shape (2n, 2n)
         Displacements of the nodes for forces on them, tooth axes (m/N).
     stress : ndarray, shape (q, 2n)
-        Normal stress at the contact points for forces on the nodes (Pa/N); no rows for laws without stress.
+        Normal stress at the contact points for forces on the nodes (Pa/N), per area of contact: the body's own times
+        thickness/width, as a pressure on the common width spreads over the thickness. No rows for laws without stress.
     slave_nodes, slave_shapes : ndarray, shape (q, 3)
         Nodes and shape functions of each contact point.
     mate : ndarray, shape (q,)
@@ -301,7 +302,8 @@ def _contact_points(pair: MeshingPair, windows: Sequence[Window], slaves: list[i
         q = flank.shapes.shape[0]
         n = w.edges * q
         lengths = flank.weights[own].ravel()
-        gamma = pair.law.parameter(body.material.youngs_modulus, flank.sizes)[own]
+        # seen per area of contact, a gear wider than the common width is stiffer by that ratio, in stress and in gamma
+        gamma = pair.law.parameter(body.material.youngs_modulus * body.thickness / pair.width, flank.sizes)[own]
         made = {
             "slave_nodes": np.repeat(w.first_node + edge_nodes(np.arange(w.edges)), q, axis=0),
             "slave_shapes": np.tile(flank.shapes, (w.edges, 1)),
@@ -353,5 +355,5 @@ def _stress(pair: MeshingPair, windows: Sequence[Window], slaves: list[int], cou
             np.matmul(body.far.stress[own], driven, out=block)
             if loaded is w:
                 block += body.stress_own[own, loaded.flank_unknowns]
-        rows.append(part)
+        rows.append(part * (body.thickness / pair.width))
     return np.concatenate(rows)
