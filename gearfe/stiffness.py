@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .contact.compliance import gear_body
+from .contact.corners import corner_bearings
 from .contact.laws import ContactLaw, law_named
 from .contact.scene import MeshingPair
 from .elasticity import Material, Plane
@@ -96,7 +97,9 @@ def elastic_pair(
             for mesh, material, gear in zip(meshes, both, gears, strict=True)
         ]
     width = min(gear.face_width for gear in gears)
-    return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen)
+    return MeshingPair(
+        bodies[0], bodies[1], pair.working_centre_distance, width, chosen, corners=corner_bearings(pair)
+    )
 
 
 def sweep_stiffness(

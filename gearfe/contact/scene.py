@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from .closest import Projection, chains_of, nearest_places, project
 from .compliance import GearBody
+from .corners import Bearing, shares
 from .flank import edge_nodes
 from .laws import ContactLaw
 
@@ -39,6 +40,8 @@ class MeshingPair:
         Common face width (m).
     law
         Contact law.
+    corners
+        Where the sharp tip corners bear, see `gearfe.contact.corners`.
     """
 
     pinion: GearBody
@@ -46,6 +49,7 @@ class MeshingPair:
     centre_distance: float
     width: float
     law: ContactLaw
+    corners: tuple[Bearing | None, Bearing | None] = (None, None)
 
     @property
     def bodies(self) -> tuple[GearBody, GearBody]:
@@ -292,7 +296,6 @@ def _gathered(pair: MeshingPair, windows: Sequence[Window]) -> dict[str, NDArray
 
 
 def _contact_points(pair: MeshingPair, windows: Sequence[Window], slaves: list[int]) -> dict[str, NDArray]:
-    share = pair.width * (0.5 if pair.law.sides == "both" else 1.0)
     parts: dict[str, list[NDArray]] = {}
     for i in slaves:
         w, mate = windows[i], windows[i ^ 1]  # windows come in couples: pinion's, wheel's
@@ -304,11 +307,12 @@ def _contact_points(pair: MeshingPair, windows: Sequence[Window], slaves: list[i
         lengths = flank.weights[own].ravel()
         # seen per area of contact, a gear wider than the common width is stiffer by that ratio, in stress and in gamma
         gamma = pair.law.parameter(body.material.youngs_modulus * body.thickness / pair.width, flank.sizes)[own]
+        share = shares(pair.corners, windows[i & ~1].angle)[w.gear] if pair.law.sides == "both" else 1.0
         made = {
             "slave_nodes": np.repeat(w.first_node + edge_nodes(np.arange(w.edges)), q, axis=0),
             "slave_shapes": np.tile(flank.shapes, (w.edges, 1)),
             "mate": np.full(n, i ^ 1),
-            "weight": share * lengths,
+            "weight": share * pair.width * lengths,
             "fade": 0.5 * lengths / mate_flank.sizes[mate.first_edge + mate.edges - 1],
             "parameter": np.repeat(gamma, q),
             "owner": np.full(n, i),
