@@ -18,8 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .contact.compliance import gear_body
+from .contact.corners import corner_bearings
 from .contact.laws import ContactLaw, law_named, law_text
 from .contact.scene import MeshingPair
+from .curve_error import COARSENING, error_estimate, solved_twice
 from .elasticity import Material, Plane
 from .errors import InputError
 from .gear import GearPair
@@ -39,9 +41,6 @@ IntArray = NDArray[Any]
 
 #: Structural steel, the material where none is given.
 STEEL = Material()
-
-#: Coarsening, assumed order of convergence and largest number of positions of the error estimate.
-COARSENING, ORDER, ESTIMATE_POSITIONS = 1.6, 1.5, 20
 
 
 def elastic_pair(
@@ -99,7 +98,9 @@ def elastic_pair(
             )
             for number, (mesh, material, gear) in enumerate(zip(meshes, both, gears, strict=True))
         ]
-    return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen)
+    # stress loads of theta = +-1 stand in the gears' stiffness with the same halves at every position
+    corners = corner_bearings(pair) if chosen.theta == 0 else (None, None)
+    return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen, corners=corners)
 
 
 def sweep_stiffness(
@@ -186,7 +187,7 @@ def sweep_stiffness(
             given = (elastic.pinion.material, elastic.wheel.material)
             common = {"plane": elastic.pinion.plane, "law": elastic.law, "points_per_edge": points_per_edge}
             coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
-            error = _estimate(coarse, solved_angles, solved, finite=finite)
+            error = _estimate(coarse, solved_angles, solved, finite=finite, coarsen=coarsen)
     curve = _assemble(pair, asked, solved_angles, source, solved, touching, lost, searched=torque is not None)
     return replace(curve, law=law_text(elastic.law), timings=dict(watch.seconds), error=error)
 
@@ -224,14 +225,11 @@ def _distinct(angles: Array, cycle: float) -> tuple[Array, IntArray]:
     return folded[order][new], source
 
 
-def _estimate(coarse: MeshingPair, angles: Array, solved: Solved, *, finite: bool) -> ErrorEstimate:
-    good = np.flatnonzero(np.array(solved.status) == "converged")
-    chosen = good[np.unique(np.linspace(0, len(good) - 1, min(len(good), ESTIMATE_POSITIONS)).round().astype(int))]
+def _estimate(coarse: MeshingPair, angles: Array, solved: Solved, *, finite: bool, coarsen: float) -> ErrorEstimate:
+    chosen = solved_twice(np.array(solved.status) == "converged")
     again = at_twists(coarse, angles[chosen], solved.twist[chosen], None, finite=finite)
-    fine = solved.numbers["torque_wheel"][chosen]
     other = np.where(np.array(again.status, dtype=object) == "converged", again.numbers["torque_wheel"], np.nan)
-    relative = np.abs(other / fine - 1) / (COARSENING**ORDER - 1)
-    return ErrorEstimate(angles[chosen], relative, COARSENING, ORDER)
+    return error_estimate(angles[chosen], solved.numbers["torque_wheel"][chosen], other, coarsen=coarsen)
 
 
 def _assemble(

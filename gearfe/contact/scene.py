@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from .closest import Projection, chains_of, nearest_places, project, unreached
 from .compliance import GearBody
+from .corners import Bearing, shares
 from .flank import edge_nodes
 from .law_data import check_stress_loads, law_data, slave_windows
 from .laws import ContactLaw
@@ -41,6 +42,8 @@ class MeshingPair:
         Common face width (m).
     law
         Contact law.
+    corners
+        Where the sharp tip corners bear, see `gearfe.contact.corners`.
     """
 
     pinion: GearBody
@@ -48,6 +51,7 @@ class MeshingPair:
     centre_distance: float
     width: float
     law: ContactLaw
+    corners: tuple[Bearing | None, Bearing | None] = (None, None)
 
     def __post_init__(self) -> None:
         check_stress_loads(self.bodies, self.law, self.width)
@@ -144,7 +148,8 @@ class Scene:
     compliance : ndarray, shape (2n, 2n)
         Displacements of the nodes for forces on them, tooth axes (m/N).
     stress : ndarray, shape (q, 2n)
-        Normal stress at the contact points for forces on the nodes (Pa/N); no rows for laws without stress.
+        Normal stress at the contact points for forces on the nodes (Pa/N), per area of contact: the body's own times
+        thickness/width, as a pressure on the common width spreads over the thickness. No rows for laws without stress.
     slave_nodes, slave_shapes : ndarray, shape (q, 3)
         Nodes and shape functions of each contact point.
     mate : ndarray, shape (q,)
@@ -309,7 +314,6 @@ def _gathered(pair: MeshingPair, windows: Sequence[Window]) -> dict[str, Any]:
 
 
 def _contact_points(pair: MeshingPair, windows: Sequence[Window], slaves: list[int]) -> dict[str, NDArray]:
-    share = pair.width * (0.5 if pair.law.sides == "both" else 1.0)
     parts: dict[str, list[NDArray]] = {}
     for i in slaves:
         w, mate = windows[i], windows[i ^ 1]  # windows come in couples: pinion's, wheel's
@@ -319,12 +323,14 @@ def _contact_points(pair: MeshingPair, windows: Sequence[Window], slaves: list[i
         q = flank.shapes.shape[0]
         n = w.edges * q
         lengths = flank.weights[own].ravel()
-        gamma = pair.law.parameter(body.material.youngs_modulus, flank.sizes)[own]
+        # seen per area of contact, a gear wider than the common width is stiffer by that ratio, in stress and in gamma
+        gamma = pair.law.parameter(body.material.youngs_modulus * body.thickness / pair.width, flank.sizes)[own]
+        share = shares(pair.corners, windows[i & ~1].angle)[w.gear] if pair.law.sides == "both" else 1.0
         made = {
             "slave_nodes": np.repeat(w.first_node + edge_nodes(np.arange(w.edges)), q, axis=0),
             "slave_shapes": np.tile(flank.shapes, (w.edges, 1)),
             "mate": np.full(n, i ^ 1),
-            "weight": share * lengths,
+            "weight": share * pair.width * lengths,
             "fade": 0.5 * lengths / mate_flank.sizes[mate.first_edge + mate.edges - 1],
             "parameter": np.repeat(gamma, q),
             "owner": np.full(n, i),
@@ -371,5 +377,5 @@ def _stress(pair: MeshingPair, windows: Sequence[Window], slaves: list[int], cou
             np.matmul(body.far.stress[own], driven, out=block)
             if loaded is w:
                 block += body.stress_own[own, loaded.flank_unknowns]
-        rows.append(part)
+        rows.append(part * (body.thickness / pair.width))
     return np.concatenate(rows)
