@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .closest import Chains, Projection, chains_of, project
+from .corners import shares
 from .scene import MeshingPair, Window
 
 Array = NDArray[Any]
@@ -174,7 +175,11 @@ def gather(pair: MeshingPair, positions: Sequence[Sequence[Window]]) -> Group:
     first_edge, counts = np.array([w.first_edge for w in flat]), np.array([w.edges for w in flat])
     flanks = [body.flank for body in pair.bodies]
     made = _geometry(pair, flat, gear, first_edge, counts)
-    made |= _contact_points(pair, gear, position, first_edge, counts, mate, made["first_node"])
+    bearing = [
+        shares(pair.corners, flat[i if g == 0 else m].angle)[g] for i, g, m in zip(index, gear, mate, strict=True)
+    ]
+    share = np.array(bearing) if pair.law.sides == "both" else np.ones(len(flat))
+    made |= _contact_points(pair, gear, position, first_edge, counts, mate, made["first_node"], share)
     first_node, _first_point = made["first_node"], made["first_point"]
     operators = [_operator(pair, gear, windows[gear::2]) for windows in positions for gear in (0, 1)]
     edges_of = np.array([flank.edges for flank in flanks])[gear]
@@ -239,6 +244,7 @@ def _contact_points(
     counts: IntArray,
     mate: IntArray,
     first_node: IntArray,
+    share: Array,
 ) -> dict[str, Any]:
     law, flanks = pair.law, [body.flank for body in pair.bodies]
     quadrature = np.array([flank.shapes.shape[0] for flank in flanks])
@@ -252,7 +258,7 @@ def _contact_points(
     number = start[gear[owner]] + quadrature[gear[owner]] * first_edge[owner] + within
     lengths = np.concatenate([f.weights.ravel() for f in flanks])[number]
     gammas = [
-        np.repeat(law.parameter(body.material.youngs_modulus, f.sizes), n)
+        np.repeat(law.parameter(body.surface_modulus, f.sizes), n)
         for body, f, n in zip(pair.bodies, flanks, quadrature, strict=True)
     ]
     sizes, last = np.concatenate([f.sizes for f in flanks]), first_edge + counts - 1
@@ -266,7 +272,7 @@ def _contact_points(
         "facing": facing,
         "slave_nodes": (first_node[owner] + 2 * edge)[:, None] + np.arange(3),
         "slave_shapes": shapes[np.array([0, quadrature[0]])[gear[owner]] + within % quadrature[gear[owner]]],
-        "weight": pair.width * (0.5 if law.sides == "both" else 1.0) * lengths,
+        "weight": pair.width * share[owner] * lengths,
         "fade": 0.5 * lengths / last_size[facing],
         "parameter": np.concatenate(gammas)[number],
     }

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from .closest import Projection, chains_of, nearest_places, project, unreached
 from .compliance import GearBody
 from .corners import Bearing, shares
@@ -55,6 +56,10 @@ class MeshingPair:
 
     def __post_init__(self) -> None:
         check_stress_loads(self.bodies, self.law, self.width)
+        widths = [body.width for body in self.bodies]
+        if self.law.uses_stress and widths != [self.width, self.width]:
+            problem = f"the gears' surface stresses are made for contacts {widths} m wide"
+            raise InputError("width", self.width, problem, "make the gears with it: gear_body(..., width=...)")
 
     @property
     def bodies(self) -> tuple[GearBody, GearBody]:
@@ -148,8 +153,7 @@ class Scene:
     compliance : ndarray, shape (2n, 2n)
         Displacements of the nodes for forces on them, tooth axes (m/N).
     stress : ndarray, shape (q, 2n)
-        Normal stress at the contact points for forces on the nodes (Pa/N), per area of contact: the body's own times
-        thickness/width, as a pressure on the common width spreads over the thickness. No rows for laws without stress.
+        Normal stress at the contact points for forces on the nodes (Pa/N); no rows for laws without stress.
     slave_nodes, slave_shapes : ndarray, shape (q, 3)
         Nodes and shape functions of each contact point.
     mate : ndarray, shape (q,)
@@ -323,8 +327,7 @@ def _contact_points(pair: MeshingPair, windows: Sequence[Window], slaves: list[i
         q = flank.shapes.shape[0]
         n = w.edges * q
         lengths = flank.weights[own].ravel()
-        # seen per area of contact, a gear wider than the common width is stiffer by that ratio, in stress and in gamma
-        gamma = pair.law.parameter(body.material.youngs_modulus * body.thickness / pair.width, flank.sizes)[own]
+        gamma = pair.law.parameter(body.surface_modulus, flank.sizes)[own]
         share = shares(pair.corners, windows[i & ~1].angle)[w.gear] if pair.law.sides == "both" else 1.0
         made = {
             "slave_nodes": np.repeat(w.first_node + edge_nodes(np.arange(w.edges)), q, axis=0),
@@ -377,5 +380,5 @@ def _stress(pair: MeshingPair, windows: Sequence[Window], slaves: list[int], cou
             np.matmul(body.far.stress[own], driven, out=block)
             if loaded is w:
                 block += body.stress_own[own, loaded.flank_unknowns]
-        rows.append(part * (body.thickness / pair.width))
+        rows.append(part)
     return np.concatenate(rows)
