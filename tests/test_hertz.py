@@ -159,10 +159,10 @@ def scaled_penalty(n: int) -> Penalty:
 
 @pytest.mark.parametrize("law", [Nitsche(), None, Exact()], ids=["nitsche", "penalty", "exact"])
 def test_rates_under_refinement(law: ContactLaw | None) -> None:
-    _check_rates(law, (1, 2, 3))
+    _check_rates(law, (1, 2))
 
 
-FINER = [Nitsche(), Nitsche(sides="pinion"), Nitsche(theta=-1), Nitsche(20.0, theta=1), None]
+FINER = [Nitsche(), Exact(), Nitsche(sides="pinion"), Nitsche(theta=-1), Nitsche(20.0, theta=1), None]
 
 
 @pytest.mark.slow
@@ -183,6 +183,6 @@ def _check_rates(law: ContactLaw | None, levels: tuple[int, ...]) -> None:
 
 
 def test_plain_points_do_not_reach_these_rates() -> None:
-    errors = [hertz_error(n, Nitsche(), "points") for n in (1, 3)]
-    assert np.log2(errors[0].energy / errors[1].energy) / np.log2(3) < 1.3
+    errors = [hertz_error(n, Nitsche(), "points") for n in (1, 2)]
+    assert np.log2(errors[0].energy / errors[1].energy) < 1.3
     assert errors[1].peak > 0.02
