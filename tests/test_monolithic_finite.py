@@ -85,7 +85,7 @@ def test_cheap_form_at_a_small_twist(angle_deg: float) -> None:
 
 @pytest.mark.slow
 def test_what_the_cheap_form_leaves_out_is_of_second_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Twice the twist, four times the remainder; with all sectors taken along, as few of them cost first-order terms."""
+    """Twice the twist, four times the remainder (all sectors taken along: few of them miss first-order parts)."""
     monkeypatch.setattr(finite_strain, "NEIGHBOURS", 15)
     at_half, at_full = (both_routes(4.0, twist) for twist in (0.25, 0.5))
     ratio = (at_full[1] - at_full[0]) / (at_half[1] - at_half[0])
