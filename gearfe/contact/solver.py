@@ -57,6 +57,8 @@ class Position:
     scene, forces, force_rate
         Pieces of flank (without their matrices), the nodal forces on them in tooth axes (N) and their derivatives with
         respect to the twist (N/rad), for recovering fields; None without a solution.
+    route
+        ``direct``: solved on the mesh; ``hertz`` or ``blend``: see `gearfe.routes`.
     """
 
     status: str
@@ -71,6 +73,7 @@ class Position:
     scene: Scene | None = None
     forces: Array | None = None
     force_rate: Array | None = None
+    route: str = "direct"
 
 
 def solve_position(pair: MeshingPair, pinion_angle: float, twist: float, *, tolerance: float = TOLERANCE) -> Position:
