@@ -33,14 +33,16 @@ def local_contact(pair: GearPair, elastic: MeshingPair, flanks: Flanks, touching
     known = inside & np.isfinite(gap)
     known[PLACES], gap[PLACES] = True, 0.0
     edges, smooth = [], math.inf
-    for g, (face, body) in enumerate(zip(flanks.faces, elastic.bodies, strict=True)):
+    # a plane body of its own face width w_i carries the load of the common width: it counts with w/w_i
+    shares = [b.material.contact_compliance(b.plane) * elastic.width / b.thickness for b in elastic.bodies]
+    for g, face in enumerate(flanks.faces):
         for mark in face.marks():
             distance = (1.0 if g == 0 else -1.0) * face.distance(float(place[g]), mark)
             smooth = min(smooth, abs(distance))
             if mark == face.end and face.sharp:
                 factor = wedge_factor(face.tip_angle()) - 2 / math.pi
-                edges.append(Edge(distance, factor * body.material.contact_compliance(body.plane)))
-    modulus = 1 / sum(b.material.contact_compliance(b.plane) for b in elastic.bodies)
+                edges.append(Edge(distance, factor * shares[g]))
+    modulus = 1 / sum(shares)
     x, gap = x[known], np.maximum(gap[known], 0.0)
     return LocalContact(modulus, _radius(x, gap, CURVED * module), x, gap, tuple(edges), smooth)
 

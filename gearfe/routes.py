@@ -87,7 +87,7 @@ class Router:
             solved = dict(zip(direct.tolist(), meshed, strict=True))
         made = []
         for i, (angle, twist) in enumerate(zip(angles, twists, strict=True)):
-            one = self._joined(float(angle), float(twist), solved.get(i), found[i], share[i], slope[i])
+            one = self._joined(float(angle), float(twist), solved.get(i), found[i], share[i], slope[i], fields=i in kept)
             made.append(one if i in kept else _bare(one))
         return made
 
@@ -158,14 +158,16 @@ class Router:
         found: Balance | None,
         share: float,
         slope: float,
+        *,
+        fields: bool,
     ) -> Position:
         if found is None:
             assert direct is not None
             return direct
         reference = self.reference(angle, twist)
-        hertz = with_forces(position_of(reference, found), reference, self.elastic, found, twist)
+        hertz = position_of(reference, found)
         if direct is None or (direct.status != "converged" and hertz.status == "converged" and share < 1.0):
-            return hertz
+            return with_forces(hertz, reference, self.elastic, found, twist) if fields else hertz
         if hertz.status != "converged" or share >= 1.0 or direct.status != "converged":
             return direct
         return blended(direct, hertz, share, slope)

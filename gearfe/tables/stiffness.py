@@ -35,6 +35,12 @@ class StiffnessTable:
         doc="small (small strain) or finite (with the first-order effect of finite strain on the torque)",
         choices=("small", "finite"),
     )
+    route: str = quantity(
+        "auto",
+        doc="how positions are solved: auto (on the mesh, or by the law of small loads where a contact is narrower than "
+        "its elements), direct (on the mesh) or hertz (law of small loads)",
+        choices=("auto", "direct", "hertz"),
+    )
     nitsche_gamma0: float = quantity(
         1.0, doc="parameter of the law nitsche, gamma h/E (-); 1 is the most accurate", low=1e-3, high=1e6
     )
