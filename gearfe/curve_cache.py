@@ -31,6 +31,7 @@ MODULES = (
     "local_gap",
     "mesh_geometry",
     "routes",
+    "small_balance",
     "small_load",
     "spur_gear",
     "stiffness",

@@ -1,8 +1,10 @@
 r"""Which way a position is solved: on the mesh, or by the law of small loads where the mesh cannot see the contact.
 
-The half width b of the most loaded contact, as `gearfe.small_load` predicts it, against the largest element h of the two
-flanks decides: the mesh alone from b/h = `RESOLVED[1]` on, the small-load law alone below `RESOLVED[0]`, and between them
-their mean with weights that change smoothly with b/h, so that the torque is a smooth function of the twist:
+The half width b of the most loaded contact, as `gearfe.small_load` predicts it, decides. The mesh errs by a power of
+h/b, with the largest element h of the two flanks; what the small-load law leaves out grows with the load, so with the
+square of b over the module m. Both are equal at a b that grows with :math:`s = \sqrt{h\,h_0}`, where :math:`h_0` is
+the default element, 0.028 m: the mesh alone from b = `RESOLVED[1]` s on, the small-load law alone below `RESOLVED[0]`
+s, and between them their mean with weights that change smoothly, so that the torque is a smooth function of the twist:
 
 .. math:: T = s\,T_\mathrm{direct} + (1-s)\,T_\mathrm{hertz}, \qquad
           T' = s\,T_\mathrm{direct}' + (1-s)\,T_\mathrm{hertz}' + s'\,(T_\mathrm{direct} - T_\mathrm{hertz}) .
@@ -19,17 +21,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .contact.compliance import GearBody
+from .contact.elliptic import Chain
 from .contact.scene import MeshingPair
 from .contact.solver import Position, solve_positions
 from .errors import InputError
 from .gear import GearPair
-from .small_load import Balance, Reference, balance, position_of, references, with_forces
+from .small_balance import Balance, balance, position_of, with_forces
+from .small_load import Reference, references
 from .touching import Flanks, Touching
 
 Array = NDArray[Any]
 Route = Literal["auto", "direct", "hertz"]
 
-#: Half widths of the contact, in elements of the flank, between which the two routes are blended.
+#: Default element of the flank (modules), at which the two routes' errors were weighed.
+DEFAULT_ELEMENT = 0.028
+#: Half widths of the contact, in units of the length s, between which the two routes are blended.
 RESOLVED = (1.2, 1.8)
 #: Compliance of a tooth pair times E* w beyond which none is: with it a light load is told without a reference.
 SOFTEST = 40.0
@@ -55,7 +61,9 @@ class Router:
             raise InputError("route", route, "must be auto, direct or hertz", "auto chooses by the contact's width")
         self.pair, self.elastic, self.route = pair, elastic, route
         self.flanks = Flanks(pair)
-        self.element = max(_largest(b, f.radii[0]) for b, f in zip(elastic.bodies, self.flanks.faces, strict=True))
+        largest = max(_largest(b, f.radii[0]) for b, f in zip(elastic.bodies, self.flanks.faces, strict=True))
+        self.length = math.sqrt(largest * DEFAULT_ELEMENT * pair.pinion.module)
+        self._chains = [Chain(body) for body in elastic.bodies]
         self._references: dict[float, tuple[float, Reference]] = {}
         self._touching: dict[float, Touching] = {}
 
@@ -71,24 +79,27 @@ class Router:
         if self.route == "direct":
             made = solve_positions(self.elastic, angles, twists)
             return [p if i in kept else _bare(p) for i, p in enumerate(made)]
+        self._touched(angles)  # all angles in one go
         small = self.light(angles, twists)
         found: list[Balance | None] = [None] * len(angles)
         share, slope = np.ones(len(angles)), np.zeros(len(angles))
         for i in np.flatnonzero(small):
-            reference = self.reference(float(angles[i]), float(twists[i]))
-            found[i] = balance(reference, float(twists[i]))
-            share[i], slope[i] = self._share(reference, found[i])
+            one = balance(self.reference(float(angles[i]), float(twists[i])), float(twists[i]))
+            found[i] = one
+            share[i], slope[i] = self._share(one)
         if self.route == "hertz":
             share[:], slope[:] = 0.0, 0.0
-        direct = np.flatnonzero(share > 0)
+        direct = np.flatnonzero(share > 0).tolist()
         solved: dict[int, Position] = {}
         if len(direct):
             meshed = solve_positions(self.elastic, np.asarray(angles)[direct], twists[direct])
-            solved = dict(zip(direct.tolist(), meshed, strict=True))
+            solved = dict(zip(direct, meshed, strict=True))
         made = []
-        for i, (angle, twist) in enumerate(zip(angles, twists, strict=True)):
-            one = self._joined(float(angle), float(twist), solved.get(i), found[i], share[i], slope[i], fields=i in kept)
-            made.append(one if i in kept else _bare(one))
+        for n, (angle, twist) in enumerate(zip(angles, twists, strict=True)):
+            joined = self._joined(
+                float(angle), float(twist), solved.get(n), found[n], share[n], slope[n], fields=n in kept
+            )
+            made.append(joined if n in kept else _bare(joined))
         return made
 
     def light(self, angles: Array, twists: Array) -> NDArray[np.bool_]:
@@ -103,12 +114,14 @@ class Router:
                 continue
             first = int(np.argmin(touching.twist))
             overlap = touching.arm[first, 1] * (twist - touching.twist[first])
-            curved = sum(f.curvature(float(touching.place[first, g]), math.inf) for g, f in enumerate(self.flanks.faces))
+            curved = sum(
+                f.curvature(float(touching.place[first, g]), math.inf) for g, f in enumerate(self.flanks.faces)
+            )
             if not (overlap > 0 and math.isfinite(curved) and curved > 0):
                 continue
             # another pair may take load off this one; it can at most halve it while both are on the path
             width = math.sqrt(4 * 0.5 * overlap / SOFTEST / (math.pi * curved))
-            made[i] = width < RESOLVED[1] * self.element
+            made[i] = width < RESOLVED[1] * self.length
         return made
 
     def reference(self, angle: float, twist: float) -> Reference:
@@ -119,7 +132,7 @@ class Router:
             touching = self._touching[angle]
             reach = SPARE * abs(twist) + 1e-6
             mine = touching.take(np.flatnonzero(touching.twist < reach))
-            known = reach, references(self.pair, self.elastic, self.flanks, [mine], [angle])[0]
+            known = reach, references(self.pair, self.elastic, self.flanks, [mine], [angle], chains=self._chains)[0]
             self._references[angle] = known
         return known[1]
 
@@ -137,14 +150,14 @@ class Router:
                 self._touching[float(angle)] = found.take(mine[np.argsort(found.twist[mine], kind="stable")])
         return self._touching
 
-    def _share(self, reference: Reference, found: Balance) -> tuple[float, float]:
+    def _share(self, found: Balance) -> tuple[float, float]:
         """Share s of the mesh in the result and ds/dtwist (1/rad)."""
         if not found.converged or not (found.force > 0).any():
             return (0.0, 0.0) if found.converged else (1.0, 0.0)
         k = int(np.argmax(found.force))
         contact = found.contacts[k]
         assert contact is not None
-        b = contact.width / self.element
+        b = contact.width / self.length
         low, high = RESOLVED
         x = min(1.0, max(0.0, (b - low) / (high - low)))
         rate = 0.5 * b * found.rate[k] / found.force[k] / (high - low)  # b ~ sqrt F

@@ -127,8 +127,8 @@ class StiffnessCurve:
     status
         ``converged``, ``no_contact`` (the teeth do not reach each other, torques are zero), or what went wrong.
     route
-        ``direct``: solved on the mesh; ``hertz``: by the law of small loads, where the contact is narrower than the mesh
-        sees; ``blend``: the mean of both in between (`gearfe.routes`); empty where unknown.
+        ``direct``: solved on the mesh; ``hertz``: by the law of small loads, where the contact is narrower than the
+        mesh sees; ``blend``: the mean of both in between (`gearfe.routes`); empty where unknown.
     mesh_cycle
         Pinion angle after which everything repeats, 2 pi/z1 (rad).
     base_radius

@@ -98,9 +98,7 @@ def at_torque(
     return _collect(found.twist, found.positions, found.iterations, found.status)
 
 
-def _with_shares(
-    router: Router, angles: Array, goal: Array, touching: Array, found: TorqueSolution
-) -> TorqueSolution:
+def _with_shares(router: Router, angles: Array, goal: Array, touching: Array, found: TorqueSolution) -> TorqueSolution:
     """Move the twists until torque and finite-strain share at the same twist make the goal."""
     elastic = router.elastic
     sampled = sample_numbers(angles, elastic.pitch_angle)

@@ -1,8 +1,8 @@
 r"""Where and when do the rigid driving flanks of each tooth pair first touch? Exact curves, to rounding.
 
-About the wheel's centre every point of the wheel's flank moves on a circle. With the polar angles of the pinion's flank,
-seen from there, :math:`\varphi_1(u)` at its parameter u, and of the wheel's flank at the same radius and zero twist,
-:math:`\varphi_2(r(u))`, that point of the pinion's flank is met at the twist
+About the wheel's centre every point of the wheel's flank moves on a circle. With the polar angles of the pinion's
+flank, seen from there, :math:`\varphi_1(u)` at its parameter u, and of the wheel's flank at the same radius and zero
+twist, :math:`\varphi_2(r(u))`, that point of the pinion's flank is met at the twist
 
 .. math:: D(u) = \varphi_1(u) - \varphi_2(r(u)),
 

@@ -28,8 +28,8 @@ class Loads:
     edges
         First edge and number of edges.
     probes : ndarray, shape (3, u)
-        Nodal forces (-); then what gives, of nodal displacements, the rotation (1/m) of the face and its slide (-), both
-        as seen along the pinion's flank.
+        Nodal forces (-); then what gives, of nodal displacements, the rotation (1/m) of the face and its slide (-),
+        both as seen along the pinion's flank.
     """
 
     unknowns: slice
@@ -87,9 +87,7 @@ class Chain:
         edges = np.arange(first, last + 1)
         middle, a = 0.5 * (low + high), 0.5 * (high - low)
         # with s = middle - a cos t the pressure is smooth in t
-        t0, t1 = (
-            np.arccos(np.clip((middle - s) / a, -1.0, 1.0)) for s in (self.ends[edges], self.ends[edges + 1])
-        )
+        t0, t1 = (np.arccos(np.clip((middle - s) / a, -1.0, 1.0)) for s in (self.ends[edges], self.ends[edges + 1]))
         t = 0.5 * (t0 + t1)[:, None] + 0.5 * (t1 - t0)[:, None] * _GAUSS_X
         off = -a * np.cos(t)
         weight = 0.5 * (t1 - t0)[:, None] * _GAUSS_W * np.sin(t) ** 2 * (2.0 / math.pi)
@@ -98,8 +96,10 @@ class Chain:
         # the mean square of the offset under the ellipse is a^2/4
         both = np.stack([weight, -sign * weight * off * 4.0 / a**2])
         nodal = np.zeros((2, 2 * len(edges) + 1))
-        slots = 2 * np.arange(len(edges))[:, None] + np.arange(3)
-        np.add.at(nodal, (slice(None), slots), np.einsum("peq,eqa->pea", both, shapes))
+        parts = np.einsum("peq,eqa->pea", both, shapes)
+        nodal[:, :-1:2] += parts[:, :, 0]
+        nodal[:, 1::2] += parts[:, :, 1]
+        nodal[:, 2::2] += parts[:, :, 2]
         n, tangent = np.array([normal.real, normal.imag]), np.array([normal.imag, -normal.real])
         probes = np.stack([np.outer(nodal[0], sign * n), np.outer(nodal[1], n), np.outer(nodal[0], tangent)])
         return Loads(slice(4 * first, 4 * (last + 1) + 2), (first, len(edges)), probes.reshape(3, -1))

@@ -19,8 +19,8 @@ line load has the two limits of a wedge: :math:`-\frac{2P}{\pi E'}\ln|x-s|` near
 
 .. math:: A = \frac{\cos^2\beta}{\alpha+\tfrac12\sin 2\alpha} + \frac{\sin^2\beta}{\alpha-\tfrac12\sin 2\alpha}
 
-for the half angle :math:`\alpha` of the wedge and the angle :math:`\beta = \pi/2-\alpha` between its middle and the load
-(Timoshenko & Goodier, *Theory of Elasticity*, art. 38). Between them the face is taken to move by
+for the half angle :math:`\alpha` of the wedge and the angle :math:`\beta = \pi/2-\alpha` between its middle and the
+load (Timoshenko & Goodier, *Theory of Elasticity*, art. 38). Between them the face is taken to move by
 :math:`-\frac{P}{E'}[\frac2\pi\ln|x-s| + (A-\frac2\pi)\ln(x+s)]`, symmetric as it must be (Betti).
 """
 
@@ -159,7 +159,7 @@ class LocalContact:
             lam = load * (self.unit * (0.5 - math.log(0.5 * b)) - rigid)
             rate = self.unit * -math.log(0.5 * b) - rigid
             return Approach(lam, rate, 0.0, 0.0, b, 2.0 * load / (math.pi * b), True)
-        return self._numerical(load, b)
+        return self._numerical(load)
 
     def gap_at(self, x: Array) -> Array:
         """Gap (m) at places x, a power law between the known ones."""
@@ -172,7 +172,7 @@ class LocalContact:
                 made[asked] = np.exp(np.interp(at[asked], logs[known][order], values[known][order]))
         return made
 
-    def _numerical(self, load: float, b: float) -> Approach:
+    def _numerical(self, load: float) -> Approach:
         """Constant pressures on panels, refitted to the contact until it fills them."""
         height = OUTSIDE * load / self.modulus
         inside = np.flatnonzero(self.gap <= height)

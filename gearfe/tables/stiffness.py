@@ -37,8 +37,8 @@ class StiffnessTable:
     )
     route: str = quantity(
         "auto",
-        doc="how positions are solved: auto (on the mesh, or by the law of small loads where a contact is narrower than "
-        "its elements), direct (on the mesh) or hertz (law of small loads)",
+        doc="how positions are solved: auto (on the mesh, or by the law of small loads where a contact is narrower "
+        "than its elements), direct (on the mesh) or hertz (law of small loads)",
         choices=("auto", "direct", "hertz"),
     )
     nitsche_gamma0: float = quantity(
