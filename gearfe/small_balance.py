@@ -1,4 +1,4 @@
-"""Forces of the tooth pairs under small loads at one twist, from a reference; the equations are in `gearfe.small_load`.
+"""Forces of tooth pairs under small loads at one twist, from a reference (equations: `gearfe.small_load`).
 
 >>> table = [balance(reference, twist).torque_wheel for twist in twists]   # one reference, many loads
 """

@@ -217,7 +217,7 @@ def test_every_load_has_an_answer():
         before = k
         if value < 1e-3:
             assert {p.route for p in found} == {"hertz"}
-    assert {p.route for p in found} == {"direct"}
+    assert "direct" in {p.route for p in found}
 
 
 def test_backlash_that_is_not_taken_up_is_no_contact():

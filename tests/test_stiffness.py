@@ -280,10 +280,13 @@ def test_a_torque_beyond_reach_is_flagged(gears, elastic, monkeypatch):
 @pytest.mark.parametrize("torque", [5.0, 800.0])
 def test_torque_mode_with_finite_strain(gears, elastic, torque):
     angles = np.radians(np.arange(0.0, 18.0, 1.0))
-    small, finite = (at(gears, angles, elastic, twist=None, torque=torque, kinematics=k) for k in ("small", "finite"))
+    # 5 N m lie below what this mesh resolves
+    small, finite = (
+        at(gears, angles, elastic, twist=None, torque=torque, kinematics=k, route="auto") for k in ("small", "finite")
+    )
     np.testing.assert_allclose(finite.torque_wheel, torque, rtol=1e-9)
     np.testing.assert_allclose(finite.torque_pinion / finite.torque_wheel, small.torque_pinion / torque, rtol=1e-3)
-    given = at(gears, angles[5:6], elastic, twist=float(finite.twist[5]), kinematics="finite")
+    given = at(gears, angles[5:6], elastic, twist=float(finite.twist[5]), kinematics="finite", route="auto")
     assert given.torque_wheel[0] == pytest.approx(torque, rel=1e-4)
     # it softens the teeth, more so under load
     assert (finite.twist > small.twist).all()
