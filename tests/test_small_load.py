@@ -1,4 +1,4 @@
-"""Loads below what the mesh resolves: contact laws against Johnson's book, the route against theory and finer meshes."""
+"""Loads below what the mesh resolves: contact laws against Johnson, the route against theory and finer meshes."""
 
 from __future__ import annotations
 
