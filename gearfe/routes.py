@@ -193,7 +193,7 @@ def _largest(body: GearBody, start: float) -> float:
 
 
 def _bare(position: Position) -> Position:
-    return replace(position, scene=None, forces=None, force_rate=None)
+    return replace(position, scene=None, forces=None, force_rate=None, stress_loads=None, stress_load_rate=None)
 
 
 def blended(direct: Position, hertz: Position, share: float, slope: float) -> Position:

@@ -70,6 +70,7 @@ def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, floa
             "pinion_angle_deg": np.degrees(error.pinion_angle),
             "relative": error.relative,
         },
+        "contact_law": curve.law,
         "statuses": dict(Counter(map(str, curve.status))),
         "routes": dict(Counter(map(str, curve.route))),
         "failed_pinion_angles_deg": failed,
@@ -89,6 +90,8 @@ def told(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
             f"contacts narrower than the mesh resolves: {routes['hertz']} positions by the law of small loads, "
             f"{routes['blend']} by its mean with the mesh (column route)"
         )
+    if curve.law:
+        lines.append(f"contact law: {curve.law}")
     level = cycle_statistics(curve, job.table.interpolation)
     if level is not None:
         mean, low, high = (1e-6 * level[key] for key in ("mean_N_per_m", "least_N_per_m", "largest_N_per_m"))

@@ -154,7 +154,7 @@ def _search(
 
 
 def _bare(position: Position) -> Position:
-    return replace(position, scene=None, forces=None, force_rate=None)
+    return replace(position, scene=None, forces=None, force_rate=None, stress_loads=None, stress_load_rate=None)
 
 
 def _collect(twists: Array, positions: list[Position], iterations: IntArray, status: list[str]) -> Solved:
