@@ -233,4 +233,12 @@ def with_forces(
     if not windows:
         return position
     scene = replace(assemble(elastic, windows), compliance=np.zeros((0, 0)), stress=np.zeros((0, 0)))
-    return replace(position, scene=scene, forces=np.concatenate(forces), force_rate=np.concatenate(rates))
+    none = np.zeros(len(scene.owner))  # laws with stress loads ask for them; these forces need none
+    return replace(
+        position,
+        scene=scene,
+        forces=np.concatenate(forces),
+        force_rate=np.concatenate(rates),
+        stress_loads=none,
+        stress_load_rate=none,
+    )

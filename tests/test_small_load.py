@@ -9,6 +9,7 @@ import pytest
 
 from gearfe import Material, StiffnessCurve, small_load, sweep_stiffness
 from gearfe.contact.hertz import Edge, LocalContact, half_width, wedge_factor
+from gearfe.contact.laws import Nitsche
 from gearfe.fields import pair_recovery
 from gearfe.routes import RESOLVED, Router
 from gearfe.small_balance import balance
@@ -308,6 +309,19 @@ def test_finite_strain_is_a_share_that_falls_with_the_load(gears, elastic):
 
     assert share(0.01) > 0
     assert share(0.01) / share(0.005) == pytest.approx(2.0, rel=0.05)
+
+
+@pytest.mark.parametrize(("law", "accuracy"), [("penalty", 1e-9), (Nitsche(theta=-1), 2e-3)])
+def test_it_does_not_depend_on_the_contact_law(gears, elastic, law, accuracy):
+    """The law of small loads asks none of the mesh's contact laws; finite strain goes with each.
+
+    Gears made for theta = -1 have the law's own terms in their compliance, which vanish with the mesh.
+    """
+    options = {"twist": math.radians(1e-3), "angles": [0.1]}
+    one = sweep_stiffness(gears, elastic=elastic, **options)
+    other = sweep_stiffness(gears, law=law, coarsen=COARSE, **options)
+    assert list(other.route) == ["hertz"]
+    assert other.k_mesh[0] == pytest.approx(one.k_mesh[0], rel=accuracy)
 
 
 def test_fields_of_a_small_load(gears, elastic, middle):
