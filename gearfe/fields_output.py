@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .contact.scene import MeshingPair
-from .contact.solver import solve_position
 from .drawing import zone
 from .errors import InputError
 from .fields import GearField, pair_recovery, straight_triangles
 from .gear import GearPair
 from .output.figures import stress_figure
 from .output.vtkhdf import VtkHdfSeries
+from .routes import Router
 from .stiffness_curve import StiffnessCurve
 from .threads import one_thread
 
@@ -78,13 +78,14 @@ def write_fields(
     chosen = chosen_positions(curve, angles_deg)
     if len(chosen) == 0:
         return []
-    recovery = pair_recovery(elastic)
+    recovery, router = pair_recovery(elastic), Router(pair, elastic)
     names = ["fields.vtkhdf"]
     worst: tuple[float, int, tuple[GearField, GearField]] | None = None
     with VtkHdfSeries(folder / "fields.vtkhdf") as series, one_thread():
         for done, number in enumerate(chosen, start=1):
             angle, twist = float(curve.pinion_angle[number]), float(curve.twist[number] + curve.lost_motion)
-            fields = recovery.at(solve_position(elastic, angle, twist), angle, twist)
+            position = router.solve(np.array([angle]), np.array([twist]), kept=[0])[0]
+            fields = recovery.at(position, angle, twist)
             _add(series, math.degrees(angle), fields, first=done == 1)
             if angles_deg is not None:
                 names.append(_picture(folder, pair, fields, angle, twist))

@@ -28,11 +28,11 @@ from .gear import GearPair
 from .meshing.recipe import sector_recipes
 from .meshing.tooth_sector import sector_mesh
 from .periodic import fold
+from .routes import Route, Router
 from .stiffness_curve import SOLVED, ErrorEstimate, StiffnessCurve
 from .stopwatch import Stopwatch
 from .sweep_positions import Progress, Solved, at_torque, at_twists, honest, load_shares
 from .threads import one_thread
-from .unloaded import unloaded_twist
 
 __all__ = ["ErrorEstimate", "StiffnessCurve", "elastic_pair", "sweep_stiffness"]
 
@@ -115,6 +115,7 @@ def sweep_stiffness(
     kinematics: Literal["small", "finite"] = "finite",
     twist_from: Literal["centred", "contact"] = "centred",
     solve_all: bool = False,
+    route: Route = "auto",
     coarsen: float = 1.0,
     points_per_edge: int = 4,
     estimate_error: bool = False,
@@ -142,6 +143,9 @@ def sweep_stiffness(
         further, where unmodified flanks touch.
     solve_all
         Solve every position, also those that differ by whole mesh cycles.
+    route
+        ``auto`` (default): on the mesh where its elements see the contact, by the law of small loads where they do not,
+        see `gearfe.routes`; or ``direct`` or ``hertz`` everywhere.
     estimate_error
         Solve again on a coarser mesh and estimate the discretisation error.
     elastic
@@ -173,13 +177,14 @@ def sweep_stiffness(
     if elastic is None:
         elastic = elastic_pair(pair, materials, coarsen=coarsen, watch=watch, **common)
     solved_angles, source = (asked, np.arange(len(asked))) if solve_all else _distinct(asked, cycle)
+    router = Router(pair, elastic, route)
     with watch.stage("unloaded flanks"):
-        touching = unloaded_twist(pair, solved_angles)
+        touching = router.touching_twists(solved_angles)
     with watch.stage("positions"), one_thread():
         if torque is None:
-            solved = at_twists(elastic, solved_angles, np.full(len(solved_angles), load), progress, finite=finite)
+            solved = at_twists(router, solved_angles, np.full(len(solved_angles), load), progress, finite=finite)
         else:
-            solved = at_torque(pair, elastic, solved_angles, load, touching, progress, finite=finite)
+            solved = at_torque(router, solved_angles, load, touching, progress, finite=finite)
     solved = honest(solved, touching)
     error = None
     if estimate_error:
@@ -187,7 +192,7 @@ def sweep_stiffness(
             given = (elastic.pinion.material, elastic.wheel.material)
             common = {"plane": elastic.pinion.plane, "law": elastic.law, "points_per_edge": points_per_edge}
             coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
-            error = _estimate(coarse, solved_angles, solved, finite=finite, coarsen=coarsen)
+            error = _estimate(Router(pair, coarse, route), solved_angles, solved, finite=finite, coarsen=coarsen)
     curve = _assemble(pair, asked, solved_angles, source, solved, touching, lost, searched=torque is not None)
     return replace(curve, law=law_text(elastic.law), timings=dict(watch.seconds), error=error)
 
@@ -225,7 +230,7 @@ def _distinct(angles: Array, cycle: float) -> tuple[Array, IntArray]:
     return folded[order][new], source
 
 
-def _estimate(coarse: MeshingPair, angles: Array, solved: Solved, *, finite: bool, coarsen: float) -> ErrorEstimate:
+def _estimate(coarse: Router, angles: Array, solved: Solved, *, finite: bool, coarsen: float) -> ErrorEstimate:
     chosen = solved_twice(np.array(solved.status) == "converged")
     again = at_twists(coarse, angles[chosen], solved.twist[chosen], None, finite=finite)
     other = np.where(np.array(again.status, dtype=object) == "converged", again.numbers["torque_wheel"], np.nan)
@@ -269,6 +274,7 @@ def _assemble(
         peak_pressure=solved.numbers["peak_pressure"][source],
         iterations=solved.iterations[source],
         status=np.array(solved.status)[source],
+        route=np.array(solved.route)[source],
         mesh_cycle=pair.mesh_cycle,
         base_radius=radius,
         lost_motion=lost,

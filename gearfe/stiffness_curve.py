@@ -47,6 +47,7 @@ COLUMNS: dict[str, str] = {
     "transmission_error_unloaded_um": "transmission_error_unloaded",
     "torque_wheel_reaction_Nm": "torque_wheel_reaction",
     "leading_pair": "leading_pair",
+    "route": "route",
 }
 #: Constants of the curve, repeated on every row so that the file stands alone.
 CONSTANTS: dict[str, str] = {
@@ -54,6 +55,8 @@ CONSTANTS: dict[str, str] = {
     "wheel_base_radius_mm": "base_radius",
     "lost_motion_deg": "lost_motion",
 }
+#: Columns of words.
+WORDS = ("status", "route")
 WHOLE = ("teeth_in_contact", "iterations")
 SHARE = "load_share_"
 
@@ -122,6 +125,9 @@ class StiffnessCurve:
         Newton iterations; -1 where unknown.
     status
         ``converged``, ``no_contact`` (the teeth do not reach each other, torques are zero), or what went wrong.
+    route
+        ``direct``: solved on the mesh; ``hertz``: by the law of small loads, where the contact is narrower than the
+        mesh sees; ``blend``: the mean of both in between (`gearfe.routes`); empty where unknown.
     mesh_cycle
         Pinion angle after which everything repeats, 2 pi/z1 (rad).
     base_radius
@@ -159,6 +165,11 @@ class StiffnessCurve:
     law: str = ""
     timings: Mapping[str, float] = field(default_factory=dict)
     error: ErrorEstimate | None = None
+    route: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=np.str_))
+
+    def __post_init__(self) -> None:
+        if len(self.route) != len(self.pinion_angle):
+            object.__setattr__(self, "route", np.full(len(self.pinion_angle), ""))
 
     def __len__(self) -> int:
         return len(self.pinion_angle)
@@ -183,7 +194,7 @@ class StiffnessCurve:
         InputError
             When the solved positions do not cover the mesh cycle.
         """
-        per_position = [c for c in COLUMNS.values() if c not in ("status", *WHOLE)]
+        per_position = [c for c in COLUMNS.values() if c not in (*WORDS, *WHOLE)]
         if quantity not in per_position:
             raise unknown_name("quantity", quantity, per_position)
         return periodic_interpolant(self.pinion_angle, getattr(self, quantity), self.mesh_cycle, method=method)
@@ -206,7 +217,7 @@ class StiffnessCurve:
 
     def _cells(self, name: str, attribute: str) -> list[str]:
         values = getattr(self, attribute)
-        if attribute == "status":
+        if attribute in WORDS:
             return [str(v) for v in values]
         if attribute in WHOLE:
             known = ~self.failed if attribute != "iterations" else values >= 0
@@ -248,7 +259,7 @@ class StiffnessCurve:
         if not np.isfinite(values["lost_motion"]):
             values["lost_motion"] = 0.0
         for name, attribute in COLUMNS.items():
-            if attribute == "status":
+            if attribute in WORDS:
                 continue
             found = curve_csv.numbers(columns, name, path)
             if attribute in WHOLE:
@@ -264,4 +275,5 @@ class StiffnessCurve:
         values["law"] = columns.get("contact_law", [""])[0].strip()
         default = ["converged" if np.isfinite(k) else "missing" for k in values["k_mesh"]]
         values["status"] = np.array([cell.strip() for cell in columns.get("status", default)])
+        values["route"] = np.array([cell.strip() for cell in columns.get("route", [""] * len(default))])
         return cls(**values)

@@ -142,7 +142,7 @@ def scenes_of(pair: MeshingPair, group: Group, rigid: Projection, vectors: Seque
         "of_wheel": (group.gear[group.node_window] == 1)[nodes],
     }
     owner = place[group.owner]
-    of_point = {
+    of_point: dict[str, Any] = {
         "slave_nodes": number[group.slave_nodes[points]],
         "slave_shapes": group.slave_shapes[points],
         "mate": place[group.facing][points],

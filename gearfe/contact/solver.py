@@ -66,6 +66,8 @@ class Position:
     scene, forces, force_rate
         Pieces of flank (without their matrices), the nodal forces on them in tooth axes (N) and their derivatives with
         respect to the twist (N/rad), for recovering fields; None without a solution.
+    route
+        ``direct``: solved on the mesh; ``hertz`` or ``blend``: see `gearfe.routes`.
     stress_loads, stress_load_rate
         Loads on the normal stress at the contact points (N m2) and their derivatives (N m2/rad); empty with theta = 0.
     """
@@ -82,6 +84,7 @@ class Position:
     scene: Scene | None = None
     forces: Array | None = None
     force_rate: Array | None = None
+    route: str = "direct"
     stress_loads: Array | None = None
     stress_load_rate: Array | None = None
 
