@@ -52,14 +52,24 @@ class Solved:
 
 
 def at_twists(
-    elastic: MeshingPair, angles: Array, twists: Array, progress: Progress | None, *, finite: bool = False
+    elastic: MeshingPair,
+    angles: Array,
+    twists: Array,
+    progress: Progress | None,
+    *,
+    finite: bool = False,
+    observe: Callable[[int, Position], None] | None = None,
 ) -> Solved:
-    """Solve positions at given pinion angles and twists, both of shape (n,) (rad); with or without finite strain."""
+    """Solve positions at given pinion angles and twists, both of shape (n,) (rad); with or without finite strain.
+
+    `observe` is called with the number of each position and its small-strain solution, forces included, which are not
+    kept.
+    """
     sampled = sample_numbers(angles, elastic.pitch_angle) if finite else np.zeros(0, dtype=np.int64)
     positions: list[Position] = []
     for start in range(0, len(angles), BATCH):
         part = slice(start, start + BATCH)
-        positions += _solve(elastic, angles[part], twists[part], sampled - start)
+        positions += _solve(elastic, angles[part], twists[part], sampled - start, observe, start)
         if progress is not None:
             progress(len(positions), len(angles), "positions")
     if finite:
@@ -152,9 +162,19 @@ def _search(
     )
 
 
-def _solve(elastic: MeshingPair, angles: Array, twists: Array, kept: IntArray | None = None) -> list[Position]:
+def _solve(
+    elastic: MeshingPair,
+    angles: Array,
+    twists: Array,
+    kept: IntArray | None = None,
+    observe: Callable[[int, Position], None] | None = None,
+    first: int = 0,
+) -> list[Position]:
     """Positions, all but those numbered in `kept` without what only fields need: a scene holds megabytes."""
     made = solve_positions(elastic, angles, twists)
+    if observe is not None:
+        for i, position in enumerate(made, start=first):
+            observe(i, position)
     keep = set() if kept is None else set(kept.tolist())
     return [p if i in keep else _bare(p) for i, p in enumerate(made)]
 
