@@ -1,11 +1,11 @@
 r"""A load map computed: the twist at which each pinion angle carries each torque.
 
-Torque by torque, from the middle of the range outwards, then the ones between, each level's twists are predicted from the
-levels that are known (`gearfe.load_map`: cubic in :math:`\ln\delta` over :math:`\ln T` with the computed tangents) and
-solved. A cell is accepted when its torque lies within :math:`\epsilon` = 1e-4 of the goal; the twist then takes one
-step with the tangent, whose error is of the order :math:`\epsilon^2`, and what else there is moves with the torque
-(forces as T, the peak pressure as :math:`\sqrt T`). Otherwise it is solved again, and in the end searched for like any
-position at a torque.
+Torque by torque, from the middle of the range outwards, then the ones between, each level's twists are predicted from
+the known levels (as in `gearfe.load_map`: cubic in :math:`\ln\delta` over :math:`\ln T`) and solved. A cell is
+accepted when its torque lies within :math:`\epsilon` = 1e-4 of the goal; the twist then takes one step with the
+tangent, whose error is of the order :math:`\epsilon^2`, and what else there is moves with the torque (forces as T, the
+peak pressure as :math:`\sqrt T`). Otherwise it is solved again, and in the end searched for like any position at a
+torque.
 
 Finite strain changes the torque by a share c. The energy that it adds is spent pair by pair, each with about the power
 :math:`2 + p` of its load, so that with the pairs' shares :math:`s_k` of the torque
@@ -118,17 +118,19 @@ def sweep_loads(
         touching = unloaded_twist(pair, solved_angles)
     recorder = None
     if root_stress:
-        from .root_stress import RootRecorder
+        from .root_stress import RootRecorder, pair_roots
 
         with watch.stage("root meshes"), one_thread():
-            recorder = RootRecorder.prepared(pair, elastic)
+            recorder = RootRecorder(pair_roots(pair, elastic))
     with watch.stage("cells"), one_thread():
         work = _Sweep(pair, elastic, solved_angles, goals, touching, progress, recorder)
         levels = [honest(level, touching) for level in work.run(finite=kinematics == "finite")]
     curves = tuple(
         assembled_curve(pair, asked, solved_angles, source, level, touching, lost, searched=True) for level in levels
     )
-    return LoadMap(goals, curves, None, dict(watch.seconds))
+    failed = np.stack([curve.failed for curve in curves])
+    root = None if recorder is None else recorder.gathered(goals, source, failed)
+    return LoadMap(goals, curves, root, dict(watch.seconds))
 
 
 @dataclass
@@ -177,7 +179,7 @@ class _Sweep:
         if len(far):
             again = self._solved(row, far, twist[far] + miss[far] / tangent[far])
             self.tally[row, far] += again.iterations
-            for k, i in enumerate(far):
+            for k, i in enumerate(far.tolist()):
                 if again.status[k] == "converged":
                     cells[i] = _one(again, k)
         return _closed(cells, self.goals[row], share, self.tally[row])
@@ -325,7 +327,7 @@ def _light(position: Position) -> Position:
     scene = position.scene
     assert scene is not None
     none = np.zeros(0)
-    arrays = {f.name: none for f in fields(scene) if isinstance(getattr(scene, f.name), np.ndarray)}
+    arrays: dict[str, Any] = {f.name: none for f in fields(scene) if isinstance(getattr(scene, f.name), np.ndarray)}
     return replace(position, scene=replace(scene, **arrays, rigid=scene.rigid.take(slice(0, 0))))
 
 

@@ -155,7 +155,7 @@ def _far_field(interface: Array, stress: Array | None, coupling: Array) -> FarFi
     """Compress displacements and stresses onto the side motions that reach the flank (Saint-Venant: a dozen or two)."""
     rows = interface if stress is None else np.concatenate([interface, stress * (_norm(interface) / _norm(stress))])
     triangular = np.linalg.qr(rows, mode="r")
-    _, values, modes = np.linalg.svd(triangular)
+    _, values, modes = np.linalg.svd(triangular, full_matrices=False)
     basis = modes[values > 1e-13 * values[0]].T
     flank = interface @ basis
     teeth = len(coupling)

@@ -37,7 +37,8 @@ def save(figure: Any, path: str | Path, *, dpi: int = 130) -> None:
         figure.savefig(temporary, dpi=dpi)
 
 
-def _tidy(axes: Any) -> None:
+def tidy(axes: Any) -> None:
+    """Axes with a light grid, open at the top and to the right."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(True, color="#e5e7eb", linewidth=0.8)
     axes.set_axisbelow(True)
@@ -72,7 +73,7 @@ def stiffness_figure(
     figure = new_figure(9.0, 6.2 if shares else 4.4)
     grid = figure.add_gridspec(2, 1, height_ratios=(2.6, 1.0)) if shares else figure.add_gridspec(1, 1)
     axes = figure.add_subplot(grid[0])
-    _tidy(axes)
+    tidy(axes)
     for number, (start, end) in enumerate(single):
         axes.axvspan(start, end, color="#f3f4f6", zorder=0, label=None if number else "single-pair contact (rigid)")
     low, high = np.nanmin(points[1], initial=np.inf), np.nanmax(points[1], initial=-np.inf)
@@ -93,7 +94,7 @@ def stiffness_figure(
     figure.legend(fontsize=8.5, loc="outside lower center", ncols=3, frameon=False)
     if shares:
         lower = figure.add_subplot(grid[1], sharex=axes)
-        _tidy(lower)
+        tidy(lower)
         axes.tick_params(labelbottom=False)
         for number, (angle, share) in enumerate(shares):
             color = (BLUE, ORANGE, GREEN)[number % 3]

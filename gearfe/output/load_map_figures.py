@@ -1,0 +1,93 @@
+"""Picture of a load map: what changes with the pinion angle, one line a torque, and what changes with the torque."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .figures import BLUE, ORANGE, new_figure, save, tidy
+
+Array = NDArray[np.float64]
+
+#: Lines of a panel; of more torques, so many are drawn.
+MOST_LINES = 24
+
+
+def load_map_figure(
+    path: str | Path,
+    *,
+    title: str,
+    angle: Array,
+    torque: Array,
+    panels: Mapping[str, Array],
+    peak_to_peak: Array,
+    mean_stiffness: Array,
+) -> None:
+    """Panels over the pinion angle coloured by torque, and mean stiffness and transmission error over the torque.
+
+    Parameters
+    ----------
+    angle : ndarray, shape (n,)
+        Pinion angles (deg).
+    torque : ndarray, shape (m,)
+        N m.
+    panels
+        Label of the axis with its unit -> values, shape (m, n).
+    peak_to_peak, mean_stiffness : ndarray, shape (m,)
+        Peak-to-peak transmission error (um) and mean stiffness (N/um) of each torque.
+    """
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LogNorm, Normalize
+
+    count = len(panels) + 1
+    columns = 2 if count <= 4 else 3
+    lines = -(-count // columns)
+    figure = new_figure(4.6 * columns + 0.9, 3.0 * lines + 0.5)
+    every: list[Any] = figure.subplots(lines, columns, squeeze=False).ravel().tolist()
+    logarithmic = len(torque) > 2 and torque[-1] / torque[0] > 10 and _is_geometric(torque)
+    low, high = float(torque[0]), float(torque[-1] if len(torque) > 1 else 1.01 * torque[0])
+    norm = LogNorm(low, high) if logarithmic else Normalize(low, high)
+    colors = colormaps["viridis"]
+    shown = np.unique(np.linspace(0, len(torque) - 1, min(len(torque), MOST_LINES)).round().astype(int))
+    marker = "." if len(angle) < 60 else ""
+    for axes, (label, values) in zip(every, panels.items(), strict=False):
+        tidy(axes)
+        for row in shown:
+            axes.plot(
+                angle, values[row], marker=marker, markersize=3, linewidth=1.1, color=colors(0.95 * norm(torque[row]))
+            )
+        axes.set_xlim(angle[0], angle[-1])
+        axes.set_title(label, loc="left", fontsize=9.5)
+        axes.set_xlabel("pinion angle (deg)", fontsize=9)
+        axes.tick_params(labelsize=8.5)
+    axes = every[len(panels)]
+    tidy(axes)
+    axes.plot(torque, mean_stiffness, "o-", color=BLUE, markersize=3.5, linewidth=1.4)
+    axes.set_ylabel("mean stiffness  (N/µm)", color=BLUE, fontsize=9)
+    axes.set_xlabel("torque at the wheel (N m)", fontsize=9)
+    other = axes.twinx()
+    other.plot(torque, peak_to_peak, "s-", color=ORANGE, markersize=3.2, linewidth=1.4)
+    other.set_ylabel("transmission error, peak to peak  (µm)", color=ORANGE, fontsize=9)
+    other.set_ylim(bottom=0.0)
+    other.spines[["top"]].set_visible(False)
+    axes.set_title("over the torque", loc="left", fontsize=9.5)
+    for one in (axes, other):
+        one.tick_params(labelsize=8.5)
+        if logarithmic:
+            one.set_xscale("log")
+    for axes in every[len(panels) + 1 :]:
+        axes.set_visible(False)
+    bar = figure.colorbar(ScalarMappable(norm, colors), ax=every[: len(panels) + 1], shrink=0.8, aspect=35, pad=0.015)
+    bar.set_label("torque at the wheel (N m)")
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    save(figure, path, dpi=110)
+
+
+def _is_geometric(torque: Array) -> bool:
+    ratio = torque[1:] / torque[:-1]
+    return bool(ratio.max() < 2 * ratio.min() and ratio.min() > 1.05)
