@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from . import curve_csv
 from .errors import InputError
 from .output.files import write_csv
-from .stiffness_curve import COLUMNS, SOLVED, WHOLE, StiffnessCurve
+from .stiffness_curve import COLUMNS, WHOLE, StiffnessCurve
 
 Array = NDArray[np.float64]
 
@@ -101,7 +101,7 @@ class LoadMap:
     @property
     def failed(self) -> NDArray[np.bool_]:
         """Cells without a solution, shape (m, n)."""
-        return np.logical_not(np.isin(self.status, SOLVED))
+        return np.stack([curve.failed for curve in self.curves])
 
     def quantity(self, name: str) -> Any:
         """A field of `StiffnessCurve` over torque and angle, shape (m, n)."""
@@ -180,7 +180,7 @@ class LoadMap:
         twist = touching + _twist_between(torque, self.torque[pair], *self._delta(pair, touching))
         bad = self.failed[pair]
         status = np.where(bad[1], self.status[after], self.status[after - 1])
-        lost = bad.any(axis=0)
+        lost: NDArray[np.bool_] = np.any(bad, axis=0)
         twist = np.where(lost, np.nan, twist)
         x = np.log(self.torque)
 

@@ -327,8 +327,9 @@ def _light(position: Position) -> Position:
     scene = position.scene
     assert scene is not None
     none = np.zeros(0)
-    arrays: dict[str, Any] = {f.name: none for f in fields(scene) if isinstance(getattr(scene, f.name), np.ndarray)}
-    return replace(position, scene=replace(scene, **arrays, rigid=scene.rigid.take(slice(0, 0))))
+    names = [f.name for f in fields(scene) if isinstance(getattr(scene, f.name), np.ndarray) and f.name != "owner"]
+    arrays: dict[str, Any] = dict.fromkeys(names, none)
+    return replace(position, pressure=None, scene=replace(scene, **arrays, rigid=scene.rigid.take(slice(0, 0))))
 
 
 def _spent(pair_torques: Array) -> float:

@@ -180,7 +180,7 @@ def _solve(
 
 
 def _bare(position: Position) -> Position:
-    return replace(position, scene=None, forces=None, force_rate=None)
+    return replace(position, scene=None, forces=None, force_rate=None, pressure=None)
 
 
 def _collect(twists: Array, positions: list[Position], iterations: IntArray, status: list[str]) -> Solved:

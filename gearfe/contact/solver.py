@@ -57,6 +57,8 @@ class Position:
     scene, forces, force_rate
         Pieces of flank (without their matrices), the nodal forces on them in tooth axes (N) and their derivatives with
         respect to the twist (N/rad), for recovering fields; None without a solution.
+    pressure : ndarray, shape (q,)
+        Pressure at the scene's contact points (Pa); None without a solution.
     """
 
     status: str
@@ -71,6 +73,7 @@ class Position:
     scene: Scene | None = None
     forces: Array | None = None
     force_rate: Array | None = None
+    pressure: Array | None = None
 
 
 def solve_position(pair: MeshingPair, pinion_angle: float, twist: float, *, tolerance: float = TOLERANCE) -> Position:
@@ -237,6 +240,7 @@ def _finish(scene: Scene, outcome: Outcome, iterations: int) -> Position:
         scene=replace(scene, compliance=np.zeros((0, 0)), stress=np.zeros((0, 0))),  # the megabytes
         forces=forces,
         force_rate=force_rate,
+        pressure=state.pressure,
     )
 
 

@@ -238,10 +238,7 @@ def stress_figure(
         drawn = axes.tripcolor(
             points[:, 0], points[:, 1], triangles, stress, shading="gouraud", cmap="turbo", vmin=0.0, vmax=top
         )
-        edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
-        unique, count = np.unique(edges, axis=0, return_counts=True)
-        rim = points[unique[count == 1]]
-        axes.add_collection(_lines(rim))
+        axes.add_collection(rim_lines(points, triangles))
     axes.set_aspect("equal")
     axes.set_xlim(x - half, x + half)
     axes.set_ylim(y - half, y + half)
@@ -255,7 +252,10 @@ def stress_figure(
     save(figure, path, dpi=110)
 
 
-def _lines(segments: Array) -> Any:
+def rim_lines(points: Array, triangles: NDArray[np.int64]) -> Any:
+    """Lines along the edges that belong to one triangle only."""
     from matplotlib.collections import LineCollection
 
-    return LineCollection(list(segments), colors="#111827", linewidths=0.7)
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    _, first, count = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_index=True, return_counts=True)
+    return LineCollection(list(points[edges[first[count == 1]]]), colors="#111827", linewidths=0.7)

@@ -44,11 +44,10 @@ def load_map_figure(
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm, Normalize
 
-    count = len(panels) + 1
-    columns = 2 if count <= 4 else 3
-    lines = -(-count // columns)
-    figure = new_figure(4.6 * columns + 0.9, 3.0 * lines + 0.5)
-    every: list[Any] = figure.subplots(lines, columns, squeeze=False).ravel().tolist()
+    count = len(panels) + 2
+    columns = -(-count // 2)
+    figure = new_figure(3.9 * columns + 0.9, 6.6)
+    every: list[Any] = figure.subplots(2, columns, squeeze=False).ravel().tolist()
     logarithmic = len(torque) > 2 and torque[-1] / torque[0] > 10 and _is_geometric(torque)
     low, high = float(torque[0]), float(torque[-1] if len(torque) > 1 else 1.01 * torque[0])
     norm = LogNorm(low, high) if logarithmic else Normalize(low, high)
@@ -65,29 +64,35 @@ def load_map_figure(
         axes.set_title(label, loc="left", fontsize=9.5)
         axes.set_xlabel("pinion angle (deg)", fontsize=9)
         axes.tick_params(labelsize=8.5)
-    axes = every[len(panels)]
-    tidy(axes)
-    axes.plot(torque, mean_stiffness, "o-", color=BLUE, markersize=3.5, linewidth=1.4)
-    axes.set_ylabel("mean stiffness  (N/µm)", color=BLUE, fontsize=9)
-    axes.set_xlabel("torque at the wheel (N m)", fontsize=9)
-    other = axes.twinx()
-    other.plot(torque, peak_to_peak, "s-", color=ORANGE, markersize=3.2, linewidth=1.4)
-    other.set_ylabel("transmission error, peak to peak  (µm)", color=ORANGE, fontsize=9)
-    other.set_ylim(bottom=0.0)
-    other.spines[["top"]].set_visible(False)
-    axes.set_title("over the torque", loc="left", fontsize=9.5)
-    for one in (axes, other):
-        one.tick_params(labelsize=8.5)
+    over = {"mean stiffness  (N/µm)": mean_stiffness, "transmission error, peak to peak  (µm)": peak_to_peak}
+    for axes, (label, values), color in zip(every[len(panels) :], over.items(), (BLUE, ORANGE), strict=False):
+        tidy(axes)
+        axes.plot(torque, values, "o-", color=color, markersize=3.5, linewidth=1.4)
+        axes.set_title(label, loc="left", fontsize=9.5)
+        axes.set_xlabel("torque at the wheel (N m)", fontsize=9)
+        axes.tick_params(labelsize=8.5)
         if logarithmic:
-            one.set_xscale("log")
-    for axes in every[len(panels) + 1 :]:
+            axes.set_xscale("log")
+            _plain_ticks(axes.xaxis)
+    for axes in every[count:]:
         axes.set_visible(False)
-    bar = figure.colorbar(ScalarMappable(norm, colors), ax=every[: len(panels) + 1], shrink=0.8, aspect=35, pad=0.015)
+    bar = figure.colorbar(ScalarMappable(norm, colors), ax=every, shrink=0.85, aspect=35, pad=0.015)
+    if logarithmic:
+        _plain_ticks(bar.ax.yaxis)
     bar.set_label("torque at the wheel (N m)")
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
     save(figure, path, dpi=110)
 
 
 def _is_geometric(torque: Array) -> bool:
-    ratio = torque[1:] / torque[:-1]
-    return bool(ratio.max() < 2 * ratio.min() and ratio.min() > 1.05)
+    ratio = np.log(torque[1:] / torque[:-1])
+    return bool(ratio.max() < 2.5 * ratio.min())
+
+
+def _plain_ticks(axis: Any) -> None:
+    """1, 2, 5, 10, ... written out."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(10, subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
