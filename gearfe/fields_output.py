@@ -140,7 +140,7 @@ def _add(series: VtkHdfSeries, time: float, fields: tuple[GearField, GearField],
     principal = [f.principal for f in fields]
     series.add(
         time,
-        both([f.points for f in fields]),
+        np.concatenate([f.points for f in fields]),
         cells,
         point_data={
             "displacement_m": both([f.displacement for f in fields]),

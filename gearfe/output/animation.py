@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .figures import new_figure, rim_lines
+from .figures import color_limit, draw_rim, new_figure
 from .files import whole_file
 
 Array = NDArray[np.float64]
@@ -66,7 +66,7 @@ def stress_animation(
     from PIL import Image
 
     x, y, half = zoom
-    top = float(max(np.quantile(np.concatenate([s for _, _, s in f.parts]), 0.995) for f in frames)) or 1.0
+    top = max(color_limit(frame.parts) for frame in frames)
     pictures: list[Any] = []
     figure = new_figure(6.6, 5.6)
     axes = figure.add_subplot()
@@ -78,7 +78,7 @@ def stress_animation(
             drawn = axes.tripcolor(
                 points[:, 0], points[:, 1], triangles, stress, shading="gouraud", cmap="turbo", vmin=0.0, vmax=top
             )
-            axes.add_collection(rim_lines(points, triangles))
+            draw_rim(axes, points, triangles)
         axes.set_aspect("equal")
         axes.set_xlim(x - half, x + half)
         axes.set_ylim(y - half, y + half)
@@ -95,7 +95,8 @@ def stress_animation(
         pictures.append(picture)
         if progress is not None:
             progress(done, len(frames), "frames drawn")
-    palette = pictures[len(pictures) // 2].quantize(256, method=Image.Quantize.MEDIANCUT)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(_palette())
     indexed = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     with whole_file(path) as temporary:
         indexed[0].save(
@@ -106,3 +107,12 @@ def stress_animation(
             loop=0,
             optimize=False,
         )
+
+
+def _palette() -> list[int]:
+    """The colour map's colours and greys for lines and text: 256 times red, green, blue."""
+    from matplotlib import colormaps
+
+    colors = np.round(255 * colormaps["turbo"](np.linspace(0, 1, 224))[:, :3]).astype(int)
+    greys = np.round(np.linspace(0, 255, 32)).astype(int)[:, None].repeat(3, axis=1)
+    return [int(v) for v in np.concatenate([colors, greys]).ravel()]

@@ -37,7 +37,7 @@ def pressure_figure(path: str | Path, *, title: str, lines: Sequence[Sequence[tu
             axes.plot(diameter, pressure, linewidth=1.5, color=colors(0.95 * norm(angle)))
         axes.set_title(name, loc="left", fontsize=10)
         axes.set_xlabel("diameter (mm)")
-        axes.set_ylim(bottom=0.0)
+    both[0].set_ylim(bottom=0.0)  # shared, and only now that both are drawn
     both[0].set_ylabel("contact pressure (MPa)")
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
     bar = figure.colorbar(ScalarMappable(norm, colors), ax=list(both), pad=0.015, aspect=30)

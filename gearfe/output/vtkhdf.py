@@ -86,7 +86,7 @@ class VtkHdfSeries:
     def add(
         self,
         time: float,
-        points: NDArray[Any] | None = None,
+        points: NDArray[np.float64] | None = None,
         cells: Mapping[str, NDArray[Any]] | None = None,
         *,
         point_data: Fields | None = None,
@@ -99,7 +99,7 @@ class VtkHdfSeries:
         time
             Its time (s), larger than the one before.
         points : (n, 2) or (n, 3)
-            Coordinates, single or double precision as in the first step; ``None`` for those of the step before.
+            Coordinates; ``None`` for those of the step before.
         cells
             Cell type (see `CELL_TYPES`) to (m, points a cell) point numbers; ``None`` for those of the step before.
         point_data, cell_data
@@ -132,14 +132,12 @@ class VtkHdfSeries:
             for name, values in (fields or {}).items():
                 self._add_field(group, name, np.asarray(values), count)
 
-    def _add_points(self, points: NDArray[Any]) -> None:
-        coordinates: NDArray[Any] = np.asarray(points)
-        if coordinates.dtype != np.float32:
-            coordinates = coordinates.astype(float)
+    def _add_points(self, points: NDArray[np.float64]) -> None:
+        coordinates = np.asarray(points, dtype=float)
         if coordinates.ndim != 2 or coordinates.shape[1] not in (2, 3):
             raise InputError("points", coordinates.shape, "must have the shape (n, 2) or (n, 3)", "")
         if coordinates.shape[1] == 2:
-            coordinates = np.column_stack([coordinates, np.zeros(len(coordinates), dtype=coordinates.dtype)])
+            coordinates = np.column_stack([coordinates, np.zeros(len(coordinates))])
         self._place["PointOffsets"] = self._length("Points")
         self._points = len(coordinates)
         self._append("Points", coordinates)
@@ -177,7 +175,7 @@ class VtkHdfSeries:
         if len(values) != count or values.ndim > 2:
             raise InputError(f"{group}.{name}", values.shape, f"must have {count} rows", "one for each point or cell")
         if values.ndim == 2 and values.shape[1] == 2:
-            values = np.column_stack([values, np.zeros(len(values), dtype=values.dtype)])
+            values = np.column_stack([values, np.zeros(len(values))])
         path = f"{group}/{name}"
         self._steps.setdefault(f"{group}Offsets/{name}", []).append(self._length(path))
         self._append(path, values)
