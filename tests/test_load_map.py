@@ -14,8 +14,10 @@ from gearfe.cli import main
 from gearfe.errors import InputError
 from gearfe.load_map import RootMap
 from gearfe.stiffness import elastic_pair
+from gearfe.train_job import read_train_job, train_curves
 
 from .gears import pair
+from .test_train_job import BORES, SMALL
 
 JOB = Path(__file__).parents[1] / "geometry" / "gear_train.toml"
 ANGLES = np.radians(np.arange(6) * 3.0)
@@ -203,6 +205,33 @@ def test_a_torque_out_of_reach_is_a_status(gears, elastic):
 def test_torques_that_are_none(gears, elastic, torques):
     with pytest.raises(InputError, match="torques"):
         sweep_loads(gears, torques, elastic=elastic)
+
+
+# ---- the gear train --------------------------------------------------------------------------------------------------
+
+
+def train_with_map(tmp_path, path):
+    """The small train of the job tests; its mesh takes the load map `path`."""
+    text = SMALL.replace("stiffness_N_per_m = 2e8", f'load_map = "{path}"') + BORES
+    (tmp_path / "job.toml").write_text(text)
+    return read_train_job(tmp_path / "job.toml")
+
+
+def test_a_train_takes_its_curve_from_a_map(tmp_path):
+    """18/27 teeth, 30 N m at the output, which is the driven gear's shaft: the map's curve at 30 N m."""
+    gears = pair(18, 27, module=2e-3, pressure_angle=20.0, width=12e-3)
+    mapped = sweep_loads(gears, [25.0, 28.0, 33.0, 38.0], angles=np.arange(6) * gears.mesh_cycle / 6, coarsen=4.0)
+    mapped.to_csv(tmp_path / "map.csv")
+    (curve,) = train_curves(train_with_map(tmp_path, "map.csv"))
+    expected = mapped.curve_at(30.0)
+    np.testing.assert_allclose(curve.k_mesh, expected.k_mesh, rtol=1e-9)
+    np.testing.assert_allclose(curve.torque_wheel, 30.0, rtol=1e-9)
+
+
+def test_a_train_refuses_the_map_of_other_gears(tmp_path, made):
+    made.to_csv(tmp_path / "map.csv")
+    with pytest.raises(InputError, match="is of other gears: mesh cycle 18 deg"):
+        train_curves(train_with_map(tmp_path, "map.csv"))
 
 
 # ---- the command -----------------------------------------------------------------------------------------------------
