@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .derived import derived_geometry
-from .load_map import GEARS, LoadMap
+from .load_map import LoadMap
+from .root_map import GEARS
 from .stiffness_job import StiffnessJob
 from .stiffness_report import versions
 from .tables.loadmap import LoadMapTable

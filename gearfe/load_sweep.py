@@ -13,13 +13,13 @@ Finite strain changes the torque by a share c. The energy that it adds is spent 
 .. math:: c = \kappa\, T^p \sum_k s_k^{1+p}, \qquad p = 0.75,
 
 where :math:`\kappa` hardly depends on torque and angle, also where pairs come and go (c itself varies fivefold over a
-map and jumps there). It is evaluated on a few levels and interpolated, and once more
-directly in the cells where c may be off by more than :math:`\epsilon/2`.
+map and jumps there). It is evaluated on a few levels and interpolated, and once more directly in the cells
+where c may be off by more than :math:`\epsilon/2`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -33,6 +33,7 @@ from .elasticity import Material, Plane
 from .errors import InputError
 from .gear import GearPair
 from .iso6336 import mesh_stiffness
+from .load_cells import closed_level, light, log_twist, one_cell, outward, spent_share
 from .load_map import LoadMap
 from .stiffness import STEEL, assembled_curve, distinct_angles, elastic_pair, lost_motion
 from .stopwatch import Stopwatch
@@ -49,8 +50,6 @@ ACCEPTED, TRIES = 1e-4, 6
 SHARE_LEVELS = 4
 #: Angles on which it is evaluated there.
 SHARE_ANGLES = 24
-#: p: the share of finite strain of a single pair grows about like this power of its load.
-SHARE_POWER = 0.75
 #: Largest number of cells.
 MOST_CELLS = 200_000
 #: Angles over one mesh cycle where none are given.
@@ -154,7 +153,7 @@ class _Sweep:
         self.held: dict[tuple[int, int], Position] = {}
         self.direct: dict[int, dict[int, float]] = {}
         sampled = set(np.linspace(0, m - 1, min(m, SHARE_LEVELS)).round().astype(int).tolist()) if finite else set()
-        for done, row in enumerate(_outward(m), start=1):
+        for done, row in enumerate(outward(m), start=1):
             self._level(row, sample=row in sampled)
             if self.progress is not None:
                 self.progress(done * len(self.angles), m * len(self.angles), "cells")
@@ -166,7 +165,7 @@ class _Sweep:
         """A level at its torque, with its share of finite strain; cells that this moves far are solved once more."""
         cells = self.raw[row]
         assert cells is not None
-        spent = np.array([_spent(c.pairs[0][1]) if len(c.pairs[0][1]) else 0.0 for c in cells])
+        spent = np.array([spent_share(c.pairs[0][1]) if len(c.pairs[0][1]) else 0.0 for c in cells])
         share = self._share(row, spent)
         for i, one in self.direct.get(row, {}).items():
             share[i] = one
@@ -181,8 +180,8 @@ class _Sweep:
             self.tally[row, far] += again.iterations
             for k, i in enumerate(far.tolist()):
                 if again.status[k] == "converged":
-                    cells[i] = _one(again, k)
-        return _closed(cells, self.goals[row], share, self.tally[row])
+                    cells[i] = one_cell(again, k)
+        return closed_level(cells, self.goals[row], share, self.tally[row])
 
     def _level(self, row: int, *, sample: bool) -> None:
         """Solve one torque at all angles."""
@@ -196,14 +195,14 @@ class _Sweep:
             if sampled:
                 self._sampled_kappa(row, sampled)
             good = [k for k, status in enumerate(made.status) if status == "converged"]
-            spent[open_[good]] = [_spent(made.pairs[k][1]) for k in good]
+            spent[open_[good]] = [spent_share(made.pairs[k][1]) for k in good]
             goal = self.goals[row] / (1 + self._share(row, spent))
             self.tally[row, open_] += made.iterations
             still = []
             for k, i in ((k, open_[k]) for k in good):
                 miss = goal[i] - made.numbers["torque_wheel"][k]
                 if abs(miss) <= ACCEPTED * self.goals[row]:
-                    found[i] = _one(made, k)
+                    found[i] = one_cell(made, k)
                 elif made.numbers["tangent"][k] > 0:
                     least = self.touching[i] + 0.5 * (twist[i] - self.touching[i])
                     twist[i] = max(twist[i] + miss / made.numbers["tangent"][k], least)
@@ -219,10 +218,10 @@ class _Sweep:
         """What `_spent` was at the nearest solved level, moved to this torque."""
         rows = [i for i, cells in enumerate(self.raw) if cells is not None]
         cells = self.raw[min(rows, key=lambda i: abs(i - row))] if rows else None
-        alone = _spent(self.goals[row : row + 1])
+        alone = spent_share(self.goals[row : row + 1])
         if cells is None:
             return np.full(len(self.angles), alone)
-        each = [_spent(c.pairs[0][1] / c.pairs[0][1].sum()) if len(c.pairs[0][1]) else 1.0 for c in cells]
+        each = [spent_share(c.pairs[0][1] / c.pairs[0][1].sum()) if len(c.pairs[0][1]) else 1.0 for c in cells]
         return alone * np.array(each)
 
     def _solved(self, row: int, numbers: IntArray, twists: Array) -> Solved:
@@ -230,7 +229,7 @@ class _Sweep:
 
         def observe(k: int, position: Position) -> None:
             if position.status == "converged":
-                self.held[row, int(numbers[k])] = _light(position)
+                self.held[row, int(numbers[k])] = light(position)
                 if self.recorder is not None:
                     self.recorder.record(row, int(numbers[k]), position)
 
@@ -261,7 +260,7 @@ class _Sweep:
             delta = np.array([c.twist[0] for c in known]) - self.touching[i]
             torque = np.array([c.numbers["torque_wheel"][0] for c in known])
             slope = torque / (delta * np.array([c.numbers["tangent"][0] for c in known]))
-            made[i] = _from_known(float(one), np.log(torque), np.log(delta), slope)
+            made[i] = log_twist(float(one), np.log(torque), np.log(delta), slope)
         return np.minimum(self.touching + np.exp(made), np.pi / self.pair.wheel.teeth)
 
     # ---- finite strain -----------------------------------------------------------------------------------------------
@@ -276,7 +275,7 @@ class _Sweep:
         numbers = np.array([i for i in sampled if (row, i) in self.held], dtype=np.int64)
         if len(numbers):
             positions = [self.held[row, int(i)] for i in numbers]
-            kappa = finite_strain_shares(self.elastic, positions) / [_spent(p.pair_torques) for p in positions]
+            kappa = finite_strain_shares(self.elastic, positions) / [spent_share(p.pair_torques) for p in positions]
             cycle = self.elastic.pitch_angle
             self.kappa[row] = interpolated_shares(self.angles, self.angles[numbers], kappa, cycle)
 
@@ -306,7 +305,7 @@ class _Sweep:
                 continue
             low, high, _ = self._bracket(row, rows)
             carrying = {self._pairs(level, i) for level in (low, row, high)}
-            doubt = abs(self.kappa[high][i] - self.kappa[low][i]) * _spent(position.pair_torques)
+            doubt = abs(self.kappa[high][i] - self.kappa[low][i]) * spent_share(position.pair_torques)
             if len(carrying) > 1 or 0.5 * doubt > ACCEPTED:
                 wanted.append((row, i))
         for first in range(0, len(wanted), SHARE_ANGLES):
@@ -320,74 +319,3 @@ class _Sweep:
         cells = self.raw[row]
         assert cells is not None
         return len(cells[i].pairs[0][0])
-
-
-def _light(position: Position) -> Position:
-    """A position with its forces and the pieces of flank that they act on, without the scene's arrays."""
-    scene = position.scene
-    assert scene is not None
-    none = np.zeros(0)
-    names = [f.name for f in fields(scene) if isinstance(getattr(scene, f.name), np.ndarray) and f.name != "owner"]
-    arrays: dict[str, Any] = dict.fromkeys(names, none)
-    return replace(position, pressure=None, scene=replace(scene, **arrays, rigid=scene.rigid.take(slice(0, 0))))
-
-
-def _spent(pair_torques: Array) -> float:
-    """T^p sum s^(1 + p) of the torques that the pairs carry (N m)."""
-    carried = np.maximum(pair_torques, 0.0)
-    return float((carried ** (1 + SHARE_POWER)).sum() / carried.sum())
-
-
-def _from_known(x: float, known: Array, y: Array, slope: Array) -> float:
-    """Cubic Hermite between the two nearest known levels round x; beyond the last, a parabola through its slopes."""
-    order = np.argsort(known)
-    known, y, slope = known[order], y[order], slope[order]
-    k = int(np.searchsorted(known, x))
-    if 0 < k < len(known):
-        h = known[k] - known[k - 1]
-        t = (x - known[k - 1]) / h
-        low, high, rise = h * slope[k - 1], h * slope[k], y[k] - y[k - 1]
-        return float(y[k - 1] + t * (low + t * (3 * rise - 2 * low - high + t * (low + high - 2 * rise))))
-    end, other = (0, 1) if k == 0 else (len(known) - 1, len(known) - 2)
-    bend = 0.0
-    if len(known) > 1:
-        bend = (slope[end] - slope[other]) / (known[end] - known[other])
-    step = x - known[end]
-    steepest = np.clip(slope[end] + 0.5 * bend * step, 0.3, 1.2)
-    return float(y[end] + steepest * step)
-
-
-def _outward(count: int) -> list[int]:
-    """Numbers 0 .. count - 1: every other one outward from the middle, then the ones between these."""
-    middle = count // 2
-    even = [*range(middle, count, 2), *range(middle - 2, -1, -2)]
-    ends = [i for i in (0, count - 1) if i not in even]
-    return [*even, *ends, *(i for i in range(count) if i not in {*even, *ends})]
-
-
-def _one(made: Solved, k: int) -> Solved:
-    part = slice(k, k + 1)
-    numbers = {name: values[part] for name, values in made.numbers.items()}
-    return Solved(made.twist[part], numbers, [made.pairs[k]], made.iterations[part], [made.status[k]])
-
-
-def _closed(cells: list[Solved], goal: float, share: Array, tally: IntArray) -> Solved:
-    """The level at its torque: the last small step, then the share of finite strain."""
-    twist = np.concatenate([c.twist for c in cells])
-    numbers = {name: np.concatenate([c.numbers[name] for c in cells]) for name in cells[0].numbers}
-    status = [c.status[0] for c in cells]
-    good = np.array(status) == "converged"
-    with np.errstate(invalid="ignore", divide="ignore"):
-        torque, tangent = numbers["torque_wheel"], numbers["tangent"]
-        miss = goal / (1 + share) - torque
-        twist = np.where(good, twist + miss / tangent, twist)
-        factor = np.where(good, goal / torque, 1.0)  # the step and the share together
-        root = np.where(good, np.sqrt(goal / (1 + share) / torque), 1.0)
-    moved = dict(numbers)
-    for name in ("torque_wheel", "torque_pinion", "torque_wheel_reaction"):
-        moved[name] = numbers[name] * factor
-    moved["torque_wheel"] = np.where(good, goal, moved["torque_wheel"])
-    moved["tangent"] = tangent * (1 + 2 * share)
-    moved["peak_pressure"] = numbers["peak_pressure"] * root
-    pairs = [(c.pairs[0][0], c.pairs[0][1] * f) for c, f in zip(cells, factor, strict=True)]
-    return replace(cells[0], twist=twist, numbers=moved, pairs=pairs, iterations=tally, status=status)

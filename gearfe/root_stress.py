@@ -33,9 +33,9 @@ from .contact.flank import Flank, edge_nodes, edge_shapes
 from .contact.scene import MeshingPair, Window
 from .contact.solver import Position
 from .gear import Gear, GearPair
-from .load_map import RootMap
 from .meshing.recipe import sector_recipes
 from .meshing.tooth_sector import SectorRecipe, sector_mesh
+from .root_map import RootMap
 
 Array = NDArray[Any]
 IntArray = NDArray[Any]

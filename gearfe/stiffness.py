@@ -189,6 +189,7 @@ def sweep_stiffness(
 
 
 def lost_motion(pair: GearPair, twist_from: str) -> float:
+    """Twist (rad) that is taken off before it counts, see `sweep_stiffness`."""
     if twist_from not in ("centred", "contact"):
         raise InputError("twist_from", twist_from, "must be centred or contact")
     return pair.contact_twist if twist_from == "contact" else 0.0

@@ -12,7 +12,7 @@ import pytest
 from gearfe import LoadMap, StiffnessCurve, sweep_loads, sweep_stiffness
 from gearfe.cli import main
 from gearfe.errors import InputError
-from gearfe.load_map import RootMap
+from gearfe.root_map import RootMap
 from gearfe.stiffness import elastic_pair
 from gearfe.train_job import read_train_job, train_curves
 
@@ -38,7 +38,7 @@ def made(gears, elastic):
     return sweep_loads(gears, np.geomspace(60.0, 180.0, 6), angles=ANGLES, elastic=elastic, root_stress=True)
 
 
-@pytest.mark.parametrize("kinematics", ["small", "finite"])
+@pytest.mark.parametrize("kinematics", [pytest.param("small", marks=pytest.mark.slow), "finite"])
 def test_cells_are_what_a_sweep_at_their_torque_finds(gears, elastic, made, kinematics):
     """The prediction and its closing step may miss the torque's own solution by 1e-4 at most."""
     mapped = made

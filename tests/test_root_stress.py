@@ -65,6 +65,7 @@ def test_the_estimate_covers_the_error(form):
             assert one.error < 0.01
 
 
+@pytest.mark.slow
 def test_a_plain_solution_of_the_whole_gear_has_the_same_root_stress(gears, elastic):
     """Assemble and factorise a whole gear with a fine fillet, take the averaged nodal stresses along the fillet."""
     from scipy.sparse import csc_array
@@ -167,7 +168,7 @@ def form_and_stress_factor(z, alpha, h_fp, rho_fp, x, d_en):
     return y_f, y_s
 
 
-@pytest.mark.parametrize(("z1", "z2", "angle"), [(20, 30, 25.0), (25, 40, 20.0)])
+@pytest.mark.parametrize(("z1", "z2", "angle"), [(20, 30, 25.0), pytest.param(25, 40, 20.0, marks=pytest.mark.slow)])
 def test_iso_6336_3_is_near(z1, z2, angle):
     """Nominal root stress at the outer point of single contact: the standard's factors come from such computations and
     the common experience is agreement within 15 %."""
