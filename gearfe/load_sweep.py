@@ -19,14 +19,14 @@ where c may be off by more than :math:`\epsilon/2`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .contact.finite_strain import finite_strain_shares, interpolated_shares
-from .contact.laws import ContactLaw
+from .contact.laws import ContactLaw, law_text
 from .contact.scene import MeshingPair
 from .contact.solver import Position
 from .elasticity import Material, Plane
@@ -125,7 +125,11 @@ def sweep_loads(
         work = _Sweep(pair, elastic, solved_angles, goals, touching, progress, recorder)
         levels = [honest(level, touching) for level in work.run(finite=kinematics == "finite")]
     curves = tuple(
-        assembled_curve(pair, asked, solved_angles, source, level, touching, lost, searched=True) for level in levels
+        replace(
+            assembled_curve(pair, asked, solved_angles, source, level, touching, lost, searched=True),
+            law=law_text(elastic.law),
+        )
+        for level in levels
     )
     failed = np.stack([curve.failed for curve in curves])
     root = None if recorder is None else recorder.gathered(goals, source, failed)
