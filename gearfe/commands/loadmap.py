@@ -132,7 +132,9 @@ def _overridden(job: StiffnessJob, table: LoadMapTable, args: argparse.Namespace
         more["root_stress"] = True
     made = replace(table, **more)
     made.check("loadmap")
-    return replace(job, table=replace(job.table, **changes)), made
+    model = replace(job.table, **changes)
+    model.check("stiffness")
+    return replace(job, table=model), made
 
 
 def _check(option: str, value: Any, known: Any) -> None:
