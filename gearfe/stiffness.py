@@ -166,7 +166,7 @@ def sweep_stiffness(
     """
     if kinematics not in ("small", "finite"):
         raise InputError("kinematics", kinematics, "must be small or finite")
-    lost = _lost_motion(pair, twist_from)
+    lost = lost_motion(pair, twist_from)
     load = _checked_load(pair, twist, torque, lost)
     cycle = pair.mesh_cycle
     asked = np.arange(20) * cycle / 20 if angles is None else np.atleast_1d(np.asarray(angles, dtype=float))
@@ -176,7 +176,7 @@ def sweep_stiffness(
     common: dict[str, Any] = {"plane": plane, "law": law, "points_per_edge": points_per_edge}
     if elastic is None:
         elastic = elastic_pair(pair, materials, coarsen=coarsen, watch=watch, **common)
-    solved_angles, source = (asked, np.arange(len(asked))) if solve_all else _distinct(asked, cycle)
+    solved_angles, source = (asked, np.arange(len(asked))) if solve_all else distinct_angles(asked, cycle)
     router = Router(pair, elastic, route)
     with watch.stage("unloaded flanks"):
         touching = router.touching_twists(solved_angles)
@@ -193,11 +193,12 @@ def sweep_stiffness(
             common = {"plane": elastic.pinion.plane, "law": elastic.law, "points_per_edge": points_per_edge}
             coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
             error = _estimate(Router(pair, coarse, route), solved_angles, solved, finite=finite, coarsen=coarsen)
-    curve = _assemble(pair, asked, solved_angles, source, solved, touching, lost, searched=torque is not None)
+    curve = assembled_curve(pair, asked, solved_angles, source, solved, touching, lost, searched=torque is not None)
     return replace(curve, law=law_text(elastic.law), timings=dict(watch.seconds), error=error)
 
 
-def _lost_motion(pair: GearPair, twist_from: str) -> float:
+def lost_motion(pair: GearPair, twist_from: str) -> float:
+    """Twist (rad) that is taken off before it counts, see `sweep_stiffness`."""
     if twist_from not in ("centred", "contact"):
         raise InputError("twist_from", twist_from, "must be centred or contact")
     return pair.contact_twist if twist_from == "contact" else 0.0
@@ -220,7 +221,7 @@ def _checked_load(pair: GearPair, twist: float | None, torque: float | None, los
     return float(twist) + lost
 
 
-def _distinct(angles: Array, cycle: float) -> tuple[Array, IntArray]:
+def distinct_angles(angles: Array, cycle: float) -> tuple[Array, IntArray]:
     """Angles within one cycle that have to be solved, and for each asked angle the number of its own."""
     folded = fold(angles, cycle)
     order = np.argsort(folded, kind="stable")
@@ -237,7 +238,7 @@ def _estimate(coarse: Router, angles: Array, solved: Solved, *, finite: bool, co
     return error_estimate(angles[chosen], solved.numbers["torque_wheel"][chosen], other, coarsen=coarsen)
 
 
-def _assemble(
+def assembled_curve(
     pair: GearPair,
     asked: Array,
     angles: Array,

@@ -10,7 +10,7 @@ d cos(alpha)/2),
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -244,7 +244,18 @@ class StiffnessCurve:
         InputError
             When the file is not such a table, or says nothing of the mesh cycle.
         """
-        columns = curve_csv.read_columns(path)
+        return cls.from_columns(curve_csv.read_columns(path), path, mesh_cycle=mesh_cycle, base_radius=base_radius)
+
+    @classmethod
+    def from_columns(
+        cls,
+        columns: Mapping[str, Sequence[str]],
+        path: str | Path,
+        *,
+        mesh_cycle: float | None = None,
+        base_radius: float | None = None,
+    ) -> StiffnessCurve:
+        """The curve that a table's columns hold as text; `path` is named in messages, see `from_csv`."""
         for needed in ("pinion_angle_deg", "k_mesh_N_per_m"):
             if needed not in columns:
                 raise InputError("stiffness curve", str(path), f"has no column {needed}", "add it")

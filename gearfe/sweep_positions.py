@@ -54,15 +54,31 @@ class Solved:
 
 
 def at_twists(
-    router: Router, angles: Array, twists: Array, progress: Progress | None, *, finite: bool = False
+    router: Router,
+    angles: Array,
+    twists: Array,
+    progress: Progress | None,
+    *,
+    finite: bool = False,
+    observe: Callable[[int, Position], None] | None = None,
 ) -> Solved:
-    """Solve positions at given pinion angles and twists, both of shape (n,) (rad); with or without finite strain."""
+    """Solve positions at given pinion angles and twists, both of shape (n,) (rad); with or without finite strain.
+
+    `observe` is called with the number of each position and its small-strain solution, forces included, which are not
+    kept.
+    """
     elastic = router.elastic
     sampled = sample_numbers(angles, elastic.pitch_angle) if finite else np.zeros(0, dtype=np.int64)
+    keep = set(sampled.tolist())
     positions: list[Position] = []
     for start in range(0, len(angles), BATCH):
         part = slice(start, start + BATCH)
-        positions += router.solve(angles[part], twists[part], (sampled - start).tolist())
+        kept = (sampled - start).tolist() if observe is None else range(len(angles[part]))
+        made = router.solve(angles[part], twists[part], kept)
+        if observe is not None:
+            for i, position in enumerate(made, start=start):
+                observe(i, position)
+        positions += [p if start + i in keep else _bare(p) for i, p in enumerate(made)]
         if progress is not None:
             progress(len(positions), len(angles), "positions")
     if finite:
@@ -154,7 +170,9 @@ def _search(
 
 
 def _bare(position: Position) -> Position:
-    return replace(position, scene=None, forces=None, force_rate=None, stress_loads=None, stress_load_rate=None)
+    return replace(
+        position, scene=None, forces=None, force_rate=None, pressure=None, stress_loads=None, stress_load_rate=None
+    )
 
 
 def _collect(twists: Array, positions: list[Position], iterations: IntArray, status: list[str]) -> Solved:

@@ -82,6 +82,8 @@ def test_fields(tmp_path):
     names = sorted(p.name for p in tmp_path.iterdir())
     assert names == [
         "fields.vtkhdf",
+        "pressure.csv",
+        "pressure.png",
         "stiffness.csv",
         "stiffness.png",
         "stress_2deg.png",
@@ -105,6 +107,19 @@ def test_fields(tmp_path):
     code = main(["stiffness", str(JOB), "--out", str(tmp_path / "b"), *options[:6], "--fields", *QUICK])
     assert code == 0
     assert len(list((tmp_path / "b").glob("stress_*deg.png"))) == 1
+
+
+def test_animation(tmp_path, capsys):
+    from PIL import Image
+
+    options = ["--twist-deg", "0.1", "--angles", "0", "3", "17", "--animate", "2", *QUICK, "--no-picture"]
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path), *options]) == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["stiffness.csv", "stress.gif", "summary.json"]
+    with Image.open(tmp_path / "stress.gif") as made:
+        assert made.n_frames == 2
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path / "b"), "--animate", "1"]) == 2
+    assert "--animate" in capsys.readouterr().err
+    assert not (tmp_path / "b").exists()
 
 
 def test_fields_open_in_vtk(tmp_path):

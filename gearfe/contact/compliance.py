@@ -280,7 +280,7 @@ def _far_field(interface: Array, stress: Array | None, coupling: Array) -> tuple
     """
     rows = interface if stress is None else np.concatenate([interface, stress * (_norm(interface) / _norm(stress))])
     triangular = np.linalg.qr(rows, mode="r")
-    _, values, modes = np.linalg.svd(triangular)
+    _, values, modes = np.linalg.svd(triangular, full_matrices=False)
     basis = modes[values > 1e-13 * values[0]].T
     flank = interface @ basis
     driven = _driven(basis, coupling, flank)

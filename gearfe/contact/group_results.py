@@ -122,8 +122,10 @@ def outgrown(group: Group, motion: Motion) -> NDArray[np.bool_]:
     return bad
 
 
-def scenes_of(pair: MeshingPair, group: Group, rigid: Projection, vectors: Sequence[Array]) -> list[tuple[Any, ...]]:
-    """Each position as a scene (without its matrices), and its stretches of the nodal `vectors`, shape (2n,)."""
+def scenes_of(
+    pair: MeshingPair, group: Group, rigid: Projection, vectors: Sequence[Array], pressure: Array
+) -> list[tuple[Any, ...]]:
+    """Each position as a scene (without its matrices), its pressures, and its stretches of the nodal `vectors`."""
     windows = np.arange(int(group.first_window[-1]))
     first = group.first_window[group.position]
     half = np.diff(group.first_window)[group.position] // 2
@@ -170,5 +172,5 @@ def scenes_of(pair: MeshingPair, group: Group, rigid: Projection, vectors: Seque
             **{name: values[at] for name, values in of_node.items()},
             **{name: values[own] for name, values in of_point.items()},
         )
-        made.append((scene, *(vector[2 * at.start : 2 * at.stop] for vector in ordered)))
+        made.append((scene, pressure[points[own]], *(vector[2 * at.start : 2 * at.stop] for vector in ordered)))
     return made

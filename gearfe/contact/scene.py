@@ -380,6 +380,5 @@ def _stress(pair: MeshingPair, windows: Sequence[Window], slaves: list[int], cou
             np.matmul(body.far.stress[own], driven, out=block)
             if loaded is w:
                 block += body.stress_own[own, loaded.flank_unknowns]
-        # a body wider than the contact spreads its load: the stress that answers the pressure is that on the contact
-        rows.append(part if body.thickness == pair.width else part * (body.thickness / pair.width))
+        rows.append(part)
     return np.concatenate(rows)

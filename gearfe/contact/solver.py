@@ -66,6 +66,8 @@ class Position:
     scene, forces, force_rate
         Pieces of flank (without their matrices), the nodal forces on them in tooth axes (N) and their derivatives with
         respect to the twist (N/rad), for recovering fields; None without a solution.
+    pressure : ndarray, shape (q,)
+        Pressure at the scene's contact points (Pa); None without a solution.
     route
         ``direct``: solved on the mesh; ``hertz`` or ``blend``: see `gearfe.routes`.
     stress_loads, stress_load_rate
@@ -85,6 +87,7 @@ class Position:
     forces: Array | None = None
     force_rate: Array | None = None
     route: str = "direct"
+    pressure: Array | None = None
     stress_loads: Array | None = None
     stress_load_rate: Array | None = None
 
@@ -182,9 +185,9 @@ def solve_group(
     beyond = outgrown(group, outcomes.motion)
     outcomes = replace(outcomes, converged=outcomes.converged & ~beyond)
     results = results_of(pair, group, outcomes)
-    scenes = scenes_of(pair, group, rigid, (results.forces, results.force_rate))
+    scenes = scenes_of(pair, group, rigid, (results.forces, results.force_rate), outcomes.motion.pressure)
     made: list[Position] = []
-    for b, (scene, forces, rate) in enumerate(scenes):
+    for b, (scene, pressure, forces, rate) in enumerate(scenes):
         steps = int(outcomes.iterations[b])
         if not outcomes.converged[b]:
             made.append(_unsolved("outgrown" if beyond[b] else "not_converged", steps))
@@ -204,6 +207,7 @@ def solve_group(
                 scene=scene,
                 forces=forces,
                 force_rate=rate,
+                pressure=pressure,
             )
         )
     return made
@@ -332,6 +336,7 @@ def _finish(scene: Scene, outcome: Outcome, iterations: int) -> Position:
         ),
         forces=forces,
         force_rate=force_rate,
+        pressure=np.where(unreached(outcome.projection.gap), 0.0, state.pressure),
         stress_loads=state.stress_loads,
         stress_load_rate=load_rate,
     )
