@@ -211,12 +211,12 @@ def frames_of(
     """
     angles = np.arange(count) * curve.mesh_cycle / count
     twists = curve.interpolant("twist")(angles).value + curve.lost_motion
-    recovery, place = pair_recovery(elastic), zone(pair, modules=1.5)
+    recovery, router, place = pair_recovery(elastic), Router(pair, elastic), zone(pair, modules=1.5)
     frames: list[Frame] = []
     with one_thread():
         for first in range(0, count, SIDE_BY_SIDE):
             part = slice(first, first + SIDE_BY_SIDE)
-            made = solve_positions(elastic, angles[part], twists[part])
+            made = router.solve(angles[part], twists[part], kept=range(len(angles[part])))
             for angle, twist, position in zip(angles[part], twists[part], made, strict=True):
                 if position.scene is not None:
                     fields = recovery.at(position, float(angle), float(twist))

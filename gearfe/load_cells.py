@@ -65,7 +65,7 @@ def one_cell(made: Solved, k: int) -> Solved:
     """Cell k of some that were solved together."""
     part = slice(k, k + 1)
     numbers = {name: values[part] for name, values in made.numbers.items()}
-    return Solved(made.twist[part], numbers, [made.pairs[k]], made.iterations[part], [made.status[k]])
+    return Solved(made.twist[part], numbers, [made.pairs[k]], made.iterations[part], [made.status[k]], [made.route[k]])
 
 
 def closed_level(cells: list[Solved], goal: float, share: Array, tally: IntArray) -> Solved:
@@ -87,4 +87,12 @@ def closed_level(cells: list[Solved], goal: float, share: Array, tally: IntArray
     moved["tangent"] = tangent * (1 + 2 * share)
     moved["peak_pressure"] = numbers["peak_pressure"] * root
     pairs = [(c.pairs[0][0], c.pairs[0][1] * f) for c, f in zip(cells, factor, strict=True)]
-    return replace(cells[0], twist=twist, numbers=moved, pairs=pairs, iterations=tally, status=status)
+    return replace(
+        cells[0],
+        twist=twist,
+        numbers=moved,
+        pairs=pairs,
+        iterations=tally,
+        status=status,
+        route=[c.route[0] for c in cells],
+    )

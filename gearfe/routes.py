@@ -36,7 +36,7 @@ Route = Literal["auto", "direct", "hertz"]
 #: Default element of the flank (modules), at which the two routes' errors were weighed.
 DEFAULT_ELEMENT = 0.028
 #: Half widths of the contact, in units of the length s, between which the two routes are blended.
-RESOLVED = (1.2, 1.8)
+RESOLVED = (0.9, 1.3)
 #: Compliance of a tooth pair times E* w beyond which none is: with it a light load is told without a reference.
 SOFTEST = 40.0
 #: References are made for pairs that touch up to this many times the twist asked for.
@@ -78,7 +78,7 @@ class Router:
         twists = np.broadcast_to(np.asarray(twists, dtype=float), np.shape(angles))
         if self.route == "direct":
             made = solve_positions(self.elastic, angles, twists)
-            return [p if i in kept else _bare(p) for i, p in enumerate(made)]
+            return [p if i in kept else bare(p) for i, p in enumerate(made)]
         self._touched(angles)  # all angles in one go
         small = self.light(angles, twists)
         found: list[Balance | None] = [None] * len(angles)
@@ -99,7 +99,7 @@ class Router:
             joined = self._joined(
                 float(angle), float(twist), solved.get(n), found[n], share[n], slope[n], fields=n in kept
             )
-            made.append(joined if n in kept else _bare(joined))
+            made.append(joined if n in kept else bare(joined))
         return made
 
     def light(self, angles: Array, twists: Array) -> NDArray[np.bool_]:
@@ -192,8 +192,12 @@ def _largest(body: GearBody, start: float) -> float:
     return float(body.flank.sizes[radii >= start * (1 - 1e-9)].max())
 
 
-def _bare(position: Position) -> Position:
-    return replace(position, scene=None, forces=None, force_rate=None, stress_loads=None, stress_load_rate=None)
+def bare(position: Position) -> Position:
+    """The position without what only fields need: a scene holds megabytes."""
+    nothing: dict[str, Any] = dict.fromkeys(
+        ("scene", "forces", "force_rate", "pressure", "stress_loads", "stress_load_rate")
+    )
+    return replace(position, **nothing)
 
 
 def blended(direct: Position, hertz: Position, share: float, slope: float) -> Position:

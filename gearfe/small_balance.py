@@ -220,7 +220,7 @@ def with_forces(
     """
     r = reference
     windows: list[Window] = []
-    forces, rates, node = [], [], 0
+    forces, rates, pressures, node = [], [], [], 0
     for number, k in enumerate(np.flatnonzero(found.force > 0)):
         for g, tooth in enumerate(r.teeth(int(k))):
             loads = r.unit[k][g]
@@ -230,6 +230,7 @@ def with_forces(
             node += 2 * edges + 1
             forces.append(found.force[k] * loads.probes[0])
             rates.append(found.rate[k] * loads.probes[0])
+            pressures.append(found.force[k] * loads.pressure(elastic.bodies[g].flank, r.width))
     if not windows:
         return position
     scene = replace(assemble(elastic, windows), compliance=np.zeros((0, 0)), stress=np.zeros((0, 0)))
@@ -239,6 +240,7 @@ def with_forces(
         scene=scene,
         forces=np.concatenate(forces),
         force_rate=np.concatenate(rates),
+        pressure=np.concatenate([pressures[i] for i in np.unique(scene.owner)]),
         stress_loads=none,
         stress_load_rate=none,
     )

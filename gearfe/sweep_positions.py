@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .contact.finite_strain import finite_strain_shares, interpolated_shares, sample_numbers, with_share
 from .contact.solver import Position
 from .iso6336 import mesh_stiffness
-from .routes import Router
+from .routes import Router, bare
 from .stiffness_curve import SOLVED
 from .torque_control import TorqueSolution, twists_for_torque
 
@@ -78,13 +78,13 @@ def at_twists(
         if observe is not None:
             for i, position in enumerate(made, start=start):
                 observe(i, position)
-        positions += [p if start + i in keep else _bare(p) for i, p in enumerate(made)]
+        positions += [p if start + i in keep else bare(p) for i, p in enumerate(made)]
         if progress is not None:
             progress(len(positions), len(angles), "positions")
     if finite:
         shares = finite_strain_shares(elastic, [positions[i] for i in sampled])
         every = interpolated_shares(angles, angles[sampled], shares, elastic.pitch_angle)
-        positions = [_bare(with_share(p, c)) for p, c in zip(positions, every, strict=True)]
+        positions = [bare(with_share(p, c)) for p, c in zip(positions, every, strict=True)]
     iterations = np.array([p.iterations for p in positions], dtype=np.int64)
     return _collect(twists, positions, iterations, [p.status for p in positions])
 
@@ -166,12 +166,6 @@ def _search(
         [position for f in parts for position in f.positions],
         np.concatenate([f.iterations for f in parts]),
         [one for f in parts for one in f.status],
-    )
-
-
-def _bare(position: Position) -> Position:
-    return replace(
-        position, scene=None, forces=None, force_rate=None, pressure=None, stress_loads=None, stress_load_rate=None
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compliance import GearBody
-from .flank import edge_shapes
+from .flank import Flank, edge_shapes
 
 Array = NDArray[Any]
 
@@ -30,11 +30,23 @@ class Loads:
     probes : ndarray, shape (3, u)
         Nodal forces (-); then what gives, of nodal displacements, the rotation (1/m) of the face and its slide (-),
         both as seen along the pinion's flank.
+    span
+        Arc lengths between which it acts, from the start of the first edge (m).
     """
 
     unknowns: slice
     edges: tuple[int, int]
     probes: Array
+    span: tuple[float, float]
+
+    def pressure(self, flank: Flank, width: float) -> Array:
+        """The pressure itself (1/m2) at the contact points of its edges, on a face `width` wide (m)."""
+        first, count = self.edges
+        sizes = flank.sizes[first : first + count]
+        xi = flank.shapes @ np.array([0.0, 0.5, 1.0])  # the shape functions reproduce the coordinate itself
+        arc = (np.cumsum(sizes) - sizes)[:, None] + sizes[:, None] * xi
+        middle, half = 0.5 * sum(self.span), 0.5 * (self.span[1] - self.span[0])
+        return (np.sqrt(np.maximum(0.0, 1 - ((arc - middle) / half) ** 2)) * 2 / (math.pi * half * width)).ravel()
 
 
 class Chain:
@@ -102,4 +114,10 @@ class Chain:
         nodal[:, 2::2] += parts[:, :, 2]
         n, tangent = np.array([normal.real, normal.imag]), np.array([normal.imag, -normal.real])
         probes = np.stack([np.outer(nodal[0], sign * n), np.outer(nodal[1], n), np.outer(nodal[0], tangent)])
-        return Loads(slice(4 * first, 4 * (last + 1) + 2), (first, len(edges)), probes.reshape(3, -1))
+        start = float(self.ends[first])
+        return Loads(
+            slice(4 * first, 4 * (last + 1) + 2),
+            (first, len(edges)),
+            probes.reshape(3, -1),
+            (low - start, high - start),
+        )
