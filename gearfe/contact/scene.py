@@ -10,17 +10,19 @@ the same at every position.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .closest import Projection, chains_of, nearest_places, project
+from .closest import Projection, chains_of, nearest_places, project, unreached
 from .compliance import GearBody
 from .corners import Bearing, shares
 from .flank import edge_nodes
+from .law_data import check_stress_loads, law_data, slave_windows
 from .laws import ContactLaw
+from .multiplier import Hats
 
 Array = NDArray[Any]
 IntArray = NDArray[Any]
@@ -50,6 +52,9 @@ class MeshingPair:
     width: float
     law: ContactLaw
     corners: tuple[Bearing | None, Bearing | None] = (None, None)
+
+    def __post_init__(self) -> None:
+        check_stress_loads(self.bodies, self.law, self.width)
 
     @property
     def bodies(self) -> tuple[GearBody, GearBody]:
@@ -163,6 +168,12 @@ class Scene:
         Tooth pair of each contact point.
     rigid : Projection
         Closest points of the undeformed bodies.
+    theta
+        The law's.
+    stress_stress : ndarray, shape (q, q)
+        Normal stress at the contact points for stress loads at them (Pa/(N m2)); no rows with theta = 0.
+    hats : Hats, or None
+        Multiplier space of the exact law.
     """
 
     windows: tuple[Window, ...]
@@ -182,6 +193,9 @@ class Scene:
     owner: IntArray
     pair: IntArray
     rigid: Projection
+    theta: int = 0
+    stress_stress: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    hats: Hats | None = None
 
     @property
     def pairs(self) -> int:
@@ -200,6 +214,10 @@ class Scene:
     def areas(self, place: Array) -> Array:
         """Areas of the contact points (m2) as far as they lie before the end of the mate's surface."""
         return self.weight * np.clip(0.5 + (self.counts[self.mate] - place) / (2 * self.fade), 0.0, 1.0)
+
+    def facing(self, projection: Projection) -> Array:
+        """Areas of the contact points (m2) as far as they face the mate at all."""
+        return np.where(unreached(projection.gap), 0.0, self.areas(projection.place))
 
 
 @dataclass(frozen=True)
@@ -271,7 +289,7 @@ def assemble_all(pair: MeshingPair, positions: Sequence[Sequence[Window]]) -> li
     ]
 
 
-def _gathered(pair: MeshingPair, windows: Sequence[Window]) -> dict[str, NDArray]:
+def _gathered(pair: MeshingPair, windows: Sequence[Window]) -> dict[str, Any]:
     """Attributes of a scene except its windows and closest points."""
     count = windows[-1].nodes.stop
     points, rotation = np.empty((count, 2)), np.empty((count, 2, 2))
@@ -281,8 +299,7 @@ def _gathered(pair: MeshingPair, windows: Sequence[Window]) -> dict[str, NDArray
         points[w.nodes] = pair.bodies[w.gear].flank.points[w.flank_nodes] @ matrix.T + pair.centre(w.gear)
         rotation[w.nodes] = matrix
         of_wheel[w.nodes] = bool(w.gear)
-    sides = pair.law.sides
-    slaves = [i for i, w in enumerate(windows) if sides == "both" or (sides == "pinion") == (w.gear == 0)]
+    slaves = slave_windows(pair, windows)
     return {
         "counts": np.array([w.edges for w in windows]),
         "points": points,
@@ -292,6 +309,7 @@ def _gathered(pair: MeshingPair, windows: Sequence[Window]) -> dict[str, NDArray
         "compliance": _compliance(pair, windows, count),
         "stress": _stress(pair, windows, slaves, count),
         **_contact_points(pair, windows, slaves),
+        **law_data(pair, windows, slaves),
     }
 
 
@@ -305,9 +323,8 @@ def _contact_points(pair: MeshingPair, windows: Sequence[Window], slaves: list[i
         q = flank.shapes.shape[0]
         n = w.edges * q
         lengths = flank.weights[own].ravel()
-        # seen per area of contact, a gear wider than the common width is stiffer by that ratio, in stress and in gamma
-        gamma = pair.law.parameter(body.material.youngs_modulus * body.thickness / pair.width, flank.sizes)[own]
-        share = shares(pair.corners, windows[i & ~1].angle)[w.gear] if pair.law.sides == "both" else 1.0
+        gamma = pair.law.parameter(body.material.youngs_modulus * _wider(pair, body), flank.sizes)[own]
+        share = _shares(pair, windows[i & ~1].angle)[w.gear]
         made = {
             "slave_nodes": np.repeat(w.first_node + edge_nodes(np.arange(w.edges)), q, axis=0),
             "slave_shapes": np.tile(flank.shapes, (w.edges, 1)),
@@ -321,6 +338,21 @@ def _contact_points(pair: MeshingPair, windows: Sequence[Window], slaves: list[i
         for name, value in made.items():
             parts.setdefault(name, []).append(value)
     return {name: np.concatenate(values) for name, values in parts.items()}
+
+
+def _wider(pair: MeshingPair, body: GearBody) -> float:
+    """Factor on sigma_n and gamma: per area of contact, a gear wider than the common width is that much stiffer.
+
+    Bodies made for a theta other than 0 have their law's term inside, with the plain stress and gamma.
+    """
+    return 1.0 if pair.law.theta else body.thickness / pair.width
+
+
+def _shares(pair: MeshingPair, angle: float) -> tuple[float, float]:
+    """Shares of the contact on pinion and wheel at an angle (rad) of the pinion's tooth frame."""
+    if pair.law.sides != "both":
+        return 1.0, 1.0
+    return (0.5, 0.5) if pair.law.theta else shares(pair.corners, angle)
 
 
 def _compliance(pair: MeshingPair, windows: Sequence[Window], count: int) -> Array:
@@ -359,5 +391,5 @@ def _stress(pair: MeshingPair, windows: Sequence[Window], slaves: list[int], cou
             np.matmul(body.far.stress[own], driven, out=block)
             if loaded is w:
                 block += body.stress_own[own, loaded.flank_unknowns]
-        rows.append(part * (body.thickness / pair.width))
+        rows.append(part * _wider(pair, body))
     return np.concatenate(rows)
