@@ -88,7 +88,7 @@ def write_fields(
     chosen = chosen_positions(curve, angles_deg)
     if len(chosen) == 0:
         return []
-    recovery, router = pair_recovery(elastic), Router(pair, elastic)
+    recovery, router = pair_recovery(elastic), _router(pair, elastic, curve)
     names = ["fields.vtkhdf", "pressure.csv", "pressure.png"]
     worst: tuple[float, int, tuple[GearField, GearField]] | None = None
     pressures: list[tuple[float, list[FlankPressure]]] = []
@@ -116,6 +116,14 @@ def write_fields(
 def _place(curve: StiffnessCurve, number: int) -> tuple[float, float]:
     """Pinion angle and twist in all (rad) of a position of the curve."""
     return float(curve.pinion_angle[number]), float(curve.twist[number] + curve.lost_motion)
+
+
+def _router(pair: GearPair, elastic: MeshingPair, curve: StiffnessCurve) -> Router:
+    """The route that the curve took: the same at all of its positions, or each by the width of its contact."""
+    taken = set(curve.route.tolist())
+    if taken == {"direct"}:
+        return Router(pair, elastic, "direct")
+    return Router(pair, elastic, "hertz" if taken == {"hertz"} else "auto")
 
 
 def _solved(router: Router, curve: StiffnessCurve, chosen: NDArray[np.int64]) -> Iterator[tuple[int, Position]]:
@@ -211,7 +219,7 @@ def frames_of(
     """
     angles = np.arange(count) * curve.mesh_cycle / count
     twists = curve.interpolant("twist")(angles).value + curve.lost_motion
-    recovery, router, place = pair_recovery(elastic), Router(pair, elastic), zone(pair, modules=1.5)
+    recovery, router, place = pair_recovery(elastic), _router(pair, elastic, curve), zone(pair, modules=1.5)
     frames: list[Frame] = []
     with one_thread():
         for first in range(0, count, SIDE_BY_SIDE):

@@ -261,7 +261,7 @@ def test_unequal_face_widths():
 
 def test_the_switch_is_smooth(gears, elastic, middle):
     """k over the twist through the blended range: residual from a cubic in ln(twist) below 0.05 %."""
-    twists = np.radians(np.geomspace(0.02, 0.2, 37))
+    twists = np.radians(np.geomspace(0.01, 0.2, 47))
     router = Router(gears, elastic)
     found = router.solve(np.full(len(twists), middle), twists)
     routes = [p.route for p in found]

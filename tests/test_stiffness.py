@@ -373,12 +373,12 @@ def test_mistakes(gears, options, message):
 
 
 def test_the_error_estimate_finds_the_error(gears, elastic):
-    """Against a mesh twice as fine, over positions with steady contact: the right order of magnitude."""
+    """Against a mesh twice as fine, over positions with steady contact: above the error, less than ten times it."""
     angles = np.concatenate(on_the_path(gears, 4))
     curve = at(gears, angles, elastic, estimate_error=True, coarsen=COARSE)
     fine = at(gears, angles, coarsen=0.5 * COARSE)
     true = np.median(np.abs(curve.k_mesh / fine.k_mesh - 1))
-    assert 0.3 * true < curve.error.typical < 4 * true
+    assert true < curve.error.typical < 10 * true
     assert curve.error.worst >= curve.error.typical > 0
     assert curve.timings["error estimate"] > 0
     assert len(curve.error.relative) == len(curve.error.pinion_angle) == len(angles)
