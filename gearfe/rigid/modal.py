@@ -19,7 +19,9 @@ from .explicit import Pieces, first_step, step_through, tableau
 from .start import Start
 
 
-def run_minimal(core: Minimal, start: Start, times: Array, *, tolerance: float, longest: float, most: int):  # type: ignore[no-untyped-def]
+def run_minimal(  # type: ignore[no-untyped-def]
+    core: Minimal, start: Start, times: Array, *, tolerance: float, longest: float, most: int, jit: bool = True
+):
     """Integrate a system in minimal coordinates; returns (dense output, status, statistics)."""
     n = core.T.shape[1]
     y0 = np.concatenate(core.reduce(start.q, start.v))
@@ -34,7 +36,7 @@ def run_minimal(core: Minimal, start: Start, times: Array, *, tolerance: float, 
     def expand(t: float, y: Array) -> tuple[Array, Array, Array]:
         return core.origin + core.T @ y[:n], core.T @ y[n:], core.T @ acceleration(t, y)
 
-    laws = _compiled_laws(core)
+    laws = _compiled_laws(core) if jit else None
     if laws is None:
         made = step_through(
             rhs, lambda _, y: y, start.time, y0, times[-1], core.system.breaks, tolerance, longest, most
