@@ -7,7 +7,7 @@ the size study, with the same elements; those of the reduction against the full 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,20 @@ from .timing import measured
 SIZES, QUICK_SIZES = (14.0, 11.0, 9.0, 7.0, 6.0, 4.6), (24.0, 16.0)
 LINEAR_SIZES, QUICK_LINEAR = (11.0, 7.0, 4.6), (24.0,)
 #: (modes, correction levels) of the reduction.
-REDUCTIONS = ((10, 0), (20, 0), (40, 0), (80, 0), (160, 0), (10, 1), (20, 1), (40, 1), (60, 1), (80, 1), (20, 2), (40, 2))
+REDUCTIONS = (
+    (10, 0),
+    (20, 0),
+    (40, 0),
+    (80, 0),
+    (160, 0),
+    (10, 1),
+    (20, 1),
+    (40, 1),
+    (60, 1),
+    (80, 1),
+    (20, 2),
+    (40, 2),
+)
 QUICK_REDUCTIONS = ((10, 0), (10, 1))
 FREQUENCIES = 20
 BETA = 1.6e-6  # Rayleigh damping (s)
@@ -67,9 +80,9 @@ def sizes(record: Record) -> None:
         return {"unknowns": housing.unknowns, **cost.columns, "solver": body.solver, **named}
 
     for size in every:
-        record.row(table, {"order": 2, "size_mm": size}, lambda size=size: make(size, 2))
+        record.row(table, {"order": 2, "size_mm": size}, partial(make, size, 2))
     for size in QUICK_LINEAR if record.quick else LINEAR_SIZES:
-        record.row(table, {"order": 1, "size_mm": size}, lambda size=size: make(size, 1))
+        record.row(table, {"order": 1, "size_mm": size}, partial(make, size, 1))
 
 
 def frequency_errors(rows: list[dict[str, Any]]) -> list[float]:
@@ -89,7 +102,9 @@ def reductions(record: Record) -> None:
     def truth() -> tuple[Housing, Any]:
         housing = housing_of(size)
         full = housing.full_model()
-        return housing, newmark(full.mass, BETA * full.stiffness, full.stiffness, load, step=step, steps=steps, watch=range(36))
+        return housing, newmark(
+            full.mass, BETA * full.stiffness, full.stiffness, load, step=step, steps=steps, watch=range(36)
+        )
 
     def load(time: float) -> np.ndarray:
         force = np.zeros(36)
@@ -107,7 +122,7 @@ def reductions(record: Record) -> None:
         return {"coordinates": body.size, "error": found[6 * 4 + 1], "largest_error": max(found), **cost.columns}
 
     for modes, levels in QUICK_REDUCTIONS if record.quick else REDUCTIONS:
-        record.row(table, {"modes": modes, "levels": levels}, lambda m=modes, n=levels: make(m, n))
+        record.row(table, {"modes": modes, "levels": levels}, partial(make, modes, levels))
 
 
 def below(signal: np.ndarray, step: float, limit_hz: float) -> np.ndarray:
@@ -120,7 +135,7 @@ def below(signal: np.ndarray, step: float, limit_hz: float) -> np.ndarray:
 def solvers(record: Record) -> None:
     """Every sparse solver that is there, reduction to 40 modes; the slowest one is spared the largest mesh."""
     table = record.table("housing_solvers", "solver", "size_mm")
-    for size in (QUICK_SIZES[-1:] if record.quick else (9.0, 7.0, 6.0)):
+    for size in QUICK_SIZES[-1:] if record.quick else (9.0, 7.0, 6.0):
         for solver in installed_solvers():
             if solver == "superlu" and size < 7.0:
                 continue

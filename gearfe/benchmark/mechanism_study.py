@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -85,7 +85,7 @@ def tolerances(record: Record) -> None:
                 asked = QUICK_SLOW if record.quick else SLOW_TOLERANCES
             for tolerance in asked:
                 key = {"mechanism": name, "program": "gearfe", "method": method, "tolerance": tolerance}
-                record.row(table, key, lambda n=name, m=method, t=tolerance: _ours(n, m, t, record.quick))
+                record.row(table, key, partial(_ours, name, method, tolerance, record.quick))
 
 
 def _ours(name: str, method: str, tolerance: float, quick: bool) -> Mapping[str, Any]:
@@ -93,9 +93,7 @@ def _ours(name: str, method: str, tolerance: float, quick: bool) -> Mapping[str,
     backend = "plain" if quick else "auto"
 
     def run() -> tuple[Any, np.ndarray]:
-        made = integrate(
-            case.system, case.times, method=method, tolerance=tolerance, start=case.start, backend=backend
-        )
+        made = integrate(case.system, case.times, method=method, tolerance=tolerance, start=case.start, backend=backend)
         return made, made.q
 
     if method == "taylor" and not quick:
@@ -192,8 +190,8 @@ def others(record: Record) -> None:
                     task = {"mechanism": name, "method": method, "tolerance": tolerance, "times": case.times.tolist()}
                     try:
                         answer = run_python(module, task, limit=60.0)
-                    except PeerError as error:
-                        return {"error": float("nan"), "status": str(error)}
+                    except PeerError as failure:
+                        return {"error": float("nan"), "status": str(failure)}
                     angles = np.array(answer.pop("angles"))
                     right = len(angles) == len(case.truth)
                     error = float(np.abs(angles - case.truth).max()) if right else float("nan")
@@ -210,7 +208,9 @@ def _peer_settings(peer: str, name: str, quick: bool) -> list[tuple[str, float]]
     if peer == "exudyn":
         if name == "slider_crank":
             return [("trapezoidal", 5e-4)]
-        return [(m, s) for m in ("generalized-alpha", "trapezoidal") for s in ((1e-2,) if quick else (1e-3, 2.5e-4, 6e-5))]
+        return [
+            (m, s) for m in ("generalized-alpha", "trapezoidal") for s in ((1e-2,) if quick else (1e-3, 2.5e-4, 6e-5))
+        ]
     if peer == "sundials":
         methods = ["CVODE-Adams", "CVODE-BDF", "IDA"]
     else:
@@ -249,7 +249,7 @@ def chains(record: Record) -> None:
         return {"steps": steps, **cost.columns, "us_a_step": 1e6 * cost.cpu_s / steps, "status": made.message}
 
     for count in QUICK_CHAINS if record.quick else CHAINS:
-        record.row(table, {"bodies": count}, lambda count=count: make(count))
+        record.row(table, {"bodies": count}, partial(make, count))
 
 
 CALL = """

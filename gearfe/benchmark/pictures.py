@@ -112,6 +112,15 @@ def _mechanisms(figure: Any, rows: list[Row]) -> None:
         _finish(axes)
 
 
+def _sweep_peers(figure: Any, rows: list[Row]) -> None:
+    from .sweep_peers import own_errors
+
+    axes = figure.subplots()
+    curves(axes, groups(own_errors(rows), "program"), "error", "sweep_cpu_s")
+    axes.set(xlabel="difference from its own finest mesh", ylabel="processor time (s)", title="sweep of 40 positions")
+    _finish(axes)
+
+
 def _housing_sizes(figure: Any, rows: list[Row]) -> None:
     from .housing_study import frequency_errors
 
@@ -145,7 +154,7 @@ def bars(label: str, value: str, axis: str, title: str) -> Draw:
 PICTURES: Mapping[str, Draw] = {
     "sweep_sizes": time_error(("law",), "stiffness, 40 positions at 0.05 deg: element size and law"),
     "sweep_routes": time_error(("route",), "one position: condensed route and whole gears", time="position_cpu_s"),
-    "sweep_peers": time_error(("program",), "one position with its set-up, own mesh limit of each program"),
+    "sweep_peers": _sweep_peers,
     "sweep_stages": bars("stage", "wall_s", "seconds", "stages of a default sweep of 40 positions"),
     "sweep_positions": over("positions", "cpu_s", ("positions", "processor time (s)"), "distinct positions", fit=True),
     "sweep_twists": over("twist_deg", "error", ("twist (deg)", "largest error"), "default settings against load"),
@@ -153,7 +162,11 @@ PICTURES: Mapping[str, Draw] = {
     "mechanism_chains": over("bodies", "us_a_step", ("bodies", "microseconds a step"), "chain of bodies", fit=True),
     "housing_sizes": _housing_sizes,
     "housing_reductions": time_error(("levels",), "housing: modes and correction levels", error="largest_error"),
-    "housing_solvers": over("unknowns", "cpu_s", ("unknowns", "processor time (s)"), "sparse solvers", ("solver",), fit=True),
-    "transient_tolerance": time_error(("variant", "program", "method"), "gear train, 7 ms: largest error of all signals"),
+    "housing_solvers": over(
+        "unknowns", "cpu_s", ("unknowns", "processor time (s)"), "sparse solvers", ("solver",), fit=True
+    ),
+    "transient_tolerance": time_error(
+        ("variant", "program", "method"), "gear train, 7 ms: largest error of all signals"
+    ),
     "transient_modes": over("modes", "acceleration_error", ("modes", "error below 5 kHz"), "modes of the housing"),
 }

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -43,6 +43,10 @@ def run_sweep(record: Record) -> None:
     positions(record)
     twists(record)
     kinematics(record)
+    if record.peers:
+        from .sweep_peers import run_peers
+
+        run_peers(record)
 
 
 def angles(record: Record) -> np.ndarray:
@@ -99,7 +103,7 @@ def sizes(record: Record) -> None:
 
     for law in LAWS:
         for coarsen in QUICK_SIZES if record.quick else SIZES:
-            record.row(table, {"law": law, "coarsen": coarsen}, lambda law=law, c=coarsen: make(law, c))
+            record.row(table, {"law": law, "coarsen": coarsen}, partial(make, law, coarsen))
 
 
 def routes(record: Record) -> None:
@@ -128,7 +132,7 @@ def routes(record: Record) -> None:
 
     for coarsen in QUICK_WHOLE_SIZES if record.quick else WHOLE_SIZES:
         for name, make in (("condensed", condensed), ("whole gears", whole)):
-            record.row(table, {"route": name, "coarsen": coarsen}, lambda make=make, c=coarsen: make(c))
+            record.row(table, {"route": name, "coarsen": coarsen}, partial(make, coarsen))
 
 
 def whole_pair(pair: GearPair, coarsen: float) -> Any:
@@ -159,7 +163,7 @@ def stages(record: Record) -> None:
         for name, seconds in curve.timings.items():
             best[name] = min(seconds, best.get(name, math.inf))
     for name in names:
-        record.row(table, {"stage": name}, lambda name=name: {"wall_s": best.get(name, 0.0)})
+        record.row(table, {"stage": name}, partial(dict, wall_s=best.get(name, 0.0)))
 
 
 def positions(record: Record) -> None:
@@ -196,7 +200,7 @@ def twists(record: Record) -> None:
         return {**found, **cost.columns, "iterations": float(np.mean(curve.iterations))}
 
     for twist in QUICK_TWISTS if record.quick else TWISTS:
-        record.row(table, {"twist_deg": twist}, lambda t=math.radians(twist): make(t))
+        record.row(table, {"twist_deg": twist}, partial(make, math.radians(twist)))
 
 
 def kinematics(record: Record) -> None:
@@ -220,4 +224,4 @@ def kinematics(record: Record) -> None:
     for twist in (0.05,) if record.quick else (0.05, 0.5):
         for name in ("small", "finite"):
             key = {"kinematics": name, "twist_deg": twist}
-            record.row(table, key, lambda name=name, t=math.radians(twist): make(name, t))
+            record.row(table, key, partial(make, name, math.radians(twist)))

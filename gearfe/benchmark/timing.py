@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import statistics
 import time
 from collections.abc import Callable
@@ -75,10 +76,8 @@ def measured(
 
 def reset_peak() -> None:
     """Forget the peak of the resident memory (Linux; elsewhere the peak stays that of the whole process)."""
-    try:
+    with contextlib.suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
-    except OSError:
-        pass
 
 
 def peak_megabytes() -> float:

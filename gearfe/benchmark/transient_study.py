@@ -1,13 +1,14 @@
 """The shipped gear train: every integrator x tolerance, number of modes of the housing; other programs beside.
 
-The error is the largest of all contact forces, shaft accelerations and attachment accelerations at the output times, each
+The error is the largest of all contact forces, shaft accelerations and attachment accelerations at the output times,
+each
 against its own largest value, held against a run of 1e-12.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -67,6 +68,7 @@ def tolerances(record: Record) -> None:
     table = record.table("transient_tolerance", "variant", "program", "method", "tolerance")
     for variant in VARIANTS[:1] if record.quick else VARIANTS:
         for method in ("explicit", "implicit"):
+            asked: tuple[float, ...]
             if method == "explicit":
                 asked = QUICK_TOLERANCES if record.quick else TOLERANCES
             elif variant != VARIANTS[0]:
@@ -75,7 +77,9 @@ def tolerances(record: Record) -> None:
                 asked = QUICK_IMPLICIT if record.quick else IMPLICIT
             for tolerance in asked:
 
-                def make(variant: str = variant, method: str = method, tolerance: float = tolerance):  # type: ignore[no-untyped-def]
+                def make(
+                    variant: str = variant, method: str = method, tolerance: float = tolerance
+                ) -> Mapping[str, Any]:
                     model, times, truth = subject(variant, record.quick)
 
                     def run() -> Any:
@@ -124,7 +128,9 @@ def _settings(peer: str, quick: bool) -> list[tuple[str, float]]:
     if peer == "exudyn":
         return [("DOPRI5", 1e-5), ("DOPRI5", 1e-7), ("generalized-alpha", 2e-3), ("generalized-alpha", 5e-4)]
     if peer == "sundials":
-        return [(m, t) for m in ("CVODE-Adams", "CVODE-BDF") for t in (1e-5, 1e-7, 1e-9) if (m, t) != ("CVODE-BDF", 1e-9)]
+        return [
+            (m, t) for m in ("CVODE-Adams", "CVODE-BDF") for t in (1e-5, 1e-7, 1e-9) if (m, t) != ("CVODE-BDF", 1e-9)
+        ]
     return [("DOP853", 1e-4), ("DOP853", 1e-6), ("DOP853", 1e-8), ("LSODA", 1e-6), ("RK45", 1e-5)]
 
 
@@ -158,4 +164,4 @@ def modes(record: Record) -> None:
         return {"unknowns": model.core.T.shape[1], **numbers, **cost.columns}
 
     for count in QUICK_MODES if record.quick else MODES:
-        record.row(table, {"modes": count}, lambda count=count: make(count))
+        record.row(table, {"modes": count}, partial(make, count))

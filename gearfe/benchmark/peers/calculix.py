@@ -4,7 +4,8 @@ Contact: CPE6, finite strain (NLGEOM) with the linear elastic law, surface to su
 N/mm3: docs/verification.md), the bore of the pinion held and that of the wheel turned by the twist, torque from the
 bore's reactions. Modes: C3D10, SPOOLES and ARPACK, bores clamped.
 
-What it does that the toolkit does not: any geometry, friction, plasticity, heat. Its own mesher is left out of the time,
+What it does that the toolkit does not: any geometry, friction, plasticity, heat. Its own mesher is left out of the
+time,
 ours too.
 """
 

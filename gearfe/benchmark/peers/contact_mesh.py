@@ -1,4 +1,4 @@
-"""Both whole gears for another program: fine teeth where they mesh, coarse ones elsewhere, as an expert would mesh them.
+"""Both whole gears for another program: fine teeth where they mesh, coarse ones elsewhere.
 
 Sectors whose recipes differ on the flanks only share the nodes of their cut sides, so fine and coarse ones join.
 """

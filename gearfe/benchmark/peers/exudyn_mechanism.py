@@ -1,7 +1,9 @@
 """exudyn: a mechanism file as rigid bodies and joints in the plane.
 
-Generalized-alpha steps of fixed length with spectral radius 0.9 (index 3), or its trapezoidal rule (index 2), which alone gets
-over the fold of the slider crank; the tolerance of the table is the step as a part of the run. What it does that the toolkit does not: three-dimensional multibody systems,
+Generalized-alpha steps of fixed length with spectral radius 0.9 (index 3), or its trapezoidal rule (index 2), which
+alone gets
+over the fold of the slider crank; the tolerance of the table is the step as a part of the run. What it does that the
+toolkit does not: three-dimensional multibody systems,
 contact, control, a viewer.
 """
 
@@ -47,7 +49,7 @@ def _run(task: dict[str, Any], times: np.ndarray) -> np.ndarray:
     with (GEOMETRY / f"{task['mechanism']}.toml").open("rb") as stream:
         file = tomllib.load(stream)
     container = exudyn.SystemContainer()
-    system = container.AddSystem()
+    system: Any = container.AddSystem()
     ground = system.AddObject(items.ObjectGround())
     bodies, sensors = {}, []
     gravity = next((f["acceleration_m_per_s2"] for f in file["forces"].values() if f["type"] == "gravity"), [0.0, 0.0])
@@ -63,8 +65,8 @@ def _run(task: dict[str, Any], times: np.ndarray) -> np.ndarray:
             items.ObjectRigidBody2D(nodeNumber=node, mass=body["mass_kg"], inertia=body["inertia_kg_m2"])
         )
         if any(gravity):
-            marker = system.AddMarker(items.MarkerBodyMass(bodyNumber=bodies[name]))
-            system.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=[*gravity, 0.0]))
+            whole = system.AddMarker(items.MarkerBodyMass(bodyNumber=bodies[name]))
+            system.AddLoad(items.LoadMassProportional(markerNumber=whole, loadVector=[*gravity, 0.0]))
         sensors.append(
             system.AddSensor(
                 items.SensorNode(
@@ -89,7 +91,10 @@ def _run(task: dict[str, Any], times: np.ndarray) -> np.ndarray:
         else:
             system.AddObject(
                 items.ObjectJointPrismatic2D(
-                    markerNumbers=ends, axisMarker0=[1.0, 0.0, 0.0], normalMarker1=[0.0, 1.0, 0.0], constrainRotation=False
+                    markerNumbers=ends,
+                    axisMarker0=[1.0, 0.0, 0.0],
+                    normalMarker1=[0.0, 1.0, 0.0],
+                    constrainRotation=False,
                 )
             )
     for force in file["forces"].values():
@@ -104,7 +109,7 @@ def _run(task: dict[str, Any], times: np.ndarray) -> np.ndarray:
             place = system.AddMarker(items.MarkerBodyRigid(bodyNumber=bodies[force["body"]]))
             system.AddLoad(items.LoadTorqueVector(markerNumber=place, loadVector=[0.0, 0.0, force["moment_N_m"]]))
     system.Assemble()
-    settings = exudyn.SimulationSettings()
+    settings: Any = exudyn.SimulationSettings()
     settings.timeIntegration.numberOfSteps = _steps(task, times)
     settings.timeIntegration.endTime = float(times[-1])
     settings.timeIntegration.generalizedAlpha.spectralRadius = 0.9

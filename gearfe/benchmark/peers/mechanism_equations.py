@@ -1,3 +1,4 @@
+# mypy: ignore-errors
 r"""Equations of the two mechanisms for general-purpose integrators, in absolute angles, compiled by numba.
 
 Andrews' mechanism: seven angles, six closure equations (Hairer & Wanner II, Sec. VII.7). A mass centre is
@@ -62,12 +63,12 @@ def published_angles(a: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True, fastmath=True)
-def _turned(x, y, c, s):  # type: ignore[no-untyped-def]
+def _turned(x, y, c, s):
     return x * c - y * s, x * s + y * c
 
 
 @njit(cache=True, fastmath=True)
-def andrews_terms(q, v, G, gamma, f):  # type: ignore[no-untyped-def]
+def andrews_terms(q, v, G, gamma, f):
     """Closure gradient G (6, 7), gamma (6,), forces f (7,); returns the three couplings of M."""
     c0, s0, c1, s1 = math.cos(q[0]), math.sin(q[0]), math.cos(q[1]), math.sin(q[1])
     c2, s2, c3, s3 = math.cos(q[2]), math.sin(q[2]), math.cos(q[3]), math.sin(q[3])
@@ -122,7 +123,7 @@ def andrews_terms(q, v, G, gamma, f):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=True)
-def _inverse_mass(k, i, j, x):  # type: ignore[no-untyped-def]
+def _inverse_mass(k, i, j, x):
     """x <- block of M^-1 x for the coupled angles i and j."""
     det = _DIAGONAL[i] * _DIAGONAL[j] - k * k
     a, b = x[i], x[j]
@@ -131,7 +132,7 @@ def _inverse_mass(k, i, j, x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=True)
-def andrews_rhs(t, y, dy):  # type: ignore[no-untyped-def]
+def andrews_rhs(t, y, dy):  # noqa: ARG001
     """dy of y = (angles, rates): index-1 form."""
     G, gamma, f = np.zeros((6, 7)), np.empty(6), np.empty(7)
     k0, k1, k2 = andrews_terms(y[:7], y[7:], G, gamma, f)
@@ -166,7 +167,7 @@ def andrews_rhs(t, y, dy):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=True)
-def _cholesky_solve(S, b):  # type: ignore[no-untyped-def]
+def _cholesky_solve(S, b):
     """b <- S^-1 b, the lower triangle of S given; S is overwritten."""
     n = b.shape[0]
     for j in range(n):
@@ -192,7 +193,7 @@ def _cholesky_solve(S, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=True)
-def andrews_residual(t, y, dy, out):  # type: ignore[no-untyped-def]
+def andrews_residual(t, y, dy, out):  # noqa: ARG001
     """Stabilised index-2 form (Gear, Gupta, Leimkuhler): y = (angles, rates, lambda, mu)."""
     G, gamma, f = np.zeros((6, 7)), np.empty(6), np.empty(7)
     k0, k1, k2 = andrews_terms(y[:7], y[7:14], G, gamma, f)
@@ -229,7 +230,7 @@ def slider_start() -> np.ndarray:
 
 
 @njit(cache=True, fastmath=True)
-def slider_rhs(t, y, dy):  # type: ignore[no-untyped-def]
+def slider_rhs(t, y, dy):  # noqa: ARG001
     """dy of y = (two angles, two rates): index-1 form of rods of 1 m and 1 kg, sin a + sin b = 0."""
     ca, cb, sa, sb = math.cos(y[0]), math.cos(y[1]), math.sin(y[0]), math.sin(y[1])
     k, n = 0.5 * math.cos(y[1] - y[0]), 0.5 * math.sin(y[1] - y[0])
@@ -246,7 +247,7 @@ def slider_rhs(t, y, dy):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=True)
-def slider_residual(t, y, dy, out):  # type: ignore[no-untyped-def]
+def slider_residual(t, y, dy, out):  # noqa: ARG001
     """Stabilised index-2 form: y = (two angles, two rates, lambda, mu)."""
     ca, cb = math.cos(y[0]), math.cos(y[1])
     k, n = 0.5 * math.cos(y[1] - y[0]), 0.5 * math.sin(y[1] - y[0])

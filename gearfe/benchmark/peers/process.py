@@ -18,11 +18,11 @@ from typing import Any
 #: Where the package lies, for the processes that import it.
 ROOT = Path(__file__).resolve().parents[3]
 #: Seconds after which a peer's run is given up.
-TIME_LIMIT = 240.0
+TIME_LIMIT = 400.0
 #: Python that Debian's GetFEM packages belong to.
 SYSTEM_PYTHON = "/usr/bin/python3"
 #: One thread, for all programs alike.
-ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "CCX_NPROC_RESULTS")}
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "CCX_NPROC_RESULTS"), "1")
 
 
 class PeerError(RuntimeError):

@@ -34,7 +34,12 @@ def answer(task: dict[str, Any]) -> dict[str, Any]:
         )
 
     made, cost = measured(run, runs=3, most_s=20.0)
-    return {"angles": angles_of(task["mechanism"], made.y.T), **cost.columns, "steps": made.nfev, "status": made.message}
+    return {
+        "angles": angles_of(task["mechanism"], made.y.T),
+        **cost.columns,
+        "steps": made.nfev,
+        "status": made.message,
+    }
 
 
 if __name__ == "__main__":

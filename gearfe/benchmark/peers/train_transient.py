@@ -1,8 +1,10 @@
 """The shipped gear train by general-purpose integrators: SUNDIALS (scikit-sundae), scipy, exudyn.
 
 All get the same right-hand side in the same modal coordinates, y'' = -w^2 y - D y' + W^T f(t, W y, W y'), compiled by
-numba; they return the state at the output times and the study evaluates the same signals. exudyn holds mass, damping and
-stiffness itself (ObjectGenericODE2) and calls the compiled forces from a Python function, which is the only way it offers for
+numba; they return the state at the output times and the study evaluates the same signals. exudyn holds mass, damping
+and
+stiffness itself (ObjectGenericODE2) and calls the compiled forces from a Python function, which is the only way it
+offers for
 forces that depend on all coordinates.
 """
 
@@ -115,7 +117,7 @@ def _exudyn(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times:
     n = len(core.squares)
     y, dy = np.zeros(2 * n), np.zeros(2 * n)
     container = exudyn.SystemContainer()
-    system = container.AddSystem()
+    system: Any = container.AddSystem()
     node = system.AddNode(
         items.NodeGenericODE2(
             referenceCoordinates=np.zeros(n),
@@ -146,7 +148,7 @@ def _exudyn(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times:
         for kind in (kinds.Coordinates, kinds.Coordinates_t)
     ]
     system.Assemble()
-    settings = exudyn.SimulationSettings()
+    settings: Any = exudyn.SimulationSettings()
     time = settings.timeIntegration
     time.endTime, time.verboseMode = float(times[-1]), 0
     settings.solutionSettings.writeSolutionToFile = False
