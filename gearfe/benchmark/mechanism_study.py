@@ -79,6 +79,7 @@ def tolerances(record: Record) -> None:
     table = record.table("mechanism_tolerance", "mechanism", "program", "method", "tolerance")
     for name in ("andrews", "slider_crank"):
         for method in ("taylor", "explicit", "implicit"):
+            asked: tuple[float, ...]
             if method == "taylor":
                 asked = QUICK_TOLERANCES if record.quick else TOLERANCES
             else:

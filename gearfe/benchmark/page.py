@@ -98,10 +98,8 @@ def summary(tables: dict[str, list[Row]]) -> list[str]:
     for title, table, part, time, wanted in PEERS:
         own = [r for r in tables.get(table, []) if all(r[n] == v for n, v in part.items())]
         for peer in dict.fromkeys(r["program"] for r in own if r["program"] != "gearfe"):
-            least = wanted.get(peer)
-            rows.append(
-                (f"{title}: times faster than {peer}", _faster(own, peer, time), f">= {least}" if least else "-")
-            )
+            least = f">= {wanted[peer]}" if peer in wanted else "-"
+            rows.append((f"{title}: times faster than {peer}", _faster(own, peer, time), least))
     for title, table, x, y, goal in (
         ("sweep: exponent in positions", "sweep_positions", "positions", "cpu_s", "1"),
         ("chain: exponent of a step in bodies", "mechanism_chains", "bodies", "us_a_step", "<= 1.2"),

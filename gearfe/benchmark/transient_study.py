@@ -76,50 +76,44 @@ def tolerances(record: Record) -> None:
             else:
                 asked = QUICK_IMPLICIT if record.quick else IMPLICIT
             for tolerance in asked:
-
-                def make(
-                    variant: str = variant, method: str = method, tolerance: float = tolerance
-                ) -> Mapping[str, Any]:
-                    model, times, truth = subject(variant, record.quick)
-
-                    def run() -> Any:
-                        options = {"tolerance": tolerance, "method": method, "backend": _backend(record.quick)}
-                        return simulate(model, times, **options)  # type: ignore[arg-type]
-
-                    fast = method == "explicit" and not record.quick
-                    made, cost = measured(run, runs=5 if fast else 1, least_s=0.2 if fast else 0.0)
-                    found = error_of(signals_of(made), truth)
-                    free = model.core.T.shape[1]
-                    return {"error": found, **cost.columns, "steps": made.statistics["steps"], "unknowns": free}
-
                 key = {"variant": variant, "program": "gearfe", "method": method, "tolerance": tolerance}
-                record.row(table, key, make)
+                record.row(table, key, partial(_ours, variant, method, tolerance, record.quick))
+
+
+def _ours(variant: str, method: str, tolerance: float, quick: bool) -> Mapping[str, Any]:
+    model, times, truth = subject(variant, quick)
+
+    def run() -> Any:
+        return simulate(model, times, tolerance=tolerance, method=method, backend=_backend(quick))
+
+    fast = method == "explicit" and not quick
+    made, cost = measured(run, runs=5 if fast else 1, least_s=0.2 if fast else 0.0)
+    found, free = error_of(signals_of(made), truth), model.core.T.shape[1]
+    return {"error": found, **cost.columns, "steps": made.statistics["steps"], "unknowns": free}
 
 
 def others(record: Record) -> None:
     """The same right-hand side by other integrators, in the same table."""
     table = record.table("transient_tolerance", "variant", "program", "method", "tolerance")
-    variants = VARIANTS[:1]
     for peer in ("sundials", "exudyn", "scipy_ivp"):
         why = missing(peer)
         if why:
             record.say(f"  left out: {why}")
             continue
-        for variant in variants:
-            for method, tolerance in _settings(peer, record.quick):
+        for method, tolerance in _settings(peer, record.quick):
+            key = {"variant": VARIANTS[0], "program": peer, "method": method, "tolerance": tolerance}
+            record.row(table, key, partial(_theirs, peer, method, tolerance, record.quick))
 
-                def make(variant: str = variant, method: str = method, tolerance: float = tolerance, peer: str = peer):  # type: ignore[no-untyped-def]
-                    model, times, truth = subject(variant, record.quick)
-                    task = {"peer": peer, "variant": variant, "method": method, "tolerance": tolerance}
-                    try:
-                        answer = run_python("train_transient", {**task, "quick": record.quick}, limit=150.0)
-                    except PeerError as error:
-                        return {"error": float("nan"), "status": str(error)}
-                    states = np.array(answer.pop("states"))
-                    return {"error": error_of(states_signals(model, times, states), truth), **answer}
 
-                key = {"variant": variant, "program": peer, "method": method, "tolerance": tolerance}
-                record.row(table, key, make)
+def _theirs(peer: str, method: str, tolerance: float, quick: bool) -> Mapping[str, Any]:
+    model, times, truth = subject(VARIANTS[0], quick)
+    task = {"peer": peer, "variant": VARIANTS[0], "method": method, "tolerance": tolerance, "quick": quick}
+    try:
+        answer = run_python("train_transient", task, limit=150.0)
+    except PeerError as error:
+        return {"error": float("nan"), "status": str(error)}
+    states = np.array(answer.pop("states"))
+    return {"error": error_of(states_signals(model, times, states), truth), **answer}
 
 
 def _settings(peer: str, quick: bool) -> list[tuple[str, float]]:

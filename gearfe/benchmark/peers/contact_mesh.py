@@ -81,7 +81,7 @@ def _rough(gear: Gear, recipe: SectorRecipe, fine: SectorMesh) -> SectorMesh:
         made = replace(recipe, flank=large, strip=large, back=factor * recipe.back, root=factor * recipe.root)
         mesh = sector_mesh(gear, made)
         sides = [np.sort(np.hypot(*m.points[m.cut_left].T)) for m in (mesh, fine)]
-        if len(sides[0]) == len(sides[1]) and np.allclose(*sides, rtol=0, atol=1e-9 * gear.module):
+        if len(sides[0]) == len(sides[1]) and np.allclose(sides[0], sides[1], rtol=0, atol=1e-9 * gear.module):
             return mesh
     return fine
 
