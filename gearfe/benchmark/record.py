@@ -32,6 +32,11 @@ UNMEASURED = ("commands", "benchmark/page.py", "benchmark/pictures.py", "benchma
 Row = dict[str, Any]
 
 
+def told(text: str) -> None:
+    """Print at once, also into a file that someone watches."""
+    print(text, flush=True)
+
+
 @dataclass
 class Table:
     """Rows of one CSV file; `key` names the columns that tell rows apart."""
@@ -73,7 +78,7 @@ class Record:
     folder: Path
     quick: bool = False
     peers: bool = True
-    say: Callable[[str], None] = print
+    say: Callable[[str], None] = told
     failures: list[str] = field(default_factory=list)
 
     def table(self, name: str, *key: str) -> Table:
@@ -100,7 +105,7 @@ class Record:
 
 
 def open_record(
-    out: str | Path, *, quick: bool = False, peers: bool = True, say: Callable[[str], None] = print
+    out: str | Path, *, quick: bool = False, peers: bool = True, say: Callable[[str], None] = told
 ) -> Record:
     """The record in folder `out`; rows of another program, machine or setting are removed first, and this is said."""
     folder = output_folder(out)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from ..threads import one_thread
-from .record import Record, open_record
+from .record import Record, open_record, told
 
 #: Job -> module of this package; its function is called run_<job>.
 JOBS = {
@@ -21,7 +21,7 @@ JOBS = {
 
 
 def run_jobs(
-    jobs: Sequence[str], out: str | Path, *, quick: bool = False, peers: bool = True, say: Callable[[str], None] = print
+    jobs: Sequence[str], out: str | Path, *, quick: bool = False, peers: bool = True, say: Callable[[str], None] = told
 ) -> Record:
     """Run jobs, one thread each, draw the pictures; finished rows of an earlier run in `out` are kept."""
     from .pictures import draw_all

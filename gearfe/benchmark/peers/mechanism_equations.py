@@ -18,7 +18,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from ...rigid import compiled
 
 MASS = np.array([0.04325, 0.00365, 0.02373, 0.00706, 0.07050, 0.00706, 0.05498])
 INERTIA = np.array([2.194e-6, 4.410e-7, 5.255e-6, 5.667e-7, 1.169e-5, 5.667e-7, 1.912e-5])
@@ -62,12 +63,10 @@ def published_angles(a: np.ndarray) -> np.ndarray:
     return np.stack(columns, axis=1)
 
 
-@njit(cache=True, fastmath=True)
 def _turned(x, y, c, s):
     return x * c - y * s, x * s + y * c
 
 
-@njit(cache=True, fastmath=True)
 def andrews_terms(q, v, G, gamma, f):
     """Closure gradient G (6, 7), gamma (6,), forces f (7,); returns the three couplings of M."""
     c0, s0, c1, s1 = math.cos(q[0]), math.sin(q[0]), math.cos(q[1]), math.sin(q[1])
@@ -122,7 +121,6 @@ def andrews_terms(q, v, G, gamma, f):
     return k0, k1, k2
 
 
-@njit(cache=True, fastmath=True)
 def _inverse_mass(k, i, j, x):
     """x <- block of M^-1 x for the coupled angles i and j."""
     det = _DIAGONAL[i] * _DIAGONAL[j] - k * k
@@ -131,7 +129,6 @@ def _inverse_mass(k, i, j, x):
     x[j] = (_DIAGONAL[i] * b - k * a) / det
 
 
-@njit(cache=True, fastmath=True)
 def andrews_rhs(t, y, dy):  # noqa: ARG001
     """dy of y = (angles, rates): index-1 form."""
     G, gamma, f = np.zeros((6, 7)), np.empty(6), np.empty(7)
@@ -166,7 +163,6 @@ def andrews_rhs(t, y, dy):  # noqa: ARG001
         dy[7 + m] = total
 
 
-@njit(cache=True, fastmath=True)
 def _cholesky_solve(S, b):
     """b <- S^-1 b, the lower triangle of S given; S is overwritten."""
     n = b.shape[0]
@@ -192,7 +188,6 @@ def _cholesky_solve(S, b):
         b[i] = total / S[i, i]
 
 
-@njit(cache=True, fastmath=True)
 def andrews_residual(t, y, dy, out):  # noqa: ARG001
     """Stabilised index-2 form (Gear, Gupta, Leimkuhler): y = (angles, rates, lambda, mu)."""
     G, gamma, f = np.zeros((6, 7)), np.empty(6), np.empty(7)
@@ -223,14 +218,13 @@ def andrews_residual(t, y, dy, out):  # noqa: ARG001
         out[20 + r] = total
 
 
-def slider_start() -> np.ndarray:
+def slider_crank_start() -> np.ndarray:
     """Crank and rod angle, their rates: the slider moves at -4 m/s."""
     rate = 4.0 / (2.0 * math.sin(math.pi / 4.0))
     return np.array([math.pi / 4.0, -math.pi / 4.0, rate, -rate])
 
 
-@njit(cache=True, fastmath=True)
-def slider_rhs(t, y, dy):  # noqa: ARG001
+def slider_crank_rhs(t, y, dy):  # noqa: ARG001
     """dy of y = (two angles, two rates): index-1 form of rods of 1 m and 1 kg, sin a + sin b = 0."""
     ca, cb, sa, sb = math.cos(y[0]), math.cos(y[1]), math.sin(y[0]), math.sin(y[1])
     k, n = 0.5 * math.cos(y[1] - y[0]), 0.5 * math.sin(y[1] - y[0])
@@ -246,8 +240,7 @@ def slider_rhs(t, y, dy):  # noqa: ARG001
     dy[2], dy[3] = g1 - w1 * push, g2 - w2 * push
 
 
-@njit(cache=True, fastmath=True)
-def slider_residual(t, y, dy, out):  # noqa: ARG001
+def slider_crank_residual(t, y, dy, out):  # noqa: ARG001
     """Stabilised index-2 form: y = (two angles, two rates, lambda, mu)."""
     ca, cb = math.cos(y[0]), math.cos(y[1])
     k, n = 0.5 * math.cos(y[1] - y[0]), 0.5 * math.sin(y[1] - y[0])
@@ -259,11 +252,20 @@ def slider_residual(t, y, dy, out):  # noqa: ARG001
     out[5] = ca * y[2] + cb * y[3]
 
 
-def equations(name: str) -> tuple[np.ndarray, Callable[..., Any], Callable[..., Any], int]:
-    """Start (angles, rates), right-hand side, residual, number of closure equations."""
-    if name == "andrews":
-        return andrews_start(), andrews_rhs, andrews_residual, 6
-    return slider_start(), slider_rhs, slider_residual, 1
+FUNCTIONS = (
+    _turned, andrews_terms, _inverse_mass, _cholesky_solve, andrews_rhs, andrews_residual, slider_crank_rhs,
+    slider_crank_residual,
+)  # fmt: skip
+
+
+def equations(name: str, *, jit: bool = True) -> tuple[np.ndarray, Callable[..., Any], Callable[..., Any], int]:
+    """Start (angles, rates), right-hand side, residual, number of closure equations; compiled, or as they stand."""
+    constants = {k: v for k, v in globals().items() if k.isupper() or k in ("_DIAGONAL", "_DOT", "_CROSS", "D_")}
+    entries = (f"{name}_rhs", f"{name}_residual")
+    functions = FUNCTIONS if name == "andrews" else FUNCTIONS[-2:]
+    made = compiled.bind(functions, {"np": np, "math": math, **constants}, compiled=jit, entries=entries)
+    start, rows = (andrews_start(), 6) if name == "andrews" else (slider_crank_start(), 1)
+    return start, getattr(made, entries[0]), getattr(made, entries[1]), rows
 
 
 def angles_of(name: str, states: np.ndarray) -> list[Any]:
