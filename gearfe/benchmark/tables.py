@@ -250,7 +250,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "mechanism_chains",
         "Mechanisms: number of bodies",
-        "Hanging chains, 0.1 s at 1e-9.",
+        "Hanging chains, 1 s at 1e-9.",
         {
             "bodies": ("bodies", digits),
             "steps": ("steps", digits),

@@ -149,10 +149,11 @@ def step_through(
             break
         d = sign * step
         try:
-            for s in range(1, 12):
-                K[s] = rhs(t + tab.C[s] * d, y + d * (tab.A[s, :s] @ K[:s]))
-            new = y + d * (tab.B @ K[:12])
-            K[12] = rhs(t + d, new)
+            with np.errstate(over="ignore", invalid="ignore"):
+                for s in range(1, 12):
+                    K[s] = rhs(t + tab.C[s] * d, finite(y + d * (tab.A[s, :s] @ K[:s])))
+                new = y + d * (tab.B @ K[:12])
+                K[12] = rhs(t + d, finite(new))
         except np.linalg.LinAlgError:  # a stage ran away (a singular position): a shorter step, or a status
             h = 0.2 * step
             if step < 1e-12 * max(1e-300, abs(t1 - t0)):
@@ -195,6 +196,19 @@ def step_through(
         h = step * min(6.0, 0.9 * max(error, 1e-12) ** (-1 / 8)) if not fixed or error > 0.01 else max(h, step)
     shape = (len(polynomials), 7, y.size)
     return np.array(ends), np.array(states), np.array(polynomials).reshape(shape), status, evaluations
+
+
+def finite(y: Array) -> Array:
+    """The state itself when it is finite.
+
+    Raises
+    ------
+    LinAlgError
+        When it is not: no right-hand side needs to see it.
+    """
+    if not np.isfinite(y).all():
+        raise np.linalg.LinAlgError("the state is not finite")
+    return y
 
 
 def first_step(y: Array, dy: Array, span: float) -> float:
