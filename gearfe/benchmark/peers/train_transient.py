@@ -52,9 +52,9 @@ def compiled_rhs(core: Any) -> Rhs:
     [(force, index)] = core.system.forces
     law = force.compiled_law
     names = {"np": np, "math": kernel_modal.math, **law.__globals__}
-    kernels = compiled.bind(
-        (kernel_modal.modal_rhs, law), names, compiled=True, entries=("modal_rhs",), alias={law.__name__: "law"}
-    )
+    functions = (kernel_modal.modal_rhs, *force.compiled_helpers, law)
+    alias = {law.__name__: "law"}
+    kernels = compiled.bind(functions, names, compiled=True, entries=("modal_rhs",), alias=alias)
     W = np.ascontiguousarray((core.T[index].T @ force.W).T)
     offset = np.atleast_1d(core.origin[index] @ force.W)
     first = np.array([0, len(W)])
