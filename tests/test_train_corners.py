@@ -15,9 +15,11 @@ SPEED = 600.0
 
 
 def parameters(sense=1.0, ratio=1.0, phase=0.0):
-    """One mesh whose curve has nodes at 0, 0.1, 0.3, 0.45 rad and the period 0.6 rad."""
-    nodes = np.array([0.0, 0.1, 0.3, 0.45])
-    shape = periodic_interpolant(nodes, np.array([1e8, 1.1e8, 0.9e8, 1e8]), 0.6, method="linear")
+    """One mesh whose curve has nodes at 0, 0.1, 0.25, 0.4, 0.5 rad and the period 0.6 rad."""
+    nodes = np.array([0.0, 0.1, 0.25, 0.4, 0.5])
+    shape = periodic_interpolant(
+        nodes, np.array([1e8, 1.1e8, 0.9e8, 1e8, 1.05e8]), 0.6, widest_gap=0.3, method="linear"
+    )
     return joined([angle_block(constant(SPEED).integral(0.0, 0.0)), mesh_block(0, 1, ratio, sense, phase, 1e8, shape)])
 
 
@@ -27,8 +29,8 @@ def parameters(sense=1.0, ratio=1.0, phase=0.0):
         (1e-4, 0.0, 0.0, 1.0, 1.0, 0.1 - 0.06),  # ahead of the node at 0.1
         (1e-4, 0.02, 0.0, 1.0, 1.0, 0.1 - 0.08),  # the shaft's own rotation counts
         (1e-4, 0.0, 0.0, 1.0, -1.0, 0.06),  # backwards in time: the node at 0
-        (1e-4, 0.0, 0.0, -1.0, 1.0, 0.54 - 0.45),  # the other sense: -0.06 is 0.54, down to 0.45
-        (0.1 / 600 - 1e-8, 0.0, 0.0, 1.0, 1.0, 0.2 + 6e-6),  # so near a node that it counts as passed
+        (1e-4, 0.0, 0.0, -1.0, 1.0, 0.54 - 0.5),  # the other sense: -0.06 is 0.54, down to 0.5
+        (0.1 / 600 - 1e-8, 0.0, 0.0, 1.0, 1.0, 0.15 + 6e-6),  # so near a node that it counts as passed
         (1.0009, 0.0, 0.0, 1.0, 1.0, 0.6 - 0.54),  # many turns later: 600.54 rad, to the end of the period
     ],
 )

@@ -336,6 +336,7 @@ SECTIONS: tuple[Section, ...] = (
             "tolerance": ("tolerance", digits),
             "unknowns": ("unknowns", digits),
             "error": ("error", digits),
+            "force_error": ("of the contact forces", digits),
             "cpu_s": ("CPU min (ms)", milliseconds),
             "cpu_median_s": ("median (ms)", milliseconds),
             "wall_s": ("wall (ms)", milliseconds),

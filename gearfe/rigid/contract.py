@@ -163,8 +163,8 @@ class LocalForce(Element):
         What `compiled_law` gets.
     compiled_corner
         ``compiled_corner(t, sign, u, du, parameters)``: time (s) to the next corner of the law, where it passes from
-        one smooth piece to another, predicted from this state; steps then end at corners, and methods of high order keep
-        their order. Without one the law counts as smooth between its `breaks`.
+        one smooth piece to another, predicted from this state; steps then end at corners, and methods of high order
+        keep their order. Without one the law counts as smooth between its `breaks`.
     compiled_helpers
         Functions that the two call by name.
     """

@@ -20,6 +20,7 @@ from ..timing import measured
 from .process import PeerError, serve
 
 Rhs = Callable[[float, Any, Any], None]
+States = tuple[np.ndarray, np.ndarray]
 
 
 def answer(task: dict[str, Any]) -> dict[str, Any]:
@@ -30,8 +31,8 @@ def answer(task: dict[str, Any]) -> dict[str, Any]:
     rhs = plain_rhs(core) if task["quick"] else compiled_rhs(core)
     rhs(0.0, start, np.empty_like(start))
     runs = {"sundials": _sundials, "scipy_ivp": _scipy, "exudyn": _exudyn}
-    states, cost = measured(lambda: runs[task["peer"]](task, core, rhs, start, times), runs=3, most_s=30.0)
-    return {"states": states.tolist(), **cost.columns, "unknowns": len(core.squares)}
+    (at, states), cost = measured(lambda: runs[task["peer"]](task, core, rhs, start, times), runs=3, most_s=30.0)
+    return {"times": at.tolist(), "states": states.tolist(), **cost.columns, "unknowns": len(core.squares)}
 
 
 def plain_rhs(core: Any) -> Rhs:
@@ -70,7 +71,7 @@ def compiled_rhs(core: Any) -> Rhs:
     return rhs
 
 
-def _sundials(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray) -> np.ndarray:
+def _sundials(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray) -> States:
     from sksundae.cvode import CVODE
 
     scale = _scale(core)
@@ -82,7 +83,7 @@ def _sundials(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, time
         max_num_steps=1_000_000,
     )
     made = solver.solve(times, start)
-    return np.asarray(made.y)
+    return times, np.asarray(made.y)
 
 
 def _scale(core: Any) -> np.ndarray:
@@ -92,7 +93,7 @@ def _scale(core: Any) -> np.ndarray:
     return np.concatenate([rate / omega, np.full(len(omega), rate)])
 
 
-def _scipy(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray) -> np.ndarray:
+def _scipy(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray) -> States:
     from scipy.integrate import solve_ivp
 
     work = np.empty_like(start)
@@ -107,10 +108,11 @@ def _scipy(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: 
     )  # fmt: skip
     if not made.success:
         raise PeerError(made.message)
-    return np.asarray(made.y.T)
+    return times, np.asarray(made.y.T)
 
 
-def _exudyn(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray) -> np.ndarray:
+def _exudyn(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray) -> States:
+    """Its explicit solvers choose their own steps and do not meet the output times: theirs come back."""
     import exudyn
     import exudyn.itemInterface as items
 
@@ -165,7 +167,10 @@ def _exudyn(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times:
         time.absoluteTolerance = task["tolerance"] * float(np.median(_scale(core)))
         time.minimumStepSize = 1e-12
     system.SolveDynamic(settings, solverType=kind)
-    return np.hstack([system.GetSensorStoredData(s)[:, 1 : n + 1] for s in sensors])
+    data = [np.asarray(system.GetSensorStoredData(s)) for s in sensors]
+    at = data[0][:, 0].copy()
+    keep = np.concatenate([[True], np.diff(at) > 1e-12])
+    return at[keep], np.hstack([d[keep, 1 : n + 1] for d in data])
 
 
 if __name__ == "__main__":
