@@ -129,11 +129,11 @@ def below(signal: np.ndarray, step: float, limit_hz: float) -> np.ndarray:
 
 
 def solvers(record: Record) -> None:
-    """Every sparse solver that is there, reduction to 40 modes; the slowest one is spared the largest mesh."""
+    """Every sparse solver that is there, reduction to 40 modes; the slowest one is spared the large meshes."""
     table = record.table("housing_solvers", "solver", "size_mm")
     for size in QUICK_SIZES[-1:] if record.quick else (9.0, 7.0, 6.0):
         for solver in installed_solvers():
-            if solver == "superlu" and size < 7.0:
+            if solver == "superlu" and size < 9.0:
                 continue
 
             def make(solver: str = solver, size: float = size) -> Mapping[str, Any]:

@@ -284,7 +284,7 @@ def calls(record: Record) -> None:
                     env["XDG_CACHE_HOME"] = empty
                 again = "20" if backend == "compiled" else "1"
                 command = [sys.executable, "-c", CALL, str(Path(GEOMETRY / "andrews.toml")), backend, again]
-                done = subprocess.run(command, check=True, capture_output=True, text=True, env=env, timeout=300)
+                done = subprocess.run(command, check=True, capture_output=True, text=True, env=env, timeout=900)
             first, later = (float(x) for x in done.stdout.split())
             return {"first_call_cpu_s": first, "later_call_cpu_s": later}
 

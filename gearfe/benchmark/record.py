@@ -11,6 +11,8 @@ import hashlib
 import json
 import os
 import platform
+import re
+import subprocess
 import sys
 import time
 import traceback
@@ -27,6 +29,11 @@ from ..output.files import output_folder, write_csv, write_json
 PACKAGES = (
     "numpy", "scipy", "numba", "scikit-fem", "gmsh", "pymetis", "pypardiso", "kvxopt", "exudyn", "scikit-sundae",
 )  # fmt: skip
+#: Programs that are no packages: what tells their version, and where it stands in the answer.
+PROGRAMS = {
+    "CalculiX": (("ccx", "-v"), r"Version ([\d.]+)"),
+    "GetFEM": (("dpkg-query", "-W", "-f=${Version}", "python3-getfem"), r"^([\d.]+)"),
+}
 #: Rooms whose text does not change what is measured.
 UNMEASURED = ("commands", "benchmark/page.py", "benchmark/pictures.py", "benchmark/tables.py")
 Row = dict[str, Any]
@@ -149,7 +156,17 @@ def versions() -> dict[str, str]:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             found[name] = "missing"
-    return found
+    return found | {name: _program(command, pattern) for name, (command, pattern) in PROGRAMS.items()}
+
+
+def _program(command: tuple[str, ...], pattern: str) -> str:
+    """Version that a program tells, ``missing`` when there is none."""
+    try:
+        done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
+    except (OSError, subprocess.TimeoutExpired):
+        return "missing"
+    told = re.search(pattern, done.stdout)
+    return told.group(1) if told else "missing"
 
 
 def sources_hash() -> str:
