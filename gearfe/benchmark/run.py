@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import logging
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -26,6 +27,7 @@ def run_jobs(
     """Run jobs, one thread each, draw the pictures; finished rows of an earlier run in `out` are kept."""
     from .pictures import draw_all
 
+    logging.getLogger("skfem").setLevel(logging.ERROR)  # it tells about memory layouts, once a position
     record = open_record(out, quick=quick, peers=peers, say=say)
     for job in jobs:
         say(job)

@@ -30,8 +30,8 @@ POSITIONS, QUICK_POSITIONS = (18, 40, 400, 4000), (3, 6)
 #: Twists (deg).
 TWISTS, QUICK_TWISTS = (1e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5), (0.05, 0.2)
 #: `coarsen` and positions of the route over whole gears; its time is that of so few positions.
-WHOLE_SIZES, QUICK_WHOLE_SIZES = (2.8, 2.0, 1.4), ()
-WHOLE_ANGLES = (4.0, 12.0)
+WHOLE_SIZES, QUICK_WHOLE_SIZES = (2.8, 2.0), ()
+WHOLE_ANGLES = (4.0,)
 TWIST = math.radians(0.05)
 
 
