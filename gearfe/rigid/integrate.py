@@ -73,7 +73,7 @@ def integrate(
     elif chosen == "explicit":
         from .explicit import run_explicit
 
-        dense, status, statistics = run_explicit(system, start, asked, **options)
+        dense, status, statistics = run_explicit(system, start, asked, jit=use_compiled(backend), **options)
     else:
         from .implicit import run_implicit
 
