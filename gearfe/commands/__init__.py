@@ -13,4 +13,5 @@ COMMANDS: dict[str, str] = {
     "housing": "housing",
     "vibration": "vibration",
     "new": "new",
+    "stress": "stress",
 }
