@@ -16,6 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the random cases (default: 1)")
     parser.add_argument("--out", metavar="DIR", default=None, help="results folder (default: out/stress)")
     parser.add_argument("--cases", type=int, metavar="N", help="how many of each campaign (default: its full form)")
+    parser.add_argument("--short", action="store_true", help="the short forms: a minute or two in all")
     parser.add_argument("--minutes", type=float, metavar="M", help="time for each campaign (default: 30)")
     parser.add_argument("--case", type=int, metavar="K", help="run case K alone and tell what came out")
 
@@ -42,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     failed = False
     for name in names:
         show = Progress()
-        ran = run_campaign(name, folder, seed=args.seed, cases=args.cases, seconds=seconds, progress=show)
+        ran = run_campaign(name, folder, seed=args.seed, cases=args.cases, short=args.short, seconds=seconds, progress=show)
         show.end()
         counts = {kind: sum(row.outcome == kind for row in ran.outcomes) for kind in CLASSES}
         told = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)

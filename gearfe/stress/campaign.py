@@ -80,8 +80,10 @@ class Campaign:
 
     Parameters
     ----------
-    full, short
-        Number of cases of the full form, and of the short one that the tests run.
+    full
+        Number of cases of the full form.
+    short
+        Case numbers of the short form, which the tests run.
     seconds
         Time limit of a case.
     long_is_bad
@@ -90,7 +92,7 @@ class Campaign:
 
     name: str
     full: int
-    short: int
+    short: tuple[int, ...]
     seconds: float
     draw: Callable[[np.random.Generator, int], Case]
     run: Callable[[Case, Path], Finding]

@@ -7,6 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ..config import build
+from ..errors import InputError
+from ..gear import GearPair
+from ..tables.pair import PairTable
+
 Table = dict[str, Any]
 
 #: Values that make little sense anywhere.
@@ -67,6 +72,18 @@ def random_pair(random: np.random.Generator, *, most_teeth: int = 150) -> Table:
             "youngs_modulus_GPa": rounded(log_uniform(random, 1.0, 400.0), 3),
             "poisson_ratio": rounded(random.uniform(0.0, 0.45), 3),
         }
+    return table
+
+
+def running_pair(random: np.random.Generator, **options: Any) -> Table:
+    """The first of many random pairs that can run together."""
+    for _ in range(200):
+        table = random_pair(random, **options)
+        try:
+            GearPair.from_table(build(PairTable, table, "pair"))
+        except InputError:
+            continue
+        break
     return table
 
 

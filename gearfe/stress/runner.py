@@ -45,6 +45,7 @@ def run_campaign(
     *,
     seed: int = 1,
     cases: int | None = None,
+    short: bool = False,
     seconds: float | None = None,
     apart: bool = True,
     progress: Progress | None = None,
@@ -57,6 +58,8 @@ def run_campaign(
         Takes the ledger, the tables and the kept cases.
     cases
         How many; None: the full form.
+    short
+        The short form instead.
     seconds
         Time for all; what is not begun by then is left for another run.
     apart
@@ -65,9 +68,9 @@ def run_campaign(
         Called with cases done, cases in all, and a text.
     """
     campaign = campaign_named(name)
-    asked = campaign.full if cases is None else cases
+    wanted = campaign.short if short else range(campaign.full if cases is None else cases)
     ledger = Ledger(folder, name, seed)
-    left = [number for number in range(asked) if number not in ledger.rows]
+    left = [number for number in wanted if number not in ledger.rows]
     end = None if seconds is None else time.monotonic() + seconds
 
     def numbers() -> Iterable[int]:
@@ -83,10 +86,10 @@ def run_campaign(
             ledger.add(row)
             bad += row.bad
             if progress is not None:
-                progress(len(ledger.rows), asked, f"{name}, {bad} bad")
+                progress(len(ledger.rows), len(wanted), f"{name}, {bad} bad")
     finally:
         write_results(folder, campaign, seed, ledger.outcomes)
-    return Ran(name, tuple(row for row in ledger.outcomes if row.case < asked), asked)
+    return Ran(name, tuple(row for row in ledger.outcomes if row.case in wanted), len(wanted))
 
 
 def _apart(campaign: Campaign, seed: int, numbers: Iterable[int]) -> Iterable[Outcome]:
