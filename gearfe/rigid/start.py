@@ -194,10 +194,20 @@ def _positions(system: System, time: float, q: Array, forced: Sequence[Forced]) 
         free, alone = close(system, time, q, ())
         if alone <= 1e-10:
             off = max(forced, key=lambda f: abs(f.value(free) - f.target))
-            problem = f"contradicts {worst}: the constraints leave a residual of {residual:.3g}"
+            other = _at_odds(system, time, q, forced, off)
+            against = worst if other is None else f"start value {other.label} = {other.target:g}"
+            problem = f"contradicts {against}: a residual of {residual:.3g} is left"
             raise InputError(f"start value {off.label}", off.target, problem, "force another value, or leave it free")
     cure = "check lengths and start poses: the nearest closed position was searched from them"
     raise InputError(worst, None, f"the loop cannot close: a residual of {residual:.3g} (m or rad) is left", cure)
+
+
+def _at_odds(system: System, time: float, q: Array, forced: Sequence[Forced], blamed: Forced) -> Forced | None:
+    """The other forced value that `blamed` contradicts: without it the rest can be met, and `blamed` alone, too."""
+    if len(forced) < 2 or close(system, time, q, [blamed])[1] > 1e-10:
+        return None
+    others = [f for f in forced if f is not blamed]
+    return next((o for o in others if close(system, time, q, [f for f in forced if f is not o])[1] <= 1e-10), None)
 
 
 def _velocities(system: System, time: float, q: Array, v: Array, forced: Sequence[Forced]) -> Array:
@@ -221,7 +231,14 @@ def _velocities(system: System, time: float, q: Array, v: Array, forced: Sequenc
         if forced:
             off = max(range(len(forced)), key=lambda k: abs(left[system.rows + k]))
             blame = forced[off]
-            problem = f"contradicts {names[part]} (residual {gap.max():.3g})"
+            weights = np.abs(left)
+            weights[system.rows + off] = 0.0
+            weights[: system.rows] *= 1.0 - 1e-6  # another forced value before a joint, where both are as much to blame
+            second = int(weights.argmax()) if weights.any() else part
+            against = names[second]
+            if second >= system.rows:
+                against += f" = {forced[second - system.rows].target:g}"
+            problem = f"contradicts {against} (residual {gap.max():.3g})"
             raise InputError(f"start velocity {blame.label}", blame.target, problem, "force another value")
         raise InputError(worst, None, f"velocities cannot meet it (residual {gap.max():.3g})", "check the motion")
     return made

@@ -12,6 +12,7 @@ import numpy as np
 
 from . import compiled, kernel_fold, kernel_rows, kernel_run, kernel_series
 from .tables import Array, Assembly, Ints, Tables
+from .within import within_run
 
 FUNCTIONS = (*kernel_rows.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_fold.FUNCTIONS, *kernel_run.FUNCTIONS)
 NAMES = {**kernel_rows.GLOBALS, **kernel_series.NAMES, **kernel_run.NAMES}
@@ -117,10 +118,10 @@ class Pieces:
 
     def __call__(self, t: Array, derivative: int = 0) -> Array:
         """Coordinates (or a derivative of them) at the times t."""
-        t = np.ascontiguousarray(t, dtype=float)
-        out = np.empty((t.size, self.coefficients.shape[2]))
         if len(self.coefficients) == 0:
             raise ValueError("no step was completed, so there is nothing between the times")
+        t = np.ascontiguousarray(within_run(self.times, t))
+        out = np.empty((t.size, self.coefficients.shape[2]))
         sign = 1.0 if self.times[-1] >= self.times[0] else -1.0
         if self.jit:
             kernels(True).sample(self.times, self.coefficients, sign, t, derivative, out)

@@ -61,7 +61,7 @@ def slider(random: np.random.Generator, *, end: float = 4.0, tolerance: float | 
     }
     start = {"positions": {"angle(crank)": theta}, "velocities": {"rate(crank)": omega}}
     tables = job(bodies, joints, end, end / 80, tolerance, start=start)
-    return tables, {"theta": theta, "omega": omega, "amplification": max(1.0, end)}
+    return tables, {"theta": theta, "omega": omega, "amplification": 3.0}
 
 
 def long_run(random: np.random.Generator) -> Made:
@@ -90,17 +90,18 @@ def loops(random: np.random.Generator) -> Made:
 
 
 def springs(random: np.random.Generator) -> Made:
-    """A pendulum of two rods whose second joint is a stiff spring instead of a hinge."""
+    """A pendulum of two rods whose second joint is a stiff, short spring instead of a hinge."""
     stiffness = rounded(log_uniform(random, 1e2, 1e10), 3)
-    one, two = random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0)
+    one, two, gap = random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0), rounded(random.uniform(0.05, 0.2), 3)
+    place = (math.cos(one) + gap * math.cos(two), math.sin(one) + gap * math.sin(two))
     bodies = {
         "a": bar(1.0, 1.0, (0.0, 0.0), one),
-        "b": bar(1.0, rounded(random.uniform(0.1, 5.0), 3), (math.cos(one), math.sin(one)), two),
+        "b": bar(1.0, rounded(random.uniform(0.1, 5.0), 3), place, two),
     }
     joints = {"O": hinge("a", "A")}
     spring = {
         "type": "spring", "body": "b", "point": "A", "to": "a", "to_point": "B", "stiffness": stiffness,
-        "damping": float(random.choice([0.0, 0.0, 1.0, 1e3])),
+        "free_length_m": gap, "damping": float(random.choice([0.0, 0.0, 1.0, 1e3])),
     }  # fmt: skip
     tolerance = rounded(log_uniform(random, 1e-9, 1e-4), 2)
     tables = job(bodies, joints, 0.3, 0.01, tolerance, forces={"joint": spring})
