@@ -43,7 +43,9 @@ def run(args: argparse.Namespace) -> int:
     failed = False
     for name in names:
         show = Progress()
-        ran = run_campaign(name, folder, seed=args.seed, cases=args.cases, short=args.short, seconds=seconds, progress=show)
+        ran = run_campaign(
+            name, folder, seed=args.seed, cases=args.cases, short=args.short, seconds=seconds, progress=show
+        )
         show.end()
         counts = {kind: sum(row.outcome == kind for row in ran.outcomes) for kind in CLASSES}
         told = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)

@@ -162,7 +162,9 @@ def _refused(case: Case, made: Any, out: Path, measures: dict[str, Any], *, may_
         whole_files(out),
     ]
     reason = lines[-1][:300] if lines else ""
-    return Finding("done" if made.returncode == 0 else "refused", reason, checks, {"base": case.data["base"], **measures})
+    return Finding(
+        "done" if made.returncode == 0 else "refused", reason, checks, {"base": case.data["base"], **measures}
+    )
 
 
 def shared_run(case: Case, folder: Path) -> Finding:

@@ -55,7 +55,7 @@ class Watch:
         elif event in WRITING:
             for path in arguments[:2]:
                 self._check(path)
-        elif event in STARTING:
+        elif event in STARTING and "'uname'" not in repr(arguments)[:40]:  # Python's own, for the name of the platform
             self.started.append(f"{event} {arguments[:1]!r}"[:200])
         elif event == "compile" and MARK in repr(arguments[0])[:10_000]:
             self.run.append(repr(arguments[0])[:200])
@@ -125,7 +125,9 @@ def _disk(out: Path, folder: Path, before: set[str]) -> list[Check]:
 
 def _bytecode() -> tuple[str, ...]:
     """Folders in which the interpreter keeps compiled modules: beside the sources."""
-    return tuple(str(Path(module.__file__).parent) for module in (importlib.import_module("gearfe"), os) if module.__file__)
+    return tuple(
+        str(Path(module.__file__).parent) for module in (importlib.import_module("gearfe"), os) if module.__file__
+    )
 
 
 def _own_temporary(folder: str) -> tuple[str, ...]:
