@@ -1,8 +1,8 @@
 """How far a run is from the exact motion, estimated from a second run with finer steps.
 
 With an error that falls with the tolerance, the difference of both runs is the error of the coarser one up to the share
-of the finer one, 1/`SHARPER`. The second run also takes shorter steps than the first where the tolerance is at its limit
-already, so that the difference then shows what rounding does. A factor of `SAFETY` stands for what both share.
+of the finer one, 1/`SHARPER`. The second run's steps are also shorter than the first one's, so that where the tolerance
+is at its limit already the difference shows what rounding does. A factor of `SAFETY` stands for what both share.
 """
 
 from __future__ import annotations

@@ -19,7 +19,6 @@ from .error_estimate import TrajectoryError, trajectory_error
 from .model import Mechanism, load_mechanism
 from .results import Results, evaluate, reactions
 
-
 #: Files that depend on the options: what is left of them from an earlier run is removed.
 MAY_WRITE = ("reactions.csv", "curves.png", "picture.png", "animation.gif")
 

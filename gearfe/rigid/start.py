@@ -173,7 +173,12 @@ def close(system: System, time: float, q: Array, forced: Sequence[Forced]) -> tu
 
 
 def least_change(system: System, G: Array, right: Array) -> Array:
-    """The change of least mass norm with G change = right, in the least-squares sense where G has lost rank."""
+    """The change of least mass norm with G change = right, in the least-squares sense where G has lost rank.
+
+    Not-a-number where the rows or the right side are not finite: the callers look at what comes back.
+    """
+    if not (np.isfinite(G).all() and np.isfinite(right).all()):
+        return np.full(system.size, np.nan)
     if system.diagonal_mass:
         root = np.sqrt(np.diagonal(system.inverse_mass))
         return root * np.linalg.lstsq(G * root, right, rcond=1e-11)[0]
@@ -221,6 +226,9 @@ def _velocities(system: System, time: float, q: Array, v: Array, forced: Sequenc
     else:
         rows, right = G, rate
     made = v - least_change(system, rows, rows @ v - right)
+    if not np.isfinite(made).all():
+        cure = "look for start values, speeds and forced velocities that are too large"
+        raise InputError("start velocities", None, "are not finite numbers once they meet the constraints", cure)
     gap = np.abs(rows @ made - right)
     scale = max(1.0, float(np.abs(right).max(initial=0.0)))
     if gap.max(initial=0.0) > 1e-8 * scale:

@@ -108,6 +108,8 @@ class Pieces:
         Taylor series on every step, the ground's coordinates last.
     folds : ndarray, shape (steps,)
         Number of singular combinations of rows at the start of every step.
+    begin : float
+        Start of the run (s).
     """
 
     status: int
@@ -115,12 +117,14 @@ class Pieces:
     coefficients: Array
     folds: Ints
     jit: bool
+    begin: float
 
     def __call__(self, t: Array, derivative: int = 0) -> Array:
         """Coordinates (or a derivative of them) at the times t."""
         if len(self.coefficients) == 0:
             raise ValueError("no step was completed, so there is nothing between the times")
-        t = np.ascontiguousarray(within_run(self.times, t))
+        # a start on a singular position is left by a series about a moment a little later
+        t = np.ascontiguousarray(within_run(np.array([self.begin, self.times[-1]]), t))
         out = np.empty((t.size, self.coefficients.shape[2]))
         sign = 1.0 if self.times[-1] >= self.times[0] else -1.0
         if self.jit:
@@ -204,5 +208,6 @@ def run(
         room = min(2 * room, max(64, 2_000_000 // coefficients[0].size), most - done)
     ends = np.concatenate([parts[0][0], *(p[0][1:] for p in parts[1:])])
     if len(parts) == 1:
-        return Pieces(int(status), ends, parts[0][1], parts[0][2], jit)
-    return Pieces(int(status), ends, np.concatenate([p[1] for p in parts]), np.concatenate([p[2] for p in parts]), jit)
+        return Pieces(int(status), ends, parts[0][1], parts[0][2], jit, t0)
+    coefficients, folds = (np.concatenate([p[k] for p in parts]) for k in (1, 2))
+    return Pieces(int(status), ends, coefficients, folds, jit, t0)

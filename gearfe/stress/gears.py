@@ -87,7 +87,8 @@ def run(case: Case, folder: Path) -> Finding:
     if len(loaded):
         checks.append(Check("tangent", float((~(curve.k_tangent[loaded] > 0)).sum()), 0.5))
         found = solve_positions(elastic, curve.pinion_angle[loaded], total[loaded])
-        checks += [c for c in map(lambda p: balance(elastic, p), found) if c is not None][:1]
+        balances = [c for c in (balance(elastic, p) for p in found) if c is not None]
+        checks += [max(balances, key=lambda c: c.share)] if balances else []
         checks += ratio_checks(job.pair, elastic, curve.pinion_angle[loaded], total[loaded], found)
         checks += swap_checks(elastic, curve.pinion_angle[loaded], total[loaded], found)
     checks += period_checks(curve)

@@ -83,7 +83,10 @@ def mutated_run(case: Case, folder: Path) -> Finding:
     out = folder / "out"
     command = [given[0], str(job), "--out", str(out), *given[1:]]
     said, told = io.StringIO(), io.StringIO()
-    caches = tuple(str(Path(p).resolve()) for p in (tempfile.gettempdir(), sys.prefix, Path.home() / ".cache"))
+    caches = tuple(
+        str(Path(p).resolve())
+        for p in (tempfile.gettempdir(), sys.prefix, Path.home() / ".cache", Path.home() / ".config")
+    )
     _WATCH.inside = (str(folder), *_bytecode(), *caches[1:], *_own_temporary(caches[0]))
     _WATCH.outside, _WATCH.started, _WATCH.run = [], [], []
     before, here = set(os.listdir(folder)), Path.cwd()
@@ -96,7 +99,7 @@ def mutated_run(case: Case, folder: Path) -> Finding:
             except SystemExit as error:  # argparse
                 code = error.code if isinstance(error.code, int) else 1
             except OverTime:
-                return Finding("stopped", "asks for more than the time limit", _disk(out, folder, before), {})
+                return Finding("limit", "asks for more than the time limit", _disk(out, folder, before), {})
             finally:
                 _WATCH.on = False
     finally:

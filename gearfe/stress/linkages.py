@@ -41,7 +41,7 @@ def job(bodies: Table, joints: Table, end: float, step: float, tolerance: float,
     return {"run": run, "bodies": bodies, "joints": joints, "forces": forces, **more}
 
 
-def slider(random: np.random.Generator, *, end: float = 4.0, tolerance: float | None = None) -> Made:
+def folding(random: np.random.Generator, *, end: float = 4.0, tolerance: float | None = None) -> Made:
     """Two equal links that fold: a random start that passes the fold with at least 0.5 rad/s, or never reaches it."""
     while True:
         theta, omega = random.uniform(0, 2 * math.pi), random.uniform(-8, 8)
@@ -65,8 +65,8 @@ def slider(random: np.random.Generator, *, end: float = 4.0, tolerance: float | 
 
 
 def long_run(random: np.random.Generator) -> Made:
-    """A slider for 1000 s: the error of the angle grows with the time, the energy may not."""
-    tables, data = slider(random, end=1000.0, tolerance=rounded(log_uniform(random, 1e-12, 1e-8), 2))
+    """Folding links for 1000 s: the error of the angle grows with the time, the energy may not."""
+    tables, data = folding(random, end=1000.0, tolerance=rounded(log_uniform(random, 1e-12, 1e-8), 2))
     tables["run"]["step_s"] = 2.0
     return tables, {**data, "amplification": 100.0}
 
@@ -143,7 +143,7 @@ def four_bar(random: np.random.Generator) -> Made:
 
 def chain(random: np.random.Generator) -> Made:
     """A closed chain: rods along a random polygon from one point of the ground to another, 4 to 40 of them."""
-    count = int(round(log_uniform(random, 4, 40)))
+    count = round(log_uniform(random, 4, 40))
     turns = np.cumsum(random.normal(0.0, 0.9, count))
     lengths = random.uniform(0.3, 1.0, count)
     bodies: Table = {}
@@ -151,7 +151,9 @@ def chain(random: np.random.Generator) -> Made:
     place, before, point = np.zeros(2), "ground", "O"
     for i in range(count):
         name = f"b{i}"
-        bodies[name] = bar(float(lengths[i]), rounded(random.uniform(0.5, 2.0), 3), tuple(place), float(turns[i]))
+        bodies[name] = bar(
+            float(lengths[i]), rounded(random.uniform(0.5, 2.0), 3), (float(place[0]), float(place[1])), float(turns[i])
+        )
         joints[f"j{i}"] = hinge(name, "A", before, point)
         place = place + lengths[i] * np.array([math.cos(turns[i]), math.sin(turns[i])])
         before, point = name, "B"
@@ -162,10 +164,10 @@ def chain(random: np.random.Generator) -> Made:
     return tables, {"links": count, "growth_per_s": 12.0, "amplification": 10.0}
 
 
-#: Kinds beside the sliders, in the order in which they take turns.
+#: Kinds beside the folding links, in the order in which they take turns.
 KINDS = ("chain", "loops", "springs", "light", "long", "chain", "loops", "springs", "light", "chain")
 MAKERS: dict[str, Callable[[np.random.Generator], Made]] = {
-    "slider": slider,
+    "folding": folding,
     "long": long_run,
     "loops": loops,
     "springs": springs,

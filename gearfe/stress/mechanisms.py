@@ -1,10 +1,10 @@
-"""Planar mechanisms: random sliders through their folds, long runs, redundant loops, stiff springs, light links, chains.
+"""Planar mechanisms: links through their folds, long runs, redundant loops, stiff springs, light links, closed chains.
 
 Each case is a mechanism file, so that `gearfe mechanism` runs it again. Checks of a run that reached its end:
 
 - *energy*: the total (kinetic + potential - work) keeps its start value, relative to the largest kinetic energy;
 - *closed*: the constraints hold, relative to the size of the mechanism;
-- *angle* (sliders): the crank angle is that of the closed equation of motion of the folding slider crank;
+- *angle* (folding links): the crank angle is that of the closed equation of motion of the folding two-link crank;
 - *back* (chains): run backwards from the end, the start comes back;
 - *estimate*: the error that the run states of itself is not exceeded by more than ten times.
 """
@@ -36,8 +36,8 @@ IMPLICIT = 3e4
 
 
 def draw(random: np.random.Generator, number: int) -> Case:
-    """Half of all cases are sliders; the other kinds take turns."""
-    kind = "slider" if number % 2 == 0 else KINDS[(number // 2) % len(KINDS)]
+    """Half of all cases are folding links; the other kinds take turns."""
+    kind = "folding" if number % 2 == 0 else KINDS[(number // 2) % len(KINDS)]
     tables, data = linkage(random, kind)
     return Case(number, kind, {"job.toml": toml_text(tables)}, "gearfe mechanism job.toml --out out", data)
 
@@ -75,10 +75,10 @@ def _checks(case: Case, mechanism: Mechanism, start: Start, made: Trajectory) ->
     planar = mechanism.system.planar
     assert planar is not None
     few = np.linspace(0, len(made.time) - 1, min(50, len(made.time))).astype(int)
-    gap = max((float(np.abs(mechanism.system.residual(made.time[i], made.q[i])).max(initial=0.0)) for i in few))
+    gap = max(float(np.abs(mechanism.system.residual(made.time[i], made.q[i])).max(initial=0.0)) for i in few)
     checks = [Check("energy", float(np.ptp(total)) / scale, turns * allowed)]
     checks.append(Check("closed", gap / planar.assembly.length, max(100 * tolerance, 1e-9)))
-    if case.kind == "slider":
+    if case.kind == "folding":
         exact = folding_angle(float(case.data["theta"]), float(case.data["omega"]), made.time)
         limit = max(40.0 * tolerance, 2e-10)
         checks.append(Check("angle", float(np.abs(made.q[:, 2] - exact).max()), limit))
@@ -133,4 +133,4 @@ def folding_angle(theta: float, omega: float, times: np.ndarray) -> np.ndarray:
     return np.asarray(made.y[0])
 
 
-CAMPAIGN = Campaign("mechanisms", 400, (0, 1, 2, 3, 5, 7, 9, 10), 120.0, draw, run)
+CAMPAIGN = Campaign("mechanisms", 400, (0, 1, 2, 3, 5, 7), 120.0, draw, run)

@@ -65,7 +65,8 @@ def row(random: np.random.Generator, kind: str) -> Made:
         meshes.append(mesh)
     speed = float(random.choice([-1.0, 1.0])) * rounded(log_uniform(random, 20.0, 3000.0))
     train: Table = {
-        "housing": "rigid", "duration_ms": 5.0, "step_us": 20.0, "tolerance": rounded(log_uniform(random, 1e-8, 1e-4), 2),
+        "housing": "rigid", "duration_ms": 5.0, "step_us": 20.0,
+        "tolerance": rounded(log_uniform(random, 1e-8, 1e-4), 2),
         "shafts": shafts, "gears": gears, "meshes": meshes, "rigid_bores": bores,
         "drive": {"shaft": "s0", "attachment": "1", "speed_rad_per_s": speed},
         "curves": {"load": "stiffness", "interpolation": str(random.choice(["cubic", "linear"]))},

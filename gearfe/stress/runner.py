@@ -94,7 +94,8 @@ def run_campaign(
 
 def _apart(campaign: Campaign, seed: int, numbers: Iterable[int]) -> Iterable[Outcome]:
     """Rows from a worker process; one that hangs or dies costs its case and is replaced."""
-    worker, pipe = None, None
+    worker: Any = None
+    pipe: Any = None
     try:
         for number in numbers:
             if worker is None:

@@ -1,4 +1,4 @@
-r"""Gear trains: random curves, damping from none to large, resonance, parametric instability, symmetry, random housings.
+r"""Gear trains: random curves, any damping, resonance, parametric instability, symmetry, random housings.
 
 Each case is a [train] job with its stiffness curves beside it. Checks of a run that reached its end:
 
@@ -71,7 +71,7 @@ def run(case: Case, folder: Path) -> Finding:
     if case.kind == "resonance":
         checks += _mean_force(scene, made)
     if case.kind == "symmetric":
-        checks += _symmetry(model, made)
+        checks += _symmetry(made)
     return Finding("done", "; ".join(made.warnings)[:200], checks, measures)
 
 
@@ -91,7 +91,7 @@ def _mean_force(scene: Any, made: Any) -> list[Check]:
     return [Check("mean", float((np.abs(mean - wanted) / (wanted + 0.1 * swing)).max()), 0.02)]
 
 
-def _symmetry(model: TrainModel, made: Any) -> list[Check]:
+def _symmetry(made: Any) -> list[Check]:
     poses = made.gear_pose
     along = float(np.abs(poses[:, :, 1]).max())
     tilt = float(np.abs(poses[:, :, [3, 5]]).max())
@@ -137,4 +137,4 @@ def _floquet(model: TrainModel, measures: dict[str, Any]) -> Finding:
     return Finding("done", "", [*seen, *quiet, *rate], measures)
 
 
-CAMPAIGN = Campaign("trains", 400, (0, 1, 2, 3, 4, 6, 7, 11), 180.0, draw, run)
+CAMPAIGN = Campaign("trains", 400, (2, 3, 4, 6, 7, 11), 180.0, draw, run)
