@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .contact.compliance import GearBody
-from .contact.recovery import flank_forces, sector_displacements
+from .contact.recovery import position_loads, sector_displacements
 from .contact.scene import MeshingPair, turn
 from .contact.solver import Position
 from .elasticity import physical_gradients, triangle_shapes, von_mises
@@ -113,10 +113,7 @@ def gear_field(recovery: GearRecovery, pair: MeshingPair, position: Position, an
         0 pinion, 1 wheel.
     """
     body, whole = recovery.body, recovery.whole
-    scene, forces = position.scene, position.forces
-    if scene is None or forces is None:
-        raise ValueError(f"a position without a solution has no fields: {position.status}")
-    loads = flank_forces(body, gear, scene.windows, forces)
+    loads = position_loads(body, gear, position)
     local = sector_displacements(body, [(loads, tooth) for tooth in range(body.teeth)])  # (s, 2, z)
     teeth = body.teeth
     turns = angle + 2 * np.pi * np.arange(teeth) / teeth

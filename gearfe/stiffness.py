@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .contact.compliance import gear_body
-from .contact.laws import ContactLaw, law_named
+from .contact.laws import ContactLaw, law_named, law_text
 from .contact.scene import MeshingPair
 from .elasticity import Material, Plane
 from .errors import InputError
@@ -83,6 +83,7 @@ def elastic_pair(
     with watch.stage("meshes"):
         recipes = sector_recipes(pair, coarsen=coarsen)
         meshes = [sector_mesh(gear, recipe) for gear, recipe in zip(gears, recipes, strict=True)]
+    width = min(gear.face_width for gear in gears)
     with watch.stage("condensation"), one_thread():
         bodies = [
             gear_body(
@@ -92,10 +93,12 @@ def elastic_pair(
                 gear.face_width,
                 points_per_edge=points_per_edge,
                 with_stress=chosen.uses_stress,
+                law=chosen,
+                gear=number,
+                width=width,
             )
-            for mesh, material, gear in zip(meshes, both, gears, strict=True)
+            for number, (mesh, material, gear) in enumerate(zip(meshes, both, gears, strict=True))
         ]
-    width = min(gear.face_width for gear in gears)
     return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen)
 
 
@@ -185,7 +188,7 @@ def sweep_stiffness(
             coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
             error = _estimate(coarse, solved_angles, solved, finite=finite)
     curve = _assemble(pair, asked, solved_angles, source, solved, touching, lost, searched=torque is not None)
-    return replace(curve, timings=dict(watch.seconds), error=error)
+    return replace(curve, law=law_text(elastic.law), timings=dict(watch.seconds), error=error)
 
 
 def _lost_motion(pair: GearPair, twist_from: str) -> float:

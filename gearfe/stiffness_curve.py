@@ -129,6 +129,8 @@ class StiffnessCurve:
         r_b of the wheel (m).
     lost_motion
         Twist (rad) taken off before `twist` counts: half the backlash, or 0.
+    law
+        Contact law with its parameters; empty where unknown.
     timings
         Seconds by stage; not in the CSV file.
     error
@@ -155,6 +157,7 @@ class StiffnessCurve:
     mesh_cycle: float
     base_radius: float
     lost_motion: float = 0.0
+    law: str = ""
     timings: Mapping[str, float] = field(default_factory=dict)
     error: ErrorEstimate | None = None
 
@@ -199,6 +202,7 @@ class StiffnessCurve:
             columns[f"{SHARE}{j + 1}"] = [curve_csv.to_text(v, SHARE) for v in self.load_share[:, j]]
         for name, attribute in CONSTANTS.items():
             columns[name] = [curve_csv.to_text(getattr(self, attribute), name)] * len(self)
+        columns["contact_law"] = [self.law] * len(self)
         return columns
 
     def _cells(self, name: str, attribute: str) -> list[str]:
@@ -258,6 +262,7 @@ class StiffnessCurve:
             if shares
             else np.zeros((len(values["k_mesh"]), 0))
         )
+        values["law"] = columns.get("contact_law", [""])[0].strip()
         default = ["converged" if np.isfinite(k) else "missing" for k in values["k_mesh"]]
         values["status"] = np.array([cell.strip() for cell in columns.get("status", default)])
         return cls(**values)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .config import load_job
-from .contact.laws import ContactLaw, Nitsche, Penalty
+from .contact.laws import ContactLaw, Exact, Nitsche, Penalty
 from .curve_csv import from_text
 from .elasticity import Material
 from .errors import InputError
@@ -43,10 +43,16 @@ class StiffnessJob:
     @property
     def law(self) -> ContactLaw:
         """Contact law with its parameter."""
-        if self.table.law == "penalty":
-            stiffness = self.table.penalty_stiffness_N_per_mm3
-            return Penalty(None if stiffness is None else stiffness * 1e9)
-        return Nitsche(self.table.nitsche_gamma0)
+        t = self.table
+        sides: dict[str, Any] = {} if t.law_sides is None else {"sides": t.law_sides}
+        if t.law == "exact":
+            return Exact(**sides)
+        if t.law == "penalty":
+            stiffness = t.penalty_stiffness_N_per_mm3
+            return Penalty(None if stiffness is None else stiffness * 1e9, **sides)
+        theta: Any = t.nitsche_theta
+        usual = 20.0 if theta == 1 else 1.0
+        return Nitsche(usual if t.nitsche_gamma0 is None else t.nitsche_gamma0, theta=theta, **sides)
 
     @property
     def model(self) -> dict[str, Any]:

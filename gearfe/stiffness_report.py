@@ -70,6 +70,7 @@ def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, floa
             "pinion_angle_deg": np.degrees(error.pinion_angle),
             "relative": error.relative,
         },
+        "contact_law": curve.law,
         "statuses": dict(Counter(map(str, curve.status))),
         "failed_pinion_angles_deg": failed,
         "timings_s": dict(timings),
@@ -82,6 +83,8 @@ def told(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
     iso = iso_values(job.pair, moduli[0], moduli[1])
     count = Counter(map(str, curve.status))
     lines = [f"{len(curve)} positions: " + ", ".join(f"{n} {status}" for status, n in count.items())]
+    if curve.law:
+        lines.append(f"contact law: {curve.law}")
     level = cycle_statistics(curve, job.table.interpolation)
     if level is not None:
         mean, low, high = (1e-6 * level[key] for key in ("mean_N_per_m", "least_N_per_m", "largest_N_per_m"))

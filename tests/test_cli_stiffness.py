@@ -171,7 +171,7 @@ def test_a_position_without_contact_is_told(tmp_path, capsys):
         ({"twist_deg": -0.5}, "stiffness.twist_deg = -0.5: must be finite and > 0"),
         ({"twist_deg": "true"}, "must be a number"),
         ({"twsit_deg": 0.5}, "did you mean 'twist_deg'?"),
-        ({"law": '"nitshe"'}, "must be one of nitsche, penalty"),
+        ({"law": '"nitshe"'}, "must be one of nitsche, penalty, exact"),
         ({"plane": '"strained"'}, "must be one of strain, stress"),
         ({"angle_step_deg": 0.0}, "angle_step_deg = 0.0: must be finite and > 0"),
         ({"angle_stop_deg": -3.0}, "must be >= angle_start_deg = 1"),
@@ -196,7 +196,7 @@ def test_mistakes_in_the_file(tmp_path, capsys, changes, message):
     [
         (["--twist-deg", "0"], "--twist-deg = 0.0: must be finite and > 0"),
         (["--torque-Nm", "-1"], "--torque-Nm = -1.0"),
-        (["--law", "glue"], "--law = 'glue': must be one of nitsche, penalty"),
+        (["--law", "glue"], "--law = 'glue': must be one of nitsche, penalty, exact"),
         (["--angles", "5", "1", "2"], "must be >= angle_start_deg = 5"),
         (["--angles", "0", "-1", "2"], "START STEP STOP = -1.0"),
         (["--fields", "x"], "must be 'all' or pinion angles"),

@@ -109,6 +109,7 @@ def test_variation_of_the_contact_force(scene: dict[str, np.ndarray]) -> None:
             slide=slide,
             projection=p,
             loads=loads,
+            gap=nothing,
             parameter=nothing,
             compliance=nothing,
             response=nothing,

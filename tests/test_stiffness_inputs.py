@@ -69,6 +69,7 @@ SWEEP_CHANGES = {
     "coarsen": 2.5,
     "twist_from": "contact",
     "points_per_edge": 3,
+    "law_sides": "wheel",
     "angle_start_deg": 1.2,
 }
 
@@ -112,5 +113,6 @@ def test_every_key_is_in_this_file():
     given = {key.rpartition(".")[2] for key in (*PAIR_CHANGES, *BASE)}
     per_gear = {"material", "pinion", "wheel", "teeth", "bore_diameter_mm", "pitch_diameter_mm", "density_kg_per_m3"}
     assert set(PairTable.__dataclass_fields__) <= given | per_gear
-    elsewhere = {"twist_deg", "nitsche_gamma0", "solve_all", "interpolation", "angle_stop_deg", "angle_step_deg"}
+    elsewhere = {"twist_deg", "nitsche_gamma0", "nitsche_theta", "solve_all", "interpolation"}
+    elsewhere |= {"angle_stop_deg", "angle_step_deg"}
     assert set(StiffnessTable.__dataclass_fields__) <= {*SWEEP_CHANGES, *elsewhere}

@@ -19,6 +19,10 @@ OVERRIDES = {
     "twist_deg": "twist_deg",
     "torque_Nm": "torque_Nm",
     "law": "law",
+    "law_sides": "law_sides",
+    "nitsche_theta": "nitsche_theta",
+    "nitsche_gamma0": "nitsche_gamma0",
+    "penalty_stiffness_N_per_mm3": "penalty_stiffness_N_per_mm3",
     "plane": "plane",
     "kinematics": "kinematics",
     "twist_from": "twist_from",
@@ -34,7 +38,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     load.add_argument("--twist-deg", type=float, metavar="X", dest="twist_deg", help="twist of the wheel (deg)")
     load.add_argument("--torque-Nm", type=float, metavar="X", dest="torque_Nm", help="torque at the wheel's hub (N m)")
     parser.add_argument("--angles", type=float, nargs=3, metavar=("START", "STEP", "STOP"), help="pinion angles (deg)")
-    parser.add_argument("--law", metavar="LAW", help="contact law: nitsche or penalty")
+    parser.add_argument("--law", metavar="LAW", help="contact law: nitsche, penalty or exact")
+    parser.add_argument(
+        "--law-sides", metavar="GEAR", help="flanks that the law is integrated on: both, pinion, wheel, tip"
+    )
+    parser.add_argument("--nitsche-theta", type=int, metavar="T", help="variant of the law nitsche: 0, 1 or -1")
+    parser.add_argument("--nitsche-gamma0", type=float, metavar="G", help="parameter gamma h/E of the law nitsche")
+    parser.add_argument(
+        "--penalty-stiffness-N-per-mm3",
+        type=float,
+        metavar="K",
+        dest="penalty_stiffness_N_per_mm3",
+        help="parameter of the law penalty (N/mm3)",
+    )
     parser.add_argument("--plane", metavar="STATE", help="plane state: strain or stress")
     parser.add_argument("--kinematics", metavar="STRAIN", help="small or finite strain")
     parser.add_argument("--twist-from", metavar="ZERO", dest="twist_from", help="zero of the twist: centred or contact")
@@ -131,7 +147,7 @@ def overridden(job: StiffnessJob, args: argparse.Namespace) -> StiffnessJob:
     changes: dict[str, Any] = {}
 
     def put(option: str, key: str, value: Any) -> None:
-        if isinstance(value, float):
+        if isinstance(value, float | int):
             check_range(value, option, known[key])
         elif known[key]["choices"] and value not in known[key]["choices"]:
             raise InputError(option, value, "must be one of " + ", ".join(known[key]["choices"]))
@@ -150,6 +166,7 @@ def overridden(job: StiffnessJob, args: argparse.Namespace) -> StiffnessJob:
     if args.solve_all:
         changes["solve_all"] = True
     table = replace(job.table, **changes)
+    table.check_law("stiffness")
     table.check("--angles" if args.angles is not None else "stiffness")
     return replace(job, table=table)
 

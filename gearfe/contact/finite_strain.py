@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ..elasticity import physical_gradients, triangle_shapes
 from .compliance import GearBody
-from .recovery import flank_forces, sector_displacements
+from .recovery import position_loads, sector_displacements
 from .scene import MeshingPair
 from .solver import Position
 
@@ -83,11 +83,7 @@ def _extra_torques(pair: MeshingPair, gear: int, positions: Sequence[Position]) 
     body = pair.bodies[gear]
     cases, counts = [], []
     for position in positions:
-        assert position.scene is not None
-        assert position.forces is not None
-        assert position.force_rate is not None
-        loads = flank_forces(body, gear, position.scene.windows, position.forces)
-        rates = flank_forces(body, gear, position.scene.windows, position.force_rate)
+        loads, rates = (position_loads(body, gear, position, rate=rate) for rate in (False, True))
         teeth = sorted({(t + k) % body.teeth for t in loads for k in range(-NEIGHBOURS, NEIGHBOURS + 1)})
         cases += [(case, tooth) for tooth in teeth for case in (loads, rates)]
         counts.append(len(teeth))

@@ -14,25 +14,38 @@ Linearised at (u, p), with the moving normals' part H of the tangent, the active
 
 where d, a small correction, is iterated within the step on one factorisation (Alart & Curnier, Comput. Methods Appl.
 Mech. Eng. 92, 1991, in the few hundred unknowns that touch).
+
+Where a law's theta makes stress loads :math:`z = \theta W \gamma^{-1} p`, they join in, :math:`u = C f + S^T z` and
+:math:`\sigma_n = S f + T z`. On a multiplier space (`gearfe.contact.multiplier`) the unknowns are its multipliers,
+:math:`p = \Psi \lambda`, and the active ones solve :math:`\Psi^T W g = 0`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgetrf, dgetrs
 
-from .closest import Projection, gap_rows, unreached
+from .closest import Projection, unreached
+from .linearised import Linearised, linearise
 from .scene import Scene
+
+__all__ = ["Dialogue", "Linearised", "Outcome", "State", "asked_pressure", "linearise", "newton"]
 
 Array = NDArray[Any]
 IntArray = NDArray[Any]
 
 MAX_ITERATIONS = 40
+#: Steps beyond are granted where the residual is below `NEAR`: where a sharp corner dents an edge deeply, kinks between
+#: edges, which the tangent leaves out, make the convergence linear.
+PATIENCE, NEAR = 120, 1e-3
+#: The line search asks for less than the largest of so many residuals: an active set that is nearly settled may need
+#: steps that go up before they go down (Grippo, Lampariello & Lucidi, SIAM J. Numer. Anal. 23, 1986). Later than
+#: `MEMORY_UNTIL` it is the linear convergence that is left, which such steps only disturb.
+MEMORY, MEMORY_UNTIL = 4, 20
 #: Newton steps taken in full before the line search watches over them.
 FREE_ITERATIONS = 3
 #: Inner corrections of each step for the moving normals; each gains two to three digits.
@@ -41,110 +54,59 @@ CORRECTIONS = 3
 
 @dataclass(frozen=True)
 class State:
-    """Pressures (Pa), the nodal forces (N) that they make, the displacements (m) that those cause, and foot points."""
+    """Pressures (Pa), the nodal forces (N) that they make, the displacements (m) that those cause, and foot points.
+
+    Attributes
+    ----------
+    stress_loads : ndarray, shape (q,) or (0,)
+        z at the contact points (N m2), of laws with theta other than 0.
+    multipliers : ndarray, shape (m,), or None
+        lambda (Pa), of laws on a multiplier space.
+    """
 
     pressure: Array
     forces: Array
     displacement: Array
     place: Array
+    stress_loads: Array = field(default_factory=lambda: np.zeros(0))
+    multipliers: Array | None = None
+
+    @property
+    def unknown(self) -> Array:
+        """What Newton's method solves for: the multipliers of a law that has them, else the pressures."""
+        return self.pressure if self.multipliers is None else self.multipliers
 
     def scaled(self, factor: float) -> State:
         """The state at a load `factor` times as large, were the contact linear."""
-        return State(factor * self.pressure, factor * self.forces, factor * self.displacement, self.place)
+        return State(
+            factor * self.pressure,
+            factor * self.forces,
+            factor * self.displacement,
+            self.place,
+            factor * self.stress_loads,
+            None if self.multipliers is None else factor * self.multipliers,
+        )
 
 
-@dataclass(frozen=True)
-class Linearised:
-    """The active points at one state, on the unknowns of the t nodes that they touch.
-
-    Attributes
-    ----------
-    unknowns : ndarray, shape (2t,)
-    opening : ndarray, shape (a, 2t)
-        dg/du of the active points.
-    weighted : ndarray, shape (2t, a)
-        G^T W.
-    response : ndarray, shape (a, 2t)
-        gamma dg/du C + S.
-    normal : ndarray, shape (a, 2t)
-        G.
-    cut : ndarray, shape (a,)
-        Change of each point's load per unit of the foot point, where its stretch lies across a sharp end (N).
-    """
-
-    unknowns: IntArray
-    opening: Array
-    weighted: Array
-    tilt: Array
-    slide: Array
-    projection: Projection
-    loads: Array
-    parameter: Array
-    compliance: Array
-    response: Array
-    factor: Any
-    normal: Array
-    cut: Array
-
-    def solve(self, right: Array) -> Array:
-        """Pressures of the active points for a right-hand side."""
-        return dgetrs(*self.factor, right, trans=1)[0]
-
-    def bending(self, change: Array) -> Array:
-        """H change: how the contact forces turn and move when the touched nodes move by `change`, shape (2t,)."""
-        p = self.projection
-        metric = p.tangent[:, 0] ** 2 + p.tangent[:, 1] ** 2
-        tilt, slide = self.tilt @ change, self.slide @ change
-        share = 1 - p.gap * p.curvature / metric
-        to_slide = -share * (tilt + p.curvature * slide)
-        to_tilt = -share * slide + p.gap / metric * tilt
-        bent = (self.loads * to_slide) @ self.slide + (self.loads * to_tilt) @ self.tilt
-        return bent + (self.cut * slide) @ self.normal if self.cut.any() else bent
-
-
-def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: Array) -> Linearised:
-    """Rows and factorised matrix of the active points."""
-    chosen = projection.take(active)
-    rows = gap_rows(chosen, scene.slave_nodes[active], scene.slave_shapes[active], scene.rotation)
-    touched = np.zeros(len(scene.points), dtype=bool)
-    touched[rows.nodes] = True
-    nodes = np.flatnonzero(touched)
-    place = np.empty(len(touched), dtype=np.int64)
-    place[nodes] = np.arange(len(nodes))
-    # the two edges of a point belong to different teeth: no slot of the dense rows is met twice
-    slot = np.arange(len(active))[:, None] * len(nodes) + place[rows.nodes]
-    spread = np.zeros((3, len(active) * len(nodes), 2))
-    spread[0, slot], spread[1, slot], spread[2, slot] = rows.normal, rows.tilt, rows.slide
-    normal, tilt, slide = spread.reshape(3, len(active), 2 * len(nodes))
-    steep = chosen.normal[:, 0] * chosen.tangent[:, 0] + chosen.normal[:, 1] * chosen.tangent[:, 1]
-    opening = normal - steep[:, None] * slide
-    unknowns = np.empty(2 * len(nodes), dtype=np.int64)
-    unknowns[::2], unknowns[1::2] = 2 * nodes, 2 * nodes + 1
-    areas, gamma = scene.areas(projection.place)[active], scene.parameter[active]
-    compliance = scene.compliance.take(unknowns, axis=0).take(unknowns, axis=1)
-    response = (gamma[:, None] * opening) @ compliance
-    if len(scene.stress):
-        response += scene.stress.take(active, axis=0).take(unknowns, axis=1)
-    weighted = np.ascontiguousarray((normal * areas[:, None]).T)
-    matrix = response @ weighted
-    matrix.flat[:: len(matrix) + 1] += 1.0
-    # the transposed matrix is what LAPACK sees in C order: factorise that, solve transposed, and nothing is copied
-    factor = dgetrf(matrix.T, overwrite_a=1)[:2]
-    loads = areas * pressure[active]
-    across = (areas > 0) & (areas < scene.weight[active])
-    cut = np.where(across, -scene.weight[active] / (2 * scene.fade[active]) * pressure[active], 0.0)
-    return Linearised(
-        unknowns, opening, weighted, tilt, slide, chosen, loads, gamma, compliance, response, factor, normal, cut
-    )
-
-
-def asked_pressure(scene: Scene, projection: Projection, forces: Array) -> Array:
-    """max(0, -gamma g - S f): the pressure that the law asks for at this state (Pa)."""
+def asked_pressure(scene: Scene, projection: Projection, forces: Array, stress_loads: Array | None = None) -> Array:
+    """max(0, -gamma g - S f - T z): the pressure that a law at points asks for at this state (Pa)."""
     trial = -scene.parameter * projection.gap
     if len(scene.stress):
         trial -= scene.stress @ forces
+    if stress_loads is not None and len(stress_loads):
+        trial -= scene.stress_stress @ stress_loads
     trial[unreached(projection.gap)] = 0.0
     return np.maximum(trial, 0.0)
+
+
+def asked(scene: Scene, projection: Projection, state: State) -> Array:
+    """What the law asks the state's unknowns to be (Pa): pressures, or max(0, lambda - c mean gap) of each hat."""
+    if scene.hats is None:
+        return asked_pressure(scene, projection, state.forces, state.stress_loads)
+    assert state.multipliers is not None
+    areas = scene.facing(projection)
+    stiffness = scene.hats.mean(areas, scene.parameter)
+    return np.maximum(state.multipliers - stiffness * scene.hats.mean(areas, projection.gap), 0.0)
 
 
 @dataclass(frozen=True)
@@ -174,16 +136,19 @@ def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
 
     A backtracking line search on the weighted pressure residual watches over all but the first steps.
     """
-    residual = np.inf
+    residual, past = np.inf, [np.inf]
     projection = yield scene.placed(state.displacement), state.place
-    wanted = state.pressure  # the guess chooses the first active set; afterwards the law does
+    state = _of_law(scene, projection, state)
+    wanted = state.unknown  # the guess chooses the first active set; afterwards the law does
     limit = 1e3 * float(scene.weight @ state.pressure)
-    for iteration in range(1, MAX_ITERATIONS + 1):
-        active = np.flatnonzero((wanted > 0) & ~unreached(projection.gap))
+    for iteration in range(1, PATIENCE + 1):
+        if iteration > MAX_ITERATIONS and residual > NEAR:
+            return Outcome("not_converged", state, projection, iteration - 1)
+        active = _active(scene, projection, wanted)
         if len(active) == 0:
             return Outcome("under_resolved", state, projection, iteration)
         lin = linearise(scene, projection, active, state.pressure)
-        aim = _step(scene, lin, active, projection, state)
+        aim = _step(scene, lin, active, state, projection)
         before = scene.areas(projection.place)
         total = float(scene.weight @ np.abs(aim.pressure))
         if not np.isfinite(total) or total > limit:
@@ -192,21 +157,37 @@ def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
         for _ in range(6):
             tried = _between(state, aim, length)
             found = yield scene.placed(tried.displacement), projection.place
-            asked = asked_pressure(scene, found, tried.forces)
+            wish = asked(scene, found, tried)
             areas = scene.areas(found.place)
-            scale = max(float(areas @ asked), 1e-12 * total)
+            shares = areas if scene.hats is None else scene.hats.integrated(scene.facing(found))
+            scale = max(float(shares @ wish), 1e-12 * total)
             # sliding past a sharp end changes the areas behind the forces as well
-            error = float(areas @ np.abs(tried.pressure - asked) + np.abs(areas - before) @ asked) / scale
+            slid = np.abs(areas - before) @ (wish if scene.hats is None else scene.hats.at_points(wish))
+            error = float(shares @ np.abs(tried.unknown - wish) + slid) / scale
             if best is None or error < best[0]:
-                best = (error, tried, found, asked)
-            if error < (1 - 0.1 * length) * residual or iteration <= FREE_ITERATIONS:
+                best = (error, tried, found, wish)
+            if error < (1 - 0.1 * length) * max(past) or iteration <= FREE_ITERATIONS:
                 break
             length *= 0.5
         assert best is not None
         residual, state, projection, wanted = best
-        if residual < max(tolerance, _rounding(scene, wanted, projection)):
+        past = [*past[-MEMORY + 1 :], residual] if iteration < MEMORY_UNTIL else [residual]
+        if residual < max(tolerance, _rounding(scene, state.pressure, projection)):
             return Outcome("converged", state, projection, iteration)
-    return Outcome("not_converged", state, projection, MAX_ITERATIONS)
+    return Outcome("not_converged", state, projection, PATIENCE)
+
+
+def _of_law(scene: Scene, projection: Projection, state: State) -> State:
+    """The starting state with the multipliers that its pressures make, where the law has them."""
+    if scene.hats is None or state.multipliers is not None:
+        return state
+    return replace(state, multipliers=scene.hats.mean(scene.facing(projection), state.pressure))
+
+
+def _active(scene: Scene, projection: Projection, wanted: Array) -> IntArray:
+    if scene.hats is None:
+        return np.flatnonzero((wanted > 0) & ~unreached(projection.gap))
+    return np.flatnonzero((wanted > 0) & (scene.hats.integrated(scene.facing(projection)) > 0))
 
 
 def _rounding(scene: Scene, wanted: Array, projection: Projection) -> float:
@@ -219,26 +200,45 @@ def _rounding(scene: Scene, wanted: Array, projection: Projection) -> float:
 def _between(old: State, new: State, length: float) -> State:
     if length == 1.0:
         return new
+
+    def part(a: Array, b: Array) -> Array:
+        return a + length * (b - a) if len(a) else length * b
+
     return State(
-        old.pressure + length * (new.pressure - old.pressure),
-        old.forces + length * (new.forces - old.forces),
-        old.displacement + length * (new.displacement - old.displacement),
+        part(old.pressure, new.pressure),
+        part(old.forces, new.forces),
+        part(old.displacement, new.displacement),
         new.place,
+        part(old.stress_loads, new.stress_loads),
+        None if old.multipliers is None or new.multipliers is None else part(old.multipliers, new.multipliers),
     )
 
 
-def _step(scene: Scene, lin: Linearised, active: IntArray, projection: Projection, state: State) -> State:
-    """Solve the linearised contact for the active points; d is iterated on the same factorisation."""
+def _step(scene: Scene, lin: Linearised, active: IntArray, state: State, projection: Projection) -> State:
+    """Solve the linearised contact for the active unknowns; d is iterated on the same factorisation."""
     before = state.displacement[lin.unknowns]
-    right = -lin.parameter * (projection.gap[active] - lin.opening @ before)
+    right = -lin.parameter * (lin.gap - lin.opening @ before)
     turned = np.zeros(len(lin.unknowns))
     for correction in range(CORRECTIONS):
         solved = lin.solve(right - lin.response @ turned if correction else right)
         local = lin.weighted @ solved + turned
         if correction + 1 < CORRECTIONS:
-            turned = lin.bending(lin.compliance @ local - before)
-    pressure = np.zeros(len(scene.weight))
-    pressure[active] = solved
+            turned = lin.bending(lin.moved(solved, local) - before)
+    return assembled(scene, lin, active, solved, local, projection.place)
+
+
+def assembled(scene: Scene, lin: Linearised, active: IntArray, solved: Array, local: Array, place: Array) -> State:
+    """The state with the active unknowns `solved` and the forces `local`, shape (2t,), on all points and nodes."""
+    unknown = np.zeros(len(scene.weight) if scene.hats is None else scene.hats.count)
+    unknown[active] = solved
     forces = np.zeros(2 * len(scene.points))
     forces[lin.unknowns] = local
-    return State(pressure, forces, scene.compliance[:, lin.unknowns] @ local, projection.place)
+    displacement = scene.compliance[:, lin.unknowns] @ local
+    if scene.hats is not None:
+        return State(scene.hats.at_points(unknown), forces, displacement, place, multipliers=unknown)
+    if not scene.theta:
+        return State(unknown, forces, displacement, place)
+    loads = np.zeros(len(scene.weight))
+    loads[active] = lin.relief * solved
+    displacement += loads[active] @ scene.stress[active]
+    return State(unknown, forces, displacement, place, loads)

@@ -10,16 +10,18 @@ the same at every position.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .closest import Projection, chains_of, nearest_places, project
+from .closest import Projection, chains_of, nearest_places, project, unreached
 from .compliance import GearBody
 from .flank import edge_nodes
+from .law_data import check_stress_loads, law_data, slave_windows
 from .laws import ContactLaw
+from .multiplier import Hats
 
 Array = NDArray[Any]
 IntArray = NDArray[Any]
@@ -46,6 +48,9 @@ class MeshingPair:
     centre_distance: float
     width: float
     law: ContactLaw
+
+    def __post_init__(self) -> None:
+        check_stress_loads(self.bodies, self.law, self.width)
 
     @property
     def bodies(self) -> tuple[GearBody, GearBody]:
@@ -158,6 +163,12 @@ class Scene:
         Tooth pair of each contact point.
     rigid : Projection
         Closest points of the undeformed bodies.
+    theta
+        The law's.
+    stress_stress : ndarray, shape (q, q)
+        Normal stress at the contact points for stress loads at them (Pa/(N m2)); no rows with theta = 0.
+    hats : Hats, or None
+        Multiplier space of the exact law.
     """
 
     windows: tuple[Window, ...]
@@ -177,6 +188,9 @@ class Scene:
     owner: IntArray
     pair: IntArray
     rigid: Projection
+    theta: int = 0
+    stress_stress: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    hats: Hats | None = None
 
     @property
     def pairs(self) -> int:
@@ -195,6 +209,10 @@ class Scene:
     def areas(self, place: Array) -> Array:
         """Areas of the contact points (m2) as far as they lie before the end of the mate's surface."""
         return self.weight * np.clip(0.5 + (self.counts[self.mate] - place) / (2 * self.fade), 0.0, 1.0)
+
+    def facing(self, projection: Projection) -> Array:
+        """Areas of the contact points (m2) as far as they face the mate at all."""
+        return np.where(unreached(projection.gap), 0.0, self.areas(projection.place))
 
 
 @dataclass(frozen=True)
@@ -266,7 +284,7 @@ def assemble_all(pair: MeshingPair, positions: Sequence[Sequence[Window]]) -> li
     ]
 
 
-def _gathered(pair: MeshingPair, windows: Sequence[Window]) -> dict[str, NDArray]:
+def _gathered(pair: MeshingPair, windows: Sequence[Window]) -> dict[str, Any]:
     """Attributes of a scene except its windows and closest points."""
     count = windows[-1].nodes.stop
     points, rotation = np.empty((count, 2)), np.empty((count, 2, 2))
@@ -276,8 +294,7 @@ def _gathered(pair: MeshingPair, windows: Sequence[Window]) -> dict[str, NDArray
         points[w.nodes] = pair.bodies[w.gear].flank.points[w.flank_nodes] @ matrix.T + pair.centre(w.gear)
         rotation[w.nodes] = matrix
         of_wheel[w.nodes] = bool(w.gear)
-    sides = pair.law.sides
-    slaves = [i for i, w in enumerate(windows) if sides == "both" or (sides == "pinion") == (w.gear == 0)]
+    slaves = slave_windows(pair, windows)
     return {
         "counts": np.array([w.edges for w in windows]),
         "points": points,
@@ -287,6 +304,7 @@ def _gathered(pair: MeshingPair, windows: Sequence[Window]) -> dict[str, NDArray
         "compliance": _compliance(pair, windows, count),
         "stress": _stress(pair, windows, slaves, count),
         **_contact_points(pair, windows, slaves),
+        **law_data(pair, windows, slaves),
     }
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .closest import Projection
+from .closest import Projection, unreached
 from .newton import Dialogue, Linearised, Outcome, State, linearise, newton
 from .overlap import Overlap, overlaps, rigidly_apart, windows_of
 from .scene import MeshingPair, Scene, assemble, assemble_all, project_all
@@ -57,6 +57,8 @@ class Position:
     scene, forces, force_rate
         Pieces of flank (without their matrices), the nodal forces on them in tooth axes (N) and their derivatives with
         respect to the twist (N/rad), for recovering fields; None without a solution.
+    stress_loads, stress_load_rate
+        Loads on the normal stress at the contact points (N m2) and their derivatives (N m2/rad); empty with theta = 0.
     """
 
     status: str
@@ -71,6 +73,8 @@ class Position:
     scene: Scene | None = None
     forces: Array | None = None
     force_rate: Array | None = None
+    stress_loads: Array | None = None
+    stress_load_rate: Array | None = None
 
 
 def solve_position(pair: MeshingPair, pinion_angle: float, twist: float, *, tolerance: float = TOLERANCE) -> Position:
@@ -213,17 +217,20 @@ def _alone(scene: Scene, start: State, tolerance: float) -> Outcome:
 
 def _finish(scene: Scene, outcome: Outcome, iterations: int) -> Position:
     state = outcome.state
-    active = np.flatnonzero(state.pressure > 0)
+    active = np.flatnonzero(state.unknown > 0)
     placed = scene.placed(state.displacement)
     lin = linearise(scene, outcome.projection, active, state.pressure)
     forces = np.zeros(2 * len(scene.points))
-    forces[lin.unknowns] = lin.weighted @ state.pressure[active]
+    forces[lin.unknowns] = lin.weighted @ state.unknown[active]
     force = np.matmul(scene.rotation, forces.reshape(-1, 2, 1))[:, :, 0]
     wheel = scene.of_wheel
     about_wheel = -_moment(placed - scene.wheel_centre, force)
     reaction = -_moment(scene.points - scene.wheel_centre, force)
     of_pair = scene.windows[1::2]
-    tangent, force_rate = _tangent(scene, lin, forces, placed)
+    tangent, force_rate, solved = _tangent(scene, lin, forces, placed)
+    load_rate = np.zeros(len(scene.weight) if scene.theta else 0)
+    if scene.theta:
+        load_rate[active] = lin.relief * solved
     return Position(
         status="converged",
         torque_wheel=float(about_wheel[wheel].sum()),
@@ -232,11 +239,15 @@ def _finish(scene: Scene, outcome: Outcome, iterations: int) -> Position:
         tangent=tangent,
         pair_numbers=tuple(-1 - w.tooth for w in of_pair),
         pair_torques=np.array([about_wheel[w.nodes].sum() for w in of_pair]),
-        peak_pressure=float(state.pressure.max()),
+        peak_pressure=float(state.pressure[~unreached(outcome.projection.gap)].max()),
         iterations=iterations,
-        scene=replace(scene, compliance=np.zeros((0, 0)), stress=np.zeros((0, 0))),  # the megabytes
+        scene=replace(  # without the megabytes
+            scene, compliance=np.zeros((0, 0)), stress=np.zeros((0, 0)), stress_stress=np.zeros((0, 0))
+        ),
         forces=forces,
         force_rate=force_rate,
+        stress_loads=state.stress_loads,
+        stress_load_rate=load_rate,
     )
 
 
@@ -244,8 +255,8 @@ def _moment(arm: Array, force: Array) -> Array:
     return arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]
 
 
-def _tangent(scene: Scene, lin: Linearised, forces: Array, placed: Array) -> tuple[float, Array]:
-    """d torque / d twist and d forces / d twist.
+def _tangent(scene: Scene, lin: Linearised, forces: Array, placed: Array) -> tuple[float, Array, Array]:
+    """d torque / d twist, d forces / d twist and d (active unknowns) / d twist.
 
     In the axes of the wheel's teeth the wheel's nodes are carried by e_z x (x - c) dphi, and
     df = G^T W dp + H dx - dphi e_z x f,  dx = carried + C df,  dp = -gamma dg - S df.
@@ -260,13 +271,14 @@ def _tangent(scene: Scene, lin: Linearised, forces: Array, placed: Array) -> tup
     right = lin.response @ frame - lin.parameter * (lin.opening @ carried)
     bend = np.zeros(len(frame))
     for _ in range(5):
-        rate = lin.weighted @ lin.solve(right - lin.response @ bend) + bend
-        moved = carried + lin.compliance @ (rate - frame)
+        solved = lin.solve(right - lin.response @ bend)
+        rate = lin.weighted @ solved + bend
+        moved = carried + lin.moved(solved, rate - frame)
         bend = lin.bending(moved)
     change = _moment(arm, (rate - frame).reshape(-1, 2)) + _moment((moved - carried).reshape(-1, 2), force)
     spread = np.zeros_like(forces)
     spread[lin.unknowns] = rate - frame
-    return -float(change[wheel[:, 0]].sum()), spread
+    return -float(change[wheel[:, 0]].sum()), spread, solved
 
 
 def _quarter_turn(vectors: Array) -> Array:

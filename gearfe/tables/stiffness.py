@@ -29,14 +29,26 @@ class StiffnessTable:
     angle_step_deg: float = quantity(1.0, doc="step of the pinion angle (deg)", above=0.0)
     angle_stop_deg: float | None = quantity(None, doc="last pinion angle (deg); without it, one mesh cycle")
     plane: str = quantity("strain", doc="plane strain or plane stress", choices=("strain", "stress"))
-    law: str = quantity("nitsche", doc="contact law", choices=("nitsche", "penalty"))
+    law: str = quantity("nitsche", doc="contact law", choices=("nitsche", "penalty", "exact"))
+    law_sides: str | None = quantity(
+        None,
+        doc="flanks that the law is integrated on: tip takes, of each tooth pair, the gear whose tip is nearer; by "
+        "default both for nitsche, pinion for penalty, tip for exact",
+        choices=("both", "pinion", "wheel", "tip"),
+    )
     kinematics: str = quantity(
         "finite",
         doc="small (small strain) or finite (with the first-order effect of finite strain on the torque)",
         choices=("small", "finite"),
     )
-    nitsche_gamma0: float = quantity(
-        1.0, doc="parameter of the law nitsche, gamma h/E (-); 1 is the most accurate", low=1e-3, high=1e6
+    nitsche_theta: int = quantity(
+        0, doc="variant of the law nitsche: 0 (cheapest), 1 (symmetric, large gamma0 only) or -1", low=-1, high=1
+    )
+    nitsche_gamma0: float | None = quantity(
+        None,
+        doc="parameter of the law nitsche, gamma h/E (-), by default 1, the most accurate, or 20 with theta = 1",
+        low=1e-6,
+        high=1e9,
     )
     penalty_stiffness_N_per_mm3: float | None = quantity(
         None,
@@ -57,6 +69,7 @@ class StiffnessTable:
         """Raise `InputError` for keys that contradict each other."""
         if self.twist_deg is not None and self.torque_Nm is not None:
             raise InputError(f"{where}.torque_Nm", self.torque_Nm, "stands beside twist_deg", "leave one of them out")
+        self.check_law(where)
         if self.angle_stop_deg is None:
             return
         if self.angle_stop_deg < self.angle_start_deg:
@@ -65,6 +78,18 @@ class StiffnessTable:
         if (self.angle_stop_deg - self.angle_start_deg) / self.angle_step_deg > MOST_POSITIONS:
             problem = f"makes more than {MOST_POSITIONS} positions"
             raise InputError(f"{where}.angle_step_deg", self.angle_step_deg, problem, "use a larger step")
+
+    def check_law(self, where: str) -> None:
+        """Raise `InputError` for keys that the contact law cannot take."""
+        if self.law == "exact" and self.law_sides == "both":
+            problem = "must be tip, pinion or wheel with the law exact: its multipliers lie on one gear"
+            raise InputError(f"{where}.law_sides", self.law_sides, problem, "leave it out")
+        if self.law == "nitsche" and self.law_sides == "tip":
+            problem = "must be both, pinion or wheel with the law nitsche"
+            raise InputError(f"{where}.law_sides", self.law_sides, problem, "leave it out (both)")
+        if self.law == "exact" and self.points_per_edge < 3:
+            problem = "must be >= 3 with the law exact: it has two multipliers an edge"
+            raise InputError(f"{where}.points_per_edge", self.points_per_edge, problem, "leave it out (4)")
 
     def angles_deg(self, mesh_cycle_deg: float) -> list[float]:
         """Pinion angles (deg), the last one included."""

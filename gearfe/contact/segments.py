@@ -1,0 +1,100 @@
+r"""Quadrature points on slave edges: a Gauss rule on each edge, or on each of its segments.
+
+The pressure's virtual work is smooth between the points of a slave edge that face vertices of the mate, and has a kink
+there: the mate's shape functions and its normal are only continuous. A Gauss rule across such a kink does not give
+the mate what it takes from the slave (a uniform pressure on a flat interface is then not a solution); on the segments
+between them it does (Puso & Laursen, *Comput. Methods Appl. Mech. Eng.* 193, 2004; Farah, Popp & Wall, *Comput. Mech.*
+55, 2015, compare both). A vertex :math:`x_v` with the blended normal :math:`n_v` faces the slave point with
+
+.. math:: (x_s(\xi) - x_v) \times n_v = 0,
+
+a quadratic equation on a quadratic edge. Breaks are placed in the current configuration and move with it. Their motion
+adds nothing to the derivative of the integral, as the integrand is continuous at them; what remains is of the order of
+the quadrature error, and Newton's method keeps converging fast.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .flank import gauss_rule
+
+Array = NDArray[Any]
+IntArray = NDArray[Any]
+Quadrature = Literal["points", "segments"]
+
+#: Segments shorter than this part of an edge are left out.
+SHORTEST = 1e-9
+
+
+def whole_edges(count: int, points_per_edge: int) -> tuple[IntArray, Array, Array]:
+    """Edge, place on it (0 to 1) and weight (1 in sum) of the points of `count` edges with a Gauss rule on each."""
+    xi, weight = gauss_rule(points_per_edge)
+    return np.repeat(np.arange(count), len(xi)), np.tile(xi, count), np.tile(weight, count)
+
+
+def segments(slave: Array, mate: Array, points_per_segment: int) -> tuple[IntArray, Array, Array]:
+    """The same with a Gauss rule on each segment.
+
+    Parameters
+    ----------
+    slave : ndarray, shape (e, 3, 2)
+        Present places of the nodes of the slave edges (m).
+    mate : ndarray, shape (2 f + 1, 2)
+        Present places of the nodes of the mate's chain (m).
+    """
+    edge, xi = breaks(slave, mate)
+    count = len(slave)
+    edge = np.concatenate([np.arange(count), edge])
+    start = np.concatenate([np.zeros(count), xi])
+    order = np.lexsort((start, edge))
+    edge, start = edge[order], start[order]
+    last = np.append(edge[1:] != edge[:-1], True)
+    end = np.where(last, 1.0, np.append(start[1:], 1.0))
+    kept = end - start > SHORTEST
+    edge, start, length = edge[kept], start[kept], (end - start)[kept]
+    at, weight = gauss_rule(points_per_segment)
+    return (
+        np.repeat(edge, len(at)),
+        (start[:, None] + length[:, None] * at).ravel(),
+        (length[:, None] * weight).ravel(),
+    )
+
+
+def breaks(slave: Array, mate: Array) -> tuple[IntArray, Array]:
+    """Slave edges and places on them (0 to 1) that face the vertices and the ends of the mate's chain."""
+    vertices, normals = mate[::2], _vertex_normals(mate)
+    x0, x1, x2 = slave[:, 0], slave[:, 1], slave[:, 2]
+    linear, quadratic = 4 * x1 - 3 * x0 - x2, 2 * (x0 - 2 * x1 + x2)
+    c = _cross(x0 - vertices[:, None], normals[:, None])
+    b = _cross(linear, normals[:, None])
+    a = _cross(quadratic, normals[:, None])
+    # roots of a xi^2 + b xi + c in the form that survives a = 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        q = -0.5 * (b + np.where(b < 0, -1.0, 1.0) * np.sqrt(b * b - 4 * a * c))
+        roots = np.stack([c / q, q / a])
+    reach = np.linalg.norm(np.ptp(mate, axis=0))
+    _, vertex, edge = found = np.nonzero(np.isfinite(roots) & (roots > 0) & (roots < 1))
+    xi = roots[found][:, None]
+    apart = x0[edge] + xi * (linear[edge] + xi * quadratic[edge]) - vertices[vertex]
+    near = np.linalg.norm(apart, axis=1) < reach
+    return edge[near], xi[near, 0]
+
+
+def _vertex_normals(chain: Array) -> Array:
+    """Normals at the vertices of a chain, blended as `gearfe.contact.closest` does, shape (f + 1, 2)."""
+    x0, x1, x2 = chain[:-2:2], chain[1:-1:2], chain[2::2]
+    at_start, at_end = _normal(4 * x1 - 3 * x0 - x2), _normal(x0 - 4 * x1 + 3 * x2)
+    mean = at_end[:-1] + at_start[1:]
+    return np.concatenate([at_start[:1], mean / np.linalg.norm(mean, axis=1, keepdims=True), at_end[-1:]])
+
+
+def _normal(tangent: Array) -> Array:
+    return np.stack([-tangent[:, 1], tangent[:, 0]], axis=1) / np.linalg.norm(tangent, axis=1, keepdims=True)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
