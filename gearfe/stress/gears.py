@@ -57,6 +57,8 @@ def draw(random: np.random.Generator, number: int) -> Case:
         "coarsen": rounded(log_uniform(random, 1.0, 3.0), 2),
         "points_per_edge": int(random.choice([4, 4, 4, 2, 3, 6])),
     }
+    if sweep["law"] == "nitsche" and random.random() < 0.4:
+        sweep["nitsche_theta"] = int(random.choice([1, -1]))
     if random.random() < 0.85:
         sweep["twist_deg"] = rounded(log_uniform(random, 1e-6, 0.5))
     else:
@@ -161,7 +163,9 @@ def swap_checks(elastic: MeshingPair, angles: Any, twists: Any, found: list[Posi
 
     Its tooth 0 then stands at the wheel's angle + pi/z2, and the twist of the other gear is twist z2/z1.
     """
-    sides = {"pinion": "wheel", "wheel": "pinion", "both": "both"}[elastic.law.sides]
+    if elastic.law.theta:
+        return []  # such gears are made for their law and their place
+    sides = {"pinion": "wheel", "wheel": "pinion"}.get(elastic.law.sides, elastic.law.sides)
     law: Any = elastic.law if sides == elastic.law.sides else replace(elastic.law, sides=sides)  # type: ignore[type-var]
     other = MeshingPair(elastic.wheel, elastic.pinion, elastic.centre_distance, elastic.width, law)
     turned = elastic.wheel_angle(angles, twists) + math.pi / elastic.wheel.teeth
