@@ -16,6 +16,7 @@ from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.error_estimate import trajectory_error
 from gearfe.output.files import whole_set
 from gearfe.rigid import integrate
+from gearfe.train.floquet import multipliers
 
 from .rigid_cases import folding_angle, folding_links, pendulum
 
@@ -67,11 +68,16 @@ def test_files_of_an_earlier_run_do_not_stay(tmp_path: Path) -> None:
     assert {p.name for p in tmp_path.iterdir()} == {"trajectory.csv", "energy.csv", "summary.json", "notes.txt"}
 
 
-def test_a_set_that_fails_leaves_the_old_one(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text("old\n")
-    with pytest.raises(RuntimeError), whole_set(tmp_path, ("*.csv",)) as made:
+def _fail(folder: Path) -> None:
+    with whole_set(folder, ("*.csv",)) as made:
         (made / "b.csv").write_text("new\n")
         raise RuntimeError
+
+
+def test_a_set_that_fails_leaves_the_old_one(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("old\n")
+    with pytest.raises(RuntimeError):
+        _fail(tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["a.csv"]
 
 
@@ -92,3 +98,15 @@ def test_a_start_on_a_fold_is_within_its_run() -> None:
     times = np.linspace(0.0, 1.0, 11)
     made = integrate(folding_links(np.pi / 2 - 1e-6, 2.0), times, tolerance=1e-9, backend="plain")
     assert np.abs(made.q[:, 2] - folding_angle(np.pi / 2 - 1e-6, 2.0, times)).max() < 1e-8
+
+
+@pytest.mark.parametrize("rate", [1e6, 1e12])
+def test_multipliers_of_a_heavily_damped_mode(rate: float) -> None:
+    """y'' + rate y' + rate y = 0 creeps as exp(-t) once the rate is large; steps back in time overflow first."""
+    one = np.ones((1, 1))
+    found = multipliers(np.array([rate]), rate * one, one, lambda t: np.zeros((len(t), 1)), 1.0)
+    if rate > 1e9:
+        assert found is None
+    else:
+        assert found is not None
+        assert np.sort(np.abs(found)) == pytest.approx([0.0, np.exp(-1.0)], abs=1e-5)
