@@ -16,6 +16,7 @@ _PUBLIC: dict[str, str] = {
     "GearPair": "gear",
     "Housing": "housing",
     "InputError": "errors",
+    "LoadMap": "load_map",
     "Material": "elasticity",
     "ModalBody": "modal_body",
     "StiffnessCurve": "stiffness",
@@ -24,6 +25,7 @@ _PUBLIC: dict[str, str] = {
     "TrainScene": "train",
     "build_train": "train",
     "simulate": "train",
+    "sweep_loads": "load_sweep",
     "sweep_stiffness": "stiffness",
 }
 

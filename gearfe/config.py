@@ -25,6 +25,7 @@ T = TypeVar("T")
 TABLES: dict[str, str] = {
     "pair": "gearfe.tables.pair:PairTable",
     "stiffness": "gearfe.tables.stiffness:StiffnessTable",
+    "loadmap": "gearfe.tables.loadmap:LoadMapTable",
     "housing": "gearfe.tables.housing:HousingTable",
     "train": "gearfe.tables.train:TrainTable",
 }

@@ -28,13 +28,17 @@ MODULES = (
     "elasticity",
     "gear",
     "involute",
+    "local_gap",
     "mesh_geometry",
+    "routes",
+    "small_balance",
+    "small_load",
     "spur_gear",
     "stiffness",
     "stiffness_curve",
     "sweep_positions",
     "torque_control",
-    "unloaded",
+    "touching",
 )
 
 

@@ -173,6 +173,15 @@ def von_mises(stresses: Array) -> Array:
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3 * xy**2)
 
 
+def principal_stresses(stresses: Array) -> tuple[Array, Array, Array]:
+    """Principal stresses sigma_1 >= sigma_2 >= sigma_3 (Pa) of stresses (..., 4) ordered xx, yy, zz, xy."""
+    xx, yy, zz, xy = np.moveaxis(stresses, -1, 0)
+    middle, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+    high, low = middle + radius, middle - radius
+    first, third = np.maximum(high, zz), np.minimum(low, zz)
+    return first, np.maximum(low, np.minimum(high, zz)), third
+
+
 # ---- the same as scikit-fem forms ------------------------------------------------------------------------------------
 
 

@@ -16,7 +16,8 @@ from .contact.compliance import GearBody
 from .contact.recovery import position_loads, sector_displacements
 from .contact.scene import MeshingPair, turn
 from .contact.solver import Position
-from .elasticity import physical_gradients, triangle_shapes, von_mises
+from .elasticity import physical_gradients, principal_stresses, triangle_shapes, von_mises
+from .flank_pressure import flank_pressures
 from .meshing.whole_gear import WholeGear, whole_gear
 
 Array = NDArray[Any]
@@ -37,17 +38,25 @@ class GearField:
         Elastic displacement against the rigid hub, global axes (m).
     stress : ndarray, shape (n, 4)
         xx, yy, zz, xy in global axes, averaged at the nodes (Pa).
+    pressure : ndarray, shape (n,)
+        Contact pressure (Pa), 0 away from the contact.
     """
 
     points: Array
     triangles: IntArray
     displacement: Array
     stress: Array
+    pressure: Array
 
     @property
     def von_mises(self) -> Array:
         """Von Mises stress at the nodes (Pa)."""
         return von_mises(self.stress)
+
+    @property
+    def principal(self) -> tuple[Array, Array, Array]:
+        """Principal stresses sigma_1 >= sigma_2 >= sigma_3 at the nodes (Pa); one of them acts along the axis."""
+        return principal_stresses(self.stress)
 
 
 @dataclass(frozen=True)
@@ -134,7 +143,13 @@ def gear_field(recovery: GearRecovery, pair: MeshingPair, position: Position, an
     total = [np.bincount(numbers, part.ravel(), len(whole.points)) / recovery.elements for part in turned]
     across = body.material.poisson_ratio * (total[0] + total[1]) if body.plane == "strain" else np.zeros(len(total[0]))
     points = whole.points @ turn(angle).T + pair.centre(gear)
-    return GearField(points, whole.triangles, displacement, np.stack([total[0], total[1], across, total[2]], axis=1))
+    stress = np.stack([total[0], total[1], across, total[2]], axis=1)
+    pressure = np.zeros(len(points))
+    for one in flank_pressures(pair, position):
+        if one.gear == gear:
+            nodes = whole.numbers[one.tooth % teeth][body.flank.nodes]
+            pressure[nodes] = np.maximum(pressure[nodes], one.at_nodes(len(nodes)))
+    return GearField(points, whole.triangles, displacement, stress, pressure)
 
 
 @dataclass(frozen=True)

@@ -18,19 +18,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .contact.compliance import gear_body
+from .contact.corners import corner_bearings
 from .contact.laws import ContactLaw, law_named, law_text
 from .contact.scene import MeshingPair
+from .curve_error import COARSENING, error_estimate, solved_twice
 from .elasticity import Material, Plane
 from .errors import InputError
 from .gear import GearPair
 from .meshing.recipe import sector_recipes
 from .meshing.tooth_sector import sector_mesh
 from .periodic import fold
+from .routes import Route, Router
 from .stiffness_curve import SOLVED, ErrorEstimate, StiffnessCurve
 from .stopwatch import Stopwatch
 from .sweep_positions import Progress, Solved, at_torque, at_twists, honest, load_shares
 from .threads import one_thread
-from .unloaded import unloaded_twist
 
 __all__ = ["ErrorEstimate", "StiffnessCurve", "elastic_pair", "sweep_stiffness"]
 
@@ -39,9 +41,6 @@ IntArray = NDArray[Any]
 
 #: Structural steel, the material where none is given.
 STEEL = Material()
-
-#: Coarsening, assumed order of convergence and largest number of positions of the error estimate.
-COARSENING, ORDER, ESTIMATE_POSITIONS = 1.6, 1.5, 20
 
 
 def elastic_pair(
@@ -99,7 +98,9 @@ def elastic_pair(
             )
             for number, (mesh, material, gear) in enumerate(zip(meshes, both, gears, strict=True))
         ]
-    return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen)
+    # stress loads of theta = +-1 stand in the gears' stiffness with the same halves at every position
+    corners = corner_bearings(pair) if chosen.theta == 0 else (None, None)
+    return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen, corners=corners)
 
 
 def sweep_stiffness(
@@ -114,6 +115,7 @@ def sweep_stiffness(
     kinematics: Literal["small", "finite"] = "finite",
     twist_from: Literal["centred", "contact"] = "centred",
     solve_all: bool = False,
+    route: Route = "auto",
     coarsen: float = 1.0,
     points_per_edge: int = 4,
     estimate_error: bool = False,
@@ -141,6 +143,9 @@ def sweep_stiffness(
         further, where unmodified flanks touch.
     solve_all
         Solve every position, also those that differ by whole mesh cycles.
+    route
+        ``auto`` (default): on the mesh where its elements see the contact, by the law of small loads where they do not,
+        see `gearfe.routes`; or ``direct`` or ``hertz`` everywhere.
     estimate_error
         Solve again on a coarser mesh and estimate the discretisation error.
     elastic
@@ -161,7 +166,7 @@ def sweep_stiffness(
     """
     if kinematics not in ("small", "finite"):
         raise InputError("kinematics", kinematics, "must be small or finite")
-    lost = _lost_motion(pair, twist_from)
+    lost = lost_motion(pair, twist_from)
     load = _checked_load(pair, twist, torque, lost)
     cycle = pair.mesh_cycle
     asked = np.arange(20) * cycle / 20 if angles is None else np.atleast_1d(np.asarray(angles, dtype=float))
@@ -171,14 +176,15 @@ def sweep_stiffness(
     common: dict[str, Any] = {"plane": plane, "law": law, "points_per_edge": points_per_edge}
     if elastic is None:
         elastic = elastic_pair(pair, materials, coarsen=coarsen, watch=watch, **common)
-    solved_angles, source = (asked, np.arange(len(asked))) if solve_all else _distinct(asked, cycle)
+    solved_angles, source = (asked, np.arange(len(asked))) if solve_all else distinct_angles(asked, cycle)
+    router = Router(pair, elastic, route)
     with watch.stage("unloaded flanks"):
-        touching = unloaded_twist(pair, solved_angles)
+        touching = router.touching_twists(solved_angles)
     with watch.stage("positions"), one_thread():
         if torque is None:
-            solved = at_twists(elastic, solved_angles, np.full(len(solved_angles), load), progress, finite=finite)
+            solved = at_twists(router, solved_angles, np.full(len(solved_angles), load), progress, finite=finite)
         else:
-            solved = at_torque(pair, elastic, solved_angles, load, touching, progress, finite=finite)
+            solved = at_torque(router, solved_angles, load, touching, progress, finite=finite)
     solved = honest(solved, touching)
     error = None
     if estimate_error:
@@ -186,12 +192,13 @@ def sweep_stiffness(
             given = (elastic.pinion.material, elastic.wheel.material)
             common = {"plane": elastic.pinion.plane, "law": elastic.law, "points_per_edge": points_per_edge}
             coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
-            error = _estimate(coarse, solved_angles, solved, finite=finite)
-    curve = _assemble(pair, asked, solved_angles, source, solved, touching, lost, searched=torque is not None)
+            error = _estimate(Router(pair, coarse, route), solved_angles, solved, finite=finite, coarsen=coarsen)
+    curve = assembled_curve(pair, asked, solved_angles, source, solved, touching, lost, searched=torque is not None)
     return replace(curve, law=law_text(elastic.law), timings=dict(watch.seconds), error=error)
 
 
-def _lost_motion(pair: GearPair, twist_from: str) -> float:
+def lost_motion(pair: GearPair, twist_from: str) -> float:
+    """Twist (rad) that is taken off before it counts, see `sweep_stiffness`."""
     if twist_from not in ("centred", "contact"):
         raise InputError("twist_from", twist_from, "must be centred or contact")
     return pair.contact_twist if twist_from == "contact" else 0.0
@@ -214,7 +221,7 @@ def _checked_load(pair: GearPair, twist: float | None, torque: float | None, los
     return float(twist) + lost
 
 
-def _distinct(angles: Array, cycle: float) -> tuple[Array, IntArray]:
+def distinct_angles(angles: Array, cycle: float) -> tuple[Array, IntArray]:
     """Angles within one cycle that have to be solved, and for each asked angle the number of its own."""
     folded = fold(angles, cycle)
     order = np.argsort(folded, kind="stable")
@@ -224,17 +231,14 @@ def _distinct(angles: Array, cycle: float) -> tuple[Array, IntArray]:
     return folded[order][new], source
 
 
-def _estimate(coarse: MeshingPair, angles: Array, solved: Solved, *, finite: bool) -> ErrorEstimate:
-    good = np.flatnonzero(np.array(solved.status) == "converged")
-    chosen = good[np.unique(np.linspace(0, len(good) - 1, min(len(good), ESTIMATE_POSITIONS)).round().astype(int))]
+def _estimate(coarse: Router, angles: Array, solved: Solved, *, finite: bool, coarsen: float) -> ErrorEstimate:
+    chosen = solved_twice(np.array(solved.status) == "converged")
     again = at_twists(coarse, angles[chosen], solved.twist[chosen], None, finite=finite)
-    fine = solved.numbers["torque_wheel"][chosen]
     other = np.where(np.array(again.status, dtype=object) == "converged", again.numbers["torque_wheel"], np.nan)
-    relative = np.abs(other / fine - 1) / (COARSENING**ORDER - 1)
-    return ErrorEstimate(angles[chosen], relative, COARSENING, ORDER)
+    return error_estimate(angles[chosen], solved.numbers["torque_wheel"][chosen], other, coarsen=coarsen)
 
 
-def _assemble(
+def assembled_curve(
     pair: GearPair,
     asked: Array,
     angles: Array,
@@ -271,6 +275,7 @@ def _assemble(
         peak_pressure=solved.numbers["peak_pressure"][source],
         iterations=solved.iterations[source],
         status=np.array(solved.status)[source],
+        route=np.array(solved.route)[source],
         mesh_cycle=pair.mesh_cycle,
         base_radius=radius,
         lost_motion=lost,

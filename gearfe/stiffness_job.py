@@ -92,6 +92,7 @@ class StiffnessJob:
             "kinematics": t.kinematics,
             "twist_from": t.twist_from,
             "solve_all": t.solve_all,
+            "route": t.route,
         }
 
 

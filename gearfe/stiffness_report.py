@@ -72,6 +72,7 @@ def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, floa
         },
         "contact_law": curve.law,
         "statuses": dict(Counter(map(str, curve.status))),
+        "routes": dict(Counter(map(str, curve.route))),
         "failed_pinion_angles_deg": failed,
         "timings_s": dict(timings),
     }
@@ -83,6 +84,12 @@ def told(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
     iso = iso_values(job.pair, moduli[0], moduli[1])
     count = Counter(map(str, curve.status))
     lines = [f"{len(curve)} positions: " + ", ".join(f"{n} {status}" for status, n in count.items())]
+    routes = Counter(map(str, curve.route[~curve.failed]))
+    if routes.keys() & {"hertz", "blend"}:
+        lines.append(
+            f"contacts narrower than the mesh resolves: {routes['hertz']} positions by the law of small loads, "
+            f"{routes['blend']} by its mean with the mesh (column route)"
+        )
     if curve.law:
         lines.append(f"contact law: {curve.law}")
     level = cycle_statistics(curve, job.table.interpolation)

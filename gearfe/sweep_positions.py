@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .contact.finite_strain import finite_strain_shares, interpolated_shares, sample_numbers, with_share
-from .contact.scene import MeshingPair
-from .contact.solver import Position, solve_positions
-from .gear import GearPair
+from .contact.solver import Position
 from .iso6336 import mesh_stiffness
+from .routes import Router, bare
 from .stiffness_curve import SOLVED
 from .torque_control import TorqueSolution, twists_for_torque
 
@@ -23,7 +22,7 @@ IntArray = NDArray[Any]
 Progress = Callable[[int, int, str], None]
 
 #: Positions handed to the solver at once: enough to work side by side, few enough to stay small in memory.
-BATCH = 16
+BATCH = 64
 #: Torque mode: the finite-strain share changes with the twist that it moves, by about a hundredth of itself each pass.
 SHARE_PASSES, SHARE_TOLERANCE = 6, 1e-10
 
@@ -42,6 +41,8 @@ class Solved:
         For each position the numbers of the tooth pairs that carry load, and their torques (N m).
     iterations : ndarray, shape (n,)
     status : list of str
+    route : list of str
+        See `gearfe.routes`.
     """
 
     twist: Array
@@ -49,30 +50,47 @@ class Solved:
     pairs: list[tuple[IntArray, Array]]
     iterations: IntArray
     status: list[str]
+    route: list[str]
 
 
 def at_twists(
-    elastic: MeshingPair, angles: Array, twists: Array, progress: Progress | None, *, finite: bool = False
+    router: Router,
+    angles: Array,
+    twists: Array,
+    progress: Progress | None,
+    *,
+    finite: bool = False,
+    observe: Callable[[int, Position], None] | None = None,
 ) -> Solved:
-    """Solve positions at given pinion angles and twists, both of shape (n,) (rad); with or without finite strain."""
+    """Solve positions at given pinion angles and twists, both of shape (n,) (rad); with or without finite strain.
+
+    `observe` is called with the number of each position and its small-strain solution, forces included, which are not
+    kept.
+    """
+    elastic = router.elastic
     sampled = sample_numbers(angles, elastic.pitch_angle) if finite else np.zeros(0, dtype=np.int64)
+    keep = set(sampled.tolist())
     positions: list[Position] = []
     for start in range(0, len(angles), BATCH):
         part = slice(start, start + BATCH)
-        positions += _solve(elastic, angles[part], twists[part], sampled - start)
+        kept = (sampled - start).tolist() if observe is None else range(len(angles[part]))
+        made = router.solve(angles[part], twists[part], kept)
+        if observe is not None:
+            for i, position in enumerate(made, start=start):
+                observe(i, position)
+        positions += [p if start + i in keep else bare(p) for i, p in enumerate(made)]
         if progress is not None:
             progress(len(positions), len(angles), "positions")
     if finite:
         shares = finite_strain_shares(elastic, [positions[i] for i in sampled])
         every = interpolated_shares(angles, angles[sampled], shares, elastic.pitch_angle)
-        positions = [_bare(with_share(p, c)) for p, c in zip(positions, every, strict=True)]
+        positions = [bare(with_share(p, c)) for p, c in zip(positions, every, strict=True)]
     iterations = np.array([p.iterations for p in positions], dtype=np.int64)
     return _collect(twists, positions, iterations, [p.status for p in positions])
 
 
 def at_torque(
-    pair: GearPair,
-    elastic: MeshingPair,
+    router: Router,
     angles: Array,
     torque: float,
     touching: Array,
@@ -86,29 +104,29 @@ def at_torque(
     are the twists (rad), shape (n,), at which the rigid flanks touch. With finite strain the share of the torque is
     evaluated at the twists so found, which then move by that share.
     """
+    pair, elastic = router.pair, router.elastic
     moduli = [body.material.youngs_modulus for body in elastic.bodies]
     guess = mesh_stiffness(pair, moduli[0], moduli[1]) * elastic.width * pair.wheel.base_radius**2
     goal = np.full(len(angles), torque)
-    found = _search(pair, elastic, angles, goal, touching, touching + torque / guess, progress)
+    found = _search(router, angles, goal, touching, touching + torque / guess, progress)
     if finite:
-        found = _with_shares(pair, elastic, angles, goal, touching, found)
+        found = _with_shares(router, angles, goal, touching, found)
     return _collect(found.twist, found.positions, found.iterations, found.status)
 
 
-def _with_shares(
-    pair: GearPair, elastic: MeshingPair, angles: Array, goal: Array, touching: Array, found: TorqueSolution
-) -> TorqueSolution:
+def _with_shares(router: Router, angles: Array, goal: Array, touching: Array, found: TorqueSolution) -> TorqueSolution:
     """Move the twists until torque and finite-strain share at the same twist make the goal."""
+    elastic = router.elastic
     sampled = sample_numbers(angles, elastic.pitch_angle)
     iterations, before = found.iterations, np.zeros(len(angles))
     for _ in range(SHARE_PASSES):
-        positions = _solve(elastic, angles[sampled], found.twist[sampled], np.arange(len(sampled)))
+        positions = router.solve(angles[sampled], found.twist[sampled], range(len(sampled)))
         shares = finite_strain_shares(elastic, positions)
         every = interpolated_shares(angles, angles[sampled], shares, elastic.pitch_angle)
         reached, tangent = (np.array([getattr(p, n) for p in found.positions]) for n in ("torque_wheel", "tangent"))
         good = np.array(found.status) == "converged"
         step = np.divide(goal / (1 + every) - reached, tangent, out=np.zeros(len(goal)), where=good & (tangent > 0))
-        found = _search(pair, elastic, angles, goal / (1 + every), touching, found.twist + step, None)
+        found = _search(router, angles, goal / (1 + every), touching, found.twist + step, None)
         iterations = iterations + found.iterations
         if np.max(np.abs(every - before)) <= SHARE_TOLERANCE:
             break
@@ -118,8 +136,7 @@ def _with_shares(
 
 
 def _search(
-    pair: GearPair,
-    elastic: MeshingPair,
+    router: Router,
     angles: Array,
     goal: Array,
     touching: Array,
@@ -132,12 +149,12 @@ def _search(
     for start, stop in zip(starts, [*starts[1:], len(angles)], strict=True):
         part = slice(start, stop)
         found = twists_for_torque(
-            lambda a, t: _solve(elastic, a, t),
+            router.solve,
             angles[part],
             goal[part],
             touching=touching[part],
             first=first[part],
-            most=math.pi / pair.wheel.teeth,
+            most=math.pi / router.pair.wheel.teeth,
         )
         parts.append(found)
         if start == 0 and found.status[0] == "converged":
@@ -152,17 +169,6 @@ def _search(
     )
 
 
-def _solve(elastic: MeshingPair, angles: Array, twists: Array, kept: IntArray | None = None) -> list[Position]:
-    """Positions, all but those numbered in `kept` without what only fields need: a scene holds megabytes."""
-    made = solve_positions(elastic, angles, twists)
-    keep = set() if kept is None else set(kept.tolist())
-    return [p if i in keep else _bare(p) for i, p in enumerate(made)]
-
-
-def _bare(position: Position) -> Position:
-    return replace(position, scene=None, forces=None, force_rate=None)
-
-
 def _collect(twists: Array, positions: list[Position], iterations: IntArray, status: list[str]) -> Solved:
     names = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "tangent", "peak_pressure")
     numbers = {name: np.array([getattr(p, name) for p in positions], dtype=float) for name in names}
@@ -170,7 +176,7 @@ def _collect(twists: Array, positions: list[Position], iterations: IntArray, sta
     for p in positions:
         carry = np.asarray(p.pair_torques) > 0
         pairs.append((np.asarray(p.pair_numbers, dtype=np.int64)[carry], np.asarray(p.pair_torques)[carry]))
-    return Solved(twists, numbers, pairs, iterations, status)
+    return Solved(twists, numbers, pairs, iterations, status, [p.route for p in positions])
 
 
 def honest(solved: Solved, touching: Array) -> Solved:

@@ -117,6 +117,8 @@ def train_curves(
             found.append(mesh.stiffness_N_per_m)
         elif mesh.curve is not None:
             found.append(_read_curve(job.path.parent / mesh.curve, teeth))
+        elif mesh.load_map is not None:
+            found.append(_mapped_curve(job.path.parent / mesh.load_map, scene, number))
         else:
             found.append(_computed_curve(job, scene, number, watch, progress))
     return tuple(found)
@@ -285,6 +287,34 @@ def _read_curve(path: Path, teeth: int) -> StiffnessCurve:
     return StiffnessCurve.from_csv(path, mesh_cycle=2.0 * math.pi / teeth)
 
 
+def _carried_torque(scene: TrainScene, number: int) -> float:
+    """Torque (N m) at the driven gear of a mesh in steady running, without sign."""
+    driven = scene.gear(scene.meshes[number].driven).gear
+    return abs(float(steady_forces(scene)[number])) * driven.base_radius
+
+
+def _mapped_curve(path: Path, scene: TrainScene, number: int) -> StiffnessCurve:
+    """The curve of a load map at the torque that a mesh carries; the map's pinion is the driver."""
+    from .load_map import LoadMap
+
+    mesh = scene.meshes[number]
+    made, torque = LoadMap.from_csv(path), _carried_torque(scene, number)
+    driver, driven = scene.gear(mesh.driver).gear, scene.gear(mesh.driven).gear
+    cycle, radius = 2.0 * math.pi / driver.teeth, driven.base_radius
+    fits = math.isclose(made.mesh_cycle, cycle, rel_tol=1e-9)
+    if not (fits and math.isclose(made.curves[0].base_radius, radius, rel_tol=1e-9)):
+        problem = (
+            f"is of other gears: mesh cycle {math.degrees(made.mesh_cycle):.6g} deg and base radius of the wheel "
+            f"{1e3 * made.curves[0].base_radius:.6g} mm, but {math.degrees(cycle):.6g} deg and {1e3 * radius:.6g} mm "
+            f"in mesh {mesh.name!r}"
+        )
+        raise InputError("load_map", str(path), problem, "make a map of this pair, the driver as its pinion")
+    if not torque > 0.0:
+        problem = "carries no torque, so its load map has no load to be read at"
+        raise InputError(f"mesh {mesh.name!r}", None, problem, "add a load, or give another stiffness")
+    return made.curve_at(torque)
+
+
 def _computed_curve(job: TrainJob, scene: TrainScene, number: int, watch: Any, progress: Any) -> StiffnessCurve:
     """Curve of a mesh with the driver as pinion, by [stiffness] or at the torque that the mesh carries."""
     from .curve_cache import cached_curve
@@ -300,13 +330,13 @@ def _computed_curve(job: TrainJob, scene: TrainScene, number: int, watch: Any, p
     model = {**tables.model, "materials": _materials(job, mesh)}
     if job.table.curves.load == "stiffness":
         return cached_curve(pair, model, tables.sweep, watch=watch, progress=progress)
-    force = abs(float(steady_forces(scene)[number]))
-    if not force > 0.0:
+    torque = _carried_torque(scene, number)
+    if not torque > 0.0:
         problem = 'carries no torque, so train.curves.load = "torque" has no load to compute its curve with'
         raise InputError(f"mesh {mesh.name!r}", None, problem, 'add a load, or write load = "stiffness"')
     count = job.table.curves.positions
     sweep = {
-        "torque": force * two.base_radius,
+        "torque": torque,
         "angles": pair.mesh_cycle * np.arange(count) / count,
         "kinematics": job.stiffness.kinematics,
         "twist_from": job.stiffness.twist_from,

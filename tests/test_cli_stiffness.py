@@ -82,6 +82,8 @@ def test_fields(tmp_path):
     names = sorted(p.name for p in tmp_path.iterdir())
     assert names == [
         "fields.vtkhdf",
+        "pressure.csv",
+        "pressure.png",
         "stiffness.csv",
         "stiffness.png",
         "stress_2deg.png",
@@ -105,6 +107,19 @@ def test_fields(tmp_path):
     code = main(["stiffness", str(JOB), "--out", str(tmp_path / "b"), *options[:6], "--fields", *QUICK])
     assert code == 0
     assert len(list((tmp_path / "b").glob("stress_*deg.png"))) == 1
+
+
+def test_animation(tmp_path, capsys):
+    from PIL import Image
+
+    options = ["--twist-deg", "0.1", "--angles", "0", "3", "17", "--animate", "2", *QUICK, "--no-picture"]
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path), *options]) == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["stiffness.csv", "stress.gif", "summary.json"]
+    with Image.open(tmp_path / "stress.gif") as made:
+        assert made.n_frames == 2
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path / "b"), "--animate", "1"]) == 2
+    assert "--animate" in capsys.readouterr().err
+    assert not (tmp_path / "b").exists()
 
 
 def test_fields_open_in_vtk(tmp_path):
@@ -132,8 +147,8 @@ def test_a_failed_position_is_told_and_in_the_table(tmp_path, capsys, monkeypatc
         bad = solver.Position("not_converged", *[math.nan] * 4, (), np.zeros(0), math.nan, 40)
         return [bad if abs(a - math.radians(4)) < 1e-9 else p for a, p in zip(angles, made, strict=True)]
 
-    monkeypatch.setattr("gearfe.sweep_positions.solve_positions", weak)
-    code = main(["stiffness", str(JOB), "--out", str(tmp_path), "--twist-deg", "0.05", *QUICK])
+    monkeypatch.setattr("gearfe.routes.solve_positions", weak)
+    code = main(["stiffness", str(JOB), "--out", str(tmp_path), "--twist-deg", "0.3", *QUICK])
     assert code == 1
     said = capsys.readouterr()
     assert "3 positions failed" in said.err  # 4, 22 and 40 deg
@@ -319,8 +334,8 @@ def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
         bad = np.isclose(np.degrees(angles), 6.0)
         return [solver._unsolved("not_converged", 40) if b else p for p, b in zip(made, bad, strict=True)]
 
-    monkeypatch.setattr("gearfe.sweep_positions.solve_positions", one_fails)
-    options = ("--twist-deg", "0.05", "--angles", "3", "3", "9", "--fields", "9", "6", "3", "--no-picture")
+    monkeypatch.setattr("gearfe.routes.solve_positions", one_fails)
+    options = ("--twist-deg", "0.3", "--angles", "3", "3", "9", "--fields", "9", "6", "3", "--no-picture")
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options]) == 1
     assert [r["status"] for r in rows(tmp_path)] == ["converged", "not_converged", "converged"]
     assert {p.name for p in tmp_path.glob("stress_*.png")} == {"stress_3deg.png", "stress_9deg.png"}

@@ -1,5 +1,6 @@
 """Fields on whole gears, against a plain finite-element solution of the whole gear and against theory."""
 
+import csv
 import math
 
 import numpy as np
@@ -7,13 +8,18 @@ import pytest
 from scipy.sparse.linalg import splu
 
 from gearfe import StiffnessCurve
+from gearfe.contact.laws import Penalty
 from gearfe.contact.scene import assemble, turn
 from gearfe.contact.solver import solve_position
+from gearfe.drawing import path_place
 from gearfe.elasticity import element_stiffness
 from gearfe.errors import InputError
 from gearfe.fields import gear_recovery, pair_recovery, straight_triangles
-from gearfe.fields_output import chosen_positions
+from gearfe.fields_output import chosen_positions, frames_of, write_fields
+from gearfe.flank_pressure import flank_pressures
 from gearfe.meshing.whole_gear import whole_gear
+from gearfe.output import animation
+from gearfe.output.figures import color_limit
 from gearfe.stiffness import elastic_pair, sweep_stiffness
 
 from .gears import pair
@@ -142,6 +148,128 @@ def test_stress_below_a_line_contact(elastic, position, fields):
         assert 0.4 * position.peak_pressure < field.von_mises.max() < 1.1 * position.peak_pressure
     far = fields[0].von_mises[np.linalg.norm(fields[0].points - np.array([-20e-3, 0.0]), axis=1) < 3e-3]
     assert far.max() < 0.05 * fields[0].von_mises.max()
+
+
+def test_principal_stresses_are_the_eigenvalues(fields):
+    """Of the full tensor with its component along the axis, by LAPACK."""
+    from gearfe.elasticity import principal_stresses
+
+    xx, yy, zz, xy = fields[0].stress[::501].T
+    full = np.zeros((len(xx), 3, 3))
+    full[:, 0, 0], full[:, 1, 1], full[:, 2, 2] = xx, yy, zz
+    full[:, 0, 1] = full[:, 1, 0] = xy
+    expected = np.linalg.eigvalsh(full)[:, ::-1]
+    found = np.stack([p[::501] for p in fields[0].principal], axis=1)
+    np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+    # zz in the middle, on top, and at the bottom
+    cases = np.array([[2.0, -1.0, 0.5, 0.0], [1.0, -1.0, 3.0, 0.0], [1.0, 2.0, -4.0, 0.0]])
+    np.testing.assert_allclose(np.stack(principal_stresses(cases), 1), [[2, 0.5, -1], [3, 1, -1], [2, 1, -4]])
+
+
+def test_the_pressure_carries_the_load(gears, elastic, position, fields):
+    """On the path of contact the force along the line of action is T/r_b; the pressure is that force's spread."""
+    force = position.torque_wheel / gears.wheel.base_radius
+    totals = [0.0, 0.0]
+    for one in flank_pressures(elastic, position):
+        weights = elastic.bodies[one.gear].flank.weights  # (edges, points an edge): Gauss's rule in the arc length
+        edges = np.unique(one.place.astype(int))
+        assert (np.diff(one.place) > 0).all()
+        totals[one.gear] += gears.wheel.face_width * float(weights[edges].ravel() @ one.pressure)
+    assert np.mean(totals) == pytest.approx(force, rel=2e-3)  # both flanks together carry it: the law is two-sided
+    for gear, total in enumerate(totals):
+        assert total == pytest.approx(force, rel=0.03)
+        field = fields[gear]
+        assert field.pressure.min() == 0.0
+        assert 0.8 * position.peak_pressure < field.pressure.max() <= position.peak_pressure
+        loaded = field.points[field.pressure > 0]
+        start, end = (np.array(path_place(gears, s)) * 1e-3 for s in (0.0, gears.tangent_length))
+        along = (end - start) / np.linalg.norm(end - start)
+        off = np.abs((loaded - start) @ np.array([-along[1], along[0]]))
+        assert off.max() < 0.2e-3  # loaded nodes lie on the line of action
+
+
+def test_a_one_sided_law_presses_on_both_flanks(gears):
+    """Penalty with points on the pinion alone: the wheel's pressure is the pinion's, on the other flank."""
+    elastic = elastic_pair(gears, coarsen=3.0, law=Penalty(sides="pinion"))
+    position = solve_position(elastic, ANGLE, TWIST)
+    found = flank_pressures(elastic, position)
+    assert {one.gear for one in found} == {0, 1}
+    for pair_number in {one.pair for one in found}:
+        peaks = [one.pressure.max() for one in found if one.pair == pair_number]
+        assert peaks[0] == pytest.approx(peaks[1], rel=1e-12)
+
+
+def test_the_series_and_the_table_of_pressures(gears, elastic, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    curve = sweep_stiffness(gears, twist=TWIST, angles=np.radians([1.0, 2.0]), elastic=elastic, route="direct")
+    names = write_fields(tmp_path, gears, elastic, curve, None)
+    assert sorted(names) == sorted(p.name for p in tmp_path.iterdir())
+    with h5py.File(tmp_path / "fields.vtkhdf") as file:
+        root = file["VTKHDF"]
+        np.testing.assert_allclose(root["Steps/Values"][:], [1.0, 2.0])
+        count = int(root["NumberOfPoints"][0])
+        data = {name: root["PointData"][name][:] for name in root["PointData"]}
+        points = root["Points"][:]
+    assert set(data) == {
+        "displacement_m", "von_mises_Pa", "principal_1_Pa", "principal_2_Pa", "principal_3_Pa", "contact_pressure_Pa",
+    }  # fmt: skip
+    one, two, three = (data[f"principal_{i}_Pa"].astype(float) for i in (1, 2, 3))
+    mises = np.sqrt(0.5 * ((one - two) ** 2 + (two - three) ** 2 + (three - one) ** 2))
+    np.testing.assert_allclose(data["von_mises_Pa"], mises, atol=1e-5 * mises.max())
+    assert (one >= two).all()
+    assert (two >= three).all()
+    # points turn with the gears (1 deg here), the displacement is the elastic one: microns, and nothing at the bore
+    turned = points[:count] @ turn3(math.radians(1.0)).T
+    pinion = len(gear_recovery(elastic.pinion).whole.points)
+    np.testing.assert_allclose(points[count : count + pinion], turned[:pinion], atol=1e-12)
+    assert 0 < np.abs(data["displacement_m"]).max() < 1e-4
+    with open(tmp_path / "pressure.csv") as stream:
+        rows = list(csv.DictReader(stream))
+    largest = [max(float(r["pressure_MPa"]) for r in rows if float(r["pinion_angle_deg"]) == a) for a in (1.0, 2.0)]
+    np.testing.assert_allclose(largest, 1e-6 * curve.peak_pressure, rtol=1e-6)
+    for r in rows[::7]:
+        gear = gears.pinion if r["gear"] == "pinion" else gears.wheel
+        roll = math.sqrt((float(r["diameter_mm"]) / 2) ** 2 - (1e3 * gear.base_radius) ** 2)
+        assert float(r["roll_length_mm"]) == pytest.approx(roll, rel=1e-9)
+
+
+def turn3(angle):
+    return np.block([[turn(angle), np.zeros((2, 1))], [np.zeros((1, 2)), np.ones((1, 1))]])
+
+
+def test_an_animation_is_one_whole_file(gears, elastic, tmp_path, monkeypatch):
+    image = pytest.importorskip("PIL.Image")
+    curve = sweep_stiffness(gears, twist=TWIST, angles=np.arange(5) * gears.mesh_cycle / 5, elastic=elastic)
+    frames, place = frames_of(gears, elastic, curve, 3)
+    np.testing.assert_allclose([f.angle for f in frames], np.degrees(gears.mesh_cycle) * np.arange(3) / 3)
+    animation.stress_animation(tmp_path / "a.gif", frames, title="test", zoom=place)
+    with image.open(tmp_path / "a.gif") as made:
+        assert made.n_frames == 3
+        assert made.info["loop"] == 0
+        pictures = []
+        for k in range(3):
+            made.seek(k)
+            pictures.append(np.asarray(made.convert("RGB"), dtype=int))
+    assert all(np.abs(pictures[0] - other).max() > 100 for other in pictures[1:])  # the gears move
+    assert (pictures[0][-20:] == pictures[1][-20:]).all()  # the axes do not
+
+    def broken(*_, **__):
+        raise OSError(28, "no space left")
+
+    monkeypatch.setattr(image.Image, "save", broken)
+    with pytest.raises(OSError, match="no space"):
+        animation.stress_animation(tmp_path / "b.gif", frames, title="test", zoom=place)
+    assert [p.name for p in tmp_path.iterdir()] == ["a.gif"]
+
+
+def test_colours_reach_what_a_small_area_exceeds():
+    """A unit square of two triangles with stress 1, and a hundredth of that area with stress 50."""
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3]])
+    parts = [(square, triangles, np.ones(4)), (0.1 * square, triangles, np.full(4, 50.0))]
+    assert color_limit(parts, share=0.02) == 1.0
+    assert color_limit(parts, share=0.005) == 50.0
+    assert color_limit([(square, triangles, np.zeros(4))]) == 1.0
 
 
 def test_choosing_positions(gears, elastic):

@@ -157,9 +157,11 @@ def scaled_penalty(n: int) -> Penalty:
     return Penalty(30 * UPPER.youngs_modulus * n**2 / HALF_WIDTH)
 
 
-@pytest.mark.parametrize("law", [Nitsche(), None, Exact()], ids=["nitsche", "penalty", "exact"])
-def test_rates_under_refinement(law: ContactLaw | None) -> None:
-    _check_rates(law, (1, 2, 3))
+@pytest.mark.parametrize(
+    ("law", "levels"), [(Nitsche(), (1, 2)), (None, (1, 2)), (Exact(), (1, 4))], ids=["nitsche", "penalty", "exact"]
+)
+def test_rates_under_refinement(law: ContactLaw | None, levels: tuple[int, ...]) -> None:
+    _check_rates(law, levels)
 
 
 FINER = [Nitsche(), Nitsche(sides="pinion"), Nitsche(theta=-1), Nitsche(20.0, theta=1), None]
@@ -168,7 +170,7 @@ FINER = [Nitsche(), Nitsche(sides="pinion"), Nitsche(theta=-1), Nitsche(20.0, th
 @pytest.mark.slow
 @pytest.mark.parametrize("law", FINER, ids=lambda law: "penalty" if law is None else f"{law.theta}, {law.sides}")
 def test_rates_under_more_refinement(law: ContactLaw | None) -> None:
-    _check_rates(law, (1, 3, 6))
+    _check_rates(law, (1, 2, 4))
 
 
 def _check_rates(law: ContactLaw | None, levels: tuple[int, ...]) -> None:
@@ -182,7 +184,8 @@ def _check_rates(law: ContactLaw | None, levels: tuple[int, ...]) -> None:
         assert error.outermost < FINE / (6 * n)  # the contact ends within one edge of the coarser side
 
 
-def test_plain_points_do_not_reach_these_rates() -> None:
-    errors = [hertz_error(n, Nitsche(), "points") for n in (1, 3)]
-    assert np.log2(errors[0].energy / errors[1].energy) / np.log2(3) < 1.3
+def test_plain_points_keep_an_error_of_the_pressure() -> None:
+    """Where the edges of the two bodies do not match, the peak pressure stays some 6 % off (energy norm: rate 1)."""
+    errors = [hertz_error(n, Nitsche(), "points") for n in (1, 2)]
+    assert errors[1].peak > 0.9 * errors[0].peak
     assert errors[1].peak > 0.02

@@ -223,7 +223,12 @@ def ring_error(n: int, law: ContactLaw, quadrature: str) -> RingError:
 
 @pytest.mark.parametrize(
     ("law", "pressure_rate"),
-    [(Nitsche(), 2.8), (Nitsche(sides="pinion"), 2.8), (Nitsche(theta=-1), 2.8), (Penalty(), 2.8)],
+    [
+        (Nitsche(), 2.8),
+        (Nitsche(sides="pinion"), 2.8),
+        pytest.param(Nitsche(theta=-1), 2.8, marks=pytest.mark.slow),
+        pytest.param(Penalty(), 2.8, marks=pytest.mark.slow),
+    ],
     ids=lambda value: name_of(value) if hasattr(value, "name") else "",
 )
 def test_curved_interface_converges_at_the_rate_of_its_geometry(law: ContactLaw, pressure_rate: float) -> None:

@@ -35,8 +35,9 @@ def on_the_path(gears, n=7, margin=0.044):
 
 
 def at(gears, angles, elastic=None, **options):
-    # small strain, where the invariants hold to rounding; finite strain has its own tests below
-    options = {"twist": TWIST, "kinematics": "small"} | options
+    # small strain on the mesh, where the invariants hold to rounding; finite strain has its own tests below, the law of
+    # small loads test_small_load.py
+    options = {"twist": TWIST, "kinematics": "small", "route": "direct"} | options
     if elastic is None:
         options = {"coarsen": COARSE} | options
     return sweep_stiffness(gears, angles=angles, elastic=elastic, **options)
@@ -115,7 +116,7 @@ def test_repeated_positions_are_solved_once(gears, elastic, monkeypatch):
             for a, t in zip(angles, np.broadcast_to(twists, len(angles)), strict=True)
         ]
 
-    monkeypatch.setattr("gearfe.sweep_positions.solve_positions", counting)
+    monkeypatch.setattr("gearfe.routes.solve_positions", counting)
     angles = np.radians(np.arange(1.0, 41.0, 3.0))
     folded = at(gears, angles, elastic)
     assert len(solved) == 6  # 1, 4, 7, ... modulo 18 deg
@@ -256,7 +257,7 @@ def test_a_torque_beyond_reach_is_flagged(gears, elastic, monkeypatch):
             made.append(p)
         return made
 
-    monkeypatch.setattr("gearfe.sweep_positions.solve_positions", weak)
+    monkeypatch.setattr("gearfe.routes.solve_positions", weak)
     fine = at(gears, [0.1], elastic, twist=None, torque=50.0)
     assert fine.torque_wheel[0] == pytest.approx(50.0, rel=1e-10)
     lost = at(gears, [0.1], elastic, twist=None, torque=100.0)
@@ -279,10 +280,13 @@ def test_a_torque_beyond_reach_is_flagged(gears, elastic, monkeypatch):
 @pytest.mark.parametrize("torque", [5.0, 800.0])
 def test_torque_mode_with_finite_strain(gears, elastic, torque):
     angles = np.radians(np.arange(0.0, 18.0, 1.0))
-    small, finite = (at(gears, angles, elastic, twist=None, torque=torque, kinematics=k) for k in ("small", "finite"))
+    # 5 N m lie below what this mesh resolves
+    small, finite = (
+        at(gears, angles, elastic, twist=None, torque=torque, kinematics=k, route="auto") for k in ("small", "finite")
+    )
     np.testing.assert_allclose(finite.torque_wheel, torque, rtol=1e-9)
     np.testing.assert_allclose(finite.torque_pinion / finite.torque_wheel, small.torque_pinion / torque, rtol=1e-3)
-    given = at(gears, angles[5:6], elastic, twist=float(finite.twist[5]), kinematics="finite")
+    given = at(gears, angles[5:6], elastic, twist=float(finite.twist[5]), kinematics="finite", route="auto")
     assert given.torque_wheel[0] == pytest.approx(torque, rel=1e-4)
     # it softens the teeth, more so under load
     assert (finite.twist > small.twist).all()
@@ -333,7 +337,7 @@ def test_a_contact_that_the_mesh_misses_is_under_resolved(gears, elastic, monkey
     def blind(pair, angles, twists):
         return [Position("no_contact", 0.0, 0.0, 0.0, 0.0, (), np.zeros(0), 0.0, 0) for _ in angles]
 
-    monkeypatch.setattr("gearfe.sweep_positions.solve_positions", blind)
+    monkeypatch.setattr("gearfe.routes.solve_positions", blind)
     curve = at(gears, [0.1], elastic)
     assert list(curve.status) == ["under_resolved"]
     assert np.isnan(curve.torque_wheel).all()
@@ -356,6 +360,7 @@ def test_a_contact_that_the_mesh_misses_is_under_resolved(gears, elastic, monkey
         ({"twist": 1e-3, "plane": "strained"}, "strain or stress"),
         ({"twist": 1e-3, "law": "glue"}, "one of nitsche, penalty"),
         ({"twist": 1e-3, "twist_from": "here"}, "centred or contact"),
+        ({"twist": 1e-3, "route": "both"}, "auto, direct or hertz"),
         ({"twist": 1e-3, "coarsen": 0.0}, "coarsen = 0.0: must be >= 0.2"),
     ],
 )
@@ -368,12 +373,12 @@ def test_mistakes(gears, options, message):
 
 
 def test_the_error_estimate_finds_the_error(gears, elastic):
-    """Against a mesh twice as fine, over positions with steady contact: the right order of magnitude."""
+    """Against a mesh twice as fine, over positions with steady contact: above the error, less than ten times it."""
     angles = np.concatenate(on_the_path(gears, 4))
     curve = at(gears, angles, elastic, estimate_error=True, coarsen=COARSE)
     fine = at(gears, angles, coarsen=0.5 * COARSE)
     true = np.median(np.abs(curve.k_mesh / fine.k_mesh - 1))
-    assert 0.3 * true < curve.error.typical < 4 * true
+    assert true < curve.error.typical < 10 * true
     assert curve.error.worst >= curve.error.typical > 0
     assert curve.timings["error estimate"] > 0
     assert len(curve.error.relative) == len(curve.error.pinion_angle) == len(angles)

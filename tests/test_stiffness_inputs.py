@@ -34,7 +34,14 @@ BASE = {
     "wheel": {"teeth": 30, "bore_diameter_mm": 18.0},
     "material": {"youngs_modulus_GPa": 200.0, "poisson_ratio": 0.3},
 }
-SWEEP = {"torque_Nm": 150.0, "law": "penalty", "coarsen": 3.0, "angle_start_deg": 1.0, "angle_step_deg": 3.5}
+SWEEP = {
+    "torque_Nm": 150.0,
+    "route": "direct",
+    "law": "penalty",
+    "coarsen": 3.0,
+    "angle_start_deg": 1.0,
+    "angle_step_deg": 3.5,
+}
 
 PAIR_CHANGES = {
     "pressure_angle_deg": 22.5,
@@ -69,6 +76,7 @@ SWEEP_CHANGES = {
     "coarsen": 2.5,
     "twist_from": "contact",
     "points_per_edge": 3,
+    "route": "hertz",
     "law_sides": "wheel",
     "angle_start_deg": 1.2,
 }

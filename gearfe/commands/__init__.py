@@ -7,6 +7,7 @@ some part failed and is marked as such in the output, 2 is kept for bad input). 
 #: Command -> module below ``gearfe.commands``; imported only when that command runs or its help is asked.
 COMMANDS: dict[str, str] = {
     "stiffness": "stiffness",
+    "loadmap": "loadmap",
     "gear": "gear",
     "mesh": "mesh",
     "mechanism": "mechanism",

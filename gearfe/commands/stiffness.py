@@ -64,6 +64,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="ANGLE",
         help="write displacement and stress of whole gears: 'all' (also without a value), or pinion angles (deg)",
     )
+    parser.add_argument(
+        "--animate",
+        type=int,
+        nargs="?",
+        const=40,
+        metavar="N",
+        help="stress in the meshing zone in N frames (40), a GIF",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -71,6 +79,7 @@ def run(args: argparse.Namespace) -> int:
     started = time.perf_counter()
     import numpy as np
 
+    from ..errors import InputError
     from ..output.files import output_folder, whole_set, write_json
     from ..stiffness import elastic_pair, sweep_stiffness
     from ..stiffness_job import read_stiffness_job
@@ -86,6 +95,8 @@ def run(args: argparse.Namespace) -> int:
             from ..fields_output import angle_numbers
 
             angle_numbers(np.degrees(sweep["angles"]), chosen)
+    if args.animate is not None and not 2 <= args.animate <= 1000:
+        raise InputError("--animate", args.animate, "must be >= 2 and <= 1000 frames", "40 are usual")
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
     elastic = elastic_pair(job.pair, watch=watch, **job.model)
     show = Progress()
@@ -104,6 +115,9 @@ def run(args: argparse.Namespace) -> int:
             angles = None if isinstance(chosen, str) else chosen
             with watch.stage("fields"):
                 write_fields(made, job.pair, elastic, curve, angles, progress=show)
+        if args.animate is not None:
+            with watch.stage("animation"):
+                _animate(made / "stress.gif", job, elastic, curve, args.animate, show)
             show.end()
         if not args.no_picture:
             with watch.stage("picture"):
@@ -120,6 +134,17 @@ def run(args: argparse.Namespace) -> int:
     for sentence in warnings(job, curve):
         print(f"gearfe: warning: {sentence}", file=sys.stderr)
     return 1 if curve.failed.any() else 0
+
+
+def _animate(path: Path, job: StiffnessJob, elastic: Any, curve: Any, count: int, show: Progress) -> None:
+    from ..fields_output import frames_of
+    from ..output.animation import stress_animation
+
+    frames, zone = frames_of(job.pair, elastic, curve, count, show)
+    if frames:
+        teeth = f"{job.pair.pinion.teeth}/{job.pair.wheel.teeth}"
+        stress_animation(path, frames, title=f"Gear pair {teeth}, von Mises stress", zoom=zone, progress=show)
+    show.end()
 
 
 def _points(job: StiffnessJob) -> dict[str, Any]:

@@ -98,8 +98,11 @@ class GearBody:
         P: flank displacements for displacements of the cut sides (-).
     coupling : ndarray, shape (z, b, b)
         X_k: displacements of the cut sides of tooth k for forces on the cut sides of tooth 0 (m/N).
+    width
+        Width of the contact (m): the mate may be narrower.
     stress_own : ndarray, shape (e q, f), or None
-        Normal stress at the quadrature points for flank forces with the cut sides held (Pa/N).
+        Normal stress at the quadrature points for flank forces with the cut sides held (Pa/N), per area of contact: the
+        body's own times thickness/width, as a pressure on the width of the contact spreads over the thickness.
     stress_interface : ndarray, shape (e q, b), or None
         Normal stress for displacements of the cut sides (Pa/m).
     far : FarField
@@ -122,12 +125,18 @@ class GearBody:
     stress_interface: Array | None
     far: FarField
     condensed: Condensed
+    width: float
     stress_loads: StressLoads | None = None
 
     @property
     def teeth(self) -> int:
         """Number of teeth."""
         return self.mesh.teeth
+
+    @property
+    def surface_modulus(self) -> float:
+        """Young's modulus seen per area of contact (Pa): a gear wider than its contact is stiffer by that ratio."""
+        return self.material.youngs_modulus * self.thickness / self.width
 
 
 def gear_body(
@@ -152,9 +161,10 @@ def gear_body(
         Quadrature points on each contact edge.
     with_stress
         Whether the normal stress on the contact surface is wanted (Nitsche's law needs it, penalty does not).
-    law, gear, width
-        Looked at only for a law with theta other than 0: the law, whether the gear is pinion (0) or wheel (1), and the
-        common face width (m; by default `thickness`).
+    law, gear
+        Looked at only for a law with theta other than 0: the law, and whether the gear is pinion (0) or wheel (1).
+    width
+        Width of the contact (m), the narrower gear's; by default `thickness`.
 
     Raises
     ------
@@ -162,6 +172,7 @@ def gear_body(
         Where theta = 1 makes the stiffness indefinite: gamma0 is too small.
     """
     flank = flank_of(mesh, points_per_edge)
+    width = thickness if width is None else width
     bore = np.unique(mesh.boundaries["bore"])
     sides = np.concatenate([mesh.cut_right[:-1], mesh.cut_left[:-1]])  # the last node of a cut lies on the bore
     coordinates = mesh.points[mesh.triangles]
@@ -169,6 +180,7 @@ def gear_body(
     row_unknowns, rows = np.zeros((0, 12), dtype=np.int64), np.zeros((0, 0, 12))
     if with_stress or share:
         row_unknowns, rows = normal_stress_rows(mesh, material, plane, points_per_edge)
+        rows = rows * (thickness / width)
     skin = flank.nodes
     if share:
         behind = np.setdiff1d(row_unknowns[:, ::2] // 2, np.concatenate([flank.nodes, sides, bore]))
@@ -186,8 +198,7 @@ def gear_body(
     if share:
         assert law is not None
         stress = _rows_on_retained(condensed, row_unknowns, rows)
-        width = thickness if width is None else width
-        gamma = law.parameter(material.youngs_modulus, flank.sizes)
+        gamma = law.parameter(material.youngs_modulus * thickness / width, flank.sizes)
         term = (law.theta * share * width * flank.weights / gamma[:, None]).ravel()
         stiffness = stiffness - stress.T @ (term[:, None] * stress)
     elif with_stress:
@@ -213,7 +224,7 @@ def gear_body(
         moved = inverse @ stress[:, :s].T
         driven = _driven(basis, coupling, far.stress)
         columns = np.concatenate([inverse[:, :f], moved], axis=1)
-        loads = StressLoads(law, float(width or 0.0), share, stress[:, :s] @ moved, driven, columns, on_skin)
+        loads = StressLoads(law, width, share, stress[:, :s] @ moved, driven, columns, on_skin)
         own = own.copy()
     return GearBody(
         mesh,
@@ -228,6 +239,7 @@ def gear_body(
         stress_interface,
         far,
         condensed,
+        width,
         loads,
     )
 
@@ -268,7 +280,7 @@ def _far_field(interface: Array, stress: Array | None, coupling: Array) -> tuple
     """
     rows = interface if stress is None else np.concatenate([interface, stress * (_norm(interface) / _norm(stress))])
     triangular = np.linalg.qr(rows, mode="r")
-    _, values, modes = np.linalg.svd(triangular)
+    _, values, modes = np.linalg.svd(triangular, full_matrices=False)
     basis = modes[values > 1e-13 * values[0]].T
     flank = interface @ basis
     driven = _driven(basis, coupling, flank)

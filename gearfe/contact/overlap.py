@@ -17,11 +17,34 @@ from .scene import MeshingPair, Window
 Array = NDArray[Any]
 IntArray = NDArray[Any]
 
-#: Edges added on either side of a window.
-MARGIN = 3
-#: Window half width as a share of the overlap's. A line contact that closes the overlap delta is narrower: with
-#: F <= 0.25 E* w delta (a tooth pair is at most that stiff) b^2 = 4 F rho/(pi E* w) <= (0.4)^2 2 rho delta.
-SHARE = 0.45
+
+@dataclass(frozen=True)
+class Reach:
+    """How far windows reach.
+
+    Attributes
+    ----------
+    share
+        Half width as a share of the overlap's.
+    margin
+        Edges added on either side.
+    whole_tips
+        Whether an overlap that comes near a tip is taken whole.
+    """
+
+    share: float
+    margin: int
+    whole_tips: bool = True
+
+
+#: A line contact that closes the overlap delta is narrower: with F <= 0.25 E* w delta (a tooth pair is at most that
+#: stiff) b^2 = 4 F rho/(pi E* w) <= (0.4)^2 2 rho delta.
+REACH = Reach(0.45, 3)
+#: What suffices for nearly all positions: a tooth pair with all the load has F = 0.13 E* w delta, b = 0.28 (2 rho
+#: delta)^(1/2). The solver sees where it did not.
+CLOSE = Reach(0.36, 1, whole_tips=False)
+#: The whole overlap and beyond.
+WHOLE = Reach(1.5, 3)
 #: Every so many nodes of the mate's flank the search for the closest point tries one.
 STRIDE = 3
 
@@ -110,36 +133,40 @@ def _rotated(points: Array, angles: Array) -> Array:
 
 
 def windows_of(
-    pair: MeshingPair, found: list[Overlap], angle: float, twist: float, *, share: float = SHARE
+    pair: MeshingPair, found: list[Overlap], angle: float, twist: float, reach: Reach = REACH
 ) -> list[Window]:
-    """Windows about the deepest points of the overlaps; `share` 1 takes the whole overlap."""
+    """Windows about the deepest points of the overlaps."""
     windows: list[Window] = []
     node = 0
+    arcs = [np.concatenate([[0.0], np.cumsum(body.flank.sizes)]) for body in pair.bodies]
     for number, overlap in enumerate(found):
         # a tip that digs in slides along its mate as the teeth bend: nothing is narrowed there
-        kept = 1.0 if any(_near_tip(pair.bodies[gear].flank.sizes, overlap.ranges[gear]) for gear in (0, 1)) else share
+        whole = reach.whole_tips and any(_near_tip(arcs[gear], overlap.ranges[gear]) for gear in (0, 1))
+        kept = max(1.0, reach.share) if whole else reach.share
         for gear, tooth in ((0, overlap.tooth), (1, -1 - overlap.tooth)):
-            flank = pair.bodies[gear].flank
-            first, end = _narrowed(flank.sizes, overlap.ranges[gear], overlap.deepest[gear], kept, overlap.depth)
+            first, end = _narrowed(
+                arcs[gear], overlap.ranges[gear], overlap.deepest[gear], kept, overlap.depth, reach.margin
+            )
             placed = pair.tooth_angle(gear, tooth, angle, twist)
             windows.append(Window(gear, number, tooth, first, end - first, node, placed))
             node += 2 * (end - first) + 1
     return windows
 
 
-def _near_tip(sizes: Array, span: tuple[int, int]) -> bool:
+def _near_tip(arc: Array, span: tuple[int, int]) -> bool:
     """Whether an overlap comes as close to the tip as a fifth of its own length."""
-    return bool(sizes[span[1] :].sum() < 0.2 * sizes[span[0] : span[1]].sum())
+    return bool(arc[-1] - arc[span[1]] < 0.2 * (arc[span[1]] - arc[span[0]]))
 
 
-def _narrowed(sizes: Array, span: tuple[int, int], deepest: int, share: float, depth: float) -> tuple[int, int]:
+def _narrowed(
+    arc: Array, span: tuple[int, int], deepest: int, share: float, depth: float, margin: int
+) -> tuple[int, int]:
     """Range of edges about the deepest one; bending moves the contact along the flank by no more than the overlap."""
     first, end = span
-    arc = np.concatenate([[0.0], np.cumsum(sizes)])
     reach = share * max(arc[end] - arc[deepest], arc[deepest] - arc[first]) + depth
     low = int(np.searchsorted(arc, arc[deepest] - reach)) - 1
     high = int(np.searchsorted(arc, arc[deepest] + reach)) + 1
-    return max(0, low - MARGIN), min(len(sizes), high + MARGIN)
+    return max(0, low - margin), min(len(arc) - 1, high + margin)
 
 
 def rigidly_apart(pair: MeshingPair, angle: float, twist: float, *, samples: int = 24) -> bool:

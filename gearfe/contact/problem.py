@@ -222,14 +222,15 @@ class ContactProblem:
         elements = self.mesh.f2t[0, edges[:, 1] - self.mesh.nvertices].astype(np.int64)
         body = self.bodies.parts[part]
         size = edge_lengths(self.mesh.doflocs.T[edges], self.points_per_edge)
-        lam, mu = body.material.lame(body.plane)
+        spread = body.thickness / self.width  # a pressure on the width of the contact spreads over the thickness
+        lam, mu = (spread * modulus for modulus in body.material.lame(body.plane))
         return {
             "nodes": edges.T,
             "element": elements,
             "start": corner(self.mesh, elements, edges[:, 0]),
             "end": corner(self.mesh, elements, edges[:, 2]),
             "size": size,
-            "parameter": self.law.parameter(body.material.youngs_modulus, size),
+            "parameter": self.law.parameter(spread * body.material.youngs_modulus, size),
             "lam": np.full(len(edges), lam),
             "mu": np.full(len(edges), mu),
         }

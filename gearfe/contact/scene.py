@@ -16,8 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from .closest import Projection, chains_of, nearest_places, project, unreached
 from .compliance import GearBody
+from .corners import Bearing, shares
 from .flank import edge_nodes
 from .law_data import check_stress_loads, law_data, slave_windows
 from .laws import ContactLaw
@@ -41,6 +43,8 @@ class MeshingPair:
         Common face width (m).
     law
         Contact law.
+    corners
+        Where the sharp tip corners bear, see `gearfe.contact.corners`.
     """
 
     pinion: GearBody
@@ -48,9 +52,14 @@ class MeshingPair:
     centre_distance: float
     width: float
     law: ContactLaw
+    corners: tuple[Bearing | None, Bearing | None] = (None, None)
 
     def __post_init__(self) -> None:
         check_stress_loads(self.bodies, self.law, self.width)
+        widths = [body.width for body in self.bodies]
+        if self.law.uses_stress and widths != [self.width, self.width]:
+            problem = f"the gears' surface stresses are made for contacts {widths} m wide"
+            raise InputError("width", self.width, problem, "make the gears with it: gear_body(..., width=...)")
 
     @property
     def bodies(self) -> tuple[GearBody, GearBody]:
@@ -309,7 +318,6 @@ def _gathered(pair: MeshingPair, windows: Sequence[Window]) -> dict[str, Any]:
 
 
 def _contact_points(pair: MeshingPair, windows: Sequence[Window], slaves: list[int]) -> dict[str, NDArray]:
-    share = pair.width * (0.5 if pair.law.sides == "both" else 1.0)
     parts: dict[str, list[NDArray]] = {}
     for i in slaves:
         w, mate = windows[i], windows[i ^ 1]  # windows come in couples: pinion's, wheel's
@@ -319,12 +327,13 @@ def _contact_points(pair: MeshingPair, windows: Sequence[Window], slaves: list[i
         q = flank.shapes.shape[0]
         n = w.edges * q
         lengths = flank.weights[own].ravel()
-        gamma = pair.law.parameter(body.material.youngs_modulus, flank.sizes)[own]
+        gamma = pair.law.parameter(body.surface_modulus, flank.sizes)[own]
+        share = shares(pair.corners, windows[i & ~1].angle)[w.gear] if pair.law.sides == "both" else 1.0
         made = {
             "slave_nodes": np.repeat(w.first_node + edge_nodes(np.arange(w.edges)), q, axis=0),
             "slave_shapes": np.tile(flank.shapes, (w.edges, 1)),
             "mate": np.full(n, i ^ 1),
-            "weight": share * lengths,
+            "weight": share * pair.width * lengths,
             "fade": 0.5 * lengths / mate_flank.sizes[mate.first_edge + mate.edges - 1],
             "parameter": np.repeat(gamma, q),
             "owner": np.full(n, i),

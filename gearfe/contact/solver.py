@@ -1,7 +1,9 @@
 """Positions of a gear pair in contact: search for the teeth that overlap, Newton's method, torques and tangent.
 
-The positions of a sweep are solved side by side: each keeps its own Newton iteration, their closest-point searches run
-as one array operation.
+Two iterations solve the same equations. Most positions are solved in lockstep, on windows that just hold the contact
+(`gearfe.contact.group_newton`); those that outgrow them once more on larger ones. What does not converge there, or has
+a law that the lockstep does not know, goes to the general iteration (`gearfe.contact.newton`), and where that fails
+too the twist is raised in steps.
 """
 
 from __future__ import annotations
@@ -14,9 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .closest import Projection, unreached
+from .group import gather, rigid_projection
+from .group_newton import iterate
+from .group_results import outgrown, results_of, scenes_of
+from .group_start import starting_states
+from .laws import ContactLaw
 from .newton import Dialogue, Linearised, Outcome, State, linearise, newton
-from .overlap import Overlap, overlaps, rigidly_apart, windows_of
-from .scene import MeshingPair, Scene, assemble, assemble_all, project_all
+from .overlap import CLOSE, REACH, WHOLE, Overlap, overlaps, rigidly_apart, windows_of
+from .scene import MeshingPair, Scene, Window, assemble, assemble_all, project_all
 from .start import starting_state
 
 Array = NDArray[Any]
@@ -24,11 +31,13 @@ Array = NDArray[Any]
 #: Relative residual of the contact pressures at which a position counts as converged.
 TOLERANCE = 1e-10
 #: Positions solved side by side.
-BATCH = 16
+BATCH = 64
 #: Memory for the matrices of positions that are solved side by side.
 GROUP_BYTES = 60e6
 #: Newton steps spent on one difficult position before it is given up.
 MAX_STEPS = 320
+#: Largest number of repetitions for the tangent; on a smooth flank each gains two to three digits, at a corner one.
+TANGENT_REPEATS = 24
 
 
 @dataclass(frozen=True)
@@ -57,6 +66,10 @@ class Position:
     scene, forces, force_rate
         Pieces of flank (without their matrices), the nodal forces on them in tooth axes (N) and their derivatives with
         respect to the twist (N/rad), for recovering fields; None without a solution.
+    pressure : ndarray, shape (q,)
+        Pressure at the scene's contact points (Pa); None without a solution.
+    route
+        ``direct``: solved on the mesh; ``hertz`` or ``blend``: see `gearfe.routes`.
     stress_loads, stress_load_rate
         Loads on the normal stress at the contact points (N m2) and their derivatives (N m2/rad); empty with theta = 0.
     """
@@ -73,6 +86,8 @@ class Position:
     scene: Scene | None = None
     forces: Array | None = None
     force_rate: Array | None = None
+    route: str = "direct"
+    pressure: Array | None = None
     stress_loads: Array | None = None
     stress_load_rate: Array | None = None
 
@@ -107,12 +122,14 @@ def solve_positions(
 
 def _solve_batch(pair: MeshingPair, angles: Array, twists: Array, tolerance: float) -> list[Position]:
     found = overlaps(pair, angles, twists)
-    windows = [windows_of(pair, one, a, t) for one, a, t in zip(found, angles, twists, strict=True)]
     positions: list[Position | None] = [None] * len(angles)
-    for i in (i for i, w in enumerate(windows) if not w):
+    for i in (i for i, overlapping in enumerate(found) if not overlapping):
         clear = rigidly_apart(pair, angles[i], twists[i])
         positions[i] = _unsolved("no_contact" if clear else "under_resolved")
-    facing = [i for i, w in enumerate(windows) if w]
+    facing = [i for i, overlapping in enumerate(found) if overlapping]
+    if in_lockstep(pair.law):
+        facing = _quickly(pair, angles, twists, found, facing, positions, tolerance)
+    windows = {i: windows_of(pair, found[i], angles[i], twists[i]) for i in facing}
     for group in _groups([windows[i][-1].nodes.stop for i in facing]):
         places = [facing[k] for k in group]
         scenes = assemble_all(pair, [windows[i] for i in places])
@@ -128,6 +145,79 @@ def _solve_batch(pair: MeshingPair, angles: Array, twists: Array, tolerance: flo
             else:
                 positions[i] = _finish(scene, outcome, outcome.iterations)
     return [p for p in positions if p is not None]
+
+
+def _quickly(
+    pair: MeshingPair,
+    angles: Array,
+    twists: Array,
+    found: Sequence[list[Overlap]],
+    facing: Sequence[int],
+    positions: list[Position | None],
+    tolerance: float,
+) -> list[int]:
+    """Solve the positions `facing` in lockstep; the answer are those for which that was not enough."""
+    left: list[int] = []
+    waiting = list(facing)
+    for reach in (CLOSE, REACH):
+        windows = {i: windows_of(pair, found[i], angles[i], twists[i], reach) for i in waiting}
+        outgrew: list[int] = []
+        for group in _groups([windows[i][-1].nodes.stop for i in waiting]):
+            places = [waiting[k] for k in group]
+            made = solve_group(pair, [windows[i] for i in places], [found[i] for i in places], tolerance)
+            for i, position in zip(places, made, strict=True):
+                if position.status == "converged":
+                    positions[i] = position
+                else:
+                    (outgrew if position.status == "outgrown" else left).append(i)
+        waiting = outgrew
+    return sorted(left + waiting)
+
+
+def solve_group(
+    pair: MeshingPair, windows: Sequence[Sequence[Window]], found: Sequence[list[Overlap]], tolerance: float
+) -> list[Position]:
+    """Positions with these windows, solved in lockstep: ``converged``, ``not_converged`` or ``outgrown``."""
+    group = gather(pair, windows)
+    deepest = np.array([one.deepest[g] for overlapping in found for g in (0, 1) for one in overlapping])
+    rigid = rigid_projection(pair, group, deepest)
+    outcomes = iterate(group, *starting_states(pair, group, rigid), rigid, tolerance)
+    beyond = outgrown(group, outcomes.motion)
+    outcomes = replace(outcomes, converged=outcomes.converged & ~beyond)
+    results = results_of(pair, group, outcomes)
+    scenes = scenes_of(pair, group, rigid, (results.forces, results.force_rate), outcomes.motion.pressure)
+    made: list[Position] = []
+    for b, (scene, pressure, forces, rate) in enumerate(scenes):
+        steps = int(outcomes.iterations[b])
+        if not outcomes.converged[b]:
+            made.append(_unsolved("outgrown" if beyond[b] else "not_converged", steps))
+            continue
+        first, end = group.first_window[b : b + 2].tolist()
+        made.append(
+            Position(
+                status="converged",
+                torque_wheel=float(results.torque_wheel[b]),
+                torque_pinion=float(results.torque_pinion[b]),
+                torque_wheel_reaction=float(results.torque_wheel_reaction[b]),
+                tangent=float(results.tangent[b]),
+                pair_numbers=tuple(-1 - w.tooth for w in scene.windows[1::2]),
+                pair_torques=results.window_torque[(first + end) // 2 : end],
+                peak_pressure=float(results.peak_pressure[b]),
+                iterations=steps,
+                scene=scene,
+                forces=forces,
+                force_rate=rate,
+                pressure=pressure,
+            )
+        )
+    return made
+
+
+def in_lockstep(law: ContactLaw) -> bool:
+    """Whether the lockstep iteration serves the law: p = max(0, -gamma g - s sigma_n) on sides that no position moves,
+    and no term in the variation of the stress.
+    """
+    return law.theta == 0 and law.multiplier is None and law.sides != "tip"
 
 
 def _groups(nodes: Sequence[int]) -> list[list[int]]:
@@ -186,7 +276,7 @@ def _with_care(
     pair: MeshingPair, angle: float, twist: float, found: list[Overlap], steps: int, tolerance: float
 ) -> Position:
     """Second attempt on the whole overlap; where that fails too, the twist is raised in steps, each from the last."""
-    scene = assemble(pair, windows_of(pair, found, angle, twist, share=1.5))
+    scene = assemble(pair, windows_of(pair, found, angle, twist, WHOLE))
     outcome = _alone(scene, _start(pair, scene), tolerance)
     steps += outcome.iterations
     done, step, last = 0.0, 0.25, None
@@ -246,6 +336,7 @@ def _finish(scene: Scene, outcome: Outcome, iterations: int) -> Position:
         ),
         forces=forces,
         force_rate=force_rate,
+        pressure=np.where(unreached(outcome.projection.gap), 0.0, state.pressure),
         stress_loads=state.stress_loads,
         stress_load_rate=load_rate,
     )
@@ -270,11 +361,13 @@ def _tangent(scene: Scene, lin: Linearised, forces: Array, placed: Array) -> tup
     frame = np.where(wheel, _quarter_turn(force), 0.0).ravel()
     right = lin.response @ frame - lin.parameter * (lin.opening @ carried)
     bend = np.zeros(len(frame))
-    for _ in range(5):
+    for _ in range(TANGENT_REPEATS):
         solved = lin.solve(right - lin.response @ bend)
         rate = lin.weighted @ solved + bend
         moved = carried + lin.moved(solved, rate - frame)
-        bend = lin.bending(moved)
+        before, bend = bend, lin.bending(moved)
+        if np.abs(bend - before).sum() <= 1e-12 * np.abs(rate).sum():
+            break
     change = _moment(arm, (rate - frame).reshape(-1, 2)) + _moment((moved - carried).reshape(-1, 2), force)
     spread = np.zeros_like(forces)
     spread[lin.unknowns] = rate - frame

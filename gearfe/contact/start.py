@@ -45,7 +45,7 @@ def starting_state(pair: MeshingPair, scene: Scene) -> tuple[Array, Array]:
         unit = np.bincount(slot.ravel(), weights=loads.ravel(), minlength=scene.pairs * size).reshape(-1, size)
         mutual = unit @ scene.compliance @ unit.T
         overlap = -np.bincount(scene.pair, weights=shape * areas * scene.rigid.gap, minlength=scene.pairs)
-        forces = _carried(mutual, overlap)
+        forces = carried(mutual, overlap)
         half_width = np.sqrt(4 * forces * radius / (np.pi * effective * pair.width))
         pressure = forces[scene.pair] * shape
     return pressure, forces @ unit
@@ -82,9 +82,13 @@ def _third_nearest(points: Array, centre: Array) -> float:
     return float(np.sqrt(np.partition(distance, min(2, len(distance) - 1))[min(2, len(distance) - 1)]))
 
 
-def _carried(compliance: Array, overlap: Array) -> Array:
+def carried(compliance: Array, overlap: Array) -> Array:
     """Forces F >= 0 with C F = overlap where F > 0: pairs that would pull are let go, the weakest first."""
     active = (overlap > 0) & (np.diagonal(compliance) > 0)
+    if active.all():
+        forces = np.linalg.solve(compliance, overlap)
+        if forces.min() >= 0:
+            return forces
     while active.any():
         forces = np.zeros(len(overlap))
         forces[active] = np.linalg.solve(compliance[np.ix_(active, active)], overlap[active])

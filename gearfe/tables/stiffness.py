@@ -41,6 +41,12 @@ class StiffnessTable:
         doc="small (small strain) or finite (with the first-order effect of finite strain on the torque)",
         choices=("small", "finite"),
     )
+    route: str = quantity(
+        "auto",
+        doc="how positions are solved: auto (on the mesh, or by the law of small loads where a contact is narrower "
+        "than its elements), direct (on the mesh) or hertz (law of small loads)",
+        choices=("auto", "direct", "hertz"),
+    )
     nitsche_theta: int = quantity(
         0, doc="variant of the law nitsche: 0 (cheapest), 1 (symmetric, large gamma0 only) or -1", low=-1, high=1
     )

@@ -83,12 +83,17 @@ class TrainMeshTable:
         None, above=0.0, doc="working centre distance (mm); left out: no backlash"
     )
     curve: str | None = quantity(None, doc="CSV file with pinion_angle_deg and k_mesh_N_per_m, beside the job file")
+    load_map: str | None = quantity(
+        None, doc="CSV file of gearfe loadmap, beside the job file: its curve at the torque that the mesh carries"
+    )
     stiffness_N_per_m: float | None = quantity(None, above=0.0, doc="constant stiffness (N/m)")
     rigid: bool = quantity(False, doc="true: an ideal rigid mesh, a constraint")
 
     def check(self, where: str) -> None:
         """At most one source of the stiffness."""
-        given = [k for k in ("curve", "stiffness_N_per_m", "rigid") if getattr(self, k) not in (None, False)]
+        given = [
+            k for k in ("curve", "load_map", "stiffness_N_per_m", "rigid") if getattr(self, k) not in (None, False)
+        ]
         if len(given) > 1:
             raise InputError(
                 f"{where}.{given[1]}", getattr(self, given[1]), f"stands beside {given[0]}", "leave one out"

@@ -1,0 +1,147 @@
+"""``gearfe loadmap JOB.toml --out DIR``: a gear pair over pinion angle and torque."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..stiffness_job import StiffnessJob
+    from ..tables.loadmap import LoadMapTable
+
+HELP = "stiffness, transmission error, load share, pressure, root stress over pinion angle and torque"
+
+#: Option -> key of the [stiffness] table that it overrides.
+OVERRIDES = {"law": "law", "plane": "plane", "kinematics": "kinematics", "coarsen": "coarsen"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("job", metavar="JOB.toml", help="job file with the tables [pair], [stiffness] and [loadmap]")
+    parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
+    load = parser.add_mutually_exclusive_group()
+    load.add_argument(
+        "--torques-Nm", type=float, nargs="+", metavar="T", dest="torques_Nm", help="torques at the wheel's hub (N m)"
+    )
+    load.add_argument(
+        "--torque-range", type=float, nargs=3, metavar=("START", "STOP", "COUNT"), help="a range of torques (N m)"
+    )
+    parser.add_argument("--spacing", metavar="HOW", help="of that range: even or log")
+    parser.add_argument("--positions", type=int, metavar="N", help="pinion angles in one mesh cycle (default 18)")
+    parser.add_argument("--root-stress", action="store_true", help="also the tension at the tooth roots")
+    parser.add_argument("--law", metavar="LAW", help="contact law, as in the table [stiffness]")
+    parser.add_argument("--plane", metavar="STATE", help="plane state: strain or stress")
+    parser.add_argument("--kinematics", metavar="STRAIN", help="small or finite strain")
+    parser.add_argument("--coarsen", type=float, metavar="C", help="factor on all element sizes")
+    parser.add_argument("--no-picture", action="store_true", help="leave out the picture")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compute the map and write the files; 1 when a cell failed."""
+    started = time.perf_counter()
+    import numpy as np
+
+    from ..load_map_report import figure_arguments, summary, told, torque_table, warnings
+    from ..load_sweep import sweep_loads
+    from ..output.files import output_folder, whole_set, write_csv, write_json
+    from ..stiffness_job import read_stiffness_job
+    from ..stopwatch import Stopwatch
+    from .stiffness import Progress
+
+    watch = Stopwatch({"program start": time.perf_counter() - started})
+    with watch.stage("geometry"):
+        job, table = _overridden(read_stiffness_job(args.job), _table(args.job), args)
+        torques = table.torques()
+    folder = output_folder(args.out or Path("out") / Path(args.job).stem)
+    show = Progress()
+    made_map = sweep_loads(
+        job.pair,
+        torques,
+        angles=np.arange(table.positions) * job.pair.mesh_cycle / table.positions,
+        root_stress=table.root_stress,
+        kinematics=job.table.kinematics,  # type: ignore[arg-type]
+        twist_from=job.table.twist_from,  # type: ignore[arg-type]
+        progress=show,
+        **job.model,
+    )
+    show.end()
+    watch.seconds.update(made_map.timings)
+    with whole_set(folder) as made:
+        with watch.stage("table"):
+            made_map.to_csv(made / "loadmap.csv")
+            write_csv(made / "loadmap_torques.csv", torque_table(made_map))
+        if not args.no_picture:
+            from ..output.load_map_figures import load_map_figure
+
+            with watch.stage("picture"):
+                load_map_figure(made / "loadmap.png", **figure_arguments(job, made_map))
+        watch.seconds["total"] = time.perf_counter() - started
+        write_json(made / "loadmap.json", summary(job, table, made_map, watch.seconds))
+        names = sorted(path.name for path in made.iterdir())
+    for line in told(made_map):
+        print(line)
+    print(f"written to {folder}: " + ", ".join(names))
+    print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
+    for sentence in warnings(job, made_map):
+        print(f"gearfe: warning: {sentence}", file=sys.stderr)
+    return 1 if made_map.failed.any() else 0
+
+
+def _table(path: str) -> LoadMapTable:
+    from ..config import load_job
+    from ..tables.loadmap import LoadMapTable
+
+    table: LoadMapTable = load_job(path, (), ("loadmap",)).get("loadmap", LoadMapTable())
+    return table
+
+
+def _overridden(job: StiffnessJob, table: LoadMapTable, args: argparse.Namespace) -> tuple[StiffnessJob, LoadMapTable]:
+    """The job with the command's options in place of the file's values, checked like these."""
+    from ..errors import InputError
+    from ..tables.loadmap import LoadMapTable
+    from ..tables.stiffness import StiffnessTable
+
+    known = {f.name: f.metadata for cls in (StiffnessTable, LoadMapTable) for f in fields(cls)}
+    changes: dict[str, Any] = {}
+    for name, key in OVERRIDES.items():
+        if getattr(args, name) is not None:
+            _check("--" + name, getattr(args, name), known[key])
+            changes[key] = getattr(args, name)
+    more: dict[str, Any] = {}
+    if args.torques_Nm is not None:
+        for torque in args.torques_Nm:
+            _check("--torques-Nm", torque, known["torques_Nm"])
+        more |= {"torques_Nm": tuple(args.torques_Nm), "torque_start_Nm": None, "torque_stop_Nm": None}
+    if args.torque_range is not None:
+        start, stop, count = args.torque_range
+        if count != int(count):
+            raise InputError("--torque-range COUNT", count, "must be a whole number")
+        ends = {"torque_start_Nm": start, "torque_stop_Nm": stop, "torque_count": int(count)}
+        for key, value in ends.items():
+            _check("--torque-range", value, known[key])
+        more |= {"torques_Nm": None, **ends}
+    for name, key in (("spacing", "torque_spacing"), ("positions", "positions")):
+        if getattr(args, name) is not None:
+            _check("--" + name, getattr(args, name), known[key])
+            more[key] = getattr(args, name)
+    if args.root_stress:
+        more["root_stress"] = True
+    made = replace(table, **more)
+    made.check("loadmap")
+    model = replace(job.table, **changes)
+    model.check("stiffness")
+    return replace(job, table=model), made
+
+
+def _check(option: str, value: Any, known: Any) -> None:
+    from ..config import check_range
+    from ..errors import InputError
+
+    if isinstance(value, (int, float)):
+        check_range(value, option, known)
+    elif known["choices"] and value not in known["choices"]:
+        raise InputError(option, value, "must be one of " + ", ".join(known["choices"]))

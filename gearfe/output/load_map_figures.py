@@ -1,0 +1,98 @@
+"""Picture of a load map: what changes with the pinion angle, one line a torque, and what changes with the torque."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .figures import BLUE, ORANGE, new_figure, save, tidy
+
+Array = NDArray[np.float64]
+
+#: Lines of a panel; of more torques, so many are drawn.
+MOST_LINES = 24
+
+
+def load_map_figure(
+    path: str | Path,
+    *,
+    title: str,
+    angle: Array,
+    torque: Array,
+    panels: Mapping[str, Array],
+    peak_to_peak: Array,
+    mean_stiffness: Array,
+) -> None:
+    """Panels over the pinion angle coloured by torque, and mean stiffness and transmission error over the torque.
+
+    Parameters
+    ----------
+    angle : ndarray, shape (n,)
+        Pinion angles (deg).
+    torque : ndarray, shape (m,)
+        N m.
+    panels
+        Label of the axis with its unit -> values, shape (m, n).
+    peak_to_peak, mean_stiffness : ndarray, shape (m,)
+        Peak-to-peak transmission error (um) and mean stiffness (N/um) of each torque.
+    """
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LogNorm, Normalize
+
+    count = len(panels) + 2
+    columns = -(-count // 2)
+    figure = new_figure(3.9 * columns + 0.9, 6.6)
+    every: list[Any] = figure.subplots(2, columns, squeeze=False).ravel().tolist()
+    logarithmic = len(torque) > 2 and torque[-1] / torque[0] > 10 and _is_geometric(torque)
+    low, high = float(torque[0]), float(torque[-1] if len(torque) > 1 else 1.01 * torque[0])
+    norm = LogNorm(low, high) if logarithmic else Normalize(low, high)
+    colors = colormaps["viridis"]
+    shown = np.unique(np.linspace(0, len(torque) - 1, min(len(torque), MOST_LINES)).round().astype(int))
+    marker = "." if len(angle) < 60 else ""
+    for axes, (label, values) in zip(every, panels.items(), strict=False):
+        tidy(axes)
+        for row in shown:
+            axes.plot(
+                angle, values[row], marker=marker, markersize=3, linewidth=1.1, color=colors(0.95 * norm(torque[row]))
+            )
+        axes.set_xlim(angle[0], angle[-1])
+        axes.set_title(label, loc="left", fontsize=9.5)
+        axes.set_xlabel("pinion angle (deg)", fontsize=9)
+        axes.tick_params(labelsize=8.5)
+    over = {"mean stiffness  (N/µm)": mean_stiffness, "transmission error, peak to peak  (µm)": peak_to_peak}
+    for axes, (label, values), color in zip(every[len(panels) :], over.items(), (BLUE, ORANGE), strict=False):
+        tidy(axes)
+        axes.plot(torque, values, "o-", color=color, markersize=3.5, linewidth=1.4)
+        axes.set_title(label, loc="left", fontsize=9.5)
+        axes.set_xlabel("torque at the wheel (N m)", fontsize=9)
+        axes.tick_params(labelsize=8.5)
+        if logarithmic:
+            axes.set_xscale("log")
+            _plain_ticks(axes.xaxis)
+    for axes in every[count:]:
+        axes.set_visible(False)
+    bar = figure.colorbar(ScalarMappable(norm, colors), ax=every, shrink=0.85, aspect=35, pad=0.015)
+    if logarithmic:
+        _plain_ticks(bar.ax.yaxis)
+    bar.set_label("torque at the wheel (N m)")
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    save(figure, path, dpi=110)
+
+
+def _is_geometric(torque: Array) -> bool:
+    ratio = np.log(torque[1:] / torque[:-1])
+    return bool(ratio.max() < 2.5 * ratio.min())
+
+
+def _plain_ticks(axis: Any) -> None:
+    """1, 2, 5, 10, ... written out."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(10, subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,278 @@
+r"""Where and when do the rigid driving flanks of each tooth pair first touch? Exact curves, to rounding.
+
+About the wheel's centre every point of the wheel's flank moves on a circle. With the polar angles of the pinion's
+flank, seen from there, :math:`\varphi_1(u)` at its parameter u, and of the wheel's flank at the same radius and zero
+twist, :math:`\varphi_2(r(u))`, that point of the pinion's flank is met at the twist
+
+.. math:: D(u) = \varphi_1(u) - \varphi_2(r(u)),
+
+the pair touches at :math:`\varphi_k = \min_u D`, and :math:`a_k (D - \varphi_k)`, with the lever :math:`a_k` of the
+common normal about the wheel's centre, is the gap beside the point of contact. The minimum is smooth on the path of
+contact and on rounds and reliefs, an end of the range where a sharp tip bears before or after the path.
+
+The working flank is the involute with its relief, then the tip round; roots take no part.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .curves import Arc, Flank
+from .mesh_geometry import MeshGeometry
+from .spur_gear import Gear
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+#: Points of the first search along a flank and of each closer look, and how often it looks closer.
+COARSE, CLOSER, LOOKS = 97, 17, 16
+
+_GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(12)
+
+
+@dataclass(frozen=True)
+class Face:
+    """Working flank of a gear in the frame of its tooth: u in [0, 1] is the involute, in [1, 2] the tip round.
+
+    Attributes
+    ----------
+    flank
+        Involute with relief, parameter linear in the roll length.
+    round_
+        Tip round, or None.
+    """
+
+    flank: Flank
+    round_: Arc | None
+
+    @property
+    def end(self) -> float:
+        """Last parameter."""
+        return 1.0 if self.round_ is None else 2.0
+
+    @property
+    def sharp(self) -> bool:
+        """Whether the flank ends in a corner."""
+        return self.round_ is None
+
+    def points(self, u: Array) -> NDArray[np.complex128]:
+        """Points (m) as complex numbers."""
+        made = _complex(self.flank.point(np.clip(u, 0.0, 1.0)))
+        return made if self.round_ is None else np.where(u > 1.0, _complex(self.round_.point(u - 1.0)), made)
+
+    def normals(self, u: Array) -> NDArray[np.complex128]:
+        """Outward unit normals as complex numbers."""
+        made = _complex(self.flank.normal(np.clip(u, 0.0, 1.0)))
+        return made if self.round_ is None else np.where(u > 1.0, _complex(self.round_.normal(u - 1.0)), made)
+
+    def speeds(self, u: Array) -> Array:
+        """Arc length per unit of u (m)."""
+        made: Array = self.flank.speed(np.clip(u, 0.0, 1.0))
+        return made if self.round_ is None else np.where(u > 1.0, self.round_.speed(u - 1.0), made)
+
+    @property
+    def radii(self) -> tuple[float, float, float]:
+        """Radii (m) of the start, of the end of the involute and of the end."""
+        low, middle, high = np.abs(self.points(np.array([0.0, 1.0, self.end])))
+        return float(low), float(middle), float(high)
+
+    def at_radius(self, radius: Array) -> Array:
+        """Parameter u of the points at given radii (m) within the range."""
+        flank = self.flank
+        forward = np.sqrt(np.maximum(0.0, (radius - flank.base_radius) * (radius + flank.base_radius)))
+        s = forward
+        if flank.amount > 0.0:  # s - relief(s) = forward
+            for _ in range(12):
+                depth, slope = flank.relief(s)
+                s = s - (s - depth - forward) / (1.0 - slope)
+        u = np.clip((s - flank.start) / (flank.end - flank.start), 0.0, 1.0)
+        if self.round_ is None:
+            return u
+        arc = self.round_
+        centre = complex(*arc.centre)
+        distance = abs(centre)
+        cosine = (radius**2 - distance**2 - arc.radius**2) / (2.0 * distance * arc.radius)
+        # the round is passed clockwise from the flank to the tip, on the left of its centre's ray
+        angle = math.atan2(centre.imag, centre.real) + np.arccos(np.clip(cosine, -1.0, 1.0))
+        along = np.clip((angle - arc.start_angle) / (arc.end_angle - arc.start_angle), 0.0, 1.0)
+        return np.where(radius > self.radii[1], 1.0 + along, u)
+
+    def moved(self, u: float, x: Array) -> Array:
+        """Parameters at the arc lengths x (m) beyond u, outside of the range where the face ends."""
+        grid = np.unique(np.concatenate([np.linspace(0.0, self.end, 401), [u]]))
+        half = 0.5 * np.diff(grid)
+        speed = self.speeds(0.5 * (grid[1:] + grid[:-1])) * 2 * half
+        arc = np.concatenate([[0.0], np.cumsum(speed)])
+        here = float(arc[np.searchsorted(grid, u)])
+        made = np.interp(here + x, arc, grid, left=-1.0, right=math.inf)
+        near = np.abs(x) < 1e-4 * arc[-1]
+        made[near] = u + x[near] / float(self.speeds(np.array(u)))
+        return made
+
+    def distance(self, u: float, mark: float) -> float:
+        """Signed arc length (m) from u to `mark`."""
+        made, sign = 0.0, math.copysign(1.0, mark - u)
+        low, high = min(u, mark), max(u, mark)
+        for a, b in ((low, min(high, 1.0)), (max(low, 1.0), high)):
+            if b > a:
+                made += 0.5 * (b - a) * float(_GAUSS_W @ self.speeds(a + 0.5 * (b - a) * (_GAUSS_X + 1)))
+        return sign * made
+
+    def curvature(self, u: float, most: float) -> float:
+        """Curvature (1/m) at u, at most `most`, which a sharp tip has."""
+        if self.round_ is not None and u > 1.0:
+            return min(most, 1.0 / self.round_.radius)
+        if u >= 1.0 - 1e-9:
+            return most
+        step = 1e-5
+        turned = self.normals(np.array([u + step, max(0.0, u - step)]))
+        lengths = self.speeds(np.array(u)) * (u + step - max(0.0, u - step))
+        return min(most, max(0.0, -float(np.angle(turned[0] / turned[1])) / float(lengths)))
+
+    def tip_angle(self) -> float:
+        """Angle (rad) of the material between the flank's end and the tip circle."""
+        at = np.array(self.end)
+        point = complex(self.points(at))
+        across = (complex(self.normals(at)) * point.conjugate()).real / abs(point)
+        return math.pi - math.acos(max(-1.0, min(1.0, across)))
+
+    def marks(self) -> list[float]:
+        """Parameters where the curvature jumps or the flank ends sharply."""
+        flank, found = self.flank, [1.0]
+        if flank.amount > 0.0:
+            found.append((flank.relief_start - flank.start) / (flank.end - flank.start))
+        return found
+
+
+def _complex(points: Any) -> NDArray[np.complex128]:
+    return np.asarray(points[..., 0] + 1j * points[..., 1])
+
+
+def face_of(gear: Gear) -> Face:
+    """Working flank of a gear."""
+    profile = gear.profile
+    round_ = next((s.curve for s in profile.segments if s.name == "tip_round"), None)
+    return Face(profile.flank, round_ if isinstance(round_, Arc) else None)
+
+
+@dataclass(frozen=True)
+class Touching:
+    """Tooth pairs whose rigid flanks meet, n of them over all positions.
+
+    Attributes
+    ----------
+    position : ndarray, shape (n,)
+        Number of the pinion angle.
+    pair : ndarray, shape (n,)
+        Pair number k: pinion tooth k, wheel tooth -1 - k.
+    angle : ndarray, shape (n,)
+        Pinion angle (rad).
+    twist : ndarray, shape (n,)
+        Twist of the wheel at which the pair touches (rad).
+    place : ndarray, shape (n, 2)
+        Parameters u of the touching points on pinion and wheel.
+    radius : ndarray, shape (n, 2)
+        Their radii about the own centres (m).
+    point, normal : ndarray of complex, shape (n,)
+        Point of contact and common normal out of the pinion, global axes.
+    arm : ndarray, shape (n, 2)
+        Torques of pinion and wheel per force (m).
+    """
+
+    position: IntArray
+    pair: IntArray
+    angle: Array
+    twist: Array
+    place: Array
+    radius: Array
+    point: NDArray[np.complex128]
+    normal: NDArray[np.complex128]
+    arm: Array
+
+    def take(self, index: Any) -> Touching:
+        """The pairs `index`."""
+        return Touching(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+
+    def __len__(self) -> int:
+        return len(self.pair)
+
+
+class Flanks:
+    """The working flanks of both gears of a pair, and the twist D at which a point of the pinion's is met."""
+
+    def __init__(self, pair: MeshGeometry) -> None:
+        self.pair = pair
+        self.pinion, self.wheel = face_of(pair.pinion), face_of(pair.wheel)
+        self.faces = (self.pinion, self.wheel)
+        self._radii = self.wheel.radii
+
+    def wheel_frame(self, angle: Array, number: IntArray) -> Array:
+        """Angle (rad) of the frame of the mating wheel tooth at zero twist."""
+        pair = self.pair
+        return -angle / pair.gear_ratio + math.pi - (2 * number + 1) * math.pi / pair.wheel.teeth
+
+    def placed(self, angle: Array, number: IntArray, u: Array) -> NDArray[np.complex128]:
+        """Points of the pinion's flank seen from the wheel's centre, global axes (m)."""
+        turn = np.exp(1j * (angle + number * self.pair.mesh_cycle))
+        return self.pinion.points(u) * turn - self.pair.working_centre_distance
+
+    def twist(self, angle: Array, number: IntArray, u: Array) -> Array:
+        """D (rad) at parameters u of the pinion's flank, infinite where the wheel's flank has no such radius."""
+        seen = self.placed(angle, number, u)
+        radius = np.abs(seen)
+        inside = (radius >= self._radii[0]) & (radius <= self._radii[2] * (1 + 1e-15))
+        mate = self.wheel.points(self.wheel.at_radius(radius))
+        apart = np.angle(seen * np.exp(-1j * self.wheel_frame(angle, number)) / mate)
+        return np.where(inside, apart, np.inf)
+
+    def touching(self, angles: Array) -> Touching:
+        """First touch of every pair that can meet at the given pinion angles (rad), shape (p,)."""
+        angle, number, position = self._candidates(angles)
+        u = np.broadcast_to(np.linspace(0.0, self.pinion.end, COARSE), (len(angle), COARSE))
+        rows = np.arange(len(angle))
+        best, least = np.zeros(len(angle)), np.full(len(angle), np.inf)
+        for _ in range(LOOKS):
+            found = self.twist(angle[:, None], number[:, None], u)
+            lowest = np.argmin(found, axis=1)
+            better = found[rows, lowest] < least
+            best = np.where(better, u[rows, lowest], best)
+            least = np.where(better, found[rows, lowest], least)
+            step = u[:, 1] - u[:, 0]
+            u = np.clip(best[:, None] + step[:, None] * np.linspace(-1.0, 1.0, CLOSER), 0.0, self.pinion.end)
+        meets = np.isfinite(least)
+        return self._described(position[meets], angle[meets], number[meets], best[meets], least[meets])
+
+    def _candidates(self, angles: Array) -> tuple[Array, IntArray, IntArray]:
+        """Pinion teeth whose tip can reach the wheel's tip circle: angles, tooth numbers and positions."""
+        pair = self.pair
+        a, tip1, tip2 = pair.working_centre_distance, pair.pinion.tip_radius, pair.wheel.tip_radius
+        reach = math.acos(min(1.0, max(-1.0, (a * a + tip1 * tip1 - tip2 * tip2) / (2 * a * tip1))))
+        reach += pair.pinion.profile.tip_half_angle + 0.5 * pair.mesh_cycle
+        half = math.ceil(reach / pair.mesh_cycle)
+        number = np.round(-angles / pair.mesh_cycle).astype(np.int64)[:, None] + np.arange(-half, half + 1)
+        position = np.repeat(np.arange(len(angles)), number.shape[1])
+        return angles[position], number.ravel(), position
+
+    def _described(self, position: IntArray, angle: Array, number: IntArray, u: Array, twist: Array) -> Touching:
+        seen = self.placed(angle, number, u)
+        radius = np.abs(seen)
+        mate = self.wheel.at_radius(radius)
+        turn = np.exp(1j * (angle + number * self.pair.mesh_cycle))
+        normal = self.pinion.normals(u) * turn
+        wheel_normal = -self.wheel.normals(mate) * np.exp(1j * (self.wheel_frame(angle, number) + twist))
+        at_tip = (u >= self.pinion.end - 1e-9) & self.pinion.sharp
+        # at a corner the smooth mate's normal counts, since the force is normal to it without friction
+        normal = np.where(at_tip, wheel_normal, normal)
+        point = seen + self.pair.working_centre_distance
+        arm = np.stack([_cross(point, normal), -_cross(seen, normal)], axis=1)
+        place = np.stack([u, mate], axis=1)
+        return Touching(position, number, angle, twist, place, np.stack([np.abs(point), radius], 1), point, normal, arm)
+
+
+def _cross(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> Array:
+    return np.asarray((np.conj(a) * b).imag)

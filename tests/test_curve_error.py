@@ -1,0 +1,140 @@
+"""Default accuracy at the cause: face widths, sharp corners, and the error estimate that stands beside a curve."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearfe import sweep_stiffness
+from gearfe.contact.corners import corner_bearings, shares
+from gearfe.contact.laws import Nitsche, Penalty
+from gearfe.contact.solver import solve_positions
+from gearfe.curve_error import COARSENING, COMMON, ORDER, error_estimate, solved_twice
+from gearfe.elasticity import Material
+from gearfe.stiffness import elastic_pair
+
+from . import gears
+
+SHARP = gears.pair(20, 30, bore=0.35)
+
+
+# ---- unlike face widths ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", [Nitsche(), Penalty()])
+def test_a_wider_gear_is_one_of_the_common_width_and_a_higher_modulus(law):
+    """Plane elasticity: only E times width counts, so 27 mm at 200 GPa is 9 mm at 600 GPa, whatever the contact law."""
+    angles, twist = np.radians([4.0, 13.0]), math.radians(0.05)
+    wide = gears.pair(20, 30, bore=0.35, width=9e-3, pinion={"width": 27e-3})
+    same = gears.pair(20, 30, bore=0.35, width=9e-3)
+    given = {"law": law, "coarsen": 2.0}
+    one = elastic_pair(wide, (Material(200e9, 0.3), Material(110e9, 0.3)), **given)
+    other = elastic_pair(same, (Material(600e9, 0.3), Material(110e9, 0.3)), **given)
+    found = [[p.torque_wheel for p in solve_positions(e, angles, twist)] for e in (one, other)]
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-8)
+
+
+# ---- sharp corners ---------------------------------------------------------------------------------------------------
+
+
+def test_shares_of_a_corner_rise_from_a_half_and_rounded_tips_keep_it():
+    start, end = (SHARP.path[name].pinion_angle for name in ("A", "E"))
+    bearings = corner_bearings(SHARP)
+    assert shares(bearings, 0.5 * (start + end)) == (0.5, 0.5)
+    assert shares(bearings, end) == (0.5, 0.5)
+    assert shares(bearings, end + 0.05) == (1.0, 0.0)
+    assert shares(bearings, start - 0.05) == (0.0, 1.0)
+    sweep = np.array([shares(bearings, a)[0] for a in np.linspace(start - 0.05, end + 0.05, 20001)])
+    assert (np.diff(sweep) >= 0).all()
+    assert np.diff(sweep).max() < 0.01
+    assert corner_bearings(gears.pair(20, 30, tip_round=0.1e-3)) == (None, None)
+
+
+def test_a_corner_pushes_along_the_normal_of_the_smooth_flank():
+    """Without friction the force that the wheel's corner puts on the pinion's involute touches its base circle.
+
+    Arms are those about the undeformed places of a bent tooth: within 2e-3 of the base radius for pairs on the path
+    too. Points on both bodies would take half of their normals from the corner's own flank.
+    """
+    elastic = elastic_pair(SHARP)
+    off = []
+    for one in (elastic, replace(elastic, corners=(None, None))):
+        position = solve_positions(one, np.radians([17.0]), math.radians(0.05))[0]
+        corner, path = _arms(position)
+        assert path == pytest.approx(SHARP.pinion.base_radius, rel=2e-3)
+        off.append(abs(corner / SHARP.pinion.base_radius - 1))
+    assert off[0] < 2.5e-3
+    assert off[0] < off[1] / 3
+
+
+def _arms(position):
+    """Arms (m) of the forces on the pinion: the pair whose wheel's corner bears before the path, the pair on it."""
+    arms = {}
+    for window in (w for w in position.scene.windows if w.gear == 0):
+        turned = position.scene.rotation[window.nodes]
+        force = np.matmul(turned, position.forces.reshape(-1, 2)[window.nodes][..., None])[..., 0]
+        place = position.scene.points[window.nodes]
+        moment = float((place[:, 0] * force[:, 1] - place[:, 1] * force[:, 0]).sum())
+        before = SHARP.pinion_roll_at(window.angle) < SHARP.path["A"].pinion_roll
+        arms[before] = abs(moment) / np.linalg.norm(force.sum(axis=0))
+    return arms[True], arms[False]
+
+
+# ---- the estimate ----------------------------------------------------------------------------------------------------
+
+
+def test_one_position_that_agrees_by_chance_is_not_believed():
+    angles, fine = np.linspace(0, 0.3, 10), np.full(10, 100.0)
+    coarse = fine * (1 + 1e-3 * np.array([1, -1, 0, 1, -1, 1, -1, 1, -1, 1]))
+    estimate = error_estimate(angles, fine, coarse)
+    assert estimate.relative.min() > 0.9e-3
+    assert estimate.worst >= estimate.typical > 0
+
+
+def test_a_position_that_failed_on_the_coarse_mesh_gets_the_largest_error():
+    fine = np.full(4, 100.0)
+    estimate = error_estimate(np.arange(4.0), fine, np.array([100.1, np.nan, 101.0, 100.2]))
+    assert estimate.relative[1] == estimate.worst == estimate.relative[2]
+    assert math.isnan(error_estimate(np.arange(2.0), fine[:2], np.full(2, np.nan)).worst)
+
+
+def test_the_estimate_is_exact_plus_what_meshes_share_for_an_error_of_its_order():
+    """T(h) = T (1 + C h^p) at every position: d is the fine mesh's error, up to its own square."""
+    size, count = 0.3, 20
+    true = 0.01 * size**ORDER
+    fine, coarse = 1 + true, 1 + 0.01 * (COARSENING * size) ** ORDER
+    found = error_estimate(np.arange(count), np.full(count, fine), np.full(count, coarse), coarsen=size)
+    expected = (1 + 1 / count) * true / fine + COMMON * size**ORDER
+    np.testing.assert_allclose(found.relative, expected, rtol=1e-12)
+
+
+def test_positions_solved_twice_have_converged_and_span_the_sweep():
+    converged = np.arange(100) % 3 != 0
+    chosen = solved_twice(converged)
+    assert len(chosen) == 20
+    assert converged[chosen].all()
+    assert (chosen[0], chosen[-1]) == (1, 98)
+    assert len(solved_twice(np.zeros(3, dtype=bool))) == 0
+
+
+@pytest.mark.parametrize("twist_deg", [0.03, pytest.param(0.2, marks=pytest.mark.slow)])
+def test_the_estimate_covers_the_true_error(twist_deg):
+    """Coarse settings against a mesh 2.5 times as fine, pair changes included: nearly all, within ten in the median."""
+    pair = gears.pair(17, 25, pressure_angle=20.0, pinion={"profile_shift": 0.3, "tip_round": 0.1e-3, "width": 14e-3})
+    given = {"twist": math.radians(twist_deg), "kinematics": "small"}
+    curve = sweep_stiffness(pair, coarsen=1.5, estimate_error=True, **given)
+    fine = sweep_stiffness(pair, coarsen=0.6, **given)
+    true = np.abs(curve.k_mesh / fine.k_mesh - 1)
+    assert len(curve.error.relative) == len(true)
+    assert (curve.error.relative >= true).sum() >= 19
+    assert np.median(curve.error.relative / true) < 10
+
+
+def test_finer_settings_are_estimated_finer():
+    given = {"twist": math.radians(0.05), "kinematics": "small", "estimate_error": True}
+    angles = np.radians([3.0, 5.0, 12.0, 14.0])
+    coarse, fine = (sweep_stiffness(SHARP, angles=angles, coarsen=c, **given).error for c in (2.0, 1.0))
+    assert fine.typical < coarse.typical / 1.5

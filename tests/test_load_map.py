@@ -1,0 +1,293 @@
+"""Load maps: against positions solved directly at a torque, against power laws, as files, from the command line."""
+
+import csv
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe import LoadMap, StiffnessCurve, sweep_loads, sweep_stiffness
+from gearfe.cli import main
+from gearfe.errors import InputError
+from gearfe.root_map import RootMap
+from gearfe.stiffness import elastic_pair
+from gearfe.train_job import read_train_job, train_curves
+
+from .gears import pair
+from .test_train_job import BORES, SMALL
+
+JOB = Path(__file__).parents[1] / "geometry" / "gear_train.toml"
+ANGLES = np.radians(np.arange(6) * 3.0)
+
+
+@pytest.fixture(scope="module")
+def gears():
+    return pair(20, 30, tip_round=0.1e-3)
+
+
+@pytest.fixture(scope="module")
+def elastic(gears):
+    return elastic_pair(gears, coarsen=3.0)
+
+
+@pytest.fixture(scope="module")
+def made(gears, elastic):
+    return sweep_loads(gears, np.geomspace(60.0, 180.0, 6), angles=ANGLES, elastic=elastic, root_stress=True)
+
+
+@pytest.mark.parametrize("kinematics", [pytest.param("small", marks=pytest.mark.slow), "finite"])
+def test_cells_are_what_a_sweep_at_their_torque_finds(gears, elastic, made, kinematics):
+    """The prediction and its closing step may miss the torque's own solution by 1e-4 at most."""
+    mapped = made
+    if kinematics == "small":
+        mapped = sweep_loads(gears, made.torque, angles=ANGLES, elastic=elastic, kinematics="small")
+    assert (mapped.status == "converged").all()
+    for row in (1, 4):
+        direct = sweep_stiffness(
+            gears, torque=float(mapped.torque[row]), angles=ANGLES, elastic=elastic, kinematics=kinematics
+        )
+        curve = mapped.curves[row]
+        np.testing.assert_allclose(curve.twist, direct.twist, rtol=1e-4)
+        np.testing.assert_allclose(curve.k_mesh, direct.k_mesh, rtol=1e-4)
+        np.testing.assert_allclose(curve.torque_pinion, direct.torque_pinion, rtol=2e-4)
+        np.testing.assert_allclose(curve.wheel_angle, direct.wheel_angle, atol=1e-4 * direct.twist.max())
+        np.testing.assert_array_equal(curve.leading_pair, direct.leading_pair)
+        np.testing.assert_allclose(curve.load_share, direct.load_share, atol=2e-3)
+        np.testing.assert_allclose(curve.k_tangent, direct.k_tangent, rtol=5e-3)
+        np.testing.assert_allclose(curve.peak_pressure, direct.peak_pressure, rtol=2e-2)
+
+
+def test_a_curve_between_the_torques(gears, elastic, made):
+    torque = 101.0
+    direct = sweep_stiffness(gears, torque=torque, angles=ANGLES, elastic=elastic)
+    curve = made.curve_at(torque)
+    worst = np.nanmax(made.interpolation_error())
+    np.testing.assert_allclose(curve.twist, direct.twist, rtol=worst)  # what the map says of itself
+    np.testing.assert_allclose(np.median(curve.twist / direct.twist), 1.0, atol=1e-4)
+    np.testing.assert_array_equal(curve.torque_wheel, torque)
+    np.testing.assert_allclose(curve.k_mesh, torque / curve.twist / gears.wheel.base_radius**2, rtol=1e-14)
+    np.testing.assert_allclose(curve.wheel_angle - curve.twist, direct.wheel_angle - direct.twist, atol=1e-15)
+    np.testing.assert_allclose(curve.load_share[:, :2].sum(axis=1), 1.0, rtol=1e-12)
+    assert np.median(np.abs(curve.k_tangent / direct.k_tangent - 1)) < 2e-3
+    assert made.curve_at(float(made.torque[2])) is made.curves[2]
+
+
+def power_law(torques, stiffness, exponent, bend=0.0):
+    """A map of T = stiffness delta^exponent (1 + bend ln delta) at two angles, exact tangents."""
+    curves = []
+    for torque in torques:
+        twist = np.full(2, 1e-3)
+        for _ in range(60):  # Newton
+            value = stiffness * twist**exponent * (1 + bend * np.log(twist))
+            slope = value * exponent / twist + stiffness * twist ** (exponent - 1) * bend
+            twist = np.maximum(twist - (value - torque) / slope, 0.2 * twist)
+        radius = 0.03
+        zero, one = np.zeros(2), np.ones(2)
+        curves.append(
+            StiffnessCurve(
+                pinion_angle=np.array([0.0, 0.1]),
+                wheel_angle=twist,
+                twist=twist,
+                torque_wheel=torque * one,
+                torque_pinion=torque * one / 1.5,
+                torque_wheel_reaction=torque * one,
+                k_torsional=torque / twist,
+                k_mesh=torque / twist / radius**2,
+                k_tangent=slope / radius**2,
+                transmission_error=twist * radius,
+                transmission_error_unloaded=zero,
+                leading_pair=zero,
+                load_share=np.ones((2, 1)),
+                teeth_in_contact=np.ones(2, dtype=np.int64),
+                peak_pressure=1e8 * np.sqrt(torque) * one,
+                iterations=np.ones(2, dtype=np.int64),
+                status=np.array(["converged"] * 2),
+                mesh_cycle=0.2,
+                base_radius=radius,
+            )
+        )
+    return LoadMap(np.array(torques), tuple(curves))
+
+
+def test_a_power_law_is_interpolated_exactly():
+    """ln delta is straight over ln T then, so a Hermite cubic is exact; so are pressures as a power of the torque."""
+    mapped = power_law([10.0, 30.0, 100.0], 1e5, 1.07)
+    curve = mapped.curve_at(52.0)
+    np.testing.assert_allclose(curve.twist, (52.0 / 1e5) ** (1 / 1.07), rtol=1e-12)
+    np.testing.assert_allclose(curve.peak_pressure, 1e8 * math.sqrt(52.0), rtol=1e-12)
+    assert np.nanmax(mapped.interpolation_error()) < 1e-12
+
+
+def test_interpolation_errors_fall_with_the_fourth_power_of_the_spacing():
+    errors = []
+    for count in (3, 5, 9, 17):
+        mapped = power_law(list(np.geomspace(10.0, 1000.0, count)), 1e5, 1.3, bend=0.08)
+        errors.append(np.nanmax(mapped.interpolation_error()))
+    slopes = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert (slopes > 3.5).all()
+    assert slopes[-1] == pytest.approx(4.0, abs=0.2)
+
+
+def test_the_map_knows_its_range_and_its_gaps():
+    mapped = power_law([10.0, 1000.0, 1e5], 1e5, 1.3, bend=0.08)
+    with pytest.raises(InputError, match=r"too far apart.*more torques"):
+        mapped.curve_at(100.0, tolerance=1e-6)
+    for torque in (9.0, 2e5, math.nan):
+        with pytest.raises(InputError, match="outside the load map, 10 to 100000 N m"):
+            mapped.curve_at(torque)
+    with pytest.raises(InputError, match="too few solved torques"):
+        power_law([10.0, 20.0], 1e5, 1.1).curve_at(15.0)
+
+
+def test_a_failed_cell_leaves_its_neighbours_failed_there():
+    mapped = power_law([10.0, 20.0, 40.0, 80.0], 1e5, 1.1)
+    lost = np.array([False, True])
+    broken = {
+        name: np.where(lost, np.nan, getattr(mapped.curves[1], name)) for name in ("twist", "k_mesh", "k_tangent")
+    }
+    status = np.array(["converged", "not_converged"])
+    curves = (mapped.curves[0], replace(mapped.curves[1], status=status, **broken), *mapped.curves[2:])
+    curve = replace(mapped, curves=curves).curve_at(30.0)
+    assert list(curve.status) == ["converged", "not_converged"]
+    assert np.isfinite(curve.twist[0])
+    assert np.isnan(curve.twist[1])
+    assert list(curve.failed) == [False, True]
+
+
+def test_tables_come_back_exactly(made, tmp_path):
+    made.to_csv(tmp_path / "map.csv")
+    again = LoadMap.from_csv(tmp_path / "map.csv")
+    np.testing.assert_array_equal(again.torque, made.torque)
+    for name in ("pinion_angle", "twist", "k_mesh", "k_tangent", "peak_pressure", "leading_pair", "status"):
+        np.testing.assert_array_equal(again.quantity(name), made.quantity(name))
+    np.testing.assert_array_equal(again.root.stress, made.root.stress)
+    np.testing.assert_array_equal(again.root.diameter, made.root.diameter)
+    np.testing.assert_allclose(again.curve_at(100.0).twist, made.curve_at(100.0).twist, rtol=1e-15)
+    with open(tmp_path / "map.csv") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 36
+    assert all(abs(sum(float(r[k]) for k in r if k.startswith("load_share")) - 1) < 1e-9 for r in rows)
+    text = (tmp_path / "map.csv").read_text().splitlines()
+    (tmp_path / "short.csv").write_text("\n".join(text[:-1]) + "\n")
+    with pytest.raises(InputError, match="same number of angles"):
+        LoadMap.from_csv(tmp_path / "short.csv")
+    made.curves[0].to_csv(tmp_path / "curve.csv")
+    with pytest.raises(InputError, match="no column torque_Nm"):
+        LoadMap.from_csv(tmp_path / "curve.csv")
+
+
+def test_root_stress_of_a_cell_is_the_largest_of_its_teeth(made):
+    assert isinstance(made.root, RootMap)
+    stress = made.root.stress
+    assert stress.shape == (6, 6, 2, 2)
+    np.testing.assert_array_equal(made.root.largest, np.nanmax(stress, axis=3))
+    # a tooth carries tension at its root exactly where its pair carries load
+    np.testing.assert_array_equal(np.isfinite(stress[:, :, 0]), made.quantity("load_share") > 0)
+    assert (stress[np.isfinite(stress)] > 0).all()
+
+
+def test_stiffness_rises_with_the_torque_and_errors_with_it(made):
+    assert (np.diff(made.quantity("k_mesh"), axis=0) > 0).all()
+    assert (np.diff(made.peak_to_peak) > 0).all()
+
+
+def test_a_torque_out_of_reach_is_a_status(gears, elastic):
+    mapped = sweep_loads(gears, [100.0, 1e6], angles=ANGLES[:1], elastic=elastic, root_stress=False)
+    assert mapped.status[0, 0] == "converged"
+    assert mapped.failed[1, 0]
+    assert np.isnan(mapped.curves[1].k_mesh[0])
+
+
+@pytest.mark.parametrize("torques", [[], [0.0], [-1.0, 5.0], [math.nan]])
+def test_torques_that_are_none(gears, elastic, torques):
+    with pytest.raises(InputError, match="torques"):
+        sweep_loads(gears, torques, elastic=elastic)
+
+
+# ---- the gear train --------------------------------------------------------------------------------------------------
+
+
+def train_with_map(tmp_path, path):
+    """The small train of the job tests; its mesh takes the load map `path`."""
+    text = SMALL.replace("stiffness_N_per_m = 2e8", f'load_map = "{path}"') + BORES
+    (tmp_path / "job.toml").write_text(text)
+    return read_train_job(tmp_path / "job.toml")
+
+
+def test_a_train_takes_its_curve_from_a_map(tmp_path):
+    """18/27 teeth, 30 N m at the output, which is the driven gear's shaft: the map's curve at 30 N m."""
+    gears = pair(18, 27, module=2e-3, pressure_angle=20.0, width=12e-3)
+    mapped = sweep_loads(gears, [25.0, 28.0, 33.0, 38.0], angles=np.arange(6) * gears.mesh_cycle / 6, coarsen=4.0)
+    mapped.to_csv(tmp_path / "map.csv")
+    (curve,) = train_curves(train_with_map(tmp_path, "map.csv"))
+    expected = mapped.curve_at(30.0)
+    np.testing.assert_allclose(curve.k_mesh, expected.k_mesh, rtol=1e-9)
+    np.testing.assert_allclose(curve.torque_wheel, 30.0, rtol=1e-9)
+
+
+def test_a_train_refuses_the_map_of_other_gears(tmp_path, made):
+    made.to_csv(tmp_path / "map.csv")
+    with pytest.raises(InputError, match="is of other gears: mesh cycle 18 deg"):
+        train_curves(train_with_map(tmp_path, "map.csv"))
+
+
+# ---- the command -----------------------------------------------------------------------------------------------------
+
+
+def test_the_command(tmp_path, capsys):
+    out = tmp_path / "out"
+    options = ["--torque-range", "50", "200", "4", "--spacing", "log", "--positions", "4", "--coarsen", "4"]
+    assert main(["loadmap", str(JOB), "--out", str(out), "--root-stress", *options]) == 0
+    said = capsys.readouterr().out
+    assert "4 torques x 4 positions: 16 converged" in said
+    assert "root stress" in said
+    assert sorted(p.name for p in out.iterdir()) == [
+        "loadmap.csv",
+        "loadmap.json",
+        "loadmap.png",
+        "loadmap_torques.csv",
+    ]
+    mapped = LoadMap.from_csv(out / "loadmap.csv")
+    np.testing.assert_allclose(mapped.torque, np.geomspace(50, 200, 4), rtol=1e-12)
+    np.testing.assert_allclose(np.degrees(mapped.pinion_angle), [0, 4.5, 9, 13.5])
+    with open(out / "loadmap_torques.csv") as stream:
+        rows = list(csv.DictReader(stream))
+    te = 1e6 * mapped.quantity("transmission_error")
+    found = [float(r["transmission_error_peak_to_peak_um"]) for r in rows]
+    np.testing.assert_allclose(found, te.max(axis=1) - te.min(axis=1), rtol=1e-12)
+    summary = json.loads((out / "loadmap.json").read_text())
+    assert summary["statuses"] == {"converged": 16}
+    assert summary["job"]["loadmap"]["torque_count"] == 4
+    assert 0 < summary["root_stress_error_estimate"] < 0.02
+    assert (out / "loadmap.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--torques-Nm", "-5"], "--torques-Nm"),
+        (["--torque-range", "100", "50", "5"], "must be > torque_start_Nm"),
+        (["--torque-range", "10", "50", "2.5"], "whole number"),
+        (["--torque-range", "10", "50", "1"], "--torque-range"),
+        (["--positions", "0"], "--positions"),
+        (["--spacing", "cubic"], "even, log"),
+        (["--law", "glue"], "--law"),
+    ],
+)
+def test_mistakes_are_named(tmp_path, capsys, options, said):
+    assert main(["loadmap", str(JOB), "--out", str(tmp_path / "out"), *options]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_torques_must_be_given(tmp_path, capsys):
+    head = JOB.read_text().partition("\n[stiffness]\n")[0]
+    (tmp_path / "job.toml").write_text(head)
+    assert main(["loadmap", str(tmp_path / "job.toml"), "--out", str(tmp_path / "out")]) == 2
+    assert "no torques are given" in capsys.readouterr().err
+    (tmp_path / "job.toml").write_text(head + "\n[loadmap]\ntorques_Nm = [10.0]\ntorque_stop_Nm = 20.0\n")
+    assert main(["loadmap", str(tmp_path / "job.toml"), "--out", str(tmp_path / "out")]) == 2
+    assert "stands beside torques_Nm" in capsys.readouterr().err
