@@ -35,8 +35,8 @@ from .toml_text import toml_text
 
 #: Limits of the checks. The first four hold to the solver's residual of 1e-10, which the softest contacts amplify.
 BALANCE, PERIOD, SWAP = 1e-7, 1e-7, 1e-6
-#: The route for small loads (`gearfe.routes`) is a formula about a solved reference, another one when the gears swap; it
-#: claims 0.1 to 0.2 %, and its forces are scaled, so that their moments cancel no better than that.
+#: The route for small loads (`gearfe.routes`) is a formula about a solved reference, which changes when the gears swap.
+#: It claims 0.1 to 0.2 %, and its forces are scaled, so that their moments cancel no better than that.
 SMALL_LOAD = 2e-3
 #: The ratio holds as the normals at the contact do: they lean with the elements that carry it (1e-4 to 1e-3 of the
 #: wheel's torque where the contact is two elements wide, more where it is narrower), and with the bending of the teeth,
