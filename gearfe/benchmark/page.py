@@ -56,7 +56,7 @@ def write_page(results: str | Path, page: str | Path) -> list[Path]:
             shutil.copyfile(picture, pictures / picture.name)
             made.append(pictures / picture.name)
             lines += [f"![{section.title}]({pictures.name}/{picture.name})", ""]
-    for path in sorted(folder.glob("*_outcomes.csv")):
+    for path in sorted(folder.glob("*_outcomes*.csv")):
         lines += _outcomes(path)
     with whole_file(target) as temporary:
         temporary.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")

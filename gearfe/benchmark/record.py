@@ -124,7 +124,7 @@ def open_record(
         if changed:
             say(f"the results in {folder} were made with other {' and '.join(changed)}: begun anew")
             for old in folder.glob("*.csv"):
-                if not old.name.endswith("_outcomes.csv"):
+                if "_outcomes" not in old.name:
                     old.unlink()
     write_json(path, state)
     return Record(folder, quick, peers, say)

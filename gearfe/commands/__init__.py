@@ -15,4 +15,5 @@ COMMANDS: dict[str, str] = {
     "vibration": "vibration",
     "benchmark": "benchmark",
     "new": "new",
+    "stress": "stress",
 }

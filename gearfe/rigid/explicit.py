@@ -20,6 +20,7 @@ from .contract import Array
 from .elimination import is_linear, minimal
 from .start import Start, least_change
 from .system import System
+from .within import within_run
 
 Rhs = Callable[[float, Array], Array]
 
@@ -70,7 +71,7 @@ class Pieces:
 
     def __call__(self, t: Array, derivative: int = 0) -> Array:
         """Coordinates, velocities or accelerations at the times t."""
-        t = np.atleast_1d(np.asarray(t, dtype=float))
+        t = within_run(self.times, t)
         return np.array([self.expand(ti, yi)[derivative] for ti, yi in zip(t, self.state(t), strict=True)])
 
 
