@@ -1,4 +1,4 @@
-"""The README's promises: its example runs, its tables name every key, column, option and file that exists."""
+"""The documents' promises: the README's example runs, the page on stiffness names every key, column and option."""
 
 import argparse
 import re
@@ -12,6 +12,7 @@ from gearfe.tables.stiffness import StiffnessTable
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "stiffness.md").read_text(encoding="utf-8")
 
 
 def test_the_example_runs(tmp_path, monkeypatch):
@@ -28,7 +29,7 @@ def test_every_key_and_column_is_there():
         f.name for table in (GearTable, PairTable, MaterialTable, ToothFormTable, StiffnessTable) for f in fields(table)
     ]
     for name in {*keys, *COLUMNS, *CONSTANTS} - {"pinion", "wheel", "material"}:
-        assert f"`{name}`" in README, name
+        assert f"`{name}`" in PAGE, name
 
 
 def test_every_option_is_there():
@@ -37,9 +38,12 @@ def test_every_option_is_there():
     for action in parser._actions:
         for option in action.option_strings:
             if option.startswith("--") and option != "--help":
-                assert option in README, option
+                assert option in PAGE, option
 
 
-def test_scripts_and_pictures_exist():
-    for name in re.findall(r"(?:bash |\]\()((?:scripts|docs)/[\w.]+)", README):
+def test_scripts_pages_and_pictures_exist():
+    for name in re.findall(r"(?:bash |\]\()((?:scripts|docs)/[\w./]+)", README):
         assert (ROOT / name).exists(), name
+    for page in (ROOT / "docs").glob("*.md"):
+        for name in re.findall(r"\]\(([\w./]+\.(?:md|png))", page.read_text(encoding="utf-8")):
+            assert (page.parent / name).exists(), (page.name, name)
