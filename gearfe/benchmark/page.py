@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 from pathlib import Path
 from typing import Any
@@ -122,11 +123,12 @@ def summary(tables: dict[str, list[Row]]) -> list[str]:
 def _faster(rows: list[Row], peer: str, time: str) -> str:
     """Range of theirs/ours over the peer's runs, each against our quickest run of equal or smaller error."""
     ours = [r for r in rows if r["program"] == "gearfe"]
+    best = min((r["error"] for r in ours if _number(r.get("error"))), default=math.inf)
     found = []
     for row in rows:
         if row["program"] != peer or not _number(row.get("error")) or row["error"] > 0.1:
             continue
-        limit = max(row["error"], min(r["error"] for r in ours if _number(r.get("error"))))
+        limit = max(row["error"], best)
         times = [r[time] for r in ours if _number(r.get("error")) and r["error"] <= limit and _number(r.get(time))]
         if times and _number(row.get(time)):
             found.append(row[time] / min(times))

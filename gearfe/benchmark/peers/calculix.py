@@ -102,9 +102,9 @@ def clamped_modes(housing: Housing, count: int) -> tuple[np.ndarray, Spent]:
         folder = Path(name)
         lines = ["*NODE, NSET=NALL"]
         lines += [f"{i + 1}, {x:.12e}, {y:.12e}, {z:.12e}" for i, (x, y, z) in enumerate(housing.nodes)]
-        lines.append("*ELEMENT, TYPE=C3D10, ELSET=ALL")
-        # midside nodes of ours stand in the order of edges 01 12 02 03 13 23, which is CalculiX's too
-        lines += [f"{e + 1}, " + ", ".join(map(str, nodes + 1)) for e, nodes in enumerate(_as_vtk(housing.tets))]
+        tets = housing.tets if housing.tets.shape[1] == 4 else _as_vtk(housing.tets)  # CalculiX has VTK's order
+        lines.append(f"*ELEMENT, TYPE=C3D{tets.shape[1]}, ELSET=ALL")
+        lines += [f"{e + 1}, " + ", ".join(map(str, nodes + 1)) for e, nodes in enumerate(tets)]
         lines += ["*NSET, NSET=HELD", *(f"{n + 1}," for n in held)]
         lines += ["*BOUNDARY", "HELD, 1, 3", "*MATERIAL, NAME=STEEL", "*ELASTIC"]
         lines += [f"{material.youngs_modulus:.12g}, {material.poisson_ratio:.12g}"]
