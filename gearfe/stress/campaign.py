@@ -88,6 +88,8 @@ class Campaign:
         Time limit of a case.
     long_is_bad
         Whether a case over its limit is a defect; not for campaigns whose cases may ask for long runs.
+    compiles
+        Whether its cases need kernels that may have to be compiled first: case 0 then runs once outside of the limits.
     """
 
     name: str
@@ -98,6 +100,7 @@ class Campaign:
     run: Callable[[Case, Path], Finding]
     tables: Callable[[Sequence[Outcome]], dict[str, Columns]] = no_tables
     long_is_bad: bool = True
+    compiles: bool = False
 
     def case(self, seed: int, number: int) -> Case:
         """The case of that number: drawn from a generator of its own, so any one can be drawn alone."""

@@ -238,4 +238,4 @@ def tables(outcomes: Sequence[Outcome]) -> dict[str, Columns]:
     return {"estimates_outcomes_by_headline": columns} if kinds else {}
 
 
-CAMPAIGN = Campaign("estimates", 200, (0, 1, 2), 600.0, draw, run, tables)
+CAMPAIGN = Campaign("estimates", 200, (0, 1, 2), 600.0, draw, run, tables, compiles=True)

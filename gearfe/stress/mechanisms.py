@@ -133,4 +133,4 @@ def folding_angle(theta: float, omega: float, times: np.ndarray) -> np.ndarray:
     return np.asarray(made.y[0])
 
 
-CAMPAIGN = Campaign("mechanisms", 400, (0, 1, 2, 3, 5, 7), 120.0, draw, run)
+CAMPAIGN = Campaign("mechanisms", 400, (0, 1, 2, 3, 5, 7), 120.0, draw, run, compiles=True)

@@ -17,6 +17,9 @@ from .outcome import Outcome
 from .report import write_results
 from .worker import GRACE, run_case, work
 
+#: Seconds that compiling the kernels may take, once.
+COMPILE = 600.0
+
 Progress = Callable[[int, int, str], None]
 
 
@@ -98,11 +101,13 @@ def _apart(campaign: Campaign, seed: int, numbers: Iterable[int]) -> Iterable[Ou
     pipe: Any = None
     try:
         for number in numbers:
+            patience = 2 * GRACE  # the first case also waits for the process to start and load its libraries
             if worker is None:
                 worker, pipe = _worker(campaign.name, seed)
+                patience += COMPILE if campaign.compiles else 0.0
             begin = time.monotonic()
             pipe.send(number)
-            row = _answer(campaign, seed, number, worker, pipe, begin)
+            row = _answer(campaign, seed, number, worker, pipe, begin, patience)
             if row.outcome in ("crash", "hang"):
                 _end(worker)
                 worker = None
@@ -112,10 +117,11 @@ def _apart(campaign: Campaign, seed: int, numbers: Iterable[int]) -> Iterable[Ou
             _end(worker, pipe)
 
 
-def _answer(campaign: Campaign, seed: int, number: int, worker: Any, pipe: Any, begin: float) -> Outcome:
+def _answer(
+    campaign: Campaign, seed: int, number: int, worker: Any, pipe: Any, begin: float, patience: float
+) -> Outcome:
     try:
-        # the first case also waits for the process to start and load its libraries
-        if pipe.poll(campaign.seconds + 2 * GRACE):
+        if pipe.poll(campaign.seconds + patience):
             made: Outcome = pipe.recv()
             return made
     except (EOFError, OSError):

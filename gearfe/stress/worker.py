@@ -51,6 +51,8 @@ def work(pipe: Any, name: str, seed: int) -> None:
         raise OverTime
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the parent, which ends this process
+    if campaign.compiles:  # an interrupted compilation would leave the compiler unusable
+        run_case(campaign, seed, 0)
     if hasattr(signal, "SIGALRM"):
         signal.signal(signal.SIGALRM, late)
     while (number := pipe.recv()) is not None:

@@ -132,10 +132,10 @@ def train_multipliers(model: TrainModel) -> tuple[Complex | None, str]:
         for body, first, ratio in zip(model.shafts, model.first, model.ratios, strict=True):
             one, two = core.T[first + 3], core.T[first + 4]
             damping += body.rotor.polar * ratio * speed * (np.outer(one, two) - np.outer(two, one))
-    directions = np.array([line.row @ core.T for line in lines]).reshape(len(lines), -1).T
+    directions = np.array([line.row @ core.T for line in lines]).reshape(len(lines), core.T.shape[1]).T
 
     def gains(t: Array) -> Array:
-        return np.array([line.mean - line.stiffness(speed * t) for line in lines]).reshape(len(lines), -1).T
+        return np.array([line.mean - line.stiffness(speed * t) for line in lines]).reshape(len(lines), len(t)).T
 
     made = multipliers(core.squares, damping, directions, gains, period)
     return made, "" if made is not None else f"numbers overflow within the common mesh period of {1e3 * period:.4g} ms"

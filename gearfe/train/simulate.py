@@ -56,8 +56,8 @@ def simulate(
     floquet
         Compute the multipliers over the common mesh period.
     estimate
-        Estimate the errors: of the integration from a second run with a hundredth of the tolerance, of the housing's
-        reduction up to `band_hz` (Hz).
+        Estimate the errors: of the integration from a second run with a hundredth of the tolerance and shorter steps,
+        of the housing's reduction up to `band_hz` (Hz).
     backend
         ``compiled``, ``plain`` or ``auto``.
 
@@ -101,9 +101,13 @@ def simulate(
     return replace(response, floquet=multipliers, floquet_note=note, estimates=estimates, warnings=tuple(warnings))
 
 
-def _run(model: TrainModel, t: Array, tolerance: float, method: str, backend: str) -> tuple[Trajectory, Motion]:
+def _run(
+    model: TrainModel, t: Array, tolerance: float, method: str, backend: str, longest: float = np.inf
+) -> tuple[Trajectory, Motion]:
     local = max(LOCAL_SHARE * tolerance, 1e-13) if method != "implicit" else tolerance
-    trajectory = integrate(model.system, t, method=method, tolerance=local, start=model.start, backend=backend)
+    trajectory = integrate(
+        model.system, t, method=method, tolerance=local, start=model.start, backend=backend, longest=longest
+    )
     return trajectory, motion(model, trajectory)
 
 
@@ -209,7 +213,9 @@ def _estimates(
     found = {}
     if len(t) >= 2:
         with np.errstate(over="ignore", invalid="ignore"):
-            _, finer = _run(model, t, max(1e-2 * tolerance, 1e-13), method, "auto")
+            # where the corners of the curves set the steps, a tolerance alone would repeat them
+            longest = 0.5 * float(t[-1]) / max(1, int(response.statistics["steps"]))
+            _, finer = _run(model, t, max(1e-2 * tolerance, 1e-13), method, "auto", longest)
         kept = min(len(finer.time), len(t))
         pairs = [(response.contact_force[:kept], finer.contact_force[:kept])]
         pairs.append((response.attachment_acceleration[:kept], finer.a[:kept] @ model.axial.T))
