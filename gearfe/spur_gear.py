@@ -16,6 +16,8 @@ from .tooth_root import half_tooth_angle
 
 #: Least rim between bore and root circle, times module.
 LEAST_RIM = 0.25
+#: Least bore, times module: plane elasticity gives a point no stiffness, and a bore of a hundredth tears loose.
+LEAST_BORE = 0.05
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,10 @@ class Gear:
             most = self.teeth / 2 + self.profile_shift - LEAST_RIM
             problem = f"leaves no material inside the root circle: must be < {most:.6g}"
             raise InputError("dedendum", self.dedendum, problem, "use less dedendum, more teeth or more profile shift")
+        if not self.bore_diameter >= LEAST_BORE * self.module:
+            problem = f"must be >= {1e3 * LEAST_BORE * self.module:.6g} mm, {LEAST_BORE:g} module"
+            cure = "use a larger bore: the gear is held there, and a point holds nothing"
+            raise InputError("bore_diameter", self.bore_diameter, problem, cure)
         limit = 2.0 * (self.root_radius - LEAST_RIM * self.module)
         if not self.bore_diameter <= limit:
             problem = (

@@ -19,6 +19,17 @@ from .train_report import TrainSpectra, response_columns, spectra, train_summary
 
 #: Frames of the animation, and steps of the field files at most.
 FRAMES, FIELD_STEPS = 50, 101
+#: Files that depend on the options: what is left of them from an earlier run is removed.
+MAY_WRITE = (
+    "spectrum.csv",
+    "response.png",
+    "spectrum.png",
+    "radiated_power.png",
+    "gears.vtkhdf",
+    "housing.vtkhdf",
+    "fields.png",
+    "fields.gif",
+)
 
 
 @dataclass(frozen=True)
@@ -106,7 +117,7 @@ def write_all(
         elif len(response.time) > 3:
             made = spectra(response, radiation, window=choice.window)
     problems: list[str] = []
-    with whole_set(folder) as target:
+    with whole_set(folder, MAY_WRITE) as target:
         with watch.stage("tables"):
             write_csv(target / "response.csv", _lists(response_columns(response, radiation)))
             if made is not None:

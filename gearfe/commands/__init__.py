@@ -13,5 +13,7 @@ COMMANDS: dict[str, str] = {
     "mechanism": "mechanism",
     "housing": "housing",
     "vibration": "vibration",
+    "benchmark": "benchmark",
     "new": "new",
+    "stress": "stress",
 }

@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     mesh[body.coupled.frequencies_hz[:shown] <= 0.0] = 0.0
     left_out = reduction_error(body, table.reduction.band_Hz)
     _report(body, mesh, left_out, seconds)
-    with whole_set(folder) as made:
+    with whole_set(folder, ("housing.png", "modes.png")) as made:
         _write(made, body, fields, mesh, left_out)
         problem = "" if args.no_pictures else _draw(made, body, fields)
     if problem:

@@ -16,6 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--until", type=float, metavar="T", help="end of the run in s (default: the file's)")
     parser.add_argument("--reactions", action="store_true", help="write reactions.csv")
     parser.add_argument("--no-figures", action="store_true", help="tables and summary only")
+    parser.add_argument("--no-estimate", action="store_true", help="leave out the second run that estimates the error")
     parser.add_argument("--animation", action="store_true", help="write animation.gif")
 
 
@@ -32,6 +33,7 @@ def run(args: argparse.Namespace) -> int:
         reactions=args.reactions,
         figures=not args.no_figures,
         animation=args.animation,
+        estimate=not args.no_estimate,
     )
     print(outcome.text)
     return 0 if outcome.complete else 1

@@ -106,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
     show.end()
     for stage, seconds in curve.timings.items():
         watch.seconds[stage] = watch.seconds.get(stage, 0.0) + seconds
-    with whole_set(folder) as made:
+    with whole_set(folder, ("stiffness.png", "fields.vtkhdf", "stress_*deg.png")) as made:
         with watch.stage("table"):
             curve.to_csv(made / "stiffness.csv")
         if chosen is not None:

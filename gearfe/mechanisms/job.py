@@ -11,12 +11,16 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..output.files import output_folder, write_csv, write_json
+from ..output.files import output_folder, whole_set, write_csv, write_json
 from ..rigid import Start, Trajectory, compiled, integrate
 from ..rigid.backend import affordable_steps
 from ..rigid.integrate import choose_method
+from .error_estimate import TrajectoryError, trajectory_error
 from .model import Mechanism, load_mechanism
 from .results import Results, evaluate, reactions
+
+#: Files that depend on the options: what is left of them from an earlier run is removed.
+MAY_WRITE = ("reactions.csv", "curves.png", "picture.png", "animation.gif")
 
 
 @dataclass(frozen=True)
@@ -38,8 +42,12 @@ def run_mechanism(
     reactions: bool = False,
     figures: bool = True,
     animation: bool = False,
+    estimate: bool = True,
 ) -> Outcome:
-    """Read the file, integrate, write ``trajectory.csv``, ``energy.csv``, ``summary.json`` and what else is asked."""
+    """Read the file, integrate, write ``trajectory.csv``, ``energy.csv``, ``summary.json`` and what else is asked.
+
+    All files appear together, or none. With `estimate` a second, finer run tells how far off the first one is.
+    """
     began = clock.perf_counter()
     mechanism = load_mechanism(path)
     run = mechanism.file.run
@@ -60,25 +68,30 @@ def run_mechanism(
         raise InputError(
             "start", None, trajectory.message, "give the bodies start velocities, or another start position"
         )
-    results = evaluate(mechanism, trajectory)
-    write_tables(folder, mechanism, results, reactions or run.reactions)
-    written = clock.perf_counter()
-    if figures:
-        from ..output.mechanism_figures import draw_figures
+    with np.errstate(over="ignore", invalid="ignore"):  # a state beyond all numbers has a status of its own
+        results = evaluate(mechanism, trajectory)
+    error = trajectory_error(mechanism, start, results, tolerance) if estimate else None
+    estimated = clock.perf_counter()
+    with whole_set(folder, MAY_WRITE) as made:
+        write_tables(made, mechanism, results, reactions or run.reactions)
+        written = clock.perf_counter()
+        if figures:
+            from ..output.mechanism_figures import draw_figures
 
-        draw_figures(folder, mechanism, results)
-    if animation:
-        from ..output.mechanism_figures import draw_animation
+            draw_figures(made, mechanism, results)
+        if animation:
+            from ..output.mechanism_figures import draw_animation
 
-        draw_animation(folder, mechanism, trajectory)
-    timings = {
-        "read_s": read - began,
-        "integrate_s": integrated - read,
-        "tables_s": written - integrated,
-        "pictures_s": clock.perf_counter() - written,
-    }
-    summary = summarise(mechanism, start, results, tolerance, timings)
-    write_json(folder / "summary.json", summary)
+            draw_animation(made, mechanism, trajectory)
+        timings = {
+            "read_s": read - began,
+            "integrate_s": integrated - read,
+            "estimate_s": estimated - integrated,
+            "tables_s": written - estimated,
+            "pictures_s": clock.perf_counter() - written,
+        }
+        summary = summarise(mechanism, start, results, tolerance, timings, error)
+        write_json(made / "summary.json", summary)
     return Outcome(trajectory.status == 0, _text(summary, folder), summary)
 
 
@@ -118,7 +131,14 @@ def write_tables(folder: Path, mechanism: Mechanism, results: Results, with_reac
         write_csv(folder / "reactions.csv", {"time_s": time, **forces})
 
 
-def summarise(mechanism: Mechanism, start: Start, results: Results, tolerance: float, timings: dict) -> dict[str, Any]:
+def summarise(
+    mechanism: Mechanism,
+    start: Start,
+    results: Results,
+    tolerance: float,
+    timings: dict,
+    error: TrajectoryError | None = None,
+) -> dict[str, Any]:
     """Content of summary.json."""
     planar = mechanism.system.planar
     assert planar is not None
@@ -161,8 +181,22 @@ def summarise(mechanism: Mechanism, start: Start, results: Results, tolerance: f
         "singular_passages": {"count": len(inside), "first_times_s": inside[:100]},
         "constraint_residual": float(np.abs(residual).max(initial=0.0)),
         "energy_drift_J": float(np.abs(total - total[0]).max(initial=0.0)),
+        "error_estimate": None
+        if error is None
+        else {
+            "coordinates_m_or_rad": error.coordinates,
+            "outputs": dict(error.outputs),
+            "tolerance_of_the_second_run": error.tolerance,
+        },
         "timings": timings,
     }
+
+
+def _told_error(error: dict[str, Any]) -> str:
+    largest = error["coordinates_m_or_rad"]
+    if not math.isfinite(largest):
+        return "error estimate: none, the second, finer run did not reach as far"
+    return f"error estimate from a second, finer run: {largest:.2g} (m or rad) at worst"
 
 
 def _text(summary: dict[str, Any], folder: Path) -> str:
@@ -173,6 +207,7 @@ def _text(summary: dict[str, Any], folder: Path) -> str:
         *(f"redundant: {name}" for name in f["redundant_constraints"]),
         f"{summary['method']}: {summary['status']} at {summary['reached_s']:g} s in {summary['steps']} steps,"
         f" {summary['timings']['integrate_s']:.3f} s; singular passages: {summary['singular_passages']['count']}",
+        *([_told_error(summary["error_estimate"])] if summary["error_estimate"] else []),
         f"results in {folder}",
     ]
     return "\n".join(lines)

@@ -176,6 +176,12 @@ class Mechanism:
             )
             return made[:n] - made[n]
 
+        here = self.system.start_q
+        with np.errstate(all="ignore"):
+            known = [position(here), *slope(here)] if level == 0 else rate_slope(here)
+        if not np.isfinite(known).all():
+            problem = "is not a finite number, or has no finite slope, at the start poses"
+            raise InputError(label, None, problem, "force another expression, or give other start poses")
         if level == 0:
             return Forced(text, target, position, slope)
         offset = self._offset(node, wanted, label)

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import tempfile
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+
+#: Name of temporary folders, and the age (s) at which one must be a leftover.
+WRITING, LEFTOVER_S = ".writing-", 86400.0
 
 
 @contextmanager
@@ -95,10 +100,30 @@ def _plain(value: Any) -> Any:
 
 
 @contextmanager
-def whole_set(folder: Path) -> Iterator[Path]:
-    """Yield a temporary folder inside `folder`; its files move to `folder` when all of them are written, else none."""
-    with tempfile.TemporaryDirectory(prefix=".writing-", dir=folder) as name:
+def whole_set(folder: Path, may_write: Sequence[str] = ()) -> Iterator[Path]:
+    """Yield a temporary folder inside `folder`; its files move to `folder` when all of them are written, else none.
+
+    Parameters
+    ----------
+    may_write
+        Patterns of all files that this kind of run can write: those of an earlier run that this one does not replace
+        are removed, so that no old picture stands beside new tables.
+    """
+    _remove_leftovers(folder)
+    with tempfile.TemporaryDirectory(prefix=WRITING, dir=folder) as name:
         made = Path(name)
         yield made
+        new = {path.name for path in made.iterdir()}
         for path in sorted(made.iterdir()):
             path.replace(folder / path.name)
+        for old in {old for pattern in may_write for old in folder.glob(pattern)}:
+            if old.name not in new and old.is_file():
+                old.unlink()
+
+
+def _remove_leftovers(folder: Path) -> None:
+    """Remove temporary folders of runs that were killed; younger ones may belong to a run that is still going on."""
+    for old in folder.glob(f"{WRITING}*"):
+        with suppress(OSError):
+            if time.time() - old.stat().st_mtime > LEFTOVER_S:
+                shutil.rmtree(old)

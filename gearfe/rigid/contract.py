@@ -161,6 +161,12 @@ class LocalForce(Element):
         share one function that looks at its parameters.
     parameters : ndarray
         What `compiled_law` gets.
+    compiled_corner
+        ``compiled_corner(t, sign, u, du, parameters)``: time (s) to the next corner of the law, where it passes from
+        one smooth piece to another, predicted from this state; steps then end at corners, and methods of high order
+        keep their order. Without one the law counts as smooth between its `breaks`.
+    compiled_helpers
+        Functions that the two call by name.
     """
 
     touches: tuple[Element, ...] = field()
@@ -170,6 +176,8 @@ class LocalForce(Element):
     parameters: Array = field(default_factory=lambda: np.zeros(0))
     breaks: tuple[float, ...] = ()
     name: str = "local force"
+    compiled_corner: Callable[..., float] | None = None
+    compiled_helpers: tuple[Callable[..., object], ...] = ()
 
     def force(self, t: float, q: Array, v: Array) -> Array:
         """W law."""

@@ -20,6 +20,7 @@ from .contract import Array
 from .elimination import is_linear, minimal
 from .start import Start, least_change
 from .system import System
+from .within import within_run
 
 Rhs = Callable[[float, Array], Array]
 
@@ -70,16 +71,18 @@ class Pieces:
 
     def __call__(self, t: Array, derivative: int = 0) -> Array:
         """Coordinates, velocities or accelerations at the times t."""
-        t = np.atleast_1d(np.asarray(t, dtype=float))
+        t = within_run(self.times, t)
         return np.array([self.expand(ti, yi)[derivative] for ti, yi in zip(t, self.state(t), strict=True)])
 
 
-def run_explicit(system: System, start: Start, times: Array, *, tolerance: float, longest: float, most: int):  # type: ignore[no-untyped-def]
-    """Integrate; returns (dense output, status, statistics)."""
+def run_explicit(  # type: ignore[no-untyped-def]
+    system: System, start: Start, times: Array, *, tolerance: float, longest: float, most: int, jit: bool = True
+):
+    """Integrate; returns (dense output, status, statistics). `jit`: compiled laws run in a compiled loop."""
     if is_linear(system):
         from .modal import run_minimal
 
-        return run_minimal(minimal(system), start, times, tolerance=tolerance, longest=longest, most=most)
+        return run_minimal(minimal(system), start, times, tolerance=tolerance, longest=longest, most=most, jit=jit)
     n = system.size
     active = start.active
 
@@ -146,10 +149,18 @@ def step_through(
             status = 1
             break
         d = sign * step
-        for s in range(1, 12):
-            K[s] = rhs(t + tab.C[s] * d, y + d * (tab.A[s, :s] @ K[:s]))
-        new = y + d * (tab.B @ K[:12])
-        K[12] = rhs(t + d, new)
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                for s in range(1, 12):
+                    K[s] = rhs(t + tab.C[s] * d, finite(y + d * (tab.A[s, :s] @ K[:s])))
+                new = y + d * (tab.B @ K[:12])
+                K[12] = rhs(t + d, finite(new))
+        except np.linalg.LinAlgError:  # a stage ran away (a singular position): a shorter step, or a status
+            h = 0.2 * step
+            if step < 1e-12 * max(1e-300, abs(t1 - t0)):
+                status = 4
+                break
+            continue
         evaluations += 12
         reach = np.maximum(scale, np.abs(new))
         limit = np.maximum(reach, step * np.abs(K[12])) * tolerance + 1e-300
@@ -186,6 +197,19 @@ def step_through(
         h = step * min(6.0, 0.9 * max(error, 1e-12) ** (-1 / 8)) if not fixed or error > 0.01 else max(h, step)
     shape = (len(polynomials), 7, y.size)
     return np.array(ends), np.array(states), np.array(polynomials).reshape(shape), status, evaluations
+
+
+def finite(y: Array) -> Array:
+    """The state itself when it is finite.
+
+    Raises
+    ------
+    LinAlgError
+        When it is not: no right-hand side needs to see it.
+    """
+    if not np.isfinite(y).all():
+        raise np.linalg.LinAlgError("the state is not finite")
+    return y
 
 
 def first_step(y: Array, dy: Array, span: float) -> float:

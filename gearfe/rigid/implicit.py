@@ -23,6 +23,7 @@ from .contract import Array
 from .explicit import on_constraints
 from .start import Start
 from .system import System
+from .within import within_run
 
 ROOT6 = math.sqrt(6.0)
 C = np.array([(4 - ROOT6) / 10, (4 + ROOT6) / 10, 1.0])
@@ -53,7 +54,7 @@ class Hermite:
 
     def __call__(self, t: Array, derivative: int = 0) -> Array:
         """Coordinates (or a derivative of them) at the times t."""
-        t = np.atleast_1d(np.asarray(t, dtype=float))
+        t = within_run(self.times, t)
         sign = 1.0 if self.times[-1] >= self.times[0] else -1.0
         k = np.clip(np.searchsorted(sign * self.times, sign * t, side="right") - 1, 0, max(0, len(self.times) - 2))
         h = (self.times[k + 1] - self.times[k])[:, None]

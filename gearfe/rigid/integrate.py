@@ -68,16 +68,17 @@ def integrate(
         start = _default_start(system, float(asked[0]))
     chosen = choose_method(system, start, float(asked[-1] - asked[0])) if method == "auto" else method
     options: dict[str, Any] = {"tolerance": tolerance, "longest": longest, "most": most_steps}
-    if chosen == "taylor":
-        dense, status, statistics = _taylor(system, start, asked, backend, **options)
-    elif chosen == "explicit":
-        from .explicit import run_explicit
+    with np.errstate(over="ignore", invalid="ignore"):  # a state that is not finite has a status of its own
+        if chosen == "taylor":
+            dense, status, statistics = _taylor(system, start, asked, backend, **options)
+        elif chosen == "explicit":
+            from .explicit import run_explicit
 
-        dense, status, statistics = run_explicit(system, start, asked, **options)
-    else:
-        from .implicit import run_implicit
+            dense, status, statistics = run_explicit(system, start, asked, jit=use_compiled(backend), **options)
+        else:
+            from .implicit import run_implicit
 
-        dense, status, statistics = run_implicit(system, start, asked, **options)
+            dense, status, statistics = run_implicit(system, start, asked, **options)
     sign = 1.0 if asked[-1] >= asked[0] else -1.0
     reached = sign * dense.times[-1] + 1e-12 * max(1.0, abs(dense.times[-1]))
     kept = asked if status == 0 else asked[sign * asked <= reached]

@@ -67,6 +67,31 @@ def modal_rhs(squares, damping, diagonal, full, constant, W, offset, first, para
         p += 1
 
 
+def no_corner(t, sign, u, du, parameters):  # noqa: ARG001
+    """A law without corners."""
+    return 1e300
+
+
+def next_corner(W, offset, first, parameters, t, sign, y, u, du):
+    """Time to the nearest corner of all laws from the state y; u and du are scratch."""
+    rows = W.shape[0]
+    n = W.shape[1]
+    for p in range(rows):
+        place = offset[p]
+        speed = 0.0
+        for i in range(n):
+            place += W[p, i] * y[i]
+            speed += W[p, i] * y[n + i]
+        u[p] = place
+        du[p] = speed
+    nearest = 1e300
+    for k in range(first.shape[0] - 1):
+        a = first[k]
+        b = first[k + 1]
+        nearest = min(nearest, corner(t, sign, u[a:b], du[a:b], parameters[k]))  # noqa: F821
+    return nearest
+
+
 def modal_steps(
     squares, damping, diagonal, full, constant, W, offset, first, parameters, A, C, E3, E5, D,
     t, t1, y, h, scale, breaks, tolerance, longest, T, Y, P,
@@ -98,6 +123,14 @@ def modal_steps(
                 goal = breaks[i]
         step = min(h, longest, abs(goal - t))
         fixed = step == abs(goal - t)
+        ahead = next_corner(W, offset, first, parameters, t, sign, y, u, du)
+        whole = step
+        if ahead < step:  # the step ends at a corner of the law
+            step = ahead
+            fixed = False
+        elif ahead < 2.0 * step:  # two equal steps to the corner, instead of one and a sliver
+            step = 0.5 * ahead
+            fixed = False
         if step < 1e-14 * max(abs(t), abs(t1 - begin)):
             status = 1
             break
@@ -190,11 +223,12 @@ def modal_steps(
             modal_rhs(squares, damping, diagonal, full, constant, W, offset, first, parameters, t, y, K[0], u, du, out)
             calls += 1
         count += 1
-        if not fixed or error > 0.01:
-            h = step * min(6.0, 0.9 * max(error, 1e-12) ** (-0.125))
+        grown = step * min(6.0, 0.9 * max(error, 1e-12) ** (-0.125))
+        if step < whole or (fixed and error <= 0.01):  # shortened for other reasons than its error
+            h = max(whole if error <= 0.5 else 0.0, grown)
         else:
-            h = max(h, step)
+            h = grown
     return status, count, t, h, calls
 
 
-FUNCTIONS = (modal_rhs, modal_steps)
+FUNCTIONS = (modal_rhs, next_corner, modal_steps)

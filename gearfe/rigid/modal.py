@@ -19,7 +19,9 @@ from .explicit import Pieces, first_step, step_through, tableau
 from .start import Start
 
 
-def run_minimal(core: Minimal, start: Start, times: Array, *, tolerance: float, longest: float, most: int):  # type: ignore[no-untyped-def]
+def run_minimal(  # type: ignore[no-untyped-def]
+    core: Minimal, start: Start, times: Array, *, tolerance: float, longest: float, most: int, jit: bool = True
+):
     """Integrate a system in minimal coordinates; returns (dense output, status, statistics)."""
     n = core.T.shape[1]
     y0 = np.concatenate(core.reduce(start.q, start.v))
@@ -34,7 +36,7 @@ def run_minimal(core: Minimal, start: Start, times: Array, *, tolerance: float, 
     def expand(t: float, y: Array) -> tuple[Array, Array, Array]:
         return core.origin + core.T @ y[:n], core.T @ y[n:], core.T @ acceleration(t, y)
 
-    laws = _compiled_laws(core)
+    laws = _compiled_laws(core) if jit else None
     if laws is None:
         made = step_through(
             rhs, lambda _, y: y, start.time, y0, times[-1], core.system.breaks, tolerance, longest, most
@@ -62,10 +64,12 @@ def _compiled_laws(core: Minimal) -> list[tuple[LocalForce, np.ndarray]] | None:
 
 
 @lru_cache(maxsize=8)
-def _kernels(law: Any) -> SimpleNamespace:
-    functions = (*kernel_modal.FUNCTIONS, law)
+def _kernels(law: Any, corner: Any, helpers: tuple[Any, ...]) -> SimpleNamespace:
+    corner = corner or kernel_modal.no_corner
+    functions = (*kernel_modal.FUNCTIONS, *helpers, law, corner)
     names = {"np": np, "math": kernel_modal.math, **law.__globals__}
-    return compiled.bind(functions, names, compiled=True, entries=("modal_steps",), alias={law.__name__: "law"})
+    alias = {law.__name__: "law", corner.__name__: "corner"}
+    return compiled.bind(functions, names, compiled=True, entries=("modal_steps",), alias=alias)
 
 
 def _compiled_steps(core, laws, t0, y0, t1, tolerance, longest, most, rhs):  # type: ignore[no-untyped-def]
@@ -82,6 +86,8 @@ def _compiled_steps(core, laws, t0, y0, t1, tolerance, longest, most, rhs):  # t
     diagonal = np.diagonal(core.damping).copy()
     full = not np.array_equal(core.damping, np.diag(diagonal))
     h0 = first_step(y0, rhs(t0, y0), abs(t1 - t0))
+    force = laws[0][0]
+    kernels = _kernels(force.compiled_law, force.compiled_corner, force.compiled_helpers)
     room = 256
     ends, states = [np.array([t0])], [y0[None, :]]
     polynomials: list[Array] = []
@@ -91,7 +97,7 @@ def _compiled_steps(core, laws, t0, y0, t1, tolerance, longest, most, rhs):  # t
     while status == 2 and sum(map(len, polynomials)) < most:
         room = min(room, most - sum(map(len, polynomials)))
         T, Y, P = np.empty(room), np.empty((room, 2 * n)), np.empty((room, 7, 2 * n))
-        status, count, t, h, calls = _kernels(laws[0][0].compiled_law).modal_steps(
+        status, count, t, h, calls = kernels.modal_steps(
             core.squares, core.damping, diagonal, full, core.constant, W, offset, first, parameters, tab.A,
             tab.C, tab.E3, tab.E5, tab.D, t, t1, y, h, scale, breaks, tolerance, longest, T, Y, P,
         )  # fmt: skip

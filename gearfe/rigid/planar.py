@@ -15,6 +15,8 @@ from ..errors import InputError
 from .timefunctions import TimeFunction, constant
 
 GROUND = "ground"
+#: Masses and inertias below this, or above its inverse, overflow in products.
+LEAST_MASS = 1e-100
 Point = tuple[float, float]
 
 
@@ -50,8 +52,11 @@ class Body:
     def __post_init__(self) -> None:
         for key in ("mass", "inertia"):
             value = getattr(self, key)
+            unit = "kg" if key == "mass" else "kg m2"
+            if math.isfinite(value) and value > 0.0 and not LEAST_MASS <= value <= 1.0 / LEAST_MASS:
+                problem = f"must be >= {LEAST_MASS:g} and <= {1.0 / LEAST_MASS:g}: its inverse or its square overflows"
+                raise InputError(f"body {self.name!r} {key}", value, problem, f"give it in {unit}")
             if not (math.isfinite(value) and value > 0.0):
-                unit = "kg" if key == "mass" else "kg m2"
                 cure = f"give a positive number in {unit}; a massless point on a line is a slot joint, not a body"
                 raise InputError(f"body {self.name!r} {key}", value, "must be finite and > 0", cure)
 

@@ -173,7 +173,12 @@ def close(system: System, time: float, q: Array, forced: Sequence[Forced]) -> tu
 
 
 def least_change(system: System, G: Array, right: Array) -> Array:
-    """The change of least mass norm with G change = right, in the least-squares sense where G has lost rank."""
+    """The change of least mass norm with G change = right, in the least-squares sense where G has lost rank.
+
+    Not-a-number where the rows or the right side are not finite: the callers look at what comes back.
+    """
+    if not (np.isfinite(G).all() and np.isfinite(right).all()):
+        return np.full(system.size, np.nan)
     if system.diagonal_mass:
         root = np.sqrt(np.diagonal(system.inverse_mass))
         return root * np.linalg.lstsq(G * root, right, rcond=1e-11)[0]
@@ -194,10 +199,20 @@ def _positions(system: System, time: float, q: Array, forced: Sequence[Forced]) 
         free, alone = close(system, time, q, ())
         if alone <= 1e-10:
             off = max(forced, key=lambda f: abs(f.value(free) - f.target))
-            problem = f"contradicts {worst}: the constraints leave a residual of {residual:.3g}"
+            other = _at_odds(system, time, q, forced, off)
+            against = worst if other is None else f"start value {other.label} = {other.target:g}"
+            problem = f"contradicts {against}: a residual of {residual:.3g} is left"
             raise InputError(f"start value {off.label}", off.target, problem, "force another value, or leave it free")
     cure = "check lengths and start poses: the nearest closed position was searched from them"
     raise InputError(worst, None, f"the loop cannot close: a residual of {residual:.3g} (m or rad) is left", cure)
+
+
+def _at_odds(system: System, time: float, q: Array, forced: Sequence[Forced], blamed: Forced) -> Forced | None:
+    """The other forced value that `blamed` contradicts: without it the rest can be met, and `blamed` alone, too."""
+    if len(forced) < 2 or close(system, time, q, [blamed])[1] > 1e-10:
+        return None
+    others = [f for f in forced if f is not blamed]
+    return next((o for o in others if close(system, time, q, [f for f in forced if f is not o])[1] <= 1e-10), None)
 
 
 def _velocities(system: System, time: float, q: Array, v: Array, forced: Sequence[Forced]) -> Array:
@@ -211,6 +226,9 @@ def _velocities(system: System, time: float, q: Array, v: Array, forced: Sequenc
     else:
         rows, right = G, rate
     made = v - least_change(system, rows, rows @ v - right)
+    if not np.isfinite(made).all():
+        cure = "look for start values, speeds and forced velocities that are too large"
+        raise InputError("start velocities", None, "are not finite numbers once they meet the constraints", cure)
     gap = np.abs(rows @ made - right)
     scale = max(1.0, float(np.abs(right).max(initial=0.0)))
     if gap.max(initial=0.0) > 1e-8 * scale:
@@ -221,7 +239,14 @@ def _velocities(system: System, time: float, q: Array, v: Array, forced: Sequenc
         if forced:
             off = max(range(len(forced)), key=lambda k: abs(left[system.rows + k]))
             blame = forced[off]
-            problem = f"contradicts {names[part]} (residual {gap.max():.3g})"
+            weights = np.abs(left)
+            weights[system.rows + off] = 0.0
+            weights[: system.rows] *= 1.0 - 1e-6  # another forced value before a joint, where both are as much to blame
+            second = int(weights.argmax()) if weights.any() else part
+            against = names[second]
+            if second >= system.rows:
+                against += f" = {forced[second - system.rows].target:g}"
+            problem = f"contradicts {against} (residual {gap.max():.3g})"
             raise InputError(f"start velocity {blame.label}", blame.target, problem, "force another value")
         raise InputError(worst, None, f"velocities cannot meet it (residual {gap.max():.3g})", "check the motion")
     return made

@@ -12,6 +12,7 @@ import numpy as np
 
 from . import compiled, kernel_fold, kernel_rows, kernel_run, kernel_series
 from .tables import Array, Assembly, Ints, Tables
+from .within import within_run
 
 FUNCTIONS = (*kernel_rows.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_fold.FUNCTIONS, *kernel_run.FUNCTIONS)
 NAMES = {**kernel_rows.GLOBALS, **kernel_series.NAMES, **kernel_run.NAMES}
@@ -107,6 +108,8 @@ class Pieces:
         Taylor series on every step, the ground's coordinates last.
     folds : ndarray, shape (steps,)
         Number of singular combinations of rows at the start of every step.
+    begin : float
+        Start of the run (s).
     """
 
     status: int
@@ -114,13 +117,15 @@ class Pieces:
     coefficients: Array
     folds: Ints
     jit: bool
+    begin: float
 
     def __call__(self, t: Array, derivative: int = 0) -> Array:
         """Coordinates (or a derivative of them) at the times t."""
-        t = np.ascontiguousarray(t, dtype=float)
-        out = np.empty((t.size, self.coefficients.shape[2]))
         if len(self.coefficients) == 0:
             raise ValueError("no step was completed, so there is nothing between the times")
+        # a start on a singular position is left by a series about a moment a little later
+        t = np.ascontiguousarray(within_run(np.array([self.begin, self.times[-1]]), t))
+        out = np.empty((t.size, self.coefficients.shape[2]))
         sign = 1.0 if self.times[-1] >= self.times[0] else -1.0
         if self.jit:
             kernels(True).sample(self.times, self.coefficients, sign, t, derivative, out)
@@ -203,5 +208,6 @@ def run(
         room = min(2 * room, max(64, 2_000_000 // coefficients[0].size), most - done)
     ends = np.concatenate([parts[0][0], *(p[0][1:] for p in parts[1:])])
     if len(parts) == 1:
-        return Pieces(int(status), ends, parts[0][1], parts[0][2], jit)
-    return Pieces(int(status), ends, np.concatenate([p[1] for p in parts]), np.concatenate([p[2] for p in parts]), jit)
+        return Pieces(int(status), ends, parts[0][1], parts[0][2], jit, t0)
+    coefficients, folds = (np.concatenate([p[k] for p in parts]) for k in (1, 2))
+    return Pieces(int(status), ends, coefficients, folds, jit, t0)

@@ -99,7 +99,7 @@ class Trajectory:
         return self.multipliers_at(self.time)
 
     def multipliers_at(self, times: Array) -> Array:
-        """Multipliers from M a = f - G^T lambda at the given times."""
+        """Multipliers from M a = f - G^T lambda at the given times; not-a-number where they are beyond all numbers."""
         states = [self.dense(times, k) for k in range(3)]
         out = np.zeros((len(times), self.system.rows))
         keep = self.start.active
@@ -110,5 +110,8 @@ class Trajectory:
             G = self.system.jacobian(t, q)[keep]
             right = G @ (self.system.inverse_mass @ (self.system.force(t, q, v)) - a)
             S = G @ self.system.inverse_mass @ G.T
+            if not np.isfinite(right).all():  # forces so large that sums of them overflow
+                out[i] = np.nan
+                continue
             out[i, keep] = np.linalg.lstsq(S, right, rcond=1e-14)[0]
         return out

@@ -31,7 +31,7 @@ OPTIONAL = ("tip_relief_length_mm",)
 class MaterialTable:
     """Isotropic linear elastic material; without any key, structural steel."""
 
-    youngs_modulus_GPa: float = quantity(200.0, doc="Young's modulus (GPa)", above=0.0)
+    youngs_modulus_GPa: float = quantity(200.0, doc="Young's modulus (GPa)", low=1e-9, high=1e9)
     poisson_ratio: float = quantity(0.30, doc="Poisson's ratio (-)", low=0.0, below=0.5)
     density_kg_per_m3: float = quantity(7850.0, doc="density (kg/m3)", above=0.0)
 

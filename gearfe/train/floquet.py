@@ -37,8 +37,8 @@ MOST_STEPS = 1 << 14
 def multipliers(
     squares: Array, damping: Array, directions: Array, gains: Callable[[Array], Array], period: float, *,
     tolerance: float = 1e-6, first: int = 64,
-) -> Complex:  # fmt: skip
-    """Floquet multipliers, largest modulus first.
+) -> Complex | None:  # fmt: skip
+    """Floquet multipliers, largest modulus first; None when numbers overflow even with the shortest steps.
 
     Parameters
     ----------
@@ -61,14 +61,23 @@ def multipliers(
     -------
     ndarray of complex, shape (2n,)
     """
+
+    def found(steps: int) -> Complex | None:
+        # the splitting also steps back: heavy damping then grows, and overflows where steps are long
+        with np.errstate(over="ignore", invalid="ignore"):
+            X = _monodromy(squares, damping, directions, gains, period, steps)
+        return _sorted(np.linalg.eigvals(X)) if np.isfinite(X).all() else None
+
     steps = first
-    before = _sorted(np.linalg.eigvals(_monodromy(squares, damping, directions, gains, period, steps)))
+    before = found(steps)
     while steps < MOST_STEPS:
         steps *= 2
-        now = _sorted(np.linalg.eigvals(_monodromy(squares, damping, directions, gains, period, steps)))
-        change = np.abs(np.abs(now) - np.abs(before)).max() / np.abs(now).max()
+        now = found(steps)
+        settled = False
+        if now is not None and before is not None:
+            settled = bool(np.abs(np.abs(now) - np.abs(before)).max() < tolerance * np.abs(now).max())
         before = now
-        if change < tolerance:
+        if settled:
             break
     return before
 
@@ -128,4 +137,5 @@ def train_multipliers(model: TrainModel) -> tuple[Complex | None, str]:
     def gains(t: Array) -> Array:
         return np.array([line.mean - line.stiffness(speed * t) for line in lines]).reshape(len(lines), -1).T
 
-    return multipliers(core.squares, damping, directions, gains, period), ""
+    made = multipliers(core.squares, damping, directions, gains, period)
+    return made, "" if made is not None else f"numbers overflow within the common mesh period of {1e3 * period:.4g} ms"

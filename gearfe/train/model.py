@@ -21,7 +21,17 @@ from .checks import check_scene
 from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge
 from .inertia import rotor
 from .kinematics import Rolling, rolling
-from .law import angle_block, derivative, gyro_block, joined, python_law, torque_block, train_law
+from .law import (
+    angle_block,
+    derivative,
+    gyro_block,
+    joined,
+    python_law,
+    time_function,
+    torque_block,
+    train_corner,
+    train_law,
+)
 from .mesh_element import MeshLine, mesh_line
 from .scene import Drive, TrainScene
 
@@ -191,7 +201,10 @@ def _forces(
     parameters = joined(blocks)
     breaks = tuple(sorted({*angle.breaks, *(b for _, function in torques for b in function.breaks)}))
     law = python_law(parameters, at)
-    return LocalForce(tuple(bodies), np.hstack(columns), law, train_law, parameters, breaks, name="forces of the train")
+    return LocalForce(
+        tuple(bodies), np.hstack(columns), law, train_law, parameters, breaks, name="forces of the train",
+        compiled_corner=train_corner, compiled_helpers=(time_function,),
+    )  # fmt: skip
 
 
 def bore_selector(scene: TrainScene, bore: str) -> Array:

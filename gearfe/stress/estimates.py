@@ -1,0 +1,241 @@
+"""Error estimates against the truth, on scenes that nobody looked at when the estimates were made.
+
+- *curve*: the estimate of `gearfe stiffness` against a mesh several times finer;
+- *frequencies*: the mesh estimate of `gearfe housing` against a mesh of half the size;
+- *reduction*: the bound on the response against a body with many more modes;
+- *response*: the integration estimate of `gearfe vibration` against a tolerance of 1e-11;
+- *trajectory*: the estimate of `gearfe mechanism` against a tolerance of 1e-12.
+
+An estimate covers a case when the true error does not exceed it. A result that is off by more than ten times its
+estimate is silently wrong.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..config import load_job
+from .campaign import Campaign, Case, Columns
+from .linkages import linkage
+from .outcome import Check, Finding, Outcome
+from .pairs import log_uniform, rounded, running_pair
+from .rows import housing, row
+from .toml_text import toml_text
+
+#: Headlines take turns: cheap ones come more often.
+KINDS = (
+    "trajectory",
+    "response",
+    "curve",
+    "trajectory",
+    "response",
+    "curve",
+    "trajectory",
+    "response",
+    "curve",
+    "body",
+)
+#: Element sizes of the truth of a curve, as a share of the case's; errors fall with its power of 1.5 to 2.
+FINER = 0.35
+#: Errors below this are rounding, which no estimate means.
+ROUNDING = 1e-12
+
+
+def draw(random: np.random.Generator, number: int) -> Case:
+    """A random scene of the headline whose turn it is."""
+    kind = KINDS[number % len(KINDS)]
+    if kind == "body":
+        kind = "frequencies" if (number // len(KINDS)) % 2 == 0 else "reduction"
+    return MAKERS[kind](random, number, kind)
+
+
+def run(case: Case, folder: Path) -> Finding:
+    """True error and estimate."""
+    found = RUNS[case.kind](case, case.write(folder))
+    if found is None:
+        return Finding("stopped", "no estimate: the run or its truth ended early")
+    true, stated, unit = found
+    measures = {"true_error": float(f"{true:.4g}"), "estimate": float(f"{stated:.4g}"), "unit": unit}
+    measures |= {"covered": bool(true <= stated + ROUNDING)}
+    return Finding("done", "", [Check("true error", true, 10.0 * stated + 10 * ROUNDING)], measures)
+
+
+Found = tuple[float, float, str] | None
+
+
+def _draw_curve(random: np.random.Generator, number: int, kind: str) -> Case:
+    sweep = {
+        "twist_deg": rounded(log_uniform(random, 0.01, 0.3)),
+        "twist_from": "contact",
+        "law": str(random.choice(["nitsche", "penalty"])),
+        "coarsen": rounded(random.uniform(1.0, 2.0), 2),
+        "kinematics": "small",
+    }
+    tables = {"pair": running_pair(random, most_teeth=80), "stiffness": sweep}
+    return Case(number, kind, {"job.toml": toml_text(tables)}, "gearfe stiffness job.toml --out out")
+
+
+def _run_curve(case: Case, job_path: Path) -> Found:
+    """Worst relative error over six positions."""
+    from ..stiffness import sweep_stiffness
+    from ..stiffness_job import read_stiffness_job
+
+    job = read_stiffness_job(job_path)
+    del case
+    angles = job.pair.mesh_cycle * (np.arange(6) + 0.19) / 6
+    options = {**job.sweep, "angles": angles}
+    curve = sweep_stiffness(job.pair, estimate_error=True, **options, **job.model)
+    finer = {**job.model, "coarsen": max(0.2, FINER * job.table.coarsen)}
+    truth = sweep_stiffness(job.pair, **options, **finer)
+    if curve.error is None or not math.isfinite(curve.error.worst) or (truth.status != "converged").any():
+        return None
+    off = np.abs(curve.torque_wheel / truth.torque_wheel - 1)
+    return float(np.nanmax(off)), curve.error.worst, "relative"
+
+
+def _draw_trajectory(random: np.random.Generator, number: int, kind: str) -> Case:
+    which = str(random.choice(["folding", "loops", "springs", "light", "chain"]))
+    tables, _ = linkage(random, which)
+    tables["run"]["tolerance"] = rounded(log_uniform(random, 1e-9, 1e-4), 2)
+    return Case(number, kind, {"job.toml": toml_text(tables)}, "gearfe mechanism job.toml --out out", {"which": which})
+
+
+def _run_trajectory(case: Case, job_path: Path) -> Found:
+    """Worst error of a coordinate over the run (m or rad)."""
+    from ..mechanisms.error_estimate import trajectory_error
+    from ..mechanisms.job import output_times, quickest
+    from ..mechanisms.model import load_mechanism
+    from ..mechanisms.results import evaluate
+    from ..rigid import integrate
+    from ..rigid.backend import compiled_is_ready
+
+    del case
+    mechanism = load_mechanism(job_path)
+    start, run_table = mechanism.start(), mechanism.file.run
+    times = output_times(run_table.end_s, run_table.step_s)
+    made = quickest(mechanism, times, start, "auto", run_table.tolerance)
+    if made.status != 0:
+        return None
+    stated = trajectory_error(mechanism, start, evaluate(mechanism, made), run_table.tolerance).coordinates
+    backend = "compiled" if compiled_is_ready() else "plain"
+    finest = 1e-12 if made.method != "implicit" else max(1e-11, 1e-5 * run_table.tolerance)
+    truth = integrate(mechanism.system, times, method=made.method, tolerance=finest, start=start, backend=backend)
+    if truth.status != 0 or not math.isfinite(stated):
+        return None
+    return float(np.abs(made.q - truth.q).max()), stated, "m or rad"
+
+
+def _draw_response(random: np.random.Generator, number: int, kind: str) -> Case:
+    tables, files, _ = row(random, "general")
+    tables["train"]["tolerance"] = rounded(log_uniform(random, 1e-8, 1e-3), 2)
+    return Case(number, kind, {"job.toml": toml_text(tables), **files}, "gearfe vibration job.toml --out out")
+
+
+def _run_response(case: Case, job_path: Path) -> Found:
+    """Worst error of a contact force over the run, relative to its largest value."""
+    from ..train import build_train, simulate
+    from ..train_job import job_scene, read_train_job, train_curves
+
+    del case
+    job = read_train_job(job_path)
+    model = build_train(job_scene(job, train_curves(job), None))
+    made = simulate(model, job.times, tolerance=job.table.tolerance, method=job.table.method, estimate=True)
+    truth = simulate(model, job.times, tolerance=1e-11)
+    if made.status != "done" or truth.status != "done":
+        return None
+    scale = np.maximum(np.abs(truth.contact_force).max(axis=0), 1e-300)
+    off = np.abs(made.contact_force - truth.contact_force).max(axis=0) / scale
+    return float(off.max()), made.estimates["integration"], "relative"
+
+
+def _draw_body(random: np.random.Generator, number: int, kind: str) -> Case:
+    table = housing(random, 62.5)
+    return Case(number, kind, {"job.toml": toml_text({"housing": table})}, "gearfe housing job.toml --out out")
+
+
+def _run_frequencies(case: Case, job_path: Path) -> Found:
+    """Worst error of the first ten natural frequencies, and the estimate of that one."""
+    from ..housing.build import material, reduced_housing
+    from ..mesh_error import frequency_errors
+
+    del case
+    table = load_job(job_path, ("housing",))["housing"]
+    body = reduced_housing(table)
+    fields = body.reconstruct(body.coupled.vectors[:, :10].T)
+    stated = frequency_errors(body.nodes, body.elements, material(table), fields)
+    mesh = dataclasses.replace(table.mesh, size_mm=0.5 * table.mesh.size_mm, bore_edges=2 * table.mesh.bore_edges)
+    truth = reduced_housing(dataclasses.replace(table, mesh=mesh))
+    off = np.abs(body.coupled.frequencies_hz[:10] / truth.coupled.frequencies_hz[:10] - 1)
+    return float(off.max()), float(stated.max()), "relative"
+
+
+def _run_reduction(case: Case, job_path: Path) -> Found:
+    """Accelerances of the bores up to the band's end, rms, against a body with many more modes."""
+    from ..housing.build import housing_from_table, reduced
+    from ..reduction_error import reduction_error
+
+    del case
+    table = load_job(job_path, ("housing",))["housing"]
+    whole = housing_from_table(table)
+    rich = dataclasses.replace(table.reduction, modes_below_Hz=1e9, modes=120, quasi_static_levels=2)
+    body, truth = reduced(whole, table.reduction), reduced(whole, rich)
+    stated = reduction_error(body, table.reduction.band_Hz).response
+    if not math.isfinite(stated):
+        return None
+    one, two = (_accelerances(b, table.reduction.band_Hz) for b in (body, truth))
+    return float(np.linalg.norm(one - two) / np.linalg.norm(two)), stated, "relative rms"
+
+
+def _accelerances(body: Any, band: float, ratio: float = 0.01, points: int = 200) -> Any:
+    """Translations of the bores for forces on the bores, shape (points, 3 m, 3 m), modal damping 1 %."""
+    m = 6 * len(body.attachment_names)
+    coupled = body.coupled
+    shapes = coupled.vectors[:m].reshape(-1, 6, body.size)[:, :3].reshape(-1, body.size)
+    own = 2.0 * math.pi * coupled.frequencies_hz
+    omega = 2.0 * math.pi * band * (np.arange(points) + 0.5) / points
+    gains = omega[:, None] ** 2 / (own**2 - omega[:, None] ** 2 + 2j * ratio * own * omega[:, None])
+    return np.einsum("ik,wk,jk->wij", shapes, gains, shapes, optimize=True)
+
+
+MAKERS: dict[str, Callable[[np.random.Generator, int, str], Case]] = {
+    "curve": _draw_curve,
+    "trajectory": _draw_trajectory,
+    "response": _draw_response,
+    "frequencies": _draw_body,
+    "reduction": _draw_body,
+}
+RUNS: dict[str, Callable[[Case, Path], Found]] = {
+    "curve": _run_curve,
+    "trajectory": _run_trajectory,
+    "response": _run_response,
+    "frequencies": _run_frequencies,
+    "reduction": _run_reduction,
+}
+
+
+def tables(outcomes: Sequence[Outcome]) -> dict[str, Columns]:
+    """For each headline: how many cases are covered, by how much the estimate is too large, how many are far off."""
+    kinds = [kind for kind in MAKERS if any(row.kind == kind and row.measures for row in outcomes)]
+    columns: dict[str, list[Any]] = {
+        "headline": kinds, "cases": [], "covered_percent": [], "median_estimate_over_error": [],
+        "largest_error_over_estimate": [], "median_true_error": [],
+    }  # fmt: skip
+    for kind in kinds:
+        rows = [row.measures for row in outcomes if row.kind == kind and row.measures]
+        true = np.array([max(r["true_error"], 1e-16) for r in rows])
+        stated = np.array([max(r["estimate"], 1e-16) for r in rows])
+        columns["cases"].append(len(rows))
+        columns["covered_percent"].append(float(f"{100 * np.mean([r['covered'] for r in rows]):.4g}"))
+        columns["median_estimate_over_error"].append(float(f"{np.median(stated / true):.3g}"))
+        columns["largest_error_over_estimate"].append(float(f"{(true / stated).max():.3g}"))
+        columns["median_true_error"].append(float(f"{np.median(true):.3g}"))
+    return {"estimates_outcomes_by_headline": columns} if kinds else {}
+
+
+CAMPAIGN = Campaign("estimates", 200, (0, 1, 2), 600.0, draw, run, tables)

@@ -1,0 +1,200 @@
+"""What is skipped is not touched, and the result is the same without it."""
+
+import dataclasses
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe import sweep_stiffness
+from gearfe.cli import main
+from gearfe.contact.solver import solve_position
+from gearfe.housing import Housing
+from gearfe.meshing import tooth_sector
+from gearfe.meshing.recipe import sector_recipes
+from gearfe.meshing.tooth_sector import sector_mesh
+from gearfe.stiffness import elastic_pair
+from gearfe.train import build_train, simulate
+
+from .gears import pair
+from .housing_meshes import box
+from .trains import SHIPPED, frame_body, train
+from .trains import elastic as in_frame
+
+ROOT = Path(__file__).parents[1]
+TWIST = math.radians(0.05)
+COARSE = 4.0
+
+
+@pytest.fixture(scope="module")
+def gears():
+    return pair(tip_round=1e-4)
+
+
+@pytest.fixture(scope="module")
+def elastic(gears):
+    return elastic_pair(gears, coarsen=COARSE)
+
+
+def touched(*args, **options):
+    raise AssertionError("touched")
+
+
+def loaded_after(code, **environment):
+    """Modules in a fresh interpreter that has run `code`, and what it printed."""
+    code += "\nimport sys; print('LOADED', *sorted(sys.modules))"
+    env = {**os.environ, **environment}
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True, env=env)
+    said, _, names = done.stdout.rpartition("LOADED")
+    return set(names.split()), said
+
+
+def test_one_sector_instead_of_the_gears(gears, monkeypatch):
+    """The whole gear is never built; that both routes agree is shown by tests/test_contact_routes.py."""
+    # the modules that use it first: they must not meet the stand-in when they are imported
+    for room in ("fields", "contact.whole_pair", "meshing.whole_gear"):
+        monkeypatch.setattr(f"gearfe.{room}.whole_gear", touched)
+    elastic = elastic_pair(gears, coarsen=COARSE)
+    curve = sweep_stiffness(gears, twist=TWIST, angles=[0.0, 0.1], elastic=elastic)
+    assert not curve.failed.any()
+    for body in elastic.bodies:  # what was meshed is one tooth
+        angles = np.arctan2(body.mesh.points[:, 1], body.mesh.points[:, 0])
+        assert np.ptp(angles) < 2.0 * 2.0 * math.pi / body.teeth
+
+
+def test_one_mesh_cycle_instead_of_two(gears, elastic, monkeypatch):
+    """Positions that differ by whole cycles are solved once, with the result of solving them all."""
+    from gearfe import stiffness
+
+    solved = []
+    real = stiffness.at_twists
+
+    def counted(elastic, angles, *rest, **options):
+        solved.append(len(angles))
+        return real(elastic, angles, *rest, **options)
+
+    monkeypatch.setattr(stiffness, "at_twists", counted)
+    angles = np.radians([2.0, 11.0, 20.0, 29.0, 38.0])  # two of them differ by less than a cycle of 18 deg
+    once = sweep_stiffness(gears, twist=TWIST, angles=angles, elastic=elastic)
+    every = sweep_stiffness(gears, twist=TWIST, angles=angles, elastic=elastic, solve_all=True)
+    assert solved == [2, 5]
+    np.testing.assert_allclose(once.k_mesh, every.k_mesh, rtol=1e-9)
+
+
+def test_neighbour_teeth_only(gears, elastic):
+    """A position looks at the pairs of teeth that can touch, and they carry the whole torque."""
+    for angle in np.radians([0.0, 4.0, 12.0]):
+        position = solve_position(elastic, float(angle), TWIST)
+        assert position.status == "converged"
+        assert len(position.pair_numbers) <= 4 < gears.pinion.teeth
+        assert position.pair_torques.sum() == pytest.approx(position.torque_wheel, rel=1e-9)
+
+
+def test_fields_only_where_asked(tmp_path):
+    job = str(ROOT / "geometry" / "gear_train.toml")
+    plain = ["stiffness", job, "--twist-deg", "0.1", "--angles", "2", "3", "5", "--coarsen", "4"]
+    plain += ["--no-estimate", "--no-picture"]
+    code = f"from gearfe.cli import main; assert main({[*plain, '--out', str(tmp_path / 'a')]!r}) == 0"
+    loaded, _ = loaded_after(code)
+    room = {"gearfe.fields", "gearfe.fields_output", "gearfe.output.vtkhdf"}
+    assert not loaded & {*room, "h5py", "pyvista", "matplotlib"}
+    assert sorted(p.name for p in (tmp_path / "a").iterdir()) == ["stiffness.csv", "summary.json"]
+    assert main([*plain, "--out", str(tmp_path / "b"), "--fields", "5"]) == 0
+    assert (tmp_path / "b" / "fields.vtkhdf").exists()
+    assert (tmp_path / "a" / "stiffness.csv").read_text() == (tmp_path / "b" / "stiffness.csv").read_text()
+
+
+RIGID = """
+from gearfe.benchmark.subject import train_model, train_times
+from gearfe.train import simulate
+made = simulate(train_model("tutorial", quick=True), train_times(True), backend="plain")
+print(made.contact_force[-1, 0], made.statistics["backend"])
+"""
+
+
+def test_a_rigid_housing_loads_no_finite_elements():
+    """In a rigid housing the springs alone decide: their mean in the end is torque over base radius."""
+    loaded, said = loaded_after(RIGID)
+    heavy = {"skfem", "gmsh", "meshio", "gearfe.housing.model", "gearfe.solid", "gearfe.reduction", "gearfe.lanczos"}
+    assert not loaded & heavy
+    assert "numba" not in loaded
+    assert said.split()[1] == "plain"
+    # the same train in a frame that is a million times stiffer than it could be
+
+    scene = train(SHIPPED)
+    body = frame_body(scene)
+    stiff = dataclasses.replace(body, stiffness=1e6 * body.stiffness)
+    times = np.linspace(0.0, 1e-3, 11)
+    rigid = simulate(build_train(scene), times, tolerance=1e-6, backend="plain")
+    frame = build_train(dataclasses.replace(in_frame(scene), housing=stiff))
+    held = simulate(frame, times, tolerance=1e-4, method="implicit")
+    size = np.abs(rigid.contact_force).max()
+    assert np.abs(held.contact_force - rigid.contact_force).max() < 2e-3 * size
+
+
+def test_modes_above_the_band_are_not_sought(monkeypatch):
+    """Asked for the modes below a frequency, those far above are not computed, and the ones below are the same."""
+    nodes, tets = box((12, 2, 2), (0.24, 0.02, 0.02))
+    housing = Housing.from_arrays(nodes, tets, fixed=((0, 0, 0), (1, 0, 0)))
+    few = housing.reduce(None, below_hz=3000.0, least_modes=1)
+    many = housing.reduce(40)
+    assert few.modes < 10 < many.modes
+    assert few.internal_hz[: few.modes].max() <= 3000.0 < many.internal_hz[few.modes]
+    np.testing.assert_allclose(few.internal_hz[: few.modes], many.internal_hz[: few.modes], rtol=1e-8)
+
+
+def test_cached_meshes_start_no_mesher(gears, tmp_path, monkeypatch):
+    from gearfe.meshing import cache
+
+    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
+    recipe = sector_recipes(gears, coarsen=COARSE)[0]
+    first = sector_mesh(gears.pinion, recipe)
+    monkeypatch.setattr(tooth_sector, "gmsh_session", touched)
+    second = sector_mesh(gears.pinion, recipe)
+    np.testing.assert_array_equal(first.points, second.points)
+    np.testing.assert_array_equal(first.triangles, second.triangles)
+    with pytest.raises(AssertionError, match="touched"):
+        sector_mesh(gears.pinion, recipe, cache=False)
+
+
+def test_a_cached_reduced_housing_loads_no_finite_elements(tmp_path):
+    table = """
+from dataclasses import replace
+from gearfe.benchmark.subject import shipped_housing
+from gearfe.housing.build import reduced_housing
+table = shipped_housing()
+small = replace(table, mesh=replace(table.mesh, order=1, size_mm=40.0), reduction=replace(table.reduction, modes=5))
+print(repr(reduced_housing(small).coupled.frequencies_hz[:8].tolist()))
+"""
+    first, made = loaded_after(table, GEARFE_CACHE=str(tmp_path))
+    assert "gmsh" in first
+    second, read = loaded_after(table, GEARFE_CACHE=str(tmp_path))
+    assert not second & {"gmsh", "skfem", "meshio"}
+    assert made == read
+
+
+def test_a_mechanism_loads_neither_finite_elements_nor_compiled_kernels(tmp_path):
+    """A run shorter than compiling takes stays in plain Python, with the reference's result."""
+    out = tmp_path / "out"
+    job = str(ROOT / "geometry" / "andrews.toml")
+    code = (
+        "from gearfe.mechanisms.job import run_mechanism\n"
+        f"made = run_mechanism({job!r}, {str(out)!r}, tolerance=1e-8, figures=False)\nassert made.complete"
+    )
+    loaded, _ = loaded_after(code, XDG_CACHE_HOME=str(tmp_path / "empty"))
+    assert not loaded & {"numba", "skfem", "gmsh", "meshio", "pyvista", "matplotlib", "h5py"}
+    assert not list((tmp_path / "empty").rglob("*.nbi"))
+    assert not list(out.glob("*.png"))
+    table = np.genfromtxt(out / "trajectory.csv", delimiter=",", names=True)
+    truth = np.genfromtxt(ROOT / "tests" / "data" / "andrews_reference.csv", delimiter=",", names=True, skip_header=1)
+    at = np.searchsorted(table["time_s"], truth["t"] - 1e-9)
+    assert np.abs(table["beta_rad"][at] - truth["beta"]).max() < 1e-7
+
+
+def test_help_of_the_benchmark_loads_no_numerics():
+    loaded, _ = loaded_after("from gearfe.cli import main; main(['--help'])")
+    assert not loaded & {"numpy", "scipy", "matplotlib", "exudyn", "gearfe.benchmark"}
