@@ -55,8 +55,34 @@ def local_contact(
     gap = touching.arm[k, 1] * apart
     known = inside & np.isfinite(gap)
     known[PLACES], gap[PLACES] = True, 0.0
+    for g, face in enumerate(flanks.faces):
+        if face.fall > 0.0:
+            start = (1.0 if g == 0 else -1.0) * face.distance(place[g], 0.0)
+            _fall_back(x, gap, known, start, 1.0 if g == 0 else -1.0, face.fall)
     x, gap = x[known], np.maximum(gap[known], 0.0)
     return LocalContact(1 / sum(shares), _radius(x, gap, CURVED * module), x, gap, tuple(edges), smooth)
+
+
+def _fall_back(x: Array, gap: Array, known: NDArray[np.bool_], start: float, up: float, fall: float) -> None:
+    """Fill in the gap beyond x = `start`, where a flank ends in an edge and its undercut root goes on: as a wedge.
+
+    The concave root and the convex mate have about the same curvature, and contact at an edge is short.
+
+    Parameters
+    ----------
+    up
+        Sign of x on the flank's side of the edge.
+    fall
+        Angle (rad) between flank and root.
+    """
+    beyond = up * (x - start) < 0
+    on = np.flatnonzero(known & ~beyond)
+    on = on[np.argsort(np.abs(x[on] - start))][:2]
+    if len(on) < 2 or not beyond.any():
+        return
+    slope = (gap[on[1]] - gap[on[0]]) / (x[on[1]] - x[on[0]])
+    made = gap[on[0]] + slope * (x[beyond] - x[on[0]]) + fall * np.abs(x[beyond] - start)
+    gap[beyond], known[beyond] = made, made >= 0.0
 
 
 def _radius(x: Array, gap: Array, far: float) -> float:

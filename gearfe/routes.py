@@ -86,9 +86,7 @@ class Router:
         for i in np.flatnonzero(small):
             one = balance(self.reference(float(angles[i]), float(twists[i])), float(twists[i]))
             found[i] = one
-            share[i], slope[i] = self._share(one)
-        if self.route == "hertz":
-            share[:], slope[:] = 0.0, 0.0
+            share[i], slope[i] = self.share(one)
         direct = np.flatnonzero(share > 0).tolist()
         solved: dict[int, Position] = {}
         if len(direct):
@@ -141,17 +139,10 @@ class Router:
         found = self._touched(angles)
         return np.array([found[float(a)].twist.min(initial=math.inf) for a in angles])
 
-    def _touched(self, angles: Array) -> dict[float, Touching]:
-        new = np.array(sorted({float(a) for a in angles} - self._touching.keys()))
-        if len(new):
-            found = self.flanks.touching(new)
-            for number, angle in enumerate(new):
-                mine = np.flatnonzero(found.position == number)
-                self._touching[float(angle)] = found.take(mine[np.argsort(found.twist[mine], kind="stable")])
-        return self._touching
-
-    def _share(self, found: Balance) -> tuple[float, float]:
+    def share(self, found: Balance) -> tuple[float, float]:
         """Share s of the mesh in the result and ds/dtwist (1/rad)."""
+        if self.route == "hertz":
+            return 0.0, 0.0
         if not found.converged or not (found.force > 0).any():
             return (0.0, 0.0) if found.converged else (1.0, 0.0)
         k = int(np.argmax(found.force))
@@ -162,6 +153,15 @@ class Router:
         x = min(1.0, max(0.0, (b - low) / (high - low)))
         rate = 0.5 * b * found.rate[k] / found.force[k] / (high - low)  # b ~ sqrt F
         return x * x * (3 - 2 * x), 6 * x * (1 - x) * rate
+
+    def _touched(self, angles: Array) -> dict[float, Touching]:
+        new = np.array(sorted({float(a) for a in angles} - self._touching.keys()))
+        if len(new):
+            found = self.flanks.touching(new)
+            for number, angle in enumerate(new):
+                mine = np.flatnonzero(found.position == number)
+                self._touching[float(angle)] = found.take(mine[np.argsort(found.twist[mine], kind="stable")])
+        return self._touching
 
     def _joined(
         self,

@@ -149,6 +149,8 @@ def balance(reference: Reference, twist: float) -> Balance:
         new[back] = np.where(force[back] > 0, least[back], light * left[bears])
         converged = bool(np.abs(new - force).max() <= TOLERANCE * new.max()) and not len(back)
         force = new
+    if not converged:  # the last step may have let pairs bear that have no answer yet
+        answers = [r.local[k].under(force[k] / w) if force[k] > 0 else None for k in range(count)]
     return _balanced(r, force, psi, radial, tuple(answers), iteration, converged)
 
 

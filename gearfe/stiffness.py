@@ -21,7 +21,7 @@ from .contact.compliance import gear_body
 from .contact.corners import corner_bearings
 from .contact.laws import ContactLaw, law_named, law_text
 from .contact.scene import MeshingPair
-from .curve_error import COARSENING, error_estimate, solved_twice
+from .curve_error import COARSENING, error_estimate, law_error, solved_twice
 from .elasticity import Material, Plane
 from .errors import InputError
 from .gear import GearPair
@@ -192,7 +192,8 @@ def sweep_stiffness(
             given = (elastic.pinion.material, elastic.wheel.material)
             common = {"plane": elastic.pinion.plane, "law": elastic.law, "points_per_edge": points_per_edge}
             coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
-            error = _estimate(Router(pair, coarse, route), solved_angles, solved, finite=finite, coarsen=coarsen)
+            routers = router, Router(pair, coarse, route)
+            error = _estimate(routers, solved_angles, solved, finite=finite, coarsen=coarsen)
     curve = assembled_curve(pair, asked, solved_angles, source, solved, touching, lost, searched=torque is not None)
     return replace(curve, law=law_text(elastic.law), timings=dict(watch.seconds), error=error)
 
@@ -231,11 +232,16 @@ def distinct_angles(angles: Array, cycle: float) -> tuple[Array, IntArray]:
     return folded[order][new], source
 
 
-def _estimate(coarse: Router, angles: Array, solved: Solved, *, finite: bool, coarsen: float) -> ErrorEstimate:
+def _estimate(
+    routers: tuple[Router, Router], angles: Array, solved: Solved, *, finite: bool, coarsen: float
+) -> ErrorEstimate:
+    """Error of positions solved by the first router, from the second's on a coarser mesh."""
+    own, coarse = routers
     chosen = solved_twice(np.array(solved.status) == "converged")
     again = at_twists(coarse, angles[chosen], solved.twist[chosen], None, finite=finite)
     other = np.where(np.array(again.status, dtype=object) == "converged", again.numbers["torque_wheel"], np.nan)
-    return error_estimate(angles[chosen], solved.numbers["torque_wheel"][chosen], other, coarsen=coarsen)
+    law = law_error(own, angles[chosen], solved.twist[chosen])
+    return error_estimate(angles[chosen], solved.numbers["torque_wheel"][chosen], other, coarsen=coarsen, law=law)
 
 
 def assembled_curve(

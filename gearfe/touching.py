@@ -10,7 +10,8 @@ the pair touches at :math:`\varphi_k = \min_u D`, and :math:`a_k (D - \varphi_k)
 common normal about the wheel's centre, is the gap beside the point of contact. The minimum is smooth on the path of
 contact and on rounds and reliefs, an end of the range where a sharp tip bears before or after the path.
 
-The working flank is the involute with its relief, then the tip round; roots take no part.
+The working flank is the involute with its relief, then the tip round. Roots take no part, but where one is undercut the
+involute starts with an edge, which can bear as a sharp tip does.
 """
 
 from __future__ import annotations
@@ -45,10 +46,13 @@ class Face:
         Involute with relief, parameter linear in the roll length.
     round_
         Tip round, or None.
+    fall
+        Angle (rad) between involute and root where the flank starts: > 0 on an undercut tooth.
     """
 
     flank: Flank
     round_: Arc | None
+    fall: float = 0.0
 
     @property
     def end(self) -> float:
@@ -127,7 +131,7 @@ class Face:
         """Curvature (1/m) at u, at most `most`, which a sharp tip has."""
         if self.round_ is not None and u > 1.0:
             return min(most, 1.0 / self.round_.radius)
-        if u >= 1.0 - 1e-9:
+        if u >= 1.0 - 1e-9 or (self.fall > 0.0 and u <= 0.0):
             return most
         step = 1e-5
         turned = self.normals(np.array([u + step, max(0.0, u - step)]))
@@ -143,7 +147,7 @@ class Face:
 
     def marks(self) -> list[float]:
         """Parameters where the curvature jumps or the flank ends sharply."""
-        flank, found = self.flank, [1.0]
+        flank, found = self.flank, [0.0, 1.0] if self.fall > 0.0 else [1.0]
         if flank.amount > 0.0:
             found.append((flank.relief_start - flank.start) / (flank.end - flank.start))
         return found
@@ -157,7 +161,13 @@ def face_of(gear: Gear) -> Face:
     """Working flank of a gear."""
     profile = gear.profile
     round_ = next((s.curve for s in profile.segments if s.name == "tip_round"), None)
-    return Face(profile.flank, round_ if isinstance(round_, Arc) else None)
+    arc = round_ if isinstance(round_, Arc) else None
+    if not profile.undercut:
+        return Face(profile.flank, arc)
+    root = profile.segment("trochoid").curve
+    # going up a convex flank its normal turns clockwise
+    fall = np.angle(_complex(root.normal(np.array(1.0))) / _complex(profile.flank.normal(np.array(0.0))))
+    return Face(profile.flank, arc, max(0.0, float(fall)))
 
 
 @dataclass(frozen=True)
@@ -265,9 +275,11 @@ class Flanks:
         turn = np.exp(1j * (angle + number * self.pair.mesh_cycle))
         normal = self.pinion.normals(u) * turn
         wheel_normal = -self.wheel.normals(mate) * np.exp(1j * (self.wheel_frame(angle, number) + twist))
-        at_tip = (u >= self.pinion.end - 1e-9) & self.pinion.sharp
+        at_edge = (u >= self.pinion.end - 1e-9) & self.pinion.sharp
+        if self.pinion.fall > 0.0:
+            at_edge |= (u <= 0.0) & ~(self.wheel.sharp & (mate >= self.wheel.end - 1e-9))
         # at a corner the smooth mate's normal counts, since the force is normal to it without friction
-        normal = np.where(at_tip, wheel_normal, normal)
+        normal = np.where(at_edge, wheel_normal, normal)
         point = seen + self.pair.working_centre_distance
         arm = np.stack([_cross(point, normal), -_cross(seen, normal)], axis=1)
         place = np.stack([u, mate], axis=1)

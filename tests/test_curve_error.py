@@ -12,8 +12,9 @@ from gearfe import sweep_stiffness
 from gearfe.contact.corners import corner_bearings, shares
 from gearfe.contact.laws import Nitsche, Penalty
 from gearfe.contact.solver import solve_positions
-from gearfe.curve_error import COARSENING, COMMON, ORDER, error_estimate, solved_twice
+from gearfe.curve_error import COARSENING, COMMON, LAW, LAW_AT_EDGES, ORDER, error_estimate, law_error, solved_twice
 from gearfe.elasticity import Material
+from gearfe.routes import Router
 from gearfe.stiffness import elastic_pair
 
 from . import gears
@@ -118,6 +119,28 @@ def test_positions_solved_twice_have_converged_and_span_the_sweep():
     assert converged[chosen].all()
     assert (chosen[0], chosen[-1]) == (1, 98)
     assert len(solved_twice(np.zeros(3, dtype=bool))) == 0
+
+
+def test_what_the_law_of_small_loads_adds():
+    """Nothing to the mesh alone; its own bound below; between, mesh and law lie within the term of their mean."""
+    elastic = elastic_pair(SHARP, coarsen=1.5)
+    angles, twists = np.full(9, math.radians(13.0)), np.radians(np.geomspace(0.002, 0.4, 9))
+    router = Router(SHARP, elastic)
+    routes = [p.route for p in router.solve(angles, twists)]
+    found = law_error(router, angles, twists)
+    assert set(routes) == {"hertz", "blend", "direct"}
+    for route, value in zip(routes, found, strict=True):
+        assert value == LAW if route == "hertz" else (value == 0.0) == (route == "direct")
+    chosen = [routes.index("blend")]
+    mean, mesh, law = (
+        Router(SHARP, elastic, r).solve(angles[chosen], twists[chosen])[0] for r in ("auto", "direct", "hertz")
+    )
+    apart = max(abs(one.torque_wheel / mean.torque_wheel - 1) for one in (mesh, law))
+    assert apart > 0
+    assert found[chosen[0]] >= apart * (1 - 1e-2)
+    assert (law_error(Router(SHARP, elastic, "direct"), angles, twists) == 0).all()
+    # a sharp tip that bears before the path
+    assert law_error(Router(SHARP, elastic, "hertz"), np.radians([17.0]), np.radians([0.05]))[0] == LAW_AT_EDGES
 
 
 @pytest.mark.parametrize("twist_deg", [0.03, pytest.param(0.2, marks=pytest.mark.slow)])

@@ -140,6 +140,11 @@ class LocalContact:
         """2/(pi E*) (1/Pa)."""
         return 2.0 / (math.pi * self.modulus)
 
+    @property
+    def clear(self) -> float:
+        """Half width (m) up to which a contact is Hertz's: what is not smooth lies well beside it."""
+        return 0.35 * self.smooth
+
     def elliptic_mean(self, low: float, high: float) -> float:
         """Mean displacement (m2/N) under an elliptic pressure of unit load from `low` to `high` (m)."""
         a = 0.5 * (high - low)
@@ -154,7 +159,7 @@ class LocalContact:
     def under(self, load: float) -> Approach:
         """Approach and contact under the force per width P = `load` > 0 (N/m)."""
         b = float(half_width(load, self.modulus, self.radius))
-        if b <= 0.35 * self.smooth:
+        if b <= self.clear:
             rigid = sum(e.factor * math.log(2.0 * abs(e.place)) for e in self.edges)
             lam = load * (self.unit * (0.5 - math.log(0.5 * b)) - rigid)
             rate = self.unit * -math.log(0.5 * b) - rigid
