@@ -119,7 +119,7 @@ def test_a_process_that_dies_costs_its_case_only() -> None:
         def join(self, _seconds: float) -> None:
             pass
 
-    row = _answer(_campaign(None), 1, 0, Gone(), Gone(), time.monotonic())
+    row = _answer(_campaign(None), 1, 0, Gone(), Gone(), time.monotonic(), 0.0)
     assert (row.outcome, row.bad) == ("crash", True)
     assert "-11" in row.reason
 
