@@ -36,8 +36,6 @@ BATCH = 64
 GROUP_BYTES = 60e6
 #: Newton steps spent on one difficult position before it is given up.
 MAX_STEPS = 320
-#: Largest number of repetitions for the tangent; on a smooth flank each gains two to three digits, at a corner one.
-TANGENT_REPEATS = 24
 
 
 @dataclass(frozen=True)
@@ -309,7 +307,7 @@ def _finish(scene: Scene, outcome: Outcome, iterations: int) -> Position:
     state = outcome.state
     active = np.flatnonzero(state.unknown > 0)
     placed = scene.placed(state.displacement)
-    lin = linearise(scene, outcome.projection, active, state.pressure)
+    lin = linearise(scene, outcome.projection, active, state.pressure, placed)
     forces = np.zeros(2 * len(scene.points))
     forces[lin.unknowns] = lin.weighted @ state.unknown[active]
     force = np.matmul(scene.rotation, forces.reshape(-1, 2, 1))[:, :, 0]
@@ -360,14 +358,8 @@ def _tangent(scene: Scene, lin: Linearised, forces: Array, placed: Array) -> tup
     carried = np.where(wheel, _quarter_turn(arm), 0.0).ravel()
     frame = np.where(wheel, _quarter_turn(force), 0.0).ravel()
     right = lin.response @ frame - lin.parameter * (lin.opening @ carried)
-    bend = np.zeros(len(frame))
-    for _ in range(TANGENT_REPEATS):
-        solved = lin.solve(right - lin.response @ bend)
-        rate = lin.weighted @ solved + bend
-        moved = carried + lin.moved(solved, rate - frame)
-        before, bend = bend, lin.bending(moved)
-        if np.abs(bend - before).sum() <= 1e-12 * np.abs(rate).sum():
-            break
+    solved, rate = lin.solve(right, carried - lin.compliance @ frame)
+    moved = carried + lin.moved(solved, rate - frame)
     change = _moment(arm, (rate - frame).reshape(-1, 2)) + _moment((moved - carried).reshape(-1, 2), force)
     spread = np.zeros_like(forces)
     spread[lin.unknowns] = rate - frame
