@@ -129,7 +129,7 @@ class Outcome:
 Dialogue = Generator[tuple[Array, Array], Projection, Outcome]
 
 
-def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
+def newton(scene: Scene, state: State, tolerance: float, most: int = MAX_ITERATIONS) -> Dialogue:
     """Solve one position from `state`, asking for projections by `yield` so that several positions can share them.
 
     A backtracking line search on the weighted pressure residual watches over all but the first steps.
@@ -140,7 +140,7 @@ def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
     wanted = state.unknown  # the guess chooses the first active set; afterwards the law does
     limit = 1e3 * float(scene.weight @ state.pressure)
     for iteration in range(1, PATIENCE + 1):
-        if iteration > MAX_ITERATIONS and residual > NEAR:
+        if iteration > most and residual > NEAR:
             return Outcome("not_converged", state, projection, iteration - 1)
         active = _active(scene, projection, wanted)
         if len(active) == 0:

@@ -34,9 +34,11 @@ TOLERANCE = 1e-10
 BATCH = 64
 #: Memory for the matrices of positions that are solved side by side.
 GROUP_BYTES = 60e6
-#: Shares of its stiffness at which a law without stress is solved one after the other where its own is too hard to
-#: start with: a point pressed in by a rounding error of the shape changes sides at every step.
-SOFTENED, SOFT_TOLERANCE = (0.01, 0.03, 0.1, 0.3), 1e-2
+#: A law without stress that is too hard to start with, as points change sides at every step, is solved softened to this
+#: share of its stiffness first, and then to so many times as much, by smaller factors where that fails.
+SOFTEST, SOFTNESS_STEP, SMALLEST_STEP = 0.01, 3.2, 1.1
+#: Accuracy of the softer solutions, and Newton steps for each.
+SOFT_TOLERANCE, SOFT_ITERATIONS = 1e-2, 20
 #: Newton steps spent on one difficult position before it is given up.
 MAX_STEPS = 320
 
@@ -304,16 +306,26 @@ def _with_care(
 
 def _solving(pair: MeshingPair, scene: Scene, tolerance: float) -> Dialogue:
     """Newton's method from the Hertzian guess; for laws without stress by way of softer ones."""
-    state, steps = _start(pair, scene), 0
-    if not (pair.law.uses_stress or scene.hats is not None):
-        for share in SOFTENED:
-            softer = replace(scene, parameter=share * scene.parameter)
-            found = yield from newton(softer, state, SOFT_TOLERANCE)
-            steps += found.iterations
-            if found.status == "converged":
-                state = replace(found.state, place=found.projection.place)
-    outcome = yield from newton(scene, state, tolerance)
-    return replace(outcome, iterations=steps + outcome.iterations)
+    state = _start(pair, scene)
+    if pair.law.uses_stress or scene.hats is not None:
+        return (yield from newton(scene, state, tolerance))
+    share, factor, solved, steps = SOFTEST, SOFTNESS_STEP, 0.0, 0
+    while True:
+        softer = scene if share == 1.0 else replace(scene, parameter=share * scene.parameter)
+        outcome = yield from newton(softer, state, SOFT_TOLERANCE if share < 1.0 else tolerance, SOFT_ITERATIONS)
+        steps += outcome.iterations
+        if outcome.status == "converged":
+            if share == 1.0:
+                break
+            state, solved = replace(outcome.state, place=outcome.projection.place), share
+        else:
+            factor = np.sqrt(factor)
+            if solved == 0.0 or factor < SMALLEST_STEP:
+                outcome = yield from newton(scene, state, tolerance)
+                steps += outcome.iterations
+                break
+        share = min(1.0, factor * solved)
+    return replace(outcome, iterations=steps)
 
 
 def _alone(scene: Scene, start: State, tolerance: float) -> Outcome:
