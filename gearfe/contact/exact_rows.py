@@ -33,6 +33,8 @@ from .closest import Projection
 Array = NDArray[Any]
 IntArray = NDArray[Any]
 
+#: Ranges of a point's ten nodes within which no node is met twice.
+PARTS = (slice(0, 3), slice(3, 5), slice(5, 8), slice(8, 10))
 #: Derivatives of an edge's shape functions at its start and end.
 AT_START, AT_END = np.array([-3.0, 4.0, -1.0]), np.array([1.0, -4.0, 3.0])
 

@@ -110,8 +110,13 @@ def _spread(found: Projection, points: IntArray, count: int) -> Projection:
     return Projection(**made)
 
 
-def iterate(group: Group, pressure: Array, forces: Array, rigid: Projection, tolerance: float) -> Outcomes:
-    """Solve all positions of the group from guessed pressures (Pa) and forces (N)."""
+def iterate(
+    group: Group, pressure: Array, forces: Array, rigid: Projection, tolerance: float, unbalanced: float | None = None
+) -> Outcomes:
+    """Solve all positions of the group from guessed pressures (Pa) and forces (N).
+
+    `unbalanced` is the accuracy asked of the forces, ten times `tolerance` where it is not given.
+    """
     size, every = group.size, np.arange(group.size)
     displacement, stress = group.respond(forces, every.tolist())
     motion = Motion(pressure, stress, pressure, forces, displacement, rigid, np.full(size, np.inf))
@@ -123,10 +128,12 @@ def iterate(group: Group, pressure: Array, forces: Array, rigid: Projection, tol
     iterations = np.zeros(size, dtype=np.int64)
     for iteration in range(1, MAX_ITERATIONS + 2):
         active = (motion.asked > 0) & ~unreached(motion.found.gap) & live[group.at]
-        rows = rows_of(group, motion.found, motion.pressure, np.flatnonzero(active))
+        rows = rows_of(
+            group, motion.found, motion.pressure, np.flatnonzero(active), group.placed(motion.displacement)
+        )
         enough = np.maximum(tolerance, _rounding(group, motion))
         done = live & (motion.residual < enough)
-        done &= _unbalanced(group, motion, rows) < 10 * tolerance
+        done &= _unbalanced(group, motion, rows) < (10 * tolerance if unbalanced is None else unbalanced)
         converged |= done
         live &= ~done & (np.bincount(rows.at, minlength=size) > 0)
         if iteration > MAX_ITERATIONS or not live.any():

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from .closest import Projection
-from .exact_rows import exact_rows
+from .exact_rows import PARTS, exact_rows
 from .scene import Scene
 
 Array = NDArray[Any]
@@ -102,7 +102,7 @@ def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: 
     slot = np.arange(len(points))[:, None] * len(nodes) + place[rows.nodes]
     spread = np.zeros((4, len(points) * len(nodes), 2))
     # no slot is met twice within a part: of a neighbour that does not exist another node stands in
-    for part in (slice(0, 3), slice(3, 5), slice(5, 8), slice(8, 10)):
+    for part in PARTS:
         for row, values in zip(spread, (rows.normal, rows.slide, rows.turn, rows.lift), strict=True):
             row[slot[:, part]] += values[:, part]
     normal, slide, turn, lift = spread.reshape(4, len(points), 2 * len(nodes))

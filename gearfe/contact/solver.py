@@ -37,6 +37,8 @@ GROUP_BYTES = 60e6
 #: A law without stress that is too hard to start with, as points change sides at every step, is solved softened to this
 #: share of its stiffness first, and then to so many times as much, by smaller factors where that fails.
 SOFTEST, SOFTNESS_STEP, SMALLEST_STEP = 0.01, 3.2, 1.1
+#: The same in lockstep, at fixed shares.
+SOFTER = (0.01, 0.03, 0.1, 0.3)
 #: Accuracy of the softer solutions, and Newton steps for each.
 SOFT_TOLERANCE, SOFT_ITERATIONS = 1e-2, 20
 #: Newton steps spent on one difficult position before it is given up.
@@ -162,12 +164,18 @@ def _quickly(
     """Solve the positions `facing` in lockstep; the answer are those for which that was not enough."""
     left: list[int] = []
     waiting = list(facing)
-    for reach in (CLOSE, REACH):
+    for reach, softly in ((CLOSE, False), (REACH, False), (REACH, True)):
+        if softly:
+            if pair.law.uses_stress:
+                break
+            waiting, left = sorted(left + waiting), []
         windows = {i: windows_of(pair, found[i], angles[i], twists[i], reach) for i in waiting}
         outgrew: list[int] = []
         for group in _groups([windows[i][-1].nodes.stop for i in waiting]):
             places = [waiting[k] for k in group]
-            made = solve_group(pair, [windows[i] for i in places], [found[i] for i in places], tolerance)
+            made = solve_group(
+                pair, [windows[i] for i in places], [found[i] for i in places], tolerance, softly=softly
+            )
             for i, position in zip(places, made, strict=True):
                 if position.status == "converged":
                     positions[i] = position
@@ -178,19 +186,35 @@ def _quickly(
 
 
 def solve_group(
-    pair: MeshingPair, windows: Sequence[Sequence[Window]], found: Sequence[list[Overlap]], tolerance: float
+    pair: MeshingPair,
+    windows: Sequence[Sequence[Window]],
+    found: Sequence[list[Overlap]],
+    tolerance: float,
+    *,
+    softly: bool = False,
 ) -> list[Position]:
-    """Positions with these windows, solved in lockstep: ``converged``, ``not_converged`` or ``outgrown``."""
+    """Positions with these windows, solved in lockstep, perhaps by way of softer laws: ``converged``, ``not_converged``
+
+    or ``outgrown``.
+    """
     group = gather(pair, windows)
     deepest = np.array([one.deepest[g] for overlapping in found for g in (0, 1) for one in overlapping])
     rigid = rigid_projection(pair, group, deepest)
-    outcomes = iterate(group, *starting_states(pair, group, rigid), rigid, tolerance)
+    pressure, forces = starting_states(pair, group, rigid)
+    for share in SOFTER if softly else ():
+        softer = iterate(
+            replace(group, parameter=share * group.parameter), pressure, forces, rigid, SOFT_TOLERANCE, SOFT_TOLERANCE
+        )
+        at_points, at_nodes = softer.converged[group.at], softer.converged[group.position[group.node_window]]
+        pressure = np.where(at_points, softer.motion.pressure, pressure)
+        forces = np.where(np.repeat(at_nodes, 2), softer.motion.forces, forces)
+    outcomes = iterate(group, pressure, forces, rigid, tolerance)
     beyond = outgrown(group, outcomes.motion)
     outcomes = replace(outcomes, converged=outcomes.converged & ~beyond)
     results = results_of(pair, group, outcomes)
     scenes = scenes_of(pair, group, rigid, (results.forces, results.force_rate), outcomes.motion.pressure)
     made: list[Position] = []
-    for b, (scene, pressure, forces, rate) in enumerate(scenes):
+    for b, (scene, pressed, loads, rate) in enumerate(scenes):
         steps = int(outcomes.iterations[b])
         if not outcomes.converged[b]:
             made.append(_unsolved("outgrown" if beyond[b] else "not_converged", steps))
@@ -208,9 +232,9 @@ def solve_group(
                 peak_pressure=float(results.peak_pressure[b]),
                 iterations=steps,
                 scene=scene,
-                forces=forces,
+                forces=loads,
                 force_rate=rate,
-                pressure=pressure,
+                pressure=pressed,
             )
         )
     return made
