@@ -222,3 +222,29 @@ def linearised(group: Group, rows: Rows) -> Linear:
         pieces.append(Piece(factor, response, both, b, slice(top, top + a), slice(left, left + t)))
         top, left, start = top + a, left + t, start + a * t
     return Linear(pieces, (2 * nodes[:, None] + np.arange(2)).ravel())
+
+
+def coupled(
+    rows: Rows, piece: Piece, unknowns: IntArray, right: Array, origin: Array, fixed: Array
+) -> tuple[Array, Array]:
+    """Pressures and forces of one position with p = right - R f for f = G^T W p + H(C f - origin) + fixed.
+
+    `rows` are its own, `origin` and `fixed` on the `unknowns` that they touch, shape (t,).
+    """
+    columns = np.searchsorted(unknowns, rows.unknowns)
+    number = np.arange(len(columns))[:, None]
+    normal, turn, slide, lift = (np.zeros((len(columns), len(unknowns))) for _ in range(4))
+    for dense, values in ((normal, rows.normal), (turn, rows.turn), (slide, rows.slide), (lift, rows.lift)):
+        np.add.at(dense, (number, columns), values)
+    turned = rows.loads[:, None] * (rows.bow[:, None] * slide + turn)
+    stiffness = (rows.metric[:, None] * slide + rows.gap[:, None] * turn).T @ turned
+    stiffness += normal.T @ (rows.cut[:, None] * slide) - lift.T @ (rows.loads[:, None] * slide)
+    split = len(piece.compliance[0])
+    bent = np.eye(len(unknowns))
+    bent[:, :split] -= stiffness[:, :split] @ piece.compliance[0]
+    bent[:, split:] -= stiffness[:, split:] @ piece.compliance[1]
+    sides = np.column_stack([(rows.area[:, None] * normal).T, fixed - stiffness @ origin])
+    solved = np.linalg.solve(bent, sides)
+    loads, rest = solved[:, :-1], solved[:, -1]
+    pressure = np.linalg.solve(np.eye(len(right)) + piece.response @ loads, right - piece.response @ rest)
+    return pressure, loads @ pressure + rest

@@ -173,9 +173,7 @@ def _quickly(
         outgrew: list[int] = []
         for group in _groups([windows[i][-1].nodes.stop for i in waiting]):
             places = [waiting[k] for k in group]
-            made = solve_group(
-                pair, [windows[i] for i in places], [found[i] for i in places], tolerance, softly=softly
-            )
+            made = solve_group(pair, [windows[i] for i in places], [found[i] for i in places], tolerance, softly=softly)
             for i, position in zip(places, made, strict=True):
                 if position.status == "converged":
                     positions[i] = position
