@@ -138,7 +138,7 @@ def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: 
         if scene.theta:
             relief = scene.theta * areas / gamma
             flex = stress.T * relief
-            unit = weighted + stiffness @ flex
+            unit = weighted + stiffness @ (stress.T * relief)
         matrix = response @ dgetrs(*turning, unit, trans=1)[0]
         if scene.theta:
             matrix += gamma[:, None] * (opening @ flex)
