@@ -141,7 +141,7 @@ def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: 
             unit = weighted + stiffness @ (stress.T * relief)
         matrix = response @ dgetrs(*turning, unit, trans=1)[0]
         if scene.theta:
-            matrix += gamma[:, None] * (opening @ flex)
+            matrix += gamma[:, None] * (opening @ (stress.T * relief))
             matrix += scene.stress_stress.take(active, axis=0).take(active, axis=1) * relief
         matrix.flat[:: len(matrix) + 1] += 1.0
     return Linearised(
