@@ -100,13 +100,19 @@ class Router:
         if self.route == "hertz":
             share[:], slope[:] = 0.0, 0.0
         direct = [i for i in np.flatnonzero(share > 0).tolist() if i not in solved]
-        if len(direct):
+        if direct:
             meshed = solve_positions(self.elastic, np.asarray(angles)[direct], twists[direct])
             solved |= dict(zip(direct, meshed, strict=True))
         made = []
         for n, (angle, twist) in enumerate(zip(angles, twists, strict=True)):
             joined = self._joined(
-                float(angle), float(twist), solved.get(n) if share[n] > 0 else None, found[n], share[n], slope[n], fields=n in kept
+                float(angle),
+                float(twist),
+                solved.get(n) if share[n] > 0 else None,
+                found[n],
+                share[n],
+                slope[n],
+                fields=n in kept,
             )
             made.append(joined if n in kept else bare(joined))
         return made
