@@ -39,6 +39,9 @@ DEFAULT_ELEMENT = 0.028
 RESOLVED = (0.9, 1.3)
 #: Compliance of a tooth pair times E* w beyond which none is: with it a light load is told without a reference.
 SOFTEST = 40.0
+#: The same of usual teeth: where it tells that the load is not light, the mesh is asked first, and believed where its
+#: forces make a contact so many times as wide as the widest that is blended.
+USUAL, CLEARLY = 10.0, 1.2
 #: References are made for pairs that touch up to this many times the twist asked for.
 SPARE = 1.5
 
@@ -80,28 +83,57 @@ class Router:
             made = solve_positions(self.elastic, angles, twists)
             return [p if i in kept else bare(p) for i, p in enumerate(made)]
         self._touched(angles)  # all angles in one go
-        small = self.light(angles, twists)
+        small, likely = self.light(angles, twists), self.light(angles, twists, USUAL)
+        solved: dict[int, Position] = {}
+        # most of what may be light is not: the mesh's own forces tell, where they are clear
+        first = np.flatnonzero(small & ~likely).tolist()
+        if first:
+            meshed = solve_positions(self.elastic, np.asarray(angles)[first], twists[first])
+            solved = dict(zip(first, meshed, strict=True))
+            small[[i for i in first if self._clear(float(angles[i]), solved[i])]] = False
         found: list[Balance | None] = [None] * len(angles)
         share, slope = np.ones(len(angles)), np.zeros(len(angles))
         for i in np.flatnonzero(small):
             one = balance(self.reference(float(angles[i]), float(twists[i])), float(twists[i]))
             found[i] = one
             share[i], slope[i] = self.share(one)
-        direct = np.flatnonzero(share > 0).tolist()
-        solved: dict[int, Position] = {}
-        if len(direct):
+        direct = [i for i in np.flatnonzero(share > 0).tolist() if i not in solved]
+        if direct:
             meshed = solve_positions(self.elastic, np.asarray(angles)[direct], twists[direct])
-            solved = dict(zip(direct, meshed, strict=True))
+            solved |= dict(zip(direct, meshed, strict=True))
         made = []
         for n, (angle, twist) in enumerate(zip(angles, twists, strict=True)):
             joined = self._joined(
-                float(angle), float(twist), solved.get(n), found[n], share[n], slope[n], fields=n in kept
+                float(angle),
+                float(twist),
+                solved.get(n) if share[n] > 0 else None,
+                found[n],
+                share[n],
+                slope[n],
+                fields=n in kept,
             )
             made.append(joined if n in kept else bare(joined))
         return made
 
-    def light(self, angles: Array, twists: Array) -> NDArray[np.bool_]:
-        """Where the load may be small; the others are resolved whatever the teeth's compliance may be."""
+    def _clear(self, angle: float, position: Position) -> bool:
+        """Whether the force that the mesh gives to the leading pair makes a contact that is resolved beyond doubt."""
+        if position.status != "converged":
+            return False
+        k = int(np.argmax(position.pair_torques))
+        touching = self._touching[angle]
+        mine = np.flatnonzero(touching.pair == position.pair_numbers[k])
+        if len(mine) != 1:
+            return False
+        place = touching.place[mine[0]]
+        curved = sum(f.curvature(float(place[g]), math.inf) for g, f in enumerate(self.flanks.faces))
+        if not (math.isfinite(curved) and curved > 0):
+            return False
+        force = position.pair_torques[k] / (touching.arm[mine[0], 1] * self.elastic.width)
+        effective = 1 / sum(body.material.contact_compliance(body.plane) for body in self.elastic.bodies)
+        return bool(math.sqrt(4 * force / (math.pi * effective * curved)) > CLEARLY * RESOLVED[1] * self.length)
+
+    def light(self, angles: Array, twists: Array, softest: float = SOFTEST) -> NDArray[np.bool_]:
+        """Where the load may be small; the others are resolved whatever the teeth's compliance up to `softest` is."""
         if self.route == "hertz":
             return np.ones(len(angles), dtype=bool)
         found = self._touched(angles)
@@ -118,7 +150,7 @@ class Router:
             if not (overlap > 0 and math.isfinite(curved) and curved > 0):
                 continue
             # another pair may take load off this one; it can at most halve it while both are on the path
-            width = math.sqrt(4 * 0.5 * overlap / SOFTEST / (math.pi * curved))
+            width = math.sqrt(4 * 0.5 * overlap / softest / (math.pi * curved))
             made[i] = width < RESOLVED[1] * self.length
         return made
 

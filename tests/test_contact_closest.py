@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from gearfe.contact.closest import OFF_END, Projection, Rows, chains_of, gap_rows, nearest_places, project
+from gearfe.contact.exact_rows import ExactRows, exact_rows
 from gearfe.contact.flank import edge_nodes, edge_shapes
-from gearfe.contact.newton import Linearised
 
 EDGES = 4
 STEP = 1e-5
@@ -89,38 +89,36 @@ def test_variation_of_gap_and_of_closest_place(scene: dict[str, np.ndarray]) -> 
     np.testing.assert_allclose(slide, (after.place - before.place) / (2 * STEP), rtol=1e-8)
 
 
-def test_variation_of_the_contact_force(scene: dict[str, np.ndarray]) -> None:
-    """Delta(n.D) along u, tested with v: what `Linearised.bending` applies for unit loads."""
-    p = _project(scene, scene["nodes"])
-    rows = _rows(scene, p)
-    spread = np.zeros((2, len(p.gap), len(scene["nodes"]), 2))
-    points = np.arange(len(p.gap))[:, None]
-    spread[0, points, rows.nodes], spread[1, points, rows.nodes] = rows.tilt, rows.slide
-    tilt, slide = spread.reshape(2, len(p.gap), -1)
-    nothing = np.zeros(0)
-    for q in range(len(p.gap)):  # one loaded point at a time
-        loads = np.zeros(len(p.gap))
-        loads[q] = 1.0
-        lin = Linearised(
-            unknowns=nothing,
-            opening=nothing,
-            weighted=nothing,
-            tilt=tilt,
-            slide=slide,
-            projection=p,
-            loads=loads,
-            gap=nothing,
-            parameter=nothing,
-            compliance=nothing,
-            response=nothing,
-            factor=None,
-            normal=nothing,
-            cut=nothing,
-        )
-        expected = lin.bending(scene["u"].ravel()) @ scene["v"].ravel()
-        after, before = (_rows(scene, _moved(scene, s * STEP)) for s in (1, -1))
-        change = _applied(after.normal, after, scene["v"]) - _applied(before.normal, before, scene["v"])
-        assert expected == pytest.approx(change[q] / (2 * STEP), rel=1e-7)
+def test_exact_variations_between_kinked_edges(scene: dict[str, np.ndarray]) -> None:
+    """No parabola any more: vertices out of line, and displacements that turn every edge another way."""
+    rng = np.random.default_rng(1)
+    half = len(scene["nodes"]) // 2
+    scene["nodes"][:half] += 2e-5 * rng.normal(size=(half, 2))
+    scene["u"], scene["v"] = 1e-3 * rng.normal(size=(2, *scene["nodes"].shape))
+    scene["slave_nodes"] = np.repeat(scene["slave_nodes"], 3, axis=0)
+    scene["shapes"] = edge_shapes(np.tile([0.1, 0.5, 0.85], EDGES))[0]
+
+    def at(step: float) -> tuple[Projection, ExactRows]:
+        p, nodes = _moved(scene, step), scene["nodes"] + step * np.einsum("nij,nj->ni", scene["rotation"], scene["u"])
+        edges = np.full(len(p.gap), EDGES)
+        return p, exact_rows(p, edges, nodes, scene["slave_nodes"], scene["shapes"], scene["rotation"])
+
+    def applied(name: str, rows: ExactRows, field: str) -> np.ndarray:
+        return np.einsum("qai,qai->q", getattr(rows, name), scene[field][rows.nodes])
+
+    step = 1e-6
+    (p, rows), (after, rows_after), (before, rows_before) = at(0.0), at(step), at(-step)
+    seen = p.gap < OFF_END
+    assert seen.sum() > 8
+    assert np.abs(rows.steep[seen] / rows.metric[seen]).max() > 0.1
+    slide, turn = applied("slide", rows, "u"), applied("turn", rows, "u")
+    gap = applied("normal", rows, "u") - rows.steep * slide
+    force = (rows.bow * slide + turn) * (rows.metric * applied("slide", rows, "v") + p.gap * applied("turn", rows, "v"))
+    force -= applied("lift", rows, "v") * slide
+    change = applied("normal", rows_after, "v") - applied("normal", rows_before, "v")
+    for exact, difference in ((gap, after.gap - before.gap), (slide, after.place - before.place), (force, change)):
+        expected = difference[seen] / (2 * step)
+        np.testing.assert_allclose(exact[seen], expected, rtol=0, atol=1e-7 * np.abs(expected).max())
 
 
 def test_gap_is_continuous_past_a_kinked_vertex_and_off_beyond_the_ends() -> None:

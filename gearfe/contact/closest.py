@@ -15,8 +15,8 @@ and
     \Delta(n\cdot D) = -(1 - g\kappa/m)(N_\Delta\,\delta\xi + N_\delta\,\Delta\xi + \kappa\,\delta\xi\,\Delta\xi)
     + \frac{g}{m} N_\Delta N_\delta
 
-(Laursen, *Computational Contact and Impact Mechanics*, 2002, ch. 5, written out for two dimensions; the last expression
-leaves out products of n.a, which is of the order of the kinks between edges).
+(Laursen, *Computational Contact and Impact Mechanics*, 2002, ch. 5, written out for two dimensions). The last two take
+the normal's turning from the point's own edge; `gearfe.contact.exact_rows` has them with kinks between edges.
 """
 
 from __future__ import annotations

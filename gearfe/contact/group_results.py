@@ -46,9 +46,9 @@ class Results:
 def results_of(pair: MeshingPair, group: Group, outcomes: Outcomes) -> Results:
     """Evaluate the converged positions."""
     motion, good = outcomes.motion, outcomes.converged
-    rows = rows_of(group, motion.found, motion.pressure, np.flatnonzero((motion.pressure > 0) & good[group.at]))
-    forces = rows.forces(motion.pressure[rows.points], len(motion.forces))
     placed = group.placed(motion.displacement)
+    rows = rows_of(group, motion.found, motion.pressure, np.flatnonzero((motion.pressure > 0) & good[group.at]), placed)
+    forces = rows.forces(motion.pressure[rows.points], len(motion.forces))
     centre = pair.centre(1)
     window = group.node_window
     of_wheel = group.gear[window] == 1

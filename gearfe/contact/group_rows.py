@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 
-from .closest import Projection, gap_rows
+from .closest import Projection
+from .exact_rows import PARTS, exact_rows
 from .group import Group
 
 Array = NDArray[Any]
@@ -18,16 +19,20 @@ IntArray = NDArray[Any]
 
 @dataclass(frozen=True)
 class Rows:
-    """Rows of the active points, each over the 12 unknowns that it touches.
+    """Rows of the active points, each over the 20 unknowns that it touches.
 
     Attributes
     ----------
     points : ndarray, shape (a,)
     at : ndarray, shape (a,)
         Position of each.
-    unknowns : ndarray, shape (a, 12)
-    opening, normal, tilt, slide : ndarray, shape (a, 12)
-        dg/du, G, N and d xi, see `gearfe.contact.closest`.
+    unknowns : ndarray, shape (a, 20)
+    opening, normal, turn, slide, lift : ndarray, shape (a, 20)
+        dg/du, G, theta, d xi and A, see `gearfe.contact.exact_rows`.
+    loads, cut : ndarray, shape (a,)
+        Forces of the points, and their change per unit of the foot point where a sharp end cuts their areas (N).
+    metric, bow, gap : ndarray, shape (a,)
+        M, nu and g.
     """
 
     points: IntArray
@@ -35,13 +40,14 @@ class Rows:
     unknowns: IntArray
     opening: Array
     normal: Array
-    tilt: Array
+    turn: Array
     slide: Array
+    lift: Array
     loads: Array
     cut: Array
-    share: Array
-    curvature: Array
-    thin: Array
+    metric: Array
+    bow: Array
+    gap: Array
     area: Array
 
     def take(self, chosen: NDArray[np.bool_]) -> Rows:
@@ -51,12 +57,12 @@ class Rows:
     def bending(self, change: Array) -> Array:
         """H change: how the contact forces turn and move when the nodes move by `change`, shape (2n,)."""
         moved = change[self.unknowns]
-        tilt, slide = _dot(self.tilt, moved), _dot(self.slide, moved)
-        to_slide = -self.loads * self.share * (tilt + self.curvature * slide)
-        to_tilt = self.loads * (self.thin * tilt - self.share * slide)
-        parts = (
-            to_slide[:, None] * self.slide + to_tilt[:, None] * self.tilt + (self.cut * slide)[:, None] * self.normal
-        )
+        slide = _dot(self.slide, moved)
+        turned = self.loads * (self.bow * slide + _dot(self.turn, moved))
+        parts = (self.metric * turned)[:, None] * self.slide + (self.gap * turned)[:, None] * self.turn
+        parts -= (self.loads * slide)[:, None] * self.lift
+        if self.cut.any():
+            parts += (self.cut * slide)[:, None] * self.normal
         return np.bincount(self.unknowns.ravel(), weights=parts.ravel(), minlength=len(change))
 
     def forces(self, pressure: Array, size: int) -> Array:
@@ -133,29 +139,32 @@ class Linear:
         return out
 
 
-def rows_of(group: Group, found: Projection, pressure: Array, active: IntArray) -> Rows:
-    """Rows of the active points at their closest points `found`, under the pressures (Pa), shape (q,)."""
+def rows_of(group: Group, found: Projection, pressure: Array, active: IntArray, placed: Array) -> Rows:
+    """Rows of the active points at their closest points `found`, under the pressures (Pa), shape (q,), with the nodes
+
+    in their places (m), shape (n, 2).
+    """
     chosen = found.take(active)
-    rows = gap_rows(chosen, group.slave_nodes[active], group.slave_shapes[active], group.rotation)
-    steep = chosen.normal[:, 0] * chosen.tangent[:, 0] + chosen.normal[:, 1] * chosen.tangent[:, 1]
-    normal, tilt, slide = (x.reshape(len(active), 12) for x in (rows.normal, rows.tilt, rows.slide))
-    unknowns = (2 * rows.nodes[:, :, None] + np.arange(2)).reshape(len(active), 12)
-    metric = chosen.tangent[:, 0] ** 2 + chosen.tangent[:, 1] ** 2
+    edges, slaves = group.counts[group.facing[active]], group.slave_nodes[active]
+    rows = exact_rows(chosen, edges, placed, slaves, group.slave_shapes[active], group.rotation)
+    normal, turn, slide, lift = (x.reshape(len(active), 20) for x in (rows.normal, rows.turn, rows.slide, rows.lift))
+    unknowns = (2 * rows.nodes[:, :, None] + np.arange(2)).reshape(len(active), 20)
     area, pressed, weight = group.areas(chosen.place, active), pressure[active], group.weight[active]
     across = (area > 0) & (area < weight)
     return Rows(
         points=active,
         at=group.at[active],
         unknowns=unknowns,
-        opening=normal - steep[:, None] * slide,
+        opening=normal - rows.steep[:, None] * slide,
         normal=normal,
-        tilt=tilt,
+        turn=turn,
         slide=slide,
+        lift=lift,
         loads=area * pressed,
         cut=np.where(across, -weight / (2 * group.fade[active]) * pressed, 0.0),
-        share=1 - chosen.gap * chosen.curvature / metric,
-        curvature=chosen.curvature,
-        thin=chosen.gap / metric,
+        metric=rows.metric,
+        bow=rows.bow,
+        gap=chosen.gap,
         area=area,
     )
 
@@ -176,15 +185,18 @@ def linearised(group: Group, rows: Rows) -> Linear:
     row = np.arange(len(at)) - (np.cumsum(active) - active)[at]
     area = active * length
     slot = (np.cumsum(area) - area)[at] + row * length[at]
-    slots = slot[:, None] + column[unknowns // 2] + np.tile([0, 1], 6)
+    slots = slot[:, None] + column[unknowns // 2] + np.tile([0, 1], 10)
     opening, weighted = np.zeros(area.sum()), np.zeros(area.sum())
-    opening[slots] = group.parameter[points][:, None] * rows.opening
-    weighted[slots] = rows.area[:, None] * rows.normal
+    scaled_opening, scaled_normal = group.parameter[points][:, None] * rows.opening, rows.area[:, None] * rows.normal
+    for of_nodes in PARTS:
+        own = slice(2 * of_nodes.start, 2 * of_nodes.stop)
+        opening[slots[:, own]] += scaled_opening[:, own]
+        weighted[slots[:, own]] += scaled_normal[:, own]
     # unknowns and stress rows within their blocks
     local = ((2 * (nodes - group.first_node[group.block_window[block]]))[:, None] + np.arange(2)).ravel()
-    own = 2 * at + group.gear[group.owner[points]]
-    stress = points - group.first_point[group.block_window[own]]
-    rows_of_block, columns_of_block = np.bincount(own, minlength=2 * group.size).tolist(), (2 * count).tolist()
+    own_block = 2 * at + group.gear[group.owner[points]]
+    stress = points - group.first_point[group.block_window[own_block]]
+    rows_of_block, columns_of_block = np.bincount(own_block, minlength=2 * group.size).tolist(), (2 * count).tolist()
     pieces: list[Piece] = []
     top = left = start = 0
     for b in np.flatnonzero(active).tolist():
@@ -210,3 +222,29 @@ def linearised(group: Group, rows: Rows) -> Linear:
         pieces.append(Piece(factor, response, both, b, slice(top, top + a), slice(left, left + t)))
         top, left, start = top + a, left + t, start + a * t
     return Linear(pieces, (2 * nodes[:, None] + np.arange(2)).ravel())
+
+
+def coupled(
+    rows: Rows, piece: Piece, unknowns: IntArray, right: Array, origin: Array, fixed: Array
+) -> tuple[Array, Array]:
+    """Pressures and forces of one position with p = right - R f for f = G^T W p + H(C f - origin) + fixed.
+
+    `rows` are its own, `origin` and `fixed` on the `unknowns` that they touch, shape (t,).
+    """
+    columns = np.searchsorted(unknowns, rows.unknowns)
+    number = np.arange(len(columns))[:, None]
+    normal, turn, slide, lift = (np.zeros((len(columns), len(unknowns))) for _ in range(4))
+    for dense, values in ((normal, rows.normal), (turn, rows.turn), (slide, rows.slide), (lift, rows.lift)):
+        np.add.at(dense, (number, columns), values)
+    turned = rows.loads[:, None] * (rows.bow[:, None] * slide + turn)
+    stiffness = (rows.metric[:, None] * slide + rows.gap[:, None] * turn).T @ turned
+    stiffness += normal.T @ (rows.cut[:, None] * slide) - lift.T @ (rows.loads[:, None] * slide)
+    split = len(piece.compliance[0])
+    bent = np.eye(len(unknowns))
+    bent[:, :split] -= stiffness[:, :split] @ piece.compliance[0]
+    bent[:, split:] -= stiffness[:, split:] @ piece.compliance[1]
+    sides = np.column_stack([(rows.area[:, None] * normal).T, fixed - stiffness @ origin])
+    solved = np.linalg.solve(bent, sides)
+    loads, rest = solved[:, :-1], solved[:, -1]
+    pressure = np.linalg.solve(np.eye(len(right)) + piece.response @ loads, right - piece.response @ rest)
+    return pressure, loads @ pressure + rest

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 
-from .closest import Projection, gap_rows
+from .closest import Projection
+from .exact_rows import PARTS, exact_rows
 from .scene import Scene
 
 Array = NDArray[Any]
@@ -31,10 +32,10 @@ class Linearised:
         gamma; 1 for multipliers.
     response : ndarray, shape (a, 2t)
         gamma dg/du C + S.
-    normal, tilt, slide, projection, loads
-        Rows G, N and delta xi (`closest.Rows`), projection and loads (N) of the points behind the active unknowns.
-    cut : ndarray
-        Change of each of these points' loads per unit of the foot point, where its stretch lies across a sharp end (N).
+    stiffness : ndarray, shape (2t, 2t)
+        H: how the contact forces turn and move with the touched nodes (N/m).
+    turning
+        Factors of 1 - H C.
     flex : ndarray, shape (2t, a), or None
         Displacements for the stress loads of the active unknowns, S^T theta W/gamma.
     relief : ndarray, shape (a,)
@@ -48,38 +49,31 @@ class Linearised:
     parameter: Array
     compliance: Array
     response: Array
+    stiffness: Array
+    turning: Any
     factor: Any
-    normal: Array
-    tilt: Array
-    slide: Array
-    projection: Projection
-    loads: Array
-    cut: Array
     flex: Array | None = None
     relief: Array = field(default_factory=lambda: np.zeros(0))
 
-    def solve(self, right: Array) -> Array:
-        """Active unknowns for a right-hand side."""
-        return dgetrs(*self.factor, right, trans=1)[0]
+    def solve(self, right: Array, offset: Array) -> tuple[Array, Array]:
+        """Active unknowns p and forces f on the touched nodes, shape (2t,), with
+
+        p + R f = right (and what stress loads add) for f = G^T W p + H (C f + S^T z + offset).
+        """
+        bent = dgetrs(*self.turning, self.stiffness @ offset, trans=1)[0]
+        solved = dgetrs(*self.factor, right - self.response @ bent, trans=1)[0]
+        loads = self.weighted @ solved
+        if self.flex is not None:
+            loads += self.stiffness @ (self.flex @ solved)
+        return solved, dgetrs(*self.turning, loads, trans=1)[0] + bent
 
     def moved(self, solved: Array, forces: Array) -> Array:
         """Displacements of the touched nodes for forces on them, shape (2t,), and active unknowns, shape (a,)."""
         found = self.compliance @ forces
         return found if self.flex is None else found + self.flex @ solved
 
-    def bending(self, change: Array) -> Array:
-        """H change: how the contact forces turn and move when the touched nodes move by `change`, shape (2t,)."""
-        p = self.projection
-        metric = p.tangent[:, 0] ** 2 + p.tangent[:, 1] ** 2
-        tilt, slide = self.tilt @ change, self.slide @ change
-        share = 1 - p.gap * p.curvature / metric
-        to_slide = -share * (tilt + p.curvature * slide)
-        to_tilt = -share * slide + p.gap / metric * tilt
-        bent = (self.loads * to_slide) @ self.slide + (self.loads * to_tilt) @ self.tilt
-        return bent + (self.cut * slide) @ self.normal if self.cut.any() else bent
 
-
-def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: Array) -> Linearised:
+def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: Array, placed: Array) -> Linearised:
     """Rows and factorised matrix of the active unknowns.
 
     Parameters
@@ -88,6 +82,8 @@ def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: 
         Numbers of the active points, or of the active hats where the scene has them.
     pressure : ndarray, shape (q,)
         At the contact points (Pa).
+    placed : ndarray, shape (n, 2)
+        Places of the nodes (m).
     """
     hats = scene.hats
     points = active
@@ -96,19 +92,21 @@ def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: 
         held[active] = True
         points = np.flatnonzero(held[hats.numbers].any(axis=1) & (scene.facing(projection) > 0))
     chosen = projection.take(points)
-    rows = gap_rows(chosen, scene.slave_nodes[points], scene.slave_shapes[points], scene.rotation)
+    edges = scene.counts[scene.mate[points]]
+    rows = exact_rows(chosen, edges, placed, scene.slave_nodes[points], scene.slave_shapes[points], scene.rotation)
     touched = np.zeros(len(scene.points), dtype=bool)
     touched[rows.nodes] = True
     nodes = np.flatnonzero(touched)
     place = np.empty(len(touched), dtype=np.int64)
     place[nodes] = np.arange(len(nodes))
-    # the two edges of a point belong to different teeth: no slot of the dense rows is met twice
     slot = np.arange(len(points))[:, None] * len(nodes) + place[rows.nodes]
-    spread = np.zeros((3, len(points) * len(nodes), 2))
-    spread[0, slot], spread[1, slot], spread[2, slot] = rows.normal, rows.tilt, rows.slide
-    normal, tilt, slide = spread.reshape(3, len(points), 2 * len(nodes))
-    steep = chosen.normal[:, 0] * chosen.tangent[:, 0] + chosen.normal[:, 1] * chosen.tangent[:, 1]
-    opening = normal - steep[:, None] * slide
+    spread = np.zeros((4, len(points) * len(nodes), 2))
+    # no slot is met twice within a part: of a neighbour that does not exist another node stands in
+    for part in PARTS:
+        for row, values in zip(spread, (rows.normal, rows.slide, rows.turn, rows.lift), strict=True):
+            row[slot[:, part]] += values[:, part]
+    normal, slide, turn, lift = spread.reshape(4, len(points), 2 * len(nodes))
+    opening = normal - rows.steep[:, None] * slide
     unknowns = np.empty(2 * len(nodes), dtype=np.int64)
     unknowns[::2], unknowns[1::2] = 2 * nodes, 2 * nodes + 1
     areas, gamma = scene.areas(projection.place)[points], scene.parameter[points]
@@ -116,6 +114,13 @@ def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: 
     shrink = np.where(across, -scene.weight[points] / (2 * scene.fade[points]), 0.0)
     compliance = scene.compliance.take(unknowns, axis=0).take(unknowns, axis=1)
     weighted = np.ascontiguousarray((normal * areas[:, None]).T)
+    loads = (areas * pressure[points])[:, None]
+    turned = loads * (rows.bow[:, None] * slide + turn)
+    stiffness = (rows.metric[:, None] * slide + chosen.gap[:, None] * turn).T @ turned - lift.T @ (loads * slide)
+    if across.any():
+        stiffness += normal.T @ ((shrink * pressure[points])[:, None] * slide)
+    # transposed matrices are what LAPACK sees in C order: factorise those, solve transposed, and nothing is copied
+    turning = dgetrf((np.eye(len(stiffness)) - stiffness @ compliance).T)[:2]
     gap, flex, relief = chosen.gap, None, np.zeros(0)
     if hats is not None:
         values = hats.matrix(active, points)
@@ -123,21 +128,22 @@ def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: 
         opening = values.T @ (areas[:, None] * opening + (shrink * gap)[:, None] * slide)
         gap, gamma = values.T @ (areas * gap), np.ones(len(active))
         response = opening @ compliance
-        matrix = response @ weighted
+        matrix = response @ dgetrs(*turning, weighted, trans=1)[0]
     else:
         response = (gamma[:, None] * opening) @ compliance
         if len(scene.stress):
             stress = scene.stress.take(active, axis=0).take(unknowns, axis=1)
             response += stress
-        matrix = response @ weighted
+        unit = weighted
         if scene.theta:
             relief = scene.theta * areas / gamma
             flex = stress.T * relief
-            matrix += gamma[:, None] * (opening @ flex)
+            unit = weighted + stiffness @ (stress.T * relief)
+        matrix = response @ dgetrs(*turning, unit, trans=1)[0]
+        if scene.theta:
+            matrix += gamma[:, None] * (opening @ (stress.T * relief))
             matrix += scene.stress_stress.take(active, axis=0).take(active, axis=1) * relief
         matrix.flat[:: len(matrix) + 1] += 1.0
-    # the transposed matrix is what LAPACK sees in C order: factorise that, solve transposed, and nothing is copied
-    factor = dgetrf(matrix.T, overwrite_a=1)[:2]
     return Linearised(
         unknowns=unknowns,
         gap=gap,
@@ -146,13 +152,9 @@ def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: 
         parameter=gamma,
         compliance=compliance,
         response=response,
-        factor=factor,
+        stiffness=stiffness,
+        turning=turning,
+        factor=dgetrf(matrix.T, overwrite_a=1)[:2],
         flex=flex,
         relief=relief,
-        normal=normal,
-        tilt=tilt,
-        slide=slide,
-        projection=chosen,
-        loads=areas * pressure[points],
-        cut=shrink * pressure[points],
     )

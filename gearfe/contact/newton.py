@@ -48,8 +48,6 @@ PATIENCE, NEAR = 120, 1e-3
 MEMORY, MEMORY_UNTIL = 4, 20
 #: Newton steps taken in full before the line search watches over them.
 FREE_ITERATIONS = 3
-#: Inner corrections of each step for the moving normals; each gains two to three digits.
-CORRECTIONS = 3
 
 
 @dataclass(frozen=True)
@@ -131,7 +129,7 @@ class Outcome:
 Dialogue = Generator[tuple[Array, Array], Projection, Outcome]
 
 
-def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
+def newton(scene: Scene, state: State, tolerance: float, most: int = MAX_ITERATIONS) -> Dialogue:
     """Solve one position from `state`, asking for projections by `yield` so that several positions can share them.
 
     A backtracking line search on the weighted pressure residual watches over all but the first steps.
@@ -142,12 +140,12 @@ def newton(scene: Scene, state: State, tolerance: float) -> Dialogue:
     wanted = state.unknown  # the guess chooses the first active set; afterwards the law does
     limit = 1e3 * float(scene.weight @ state.pressure)
     for iteration in range(1, PATIENCE + 1):
-        if iteration > MAX_ITERATIONS and residual > NEAR:
+        if iteration > most and residual > NEAR:
             return Outcome("not_converged", state, projection, iteration - 1)
         active = _active(scene, projection, wanted)
         if len(active) == 0:
             return Outcome("under_resolved", state, projection, iteration)
-        lin = linearise(scene, projection, active, state.pressure)
+        lin = linearise(scene, projection, active, state.pressure, scene.placed(state.displacement))
         aim = _step(scene, lin, active, state, projection)
         before = scene.areas(projection.place)
         total = float(scene.weight @ np.abs(aim.pressure))
@@ -215,15 +213,10 @@ def _between(old: State, new: State, length: float) -> State:
 
 
 def _step(scene: Scene, lin: Linearised, active: IntArray, state: State, projection: Projection) -> State:
-    """Solve the linearised contact for the active unknowns; d is iterated on the same factorisation."""
+    """Solve the linearised contact for the active unknowns."""
     before = state.displacement[lin.unknowns]
     right = -lin.parameter * (lin.gap - lin.opening @ before)
-    turned = np.zeros(len(lin.unknowns))
-    for correction in range(CORRECTIONS):
-        solved = lin.solve(right - lin.response @ turned if correction else right)
-        local = lin.weighted @ solved + turned
-        if correction + 1 < CORRECTIONS:
-            turned = lin.bending(lin.moved(solved, local) - before)
+    solved, local = lin.solve(right, -before)
     return assembled(scene, lin, active, solved, local, projection.place)
 
 

@@ -34,10 +34,15 @@ TOLERANCE = 1e-10
 BATCH = 64
 #: Memory for the matrices of positions that are solved side by side.
 GROUP_BYTES = 60e6
+#: A law without stress that is too hard to start with, as points change sides at every step, is solved softened to this
+#: share of its stiffness first, and then to so many times as much, by smaller factors where that fails.
+SOFTEST, SOFTNESS_STEP, SMALLEST_STEP = 0.01, 3.2, 1.1
+#: The same in lockstep, at fixed shares.
+SOFTER = (0.01, 0.03, 0.1, 0.3)
+#: Accuracy of the softer solutions, and Newton steps for each.
+SOFT_TOLERANCE, SOFT_ITERATIONS = 1e-2, 20
 #: Newton steps spent on one difficult position before it is given up.
 MAX_STEPS = 320
-#: Largest number of repetitions for the tangent; on a smooth flank each gains two to three digits, at a corner one.
-TANGENT_REPEATS = 24
 
 
 @dataclass(frozen=True)
@@ -138,7 +143,7 @@ def _solve_batch(pair: MeshingPair, angles: Array, twists: Array, tolerance: flo
             positions[i] = _unsolved("under_resolved")
         places = [i for i, one in zip(places, seen, strict=True) if one]
         scenes = [scene for scene, one in zip(scenes, seen, strict=True) if one]
-        outcomes = _side_by_side(scenes, [newton(s, _start(pair, s), tolerance) for s in scenes])
+        outcomes = _side_by_side(scenes, [_solving(pair, s, tolerance) for s in scenes])
         for i, scene, outcome in zip(places, scenes, outcomes, strict=True):
             if outcome.status != "converged" or _outgrown(pair, scene, outcome):
                 positions[i] = _with_care(pair, angles[i], twists[i], found[i], outcome.iterations, tolerance)
@@ -159,12 +164,16 @@ def _quickly(
     """Solve the positions `facing` in lockstep; the answer are those for which that was not enough."""
     left: list[int] = []
     waiting = list(facing)
-    for reach in (CLOSE, REACH):
+    for reach, softly in ((CLOSE, False), (REACH, False), (REACH, True)):
+        if softly:
+            if pair.law.uses_stress:
+                break
+            waiting, left = sorted(left + waiting), []
         windows = {i: windows_of(pair, found[i], angles[i], twists[i], reach) for i in waiting}
         outgrew: list[int] = []
         for group in _groups([windows[i][-1].nodes.stop for i in waiting]):
             places = [waiting[k] for k in group]
-            made = solve_group(pair, [windows[i] for i in places], [found[i] for i in places], tolerance)
+            made = solve_group(pair, [windows[i] for i in places], [found[i] for i in places], tolerance, softly=softly)
             for i, position in zip(places, made, strict=True):
                 if position.status == "converged":
                     positions[i] = position
@@ -175,19 +184,35 @@ def _quickly(
 
 
 def solve_group(
-    pair: MeshingPair, windows: Sequence[Sequence[Window]], found: Sequence[list[Overlap]], tolerance: float
+    pair: MeshingPair,
+    windows: Sequence[Sequence[Window]],
+    found: Sequence[list[Overlap]],
+    tolerance: float,
+    *,
+    softly: bool = False,
 ) -> list[Position]:
-    """Positions with these windows, solved in lockstep: ``converged``, ``not_converged`` or ``outgrown``."""
+    """Positions with these windows, solved in lockstep, perhaps by way of softer laws: ``converged``, ``not_converged``
+
+    or ``outgrown``.
+    """
     group = gather(pair, windows)
     deepest = np.array([one.deepest[g] for overlapping in found for g in (0, 1) for one in overlapping])
     rigid = rigid_projection(pair, group, deepest)
-    outcomes = iterate(group, *starting_states(pair, group, rigid), rigid, tolerance)
+    pressure, forces = starting_states(pair, group, rigid)
+    for share in SOFTER if softly else ():
+        softer = iterate(
+            replace(group, parameter=share * group.parameter), pressure, forces, rigid, SOFT_TOLERANCE, SOFT_TOLERANCE
+        )
+        at_points, at_nodes = softer.converged[group.at], softer.converged[group.position[group.node_window]]
+        pressure = np.where(at_points, softer.motion.pressure, pressure)
+        forces = np.where(np.repeat(at_nodes, 2), softer.motion.forces, forces)
+    outcomes = iterate(group, pressure, forces, rigid, tolerance)
     beyond = outgrown(group, outcomes.motion)
     outcomes = replace(outcomes, converged=outcomes.converged & ~beyond)
     results = results_of(pair, group, outcomes)
     scenes = scenes_of(pair, group, rigid, (results.forces, results.force_rate), outcomes.motion.pressure)
     made: list[Position] = []
-    for b, (scene, pressure, forces, rate) in enumerate(scenes):
+    for b, (scene, pressed, loads, rate) in enumerate(scenes):
         steps = int(outcomes.iterations[b])
         if not outcomes.converged[b]:
             made.append(_unsolved("outgrown" if beyond[b] else "not_converged", steps))
@@ -205,9 +230,9 @@ def solve_group(
                 peak_pressure=float(results.peak_pressure[b]),
                 iterations=steps,
                 scene=scene,
-                forces=forces,
+                forces=loads,
                 force_rate=rate,
-                pressure=pressure,
+                pressure=pressed,
             )
         )
     return made
@@ -277,7 +302,7 @@ def _with_care(
 ) -> Position:
     """Second attempt on the whole overlap; where that fails too, the twist is raised in steps, each from the last."""
     scene = assemble(pair, windows_of(pair, found, angle, twist, WHOLE))
-    outcome = _alone(scene, _start(pair, scene), tolerance)
+    outcome = _side_by_side([scene], [_solving(pair, scene, tolerance)])[0]
     steps += outcome.iterations
     done, step, last = 0.0, 0.25, None
     while outcome.status != "converged" and step > 0.01 and steps < MAX_STEPS:
@@ -301,6 +326,30 @@ def _with_care(
     return _finish(scene, outcome, steps) if outcome.status == "converged" else _unsolved(outcome.status, steps)
 
 
+def _solving(pair: MeshingPair, scene: Scene, tolerance: float) -> Dialogue:
+    """Newton's method from the Hertzian guess; for laws without stress by way of softer ones."""
+    state = _start(pair, scene)
+    if pair.law.uses_stress or scene.hats is not None:
+        return (yield from newton(scene, state, tolerance))
+    share, factor, solved, steps = SOFTEST, SOFTNESS_STEP, 0.0, 0
+    while True:
+        softer = scene if share == 1.0 else replace(scene, parameter=share * scene.parameter)
+        outcome = yield from newton(softer, state, SOFT_TOLERANCE if share < 1.0 else tolerance, SOFT_ITERATIONS)
+        steps += outcome.iterations
+        if outcome.status == "converged":
+            if share == 1.0:
+                break
+            state, solved = replace(outcome.state, place=outcome.projection.place), share
+        else:
+            factor = np.sqrt(factor)
+            if solved == 0.0 or factor < SMALLEST_STEP:
+                outcome = yield from newton(scene, state, tolerance)
+                steps += outcome.iterations
+                break
+        share = min(1.0, factor * solved)
+    return replace(outcome, iterations=steps)
+
+
 def _alone(scene: Scene, start: State, tolerance: float) -> Outcome:
     return _side_by_side([scene], [newton(scene, start, tolerance)])[0]
 
@@ -309,7 +358,7 @@ def _finish(scene: Scene, outcome: Outcome, iterations: int) -> Position:
     state = outcome.state
     active = np.flatnonzero(state.unknown > 0)
     placed = scene.placed(state.displacement)
-    lin = linearise(scene, outcome.projection, active, state.pressure)
+    lin = linearise(scene, outcome.projection, active, state.pressure, placed)
     forces = np.zeros(2 * len(scene.points))
     forces[lin.unknowns] = lin.weighted @ state.unknown[active]
     force = np.matmul(scene.rotation, forces.reshape(-1, 2, 1))[:, :, 0]
@@ -360,14 +409,8 @@ def _tangent(scene: Scene, lin: Linearised, forces: Array, placed: Array) -> tup
     carried = np.where(wheel, _quarter_turn(arm), 0.0).ravel()
     frame = np.where(wheel, _quarter_turn(force), 0.0).ravel()
     right = lin.response @ frame - lin.parameter * (lin.opening @ carried)
-    bend = np.zeros(len(frame))
-    for _ in range(TANGENT_REPEATS):
-        solved = lin.solve(right - lin.response @ bend)
-        rate = lin.weighted @ solved + bend
-        moved = carried + lin.moved(solved, rate - frame)
-        before, bend = bend, lin.bending(moved)
-        if np.abs(bend - before).sum() <= 1e-12 * np.abs(rate).sum():
-            break
+    solved, rate = lin.solve(right, carried - lin.compliance @ frame)
+    moved = carried + lin.moved(solved, rate - frame)
     change = _moment(arm, (rate - frame).reshape(-1, 2)) + _moment((moved - carried).reshape(-1, 2), force)
     spread = np.zeros_like(forces)
     spread[lin.unknowns] = rate - frame
