@@ -79,8 +79,9 @@ def test_one_mesh_cycle_instead_of_two(gears, elastic, monkeypatch):
 
     monkeypatch.setattr(stiffness, "at_twists", counted)
     angles = np.radians([2.0, 11.0, 20.0, 29.0, 38.0])  # two of them differ by less than a cycle of 18 deg
-    once = sweep_stiffness(gears, twist=TWIST, angles=angles, elastic=elastic)
-    every = sweep_stiffness(gears, twist=TWIST, angles=angles, elastic=elastic, solve_all=True)
+    given = {"twist": TWIST, "angles": angles, "elastic": elastic, "route": "direct"}
+    once = sweep_stiffness(gears, **given)
+    every = sweep_stiffness(gears, **given, solve_all=True)
     assert solved == [2, 5]
     np.testing.assert_allclose(once.k_mesh, every.k_mesh, rtol=1e-9)
 
