@@ -14,6 +14,7 @@ import pytest
 from gearfe import StiffnessCurve
 from gearfe.cli import main
 from gearfe.contact import solver
+from gearfe.contact.position import unsolved
 
 ROOT = Path(__file__).parents[1]
 JOB = ROOT / "geometry" / "gear_train.toml"
@@ -332,7 +333,7 @@ def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
     def one_fails(pair, angles, twists, **options):
         made = solve(pair, angles, twists, **options)
         bad = np.isclose(np.degrees(angles), 6.0)
-        return [solver._unsolved("not_converged", 40) if b else p for p, b in zip(made, bad, strict=True)]
+        return [unsolved("not_converged", 40) if b else p for p, b in zip(made, bad, strict=True)]
 
     monkeypatch.setattr("gearfe.routes.solve_positions", one_fails)
     options = ("--twist-deg", "0.3", "--angles", "3", "3", "9", "--fields", "9", "6", "3", "--no-picture")

@@ -195,15 +195,15 @@ def gear_body(
     )
     f, s = 2 * len(flank.nodes), 2 * len(skin)
     stiffness, stress = condensed.schur, None
+    if share or with_stress:
+        every = np.repeat(row_unknowns, rows.shape[1], axis=0)
+        stress = condensed.on_retained(rows.reshape(len(every), -1), every)
     if share:
         assert law is not None
-        stress = _rows_on_retained(condensed, row_unknowns, rows)
+        assert stress is not None
         gamma = law.parameter(material.youngs_modulus * thickness / width, flank.sizes)
         term = (law.theta * share * width * flank.weights / gamma[:, None]).ravel()
         stiffness = stiffness - stress.T @ (term[:, None] * stress)
-    elif with_stress:
-        recovered = condensed.recover(np.eye(len(stiffness)), wanted=row_unknowns.ravel())
-        stress = np.matmul(rows, recovered[row_unknowns]).reshape(-1, len(stiffness))
     factor, info = dpotrf(stiffness[:s, :s], lower=1)
     if info != 0:
         if share and law is not None and law.theta > 0:
@@ -242,17 +242,6 @@ def gear_body(
         width,
         loads,
     )
-
-
-def _rows_on_retained(condensed: Condensed, unknowns: Array, rows: Array) -> Array:
-    """Stress rows, shape (e q, r), on the retained unknowns; what lies on none of them is held."""
-    edges, points = rows.shape[:2]
-    place = np.full(condensed.size, len(condensed.retained))
-    place[condensed.retained] = np.arange(len(condensed.retained))
-    dense = np.zeros((edges, points, len(condensed.retained) + 1))
-    edge, point = np.arange(edges)[:, None, None], np.arange(points)[None, :, None]
-    dense[edge, point, place[unknowns][:, None, :]] = rows
-    return dense.reshape(edges * points, -1)[:, :-1]
 
 
 def _not_coercive(law: ContactLaw, stiffness: Array, stress: Array, term: Array) -> InputError:

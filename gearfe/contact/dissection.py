@@ -75,6 +75,28 @@ class Condensed:
             full[front.inner] = -dtrsm(1.0, front.factor, right, lower=1, trans_a=1)
         return full
 
+    def on_retained(self, rows: Array, unknowns: IntArray) -> Array:
+        """What gives linear forms of the full displacement from the retained unknowns alone: B_r - B_e K_ee^-1 K_er.
+
+        Parameters
+        ----------
+        rows, unknowns : ndarray, shape (m, a)
+            Coefficients of m forms (any unit) and the unknowns that they belong to.
+
+        Returns
+        -------
+        ndarray, shape (m, r)
+        """
+        forms = np.zeros((self.size, len(rows)))
+        np.add.at(forms, (unknowns, np.arange(len(rows))[:, None]), rows)
+        for front in self.fronts:
+            own = forms[front.inner]
+            met = np.flatnonzero(own.any(axis=0))  # few forms look into a small front
+            if len(met):
+                solved = dtrsm(1.0, front.factor, own[:, met], lower=1)
+                forms[np.ix_(front.outer, met)] -= front.coupling.T @ solved
+        return np.ascontiguousarray(forms[self.retained].T)
+
 
 def _leading_to(fronts: tuple[_Front, ...], wanted: IntArray | None, size: int) -> list[_Front]:
     """Fronts to run through backwards so that the `wanted` unknowns come out."""

@@ -1,4 +1,4 @@
-"""Positions of a gear pair in contact: search for the teeth that overlap, Newton's method, torques and tangent.
+"""Positions of a gear pair in contact: search for the teeth that overlap, and Newton's method.
 
 Two iterations solve the same equations. Most positions are solved in lockstep, on windows that just hold the contact
 (`gearfe.contact.group_newton`); those that outgrow them once more on larger ones. What does not converge there, or has
@@ -9,22 +9,25 @@ too the twist is raised in steps.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .closest import Projection, unreached
+from .closest import Projection
 from .group import gather, rigid_projection
 from .group_newton import iterate
 from .group_results import outgrown, results_of, scenes_of
 from .group_start import starting_states
 from .laws import ContactLaw
-from .newton import Dialogue, Linearised, Outcome, State, linearise, newton
+from .newton import Dialogue, Outcome, State, newton
 from .overlap import CLOSE, REACH, WHOLE, Overlap, overlaps, rigidly_apart, windows_of
+from .position import Position, finish, unsolved
 from .scene import MeshingPair, Scene, Window, assemble, assemble_all, project_all
 from .start import starting_state
+
+__all__ = ["Position", "in_lockstep", "solve_group", "solve_position", "solve_positions"]
 
 Array = NDArray[Any]
 
@@ -43,58 +46,6 @@ SOFTER = (0.01, 0.03, 0.1, 0.3)
 SOFT_TOLERANCE, SOFT_ITERATIONS = 1e-2, 20
 #: Newton steps spent on one difficult position before it is given up.
 MAX_STEPS = 320
-
-
-@dataclass(frozen=True)
-class Position:
-    """Solution of one position.
-
-    Attributes
-    ----------
-    status
-        ``converged``, ``no_contact`` (the undeformed gears are clear of each other), ``under_resolved`` (they overlap,
-        yet no contact point does) or ``not_converged``. Torques are 0 without contact, not-a-number when not solved.
-    torque_wheel, torque_pinion
-        Moments that the hubs need, energy-conjugate: sum of (x - c) x f over the current places (N m).
-    torque_wheel_reaction
-        Moment of the reactions at the wheel's bore: sum of (x - u - c) x f (N m).
-    tangent
-        d torque_wheel / d twist (N m/rad).
-    pair_numbers : tuple of int
-        Pair k joins pinion tooth k and wheel tooth -1 - k.
-    pair_torques : ndarray
-        Share of each pair in `torque_wheel` (N m).
-    peak_pressure
-        Largest pressure at a contact point (Pa).
-    iterations
-        Newton steps.
-    scene, forces, force_rate
-        Pieces of flank (without their matrices), the nodal forces on them in tooth axes (N) and their derivatives with
-        respect to the twist (N/rad), for recovering fields; None without a solution.
-    pressure : ndarray, shape (q,)
-        Pressure at the scene's contact points (Pa); None without a solution.
-    route
-        ``direct``: solved on the mesh; ``hertz`` or ``blend``: see `gearfe.routes`.
-    stress_loads, stress_load_rate
-        Loads on the normal stress at the contact points (N m2) and their derivatives (N m2/rad); empty with theta = 0.
-    """
-
-    status: str
-    torque_wheel: float
-    torque_pinion: float
-    torque_wheel_reaction: float
-    tangent: float
-    pair_numbers: tuple[int, ...]
-    pair_torques: Array
-    peak_pressure: float
-    iterations: int
-    scene: Scene | None = None
-    forces: Array | None = None
-    force_rate: Array | None = None
-    route: str = "direct"
-    pressure: Array | None = None
-    stress_loads: Array | None = None
-    stress_load_rate: Array | None = None
 
 
 def solve_position(pair: MeshingPair, pinion_angle: float, twist: float, *, tolerance: float = TOLERANCE) -> Position:
@@ -130,7 +81,7 @@ def _solve_batch(pair: MeshingPair, angles: Array, twists: Array, tolerance: flo
     positions: list[Position | None] = [None] * len(angles)
     for i in (i for i, overlapping in enumerate(found) if not overlapping):
         clear = rigidly_apart(pair, angles[i], twists[i])
-        positions[i] = _unsolved("no_contact" if clear else "under_resolved")
+        positions[i] = unsolved("no_contact" if clear else "under_resolved")
     facing = [i for i, overlapping in enumerate(found) if overlapping]
     if in_lockstep(pair.law):
         facing = _quickly(pair, angles, twists, found, facing, positions, tolerance)
@@ -140,7 +91,7 @@ def _solve_batch(pair: MeshingPair, angles: Array, twists: Array, tolerance: flo
         scenes = assemble_all(pair, [windows[i] for i in places])
         seen = [(scene.rigid.gap < 0).any() for scene in scenes]
         for i in (i for i, one in zip(places, seen, strict=True) if not one):
-            positions[i] = _unsolved("under_resolved")
+            positions[i] = unsolved("under_resolved")
         places = [i for i, one in zip(places, seen, strict=True) if one]
         scenes = [scene for scene, one in zip(scenes, seen, strict=True) if one]
         outcomes = _side_by_side(scenes, [_solving(pair, s, tolerance) for s in scenes])
@@ -148,7 +99,7 @@ def _solve_batch(pair: MeshingPair, angles: Array, twists: Array, tolerance: flo
             if outcome.status != "converged" or _outgrown(pair, scene, outcome):
                 positions[i] = _with_care(pair, angles[i], twists[i], found[i], outcome.iterations, tolerance)
             else:
-                positions[i] = _finish(scene, outcome, outcome.iterations)
+                positions[i] = finish(scene, outcome, outcome.iterations)
     return [p for p in positions if p is not None]
 
 
@@ -215,7 +166,7 @@ def solve_group(
     for b, (scene, pressed, loads, rate) in enumerate(scenes):
         steps = int(outcomes.iterations[b])
         if not outcomes.converged[b]:
-            made.append(_unsolved("outgrown" if beyond[b] else "not_converged", steps))
+            made.append(unsolved("outgrown" if beyond[b] else "not_converged", steps))
             continue
         first, end = group.first_window[b : b + 2].tolist()
         made.append(
@@ -323,7 +274,7 @@ def _with_care(
                 scene, outcome = part, tried
         else:
             step *= 0.5
-    return _finish(scene, outcome, steps) if outcome.status == "converged" else _unsolved(outcome.status, steps)
+    return finish(scene, outcome, steps) if outcome.status == "converged" else unsolved(outcome.status, steps)
 
 
 def _solving(pair: MeshingPair, scene: Scene, tolerance: float) -> Dialogue:
@@ -352,75 +303,3 @@ def _solving(pair: MeshingPair, scene: Scene, tolerance: float) -> Dialogue:
 
 def _alone(scene: Scene, start: State, tolerance: float) -> Outcome:
     return _side_by_side([scene], [newton(scene, start, tolerance)])[0]
-
-
-def _finish(scene: Scene, outcome: Outcome, iterations: int) -> Position:
-    state = outcome.state
-    active = np.flatnonzero(state.unknown > 0)
-    placed = scene.placed(state.displacement)
-    lin = linearise(scene, outcome.projection, active, state.pressure, placed)
-    forces = np.zeros(2 * len(scene.points))
-    forces[lin.unknowns] = lin.weighted @ state.unknown[active]
-    force = np.matmul(scene.rotation, forces.reshape(-1, 2, 1))[:, :, 0]
-    wheel = scene.of_wheel
-    about_wheel = -_moment(placed - scene.wheel_centre, force)
-    reaction = -_moment(scene.points - scene.wheel_centre, force)
-    of_pair = scene.windows[1::2]
-    tangent, force_rate, solved = _tangent(scene, lin, forces, placed)
-    load_rate = np.zeros(len(scene.weight) if scene.theta else 0)
-    if scene.theta:
-        load_rate[active] = lin.relief * solved
-    return Position(
-        status="converged",
-        torque_wheel=float(about_wheel[wheel].sum()),
-        torque_pinion=-float(_moment(placed, force)[~wheel].sum()),
-        torque_wheel_reaction=float(reaction[wheel].sum()),
-        tangent=tangent,
-        pair_numbers=tuple(-1 - w.tooth for w in of_pair),
-        pair_torques=np.array([about_wheel[w.nodes].sum() for w in of_pair]),
-        peak_pressure=float(state.pressure[~unreached(outcome.projection.gap)].max()),
-        iterations=iterations,
-        scene=replace(  # without the megabytes
-            scene, compliance=np.zeros((0, 0)), stress=np.zeros((0, 0)), stress_stress=np.zeros((0, 0))
-        ),
-        forces=forces,
-        force_rate=force_rate,
-        pressure=np.where(unreached(outcome.projection.gap), 0.0, state.pressure),
-        stress_loads=state.stress_loads,
-        stress_load_rate=load_rate,
-    )
-
-
-def _moment(arm: Array, force: Array) -> Array:
-    return arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]
-
-
-def _tangent(scene: Scene, lin: Linearised, forces: Array, placed: Array) -> tuple[float, Array, Array]:
-    """d torque / d twist, d forces / d twist and d (active unknowns) / d twist.
-
-    In the axes of the wheel's teeth the wheel's nodes are carried by e_z x (x - c) dphi, and
-    df = G^T W dp + H dx - dphi e_z x f,  dx = carried + C df,  dp = -gamma dg - S df.
-    """
-    nodes = lin.unknowns[::2] // 2
-    wheel = scene.of_wheel[nodes][:, None]
-    axes = scene.rotation[nodes]
-    arm = np.matmul((placed - scene.wheel_centre)[nodes][:, None, :], axes)[:, 0, :]
-    force = forces[lin.unknowns].reshape(-1, 2)
-    carried = np.where(wheel, _quarter_turn(arm), 0.0).ravel()
-    frame = np.where(wheel, _quarter_turn(force), 0.0).ravel()
-    right = lin.response @ frame - lin.parameter * (lin.opening @ carried)
-    solved, rate = lin.solve(right, carried - lin.compliance @ frame)
-    moved = carried + lin.moved(solved, rate - frame)
-    change = _moment(arm, (rate - frame).reshape(-1, 2)) + _moment((moved - carried).reshape(-1, 2), force)
-    spread = np.zeros_like(forces)
-    spread[lin.unknowns] = rate - frame
-    return -float(change[wheel[:, 0]].sum()), spread, solved
-
-
-def _quarter_turn(vectors: Array) -> Array:
-    return np.stack([-vectors[:, 1], vectors[:, 0]], axis=1)
-
-
-def _unsolved(status: str, iterations: int = 0) -> Position:
-    nothing = 0.0 if status == "no_contact" else float("nan")
-    return Position(status, nothing, nothing, nothing, nothing, (), np.zeros(0), nothing, iterations)
