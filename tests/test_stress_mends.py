@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import time
 from pathlib import Path
@@ -16,6 +17,7 @@ from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.error_estimate import trajectory_error
 from gearfe.output.files import whole_set
 from gearfe.rigid import integrate
+from gearfe.rigid.timefunctions import smoothed_step
 from gearfe.train.floquet import multipliers
 
 from .rigid_cases import folding_angle, folding_links, pendulum
@@ -110,3 +112,9 @@ def test_multipliers_of_a_heavily_damped_mode(rate: float) -> None:
     else:
         assert found is not None
         assert np.sort(np.abs(found)) == pytest.approx([0.0, np.exp(-1.0)], abs=1e-5)
+
+
+@pytest.mark.parametrize(("centre", "width"), [(0.0, 1e-80), (1.0, 1e-17), (0.0, 0.0), (math.nan, 1.0)])
+def test_a_step_that_takes_no_time_is_refused(centre: float, width: float) -> None:
+    with pytest.raises(InputError, match="smoothed step width"):
+        smoothed_step(centre, width)

@@ -114,8 +114,10 @@ def sine(amplitude: float, omega: float, phase: float = 0.0) -> TimeFunction:
 
 def smoothed_step(centre: float, width: float, height: float = 1.0) -> TimeFunction:
     """Step from 0 to `height`: ``10 x^3 - 15 x^4 + 6 x^5`` with ``x = (t - centre + width/2) / width``."""
-    if not (width > 0.0 and math.isfinite(width)):
-        raise InputError("smoothed step width", width, "must be finite and > 0 s", "give the duration of the rise")
+    least = max(1e-30, 4 * float(np.spacing(abs(centre))))  # the fifth power has to exist, and the rise to take time
+    if not (math.isfinite(centre) and math.isfinite(width) and width >= least):
+        problem = f"must be finite and >= {least:.3g} s at the centre {centre:.6g} s"
+        raise InputError("smoothed step width", width, problem, "give the duration of the rise")
     begin = centre - width / 2
     rise = (0.0, 0.0, 0.0, 10.0 * height / width**3, -15.0 * height / width**4, 6.0 * height / width**5)
     return TimeFunction((-math.inf, begin, begin + width), (begin, begin, begin + width), ((0.0,), rise, (height,)))
