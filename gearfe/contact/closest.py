@@ -228,24 +228,22 @@ def unreached(gap: Array) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class Rows:
-    """Variations of the gaps over the six nodes of each point: three of its own edge, three of the mate's.
+    """Variations n.D of the gaps over the six nodes of each point: three of its own edge, three of the mate's.
 
     Attributes
     ----------
     nodes : ndarray, shape (n, 6)
         Node numbers.
-    normal, tilt, slide : ndarray, shape (n, 6, 2)
-        Coefficients of n.D, N and delta xi (per metre), in the axes of the tooth that each node belongs to.
+    normal : ndarray, shape (n, 6, 2)
+        Coefficients, in the axes of the tooth that each node belongs to.
     """
 
     nodes: IntArray
     normal: Array
-    tilt: Array
-    slide: Array
 
 
 def gap_rows(projection: Projection, slave_nodes: IntArray, slave_shapes: Array, rotation: Array) -> Rows:
-    """Rows of n.D, N and delta xi.
+    """Rows of n.D; `gearfe.contact.exact_rows` has all that Newton's tangent needs.
 
     Parameters
     ----------
@@ -255,21 +253,10 @@ def gap_rows(projection: Projection, slave_nodes: IntArray, slave_shapes: Array,
         Tooth axes to global axes, of each node.
     """
     p = projection
-    own, mate = rotation[slave_nodes[:, 0]], rotation[p.edge]
-    vectors = np.stack([p.normal, p.tangent], axis=1)
-    on_slave, on_mate = np.matmul(vectors, own), np.matmul(vectors, mate)
-    count = len(p.gap)
-    normal, tilt, slide = np.empty((count, 6, 2)), np.zeros((count, 6, 2)), np.empty((count, 6, 2))
-    shapes = p.shapes[:, :, None]
-    np.multiply(slave_shapes[:, :, None], on_slave[:, :1], out=normal[:, :3])
-    np.multiply(-shapes, on_mate[:, :1], out=normal[:, 3:])
-    np.multiply(p.slopes[:, :, None], on_mate[:, :1], out=tilt[:, 3:])
-    scale = 1 / (p.tangent[:, 0] ** 2 + p.tangent[:, 1] ** 2 - p.gap * p.curvature)
-    on_slave, on_mate = on_slave[:, 1:] * scale[:, None, None], on_mate[:, 1:] * scale[:, None, None]
-    np.multiply(slave_shapes[:, :, None], on_slave, out=slide[:, :3])
-    np.multiply(-shapes, on_mate, out=slide[:, 3:])
-    slide[:, 3:] += (p.gap * scale)[:, None, None] * tilt[:, 3:]
-    nodes = np.empty((count, 6), dtype=np.int64)
-    nodes[:, :3] = slave_nodes
-    np.add(p.edge[:, None], np.arange(3), out=nodes[:, 3:])
-    return Rows(nodes, normal, tilt, slide)
+    normal = np.empty((len(p.gap), 6, 2))
+    for part, shapes, axes in (
+        (slice(0, 3), slave_shapes, rotation[slave_nodes[:, 0]]),
+        (slice(3, 6), -p.shapes, rotation[p.edge]),
+    ):
+        np.multiply(shapes[:, :, None], np.matmul(p.normal[:, None], axes), out=normal[:, part])
+    return Rows(np.concatenate([slave_nodes, p.edge[:, None] + np.arange(3)], axis=1), normal)

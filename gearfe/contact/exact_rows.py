@@ -1,8 +1,8 @@
 r"""Exact variations of the gaps on chains of quadratic edges, with the blended normals' own dependence on the nodes.
 
-`gearfe.contact.closest.gap_rows` takes the turning of the blended normal from the point's own edge. That is all there
-is on a smooth surface; where a corner dents the mate, edges meet at kinks, and what the neighbours' ends add to the
-normal counts as much. With :math:`x_s - x_m(\xi) = g\,n`, :math:`t` the unit vector across n,
+`gearfe.contact.closest` writes the variations with the turning of the blended normal from the point's own edge. That is
+all there is on a smooth surface; where a corner dents the mate, edges meet at kinks, and what the neighbours' ends add
+to the normal counts as much. With :math:`x_s - x_m(\xi) = g\,n`, :math:`t` the unit vector across n,
 :math:`D = \delta x_s - \delta x_m`, :math:`\tau = t\cdot a`, :math:`\nu = t\cdot n'`,
 :math:`\vartheta_\delta = t\cdot\delta n` at fixed :math:`\xi`, :math:`A_\delta = n\cdot\delta x_m'` and
 :math:`M = \tau + g\nu`, the two components of :math:`\delta(x_s - x_m - g\,n) = 0` give
