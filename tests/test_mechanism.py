@@ -329,12 +329,14 @@ def test_a_planar_run_loads_no_heavy_library(tmp_path):
 
 
 def test_the_core_knows_no_mechanism():
-    """The names of the benchmarks stand in no name and no string of the package: in docstrings and comments only."""
+    """The names of the benchmarks stand in no name and no string of what computes: in docstrings and comments only."""
     import ast
     import io
     import tokenize
 
     for path in (ROOT / "gearfe").rglob("*.py"):
+        if path.relative_to(ROOT / "gearfe").parts[0] in ("benchmark", "stress"):
+            continue  # the rooms that run the shipped scenes
         text = path.read_text()
         tree = ast.parse(text)
         prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
