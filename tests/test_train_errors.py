@@ -132,5 +132,7 @@ def test_output_times() -> None:
 
 def test_a_curve_may_come_as_an_interpolant() -> None:
     flat = periodic_interpolant(np.radians(np.arange(18.0)), np.full(18, 1e8), math.radians(18.0))
-    one, two = (simulate(build_train(meshes(BASE, stiffness=s)), [0.0, 1e-3, 2e-3]) for s in (flat, 1e8))
+    # steps end at the corners of a curve, so the two runs differ by the tolerance of the integration
+    times, given = [0.0, 1e-3, 2e-3], {"tolerance": 1e-10}
+    one, two = (simulate(build_train(meshes(BASE, stiffness=s)), times, **given) for s in (flat, 1e8))
     assert one.contact_force == pytest.approx(two.contact_force, rel=1e-9, abs=1e-9)
