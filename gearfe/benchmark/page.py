@@ -48,6 +48,9 @@ def write_page(results: str | Path, page: str | Path) -> list[Path]:
     ]
     made = [target]
     found = [(s, read_rows(folder / f"{s.table}.csv")) for s in SECTIONS if (folder / f"{s.table}.csv").exists()]
+    remarks = folder / "remarks.md"  # of whoever ran it: what else the machine did, what is missing
+    if remarks.exists():
+        lines += [remarks.read_text(encoding="utf-8").strip(), ""]
     lines += summary({s.table: s.prepare(rows) for s, rows in found})
     for section, rows in found:
         lines += _section(section, section.prepare(rows), folder)

@@ -74,12 +74,16 @@ def _compared(make: Callable[[float], Mapping[str, Any]], coarsen: float, quick:
 
 
 def own_errors(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Rows with ``error``: the difference from the finest row of the same program (this program: from its limit)."""
+    """Rows with ``error``: the difference from the finest row of the same program (this program: from its limit).
+
+    Of another program's finest row no error is known: not-a-number, so that nothing is compared with it.
+    """
     made = []
     for row in rows:
         own = [r for r in rows if r["program"] == row["program"]]
         finest = min(own, key=lambda r: r["coarsen"])
-        error = abs(row["k_mesh_N_per_m"] / finest["k_mesh_N_per_m"] - 1.0)
+        known = row is not finest
+        error = abs(row["k_mesh_N_per_m"] / finest["k_mesh_N_per_m"] - 1.0) if known else float("nan")
         made.append({**row, "error": abs(row["off_converged"]) if row["program"] == "gearfe" else error})
     return made
 

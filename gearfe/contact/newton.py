@@ -39,8 +39,7 @@ Array = NDArray[Any]
 IntArray = NDArray[Any]
 
 MAX_ITERATIONS = 40
-#: Steps beyond are granted where the residual is below `NEAR`: where a sharp corner dents an edge deeply, kinks between
-#: edges, which the tangent leaves out, make the convergence linear.
+#: Steps beyond are granted where the residual is below `NEAR`: stiff laws at sharp corners may settle slowly.
 PATIENCE, NEAR = 120, 1e-3
 #: The line search asks for less than the largest of so many residuals: an active set that is nearly settled may need
 #: steps that go up before they go down (Grippo, Lampariello & Lucidi, SIAM J. Numer. Anal. 23, 1986). Later than
