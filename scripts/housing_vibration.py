@@ -10,8 +10,8 @@ import sys
 
 from gearfe.output.files import output_folder, write_csv
 from gearfe.train import build_train, simulate
-from gearfe.train_job import job_scene, read_train_job, train_body, train_curves
-from gearfe.train_report import mean_over_periods, response_columns, spectra
+from gearfe.vibration.job import job_scene, read_train_job, train_body, train_curves
+from gearfe.vibration.report import mean_over_periods, response_columns, spectra
 
 
 def main(job_file: str = "geometry/gear_train.toml", out: str = "out/vibration", variant: str | None = None) -> int:

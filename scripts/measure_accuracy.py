@@ -22,7 +22,7 @@ import numpy as np
 from gearfe import GearPair, sweep_stiffness
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh
-from gearfe.stiffness_job import read_stiffness_job
+from gearfe.stiffness.job import read_stiffness_job
 
 ROOT = Path(__file__).resolve().parents[1]
 SIZES = (2.0, 1.5, 1.0, 0.7)

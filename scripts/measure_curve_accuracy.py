@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from gearfe import Gear, GearPair, StiffnessCurve, sweep_stiffness
 from gearfe.elasticity import Material, Plane
 from gearfe.errors import InputError
-from gearfe.gear import TipRelief
-from gearfe.stiffness import elastic_pair
+from gearfe.gear.pair import TipRelief
+from gearfe.stiffness.sweep import elastic_pair
 
 Case = tuple[GearPair, tuple[Material, Material], Plane]
 

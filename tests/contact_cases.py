@@ -10,7 +10,7 @@ from gearfe.contact.laws import ContactLaw
 from gearfe.contact.scene import MeshingPair
 from gearfe.contact.whole_pair import ElasticGear, WholePair
 from gearfe.elasticity import Material, Plane
-from gearfe.gear import Gear, GearPair, TipRelief
+from gearfe.gear.pair import Gear, GearPair, TipRelief
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import SectorMesh, sector_mesh
 

@@ -148,7 +148,7 @@ def test_a_failed_position_is_told_and_in_the_table(tmp_path, capsys, monkeypatc
         bad = solver.Position("not_converged", *[math.nan] * 4, (), np.zeros(0), math.nan, 40)
         return [bad if abs(a - math.radians(4)) < 1e-9 else p for a, p in zip(angles, made, strict=True)]
 
-    monkeypatch.setattr("gearfe.routes.solve_positions", weak)
+    monkeypatch.setattr("gearfe.stiffness.routes.solve_positions", weak)
     code = main(["stiffness", str(JOB), "--out", str(tmp_path), "--twist-deg", "0.3", *QUICK])
     assert code == 1
     said = capsys.readouterr()
@@ -335,7 +335,7 @@ def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
         bad = np.isclose(np.degrees(angles), 6.0)
         return [unsolved("not_converged", 40) if b else p for p, b in zip(made, bad, strict=True)]
 
-    monkeypatch.setattr("gearfe.routes.solve_positions", one_fails)
+    monkeypatch.setattr("gearfe.stiffness.routes.solve_positions", one_fails)
     options = ("--twist-deg", "0.3", "--angles", "3", "3", "9", "--fields", "9", "6", "3", "--no-picture")
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options]) == 1
     assert [r["status"] for r in rows(tmp_path)] == ["converged", "not_converged", "converged"]

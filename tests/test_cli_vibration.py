@@ -20,9 +20,18 @@ from gearfe.housing import Attachment, Housing
 from gearfe.output.train_scene import draw_scene, sharp_edges
 from gearfe.stopwatch import Stopwatch
 from gearfe.train import GearMesh, Shaft, ShaftGear, TrainScene
-from gearfe.train_fields import frames, gear_surface, moved, solids, step_at, tooth_angles, write_gears, write_housing
-from gearfe.train_files import OutputChoice, write_all
-from gearfe.train_report import mean_over_periods, response_columns, spectra
+from gearfe.vibration.fields import (
+    frames,
+    gear_surface,
+    moved,
+    solids,
+    step_at,
+    tooth_angles,
+    write_gears,
+    write_housing,
+)
+from gearfe.vibration.files import OutputChoice, write_all
+from gearfe.vibration.report import mean_over_periods, response_columns, spectra
 
 from .gears import pair
 from .housing_meshes import box

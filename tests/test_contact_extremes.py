@@ -12,7 +12,7 @@ from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
 from gearfe.contact.scene import MeshingPair
 from gearfe.contact.solver import solve_positions
 from gearfe.elasticity import Material
-from gearfe.gear import Gear, GearPair, TipRelief
+from gearfe.gear.pair import Gear, GearPair, TipRelief
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh
 

@@ -20,8 +20,8 @@ from gearfe.contact.solver import Position, solve_position, solve_positions
 from gearfe.elasticity import Plane, element_stiffness
 from gearfe.errors import InputError
 from gearfe.meshing.whole_gear import whole_gear
-from gearfe.stiffness import sweep_stiffness
-from gearfe.stiffness_curve import StiffnessCurve
+from gearfe.stiffness.curve import StiffnessCurve
+from gearfe.stiffness.sweep import sweep_stiffness
 
 from .contact_cases import IRON, STEEL, WIDTH, gears, meshes, whole
 

@@ -10,7 +10,7 @@ from gearfe.contact.linearised import linearise
 from gearfe.contact.overlap import WHOLE, overlaps, windows_of
 from gearfe.contact.scene import assemble, project_all
 from gearfe.contact.solver import solve_positions
-from gearfe.stiffness import elastic_pair
+from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import pair
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearfe import curve_cache
 from gearfe.contact.laws import Nitsche, Penalty
-from gearfe.curve_cache import cached_curve, curve_key
 from gearfe.elasticity import Material
+from gearfe.stiffness import curve_cache
+from gearfe.stiffness.curve_cache import cached_curve, curve_key
 
 from .gears import pair
 
@@ -31,7 +31,7 @@ def test_the_second_time_nothing_is_computed(folder, monkeypatch):
     def computes(*args, **options):
         raise AssertionError("computed again")
 
-    monkeypatch.setattr("gearfe.stiffness.elastic_pair", computes)
+    monkeypatch.setattr("gearfe.stiffness.sweep.elastic_pair", computes)
     second = cached_curve(gears, MODEL, SWEEP)
     for name in ("k_mesh", "torque_wheel", "pinion_angle", "twist", "load_share"):
         np.testing.assert_array_equal(getattr(second, name), getattr(first, name))

@@ -12,10 +12,19 @@ from gearfe import sweep_stiffness
 from gearfe.contact.corners import corner_bearings, shares
 from gearfe.contact.laws import Nitsche, Penalty
 from gearfe.contact.solver import solve_positions
-from gearfe.curve_error import COARSENING, COMMON, LAW, LAW_AT_EDGES, ORDER, error_estimate, law_error, solved_twice
 from gearfe.elasticity import Material
-from gearfe.routes import Router
-from gearfe.stiffness import elastic_pair
+from gearfe.stiffness.curve_error import (
+    COARSENING,
+    COMMON,
+    LAW,
+    LAW_AT_EDGES,
+    ORDER,
+    error_estimate,
+    law_error,
+    solved_twice,
+)
+from gearfe.stiffness.routes import Router
+from gearfe.stiffness.sweep import elastic_pair
 
 from . import gears
 

@@ -11,16 +11,16 @@ from gearfe import StiffnessCurve
 from gearfe.contact.laws import Penalty
 from gearfe.contact.scene import assemble, turn
 from gearfe.contact.solver import solve_position
-from gearfe.drawing import path_place
 from gearfe.elasticity import element_stiffness
 from gearfe.errors import InputError
-from gearfe.fields import gear_recovery, pair_recovery, straight_triangles
-from gearfe.fields_output import chosen_positions, frames_of, write_fields
-from gearfe.flank_pressure import flank_pressures
+from gearfe.gear.drawing import path_place
 from gearfe.meshing.whole_gear import whole_gear
 from gearfe.output import animation
 from gearfe.output.figures import color_limit
-from gearfe.stiffness import elastic_pair, sweep_stiffness
+from gearfe.stiffness.fields import gear_recovery, pair_recovery, straight_triangles
+from gearfe.stiffness.fields_output import chosen_positions, frames_of, write_fields
+from gearfe.stiffness.flank_pressure import flank_pressures
+from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 
 from .gears import pair
 
@@ -135,7 +135,7 @@ def test_a_uniform_strain_gives_its_stress(gears, plane):
 def test_turning_the_whole_picture_changes_nothing(elastic, position, fields):
     """The same loads on a gear drawn at another angle: stresses turn with it, von Mises stays."""
     recovery = pair_recovery(elastic).gears[0]
-    from gearfe.fields import gear_field
+    from gearfe.stiffness.fields import gear_field
 
     turned = gear_field(recovery, elastic, position, ANGLE + 0.4, 0)
     np.testing.assert_allclose(turned.von_mises, fields[0].von_mises, rtol=1e-9)

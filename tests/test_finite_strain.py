@@ -16,7 +16,7 @@ from gearfe.contact.recovery import flank_forces, sector_displacements
 from gearfe.contact.scene import MeshingPair
 from gearfe.contact.solver import Position, solve_position, solve_positions
 from gearfe.elasticity import Material, physical_gradients, triangle_shapes
-from gearfe.gear import Gear, GearPair
+from gearfe.gear.pair import Gear, GearPair
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh
 

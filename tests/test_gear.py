@@ -10,10 +10,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gearfe import iso6336
 from gearfe.errors import InputError
-from gearfe.gear import Gear, GearPair, TipRelief
-from gearfe.involute import inv
+from gearfe.gear import iso6336
+from gearfe.gear.involute import inv
+from gearfe.gear.pair import Gear, GearPair, TipRelief
 
 
 def gear(teeth, module=2.5e-3, degrees=25.0, **form):

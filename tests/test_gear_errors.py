@@ -8,7 +8,7 @@ import re
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.gear import Gear, GearPair, TipRelief
+from gearfe.gear.pair import Gear, GearPair, TipRelief
 
 #: Waist of the tooth below zero: see the test of the waist in test_involute.py.
 SEVERED = {

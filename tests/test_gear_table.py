@@ -12,7 +12,7 @@ import pytest
 
 from gearfe.config import build, load_job, table_class
 from gearfe.errors import InputError
-from gearfe.gear import GearPair, TipRelief
+from gearfe.gear.pair import GearPair, TipRelief
 
 SHIPPED = Path(__file__).parents[1] / "geometry" / "gear_train.toml"
 

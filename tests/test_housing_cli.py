@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from gearfe.cli import main
-from gearfe.modal_body import ModalBody
 from gearfe.output.housing_figures import draw_modes
+from gearfe.reduction.modal_body import ModalBody
 
 JOB = """
 [housing]

@@ -9,9 +9,10 @@ from scipy.sparse.linalg import spsolve
 
 from gearfe.errors import InputError
 from gearfe.housing.mesh_checks import boundary_faces
+from gearfe.housing.mesh_error import frequency_errors
 from gearfe.housing.surface import nodal_normals, radiation_matrix, surface_area, surface_quadrature
-from gearfe.lanczos import lowest_modes
-from gearfe.mesh_error import frequency_errors
+from gearfe.reduction.lanczos import lowest_modes
+from gearfe.reduction.sparse_solver import factorize
 from gearfe.solid import (
     SolidMaterial,
     assemble,
@@ -20,7 +21,6 @@ from gearfe.solid import (
     jacobian_determinants,
     skfem_mesh,
 )
-from gearfe.sparse_solver import factorize
 from tests.housing_meshes import box
 
 STEEL = SolidMaterial()

@@ -12,9 +12,9 @@ import pytest
 from gearfe import LoadMap, StiffnessCurve, sweep_loads, sweep_stiffness
 from gearfe.cli import main
 from gearfe.errors import InputError
-from gearfe.root_map import RootMap
-from gearfe.stiffness import elastic_pair
-from gearfe.train_job import read_train_job, train_curves
+from gearfe.loadmap.root_map import RootMap
+from gearfe.stiffness.sweep import elastic_pair
+from gearfe.vibration.job import read_train_job, train_curves
 
 from .gears import pair
 from .test_train_job import BORES, SMALL

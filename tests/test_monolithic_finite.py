@@ -17,7 +17,7 @@ from gearfe.contact.scene import MeshingPair
 from gearfe.contact.solver import solve_position
 from gearfe.contact.whole_pair import ElasticGear, WholePair
 from gearfe.elasticity import Material
-from gearfe.gear import Gear, GearPair
+from gearfe.gear.pair import Gear, GearPair
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh
 

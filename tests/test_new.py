@@ -7,9 +7,9 @@ import pytest
 
 from gearfe.cli import main
 from gearfe.config import build, load_job, quantity, table_class
-from gearfe.job_examples import JOBS, job_file
-from gearfe.job_text import table_text
+from gearfe.tables.examples import JOBS, job_file
 from gearfe.tables.mechanism import MechanismFile
+from gearfe.tables.text import table_text
 
 KINDS = ("stiffness", "vibration", "mechanism")
 

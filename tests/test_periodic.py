@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from gearfe.errors import InputError
-from gearfe.periodic import METHODS, periodic_interpolant
+from gearfe.stiffness.periodic import METHODS, periodic_interpolant
 
 PERIOD = 0.31
 

@@ -8,7 +8,7 @@ import pytest
 from gearfe.errors import InputError
 from gearfe.housing.mesh_checks import boundary_faces
 from gearfe.housing.surface import radiation_matrix
-from gearfe.radiation import instantaneous_power, power_level, radiated_power
+from gearfe.vibration.radiation import instantaneous_power, power_level, radiated_power
 
 from .housing_meshes import box
 

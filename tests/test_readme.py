@@ -6,7 +6,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from gearfe.commands import stiffness
-from gearfe.stiffness_curve import COLUMNS, CONSTANTS
+from gearfe.stiffness.curve import COLUMNS, CONSTANTS
 from gearfe.tables.pair import GearTable, MaterialTable, PairTable, ToothFormTable
 from gearfe.tables.stiffness import StiffnessTable
 

@@ -13,11 +13,11 @@ from scipy.linalg import eigh
 
 from gearfe.errors import InputError
 from gearfe.housing import Attachment, Housing, Plane
-from gearfe.modal_body import ModalBody
-from gearfe.reduction import reduce_model
-from gearfe.reduction_error import reduction_error
+from gearfe.reduction.craig_bampton import reduce_model
+from gearfe.reduction.error import reduction_error
+from gearfe.reduction.modal_body import ModalBody
+from gearfe.reduction.transient import newmark, smooth_ramp
 from gearfe.solid import SolidMaterial
-from gearfe.transient import newmark, smooth_ramp
 from tests.housing_meshes import box
 
 SIZE = (0.4, 0.08, 0.06)
@@ -260,7 +260,7 @@ def test_loading_is_quick_and_light(tmp_path: Path) -> None:
     beam(cells=(20, 5, 5)).reduce(40).save(tmp_path / "body.npz")
     code = (
         "import sys, time, numpy\n"
-        "from gearfe.modal_body import ModalBody\n"
+        "from gearfe.reduction.modal_body import ModalBody\n"
         "t = time.process_time()\n"
         "body = ModalBody.load(sys.argv[1])\n"
         "spent = time.process_time() - t\n"

@@ -9,12 +9,12 @@ from gearfe.contact.compliance import gear_body
 from gearfe.contact.flank import flank_of
 from gearfe.contact.solver import solve_position
 from gearfe.elasticity import element_stiffness
-from gearfe.fields import gear_recovery
+from gearfe.loadmap.root_stress import fillet_radius, pair_roots, peak, root_mesh, root_recipe, spread_of
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh
 from gearfe.meshing.whole_gear import whole_gear
-from gearfe.root_stress import fillet_radius, pair_roots, peak, root_mesh, root_recipe, spread_of
-from gearfe.stiffness import elastic_pair
+from gearfe.stiffness.fields import gear_recovery
+from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import gear, pair
 

@@ -7,15 +7,16 @@ import math
 import numpy as np
 import pytest
 
-from gearfe import Material, StiffnessCurve, small_load, sweep_stiffness
+from gearfe import Material, StiffnessCurve, sweep_stiffness
 from gearfe.contact.hertz import Edge, LocalContact, half_width, wedge_factor
 from gearfe.contact.laws import Nitsche
-from gearfe.fields import pair_recovery
-from gearfe.routes import RESOLVED, Router
-from gearfe.small_balance import balance
-from gearfe.spur_gear import TipRelief
-from gearfe.stiffness import elastic_pair
-from gearfe.touching import Flanks
+from gearfe.gear.spur_gear import TipRelief
+from gearfe.gear.touching import Flanks
+from gearfe.stiffness import small_load
+from gearfe.stiffness.fields import pair_recovery
+from gearfe.stiffness.routes import RESOLVED, Router
+from gearfe.stiffness.small_balance import balance
+from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import pair
 

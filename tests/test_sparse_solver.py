@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from gearfe import sparse_solver
 from gearfe.errors import InputError, MissingLibraryError
-from gearfe.lanczos import lowest_modes
+from gearfe.reduction import sparse_solver
+from gearfe.reduction.lanczos import lowest_modes
+from gearfe.reduction.sparse_solver import PACKAGES, choose_solver, factorize, installed_solvers
 from gearfe.solid import SolidMaterial, assemble
-from gearfe.sparse_solver import PACKAGES, choose_solver, factorize, installed_solvers
 from tests.housing_meshes import box
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from gearfe import InputError, Material, sweep_stiffness
 from gearfe.contact.solver import Position, solve_position
-from gearfe.spur_gear import TipRelief
-from gearfe.stiffness import elastic_pair
+from gearfe.gear.spur_gear import TipRelief
+from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import pair
 
@@ -116,7 +116,7 @@ def test_repeated_positions_are_solved_once(gears, elastic, monkeypatch):
             for a, t in zip(angles, np.broadcast_to(twists, len(angles)), strict=True)
         ]
 
-    monkeypatch.setattr("gearfe.routes.solve_positions", counting)
+    monkeypatch.setattr("gearfe.stiffness.routes.solve_positions", counting)
     angles = np.radians(np.arange(1.0, 41.0, 3.0))
     folded = at(gears, angles, elastic)
     assert len(solved) == 6  # 1, 4, 7, ... modulo 18 deg
@@ -257,7 +257,7 @@ def test_a_torque_beyond_reach_is_flagged(gears, elastic, monkeypatch):
             made.append(p)
         return made
 
-    monkeypatch.setattr("gearfe.routes.solve_positions", weak)
+    monkeypatch.setattr("gearfe.stiffness.routes.solve_positions", weak)
     fine = at(gears, [0.1], elastic, twist=None, torque=50.0)
     assert fine.torque_wheel[0] == pytest.approx(50.0, rel=1e-10)
     lost = at(gears, [0.1], elastic, twist=None, torque=100.0)
@@ -337,7 +337,7 @@ def test_a_contact_that_the_mesh_misses_is_under_resolved(gears, elastic, monkey
     def blind(pair, angles, twists):
         return [Position("no_contact", 0.0, 0.0, 0.0, 0.0, (), np.zeros(0), 0.0, 0) for _ in angles]
 
-    monkeypatch.setattr("gearfe.routes.solve_positions", blind)
+    monkeypatch.setattr("gearfe.stiffness.routes.solve_positions", blind)
     curve = at(gears, [0.1], elastic)
     assert list(curve.status) == ["under_resolved"]
     assert np.isnan(curve.torque_wheel).all()

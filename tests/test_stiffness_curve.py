@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from gearfe import StiffnessCurve
-from gearfe.curve_csv import from_text, to_text
 from gearfe.errors import InputError
+from gearfe.stiffness.curve_csv import from_text, to_text
 
 #: The first columns of the file, in the order that is promised to readers.
 PROMISED = (

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from gearfe.config import build
-from gearfe.gear import GearPair
-from gearfe.stiffness import sweep_stiffness
-from gearfe.stiffness_job import StiffnessJob
+from gearfe.gear.pair import GearPair
+from gearfe.stiffness.job import StiffnessJob
+from gearfe.stiffness.sweep import sweep_stiffness
 from gearfe.tables.pair import PairTable
 from gearfe.tables.stiffness import StiffnessTable
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gearfe.periodic import periodic_interpolant
 from gearfe.rigid import constant
 from gearfe.rigid.compiled import available
+from gearfe.stiffness.periodic import periodic_interpolant
 from gearfe.train import build_train, simulate
 from gearfe.train.law import NEAR, angle_block, joined, mesh_block, train_corner
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.periodic import periodic_interpolant
 from gearfe.rigid import constant
-from gearfe.stiffness_curve import StiffnessCurve
+from gearfe.stiffness.curve import StiffnessCurve
+from gearfe.stiffness.periodic import periodic_interpolant
 from gearfe.train import Bearing, Damping, Drive, GearMesh, Load, TrainScene, build_train, simulate
 
 from .trains import SHIPPED, changed, curve, elastic, gear, train

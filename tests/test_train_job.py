@@ -11,10 +11,10 @@ import pytest
 
 from gearfe.config import load_job
 from gearfe.errors import InputError
-from gearfe.stiffness_curve import StiffnessCurve
+from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.train import build_train, simulate
 from gearfe.train.kinematics import steady_forces
-from gearfe.train_job import bore_places, job_scene, read_train_job, train_curves
+from gearfe.vibration.job import bore_places, job_scene, read_train_job, train_curves
 
 SHIPPED = Path(__file__).parent.parent / "geometry" / "gear_train.toml"
 

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.spur_gear import TipRelief
-from gearfe.unloaded import unloaded_twist
+from gearfe.gear.spur_gear import TipRelief
 
 from .gears import pair
+from .unloaded import unloaded_twist
 
 NM = 1e-9
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import null_space
 
-from gearfe.sparse_solver import factorize
+from gearfe.reduction.sparse_solver import factorize
 from gearfe.train import TrainModel
 
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.gear import Gear
-from gearfe.modal_body import ModalBody
-from gearfe.periodic import PeriodicInterpolant, periodic_interpolant
+from gearfe.gear.pair import Gear
+from gearfe.reduction.modal_body import ModalBody
 from gearfe.rigid import TimeFunction, constant, smoothed_step
+from gearfe.stiffness.periodic import PeriodicInterpolant, periodic_interpolant
 from gearfe.train import Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
 
 MODULE, ALPHA = 2.5e-3, math.radians(25.0)

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from ..housing import Housing
-from ..reduction import reduce_model
-from ..sparse_solver import installed_solvers
-from ..transient import newmark, smooth_ramp
+from ..reduction.craig_bampton import reduce_model
+from ..reduction.sparse_solver import installed_solvers
+from ..reduction.transient import newmark, smooth_ramp
 from .peers.process import missing, run_python
 from .record import Record
 from .subject import DATA, given_file, housing_of

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..iso6336 import mesh_stiffness, single_stiffness
+from ..gear.iso6336 import mesh_stiffness, single_stiffness
 from ..rigid import integrate
-from ..stiffness import sweep_stiffness
+from ..stiffness.sweep import sweep_stiffness
 from .housing_study import reference_housing
 from .mechanism_study import subject
 from .record import Record

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..stiffness import elastic_pair, sweep_stiffness
+from ..stiffness.sweep import elastic_pair, sweep_stiffness
 from .record import Record
 from .subject import GEOMETRY, ROOT, housing_of, shipped_housing, shipped_pair
 from .sweep_study import whole_pair
@@ -47,7 +47,7 @@ def _cpu(job: Callable[[], Any], runs: int = 2) -> float:
 
 def one_sector(quick: bool) -> tuple[float, float, str]:
     """Condensing one tooth sector of each gear; assembling and factorising the whole gears once."""
-    from ..sparse_solver import factorize
+    from ..reduction.sparse_solver import factorize
 
     pair, coarsen = shipped_pair(), 5.0 if quick else 2.0
     short = _cpu(lambda: elastic_pair(pair, coarsen=coarsen))
@@ -92,7 +92,7 @@ def neighbours(quick: bool) -> tuple[float, float, str]:
 def fields(quick: bool) -> tuple[float, float, str]:
     """A sweep without fields; with displacement and stress of the whole gears at every position."""
     from ..contact.solver import solve_positions
-    from ..fields import pair_recovery
+    from ..stiffness.fields import pair_recovery
 
     pair = shipped_pair()
     elastic = elastic_pair(pair, coarsen=5.0 if quick else 1.0)
@@ -158,7 +158,7 @@ def cached_meshes(_quick: bool) -> tuple[float, float, str]:
 
 def cached_body(quick: bool) -> tuple[float, float, str]:
     """A reduced housing loaded, and made from its mesh."""
-    from ..modal_body import ModalBody
+    from ..reduction.modal_body import ModalBody
 
     housing = housing_of(24.0, order=1) if quick else housing_of(shipped_housing().mesh.size_mm)
     made, cost = measured(lambda: housing.reduce(10 if quick else 60), runs=1)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from ..gear import GearPair
+    from ..gear.pair import GearPair
     from ..housing import Housing
     from ..tables.housing import HousingTable
 
@@ -38,14 +38,14 @@ def given_file(path: Path) -> Path:
 
 def shipped_pair() -> GearPair:
     """20/30 teeth with tip rounds of 0.1 mm, `geometry/gear_train.toml`."""
-    from ..stiffness_job import read_stiffness_job
+    from ..stiffness.job import read_stiffness_job
 
     return read_stiffness_job(given_file(GEOMETRY / "gear_train.toml")).pair
 
 
 def reference_pair() -> GearPair:
     """The sharp-tipped pair of `tests/data/gear_pair_20_30.csv`, bores of 0.35 times the pitch diameter."""
-    from ..gear import Gear, GearPair
+    from ..gear.pair import Gear, GearPair
 
     form: dict[str, Any] = {"module": 2.5e-3, "pressure_angle": math.radians(25.0), "face_width": 10e-3}
     pinion, wheel = (Gear(z, bore_diameter=0.35 * z * 2.5e-3, **form) for z in (20, 30))
@@ -88,7 +88,7 @@ def train_model(variant: str, *, quick: bool = False, modes: int | None = None) 
         Of the housing with held bores, in place of the job's choice by frequency.
     """
     from ..train import build_train
-    from ..train_job import job_scene, read_train_job, train_body, train_curves
+    from ..vibration.job import job_scene, read_train_job, train_body, train_curves
 
     job = read_train_job(given_file(GEOMETRY / "gear_train.toml"), variant)
     if quick:

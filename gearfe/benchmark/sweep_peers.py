@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from functools import lru_cache, partial
 from typing import Any
 
-from ..stiffness import sweep_stiffness
+from ..stiffness.sweep import sweep_stiffness
 from .peers.process import missing
 from .record import Record, Table
 from .subject import reference_pair

@@ -20,12 +20,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the geometry, write gear_pair.png and gear_pair.json."""
-    from ..derived import derived_geometry, iso_values
-    from ..drawing import pair_drawing
     from ..errors import InputError
+    from ..gear.derived import derived_geometry, iso_values
+    from ..gear.drawing import pair_drawing
     from ..output.figures import pair_figure
     from ..output.files import output_folder, whole_set, write_json
-    from ..stiffness_job import read_stiffness_job
+    from ..stiffness.job import read_stiffness_job
 
     if not math.isfinite(args.angle_deg):
         raise InputError("--angle-deg", args.angle_deg, "must be finite")

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ..modal_body import ModalBody
-    from ..reduction_error import ReductionError
+    from ..reduction.error import ReductionError
+    from ..reduction.modal_body import ModalBody
 
 HELP = "reduce a housing to a small elastic body: mass, bores, frequencies, mode shapes"
 
@@ -31,9 +31,9 @@ def run(args: argparse.Namespace) -> int:
     from ..config import load_job
     from ..errors import InputError
     from ..housing.build import material, reduced_housing
-    from ..mesh_error import frequency_errors
+    from ..housing.mesh_error import frequency_errors
     from ..output.files import output_folder, whole_set
-    from ..reduction_error import reduction_error
+    from ..reduction.error import reduction_error
 
     if args.modes < 1:
         raise InputError("--modes", args.modes, "must be 1 or more", "20 is the default")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ..stiffness_job import StiffnessJob
+    from ..stiffness.job import StiffnessJob
     from ..tables.loadmap import LoadMapTable
 
 HELP = "stiffness, transmission error, load share, pressure, root stress over pinion angle and torque"
@@ -45,10 +45,10 @@ def run(args: argparse.Namespace) -> int:
     started = time.perf_counter()
     import numpy as np
 
-    from ..load_map_report import figure_arguments, summary, told, torque_table, warnings
-    from ..load_sweep import sweep_loads
+    from ..loadmap.report import figure_arguments, summary, told, torque_table, warnings
+    from ..loadmap.sweep import sweep_loads
     from ..output.files import output_folder, whole_set, write_csv, write_json
-    from ..stiffness_job import read_stiffness_job
+    from ..stiffness.job import read_stiffness_job
     from ..stopwatch import Stopwatch
     from .stiffness import Progress
 

@@ -27,7 +27,7 @@ def run(args: argparse.Namespace) -> int:
     from ..meshing.recipe import sector_recipes
     from ..meshing.tooth_sector import sector_mesh
     from ..output.files import output_folder
-    from ..stiffness_job import read_stiffness_job
+    from ..stiffness.job import read_stiffness_job
 
     format_of(args.out)
     job = read_stiffness_job(args.job)

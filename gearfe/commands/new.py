@@ -20,8 +20,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the file."""
     from ..errors import InputError, unknown_name
-    from ..job_examples import job_file
     from ..output.files import whole_file
+    from ..tables.examples import job_file
 
     if args.kind not in KINDS:
         raise unknown_name("kind of job", args.kind, KINDS)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ..stiffness_job import StiffnessJob
+    from ..stiffness.job import StiffnessJob
 
 HELP = "mesh stiffness of a gear pair over its rotation: table, picture, summary, fields"
 
@@ -81,9 +81,9 @@ def run(args: argparse.Namespace) -> int:
 
     from ..errors import InputError
     from ..output.files import output_folder, whole_set, write_json
-    from ..stiffness import elastic_pair, sweep_stiffness
-    from ..stiffness_job import read_stiffness_job
-    from ..stiffness_report import figure_arguments, summary, told, warnings
+    from ..stiffness.job import read_stiffness_job
+    from ..stiffness.report import figure_arguments, summary, told, warnings
+    from ..stiffness.sweep import elastic_pair, sweep_stiffness
     from ..stopwatch import Stopwatch
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
         sweep = job.sweep
         chosen = None if args.fields is None else _field_angles(args.fields)
         if isinstance(chosen, list):
-            from ..fields_output import angle_numbers
+            from ..stiffness.fields_output import angle_numbers
 
             angle_numbers(np.degrees(sweep["angles"]), chosen)
     if args.animate is not None and not 2 <= args.animate <= 1000:
@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
         with watch.stage("table"):
             curve.to_csv(made / "stiffness.csv")
         if chosen is not None:
-            from ..fields_output import write_fields
+            from ..stiffness.fields_output import write_fields
 
             angles = None if isinstance(chosen, str) else chosen
             with watch.stage("fields"):
@@ -137,8 +137,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _animate(path: Path, job: StiffnessJob, elastic: Any, curve: Any, count: int, show: Progress) -> None:
-    from ..fields_output import frames_of
     from ..output.animation import stress_animation
+    from ..stiffness.fields_output import frames_of
 
     frames, zone = frames_of(job.pair, elastic, curve, count, show)
     if frames:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ..train.response import TrainResponse
     from ..train.scene import TrainScene
-    from ..train_files import OutputChoice, Written
-    from ..train_job import TrainJob
+    from ..vibration.files import OutputChoice, Written
+    from ..vibration.job import TrainJob
 
 HELP = "gear train in its housing: contact forces, speeds, vibration, spectrum, radiated power"
 
@@ -51,8 +51,8 @@ def run(args: argparse.Namespace) -> int:
     from ..output.files import output_folder
     from ..stopwatch import Stopwatch
     from ..tables.train import TrainTable
-    from ..train_files import OutputChoice, check_choice, write_all
-    from ..train_job import read_train_job
+    from ..vibration.files import OutputChoice, check_choice, write_all
+    from ..vibration.job import read_train_job
     from .stiffness import Progress
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
@@ -103,7 +103,7 @@ def simulated(
 ) -> tuple[TrainScene, TrainResponse]:
     """Curves, housing and transient of a job, each from the cache where it can be."""
     from ..train import build_train, simulate
-    from ..train_job import job_scene, train_body, train_curves
+    from ..vibration.job import job_scene, train_body, train_curves
 
     with watch.stage("curves"):
         stiffness = train_curves(job, curves, progress=progress)
@@ -135,8 +135,8 @@ def described(job: TrainJob, scene: TrainScene) -> dict[str, Any]:
     """What was computed: entries of the summary."""
     from dataclasses import asdict
 
-    from ..stiffness_report import versions
-    from ..train_report import stiffness_ranges
+    from ..stiffness.report import versions
+    from ..vibration.report import stiffness_ranges
 
     body = scene.housing
     housing = None
@@ -159,8 +159,8 @@ def described(job: TrainJob, scene: TrainScene) -> dict[str, Any]:
 
 def told(response: TrainResponse, scene: TrainScene, written: Written, choice: OutputChoice) -> list[str]:
     """Lines for the terminal."""
-    from ..train_pictures import attachment_to_draw
-    from ..train_report import dominant
+    from ..vibration.pictures import attachment_to_draw
+    from ..vibration.report import dominant
 
     summary = written.summary
     stiffness = summary["mesh_stiffness_N_per_m"]

@@ -9,7 +9,7 @@ therefore rises from a half to one.
 
 from __future__ import annotations
 
-from ..mesh_geometry import MeshGeometry
+from ..gear.mesh_geometry import MeshGeometry
 
 #: Range of angles (rad) of the pinion's tooth frame: where a corner starts to bear, and from where it bears alone.
 Bearing = tuple[float, float]

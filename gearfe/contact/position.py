@@ -45,7 +45,7 @@ class Position:
     pressure : ndarray, shape (q,)
         Pressure at the scene's contact points (Pa); None without a solution.
     route
-        ``direct``: solved on the mesh; ``hertz`` or ``blend``: see `gearfe.routes`.
+        ``direct``: solved on the mesh; ``hertz`` or ``blend``: see `gearfe.stiffness.routes`.
     stress_loads, stress_load_rate
         Loads on the normal stress at the contact points (N m2) and their derivatives (N m2/rad); empty with theta = 0.
     """

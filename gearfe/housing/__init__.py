@@ -1,4 +1,4 @@
-"""Elastic housings: description or arrays -> mesh -> full model -> reduced body (`gearfe.modal_body.ModalBody`).
+"""Elastic housings: description or arrays -> mesh -> full model -> reduced body (`gearfe.ModalBody`).
 
 housing = Housing.from_job("geometry/housing.toml")
 body = housing.reduce()

@@ -11,7 +11,7 @@ from .. import __version__
 from ..errors import InputError
 from ..meshing.cache import cache_folder, cache_key
 from ..meshing.housing_mesh import RECIPE, bore_ranges, housing_mesh
-from ..modal_body import FORMAT, ModalBody
+from ..reduction.modal_body import FORMAT, ModalBody
 from ..solid import MassRule, SolidMaterial
 from ..tables.housing import HousingDampingTable, HousingReductionTable, HousingTable
 from .attachments import PLACE_TOLERANCE, Bore

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import InputError
-from ..lanczos import lowest_modes
-from ..reduction import rigid_shift
-from ..sparse_solver import factorize
+from ..reduction.craig_bampton import rigid_shift
+from ..reduction.lanczos import lowest_modes
+from ..reduction.sparse_solver import factorize
 from ..threads import one_thread
 
 Floats = NDArray[np.float64]
@@ -35,7 +35,7 @@ class FullModel:
     held
         Whether a part of the body is fixed.
     solver
-        Sparse solver, see `gearfe.sparse_solver`.
+        Sparse solver, see `gearfe.reduction.sparse_solver`.
     """
 
     mass: Any
@@ -73,7 +73,7 @@ class FullModel:
 
 
 def full_model(stiffness: Any, mass: Any, interface: Any, internal: Ints, *, held: bool, solver: str) -> FullModel:
-    """Model of a body from its nodal matrices, its interface rows and its internal rows (see `gearfe.reduction`)."""
+    """Model of a body from nodal matrices, interface rows and internal rows (`gearfe.reduction.craig_bampton`)."""
     count = len(internal)
     unit = sparse.csc_array((np.ones(count), (internal, np.arange(count))), shape=(stiffness.shape[0], count))
     transform = sparse.hstack([interface, unit], format="csc")

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ..config import load_job
 from ..errors import InputError
-from ..modal_body import ModalBody
-from ..reduction import reduce_model
+from ..reduction.craig_bampton import reduce_model
+from ..reduction.modal_body import ModalBody
 from ..solid import MassRule, SolidMaterial, SolidMatrices, assemble
 from ..tables.housing import HousingTable
 from .attachments import (
@@ -209,7 +209,7 @@ class Housing:
         quasi_static
             Levels of correction vectors; 0 for none.
         solver
-            Sparse solver, see `gearfe.sparse_solver`.
+            Sparse solver, see `gearfe.reduction.sparse_solver`.
         """
         stiffness, mass = self.matrices.stiffness, self.matrices.mass
         found = reduce_model(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..gear import GearPair
+from ..gear.pair import GearPair
 from .tooth_sector import MINIMUM_BORE_EDGES, SectorRecipe
 
 

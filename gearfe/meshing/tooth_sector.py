@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gear import Gear
-from ..involute import tooth_profile
+from ..gear.involute import tooth_profile
+from ..gear.pair import Gear
 from .cache import cached_arrays
 from .session import gmsh_session
 

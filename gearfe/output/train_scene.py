@@ -26,7 +26,7 @@ _STILL, _FILM = (2000, 1440), (720, 520)
 
 
 def draw_scene(path: str | Path, arrays: Mapping[str, NDArray[Any]], title: str) -> str:
-    """Draw what `gearfe.train_fields.frames` gives: one step into a ``.png``, several into an animated ``.gif``.
+    """Draw what `gearfe.vibration.fields.frames` gives: one step into a ``.png``, several into an animated ``.gif``.
 
     Returns
     -------

@@ -83,8 +83,8 @@ def _draw_curve(random: np.random.Generator, number: int, kind: str) -> Case:
 
 def _run_curve(case: Case, job_path: Path) -> Found:
     """Worst relative error over six positions."""
-    from ..stiffness import sweep_stiffness
-    from ..stiffness_job import read_stiffness_job
+    from ..stiffness.job import read_stiffness_job
+    from ..stiffness.sweep import sweep_stiffness
 
     job = read_stiffness_job(job_path)
     del case
@@ -140,7 +140,7 @@ def _draw_response(random: np.random.Generator, number: int, kind: str) -> Case:
 def _run_response(case: Case, job_path: Path) -> Found:
     """Worst error of a contact force over the run, relative to its largest value."""
     from ..train import build_train, simulate
-    from ..train_job import job_scene, read_train_job, train_curves
+    from ..vibration.job import job_scene, read_train_job, train_curves
 
     del case
     job = read_train_job(job_path)
@@ -162,7 +162,7 @@ def _draw_body(random: np.random.Generator, number: int, kind: str) -> Case:
 def _run_frequencies(case: Case, job_path: Path) -> Found:
     """Worst error of the first ten natural frequencies, and the estimate of that one."""
     from ..housing.build import material, reduced_housing
-    from ..mesh_error import frequency_errors
+    from ..housing.mesh_error import frequency_errors
 
     del case
     table = load_job(job_path, ("housing",))["housing"]
@@ -178,7 +178,7 @@ def _run_frequencies(case: Case, job_path: Path) -> Found:
 def _run_reduction(case: Case, job_path: Path) -> Found:
     """Accelerances of the bores up to the band's end, rms, against a body with many more modes."""
     from ..housing.build import housing_from_table, reduced
-    from ..reduction_error import reduction_error
+    from ..reduction.error import reduction_error
 
     del case
     table = load_job(job_path, ("housing",))["housing"]

@@ -23,11 +23,11 @@ import numpy as np
 from ..contact.laws import LAWS
 from ..contact.scene import MeshingPair
 from ..contact.solver import Position
-from ..gear import GearPair
-from ..routes import Router
-from ..stiffness import elastic_pair, sweep_stiffness
-from ..stiffness_curve import SOLVED
-from ..stiffness_job import read_stiffness_job
+from ..gear.pair import GearPair
+from ..stiffness.curve import SOLVED
+from ..stiffness.job import read_stiffness_job
+from ..stiffness.routes import Router
+from ..stiffness.sweep import elastic_pair, sweep_stiffness
 from .campaign import Campaign, Case
 from .outcome import Check, Finding
 from .pairs import log_uniform, random_pair, rounded, running_pair, spoiled
@@ -35,7 +35,7 @@ from .toml_text import toml_text
 
 #: Limits of the checks. The first four hold to the solver's residual of 1e-10, which the softest contacts amplify.
 BALANCE, PERIOD, SWAP = 1e-7, 1e-7, 1e-6
-#: The route for small loads (`gearfe.routes`) is a formula about a solved reference, which changes when the gears swap.
+#: The route for small loads is a formula about a solved reference, which changes when the gears swap.
 #: It claims 0.1 to 0.2 %, and its forces are scaled, so that their moments cancel no better than that.
 SMALL_LOAD = 2e-3
 #: The ratio holds as the normals at the contact do: they lean with the elements that carry it (1e-4 to 1e-3 of the

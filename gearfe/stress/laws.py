@@ -21,8 +21,8 @@ import numpy as np
 from ..contact.laws import Nitsche, Theta, law_named
 from ..contact.scene import MeshingPair
 from ..contact.solver import solve_positions
-from ..stiffness import elastic_pair
-from ..stiffness_job import StiffnessJob, read_stiffness_job
+from ..stiffness.job import StiffnessJob, read_stiffness_job
+from ..stiffness.sweep import elastic_pair
 from .campaign import Campaign, Case, Columns
 from .outcome import Finding, Outcome
 from .pairs import running_pair

@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from ..job_examples import HOUSING, MECHANISM, PAIR, TRAIN
+from ..tables.examples import HOUSING, MECHANISM, PAIR, TRAIN
 from .toml_text import toml_text
 
 #: What is put where a value was. The last ones would do something if they were run, opened or followed.

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..config import build
 from ..errors import InputError
-from ..gear import GearPair
+from ..gear.pair import GearPair
 from ..tables.pair import PairTable
 
 Table = dict[str, Any]

@@ -24,7 +24,7 @@ from ..train import TrainModel, build_train, simulate
 from ..train.floquet import train_multipliers
 from ..train.kinematics import steady_forces
 from ..train.motion import motion
-from ..train_job import job_scene, read_train_job, train_body, train_curves
+from ..vibration.job import job_scene, read_train_job, train_body, train_curves
 from .campaign import Campaign, Case
 from .outcome import Check, Finding
 from .rows import KINDS, row

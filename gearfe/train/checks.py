@@ -8,9 +8,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..errors import InputError, unknown_name
-from ..gear import GearPair
-from ..periodic import PeriodicInterpolant
-from ..stiffness_curve import StiffnessCurve
+from ..gear.pair import GearPair
+from ..stiffness.curve import StiffnessCurve
+from ..stiffness.periodic import PeriodicInterpolant
 from .scene import Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
 
 #: Agreement of lengths and angles that count as equal (relative).

@@ -15,9 +15,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drawing import gear_outline
 from ..errors import InputError
-from ..gear import Gear
+from ..gear.drawing import gear_outline
+from ..gear.pair import Gear
 from .scene import Shaft, ShaftGear
 
 Array = NDArray[np.float64]

@@ -24,8 +24,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..periodic import PeriodicInterpolant
 from ..rigid.timefunctions import TimeFunction
+from ..stiffness.periodic import PeriodicInterpolant
 
 Array = NDArray[np.float64]
 ANGLE, MESH, GYRO, TORQUE = 0.0, 1.0, 2.0, 3.0

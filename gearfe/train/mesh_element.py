@@ -25,9 +25,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gear import GearPair
-from ..periodic import PeriodicInterpolant
+from ..gear.pair import GearPair
 from ..rigid import Element, LinearJoint
+from ..stiffness.periodic import PeriodicInterpolant
 from .checks import interpolant
 from .elements import LinearForce, RigidShaft
 from .kinematics import drive_sense

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gear import Gear
-from ..modal_body import ModalBody
-from ..periodic import PeriodicInterpolant
+from ..gear.pair import Gear
+from ..reduction.modal_body import ModalBody
 from ..rigid.timefunctions import TimeFunction
-from ..stiffness_curve import StiffnessCurve
+from ..stiffness.curve import StiffnessCurve
+from ..stiffness.periodic import PeriodicInterpolant
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]

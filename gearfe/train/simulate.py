@@ -223,7 +223,7 @@ def _estimates(
         found["integration"] = SAFETY * float(max((w.max() for w in worst), default=0.0))
     body = model.scene.housing
     if body is not None:
-        from ..reduction_error import reduction_error
+        from ..reduction.error import reduction_error
 
         found["reduction"] = reduction_error(body, band_hz).response
     return found

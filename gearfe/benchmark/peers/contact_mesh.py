@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...gear import Gear, GearPair
+from ...gear.pair import Gear, GearPair
 from ...meshing.export import MeshPart
 from ...meshing.recipe import sector_recipes
 from ...meshing.tooth_sector import SectorMesh, SectorRecipe, sector_mesh

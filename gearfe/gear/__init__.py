@@ -1,0 +1,5 @@
+"""Gears and gear pairs: exact profiles, checks, geometry of the mesh (ISO 21771), ISO 6336 stiffness. NumPy only."""
+
+from .pair import Gear, GearPair, PathPoint, TipRelief
+
+__all__ = ["Gear", "GearPair", "PathPoint", "TipRelief"]

@@ -1,0 +1,73 @@
+"""What follows from the data of a gear pair, in everyday units with the unit in every name (ISO 21771 names)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from .iso6336 import mesh_stiffness, single_stiffness
+from .pair import GearPair
+from .spur_gear import Gear
+
+
+def derived_geometry(pair: GearPair) -> dict[str, Any]:
+    """Derived geometry of the pair and both gears: name with unit -> number."""
+    return {
+        "gear_ratio": pair.gear_ratio,
+        "centre_distance_mm": 1e3 * pair.working_centre_distance,
+        "working_pressure_angle_deg": math.degrees(pair.working_pressure_angle),
+        "base_pitch_mm": 1e3 * pair.base_pitch,
+        "backlash_mm": 1e3 * pair.backlash,
+        "normal_backlash_mm": 1e3 * pair.normal_backlash,
+        "lost_motion_to_contact_deg": math.degrees(pair.contact_twist),
+        "contact_ratio": pair.contact_ratio,
+        "contact_ratio_active": pair.contact_ratio_active,
+        "contact_ratio_effective": pair.contact_ratio_effective,
+        "path_length_mm": 1e3 * pair.path_length,
+        "mesh_cycle_deg": math.degrees(pair.mesh_cycle),
+        "path_of_contact": {
+            name: {
+                "pinion_roll_mm": 1e3 * point.pinion_roll,
+                "wheel_roll_mm": 1e3 * point.wheel_roll,
+                "pinion_angle_deg": math.degrees(point.pinion_angle),
+            }
+            for name, point in pair.path.items()
+        },
+        "pinion": _of_gear(pair.pinion, pair.pinion_working_radius),
+        "wheel": _of_gear(pair.wheel, pair.wheel_working_radius),
+    }
+
+
+def _of_gear(gear: Gear, working_radius: float) -> dict[str, Any]:
+    return {
+        "teeth": gear.teeth,
+        "module_mm": 1e3 * gear.module,
+        "pitch_diameter_mm": 1e3 * gear.pitch_diameter,
+        "working_pitch_diameter_mm": 2e3 * working_radius,
+        "base_diameter_mm": 2e3 * gear.base_radius,
+        "tip_diameter_mm": 2e3 * gear.tip_radius,
+        "root_diameter_mm": 2e3 * gear.root_radius,
+        "form_diameter_mm": 2e3 * gear.form_radius,
+        "bore_diameter_mm": 1e3 * gear.bore_diameter,
+        "tip_thickness_mm": 1e3 * gear.tip_thickness,
+        "profile_shift": gear.profile_shift,
+        "undercut": gear.undercut,
+    }
+
+
+def iso_values(pair: GearPair, pinion_modulus: float, wheel_modulus: float) -> dict[str, float]:
+    """ISO 6336-1 method B for the pair: c', c_gamma per face width, and c_gamma times the common face width.
+
+    Parameters
+    ----------
+    pinion_modulus, wheel_modulus
+        Young's moduli (Pa).
+    """
+    width = min(pair.pinion.face_width, pair.wheel.face_width)
+    single = single_stiffness(pair, pinion_modulus, wheel_modulus)
+    mean = mesh_stiffness(pair, pinion_modulus, wheel_modulus)
+    return {
+        "c_prime_N_per_mm_um": single * 1e-9,
+        "c_gamma_N_per_mm_um": mean * 1e-9,
+        "c_gamma_times_width_N_per_m": mean * width,
+    }

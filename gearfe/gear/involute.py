@@ -1,0 +1,237 @@
+"""Exact transverse profile of an external involute gear tooth as a rack cuts it.
+
+The half profile of a tooth centred on the +x axis runs from the middle of the space (polar angle pi/z) to the tip
+centreline (polar angle 0) through up to five curves: root circle, trochoid, involute, tip round, tip circle. Names
+after ISO 21771; the curves themselves are in `gearfe.gear.curves`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from .curves import Arc, Array, Flank, Point, Segment, Trochoid, bisect, inv, inverse_inv
+from .tooth_root import NIL_ANGLE, ToothForm, half_tooth_angle, tip_radius, tooth_root
+
+__all__ = ["Segment", "ToothForm", "ToothProfile", "inv", "inverse_inv", "tooth_profile"]
+
+
+@dataclass(frozen=True)
+class ToothProfile:
+    """Left half of a tooth centred on the +x axis, from the middle of the space to the tip centreline.
+
+    Parameters
+    ----------
+    segments
+        In order root_circle, trochoid, involute, tip_round, tip; a piece of zero length is left out.
+    flank
+        The involute with its relief, as a function of the roll length.
+    form_roll, round_roll, tip_roll
+        Roll lengths (m) of the form point (start of the involute), of the start of the tip round (end of the involute
+        segment) and of the tip circle on the unrelieved involute.
+    relief_roll
+        Roll length (m) where the relief starts; `tip_roll` without relief.
+    undercut
+        True when trochoid and involute cross instead of touching.
+    tip_half_angle, tip_land_half_angle
+        Polar angles (rad) of the flank's end on the tip circle if it were not rounded, and where the tip arc begins.
+    """
+
+    segments: tuple[Segment, ...]
+    flank: Flank
+    form_roll: float
+    relief_roll: float
+    round_roll: float
+    tip_roll: float
+    undercut: bool
+    tip_half_angle: float
+    tip_land_half_angle: float
+
+    def segment(self, name: str) -> Segment:
+        """The segment called `name`; KeyError when the profile has none."""
+        for segment in self.segments:
+            if segment.name == name:
+                return segment
+        raise KeyError(name)
+
+    def parameter_of_roll(self, s: Array) -> Array:
+        """Parameter t on the involute segment at roll lengths s (m)."""
+        return (np.asarray(s, dtype=float) - self.form_roll) / (self.round_roll - self.form_roll)
+
+    def roll_of_parameter(self, t: Array) -> Array:
+        """Roll length s (m) at parameters t of the involute segment."""
+        return self.flank.roll(np.asarray(t, dtype=float))
+
+    def points_of_roll(self, s: Array) -> Array:
+        """Flank points (m) at roll lengths s (m), shape (n, 2)."""
+        return self.flank.at(np.asarray(s, dtype=float))
+
+    def normals_of_roll(self, s: Array) -> Array:
+        """Outward unit normals of the flank at roll lengths s (m), shape (n, 2)."""
+        return self.flank.normal_at(np.asarray(s, dtype=float))
+
+    def polyline(self, per_segment: int = 40) -> Array:
+        """Points (m) of the half profile, equally spaced in arc length on each segment, shape (n, 2)."""
+        parts: list[Array] = []
+        for segment in self.segments:
+            t = segment.parameter_at(np.linspace(0.0, segment.length, per_segment + 1))
+            parts.append(segment.points(t)[(1 if parts else 0) :])
+        return np.concatenate(parts)
+
+
+def tooth_profile(gear: ToothForm) -> ToothProfile:
+    """Exact left half profile of a tooth.
+
+    Raises
+    ------
+    InputError
+        When the rack has no land, the tooth is pointed or cut through, or tip round or relief do not fit.
+    """
+    root, form_roll, undercut = tooth_root(gear)
+    flank, tip_roll = _flank(gear, form_roll)
+    end_roll = bisect(lambda s: _radius(flank, s) - tip_radius(gear), tip_roll, tip_roll + 2.0 * flank.amount)
+    tip_half_angle = _angle(flank, end_roll)
+    if tip_half_angle <= 0.0:
+        peak = flank.base_radius / math.cos(inverse_inv(flank.base_angle))
+        problem = f"the tooth is pointed below its tip circle: must be < {_addendum_to(gear, peak):.5g}"
+        cure = "use less addendum or profile shift, or some tip_shortening"
+        raise InputError("addendum", gear.addendum, problem, cure)
+    round_roll = _round_start(gear, flank, tip_roll, end_roll)
+    flank = Flank(flank.base_radius, flank.base_angle, form_roll, round_roll, *_relief_numbers(flank))
+
+    pieces: list[tuple[str, Arc | Trochoid | Flank]] = []
+    root_radius = gear.module * (gear.teeth / 2 + gear.profile_shift - gear.dedendum)
+    space = math.pi / gear.teeth
+    land_angle = root.offset / root.reference_radius
+    if land_angle > 0.0:
+        pieces.append(("root_circle", Arc((0.0, 0.0), root_radius, space, space - land_angle)))
+    if root.radius > 0.0 or root.depth != 0.0:
+        pieces.append(("trochoid", root))
+    pieces.append(("involute", flank))
+    land = tip_half_angle
+    if gear.tip_round > 0.0:
+        arc, land = _tip_arc(gear, flank, round_roll)
+        pieces.append(("tip_round", arc))
+    if land > NIL_ANGLE:
+        pieces.append(("tip", Arc((0.0, 0.0), tip_radius(gear), land, 0.0)))
+    return ToothProfile(
+        segments=_joined(pieces, flank),
+        flank=flank,
+        form_roll=form_roll,
+        relief_roll=min(flank.relief_start, tip_roll),
+        round_roll=round_roll,
+        tip_roll=tip_roll,
+        undercut=undercut,
+        tip_half_angle=tip_half_angle,
+        tip_land_half_angle=land,
+    )
+
+
+def _radius(flank: Flank, s: float) -> float:
+    return math.hypot(flank.base_radius, s - float(flank.relief(np.array(s))[0]))
+
+
+def _angle(flank: Flank, s: float) -> float:
+    x, y = flank.at(np.array(s))
+    return math.atan2(y, x)
+
+
+def _relief_numbers(flank: Flank) -> tuple[float, float, float, float]:
+    return flank.amount, flank.relief_start, flank.length, flank.exponent
+
+
+def _flank(gear: ToothForm, form_roll: float) -> tuple[Flank, float]:
+    """Flank from the form point, end still open, and the roll length (m) of the tip circle."""
+    base = 0.5 * gear.module * gear.teeth * math.cos(gear.pressure_angle)
+    base_angle = half_tooth_angle(gear) + inv(gear.pressure_angle)
+    tip = tip_radius(gear)
+    tip_roll = math.sqrt(max(0.0, (tip - base) * (tip + base)))
+    if tip_roll <= form_roll:
+        lowest = _addendum_to(gear, math.hypot(base, form_roll))
+        problem = f"the tip circle lies below the start of the involute: must be > {lowest:.5g}"
+        raise InputError(
+            "addendum", gear.addendum, problem, "use more addendum, teeth or profile shift, or less dedendum"
+        )
+    relief = gear.tip_relief
+    if relief is None or relief.amount == 0.0:
+        return Flank(base, base_angle, form_roll, tip_roll), tip_roll
+    start = tip_roll - relief.length
+    if start < form_roll:
+        problem = f"is longer than the flank: must be <= {1e3 * (tip_roll - form_roll):.6g} mm of roll length"
+        raise InputError("tip_relief.length", relief.length, problem, "use a shorter relief")
+    if relief.amount * relief.exponent > 0.2 * relief.length:
+        problem = (
+            f"is too steep: must be <= {200.0 * relief.length / relief.exponent:.6g} mm for this length and exponent"
+        )
+        raise InputError("tip_relief.amount", relief.amount, problem, "use less relief or a longer one")
+    return Flank(base, base_angle, form_roll, tip_roll, relief.amount, start, relief.length, relief.exponent), tip_roll
+
+
+def _round_centre(gear: ToothForm, flank: Flank, s: float) -> Point:
+    at = np.array(s)
+    x, y = flank.at(at) - gear.tip_round * flank.normal_at(at)
+    return float(x), float(y)
+
+
+def _round_start(gear: ToothForm, flank: Flank, tip_roll: float, end_roll: float) -> float:
+    """Roll length (m) where the tip round, tangent to flank and tip circle, begins; the flank's end without one."""
+    rho, tip = gear.tip_round, tip_radius(gear)
+    if rho == 0.0:
+        return end_roll
+    inner = tip - rho
+    core = (inner - flank.base_radius) * (inner + flank.base_radius)
+    start = rho + math.sqrt(core) if core >= 0.0 else -math.inf
+    if start <= flank.start:
+        problem = f"would begin below the start of the involute: must be < {1e3 * _largest_round(gear, flank):.5g} mm"
+        raise InputError("tip_round", rho, problem, "use a smaller tip round")
+    if flank.amount > 0.0:
+        if flank.relief_start >= start:
+            problem = f"lies wholly inside the tip round: must be > {1e3 * (tip_roll - start):.6g} mm of roll length"
+            raise InputError("tip_relief.length", flank.length, problem, "use a longer relief or a smaller tip round")
+        above = np.nextafter(flank.relief_start, math.inf)
+        start = bisect(lambda s: math.hypot(*_round_centre(gear, flank, s)) - inner, float(above), end_roll)
+    if math.atan2(*reversed(_round_centre(gear, flank, start))) < -NIL_ANGLE:
+        limit = 1e3 * _largest_round(gear, flank)
+        problem = f"does not fit the tip, the rounds of both flanks overlap: must be < {limit:.5g} mm"
+        raise InputError("tip_round", rho, problem, "use a smaller tip round, less addendum or less profile shift")
+    return start
+
+
+def _largest_round(gear: ToothForm, flank: Flank) -> float:
+    """Largest tip round (m) that begins above the form point and leaves a tip land; relief not counted."""
+    tip, base = tip_radius(gear), flank.base_radius
+
+    def too_large(rho: float) -> float:
+        roll = math.sqrt((tip - rho - base) * (tip - rho + base))
+        land = flank.base_angle - (rho + roll) / base + math.atan(roll / base)
+        return 1.0 if land < 0.0 or rho + roll < flank.start else -1.0
+
+    return bisect(too_large, 0.0, tip - base)
+
+
+def _addendum_to(gear: ToothForm, radius: float) -> float:
+    """Addendum coefficient with which the tip circle has the given radius (m)."""
+    return radius / gear.module - gear.teeth / 2 - gear.profile_shift + gear.tip_shortening
+
+
+def _tip_arc(gear: ToothForm, flank: Flank, round_roll: float) -> tuple[Arc, float]:
+    """Tip round and the half angle (rad) of the tip land that it leaves."""
+    centre = _round_centre(gear, flank, round_roll)
+    x, y = flank.normal_at(np.array(round_roll))
+    land = math.atan2(centre[1], centre[0])
+    return Arc(centre, gear.tip_round, math.atan2(y, x), land), land
+
+
+def _joined(pieces: list[tuple[str, Arc | Trochoid | Flank]], flank: Flank) -> tuple[Segment, ...]:
+    """Segments that share their end points: each inner joint is where the later piece starts."""
+    ends = [tuple(map(float, curve.point(np.array(0.0)))) for _, curve in pieces]
+    ends.append(tuple(map(float, pieces[-1][1].point(np.array(1.0)))))
+    kink = (flank.relief_start - flank.start) / (flank.end - flank.start)
+    made = []
+    for i, (name, curve) in enumerate(pieces):
+        breaks = (kink,) if name == "involute" and 0.0 < kink < 1.0 else ()
+        made.append(Segment(name, curve, (ends[i][0], ends[i][1]), (ends[i + 1][0], ends[i + 1][1]), breaks))
+    return tuple(made)

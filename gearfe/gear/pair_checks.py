@@ -1,0 +1,143 @@
+"""Can two gears run together? Errors for those that cannot, warnings for those that barely do."""
+
+from __future__ import annotations
+
+import math
+from numbers import Real
+
+from ..errors import InputError
+from .interference import TOLERANCE, tip_penetration
+from .involute import inv, inverse_inv
+from .mesh_geometry import MeshGeometry
+from .spur_gear import Gear
+from .tooth_root import least_shift
+
+
+def check_pair(pair: MeshGeometry) -> None:
+    """Raise `InputError` for gears that cannot run together."""
+    pinion, wheel = pair.pinion, pair.wheel
+    for name, what, unit in (("module", "module", 1e3), ("pressure_angle", "pressure angle", 180.0 / math.pi)):
+        value, other = getattr(wheel, name), getattr(pinion, name)
+        if abs(value - other) > 1e-9 * abs(other):
+            symbol = "mm" if name == "module" else "deg"
+            both = f"{unit * value:.9g} {symbol} and {unit * other:.9g} {symbol} (pinion)"
+            problem = f"gears that differ in {what}, {both}, do not mesh"
+            raise InputError(f"wheel.{name}", value, problem, f"give both the same {what}")
+    _check_distance(pair)
+    a = pair.working_centre_distance
+    for name, gear, mate in (("pinion", pinion, wheel), ("wheel", wheel, pinion)):
+        if gear.tip_radius + mate.root_radius >= a:
+            room = (a - mate.root_radius - gear.reference_radius) / gear.module
+            problem = "makes the tip circle hit the mate's root circle: addendum + profile_shift - tip_shortening must"
+            cure = "use more tip_shortening, less addendum, more dedendum or more centre distance"
+            raise InputError(f"{name}.addendum", gear.addendum, f"{problem} be < {room:.6g}", cure)
+    _check_ratio(pair)
+    for name, gear, mate, own in (("pinion", pinion, wheel, "wheel"), ("wheel", wheel, pinion, "pinion")):
+        _check_interference(pair, name, gear, mate, own)
+
+
+def _check_distance(pair: MeshGeometry) -> None:
+    pinion, wheel = pair.pinion, pair.wheel
+    alpha, a0 = pinion.pressure_angle, pair.reference_centre_distance
+    free = pinion.base_radius + wheel.base_radius
+    involute = (
+        pinion.base_radius * pinion.base_angle + wheel.base_radius * wheel.base_angle - pair.base_pitch / 2
+    ) / free
+    if pair.centre_distance is None:
+        shift = pinion.profile_shift + wheel.profile_shift
+        least = -0.5 * (pinion.teeth + wheel.teeth) * inv(alpha) / math.tan(alpha)
+        if shift <= least:
+            problem = f"leaves no working pressure angle: the sum of both profile shifts must be > {least:.6g}"
+            raise InputError("pinion.profile_shift", pinion.profile_shift, problem, "use larger profile shifts")
+        return
+    a = pair.centre_distance
+    lowest = a0 * math.cos(alpha)
+    if isinstance(a, bool) or not isinstance(a, Real) or not math.isfinite(a) or a <= lowest:
+        problem = f"leaves no working pressure angle: must be finite and > {1e3 * lowest:.9g} mm"
+        raise InputError("centre_distance", a, problem, "use a larger centre distance, or leave it out")
+    if pair.normal_backlash < 0.0:
+        tight = lowest / math.cos(inverse_inv(involute))
+        problem = f"jams the teeth (backlash {1e3 * pair.backlash:.6g} mm): must be >= {1e3 * tight:.12g} mm"
+        cure = "use a larger centre distance, less profile shift or more tooth thinning, or leave it out"
+        raise InputError("centre_distance", a, problem, cure)
+
+
+def _tips_ratio(pair: MeshGeometry, *, rounded: bool) -> float:
+    """Contact ratio between the tips alone, as if no flank were undercut."""
+    rolls = [
+        (g.profile.round_roll if rounded and g.tip_round > 0.0 else g.profile.tip_roll)
+        for g in (pair.pinion, pair.wheel)
+    ]
+    return (sum(rolls) - pair.tangent_length) / pair.base_pitch
+
+
+def _check_ratio(pair: MeshGeometry) -> None:
+    nominal, active = _tips_ratio(pair, rounded=False), pair.contact_ratio_active
+    if nominal < 1.0:
+        problem = f"gives a contact ratio of {nominal:.4g}, must be >= 1"
+        if pair.centre_distance is not None and pair.backlash > 1e-3 * pair.base_pitch:
+            raise InputError("centre_distance", pair.centre_distance, problem, "use a smaller centre distance")
+        cure = "use more addendum, less tip_shortening, more teeth or a smaller pressure angle"
+        raise InputError("pinion.addendum", pair.pinion.addendum, problem, cure)
+    if active >= 1.0:
+        return
+    rounded = _tips_ratio(pair, rounded=True)
+    if rounded < 1.0:
+        name = "pinion" if pair.pinion.tip_round >= pair.wheel.tip_round else "wheel"
+        problem = f"leaves a contact ratio of {rounded:.4g}, must be >= 1"
+        raise InputError(f"{name}.tip_round", getattr(pair, name).tip_round, problem, "use a smaller tip round")
+    cuts = {name: lost for name, lost in _lost_to_form_points(pair).items() if lost > 0.0}
+    name = max(cuts, key=cuts.__getitem__)
+    gear: Gear = getattr(pair, name)
+    problem = f"leaves an undercut root that eats the path of contact: contact ratio {active:.4g}, must be >= 1"
+    cure = f"use more profile shift (no undercut from {least_shift(gear):.4g} on), more teeth or less dedendum"
+    raise InputError(f"{name}.profile_shift", gear.profile_shift, problem, cure)
+
+
+def _lost_to_form_points(pair: MeshGeometry) -> dict[str, float]:
+    """Length (m) of path that the mate's active tip reaches below each gear's form point; <= 0 when there is none."""
+
+    def lost(gear: Gear, mate: Gear) -> float:
+        tip = min(mate.profile.round_roll, mate.profile.tip_roll)
+        return gear.form_roll - (pair.tangent_length - tip)
+
+    return {"pinion": lost(pair.pinion, pair.wheel), "wheel": lost(pair.wheel, pair.pinion)}
+
+
+def _check_interference(pair: MeshGeometry, name: str, gear: Gear, mate: Gear, mate_name: str) -> None:
+    cure = "use less addendum or more tip_shortening there, more dedendum or a smaller rack_tip_radius here"
+    lost = _lost_to_form_points(pair)[name]
+    if lost > 1e-7 * gear.module and not gear.undercut:
+        allowed = math.hypot(mate.base_radius, pair.tangent_length - gear.form_roll)
+        most = mate.addendum - (mate.tip_radius - allowed) / mate.module
+        problem = (
+            f"makes the tip reach {1e3 * lost:.4g} mm of roll length below the start of the {name}'s involute "
+            f"(form diameter {2e3 * gear.form_radius:.6g} mm), where the root is no involute: must be < {most:.5g}"
+        )
+        raise InputError(f"{mate_name}.addendum", mate.addendum, problem, cure)
+    depth = tip_penetration(gear, mate, pair.working_centre_distance, 0.5 * pair.normal_backlash / mate.base_radius)
+    if depth > TOLERANCE * gear.module:
+        problem = f"makes the tip cut {1e3 * depth:.4g} mm into the {name}'s root"
+        raise InputError(f"{mate_name}.addendum", mate.addendum, problem, cure)
+
+
+def pair_warnings(pair: MeshGeometry) -> tuple[str, ...]:
+    """What is legal but deserves a look, one sentence each."""
+    said = []
+    for name, lost in _lost_to_form_points(pair).items():
+        gear: Gear = getattr(pair, name)
+        if not gear.undercut:
+            continue
+        if lost > 0.0:
+            said.append(
+                f"the {name} is undercut and loses {1e3 * lost:.4g} mm of the path of contact: contact ratio "
+                f"{pair.contact_ratio_active:.4g} instead of {_tips_ratio(pair, rounded=True):.4g}"
+            )
+        else:
+            said.append(f"the {name} is undercut below its active flank; the path of contact is whole")
+    if pair.contact_ratio_effective < 1.0:
+        said.append(
+            f"tip relief leaves a contact ratio of {pair.contact_ratio_effective:.4g} on the unrelieved flanks: "
+            "unloaded, the teeth hand over on the relieved part"
+        )
+    return tuple(said)

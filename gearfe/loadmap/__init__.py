@@ -1,0 +1,1 @@
+"""Mesh stiffness and tooth-root stress over twist and rotation: sweep, map, report."""

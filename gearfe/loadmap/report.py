@@ -1,0 +1,132 @@
+"""What the loadmap command tells and draws: the table by torque, the printed lines, the summary, the figure."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..gear.derived import derived_geometry
+from ..stiffness.job import StiffnessJob
+from ..stiffness.report import versions
+from ..tables.loadmap import LoadMapTable
+from .load_map import LoadMap
+from .root_map import GEARS
+
+Array = NDArray[np.float64]
+
+
+def torque_table(made: LoadMap) -> dict[str, list[float]]:
+    """One row per torque: means over the positions, peak-to-peak transmission error, largest stresses."""
+    error = made.quantity("transmission_error")
+    table = {
+        "torque_Nm": made.torque,
+        "k_mesh_mean_N_per_m": made.quantity("k_mesh").mean(axis=1),
+        "k_tangent_mean_N_per_m": made.quantity("k_tangent").mean(axis=1),
+        "transmission_error_mean_um": 1e6 * error.mean(axis=1),
+        "transmission_error_peak_to_peak_um": 1e6 * made.peak_to_peak,
+        "peak_pressure_largest_MPa": 1e-6 * made.quantity("peak_pressure").max(axis=1),
+    }
+    if made.root is not None:
+        for g, gear in enumerate(GEARS):
+            table[f"root_stress_largest_{gear}_MPa"] = 1e-6 * made.root.largest[:, :, g].max(axis=1)
+    table["failed_positions"] = made.failed.sum(axis=1)
+    return {name: values.tolist() for name, values in table.items()}
+
+
+def summary(job: StiffnessJob, table: LoadMapTable, made: LoadMap, timings: Mapping[str, float]) -> dict[str, Any]:
+    """Content of loadmap.json."""
+    missed = made.interpolation_error()
+    return {
+        "job": {"pair": asdict(job.pair_table), "stiffness": asdict(job.table), "loadmap": asdict(table)},
+        "versions": versions(),
+        "derived_geometry": derived_geometry(job.pair),
+        "warnings": list(job.pair.warnings),
+        "by_torque": torque_table(made),
+        "relative_twist_error_with_a_torque_left_out": missed,
+        "root_stress_error_estimate": None if made.root is None else _largest(made.root.error),
+        "statuses": dict(Counter(map(str, made.status.ravel()))),
+        "timings_s": dict(timings),
+    }
+
+
+def _largest(values: Array) -> float:
+    return float(np.nanmax(values)) if np.isfinite(values).any() else float("nan")
+
+
+def told(made: LoadMap) -> list[str]:
+    """Lines to print."""
+    count = Counter(map(str, made.status.ravel()))
+    statuses = ", ".join(f"{n} {status}" for status, n in count.items())
+    lines = [f"{len(made.torque)} torques x {len(made.pinion_angle)} positions: {statuses}"]
+    for row in sorted({0, len(made.torque) // 2, len(made.torque) - 1}):
+        curve = made.curves[row]
+        line = (
+            f"at {made.torque[row]:.4g} N m: mean stiffness {1e-6 * curve.k_mesh.mean():.4g} N/um, transmission error "
+            f"{1e6 * curve.transmission_error.mean():.4g} um with {1e6 * made.peak_to_peak[row]:.3g} um peak to peak, "
+            f"peak pressure {1e-6 * curve.peak_pressure.max():.4g} MPa"
+        )
+        if made.root is not None:
+            pinion, wheel = 1e-6 * made.root.largest[row].max(axis=0)
+            line += f", root stress {pinion:.4g} MPa (pinion), {wheel:.4g} MPa (wheel)"
+        lines.append(line)
+    missed = made.interpolation_error()
+    if np.isfinite(missed).any():
+        lines.append(
+            "curves between the torques: with a torque left out, its twists are missed by "
+            f"{100 * np.nanmedian(missed):.2g} % (median), {100 * np.nanmax(missed):.2g} % at worst"
+        )
+    if made.root is not None:
+        lines.append(f"root stress: estimated error at worst {100 * _largest(made.root.error):.2g} %")
+    return lines
+
+
+def warnings(job: StiffnessJob, made: LoadMap) -> list[str]:
+    """Sentences about what deserves a look."""
+    said = list(job.pair.warnings)
+    if made.failed.any():
+        rows = np.flatnonzero(made.failed.any(axis=1))
+        torques = ", ".join(f"{made.torque[row]:.4g}" for row in rows[:6]) + (" ..." if len(rows) > 6 else "")
+        said.append(
+            f"{int(made.failed.sum())} cells failed and have no numbers, only their status (torques {torques} N m): "
+            "use less load or a finer mesh (coarsen below 1)"
+        )
+    if job.table.law == "penalty":
+        said.append(
+            "peak pressures of the penalty law oscillate from point to point and are too high: use nitsche for them"
+        )
+    return said
+
+
+def figure_arguments(job: StiffnessJob, made: LoadMap) -> dict[str, Any]:
+    """Arguments of `gearfe.output.load_map_figures.load_map_figure`."""
+    pair, cycle = job.pair, np.degrees(made.mesh_cycle)
+    angle = np.degrees(made.pinion_angle)
+    inside = bool(len(angle) and np.isclose(angle[0], 0.0) and angle[-1] < cycle)
+    close = slice(0, 1 if inside else 0)  # the first position again at the end of the cycle
+
+    def closed(values: Array) -> Array:
+        return np.concatenate([values, values[:, close]], axis=1)
+
+    share = np.stack([c.load_share.max(axis=1) for c in made.curves])
+    panels = {
+        "mesh stiffness k  (N/µm)": 1e-6 * made.quantity("k_mesh"),
+        "transmission error  (µm)": 1e6 * made.quantity("transmission_error"),
+        "largest load share of a pair  (–)": share,
+        "peak pressure  (MPa)": 1e-6 * made.quantity("peak_pressure"),
+    }
+    if made.root is not None:
+        for g, gear in enumerate(GEARS):
+            panels[f"root stress, {gear}  (MPa)"] = 1e-6 * made.root.largest[:, :, g]
+    return {
+        "title": f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, plane {job.table.plane}, law {job.table.law}",
+        "angle": np.append(angle, [cycle] if inside else []),
+        "torque": made.torque,
+        "panels": {name: closed(values) for name, values in panels.items()},
+        "peak_to_peak": 1e6 * made.peak_to_peak,
+        "mean_stiffness": 1e-6 * made.quantity("k_mesh").mean(axis=1),
+    }

@@ -1,0 +1,222 @@
+r"""Craig-Bampton reduction of a sparse pair (K, M) with interface rows, corrected for what the left-out modes carry.
+
+The unknowns of the full model are ``u = B q_b + E u_i``: the interface coordinates ``q_b`` (rigid attachments: six
+each) move their rows through the constant matrix B, the internal unknowns ``u_i`` are free, all other rows are held.
+
+.. math::
+    u_i = \Psi q_b + \Phi \eta + \tilde X \xi,\qquad
+    \Psi = -K_{ii}^{-1} K_{ib},\qquad K_{ii}\Phi = M_{ii}\Phi\Lambda,\qquad
+    X = K_{ii}^{-1}(M_{ii}\Psi + M_{ib}) .
+
+``Psi`` are the static shapes (the static response at the interfaces is exact), ``Phi`` the lowest modes with the
+interfaces held (Craig, Bampton, AIAA J. 6, 1968), ``X`` the first-order inertia corrections: the quasi-static part of
+all modes that are left out. ``X`` is freed of ``Phi`` and made M-orthonormal, and both are turned to the principal axes
+of their stiffness: all internal coordinates have unit mass and diagonal stiffness. One more level repeats ``K^-1 M`` on
+the last one. All this is Galerkin projection: frequencies converge from above. One factorisation serves all of it.
+
+**Error bound.** The interfaces see the internal unknowns through the dynamic stiffness
+``D(w) = K_bb - w^2 M_bb - w^4 b^T (K_ii - w^2 M_ii)^{-1} b``, ``b = M_ii Psi + M_ib``. With exact modes and L levels of
+corrections the Galerkin error is at most ``w^{4 L + 4} S / (w_next^2 - w^2)``, ``S = X_L^T M X_L`` freed of the modes;
+for L = 0 it is ``w^4 S w_next^2 / (w_next^2 - w^2)`` with ``S = X^T K X``. ``w_next`` is the first one left out.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..errors import InputError
+from ..threads import one_thread
+from .lanczos import lowest_modes
+from .sparse_solver import Factorization, factorize
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Part of its own size below which a correction vector counts as contained in the others.
+DEPENDENT = 1e-6
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """Reduced matrices over ``[interface coordinates (m) | internal coordinates (k)]`` and the way back.
+
+    Attributes
+    ----------
+    mass, stiffness : (m + k, m + k)
+        Projected matrices; the internal part has unit mass and diagonal stiffness, and no stiffness couples it to the
+        interfaces.
+    shapes : (n, m + k)
+        Full unknowns ``u = shapes @ q``.
+    eigenvalues : (k,)
+        Diagonal of the internal stiffness (rad^2/s^2), ascending: modes first, then corrections.
+    modes
+        How many of the k internal coordinates are modes.
+    tail : (m, m)
+        S of the error bound.
+    levels
+        L of the error bound.
+    next_eigenvalue
+        Square of ``w_next``; infinite when no mode is left out.
+    solver
+        Name of the sparse solver.
+    solved_columns
+        Right-hand sides solved for.
+    """
+
+    mass: Floats
+    stiffness: Floats
+    shapes: Floats
+    eigenvalues: Floats
+    modes: int
+    tail: Floats
+    levels: int
+    next_eigenvalue: float
+    solver: str
+    solved_columns: int
+
+
+@one_thread()
+def reduce_model(
+    stiffness: Any,
+    mass: Any,
+    interface: Any,
+    internal: Ints,
+    *,
+    count: int | None = None,
+    below_hz: float = math.inf,
+    at_least: int = 0,
+    corrections: int = 1,
+    free: bool = False,
+    solver: str = "auto",
+) -> Reduction:
+    """Reduce a sparse model to its interface coordinates, its lowest modes and their quasi-static corrections.
+
+    Parameters
+    ----------
+    stiffness, mass : (n, n) sparse
+        Full matrices, symmetric.
+    interface : (n, m) sparse
+        B: displacement of every row for unit interface coordinates; zero in internal and held rows. m may be 0.
+    internal : (k,)
+        Rows that are free and in no interface.
+    count, below_hz
+        Number of modes with the interfaces held, and their highest frequency (Hz): whichever ends first.
+    at_least
+        Number of modes kept in any case, when they are chosen by frequency.
+    corrections
+        Levels of correction vectors; 0 gives plain Craig-Bampton.
+    free
+        Whether a model without interfaces is held nowhere, so that its first modes are rigid-body modes.
+    solver
+        See `gearfe.reduction.sparse_solver.factorize`.
+
+    Raises
+    ------
+    InputError
+        Neither `count` nor a finite `below_hz`; negative values; a model that can still move with its interfaces held.
+    """
+    _check(count, below_hz, corrections)
+    boundary = sparse.csc_array(interface)
+    m = boundary.shape[1]
+    k_rows, m_rows = sparse.csr_array(stiffness)[internal], sparse.csr_array(mass)[internal]
+    k_ii, m_ii = k_rows[:, internal], m_rows[:, internal]
+    k_ib, m_ib = ((rows @ boundary).toarray() for rows in (k_rows, m_rows))
+    del k_rows, m_rows
+    shift = rigid_shift(k_ii, m_ii) if m == 0 and free else 0.0
+    factor = factorize(k_ii + shift * m_ii if shift else k_ii, solver=solver)
+    psi = -factor.solve(k_ib) if m else k_ib
+    coupling = m_ii @ psi + m_ib
+    limit = (2.0 * math.pi * below_hz) ** 2
+    modes = lowest_modes(
+        factor.solve, m_ii, count=count, limit=limit, at_least=at_least if count is None else 0, shift=shift
+    )
+    added, tail, columns = _corrections(factor, m_ii, modes.vectors, coupling, corrections if m else 0)
+    inner = np.concatenate([modes.vectors, added], axis=1)
+    # principal axes of the whole inner space: the projection is exact whatever the modes' last digits are
+    eigenvalues, axes = np.linalg.eigh(_symmetric(inner.T @ (k_ii @ inner)))
+    inner = inner @ axes
+    size = m + len(eigenvalues)
+    k_red, m_red = np.zeros((size, size)), np.eye(size)
+    k_red[:m, :m] = _symmetric((boundary.T @ (stiffness @ boundary)).toarray() + psi.T @ k_ib) if m else 0.0
+    if m:
+        m_bb = (boundary.T @ (mass @ boundary)).toarray()
+        m_red[:m, :m] = _symmetric(m_bb + psi.T @ m_ib + coupling.T @ psi)
+    m_red[:m, m:] = coupling.T @ inner
+    m_red[m:, :m] = m_red[:m, m:].T
+    k_red[range(m, size), range(m, size)] = eigenvalues
+    shapes = np.zeros((stiffness.shape[0], size))
+    shapes[:, :m] = boundary.toarray()
+    shapes[internal, :m] = psi
+    shapes[internal, m:] = inner
+    return Reduction(
+        mass=m_red,
+        stiffness=k_red,
+        shapes=shapes,
+        eigenvalues=eigenvalues,
+        modes=len(modes.eigenvalues),
+        tail=tail,
+        levels=corrections,
+        next_eigenvalue=modes.next_eigenvalue,
+        solver=factor.solver,
+        solved_columns=m + modes.columns + columns,
+    )
+
+
+def _corrections(
+    factor: Factorization, m_ii: Any, modes: Floats, coupling: Floats, wanted: int
+) -> tuple[Floats, Floats, int]:
+    """M-orthonormal correction vectors, the tail S of the error bound, and the number of right-hand sides.
+
+    ``X_1 = K^-1 b``, ``X_l = K^-1 M X_{l-1}``: all freed of the modes. S is ``X_L^T M X_L``, or ``X_1^T b`` for L = 0.
+    """
+    m_modes = np.asarray(m_ii @ modes)
+    found = [modes]
+    x = factor.solve(coupling)
+    x = x - modes @ (m_modes.T @ x)
+    columns, tail = coupling.shape[1], _symmetric(x.T @ coupling)
+    for number in range(1, wanted + 1):
+        mx = np.asarray(m_ii @ x)
+        if number > 1:
+            x = factor.solve(mx)
+            x = x - modes @ (m_modes.T @ x)
+            mx = np.asarray(m_ii @ x)
+            columns += coupling.shape[1]
+        tail = _symmetric(x.T @ mx)
+        scale = np.maximum(np.sqrt(np.diag(tail)), 1e-300)
+        new, m_new = x / scale, mx / scale
+        for again in (True, False):
+            new = new - sum(basis @ (basis.T @ m_new) for basis in found)
+            size, directions = np.linalg.eigh(_symmetric(new.T @ (m_ii @ new)))
+            keep = size > DEPENDENT**2
+            new = new @ (directions[:, keep] / np.sqrt(size[keep]))
+            m_new = m_ii @ new if again else m_new
+        found.append(new)
+    return np.concatenate([np.zeros((len(modes), 0)), *found[1:]], axis=1), tail, columns
+
+
+def _symmetric(matrix: Floats) -> Floats:
+    return np.asarray(0.5 * (matrix + matrix.T))
+
+
+def rigid_shift(stiffness: Any, mass: Any) -> float:
+    """A shift far below the elastic modes and far above rounding, for a body that is held nowhere (rad^2/s^2)."""
+    return float(1e-9 * np.max(stiffness.diagonal() / mass.diagonal()))
+
+
+def _check(count: int | None, below_hz: float, corrections: int) -> None:
+    if count is not None and count < 0:
+        raise InputError("modes", count, "must be 0 or more", "0 keeps static shapes and corrections only")
+    if not below_hz > 0.0:
+        raise InputError("below_hz", below_hz, "must be > 0", "give a frequency in Hz")
+    if count is None and math.isinf(below_hz):
+        raise InputError(
+            "modes", None, "neither a number of modes nor a highest frequency is given", "give one of them"
+        )
+    if corrections < 0:
+        raise InputError("corrections", corrections, "must be 0 or more", "1 is the default")

@@ -1,0 +1,222 @@
+r"""An elastic body as a few constant matrices: what the rigid core carries, and the way back to the full field.
+
+Coordinates ``q = [attachments | internal]``: six for each attachment, the displacement of its reference point (m) along
+x, y, z and its small rotation about x, y, z (rad), in the body's own frame; then internal ones with unit modal mass
+(m kg^1/2). In that frame
+
+.. math::
+    M\ddot q + C\dot q + K q = f, \qquad u(x) = \mathrm{shapes}(x)\,q ,
+
+``f`` the forces (N) and moments (N m) on the attachments, zero for the internal coordinates. Loading and using a saved
+body needs numpy and scipy only.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, unknown_name
+from ..output.arrays import load_arrays, save_arrays
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Written to files; a file of another format is refused with a message.
+FORMAT = 1
+
+
+@dataclass(frozen=True, eq=False)
+class ModalBody:
+    """Constant matrices of an elastic body over ``[attachments (6 each) | internal]``, N coordinates.
+
+    Attributes
+    ----------
+    mass, damping, stiffness : (N, N)
+        M, C, K blocks (SI).
+    attachment_names
+        One a attachment.
+    attachment_points : (a, 3)
+        Reference points (m), on the bores' axes.
+    attachment_axes : (a, 3)
+        Unit vectors along the bores' axes.
+    internal_hz : (N - 6 a,)
+        Frequencies with the attachments held (Hz): modes first, then those of the correction vectors.
+    modes
+        How many of the internal coordinates are modes.
+    nodes : (n, 3)
+        Mesh nodes (m).
+    elements : (m, 4) or (m, 10)
+        Tetrahedra.
+    shapes : (3 n, N)
+        Nodal displacement for unit coordinates, rows ``3 node + axis``.
+    faces : (f, 3) or (f, 6)
+        Triangles of the outer surface, anticlockwise from outside, midside nodes last.
+    normals : (n, 3)
+        Outward unit normals of the outer surface at its nodes, zero elsewhere.
+    radiation : (N, N)
+        Surface matrix: ``qdot^T radiation qdot`` is the integral of the squared normal velocity over the outer surface
+        (m4/s2).
+    momentum : (6, N)
+        Linear (kg m/s) and angular momentum about the frame's origin (kg m2/s) for unit coordinate rates.
+    rigid_mass : (6, 6)
+        Mass, static moments and inertia about the origin: kinetic energy of rigid translations and rotations.
+    tail, levels, next_hz
+        Matrix S, number L and frequency of the error bound in `gearfe.reduction.craig_bampton`.
+    held
+        Whether a part of the body is fixed to the frame; a free body has six rigid-body modes.
+    solver
+        Sparse solver that made it.
+    notes
+        What the user should know about how it was made.
+    """
+
+    mass: Floats
+    damping: Floats
+    stiffness: Floats
+    attachment_names: tuple[str, ...]
+    attachment_points: Floats
+    attachment_axes: Floats
+    internal_hz: Floats
+    modes: int
+    nodes: Floats
+    elements: Ints
+    shapes: Floats
+    faces: Ints
+    normals: Floats
+    radiation: Floats
+    momentum: Floats
+    rigid_mass: Floats
+    tail: Floats
+    levels: int
+    next_hz: float
+    held: bool
+    solver: str
+    notes: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates N."""
+        return len(self.mass)
+
+    @cached_property
+    def coupled(self) -> CoupledModes:
+        """Modes of the body with its attachments free to move, bores rigid."""
+        from scipy.linalg import eigh
+
+        values, vectors = eigh(self.stiffness, self.mass)
+        if not self.held:
+            values[:6] = np.where(np.abs(values[:6]) < 1e-6 * abs(values[min(6, len(values) - 1)]), 0.0, values[:6])
+        return CoupledModes(np.sqrt(np.maximum(values, 0.0)) / (2.0 * math.pi), vectors)
+
+    def attachment(self, name: str) -> slice:
+        """Slice of the six coordinates of an attachment."""
+        if name not in self.attachment_names:
+            raise unknown_name("attachment", name, self.attachment_names)
+        first = 6 * self.attachment_names.index(name)
+        return slice(first, first + 6)
+
+    def reconstruct(self, q: Floats) -> Floats:
+        """Nodal field of coordinates: displacement from q, velocity from its rate, acceleration from its second rate.
+
+        Parameters
+        ----------
+        q : (N,) or (steps, N)
+
+        Returns
+        -------
+        ndarray, shape (n, 3) or (steps, n, 3)
+        """
+        q = np.asarray(q, dtype=float)
+        if q.shape[-1] != self.size:
+            raise InputError("q", q.shape, f"must have {self.size} coordinates in its last axis", "")
+        field = self.shapes @ q if q.ndim == 1 else (self.shapes @ q.T).T
+        return np.asarray(field.reshape(*q.shape[:-1], len(self.nodes), 3))
+
+    def normal_component(self, q: Floats) -> Floats:
+        """Nodal field's component along the outward normal: (n,) or (steps, n), zero off the outer surface."""
+        return np.asarray(np.einsum("...nk,nk->...n", self.reconstruct(q), self.normals))
+
+    def surface_integral(self, rates: Floats) -> Floats:
+        """Integral over the outer surface of the squared normal component of a field: () or (steps,).
+
+        Complex amplitudes are allowed: the integral of the squared magnitude is returned.
+        """
+        rates = np.asarray(rates)
+        return np.asarray(np.einsum("...i,ij,...j->...", rates.conj(), self.radiation, rates, optimize=True).real)
+
+    def with_damping(self, *, ratio: float | Floats | None = None, alpha: float = 0.0, beta: float = 0.0) -> ModalBody:
+        """The same body with another damping block.
+
+        Parameters
+        ----------
+        ratio
+            Modal damping ratio for all modes of the body with free attachments, or one a mode (the last one holds for
+            all above). Rigid-body modes stay undamped.
+        alpha, beta
+            Rayleigh damping ``alpha M + beta K`` (1/s, s), added to it.
+        """
+        damping = alpha * self.mass + beta * self.stiffness
+        given = np.atleast_1d(np.asarray(0.0 if ratio is None else ratio, dtype=float))
+        for field, value in (("ratio", float(np.min(given))), ("alpha", alpha), ("beta", beta)):
+            if not value >= 0.0:
+                raise InputError(f"damping {field}", value, "must be >= 0", "negative damping feeds energy in")
+        if np.any(given > 0.0):
+            omega = 2.0 * math.pi * self.coupled.frequencies_hz
+            per_mode = np.append(given, np.full(max(0, self.size - len(given)), given[-1]))[: self.size]
+            weighted = self.mass @ self.coupled.vectors
+            damping = damping + (weighted * (2.0 * per_mode * omega)) @ weighted.T
+        return dataclasses.replace(self, damping=0.5 * (damping + damping.T))
+
+    def save(self, path: str | Path) -> None:
+        """Write one file with everything; `load` gives an equal body back."""
+        values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        save_arrays(path, {"format": np.array(FORMAT)} | {name: np.asarray(value) for name, value in values.items()})
+
+    @classmethod
+    def load(cls, path: str | Path, *, verify: bool = False) -> ModalBody:
+        """Read a saved body; its large matrix stays on disk until it is used.
+
+        With `verify` all of the file is read once and held against its checksums.
+
+        Raises
+        ------
+        InputError
+            When the file is missing, damaged, or of another format.
+        """
+        stored = load_arrays(path, verify=verify)
+        made: dict[str, Any] = {}
+        if int(stored.get("format", np.array(-1))) != FORMAT:
+            raise InputError("reduced model", str(path), "was written by another version", "make it anew")
+        for field in dataclasses.fields(cls):
+            if field.name not in stored:
+                raise InputError("reduced model", str(path), f"has no entry {field.name!r}", "make it anew")
+            value = stored[field.name]
+            if field.type in ("int", "float", "bool", "str"):
+                made[field.name] = value.item()
+            else:
+                made[field.name] = tuple(value.tolist()) if field.type == "tuple[str, ...]" else value
+        return cls(**made)
+
+
+@dataclass(frozen=True, eq=False)
+class CoupledModes:
+    """Modes of a body whose attachments are free to move.
+
+    Attributes
+    ----------
+    frequencies_hz : (N,)
+        Natural frequencies (Hz), ascending; zero for rigid-body modes.
+    vectors : (N, N)
+        Mode shapes in the body's coordinates, one a column, of unit modal mass.
+    """
+
+    frequencies_hz: Floats
+    vectors: Floats

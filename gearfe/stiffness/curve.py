@@ -1,0 +1,290 @@
+r"""The mesh-stiffness curve of a gear pair: plain arrays, periodic interpolation, CSV in and out. SI units.
+
+With the twist :math:`\vartheta` of the wheel, its hub torque T and its base radius :math:`r_b` (the reference one,
+d cos(alpha)/2),
+
+.. math::
+    k_\mathrm{torsional} = T/\vartheta, \quad k_\mathrm{mesh} = T/(\vartheta r_b^2), \quad
+    k_\mathrm{tangent} = (dT/d\vartheta)/r_b^2, \quad \mathrm{TE} = \vartheta r_b .
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError, unknown_name
+from ..output.files import write_csv
+from . import curve_csv
+from .periodic import PeriodicInterpolant, ValueAndSlope, periodic_interpolant
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+#: Statuses that stand for a result; every other one marks a failed position, whose numbers are not-a-number.
+SOLVED = ("converged", "no_contact")
+
+#: Column of the CSV file -> field, in order; a field of whole numbers has -1 where the file has ``nan``.
+COLUMNS: dict[str, str] = {
+    "pinion_angle_deg": "pinion_angle",
+    "wheel_angle_deg": "wheel_angle",
+    "twist_deg": "twist",
+    "torque_wheel_Nm": "torque_wheel",
+    "torque_pinion_Nm": "torque_pinion",
+    "k_torsional_Nm_per_rad": "k_torsional",
+    "k_mesh_N_per_m": "k_mesh",
+    "transmission_error_um": "transmission_error",
+    "teeth_in_contact": "teeth_in_contact",
+    "peak_pressure_MPa": "peak_pressure",
+    "iterations": "iterations",
+    "status": "status",
+    "k_tangent_N_per_m": "k_tangent",
+    "transmission_error_unloaded_um": "transmission_error_unloaded",
+    "torque_wheel_reaction_Nm": "torque_wheel_reaction",
+    "leading_pair": "leading_pair",
+    "route": "route",
+}
+#: Constants of the curve, repeated on every row so that the file stands alone.
+CONSTANTS: dict[str, str] = {
+    "mesh_cycle_deg": "mesh_cycle",
+    "wheel_base_radius_mm": "base_radius",
+    "lost_motion_deg": "lost_motion",
+}
+#: Columns of words.
+WORDS = ("status", "route")
+WHOLE = ("teeth_in_contact", "iterations")
+SHARE = "load_share_"
+
+
+@dataclass(frozen=True)
+class ErrorEstimate:
+    """Discretisation error of a curve, from a second sweep on a coarser mesh: see `gearfe.stiffness.curve_error`.
+
+    Attributes
+    ----------
+    pinion_angle : ndarray, shape (m,)
+        Positions that were solved twice (rad).
+    relative : ndarray, shape (m,)
+        Estimated relative error of k_mesh there (-): covers the true error at about 19 of 20 positions.
+        Not-a-number where nothing converged on the coarser mesh.
+    coarsening, order
+        Factor c between the meshes and assumed order of convergence p.
+    """
+
+    pinion_angle: Array
+    relative: Array
+    coarsening: float
+    order: float
+
+    @property
+    def typical(self) -> float:
+        """Median over the positions (-)."""
+        return float(np.nanmedian(self.relative)) if np.isfinite(self.relative).any() else float("nan")
+
+    @property
+    def worst(self) -> float:
+        """Largest of all positions (-)."""
+        return float(np.nanmax(self.relative)) if np.isfinite(self.relative).any() else float("nan")
+
+
+@dataclass(frozen=True)
+class StiffnessCurve:
+    """Mesh stiffness of a gear pair over the pinion's rotation; all arrays have one entry per position, shape (n,).
+
+    Attributes
+    ----------
+    pinion_angle, wheel_angle
+        Rotations (rad), counter-clockwise; at pinion angle 0 a pinion tooth stands on the line of centres.
+    twist
+        Twist of the wheel (rad), counted from `lost_motion` behind the position in which a wheel space faces a tooth.
+    torque_wheel, torque_pinion
+        Moments that the hubs need (N m), energy-conjugate; positive when the driving flanks are pressed together.
+    torque_wheel_reaction
+        Moment of the bore reactions of the small-strain wheel (N m).
+    k_torsional
+        torque_wheel/twist (N m/rad).
+    k_mesh, k_tangent
+        torque_wheel/twist/r_b^2 and d torque_wheel/d twist/r_b^2, along the line of action (N/m).
+    transmission_error, transmission_error_unloaded
+        twist r_b under load, and r_b times the twist at which the rigid flanks just touch (m).
+    leading_pair
+        Number k of the pair that is farthest along the path of contact: it joins pinion tooth k and wheel tooth -1 - k,
+        counted from the teeth at (pinion) or just below (wheel) the line of centres at angle 0. Without contact, nan.
+    load_share : ndarray, shape (n, p)
+        Share of the wheel's torque (-) that the pairs `leading_pair`, `leading_pair` - 1, ... carry.
+    teeth_in_contact
+        Tooth pairs that carry load; -1 where the position failed.
+    peak_pressure
+        Largest contact pressure (Pa).
+    iterations
+        Newton iterations; -1 where unknown.
+    status
+        ``converged``, ``no_contact`` (the teeth do not reach each other, torques are zero), or what went wrong.
+    route
+        ``direct``: solved on the mesh; ``hertz``: by the law of small loads, where the contact is narrower than the
+        mesh sees; ``blend``: the mean of both in between (`gearfe.stiffness.routes`); empty where unknown.
+    mesh_cycle
+        Pinion angle after which everything repeats, 2 pi/z1 (rad).
+    base_radius
+        r_b of the wheel (m).
+    lost_motion
+        Twist (rad) taken off before `twist` counts: half the backlash, or 0.
+    law
+        Contact law with its parameters; empty where unknown.
+    timings
+        Seconds by stage; not in the CSV file.
+    error
+        Estimate of the discretisation error, when asked for; not in the CSV file.
+    """
+
+    pinion_angle: Array
+    wheel_angle: Array
+    twist: Array
+    torque_wheel: Array
+    torque_pinion: Array
+    torque_wheel_reaction: Array
+    k_torsional: Array
+    k_mesh: Array
+    k_tangent: Array
+    transmission_error: Array
+    transmission_error_unloaded: Array
+    leading_pair: Array
+    load_share: Array
+    teeth_in_contact: IntArray
+    peak_pressure: Array
+    iterations: IntArray
+    status: NDArray[np.str_]
+    mesh_cycle: float
+    base_radius: float
+    lost_motion: float = 0.0
+    law: str = ""
+    timings: Mapping[str, float] = field(default_factory=dict)
+    error: ErrorEstimate | None = None
+    route: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=np.str_))
+
+    def __post_init__(self) -> None:
+        if len(self.route) != len(self.pinion_angle):
+            object.__setattr__(self, "route", np.full(len(self.pinion_angle), ""))
+
+    def __len__(self) -> int:
+        return len(self.pinion_angle)
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Positions without a solution."""
+        return ~np.isin(self.status, SOLVED)
+
+    def interpolant(self, quantity: str = "k_mesh", *, method: str = "cubic") -> PeriodicInterpolant:
+        """Periodic interpolant of a quantity over the pinion angle; failed positions are left out and named in it.
+
+        Parameters
+        ----------
+        quantity
+            Name of any field of numbers.
+        method
+            ``cubic`` (monotone) or ``linear``.
+
+        Raises
+        ------
+        InputError
+            When the solved positions do not cover the mesh cycle.
+        """
+        per_position = [c for c in COLUMNS.values() if c not in (*WORDS, *WHOLE)]
+        if quantity not in per_position:
+            raise unknown_name("quantity", quantity, per_position)
+        return periodic_interpolant(self.pinion_angle, getattr(self, quantity), self.mesh_cycle, method=method)
+
+    def interpolate(self, phase: ArrayLike, quantity: str = "k_mesh", *, method: str = "cubic") -> ValueAndSlope:
+        """Value and slope (per rad) of a quantity at any pinion angle (rad); see `interpolant`."""
+        return self.interpolant(quantity, method=method)(phase)
+
+    # ---- tables ------------------------------------------------------------------------------------------------------
+
+    def table(self) -> dict[str, list[str]]:
+        """Columns of the CSV file as text."""
+        columns = {name: self._cells(name, attribute) for name, attribute in COLUMNS.items()}
+        for j in range(self.load_share.shape[1]):
+            columns[f"{SHARE}{j + 1}"] = [curve_csv.to_text(v, SHARE) for v in self.load_share[:, j]]
+        for name, attribute in CONSTANTS.items():
+            columns[name] = [curve_csv.to_text(getattr(self, attribute), name)] * len(self)
+        columns["contact_law"] = [self.law] * len(self)
+        return columns
+
+    def _cells(self, name: str, attribute: str) -> list[str]:
+        values = getattr(self, attribute)
+        if attribute in WORDS:
+            return [str(v) for v in values]
+        if attribute in WHOLE:
+            known = ~self.failed if attribute != "iterations" else values >= 0
+            return [str(int(v)) if ok else "nan" for v, ok in zip(values, known, strict=True)]
+        return [curve_csv.to_text(v, name) for v in values]
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the table; `from_csv` gives back every number exactly."""
+        write_csv(path, self.table())
+
+    @classmethod
+    def from_csv(
+        cls, path: str | Path, *, mesh_cycle: float | None = None, base_radius: float | None = None
+    ) -> StiffnessCurve:
+        """Read a curve that `to_csv` wrote, or any CSV file with ``pinion_angle_deg`` and ``k_mesh_N_per_m``.
+
+        Parameters
+        ----------
+        mesh_cycle, base_radius
+            Mesh cycle (rad) and base radius of the wheel (m) for files that do not hold them; they win over the file's.
+
+        Raises
+        ------
+        InputError
+            When the file is not such a table, or says nothing of the mesh cycle.
+        """
+        return cls.from_columns(curve_csv.read_columns(path), path, mesh_cycle=mesh_cycle, base_radius=base_radius)
+
+    @classmethod
+    def from_columns(
+        cls,
+        columns: Mapping[str, Sequence[str]],
+        path: str | Path,
+        *,
+        mesh_cycle: float | None = None,
+        base_radius: float | None = None,
+    ) -> StiffnessCurve:
+        """The curve that a table's columns hold as text; `path` is named in messages, see `from_csv`."""
+        for needed in ("pinion_angle_deg", "k_mesh_N_per_m"):
+            if needed not in columns:
+                raise InputError("stiffness curve", str(path), f"has no column {needed}", "add it")
+        given: dict[str, Any] = {"mesh_cycle": mesh_cycle, "base_radius": base_radius, "lost_motion": None}
+        values: dict[str, Any] = {}
+        for name, attribute in CONSTANTS.items():
+            stored = float(curve_csv.numbers(columns, name, path)[0])
+            values[attribute] = stored if given[attribute] is None else float(given[attribute])
+        if not (np.isfinite(values["mesh_cycle"]) and values["mesh_cycle"] > 0):
+            cure = "add a column mesh_cycle_deg (360 deg/pinion teeth), or give mesh_cycle"
+            raise InputError("stiffness curve", str(path), "does not tell the mesh cycle", cure)
+        if not np.isfinite(values["lost_motion"]):
+            values["lost_motion"] = 0.0
+        for name, attribute in COLUMNS.items():
+            if attribute in WORDS:
+                continue
+            found = curve_csv.numbers(columns, name, path)
+            if attribute in WHOLE:
+                values[attribute] = np.where(np.isfinite(found), found, -1).astype(np.int64)
+            else:
+                values[attribute] = found
+        shares = [name for name in columns if name.startswith(SHARE)]
+        values["load_share"] = (
+            np.stack([curve_csv.numbers(columns, name, path) for name in shares], axis=1)
+            if shares
+            else np.zeros((len(values["k_mesh"]), 0))
+        )
+        values["law"] = columns.get("contact_law", [""])[0].strip()
+        default = ["converged" if np.isfinite(k) else "missing" for k in values["k_mesh"]]
+        values["status"] = np.array([cell.strip() for cell in columns.get("status", default)])
+        values["route"] = np.array([cell.strip() for cell in columns.get("route", [""] * len(default))])
+        return cls(**values)

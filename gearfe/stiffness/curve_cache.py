@@ -1,0 +1,114 @@
+"""Stiffness curves kept on disk: a second run with the same gears, load and mesh sizes reads its curve.
+
+A stored curve is the CSV file of `gearfe.stiffness.curve.StiffnessCurve` (exact in both directions) in the folder of
+the mesh cache, named by a hash of all that decides it: the pair, materials, contact law, sizes and positions, the
+versions of numpy, scipy and gmsh, and the text of this package's own modules that compute it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..errors import InputError
+from ..gear.pair import GearPair
+from ..meshing.cache import cache_folder, cache_key
+from ..stopwatch import Stopwatch
+from .curve import StiffnessCurve
+
+#: Modules beside those of contact and meshing that decide a curve.
+MODULES = (
+    "curves",
+    "elasticity",
+    "gear",
+    "involute",
+    "local_gap",
+    "mesh_geometry",
+    "routes",
+    "small_balance",
+    "small_load",
+    "spur_gear",
+    "stiffness",
+    "stiffness_curve",
+    "sweep_positions",
+    "torque_control",
+    "touching",
+)
+
+
+def cached_curve(
+    pair: GearPair,
+    model: dict[str, Any],
+    sweep: dict[str, Any],
+    *,
+    watch: Stopwatch | None = None,
+    progress: Any = None,
+) -> StiffnessCurve:
+    """Curve of `gearfe.sweep_stiffness`, from disk when it was computed before. Failed curves are not kept.
+
+    Parameters
+    ----------
+    pair
+        The gears, the driver as pinion.
+    model, sweep
+        Keyword arguments of `sweep_stiffness`, such as those of `gearfe.stiffness.job.StiffnessJob`.
+    watch, progress
+        See `sweep_stiffness`.
+    """
+    folder = cache_folder()
+    path = None if folder is None else folder / f"curve-{curve_key(pair, model, sweep)[:32]}.csv"
+    found = None if path is None else _stored(path, pair)
+    if found is not None:
+        return found
+    from .sweep import elastic_pair, sweep_stiffness
+
+    elastic = elastic_pair(pair, watch=watch, **model)
+    points = {name: model[name] for name in ("coarsen", "points_per_edge") if name in model}
+    curve = sweep_stiffness(pair, elastic=elastic, progress=progress, **sweep, **points)
+    if watch is not None:
+        for stage, seconds in curve.timings.items():
+            watch.seconds[stage] = watch.seconds.get(stage, 0.0) + seconds
+    if path is not None and not curve.failed.any():
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            curve.to_csv(path)
+        except OSError:
+            pass
+    return curve
+
+
+def curve_key(pair: GearPair, model: dict[str, Any], sweep: dict[str, Any]) -> str:
+    """Hash (hex) of all that decides a curve."""
+    import scipy
+
+    versions = {"numpy": np.__version__, "scipy": scipy.__version__, "gearfe": __version__, "source": _source()}
+    return cache_key("curve", {"pair": pair, "model": model, "sweep": sweep, "versions": versions})
+
+
+def _stored(path: Path, pair: GearPair) -> StiffnessCurve | None:
+    if not path.exists():
+        return None
+    try:
+        curve = StiffnessCurve.from_csv(path)
+    except InputError:
+        return None
+    whole = math.isclose(curve.mesh_cycle, pair.mesh_cycle, rel_tol=1e-12) and not curve.failed.any()
+    return curve if whole else None
+
+
+@cache
+def _source() -> str:
+    """Hash of the text of the modules that compute curves."""
+    here = Path(__file__).parent
+    files = [here / f"{name}.py" for name in MODULES]
+    files += [file for folder in ("contact", "meshing") for file in sorted((here / folder).glob("*.py"))]
+    text = hashlib.sha256()
+    for file in files:
+        text.update(file.name.encode() + file.read_bytes())
+    return text.hexdigest()

@@ -1,0 +1,103 @@
+r"""Discretisation error of a solved curve, from the same positions solved again on a coarser mesh.
+
+With sizes larger by the factor c and errors of order p, one position's error would be :math:`d_i = |T_{c,i}/T_i - 1|
+/(c^p - 1)`. Alone that is not to be trusted: the error swings about as the edge of the contact slides past the nodes,
+so coarse and fine mesh often agree by chance. The swing is alike at all n positions of a sweep, hence
+
+.. math:: e_i = \max\Big(d_i,\; (1 + 1/n)\,\big(\tfrac1n\sum_j d_j^2\big)^{1/2}\Big) + 5\cdot10^{-5} c_0^p,
+
+with the curve's own factor :math:`c_0` on the default sizes. p is 1, the lowest order that was measured (contacts of
+about one element's half width; 1.5 to 2 where the mesh sees the contact well). The last term stands for what both
+meshes share.
+
+The law of small loads (`.small_load`) has an error that no refinement shows, both meshes share it. Where a
+position takes the share 1 - s from the law and s from the mesh (`gearfe.stiffness.routes`), there is added
+
+.. math:: (1-s)\,\epsilon + \max(s, 1-s)\,|T_\mathrm{direct}/T_\mathrm{hertz} - 1| ,
+
+the second term, measured on the curve's own mesh, for 0 < s < 1 only. :math:`\epsilon` is a bound of the law's error
+against fine meshes: `LAW` where every contact is that of smooth curves, `LAW_AT_EDGES` where one reaches a tip's end,
+the start of a relief or the edge of an undercut.
+
+Not in it: the model (plane, no friction, rigid bores, small strain with its first-order correction) and what no
+refinement of one mesh family shows. `scripts/measure_curve_accuracy.py` measures over random pairs how often it covers
+the true error.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contact.solver import solve_positions
+from .curve import ErrorEstimate
+from .routes import Router
+from .small_balance import balance
+
+Array = NDArray[Any]
+
+#: Coarsening c, assumed order of convergence p, share of the meshes' common error at the default sizes, and largest
+#: number of positions solved twice.
+COARSENING, ORDER, COMMON, POSITIONS = 1.6, 1.0, 5e-5, 20
+#: Relative error of the law of small loads on smooth flanks and at their ends and edges.
+LAW, LAW_AT_EDGES = 2e-4, 1e-3
+
+
+def solved_twice(converged: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Positions to solve again, evenly among those that converged: their numbers."""
+    good = np.flatnonzero(converged)
+    if len(good) == 0:
+        return good.astype(np.int64)
+    return good[np.unique(np.linspace(0, len(good) - 1, min(len(good), POSITIONS)).round().astype(np.int64))]
+
+
+def law_error(router: Router, angles: Array, twists: Array) -> Array:
+    """What the law of small loads adds to the relative error at n pinion angles and twists (rad), shape (n,)."""
+    made = np.zeros(len(angles))
+    if router.route == "direct":
+        return made
+    for i in np.flatnonzero(router.light(angles, twists)):
+        angle, twist = float(angles[i]), float(twists[i])
+        reference = router.reference(angle, twist)
+        found = balance(reference, twist)
+        share = router.share(found)[0]
+        if not found.converged or share >= 1.0:
+            continue
+        pairs = [(c, known) for c, known in zip(found.contacts, reference.local, strict=True) if c is not None]
+        smooth = all(contact.width <= known.clear for contact, known in pairs)
+        made[i] = (1 - share) * (LAW if smooth else LAW_AT_EDGES)
+        if share > 0:
+            (direct,) = solve_positions(router.elastic, np.array([angle]), np.array([twist]))
+            if direct.status == "converged":
+                made[i] += max(share, 1 - share) * abs(direct.torque_wheel / found.torque_wheel - 1)
+    return made
+
+
+def error_estimate(
+    angles: Array, torque: Array, coarse: Array, *, coarsen: float = 1.0, law: Array | float = 0.0
+) -> ErrorEstimate:
+    """Estimated relative error at the positions solved twice.
+
+    Parameters
+    ----------
+    angles : ndarray, shape (m,)
+        Pinion angles (rad).
+    torque, coarse : ndarray, shape (m,)
+        Torque of the curve there and on the coarser mesh (N m); not-a-number where that one failed. Such a position
+        gets the largest error of the others.
+    coarsen
+        The curve's own factor on the default element sizes.
+    law : ndarray, shape (m,)
+        What the law of small loads adds, from `law_error`.
+    """
+    single = np.abs(coarse / torque - 1) / (COARSENING**ORDER - 1)
+    known = np.isfinite(single)
+    relative = np.full(len(single), np.nan)
+    if known.any():
+        count = int(known.sum())
+        usual = (1 + 1 / count) * float(np.sqrt(np.mean(single[known] ** 2)))
+        relative = np.where(known, np.maximum(single, usual), max(usual, float(single[known].max())))
+        relative = relative + COMMON * coarsen**ORDER + law
+    return ErrorEstimate(angles, relative, COARSENING, ORDER)

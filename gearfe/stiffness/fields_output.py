@@ -1,0 +1,249 @@
+"""Fields of chosen positions of a sweep as files: a VTKHDF series, pressures along the flanks, pictures, frames."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contact.scene import MeshingPair
+from ..contact.solver import Position
+from ..errors import InputError
+from ..gear.drawing import zone
+from ..gear.pair import GearPair
+from ..output.animation import Frame, cut_out
+from ..output.figures import stress_figure
+from ..output.files import write_csv
+from ..output.pressure_figures import pressure_figure
+from ..output.vtkhdf import VtkHdfSeries
+from ..threads import one_thread
+from .curve import StiffnessCurve
+from .fields import GearField, pair_recovery, straight_triangles
+from .flank_pressure import FlankPressure, flank_pressures
+from .routes import Router
+
+Array = NDArray[Any]
+Progress = Callable[[int, int, str], None]
+
+GEARS = ("pinion", "wheel")
+#: Positions solved side by side, and positions drawn in the picture of the pressures.
+SIDE_BY_SIDE, MOST_LINES = 8, 12
+
+
+def chosen_positions(curve: StiffnessCurve, angles_deg: Sequence[float] | None) -> NDArray[np.int64]:
+    """Numbers of the positions of a curve at given pinion angles (deg), all without them, in the order of the angles.
+
+    Positions without a solution are left out.
+    """
+    if angles_deg is None:
+        found = np.arange(len(curve.pinion_angle))
+    else:
+        found = np.unique(angle_numbers(np.degrees(curve.pinion_angle), angles_deg))
+    found = found[curve.status[found] == "converged"]
+    return found[np.argsort(curve.pinion_angle[found], kind="stable")]
+
+
+def angle_numbers(known_deg: Array, angles_deg: Sequence[float]) -> NDArray[np.int64]:
+    """Numbers of given angles among the sweep's angles (deg).
+
+    Raises
+    ------
+    InputError
+        For an angle that is none of them.
+    """
+    found = []
+    for angle in angles_deg:
+        nearest = int(np.argmin(np.abs(known_deg - angle)))
+        if not abs(known_deg[nearest] - angle) <= 1e-6:
+            problem = f"is none of the sweep's angles; the nearest is {known_deg[nearest]:.6g} deg"
+            raise InputError("--fields", angle, problem, "choose one of them, or change --angles")
+        found.append(nearest)
+    return np.array(found, dtype=np.int64)
+
+
+def write_fields(
+    folder: Path,
+    pair: GearPair,
+    elastic: MeshingPair,
+    curve: StiffnessCurve,
+    angles_deg: Sequence[float] | None,
+    *,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> list[str]:
+    """Write ``fields.vtkhdf`` (time: pinion angle in deg), the pressures and pictures; return the files' names.
+
+    Without a single solution nothing is written.
+
+    Parameters
+    ----------
+    folder
+        Where to write.
+    angles_deg
+        Pinion angles (deg) out of the curve's; None writes all, and the picture of the most stressed one only.
+    """
+    chosen = chosen_positions(curve, angles_deg)
+    if len(chosen) == 0:
+        return []
+    recovery, router = pair_recovery(elastic), _router(pair, elastic, curve)
+    names = ["fields.vtkhdf", "pressure.csv", "pressure.png"]
+    worst: tuple[float, int, tuple[GearField, GearField]] | None = None
+    pressures: list[tuple[float, list[FlankPressure]]] = []
+    with VtkHdfSeries(folder / "fields.vtkhdf") as series, one_thread():
+        for done, (number, position) in enumerate(_solved(router, curve, chosen), start=1):
+            angle, twist = _place(curve, number)
+            fields = recovery.at(position, angle, twist)
+            pressures.append((math.degrees(angle), flank_pressures(elastic, position)))
+            _add(series, math.degrees(angle), fields, first=done == 1)
+            if angles_deg is not None:
+                names.append(_picture(folder, pair, fields, angle, twist))
+            else:
+                peak = max(float(f.von_mises.max()) for f in fields)
+                if worst is None or peak > worst[0]:
+                    worst = (peak, int(number), fields)
+            if progress is not None:
+                progress(done, len(chosen), "fields")
+    if worst is not None:
+        names.append(_picture(folder, pair, worst[2], *_place(curve, worst[1])))
+    write_csv(folder / "pressure.csv", pressure_table(pair, pressures))
+    pressure_figure(folder / "pressure.png", **_pressure_lines(pair, pressures))
+    return names
+
+
+def _place(curve: StiffnessCurve, number: int) -> tuple[float, float]:
+    """Pinion angle and twist in all (rad) of a position of the curve."""
+    return float(curve.pinion_angle[number]), float(curve.twist[number] + curve.lost_motion)
+
+
+def _router(pair: GearPair, elastic: MeshingPair, curve: StiffnessCurve) -> Router:
+    """The route that the curve took: the same at all of its positions, or each by the width of its contact."""
+    taken = set(curve.route.tolist())
+    if taken == {"direct"}:
+        return Router(pair, elastic, "direct")
+    return Router(pair, elastic, "hertz" if taken == {"hertz"} else "auto")
+
+
+def _solved(router: Router, curve: StiffnessCurve, chosen: NDArray[np.int64]) -> Iterator[tuple[int, Position]]:
+    """Positions of the curve solved again, a few side by side; one that does not converge again is left out."""
+    for first in range(0, len(chosen), SIDE_BY_SIDE):
+        part = chosen[first : first + SIDE_BY_SIDE]
+        made = router.solve(curve.pinion_angle[part], curve.twist[part] + curve.lost_motion, kept=range(len(part)))
+        for number, position in zip(part.tolist(), made, strict=True):
+            if position.scene is not None:
+                yield number, position
+
+
+def _add(series: VtkHdfSeries, time: float, fields: tuple[GearField, GearField], *, first: bool) -> None:
+    """Both gears as one grid; the elements are stored with the first step only."""
+    pinion, wheel = fields
+    cells = None
+    if first:
+        cells = {"triangle6": np.concatenate([pinion.triangles, wheel.triangles + len(pinion.points)])}
+
+    def both(values: Sequence[Array]) -> Array:
+        return np.concatenate(values).astype(np.float32)
+
+    principal = [f.principal for f in fields]
+    series.add(
+        time,
+        np.concatenate([f.points for f in fields]),
+        cells,
+        point_data={
+            "displacement_m": both([f.displacement for f in fields]),
+            "von_mises_Pa": both([f.von_mises for f in fields]),
+            **{f"principal_{i + 1}_Pa": both([p[i] for p in principal]) for i in range(3)},
+            "contact_pressure_Pa": both([f.pressure for f in fields]),
+        },
+        cell_data={"gear": np.repeat(np.array([0, 1], dtype=np.uint8), [len(f.triangles) for f in fields])},
+    )
+
+
+def pressure_table(pair: GearPair, pressures: Sequence[tuple[float, list[FlankPressure]]]) -> dict[str, list[Any]]:
+    """Columns of pressure.csv: every contact point that carries pressure, and its neighbours on either side.
+
+    Parameters
+    ----------
+    pressures
+        For each position its pinion angle (deg) and the pressures along its flanks.
+    """
+    names = ("pinion_angle_deg", "gear", "pair", "tooth", "diameter_mm", "roll_length_mm", "pressure_MPa")
+    columns: dict[str, list[Any]] = {name: [] for name in names}
+    for angle, flanks in pressures:
+        for one in flanks:
+            gear = (pair.pinion, pair.wheel)[one.gear]
+            for k in _shown(one):
+                above = one.radius[k] > gear.base_radius
+                row = (angle, GEARS[one.gear], one.pair, one.tooth % gear.teeth, 2e3 * one.radius[k])
+                roll = 1e3 * gear.roll_length(float(one.radius[k])) if above else math.nan
+                for name, value in zip(names, (*row, roll, 1e-6 * one.pressure[k]), strict=True):
+                    columns[name].append(value)
+    return columns
+
+
+def _shown(one: FlankPressure) -> NDArray[np.int64]:
+    """Contact points with pressure and one neighbour on either side."""
+    carries = one.pressure > 0
+    near = carries.copy()
+    near[1:] |= carries[:-1]
+    near[:-1] |= carries[1:]
+    return np.flatnonzero(near)
+
+
+def _pressure_lines(pair: GearPair, pressures: Sequence[tuple[float, list[FlankPressure]]]) -> dict[str, Any]:
+    """Arguments of the figure: lines of at most `MOST_LINES` positions, over the diameter."""
+    pick = np.unique(np.linspace(0, len(pressures) - 1, min(len(pressures), MOST_LINES)).round().astype(int))
+    lines: list[list[tuple[float, Array, Array]]] = [[], []]
+    for number in pick:
+        angle, flanks = pressures[number]
+        for one in flanks:
+            k = _shown(one)
+            if len(k):
+                lines[one.gear].append((angle, 2e3 * one.radius[k], 1e-6 * one.pressure[k]))
+    return {"title": f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, pressure along the flanks", "lines": lines}
+
+
+def frames_of(
+    pair: GearPair, elastic: MeshingPair, curve: StiffnessCurve, count: int, progress: Progress | None = None
+) -> tuple[list[Frame], tuple[float, float, float]]:
+    """Frames of the von Mises stress in the meshing zone over one mesh cycle, and the zone (mm).
+
+    The twists are the curve's own where it has them, interpolated between its positions otherwise.
+
+    Raises
+    ------
+    InputError
+        When the curve does not cover the mesh cycle.
+    """
+    angles = np.arange(count) * curve.mesh_cycle / count
+    twists = curve.interpolant("twist")(angles).value + curve.lost_motion
+    recovery, router, place = pair_recovery(elastic), _router(pair, elastic, curve), zone(pair, modules=1.5)
+    frames: list[Frame] = []
+    with one_thread():
+        for first in range(0, count, SIDE_BY_SIDE):
+            part = slice(first, first + SIDE_BY_SIDE)
+            made = router.solve(angles[part], twists[part], kept=range(len(angles[part])))
+            for angle, twist, position in zip(angles[part], twists[part], made, strict=True):
+                if position.scene is not None:
+                    fields = recovery.at(position, float(angle), float(twist))
+                    parts = [
+                        cut_out(1e3 * (f.points + f.displacement), f.triangles, 1e-6 * f.von_mises, place)
+                        for f in fields
+                    ]
+                    frames.append(Frame(math.degrees(angle), parts))
+            if progress is not None:
+                progress(min(first + SIDE_BY_SIDE, count), count, "frames solved")
+    return frames, place
+
+
+def _picture(folder: Path, pair: GearPair, fields: Sequence[GearField], angle: float, twist: float) -> str:
+    name = f"stress_{math.degrees(angle):.6g}deg.png"
+    parts = [(1e3 * (f.points + f.displacement), straight_triangles(f.triangles), 1e-6 * f.von_mises) for f in fields]
+    title = (
+        f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, pinion at {math.degrees(angle):.6g}°, "
+        f"wheel twisted by {math.degrees(twist):.4g}°, deformation to scale"
+    )
+    stress_figure(folder / name, title=title, parts=parts, zoom=zone(pair, modules=1.5))
+    return name

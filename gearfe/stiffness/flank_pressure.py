@@ -1,0 +1,86 @@
+"""Contact pressure along the flanks of a solved position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contact.flank import Flank, edge_nodes, edge_shapes
+from ..contact.scene import MeshingPair
+from ..contact.solver import Position
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class FlankPressure:
+    """Pressure along one tooth's contact surface; arrays have one entry per contact point, from root to tip.
+
+    Attributes
+    ----------
+    gear
+        0 pinion, 1 wheel.
+    pair, tooth
+        Number of the tooth pair, and of the tooth.
+    place : ndarray, shape (q,)
+        Edge number plus position in the edge, along the tooth's whole contact surface.
+    radius : ndarray, shape (q,)
+        Distance of the undeformed point from the gear's centre (m).
+    pressure : ndarray, shape (q,)
+        Pa.
+    """
+
+    gear: int
+    pair: int
+    tooth: int
+    place: Array
+    radius: Array
+    pressure: Array
+
+    def at_nodes(self, count: int) -> Array:
+        """Pressure (Pa) at the `count` nodes of the tooth's contact surface, linear between the contact points."""
+        return np.asarray(np.interp(0.5 * np.arange(count), self.place, self.pressure, left=0.0, right=0.0))
+
+
+def flank_pressures(pair: MeshingPair, position: Position) -> list[FlankPressure]:
+    """Pressure on each piece of flank of a solved position.
+
+    On a gear whose flank carries no contact points of its own (one-sided laws) it is what the mate's points press on
+    it, at their closest places before deformation.
+    """
+    scene, pressure = position.scene, position.pressure
+    if scene is None or pressure is None:
+        return []
+    made = []
+    for i, w in enumerate(scene.windows):
+        flank = pair.bodies[w.gear].flank
+        mine = np.flatnonzero(scene.owner == i)
+        if len(mine):
+            place = w.first_edge + _own_places(flank, w.edges, len(mine))
+        else:
+            mine = np.flatnonzero((scene.mate == i) & ~scene.rigid.beyond)
+            place = w.first_edge + scene.rigid.place[mine]
+            order = np.argsort(place, kind="stable")
+            mine, place = mine[order], place[order]
+        if len(mine):
+            radius = np.linalg.norm(_points(flank, place), axis=1)
+            number = w.tooth if w.gear == 0 else -1 - w.tooth
+            made.append(FlankPressure(w.gear, number, w.tooth, place, radius, pressure[mine]))
+    return made
+
+
+def _own_places(flank: Flank, edges: int, count: int) -> Array:
+    """Edge plus position in it of the contact points of a piece of flank."""
+    xi = flank.shapes @ np.array([0.0, 0.5, 1.0])  # the shape functions reproduce the coordinate itself
+    assert count == edges * len(xi)
+    return np.asarray((np.arange(edges)[:, None] + xi).ravel())
+
+
+def _points(flank: Flank, place: Array) -> Array:
+    """Points (m) of a tooth's contact surface, shape (q, 2)."""
+    edge = np.clip(place.astype(np.int64), 0, flank.edges - 1)
+    shapes = edge_shapes(place - edge)[0]
+    return np.asarray(np.einsum("qa,qai->qi", shapes, flank.points[edge_nodes(edge)]))

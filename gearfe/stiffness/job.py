@@ -1,0 +1,118 @@
+"""From the [pair] and [stiffness] tables of a job file to the arguments of `gearfe.stiffness.sweep.sweep_stiffness`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..config import load_job
+from ..contact.laws import ContactLaw, Exact, Nitsche, Penalty
+from ..elasticity import Material
+from ..errors import InputError
+from ..gear.pair import GearPair
+from ..tables.pair import MaterialTable, PairTable
+from ..tables.stiffness import StiffnessTable
+from .curve_csv import from_text
+
+
+@dataclass(frozen=True)
+class StiffnessJob:
+    """A stiffness job: its tables and what they mean in SI.
+
+    Attributes
+    ----------
+    pair_table, table
+        The tables as read, with any overrides.
+    pair
+        The gears.
+    """
+
+    pair_table: PairTable
+    table: StiffnessTable
+    pair: GearPair
+
+    @property
+    def materials(self) -> tuple[Material, Material]:
+        """Materials of pinion and wheel."""
+        return _material(self.pair_table.material_of("pinion")), _material(self.pair_table.material_of("wheel"))
+
+    @property
+    def law(self) -> ContactLaw:
+        """Contact law with its parameter."""
+        t = self.table
+        sides: dict[str, Any] = {} if t.law_sides is None else {"sides": t.law_sides}
+        if t.law == "exact":
+            return Exact(**sides)
+        if t.law == "penalty":
+            stiffness = t.penalty_stiffness_N_per_mm3
+            return Penalty(None if stiffness is None else stiffness * 1e9, **sides)
+        theta: Any = t.nitsche_theta
+        usual = 20.0 if theta == 1 else 1.0
+        return Nitsche(usual if t.nitsche_gamma0 is None else t.nitsche_gamma0, theta=theta, **sides)
+
+    @property
+    def model(self) -> dict[str, Any]:
+        """Keyword arguments of `gearfe.stiffness.sweep.elastic_pair`."""
+        t = self.table
+        return {
+            "materials": self.materials,
+            "plane": t.plane,
+            "law": self.law,
+            "coarsen": t.coarsen,
+            "points_per_edge": t.points_per_edge,
+        }
+
+    @property
+    def sweep(self) -> dict[str, Any]:
+        """Keyword arguments of `gearfe.stiffness.sweep.sweep_stiffness` beside `model`.
+
+        Raises
+        ------
+        InputError
+            When the job has neither a twist nor a torque.
+        """
+        t = self.table
+        if t.twist_deg is None and t.torque_Nm is None:
+            cure = "add twist_deg or torque_Nm to [stiffness], or give --twist-deg or --torque-Nm"
+            raise InputError("stiffness.twist_deg", None, "no load: neither twist_deg nor torque_Nm is given", cure)
+        if t.twist_deg is not None:
+            lost = math.degrees(self.pair.contact_twist) if t.twist_from == "contact" else 0.0
+            most = 180.0 / self.pair.wheel.teeth - lost
+            if not t.twist_deg < most:
+                problem = f"must be < {most:.6g} deg, half a pitch of the wheel"
+                raise InputError("stiffness.twist_deg", t.twist_deg, problem, "0.01 to 0.5 deg is usual")
+        return {
+            "twist": None if t.twist_deg is None else _radians(t.twist_deg),
+            "torque": t.torque_Nm,
+            "angles": np.array([_radians(angle) for angle in t.angles_deg(math.degrees(self.pair.mesh_cycle))]),
+            "kinematics": t.kinematics,
+            "twist_from": t.twist_from,
+            "solve_all": t.solve_all,
+            "route": t.route,
+        }
+
+
+def _radians(degrees: float) -> float:
+    """Angle rounded once, so that the table shows 15 deg as 15."""
+    return from_text(repr(degrees), "_deg")
+
+
+def _material(table: MaterialTable) -> Material:
+    return Material(table.youngs_modulus_GPa * 1e9, table.poisson_ratio, density=table.density_kg_per_m3)
+
+
+def read_stiffness_job(path: str | Path) -> StiffnessJob:
+    """Read a job file; without a [stiffness] table its defaults hold.
+
+    Raises
+    ------
+    InputError
+        For every mistake in the file, and for gears that cannot run together.
+    """
+    tables = load_job(path, ("pair",), ("stiffness",))
+    table = tables.get("stiffness", StiffnessTable())
+    return StiffnessJob(tables["pair"], table, GearPair.from_table(tables["pair"]))

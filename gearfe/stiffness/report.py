@@ -1,0 +1,184 @@
+"""What the stiffness command tells and draws: the printed lines, the summary, the arguments of the figure."""
+
+from __future__ import annotations
+
+import math
+import platform
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import asdict
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..errors import InputError
+from ..gear.derived import derived_geometry, iso_values
+from ..gear.drawing import single_pair_stretches
+from .curve import StiffnessCurve
+from .job import StiffnessJob
+from .periodic import fold
+
+Array = NDArray[np.float64]
+
+#: Packages whose versions decide the numbers.
+PACKAGES = ("numpy", "scipy", "gmsh")
+
+
+def versions() -> dict[str, str]:
+    """Versions of this program, of Python and of the packages that decide the numbers."""
+    found = {"gearfe": __version__, "python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "absent"
+    return found
+
+
+def cycle_statistics(curve: StiffnessCurve, method: str) -> dict[str, float] | None:
+    """Mean, least and largest stiffness over one mesh cycle (N/m), or None where the curve does not cover it."""
+    try:
+        interpolant = curve.interpolant(method=method)
+    except InputError:
+        return None
+    k = interpolant(np.arange(2000) * curve.mesh_cycle / 2000).value
+    return {"mean_N_per_m": float(k.mean()), "least_N_per_m": float(k.min()), "largest_N_per_m": float(k.max())}
+
+
+def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, float]) -> dict[str, Any]:
+    """Content of summary.json."""
+    moduli = [material.youngs_modulus for material in job.materials]
+    error = curve.error
+    failed = np.degrees(curve.pinion_angle[curve.failed])
+    return {
+        "job": {"pair": asdict(job.pair_table), "stiffness": asdict(job.table)},
+        "versions": versions(),
+        "derived_geometry": derived_geometry(job.pair),
+        "warnings": list(job.pair.warnings),
+        "iso_6336": iso_values(job.pair, moduli[0], moduli[1]),
+        "mesh_stiffness": cycle_statistics(curve, job.table.interpolation),
+        "error_estimate": None
+        if error is None
+        else {
+            "typical_relative": error.typical,
+            "worst_relative": error.worst,
+            "mesh_coarsening": error.coarsening,
+            "assumed_order": error.order,
+            "pinion_angle_deg": np.degrees(error.pinion_angle),
+            "relative": error.relative,
+        },
+        "contact_law": curve.law,
+        "statuses": dict(Counter(map(str, curve.status))),
+        "routes": dict(Counter(map(str, curve.route))),
+        "failed_pinion_angles_deg": failed,
+        "timings_s": dict(timings),
+    }
+
+
+def told(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
+    """Lines to print."""
+    moduli = [material.youngs_modulus for material in job.materials]
+    iso = iso_values(job.pair, moduli[0], moduli[1])
+    count = Counter(map(str, curve.status))
+    lines = [f"{len(curve)} positions: " + ", ".join(f"{n} {status}" for status, n in count.items())]
+    routes = Counter(map(str, curve.route[~curve.failed]))
+    if routes.keys() & {"hertz", "blend"}:
+        lines.append(
+            f"contacts narrower than the mesh resolves: {routes['hertz']} positions by the law of small loads, "
+            f"{routes['blend']} by its mean with the mesh (column route)"
+        )
+    if curve.law:
+        lines.append(f"contact law: {curve.law}")
+    level = cycle_statistics(curve, job.table.interpolation)
+    if level is not None:
+        mean, low, high = (1e-6 * level[key] for key in ("mean_N_per_m", "least_N_per_m", "largest_N_per_m"))
+        lines.append(f"mesh stiffness: mean {mean:.4g}, least {low:.4g}, largest {high:.4g} N/um")
+    lines.append(
+        f"ISO 6336 method B, for comparison: c' = {iso['c_prime_N_per_mm_um']:.3g}, "
+        f"c_gamma = {iso['c_gamma_N_per_mm_um']:.3g} N/(mm um); "
+        f"c_gamma times width = {1e-6 * iso['c_gamma_times_width_N_per_m']:.4g} N/um"
+    )
+    if curve.error is not None and math.isfinite(curve.error.worst):
+        e = curve.error
+        lines.append(
+            f"discretisation error, estimated on a mesh {e.coarsening:g} times coarser (order {e.order:g} assumed): "
+            f"typically {100 * e.typical:.2g} %, at worst {100 * e.worst:.2g} %"
+        )
+    return lines
+
+
+def warnings(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
+    """Sentences about what deserves a look."""
+    said = list(job.pair.warnings)
+    apart = int(np.count_nonzero(curve.status == "no_contact"))
+    if apart:
+        sentence = f"{apart} positions have no contact: the twist does not take up backlash and relief there"
+        cure = "" if curve.lost_motion else ' (twist_from = "contact" counts it from where the flanks touch)'
+        said.append(sentence + cure)
+    if curve.failed.any():
+        angles = ", ".join(f"{a:.6g}" for a in np.degrees(curve.pinion_angle[curve.failed])[:8])
+        more = " ..." if curve.failed.sum() > 8 else ""
+        cure = "use less load or a finer mesh (coarsen below 1)"
+        if set(curve.status[curve.failed]) == {"under_resolved"}:
+            cure = "no contact point overlaps there: use another load (more, if it is small) or a finer mesh"
+        said.append(
+            f"{int(curve.failed.sum())} positions failed and have no numbers, only their status (pinion angle {angles}"
+            f"{more} deg): {cure}"
+        )
+    if job.table.law == "penalty":
+        said.append(
+            "peak pressures of the penalty law oscillate from point to point and are too high: use nitsche for them"
+        )
+    return said
+
+
+def figure_arguments(job: StiffnessJob, curve: StiffnessCurve) -> dict[str, Any]:
+    """Arguments of `gearfe.output.figures.stiffness_figure`: two mesh cycles from pinion angle 0."""
+    table, pair = job.table, job.pair
+    cycle = curve.mesh_cycle
+    folded, first = np.unique(np.round(fold(curve.pinion_angle, cycle), 12), return_index=True)
+    angles = np.concatenate([folded, folded + cycle, [2 * cycle] if len(folded) and folded[0] == 0 else []])
+    pick = np.concatenate([first, first, first[:1] if len(angles) % 2 else []]).astype(int)
+    try:
+        interpolant = curve.interpolant(method=table.interpolation)
+    except InputError:
+        line = (angles, curve.k_mesh[pick])
+    else:
+        fine = np.linspace(0.0, 2 * cycle, 1201)
+        line = (fine, interpolant(fine).value)
+    load = f"twist {table.twist_deg:g}°" if table.twist_deg is not None else f"wheel torque {table.torque_Nm:g} N m"
+    moduli = [material.youngs_modulus for material in job.materials]
+    levels = {r"ISO 6336 $c_\gamma b$": 1e-6 * iso_values(pair, moduli[0], moduli[1])["c_gamma_times_width_N_per_m"]}
+    level = cycle_statistics(curve, table.interpolation)
+    if level is not None:
+        levels = {"mean over the cycle": 1e-6 * level["mean_N_per_m"], **levels}
+    lost = curve.failed[pick]
+    return {
+        "title": f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, {load}, plane {table.plane}, law {table.law}",
+        "line": (np.degrees(line[0]), 1e-6 * line[1]),
+        "points": (np.degrees(angles), 1e-6 * curve.k_mesh[pick]),
+        "failed": np.degrees(angles[lost]),
+        "single": [(math.degrees(a), math.degrees(b)) for a, b in single_pair_stretches(pair, 0.0, 2 * cycle)],
+        "levels": levels,
+        "shares": _shares(curve, angles, pick),
+    }
+
+
+def _shares(curve: StiffnessCurve, angles: Array, pick: NDArray[np.int64]) -> list[tuple[Array, Array]]:
+    """For each tooth pair its share of the load against the pinion angle (deg), along its whole way through contact."""
+    moved = np.round((angles - curve.pinion_angle[pick]) / curve.mesh_cycle)
+    leading = curve.leading_pair[pick] - moved
+    columns = np.arange(curve.load_share.shape[1])
+    number = leading[:, None] - columns
+    share = curve.load_share[pick]
+    found = []
+    for pair in np.unique(number[(share > 0) & np.isfinite(number)])[::-1]:
+        mine = np.where(number == pair, share, 0.0).sum(axis=1)
+        mine[~np.isfinite(leading)] = np.nan
+        carries = np.flatnonzero(mine > 0)
+        stretch = slice(max(0, carries[0] - 1), carries[-1] + 2)
+        found.append((np.degrees(angles[stretch]), mine[stretch]))
+    return found

@@ -1,0 +1,252 @@
+r"""Which way a position is solved: on the mesh, or by the law of small loads where the mesh cannot see the contact.
+
+The half width b of the most loaded contact, as `.small_load` predicts it, decides. The mesh errs by a power of
+h/b, with the largest element h of the two flanks; what the small-load law leaves out grows with the load, so with the
+square of b over the module m. Both are equal at a b that grows with :math:`s = \sqrt{h\,h_0}`, where :math:`h_0` is
+the default element, 0.028 m: the mesh alone from b = `RESOLVED[1]` s on, the small-load law alone below `RESOLVED[0]`
+s, and between them their mean with weights that change smoothly, so that the torque is a smooth function of the twist:
+
+.. math:: T = s\,T_\mathrm{direct} + (1-s)\,T_\mathrm{hertz}, \qquad
+          T' = s\,T_\mathrm{direct}' + (1-s)\,T_\mathrm{hertz}' + s'\,(T_\mathrm{direct} - T_\mathrm{hertz}) .
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contact.compliance import GearBody
+from ..contact.elliptic import Chain
+from ..contact.scene import MeshingPair
+from ..contact.solver import Position, solve_positions
+from ..errors import InputError
+from ..gear.pair import GearPair
+from ..gear.touching import Flanks, Touching
+from .small_balance import Balance, balance, position_of, with_forces
+from .small_load import Reference, references
+
+Array = NDArray[Any]
+Route = Literal["auto", "direct", "hertz"]
+
+#: Default element of the flank (modules), at which the two routes' errors were weighed.
+DEFAULT_ELEMENT = 0.028
+#: Half widths of the contact, in units of the length s, between which the two routes are blended.
+RESOLVED = (0.9, 1.3)
+#: Compliance of a tooth pair times E* w beyond which none is: with it a light load is told without a reference.
+SOFTEST = 40.0
+#: The same of usual teeth: where it tells that the load is not light, the mesh is asked first, and believed where its
+#: forces make a contact so many times as wide as the widest that is blended.
+USUAL, CLEARLY = 10.0, 1.2
+#: References are made for pairs that touch up to this many times the twist asked for.
+SPARE = 1.5
+
+
+class Router:
+    """Solves positions of one pair by the fitting route; keeps the references of its pinion angles.
+
+    Parameters
+    ----------
+    pair
+        Geometry.
+    elastic
+        The same gears, meshed and condensed.
+    route
+        ``auto``, or ``direct`` or ``hertz`` for all positions.
+    """
+
+    def __init__(self, pair: GearPair, elastic: MeshingPair, route: Route = "auto") -> None:
+        if route not in ("auto", "direct", "hertz"):
+            raise InputError("route", route, "must be auto, direct or hertz", "auto chooses by the contact's width")
+        self.pair, self.elastic, self.route = pair, elastic, route
+        self.flanks = Flanks(pair)
+        largest = max(_largest(b, f.radii[0]) for b, f in zip(elastic.bodies, self.flanks.faces, strict=True))
+        self.length = math.sqrt(largest * DEFAULT_ELEMENT * pair.pinion.module)
+        self._chains = [Chain(body) for body in elastic.bodies]
+        self._references: dict[float, tuple[float, Reference]] = {}
+        self._touching: dict[float, Touching] = {}
+
+    def solve(self, angles: Array, twists: Array, kept: Collection[int] = ()) -> list[Position]:
+        """Positions at pinion angles and twists (rad), both of shape (n,).
+
+        Parameters
+        ----------
+        kept
+            Numbers of the positions that need what fields need; the others go without, a scene holds megabytes.
+        """
+        twists = np.broadcast_to(np.asarray(twists, dtype=float), np.shape(angles))
+        if self.route == "direct":
+            made = solve_positions(self.elastic, angles, twists)
+            return [p if i in kept else bare(p) for i, p in enumerate(made)]
+        self._touched(angles)  # all angles in one go
+        small, likely = self.light(angles, twists), self.light(angles, twists, USUAL)
+        solved: dict[int, Position] = {}
+        # most of what may be light is not: the mesh's own forces tell, where they are clear
+        first = np.flatnonzero(small & ~likely).tolist()
+        if first:
+            meshed = solve_positions(self.elastic, np.asarray(angles)[first], twists[first])
+            solved = dict(zip(first, meshed, strict=True))
+            small[[i for i in first if self._clear(float(angles[i]), solved[i])]] = False
+        found: list[Balance | None] = [None] * len(angles)
+        share, slope = np.ones(len(angles)), np.zeros(len(angles))
+        for i in np.flatnonzero(small):
+            one = balance(self.reference(float(angles[i]), float(twists[i])), float(twists[i]))
+            found[i] = one
+            share[i], slope[i] = self.share(one)
+        direct = [i for i in np.flatnonzero(share > 0).tolist() if i not in solved]
+        if direct:
+            meshed = solve_positions(self.elastic, np.asarray(angles)[direct], twists[direct])
+            solved |= dict(zip(direct, meshed, strict=True))
+        made = []
+        for n, (angle, twist) in enumerate(zip(angles, twists, strict=True)):
+            joined = self._joined(
+                float(angle),
+                float(twist),
+                solved.get(n) if share[n] > 0 else None,
+                found[n],
+                share[n],
+                slope[n],
+                fields=n in kept,
+            )
+            made.append(joined if n in kept else bare(joined))
+        return made
+
+    def _clear(self, angle: float, position: Position) -> bool:
+        """Whether the force that the mesh gives to the leading pair makes a contact that is resolved beyond doubt."""
+        if position.status != "converged":
+            return False
+        k = int(np.argmax(position.pair_torques))
+        touching = self._touching[angle]
+        mine = np.flatnonzero(touching.pair == position.pair_numbers[k])
+        if len(mine) != 1:
+            return False
+        place = touching.place[mine[0]]
+        curved = sum(f.curvature(float(place[g]), math.inf) for g, f in enumerate(self.flanks.faces))
+        if not (math.isfinite(curved) and curved > 0):
+            return False
+        force = position.pair_torques[k] / (touching.arm[mine[0], 1] * self.elastic.width)
+        effective = 1 / sum(body.material.contact_compliance(body.plane) for body in self.elastic.bodies)
+        return bool(math.sqrt(4 * force / (math.pi * effective * curved)) > CLEARLY * RESOLVED[1] * self.length)
+
+    def light(self, angles: Array, twists: Array, softest: float = SOFTEST) -> NDArray[np.bool_]:
+        """Where the load may be small; the others are resolved whatever the teeth's compliance up to `softest` is."""
+        if self.route == "hertz":
+            return np.ones(len(angles), dtype=bool)
+        found = self._touched(angles)
+        made = np.ones(len(angles), dtype=bool)
+        for i, (angle, twist) in enumerate(zip(angles, twists, strict=True)):
+            touching = found[float(angle)]
+            if len(touching) == 0:
+                continue
+            first = int(np.argmin(touching.twist))
+            overlap = touching.arm[first, 1] * (twist - touching.twist[first])
+            curved = sum(
+                f.curvature(float(touching.place[first, g]), math.inf) for g, f in enumerate(self.flanks.faces)
+            )
+            if not (overlap > 0 and math.isfinite(curved) and curved > 0):
+                continue
+            # another pair may take load off this one; it can at most halve it while both are on the path
+            width = math.sqrt(4 * 0.5 * overlap / softest / (math.pi * curved))
+            made[i] = width < RESOLVED[1] * self.length
+        return made
+
+    def reference(self, angle: float, twist: float) -> Reference:
+        """Reference of a pinion angle with all pairs that touch at the twist (rad)."""
+        known = self._references.get(angle)
+        if known is None or known[0] < twist:
+            self._touched(np.array([angle]))
+            touching = self._touching[angle]
+            reach = SPARE * abs(twist) + 1e-6
+            mine = touching.take(np.flatnonzero(touching.twist < reach))
+            known = reach, references(self.pair, self.elastic, self.flanks, [mine], [angle], chains=self._chains)[0]
+            self._references[angle] = known
+        return known[1]
+
+    def touching_twists(self, angles: Array) -> Array:
+        """Twists (rad) at which the rigid gears just touch."""
+        found = self._touched(angles)
+        return np.array([found[float(a)].twist.min(initial=math.inf) for a in angles])
+
+    def share(self, found: Balance) -> tuple[float, float]:
+        """Share s of the mesh in the result and ds/dtwist (1/rad)."""
+        if self.route == "hertz":
+            return 0.0, 0.0
+        if not found.converged or not (found.force > 0).any():
+            return (0.0, 0.0) if found.converged else (1.0, 0.0)
+        k = int(np.argmax(found.force))
+        contact = found.contacts[k]
+        assert contact is not None
+        b = contact.width / self.length
+        low, high = RESOLVED
+        x = min(1.0, max(0.0, (b - low) / (high - low)))
+        rate = 0.5 * b * found.rate[k] / found.force[k] / (high - low)  # b ~ sqrt F
+        return x * x * (3 - 2 * x), 6 * x * (1 - x) * rate
+
+    def _touched(self, angles: Array) -> dict[float, Touching]:
+        new = np.array(sorted({float(a) for a in angles} - self._touching.keys()))
+        if len(new):
+            found = self.flanks.touching(new)
+            for number, angle in enumerate(new):
+                mine = np.flatnonzero(found.position == number)
+                self._touching[float(angle)] = found.take(mine[np.argsort(found.twist[mine], kind="stable")])
+        return self._touching
+
+    def _joined(
+        self,
+        angle: float,
+        twist: float,
+        direct: Position | None,
+        found: Balance | None,
+        share: float,
+        slope: float,
+        *,
+        fields: bool,
+    ) -> Position:
+        if found is None:
+            assert direct is not None
+            return direct
+        reference = self.reference(angle, twist)
+        hertz = position_of(reference, found)
+        if direct is None or (direct.status != "converged" and hertz.status == "converged" and share < 1.0):
+            return with_forces(hertz, reference, self.elastic, found, twist) if fields else hertz
+        if hertz.status != "converged" or share >= 1.0 or direct.status != "converged":
+            return direct
+        return blended(direct, hertz, share, slope)
+
+
+def _largest(body: GearBody, start: float) -> float:
+    """Largest edge (m) of the contact surface above the radius at which the working flank starts (m)."""
+    radii = np.linalg.norm(body.flank.points[:-1:2], axis=1)
+    return float(body.flank.sizes[radii >= start * (1 - 1e-9)].max())
+
+
+def bare(position: Position) -> Position:
+    """The position without what only fields need: a scene holds megabytes."""
+    nothing: dict[str, Any] = dict.fromkeys(
+        ("scene", "forces", "force_rate", "pressure", "stress_loads", "stress_load_rate")
+    )
+    return replace(position, **nothing)
+
+
+def blended(direct: Position, hertz: Position, share: float, slope: float) -> Position:
+    """s direct + (1 - s) hertz; fields are the mesh's own. `slope` is ds/dtwist (1/rad)."""
+    names = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "tangent", "peak_pressure")
+    mean: dict[str, Any] = {n: share * getattr(direct, n) + (1 - share) * getattr(hertz, n) for n in names}
+    mean["tangent"] += slope * (direct.torque_wheel - hertz.torque_wheel)
+    numbers = sorted({*direct.pair_numbers, *hertz.pair_numbers})
+    torques = np.zeros(len(numbers))
+    for position, weight in ((direct, share), (hertz, 1 - share)):
+        for one, value in zip(position.pair_numbers, position.pair_torques, strict=True):
+            torques[numbers.index(one)] += weight * value
+    return replace(
+        direct,
+        **mean,
+        pair_numbers=tuple(numbers),
+        pair_torques=torques,
+        iterations=direct.iterations + hertz.iterations,
+        route="blend",
+    )

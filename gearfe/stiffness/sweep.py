@@ -1,0 +1,288 @@
+"""Rotation sweep: from a gear pair to its mesh-stiffness curve.
+
+Conventions: pinion centre at the origin, wheel at +x; at pinion angle 0 a pinion tooth stands on the line of centres
+and a wheel space faces it; angles are counter-clockwise; wheel angle = -pinion angle z1/z2 + twist, and a positive
+twist presses the driving flanks together.
+
+    >>> curve = sweep_stiffness(pair, twist=math.radians(0.05))   # one mesh cycle in 20 positions
+    >>> k, slope = curve.interpolate(math.radians(7.3))           # N/m and N/(m rad)
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..contact.compliance import gear_body
+from ..contact.corners import corner_bearings
+from ..contact.laws import ContactLaw, law_named, law_text
+from ..contact.scene import MeshingPair
+from ..elasticity import Material, Plane
+from ..errors import InputError
+from ..gear.pair import GearPair
+from ..meshing.recipe import sector_recipes
+from ..meshing.tooth_sector import sector_mesh
+from ..stopwatch import Stopwatch
+from ..threads import one_thread
+from .curve import SOLVED, ErrorEstimate, StiffnessCurve
+from .curve_error import COARSENING, error_estimate, law_error, solved_twice
+from .periodic import fold
+from .positions import Progress, Solved, at_torque, at_twists, honest, load_shares
+from .routes import Route, Router
+
+__all__ = ["ErrorEstimate", "StiffnessCurve", "elastic_pair", "sweep_stiffness"]
+
+Array = NDArray[Any]
+IntArray = NDArray[Any]
+
+#: Structural steel, the material where none is given.
+STEEL = Material()
+
+
+def elastic_pair(
+    pair: GearPair,
+    materials: Material | tuple[Material, Material] = STEEL,
+    *,
+    plane: Plane = "strain",
+    law: str | ContactLaw = "nitsche",
+    coarsen: float = 1.0,
+    points_per_edge: int = 4,
+    watch: Stopwatch | None = None,
+) -> MeshingPair:
+    """Mesh both gears (or read their meshes from the cache) and condense them to their flanks.
+
+    Parameters
+    ----------
+    materials
+        Of both gears, or of pinion and wheel.
+    plane
+        ``strain`` or ``stress``.
+    law
+        Contact law, or the name of one with its default parameter.
+    coarsen
+        Factor on all element sizes.
+    points_per_edge
+        Contact points on each edge of a flank.
+    watch
+        Takes the time of the stages.
+    """
+    if plane not in ("strain", "stress"):
+        raise InputError("plane", plane, "must be strain or stress")
+    # the error estimate of a mesh at the limit is coarser by COARSENING
+    if not (math.isfinite(coarsen) and 0.2 <= coarsen <= 5.0 * COARSENING):
+        raise InputError("coarsen", coarsen, "must be >= 0.2 and <= 5", "1 is the default mesh, 2 twice its sizes")
+    chosen = law_named(law) if isinstance(law, str) else law
+    both = (materials, materials) if isinstance(materials, Material) else materials
+    watch = watch or Stopwatch()
+    gears = (pair.pinion, pair.wheel)
+    with watch.stage("meshes"):
+        recipes = sector_recipes(pair, coarsen=coarsen)
+        meshes = [sector_mesh(gear, recipe) for gear, recipe in zip(gears, recipes, strict=True)]
+    width = min(gear.face_width for gear in gears)
+    with watch.stage("condensation"), one_thread():
+        bodies = [
+            gear_body(
+                mesh,
+                material,
+                plane,
+                gear.face_width,
+                points_per_edge=points_per_edge,
+                with_stress=chosen.uses_stress,
+                law=chosen,
+                gear=number,
+                width=width,
+            )
+            for number, (mesh, material, gear) in enumerate(zip(meshes, both, gears, strict=True))
+        ]
+    # stress loads of theta = +-1 stand in the gears' stiffness with the same halves at every position
+    corners = corner_bearings(pair) if chosen.theta == 0 else (None, None)
+    return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen, corners=corners)
+
+
+def sweep_stiffness(
+    pair: GearPair,
+    *,
+    twist: float | None = None,
+    torque: float | None = None,
+    angles: ArrayLike | None = None,
+    materials: Material | tuple[Material, Material] = STEEL,
+    plane: Plane = "strain",
+    law: str | ContactLaw = "nitsche",
+    kinematics: Literal["small", "finite"] = "finite",
+    twist_from: Literal["centred", "contact"] = "centred",
+    solve_all: bool = False,
+    route: Route = "auto",
+    coarsen: float = 1.0,
+    points_per_edge: int = 4,
+    estimate_error: bool = False,
+    elastic: MeshingPair | None = None,
+    progress: Progress | None = None,
+) -> StiffnessCurve:
+    """Mesh stiffness over the rotation of the pinion, at a given twist or a given torque.
+
+    Parameters
+    ----------
+    twist
+        Twist of the wheel (rad), > 0.
+    torque
+        Torque at the wheel's hub (N m), > 0, instead of `twist`.
+    angles : array_like, shape (n,), optional
+        Pinion angles (rad); without them, 20 over one mesh cycle. Positions that differ by whole mesh cycles are
+        solved once.
+    materials, plane, law, coarsen, points_per_edge
+        See `elastic_pair`.
+    kinematics
+        ``small``: small strain in each hub's frame; ``finite`` (default) adds the first-order effect of finite strain
+        on the torque, see `gearfe.contact.finite_strain`.
+    twist_from
+        Where the twist counts from: ``centred``, a wheel space faces the pinion tooth; ``contact``, half the backlash
+        further, where unmodified flanks touch.
+    solve_all
+        Solve every position, also those that differ by whole mesh cycles.
+    route
+        ``auto`` (default): on the mesh where its elements see the contact, by the law of small loads where they do not,
+        see `gearfe.stiffness.routes`; or ``direct`` or ``hertz`` everywhere.
+    estimate_error
+        Solve again on a coarser mesh and estimate the discretisation error.
+    elastic
+        The pair from `elastic_pair`, when it is there already; of its arguments only coarsen and points_per_edge are
+        then looked at, by the error estimate.
+    progress
+        Called with positions done, positions in all, and the stage's name.
+
+    Returns
+    -------
+    StiffnessCurve
+        With every position asked for; a position that failed has its status and not-a-number.
+
+    Raises
+    ------
+    InputError
+        For neither or both of twist and torque, or values out of range.
+    """
+    if kinematics not in ("small", "finite"):
+        raise InputError("kinematics", kinematics, "must be small or finite")
+    lost = lost_motion(pair, twist_from)
+    load = _checked_load(pair, twist, torque, lost)
+    cycle = pair.mesh_cycle
+    asked = np.arange(20) * cycle / 20 if angles is None else np.atleast_1d(np.asarray(angles, dtype=float))
+    if asked.ndim != 1 or len(asked) == 0 or not np.isfinite(asked).all():
+        raise InputError("angles", angles, "must be a list of finite angles (rad)", "give at least one angle")
+    watch, finite = Stopwatch(), kinematics == "finite"
+    common: dict[str, Any] = {"plane": plane, "law": law, "points_per_edge": points_per_edge}
+    if elastic is None:
+        elastic = elastic_pair(pair, materials, coarsen=coarsen, watch=watch, **common)
+    solved_angles, source = (asked, np.arange(len(asked))) if solve_all else distinct_angles(asked, cycle)
+    router = Router(pair, elastic, route)
+    with watch.stage("unloaded flanks"):
+        touching = router.touching_twists(solved_angles)
+    with watch.stage("positions"), one_thread():
+        if torque is None:
+            solved = at_twists(router, solved_angles, np.full(len(solved_angles), load), progress, finite=finite)
+        else:
+            solved = at_torque(router, solved_angles, load, touching, progress, finite=finite)
+    solved = honest(solved, touching)
+    error = None
+    if estimate_error:
+        with watch.stage("error estimate"), one_thread():
+            given = (elastic.pinion.material, elastic.wheel.material)
+            common = {"plane": elastic.pinion.plane, "law": elastic.law, "points_per_edge": points_per_edge}
+            coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
+            routers = router, Router(pair, coarse, route)
+            error = _estimate(routers, solved_angles, solved, finite=finite, coarsen=coarsen)
+    curve = assembled_curve(pair, asked, solved_angles, source, solved, touching, lost, searched=torque is not None)
+    return replace(curve, law=law_text(elastic.law), timings=dict(watch.seconds), error=error)
+
+
+def lost_motion(pair: GearPair, twist_from: str) -> float:
+    """Twist (rad) that is taken off before it counts, see `sweep_stiffness`."""
+    if twist_from not in ("centred", "contact"):
+        raise InputError("twist_from", twist_from, "must be centred or contact")
+    return pair.contact_twist if twist_from == "contact" else 0.0
+
+
+def _checked_load(pair: GearPair, twist: float | None, torque: float | None, lost: float) -> float:
+    """Twist in all (rad), or torque."""
+    if (twist is None) == (torque is None):
+        problem = "neither is given" if twist is None else "both are given"
+        raise InputError("twist, torque", None, problem, "give exactly one of them")
+    if torque is not None:
+        if not (math.isfinite(torque) and torque > 0):
+            raise InputError("torque", torque, "must be finite and > 0 N m", "give the torque at the wheel's hub")
+        return float(torque)
+    assert twist is not None
+    most = math.pi / pair.wheel.teeth - lost
+    if not (math.isfinite(twist) and 0 < twist < most):
+        problem = f"must be > 0 and < {most:.6g} rad ({math.degrees(most):.6g} deg, half a pitch of the wheel)"
+        raise InputError("twist", twist, problem, "0.01 to 0.5 deg is usual")
+    return float(twist) + lost
+
+
+def distinct_angles(angles: Array, cycle: float) -> tuple[Array, IntArray]:
+    """Angles within one cycle that have to be solved, and for each asked angle the number of its own."""
+    folded = fold(angles, cycle)
+    order = np.argsort(folded, kind="stable")
+    new = np.concatenate([[True], np.diff(folded[order]) > 1e-9 * cycle])
+    source = np.empty(len(angles), dtype=np.int64)
+    source[order] = np.cumsum(new) - 1
+    return folded[order][new], source
+
+
+def _estimate(
+    routers: tuple[Router, Router], angles: Array, solved: Solved, *, finite: bool, coarsen: float
+) -> ErrorEstimate:
+    """Error of positions solved by the first router, from the second's on a coarser mesh."""
+    own, coarse = routers
+    chosen = solved_twice(np.array(solved.status) == "converged")
+    again = at_twists(coarse, angles[chosen], solved.twist[chosen], None, finite=finite)
+    other = np.where(np.array(again.status, dtype=object) == "converged", again.numbers["torque_wheel"], np.nan)
+    law = law_error(own, angles[chosen], solved.twist[chosen])
+    return error_estimate(angles[chosen], solved.numbers["torque_wheel"][chosen], other, coarsen=coarsen, law=law)
+
+
+def assembled_curve(
+    pair: GearPair,
+    asked: Array,
+    angles: Array,
+    source: IntArray,
+    solved: Solved,
+    touching: Array,
+    lost: float,
+    *,
+    searched: bool,
+) -> StiffnessCurve:
+    """The curve at all asked angles; `searched` says that the twist is a result, not given."""
+    radius = pair.wheel.base_radius
+    failed = ~np.isin(solved.status, SOLVED)
+    total = np.where(failed & searched, np.nan, solved.twist)
+    twist = total - lost
+    torque = solved.numbers["torque_wheel"]
+    cycles = np.round((asked - angles[source]) / pair.mesh_cycle).astype(np.int64)
+    leading, shares = load_shares(solved.pairs, torque)
+    return StiffnessCurve(
+        pinion_angle=asked,
+        wheel_angle=pair.wheel_angle_at(asked, total[source]),  # type: ignore[arg-type]
+        twist=twist[source],
+        torque_wheel=torque[source],
+        torque_pinion=solved.numbers["torque_pinion"][source],
+        torque_wheel_reaction=solved.numbers["torque_wheel_reaction"][source],
+        k_torsional=(torque / twist)[source],
+        k_mesh=(torque / twist / radius**2)[source],
+        k_tangent=(solved.numbers["tangent"] / radius**2)[source],
+        transmission_error=(twist * radius)[source],
+        transmission_error_unloaded=((touching - lost) * radius)[source],
+        leading_pair=leading[source] - cycles,
+        load_share=shares[source],
+        teeth_in_contact=np.where(failed, -1, (shares > 0).sum(axis=1))[source],
+        peak_pressure=solved.numbers["peak_pressure"][source],
+        iterations=solved.iterations[source],
+        status=np.array(solved.status)[source],
+        route=np.array(solved.route)[source],
+        mesh_cycle=pair.mesh_cycle,
+        base_radius=radius,
+        lost_motion=lost,
+    )

@@ -1,0 +1,269 @@
+r"""Fields of a gear train over time: the housing's vibration and the turning gears, as VTKHDF series and as pictures.
+
+A point of a gear or shaft at :math:`X_0`, with c the gear's centre at rest, d its displacement, :math:`\varphi` the
+angle turned about the axis a and :math:`\theta` the small tilt, is at
+
+.. math:: X = c + d + (I + \theta\times)\, R(a, \varphi)\,(X_0 - c) .
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..gear.drawing import gear_outline
+from ..gear.spur_gear import Gear
+from ..output.vtkhdf import VtkHdfSeries
+from ..reduction.modal_body import ModalBody
+from ..train.response import TrainResponse
+from ..train.scene import ShaftGear, TrainScene
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Steps whose fields are in memory at a time.
+_AT_ONCE = 25
+#: Points round a shaft.
+_ROUND = 32
+#: Largest displacement of the housing in a picture, in parts of its size.
+_SHOWN = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """Surface of a body that moves with a gear.
+
+    Attributes
+    ----------
+    gear
+        Number of the gear whose motion it follows.
+    points : (n, 3)
+        At the start of the run (m).
+    quads : (f, 4)
+    triangles : (t, 3)
+    """
+
+    gear: int
+    points: Array
+    quads: Ints
+    triangles: Ints
+
+
+def gear_surface(gear: Gear, angle: float, *, per_segment: int = 3) -> tuple[Array, Ints]:
+    """Surface of a gear about its own axis (the third coordinate): points (4 k, 3) in m and quadrilaterals.
+
+    Parameters
+    ----------
+    angle
+        Where tooth 0 points (rad).
+    per_segment
+        Pieces of each of the profile's curves.
+    """
+    outline = 1e-3 * gear_outline(gear, angle, (0.0, 0.0), per_segment=per_segment)[:-1]
+    inner = outline * (0.5 * gear.bore_diameter / np.linalg.norm(outline, axis=1, keepdims=True))
+    k, half = len(outline), 0.5 * gear.face_width
+    rings = [np.column_stack([ring, np.full(k, z)]) for z in (-half, half) for ring in (inner, outline)]
+    here, after = np.arange(k), np.roll(np.arange(k), -1)
+    # rings: 0 inner and 1 outer at the bottom, 2 inner and 3 outer at the top; each quad anticlockwise from outside
+    sides = ((1, 0), (2, 3), (3, 1), (0, 2))
+    quads = [np.column_stack([a * k + here, b * k + here, b * k + after, a * k + after]) for a, b in sides]
+    return np.concatenate(rings), np.concatenate(quads)
+
+
+def cylinder_surface(radius: float, low: float, high: float) -> tuple[Array, Ints, Ints]:
+    """Cylinder about the third axis: points, quadrilaterals, triangles of the ends."""
+    angle = 2.0 * np.pi * np.arange(_ROUND) / _ROUND
+    circle = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    ends = [np.column_stack([circle, np.full(_ROUND, z)]) for z in (low, high)]
+    points = np.concatenate([*ends, [[0.0, 0.0, low], [0.0, 0.0, high]]])
+    here, after = np.arange(_ROUND), np.roll(np.arange(_ROUND), -1)
+    quads = np.column_stack([here, after, _ROUND + after, _ROUND + here])
+    bottom = np.column_stack([np.full(_ROUND, 2 * _ROUND), after, here])
+    top = np.column_stack([np.full(_ROUND, 2 * _ROUND + 1), _ROUND + here, _ROUND + after])
+    return points, quads, np.concatenate([bottom, top])
+
+
+def tooth_angles(scene: TrainScene, senses: Sequence[float]) -> dict[str, float]:
+    """Gear -> angle (rad) at which its tooth 0 stands at the start, in the train's frame, so that flanks meet.
+
+    With u the direction from driver to driven, a driver's tooth stands at the mesh's phase past u in the driving sense,
+    and a driven gear has a space there. A gear in two meshes follows the first.
+
+    Parameters
+    ----------
+    senses
+        For each mesh, +1 or -1: the driver turns about the axis or against it.
+    """
+    frame = scene.frame
+    found: dict[str, float] = {}
+    for mesh, sense in zip(scene.meshes, senses, strict=True):
+        driver, driven = scene.gear(mesh.driver), scene.gear(mesh.driven)
+        centres = [np.array(scene.shaft(g.shaft).point) for g in (driver, driven)]
+        line = frame[:2] @ (centres[1] - centres[0])
+        towards = float(np.arctan2(line[1], line[0]))
+        ratio = driver.gear.teeth / driven.gear.teeth
+        start = found.setdefault(driver.name, towards + sense * mesh.phase)
+        found.setdefault(driven.name, towards + np.pi + np.pi / driven.gear.teeth - ratio * (start - towards))
+    return {gear.name: found.get(gear.name, 0.0) for gear in scene.gears}
+
+
+def solids(scene: TrainScene, response: TrainResponse, *, per_segment: int = 2) -> tuple[Solid, ...]:
+    """Surfaces of all gears and of the shafts that carry them, where they stand at the start."""
+    frame = scene.frame
+    first = {gear.name: _spin(response, response.gear_names.index(gear.name), frame) for gear in scene.gears}
+    senses = [-1.0 if first[mesh.driver][-1] < 0.0 else 1.0 for mesh in scene.meshes]
+    angles = tooth_angles(scene, senses)
+    found = []
+    carried: set[str] = set()
+    for gear in scene.gears:
+        number = response.gear_names.index(gear.name)
+        points, quads = gear_surface(gear.gear, angles[gear.name], per_segment=per_segment)
+        none = np.zeros((0, 3), dtype=np.int64)
+        found.append(Solid(number, response.gear_centres[number] + points @ frame, quads, none))
+        if gear.shaft not in carried:
+            carried.add(gear.shaft)
+            found.append(_shaft(scene, gear, number))
+    return tuple(found)
+
+
+def moved(solid: Solid, response: TrainResponse, frame: Array, step: int, exaggeration: float = 1.0) -> Array:
+    """(n, 3) points of a surface at an output step; displacement and tilt times `exaggeration`, the turning not."""
+    pose, centre = response.gear_pose[step, solid.gear], response.gear_centres[solid.gear]
+    angle = float(pose[3:] @ frame[2])
+    tilt = exaggeration * (pose[3:] - angle * frame[2])
+    arm = solid.points - centre
+    along = np.outer(arm @ frame[2], frame[2])
+    turned = along + np.cos(angle) * (arm - along) + np.sin(angle) * np.cross(frame[2], arm)
+    return np.asarray(centre + exaggeration * pose[:3] + turned + np.cross(tilt, turned))
+
+
+def write_gears(path: Path, scene: TrainScene, response: TrainResponse, steps: Sequence[int] | Ints) -> None:
+    """VTKHDF series of the gears and shafts: places, displacement from the start (m), number of the gear."""
+    parts, frame = solids(scene, response), scene.frame
+    starts = np.cumsum([0, *(len(part.points) for part in parts)])
+    cells = {
+        "quad": np.concatenate([part.quads + s for part, s in zip(parts, starts, strict=False)]),
+        "triangle": np.concatenate([part.triangles + s for part, s in zip(parts, starts, strict=False)]),
+    }
+    rest = np.concatenate([part.points for part in parts])
+    number = np.repeat([part.gear + 1 for part in parts], np.diff(starts)).astype(np.uint8)
+    with VtkHdfSeries(path) as series:
+        for count, step in enumerate(steps):
+            points = np.concatenate([moved(part, response, frame, int(step)) for part in parts])
+            data = {"displacement_m": (points - rest).astype(np.float32), "gear": number}
+            series.add(float(response.time[step]), points, None if count else cells, point_data=data)
+
+
+def write_housing(
+    path: Path,
+    body: ModalBody,
+    response: TrainResponse,
+    steps: Sequence[int] | Ints,
+    *,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> None:
+    """VTKHDF series of the housing: displacement (m), acceleration along the outward normal (m/s2)."""
+    position, acceleration = _coordinates(response)
+    cells = {"tetra" if body.elements.shape[1] == 4 else "tetra10": body.elements}
+    chosen = np.asarray(steps, dtype=np.int64)
+    with VtkHdfSeries(path) as series:
+        for first in range(0, len(chosen), _AT_ONCE):
+            some = chosen[first : first + _AT_ONCE]
+            displacement = body.reconstruct(position[some]).astype(np.float32)
+            normal = body.normal_component(acceleration[some]).astype(np.float32)
+            for i, step in enumerate(some):
+                start = first + i == 0
+                data = {"displacement_m": displacement[i], "normal_acceleration_m_per_s2": normal[i]}
+                series.add(
+                    float(response.time[step]), body.nodes if start else None, cells if start else None, point_data=data
+                )
+            if progress is not None:
+                progress(first + len(some), len(chosen), "fields")
+
+
+def frames(
+    scene: TrainScene, response: TrainResponse, steps: Sequence[int] | Ints, *, exaggeration: float | None = None
+) -> dict[str, NDArray[np.generic]]:
+    """Arrays that `gearfe.output.train_scene` draws: surfaces in all `steps`, in m, and their colours.
+
+    Parameters
+    ----------
+    exaggeration
+        Factor on displacement and tilt; by default such that the housing's largest one is seen.
+    """
+    body, chosen = scene.housing, np.asarray(steps, dtype=np.int64)
+    arrays: dict[str, NDArray[np.generic]] = {"time": response.time[chosen]}
+    factor = 1.0 if exaggeration is None else exaggeration
+    if body is not None:
+        from ..housing.mesh_checks import boundary_faces
+
+        faces = boundary_faces(body.elements)
+        used, renumbered = np.unique(faces, return_inverse=True)
+        rows = (3 * used[:, None] + np.arange(3)).ravel()
+        shapes = np.asarray(body.shapes[rows])
+        position, acceleration = _coordinates(response)
+        shift = (position[chosen] @ shapes.T).reshape(len(chosen), -1, 3)
+        if exaggeration is None:
+            size, most = float(np.ptp(body.nodes, axis=0).max()), float(np.abs(shift).max(initial=0.0))
+            factor = _rounded(_SHOWN * size / most) if most > 0.0 else 1.0
+        normal = (acceleration[chosen] @ shapes.T).reshape(len(chosen), -1, 3)
+        arrays |= {
+            "housing_faces": renumbered.reshape(faces.shape),
+            "housing_points": (body.nodes[used] + factor * shift).astype(np.float32),
+            "housing_values": np.einsum("snk,nk->sn", normal, body.normals[used]).astype(np.float32),
+        }
+    parts, frame = solids(scene, response, per_segment=4), scene.frame
+    rest = np.concatenate([part.points for part in parts])
+    true = [np.concatenate([moved(part, response, frame, int(s)) for part in parts]) for s in chosen]
+    shown = [np.concatenate([moved(part, response, frame, int(s), factor) for part in parts]) for s in chosen]
+    starts = np.cumsum([0, *(len(part.points) for part in parts)])
+    arrays |= {
+        "gear_quads": np.concatenate([part.quads + s for part, s in zip(parts, starts, strict=False)]),
+        "gear_triangles": np.concatenate([part.triangles + s for part, s in zip(parts, starts, strict=False)]),
+        "gear_points": np.array(shown, dtype=np.float32),
+        "gear_values": np.array([1e3 * np.linalg.norm(p - rest, axis=1) for p in true], dtype=np.float32),
+        "exaggeration": np.array(factor),
+    }
+    return arrays
+
+
+def step_at(response: TrainResponse, time: float) -> int:
+    """Number of the output time nearest to `time` (s).
+
+    Raises
+    ------
+    InputError
+        When the run does not reach it.
+    """
+    step = 0.5 * float(response.time[1] - response.time[0]) if len(response.time) > 1 else 0.0
+    if not response.time[0] - step <= time <= response.time[-1] + step:
+        problem = f"lies outside of the run, {response.time[0]:g}..{response.time[-1]:g} s"
+        raise InputError("time of the picture", time, problem, "choose another one")
+    return int(np.argmin(np.abs(response.time - time)))
+
+
+def _coordinates(response: TrainResponse) -> tuple[Array, Array]:
+    if response.modal is None or response.modal_acceleration is None:
+        raise InputError("housing", None, "is rigid and has no field", "take an elastic housing")
+    return response.modal, response.modal_acceleration
+
+
+def _spin(response: TrainResponse, gear: int, frame: Array) -> Array:
+    return np.asarray(response.gear_pose[:, gear, 3:] @ frame[2])
+
+
+def _shaft(scene: TrainScene, gear: ShaftGear, number: int) -> Solid:
+    shaft = scene.shaft(gear.shaft)
+    points, quads, triangles = cylinder_surface(shaft.radius, -0.5 * shaft.length, 0.5 * shaft.length)
+    return Solid(number, np.array(shaft.point) + points @ scene.frame, quads, triangles)
+
+
+def _rounded(factor: float) -> float:
+    """Down to one digit."""
+    power = 10.0 ** np.floor(np.log10(factor))
+    return float(np.floor(factor / power) * power)

@@ -1,0 +1,356 @@
+"""From the tables of a job file to a gear train: ``[train]`` with ``[pair]``, ``[stiffness]`` and ``[housing]``.
+
+job = read_train_job("geometry/gear_train.toml", variant="operating")
+model = build_train(job_scene(job, train_curves(job), train_body(job)))
+response = simulate(model, job.times, tolerance=job.table.tolerance)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..config import load_job
+from ..errors import InputError
+from ..gear.pair import Gear, GearPair
+from ..rigid import TimeFunction, constant, smoothed_step
+from ..stiffness.curve import StiffnessCurve
+from ..tables.housing import HousingTable
+from ..tables.pair import DEFAULTS, PairTable
+from ..tables.stiffness import StiffnessTable
+from ..tables.train import TrainGearTable, TrainMeshTable, TrainTable
+from ..train.kinematics import steady_forces
+from ..train.scene import Bearing, Damping, Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
+
+if TYPE_CHECKING:
+    from ..reduction.modal_body import ModalBody
+
+Stiffness = StiffnessCurve | float | None
+
+
+@dataclass(frozen=True, eq=False)
+class TrainJob:
+    """A train job as read.
+
+    Attributes
+    ----------
+    path
+        The job file; curves that it names lie beside it.
+    table
+        [train], with the chosen variant's curves and damping.
+    pair, stiffness, housing
+        The other tables, None where the file has none.
+    """
+
+    path: Path
+    table: TrainTable
+    pair: PairTable | None
+    stiffness: StiffnessTable
+    housing: HousingTable | None
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """Output times (s), from 0 to the end, the end included where the steps meet it."""
+        step = 1e-6 * self.table.step_us
+        count = int(1e-3 * self.table.duration_ms / step * (1 + 1e-12) + 1e-9)
+        return np.asarray(step * np.arange(count + 1), dtype=float)
+
+
+def read_train_job(path: str | Path, variant: str | None = None) -> TrainJob:
+    """Read a job file; `variant` None takes the one that the file names.
+
+    Raises
+    ------
+    InputError
+        For every mistake in the file, and an unknown variant.
+    """
+    tables = load_job(path, ("train",), ("pair", "stiffness", "housing"))
+    table: TrainTable = tables["train"]
+    table = table.chosen(table.variant if variant is None else variant)
+    if table.housing == "elastic" and "housing" not in tables:
+        raise InputError("train.housing", "elastic", "needs a table [housing]", 'add it, or write housing = "rigid"')
+    stiffness = tables.get("stiffness", StiffnessTable())
+    return TrainJob(Path(path), table, tables.get("pair"), stiffness, tables.get("housing"))
+
+
+def train_body(job: TrainJob) -> ModalBody | None:
+    """Reduced housing of the job, from the cache when it was made before; None for a rigid one."""
+    if job.table.housing == "rigid":
+        return None
+    from ..housing.build import reduced_housing
+
+    assert job.housing is not None
+    return reduced_housing(job.housing)
+
+
+def train_curves(
+    job: TrainJob, files: Sequence[str | Path] = (), *, watch: Any = None, progress: Any = None
+) -> tuple[Stiffness, ...]:
+    """Stiffness of each mesh: from `files`, from the file or number its table names, or computed (and cached).
+
+    Parameters
+    ----------
+    files
+        CSV files, one for all meshes or one a mesh; they win over the job's.
+    watch, progress
+        See `gearfe.stiffness.sweep.sweep_stiffness`.
+    """
+    meshes = job.table.meshes
+    if files and len(files) not in (1, len(meshes)):
+        problem = f"{len(files)} files for {len(meshes)} meshes"
+        raise InputError("curve", [str(f) for f in files], problem, "give one for all, or one a mesh")
+    scene = job_scene(job, [1e8] * len(meshes), None, geometry_only=True)
+    found: list[Stiffness] = []
+    for number, (mesh, made) in enumerate(zip(meshes, scene.meshes, strict=True)):
+        teeth = scene.gear(made.driver).gear.teeth
+        if files:
+            found.append(_read_curve(Path(files[number if len(files) > 1 else 0]), teeth))
+        elif mesh.rigid:
+            found.append(None)
+        elif mesh.stiffness_N_per_m is not None:
+            found.append(mesh.stiffness_N_per_m)
+        elif mesh.curve is not None:
+            found.append(_read_curve(job.path.parent / mesh.curve, teeth))
+        elif mesh.load_map is not None:
+            found.append(_mapped_curve(job.path.parent / mesh.load_map, scene, number))
+        else:
+            found.append(_computed_curve(job, scene, number, watch, progress))
+    return tuple(found)
+
+
+def job_scene(
+    job: TrainJob, curves: Sequence[Stiffness], body: ModalBody | None, *, geometry_only: bool = False
+) -> TrainScene:
+    """The train of a job with the stiffness of each mesh and its reduced housing.
+
+    With `geometry_only` the bores stand still where the shafts need them: enough for kinematics and statics.
+    """
+    t = job.table
+    shafts = tuple(
+        Shaft(
+            s.name,
+            (1e-3 * s.x_mm, 1e-3 * s.y_mm, 1e-3 * s.z_mm),
+            1e-3 * s.length_mm,
+            1e-3 * s.radius_mm,
+            tuple(str(a) for a in s.attachments),
+            s.density_kg_per_m3,
+            s.initial_speed_rad_per_s,
+            s.mass_kg,
+            s.polar_inertia_kg_m2,
+            s.transverse_inertia_kg_m2,
+        )
+        for s in t.shafts
+    )
+    gears = tuple(
+        ShaftGear(g.name, g.shaft, 1e-3 * g.y_mm, train_gear(job, g, f"train.gears[{i}]"), _density(job, g))
+        for i, g in enumerate(t.gears)
+    )
+    meshes = tuple(_mesh(job, m, c) for m, c in zip(t.meshes, curves, strict=True))
+    drive = None
+    if t.drive is not None:
+        speed = _ramp(t.drive.speed_rad_per_s, t.drive.ramp_centre_ms, t.drive.ramp_width_ms)
+        coupling = (t.drive.stiffness_Nm_per_rad, t.drive.damping_Nm_s_per_rad)
+        drive = Drive(t.drive.shaft, str(t.drive.attachment), speed, *coupling)
+    loads = tuple(
+        Load(
+            x.shaft,
+            None if x.attachment is None else str(x.attachment),
+            _ramp(x.torque_Nm, x.ramp_centre_ms, x.ramp_width_ms),
+        )
+        for x in t.loads
+    )
+    damping = Damping(t.damping.ratio, t.damping.rayleigh_alpha_per_s, t.damping.rayleigh_beta_s, t.damping.gyroscopic)
+    scene = TrainScene(
+        shafts,
+        gears,
+        meshes,
+        drive,
+        loads,
+        body,
+        {} if body is not None else _rigid_bores(job),
+        tuple(Bearing(str(b.attachment), b.stiffness, b.damping) for b in t.bearings),
+        damping,
+    )
+    if geometry_only:
+        from ..train.checks import check_scene
+
+        check_scene(scene)
+    return scene
+
+
+def train_gear(job: TrainJob, table: TrainGearTable, where: str) -> Gear:
+    """The gear that an entry of [[train.gears]] describes."""
+    pair = job.pair
+    if table.gear:
+        if pair is None:
+            raise InputError(
+                f"{where}.gear", table.gear, "needs a table [pair]", "add it, or give teeth, module_mm, ..."
+            )
+        made = GearPair.from_table(pair)
+        return made.pinion if table.gear == "pinion" else made.wheel
+
+    def value(key: str) -> Any:
+        for source in (table, pair):
+            found = None if source is None else getattr(source, key)
+            if found is not None:
+                return found
+        if key in DEFAULTS:
+            return DEFAULTS[key]
+        raise InputError(f"{where}.{key}", None, "is required", "add it here, or to a table [pair]")
+
+    assert table.teeth is not None
+    module = 1e-3 * value("module_mm")
+    bore = 0.2 * module * table.teeth if table.bore_diameter_mm is None else 1e-3 * table.bore_diameter_mm
+    form = {key: value(key) for key in ("profile_shift", "addendum", "dedendum", "rack_tip_radius", "tip_shortening")}
+    try:
+        return Gear(
+            table.teeth,
+            module,
+            math.radians(value("pressure_angle_deg")),
+            1e-3 * value("face_width_mm"),
+            bore,
+            tip_round=1e-3 * value("tip_round_mm"),
+            tooth_thinning=1e-6 * value("tooth_thinning_um"),
+            **form,
+        )
+    except InputError as error:
+        raise InputError(f"{where}.{error.field}", error.value, error.problem, error.cure) from None
+
+
+def _density(job: TrainJob, table: TrainGearTable) -> float:
+    if table.density_kg_per_m3 is not None:
+        return table.density_kg_per_m3
+    if job.pair is None:
+        return 7850.0
+    return (job.pair.material_of(table.gear) if table.gear else job.pair.material).density_kg_per_m3
+
+
+def _mesh(job: TrainJob, table: TrainMeshTable, stiffness: Stiffness) -> GearMesh:
+    distance = table.centre_distance_mm
+    if distance is None and job.pair is not None and job.pair.centre_distance_mm is not None:
+        sides = {g.name: g.gear for g in job.table.gears}
+        if {sides.get(table.driver), sides.get(table.driven)} == {"pinion", "wheel"}:
+            distance = job.pair.centre_distance_mm
+    return GearMesh(
+        table.driver,
+        table.driven,
+        stiffness,
+        math.radians(table.phase_deg),
+        table.damping_N_s_per_m,
+        job.table.curves.interpolation,
+        None if distance is None else 1e-3 * distance,
+    )
+
+
+def _ramp(height: float, centre_ms: float, width_ms: float | None) -> TimeFunction:
+    return constant(height) if width_ms is None else smoothed_step(1e-3 * centre_ms, 1e-3 * width_ms, height)
+
+
+def _rigid_bores(job: TrainJob) -> dict[str, tuple[float, float, float]]:
+    """Bores of a rigid housing: those of the table, else the places of [housing]'s bores."""
+    found = {str(b.attachment): (1e-3 * b.x_mm, 1e-3 * b.y_mm, 1e-3 * b.z_mm) for b in job.table.rigid_bores}
+    if found:
+        return found
+    if job.housing is None:
+        problem = "are not given: neither [[train.rigid_bores]] nor [housing] tells where the bores are"
+        raise InputError("train.rigid_bores", None, problem, "add one entry for each attachment")
+    return bore_places(job.housing)
+
+
+def bore_places(table: HousingTable) -> dict[str, tuple[float, float, float]]:
+    """Name -> reference point (m) of the bores of a [housing] table: their middles, numbered as attachments."""
+    places, number = {}, 0
+    for shaft in table.shafts:
+        for side, sign in (("plus", 1.0), ("minus", -1.0)):
+            if shaft.walls not in ("both", side):
+                continue
+            number += 1
+            inner = 0.5 * table.inner_gap_mm
+            outer = inner + table.wall_thickness_mm[0 if side == "plus" else 1] + shaft.boss_height_mm
+            places[str(number)] = (1e-3 * shaft.x_mm, 0.5e-3 * sign * (inner + outer), 1e-3 * shaft.z_mm)
+    return places
+
+
+def _read_curve(path: Path, teeth: int) -> StiffnessCurve:
+    """A curve from a CSV file; where the file does not tell its period it is that of the driver."""
+    try:
+        return StiffnessCurve.from_csv(path)
+    except InputError as error:
+        if "mesh cycle" not in error.problem:
+            raise
+    return StiffnessCurve.from_csv(path, mesh_cycle=2.0 * math.pi / teeth)
+
+
+def _carried_torque(scene: TrainScene, number: int) -> float:
+    """Torque (N m) at the driven gear of a mesh in steady running, without sign."""
+    driven = scene.gear(scene.meshes[number].driven).gear
+    return abs(float(steady_forces(scene)[number])) * driven.base_radius
+
+
+def _mapped_curve(path: Path, scene: TrainScene, number: int) -> StiffnessCurve:
+    """The curve of a load map at the torque that a mesh carries; the map's pinion is the driver."""
+    from ..loadmap.load_map import LoadMap
+
+    mesh = scene.meshes[number]
+    made, torque = LoadMap.from_csv(path), _carried_torque(scene, number)
+    driver, driven = scene.gear(mesh.driver).gear, scene.gear(mesh.driven).gear
+    cycle, radius = 2.0 * math.pi / driver.teeth, driven.base_radius
+    fits = math.isclose(made.mesh_cycle, cycle, rel_tol=1e-9)
+    if not (fits and math.isclose(made.curves[0].base_radius, radius, rel_tol=1e-9)):
+        problem = (
+            f"is of other gears: mesh cycle {math.degrees(made.mesh_cycle):.6g} deg and base radius of the wheel "
+            f"{1e3 * made.curves[0].base_radius:.6g} mm, but {math.degrees(cycle):.6g} deg and {1e3 * radius:.6g} mm "
+            f"in mesh {mesh.name!r}"
+        )
+        raise InputError("load_map", str(path), problem, "make a map of this pair, the driver as its pinion")
+    if not torque > 0.0:
+        problem = "carries no torque, so its load map has no load to be read at"
+        raise InputError(f"mesh {mesh.name!r}", None, problem, "add a load, or give another stiffness")
+    return made.curve_at(torque)
+
+
+def _computed_curve(job: TrainJob, scene: TrainScene, number: int, watch: Any, progress: Any) -> StiffnessCurve:
+    """Curve of a mesh with the driver as pinion, by [stiffness] or at the torque that the mesh carries."""
+    from ..stiffness.curve_cache import cached_curve
+    from ..stiffness.job import StiffnessJob
+
+    mesh = scene.meshes[number]
+    one, two = scene.gear(mesh.driver).gear, scene.gear(mesh.driven).gear
+    pair = GearPair(one, two, mesh.centre_distance)
+    if job.pair is None:
+        problem = "has no stiffness: there is no table [pair] to compute it with"
+        raise InputError(f"mesh {mesh.name!r}", None, problem, "add curve, stiffness_N_per_m or rigid to it, or [pair]")
+    tables = StiffnessJob(job.pair, job.stiffness, pair)
+    model = {**tables.model, "materials": _materials(job, mesh)}
+    if job.table.curves.load == "stiffness":
+        return cached_curve(pair, model, tables.sweep, watch=watch, progress=progress)
+    torque = _carried_torque(scene, number)
+    if not torque > 0.0:
+        problem = 'carries no torque, so train.curves.load = "torque" has no load to compute its curve with'
+        raise InputError(f"mesh {mesh.name!r}", None, problem, 'add a load, or write load = "stiffness"')
+    count = job.table.curves.positions
+    sweep = {
+        "torque": torque,
+        "angles": pair.mesh_cycle * np.arange(count) / count,
+        "kinematics": job.stiffness.kinematics,
+        "twist_from": job.stiffness.twist_from,
+    }
+    return cached_curve(pair, model, sweep, watch=watch, progress=progress)
+
+
+def _materials(job: TrainJob, mesh: GearMesh) -> Any:
+    from ..elasticity import Material
+
+    assert job.pair is not None
+    sides = {g.name: g.gear for g in job.table.gears}
+    made = []
+    for name in (mesh.driver, mesh.driven):
+        table = job.pair.material_of(sides[name]) if sides[name] else job.pair.material
+        made.append(Material(table.youngs_modulus_GPa * 1e9, table.poisson_ratio, density=table.density_kg_per_m3))
+    return tuple(made)

@@ -1,0 +1,120 @@
+"""From the response of a train to the arguments of `gearfe.output.train_figures`: units, signs, labels, marks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import unknown_name
+from ..output.train_figures import Mark, power_figure, response_figure, spectrum_figure
+from ..spectrum import nearest_line, peaks
+from ..train.response import TrainResponse
+from .report import TrainSpectra, lines_of, mean_over_periods
+
+#: Lines that are named in the picture of a spectrum, and the least amplitude of such a line in parts of the largest.
+_NAMED, _LEAST = 5, 0.2
+#: End of the frequency axis: this multiple of the highest mesh frequency, unless larger lines lie above it.
+_MESH_MULTIPLES = 4.2
+
+
+def draw_response(path: Path, response: TrainResponse, attachment: str, title: str) -> None:
+    """Contact forces, speeds, angular accelerations, and the acceleration at an attachment over the drive's rotation.
+
+    Shafts that turn against the drive are drawn with their sign reversed.
+    """
+    sense = float(np.sign(response.drive_angle[-1])) or 1.0
+    signs = np.where(np.sign(response.speed.mean(axis=0)) * sense < 0.0, -1.0, 1.0)
+    drive = sense if len(signs) else 1.0
+    labels = [n if s > 0.0 else f"{n} (sign reversed)" for n, s in zip(response.shaft_names, signs, strict=True)]
+    means = {}
+    if len(response.time) >= 4:
+        mean, _ = mean_over_periods(
+            response.time, response.contact_force, response.load_end_s, response.common_period_s
+        )
+        means = {f"mesh {i + 1}, mean {m / 1e3:.4g} kN": m / 1e3 for i, m in enumerate(mean)}
+    names = list(means) or [f"mesh {i + 1}" for i in range(len(response.mesh_names))]
+    response_figure(
+        path,
+        title=title,
+        angle=np.degrees(response.drive_angle) * drive,
+        forces=dict(zip(names, 1e-3 * response.contact_force.T, strict=True)),
+        speeds=dict(zip(labels, (response.speed * signs).T, strict=True)),
+        accelerations=dict(zip(labels, 1e-3 * (response.acceleration * signs).T, strict=True)),
+        attachment=(f"normal acceleration at attachment {attachment}", _acceleration(response, attachment)),
+        means=means,
+    )
+
+
+def draw_spectrum(path: Path, response: TrainResponse, made: TrainSpectra, attachment: str, title: str) -> None:
+    """Amplitude spectrum of the acceleration at an attachment."""
+    name, spectrum = f"attachment_{attachment}_acceleration_m_per_s2", made.spectrum
+    amplitude = made.amplitude(name)
+    lines = lines_of(response, spectrum.nyquist)
+    named = []
+    for peak in peaks(spectrum.frequency, amplitude, _NAMED, above=_LEAST):
+        line = nearest_line(peak.frequency, lines, 0.51 * spectrum.resolution)
+        what = "" if line is None else f"\n{line.name} × {line.order}"
+        named.append((1e-3 * peak.frequency, peak.amplitude, f"{peak.frequency:.0f} Hz: {peak.amplitude:.3g}{what}"))
+    window = "no window" if spectrum.window == "none" else f"window: {spectrum.window}"
+    spectrum_figure(
+        path,
+        title=f"Normal acceleration at attachment {attachment}\n{title}",
+        frequency=1e-3 * spectrum.frequency,
+        amplitude=amplitude,
+        quantity="amplitude  (m/s²)",
+        peaks=named,
+        marks=_marks(response, made),
+        shaft=_first_shaft(response),
+        note=f"resolution {spectrum.resolution:.1f} Hz, {window}",
+        highest=_highest(response, made, [f for f, _, _ in named]),
+    )
+
+
+def draw_power(path: Path, response: TrainResponse, made: TrainSpectra, title: str) -> None:
+    """Level of the equivalent radiated power; the housing is elastic."""
+    assert made.power is not None
+    found = peaks(made.power.frequency, made.power.power, 3)
+    power_figure(
+        path,
+        title=f"Equivalent radiated power of the housing\n{title}",
+        frequency=1e-3 * made.power.frequency,
+        level=made.power.level,
+        marks=_marks(response, made),
+        shaft=_first_shaft(response),
+        note=f"mean power {made.power.mean_level:.1f} dB, resolution {made.spectrum.resolution:.1f} Hz",
+        highest=_highest(response, made, [1e-3 * p.frequency for p in found]),
+    )
+
+
+def attachment_to_draw(response: TrainResponse, asked: str | None, loaded: str | None) -> str:
+    """Name of the attachment in the pictures: the asked one, else the bore that carries the load's reaction."""
+    names = response.attachment_names
+    if asked is not None and asked not in names:
+        raise unknown_name("--attachment", asked, names)
+    if asked is not None:
+        return asked
+    return loaded if loaded is not None and loaded in names else names[-1]
+
+
+def _acceleration(response: TrainResponse, attachment: str) -> np.ndarray:
+    return np.asarray(response.attachment_acceleration[:, response.attachment_names.index(attachment)])
+
+
+def _first_shaft(response: TrainResponse) -> tuple[str, float]:
+    return response.shaft_names[0], 1e-3 * float(abs(response.shaft_frequencies_Hz[0]))
+
+
+def _highest(response: TrainResponse, made: TrainSpectra, lines: list[float]) -> float:
+    """End of the frequency axis (kHz)."""
+    top = 1e-3 * made.spectrum.nyquist
+    meshes = 1e-3 * float(np.max(np.abs(response.mesh_frequencies_Hz), initial=0.0))
+    return min(top, max([_MESH_MULTIPLES * meshes, *(1.08 * f for f in lines)]) or top)
+
+
+def _marks(response: TrainResponse, made: TrainSpectra) -> list[Mark]:
+    first = {f"mesh {i + 1}": f for i, f in enumerate(response.mesh_frequencies_Hz)}
+    return [
+        Mark(f"{line.name}: {first[line.name]:.1f} Hz and its multiples", str(line.order), 1e-3 * line.frequency)
+        for line in lines_of(response, made.spectrum.nyquist)
+    ]

@@ -1,0 +1,127 @@
+r"""Equivalent radiated power: an estimate of the sound that a vibrating surface sends into air.
+
+Each piece of the surface is taken to radiate like a piston in a plane wave (radiation efficiency 1), so with the normal
+velocity :math:`v_n` of the outer surface S and the impedance :math:`\rho c` of the air
+
+.. math::
+    P(t) = \rho c \int_S v_n^2\,dA = \rho c\; \dot q^T R\, \dot q , \qquad
+    P(f) = \tfrac12 \rho c \int_S |\hat v_n|^2 dA = \tfrac12\rho c\; \hat{\dot q}^H R\, \hat{\dot q} ,
+
+where R is the surface matrix of the reduced body (`gearfe.ModalBody.radiation`) and a hat marks complex
+amplitudes: no field is needed. The constant and, with an even number of samples, the Nyquist line count twice as much
+(the mean of their square is the amplitude's square itself), so without a window the lines sum to the mean power.
+Levels are :math:`10\lg(P/10^{-12}\,\mathrm W)` (ISO 3744). At low frequencies a surface radiates less than this: the
+estimate is an upper one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from ..spectrum import Spectrum, amplitude_spectrum
+
+Floats = NDArray[np.float64]
+
+#: Density (kg/m3) and speed of sound (m/s) of air at 20 degrees Celsius, 101325 Pa.
+AIR_DENSITY, AIR_SPEED = 1.2041, 343.21
+#: Power of 0 dB (W), ISO 3744.
+REFERENCE_POWER = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class RadiatedPower:
+    """Equivalent radiated power.
+
+    Attributes
+    ----------
+    frequency : ndarray, shape (m,)
+        Frequencies (Hz).
+    power : ndarray, shape (m,)
+        Power of each line (W).
+    mean
+        Mean of the power over the samples (W).
+    """
+
+    frequency: Floats
+    power: Floats
+    mean: float
+
+    @property
+    def level(self) -> Floats:
+        """(m,) levels of the lines (dB re 1e-12 W); minus infinity where nothing is radiated."""
+        return power_level(self.power)
+
+    @property
+    def mean_level(self) -> float:
+        """Level of the mean power (dB re 1e-12 W)."""
+        return float(power_level(self.mean))
+
+
+def power_level(power: ArrayLike) -> Floats:
+    """Level (dB re 1e-12 W) of a power (W)."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(10.0 * np.log10(np.asarray(power, dtype=float) / REFERENCE_POWER))
+
+
+def instantaneous_power(
+    radiation: Floats, velocity: ArrayLike, *, density: float = AIR_DENSITY, speed: float = AIR_SPEED
+) -> Floats:
+    """Power (W) at each time: () or (n,); see `radiated_power` for the arguments."""
+    matrix, v = _checked(radiation, velocity, density, speed)
+    return np.asarray(density * speed * np.einsum("...i,...i->...", v @ matrix, v))
+
+
+def radiated_power(
+    radiation: Floats,
+    velocity: ArrayLike,
+    step: float,
+    *,
+    window: str = "none",
+    start: int = 0,
+    length: int | None = None,
+    density: float = AIR_DENSITY,
+    speed: float = AIR_SPEED,
+) -> RadiatedPower:
+    """Spectrum of the equivalent radiated power.
+
+    Parameters
+    ----------
+    radiation : (N, N)
+        Surface matrix R (m4/s2 for unit rates): ``qdot^T R qdot`` is the integral of the squared normal velocity.
+    velocity : (n, N)
+        Rates of the body's coordinates at equally spaced times.
+    step, window, start, length
+        See `gearfe.spectrum.amplitude_spectrum`.
+    density, speed
+        Of the air: kg/m3 and m/s.
+    """
+    matrix, v = _checked(radiation, velocity, density, speed)
+    spectrum = amplitude_spectrum(v, step, window=window, start=start, length=length)
+    taken = v[start : start + spectrum.samples]
+    mean = float(instantaneous_power(matrix, taken, density=density, speed=speed).mean())
+    return RadiatedPower(spectrum.frequency, power_of_lines(matrix, spectrum, density=density, speed=speed), mean)
+
+
+def power_of_lines(
+    radiation: Floats, spectrum: Spectrum, *, density: float = AIR_DENSITY, speed: float = AIR_SPEED
+) -> Floats:
+    """(m,) power (W) of the lines of a velocity spectrum of all N coordinates."""
+    v = spectrum.value
+    square = np.einsum("ki,ki->k", v.conj(), v @ radiation).real
+    return np.asarray(density * speed * spectrum.weight * np.maximum(square, 0.0))
+
+
+def _checked(radiation: Floats, velocity: ArrayLike, density: float, speed: float) -> tuple[Floats, Floats]:
+    matrix, v = np.asarray(radiation, dtype=float), np.asarray(velocity, dtype=float)
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
+        raise InputError("radiation", matrix.shape, "must be a square matrix", "take ModalBody.radiation")
+    if v.shape[-1:] != matrix.shape[:1]:
+        raise InputError("velocity", v.shape, f"must have {len(matrix)} coordinates in its last axis", "")
+    for field, value in (("density", density), ("speed", speed)):
+        if not value > 0.0:
+            raise InputError(field, value, "must be > 0", "air at 20 degrees: 1.2041 kg/m3, 343.21 m/s")
+    return matrix, v

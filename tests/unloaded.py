@@ -1,0 +1,34 @@
+"""When do the rigid, undeformed flanks just touch? The unloaded transmission error of the exact profiles."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gearfe.gear.mesh_geometry import MeshGeometry
+from gearfe.gear.touching import Flanks
+
+Array = NDArray[np.float64]
+
+
+def unloaded_twist(pair: MeshGeometry, pinion_angles: ArrayLike) -> Array:
+    """Twist of the wheel (rad) at which the rigid driving flanks just touch; 0 faces a pinion tooth with a wheel space.
+
+    The least over all tooth pairs (`gearfe.gear.touching`).
+
+    Parameters
+    ----------
+    pinion_angles : array_like, shape (n,)
+        Pinion angles (rad).
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    angles = np.asarray(pinion_angles, dtype=float)
+    found = Flanks(pair).touching(angles)
+    least = np.full(len(angles), math.inf)
+    np.minimum.at(least, found.position, found.twist)
+    return least
