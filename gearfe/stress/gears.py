@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from ..contact.corners import corner_bearings
 from ..contact.laws import LAWS
 from ..contact.scene import MeshingPair
 from ..contact.solver import Position
@@ -172,9 +173,11 @@ def swap_checks(pair: GearPair, elastic: MeshingPair, angles: Any, twists: Any, 
         return []  # such gears are made for their law and their place
     sides = {"pinion": "wheel", "wheel": "pinion"}.get(elastic.law.sides, elastic.law.sides)
     law: Any = elastic.law if sides == elastic.law.sides else replace(elastic.law, sides=sides)  # type: ignore[type-var]
-    other = MeshingPair(elastic.wheel, elastic.pinion, elastic.centre_distance, elastic.width, law)
-    turned = elastic.wheel_angle(angles, twists) + math.pi / elastic.wheel.teeth
     mirrored = GearPair(pair.wheel, pair.pinion, pair.centre_distance)
+    # where sharp corners bear is part of the law's data, and changes sides with the gears
+    corners = corner_bearings(mirrored)
+    other = MeshingPair(elastic.wheel, elastic.pinion, elastic.centre_distance, elastic.width, law, corners)
+    turned = elastic.wheel_angle(angles, twists) + math.pi / elastic.wheel.teeth
     swapped = Router(mirrored, other).solve(turned, twists * elastic.wheel.teeth / elastic.pinion.teeth)
     checks = [
         Check(
