@@ -103,10 +103,13 @@ def _growing(r: Reference, force: Array, psi: Array, answers: Sequence[Approach 
     bent = (r.wander @ v[:, :, None])[:, :, 0]
     stiff = r.wander @ r.motion
     rigid = (r.wander @ r.rigid[:, :, None])[:, :, 0]
-    # the moment of the contact pressure about the middle of the reference pressure turns with the tilt of the faces
-    moment = np.array([0.0 if a is None else a.moment * r.width for a in answers]) - r.middle * force
-    rate = np.array([0.0 if a is None else a.moment_rate for a in answers]) - r.middle
-    tilt, tilts = v @ _TILT, np.einsum("i,kij->kj", _TILT, r.motion)
+    # the moment of the contact pressure turns with the tilt of the faces. C has the elastic tilt under the reference
+    # pressure: about its middle there; the rigid tilt turns about the point of contact
+    moment = np.array([0.0 if a is None else a.moment * r.width for a in answers])
+    moment_rate = np.array([0.0 if a is None else a.moment_rate for a in answers])
+    rate, offset = moment_rate - r.middle, moment - r.middle * force
+    tilts, rigid_tilt = np.einsum("i,kij->kj", _TILT, r.motion), r.rigid @ _TILT
+    tilt = rate * (tilts @ force) + moment_rate * psi * rigid_tilt
     seen = np.einsum("ki,kij->kj", bent, r.motion) + rate[:, None] * tilts
     by_force = 0.5 * np.einsum("ki,ki->k", bent, v) + force @ np.einsum("ki,kij->kj", bent, r.motion)
     own = np.einsum("ki,ki->k", bent, r.rigid)
@@ -114,10 +117,10 @@ def _growing(r: Reference, force: Array, psi: Array, answers: Sequence[Approach 
     slid, slides = r.motion[:, 3] @ force, psi[:, None] * r.motion[:, 3]
     carried = force @ r.motion[:, 3]
     return _Growing(
-        force=by_force + rate * tilt + moment @ tilts - psi * slid - force @ slides,
+        force=by_force + tilt + offset @ tilts - psi * slid - force @ slides,
         force_twice=seen + seen.T + np.einsum("k,kij,kil->jl", force, r.motion, stiff) - slides - slides.T,
-        force_twist=own + np.einsum("k,ki,kij->j", force, rigid, r.motion) + rate * (r.rigid @ _TILT) - slid - carried,
-        pulls=force * (own - slid) + moment * (r.rigid @ _TILT),
+        force_twist=own + np.einsum("k,ki,kij->j", force, rigid, r.motion) + moment_rate * rigid_tilt - slid - carried,
+        pulls=force * (own - slid) + moment * rigid_tilt,
         twist_twice=float(force @ np.einsum("ki,ki->k", rigid, r.rigid)),
         pinion=float(
             force @ (np.einsum("ki,ki->k", bent, r.pinion_rigid) + r.motion[:, 2] @ force)
