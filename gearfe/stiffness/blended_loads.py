@@ -14,7 +14,9 @@ from ..contact.solver import Position
 Array = NDArray[Any]
 
 
-def blended_loads(elastic: MeshingPair, direct: Position, hertz: Position, share: float, slope: float) -> dict[str, Any]:
+def blended_loads(
+    elastic: MeshingPair, direct: Position, hertz: Position, share: float, slope: float
+) -> dict[str, Any]:
     """s direct + (1 - s) hertz: scene, forces, pressures and stress loads on windows that hold those of both.
 
     Parameters

@@ -140,7 +140,9 @@ def balance(reference: Reference, twist: float) -> Balance:
     overlap = np.where(psi > 0, lever * psi + 0.5 * psi**2 * radial, lever * psi)
     answers: list[Approach | None] = [None] * count
     if not (overlap > 0).any():
-        return Balance(True, np.zeros(count), np.zeros(count), tuple(answers), 0.0, 0.0, 0.0, 0.0, *np.zeros((3, count)), 0)
+        return Balance(
+            True, np.zeros(count), np.zeros(count), tuple(answers), 0.0, 0.0, 0.0, 0.0, *np.zeros((3, count)), 0
+        )
     psi = np.maximum(psi, 0.0)
     light = 0.05 * r.local[0].modulus * w  # a stiffness that a line contact has about
     force = np.where(overlap > 0, light * overlap, 0.0)
