@@ -30,6 +30,7 @@ from ..stiffness.curve import SOLVED
 from ..stiffness.job import read_stiffness_job
 from ..stiffness.routes import Router
 from ..stiffness.sweep import elastic_pair, sweep_stiffness
+from ..stiffness.torque_control import ANGLE_ROUNDING
 from .campaign import Campaign, Case
 from .outcome import Check, Finding
 from .pairs import log_uniform, random_pair, rounded, running_pair, spoiled
@@ -91,7 +92,8 @@ def run(case: Case, folder: Path) -> Finding:
     counts = Counter(str(s) for s in curve.status)
     total = np.where(np.isfinite(curve.twist), curve.twist, 0.0) + curve.lost_motion
     loaded = np.flatnonzero(curve.status == "converged")
-    checks = []
+    checks: list[Check] = []
+    found: list[Position] = []
     measures: dict[str, Any] = {"positions": len(curve.status), "converged": len(loaded), "law": job.table.law}
     measures["iterations"] = int(curve.iterations.max(initial=0))
     if len(loaded):
@@ -101,21 +103,22 @@ def run(case: Case, folder: Path) -> Finding:
         checks += [max(balances, key=lambda c: c.share)] if balances else []
         checks += ratio_checks(job.pair, elastic, curve.pinion_angle[loaded], total[loaded], found)
         checks += swap_checks(job.pair, elastic, curve.pinion_angle[loaded], total[loaded], found)
-    checks += period_checks(curve)
+    checks += period_checks(curve, found)
     bad = {s: n for s, n in counts.items() if s not in SOLVED}
     told = ", ".join(f"{n} of {len(curve.status)} positions {s}" for s, n in bad.items())
     return Finding("stopped" if bad else "done", told, checks, measures)
 
 
-def period_checks(curve: Any) -> list[Check]:
-    """Whether the last position, one cycle after the first, repeats it."""
+def period_checks(curve: Any, found: list[Position]) -> list[Check]:
+    """Whether the last position, one cycle after the first, repeats it, up to the rounding of angles."""
     if not math.isclose(curve.pinion_angle[-1] - curve.pinion_angle[0], curve.mesh_cycle, rel_tol=1e-9):
         return []
     if curve.status[0] != curve.status[-1]:
         return [Check("period", math.inf, PERIOD)]
     if curve.status[0] != "converged":
         return []
-    return [Check("period", abs(float(curve.torque_wheel[-1] / curve.torque_wheel[0]) - 1), PERIOD)]
+    rounding = 2 * ANGLE_ROUNDING * found[0].tangent / found[0].torque_wheel
+    return [Check("period", abs(float(curve.torque_wheel[-1] / curve.torque_wheel[0]) - 1), max(PERIOD, rounding))]
 
 
 def balance(elastic: MeshingPair, found: Position) -> Check | None:
