@@ -41,7 +41,7 @@ RESOLVED = (0.9, 1.3)
 SOFTEST = 40.0
 #: The same of usual teeth: where it tells that the load is not light, the mesh is asked first, and believed where its
 #: forces make a contact so many times as wide as the widest that is blended.
-USUAL, CLEARLY = 10.0, 1.2
+USUAL, CLEARLY = 10.0, 1.1
 #: References are made for pairs that touch up to this many times the twist asked for.
 SPARE = 1.5
 
