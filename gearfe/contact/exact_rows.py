@@ -139,7 +139,7 @@ def _turned(vectors: Array, axes: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Edge:
-    """Tangents a, lengths |a| and normals of edges at one place of each, and the slopes there, shape (3, n) or (3, 1)."""
+    """Tangents a, lengths |a| and normals of n edges at one place of each; slopes of the shapes, shape (3, n or 1)."""
 
     slopes: Array
     tangent: Array

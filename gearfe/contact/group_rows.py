@@ -185,8 +185,8 @@ def linearised(group: Group, rows: Rows) -> Linear:
     area = active * length
     slot = (np.cumsum(area) - area)[at] + row * length[at]
     slots = (slot + column[unknowns // 2] + np.tile([0, 1], 10)[:, None]).ravel()
-    opening = np.bincount(slots, (group.parameter[points] * rows.opening).ravel(), area.sum())
-    weighted = np.bincount(slots, (rows.area * rows.normal).ravel(), area.sum())
+    opening: Array = np.bincount(slots, (group.parameter[points] * rows.opening).ravel(), area.sum())
+    weighted: Array = np.bincount(slots, (rows.area * rows.normal).ravel(), area.sum())
     # unknowns and stress rows within their blocks
     local = ((2 * (nodes - group.first_node[group.block_window[block]]))[:, None] + np.arange(2)).ravel()
     own_block = 2 * at + group.gear[group.owner[points]]

@@ -4,8 +4,8 @@ Torque by torque, from the middle of the range outwards, then the ones between, 
 the known levels (as in `gearfe.loadmap.load_map`: cubic in :math:`\ln\delta` over :math:`\ln T`) and solved. A cell is
 accepted when its torque lies within :math:`\epsilon` = 3e-4 of the goal; the twist then takes one step along the
 tangent of :math:`\ln\delta` over :math:`\ln T`, whose error is a few hundredths of :math:`\epsilon^2`, and what else
-there is moves with the torque (forces as T, the peak pressure as :math:`\sqrt T`). Otherwise it is solved again, and in the end searched for like any position at a
-torque.
+there is moves with the torque (forces as T, the peak pressure as :math:`\sqrt T`). Otherwise it is solved again, and
+in the end searched for like any position at a torque.
 
 Finite strain changes the torque by a share c. The energy that it adds is spent pair by pair, each with about the power
 :math:`2 + p` of its load, so that with the pairs' shares :math:`s_k` of the torque
