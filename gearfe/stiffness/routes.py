@@ -42,7 +42,7 @@ RESOLVED = (0.9, 1.3)
 SOFTEST = 40.0
 #: The same of usual teeth: where it tells that the load is not light, the mesh is asked first, and believed where its
 #: forces make a contact so many times as wide as the widest that is blended.
-USUAL, CLEARLY = 10.0, 1.2
+USUAL, CLEARLY = 10.0, 1.1
 #: References are made for pairs that touch up to this many times the twist asked for.
 SPARE = 1.5
 
@@ -125,8 +125,7 @@ class Router:
         mine = np.flatnonzero(touching.pair == position.pair_numbers[k])
         if len(mine) != 1:
             return False
-        place = touching.place[mine[0]]
-        curved = sum(f.curvature(float(place[g]), math.inf) for g, f in enumerate(self.flanks.faces))
+        curved = touching.curvature[mine[0]]
         if not (math.isfinite(curved) and curved > 0):
             return False
         force = position.pair_torques[k] / (touching.arm[mine[0], 1] * self.elastic.width)
@@ -145,9 +144,7 @@ class Router:
                 continue
             first = int(np.argmin(touching.twist))
             overlap = touching.arm[first, 1] * (twist - touching.twist[first])
-            curved = sum(
-                f.curvature(float(touching.place[first, g]), math.inf) for g, f in enumerate(self.flanks.faces)
-            )
+            curved = touching.curvature[first]
             if not (overlap > 0 and math.isfinite(curved) and curved > 0):
                 continue
             # another pair may take load off this one; it can at most halve it while both are on the path
