@@ -43,11 +43,11 @@ from ..errors import InputError, MissingLibraryError
 
 Floats = NDArray[np.float64]
 
-#: Names of the solvers; each needs the package on the right (``None``: scipy alone).
+#: Names of the solvers, best first; each needs the package on the right (``None``: scipy alone).
 PACKAGES: dict[str, str | None] = {
     "multifrontal": "pymetis",
-    "pardiso": "pypardiso",
     "cholmod": "kvxopt",
+    "pardiso": "pypardiso",
     "superlu": None,
 }
 #: Response to a random load, against the stiffest unknown's, above which a body counts as free to move. Bodies that are
@@ -81,14 +81,13 @@ def installed_solvers() -> tuple[str, ...]:
     return tuple(name for name, package in PACKAGES.items() if package is None or importlib.util.find_spec(package))
 
 
-def choose_solver(unknowns: int, solver: str = "auto") -> str:
-    """Name of the solver that `factorize` will use for a matrix of this order."""
+def choose_solver(solver: str = "auto") -> str:
+    """Name of the solver that `factorize` will use."""
     if solver == "auto":
         solver = os.environ.get(SOLVER_VARIABLE, "auto") or "auto"
     here = installed_solvers()
     if solver == "auto":
-        order = ("multifrontal", "cholmod", "pardiso", "superlu")
-        return next(name for name in order if name in here)
+        return here[0]
     if solver not in PACKAGES:
         raise InputError("solver", solver, "must be auto, " + ", ".join(PACKAGES), "choose one of these")
     if solver not in here:
@@ -121,7 +120,7 @@ def factorize(matrix: Any, *, solver: str = "auto", block: int = 3) -> Factoriza
         raise InputError("matrix", matrix.shape, "must be square", "")
     if matrix.shape[0] == 0:
         return Factorization("none", 0, lambda b: np.array(b, dtype=float))
-    name = choose_solver(matrix.shape[0], solver)
+    name = choose_solver(solver)
     if name == "multifrontal":
         solve = _multifrontal(matrix, block)
     elif name == "pardiso":
