@@ -26,7 +26,7 @@ INTERNAL, LEVER = 4, 0.05
 
 
 def mirror(points: Floats, internal: Floats) -> Floats:
-    """Matrix P of the reflection at y = 0 over attachments at `points` (a, 3) and internal coordinates of given signs."""
+    """Matrix P of the reflection at y = 0: attachments at `points` (a, 3), then internal coordinates of given signs."""
     a = len(points)
     made = np.zeros((6 * a + len(internal), 6 * a + len(internal)))
     for i, point in enumerate(points):

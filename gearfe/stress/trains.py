@@ -8,8 +8,8 @@ Each case is a [train] job with its stiffness curves beside it. Checks of a run 
   by the largest multiplier that the analysis found: an instability found is an instability seen, and the other way
   round;
 - *mean*: a damped train in its steady state carries the static force on average;
-- *axial*, *tilt*, *mirror*: spur gears push nothing along the axis, symmetric scenes do not tilt, and a symmetric elastic
-  housing stays its own mirror image (it takes the place of the job's rigid bores; no job file can ask for one);
+- *axial*, *tilt*, *mirror*: spur gears push nothing along the axis, symmetric scenes do not tilt, and a symmetric
+  elastic housing stays its own mirror image (it takes the place of the job's rigid bores; no job can ask for one);
 - *order*: half the step, kept fixed, divides the error by 2^8 (explicit) or 2^5 (implicit), scenes without corners;
 - *settled*: damped trains with constant stiffness end at the static force, however long the steps are beside the
   fastest vibration.
