@@ -1,6 +1,6 @@
 r"""A random elastic body that is its own mirror image: what a symmetric train stands in.
 
-With the mirror at y = 0, attachment i at (x, y, z) has its image i' at (x, -y, z), and the reflection of the coordinates
+With the mirror at y = 0, attachment i at (x, y, z) has its image i' at (x, -y, z), and coordinates reflect as
 
 .. math::
     (P q)_{i'} = \mathrm{diag}(1, -1, 1, -1, 1, -1)\, q_i

@@ -164,15 +164,17 @@ def wheel_inertia(teeth: int) -> float:
 def housing(random: np.random.Generator, distance: float) -> Table:
     """A small random housing, coarsely meshed, for two shafts."""
     walls = [rounded(random.uniform(4.0, 12.0), 2), rounded(random.uniform(4.0, 12.0), 2)]
-    return {
+    made: Table = {
         "wall_x_mm": [-rounded(random.uniform(35.0, 55.0), 3), distance + rounded(random.uniform(35.0, 55.0), 3)],
         "wall_z_mm": [-rounded(random.uniform(50.0, 90.0), 3), rounded(random.uniform(22.0, 45.0), 3)],
         "inner_gap_mm": rounded(random.uniform(30.0, 60.0), 3),
         "wall_thickness_mm": walls,
         "base_thickness_mm": rounded(random.uniform(8.0, 20.0), 3),
         "shafts": [{"x_mm": 0.0, "bore_radius_mm": 10.0}, {"x_mm": distance, "bore_radius_mm": 10.0}],
-        "feet": {"length_x_mm": 20.0, "width_y_mm": 15.0, "height_mm": 10.0, "fixed": True},
+        "feet": {"length_x_mm": 20.0, "width_y_mm": 15.0, "fixed": True},
         "mesh": {"size_mm": rounded(random.uniform(9.0, 13.0), 2), "order": 2},
         "reduction": {"modes_below_Hz": 8000.0, "least_modes": 20, "band_Hz": 4000.0},
         "damping": {"ratio": float(random.choice([0.0, 0.01, 0.03]))},
     }
+    made["feet"]["height_mm"] = min(10.0, made["base_thickness_mm"])
+    return made
