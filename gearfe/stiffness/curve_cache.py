@@ -22,23 +22,17 @@ from ..meshing.cache import cache_folder, cache_key
 from ..stopwatch import Stopwatch
 from .curve import StiffnessCurve
 
-#: Modules beside those of contact and meshing that decide a curve.
+#: Modules beside those of contact, gear and meshing that decide a curve.
 MODULES = (
-    "curves",
     "elasticity",
-    "gear",
-    "involute",
-    "local_gap",
-    "mesh_geometry",
-    "routes",
-    "small_balance",
-    "small_load",
-    "spur_gear",
-    "stiffness",
-    "stiffness_curve",
-    "sweep_positions",
-    "torque_control",
-    "touching",
+    "stiffness/curve",
+    "stiffness/local_gap",
+    "stiffness/positions",
+    "stiffness/routes",
+    "stiffness/small_balance",
+    "stiffness/small_load",
+    "stiffness/sweep",
+    "stiffness/torque_control",
 )
 
 
@@ -105,9 +99,9 @@ def _stored(path: Path, pair: GearPair) -> StiffnessCurve | None:
 @cache
 def _source() -> str:
     """Hash of the text of the modules that compute curves."""
-    here = Path(__file__).parent
+    here = Path(__file__).parents[1]
     files = [here / f"{name}.py" for name in MODULES]
-    files += [file for folder in ("contact", "meshing") for file in sorted((here / folder).glob("*.py"))]
+    files += [file for folder in ("contact", "gear", "meshing") for file in sorted((here / folder).glob("*.py"))]
     text = hashlib.sha256()
     for file in files:
         text.update(file.name.encode() + file.read_bytes())
