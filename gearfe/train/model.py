@@ -27,13 +27,11 @@ from .law import (
     gyro_block,
     joined,
     python_law,
-    time_function,
     torque_block,
-    train_corner,
-    train_law,
 )
 from .mesh_element import MeshLine, mesh_line
 from .scene import Drive, TrainScene
+from .series import train_series
 
 Array = NDArray[np.float64]
 
@@ -201,10 +199,8 @@ def _forces(
     parameters = joined(blocks)
     breaks = tuple(sorted({*angle.breaks, *(b for _, function in torques for b in function.breaks)}))
     law = python_law(parameters, at)
-    return LocalForce(
-        tuple(bodies), np.hstack(columns), law, train_law, parameters, breaks, name="forces of the train",
-        compiled_corner=train_corner, compiled_helpers=(time_function,),
-    )  # fmt: skip
+    series = train_series(parameters, sum(line.curve is not None for line in lines))
+    return LocalForce(tuple(bodies), np.hstack(columns), law, series, breaks, name="forces of the train")
 
 
 def bore_selector(scene: TrainScene, bore: str) -> Array:
