@@ -146,14 +146,15 @@ class LinearJoint(Element):
 class SeriesLaw:
     """A law phi(t, u, u') of p directions by the orders of its Taylor series: module-level functions for numba.
 
-    Time is t + s x, s the trial step; ``u[j, k]`` is order j of direction k over x. The law keeps series of its own in
+    Time is t + s x, s the trial step; ``u[k, j]`` is order j of direction k over x. The law keeps series of its own in
     ``memory[row, order]``, from order to order of one step, and in ``pieces`` whole numbers for the whole run: on which
     of its smooth pieces it is.
 
     Parameters
     ----------
     begin
-        ``begin(t, sign, u, du, parameters, pieces)``: sets the pieces at the start; sign tells where time runs.
+        ``begin(t, sign, u, parameters, pieces)``: sets the pieces at the start, where ``u[k, 0], u[k, 1]`` are value and
+        rate; sign tells where time runs.
     order
         ``order(j, t, s, u, parameters, memory, pieces, out)``: order j of the forces into ``out[k]``, from orders up to
         j of u and up to j + 1 for u'.

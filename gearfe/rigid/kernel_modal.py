@@ -21,26 +21,26 @@ import numpy as np
 LEAST = 8
 
 
-def project(W, y, row, out):
-    """out[row] = W y[row]; four directions at a time, so that y is read once for all."""
+def project(W, y, j, out):
+    """out[k, j] = sum_i W[k, i] y[j, i]; four directions at a time, so that y is read once for all."""
     n = y.shape[1]
     rows = W.shape[0]
     p = 0
     while p + 3 < rows:
         a0, a1, a2, a3 = 0.0, 0.0, 0.0, 0.0
         for i in range(n):
-            value = y[row, i]
+            value = y[j, i]
             a0 += W[p, i] * value
             a1 += W[p + 1, i] * value
             a2 += W[p + 2, i] * value
             a3 += W[p + 3, i] * value
-        out[row, p], out[row, p + 1], out[row, p + 2], out[row, p + 3] = a0, a1, a2, a3
+        out[p, j], out[p + 1, j], out[p + 2, j], out[p + 3, j] = a0, a1, a2, a3
         p += 4
     while p < rows:
         value = 0.0
         for i in range(n):
-            value += W[p, i] * y[row, i]
-        out[row, p] = value
+            value += W[p, i] * y[j, i]
+        out[p, j] = value
         p += 1
 
 
@@ -150,7 +150,7 @@ def modal_steps(
     n = squares.shape[0]
     most = memory.shape[1] - 1
     y = np.zeros((most + 1, n))
-    u = np.zeros((most + 1, W.shape[0]))
+    u = np.zeros((W.shape[0], most + 1))
     force = np.zeros(W.shape[0])
     weight = np.empty(n)
     value = np.empty(n)
@@ -168,8 +168,8 @@ def modal_steps(
         project(W, y, 0, u)
         project(W, y, 1, u)
         for p in range(W.shape[0]):
-            u[0, p] += offset[p]
-        law_begin(t, sign, u[0], u[1], parameters, pieces)  # noqa: F821
+            u[p, 0] += offset[p]
+        law_begin(t, sign, u, parameters, pieces)  # noqa: F821
     while sign * (t1 - t) > 0.0:
         if count >= T.shape[0]:
             status = 2
@@ -189,7 +189,7 @@ def modal_steps(
             y[1, i] = s * state[n + i]
         project(W, y, 0, u)
         for p in range(W.shape[0]):
-            u[0, p] += offset[p]
+            u[p, 0] += offset[p]
         set_weights(squares, reach, pull, tolerance, weight)
         end = 1.0
         power = 1.0

@@ -22,7 +22,7 @@ PAST = 2e-3
 SAME = 1e-9
 
 
-def train_begin(t, sign, u, du, parameters, pieces):  # type: ignore[no-untyped-def]
+def train_begin(t, sign, u, parameters, pieces):  # type: ignore[no-untyped-def]
     """Number of the cubic that each mesh is on, counted through all periods; at a node the one that lies ahead."""
     angle = 0.0
     rate = 0.0
@@ -33,8 +33,8 @@ def train_begin(t, sign, u, du, parameters, pieces):  # type: ignore[no-untyped-
             angle, rate = time_function(t, parameters, o + 1)
         elif parameters[o] == 1.0:
             r = int(parameters[o + 2])
-            phase = parameters[o + 4] * (parameters[o + 3] * angle + u[r]) + parameters[o + 5]
-            speed = sign * parameters[o + 4] * (parameters[o + 3] * rate + du[r])
+            phase = parameters[o + 4] * (parameters[o + 3] * angle + u[r, 0]) + parameters[o + 5]
+            speed = sign * parameters[o + 4] * (parameters[o + 3] * rate + u[r, 1])
             n = int(parameters[o + 7])
             first = o + 8
             period = parameters[first + n] - parameters[first]
@@ -55,8 +55,8 @@ def train_begin(t, sign, u, du, parameters, pieces):  # type: ignore[no-untyped-
 def train_order(j, t, s, u, parameters, memory, pieces, out):  # type: ignore[no-untyped-def]
     """Order j of the forces over x, time t + s x, from the orders up to j + 1 of u; see the module's docstring.
 
-    Rows of the memory, four to a block: function of time or momentum; or phase from the cubic's node on, its
-    square, its cube, stiffness.
+    Rows of the memory, three to a block: a function of time; or phase from the cubic's node on, its square, the changing
+    part of the stiffness; or momentum and the rates of both tilts.
     """
     for i in range(out.shape[0]):
         out[i] = 0.0
@@ -64,7 +64,7 @@ def train_order(j, t, s, u, parameters, memory, pieces, out):  # type: ignore[no
     for block in range(int(parameters[0])):
         o = int(parameters[1 + block])
         kind = parameters[o]
-        row = 4 * block
+        row = 3 * block
         if kind == 1.0:
             d = int(parameters[o + 1])
             first = o + 8
@@ -72,7 +72,7 @@ def train_order(j, t, s, u, parameters, memory, pieces, out):  # type: ignore[no
             turn = pieces[mesh] // n
             low = pieces[mesh] - turn * n
             mesh += 1
-            value = parameters[o + 4] * (parameters[o + 3] * memory[0, j] + u[j, int(parameters[o + 2])])
+            value = parameters[o + 4] * (parameters[o + 3] * memory[0, j] + u[int(parameters[o + 2]), j])
             c = first + n + 1 + 4 * low
             stiffness = 0.0
             if j == 0:
@@ -82,35 +82,32 @@ def train_order(j, t, s, u, parameters, memory, pieces, out):  # type: ignore[no
             memory[row, j] = value
             stiffness += parameters[c + 1] * value
             if parameters[c + 2] != 0.0 or parameters[c + 3] != 0.0:
-                square = 0.0
-                for i in range(j + 1):
-                    square += memory[row, i] * memory[row, j - i]
+                square = product(memory, row, memory, row, j)
                 memory[row + 1, j] = square
-                cube = 0.0
-                for i in range(j + 1):
-                    cube += memory[row + 1, i] * memory[row, j - i]
-                stiffness += parameters[c + 2] * square + parameters[c + 3] * cube
-            memory[row + 3, j] = stiffness
-            force = 0.0
-            for i in range(j + 1):
-                force += memory[row + 3, i] * u[j - i, d]
-            out[d] -= force
+                stiffness += parameters[c + 2] * square + parameters[c + 3] * product(memory, row + 1, memory, row, j)
+            memory[row + 2, j] = stiffness
+            out[d] -= product(memory, row + 2, u, d, j)
         elif kind == 2.0:
             d = int(parameters[o + 1])
-            memory[row, j] = parameters[o + 3] * (j + 1) * (parameters[o + 2] * memory[0, j + 1] + u[j + 1, d + 2]) / s
-            one = 0.0
-            two = 0.0
-            for i in range(j + 1):
-                momentum = memory[row, i] * (j - i + 1) / s
-                one += momentum * u[j - i + 1, d]
-                two += momentum * u[j - i + 1, d + 1]
-            out[d] -= two
-            out[d + 1] += one
+            rate = (j + 1) / s
+            memory[row, j] = parameters[o + 3] * rate * (parameters[o + 2] * memory[0, j + 1] + u[d + 2, j + 1])
+            memory[row + 1, j] = rate * u[d, j + 1]
+            memory[row + 2, j] = rate * u[d + 1, j + 1]
+            out[d] -= product(memory, row, memory, row + 2, j)
+            out[d + 1] += product(memory, row, memory, row + 1, j)
         else:
             if j == 0:
                 time_orders(t, s, parameters, o + 1 if kind == 0.0 else o + 2, memory, row)
             if kind == 3.0:
                 out[int(parameters[o + 1])] += memory[row, j]
+
+
+def product(a, row, b, other, j):  # type: ignore[no-untyped-def]
+    """Order j of the product of two series (Cauchy)."""
+    total = 0.0
+    for i in range(j + 1):
+        total += a[row, i] * b[other, j - i]
+    return total
 
 
 def time_orders(t, s, parameters, at, memory, row):  # type: ignore[no-untyped-def]
@@ -153,7 +150,7 @@ def train_corner(last, limit, parameters, memory, pieces, ahead):  # type: ignor
             o = int(parameters[1 + block])
             if parameters[o] != 1.0:
                 continue
-            row = 4 * block
+            row = 3 * block
             n = int(parameters[o + 7])
             low = pieces[mesh] % n
             width = parameters[o + 9 + low] - parameters[o + 8 + low]
@@ -203,5 +200,5 @@ def polynomial(memory, row, last, x):  # type: ignore[no-untyped-def]
 
 def train_series(parameters: NDArray[np.float64], meshes: int) -> SeriesLaw:
     """The law with these parameters, whose blocks hold so many meshes of changing stiffness."""
-    helpers = (time_function, time_orders, polynomial)
-    return SeriesLaw(train_begin, train_order, train_corner, helpers, parameters, 4 * int(parameters[0]), meshes)
+    helpers = (time_function, product, time_orders, polynomial)
+    return SeriesLaw(train_begin, train_order, train_corner, helpers, parameters, 3 * int(parameters[0]), meshes)
