@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +101,11 @@ class TrainModel:
     def coupled_frequencies_hz(self) -> Array:
         """Natural frequencies with mean mesh stiffness (Hz)."""
         return np.sqrt(np.maximum(self.core.squares, 0.0)) / (2.0 * math.pi)
+
+    @cached_property
+    def multipliers_of_forces(self) -> Array:
+        """Force left over on the coordinates to the least multipliers that hold it, (system size, rows)."""
+        return np.asarray(np.linalg.pinv(self.system.jacobian(0.0, np.zeros(self.system.size))))
 
 
 def build_train(scene: TrainScene) -> TrainModel:
