@@ -153,15 +153,15 @@ class SeriesLaw:
     Parameters
     ----------
     begin
-        ``begin(t, sign, u, parameters, pieces)``: sets the pieces at the start, where ``u[k, 0], u[k, 1]`` are value and
-        rate; sign tells where time runs.
+        ``begin(t, sign, u, parameters, pieces)``: sets the pieces at the start, where ``u[k, 0], u[k, 1]`` are value
+        and rate; sign tells where time runs.
     order
         ``order(j, t, s, u, parameters, memory, pieces, out)``: order j of the forces into ``out[k]``, from orders up to
         j of u and up to j + 1 for u'.
     corner
-        ``corner(last, limit, parameters, memory, pieces, ahead)``: where x, up to `limit`, leaves a smooth piece, 2 when
-        it does not; the pieces then go on to the next. With `ahead` from orders 0 and 1 a little past that place, for
-        the length of the step; pieces stay.
+        ``corner(last, limit, parameters, memory, pieces, ahead)``: where x, up to `limit`, leaves a smooth piece, 2
+        when it does not; the pieces then go on to the next. With `ahead` from orders 0 and 1 a little past that
+        place, for the length of the step; pieces stay.
     helpers
         Functions that they call by name.
     parameters : ndarray

@@ -101,6 +101,14 @@ def evaluate(y, last, x, s, value, rate):
         rate[i] /= s
 
 
+def widen(state, value, rate, step, reach, pull):
+    """Largest coordinates and accelerations so far, the mean acceleration of a step standing for all of it."""
+    n = value.shape[0]
+    for i in range(n):
+        reach[i] = max(reach[i], abs(value[i]))
+        pull[i] = max(pull[i], abs(rate[i] - state[n + i]) / step)
+
+
 def set_weights(squares, reach, pull, tolerance, weight):
     """1 / limit of each coordinate: `tolerance` of its largest value, and of what its largest acceleration makes."""
     n = squares.shape[0]
@@ -113,39 +121,18 @@ def set_weights(squares, reach, pull, tolerance, weight):
         limit = max(reach[i], 1e-6 * far)
         if squares[i] > 0.0:
             limit = min(limit, max(pull[i], 1e-3 * strong) / squares[i])
-        weight[i] = 1.0 / (tolerance * limit + 1e-300)
+        weight[i] = 1.0 / (tolerance * limit + 1e-100)
 
 
 def modal_steps(
-    squares,
-    damping,
-    diagonal,
-    full,
-    constant,
-    W,
-    offset,
-    parameters,
-    memory,
-    pieces,
-    first,
-    t,
-    t1,
-    state,
-    h,
-    reach,
-    pull,
-    breaks,
-    tolerance,
-    longest,
-    asked,
-    at,
-    found,
-    T,
-    Y,
-):
+    squares, damping, diagonal, full, constant, W, offset, parameters, memory, pieces, first, t, t1, state, h, reach,
+    pull, breaks, tolerance, longest, asked, at, found, T, Y,
+):  # fmt: skip
     """Steps from t to t1, or until T is full; states at the `asked` times go to `found`, step ends to T, Y.
 
-    Returns (status, steps, time, h, orders, number of asked times passed).
+    h is the trial step; reach, pull are the largest coordinates and accelerations so far. A coordinate's limit is
+    `tolerance` of its reach, and of what its pull makes of it: accelerations then hold as well as coordinates. Returns
+    (status, steps, time, h, orders computed, number of asked times passed).
     """
     n = squares.shape[0]
     most = memory.shape[1] - 1
@@ -196,6 +183,7 @@ def modal_steps(
         last = most
         size = 0.0
         before = 1e300
+        largest = 0.0
         for j in range(most - 1):
             project(W, y, j + 1, u)
             law_order(j, t, s, u, parameters, memory, pieces, force)  # noqa: F821
@@ -208,11 +196,12 @@ def modal_steps(
             for i in range(n):
                 off = y[j + 2, i] * weight[i]
                 size += off * off
-            size = math.sqrt(size) * power
+            size = (j + 2.0) * math.sqrt(size) * power  # the term of the velocity, over the trial step
             if size < 1.0 and before < 1.0 and j >= LEAST - 2:
                 last = j + 2
                 break
             before = size
+            largest = max(largest, size)
         orders += last
         for i in range(n):
             pull[i] = max(pull[i], abs(2.0 * y[2, i] / (s * s)))
@@ -223,28 +212,27 @@ def modal_steps(
                 break
             continue
         x = end
-        if size >= 1.0:  # too long: as far as the last term allows
+        if 1.0 <= size < 1e-3 * largest:  # the sum holds: the motion itself tells its size, as at a start from rest
             evaluate(y, last, end, s, value, rate)
-            for i in range(n):
-                reach[i] = max(reach[i], abs(value[i]))
-                pull[i] = max(pull[i], abs(rate[i] - state[n + i]) / (end * step))
+            widen(state, value, rate, end * step, reach, pull)
             set_weights(squares, reach, pull, tolerance, weight)
             size = 0.0
             for i in range(n):
                 off = y[last, i] * weight[i]
                 size += off * off
-            size = math.sqrt(size) * power
-            if size > 1.0:
-                x = end * size ** (-1.0 / last)
+            size = last * math.sqrt(size) * power
+        if size > 1.0:  # too long: as far as the last term allows
+            x = end * size ** (-1.0 / last)
         if still < 20:  # corners that the law does not get past are no reason to stand still
             corner = law_corner(last - 2, x, parameters, memory, pieces, False)  # noqa: F821
-            if corner < x:
-                x = corner
+            x = min(x, corner)
         if x * step <= 1e-15 * max(abs(t), abs(t1 - begin)):
             still += 1
             continue
         still = 0
-        ends = t + x * s if x < 1.0 or not fixed else goal
+        ends = t + x * s
+        if (fixed and x == 1.0) or abs(goal - ends) <= 1e-13 * max(abs(goal), abs(t1 - begin)):
+            ends = goal
         while at < asked.shape[0] and sign * (asked[at] - ends) <= 0.0:
             evaluate(y, last, (asked[at] - t) / s, s, value, rate)
             for i in range(n):
@@ -252,13 +240,10 @@ def modal_steps(
                 found[at, n + i] = rate[i]
             at += 1
         evaluate(y, last, x, s, value, rate)
+        widen(state, value, rate, x * step, reach, pull)
         for i in range(n):
-            reach[i] = max(reach[i], abs(value[i]))
-            pull[i] = max(pull[i], abs(rate[i] - state[n + i]) / (x * step))
-            state[i] = value[i]
-            state[n + i] = rate[i]
-            Y[count, i] = value[i]
-            Y[count, n + i] = rate[i]
+            state[i] = Y[count, i] = value[i]
+            state[n + i] = Y[count, n + i] = rate[i]
         t = ends
         T[count] = t
         count += 1
@@ -269,4 +254,4 @@ def modal_steps(
     return status, count, t, h, orders, at
 
 
-FUNCTIONS = (project, add_forces, next_order, evaluate, set_weights, modal_steps)
+FUNCTIONS = (project, add_forces, next_order, evaluate, widen, set_weights, modal_steps)

@@ -48,8 +48,15 @@ def run_minimal(  # type: ignore[no-untyped-def]
     series = _series(core) if jit else None
     if series is None:
         made = step_through(
-            rhs, lambda _, y: y, start.time, y0, times[-1], core.system.breaks,
-            max(PLAIN_SHARE * tolerance, 1e-14), longest, most,
+            rhs,
+            lambda _, y: y,
+            start.time,
+            y0,
+            times[-1],
+            core.system.breaks,
+            max(PLAIN_SHARE * tolerance, 1e-14),
+            longest,
+            most,
         )
         ends, states, polynomials, status, evaluations = made
         statistics: dict[str, Any] = {"steps": len(polynomials), "evaluations": evaluations, "backend": "plain"}
@@ -67,8 +74,9 @@ def _series(core: Minimal) -> tuple[LocalForce, np.ndarray, SeriesLaw] | None:
     if not compiled.available() or len(forces) != 1:
         return None
     force, index = forces[0]
-    series = force.series if isinstance(force, LocalForce) else None
-    return None if series is None else (force, index, series)
+    if not isinstance(force, LocalForce) or force.series is None:
+        return None
+    return force, index, force.series
 
 
 @lru_cache(maxsize=8)

@@ -38,7 +38,7 @@ def train_begin(t, sign, u, parameters, pieces):  # type: ignore[no-untyped-def]
             n = int(parameters[o + 7])
             first = o + 8
             period = parameters[first + n] - parameters[first]
-            turn = int(math.floor((phase - parameters[first]) / period))
+            turn = math.floor((phase - parameters[first]) / period)
             place = phase - turn * period
             low = 0
             while low < n - 1 and parameters[first + low + 1] <= place:
@@ -55,8 +55,8 @@ def train_begin(t, sign, u, parameters, pieces):  # type: ignore[no-untyped-def]
 def train_order(j, t, s, u, parameters, memory, pieces, out):  # type: ignore[no-untyped-def]
     """Order j of the forces over x, time t + s x, from the orders up to j + 1 of u; see the module's docstring.
 
-    Rows of the memory, three to a block: a function of time; or phase from the cubic's node on, its square, the changing
-    part of the stiffness; or momentum and the rates of both tilts.
+    Rows of the memory, three to a block: a function of time; or phase from the cubic's node on, its square, the
+    changing part of the stiffness; or momentum and the rates of both tilts.
     """
     for i in range(out.shape[0]):
         out[i] = 0.0
