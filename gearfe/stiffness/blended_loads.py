@@ -80,7 +80,7 @@ def _on_points(scene: Scene, position: Position, name: str) -> Array:
     """The same at contact points; nothing where the law has none of it."""
     own, values = position.scene, getattr(position, name)
     assert own is not None
-    if len(values) == 0:
+    if values is None or len(values) == 0:
         return np.zeros(0)
     made = np.zeros(len(scene.owner))
     place = {(w.gear, w.tooth): (i, w) for i, w in enumerate(scene.windows)}
