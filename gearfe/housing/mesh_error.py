@@ -25,7 +25,7 @@ from ..solid import SolidMaterial, maps, node_gradients, shape_functions
 #: Smallest volume ratio at a node, against the element's mean, at which its stress is used.
 _SOUND = 0.02
 #: Factor on the estimate that makes it cover the true error.
-SAFETY = 5.0
+SAFETY = 8.0
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
