@@ -22,8 +22,8 @@ SuperLU, METIS  1.9 s, 11 ms     8.6 s, 51 ms
 ==============  ===============  ===============
 
 A reduction to some tens of modes solves for 200 right-hand sides: of 72,000 unknowns it took 7.7 s with the first,
-13.1 s with the second, 15.9 s with the third. The unknowns of a mesh node stay together: orderings are found on the graph
-of nodes, a third of the size.
+13.1 s with the second, 15.9 s with the third. The unknowns of a mesh node stay together: orderings are found on the
+graph of nodes, a third of the size.
 """
 
 from __future__ import annotations
