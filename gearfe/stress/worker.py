@@ -43,7 +43,7 @@ def run_case(campaign: Campaign, seed: int, number: int) -> Outcome:
 
 
 def compile_series() -> None:
-    """Compile the series of planar mechanisms with a pendulum: short runs do without, long ones would within a limit."""
+    """Compile the series of mechanisms with a pendulum: short runs do without, long ones would within a limit."""
     from ..rigid import Body, Gravity, Hinge, PlanarScene, Scene, System, compiled, integrate
 
     if compiled.available():
