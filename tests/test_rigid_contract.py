@@ -18,6 +18,7 @@ from gearfe.rigid import (
     ModalBlocks,
     PlanarScene,
     Scene,
+    SeriesLaw,
     System,
     consistent_start,
     integrate,
@@ -123,6 +124,32 @@ def mesh_like_law(t, u, du, parameters, out):  # type: ignore[no-untyped-def]
     out[1] = 0.0
 
 
+def mesh_like_begin(t, sign, u, parameters, pieces):  # type: ignore[no-untyped-def]
+    """No pieces."""
+
+
+def mesh_like_order(j, t, s, u, parameters, memory, pieces, out):  # type: ignore[no-untyped-def]
+    """The same by orders; in the memory cosine and sine of the phase p = 5 t + u1: c' = -s p', s' = c p'."""
+    if j == 0:
+        memory[0, 0], memory[1, 0] = np.cos(5.0 * t + u[1, 0]), np.sin(5.0 * t + u[1, 0])
+    else:
+        memory[0, j] = memory[1, j] = 0.0
+        for i in range(1, j + 1):
+            rate = i * (u[1, i] + (5.0 * s if i == 1 else 0.0)) / j
+            memory[0, j] -= rate * memory[1, j - i]
+            memory[1, j] += rate * memory[0, j - i]
+    stiff = u[0, j]
+    for i in range(j + 1):
+        stiff += 0.3 * memory[0, i] * u[0, j - i]
+    out[0] = -(parameters[0] * stiff + parameters[1] * (j + 1) * u[0, j + 1] / s)
+    out[1] = 0.0
+
+
+def mesh_like_corner(last, limit, parameters, memory, pieces, ahead):  # type: ignore[no-untyped-def]
+    """Smooth everywhere."""
+    return 2.0
+
+
 def two_spins(compiled: bool) -> System:
     """Two inertias on a spring of varying stiffness: directions (difference, first angle)."""
     body = ModalBlocks(np.diag([0.8, 0.3]), np.zeros((2, 2)), np.zeros((2, 2)), v0=np.array([3.0, 1.0]))
@@ -134,8 +161,8 @@ def two_spins(compiled: bool) -> System:
         return out
 
     W = np.array([[1.0, 1.0], [-1.0, 0.0]])
-    own = mesh_like_law if compiled else None
-    return System([body, LocalForce((body,), W, law, own, parameters)])
+    series = SeriesLaw(mesh_like_begin, mesh_like_order, mesh_like_corner, (), parameters, 2, 0)
+    return System([body, LocalForce((body,), W, law, series if compiled else None)])
 
 
 @pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=pytest.mark.slow)])

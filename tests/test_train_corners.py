@@ -1,65 +1,142 @@
-"""Corners of a train's forces: where a mesh passes from one cubic of its stiffness curve to the next."""
+"""The series of a train's forces: the law again, order by order, and the corners between its cubics."""
+
+import math
 
 import numpy as np
 import pytest
 
-from gearfe.rigid import constant
-from gearfe.rigid.compiled import available
+from gearfe.rigid import TimeFunction, compiled, constant, kernel_modal, smoothed_step
 from gearfe.stiffness.periodic import periodic_interpolant
 from gearfe.train import build_train, simulate
-from gearfe.train.law import NEAR, angle_block, joined, mesh_block, train_corner
+from gearfe.train.law import angle_block, gyro_block, joined, mesh_block, torque_block, train_law
+from gearfe.train.series import train_begin, train_corner, train_order, train_series
 
 from .trains import SHIPPED, curve, train
 
 SPEED = 600.0
+NODES = np.array([0.0, 0.1, 0.25, 0.4, 0.5])
 
 
-def parameters(sense=1.0, ratio=1.0, phase=0.0):
-    """One mesh whose curve has nodes at 0, 0.1, 0.25, 0.4, 0.5 rad and the period 0.6 rad."""
-    nodes = np.array([0.0, 0.1, 0.25, 0.4, 0.5])
-    shape = periodic_interpolant(
-        nodes, np.array([1e8, 1.1e8, 0.9e8, 1e8, 1.05e8]), 0.6, widest_gap=0.3, method="linear"
-    )
-    return joined([angle_block(constant(SPEED).integral(0.0, 0.0)), mesh_block(0, 1, ratio, sense, phase, 1e8, shape)])
+def mesh(sense=1.0, method="linear", direction=0, spin=1):
+    """A mesh whose curve has nodes at 0, 0.1, 0.25, 0.4, 0.5 rad and the period 0.6 rad."""
+    values = np.array([1e8, 1.1e8, 0.9e8, 1e8, 1.05e8])
+    shape = periodic_interpolant(NODES, values, 0.6, widest_gap=0.3, method=method)
+    return mesh_block(direction, spin, 1.0, sense, 0.0, 1e8, shape)
+
+
+def began(t, sign, u, parameters, meshes=1):
+    """Pieces at a start, and memory for the series."""
+    law = train_series(parameters, meshes)
+    pieces = np.zeros(law.pieces, dtype=np.int64)
+    train_begin(t, sign, u, parameters, pieces)
+    return np.zeros((law.rows, u.shape[1])), pieces
+
+
+@pytest.mark.parametrize("method", ["linear", "cubic"])
+@pytest.mark.parametrize("s", [2e-5, -2e-5])
+def test_the_series_sums_up_to_the_law(method, s):
+    """Meshes, gyroscopic moments, torques of both kinds along a motion that is a polynomial of time."""
+    speed = constant(SPEED) + TimeFunction(sines=((20.0, 4e4, 0.3),))
+    torque = smoothed_step(0.5e-3, 1e-3, -100.0) + TimeFunction(sines=((7.0, 3e4, 1.0),))
+    blocks = [angle_block(speed.integral(0.0, 0.0)), gyro_block(0, 1.5, 2e-4), mesh(1.0, method, 3, 2)]
+    parameters = joined([*blocks, mesh(-1.0, method, 4, 2), torque_block(5, torque)])
+    random, t, most = np.random.default_rng(4), 0.21e-3, 30
+    u = np.zeros((6, most + 1))
+    u[:, :5] = random.normal(size=(6, 5)) * [1e-5, 1e-5, 1e-6, 1e-6, 1e-6]
+    rates = u.copy()
+    rates[:, 1] /= s
+    memory, pieces = began(t, math.copysign(1.0, s), rates, parameters, 2)
+    out, orders = np.zeros(6), np.zeros((most, 6))
+    for j in range(most):
+        train_order(j, t, s, u, parameters, memory, pieces, out)
+        orders[j] = out
+    powers = np.arange(most + 1)
+    for x in (0.0, 0.3, 0.9):
+        now, rate = u @ x**powers, (u[:, 1:] * powers[1:]) @ x ** powers[:-1] / s
+        train_law(t + s * x, now, rate, parameters, out)
+        assert x ** powers[:-1] @ orders == pytest.approx(out, rel=1e-11, abs=1e-11 * np.abs(out).max())
 
 
 @pytest.mark.parametrize(
-    ("t", "spin", "rate", "sense", "sign", "way"),
+    ("t", "spin", "sense", "sign", "way"),
     [
-        (1e-4, 0.0, 0.0, 1.0, 1.0, 0.1 - 0.06),  # ahead of the node at 0.1
-        (1e-4, 0.02, 0.0, 1.0, 1.0, 0.1 - 0.08),  # the shaft's own rotation counts
-        (1e-4, 0.0, 0.0, 1.0, -1.0, 0.06),  # backwards in time: the node at 0
-        (1e-4, 0.0, 0.0, -1.0, 1.0, 0.54 - 0.5),  # the other sense: -0.06 is 0.54, down to 0.5
-        (0.1 / 600 - 1e-8, 0.0, 0.0, 1.0, 1.0, 0.15 + 6e-6),  # so near a node that it counts as passed
-        (1.0009, 0.0, 0.0, 1.0, 1.0, 0.6 - 0.54),  # many turns later: 600.54 rad, to the end of the period
+        (1e-4, 0.0, 1.0, 1.0, 0.1 - 0.06),  # ahead of the node at 0.1
+        (1e-4, 0.02, 1.0, 1.0, 0.1 - 0.08),  # the shaft's own rotation counts
+        (1e-4, 0.0, 1.0, -1.0, 0.06),  # backwards in time: the node at 0
+        (1e-4, 0.0, -1.0, 1.0, 0.54 - 0.5),  # the other sense: -0.06 is 0.54, down to 0.5
+        (0.1 / 600, 0.0, 1.0, 1.0, 0.15),  # at a node
+        (0.1 / 600, 0.0, 1.0, -1.0, 0.1),  # at a node, backwards
+        (1.0009, 0.0, 1.0, 1.0, 0.6 - 0.54),  # many turns later: 600.54 rad, to the end of the period
     ],
 )
-def test_time_to_the_next_corner(t, spin, rate, sense, sign, way):
-    u, du = np.array([0.0, spin]), np.array([0.0, rate])
-    found = train_corner(t, sign, u, du, parameters(sense=sense))
-    assert found * SPEED == pytest.approx(way, rel=1e-6)
-    assert NEAR * 0.1 > 6e-6
+def test_the_way_to_the_next_corner(t, spin, sense, sign, way):
+    parameters, s = joined([angle_block(constant(SPEED).integral(0.0, 0.0)), mesh(sense)]), sign * 0.3 / SPEED
+    u, out = np.zeros((2, 11)), np.zeros(2)
+    u[1, 0] = spin
+    memory, pieces = began(t, sign, u, parameters)
+    for j in range(10):
+        train_order(j, t, s, u, parameters, memory, pieces, out)
+    before = pieces.copy()
+    told = 0.3 * train_corner(1, 1.0, parameters, memory, pieces, True)
+    assert way * (1 + 1e-9) < told < way + 1e-3
+    assert train_corner(9, 0.9 * way / 0.3, parameters, memory, pieces, False) == 2.0
+    assert (pieces == before).all()
+    assert train_corner(9, 1.0, parameters, memory, pieces, False) * 0.3 == pytest.approx(way, rel=1e-9)
+    assert pieces[0] - before[0] == sense * sign
 
 
 def test_a_constant_stiffness_has_no_corner():
-    assert train_corner(0.1, 1.0, np.zeros(1), np.zeros(1), joined([angle_block(constant(SPEED))])) > 1e299
+    parameters = joined([angle_block(constant(SPEED))])
+    assert train_corner(9, 1.0, parameters, np.zeros((3, 11)), np.zeros(0, dtype=np.int64), False) == 2.0
+
+
+def oscillators(tolerance):
+    """Two free oscillators and a rigid mode by the plain kernel: (states, at 1/4 s ... 4 s)."""
+
+    def begin(t, sign, u, parameters, pieces):
+        """Nothing to set."""
+
+    def order(j, t, s, u, parameters, memory, pieces, out):
+        out[0] = 0.0
+
+    def corner(last, limit, parameters, memory, pieces, ahead):
+        return 2.0
+
+    names = {"np": np, "math": math, "LEAST": kernel_modal.LEAST}
+    alias = {"begin": "law_begin", "order": "law_order", "corner": "law_corner"}
+    kernels = compiled.bind((*kernel_modal.FUNCTIONS, begin, order, corner), names, compiled=False, alias=alias)
+    squares, diagonal = np.array([0.0, 4.0, 900.0]), np.array([0.0, 0.0, 1.2])
+    state, asked = np.array([0.1, 1.0, 1e-3, 0.5, 0.0, 1.0]), np.linspace(0.25, 4.0, 16)
+    found, T, Y = np.zeros((16, 6)), np.zeros(999), np.zeros((999, 6))
+    made = kernels.modal_steps(
+        squares, np.diag(diagonal), diagonal, False, np.zeros(3), np.zeros((1, 3)), np.zeros(1), np.zeros(1),
+        np.zeros((1, 21)), np.zeros(1, dtype=np.int64), True, 0.0, 4.0, state, 0.1, np.abs(state[:3]), np.zeros(3),
+        np.array([0.7]), tolerance, np.inf, asked, 0, found, T, Y,
+    )  # fmt: skip
+    status, steps, _, _, _, passed = made
+    assert (status, passed) == (0, 16)
+    assert 0.7 in T[:steps]  # a step ends where a force may break
+    return found, asked
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-8, 1e-12])
+def test_free_response_of_modal_coordinates_in_closed_form(tolerance):
+    found, t = oscillators(tolerance)
+    decay, omega = 0.6, math.sqrt(900.0 - 0.36)
+    fast = np.exp(-decay * t) * (1e-3 * np.cos(omega * t) + (1.0 + 1e-3 * decay) / omega * np.sin(omega * t))
+    exact = np.stack([0.1 + 0.5 * t, np.cos(2 * t), fast, 0.5 + 0 * t, -2 * np.sin(2 * t)], axis=1)
+    off = np.abs(found[:, :5] - exact).max(axis=0) / np.abs(exact).max(axis=0)
+    assert off.max() < 5 * tolerance + 1e-13
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not available(), reason="numba is not installed")
-def test_steps_that_end_at_corners_are_fewer_and_better(monkeypatch):
-    """A curve of straight lines, with and without its corners told to the integrator."""
-    scene = train(SHIPPED, stiffness=lambda z: curve(z, swing=0.2, method="linear", count=12))
-    times = np.linspace(0.0, 4e-3, 41)
-    told = build_train(scene)
-    monkeypatch.setattr("gearfe.train.model.train_corner", None)
-    untold = build_train(scene)
-    truth = simulate(told, times, tolerance=1e-12).contact_force
-    other = simulate(untold, times, tolerance=1e-12).contact_force
-    assert np.abs(truth - other).max() < 1e-9 * np.abs(truth).max()
-    found = []
-    for model in (told, untold):
-        made = simulate(model, times, tolerance=1e-6)
-        found.append((made.statistics["steps"], np.abs(made.contact_force - truth).max() / np.abs(truth).max()))
-    assert found[0][0] < 0.8 * found[1][0]
-    assert found[0][1] < 1e-6
+@pytest.mark.skipif(not compiled.available(), reason="numba is not installed")
+@pytest.mark.parametrize("method", ["linear", "cubic"])
+def test_compiled_series_against_plain_runge_kutta(method):
+    """Another formulation: steps of order 8 that know no corners, short enough for them."""
+    scene = train(SHIPPED, stiffness=lambda z: curve(z, swing=0.2, method=method, count=12))
+    model, times = build_train(scene), np.linspace(0.0, 4e-3, 41)
+    made = simulate(model, times, tolerance=1e-8)
+    truth = simulate(model, times, tolerance=1e-11, backend="plain").contact_force
+    assert made.statistics["backend"] == "compiled"
+    assert np.abs(made.contact_force - truth).max() < 1e-7 * np.abs(truth).max()

@@ -15,9 +15,16 @@ of their stiffness: all internal coordinates have unit mass and diagonal stiffne
 the last one. All this is Galerkin projection: frequencies converge from above. One factorisation serves all of it.
 
 **Error bound.** The interfaces see the internal unknowns through the dynamic stiffness
-``D(w) = K_bb - w^2 M_bb - w^4 b^T (K_ii - w^2 M_ii)^{-1} b``, ``b = M_ii Psi + M_ib``. With exact modes and L levels of
-corrections the Galerkin error is at most ``w^{4 L + 4} S / (w_next^2 - w^2)``, ``S = X_L^T M X_L`` freed of the modes;
-for L = 0 it is ``w^4 S w_next^2 / (w_next^2 - w^2)`` with ``S = X^T K X``. ``w_next`` is the first one left out.
+``D(w) = K_bb - w^2 M_bb - w^4 b^T A(w)^{-1} b``, ``A = K_ii - w^2 M_ii``, ``b = M_ii Psi + M_ib``. With all internal
+vectors V, M-orthonormal with stiffnesses L, the projection puts ``x = V g, g = (L - w^2)^{-1} V^T b`` for ``A^{-1} b``
+and errs by ``dD = w^4 r^T A^{-1} r``, ``r = b - A x``. Modes leave no residual; with corrections b lies in K V, and r is
+``w^2 K Y g`` with Y what ``K^{-1} M V`` has K-orthogonal to V. On what is left out ``A >= (1 - w^2/w_next^2) K``, hence
+
+.. math::
+    dD \le \frac{w^8}{1 - w^2/w_{next}^2}\; g^T S\, g,\qquad S = Y^T K Y = V^T M K^{-1} M V - L^{-1},
+
+``w_next`` the first one left out. Without corrections ``w^4 S``, S = ``b^T K^{-1} b`` freed of the modes, stands for
+``w^8 g^T S g``.
 """
 
 from __future__ import annotations
@@ -57,10 +64,10 @@ class Reduction:
         Diagonal of the internal stiffness (rad^2/s^2), ascending: modes first, then corrections.
     modes
         How many of the k internal coordinates are modes.
-    tail : (m, m)
+    tail : (k, k), or (m, m) without corrections
         S of the error bound.
     levels
-        L of the error bound.
+        Levels of correction vectors.
     next_eigenvalue
         Square of ``w_next``; infinite when no mode is left out.
     solver
@@ -136,11 +143,15 @@ def reduce_model(
     modes = lowest_modes(
         factor.solve, m_ii, count=count, limit=limit, at_least=at_least if count is None else 0, shift=shift
     )
-    added, tail, columns = _corrections(factor, m_ii, modes.vectors, coupling, corrections if m else 0)
+    added, left, columns = _corrections(factor, m_ii, modes.vectors, coupling, corrections if m else 0)
     inner = np.concatenate([modes.vectors, added], axis=1)
     # principal axes of the whole inner space: the projection is exact whatever the modes' last digits are
     eigenvalues, axes = np.linalg.eigh(_symmetric(inner.T @ (k_ii @ inner)))
     inner = inner @ axes
+    tail = left
+    if corrections and m:  # of the next level only what is K-orthogonal to the vectors kept
+        last = axes[len(axes) - len(left) :]
+        tail = _symmetric(last.T @ (left - (last / eigenvalues) @ last.T) @ last)
     size = m + len(eigenvalues)
     k_red, m_red = np.zeros((size, size)), np.eye(size)
     k_red[:m, :m] = _symmetric((boundary.T @ (stiffness @ boundary)).toarray() + psi.T @ k_ib) if m else 0.0
@@ -171,24 +182,26 @@ def reduce_model(
 def _corrections(
     factor: Factorization, m_ii: Any, modes: Floats, coupling: Floats, wanted: int
 ) -> tuple[Floats, Floats, int]:
-    """M-orthonormal correction vectors, the tail S of the error bound, and the number of right-hand sides.
+    """M-orthonormal correction vectors, ``V^T M K^-1 M V`` of the last level's, and the number of right-hand sides.
 
-    ``X_1 = K^-1 b``, ``X_l = K^-1 M X_{l-1}``: all freed of the modes. S is ``X_L^T M X_L``, or ``X_1^T b`` for L = 0.
+    ``X_1 = K^-1 b``, ``X_l = K^-1 M X_{l-1}``: all freed of the modes. Without corrections ``X_1^T b`` comes second.
     """
     m_modes = np.asarray(m_ii @ modes)
     found = [modes]
-    x = factor.solve(coupling)
-    x = x - modes @ (m_modes.T @ x)
-    columns, tail = coupling.shape[1], _symmetric(x.T @ coupling)
+
+    def solved(load: Floats) -> Floats:
+        x = factor.solve(load)
+        return np.asarray(x - modes @ (m_modes.T @ x))
+
+    x = solved(coupling)
+    columns, left = coupling.shape[1], _symmetric(x.T @ coupling)
     for number in range(1, wanted + 1):
         mx = np.asarray(m_ii @ x)
         if number > 1:
-            x = factor.solve(mx)
-            x = x - modes @ (m_modes.T @ x)
+            x = solved(mx)
             mx = np.asarray(m_ii @ x)
             columns += coupling.shape[1]
-        tail = _symmetric(x.T @ mx)
-        scale = np.maximum(np.sqrt(np.diag(tail)), 1e-300)
+        scale = np.maximum(np.sqrt(np.einsum("ij,ij->j", x, mx)), 1e-300)
         new, m_new = x / scale, mx / scale
         for again in (True, False):
             new = new - sum(basis @ (basis.T @ m_new) for basis in found)
@@ -197,7 +210,11 @@ def _corrections(
             new = new @ (directions[:, keep] / np.sqrt(size[keep]))
             m_new = m_ii @ new if again else m_new
         found.append(new)
-    return np.concatenate([np.zeros((len(modes), 0)), *found[1:]], axis=1), tail, columns
+        if number == wanted:
+            m_new = np.asarray(m_ii @ new)
+            left = _symmetric(solved(m_new).T @ m_new)
+            columns += m_new.shape[1]
+    return np.concatenate([np.zeros((len(modes), 0)), *found[1:]], axis=1), left, columns
 
 
 def _symmetric(matrix: Floats) -> Floats:

@@ -1,10 +1,10 @@
 r"""What a reduced body leaves out, bounded without the full model.
 
-With the bound of `gearfe.reduction.craig_bampton` on the interfaces' dynamic stiffness, ``dD(w) <= e(w) S``, follow
+With the bound of `gearfe.reduction.craig_bampton` on the interfaces' dynamic stiffness, ``dD(w) <= E(w)``, follow
 
-- natural frequencies with free attachments: ``d lambda_k <= v_b^T dD(w_k) v_b``, v_b the attachment part of the mode of
-  unit modal mass, so ``d f_k / f_k <= v_b^T dD v_b / (2 w_k^2)``;
-- the response of the attachments to forces on them: ``dH = H dD H`` with ``H = D^-1``, compared with H over the band.
+- natural frequencies with free attachments: ``d lambda_k <= v_b^T E(w_k) v_b``, v_b the attachment part of the mode of
+  unit modal mass, so ``d f_k / f_k <= v_b^T E v_b / (2 w_k^2)``;
+- the response of the attachments to forces on them: ``dH = H E H`` with ``H = D^-1``, compared with H over the band.
 """
 
 from __future__ import annotations
@@ -67,8 +67,8 @@ def reduction_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, poi
         return ReductionError(band_hz, math.inf, own, np.full(len(own), math.inf))
     shapes = coupled.vectors[:m]
     omega = 2.0 * math.pi * own
-    energy = np.einsum("ik,ij,jk->k", shapes[:, inside], body.tail, shapes[:, inside])
-    errors = np.array([_factor(w, body) for w in omega]) * energy / np.maximum(2.0 * omega**2, 1e-300)
+    energy = np.array([v @ lost_stiffness(body, w) @ v for v, w in zip(shapes[:, inside].T, omega, strict=True)])
+    errors = energy / np.maximum(2.0 * omega**2, 1e-300)
     forces = shapes.reshape(-1, 6, body.size)[:, :3].reshape(-1, body.size)
     lost = total = 0.0
     all_omega = 2.0 * math.pi * coupled.frequencies_hz
@@ -76,17 +76,19 @@ def reduction_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, poi
         gain = w**2 / (all_omega**2 - w**2 + 2j * ratio * all_omega * w)
         response = (shapes * gain) @ forces.T
         direct = (forces * gain) @ forces.T
-        change = (response.T @ body.tail @ response) * (_factor(float(w), body) / w**2)
+        change = (response.T @ lost_stiffness(body, float(w)) @ response) / w**2
         lost += float(np.sum(np.abs(change) ** 2))
         total += float(np.sum(np.abs(direct) ** 2))
     return ReductionError(band_hz, math.sqrt(lost / total) if total else 0.0, own, errors)
 
 
-def _factor(omega: float, body: ModalBody) -> float:
-    """e(w) of the bound ``dD <= e(w) S``."""
-    following = (2.0 * math.pi * body.next_hz) ** 2
-    if math.isinf(following):
-        return 0.0
+def lost_stiffness(body: ModalBody, omega: float) -> Floats:
+    """E of the bound ``dD <= E`` at a circular frequency (rad/s), over the attachments' coordinates, (6 a, 6 a)."""
+    m = 6 * len(body.attachment_names)
+    if math.isinf(body.next_hz):
+        return np.zeros((m, m))
+    left = 1.0 - (omega / (2.0 * math.pi * body.next_hz)) ** 2
     if body.levels == 0:
-        return omega**4 * following / (following - omega**2)
-    return float(omega ** (4 * body.levels + 4) / (following - omega**2))
+        return np.asarray(omega**4 / left * body.tail)
+    weights = body.mass[m:, :m] / (np.diag(body.stiffness)[m:, None] - omega**2)
+    return np.asarray(omega**8 / left * (weights.T @ body.tail @ weights))

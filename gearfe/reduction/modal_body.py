@@ -30,7 +30,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: Written to files; a file of another format is refused with a message.
-FORMAT = 1
+FORMAT = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ class ModalBody:
     rigid_mass : (6, 6)
         Mass, static moments and inertia about the origin: kinetic energy of rigid translations and rotations.
     tail, levels, next_hz
-        Matrix S, number L and frequency of the error bound in `gearfe.reduction.craig_bampton`.
+        Matrix S, levels of corrections and frequency of the error bound in `gearfe.reduction.craig_bampton`.
     held
         Whether a part of the body is fixed to the frame; a free body has six rigid-body modes.
     solver

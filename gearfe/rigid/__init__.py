@@ -3,7 +3,7 @@
 Nothing here knows which mechanism it runs. The component contract is in `gearfe.rigid.contract`.
 """
 
-from .contract import Element, LinearJoint, LocalForce, ModalBlocks
+from .contract import Element, LinearJoint, LocalForce, ModalBlocks, SeriesLaw
 from .integrate import integrate
 from .planar import (
     GROUND,
@@ -45,6 +45,7 @@ __all__ = [
     "Prescribed",
     "Prismatic",
     "Scene",
+    "SeriesLaw",
     "Slot",
     "Spring",
     "Start",

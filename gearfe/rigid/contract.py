@@ -143,6 +143,43 @@ class LinearJoint(Element):
 
 
 @dataclass(frozen=True, eq=False)
+class SeriesLaw:
+    """A law phi(t, u, u') of p directions by the orders of its Taylor series: module-level functions for numba.
+
+    Time is t + s x, s the trial step; ``u[k, j]`` is order j of direction k over x. The law keeps series of its own in
+    ``memory[row, order]``, from order to order of one step, and in ``pieces`` whole numbers for the whole run: on which
+    of its smooth pieces it is.
+
+    Parameters
+    ----------
+    begin
+        ``begin(t, sign, u, parameters, pieces)``: sets the pieces at the start, where ``u[k, 0], u[k, 1]`` are value
+        and rate; sign tells where time runs.
+    order
+        ``order(j, t, s, u, parameters, memory, pieces, out)``: order j of the forces into ``out[k]``, from orders up to
+        j of u and up to j + 1 for u'.
+    corner
+        ``corner(last, limit, parameters, memory, pieces, ahead)``: where x, up to `limit`, leaves a smooth piece, 2
+        when it does not; the pieces then go on to the next. With `ahead` from orders 0 and 1 a little past that
+        place, for the length of the step; pieces stay.
+    helpers
+        Functions that they call by name.
+    parameters : ndarray
+        What they get.
+    rows, pieces
+        Number of series in the memory, and of whole numbers.
+    """
+
+    begin: Callable[..., None]
+    order: Callable[..., None]
+    corner: Callable[..., float]
+    helpers: tuple[Callable[..., object], ...]
+    parameters: Array
+    rows: int
+    pieces: int
+
+
+@dataclass(frozen=True, eq=False)
 class LocalForce(Element):
     """Force along few directions: ``f = W law(t, W^T q, W^T v)``, the law being any callable of state and time.
 
@@ -154,30 +191,17 @@ class LocalForce(Element):
         Directions on the local coordinates.
     law
         ``law(t, u, du) -> (p,)`` with u = W^T q, du = W^T v: any callable of state and time.
-    compiled_law
-        The same law as ``compiled_law(t, u, du, parameters, out)``, a module-level function that numba can
-        compile. When
-        every force of a linear system has the same one, the whole integration runs compiled; forces of different kinds
-        share one function that looks at its parameters.
-    parameters : ndarray
-        What `compiled_law` gets.
-    compiled_corner
-        ``compiled_corner(t, sign, u, du, parameters)``: time (s) to the next corner of the law, where it passes from
-        one smooth piece to another, predicted from this state; steps then end at corners, and methods of high order
-        keep their order. Without one the law counts as smooth between its `breaks`.
-    compiled_helpers
-        Functions that the two call by name.
+    series
+        The same law by the orders of its Taylor series. When the only force of a linear system has one, the whole
+        integration runs compiled.
     """
 
     touches: tuple[Element, ...] = field()
     W: Array = field()
     law: Callable[[float, Array, Array], Array] = field()
-    compiled_law: Callable[..., None] | None = None
-    parameters: Array = field(default_factory=lambda: np.zeros(0))
+    series: SeriesLaw | None = None
     breaks: tuple[float, ...] = ()
     name: str = "local force"
-    compiled_corner: Callable[..., float] | None = None
-    compiled_helpers: tuple[Callable[..., object], ...] = ()
 
     def force(self, t: float, q: Array, v: Array) -> Array:
         """W law."""

@@ -1,8 +1,14 @@
 # mypy: ignore-errors
-"""Compiled loop of the explicit method of order 8 in modal coordinates; the same steps as `explicit.step_through`.
+"""Taylor series in modal coordinates, compiled: y'' = c - w^2 y - D y' + W^T phi(t, u, u'), u = W y + offset.
 
-`law(t, u, du, parameters, out)` is bound by name: forces `out` along the directions, from u = W y + offset and
-du = W y'.
+With y = sum_j y_j x^j, x = (t - t0) / s running from 0 to 1 over the trial step s, the equation of motion gives
+
+    (j + 2)(j + 1) y_{j+2} = s^2 (c_j - w^2 y_j + W^T phi_j) - s (j + 1) D y_{j+1}
+
+(Hairer, Norsett & Wanner I, Sec. I.8). phi_j comes from the law's own recurrences (`gearfe.rigid.contract.SeriesLaw`),
+bound by the names `law_begin`, `law_order`, `law_corner`. One order costs two small products with W, half a stage of
+a Runge-Kutta method of order 8, and takes the fastest mode further. A step ends where its law has a corner; the number
+of orders follows from the terms.
 """
 
 from __future__ import annotations
@@ -11,108 +17,146 @@ import math
 
 import numpy as np
 
+#: Orders that are computed in any case: a force that sets in as a polynomial of degree 5 shows up to order 7.
+LEAST = 8
 
-def modal_rhs(squares, damping, diagonal, full, constant, W, offset, first, parameters, t, y, dy, u, du, out):
-    """dy of the state y = (coordinates, velocities)."""
-    n = squares.shape[0]
-    for i in range(n):
-        dy[i] = y[n + i]
-        dy[n + i] = constant[i] - squares[i] * y[i] - diagonal[i] * y[n + i]
-    if full:
-        for i in range(n):
-            value = 0.0
-            for j in range(n):
-                value += damping[i, j] * y[n + j]
-            dy[n + i] -= value - diagonal[i] * y[n + i]
+
+def project(W, y, j, out):
+    """out[k, j] = sum_i W[k, i] y[j, i]; four directions at a time, so that y is read once for all."""
+    n = y.shape[1]
     rows = W.shape[0]
     p = 0
-    while p + 3 < rows:  # four directions at a time: y and dy are read once for all
-        a0, a1, a2, a3 = offset[p], offset[p + 1], offset[p + 2], offset[p + 3]
-        b0, b1, b2, b3 = 0.0, 0.0, 0.0, 0.0
+    while p + 3 < rows:
+        a0, a1, a2, a3 = 0.0, 0.0, 0.0, 0.0
         for i in range(n):
-            value, rate = y[i], y[n + i]
+            value = y[j, i]
             a0 += W[p, i] * value
             a1 += W[p + 1, i] * value
             a2 += W[p + 2, i] * value
             a3 += W[p + 3, i] * value
-            b0 += W[p, i] * rate
-            b1 += W[p + 1, i] * rate
-            b2 += W[p + 2, i] * rate
-            b3 += W[p + 3, i] * rate
-        u[p], u[p + 1], u[p + 2], u[p + 3] = a0, a1, a2, a3
-        du[p], du[p + 1], du[p + 2], du[p + 3] = b0, b1, b2, b3
+        out[p, j], out[p + 1, j], out[p + 2, j], out[p + 3, j] = a0, a1, a2, a3
         p += 4
     while p < rows:
-        place = offset[p]
-        speed = 0.0
+        value = 0.0
         for i in range(n):
-            place += W[p, i] * y[i]
-            speed += W[p, i] * y[n + i]
-        u[p] = place
-        du[p] = speed
+            value += W[p, i] * y[j, i]
+        out[p, j] = value
         p += 1
-    for k in range(first.shape[0] - 1):
-        a = first[k]
-        b = first[k + 1]
-        law(t, u[a:b], du[a:b], parameters[k], out[a:b])  # noqa: F821
+
+
+def add_forces(W, force, factor, y, row):
+    """y[row] += factor W^T force, directions without force left out."""
+    n = y.shape[1]
     p = 0
-    while p + 3 < rows:
-        f0, f1, f2, f3 = out[p], out[p + 1], out[p + 2], out[p + 3]
-        for i in range(n):
-            dy[n + i] += W[p, i] * f0 + W[p + 1, i] * f1 + W[p + 2, i] * f2 + W[p + 3, i] * f3
-        p += 4
-    while p < rows:
-        for i in range(n):
-            dy[n + i] += W[p, i] * out[p]
-        p += 1
-
-
-def no_corner(t, sign, u, du, parameters):  # noqa: ARG001
-    """A law without corners."""
-    return 1e300
-
-
-def next_corner(W, offset, first, parameters, t, sign, y, u, du):
-    """Time to the nearest corner of all laws from the state y; u and du are scratch."""
     rows = W.shape[0]
-    n = W.shape[1]
-    for p in range(rows):
-        place = offset[p]
-        speed = 0.0
+    while p < rows:
+        if force[p] == 0.0:
+            p += 1
+            continue
+        second = p + 1
+        while second < rows and force[second] == 0.0:
+            second += 1
+        f0 = factor * force[p]
+        if second < rows:
+            f1 = factor * force[second]
+            for i in range(n):
+                y[row, i] += f0 * W[p, i] + f1 * W[second, i]
+        else:
+            for i in range(n):
+                y[row, i] += f0 * W[p, i]
+        p = second + 1
+
+
+def next_order(squares, damping, diagonal, full, constant, W, force, s, y, j):
+    """Order j + 2 of the coordinates."""
+    n = squares.shape[0]
+    below = 1.0 / ((j + 2.0) * (j + 1.0))
+    square = s * s * below
+    slope = s * (j + 1.0) * below
+    for i in range(n):
+        y[j + 2, i] = -square * squares[i] * y[j, i] - slope * diagonal[i] * y[j + 1, i]
+    if j == 0:
         for i in range(n):
-            place += W[p, i] * y[i]
-            speed += W[p, i] * y[n + i]
-        u[p] = place
-        du[p] = speed
-    nearest = 1e300
-    for k in range(first.shape[0] - 1):
-        a = first[k]
-        b = first[k + 1]
-        nearest = min(nearest, corner(t, sign, u[a:b], du[a:b], parameters[k]))  # noqa: F821
-    return nearest
+            y[2, i] += square * constant[i]
+    if full:
+        for i in range(n):
+            value = 0.0
+            for k in range(n):
+                value += damping[i, k] * y[j + 1, k]
+            y[j + 2, i] -= slope * (value - diagonal[i] * y[j + 1, i])
+    add_forces(W, force, square, y, j + 2)
+
+
+def evaluate(y, last, x, s, value, rate):
+    """Coordinates and velocities at x (Horner)."""
+    n = y.shape[1]
+    for i in range(n):
+        value[i] = y[last, i]
+        rate[i] = 0.0
+    for j in range(last - 1, -1, -1):
+        for i in range(n):
+            rate[i] = rate[i] * x + value[i]
+            value[i] = value[i] * x + y[j, i]
+    for i in range(n):
+        rate[i] /= s
+
+
+def widen(state, value, rate, step, reach, pull):
+    """Largest coordinates and accelerations so far, the mean acceleration of a step standing for all of it."""
+    n = value.shape[0]
+    for i in range(n):
+        reach[i] = max(reach[i], abs(value[i]))
+        pull[i] = max(pull[i], abs(rate[i] - state[n + i]) / step)
+
+
+def set_weights(squares, reach, pull, tolerance, weight):
+    """1 / limit of each coordinate: `tolerance` of its largest value, and of what its largest acceleration makes."""
+    n = squares.shape[0]
+    far = 0.0
+    strong = 0.0
+    for i in range(n):
+        far = max(far, reach[i])
+        strong = max(strong, pull[i])
+    for i in range(n):
+        limit = max(reach[i], 1e-6 * far)
+        if squares[i] > 0.0:
+            limit = min(limit, max(pull[i], 1e-3 * strong) / squares[i])
+        weight[i] = 1.0 / (tolerance * limit + 1e-100)
 
 
 def modal_steps(
-    squares, damping, diagonal, full, constant, W, offset, first, parameters, A, C, E3, E5, D,
-    t, t1, y, h, scale, breaks, tolerance, longest, T, Y, P,
+    squares, damping, diagonal, full, constant, W, offset, parameters, memory, pieces, first, t, t1, state, h, reach,
+    pull, breaks, tolerance, longest, asked, at, found, T, Y,
 ):  # fmt: skip
-    """Steps until t1 or until the arrays are full: (status, steps, time, next step, evaluations)."""
-    n2 = y.shape[0]
-    n = n2 // 2
-    K = np.zeros((16, n2))
-    z = np.empty(n2)
-    u = np.empty(W.shape[0])
-    du = np.empty(W.shape[0])
-    out = np.zeros(W.shape[0])
-    limit = np.empty(n2)
-    five = np.empty(n2)
-    three = np.empty(n2)
+    """Steps from t to t1, or until T is full; states at the `asked` times go to `found`, step ends to T, Y.
+
+    h is the trial step; reach, pull are the largest coordinates and accelerations so far. A coordinate's limit is
+    `tolerance` of its reach, and of what its pull makes of it: accelerations then hold as well as coordinates. Returns
+    (status, steps, time, h, orders computed, number of asked times passed).
+    """
+    n = squares.shape[0]
+    most = memory.shape[1] - 1
+    y = np.zeros((most + 1, n))
+    u = np.zeros((W.shape[0], most + 1))
+    force = np.zeros(W.shape[0])
+    weight = np.empty(n)
+    value = np.empty(n)
+    rate = np.empty(n)
     sign = 1.0 if t1 >= t else -1.0
     begin = t
-    modal_rhs(squares, damping, diagonal, full, constant, W, offset, first, parameters, t, y, K[0], u, du, out)
-    calls = 1
     count = 0
+    orders = 0
     status = 0
+    still = 0
+    if first:
+        for i in range(n):
+            y[0, i] = state[i]
+            y[1, i] = state[n + i]
+        project(W, y, 0, u)
+        project(W, y, 1, u)
+        for p in range(W.shape[0]):
+            u[p, 0] += offset[p]
+        law_begin(t, sign, u, parameters, pieces)  # noqa: F821
     while sign * (t1 - t) > 0.0:
         if count >= T.shape[0]:
             status = 2
@@ -123,112 +167,91 @@ def modal_steps(
                 goal = breaks[i]
         step = min(h, longest, abs(goal - t))
         fixed = step == abs(goal - t)
-        ahead = next_corner(W, offset, first, parameters, t, sign, y, u, du)
-        whole = step
-        if ahead < step:  # the step ends at a corner of the law
-            step = ahead
-            fixed = False
-        elif ahead < 2.0 * step:  # two equal steps to the corner, instead of one and a sliver
-            step = 0.5 * ahead
-            fixed = False
         if step < 1e-14 * max(abs(t), abs(t1 - begin)):
             status = 1
             break
-        d = sign * step
-        for s in range(1, 13):
-            for i in range(n2):
-                z[i] = y[i]
-            for r in range(s):
-                factor = d * A[s, r]
-                if factor != 0.0:
-                    for i in range(n2):
-                        z[i] += factor * K[r, i]
-            modal_rhs(
-                squares, damping, diagonal, full, constant, W, offset, first, parameters,
-                t + C[s] * d, z, K[s], u, du, out,
-            )  # fmt: skip
-        calls += 12
-        top_q = 0.0
-        top_v = 0.0
-        for i in range(n2):
-            limit[i] = max(scale[i], abs(z[i]), step * abs(K[12, i])) * tolerance + 1e-300
-            if i < n:
-                top_q = max(top_q, limit[i])
-            else:
-                top_v = max(top_v, limit[i])
-        for i in range(n2):
-            five[i] = 0.0
-            three[i] = 0.0
-        for s in range(13):
-            if E5[s] != 0.0 or E3[s] != 0.0:
-                for i in range(n2):
-                    five[i] += E5[s] * K[s, i]
-                    three[i] += E3[s] * K[s, i]
-        for i in range(n2):
-            reach = 1.0 / (limit[i] + 1e-6 * (top_q if i < n else top_v))
-            five[i] *= reach
-            three[i] *= reach
-        big = 0.0
-        small = 0.0
-        for i in range(n2):
-            big += five[i] * five[i]
-            small += three[i] * three[i]
-        error = 0.0
-        if big > 0.0:
-            error = step * big / math.sqrt((big + 0.01 * small) * n2)
-        if not np.isfinite(error):
-            h = 0.2 * step
-            if step < 1e-12 * abs(t1 - begin):
+        s = sign * step
+        for i in range(n):
+            y[0, i] = state[i]
+            y[1, i] = s * state[n + i]
+        project(W, y, 0, u)
+        for p in range(W.shape[0]):
+            u[p, 0] += offset[p]
+        set_weights(squares, reach, pull, tolerance, weight)
+        end = 1.0
+        power = 1.0
+        last = most
+        size = 0.0
+        before = 1e300
+        largest = 0.0
+        for j in range(most - 1):
+            project(W, y, j + 1, u)
+            law_order(j, t, s, u, parameters, memory, pieces, force)  # noqa: F821
+            next_order(squares, damping, diagonal, full, constant, W, force, s, y, j)
+            if j == 1:
+                end = min(1.0, law_corner(1, 1.0, parameters, memory, pieces, True))  # noqa: F821
+                power = end * end
+            power *= end
+            size = 0.0
+            for i in range(n):
+                off = y[j + 2, i] * weight[i]
+                size += off * off
+            size = (j + 2.0) * math.sqrt(size) * power  # the term of the velocity, over the trial step
+            if size < 1.0 and before < 1.0 and j >= LEAST - 2:
+                last = j + 2
+                break
+            before = size
+            largest = max(largest, size)
+        orders += last
+        for i in range(n):
+            pull[i] = max(pull[i], abs(2.0 * y[2, i] / (s * s)))
+        if not np.isfinite(size):
+            h = 0.1 * step
+            if h < 1e-12 * abs(t1 - begin):
                 status = 4
                 break
             continue
-        if error > 1.0:
-            h = step * max(0.2, 0.9 * error ** (-0.125))
+        x = end
+        if 1.0 <= size < 1e-3 * largest:  # the sum holds: the motion itself tells its size, as at a start from rest
+            evaluate(y, last, end, s, value, rate)
+            widen(state, value, rate, end * step, reach, pull)
+            set_weights(squares, reach, pull, tolerance, weight)
+            size = 0.0
+            for i in range(n):
+                off = y[last, i] * weight[i]
+                size += off * off
+            size = last * math.sqrt(size) * power
+        if size > 1.0:  # too long: as far as the last term allows
+            x = end * size ** (-1.0 / last)
+        if still < 20:  # corners that the law does not get past are no reason to stand still
+            corner = law_corner(last - 2, x, parameters, memory, pieces, False)  # noqa: F821
+            x = min(x, corner)
+        if x * step <= 1e-15 * max(abs(t), abs(t1 - begin)):
+            still += 1
             continue
-        for i in range(n2):
-            Y[count, i] = z[i]
-        for s in range(13, 16):
-            for i in range(n2):
-                z[i] = y[i]
-            for r in range(s):
-                factor = d * A[s, r]
-                if factor != 0.0:
-                    for i in range(n2):
-                        z[i] += factor * K[r, i]
-            modal_rhs(
-                squares, damping, diagonal, full, constant, W, offset, first, parameters,
-                t + C[s] * d, z, K[s], u, du, out,
-            )  # fmt: skip
-        calls += 3
-        for i in range(n2):
-            change = Y[count, i] - y[i]
-            P[count, 0, i] = change
-            P[count, 1, i] = d * K[0, i] - change
-            P[count, 2, i] = 2.0 * change - d * (K[12, i] + K[0, i])
-        for k in range(4):
-            for i in range(n2):
-                P[count, 3 + k, i] = 0.0
-            for s in range(16):
-                factor = d * D[k, s]
-                if factor != 0.0:
-                    for i in range(n2):
-                        P[count, 3 + k, i] += factor * K[s, i]
-        t = goal if fixed else t + d
+        still = 0
+        ends = t + x * s
+        if (fixed and x == 1.0) or abs(goal - ends) <= 1e-13 * max(abs(goal), abs(t1 - begin)):
+            ends = goal
+        while at < asked.shape[0] and sign * (asked[at] - ends) <= 0.0:
+            evaluate(y, last, (asked[at] - t) / s, s, value, rate)
+            for i in range(n):
+                found[at, i] = value[i]
+                found[at, n + i] = rate[i]
+            at += 1
+        evaluate(y, last, x, s, value, rate)
+        widen(state, value, rate, x * step, reach, pull)
+        for i in range(n):
+            state[i] = Y[count, i] = value[i]
+            state[n + i] = Y[count, n + i] = rate[i]
+        t = ends
         T[count] = t
-        for i in range(n2):
-            y[i] = Y[count, i]
-            scale[i] = max(scale[i], abs(y[i]))
-            K[0, i] = K[12, i]
-        if fixed:  # a time function may change its piece here
-            modal_rhs(squares, damping, diagonal, full, constant, W, offset, first, parameters, t, y, K[0], u, du, out)
-            calls += 1
         count += 1
-        grown = step * min(6.0, 0.9 * max(error, 1e-12) ** (-0.125))
-        if step < whole or (fixed and error <= 0.01):  # shortened for other reasons than its error
-            h = max(whole if error <= 0.5 else 0.0, grown)
+        if size > 1.0:
+            h = 0.9 * step * end * size ** (-1.0 / last)
         else:
-            h = grown
-    return status, count, t, h, calls
+            h = max(h, 0.9 * step * end * most / last)
+    return status, count, t, h, orders, at
 
 
-FUNCTIONS = (modal_rhs, next_corner, modal_steps)
+FUNCTIONS = (project, add_forces, next_order, evaluate, widen, set_weights, modal_steps)

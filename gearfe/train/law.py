@@ -29,8 +29,6 @@ from ..stiffness.periodic import PeriodicInterpolant
 
 Array = NDArray[np.float64]
 ANGLE, MESH, GYRO, TORQUE = 0.0, 1.0, 2.0, 3.0
-#: Part of an interval of the curve by which a corner may be missed.
-NEAR = 2e-3
 
 
 def train_law(t, u, du, parameters, out):  # type: ignore[no-untyped-def]
@@ -98,51 +96,6 @@ def time_function(t, parameters, at):  # type: ignore[no-untyped-def]
         value += parameters[row + 3 * j] * math.sin(turn)
         slope += parameters[row + 3 * j] * parameters[row + 3 * j + 1] * math.cos(turn)
     return value, slope
-
-
-def train_corner(t, sign, u, du, parameters):  # type: ignore[no-untyped-def]
-    """Time (s) to the next corner of the law, where the phase of a mesh passes from one cubic of its curve to another.
-
-    The phase is taken to go on at its present rate; corners nearer than `NEAR` of an interval count as passed: that is
-    how far a prediction misses.
-    """
-    angle = 0.0
-    rate = 0.0
-    nearest = 1e300
-    for block in range(int(parameters[0])):
-        o = int(parameters[1 + block])
-        kind = parameters[o]
-        if kind == 0.0:
-            angle, rate = time_function(t, parameters, o + 1)
-        elif kind == 1.0:
-            r = int(parameters[o + 2])
-            phase = parameters[o + 4] * (parameters[o + 3] * angle + u[r]) + parameters[o + 5]
-            speed = sign * parameters[o + 4] * (parameters[o + 3] * rate + du[r])
-            n = int(parameters[o + 7])
-            first = o + 8
-            begin = parameters[first]
-            period = parameters[first + n] - begin
-            place = phase - math.floor((phase - begin) / period) * period
-            low = 0
-            high = n
-            while high - low > 1:
-                middle = (low + high) // 2
-                if parameters[first + middle] <= place:
-                    low = middle
-                else:
-                    high = middle
-            width = parameters[first + low + 1] - parameters[first + low]
-            if speed > 0.0:
-                way = parameters[first + low + 1] - place
-                after = (low + 1) % n
-            else:
-                way = place - parameters[first + low]
-                after = (low - 1) % n
-            if way < NEAR * width:
-                way += parameters[first + after + 1] - parameters[first + after]
-            if speed != 0.0:
-                nearest = min(nearest, way / abs(speed))
-    return nearest
 
 
 def python_law(parameters: Array, size: int):  # type: ignore[no-untyped-def]

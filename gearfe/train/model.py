@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,13 +28,11 @@ from .law import (
     gyro_block,
     joined,
     python_law,
-    time_function,
     torque_block,
-    train_corner,
-    train_law,
 )
 from .mesh_element import MeshLine, mesh_line
 from .scene import Drive, TrainScene
+from .series import train_series
 
 Array = NDArray[np.float64]
 
@@ -102,6 +101,11 @@ class TrainModel:
     def coupled_frequencies_hz(self) -> Array:
         """Natural frequencies with mean mesh stiffness (Hz)."""
         return np.sqrt(np.maximum(self.core.squares, 0.0)) / (2.0 * math.pi)
+
+    @cached_property
+    def multipliers_of_forces(self) -> Array:
+        """Force left over on the coordinates to the least multipliers that hold it, (system size, rows)."""
+        return np.asarray(np.linalg.pinv(self.system.jacobian(0.0, np.zeros(self.system.size))))
 
 
 def build_train(scene: TrainScene) -> TrainModel:
@@ -201,10 +205,8 @@ def _forces(
     parameters = joined(blocks)
     breaks = tuple(sorted({*angle.breaks, *(b for _, function in torques for b in function.breaks)}))
     law = python_law(parameters, at)
-    return LocalForce(
-        tuple(bodies), np.hstack(columns), law, train_law, parameters, breaks, name="forces of the train",
-        compiled_corner=train_corner, compiled_helpers=(time_function,),
-    )  # fmt: skip
+    series = train_series(parameters, sum(line.curve is not None for line in lines))
+    return LocalForce(tuple(bodies), np.hstack(columns), law, series, breaks, name="forces of the train")
 
 
 def bore_selector(scene: TrainScene, bore: str) -> Array:

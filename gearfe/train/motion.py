@@ -96,7 +96,7 @@ def joint_multipliers(model: TrainModel, t: Array, q: Array, v: Array, a: Array)
     """
     system = model.system
     left = forces(model, t, q, v) - v @ system.damping.T - q @ system.stiffness - a @ system.mass
-    multipliers = left @ np.linalg.pinv(system.jacobian(0.0, np.zeros(system.size)))
+    multipliers = left @ model.multipliers_of_forces
     found, at = {}, 0
     for element, _ in system.joints:
         found[element.name] = multipliers[:, at : at + element.rows]

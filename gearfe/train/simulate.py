@@ -19,9 +19,6 @@ from .response import TrainResponse
 
 Array = NDArray[np.float64]
 
-#: Asked tolerance -> that of the integrator: accelerations weigh the fast modes more than the state does. Measured on
-#: 119 coordinates: asked for 1e-6, all signals agree with a run at 1e-12 to 1.1e-5 of their largest value.
-LOCAL_SHARE = 0.03
 #: The finer run shares a little of the error; with this factor the estimate covers it.
 SAFETY = 1.5
 #: An approach or a bore's displacement beyond this part of the module means that nothing holds any more.
@@ -104,9 +101,8 @@ def simulate(
 def _run(
     model: TrainModel, t: Array, tolerance: float, method: str, backend: str, longest: float = np.inf
 ) -> tuple[Trajectory, Motion]:
-    local = max(LOCAL_SHARE * tolerance, 1e-13) if method != "implicit" else tolerance
     trajectory = integrate(
-        model.system, t, method=method, tolerance=local, start=model.start, backend=backend, longest=longest
+        model.system, t, method=method, tolerance=tolerance, start=model.start, backend=backend, longest=longest
     )
     return trajectory, motion(model, trajectory)
 
