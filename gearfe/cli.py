@@ -39,7 +39,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("gearfe: interrupted", file=sys.stderr)
         return 130
     except OSError as error:
-        print(f"gearfe: error: {error.filename or 'file'}: {error.strerror or error}", file=sys.stderr)
+        print(
+            f"gearfe: error: {error.filename or 'a file cannot be written or read'}: {error.strerror or error}",
+            file=sys.stderr,
+        )
         return 2
 
 

@@ -33,7 +33,8 @@ if [ "${#packages[@]}" -gt 0 ]; then
         fi
         echo "installing system libraries: ${packages[*]}"
         $sudo apt-get update -qq
-        DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends "${packages[@]}" >/dev/null
+        # a fresh machine may be updating itself: wait for its lock
+        DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends -o DPkg::Lock::Timeout=300 "${packages[@]}" >/dev/null
     else
         echo "warning: gmsh and off-screen rendering need the libraries that Debian calls ${packages[*]};" \
              "install them with your system's package manager" >&2

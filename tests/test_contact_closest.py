@@ -103,7 +103,7 @@ def test_exact_variations_between_kinked_edges(scene: dict[str, np.ndarray]) -> 
         return p, exact_rows(p, edges, nodes, scene["slave_nodes"], scene["shapes"], scene["rotation"])
 
     def applied(name: str, rows: ExactRows, field: str) -> np.ndarray:
-        return np.einsum("qai,qai->q", getattr(rows, name), scene[field][rows.nodes])
+        return np.einsum("aiq,aqi->q", getattr(rows, name), scene[field][rows.nodes])
 
     step = 1e-6
     (p, rows), (after, rows_after), (before, rows_before) = at(0.0), at(step), at(-step)

@@ -107,7 +107,8 @@ def test_one_position_that_agrees_by_chance_is_not_believed():
 def test_a_position_that_failed_on_the_coarse_mesh_gets_the_largest_error():
     fine = np.full(4, 100.0)
     estimate = error_estimate(np.arange(4.0), fine, np.array([100.1, np.nan, 101.0, 100.2]))
-    assert estimate.relative[1] == estimate.worst == estimate.relative[2]
+    assert estimate.relative[1] == estimate.relative[2] == estimate.relative.max()
+    assert estimate.worst > estimate.relative.max()  # one of many covered at 95 % each is off further
     assert math.isnan(error_estimate(np.arange(2.0), fine[:2], np.full(2, np.nan)).worst)
 
 

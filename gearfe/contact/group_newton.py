@@ -169,7 +169,7 @@ def _rounding(group: Group, motion: Motion) -> Array:
 def _step(group: Group, motion: Motion, rows: Rows, live: NDArray[np.bool_]) -> Motion:
     """Solution of the contact linearised at the present state."""
     points = rows.points
-    before = np.einsum("ij,ij->i", rows.opening, motion.displacement[rows.unknowns])
+    before = np.einsum("ij,ij->j", rows.opening, motion.displacement[rows.unknowns])
     right = -group.parameter[points] * (motion.found.gap[points] - before)
     solved = equilibrium(group, rows, right, motion.displacement, motion.pressure[points])
     whole = np.zeros(len(motion.pressure))

@@ -96,7 +96,7 @@ def _force_rates(group: Group, rows: Rows, forces: Array, arm: Array, good: NDAr
     force = forces.reshape(-1, 2)
     carried = np.where(wheel, _quarter_turn(local), 0.0).ravel()
     frame = np.where(wheel, _quarter_turn(force), 0.0).ravel()
-    opened = np.einsum("ij,ij->i", rows.opening, carried[rows.unknowns])
+    opened = np.einsum("ij,ij->j", rows.opening, carried[rows.unknowns])
     rate = equilibrium(group, rows, -group.parameter[rows.points] * opened, -carried, None, -frame)[1]
     moved = group.respond(rate, np.flatnonzero(good).tolist())[0].reshape(-1, 2)  # C df = dx - carried
     return rate, _moment(local, rate.reshape(-1, 2)) + _moment(moved, force)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from .closest import Projection
-from .exact_rows import PARTS, exact_rows
+from .exact_rows import exact_rows
 from .group import Group
 
 Array = NDArray[Any]
@@ -26,8 +26,8 @@ class Rows:
     points : ndarray, shape (a,)
     at : ndarray, shape (a,)
         Position of each.
-    unknowns : ndarray, shape (a, 20)
-    opening, normal, turn, slide, lift : ndarray, shape (a, 20)
+    unknowns : ndarray, shape (20, a)
+    opening, normal, turn, slide, lift : ndarray, shape (20, a)
         dg/du, G, theta, d xi and A, see `gearfe.contact.exact_rows`.
     loads, cut : ndarray, shape (a,)
         Forces of the points, and their change per unit of the foot point where a sharp end cuts their areas (N).
@@ -52,27 +52,26 @@ class Rows:
 
     def take(self, chosen: NDArray[np.bool_]) -> Rows:
         """The rows `chosen`."""
-        return Rows(**{name: getattr(self, name)[chosen] for name in self.__dataclass_fields__})
+        return Rows(**{name: getattr(self, name)[..., chosen] for name in self.__dataclass_fields__})
 
     def bending(self, change: Array) -> Array:
         """H change: how the contact forces turn and move when the nodes move by `change`, shape (2n,)."""
         moved = change[self.unknowns]
         slide = _dot(self.slide, moved)
         turned = self.loads * (self.bow * slide + _dot(self.turn, moved))
-        parts = (self.metric * turned)[:, None] * self.slide + (self.gap * turned)[:, None] * self.turn
-        parts -= (self.loads * slide)[:, None] * self.lift
+        parts = self.metric * turned * self.slide + self.gap * turned * self.turn - self.loads * slide * self.lift
         if self.cut.any():
-            parts += (self.cut * slide)[:, None] * self.normal
+            parts += self.cut * slide * self.normal
         return np.bincount(self.unknowns.ravel(), weights=parts.ravel(), minlength=len(change))
 
     def forces(self, pressure: Array, size: int) -> Array:
         """G^T W p, shape (size,)."""
-        parts = (self.area * pressure)[:, None] * self.normal
+        parts = self.area * pressure * self.normal
         return np.bincount(self.unknowns.ravel(), weights=parts.ravel(), minlength=size)
 
 
 def _dot(a: Array, b: Array) -> Array:
-    return np.einsum("ij,ij->i", a, b)
+    return np.einsum("ij,ij->j", a, b)
 
 
 @dataclass(frozen=True)
@@ -147,15 +146,15 @@ def rows_of(group: Group, found: Projection, pressure: Array, active: IntArray, 
     chosen = found.take(active)
     edges, slaves = group.counts[group.facing[active]], group.slave_nodes[active]
     rows = exact_rows(chosen, edges, placed, slaves, group.slave_shapes[active], group.rotation)
-    normal, turn, slide, lift = (x.reshape(len(active), 20) for x in (rows.normal, rows.turn, rows.slide, rows.lift))
-    unknowns = (2 * rows.nodes[:, :, None] + np.arange(2)).reshape(len(active), 20)
+    normal, turn, slide, lift = (x.reshape(20, -1) for x in (rows.normal, rows.turn, rows.slide, rows.lift))
+    unknowns = (2 * rows.nodes[:, None] + np.arange(2)[:, None]).reshape(20, -1)
     area, pressed, weight = group.areas(chosen.place, active), pressure[active], group.weight[active]
     across = (area > 0) & (area < weight)
     return Rows(
         points=active,
         at=group.at[active],
         unknowns=unknowns,
-        opening=normal - rows.steep[:, None] * slide,
+        opening=normal - rows.steep * slide,
         normal=normal,
         turn=turn,
         slide=slide,
@@ -173,7 +172,7 @@ def linearised(group: Group, rows: Rows) -> Linear:
     """Matrices of the active points, factorised."""
     at, unknowns, points = rows.at, rows.unknowns, rows.points
     touched = np.zeros(len(group.points), dtype=bool)
-    touched[unknowns[:, ::2] // 2] = True
+    touched[unknowns[::2] // 2] = True
     nodes = np.flatnonzero(touched)
     window = group.node_window[nodes]
     block = 2 * group.position[window] + group.gear[window]
@@ -185,13 +184,9 @@ def linearised(group: Group, rows: Rows) -> Linear:
     row = np.arange(len(at)) - (np.cumsum(active) - active)[at]
     area = active * length
     slot = (np.cumsum(area) - area)[at] + row * length[at]
-    slots = slot[:, None] + column[unknowns // 2] + np.tile([0, 1], 10)
-    opening, weighted = np.zeros(area.sum()), np.zeros(area.sum())
-    scaled_opening, scaled_normal = group.parameter[points][:, None] * rows.opening, rows.area[:, None] * rows.normal
-    for of_nodes in PARTS:
-        own = slice(2 * of_nodes.start, 2 * of_nodes.stop)
-        opening[slots[:, own]] += scaled_opening[:, own]
-        weighted[slots[:, own]] += scaled_normal[:, own]
+    slots = (slot + column[unknowns // 2] + np.tile([0, 1], 10)[:, None]).ravel()
+    opening: Array = np.bincount(slots, (group.parameter[points] * rows.opening).ravel(), area.sum())
+    weighted: Array = np.bincount(slots, (rows.area * rows.normal).ravel(), area.sum())
     # unknowns and stress rows within their blocks
     local = ((2 * (nodes - group.first_node[group.block_window[block]]))[:, None] + np.arange(2)).ravel()
     own_block = 2 * at + group.gear[group.owner[points]]
@@ -208,11 +203,11 @@ def linearised(group: Group, rows: Rows) -> Linear:
         for k in (2 * b, 2 * b + 1):
             matrix, rr, cc = group.blocks[k].matrix, r + rows_of_block[k], c + columns_of_block[k]
             used = local[left + c : left + cc]
-            compliance.append(matrix[used[:, None], used])
+            compliance.append(matrix.take(used, axis=0).take(used, axis=1))
             np.matmul(scaled[:, c:cc], compliance[-1], out=response[:, c:cc])
             if group.stressed is not None and rr > r:
                 chosen = stress[top + r : top + rr] + len(group.blocks[k].forces)
-                response[r:rr, c:cc] += matrix[chosen[:, None], used]
+                response[r:rr, c:cc] += matrix.take(chosen, axis=0).take(used, axis=1)
             r, c = rr, cc
         m = response @ loads.T
         m.flat[:: a + 1] += 1.0
@@ -232,8 +227,8 @@ def coupled(
     `rows` are its own, `origin` and `fixed` on the `unknowns` that they touch, shape (t,).
     """
     columns = np.searchsorted(unknowns, rows.unknowns)
-    number = np.arange(len(columns))[:, None]
-    normal, turn, slide, lift = (np.zeros((len(columns), len(unknowns))) for _ in range(4))
+    number = np.arange(len(right))
+    normal, turn, slide, lift = (np.zeros((len(right), len(unknowns))) for _ in range(4))
     for dense, values in ((normal, rows.normal), (turn, rows.turn), (slide, rows.slide), (lift, rows.lift)):
         np.add.at(dense, (number, columns), values)
     turned = rows.loads[:, None] * (rows.bow[:, None] * slide + turn)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .compliance import GearBody
+from .flank import Flank, edge_shapes
 from .laws import ContactLaw, side_share
 from .multiplier import hats_on
 
@@ -39,10 +40,29 @@ def slave_windows(pair: MeshingPair, windows: Sequence[Window]) -> list[int]:
     if pair.law.sides != "tip":
         return [i for i, w in enumerate(windows) if side_share(pair.law, w.gear) > 0]
 
-    def to_tip(w: Window) -> float:
-        return float(pair.bodies[w.gear].flank.sizes[w.first_edge + w.edges // 2 :].sum())
+    return [i + _bears(pair, windows[i], windows[i + 1]) for i in range(0, len(windows), 2)]
 
-    return [i if to_tip(windows[i]) <= to_tip(windows[i + 1]) else i + 1 for i in range(0, len(windows), 2)]
+
+def _bears(pair: MeshingPair, one: Window, two: Window) -> int:
+    """Which gear's tip is nearer to the contact, 0 or 1: where the gap opens towards a tip, it is the other's.
+
+    Asked halfway between the tips, as both gears see it: the answer depends on the teeth's places alone, and does not
+    change when the gears swap.
+    """
+    turns, flanks = [np.exp(1j * w.angle) for w in (one, two)], [pair.bodies[w.gear].flank for w in (one, two)]
+    tips = [complex(*f.points[-1]) * t for f, t in zip(flanks, turns, strict=True)]
+    half = 0.5 * abs(tips[1] + pair.centre_distance - tips[0])
+    up, down = (_upwards(f, half) * t for f, t in zip(flanks, turns, strict=True))
+    return int((up * np.conj(down)).imag > 0)
+
+
+def _upwards(flank: Flank, below: float) -> complex:
+    """Tangent of a flank towards its tip, `below` metres of arc from there, in the axes of its tooth."""
+    ends = np.cumsum(flank.sizes)
+    arc = max(0.0, ends[-1] - below)
+    edge = int(min(np.searchsorted(ends, arc), flank.edges - 1))
+    xi = 1 - (ends[edge] - arc) / flank.sizes[edge]
+    return complex(*(edge_shapes(np.array(xi))[1] @ flank.points[2 * edge : 2 * edge + 3]))
 
 
 def law_data(pair: MeshingPair, windows: Sequence[Window], slaves: list[int]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from .closest import Projection
-from .exact_rows import PARTS, exact_rows
+from .exact_rows import exact_rows
 from .scene import Scene
 
 Array = NDArray[Any]
@@ -99,13 +99,12 @@ def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: 
     nodes = np.flatnonzero(touched)
     place = np.empty(len(touched), dtype=np.int64)
     place[nodes] = np.arange(len(nodes))
-    slot = np.arange(len(points))[:, None] * len(nodes) + place[rows.nodes]
-    spread = np.zeros((4, len(points) * len(nodes), 2))
-    # no slot is met twice within a part: of a neighbour that does not exist another node stands in
-    for part in PARTS:
-        for row, values in zip(spread, (rows.normal, rows.slide, rows.turn, rows.lift), strict=True):
-            row[slot[:, part]] += values[:, part]
-    normal, slide, turn, lift = spread.reshape(4, len(points), 2 * len(nodes))
+    slot = 2 * (np.arange(len(points)) * len(nodes) + place[rows.nodes])
+    slots = (slot[:, None] + np.arange(2)[:, None]).ravel()
+    normal, slide, turn, lift = (
+        np.bincount(slots, values.ravel(), 2 * len(points) * len(nodes)).reshape(len(points), -1)
+        for values in (rows.normal, rows.slide, rows.turn, rows.lift)
+    )
     opening = normal - rows.steep[:, None] * slide
     unknowns = np.empty(2 * len(nodes), dtype=np.int64)
     unknowns[::2], unknowns[1::2] = 2 * nodes, 2 * nodes + 1

@@ -5,7 +5,7 @@ All positions of a sweep are searched in one pass.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,8 @@ CLOSE = Reach(0.36, 1, whole_tips=False)
 WHOLE = Reach(1.5, 3)
 #: Every so many nodes of the mate's flank the search for the closest point tries one.
 STRIDE = 3
+#: Overlap, as a share of the length of a tooth's contact surface, from which on the wheel's vertices are asked too.
+DEEP = 0.02
 
 
 @dataclass(frozen=True)
@@ -72,16 +74,39 @@ class Overlap:
 
 
 def overlaps(pair: MeshingPair, angles: Array, twists: Array) -> list[list[Overlap]]:
-    """Overlapping tooth pairs at each pinion angle (rad) and twist (rad)."""
-    one, two = pair.pinion.flank.points[::2], pair.wheel.flank.points
-    found: list[list[Overlap]] = [[] for _ in angles]
-    position, teeth = _candidates(pair, angles, one)
+    """Overlapping tooth pairs at each pinion angle (rad) and twist (rad).
+
+    Looked for are the pinion's vertices in the wheel. Where teeth overlap so deeply that they bend far out of the way,
+    a tip of the wheel may bear that none of them has come into: there the wheel's vertices are asked too.
+    """
+    position, teeth = _candidates(pair, angles, pair.pinion.flank.points[::2])
+    found = _inside(pair, angles, twists, 0, position, teeth)
+    lengths = [float(body.flank.sizes.sum()) for body in pair.bodies]
+    deepest = np.zeros(len(angles))
+    for (n, _), one in found.items():
+        deepest[n] = max(deepest[n], one.depth)
+    deep = deepest[position] > DEEP * min(lengths)
+    if deep.any():
+        for key, one in _inside(pair, angles, twists, 1, position[deep], teeth[deep]).items():
+            found[key] = _merged(found[key], one) if key in found else one
+    made: list[list[Overlap]] = [[] for _ in angles]
+    for n, k in sorted(found):
+        made[n].append(found[n, k])
+    return made
+
+
+def _inside(
+    pair: MeshingPair, angles: Array, twists: Array, gear: int, position: IntArray, teeth: IntArray
+) -> dict[tuple[int, int], Overlap]:
+    """Overlaps by position and pair number, as the vertices of pinion (gear 0) or wheel (1) find them in the mate."""
+    found: dict[tuple[int, int], Overlap] = {}
     if len(position) == 0:
         return found
-    # pinion vertices in the frame of the mate's tooth
-    angle1 = pair.tooth_angle(0, teeth, angles[position], twists[position])
-    angle2 = pair.tooth_angle(1, -1 - teeth, angles[position], twists[position])
-    placed = _rotated(one, angle1) - pair.centre(1)
+    one, two = pair.bodies[gear].flank.points[::2], pair.bodies[1 - gear].flank.points
+    # own vertices in the frame of the mate's tooth
+    numbers = (teeth, -1 - teeth)
+    angle1, angle2 = (pair.tooth_angle(g, numbers[g], angles[position], twists[position]) for g in (gear, 1 - gear))
+    placed = _rotated(one, angle1) + pair.centre(gear) - pair.centre(1 - gear)
     local = np.stack(
         [
             np.cos(angle2)[:, None] * placed[..., 0] + np.sin(angle2)[:, None] * placed[..., 1],
@@ -102,15 +127,22 @@ def overlaps(pair: MeshingPair, angles: Array, twists: Array) -> list[list[Overl
         mine = np.flatnonzero(inside & (where[:, 0] == case))
         vertex, place, gap = where[mine, 1], result.place[mine], result.gap[mine]
         bottom = int(np.argmin(gap))
-        found[position[case]].append(
-            Overlap(
-                tooth=int(teeth[case]),
-                depth=float(-gap[bottom]),
-                ranges=((int(vertex.min()), int(vertex.max())), (int(place.min()), int(place.max()) + 1)),
-                deepest=(int(vertex[bottom]), int(place[bottom])),
-            )
+        ranges = (int(vertex.min()), int(vertex.max())), (int(place.min()), int(place.max()) + 1)
+        deepest = int(vertex[bottom]), int(place[bottom])
+        found[int(position[case]), int(teeth[case])] = Overlap(
+            tooth=int(teeth[case]),
+            depth=float(-gap[bottom]),
+            ranges=(ranges[gear], ranges[1 - gear]),
+            deepest=(deepest[gear], deepest[1 - gear]),
         )
     return found
+
+
+def _merged(one: Overlap, two: Overlap) -> Overlap:
+    """What both have found."""
+    (a, b), (c, d) = (((min(x[0], y[0]), max(x[1], y[1]))) for x, y in zip(one.ranges, two.ranges, strict=True))
+    deeper = one if one.depth >= two.depth else two
+    return replace(deeper, ranges=((a, b), (c, d)))
 
 
 def _candidates(pair: MeshingPair, angles: Array, flank: Array) -> tuple[IntArray, IntArray]:

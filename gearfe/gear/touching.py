@@ -127,16 +127,18 @@ class Face:
                 made += 0.5 * (b - a) * float(_GAUSS_W @ self.speeds(a + 0.5 * (b - a) * (_GAUSS_X + 1)))
         return sign * made
 
-    def curvature(self, u: float, most: float) -> float:
-        """Curvature (1/m) at u, at most `most`, which a sharp tip has."""
-        if self.round_ is not None and u > 1.0:
-            return min(most, 1.0 / self.round_.radius)
-        if u >= 1.0 - 1e-9 or (self.fall > 0.0 and u <= 0.0):
-            return most
+    def curvature(self, u: Any, most: float) -> Any:
+        """Curvature (1/m) at u (a number or an array), at most `most`, which a sharp tip has."""
         step = 1e-5
-        turned = self.normals(np.array([u + step, max(0.0, u - step)]))
-        lengths = self.speeds(np.array(u)) * (u + step - max(0.0, u - step))
-        return min(most, max(0.0, -float(np.angle(turned[0] / turned[1])) / float(lengths)))
+        before, after = np.clip(u - step, 0.0, 1.0), np.asarray(u + step)
+        turned = -np.angle(self.normals(after) / self.normals(before)) / (self.speeds(u) * (after - before))
+        corner = np.asarray(u >= 1.0 - 1e-9)
+        if self.fall > 0.0:
+            corner = corner | (u <= 0.0)
+        made = np.where(corner, most, np.maximum(0.0, turned))
+        if self.round_ is not None:
+            made = np.where(u > 1.0, 1.0 / self.round_.radius, made)
+        return np.minimum(most, made)[()]
 
     def tip_angle(self) -> float:
         """Angle (rad) of the material between the flank's end and the tip circle."""
@@ -192,6 +194,8 @@ class Touching:
         Point of contact and common normal out of the pinion, global axes.
     arm : ndarray, shape (n, 2)
         Torques of pinion and wheel per force (m).
+    curvature : ndarray, shape (n,)
+        Relative curvature of both flanks there (1/m), infinite at a sharp corner.
     """
 
     position: IntArray
@@ -203,6 +207,7 @@ class Touching:
     point: NDArray[np.complex128]
     normal: NDArray[np.complex128]
     arm: Array
+    curvature: Array
 
     def take(self, index: Any) -> Touching:
         """The pairs `index`."""
@@ -265,8 +270,8 @@ class Flanks:
         reach += pair.pinion.profile.tip_half_angle + 0.5 * pair.mesh_cycle
         half = math.ceil(reach / pair.mesh_cycle)
         number = np.round(-angles / pair.mesh_cycle).astype(np.int64)[:, None] + np.arange(-half, half + 1)
-        position = np.repeat(np.arange(len(angles)), number.shape[1])
-        return angles[position], number.ravel(), position
+        position, tooth = np.nonzero(np.abs(angles[:, None] + number * pair.mesh_cycle) <= reach)
+        return angles[position], number[position, tooth], position
 
     def _described(self, position: IntArray, angle: Array, number: IntArray, u: Array, twist: Array) -> Touching:
         seen = self.placed(angle, number, u)
@@ -282,8 +287,9 @@ class Flanks:
         normal = np.where(at_edge, wheel_normal, normal)
         point = seen + self.pair.working_centre_distance
         arm = np.stack([_cross(point, normal), -_cross(seen, normal)], axis=1)
-        place = np.stack([u, mate], axis=1)
-        return Touching(position, number, angle, twist, place, np.stack([np.abs(point), radius], 1), point, normal, arm)
+        place, radii = np.stack([u, mate], axis=1), np.stack([np.abs(point), radius], axis=1)
+        bent = self.pinion.curvature(u, math.inf) + self.wheel.curvature(mate, math.inf)
+        return Touching(position, number, angle, twist, place, radii, point, normal, arm, bent)
 
 
 def _cross(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> Array:

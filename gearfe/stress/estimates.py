@@ -33,13 +33,13 @@ KINDS = (
     "trajectory",
     "response",
     "curve",
+    "frequencies",
     "trajectory",
     "response",
     "curve",
+    "reduction",
     "trajectory",
     "response",
-    "curve",
-    "body",
 )
 #: Element sizes of the truth of a curve, as a share of the case's; errors fall with its power of 1.5 to 2.
 FINER = 0.35
@@ -50,8 +50,6 @@ ROUNDING = 1e-12
 def draw(random: np.random.Generator, number: int) -> Case:
     """A random scene of the headline whose turn it is."""
     kind = KINDS[number % len(KINDS)]
-    if kind == "body":
-        kind = "frequencies" if (number // len(KINDS)) % 2 == 0 else "reduction"
     return MAKERS[kind](random, number, kind)
 
 

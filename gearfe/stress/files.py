@@ -7,7 +7,10 @@ Kinds of cases:
   no program be started, and no text of the file be run as code. An audit hook (PEP 578) watches all of that;
 - *killed*: the program as a process of its own, killed at a random moment: each file in the output folder is whole, and
   a second run succeeds;
-- *full*: it runs with a limit on the size of files, as on a full disk: exit code 2 with a reason, or 0;
+- *full*: it runs with a limit on the size of files: exit code 2 with a reason, or 0;
+- *disk*: its output folder is on a mounted disk of 4 to 32 KiB, and so is the cache of every other one: the same, and
+  all files or none;
+- *read_only*: on a disk that is mounted to be read only: exit code 2 with a reason;
 - *closed*: its output folder cannot be made or written to: exit code 2 with a reason;
 - *shared*: two processes with one empty cache and one job at the same time: both tables are the same.
 """
@@ -21,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from .campaign import Campaign, Case
-from .disturbed import closed_run, full_run, killed_run, shared_run
+from .disturbed import closed_run, disk_run, full_run, killed_run, read_only_run, shared_run
 from .in_process import mutated_run
 from .mutations import base_jobs, mutated
 from .outcome import Finding
@@ -32,10 +35,12 @@ RUNS: dict[str, Callable[[Case, Path], Finding]] = {
     "mutated": mutated_run,
     "killed": killed_run,
     "full": full_run,
+    "disk": disk_run,
+    "read_only": read_only_run,
     "closed": closed_run,
     "shared": shared_run,
 }
-KINDS = ("killed", "full", "closed", "killed", "full", "shared", "killed", "closed")
+KINDS = ("killed", "full", "closed", "disk", "read_only", "shared", "killed", "disk")
 
 
 def draw(random: np.random.Generator, number: int) -> Case:
@@ -61,4 +66,4 @@ def run(case: Case, folder: Path) -> Finding:
     return RUNS[case.kind](case, folder)
 
 
-CAMPAIGN = Campaign("files", 10_000, (0, 100, 200, 500, *range(1, 61)), 30.0, draw, run, long_is_bad=False)
+CAMPAIGN = Campaign("files", 10_000, (0, 100, 200, 300, 400, 500, *range(1, 61)), 30.0, draw, run, long_is_bad=False)

@@ -13,8 +13,10 @@ Table = dict[str, Any]
 Made = tuple[Table, dict[str, str], dict[str, Any]]
 
 #: Kinds that take turns.
-KINDS = ("general", "resonance", "floquet", "symmetric", "order", "floquet")
+KINDS = ("general", "resonance", "floquet", "symmetric", "order", "stiff")
 MODULE, ALPHA = 2.5, 25.0
+#: Length of a run that is to settle, times its damping per mass.
+SETTLED = 50.0
 
 
 def curve_text(random: np.random.Generator, teeth: int, mean: float, swing: float) -> str:
@@ -32,8 +34,9 @@ def curve_text(random: np.random.Generator, teeth: int, mean: float, swing: floa
 
 def row(random: np.random.Generator, kind: str) -> Made:
     """Tables, curve files and what the checks need to know of a random train."""
-    symmetric = kind in ("symmetric",)
-    stages = 1 if kind in ("symmetric", "floquet", "resonance", "housing") else int(random.integers(1, 5))
+    symmetric = kind == "symmetric"
+    stages = int(random.integers(1, 5)) if kind in ("general", "order", "stiff") else 1
+    smooth = kind == "stiff" or (kind == "order" and random.random() < 0.5)
     most = (40, 50) if stages == 1 else (26, 27)  # gears of longer rows must clear the shafts beside them
     teeth = [(int(random.integers(18, most[0])), int(random.integers(18, most[1]))) for _ in range(stages)]
     if kind == "housing":
@@ -56,8 +59,12 @@ def row(random: np.random.Generator, kind: str) -> Made:
         along = 0.0 if symmetric or kind == "housing" else 15.0 - 10.0 * i
         gears.append({"name": f"d{i}", "shaft": f"s{i}", "y_mm": along, "teeth": one, **form})
         gears.append({"name": f"g{i}", "shaft": f"s{i + 1}", "y_mm": along, "teeth": two, **form})
-        mesh: Table = {"driver": f"d{i}", "driven": f"g{i}", "curve": f"curve_{i}.csv"}
-        files[f"curve_{i}.csv"] = curve_text(random, one, stiffness, swing)
+        mesh: Table = {"driver": f"d{i}", "driven": f"g{i}"}
+        if smooth:
+            mesh["stiffness_N_per_m"] = rounded(stiffness * random.uniform(0.5, 2.0), 6)
+        else:
+            mesh["curve"] = f"curve_{i}.csv"
+            files[f"curve_{i}.csv"] = curve_text(random, one, stiffness, swing)
         if kind == "general" and random.random() < 0.15:
             mesh = {"driver": f"d{i}", "driven": f"g{i}", "rigid": True}
         if random.random() < 0.3 and "rigid" not in mesh:
@@ -75,8 +82,11 @@ def row(random: np.random.Generator, kind: str) -> Made:
     last = 2 * len(teeth) + 1
     load = rounded(log_uniform(random, 1.0, 300.0), 3) * -math.copysign(1.0, speed) * (-1.0) ** len(teeth)
     train["loads"] = [{"shaft": f"s{len(teeth)}", "attachment": str(last), "torque_Nm": load}]
-    data: dict[str, Any] = {}
+    data: dict[str, Any] = {"smooth": smooth}
     _special(random, kind, train, teeth[0], stiffness, last)
+    if symmetric and random.random() < 0.5:
+        data["frame"] = int(random.integers(1 << 30))
+        _in_a_frame(train)
     if kind == "housing":
         del train["rigid_bores"]
         train |= {"housing": "elastic", "tolerance": 1e-6}
@@ -88,8 +98,8 @@ def _special(
     random: np.random.Generator, kind: str, train: Table, teeth: tuple[int, int], stiffness: float, last: int
 ) -> None:
     """What a kind asks for beside the common parts."""
-    if kind in ("general", "order") and random.random() < 0.5:
-        size = log_uniform(random, 1e6, 1e9)
+    if kind == "stiff" or (kind in ("general", "order") and random.random() < 0.5):
+        size = log_uniform(random, 1e6, 1e10 if kind == "stiff" else 1e9)
         held = [[size, size, size, 1e-3 * size, 1e-3 * size][k] * random.uniform(0.5, 2.0) for k in range(5)]
         damp = [1e-5 * float(random.choice([0.0, 1.0])) * x for x in held]
         train["bearings"] = [{"attachment": str(n), "stiffness": held, "damping": damp} for n in range(1, last + 2)]
@@ -105,6 +115,14 @@ def _special(
         train["tolerance"] = rounded(log_uniform(random, 1e-7, 1e-2), 2)
         train["duration_ms"] = 0.5
         train["step_us"] = 5.0
+    if kind == "stiff":
+        # all modes, slow and fast, decay with half of alpha: e-folds enough until the end
+        alpha = rounded(log_uniform(random, 200.0, 2000.0), 4)
+        train["damping"] = {"rayleigh_alpha_per_s": alpha}
+        train["method"] = str(random.choice(["auto", "explicit", "implicit"]))
+        train["tolerance"] = rounded(log_uniform(random, 1e-7, 1e-2), 2)
+        train["duration_ms"] = 1e3 * SETTLED / alpha
+        train["step_us"] = 1e3 * train["duration_ms"] / 100
     if kind in ("floquet", "resonance"):
         # a driven wheel that is free to turn: the drive holds the pinion, k works on its polar inertia
         inertia = wheel_inertia(teeth[1])
@@ -128,6 +146,15 @@ def _special(
         train["bearings"] = [{"attachment": str(n), "stiffness": held} for n in range(1, last + 2)]
 
 
+def _in_a_frame(train: Table) -> None:
+    """A third bore for each shaft, in the mirror plane, so that drive and load act there and spoil no symmetry."""
+    for shaft, part in zip(train["shafts"], (train["drive"], train["loads"][0]), strict=True):
+        name = f"{shaft['name']} middle"
+        shaft["attachments"] = [*shaft["attachments"], name]
+        train["rigid_bores"].append({"attachment": name, "x_mm": shaft["x_mm"], "y_mm": 0.0})
+        part["attachment"] = name
+
+
 def wheel_inertia(teeth: int) -> float:
     """About the polar inertia (kg m2) of the driven shaft with its gear: a disc of the pitch diameter and the shaft."""
     disc = 0.5 * 7850.0 * math.pi * 8e-3 * (0.5e-3 * MODULE * teeth) ** 4
@@ -137,15 +164,17 @@ def wheel_inertia(teeth: int) -> float:
 def housing(random: np.random.Generator, distance: float) -> Table:
     """A small random housing, coarsely meshed, for two shafts."""
     walls = [rounded(random.uniform(4.0, 12.0), 2), rounded(random.uniform(4.0, 12.0), 2)]
-    return {
+    made: Table = {
         "wall_x_mm": [-rounded(random.uniform(35.0, 55.0), 3), distance + rounded(random.uniform(35.0, 55.0), 3)],
         "wall_z_mm": [-rounded(random.uniform(50.0, 90.0), 3), rounded(random.uniform(22.0, 45.0), 3)],
         "inner_gap_mm": rounded(random.uniform(30.0, 60.0), 3),
         "wall_thickness_mm": walls,
         "base_thickness_mm": rounded(random.uniform(8.0, 20.0), 3),
         "shafts": [{"x_mm": 0.0, "bore_radius_mm": 10.0}, {"x_mm": distance, "bore_radius_mm": 10.0}],
-        "feet": {"length_x_mm": 20.0, "width_y_mm": 15.0, "height_mm": 10.0, "fixed": True},
+        "feet": {"length_x_mm": 20.0, "width_y_mm": 15.0, "fixed": True},
         "mesh": {"size_mm": rounded(random.uniform(9.0, 13.0), 2), "order": 2},
         "reduction": {"modes_below_Hz": 8000.0, "least_modes": 20, "band_Hz": 4000.0},
         "damping": {"ratio": float(random.choice([0.0, 0.01, 0.03]))},
     }
+    made["feet"]["height_mm"] = min(10.0, made["base_thickness_mm"])
+    return made
