@@ -34,7 +34,7 @@ class ReductionError:
     band_hz
         Upper end of the band (Hz).
     response
-        Estimated error of the attachments' accelerations under forces on them, relative, rms over the band and all pairs.
+        Estimated error of the attachments' accelerations under forces on them: relative, rms over band and pairs.
     frequencies_hz : (k,)
         Natural frequencies within the band, attachments free (Hz).
     frequency_errors : (k,)
