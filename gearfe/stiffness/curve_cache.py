@@ -2,7 +2,7 @@
 
 A stored curve is the CSV file of `gearfe.stiffness.curve.StiffnessCurve` (exact in both directions) in the folder of
 the mesh cache, named by a hash of all that decides it: the pair, materials, contact law, sizes and positions, the
-versions of numpy, scipy and gmsh, and the text of this package's own modules that compute it.
+versions of numpy, scipy and gmsh, and the text of this package's own rooms that compute it.
 """
 
 from __future__ import annotations
@@ -22,24 +22,8 @@ from ..meshing.cache import cache_folder, cache_key
 from ..stopwatch import Stopwatch
 from .curve import StiffnessCurve
 
-#: Modules beside those of contact and meshing that decide a curve.
-MODULES = (
-    "curves",
-    "elasticity",
-    "gear",
-    "involute",
-    "local_gap",
-    "mesh_geometry",
-    "routes",
-    "small_balance",
-    "small_load",
-    "spur_gear",
-    "stiffness",
-    "stiffness_curve",
-    "sweep_positions",
-    "torque_control",
-    "touching",
-)
+#: Rooms whose text decides a curve, beside `gearfe.elasticity`.
+ROOMS = ("contact", "gear", "meshing", "stiffness")
 
 
 def cached_curve(
@@ -104,10 +88,9 @@ def _stored(path: Path, pair: GearPair) -> StiffnessCurve | None:
 
 @cache
 def _source() -> str:
-    """Hash of the text of the modules that compute curves."""
-    here = Path(__file__).parent
-    files = [here / f"{name}.py" for name in MODULES]
-    files += [file for folder in ("contact", "meshing") for file in sorted((here / folder).glob("*.py"))]
+    """Hash of the text of the rooms that compute curves."""
+    package = Path(__file__).parents[1]
+    files = [package / "elasticity.py", *(file for room in ROOMS for file in sorted((package / room).glob("*.py")))]
     text = hashlib.sha256()
     for file in files:
         text.update(file.name.encode() + file.read_bytes())
