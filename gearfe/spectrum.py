@@ -240,7 +240,7 @@ def order_lines(fundamentals: Mapping[str, float], highest: float, *, orders: in
         OrderLine(name, k, k * abs(f))
         for name, f in fundamentals.items()
         if f != 0.0
-        for k in range(1, min(orders, int(highest / abs(f) * (1.0 + 1e-12))) + 1)
+        for k in range(1, int(min(orders, highest / abs(f) * (1.0 + 1e-12))) + 1)
     ]
     return tuple(sorted(lines, key=lambda line: (float(f"{line.frequency:.9g}"), line.order)))
 
