@@ -214,7 +214,7 @@ def test_outer_surface_of_a_box() -> None:
 
 
 def test_mesh_error_estimate_follows_the_true_error() -> None:
-    """Cantilever bending, clamped edges and all: the estimate keeps the true error's size and falls with it."""
+    """Cantilever bending, clamped edges and all: the estimate covers the true error, keeps its size, falls with it."""
 
     def first(divisions: int) -> tuple[float, float]:
         nodes, tets = box((4 * divisions, divisions, divisions), (0.4, 0.1, 0.1))
@@ -230,7 +230,7 @@ def test_mesh_error_estimate_follows_the_true_error() -> None:
     fine = first(5)
     found = np.array([first(divisions) for divisions in (1, 2)])
     true = 1.0 - fine[0] / found[:, 0]
-    assert np.all((found[:, 1] > 0.25 * true) & (found[:, 1] < 2.0 * true)), (true, found[:, 1])
+    assert np.all((found[:, 1] > true) & (found[:, 1] < 5.0 * true)), (true, found[:, 1])
     assert found[0, 1] / found[1, 1] == pytest.approx(true[0] / true[1], rel=0.25)
 
 

@@ -56,7 +56,7 @@ def test_an_order_that_is_missing_is_seen() -> None:
     truth = simulate(model, times, tolerance=1e-11, method="explicit").contact_force
     for method in ("explicit", "implicit"):
         (good,) = _order(model, times, method, truth)
-        assert abs(good.value) < 0.6
+        assert good.value < 0.6
         (bad,) = _order(model, times, method, truth * 1.01)  # an error that no smaller step makes smaller
         assert bad.share > 1.0
 

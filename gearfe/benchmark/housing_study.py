@@ -22,7 +22,7 @@ from .subject import DATA, given_file, housing_of
 from .timing import measured
 
 #: Element sizes (mm), coarse to fine; the last one is the truth of the others.
-SIZES, QUICK_SIZES = (14.0, 11.0, 9.0, 7.0, 6.0, 4.6), (40.0, 24.0)
+SIZES, QUICK_SIZES = (20.0, 14.0, 11.0, 9.0, 7.0, 6.0, 4.6, 4.0), (40.0, 24.0)
 LINEAR_SIZES = (11.0, 7.0, 4.6)
 #: (modes, correction levels) of the reduction.
 REDUCTIONS = (

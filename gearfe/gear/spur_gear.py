@@ -18,6 +18,8 @@ from .tooth_root import half_tooth_angle
 LEAST_RIM = 0.25
 #: Least bore, times module: plane elasticity gives a point no stiffness, and a bore of a hundredth tears loose.
 LEAST_BORE = 0.05
+#: Least tip round that is not a sharp corner, times module: meshers need seconds for less, and elements degenerate.
+LEAST_ROUND = 1e-6
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,9 @@ class Gear:
             problem = f"must be >= {1e3 * LEAST_BORE * self.module:.6g} mm, {LEAST_BORE:g} module"
             cure = "use a larger bore: the gear is held there, and a point holds nothing"
             raise InputError("bore_diameter", self.bore_diameter, problem, cure)
+        if 0.0 < self.tip_round < LEAST_ROUND * self.module:
+            problem = f"must be 0 or >= {1e3 * LEAST_ROUND * self.module:.6g} mm, {LEAST_ROUND:g} module"
+            raise InputError("tip_round", self.tip_round, problem, "write 0 for a sharp corner")
         limit = 2.0 * (self.root_radius - LEAST_RIM * self.module)
         if not self.bore_diameter <= limit:
             problem = (

@@ -1,4 +1,4 @@
-r"""Cholesky factorisation of a large sparse matrix on dense fronts: ``A = L L^T`` with LAPACK doing nearly all the work.
+r"""Cholesky factorisation of a large sparse matrix on dense fronts: ``A = L L^T`` by LAPACK, front by front.
 
 Nested dissection orders the unknowns; what depends on what is a tree (the elimination tree). Runs of the tree become
 *fronts*. Taken from the leaves to the roots, a front collects the rows of A that belong to its own unknowns and what
@@ -28,7 +28,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 Floats = NDArray[np.float64]
 Ints = NDArray[Any]
 
-#: Nodes in a subtree that becomes one front: below, calls of small kernels rule; above, zeros that are stored as numbers.
+#: Nodes in a subtree that becomes one front: with fewer, calls of small kernels rule; with more, stored zeros do.
 LEAF_NODES = 32
 #: Rows of an update that are passed on at a time: a strip of them stays in the processor's cache.
 STRIP = 64
@@ -183,11 +183,10 @@ def _fronts(graph: Any, order: Ints) -> _Tree:
     parent = _elimination_tree(graph[order][:, order])
     nodes = len(parent)
     size = [1] * nodes
-    for j, above in enumerate(parent):
-        if above >= 0:
-            size[above] += size[j]
-    large = np.array(size) > LEAF_NODES
-    above = np.array(parent)
+    for j, p in enumerate(parent):
+        if p >= 0:
+            size[p] += size[j]
+    large, above = np.array(size) > LEAF_NODES, np.array(parent)
     branches = np.bincount(above[large & (above >= 0)], minlength=nodes)
     # the last node of a front: top of a small subtree, or a large one whose parent has several large children, or none
     goes_on = (above >= 0) & np.where(large, branches[above] == 1, ~large[above])

@@ -3,27 +3,27 @@ r"""Sparse symmetric positive definite systems ``A x = b``: one small interface,
 ==================  =====================================================  ============  ===========================
 name                what it is                                             licence       needs
 ==================  =====================================================  ============  ===========================
-``metis-superlu``   SuperLU, symmetric mode, nested dissection by METIS    permissive    pymetis
-``pardiso``         PARDISO for positive definite matrices (mtype 2)       MKL's own     pypardiso (x86 only)
+``multifrontal``    Cholesky on dense fronts, nested dissection by METIS   permissive    pymetis
 ``cholmod``         supernodal Cholesky                                    GPL-3         kvxopt
+``pardiso``         PARDISO for positive definite matrices (mtype 2)       MKL's own     pypardiso (x86 only)
 ``superlu``         SuperLU, symmetric mode, minimum degree                permissive    nothing (scipy)
 ==================  =====================================================  ============  ===========================
 
-``auto`` takes the first that is installed, in an order that was measured (processor seconds on one core, second-order
-elasticity in three dimensions; factor, then one right-hand side out of a block of eight):
+``auto`` takes the first that is installed. The order was measured (processor seconds on one core of a busy machine,
+second-order elasticity in three dimensions; factor, then one right-hand side out of a block of eight):
 
-=============  =================  =================
-unknowns       44k                131k
-=============  =================  =================
-metis-superlu  0.82 s, 12 ms      6.4 s, 37 ms
-pardiso        0.68 s, 15 ms      2.2 s, 60 ms
-cholmod        0.46 s, 11 ms      2.8 s, 64 ms
-superlu        1.06 s, 9 ms       21.5 s, 58 ms
-=============  =================  =================
+==============  ===============  ===============
+unknowns        45k              108k
+==============  ===============  ===============
+multifrontal    1.0 s,  9 ms     3.6 s, 24 ms
+cholmod         0.9 s, 20 ms     3.3 s, 64 ms
+pardiso         1.4 s, 28 ms     4.2 s, 71 ms
+SuperLU, METIS  1.9 s, 11 ms     8.6 s, 51 ms
+==============  ===============  ===============
 
-A reduction to some tens of modes needs 100 to 200 right-hand sides, which brings the first three level up to about
-150,000 unknowns; above `LARGE` the factorisation decides and the packages that factor fastest go first. The unknowns of
-a mesh node stay together: orderings are found on the graph of nodes, a third of the size.
+A reduction to some tens of modes solves for 200 right-hand sides: of 72,000 unknowns it took 7.7 s with the first,
+13.1 s with the second, 15.9 s with the third. The unknowns of a mesh node stay together: orderings are found on the
+graph of nodes, a third of the size.
 """
 
 from __future__ import annotations

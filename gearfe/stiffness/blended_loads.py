@@ -30,11 +30,11 @@ def blended_loads(
     assert hertz.scene is not None
     scene = assemble(elastic, _common_windows(direct.scene, hertz.scene))
     scene = replace(scene, compliance=np.zeros((0, 0)), stress=np.zeros((0, 0)), stress_stress=np.zeros((0, 0)))
-    forces = [_on_nodes(scene, p.scene, p.forces) for p in (direct, hertz)]
-    rates = [_on_nodes(scene, p.scene, p.force_rate) for p in (direct, hertz)]
-    pressure = [_on_points(scene, p.scene, p.pressure) for p in (direct, hertz)]
+    forces = [_on_nodes(scene, p, "forces") for p in (direct, hertz)]
+    rates = [_on_nodes(scene, p, "force_rate") for p in (direct, hertz)]
+    pressure = [_on_points(scene, p, "pressure") for p in (direct, hertz)]
     # stress loads are the mesh's alone
-    loads, load_rate = (_on_points(scene, direct.scene, a) for a in (direct.stress_loads, direct.stress_load_rate))
+    loads, load_rate = (_on_points(scene, direct, name) for name in ("stress_loads", "stress_load_rate"))
     return {
         "scene": scene,
         "forces": share * forces[0] + (1 - share) * forces[1],
@@ -63,19 +63,23 @@ def _common_windows(*scenes: Scene) -> list[Window]:
     return made
 
 
-def _on_nodes(scene: Scene, own: Scene, values: Array) -> Array:
-    """Values at the unknowns of a scene's windows on those of the larger ones."""
+def _on_nodes(scene: Scene, position: Position, name: str) -> Array:
+    """What a position has at the unknowns of its windows, on those of the larger ones."""
+    assert position.scene is not None
+    values = getattr(position, name)
     made = np.zeros(2 * len(scene.points))
     place = {(w.gear, w.tooth): w for w in scene.windows}
-    for w in own.windows:
+    for w in position.scene.windows:
         into = place[w.gear, w.tooth]
         first = into.unknowns.start + 4 * (w.first_edge - into.first_edge)
         made[first : first + 4 * w.edges + 2] += values[w.unknowns]
     return made
 
 
-def _on_points(scene: Scene, own: Scene, values: Array | None) -> Array:
-    """The same for values at contact points; where the law has its points on the other flank they are left out."""
+def _on_points(scene: Scene, position: Position, name: str) -> Array:
+    """The same at contact points; nothing where the law has none of it."""
+    own, values = position.scene, getattr(position, name)
+    assert own is not None
     if values is None or len(values) == 0:
         return np.zeros(0)
     made = np.zeros(len(scene.owner))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..contact.finite_strain import finite_strain_shares, interpolated_shares, sample_numbers, with_share
 from ..contact.solver import Position
+from ..errors import InputError
 from ..gear.iso6336 import mesh_stiffness
 from .curve import SOLVED
 from .routes import Router, bare
@@ -89,6 +90,27 @@ def at_twists(
     return _collect(twists, positions, iterations, [p.status for p in positions])
 
 
+#: Yield of a tooth pair (modules) by the standard's stiffness beyond which a torque is refused. Each tooth, 2 modules
+#: high and 1.8 thick, then yields by d = 1/8 module: as a cantilever it has the strain 3 t d/(2 h^2), 8 %, at its root.
+MOST_YIELD = 0.25
+
+
+def check_torque(router: Router, torque: float) -> None:
+    """Raise `InputError` for a torque (N m) that small strain is not meant for."""
+    pair = router.pair
+    most = MOST_YIELD * pair.pinion.module * _usual_stiffness(router) * pair.wheel.base_radius
+    if torque > most:
+        problem = f"must be <= {most:.3g} N m: the teeth would yield by more than {MOST_YIELD:g} modules"
+        raise InputError("torque", torque, problem, "linear elasticity does not reach so far; give less")
+
+
+def _usual_stiffness(router: Router) -> float:
+    """Mesh stiffness by the standard (N/m)."""
+    pair, elastic = router.pair, router.elastic
+    moduli = [body.material.youngs_modulus for body in elastic.bodies]
+    return mesh_stiffness(pair, moduli[0], moduli[1]) * elastic.width
+
+
 def at_torque(
     router: Router,
     angles: Array,
@@ -104,9 +126,8 @@ def at_torque(
     are the twists (rad), shape (n,), at which the rigid flanks touch. With finite strain the share of the torque is
     evaluated at the twists so found, which then move by that share.
     """
-    pair, elastic = router.pair, router.elastic
-    moduli = [body.material.youngs_modulus for body in elastic.bodies]
-    guess = mesh_stiffness(pair, moduli[0], moduli[1]) * elastic.width * pair.wheel.base_radius**2
+    pair = router.pair
+    guess = _usual_stiffness(router) * pair.wheel.base_radius**2
     goal = np.full(len(angles), torque)
     found = _search(router, angles, goal, touching, touching + torque / guess, progress)
     if finite:

@@ -38,11 +38,11 @@ class Balance:
         Local contact of each loaded pair, None for the others.
     torque_wheel, torque_pinion, tangent
         N m, N m, N m/rad.
-    bore_difference
-        What the moment of the bore's reactions has more than torque_wheel, since forces act at displaced points: sum of
-        u x f over the wheel (N m).
     shares : ndarray, shape (m,)
         Torque of each pair on the wheel (N m).
+    reactions : ndarray, shape (2, m)
+        Moments of the reactions at the bores of pinion and wheel, pair by pair: those of the forces at undeformed
+        places, while torques are those at displaced ones (N m).
     lean, lean_rate : ndarray, shape (m,)
         Angle (rad) by which the common normal of the loaded faces has turned from n, and its rate with the twist (-).
     iterations
@@ -56,8 +56,8 @@ class Balance:
     torque_wheel: float
     torque_pinion: float
     tangent: float
-    bore_difference: float
     shares: Array
+    reactions: Array
     lean: Array
     lean_rate: Array
     iterations: int
@@ -74,12 +74,10 @@ class _Growing:
     force_twice : ndarray, shape (m, m)
     force_twist : ndarray, shape (m,)
         d2G/dF dtwist (m).
-    pulls : ndarray, shape (m,)
-        dG/dtwist, its parts from each contact (N m).
+    pulls : ndarray, shape (2, m)
+        dG by the rotations of pinion and wheel, its parts from each contact but for the slides' (N m).
     twist_twice
         d2G/dtwist2 (N m).
-    pinion
-        dG by the pinion's rotation (N m).
     lean : ndarray, shape (m,)
         dQ/dtau_2, the angle by which the force turns: a contact that may slide to where the faces overlap more is
         pushed that way (rad).
@@ -90,7 +88,6 @@ class _Growing:
     force_twist: Array
     pulls: Array
     twist_twice: float
-    pinion: float
     lean: Array
 
 
@@ -113,6 +110,7 @@ def _growing(r: Reference, force: Array, psi: Array, answers: Sequence[Approach 
     seen = np.einsum("ki,kij->kj", bent, r.motion) + rate[:, None] * tilts
     by_force = 0.5 * np.einsum("ki,ki->k", bent, v) + force @ np.einsum("ki,kij->kj", bent, r.motion)
     own = np.einsum("ki,ki->k", bent, r.rigid)
+    rigids = np.stack([r.pinion_rigid, r.rigid])
     # the wheel turns on by psi with the slides that the loads gave its faces
     slid, slides = r.motion[:, 3] @ force, psi[:, None] * r.motion[:, 3]
     carried = force @ r.motion[:, 3]
@@ -120,12 +118,8 @@ def _growing(r: Reference, force: Array, psi: Array, answers: Sequence[Approach 
         force=by_force + tilt + offset @ tilts - psi * slid - force @ slides,
         force_twice=seen + seen.T + np.einsum("k,kij,kil->jl", force, r.motion, stiff) - slides - slides.T,
         force_twist=own + np.einsum("k,ki,kij->j", force, rigid, r.motion) + moment_rate * rigid_tilt - slid - carried,
-        pulls=force * (own - slid) + moment * rigid_tilt,
+        pulls=np.einsum("gki,ki->gk", rigids, force[:, None] * bent + moment[:, None] * _TILT),
         twist_twice=float(force @ np.einsum("ki,ki->k", rigid, r.rigid)),
-        pinion=float(
-            force @ (np.einsum("ki,ki->k", bent, r.pinion_rigid) + r.motion[:, 2] @ force)
-            + moment @ (r.pinion_rigid @ _TILT)
-        ),
         lean=bent[:, 3],
     )
 
@@ -140,9 +134,8 @@ def balance(reference: Reference, twist: float) -> Balance:
     overlap = np.where(psi > 0, lever * psi + 0.5 * psi**2 * radial, lever * psi)
     answers: list[Approach | None] = [None] * count
     if not (overlap > 0).any():
-        return Balance(
-            True, np.zeros(count), np.zeros(count), tuple(answers), 0.0, 0.0, 0.0, 0.0, *np.zeros((3, count)), 0
-        )
+        none = np.zeros(count)
+        return Balance(True, none, none, tuple(answers), 0.0, 0.0, 0.0, none, np.zeros((2, count)), none, none, 0)
     psi = np.maximum(psi, 0.0)
     light = 0.05 * r.local[0].modulus * w  # a stiffness that a line contact has about
     force = np.where(overlap > 0, light * overlap, 0.0)
@@ -190,14 +183,23 @@ def _balanced(
     rate = np.zeros(len(force))
     local = np.diag([contacts[k].rate / r.width for k in on])
     rate[on] = np.linalg.solve((r.compliance - grown.force_twice)[np.ix_(on, on)] + local, pull[on])
-    shares = force * lever + grown.pulls
     tangent = float(pull @ rate + force @ radial) + grown.twist_twice
-    pinion = float(r.touching.arm[:, 0] @ force) + grown.pinion
-    slide = float(force @ (r.motion[:, 3] @ force))
+    reactions = force * np.stack([r.touching.arm[:, 0], lever]) + grown.pulls
+    pinion, shares = reactions + force * np.stack([r.motion[:, 2] @ force, -r.motion[:, 3] @ force])
     turning = np.einsum("ki,ki->k", r.wander[:, 3], r.motion @ rate + r.rigid)
-    torque = float(shares.sum())
     return Balance(
-        converged, force, rate, contacts, torque, pinion, tangent, slide, shares, grown.lean, turning, iteration
+        converged,
+        force,
+        rate,
+        contacts,
+        float(shares.sum()),
+        float(pinion.sum()),
+        tangent,
+        shares,
+        reactions,
+        grown.lean,
+        turning,
+        iteration,
     )
 
 
@@ -220,7 +222,7 @@ def position_of(reference: Reference, found: Balance) -> Position:
         status="converged",
         torque_wheel=found.torque_wheel,
         torque_pinion=found.torque_pinion,
-        torque_wheel_reaction=found.torque_wheel + found.bore_difference,
+        torque_wheel_reaction=float(found.reactions[1].sum()),
         tangent=found.tangent,
         pair_numbers=tuple(int(k) for k in r.touching.pair[order]),
         pair_torques=found.shares[order],
@@ -240,28 +242,31 @@ def with_forces(
 ) -> Position:
     """The position with scene and forces, for fields and for the share of finite strain.
 
-    The forces are the reference pressures scaled to the forces of the pairs and turned to the normal of the loaded
-    faces, so that those on both gears cancel and T_wheel + T_pinion = a F_y: fields recovered from them are right
-    beyond about two half widths of the reference pressure from a contact, which they show wider and with less stress
-    than it has.
+    The forces are the reference pressures scaled to the forces of the pairs, turned to the normal of the loaded faces
+    and moved by a couple to their line: those on both gears cancel and have the moments of the balance. Fields
+    recovered from them are right beyond about two half widths of the reference pressure from a contact, which they show
+    wider and with less stress than it has.
     """
     r = reference
     windows: list[Window] = []
     forces, rates, pressures, node = [], [], [], 0
     for number, k in enumerate(np.flatnonzero(found.force > 0)):
-        along = found.force[k] * (1 + 1j * found.lean[k])
-        along_rate = found.rate[k] * (1 + 1j * found.lean[k]) + found.force[k] * 1j * found.lean_rate[k]
+        rate = found.rate[k] + found.force[k] * 1j * found.lean_rate[k]
         for g, tooth in enumerate(r.teeth(int(k))):
             loads = r.unit[k][g]
             first, edges = loads.edges
             placed = elastic.tooth_angle(g, tooth, r.angle, twist)
             windows.append(Window(g, number, tooth, first, edges, node, placed))
             node += 2 * edges + 1
-            unit = loads.probes[0].view(complex)
             # the wheel's axes have turned on since its tooth touched, and go on turning
             turned = np.exp(-1j * g * (twist - r.touching.twist[k]))
-            forces.append((along * turned * unit).view(float))
-            rates.append(((along_rate - 1j * g * along) * turned * unit).view(float))
+            unit, couple = turned * loads.probes[:2].view(complex)
+            unit = unit * (1 + 1j * found.lean[k])
+            arms = elastic.bodies[g].flank.points.ravel()[loads.unknowns].view(complex)
+            missing = -found.reactions[g, k] / found.force[k] - _moment(arms, unit)
+            unit += missing / _moment(arms, couple) * couple
+            forces.append((found.force[k] * unit).view(float))
+            rates.append(((rate - 1j * g * found.force[k]) * unit).view(float))
             pressures.append(found.force[k] * loads.pressure(elastic.bodies[g].flank, r.width))
     if not windows:
         return position
@@ -276,3 +281,8 @@ def with_forces(
         stress_loads=none,
         stress_load_rate=none,
     )
+
+
+def _moment(arms: NDArray[np.complex128], forces: NDArray[np.complex128]) -> float:
+    """Sum of x f_y - y f_x."""
+    return float((np.conj(arms) * forces).imag.sum())

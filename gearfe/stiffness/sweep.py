@@ -31,7 +31,7 @@ from ..threads import one_thread
 from .curve import SOLVED, ErrorEstimate, StiffnessCurve
 from .curve_error import COARSENING, error_estimate, law_error, solved_twice
 from .periodic import fold
-from .positions import Progress, Solved, at_torque, at_twists, honest, load_shares
+from .positions import Progress, Solved, at_torque, at_twists, check_torque, honest, load_shares
 from .routes import Route, Router
 
 __all__ = ["ErrorEstimate", "StiffnessCurve", "elastic_pair", "sweep_stiffness"]
@@ -178,6 +178,8 @@ def sweep_stiffness(
         elastic = elastic_pair(pair, materials, coarsen=coarsen, watch=watch, **common)
     solved_angles, source = (asked, np.arange(len(asked))) if solve_all else distinct_angles(asked, cycle)
     router = Router(pair, elastic, route)
+    if torque is not None:
+        check_torque(router, load)
     with watch.stage("unloaded flanks"):
         touching = router.touching_twists(solved_angles)
     with watch.stage("positions"), one_thread():

@@ -1,7 +1,7 @@
 """Error estimates against the truth, on scenes that nobody looked at when the estimates were made.
 
 - *curve*: the estimate of `gearfe stiffness` against a mesh several times finer;
-- *frequencies*: the mesh estimate of `gearfe housing` against a mesh of half the size;
+- *frequencies*: the mesh estimate of `gearfe housing` against a mesh of half the size, whose own error is added;
 - *reduction*: the bound on the response against a body with many more modes;
 - *response*: the integration estimate of `gearfe vibration` against a tolerance of 1e-11;
 - *trajectory*: the estimate of `gearfe mechanism` against a tolerance of 1e-12.
@@ -43,6 +43,9 @@ KINDS = (
 )
 #: Element sizes of the truth of a curve, as a share of the case's; errors fall with its power of 1.5 to 2.
 FINER = 0.35
+#: Error of a frequency over its difference from a mesh of half the size. The clamped edges of the feet let the lowest
+#: modes converge with an order of about 1 only: the finer mesh errs half as much and hides as much again.
+HIDDEN = 2.0
 #: Errors below this are rounding, which no estimate means.
 ROUNDING = 1e-12
 
@@ -169,7 +172,7 @@ def _run_frequencies(case: Case, job_path: Path) -> Found:
     stated = frequency_errors(body.nodes, body.elements, material(table), fields)
     mesh = dataclasses.replace(table.mesh, size_mm=0.5 * table.mesh.size_mm, bore_edges=2 * table.mesh.bore_edges)
     truth = reduced_housing(dataclasses.replace(table, mesh=mesh))
-    off = np.abs(body.coupled.frequencies_hz[:10] / truth.coupled.frequencies_hz[:10] - 1)
+    off = HIDDEN * np.abs(body.coupled.frequencies_hz[:10] / truth.coupled.frequencies_hz[:10] - 1)
     return float(off.max()), float(stated.max()), "relative"
 
 

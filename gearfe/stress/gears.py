@@ -3,7 +3,7 @@
 Checks of an answer, at every position that was solved:
 
 - *balance*: the contact forces on both gears cancel, and so do their moments: T_wheel + T_pinion = a F_y about current
-  places, relative to the wheel's torque;
+  places, and those at undeformed places make the reactions at the wheel's bore, relative to the wheel's torque;
 - *ratio*: while all loaded pairs touch on their involutes, T_wheel/T_pinion = z_wheel/z_pinion, but for what the
   bending of the teeth makes of their normals;
 - *period*: one mesh cycle further the torque is the same;
@@ -129,7 +129,10 @@ def balance(elastic: MeshingPair, found: Position) -> Check | None:
     on_wheel = force[found.scene.of_wheel].sum(axis=0)
     moment = found.torque_wheel + found.torque_pinion - elastic.centre_distance * on_wheel[1]
     rest = float(np.linalg.norm(force.sum(axis=0)) / np.linalg.norm(on_wheel))
-    return Check("balance", max(rest, abs(moment / found.torque_wheel)), BALANCE)
+    arm = (found.scene.points - found.scene.wheel_centre)[found.scene.of_wheel]
+    pull = force[found.scene.of_wheel]
+    reaction = found.torque_wheel_reaction + float((arm[:, 0] * pull[:, 1] - arm[:, 1] * pull[:, 0]).sum())
+    return Check("balance", max(rest, *(abs(m / found.torque_wheel) for m in (moment, reaction))), BALANCE)
 
 
 def on_path(pair: GearPair, angle: float, twist: float, found: Position) -> bool:
@@ -151,7 +154,7 @@ def ratio_checks(pair: GearPair, elastic: MeshingPair, angles: Any, twists: Any,
         ratio = p.torque_wheel / p.torque_pinion
         expected = pair.wheel.teeth / pair.pinion.teeth
         if p.route == "direct":
-            (bent,) = known.solve([angle], [twist])
+            (bent,) = known.solve(np.array([angle]), np.array([twist]))
             expected = bent.torque_wheel / bent.torque_pinion
         overlap = abs(twist - pair.contact_twist) * pair.wheel.base_radius / pair.pinion.module
         limit = RATIO * max(1.0, 2.0 / elements_within(pair, elastic, angle, p)) + RATIO_BENT * overlap**2

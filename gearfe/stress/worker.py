@@ -42,6 +42,16 @@ def run_case(campaign: Campaign, seed: int, number: int) -> Outcome:
     return judged(number, case.kind, time.perf_counter() - begin, found)
 
 
+def compile_series() -> None:
+    """Compile the series of mechanisms with a pendulum: short runs do without, long ones would within a limit."""
+    from ..rigid import Body, Gravity, Hinge, PlanarScene, Scene, System, compiled, integrate
+
+    if compiled.available():
+        rod = Body("rod", 1.0, 0.1, (0.5, 0.0), (0.0, 0.0), 1.0)
+        scene = PlanarScene(Scene((rod,), (Hinge("rod", "ground"),), (Gravity((0.0, -9.81)),)))
+        integrate(System([scene]), [0.0, 0.1], method="taylor", backend="compiled")
+
+
 def work(pipe: Any, name: str, seed: int) -> None:
     """Answer case numbers from `pipe` with rows, until None comes."""
     os.environ.setdefault("MPLBACKEND", "Agg")
@@ -53,6 +63,7 @@ def work(pipe: Any, name: str, seed: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the parent, which ends this process
     if campaign.compiles:  # an interrupted compilation would leave the compiler unusable
         run_case(campaign, seed, 0)
+        compile_series()
     if hasattr(signal, "SIGALRM"):
         signal.signal(signal.SIGALRM, late)
     while (number := pipe.recv()) is not None:
