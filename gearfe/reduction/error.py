@@ -20,9 +20,10 @@ from .modal_body import ModalBody
 
 Floats = NDArray[np.float64]
 
-#: The response is bounded to first order and with modes as exact as the eigensolver; this covers both (on
-#: random housings the true error was 0.86 to 1.14 of the bare figure).
+#: The response is bounded to first order: on random housings the bare figure was 0.97 to 1.15 times the true error.
 SAFETY = 1.5
+#: What the eigensolver leaves of the modes that are kept; it matters where next to nothing is left out.
+EIGENSOLVER = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +84,8 @@ def reduction_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, poi
         change = (response.T @ lost_stiffness(body, float(w)) @ response) / w**2
         lost += float(np.sum(np.abs(change) ** 2))
         total += float(np.sum(np.abs(direct) ** 2))
-    return ReductionError(band_hz, SAFETY * math.sqrt(lost / total) if total else 0.0, own, errors)
+    response = SAFETY * math.sqrt(lost / total) + EIGENSOLVER if lost else 0.0
+    return ReductionError(band_hz, response, own, errors)
 
 
 def lost_stiffness(body: ModalBody, omega: float) -> Floats:
