@@ -18,7 +18,7 @@ from gearfe.stress.gears import run
 
 KEPT = sorted((Path(__file__).parent / "test_stress_cases" / "gears").glob("*.toml"))
 #: Large windows, many Newton steps.
-LONG = {"teeth_missed", "nearer_tip", "bent_teeth"}
+LONG = {"teeth_missed", "nearer_tip", "bent_teeth", "points_on_the_other_gear"}
 
 
 @pytest.mark.parametrize(

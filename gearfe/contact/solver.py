@@ -255,7 +255,7 @@ def _with_care(
     scene = assemble(pair, windows_of(pair, found, angle, twist, WHOLE))
     outcome = _side_by_side([scene], [_solving(pair, scene, tolerance)])[0]
     steps += outcome.iterations
-    done, step, last = 0.0, 0.25, None
+    done, step, last, owner = 0.0, 0.25, None, scene.owner
     while outcome.status != "converged" and step > 0.01 and steps < MAX_STEPS:
         share = min(1.0, done + step)
         turned = tuple(replace(w, angle=pair.tooth_angle(w.gear, w.tooth, angle, share * twist)) for w in scene.windows)
@@ -265,11 +265,13 @@ def _with_care(
             if share >= 1.0:
                 break
             continue
-        tried = _alone(part, _start(pair, part) if last is None else last.scaled(share / done), tolerance)
+        # at another twist the law may set its points on the other gear: what was found there is no start then
+        fits = last is not None and np.array_equal(owner, part.owner)
+        tried = _alone(part, last.scaled(share / done) if last is not None and fits else _start(pair, part), tolerance)
         steps += tried.iterations
         if tried.status == "converged":
             done, step = share, 1.5 * step
-            last = replace(tried.state, place=tried.projection.place)
+            last, owner = replace(tried.state, place=tried.projection.place), part.owner
             if share >= 1.0:
                 scene, outcome = part, tried
         else:
