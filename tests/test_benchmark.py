@@ -171,11 +171,10 @@ def test_smoke_of_every_job(tmp_path, job, capsys):
     tables = {s.table for s in SECTIONS if s.command == job} - left_out
     assert tables <= {p.stem for p in tmp_path.glob("*.csv")}
     assert list(tmp_path.glob("*.png"))
-    if job == "sweep":  # the table says what it claims: the finer mesh has the smaller error, whatever the law
+    if job == "sweep":  # coarse meshes hand small loads to a law of their own: 0.3 % is promised on any mesh
         rows = read_rows(tmp_path / "sweep_sizes.csv")
-        for law in {r["law"] for r in rows}:
-            fine, coarse = sorted((r for r in rows if r["law"] == law), key=lambda r: r["coarsen"])
-            assert fine["error"] < coarse["error"] < 2e-2
+        assert {r["law"] for r in rows} == {"nitsche", "penalty", "exact"}
+        assert all(0.0 < r["error"] < 3e-3 for r in rows)
     before = {p.name: p.stat().st_mtime_ns for p in tmp_path.glob("*.csv")}
     assert main(["benchmark", job, "--out", str(tmp_path), *QUICK]) == 0
     assert {p.name: p.stat().st_mtime_ns for p in tmp_path.glob("*.csv")} == before
