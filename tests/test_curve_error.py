@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from gearfe import sweep_stiffness
-from gearfe.contact.corners import corner_bearings, shares
+from gearfe.contact import solver
+from gearfe.contact.corners import RISE, corner_bearings, shares
 from gearfe.contact.laws import Nitsche, Penalty
 from gearfe.contact.solver import solve_positions
 from gearfe.elasticity import Material
@@ -53,14 +54,35 @@ def test_a_wider_gear_is_one_of_the_common_width_and_a_higher_modulus(law):
 def test_shares_of_a_corner_rise_from_a_half_and_rounded_tips_keep_it():
     start, end = (SHARP.path[name].pinion_angle for name in ("A", "E"))
     bearings = corner_bearings(SHARP)
-    assert shares(bearings, 0.5 * (start + end)) == (0.5, 0.5)
-    assert shares(bearings, end) == (0.5, 0.5)
-    assert shares(bearings, end + 0.05) == (1.0, 0.0)
-    assert shares(bearings, start - 0.05) == (0.0, 1.0)
-    sweep = np.array([shares(bearings, a)[0] for a in np.linspace(start - 0.05, end + 0.05, 20001)])
+
+    def at(angle):
+        """Tooth pair 0 touching without a load: the wheel's tooth -1 stands above the line of centres."""
+        wheel = SHARP.wheel_angle_at(angle, SHARP.contact_twist) + SHARP.wheel_phase - 2 * math.pi / SHARP.wheel.teeth
+        return shares(bearings, (angle, wheel))
+
+    assert at(0.5 * (start + end)) == (0.5, 0.5)
+    assert at(end) == (0.5, 0.5)
+    assert at(start) == pytest.approx((0.5, 0.5), abs=1e-9)
+    assert at(end + 0.05) == (1.0, 0.0)
+    assert at(start - 0.05) == (0.0, 1.0)
+    sweep = np.array([at(a)[0] for a in np.linspace(start - 0.05, end + 0.05, 20001)])
     assert (np.diff(sweep) >= 0).all()
     assert np.diff(sweep).max() < 0.01
     assert corner_bearings(gears.pair(20, 30, tip_round=0.1e-3)) == (None, None)
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_the_tangent_follows_the_share_of_the_wheels_corner(lockstep, monkeypatch):
+    """The wheel's corner bears the more, the further the twist turns it: central differences of the torque see that."""
+    if not lockstep:
+        monkeypatch.setattr(solver, "in_lockstep", lambda law: False)
+    elastic, twist = elastic_pair(SHARP, coarsen=3.0), math.radians(0.2)
+    start, _ = SHARP.path_limits()
+    half_risen = start - 0.5 * RISE * SHARP.pinion.module
+    angle = SHARP.pinion_angle_at(half_risen) + (twist - SHARP.contact_twist) * SHARP.gear_ratio
+    less, here, more = (solve_positions(elastic, [angle], t)[0] for t in (0.9999 * twist, twist, 1.0001 * twist))
+    assert (here.scene.growth != 0).any()
+    assert here.tangent == pytest.approx((more.torque_wheel - less.torque_wheel) / (2e-4 * twist), rel=1e-6)
 
 
 def test_a_corner_pushes_along_the_normal_of_the_smooth_flank():

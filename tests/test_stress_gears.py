@@ -12,13 +12,14 @@ from gearfe.contact.overlap import overlaps
 from gearfe.contact.scene import MeshingPair
 from gearfe.errors import InputError
 from gearfe.stiffness.job import read_stiffness_job
+from gearfe.stiffness.routes import Router
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 from gearfe.stress.campaign import Case
 from gearfe.stress.gears import run
 
 KEPT = sorted((Path(__file__).parent / "test_stress_cases" / "gears").glob("*.toml"))
 #: Large windows, many Newton steps.
-LONG = {"teeth_missed", "nearer_tip", "bent_teeth", "points_on_the_other_gear"}
+LONG = {"bent_teeth", "blend_of_routes", "jump_of_the_moment", "nearer_tip", "points_on_the_other_gear", "teeth_missed"}
 
 
 @pytest.mark.parametrize(
@@ -45,6 +46,16 @@ def test_both_gears_see_the_same_teeth_overlap() -> None:
         assert {o.tooth for o in mine} == {-1 - o.tooth for o in theirs}
         depth = {-1 - o.tooth: o.depth for o in theirs}
         assert all(o.depth == pytest.approx(depth[o.tooth], rel=1e-6) for o in mine)
+
+
+def test_small_loads_where_the_moment_of_the_pressure_has_a_jumping_rate() -> None:
+    """Newton's steps went to and fro across the jump. The mesh knows the torque from another formulation."""
+    job = read_stiffness_job(Path(__file__).parent / "test_stress_cases" / "gears" / "jump_of_the_moment.toml")
+    elastic = elastic_pair(job.pair, **job.model)
+    angle, twist = np.radians([0.1693]), np.array([4.3794e-4])
+    known, direct = (Router(job.pair, elastic, route).solve(angle, twist)[0] for route in ("hertz", "direct"))
+    assert known.status == direct.status == "converged"
+    assert known.torque_wheel == pytest.approx(direct.torque_wheel, rel=2e-3)
 
 
 def test_a_torque_beyond_small_strain_is_refused() -> None:

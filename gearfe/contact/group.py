@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .closest import Chains, Projection, chains_of, project
-from .corners import shares
+from .corners import growths, shares
 from .scene import MeshingPair, Window
 
 Array = NDArray[Any]
@@ -66,7 +66,7 @@ class Group:
         Of the angle of the tooth that each node belongs to.
     owner : ndarray, shape (q,)
         Window of each contact point; `at`, its position; `facing`, the window it is projected onto.
-    slave_nodes, slave_shapes, weight, fade, parameter
+    slave_nodes, slave_shapes, weight, growth, fade, parameter
         See `Scene`.
     blocks : list of Block
         Two of each position.
@@ -96,6 +96,7 @@ class Group:
     slave_nodes: IntArray
     slave_shapes: Array
     weight: Array
+    growth: Array
     fade: Array
     parameter: Array
     blocks: list[Block]
@@ -175,11 +176,13 @@ def gather(pair: MeshingPair, positions: Sequence[Sequence[Window]]) -> Group:
     first_edge, counts = np.array([w.first_edge for w in flat]), np.array([w.edges for w in flat])
     flanks = [body.flank for body in pair.bodies]
     made = _geometry(pair, flat, gear, first_edge, counts)
-    bearing = [
-        shares(pair.corners, flat[i if g == 0 else m].angle)[g] for i, g, m in zip(index, gear, mate, strict=True)
-    ]
-    share = np.array(bearing) if pair.law.sides == "both" else np.ones(len(flat))
+    share, growth = np.ones(len(flat)), np.zeros(len(flat))
+    if pair.law.sides == "both":
+        angles = [(flat[min(i, m)].angle, flat[max(i, m)].angle) for i, m in zip(index, mate, strict=True)]
+        share = np.array([shares(pair.corners, a)[g] for a, g in zip(angles, gear, strict=True)])
+        growth = np.array([growths(pair.corners, a)[g] for a, g in zip(angles, gear, strict=True)])
     made |= _contact_points(pair, gear, position, first_edge, counts, mate, made["first_node"], share)
+    made["growth"] = growth[made["owner"]]
     first_node, _first_point = made["first_node"], made["first_point"]
     operators = [_operator(pair, gear, windows[gear::2]) for windows in positions for gear in (0, 1)]
     edges_of = np.array([flank.edges for flank in flanks])[gear]

@@ -58,7 +58,9 @@ def results_of(pair: MeshingPair, group: Group, outcomes: Outcomes) -> Results:
     about = np.bincount(window, weights=-_moment(placed - centre, force), minlength=windows)
     rigid = np.bincount(window, weights=-_moment(group.points - centre, force), minlength=windows)
     pinion = np.bincount(window, weights=-_moment(placed, force), minlength=windows)
-    rate = _force_rates(group, rows, forces, placed - centre, good)
+    loads = motion.pressure[rows.points]
+    grown = rows.forces(loads * group.growth[rows.points], len(forces))
+    rate = _force_rates(group, rows, forces, grown, placed - centre, good)
     peak = np.zeros(group.size)
     np.maximum.at(peak, group.at, motion.pressure)
     wheel = group.gear == 1
@@ -83,11 +85,14 @@ def _moment(arm: Array, force: Array) -> Array:
     return arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]
 
 
-def _force_rates(group: Group, rows: Rows, forces: Array, arm: Array, good: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _force_rates(
+    group: Group, rows: Rows, forces: Array, grown: Array, arm: Array, good: NDArray[np.bool_]
+) -> tuple[Array, Array]:
     """d forces / d twist (N/rad), and of each node the rate of its moment about the wheel's centre (N m/rad).
 
     In the axes of the wheel's teeth the wheel's nodes are carried by e_z x (x - c) dphi, and
-    df = G^T W dp + H dx - dphi e_z x f,  dx = carried + C df,  dp = -gamma dg - S df.
+    df = G^T (W dp + dW p) + H dx - dphi e_z x f,  dx = carried + C df,  dp = -gamma dg - S df,
+    where the areas W grow only with the shares of corners: `grown` is G^T dW p/dphi.
     """
     wheel = (group.gear[group.node_window] == 1)[:, None]
     local = np.stack(
@@ -97,7 +102,7 @@ def _force_rates(group: Group, rows: Rows, forces: Array, arm: Array, good: NDAr
     carried = np.where(wheel, _quarter_turn(local), 0.0).ravel()
     frame = np.where(wheel, _quarter_turn(force), 0.0).ravel()
     opened = np.einsum("ij,ij->j", rows.opening, carried[rows.unknowns])
-    rate = equilibrium(group, rows, -group.parameter[rows.points] * opened, -carried, None, -frame)[1]
+    rate = equilibrium(group, rows, -group.parameter[rows.points] * opened, -carried, None, grown - frame)[1]
     moved = group.respond(rate, np.flatnonzero(good).tolist())[0].reshape(-1, 2)  # C df = dx - carried
     return rate, _moment(local, rate.reshape(-1, 2)) + _moment(moved, force)
 
@@ -149,6 +154,7 @@ def scenes_of(
         "slave_shapes": group.slave_shapes[points],
         "mate": place[group.facing][points],
         "weight": group.weight[points],
+        "growth": group.growth[points],
         "fade": group.fade[points],
         "parameter": group.parameter[points],
         "owner": owner[points],

@@ -81,7 +81,9 @@ def finish(scene: Scene, outcome: Outcome, iterations: int) -> Position:
     about_wheel = -_moment(placed - scene.wheel_centre, force)
     reaction = -_moment(scene.points - scene.wheel_centre, force)
     of_pair = scene.windows[1::2]
-    tangent, force_rate, solved = _tangent(scene, lin, forces, placed)
+    # laws of multipliers bear on one side
+    grown = lin.weighted @ (state.unknown * scene.growth)[active] if scene.hats is None else np.zeros(len(lin.unknowns))
+    tangent, force_rate, solved = _tangent(scene, lin, forces, grown, placed)
     load_rate = np.zeros(len(scene.weight) if scene.theta else 0)
     if scene.theta:
         load_rate[active] = lin.relief * solved
@@ -110,11 +112,12 @@ def _moment(arm: Array, force: Array) -> Array:
     return arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]
 
 
-def _tangent(scene: Scene, lin: Linearised, forces: Array, placed: Array) -> tuple[float, Array, Array]:
+def _tangent(scene: Scene, lin: Linearised, forces: Array, grown: Array, placed: Array) -> tuple[float, Array, Array]:
     """d torque / d twist, d forces / d twist and d (active unknowns) / d twist.
 
     In the axes of the wheel's teeth the wheel's nodes are carried by e_z x (x - c) dphi, and
-    df = G^T W dp + H dx - dphi e_z x f,  dx = carried + C df,  dp = -gamma dg - S df.
+    df = G^T (W dp + dW p) + H dx - dphi e_z x f,  dx = carried + C df,  dp = -gamma dg - S df,
+    where the areas W grow only with the shares of corners: `grown` is G^T dW p/dphi.
     """
     nodes = lin.unknowns[::2] // 2
     wheel = scene.of_wheel[nodes][:, None]
@@ -122,7 +125,7 @@ def _tangent(scene: Scene, lin: Linearised, forces: Array, placed: Array) -> tup
     arm = np.matmul((placed - scene.wheel_centre)[nodes][:, None, :], axes)[:, 0, :]
     force = forces[lin.unknowns].reshape(-1, 2)
     carried = np.where(wheel, _quarter_turn(arm), 0.0).ravel()
-    frame = np.where(wheel, _quarter_turn(force), 0.0).ravel()
+    frame = np.where(wheel, _quarter_turn(force), 0.0).ravel() - grown
     right = lin.response @ frame - lin.parameter * (lin.opening @ carried)
     solved, rate = lin.solve(right, carried - lin.compliance @ frame)
     moved = carried + lin.moved(solved, rate - frame)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .closest import Projection, chains_of, nearest_places, project, unreached
 from .compliance import GearBody
-from .corners import Bearing, shares
+from .corners import Bearing, growths, shares
 from .flank import edge_nodes
 from .law_data import check_stress_loads, law_data, slave_windows
 from .laws import ContactLaw
@@ -160,6 +160,8 @@ class Scene:
         Window that each contact point is projected onto.
     weight : ndarray, shape (q,)
         Area of each contact point (m2).
+    growth : ndarray, shape (q,)
+        Rate of ln(weight) with the twist (1/rad), see `corners.growths`.
     fade : ndarray, shape (q,)
         Half of the point's own stretch of surface, in edges of the mate. Where a stretch lies across the end of the
         mate's surface (a sharp tip), the part that is past it does not count, so that sliding past the corner is
@@ -192,6 +194,7 @@ class Scene:
     slave_shapes: Array
     mate: IntArray
     weight: Array
+    growth: Array
     fade: Array
     parameter: Array
     owner: IntArray
@@ -328,12 +331,16 @@ def _contact_points(pair: MeshingPair, windows: Sequence[Window], slaves: list[i
         n = w.edges * q
         lengths = flank.weights[own].ravel()
         gamma = pair.law.parameter(body.surface_modulus, flank.sizes)[own]
-        share = shares(pair.corners, windows[i & ~1].angle)[w.gear] if pair.law.sides == "both" else 1.0
+        angles = windows[i & ~1].angle, windows[i | 1].angle
+        share, growth = 1.0, 0.0
+        if pair.law.sides == "both":
+            share, growth = shares(pair.corners, angles)[w.gear], growths(pair.corners, angles)[w.gear]
         made = {
             "slave_nodes": np.repeat(w.first_node + edge_nodes(np.arange(w.edges)), q, axis=0),
             "slave_shapes": np.tile(flank.shapes, (w.edges, 1)),
             "mate": np.full(n, i ^ 1),
             "weight": share * pair.width * lengths,
+            "growth": np.full(n, growth),
             "fade": 0.5 * lengths / mate_flank.sizes[mate.first_edge + mate.edges - 1],
             "parameter": np.repeat(gamma, q),
             "owner": np.full(n, i),

@@ -251,14 +251,17 @@ class Flanks:
         u = np.broadcast_to(np.linspace(0.0, self.pinion.end, COARSE), (len(angle), COARSE))
         rows = np.arange(len(angle))
         best, least = np.zeros(len(angle)), np.full(len(angle), np.inf)
+        step = self.pinion.end / (COARSE - 1)
         for _ in range(LOOKS):
             found = self.twist(angle[:, None], number[:, None], u)
             lowest = np.argmin(found, axis=1)
             better = found[rows, lowest] < least
             best = np.where(better, u[rows, lowest], best)
             least = np.where(better, found[rows, lowest], least)
-            step = u[:, 1] - u[:, 0]
-            u = np.clip(best[:, None] + step[:, None] * np.linspace(-1.0, 1.0, CLOSER), 0.0, self.pinion.end)
+            # not a difference of u: near an end of the face several of them are the end
+            u = np.clip(best[:, None] + step * np.linspace(-1.0, 1.0, CLOSER), 0.0, self.pinion.end)
+            step *= 2.0 / (CLOSER - 1)
+        best = np.where(best < 1e-9, 0.0, best)  # the start itself, but for rounding of D
         meets = np.isfinite(least)
         return self._described(position[meets], angle[meets], number[meets], best[meets], least[meets])
 

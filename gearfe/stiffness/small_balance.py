@@ -21,7 +21,11 @@ from .small_load import Reference
 Array = NDArray[Any]
 
 #: Newton steps of a balance, and the change of the forces at which it is done.
-MAX_ITERATIONS, TOLERANCE = 60, 1e-12
+MAX_ITERATIONS, TOLERANCE = 120, 1e-12
+#: The moment of a pressure on panels has a rate that jumps where the contact takes in one panel more, and the residual
+#: with it. Where the solution lies at such a jump Newton's steps go to and fro across it: after `PLAIN` of them, each
+#: return halves what is taken of the next, and a whole step must be less than `JUMP` of the force in the end.
+PLAIN, JUMP = 20, 1e-3
 
 
 @dataclass(frozen=True)
@@ -139,7 +143,7 @@ def balance(reference: Reference, twist: float) -> Balance:
     psi = np.maximum(psi, 0.0)
     light = 0.05 * r.local[0].modulus * w  # a stiffness that a line contact has about
     force = np.where(overlap > 0, light * overlap, 0.0)
-    converged, iteration = False, 0
+    converged, iteration, taken, last = False, 0, 1.0, np.zeros(count)
     while not converged and iteration < MAX_ITERATIONS:
         iteration += 1
         on = np.flatnonzero(force > 0)
@@ -148,8 +152,12 @@ def balance(reference: Reference, twist: float) -> Balance:
         grown = _growing(r, force, psi, answers)
         matrix = (r.compliance - grown.force_twice)[np.ix_(on, on)] + np.diag([a.rate / w for a in given])
         residual = (overlap + grown.force - r.compliance @ force)[on] - [a.approach for a in given]
-        new = force.copy()
-        new[on] += np.linalg.solve(matrix, residual)
+        step = np.zeros(count)
+        step[on] = np.linalg.solve(matrix, residual)
+        if iteration > PLAIN and step @ last < 0:
+            taken *= 0.5
+        last = step
+        new = force + taken * step
         least = 0.1 * force
         light_ones = on[new[on] < least[on]]
         new[light_ones] = 0.0
@@ -161,6 +169,7 @@ def balance(reference: Reference, twist: float) -> Balance:
         back = open_[bears]
         new[back] = np.where(force[back] > 0, least[back], light * left[bears])
         converged = bool(np.abs(new - force).max() <= TOLERANCE * new.max()) and not len(back)
+        converged &= bool(np.abs(step).max() <= JUMP * new.max())
         force = new
     if not converged:  # the last step may have let pairs bear that have no answer yet
         answers = [r.local[k].under(force[k] / w) if force[k] > 0 else None for k in range(count)]

@@ -155,6 +155,8 @@ def ratio_checks(pair: GearPair, elastic: MeshingPair, angles: Any, twists: Any,
         expected = pair.wheel.teeth / pair.pinion.teeth
         if p.route == "direct":
             (bent,) = known.solve(np.array([angle]), np.array([twist]))
+            if bent.status != "converged":
+                continue  # there is nothing to compare with
             expected = bent.torque_wheel / bent.torque_pinion
         overlap = abs(twist - pair.contact_twist) * pair.wheel.base_radius / pair.pinion.module
         limit = RATIO * max(1.0, 2.0 / elements_within(pair, elastic, angle, p)) + RATIO_BENT * overlap**2
