@@ -285,16 +285,20 @@ def line_amplitudes(values: ArrayLike, step: float, frequencies: ArrayLike) -> N
     return np.asarray(found[1 : 1 + len(f)] - 1j * found[1 + len(f) :])
 
 
-def aliasing_warning(frequencies: ArrayLike, step: float) -> str:
-    """A sentence when natural frequencies (Hz) lie above the Nyquist frequency of the step (s), else empty."""
+def aliasing_warning(frequencies: ArrayLike, step: float, share: float | None = None) -> str:
+    """A sentence when natural frequencies (Hz) lie above the Nyquist frequency of the step (s), else empty.
+
+    `share`: what that adds to the spectrum in the band of interest, relative to what belongs there; None: not known.
+    """
     f, nyquist = np.asarray(frequencies, dtype=float), 0.5 / step
     above = f[f > nyquist]
     if not len(above):
         return ""
+    told = "" if share is None else f" and adds up to {100 * share:.2g} % (rms) in the band of interest"
     return (
         f"{len(above)} of {len(f)} modes lie above {nyquist:.6g} Hz, half the output's sampling frequency (the highest "
-        f"at {above.max():.6g} Hz): their vibration is folded into the spectrum; a step of {0.5 / above.max():.3g} s "
-        "shows them where they are"
+        f"at {above.max():.6g} Hz): their vibration is folded into the spectrum{told}; a step of "
+        f"{_below(0.5e6 / above.max()):.3g} us shows them where they are"
     )
 
 
@@ -310,3 +314,9 @@ def waterfall(
     parts = [amplitude_spectrum(x, step, window=window, start=s, length=length) for s in starts]
     middle = step * (np.array(starts) + 0.5 * (length - 1))
     return Waterfall(middle, parts[0].frequency, np.array([p.amplitude for p in parts]))
+
+
+def _below(value: float) -> float:
+    """Three digits, rounded down: a step read off the text shall do what the text says."""
+    digits = 10.0 ** (2 - math.floor(math.log10(value)))
+    return math.floor(value * digits * (1.0 + 1e-12)) / digits

@@ -152,7 +152,14 @@ def test_aliasing():
     assert aliasing_warning([100.0, 14_000.0], STEP) == ""
     said = aliasing_warning([100.0, 20_000.0, 30_000.0], STEP)
     assert said.startswith("2 of 3 modes lie above 14285.7 Hz")
-    assert "1.67e-05 s" in said
+    assert "16.6 us" in said  # 1/60000 s, rounded down
+    assert aliasing_warning([30_000.0], said_step(said)) == ""
+    assert "adds up to 31 % (rms)" in aliasing_warning([20_000.0], STEP, 0.31)
+
+
+def said_step(said: str) -> float:
+    """The step that a warning recommends (s)."""
+    return 1e-6 * float(said.partition("a step of ")[2].partition(" us")[0])
 
 
 def test_steps():

@@ -99,13 +99,26 @@ def test_hangs_and_exceptions_are_told_apart() -> None:
     def refuses(_case, _folder):  # type: ignore[no-untyped-def]
         raise InputError("key", 1, "must be 2")
 
-    before = signal.signal(signal.SIGALRM, late)
+    def busy(_case, _folder):  # type: ignore[no-untyped-def]
+        while True:
+            pass
+
+    def slow(_case, _folder):  # type: ignore[no-untyped-def]
+        time.sleep(0.4)
+        raise InputError("key", 1, "must be 2")
+
+    before = [signal.signal(number, late) for number in (signal.SIGALRM, signal.SIGPROF)]
     try:
         assert _timed(_campaign(endless), 1, 0).outcome == "hang"
+        begin = time.process_time()
+        assert _timed(_campaign(busy), 1, 0).outcome == "hang"
+        assert time.process_time() - begin < 0.5  # its limit of 0.2 s is one of processor time
+        assert _timed(_campaign(slow), 1, 0).outcome == "refused"  # waiting costs none
         assert _timed(_campaign(lambda *_: 1 / 0), 1, 0).outcome == "traceback"
         refused = _timed(_campaign(refuses), 1, 0)
     finally:
-        signal.signal(signal.SIGALRM, before)
+        for number, handler in zip((signal.SIGALRM, signal.SIGPROF), before, strict=True):
+            signal.signal(number, handler)
     assert (refused.outcome, refused.reason) == ("refused", "key = 1: must be 2")
 
 

@@ -21,6 +21,8 @@ from .results import Results, evaluate, reactions
 
 #: Files that depend on the options: what is left of them from an earlier run is removed.
 MAY_WRITE = ("reactions.csv", "curves.png", "picture.png", "animation.gif")
+#: Share of the affordable plain steps from which the number of all steps is told: 1/PROBE.
+PROBE = 8
 
 
 @dataclass(frozen=True)
@@ -106,14 +108,22 @@ def output_times(end: float, step: float) -> np.ndarray:
 
 
 def quickest(mechanism: Mechanism, times: np.ndarray, start: Start, method: str, tolerance: float) -> Trajectory:
-    """Series: plain Python for as long as loading (or compiling) the kernels would take, then the kernels."""
+    """Series: plain Python where the run takes less of it than loading (or compiling) the kernels; else the kernels.
+
+    The first steps tell how many the whole run takes: a long one turns to the kernels at once.
+    """
     if method == "auto":
         method = choose_method(mechanism.system, start, float(times[-1] - times[0]))
     options: dict[str, Any] = {"start": start, "method": method, "tolerance": tolerance}
     if method != "taylor":
         return integrate(mechanism.system, times, **options)
     steps = affordable_steps(mechanism.system)
-    made = integrate(mechanism.system, times, backend="plain", most_steps=steps, **options)
+    first = max(1, steps // PROBE) if compiled.available() else steps
+    made = integrate(mechanism.system, times, backend="plain", most_steps=first, **options)
+    span = float(abs(times[-1] - times[0]))
+    reached = float(abs(made.reached - times[0]))
+    if made.status == 2 and made.statistics["steps"] * span <= steps * reached:
+        made = integrate(mechanism.system, times, backend="plain", most_steps=steps, **options)
     if made.status != 2 or not compiled.available():
         return made
     return integrate(mechanism.system, times, backend="compiled", **options)

@@ -15,7 +15,7 @@ from .campaign import Campaign, campaign_named
 from .ledger import Ledger
 from .outcome import Outcome
 from .report import write_results
-from .worker import GRACE, run_case, work
+from .worker import GRACE, WAITING, run_case, work
 
 #: Seconds that compiling the kernels may take, once.
 COMPILE = 600.0
@@ -121,7 +121,7 @@ def _answer(
     campaign: Campaign, seed: int, number: int, worker: Any, pipe: Any, begin: float, patience: float
 ) -> Outcome:
     try:
-        if pipe.poll(campaign.seconds + patience):
+        if pipe.poll(WAITING * campaign.seconds + patience):
             made: Outcome = pipe.recv()
             return made
     except (EOFError, OSError):
@@ -130,7 +130,7 @@ def _answer(
         said = f"the process ended with code {worker.exitcode}"
         return Outcome(number, kind, "crash", time.monotonic() - begin, said)
     kind = campaign.case(seed, number).kind
-    said = f"not done after {campaign.seconds:g} s, and not to be interrupted"
+    said = f"not done after {WAITING * campaign.seconds:g} s, and not to be interrupted"
     return Outcome(number, kind, "hang", time.monotonic() - begin, said)
 
 

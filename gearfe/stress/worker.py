@@ -16,6 +16,8 @@ from .outcome import Outcome, judged
 
 #: Seconds between the interruption of a case and the end of its process.
 GRACE = 20.0
+#: A case's limit is processor time, fair on a busy machine; one that waits ends after so many times as long.
+WAITING = 5.0
 
 
 class OverTime(BaseException):
@@ -66,6 +68,7 @@ def work(pipe: Any, name: str, seed: int) -> None:
         compile_series()
     if hasattr(signal, "SIGALRM"):
         signal.signal(signal.SIGALRM, late)
+        signal.signal(signal.SIGPROF, late)
     while (number := pipe.recv()) is not None:
         pipe.send(_timed(campaign, seed, number))
 
@@ -74,11 +77,13 @@ def _timed(campaign: Campaign, seed: int, number: int) -> Outcome:
     begin = time.perf_counter()
     try:
         if hasattr(signal, "SIGALRM"):
-            signal.setitimer(signal.ITIMER_REAL, campaign.seconds)
+            signal.setitimer(signal.ITIMER_PROF, campaign.seconds)
+            signal.setitimer(signal.ITIMER_REAL, WAITING * campaign.seconds)
         return run_case(campaign, seed, number)
     except OverTime:  # between the end of the case and here
         kind = campaign.case(seed, number).kind
         return Outcome(number, kind, "hang", time.perf_counter() - begin, f"not done after {campaign.seconds:g} s")
     finally:
         if hasattr(signal, "SIGALRM"):
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
             signal.setitimer(signal.ITIMER_REAL, 0.0)

@@ -64,7 +64,7 @@ class TrainResponse:
         Time at which all load ramps have ended (s).
     statistics, estimates : mapping
         ``steps``, ``evaluations``, ``method``, ``seconds``, ``free_coordinates``, ``redundant_constraints`` (names),
-        ``smallest_contact_force_N``; error estimates (``integration``, ``reduction``), as far as they were asked for.
+        ``smallest_contact_force_N``; error estimates asked for (``integration``, ``reduction``, ``folding``).
     warnings : tuple of str
     """
 

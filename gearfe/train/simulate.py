@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..rigid import Trajectory, integrate
+from ..spectrum import UNEVEN, amplitude_spectrum
 from .floquet import train_multipliers
 from .model import TrainModel
 from .motion import Motion, motion
@@ -23,6 +24,8 @@ Array = NDArray[np.float64]
 SAFETY = 1.5
 #: An approach or a bore's displacement beyond this part of the module means that nothing holds any more.
 DIVERGED = 0.25
+#: Folding is measured with samples that hold this much more than the highest mode, and so many at most.
+SPARE, MOST_SAMPLES = 1.4, 20_000
 #: A multiplier beyond this is an instability, not round-off.
 STABLE = 1.0 + 1e-6
 
@@ -54,7 +57,8 @@ def simulate(
         Compute the multipliers over the common mesh period.
     estimate
         Estimate the errors: of the integration from a second run with a hundredth of the tolerance and shorter steps,
-        of the housing's reduction up to `band_hz` (Hz).
+        of the housing's reduction up to `band_hz` (Hz), and of the spectrum up to there where the output times are too
+        far apart for the highest modes (`folding`).
     backend
         ``compiled``, ``plain`` or ``auto``.
 
@@ -71,7 +75,7 @@ def simulate(
     begin = clock.perf_counter()
     with np.errstate(over="ignore", invalid="ignore"):
         trajectory, moved = _run(model, t, tolerance, method, backend)
-        status, keep = _ended(model, trajectory, moved)
+        status, keep, why = _ended(model, trajectory, moved)
     moved = _cut(moved, keep)
     seconds = clock.perf_counter() - begin
     statistics = {
@@ -85,10 +89,12 @@ def simulate(
     response = _response(model, moved, status, statistics)
     warnings = _pulls(model, moved)
     if status != "done":
-        warnings.append(f"the run ended at {1e3 * response.time_reached:.6g} ms of {1e3 * t[-1]:.6g} ms: {status}")
+        warnings.append(f"the run ended at {1e3 * response.time_reached:.6g} ms of {1e3 * t[-1]:.6g} ms: {status}{why}")
     estimates: dict[str, float] = {}
     if estimate:
         estimates = _estimates(model, response, t[: len(moved.time)], tolerance, method, band_hz)
+        folded = _folded(model, trajectory, moved.time, band_hz)
+        estimates |= {} if folded is None else {"folding": folded}
     multipliers, note = (None, "not computed") if not floquet else train_multipliers(model)
     if multipliers is not None and abs(multipliers[0]) > STABLE:
         warnings.append(
@@ -107,8 +113,8 @@ def _run(
     return trajectory, motion(model, trajectory)
 
 
-def _ended(model: TrainModel, trajectory: Trajectory, moved: Motion) -> tuple[str, int]:
-    """Status, and the number of output times up to which the results hold."""
+def _ended(model: TrainModel, trajectory: Trajectory, moved: Motion) -> tuple[str, int, str]:
+    """Status, the number of output times up to which the results hold, and what moved too far."""
     limit = DIVERGED * min((line.module for line in model.meshes), default=1e-3)
     reach = (
         np.abs(moved.q @ np.array([line.row for line in model.meshes]).T)
@@ -119,8 +125,23 @@ def _ended(model: TrainModel, trajectory: Trajectory, moved: Motion) -> tuple[st
     worst = np.maximum(reach.max(axis=1), shafts.max(axis=1))
     bad = ~np.isfinite(moved.q).all(axis=1) | ~(worst <= limit)
     if bad.any():
-        return "diverged", int(np.argmax(bad))
-    return ("diverged" if trajectory.status == 4 else trajectory.message), len(moved.time)
+        at = int(np.argmax(bad))
+        return "diverged", at, _too_far(model, reach[at], shafts[at], limit)
+    return ("diverged" if trajectory.status == 4 else trajectory.message), len(moved.time), ""
+
+
+def _too_far(model: TrainModel, reach: Array, shafts: Array, limit: float) -> str:
+    """What passed the limit: the motion may be bounded, but the gears' geometry no longer holds."""
+    if not (np.isfinite(reach).all() and np.isfinite(shafts).all()):
+        return ""
+    if reach.max() > limit:
+        what, size = f"mesh {model.meshes[int(reach.argmax())].name} yields", reach.max()
+    else:
+        what, size = f"shaft {model.scene.shafts[int(shafts.argmax()) // 3].name} moves", shafts.max()
+    return (
+        f"; {what} by {1e3 * size:.3g} mm, more than {DIVERGED:g} module ({1e3 * limit:.3g} mm), where the gears' "
+        "geometry no longer holds: lower the load, ramp it up more slowly, or stiffen or damp meshes and bearings"
+    )
 
 
 def _cut(moved: Motion, keep: int) -> Motion:
@@ -223,3 +244,30 @@ def _estimates(
 
         found["reduction"] = reduction_error(body, band_hz).response
     return found
+
+
+def _folded(model: TrainModel, trajectory: Trajectory, t: Array, band_hz: float) -> float | None:
+    """What vibration above half the output's sampling frequency adds to the spectrum up to `band_hz`, rms.
+
+    The same run sampled `finer` times as often has the spectrum Y; taking each `finer`-th sample gives X, the bins of Y
+    that lie whole sampling frequencies apart summed up. The largest ``|X - Y|/|Y|`` over the contact forces and the
+    attachments' accelerations, constant left out. None where no mode lies above, the times are not evenly spaced, or
+    the run is too short.
+    """
+    highest = float(model.coupled_frequencies_hz.max(initial=0.0))
+    if len(t) < 4 or np.ptp(np.diff(t)) > UNEVEN * (step := float(t[1] - t[0])) or highest <= 0.5 / step:
+        return None
+    finer = math.ceil(SPARE * 2.0 * highest * step)
+    count = min(len(t) - 1, max(MOST_SAMPLES // finer, 4))
+    times = t[-1 - count] + step / finer * np.arange(count * finer)
+    with np.errstate(over="ignore", invalid="ignore"):
+        moved = motion(model, replace(trajectory, time=times))
+    signals = np.hstack([moved.contact_force, moved.a @ model.axial.T])
+    if not np.isfinite(signals).all():
+        return None
+    true, seen = amplitude_spectrum(signals, step / finer), amplitude_spectrum(signals[::finer], step)
+    inside = (seen.frequency > 0.0) & (seen.frequency <= band_hz) & (seen.frequency < seen.nyquist)
+    true_band, seen_band = true.value[: len(inside)][inside], seen.value[inside]
+    size = np.linalg.norm(true_band, axis=0)
+    off = np.linalg.norm(seen_band - true_band, axis=0)
+    return float((off / np.where(size > 0.0, size, np.inf)).max(initial=0.0))

@@ -274,5 +274,7 @@ def stiffness_ranges(scene: TrainScene) -> dict[str, tuple[float | None, float |
 def all_warnings(response: TrainResponse, made: TrainSpectra | None) -> list[str]:
     """Warnings of the response, and of modes that the output step folds into the spectrum."""
     said = list(response.warnings)
-    folded = "" if made is None else aliasing_warning(response.coupled_frequencies_Hz, made.step)
+    if made is None:
+        return said
+    folded = aliasing_warning(response.coupled_frequencies_Hz, made.step, response.estimates.get("folding"))
     return [*said, folded] if folded else said
