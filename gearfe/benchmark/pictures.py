@@ -13,6 +13,8 @@ from ..output.files import whole_file
 from .record import Row, read_rows
 
 Draw = Callable[[Any, list[Row]], None]
+#: Curves above which a legend stands below the axes, where it covers none.
+MANY = 6
 NAMES = {"scipy_ivp": "scipy", "sundials": "SUNDIALS", "calculix": "CalculiX", "getfem": "GetFEM"}
 
 
@@ -101,7 +103,11 @@ def _finish(axes: Any) -> None:
     axes.grid(visible=True, which="both", alpha=0.25)
     handles, labels = axes.get_legend_handles_labels()
     if any(labels):
-        axes.legend(handles, labels, fontsize=8)
+        if len(labels) > MANY:
+            axes.legend(handles, labels, fontsize=7, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.12))
+            axes.figure.set_figheight(6.2)
+        else:
+            axes.legend(handles, labels, fontsize=8)
 
 
 def _mechanisms(figure: Any, rows: list[Row]) -> None:
