@@ -228,6 +228,9 @@ def modal_steps(
             x = min(x, corner)
         if x * step <= 1e-15 * max(abs(t), abs(t1 - begin)):
             still += 1
+            if still > 40:  # it is not the corners
+                status = 1
+                break
             continue
         still = 0
         ends = t + x * s
