@@ -2,6 +2,7 @@
 
 import math
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -89,7 +90,8 @@ def test_measured_tells_work_from_waiting():
     assert 0 < cost.cpu_s <= cost.cpu_median_s
     _, large = measured(lambda: np.ones(20_000_000).sum(), runs=1)
     assert large.peak_MB - cost.peak_MB > 100 or math.isnan(large.peak_MB)  # 160 MB were touched
-    assert measured(lambda: np.zeros(10), runs=1)[1].peak_MB < large.peak_MB - 100
+    if Path("/proc/self/clear_refs").exists():  # elsewhere the peak is that of the whole process
+        assert measured(lambda: np.zeros(10), runs=1)[1].peak_MB < large.peak_MB - 100
 
 
 def test_exponent_of_a_power_law():
