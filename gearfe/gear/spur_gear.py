@@ -20,6 +20,8 @@ LEAST_RIM = 0.25
 LEAST_BORE = 0.05
 #: Least tip round that is not a sharp corner, times module: meshers need seconds for less, and elements degenerate.
 LEAST_ROUND = 1e-6
+#: Modules and face widths beyond it (m) are mistakes, and large ones overflow.
+LARGEST = 1e4
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,9 @@ class Gear:
         if 0.0 < self.tip_round < LEAST_ROUND * self.module:
             problem = f"must be 0 or >= {1e3 * LEAST_ROUND * self.module:.6g} mm, {LEAST_ROUND:g} module"
             raise InputError("tip_round", self.tip_round, problem, "write 0 for a sharp corner")
+        if self.tip_round > self.module:
+            problem = f"must be <= {1e3 * self.module:.6g} mm, one module"
+            raise InputError("tip_round", self.tip_round, problem, "use a smaller tip round")
         limit = 2.0 * (self.root_radius - LEAST_RIM * self.module)
         if not self.bore_diameter <= limit:
             problem = (
@@ -188,9 +193,9 @@ class Gear:
                 "teeth", self.teeth, "must be a whole number >= 5 and <= 1000", "use another number of teeth"
             )
         ranges = {
-            "module": (0.0, math.inf, False),
+            "module": (0.0, LARGEST, False),
             "pressure_angle": (math.radians(5.0), math.radians(45.0), True),
-            "face_width": (0.0, math.inf, False),
+            "face_width": (0.0, LARGEST, False),
             "bore_diameter": (0.0, math.inf, False),
             "profile_shift": (-math.inf, math.inf, True),
             "addendum": (0.0, math.inf, False),
