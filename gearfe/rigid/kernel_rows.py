@@ -33,10 +33,7 @@ def trigonometry(q, c, s):
 
 
 def gradients(rows, q, c, s, G):
-    """G[r, side] = gradient of row r with respect to (x, y, theta) of its body on that side; shape (m, 2, 5).
-
-    The last two columns hold the factors of cosine and sine, constants of the row (zero for kind 1).
-    """
+    """G[r, side] = gradient of row r with respect to (x, y, theta) of its body on that side; shape (m, 2, 3)."""
     for r in range(rows.ints.shape[0]):
         if rows.ints[r, 2] == 0:
             for a in range(2):
@@ -46,8 +43,6 @@ def gradients(rows, q, c, s, G):
                 G[r, a, 2] = (
                     rows.reals[r, 5 * a + 2] - rows.reals[r, 5 * a + 3] * s[b] + rows.reals[r, 5 * a + 4] * c[b]
                 )
-                G[r, a, 3] = rows.reals[r, 5 * a + 3]
-                G[r, a, 4] = rows.reals[r, 5 * a + 4]
         else:
             a = rows.ints[r, 0]
             b = rows.ints[r, 1]
@@ -177,9 +172,8 @@ def factorise(rows, plan, mass, G, skip, val, diag):
         if ratio < 1e-30:
             val[j] = 1e-30 * diag[j]
         d = val[j]
-        share = 1.0 / d
         for e in range(plan.start[j], plan.start[j + 1]):
-            val[m + e] *= share
+            val[m + e] /= d
         for u in range(plan.update_start[j], plan.update_start[j + 1]):
             val[plan.update[u, 0]] -= val[m + plan.update[u, 1]] * val[m + plan.update[u, 2]] * d
     for j in range(m):
@@ -188,17 +182,14 @@ def factorise(rows, plan, mass, G, skip, val, diag):
 
 
 def solve(plan, val, x):
-    """x := S^-1 x with the factor of `factorise`, column by column."""
+    """x := S^-1 x with the factor of `factorise`."""
     m = x.shape[0]
+    for e in range(plan.row.shape[0]):
+        x[plan.row[e]] -= val[m + e] * x[plan.column[e]]
     for j in range(m):
-        value = x[j]
-        for e in range(plan.start[j], plan.start[j + 1]):
-            x[plan.row[e]] -= val[m + e] * value
-    for j in range(m - 1, -1, -1):
-        value = x[j] * val[j]
-        for e in range(plan.start[j], plan.start[j + 1]):
-            value -= val[m + e] * x[plan.row[e]]
-        x[j] = value
+        x[j] *= val[j]
+    for e in range(plan.row.shape[0] - 1, -1, -1):
+        x[plan.column[e]] -= val[m + e] * x[plan.row[e]]
 
 
 def time_series(times, t, forward, orders, out):
@@ -220,13 +211,11 @@ def time_series(times, t, forward, orders, out):
                 out[k, i] = out[k, i] * d + out[k, i - 1]
             out[k, 0] = out[k, 0] * d + times.factor[p, j]
         for i in range(times.sine_first[k], times.sine_first[k + 1]):
+            scale = times.sine[i, 0]
             phase = times.sine[i, 1] * t + times.sine[i, 2]
-            now = times.sine[i, 0] * math.sin(phase)
-            after = times.sine[i, 0] * math.cos(phase)
-            for j in range(orders):  # derivatives: sine, cosine, -sine, -cosine, ...
-                out[k, j] += now
-                share = times.sine[i, 1] / (j + 1)
-                now, after = after * share, -now * share
+            for j in range(orders):
+                out[k, j] += scale * math.sin(phase + 0.5 * math.pi * j)
+                scale *= times.sine[i, 1] / (j + 1)
 
 
 def least_norm(rows, plan, mass, G, val, skip, rhs, work, u):

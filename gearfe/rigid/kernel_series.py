@@ -19,11 +19,9 @@ bordered system with the rows B; multipliers are then stored one order up ("shif
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from .kernel_rows import fill, solve, time_series
+from .kernel_rows import add_transposed, fill, solve, time_series, times_gradients, trigonometry
 
 #: Planes of the body series: j theta_j, sine, cosine, the sums A and B.
 DT, SN, CS, AS, BS = 0, 1, 2, 3, 4
@@ -36,32 +34,15 @@ SPRING, LINEAR, LOAD = 0, 1, 2
 
 
 def angle_orders(bs, j, known):
-    """Orders j of sine and cosine from the orders of theta below `known`: what theta_j itself adds comes later.
-
-    Four bodies at a time (the planes are padded): eight sums that do not wait for one another.
-    """
-    share = 1.0 / j
-    for b in range(0, bs.shape[2], 4):
-        s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
-        c0, c1, c2, c3 = 0.0, 0.0, 0.0, 0.0
+    """Orders j of sine and cosine from the orders of theta below `known`: what theta_j itself adds comes later."""
+    for b in range(bs.shape[2]):
+        sine = 0.0
+        cosine = 0.0
         for i in range(1, known):
-            d0, d1, d2, d3 = bs[DT, i, b], bs[DT, i, b + 1], bs[DT, i, b + 2], bs[DT, i, b + 3]
-            s0 += d0 * bs[CS, j - i, b]
-            s1 += d1 * bs[CS, j - i, b + 1]
-            s2 += d2 * bs[CS, j - i, b + 2]
-            s3 += d3 * bs[CS, j - i, b + 3]
-            c0 -= d0 * bs[SN, j - i, b]
-            c1 -= d1 * bs[SN, j - i, b + 1]
-            c2 -= d2 * bs[SN, j - i, b + 2]
-            c3 -= d3 * bs[SN, j - i, b + 3]
-        bs[SN, j, b] = s0 * share
-        bs[SN, j, b + 1] = s1 * share
-        bs[SN, j, b + 2] = s2 * share
-        bs[SN, j, b + 3] = s3 * share
-        bs[CS, j, b] = c0 * share
-        bs[CS, j, b + 1] = c1 * share
-        bs[CS, j, b + 2] = c2 * share
-        bs[CS, j, b + 3] = c3 * share
+            sine += bs[DT, i, b] * bs[CS, j - i, b]
+            cosine -= bs[DT, i, b] * bs[SN, j - i, b]
+        bs[SN, j, b] = sine / j
+        bs[CS, j, b] = cosine / j
 
 
 def slot_orders(rows, QS, bs, ls, j):
@@ -78,19 +59,17 @@ def slot_orders(rows, QS, bs, ls, j):
         ls[DY, j, k] = QS[j, 3 * b + 1] + ry - QS[j, 3 * a + 1]
 
 
-def row_orders(rows, G, z, TF, ls, j, out):
-    """Order j >= 2 of every constraint row, from z[body] = known parts of the orders j of x, y, theta, cosine, sine."""
+def row_orders(rows, TF, bs, ls, j, out):
+    """Order j >= 2 of every constraint row without the part of q_j."""
     for r in range(rows.ints.shape[0]):
-        a = rows.ints[r, 0]
-        b = rows.ints[r, 1]
-        first = 0.0
-        second = 0.0
-        for i in range(5):
-            first += G[r, 0, i] * z[a, i]
-            second += G[r, 1, i] * z[b, i]
+        value = 0.0
         if rows.ints[r, 3] >= 0:
-            first -= TF[rows.ints[r, 3], j]
-        out[r] = first + second
+            value = -TF[rows.ints[r, 3], j]
+        if rows.ints[r, 2] == 0:
+            for side in range(2):
+                b = rows.ints[r, side]
+                value += rows.reals[r, 5 * side + 3] * bs[CS, j, b] + rows.reals[r, 5 * side + 4] * bs[SN, j, b]
+        out[r] = value
     for k in range(rows.lines.shape[0]):
         value = 0.0
         for i in range(j + 1):
@@ -99,29 +78,37 @@ def row_orders(rows, G, z, TF, ls, j, out):
 
 
 def spring_orders(forces, QS, bs, es, j):
-    """Order j of the span D, length L and 1/L of every spring, from L^2 = D^2 and L (1/L) = 1."""
+    """Order j of the span D, length L and 1/L of every spring."""
     for k in range(es.shape[2]):
         a = forces.ints[k, 1]
         b = forces.ints[k, 2]
         p = forces.reals[k]
-        x = QS[j, 3 * b] - QS[j, 3 * a] + bs[CS, j, b] * p[2] - bs[SN, j, b] * p[3]
-        y = QS[j, 3 * b + 1] - QS[j, 3 * a + 1] + bs[SN, j, b] * p[2] + bs[CS, j, b] * p[3]
-        x += bs[SN, j, a] * p[1] - bs[CS, j, a] * p[0]
-        y -= bs[SN, j, a] * p[0] + bs[CS, j, a] * p[1]
-        es[EX, j, k] = x
-        es[EY, j, k] = y
+        es[EX, j, k] = (
+            QS[j, 3 * b]
+            - QS[j, 3 * a]
+            + bs[CS, j, b] * p[2]
+            - bs[SN, j, b] * p[3]
+            - bs[CS, j, a] * p[0]
+            + bs[SN, j, a] * p[1]
+        )
+        es[EY, j, k] = (
+            QS[j, 3 * b + 1] - QS[j, 3 * a + 1] + bs[SN, j, b] * p[2] + bs[CS, j, b] * p[3]
+            - bs[SN, j, a] * p[0] - bs[CS, j, a] * p[1]
+        )  # fmt: skip
+        square = 0.0
+        for i in range(j + 1):
+            square += es[EX, i, k] * es[EX, j - i, k] + es[EY, i, k] * es[EY, j - i, k]
         if j == 0:
-            es[EL, 0, k] = np.sqrt(x * x + y * y)
+            es[EL, 0, k] = np.sqrt(square)
             es[EI, 0, k] = 1.0 / es[EL, 0, k]
         else:
-            square = 2.0 * (x * es[EX, 0, k] + y * es[EY, 0, k])
-            inverse = 0.0
             for i in range(1, j):
-                square += es[EX, i, k] * es[EX, j - i, k] + es[EY, i, k] * es[EY, j - i, k]
                 square -= es[EL, i, k] * es[EL, j - i, k]
-                inverse += es[EL, i, k] * es[EI, j - i, k]
             es[EL, j, k] = 0.5 * square * es[EI, 0, k]
-            es[EI, j, k] = -(inverse + es[EL, j, k] * es[EI, 0, k]) * es[EI, 0, k]
+            inverse = 0.0
+            for i in range(1, j + 1):
+                inverse += es[EL, i, k] * es[EI, j - i, k]
+            es[EI, j, k] = -inverse * es[EI, 0, k]
 
 
 def force_orders(forces, QS, TF, bs, es, k, at, F):
@@ -217,47 +204,44 @@ def slot_arms(rows, bs, at, r, b, fx, fy):
     bs[BS, at, b] -= x * fy - y * fx
 
 
-def add_multipliers(rows, LM, bs, ls, at, factor, mu, f):
-    """Multipliers `factor` mu join order `at`, with the rows' forces f = G^T mu: what turns with a body goes into A and
-    B, and into the lines' forces.
-    """
-    for b in range(f.shape[0]):
-        bs[AS, at, b] += factor * f[b, 3]
-        bs[BS, at, b] -= factor * f[b, 4]
-    for r in range(mu.shape[0]):
-        LM[at, r] += factor * mu[r]
-    add_line_multipliers(rows, bs, ls, at, 0, factor, mu)
+def add_multipliers(rows, LM, bs, ls, at, values):
+    """Multipliers `values` (one per row) join order `at`: what turns with a body goes into A, B, and into the
+    lines' forces."""
+    for r in range(values.shape[0]):
+        value = values[r]
+        LM[at, r] += value
+        if rows.ints[r, 2] == 0:
+            for side in range(2):
+                b = rows.ints[r, side]
+                bs[AS, at, b] += rows.reals[r, 5 * side + 3] * value
+                bs[BS, at, b] -= rows.reals[r, 5 * side + 4] * value
+    add_line_multipliers(rows, bs, ls, at, 0, values)
 
 
-def add_line_multipliers(rows, bs, ls, at, i, factor, mu):
+def add_line_multipliers(rows, bs, ls, at, i, values):
     """Order `at` of the force of every moving line gains n_i times its multiplier."""
     for k in range(rows.lines.shape[0]):
         r = rows.lines[k]
-        fx = ls[NX, i, k] * factor * mu[r]
-        fy = ls[NY, i, k] * factor * mu[r]
+        fx = ls[NX, i, k] * values[r]
+        fy = ls[NY, i, k] * values[r]
         ls[FX, at, k] += fx
         ls[FY, at, k] += fy
         slot_arms(rows, bs, at, r, rows.ints[r, 1], fx, fy)
 
 
-def torque_orders(bs, at, torque):
-    """Order `at` of s A + c B for every body, four bodies at a time."""
-    for b in range(0, bs.shape[2], 4):
-        t0, t1, t2, t3 = 0.0, 0.0, 0.0, 0.0
+def torque_orders(bs, at, F):
+    """F gains order `at` of s A + c B for every body."""
+    for b in range(bs.shape[2]):
+        torque = 0.0
         for i in range(at + 1):
-            t0 += bs[SN, i, b] * bs[AS, at - i, b] + bs[CS, i, b] * bs[BS, at - i, b]
-            t1 += bs[SN, i, b + 1] * bs[AS, at - i, b + 1] + bs[CS, i, b + 1] * bs[BS, at - i, b + 1]
-            t2 += bs[SN, i, b + 2] * bs[AS, at - i, b + 2] + bs[CS, i, b + 2] * bs[BS, at - i, b + 2]
-            t3 += bs[SN, i, b + 3] * bs[AS, at - i, b + 3] + bs[CS, i, b + 3] * bs[BS, at - i, b + 3]
-        torque[b] = t0
-        torque[b + 1] = t1
-        torque[b + 2] = t2
-        torque[b + 3] = t3
+            torque += bs[SN, i, b] * bs[AS, at - i, b] + bs[CS, i, b] * bs[BS, at - i, b]
+        F[3 * b + 2] += torque
 
 
 def finish_order(rows, forces, QS, bs, ls, es, j):
     """Everything that follows from q_j: sine, cosine, ls, springs."""
-    for b in range(QS.shape[1] // 3):
+    n = bs.shape[2]
+    for b in range(n):
         theta = QS[j, 3 * b + 2]
         bs[DT, j, b] = j * theta
         bs[SN, j, b] += bs[CS, 0, b] * theta
@@ -274,7 +258,7 @@ def expand(tb, t, forward, order, folds, w):
     rows, plan, forces, mass = tb.rows, tb.plan, tb.forces, tb.mass
     bs, ls, es, fold = w.bs, w.ls, w.es, w.fold
     QS, TF, LM, G, val, skip = w.QS, w.TF, w.LM, w.G, w.val, w.skip
-    mu, F, u, z, torque = w.mu, w.F, w.u, w.z, w.torque
+    mu, rhs, F, u = w.mu, w.rhs, w.F, w.u
     shift = 1 if folds > 0 else 0
     time_series(tb.times, t, forward, order + 2, TF)
     start_series(rows, forces, order, QS, LM, bs, ls, es)
@@ -285,55 +269,39 @@ def expand(tb, t, forward, order, folds, w):
         share = 1.0 / alpha
         force_orders(forces, QS, TF, bs, es, k, at, F)
         slot_forces(rows, LM, bs, ls, at, F)
-        torque_orders(bs, at, torque)
+        torque_orders(bs, at, F)
         angle_orders(bs, j, j)
         slot_orders(rows, QS, bs, ls, j)
-        for b in range(z.shape[0]):
-            F[3 * b + 2] += torque[b]
-            for i in range(3):
-                u[3 * b + i] = F[3 * b + i] * mass[3 * b + i] * share
-                z[b, i] = u[3 * b + i]
-            z[b, 3] = bs[CS, j, b]
-            z[b, 4] = bs[SN, j, b]
-        row_orders(rows, G, z, TF, ls, j, mu)
+        row_orders(rows, TF, bs, ls, j, rhs)
+        for i in range(F.shape[0]):
+            u[i] = F[i] * mass[i] * share
         if folds > 0:
-            fold_rows(rows, QS, TF, G, bs, ls, fold, w.rhs, u, z, j, folds)
+            fold_rows(rows, QS, TF, bs, ls, fold, mu, u, j, folds)
+        times_gradients(rows, G, u, mu)
         for r in range(mu.shape[0]):
-            if skip[r] != 0:
-                mu[r] = 0.0
+            mu[r] = mu[r] + rhs[r] if skip[r] == 0 else 0.0
         if folds > 0:
             fold_solve(plan, val, fold, mu, folds)
         else:
             solve(plan, val, mu)
-        row_forces(rows, G, mu, z)
+        fill(F, 0.0)
+        add_transposed(rows, G, mu, 1.0, F)
         for p in range(folds):
-            for i in range(u.shape[0]):
-                u[i] -= fold.B[p, i] * fold.nu[p] * mass[i]
-        for b in range(z.shape[0]):
-            for i in range(3):
-                QS[j, 3 * b + i] = u[3 * b + i] - z[b, i] * mass[3 * b + i]
-        add_multipliers(rows, LM, bs, ls, at, alpha, mu, z)
+            for i in range(F.shape[0]):
+                F[i] += fold.B[p, i] * fold.nu[p]
+        for i in range(F.shape[0]):
+            QS[j, i] = u[i] - F[i] * mass[i]
+        for r in range(mu.shape[0]):
+            mu[r] *= alpha
+        add_multipliers(rows, LM, bs, ls, at, mu)
         if folds > 0:  # the multipliers Z nu belong one order below the regular ones
             for r in range(mu.shape[0]):
                 mu[r] = 0.0
                 for p in range(folds):
-                    mu[r] += fold.Z[p, r] * fold.nu[p]
-            row_forces(rows, G, mu, z)
-            add_multipliers(rows, LM, bs, ls, at - 1, alpha, mu, z)
-            add_line_multipliers(rows, bs, ls, at, 1, alpha, mu)
+                    mu[r] += alpha * fold.Z[p, r] * fold.nu[p]
+            add_multipliers(rows, LM, bs, ls, at - 1, mu)
+            add_line_multipliers(rows, bs, ls, at, 1, mu)
         finish_order(rows, forces, QS, bs, ls, es, j)
-
-
-def row_forces(rows, G, mu, f):
-    """f[body] = G^T mu: forces along x, y, theta, and what turns with the body."""
-    for b in range(f.shape[0]):
-        for i in range(5):
-            f[b, i] = 0.0
-    for r in range(mu.shape[0]):
-        for side in range(2):
-            b = rows.ints[r, side]
-            for i in range(5):
-                f[b, i] += G[r, side, i] * mu[r]
 
 
 def start_series(rows, forces, order, QS, LM, bs, ls, es):
@@ -344,9 +312,7 @@ def start_series(rows, forces, order, QS, LM, bs, ls, es):
         fill(LM[j], 0.0)
     fill(ls[FX, 0], 0.0)
     fill(ls[FY, 0], 0.0)
-    for b in range(QS.shape[1] // 3):
-        bs[CS, 0, b] = math.cos(QS[0, 3 * b + 2])
-        bs[SN, 0, b] = math.sin(QS[0, 3 * b + 2])
+    trigonometry(QS[0], bs[CS, 0], bs[SN, 0])
     fill(bs[DT, 0], 0.0)
     fill(bs[SN, 1], 0.0)
     fill(bs[CS, 1], 0.0)
@@ -357,17 +323,11 @@ def start_series(rows, forces, order, QS, LM, bs, ls, es):
     finish_order(rows, forces, QS, bs, ls, es, 1)
 
 
-def fold_rows(rows, QS, TF, G, bs, ls, fold, work, u, z, j, folds):
+def fold_rows(rows, QS, TF, bs, ls, fold, work, u, j, folds):
     """Order j + 1 of Z^T g with q_j and q_{j+1} left out: fold.nu; the part of q_j is B q_j."""
     angle_orders(bs, j + 1, j)
     slot_orders(rows, QS, bs, ls, j + 1)
-    for b in range(z.shape[0]):
-        z[b, 0] = 0.0
-        z[b, 1] = 0.0
-        z[b, 2] = 0.0
-        z[b, 3] = bs[CS, j + 1, b]
-        z[b, 4] = bs[SN, j + 1, b]
-    row_orders(rows, G, z, TF, ls, j + 1, work)
+    row_orders(rows, TF, bs, ls, j + 1, work)
     for p in range(folds):
         value = 0.0
         for r in range(work.shape[0]):
@@ -431,7 +391,6 @@ FUNCTIONS = (
     add_multipliers,
     add_line_multipliers,
     torque_orders,
-    row_forces,
     finish_order,
     expand,
     start_series,

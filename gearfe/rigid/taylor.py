@@ -21,7 +21,7 @@ HOT = (
     "fill", "copy", "trigonometry", "gradients", "residuals", "times_gradients", "add_transposed", "solve",
     "least_norm",
     "angle_orders", "slot_orders", "row_orders", "spring_orders", "force_orders", "spring_force", "slot_forces",
-    "slot_arms", "add_multipliers", "add_line_multipliers", "torque_orders", "row_forces", "finish_order",
+    "slot_arms", "add_multipliers", "add_line_multipliers", "torque_orders", "finish_order",
 )  # fmt: skip
 MOST_FOLDS = 4
 
@@ -46,18 +46,16 @@ class Work(NamedTuple):
     QS: Array  # (K, 3n) series of the coordinates
     LM: Array  # (K, m) multipliers
     TF: Array  # (functions, K)
-    bs: Array  # (5, K, n up to a multiple of 4) series of the bodies, see the planes in kernel_series
+    bs: Array  # (5, K, n) series of the bodies, see the planes in kernel_series
     ls: Array  # (6, K, moving lines)
     es: Array  # (5, K, springs)
     fold: FoldFrame
-    G: Array  # (m, 2, 5)
+    G: Array  # (m, 2, 3)
     H: Array  # (m, 2, 3) dG/dt
     val: Array  # (m + nnz,) factor
     diag: Array  # (m,)
     mu: Array  # (m,)
     rhs: Array  # (m,)
-    z: Array  # (n, 5) one order of x, y, theta, cosine, sine of every body; forces on them
-    torque: Array  # (n up to a multiple of 4,)
     F: Array  # (3n,)
     u: Array
     work: Array
@@ -75,8 +73,6 @@ def work_space(tables: Tables, order: int) -> Work:
     K, n3, m, d = order + 3, tables.mass.size, len(tables.rows.ints), MOST_FOLDS
     n, lines, springs = n3 // 3, tables.rows.lines.size, int((tables.forces.ints[:, 0] == kernel_series.SPRING).sum())
 
-    padded = -(-n // 4) * 4
-
     def zeros(count: int, *shape: int) -> list[Any]:
         return [np.zeros(shape) for _ in range(count)]
 
@@ -86,16 +82,13 @@ def work_space(tables: Tables, order: int) -> Work:
         np.zeros((K, n3)),
         np.zeros((K, m)),
         np.zeros((tables.times.first.size - 1, K)),
-        np.zeros((5, K, padded)),
+        np.zeros((5, K, n)),
         np.zeros((6, K, lines)),
         np.zeros((5, K, springs)),
         FoldFrame._make(fold),
-        np.zeros((m, 2, 5)),
-        np.zeros((m, 2, 3)),
+        *zeros(2, m, 2, 3),
         np.zeros(m + tables.plan.row.size),
         *zeros(3, m),
-        np.zeros((n, 5)),
-        np.zeros(padded),
         *zeros(7, n3),
         *zeros(2, n),
         np.zeros(m, dtype=np.int64),
