@@ -135,6 +135,11 @@ class Flank:
     length: float = 1.0
     exponent: float = 1.0
 
+    @property
+    def kinked(self) -> bool:
+        """Whether the relief starts with a kink within the flank."""
+        return self.amount > 0.0 and self.exponent == 1.0 and self.start < self.relief_start < self.end
+
     def relief(self, s: Array) -> tuple[Array, Array]:
         """Relief (m) and its slope d delta/ds (-) at roll lengths s (m)."""
         s = np.asarray(s, dtype=float)

@@ -80,6 +80,12 @@ class Face:
         return made if self.round_ is None else np.where(u > 1.0, self.round_.speed(u - 1.0), made)
 
     @property
+    def relief_start(self) -> float:
+        """Parameter at which the relief starts."""
+        flank = self.flank
+        return (flank.relief_start - flank.start) / (flank.end - flank.start)
+
+    @property
     def radii(self) -> tuple[float, float, float]:
         """Radii (m) of the start, of the end of the involute and of the end."""
         low, middle, high = np.abs(self.points(np.array([0.0, 1.0, self.end])))
@@ -127,14 +133,24 @@ class Face:
                 made += 0.5 * (b - a) * float(_GAUSS_W @ self.speeds(a + 0.5 * (b - a) * (_GAUSS_X + 1)))
         return sign * made
 
+    def corners(self, u: Array) -> NDArray[np.bool_]:
+        """Whether the face has a corner at u: a sharp tip, an undercut's edge, the kink where a linear relief starts.
+
+        Its normal may be any of a fan there, and without friction the force takes that of the smooth mate.
+        """
+        found = np.asarray((u >= self.end - 1e-9) & self.sharp)
+        if self.fall > 0.0:
+            found = found | (u <= 0.0)
+        if self.flank.kinked:
+            found = found | (np.abs(u - self.relief_start) <= 1e-9)
+        return found
+
     def curvature(self, u: Any, most: float) -> Any:
-        """Curvature (1/m) at u (a number or an array), at most `most`, which a sharp tip has."""
+        """Curvature (1/m) at u (a number or an array), at most `most`, which a corner has."""
         step = 1e-5
         before, after = np.clip(u - step, 0.0, 1.0), np.asarray(u + step)
         turned = -np.angle(self.normals(after) / self.normals(before)) / (self.speeds(u) * (after - before))
-        corner = np.asarray(u >= 1.0 - 1e-9)
-        if self.fall > 0.0:
-            corner = corner | (u <= 0.0)
+        corner = self.corners(u) | (np.asarray(u) >= 1.0 - 1e-9)
         made = np.where(corner, most, np.maximum(0.0, turned))
         if self.round_ is not None:
             made = np.where(u > 1.0, 1.0 / self.round_.radius, made)
@@ -149,10 +165,8 @@ class Face:
 
     def marks(self) -> list[float]:
         """Parameters where the curvature jumps or the flank ends sharply."""
-        flank, found = self.flank, [0.0, 1.0] if self.fall > 0.0 else [1.0]
-        if flank.amount > 0.0:
-            found.append((flank.relief_start - flank.start) / (flank.end - flank.start))
-        return found
+        found = [0.0, 1.0] if self.fall > 0.0 else [1.0]
+        return [*found, self.relief_start] if self.flank.amount > 0.0 else found
 
 
 def _complex(points: Any) -> NDArray[np.complex128]:
@@ -283,11 +297,7 @@ class Flanks:
         turn = np.exp(1j * (angle + number * self.pair.mesh_cycle))
         normal = self.pinion.normals(u) * turn
         wheel_normal = -self.wheel.normals(mate) * np.exp(1j * (self.wheel_frame(angle, number) + twist))
-        at_edge = (u >= self.pinion.end - 1e-9) & self.pinion.sharp
-        if self.pinion.fall > 0.0:
-            at_edge |= (u <= 0.0) & ~(self.wheel.sharp & (mate >= self.wheel.end - 1e-9))
-        # at a corner the smooth mate's normal counts, since the force is normal to it without friction
-        normal = np.where(at_edge, wheel_normal, normal)
+        normal = np.where(self.pinion.corners(u) & ~self.wheel.corners(mate), wheel_normal, normal)
         point = seen + self.pair.working_centre_distance
         arm = np.stack([_cross(point, normal), -_cross(seen, normal)], axis=1)
         place, radii = np.stack([u, mate], axis=1), np.stack([np.abs(point), radius], axis=1)

@@ -97,7 +97,7 @@ class Router:
         for i in np.flatnonzero(small):
             one = balance(self.reference(float(angles[i]), float(twists[i])), float(twists[i]))
             found[i] = one
-            share[i], slope[i] = self.share(one)
+            share[i], slope[i] = self.share(float(angles[i]), float(twists[i]), one)
         direct = [i for i in np.flatnonzero(share > 0).tolist() if i not in solved]
         if direct:
             meshed = solve_positions(self.elastic, np.asarray(angles)[direct], twists[direct])
@@ -169,20 +169,23 @@ class Router:
         found = self._touched(angles)
         return np.array([found[float(a)].twist.min(initial=math.inf) for a in angles])
 
-    def share(self, found: Balance) -> tuple[float, float]:
+    def share(self, angle: float, twist: float, found: Balance) -> tuple[float, float]:
         """Share s of the mesh in the result and ds/dtwist (1/rad)."""
         if self.route == "hertz":
             return 0.0, 0.0
         if not found.converged or not (found.force > 0).any():
             return (0.0, 0.0) if found.converged else (1.0, 0.0)
-        k = int(np.argmax(found.force))
-        contact = found.contacts[k]
-        assert contact is not None
-        b = contact.width / self.length
+        r = self.reference(angle, twist)
+        on = np.flatnonzero(found.force > 0)
+        widths = np.array([contact.width for contact in found.contacts if contact is not None])
         low, high = RESOLVED
-        x = min(1.0, max(0.0, (b - low) / (high - low)))
-        rate = 0.5 * b * found.rate[k] / found.force[k] / (high - low)  # b ~ sqrt F
-        return x * x * (3 - 2 * x), 6 * x * (1 - x) * rate
+        b = widths / np.sqrt(r.elements[on] * DEFAULT_ELEMENT * self.pair.pinion.module)
+        x = np.clip((b - low) / (high - low), 0.0, 1.0)
+        weight = found.force[on] / found.force.sum()
+        weight_rate = (found.rate[on] - weight * found.rate.sum()) / found.force.sum()
+        each = x * x * (3 - 2 * x)
+        each_rate = 6 * x * (1 - x) * 0.5 * b * found.rate[on] / found.force[on] / (high - low)  # b ~ sqrt F
+        return float(weight @ each), float(weight @ each_rate + weight_rate @ each)
 
     def _touched(self, angles: Array) -> dict[float, Touching]:
         new = np.array(sorted({float(a) for a in angles} - self._touching.keys()))
