@@ -179,6 +179,8 @@ def test_free_housing() -> None:
         ({"mesh": {"size": 3}}, "size_mm"),
         ({"material": {"poisson_ratio": 0.5}}, "poisson_ratio"),
         ({"mesh": {"size_mm": 1e-3}}, "more than 2000000 elements"),
+        ({"feet": {"length_x_mm": 3e10}}, r"more than 2000000 elements.*feet \(3e\+10 mm long\)"),
+        ({"wall_x_mm": [-45.0, 1e9]}, "more than 2000000 elements"),
         ({"reduction": {"modes": 100000}}, "modes"),
         ({"damping": {"ratio": -0.01}}, "ratio"),
         ({"reduction": {"solver": "mumps"}, "mesh": {"size_mm": 30.0}}, "solver"),

@@ -10,8 +10,9 @@ import pytest
 from gearfe import Material, StiffnessCurve, sweep_stiffness
 from gearfe.contact.hertz import Edge, LocalContact, half_width, wedge_factor
 from gearfe.contact.laws import Nitsche
+from gearfe.gear.pair import GearPair
 from gearfe.gear.spur_gear import TipRelief
-from gearfe.gear.touching import Flanks
+from gearfe.gear.touching import Flanks, face_of
 from gearfe.stiffness import small_load
 from gearfe.stiffness.fields import pair_recovery
 from gearfe.stiffness.routes import RESOLVED, Router
@@ -384,3 +385,32 @@ def test_random_pairs_against_fine_meshes(case):
         error = np.abs(one / other - 1)
         assert np.median(error) < 1e-3
         assert error.max() < 4e-3  # the finer mesh misses sharp corners by 0.1 % itself
+
+
+@pytest.mark.parametrize("u", [0.3, 0.9995, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 1.0005, 1.01, 1.7])
+def test_places_beside_a_contact_lie_where_they_are_asked_for(u):
+    """Chords of short ways along the flank and into its tip round, whose parameter runs at another speed."""
+    face = face_of(pair(20, 30, pinion={"tip_round": 0.1e-3}).pinion)
+    x = np.concatenate([-np.geomspace(1e-5, 1e-9, 30), np.geomspace(1e-9, 1e-5, 30)])
+    chord = np.abs(face.points(face.moved(u, x)) - face.points(np.array(u)))
+    np.testing.assert_allclose(chord, np.abs(x), rtol=5e-3, atol=1e-17)
+    assert (np.diff(face.moved(u, x)) > 0).all()
+
+
+def test_at_the_kink_of_a_linear_relief_the_mate_gives_the_normal():
+    """Both gears see the same first touch and the same normal; the kink lies there over a stretch of pinion angles."""
+    gears = pair(24, 31, wheel={"tip_relief": TipRelief(40e-6, 1.2e-3, 1.0)})
+    mirrored = GearPair(gears.wheel, gears.pinion, gears.centre_distance)
+    mark, seen = Flanks(gears).wheel.relief_start, 0
+    for angle in np.linspace(0.0, gears.mesh_cycle, 40):
+        one = Flanks(gears).touching(np.array([angle]))
+        for k in np.flatnonzero(np.abs(one.place[:, 1] - mark) < 1e-9):
+            seen += 1
+            turned = -(angle / gears.gear_ratio) + one.twist[k] + math.pi / gears.wheel.teeth
+            other = Flanks(mirrored).touching(np.array([turned]))
+            j = int(np.argmin(np.abs(other.place[:, 0] - mark) + np.abs(other.place[:, 1] - one.place[k, 0])))
+            np.testing.assert_allclose(other.place[j], one.place[k, ::-1], atol=1e-8)
+            # half a turn about the middle of the centres: what pushes the wheel here pushes the pinion there
+            np.testing.assert_allclose(other.normal[j], one.normal[k], atol=1e-7)
+            np.testing.assert_allclose(other.arm[j], one.arm[k, ::-1], atol=1e-9)
+    assert seen >= 3

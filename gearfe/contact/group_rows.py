@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.sparse import csr_array
 
 from .closest import Projection
 from .exact_rows import exact_rows
@@ -226,19 +227,21 @@ def coupled(
 
     `rows` are its own, `origin` and `fixed` on the `unknowns` that they touch, shape (t,).
     """
-    columns = np.searchsorted(unknowns, rows.unknowns)
-    number = np.arange(len(right))
-    normal, turn, slide, lift = (np.zeros((len(right), len(unknowns))) for _ in range(4))
-    for dense, values in ((normal, rows.normal), (turn, rows.turn), (slide, rows.slide), (lift, rows.lift)):
-        np.add.at(dense, (number, columns), values)
-    turned = rows.loads[:, None] * (rows.bow[:, None] * slide + turn)
-    stiffness = (rows.metric[:, None] * slide + rows.gap[:, None] * turn).T @ turned
-    stiffness += normal.T @ (rows.cut[:, None] * slide) - lift.T @ (rows.loads[:, None] * slide)
+    columns = np.searchsorted(unknowns, rows.unknowns).T.ravel()
+    starts = 20 * np.arange(len(right) + 1)
+
+    def spread(values: Array) -> csr_array:
+        return csr_array((values.T.ravel(), columns, starts), shape=(len(right), len(unknowns)))
+
+    turned = spread(rows.loads * (rows.bow * rows.slide + rows.turn))
+    stiffness = spread(rows.metric * rows.slide + rows.gap * rows.turn).T @ turned
+    stiffness = stiffness + spread(rows.normal).T @ spread(rows.cut * rows.slide)
+    stiffness = stiffness - spread(rows.lift).T @ spread(rows.loads * rows.slide)
     split = len(piece.compliance[0])
     bent = np.eye(len(unknowns))
     bent[:, :split] -= stiffness[:, :split] @ piece.compliance[0]
     bent[:, split:] -= stiffness[:, split:] @ piece.compliance[1]
-    sides = np.column_stack([(rows.area[:, None] * normal).T, fixed - stiffness @ origin])
+    sides = np.column_stack([spread(rows.area * rows.normal).toarray().T, fixed - stiffness @ origin])
     solved = np.linalg.solve(bent, sides)
     loads, rest = solved[:, :-1], solved[:, -1]
     pressure = np.linalg.solve(np.eye(len(right)) + piece.response @ loads, right - piece.response @ rest)

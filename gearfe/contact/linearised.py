@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.sparse import csr_array
 
 from .closest import Projection
 from .exact_rows import exact_rows
@@ -24,7 +25,7 @@ class Linearised:
     Attributes
     ----------
     unknowns : ndarray, shape (2t,)
-    gap, opening : ndarray, shape (a,) and (a, 2t)
+    gap, opening : ndarray, shape (a,); ndarray or sparse, shape (a, 2t)
         g and dg/du of the active unknowns; integrals over the hats for multipliers.
     weighted : ndarray, shape (2t, a)
         G^T W: forces for the active unknowns.
@@ -32,7 +33,7 @@ class Linearised:
         gamma; 1 for multipliers.
     response : ndarray, shape (a, 2t)
         gamma dg/du C + S.
-    stiffness : ndarray, shape (2t, 2t)
+    stiffness : sparse, shape (2t, 2t)
         H: how the contact forces turn and move with the touched nodes (N/m).
     turning
         Factors of 1 - H C.
@@ -44,12 +45,12 @@ class Linearised:
 
     unknowns: IntArray
     gap: Array
-    opening: Array
+    opening: Any
     weighted: Array
     parameter: Array
     compliance: Array
     response: Array
-    stiffness: Array
+    stiffness: csr_array
     turning: Any
     factor: Any
     flex: Array | None = None
@@ -99,37 +100,41 @@ def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: 
     nodes = np.flatnonzero(touched)
     place = np.empty(len(touched), dtype=np.int64)
     place[nodes] = np.arange(len(nodes))
-    slot = 2 * (np.arange(len(points)) * len(nodes) + place[rows.nodes])
-    slots = (slot[:, None] + np.arange(2)[:, None]).ravel()
-    normal, slide, turn, lift = (
-        np.bincount(slots, values.ravel(), 2 * len(points) * len(nodes)).reshape(len(points), -1)
-        for values in (rows.normal, rows.slide, rows.turn, rows.lift)
-    )
-    opening = normal - rows.steep[:, None] * slide
+    columns = (2 * place[rows.nodes][:, None] + np.arange(2)[:, None]).reshape(20, -1).T.ravel()
+    starts = 20 * np.arange(len(points) + 1)
+
+    def spread(values: Array) -> csr_array:
+        """One row a point: the coefficients of its ten nodes, a few of the columns."""
+        return csr_array((values.reshape(20, -1).T.ravel(), columns, starts), shape=(len(points), 2 * len(nodes)))
+
+    opening: Any = spread(rows.normal - rows.steep * rows.slide)
     unknowns = np.empty(2 * len(nodes), dtype=np.int64)
     unknowns[::2], unknowns[1::2] = 2 * nodes, 2 * nodes + 1
     areas, gamma = scene.areas(projection.place)[points], scene.parameter[points]
     across = (areas > 0) & (areas < scene.weight[points])
     shrink = np.where(across, -scene.weight[points] / (2 * scene.fade[points]), 0.0)
     compliance = scene.compliance.take(unknowns, axis=0).take(unknowns, axis=1)
-    weighted = np.ascontiguousarray((normal * areas[:, None]).T)
-    loads = (areas * pressure[points])[:, None]
-    turned = loads * (rows.bow[:, None] * slide + turn)
-    stiffness = (rows.metric[:, None] * slide + chosen.gap[:, None] * turn).T @ turned - lift.T @ (loads * slide)
+    weighted = np.ascontiguousarray(spread(areas * rows.normal).toarray().T)
+    loads = areas * pressure[points]
+    stiffness = spread(rows.metric * rows.slide + chosen.gap * rows.turn).T @ spread(
+        loads * (rows.bow * rows.slide + rows.turn)
+    )
+    stiffness = stiffness - spread(rows.lift).T @ spread(loads * rows.slide)
     if across.any():
-        stiffness += normal.T @ ((shrink * pressure[points])[:, None] * slide)
+        stiffness = stiffness + spread(rows.normal).T @ spread(shrink * pressure[points] * rows.slide)
     # transposed matrices are what LAPACK sees in C order: factorise those, solve transposed, and nothing is copied
-    turning = dgetrf((np.eye(len(stiffness)) - stiffness @ compliance).T)[:2]
+    turning = dgetrf((np.eye(len(unknowns)) - stiffness @ compliance).T)[:2]
     gap, flex, relief = chosen.gap, None, np.zeros(0)
     if hats is not None:
         values = hats.matrix(active, points)
         weighted = weighted @ values
-        opening = values.T @ (areas[:, None] * opening + (shrink * gap)[:, None] * slide)
+        opened = spread(areas * (rows.normal - rows.steep * rows.slide) + shrink * gap * rows.slide)
+        opening = values.T @ opened.toarray()
         gap, gamma = values.T @ (areas * gap), np.ones(len(active))
         response = opening @ compliance
         matrix = response @ dgetrs(*turning, weighted, trans=1)[0]
     else:
-        response = (gamma[:, None] * opening) @ compliance
+        response = spread(gamma * (rows.normal - rows.steep * rows.slide)) @ compliance
         if len(scene.stress):
             stress = scene.stress.take(active, axis=0).take(unknowns, axis=1)
             response += stress
@@ -137,10 +142,10 @@ def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: 
         if scene.theta:
             relief = scene.theta * areas / gamma
             flex = stress.T * relief
-            unit = weighted + stiffness @ (stress.T * relief)
+            unit = weighted + stiffness @ flex
         matrix = response @ dgetrs(*turning, unit, trans=1)[0]
         if scene.theta:
-            matrix += gamma[:, None] * (opening @ (stress.T * relief))
+            matrix += gamma[:, None] * (opening @ flex)
             matrix += scene.stress_stress.take(active, axis=0).take(active, axis=1) * relief
         matrix.flat[:: len(matrix) + 1] += 1.0
     return Linearised(

@@ -44,8 +44,9 @@ SOFTEST, SOFTNESS_STEP, SMALLEST_STEP = 0.01, 3.2, 1.1
 SOFTER = (0.01, 0.03, 0.1, 0.3)
 #: Accuracy of the softer solutions, and Newton steps for each.
 SOFT_TOLERANCE, SOFT_ITERATIONS = 1e-2, 20
-#: Newton steps spent on one difficult position before it is given up.
-MAX_STEPS = 320
+#: Newton steps spent on one difficult position before it is given up, where so many points lie inside the mate; where
+#: there are more, so many fewer that the matrices cost no more.
+MAX_STEPS, USUAL_POINTS = 320, 350
 
 
 def solve_position(pair: MeshingPair, pinion_angle: float, twist: float, *, tolerance: float = TOLERANCE) -> Position:
@@ -97,7 +98,8 @@ def _solve_batch(pair: MeshingPair, angles: Array, twists: Array, tolerance: flo
         outcomes = _side_by_side(scenes, [_solving(pair, s, tolerance) for s in scenes])
         for i, scene, outcome in zip(places, scenes, outcomes, strict=True):
             if outcome.status != "converged" or _outgrown(pair, scene, outcome):
-                positions[i] = _with_care(pair, angles[i], twists[i], found[i], outcome.iterations, tolerance)
+                failed = (windows[i], outcome)
+                positions[i] = _with_care(pair, angles[i], twists[i], found[i], failed, tolerance)
             else:
                 positions[i] = finish(scene, outcome, outcome.iterations)
     return [p for p in positions if p is not None]
@@ -249,14 +251,28 @@ def _outgrown(pair: MeshingPair, scene: Scene, outcome: Outcome) -> bool:
 
 
 def _with_care(
-    pair: MeshingPair, angle: float, twist: float, found: list[Overlap], steps: int, tolerance: float
+    pair: MeshingPair,
+    angle: float,
+    twist: float,
+    found: list[Overlap],
+    failed: tuple[Sequence[Window], Outcome],
+    tolerance: float,
 ) -> Position:
-    """Second attempt on the whole overlap; where that fails too, the twist is raised in steps, each from the last."""
-    scene = assemble(pair, windows_of(pair, found, angle, twist, WHOLE))
-    outcome = _side_by_side([scene], [_solving(pair, scene, tolerance)])[0]
-    steps += outcome.iterations
+    """Second attempt on the whole overlap; where that fails too, the twist is raised in steps, each from the last.
+
+    `failed` are windows and outcome of the first attempt, which is not repeated if the same would be done again.
+    """
+    windows = windows_of(pair, found, angle, twist, WHOLE)
+    scene = assemble(pair, windows)
+    before, outcome = failed
+    steps = outcome.iterations
+    if pair.law.uses_stress or list(windows) != list(before):
+        outcome = _side_by_side([scene], [_solving(pair, scene, tolerance, by_penalty=True)])[0]
+        steps += outcome.iterations
+    inside = int((scene.rigid.gap < 0).sum())
+    most = MAX_STEPS * min(1.0, (USUAL_POINTS / inside) ** 2)
     done, step, last, owner = 0.0, 0.25, None, scene.owner
-    while outcome.status != "converged" and step > 0.01 and steps < MAX_STEPS:
+    while outcome.status != "converged" and step > 0.01 and steps < most:
         share = min(1.0, done + step)
         turned = tuple(replace(w, angle=pair.tooth_angle(w.gear, w.tooth, angle, share * twist)) for w in scene.windows)
         part = assemble(pair, turned)
@@ -279,11 +295,30 @@ def _with_care(
     return finish(scene, outcome, steps) if outcome.status == "converged" else unsolved(outcome.status, steps)
 
 
-def _solving(pair: MeshingPair, scene: Scene, tolerance: float) -> Dialogue:
-    """Newton's method from the Hertzian guess; for laws without stress by way of softer ones."""
-    state = _start(pair, scene)
+def _solving(pair: MeshingPair, scene: Scene, tolerance: float, *, by_penalty: bool = False) -> Dialogue:
+    """Newton's method from the Hertzian guess; for laws without stress by way of softer ones.
+
+    Parameters
+    ----------
+    by_penalty
+        Laws with stress start from what the law without its stress comes to, softened.
+    """
+    state, steps = _start(pair, scene), 0
     if pair.law.uses_stress or scene.hats is not None:
-        return (yield from newton(scene, state, tolerance))
+        if by_penalty and scene.hats is None:
+            none = np.zeros((0, 0))
+            plain = replace(scene, theta=0, stress=none, stress_stress=none)
+            softly = yield from _softened(plain, state, SOFT_TOLERANCE)
+            steps = softly.iterations
+            if softly.status == "converged":
+                state = replace(softly.state, place=softly.projection.place)
+        outcome = yield from newton(scene, state, tolerance)
+        return replace(outcome, iterations=steps + outcome.iterations)
+    return (yield from _softened(scene, state, tolerance))
+
+
+def _softened(scene: Scene, state: State, tolerance: float) -> Dialogue:
+    """A law without stress by way of softer ones."""
     share, factor, solved, steps = SOFTEST, SOFTNESS_STEP, 0.0, 0
     while True:
         softer = scene if share == 1.0 else replace(scene, parameter=share * scene.parameter)

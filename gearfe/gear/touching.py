@@ -121,7 +121,12 @@ class Face:
         here = float(arc[np.searchsorted(grid, u)])
         made = np.interp(here + x, arc, grid, left=-1.0, right=math.inf)
         near = np.abs(x) < 1e-4 * arc[-1]
-        made[near] = u + x[near] / float(self.speeds(np.array(u)))
+        speed_here = float(self.speeds(np.array(u)))
+        made[near] = u + x[near] / speed_here
+        if self.round_ is not None:  # the parameter's speed jumps where the round starts
+            start = (1.0 - u) * speed_here
+            across = near & ((x > start) if u <= 1.0 else (x < start))
+            made[across] = 1.0 + (x[across] - start) / float(self.speeds(np.array(1.0 if u > 1.0 else 1.0 + 1e-9)))
         return made
 
     def distance(self, u: float, mark: float) -> float:

@@ -62,7 +62,7 @@ def law_error(router: Router, angles: Array, twists: Array) -> Array:
         angle, twist = float(angles[i]), float(twists[i])
         reference = router.reference(angle, twist)
         found = balance(reference, twist)
-        share = router.share(found)[0]
+        share = router.share(angle, twist, found)[0]
         if not found.converged or share >= 1.0:
             continue
         pairs = [(c, known) for c, known in zip(found.contacts, reference.local, strict=True) if c is not None]

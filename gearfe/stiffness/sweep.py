@@ -33,6 +33,7 @@ from .curve_error import COARSENING, error_estimate, law_error, solved_twice
 from .periodic import fold
 from .positions import Progress, Solved, at_torque, at_twists, check_torque, honest, load_shares
 from .routes import Route, Router
+from .torque_control import ANGLE_ROUNDING
 
 __all__ = ["ErrorEstimate", "StiffnessCurve", "elastic_pair", "sweep_stiffness"]
 
@@ -242,8 +243,10 @@ def _estimate(
     chosen = solved_twice(np.array(solved.status) == "converged")
     again = at_twists(coarse, angles[chosen], solved.twist[chosen], None, finite=finite)
     other = np.where(np.array(again.status, dtype=object) == "converged", again.numbers["torque_wheel"], np.nan)
-    law = law_error(own, angles[chosen], solved.twist[chosen])
-    return error_estimate(angles[chosen], solved.numbers["torque_wheel"][chosen], other, coarsen=coarsen, law=law)
+    torque, tangent = solved.numbers["torque_wheel"][chosen], solved.numbers["tangent"][chosen]
+    # a twist of some bits of the gears' angles is not what the gears are turned by
+    law = law_error(own, angles[chosen], solved.twist[chosen]) + ANGLE_ROUNDING * np.abs(tangent / torque)
+    return error_estimate(angles[chosen], torque, other, coarsen=coarsen, law=law)
 
 
 def assembled_curve(

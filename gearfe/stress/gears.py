@@ -117,8 +117,13 @@ def period_checks(curve: Any, found: list[Position]) -> list[Check]:
         return [Check("period", math.inf, PERIOD)]
     if curve.status[0] != "converged":
         return []
-    rounding = 2 * ANGLE_ROUNDING * found[0].tangent / found[0].torque_wheel
-    return [Check("period", abs(float(curve.torque_wheel[-1] / curve.torque_wheel[0]) - 1), max(PERIOD, rounding))]
+    apart = abs(float(curve.torque_wheel[-1] / curve.torque_wheel[0]) - 1)
+    return [Check("period", apart, max(PERIOD, _rounding(found[0])))]
+
+
+def _rounding(found: Position) -> float:
+    """Relative change of the torque by the rounding of two angles."""
+    return 2 * ANGLE_ROUNDING * found.tangent / found.torque_wheel
 
 
 def balance(elastic: MeshingPair, found: Position) -> Check | None:
@@ -197,7 +202,7 @@ def swap_checks(pair: GearPair, elastic: MeshingPair, angles: Any, twists: Any, 
         Check(
             "swap",
             max(abs(q.torque_pinion / p.torque_wheel - 1), abs(q.torque_wheel / p.torque_pinion - 1)),
-            SWAP if p.route == q.route == "direct" else SMALL_LOAD,
+            max(SWAP if p.route == q.route == "direct" else SMALL_LOAD, _rounding(p)),
         )
         for p, q in zip(found, swapped, strict=True)
         if p.status == q.status == "converged"

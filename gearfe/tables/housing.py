@@ -7,6 +7,7 @@ y = 0.
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 
 from ..config import quantity
@@ -133,13 +134,19 @@ class HousingTable:
     def _check_size(self, where: str) -> None:
         """A size that makes more elements than any machine here holds is a slip of the unit."""
         length, height = (b - a for a, b in (self.wall_x_mm, self.wall_z_mm))
-        depth = self.inner_gap_mm + sum(self.wall_thickness_mm)
-        walls = height * (length * sum(self.wall_thickness_mm) + depth * sum(self.end_wall_thickness_mm))
-        volume = walls + length * depth * (self.base_thickness_mm + self.cover_thickness_mm)
-        least = (volume / (0.12 * MOST_ELEMENTS)) ** (1 / 3)  # a tetrahedron of edge h fills about 0.12 h^3
-        if self.mesh.size_mm < least:
+        depth, feet = self.inner_gap_mm + sum(self.wall_thickness_mm), self.feet
+        plates = [(height * length, t) for t in self.wall_thickness_mm]
+        plates += [(height * depth, t) for t in self.end_wall_thickness_mm]
+        plates += [(length * depth, t) for t in (self.base_thickness_mm, self.cover_thickness_mm)]
+        plates += [(4 * feet.length_x_mm * feet.width_y_mm, feet.height_mm)]
+        plates += [(2 * s.boss_height_mm * s.boss_radius_mm, math.pi * s.boss_radius_mm) for s in self.shafts]
+        # a tetrahedron of edge h fills about 0.12 h^3, and a thin plate is one element thick at least
+        least = (sum(area * thickness for area, thickness in plates) / (0.12 * MOST_ELEMENTS)) ** (1 / 3)
+        least = max(least, (max(area for area, thickness in plates if thickness > 0) / (0.12 * MOST_ELEMENTS)) ** 0.5)
+        if not self.mesh.size_mm >= least:
             problem = f"makes more than {MOST_ELEMENTS} elements of this housing: must be >= {least:.3g}"
-            raise InputError(f"{where}.size_mm", self.mesh.size_mm, problem, "choose a larger size (mm)")
+            cure = f"choose a larger size (mm); walls, feet ({feet.length_x_mm:g} mm long) and bosses count"
+            raise InputError(f"{where}.size_mm", self.mesh.size_mm, problem, cure)
 
     def _check_feet(self, where: str) -> None:
         feet, depth = self.feet, self.inner_gap_mm + sum(self.wall_thickness_mm)

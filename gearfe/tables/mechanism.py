@@ -183,7 +183,7 @@ class RunTable:
 
     def check(self, where: str) -> None:
         """A sane number of rows."""
-        if self.end_s / self.step_s > 5e6:
+        if self.end_s > 5e6 * self.step_s:  # no division: it may overflow
             raise InputError(f"{where}.step_s", self.step_s, "gives more than five million rows", "take a longer step")
 
 

@@ -204,7 +204,7 @@ class TrainTable:
         if self.step_us * 1e-3 > self.duration_ms * (1 + 1e-12):
             problem = f"is longer than duration_ms = {self.duration_ms:g}"
             raise InputError(f"{where}.step_us", self.step_us, problem, "use a smaller step")
-        if self.duration_ms / (self.step_us * 1e-3) > 5e6:
+        if self.duration_ms > 5e6 * (self.step_us * 1e-3):  # no division: the step may round to zero
             raise InputError(f"{where}.step_us", self.step_us, "makes more than 5 million outputs", "use a larger step")
         if self.variant:
             self.chosen(self.variant)
