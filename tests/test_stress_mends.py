@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import time
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -161,3 +163,29 @@ def test_estimates_that_ended_without_a_reason(number: int) -> None:
     else:
         assert row.outcome == "stopped"
         assert "shaft s1 moves by" in row.reason
+
+
+@pytest.mark.parametrize("share", [1e-13, 3e-12])
+def test_a_link_without_mass_does_not_stop_a_run(share: float, tmp_path: Path) -> None:
+    """Campaign mechanisms, seed 61, case 67: the pivots of so light a coupler looked like a singular position.
+
+    What the mass of a coupler does to the motion is proportional to it, so one of 1e-8 on series is near enough.
+    """
+    case = campaign_named("mechanisms").case(61, 67)
+    table = case.files["job.toml"]
+    made = {}
+    for factor in (share, 1e-8):
+        light = re.compile(r"(mass_kg|inertia_kg_m2) = (\S*e-1[0-9])")
+        scaled = light.sub(partial(_rescaled, factor), table)
+        (tmp_path / "job.toml").write_text(scaled, encoding="utf-8")
+        mechanism = load_mechanism(tmp_path / "job.toml")
+        times = np.linspace(0.0, mechanism.file.run.end_s, 11)
+        made[factor] = integrate(mechanism.system, times, tolerance=1e-8, start=mechanism.start(), backend="plain")
+    assert [m.method for m in made.values()] == ["implicit", "taylor"]
+    assert [m.status for m in made.values()] == [0, 0]
+    np.testing.assert_allclose(made[share].q, made[1e-8].q, atol=3e-6)
+
+
+def _rescaled(share: float, found: re.Match[str]) -> str:
+    """The case's coupler has the share 7.84e-12 of the other links' mass."""
+    return f"{found[1]} = {float(found[2]) * share / 7.84e-12}"

@@ -6,7 +6,7 @@ from . import compiled, taylor
 from .system import System
 
 #: Measured: CPU seconds to compile the kernels, to load numba with the cached ones, and of a plain step with n bodies.
-COMPILE_SECONDS = 25.0
+COMPILE_SECONDS = 50.0
 LOAD_SECONDS = 0.4
 STEP_SECONDS = (1.2e-3, 0.9e-3)
 

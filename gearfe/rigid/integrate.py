@@ -20,7 +20,10 @@ METHODS = ("auto", "taylor", "explicit", "implicit")
 #: Asked tolerance -> largest last term of a Taylor step. The benchmark mechanisms amplify local errors some
 #: hundred times.
 LOCAL_SHARE = 5e-4
-COMPILING = "gearfe: compiling the kernels once (about half a minute); backend='plain' does without"
+#: Ratio of masses (or of moments of inertia) from which on a link counts as massless, and least singular value of the
+#: constraints' unit gradients at a start that is no singular position.
+MASSLESS, REGULAR = 1e11, 1e-6
+COMPILING = "gearfe: compiling the kernels once (about a minute); backend='plain' does without"
 
 
 def integrate(
@@ -45,7 +48,8 @@ def integrate(
     method : {"auto", "taylor", "explicit", "implicit"}
         "taylor": series of the index-3 equations, planar scenes only, any accuracy. "explicit": Runge-Kutta of order 8
         with projection, any smooth system. "implicit": Radau IIA of order 5 on the index-3 equations, for stiff ones.
-        "auto" takes "taylor" when the system is a planar scene that is not stiff, else "explicit", else "implicit".
+        "auto" takes "taylor" when the system is a planar scene that is not stiff and has no link without mass, else
+        "explicit", else "implicit".
     tolerance : float
         Accuracy asked for, relative to 1 rad and to the size of the mechanism; 1e-13 to 0.1.
     start : Start, optional
@@ -101,7 +105,8 @@ def _dropped_rows_hold(system: System, start: Start, dense: Any, tolerance: floa
 
 
 def choose_method(system: System, start: Start, span: float) -> str:
-    """The method that "auto" takes: Taylor for planar scenes, explicit otherwise, implicit when the start is stiff.
+    """The method that "auto" takes: Taylor for planar scenes, explicit otherwise, implicit when the start is stiff or a
+    link of a planar scene has next to no mass.
 
     Stiff: explicit steps would have to follow the damping or the fastest vibration more than 30,000 times over the run.
     """
@@ -114,9 +119,25 @@ def choose_method(system: System, start: Start, span: float) -> str:
         known[key] = (fastest_rate(system, start), start)  # the start is kept, so its id stays its own
     decay, omega = known[key][0]
     work = abs(span) * decay / 4.0 + abs(span) * omega / 4.0
-    if work > 30_000:
+    if work > 30_000 or (scene is not None and _has_massless_links(system, start)):
         return "implicit"
     return "taylor" if scene is not None else "explicit"
+
+
+def _has_massless_links(system: System, start: Start) -> bool:
+    """Whether masses differ so much that the series cannot tell a link without mass from a singular position.
+
+    They eliminate on G M^-1 G^T, which tells singular positions by its pivots; the implicit method solves for M and G
+    side by side. At a truly singular start the series stay, for they alone follow the branch that the velocity selects.
+    """
+    assert system.planar is not None
+    inverse = system.planar.assembly.tables.mass.reshape(-1, 3)[:-1]
+    moving = inverse[(inverse > 0).all(axis=1)]
+    if len(moving) == 0 or (moving.max(axis=0) < MASSLESS * moving.min(axis=0)).all():
+        return False
+    gradients = system.jacobian(start.time, start.q)[start.active]
+    gradients = gradients / np.linalg.norm(gradients, axis=1, keepdims=True)
+    return len(gradients) > 0 and bool(np.linalg.svd(gradients, compute_uv=False)[-1] > REGULAR)
 
 
 def _taylor(system: System, start: Start, times, backend: str, *, tolerance, longest, most):  # type: ignore[no-untyped-def]
