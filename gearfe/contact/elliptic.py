@@ -81,6 +81,10 @@ class Chain:
         first, last = self._edges(low, high)
         return float(self.sizes[first : last + 1].max())
 
+    def size_at(self, arc: float) -> float:
+        """Element size (m) at an arc length, continuous between the middles of the elements."""
+        return float(np.interp(arc, 0.5 * (self.ends[1:] + self.ends[:-1]), self.sizes))
+
     def _edges(self, low: float, high: float) -> tuple[int, int]:
         first = int(np.clip(np.searchsorted(self.ends, low, side="right") - 1, 0, len(self.sizes) - 1))
         return first, int(np.clip(np.searchsorted(self.ends, high) - 1, first, len(self.sizes) - 1))

@@ -1,10 +1,11 @@
 r"""Which way a position is solved: on the mesh, or by the law of small loads where the mesh cannot see the contact.
 
-The half width b of the most loaded contact, as `.small_load` predicts it, decides. The mesh errs by a power of
-h/b, with the largest element h of the two flanks; what the small-load law leaves out grows with the load, so with the
-square of b over the module m. Both are equal at a b that grows with :math:`s = \sqrt{h\,h_0}`, where :math:`h_0` is
-the default element, 0.028 m: the mesh alone from b = `RESOLVED[1]` s on, the small-load law alone below `RESOLVED[0]`
-s, and between them their mean with weights that change smoothly, so that the torque is a smooth function of the twist:
+The half width b of each contact, as `.small_load` predicts it, decides. The mesh errs by a power of h/b, with the
+element h of the coarser flank at the contact; what the small-load law leaves out grows with the load, so with the
+square of b over the module m. Both are equal at a b that grows with :math:`\sqrt{h\,h_0}`, where :math:`h_0` is the
+default element, 0.028 m: the mesh alone from b = `RESOLVED[1]` of it on, the small-load law alone below `RESOLVED[0]`,
+and between them their mean with weights that change smoothly. Where several contacts bear, the mean of their widths
+decides, weighed by their forces, so that the torque is a smooth function of the twist:
 
 .. math:: T = s\,T_\mathrm{direct} + (1-s)\,T_\mathrm{hertz}, \qquad
           T' = s\,T_\mathrm{direct}' + (1-s)\,T_\mathrm{hertz}' + s'\,(T_\mathrm{direct} - T_\mathrm{hertz}) .
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 
 from ..contact.compliance import GearBody
 from ..contact.elliptic import Chain
+from ..contact.hertz import half_width
 from ..contact.scene import MeshingPair
 from ..contact.solver import Position, solve_positions
 from ..errors import InputError
@@ -36,8 +38,11 @@ Route = Literal["auto", "direct", "hertz"]
 
 #: Default element of the flank (modules), at which the two routes' errors were weighed.
 DEFAULT_ELEMENT = 0.028
-#: Half widths of the contact, in units of the length s, between which the two routes are blended.
+#: Half widths of a contact, in units of that length, between which the two routes are blended.
 RESOLVED = (0.9, 1.3)
+#: Under an edge a contact is narrow whatever it carries: it counts at least this share of what its force would make at
+#: the pitch point, so that a heavy load is left to the mesh there as well.
+EDGES = 0.5
 #: Compliance of a tooth pair times E* w beyond which none is: with it a light load is told without a reference.
 SOFTEST = 40.0
 #: The same of usual teeth: where it tells that the load is not light, the mesh is asked first, and believed where its
@@ -67,6 +72,8 @@ class Router:
         self.flanks = Flanks(pair)
         largest = max(_largest(b, f.radii[0]) for b, f in zip(elastic.bodies, self.flanks.faces, strict=True))
         self.length = math.sqrt(largest * DEFAULT_ELEMENT * pair.pinion.module)
+        teeth = pair.pinion.teeth, pair.wheel.teeth
+        self._radius = pair.tangent_length * teeth[0] * teeth[1] / sum(teeth) ** 2  # relative, at the pitch point
         self._chains = [Chain(body) for body in elastic.bodies]
         self._references: dict[float, tuple[float, Reference]] = {}
         self._touching: dict[float, Touching] = {}
@@ -117,20 +124,21 @@ class Router:
         return made
 
     def _clear(self, angle: float, position: Position) -> bool:
-        """Whether the force that the mesh gives to the leading pair makes a contact that is resolved beyond doubt."""
+        """Whether the forces that the mesh gives make contacts that are resolved beyond doubt."""
         if position.status != "converged":
             return False
-        k = int(np.argmax(position.pair_torques))
         touching = self._touching[angle]
-        mine = np.flatnonzero(touching.pair == position.pair_numbers[k])
-        if len(mine) != 1:
-            return False
-        curved = touching.curvature[mine[0]]
-        if not (math.isfinite(curved) and curved > 0):
-            return False
-        force = position.pair_torques[k] / (touching.arm[mine[0], 1] * self.elastic.width)
-        effective = 1 / sum(body.material.contact_compliance(body.plane) for body in self.elastic.bodies)
-        return bool(math.sqrt(4 * force / (math.pi * effective * curved)) > CLEARLY * RESOLVED[1] * self.length)
+        modulus = 1 / sum(body.material.contact_compliance(body.plane) for body in self.elastic.bodies)
+        forces, widths = np.zeros(len(position.pair_numbers)), np.zeros(len(position.pair_numbers))
+        for i, (number, torque) in enumerate(zip(position.pair_numbers, position.pair_torques, strict=True)):
+            mine = np.flatnonzero(touching.pair == number)
+            if len(mine) != 1:
+                return False
+            forces[i] = max(0.0, torque / (touching.arm[mine[0], 1] * self.elastic.width))
+            curved = float(touching.curvature[mine[0]])
+            own = half_width(forces[i], modulus, 1 / curved) if math.isfinite(curved) and curved > 0 else 0.0
+            widths[i] = max(own, EDGES * half_width(forces[i], modulus, self._radius))
+        return bool(forces @ widths > CLEARLY * RESOLVED[1] * self.length * forces.sum())
 
     def light(self, angles: Array, twists: Array, softest: float = SOFTEST) -> NDArray[np.bool_]:
         """Where the load may be small; the others are resolved whatever the teeth's compliance up to `softest` is."""
@@ -142,13 +150,12 @@ class Router:
             touching = found[float(angle)]
             if len(touching) == 0:
                 continue
-            first = int(np.argmin(touching.twist))
-            overlap = touching.arm[first, 1] * (twist - touching.twist[first])
-            curved = touching.curvature[first]
-            if not (overlap > 0 and math.isfinite(curved) and curved > 0):
+            overlap = touching.arm[:, 1] * (twist - touching.twist)
+            known = (overlap > 0) & np.isfinite(touching.curvature) & (touching.curvature > 0)
+            if not known.any():
                 continue
             # another pair may take load off this one; it can at most halve it while both are on the path
-            width = math.sqrt(4 * 0.5 * overlap / softest / (math.pi * curved))
+            width = np.sqrt(4 * 0.5 * overlap[known] / softest / (math.pi * touching.curvature[known])).max()
             made[i] = width < RESOLVED[1] * self.length
         return made
 
@@ -178,14 +185,15 @@ class Router:
         r = self.reference(angle, twist)
         on = np.flatnonzero(found.force > 0)
         widths = np.array([contact.width for contact in found.contacts if contact is not None])
+        widths = np.maximum(widths, EDGES * half_width(found.force[on] / r.width, r.local[0].modulus, self._radius))
         low, high = RESOLVED
-        b = widths / np.sqrt(r.elements[on] * DEFAULT_ELEMENT * self.pair.pinion.module)
-        x = np.clip((b - low) / (high - low), 0.0, 1.0)
+        each = widths / np.sqrt(r.elements[on] * DEFAULT_ELEMENT * self.pair.pinion.module)
         weight = found.force[on] / found.force.sum()
-        weight_rate = (found.rate[on] - weight * found.rate.sum()) / found.force.sum()
-        each = x * x * (3 - 2 * x)
-        each_rate = 6 * x * (1 - x) * 0.5 * b * found.rate[on] / found.force[on] / (high - low)  # b ~ sqrt F
-        return float(weight @ each), float(weight @ each_rate + weight_rate @ each)
+        b = float(weight @ each)
+        # widths grow with the root of the forces
+        rate = float(found.rate[on] @ (1.5 * each - b)) / found.force.sum()
+        x = min(1.0, max(0.0, (b - low) / (high - low)))
+        return x * x * (3 - 2 * x), 6 * x * (1 - x) * rate / (high - low)
 
     def _touched(self, angles: Array) -> dict[float, Touching]:
         new = np.array(sorted({float(a) for a in angles} - self._touching.keys()))

@@ -88,7 +88,7 @@ class Reference:
     width
         Common face width (m).
     elements : ndarray, shape (m,)
-        Element size of the flanks at each contact (m).
+        Element size of the coarser flank at each contact (m).
     unit : tuple of (Loads, Loads)
         Nodal loads on pinion and wheel of the reference pressures.
     """
@@ -140,9 +140,10 @@ def _reference(
     for k in range(count):
         arcs = [chain.arc_at(float(touching.radius[k, g])) for g, chain in enumerate(chains)]
         # x runs along the pinion's flank to its tip, against the wheel's
-        low, high, sizes[k] = _span(chains, arcs)
+        low, high, element = _span(chains, arcs)
+        sizes[k] = max(c.size_at(a) for c, a in zip(chains, arcs, strict=True))
         spans.append((low, high))
-        local.append(local_contact(pair, elastic, flanks, touching, k, sizes[k]))
+        local.append(local_contact(pair, elastic, flanks, touching, k, element))
         normal = complex(touching.normal[k])
         axes = [elastic.tooth_angle(g, t, angle, touching.twist[k]) for g, t in enumerate(_teeth(touching, k))]
         # frictionless: the pinion is pushed against n, the wheel along it
