@@ -15,6 +15,7 @@ from gearfe.gear.spur_gear import TipRelief
 from gearfe.gear.touching import Flanks, face_of
 from gearfe.stiffness import small_load
 from gearfe.stiffness.fields import pair_recovery
+from gearfe.stiffness.local_gap import local_contact
 from gearfe.stiffness.routes import RESOLVED, Router
 from gearfe.stiffness.small_balance import balance
 from gearfe.stiffness.sweep import elastic_pair
@@ -414,3 +415,27 @@ def test_at_the_kink_of_a_linear_relief_the_mate_gives_the_normal():
             np.testing.assert_allclose(other.normal[j], one.normal[k], atol=1e-7)
             np.testing.assert_allclose(other.arm[j], one.arm[k, ::-1], atol=1e-9)
     assert seen >= 3
+
+
+@pytest.mark.parametrize("u", [1e-6, 0.4, 0.9, 0.999995, 1.0 - 2e-9])
+def test_curvature_of_an_involute_up_to_its_round(u):
+    """The radius of curvature is the roll length (ISO 21771), also within a difference's step of the round."""
+    face = face_of(pair(20, 30, pinion={"tip_round": 0.1e-3}).pinion)
+    assert face.curvature(u, math.inf) * face.flank.roll(u) == pytest.approx(1.0, rel=1e-4)
+
+
+def test_a_contact_that_does_not_reach_the_round_is_hertz():
+    """Just below a tip round: the approach under a light load is that of the involutes, not of the round."""
+    gears = pair(20, 30, pinion={"tip_round": 0.1e-3})
+    flanks, elastic = Flanks(gears), elastic_pair(gears, coarsen=4.0)
+    touching = flanks.touching(np.linspace(0.0, gears.mesh_cycle, 4000))
+    below = (1.0 - touching.place[:, 0]) * float(flanks.pinion.speeds(np.array(1.0)))
+    k = int(np.argmin(np.where(below > 1e-7, below, np.inf)))
+    contact = local_contact(gears, elastic, flanks, touching, k, 1e-4)
+    assert 1e-7 < contact.smooth < 2e-5
+    load = (
+        math.pi * contact.modulus * (0.2 * contact.smooth) ** 2 * touching.curvature[k] / 4
+    )  # of the half width 0.2 smooth
+    found = contact.under(load)
+    assert found.width == pytest.approx(0.2 * contact.smooth, rel=1e-3)
+    assert found.approach == pytest.approx(contact._numerical(load).approach, rel=1e-3)

@@ -153,7 +153,8 @@ class Face:
     def curvature(self, u: Any, most: float) -> Any:
         """Curvature (1/m) at u (a number or an array), at most `most`, which a corner has."""
         step = 1e-5
-        before, after = np.clip(u - step, 0.0, 1.0), np.asarray(u + step)
+        # not across the start of the round, whose curvature is its own
+        before, after = np.clip(u - step, 0.0, 1.0 - step), np.clip(u + step, step, 1.0)
         turned = -np.angle(self.normals(after) / self.normals(before)) / (self.speeds(u) * (after - before))
         corner = self.corners(u) | (np.asarray(u) >= 1.0 - 1e-9)
         made = np.where(corner, most, np.maximum(0.0, turned))

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 #: Nearest and farthest known places of the gap from the point of contact (modules), and their number on either side.
 NEAR, FAR, PLACES = 1e-8, 0.4, 90
-#: Distance (modules) over which the radius of curvature is taken where no edge is near.
+#: Distance (modules) over which the radius of curvature is taken at an edge.
 CURVED = 0.01
 #: Elements between a contact and the nearest edge or jump of curvature, from which on it is that of smooth curves.
 CLEAR = 8.0
@@ -60,7 +60,9 @@ def local_contact(
             start = (1.0 if g == 0 else -1.0) * face.distance(place[g], 0.0)
             _fall_back(x, gap, known, start, 1.0 if g == 0 else -1.0, face.fall)
     x, gap = x[known], np.maximum(gap[known], 0.0)
-    return LocalContact(1 / sum(shares), _radius(x, gap, CURVED * module), x, gap, tuple(edges), smooth)
+    # lighter contacts than reach the next edge or jump know the curvature at the point alone
+    radius = float(1 / bend) if smooth > 0 and 0 < bend < math.inf else _radius(x, gap, CURVED * module)
+    return LocalContact(1 / sum(shares), radius, x, gap, tuple(edges), smooth)
 
 
 def _fall_back(x: Array, gap: Array, known: NDArray[np.bool_], start: float, up: float, fall: float) -> None:
