@@ -35,8 +35,8 @@ SIZES = (5.0, 3.2, 2.0, 1.4, 1.0, 0.7, 0.5, 0.35, 0.2)
 NOISE = (1e-3, 1e-2, 0.05, 0.5)
 #: Family -> theta of Nitsche's law.
 THETA: dict[str, Theta] = {"nitsche": 0, "nitsche symmetric": 1, "nitsche skew": -1}
-#: Positions of the comparison in one mesh cycle, and the step (deg) of the dense curve.
-POSITIONS, FINE_STEP = 8, 0.05
+#: Positions of the comparison in one mesh cycle, and the step (deg) and the most positions of the dense curve.
+POSITIONS, FINE_STEP, MOST_FINE = 8, 0.05, 240
 
 
 def settings() -> list[tuple[str, float]]:
@@ -151,7 +151,7 @@ def _noise(case: Case, job: StiffnessJob, elastic: MeshingPair, twist: float) ->
     because at pair changes the curve truly bends.
     """
     step = math.radians(FINE_STEP)
-    angles = step * np.arange(round(job.pair.mesh_cycle / step))
+    angles = step * np.arange(min(MOST_FINE, round(job.pair.mesh_cycle / step)))
     torque, iterations, status = _torques(elastic, angles, twist)
     third = np.abs(np.diff(torque, 3)) / math.sqrt(20.0) / np.nanmedian(torque)
     failed = sum(n for s, n in status.items() if s not in ("converged", "no_contact"))
