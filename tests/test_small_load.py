@@ -439,3 +439,25 @@ def test_a_contact_that_does_not_reach_the_round_is_hertz():
     found = contact.under(load)
     assert found.width == pytest.approx(0.2 * contact.smooth, rel=1e-3)
     assert found.approach == pytest.approx(contact._numerical(load).approach, rel=1e-3)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.0 + 1e-12, 1.001, 1.03, 1.5])
+def test_the_normal_is_that_of_both_faces(exponent):
+    """Also where a relief starts with a kink, or so quickly that the place is not known well enough for a normal."""
+    flanks = Flanks(pair(24, 31, pinion={"tip_relief": TipRelief(40e-6, 1.2e-3, exponent)}))
+    touching = flanks.touching(np.linspace(0.0, flanks.pair.mesh_cycle, 60))
+    mate = touching.place[:, 1]
+    turn = np.exp(1j * (flanks.wheel_frame(touching.angle, touching.pair) + touching.twist))
+    apart = np.abs(np.angle(touching.normal / (-flanks.wheel.normals(mate) * turn)))
+    inner = (mate > 1e-6) & (mate < flanks.wheel.end - 1e-6)
+    assert inner.sum() > 60
+    assert apart[inner].max() < 1e-6
+
+
+def test_the_width_of_a_numerical_contact_is_smooth_in_the_load():
+    """b ~ sqrt P on a parabola: the rate of change holds from step to step, though panels join one by one."""
+    found = local(lambda x: x**2 / (2 * RHO))
+    loads = 1e3 * np.exp(np.linspace(0.0, 0.2, 81))
+    widths = np.array([found.under(load).width for load in loads])
+    np.testing.assert_allclose(widths, np.sqrt(4 * loads * RHO / (math.pi * E_STAR)), rtol=4e-3)
+    assert (np.diff(np.log(widths)) > 0).all()

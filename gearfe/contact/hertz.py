@@ -196,9 +196,16 @@ class LocalContact:
         width = 0.5 * float(nodes[last + 1] - nodes[first])
         middle = 0.5 * float(nodes[last + 1] + nodes[first])
         smooth = all(abs(edge.place - middle) > 1.02 * width for edge in self.edges)
-        arm = 0.5 * (nodes[1:] + nodes[:-1]) * np.diff(nodes)
+        place, size = 0.5 * (nodes[1:] + nodes[:-1]), np.diff(nodes)
+        ends = _end(place, pressure, first, nodes[first], 1), _end(place, pressure, last, nodes[last + 1], -1)
         return Approach(
-            approach, rate, float(arm @ pressure), float(arm @ change), width, float(pressure.max()), smooth
+            approach,
+            rate,
+            float((place * size) @ pressure),
+            float((place * size) @ change),
+            0.5 * (ends[1] - ends[0]),
+            float(pressure.max()),
+            smooth,
         )
 
     def _panels(self, load: float, nodes: Array) -> tuple[Array, Array, float, float]:
@@ -228,6 +235,24 @@ class LocalContact:
                 break
             active = wanted
         return np.maximum(pressure, 0.0), change, float(approach), float(rate)
+
+
+def _end(place: Array, pressure: Array, outer: int, node: float, inwards: int) -> float:
+    """Where the pressure ends: beyond the panel `outer` its square falls on as between the last two.
+
+    The panels in contact change by jumps with the load, this place does not. Under a sharp edge, where the pressure
+    rises, it is the panel's outer node.
+    """
+    inner = outer + inwards
+    if not 0 <= inner < len(place):
+        return node
+    low, high = pressure[outer] ** 2, pressure[inner] ** 2
+    if high <= low:
+        return node
+    end = place[outer] + low / (high - low) * (place[outer] - place[inner])
+    beyond = outer - inwards
+    most = place[beyond] if 0 <= beyond < len(place) else node
+    return float(max(end, most) if inwards > 0 else min(end, most))
 
 
 def _primitive(z: Array) -> Array:

@@ -50,7 +50,7 @@ class Linearised:
     parameter: Array
     compliance: Array
     response: Array
-    stiffness: csr_array
+    stiffness: Any
     turning: Any
     factor: Any
     flex: Array | None = None

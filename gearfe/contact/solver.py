@@ -47,6 +47,8 @@ SOFT_TOLERANCE, SOFT_ITERATIONS = 1e-2, 20
 #: Newton steps spent on one difficult position before it is given up, where so many points lie inside the mate; where
 #: there are more, so many fewer that the matrices cost no more.
 MAX_STEPS, USUAL_POINTS = 320, 350
+#: The twist is raised for this many steps in any case.
+LEAST_STEPS = 40
 
 
 def solve_position(pair: MeshingPair, pinion_angle: float, twist: float, *, tolerance: float = TOLERANCE) -> Position:
@@ -269,8 +271,8 @@ def _with_care(
     if pair.law.uses_stress or list(windows) != list(before):
         outcome = _side_by_side([scene], [_solving(pair, scene, tolerance, by_penalty=True)])[0]
         steps += outcome.iterations
-    inside = int((scene.rigid.gap < 0).sum())
-    most = MAX_STEPS * min(1.0, (USUAL_POINTS / inside) ** 2)
+    inside = max(1, int((scene.rigid.gap < 0).sum()))
+    most = max(steps + LEAST_STEPS, MAX_STEPS * min(1.0, (USUAL_POINTS / inside) ** 2))
     done, step, last, owner = 0.0, 0.25, None, scene.owner
     while outcome.status != "converged" and step > 0.01 and steps < most:
         share = min(1.0, done + step)

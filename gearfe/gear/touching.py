@@ -153,14 +153,25 @@ class Face:
     def curvature(self, u: Any, most: float) -> Any:
         """Curvature (1/m) at u (a number or an array), at most `most`, which a corner has."""
         step = 1e-5
-        # not across the start of the round, whose curvature is its own
-        before, after = np.clip(u - step, 0.0, 1.0 - step), np.clip(u + step, step, 1.0)
+        before, after = np.asarray(u - step), np.asarray(u + step)
+        for mark in self.marks():  # not across the starts of relief and round, whose curvatures are their own
+            below = np.asarray(u) <= mark
+            before = np.where(~below, np.maximum(before, mark), before)
+            after = np.where(below, np.minimum(after, np.maximum(mark, u)), after)
+        before, after = np.clip(before, 0.0, 1.0), np.clip(after, 0.0, 1.0)
+        after = np.where(after > before, after, before + step)
         turned = -np.angle(self.normals(after) / self.normals(before)) / (self.speeds(u) * (after - before))
         corner = self.corners(u) | (np.asarray(u) >= 1.0 - 1e-9)
         made = np.where(corner, most, np.maximum(0.0, turned))
         if self.round_ is not None:
             made = np.where(u > 1.0, 1.0 / self.round_.radius, made)
         return np.minimum(most, made)[()]
+
+    def bend(self, u: Array) -> Array:
+        """How much the normal turns around u, per length (1/m): across marks too, infinite at corners."""
+        before, after = np.clip(u - 1e-5, 0.0, self.end), np.clip(u + 1e-5, 0.0, self.end)
+        turned = np.abs(np.angle(self.normals(after) / self.normals(before)))
+        return np.where(self.corners(u), math.inf, turned / np.abs(self.points(after) - self.points(before)))
 
     def tip_angle(self) -> float:
         """Angle (rad) of the material between the flank's end and the tip circle."""
@@ -303,7 +314,8 @@ class Flanks:
         turn = np.exp(1j * (angle + number * self.pair.mesh_cycle))
         normal = self.pinion.normals(u) * turn
         wheel_normal = -self.wheel.normals(mate) * np.exp(1j * (self.wheel_frame(angle, number) + twist))
-        normal = np.where(self.pinion.corners(u) & ~self.wheel.corners(mate), wheel_normal, normal)
+        # the normal of the flatter face is the surer one; at the mate's corner it is the only one
+        normal = np.where(self.pinion.bend(u) > self.wheel.bend(mate), wheel_normal, normal)
         point = seen + self.pair.working_centre_distance
         arm = np.stack([_cross(point, normal), -_cross(seen, normal)], axis=1)
         place, radii = np.stack([u, mate], axis=1), np.stack([np.abs(point), radius], axis=1)

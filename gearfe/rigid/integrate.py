@@ -20,9 +20,9 @@ METHODS = ("auto", "taylor", "explicit", "implicit")
 #: Asked tolerance -> largest last term of a Taylor step. The benchmark mechanisms amplify local errors some
 #: hundred times.
 LOCAL_SHARE = 5e-4
-#: Ratio of masses (or of moments of inertia) from which on a link counts as massless, and least singular value of the
+#: Ratio of masses from which on a link counts as massless, and least singular value of the
 #: constraints' unit gradients at a start that is no singular position.
-MASSLESS, REGULAR = 1e11, 1e-6
+MASSLESS, REGULAR = 1e10, 1e-6
 COMPILING = "gearfe: compiling the kernels once (about a minute); backend='plain' does without"
 
 
@@ -132,8 +132,8 @@ def _has_massless_links(system: System, start: Start) -> bool:
     """
     assert system.planar is not None
     inverse = system.planar.assembly.tables.mass.reshape(-1, 3)[:-1]
-    moving = inverse[(inverse > 0).all(axis=1)]
-    if len(moving) == 0 or (moving.max(axis=0) < MASSLESS * moving.min(axis=0)).all():
+    moving = inverse[:, 0][inverse[:, 0] > 0]  # moments of inertia follow masses and sizes
+    if len(moving) == 0 or moving.max() < MASSLESS * moving.min():
         return False
     gradients = system.jacobian(start.time, start.q)[start.active]
     gradients = gradients / np.linalg.norm(gradients, axis=1, keepdims=True)

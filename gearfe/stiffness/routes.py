@@ -73,6 +73,9 @@ class Router:
         largest = max(_largest(b, f.radii[0]) for b, f in zip(elastic.bodies, self.flanks.faces, strict=True))
         self.length = math.sqrt(largest * DEFAULT_ELEMENT * pair.pinion.module)
         teeth = pair.pinion.teeth, pair.wheel.teeth
+        # a body of its own face width counts with its share of the common one, as in `.local_gap`
+        shares = [b.material.contact_compliance(b.plane) * elastic.width / b.thickness for b in elastic.bodies]
+        self._modulus = 1 / sum(shares)
         self._radius = pair.tangent_length * teeth[0] * teeth[1] / sum(teeth) ** 2  # relative, at the pitch point
         self._chains = [Chain(body) for body in elastic.bodies]
         self._references: dict[float, tuple[float, Reference]] = {}
@@ -128,7 +131,7 @@ class Router:
         if position.status != "converged":
             return False
         touching = self._touching[angle]
-        modulus = 1 / sum(body.material.contact_compliance(body.plane) for body in self.elastic.bodies)
+        modulus = self._modulus
         forces, widths = np.zeros(len(position.pair_numbers)), np.zeros(len(position.pair_numbers))
         for i, (number, torque) in enumerate(zip(position.pair_numbers, position.pair_torques, strict=True)):
             mine = np.flatnonzero(touching.pair == number)
@@ -141,7 +144,9 @@ class Router:
         return bool(forces @ widths > CLEARLY * RESOLVED[1] * self.length * forces.sum())
 
     def light(self, angles: Array, twists: Array, softest: float = SOFTEST) -> NDArray[np.bool_]:
-        """Where the load may be small; the others are resolved whatever the teeth's compliance up to `softest` is."""
+        """Where the load may be small: where the widest contact that teeth of the compliance `softest` let the rigid
+        overlap make, were half of it another pair's, is not resolved.
+        """
         if self.route == "hertz":
             return np.ones(len(angles), dtype=bool)
         found = self._touched(angles)
@@ -185,7 +190,7 @@ class Router:
         r = self.reference(angle, twist)
         on = np.flatnonzero(found.force > 0)
         widths = np.array([contact.width for contact in found.contacts if contact is not None])
-        widths = np.maximum(widths, EDGES * half_width(found.force[on] / r.width, r.local[0].modulus, self._radius))
+        widths = np.maximum(widths, EDGES * half_width(found.force[on] / r.width, self._modulus, self._radius))
         low, high = RESOLVED
         each = widths / np.sqrt(r.elements[on] * DEFAULT_ELEMENT * self.pair.pinion.module)
         weight = found.force[on] / found.force.sum()

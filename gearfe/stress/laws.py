@@ -145,7 +145,9 @@ def _torques(elastic: MeshingPair, angles: Any, twist: float) -> tuple[Any, Any,
 
 
 def _noise(case: Case, job: StiffnessJob, elastic: MeshingPair, twist: float) -> Finding:
-    """Third differences of the curve: what a smooth function does not have at this step.
+    """Third differences of the curve, over a mesh cycle or `MOST_FINE` positions.
+
+    They are what a smooth function does not have at this step.
 
     For independent errors of standard deviation s those differences have 20 s^2 (1 + 9 + 9 + 1); the median is taken,
     because at pair changes the curve truly bends.

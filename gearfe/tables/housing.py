@@ -144,7 +144,8 @@ class HousingTable:
         least = (sum(area * thickness for area, thickness in plates) / (0.12 * MOST_ELEMENTS)) ** (1 / 3)
         least = max(least, (max(area for area, thickness in plates if thickness > 0) / (0.12 * MOST_ELEMENTS)) ** 0.5)
         if not self.mesh.size_mm >= least:
-            problem = f"makes more than {MOST_ELEMENTS} elements of this housing: must be >= {least:.3g}"
+            problem = f"makes more than {MOST_ELEMENTS} elements of this housing"
+            problem += f": must be >= {least:.3g}" if math.isfinite(least) else ""
             cure = f"choose a larger size (mm); walls, feet ({feet.length_x_mm:g} mm long) and bosses count"
             raise InputError(f"{where}.size_mm", self.mesh.size_mm, problem, cure)
 
