@@ -98,6 +98,17 @@ def _read(key: str) -> StiffnessJob:
         return read_stiffness_job(path)
 
 
+def _angles(job: StiffnessJob) -> Any:
+    """Positions at which the laws are compared (rad)."""
+    return job.pair.mesh_cycle * (np.arange(POSITIONS) + 0.37) / POSITIONS
+
+
+@lru_cache(maxsize=2)
+def _truth(key: str, coarsen: float, twist: float) -> Any:
+    """Torques by the exact law (N m): many cases of a scene are held against the same."""
+    return _torques(replace(_pair(key, coarsen), law=exact_law()), _angles(_read(key)), twist)[0]
+
+
 def run(case: Case, folder: Path) -> Finding:
     """Stiffness of the case against its reference, or the noise of a dense curve."""
     job = read_stiffness_job(case.write(folder))
@@ -107,14 +118,13 @@ def run(case: Case, folder: Path) -> Finding:
     twist = job.sweep["twist"] + lost
     if family.startswith("noise"):
         return _noise(case, job, replace(_pair(plain, 1.0), law=job.law), twist)
-    angles = job.pair.mesh_cycle * (np.arange(POSITIONS) + 0.37) / POSITIONS
+    angles = _angles(job)
     if THETA.get(family, 0):  # such gears are made for their law
         elastic = elastic_pair(job.pair, **job.model)
     else:
         elastic = replace(_pair(plain, value if family == "size" else 1.0), law=job.law)
     torque, iterations, status = _torques(elastic, angles, twist)
-    finest = SIZES[-1]
-    truth, _, _ = _torques(replace(_pair(plain, finest if family == "size" else 1.0), law=exact_law()), angles, twist)
+    truth = _truth(plain, SIZES[-1] if family == "size" else 1.0, twist)
     off = np.abs(torque / truth - 1)
     both = np.isfinite(off)
     failed = sum(n for s, n in status.items() if s != "converged")
