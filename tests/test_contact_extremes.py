@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from gearfe.contact.compliance import gear_body
 from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
 from gearfe.contact.scene import MeshingPair
-from gearfe.contact.solver import solve_positions
+from gearfe.contact.solver import solve_positions, stable
 from gearfe.elasticity import Material
 from gearfe.gear.pair import Gear, GearPair, TipRelief
 from gearfe.meshing.recipe import sector_recipes
@@ -81,3 +82,13 @@ def test_out_of_reach_and_below_the_mesh() -> None:
     assert {p.status for p in grazing} <= {"under_resolved", "converged"}
     assert "under_resolved" in {p.status for p in grazing}
     assert all(np.isnan(p.torque_wheel) for p in grazing if p.status == "under_resolved")
+
+
+def test_a_torque_that_falls_with_the_twist_is_no_answer() -> None:
+    """Campaign gears, seed 111, case 274: a sharp corner dents by 0.2 modules and snaps on, with a tangent below zero."""
+    pair, angle = build("relief on both", Nitsche()), np.array([0.1])
+    (found,) = solve_positions(pair, angle, np.radians([0.05]))
+    assert stable(found) is found
+    fallen = stable(replace(found, tangent=-found.tangent))
+    assert fallen.status == "not_converged"
+    assert math.isnan(fallen.torque_wheel)
