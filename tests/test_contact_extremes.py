@@ -85,8 +85,8 @@ def test_out_of_reach_and_below_the_mesh() -> None:
 
 
 def test_a_torque_that_falls_with_the_twist_is_no_answer() -> None:
-    """Campaign gears, seed 111, case 274: a sharp corner dents by 0.2 modules and snaps on, with a tangent below zero."""
-    pair, angle = build("relief on both", Nitsche()), np.array([0.1])
+    """Campaign gears, seed 111, case 274: a sharp corner dents by 0.2 modules and snaps on, its tangent below zero."""
+    (_, pair), angle = build("relief on both", Nitsche()), np.array([0.1])
     (found,) = solve_positions(pair, angle, np.radians([0.05]))
     assert stable(found) is found
     fallen = stable(replace(found, tangent=-found.tangent))
