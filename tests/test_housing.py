@@ -181,6 +181,7 @@ def test_free_housing() -> None:
         ({"mesh": {"size_mm": 1e-3}}, "more than 2000000 elements"),
         ({"feet": {"length_x_mm": 3e10}}, r"more than 2000000 elements.*feet \(3e\+10 mm long\)"),
         ({"wall_x_mm": [-45.0, 1e9]}, "more than 2000000 elements"),
+        ({"shafts": [{"x_mm": 0.0, "bore_radius_mm": 1e-8}]}, "bore_radius_mm = 1e-08.*of a bore 16 mm deep"),
         ({"reduction": {"modes": 100000}}, "modes"),
         ({"damping": {"ratio": -0.01}}, "ratio"),
         ({"reduction": {"solver": "mumps"}, "mesh": {"size_mm": 30.0}}, "solver"),

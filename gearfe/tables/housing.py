@@ -166,6 +166,12 @@ class HousingTable:
         x0, x1 = x0 + self.end_wall_thickness_mm[0], x1 - self.end_wall_thickness_mm[1]
         place = f"bore of radius {r:g} mm at x = {shaft.x_mm:g}, z = {shaft.z_mm:g}"
         cure = f"its centre must lie within x {x0 + r:g}..{x1 - r:g} and z {z0 + r:g}..{z1 - r:g} mm"
+        depth = max(self.wall_thickness_mm) + shaft.boss_height_mm
+        # two triangles for each square on the bore's surface, and some ten tetrahedra for each as the mesh coarsens
+        least = 20.0 * depth * self.mesh.bore_edges**2 / (2.0 * math.pi * MOST_ELEMENTS)
+        if not r >= least:
+            problem = f"makes more than {MOST_ELEMENTS} elements of a bore {depth:g} mm deep: must be >= {least:.3g}"
+            raise InputError(f"{where}.bore_radius_mm", r, problem, "choose a larger radius (mm)")
         if not (x0 - r < shaft.x_mm < x1 + r and z0 - r < shaft.z_mm < z1 + r):
             raise InputError(where, None, f"{place} misses every wall", cure)
         if not (x0 + r < shaft.x_mm < x1 - r and z0 + r < shaft.z_mm < z1 - r):
