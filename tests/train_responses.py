@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,13 @@ from gearfe.train.response import TrainResponse
 #: Record of the shipped job: 0..7 ms in steps of 35 us.
 STEP, COUNT = 35e-6, 201
 DRIVE = 600.0
+SHAFTS = ("drive", "intermediate", "output")
+#: Columns of the shipped job's response, in their order.
+COLUMNS = [
+    "time_s", "drive_angle_deg", "contact_force_1_N", "contact_force_2_N",
+    *(f"speed_{s}_rad_per_s" for s in SHAFTS), *(f"acceleration_{s}_rad_per_s2" for s in SHAFTS),
+    *(f"attachment_{k}_acceleration_m_per_s2" for k in range(1, 7)),
+]  # fmt: skip
 
 
 def tone(time: np.ndarray, line: int, amplitude: float, phase: float = 0.0) -> np.ndarray:
@@ -66,3 +75,10 @@ def made_up(**changes: Any) -> TrainResponse:
         "warnings": (),
     }
     return TrainResponse(**(values | changes))
+
+
+def table(path: Path) -> tuple[list[str], np.ndarray]:
+    """Names and values of a table of numbers."""
+    with path.open() as handle:
+        names, *rows = list(csv.reader(handle))
+    return names, np.array(rows, dtype=float)

@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from .closest import Projection
 
@@ -125,6 +126,46 @@ def exact_rows(
     slide[5:8] -= shapes[:, None] * _turned(t / metric, axes)
     nodes = np.concatenate([slave_nodes.T, before[:2], own, after[1:]])
     return ExactRows(nodes, normal, slide, turn, lift, steep, metric, bow)
+
+
+def sparse_rows(values: Array, columns: IntArray, count: int) -> csr_array:
+    """One row a point over `count` unknowns: `values` and their `columns`, shape (20, n). Doubled columns add up."""
+    points = values.shape[1]
+    return csr_array((values.T.ravel(), columns.T.ravel(), 20 * np.arange(points + 1)), shape=(points, count))
+
+
+def turning_stiffness(
+    normal: Array,
+    slide: Array,
+    turn: Array,
+    lift: Array,
+    *,
+    metric: Array,
+    bow: Array,
+    gap: Array,
+    loads: Array,
+    cut: Array,
+    columns: IntArray,
+    count: int,
+) -> Any:
+    """H, sparse, shape (count, count): how contact forces turn and move with the nodes (N/m).
+
+    Parameters
+    ----------
+    normal, slide, turn, lift : ndarray, shape (20, n)
+        As in `ExactRows`.
+    loads, cut : ndarray, shape (n,)
+        Forces w p at the points (N), and how they shrink as the points slide past a sharp end (N).
+    columns, count
+        Unknowns of the coefficients, and how many there are.
+    """  # fmt: skip
+
+    def spread(values: Array) -> csr_array:
+        return sparse_rows(values, columns, count)
+
+    found = spread(metric * slide + gap * turn).T @ spread(loads * (bow * slide + turn))
+    found = found - spread(lift).T @ spread(loads * slide)
+    return found + spread(normal).T @ spread(cut * slide) if cut.any() else found
 
 
 def _columns(values: Array) -> Array:

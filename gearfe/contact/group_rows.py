@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
-from scipy.sparse import csr_array
 
 from .closest import Projection
-from .exact_rows import exact_rows
+from .exact_rows import exact_rows, sparse_rows, turning_stiffness
 from .group import Group
 
 Array = NDArray[Any]
@@ -227,21 +226,17 @@ def coupled(
 
     `rows` are its own, `origin` and `fixed` on the `unknowns` that they touch, shape (t,).
     """
-    columns = np.searchsorted(unknowns, rows.unknowns).T.ravel()
-    starts = 20 * np.arange(len(right) + 1)
-
-    def spread(values: Array) -> csr_array:
-        return csr_array((values.T.ravel(), columns, starts), shape=(len(right), len(unknowns)))
-
-    turned = spread(rows.loads * (rows.bow * rows.slide + rows.turn))
-    stiffness = spread(rows.metric * rows.slide + rows.gap * rows.turn).T @ turned
-    stiffness = stiffness + spread(rows.normal).T @ spread(rows.cut * rows.slide)
-    stiffness = stiffness - spread(rows.lift).T @ spread(rows.loads * rows.slide)
+    columns, count = np.searchsorted(unknowns, rows.unknowns), len(unknowns)
+    stiffness = turning_stiffness(
+        rows.normal, rows.slide, rows.turn, rows.lift, metric=rows.metric, bow=rows.bow, gap=rows.gap,
+        loads=rows.loads, cut=rows.cut, columns=columns, count=count,
+    )  # fmt: skip
     split = len(piece.compliance[0])
     bent = np.eye(len(unknowns))
     bent[:, :split] -= stiffness[:, :split] @ piece.compliance[0]
     bent[:, split:] -= stiffness[:, split:] @ piece.compliance[1]
-    sides = np.column_stack([spread(rows.area * rows.normal).toarray().T, fixed - stiffness @ origin])
+    weighted = sparse_rows(rows.area * rows.normal, columns, count).toarray().T
+    sides = np.column_stack([weighted, fixed - stiffness @ origin])
     solved = np.linalg.solve(bent, sides)
     loads, rest = solved[:, :-1], solved[:, -1]
     pressure = np.linalg.solve(np.eye(len(right)) + piece.response @ loads, right - piece.response @ rest)

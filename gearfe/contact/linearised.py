@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
-from scipy.sparse import csr_array
 
 from .closest import Projection
-from .exact_rows import exact_rows
+from .exact_rows import exact_rows, sparse_rows, turning_stiffness
 from .scene import Scene
 
 Array = NDArray[Any]
@@ -100,41 +99,33 @@ def linearise(scene: Scene, projection: Projection, active: IntArray, pressure: 
     nodes = np.flatnonzero(touched)
     place = np.empty(len(touched), dtype=np.int64)
     place[nodes] = np.arange(len(nodes))
-    columns = (2 * place[rows.nodes][:, None] + np.arange(2)[:, None]).reshape(20, -1).T.ravel()
-    starts = 20 * np.arange(len(points) + 1)
-
-    def spread(values: Array) -> csr_array:
-        """One row a point: the coefficients of its ten nodes, a few of the columns."""
-        return csr_array((values.reshape(20, -1).T.ravel(), columns, starts), shape=(len(points), 2 * len(nodes)))
-
-    opening: Any = spread(rows.normal - rows.steep * rows.slide)
+    columns, count = (2 * place[rows.nodes][:, None] + np.arange(2)[:, None]).reshape(20, -1), 2 * len(nodes)
+    normal, slide, turn, lift = (x.reshape(20, -1) for x in (rows.normal, rows.slide, rows.turn, rows.lift))
+    opened = normal - rows.steep * slide
+    opening: Any = sparse_rows(opened, columns, count)
     unknowns = np.empty(2 * len(nodes), dtype=np.int64)
     unknowns[::2], unknowns[1::2] = 2 * nodes, 2 * nodes + 1
     areas, gamma = scene.areas(projection.place)[points], scene.parameter[points]
     across = (areas > 0) & (areas < scene.weight[points])
     shrink = np.where(across, -scene.weight[points] / (2 * scene.fade[points]), 0.0)
     compliance = scene.compliance.take(unknowns, axis=0).take(unknowns, axis=1)
-    weighted = np.ascontiguousarray(spread(areas * rows.normal).toarray().T)
-    loads = areas * pressure[points]
-    stiffness = spread(rows.metric * rows.slide + chosen.gap * rows.turn).T @ spread(
-        loads * (rows.bow * rows.slide + rows.turn)
-    )
-    stiffness = stiffness - spread(rows.lift).T @ spread(loads * rows.slide)
-    if across.any():
-        stiffness = stiffness + spread(rows.normal).T @ spread(shrink * pressure[points] * rows.slide)
+    weighted = np.ascontiguousarray(sparse_rows(areas * normal, columns, count).toarray().T)
+    stiffness = turning_stiffness(
+        normal, slide, turn, lift, metric=rows.metric, bow=rows.bow, gap=chosen.gap,
+        loads=areas * pressure[points], cut=shrink * pressure[points], columns=columns, count=count,
+    )  # fmt: skip
     # transposed matrices are what LAPACK sees in C order: factorise those, solve transposed, and nothing is copied
     turning = dgetrf((np.eye(len(unknowns)) - stiffness @ compliance).T)[:2]
     gap, flex, relief = chosen.gap, None, np.zeros(0)
     if hats is not None:
         values = hats.matrix(active, points)
         weighted = weighted @ values
-        opened = spread(areas * (rows.normal - rows.steep * rows.slide) + shrink * gap * rows.slide)
-        opening = values.T @ opened.toarray()
+        opening = values.T @ sparse_rows(areas * opened + shrink * gap * slide, columns, count).toarray()
         gap, gamma = values.T @ (areas * gap), np.ones(len(active))
         response = opening @ compliance
         matrix = response @ dgetrs(*turning, weighted, trans=1)[0]
     else:
-        response = spread(gamma * (rows.normal - rows.steep * rows.slide)) @ compliance
+        response = sparse_rows(gamma * opened, columns, count) @ compliance
         if len(scene.stress):
             stress = scene.stress.take(active, axis=0).take(unknowns, axis=1)
             response += stress

@@ -67,6 +67,14 @@ class MeshingPair:
         return self.pinion, self.wheel
 
     @property
+    def contact_compliances(self) -> tuple[float, float]:
+        """1/E' of both gears (1/Pa); a plane body of its own face width w_i carries the load of the common width and
+        counts with w/w_i.
+        """
+        one, two = (b.material.contact_compliance(b.plane) * self.width / b.thickness for b in self.bodies)
+        return one, two
+
+    @property
     def pitch_angle(self) -> float:
         """Mesh cycle in terms of the pinion's rotation (rad)."""
         return 2 * np.pi / self.pinion.teeth

@@ -152,17 +152,14 @@ class Face:
 
     def curvature(self, u: Any, most: float) -> Any:
         """Curvature (1/m) at u (a number or an array), at most `most`, which a corner has."""
-        step = 1e-5
-        before, after = np.asarray(u - step), np.asarray(u + step)
-        for mark in self.marks():  # not across the starts of relief and round, whose curvatures are their own
-            below = np.asarray(u) <= mark
-            before = np.where(~below, np.maximum(before, mark), before)
-            after = np.where(below, np.minimum(after, np.maximum(mark, u)), after)
-        before, after = np.clip(before, 0.0, 1.0), np.clip(after, 0.0, 1.0)
-        after = np.where(after > before, after, before + step)
-        turned = -np.angle(self.normals(after) / self.normals(before)) / (self.speeds(u) * (after - before))
-        corner = self.corners(u) | (np.asarray(u) >= 1.0 - 1e-9)
-        made = np.where(corner, most, np.maximum(0.0, turned))
+        step, at = 1e-5, np.clip(u, 0.0, 1.0)
+        before, after = np.maximum(at - step, 0.0), np.minimum(at + step, 1.0)
+        if self.flank.amount > 0.0 and self.relief_start > 0.0:  # not across its start, beside which it is another
+            below = at <= self.relief_start
+            before = np.where(below, before, np.maximum(before, self.relief_start))
+            after = np.where(below, np.minimum(after, self.relief_start), after)
+        turned = -np.angle(self.normals(after) / self.normals(before)) / (self.speeds(at) * (after - before))
+        made = np.where(self.corners(np.asarray(u)), most, np.maximum(0.0, turned))
         if self.round_ is not None:
             made = np.where(u > 1.0, 1.0 / self.round_.radius, made)
         return np.minimum(most, made)[()]

@@ -10,12 +10,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import compiled, kernel_fold, kernel_rows, kernel_run, kernel_series
+from . import compiled, kernel_fold, kernel_forces, kernel_planes, kernel_rows, kernel_run, kernel_series
 from .tables import Array, Assembly, Ints, Tables
 from .within import within_run
 
-FUNCTIONS = (*kernel_rows.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_fold.FUNCTIONS, *kernel_run.FUNCTIONS)
-NAMES = {**kernel_rows.GLOBALS, **kernel_series.NAMES, **kernel_run.NAMES}
+FUNCTIONS = (
+    *kernel_rows.FUNCTIONS, *kernel_forces.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_fold.FUNCTIONS,
+    *kernel_run.FUNCTIONS,
+)  # fmt: skip
+NAMES = {**kernel_rows.GLOBALS, **kernel_planes.NAMES, **kernel_run.NAMES}
 ENTRIES = ("integrate_series", "sample")
 HOT = (
     "fill", "copy", "trigonometry", "gradients", "residuals", "times_gradients", "add_transposed", "solve",
@@ -46,7 +49,7 @@ class Work(NamedTuple):
     QS: Array  # (K, 3n) series of the coordinates
     LM: Array  # (K, m) multipliers
     TF: Array  # (functions, K)
-    bs: Array  # (5, K, n) series of the bodies, see the planes in kernel_series
+    bs: Array  # (5, K, n) series of the bodies, see kernel_planes
     ls: Array  # (6, K, moving lines)
     es: Array  # (5, K, springs)
     fold: FoldFrame
@@ -71,7 +74,7 @@ class Work(NamedTuple):
 def work_space(tables: Tables, order: int) -> Work:
     """Scratch arrays for series up to `order`."""
     K, n3, m, d = order + 3, tables.mass.size, len(tables.rows.ints), MOST_FOLDS
-    n, lines, springs = n3 // 3, tables.rows.lines.size, int((tables.forces.ints[:, 0] == kernel_series.SPRING).sum())
+    n, lines, springs = n3 // 3, tables.rows.lines.size, int((tables.forces.ints[:, 0] == kernel_planes.SPRING).sum())
 
     def zeros(count: int, *shape: int) -> list[Any]:
         return [np.zeros(shape) for _ in range(count)]

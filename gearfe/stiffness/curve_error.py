@@ -62,7 +62,7 @@ def law_error(router: Router, angles: Array, twists: Array) -> Array:
         angle, twist = float(angles[i]), float(twists[i])
         reference = router.reference(angle, twist)
         found = balance(reference, twist)
-        share = router.share(angle, twist, found)[0]
+        share = router.share(reference, found)[0]
         if not found.converged or share >= 1.0:
             continue
         pairs = [(c, known) for c, known in zip(found.contacts, reference.local, strict=True) if c is not None]
@@ -90,7 +90,7 @@ def error_estimate(
     coarsen
         The curve's own factor on the default element sizes.
     law : ndarray, shape (m,)
-        What the law of small loads adds, from `law_error`.
+        What the law of small loads, from `law_error`, and the rounding of the gears' angles add.
     """
     single = np.abs(coarse / torque - 1) / (COARSENING**ORDER - 1)
     known = np.isfinite(single)

@@ -32,8 +32,7 @@ def local_contact(
     element
         Element size there (m). Where all edges are `CLEAR` elements away, the gap is the parabola of the curvatures.
     """
-    # a plane body of its own face width w_i carries the load of the common width: it counts with w/w_i
-    shares = [b.material.contact_compliance(b.plane) * elastic.width / b.thickness for b in elastic.bodies]
+    shares = elastic.contact_compliances
     place = [float(u) for u in touching.place[k]]
     edges, smooth = [], math.inf
     for g, face in enumerate(flanks.faces):

@@ -71,11 +71,11 @@ class Router:
         self.pair, self.elastic, self.route = pair, elastic, route
         self.flanks = Flanks(pair)
         largest = max(_largest(b, f.radii[0]) for b, f in zip(elastic.bodies, self.flanks.faces, strict=True))
-        self.length = math.sqrt(largest * DEFAULT_ELEMENT * pair.pinion.module)
+        #: Largest element of the flanks, in default ones.
+        self.coarseness = largest / (DEFAULT_ELEMENT * pair.pinion.module)
+        self.length = math.sqrt(self.coarseness) * DEFAULT_ELEMENT * pair.pinion.module
         teeth = pair.pinion.teeth, pair.wheel.teeth
-        # a body of its own face width counts with its share of the common one, as in `.local_gap`
-        shares = [b.material.contact_compliance(b.plane) * elastic.width / b.thickness for b in elastic.bodies]
-        self._modulus = 1 / sum(shares)
+        self._modulus = 1 / sum(elastic.contact_compliances)
         self._radius = pair.tangent_length * teeth[0] * teeth[1] / sum(teeth) ** 2  # relative, at the pitch point
         self._chains = [Chain(body) for body in elastic.bodies]
         self._references: dict[float, tuple[float, Reference]] = {}
@@ -105,9 +105,10 @@ class Router:
         found: list[Balance | None] = [None] * len(angles)
         share, slope = np.ones(len(angles)), np.zeros(len(angles))
         for i in np.flatnonzero(small):
-            one = balance(self.reference(float(angles[i]), float(twists[i])), float(twists[i]))
+            reference = self.reference(float(angles[i]), float(twists[i]))
+            one = balance(reference, float(twists[i]))
             found[i] = one
-            share[i], slope[i] = self.share(float(angles[i]), float(twists[i]), one)
+            share[i], slope[i] = self.share(reference, one)
         direct = [i for i in np.flatnonzero(share > 0).tolist() if i not in solved]
         if direct:
             meshed = solve_positions(self.elastic, np.asarray(angles)[direct], twists[direct])
@@ -131,7 +132,6 @@ class Router:
         if position.status != "converged":
             return False
         touching = self._touching[angle]
-        modulus = self._modulus
         forces, widths = np.zeros(len(position.pair_numbers)), np.zeros(len(position.pair_numbers))
         for i, (number, torque) in enumerate(zip(position.pair_numbers, position.pair_torques, strict=True)):
             mine = np.flatnonzero(touching.pair == number)
@@ -139,9 +139,13 @@ class Router:
                 return False
             forces[i] = max(0.0, torque / (touching.arm[mine[0], 1] * self.elastic.width))
             curved = float(touching.curvature[mine[0]])
-            own = half_width(forces[i], modulus, 1 / curved) if math.isfinite(curved) and curved > 0 else 0.0
-            widths[i] = max(own, EDGES * half_width(forces[i], modulus, self._radius))
-        return bool(forces @ widths > CLEARLY * RESOLVED[1] * self.length * forces.sum())
+            if math.isfinite(curved) and curved > 0:
+                widths[i] = half_width(forces[i], self._modulus, 1 / curved)
+        return bool(forces @ self._counted(widths, forces) > CLEARLY * RESOLVED[1] * self.length * forces.sum())
+
+    def _counted(self, widths: Array, forces: Array) -> Array:
+        """What half widths (m) of contacts under forces per width (N/m) count as: not less than an edge does."""
+        return np.maximum(widths, EDGES * half_width(forces, self._modulus, self._radius))
 
     def light(self, angles: Array, twists: Array, softest: float = SOFTEST) -> NDArray[np.bool_]:
         """Where the load may be small: where the widest contact that teeth of the compliance `softest` let the rigid
@@ -181,22 +185,19 @@ class Router:
         found = self._touched(angles)
         return np.array([found[float(a)].twist.min(initial=math.inf) for a in angles])
 
-    def share(self, angle: float, twist: float, found: Balance) -> tuple[float, float]:
-        """Share s of the mesh in the result and ds/dtwist (1/rad)."""
+    def share(self, reference: Reference, found: Balance) -> tuple[float, float]:
+        """Share s of the mesh in the result and ds/dtwist (1/rad), from a balance of that reference."""
         if self.route == "hertz":
             return 0.0, 0.0
         if not found.converged or not (found.force > 0).any():
             return (0.0, 0.0) if found.converged else (1.0, 0.0)
-        r = self.reference(angle, twist)
-        on = np.flatnonzero(found.force > 0)
-        widths = np.array([contact.width for contact in found.contacts if contact is not None])
-        widths = np.maximum(widths, EDGES * half_width(found.force[on] / r.width, self._modulus, self._radius))
         low, high = RESOLVED
-        each = widths / np.sqrt(r.elements[on] * DEFAULT_ELEMENT * self.pair.pinion.module)
-        weight = found.force[on] / found.force.sum()
-        b = float(weight @ each)
-        # widths grow with the root of the forces
-        rate = float(found.rate[on] @ (1.5 * each - b)) / found.force.sum()
+        on, total = np.flatnonzero(found.force > 0), found.force.sum()
+        widths = np.array([contact.width for contact in found.contacts if contact is not None])
+        each = self._counted(widths, found.force[on] / reference.width)
+        each = each / np.sqrt(reference.elements[on] * DEFAULT_ELEMENT * self.pair.pinion.module)
+        b = float(found.force[on] @ each) / total
+        rate = float(found.rate[on] @ (1.5 * each - b)) / total  # widths grow with the root of the forces
         x = min(1.0, max(0.0, (b - low) / (high - low)))
         return x * x * (3 - 2 * x), 6 * x * (1 - x) * rate / (high - low)
 

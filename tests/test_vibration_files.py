@@ -1,0 +1,307 @@
+"""Files and fields of a vibration job: what is written is what was computed."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe.errors import InputError
+from gearfe.housing import Attachment, Housing
+from gearfe.output.train_scene import draw_scene, sharp_edges
+from gearfe.stopwatch import Stopwatch
+from gearfe.train import GearMesh, Shaft, ShaftGear, TrainScene
+from gearfe.vibration.fields import (
+    frames,
+    gear_surface,
+    moved,
+    solids,
+    step_at,
+    tooth_angles,
+    write_gears,
+    write_housing,
+)
+from gearfe.vibration.files import OutputChoice, write_all
+from gearfe.vibration.report import mean_over_periods, response_columns, spectra
+
+from .gears import pair
+from .housing_meshes import box
+from .train_responses import COLUMNS, COUNT, STEP, made_up, table, tone
+
+ROOT = Path(__file__).parents[1]
+JOB = ROOT / "geometry" / "gear_train.toml"
+
+
+@pytest.fixture
+def scene():
+    gears = pair(20, 30)
+    shafts = tuple(
+        Shaft(name, (1e-3 * x, 0.0, 0.0), 82e-3, 10e-3, bores)
+        for name, x, bores in (
+            ("drive", 0, ("1", "2")),
+            ("intermediate", 62.5, ("3", "4")),
+            ("output", 125, ("5", "6")),
+        )
+    )
+    on = (
+        ShaftGear("gear1", "drive", 10e-3, gears.pinion),
+        ShaftGear("gear2", "intermediate", 10e-3, gears.wheel),
+        ShaftGear("gear3", "intermediate", -2e-3, gears.pinion),
+        ShaftGear("gear4", "output", -2e-3, gears.wheel),
+    )
+    meshes = (GearMesh("gear1", "gear2", 1e8), GearMesh("gear3", "gear4", 1e8, phase=0.1))
+    return TrainScene(shafts, on, meshes, None)
+
+
+# ---- files of a known response ---------------------------------------------------------------------------------------
+
+
+def test_columns_and_digits(tmp_path, scene):
+    response = made_up()
+    written = write_all(tmp_path, scene, response, OutputChoice(), title="made up", watch=Stopwatch())
+    names, values = table(tmp_path / "response.csv")
+    assert names[: len(COLUMNS)] == COLUMNS
+    assert values.shape == (COUNT, len(names))
+    by_name = dict(zip(names, values.T, strict=True))
+    assert (by_name["contact_force_2_N"] == response.contact_force[:, 1]).all()  # 17 digits bring every double back
+    assert (by_name["speed_intermediate_rad_per_s"] == response.speed[:, 1]).all()
+    assert (by_name["attachment_5_acceleration_m_per_s2"] == response.attachment_acceleration[:, 4]).all()
+    assert by_name["drive_angle_deg"] == pytest.approx(np.degrees(600.0 * response.time), rel=1e-15)
+    lines, _ = table(tmp_path / "spectrum.csv")
+    assert lines[0] == "frequency_Hz"
+    assert lines[1 : len(COLUMNS) - 1] == COLUMNS[2:]
+    assert set(written.names) >= {"response.png", "spectrum.png", "summary.json"}
+    for name in ("response.png", "spectrum.png"):
+        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_spectrum_of_known_lines(tmp_path, scene):
+    write_all(tmp_path, scene, made_up(), OutputChoice(pictures=False), title="", watch=Stopwatch())
+    names, values = table(tmp_path / "spectrum.csv")
+    by_name = dict(zip(names, values.T, strict=True))
+    assert by_name["frequency_Hz"] == pytest.approx(np.arange(101) / 7e-3, rel=1e-13)
+    side = by_name["attachment_5_acceleration_m_per_s2"]
+    assert side[[4, 14]] == pytest.approx([10.7, 9.7], rel=1e-12)
+    assert np.delete(side, [4, 14]).max() < 1e-12
+    assert by_name["contact_force_1_N"][[0, 13]] == pytest.approx([2000.0, 150.0], rel=1e-12)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    first, second = summary["dominant_lines"]["attachment_5_acceleration_m_per_s2"]
+    assert (first["frequency_Hz"], first["amplitude"]) == pytest.approx((571.4286, 10.7), rel=1e-6)
+    assert first["near"] is None
+    assert second["frequency_Hz"] == pytest.approx(2000.0)
+    assert second["near"] == "mesh 1 x 1"
+    assert summary["spectrum"]["resolution_Hz"] == pytest.approx(142.857, abs=1e-3)
+
+
+def test_summary_of_a_known_response(tmp_path, scene):
+    write_all(tmp_path, scene, made_up(), OutputChoice(pictures=False), title="", watch=Stopwatch())
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["mean_over_common_periods"] == 3
+    # bins 13 and 9 of 7 ms leave a known rest over 3 periods of 1.5708 ms at the end
+    low, high = 7e-3 - 3 * made_up().common_period_s, 7e-3
+    for i, (line, size, mean) in enumerate(((13, 150.0, 2000.0), (9, 200.0, 3000.0))):
+        omega = 2 * math.pi * line / 7e-3
+        exact = mean + size * (math.sin(omega * high) - math.sin(omega * low)) / (omega * (high - low))
+        assert summary["mean_contact_forces_N"][i] == pytest.approx(exact, rel=1e-6)
+    assert summary["floquet"]["largest_multiplier"] == pytest.approx(math.hypot(0.98, 0.05))
+    assert summary["status"] == "done"
+    assert summary["mesh_frequencies_Hz"] == pytest.approx([1909.859, 1273.240], abs=1e-3)
+    assert summary["error_estimates"] == {"integration": 1e-7}
+
+
+def test_a_mean_without_a_period():
+    time = np.linspace(0.0, 1.0, 201)
+    mean, count = mean_over_periods(time, np.column_stack([time, 3 + 0 * time]), 0.5, None)
+    assert count == 0
+    assert mean == pytest.approx([0.75, 3.0], rel=1e-12)
+    mean, count = mean_over_periods(time, (time**2)[:, None], 0.1, 0.4)
+    assert count == 2
+    assert mean == pytest.approx([(1 - 0.2**3) / 3 / 0.8], rel=1e-12)
+
+
+def test_the_radiated_power_of_one_coordinate(tmp_path, scene):
+    """Housing with one coordinate and R = 2e-3 m4/s2: P = rho c R v^2/2 on its line."""
+    time = STEP * np.arange(COUNT)
+    rate = tone(time, 14, 0.01)[:, None]
+    response = made_up(modal=rate, modal_velocity=rate, modal_acceleration=rate)
+    made = spectra(response, np.array([[2e-3]]))
+    power = made.columns()["radiated_power_W"]
+    assert power[14] == pytest.approx(0.5 * 1.2041 * 343.21 * 2e-3 * 0.01**2, rel=1e-12)
+    assert np.delete(power, 14).max() < 1e-20 * power[14]
+    assert made.columns()["radiated_power_level_dB"][14] == pytest.approx(10 * math.log10(power[14] / 1e-12))
+    assert response_columns(response, np.array([[2e-3]]))["instantaneous_radiated_power_W"][0] == pytest.approx(
+        2 * power[14], rel=1e-12
+    )
+
+
+def test_a_run_that_ended_early_is_written(tmp_path, scene):
+    short = {
+        name: getattr(made_up(), name)[:40]
+        for name in ("time", "drive_angle", "drive_torque", "contact_force", "speed", "speed_absolute", "acceleration")
+    }
+    short |= {
+        name: getattr(made_up(), name)[:40]
+        for name in ("acceleration_absolute", "attachment_acceleration", "gear_pose")
+    }
+    response = made_up(**short, status="diverged", time_reached=39 * STEP)
+    choice = OutputChoice(spectrum_start=5e-3)  # beyond what was reached
+    written = write_all(tmp_path, scene, response, choice, title="", watch=Stopwatch())
+    assert {"response.csv", "spectrum.csv", "summary.json"} <= set(written.names)
+    assert len(table(tmp_path / "response.csv")[1]) == 40
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["status"] == "diverged"
+    assert summary["time_reached_s"] == pytest.approx(39 * STEP)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"length": 7.1e-3}, "the window is longer than the signal"),
+        ({"start": 5e-3, "length": 3e-3}, "which has 0.001995 s"),  # 57 whole steps are left
+        ({"start": 8e-3}, "begin earlier"),
+        ({"length": 1e-6}, "less than two steps"),
+        ({"window": "box"}, "must be one of none, hann"),
+    ],
+)
+def test_records_that_do_not_fit(options, message):
+    with pytest.raises(InputError, match=message):
+        spectra(made_up(), **options)
+
+
+# ---- fields ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_gear_is_a_closed_solid():
+    """Volume by the divergence theorem: outline times width, less the bore."""
+    gear = pair(20, 30).pinion
+    points, quads = gear_surface(gear, 0.3, per_segment=12)
+    a, b, c, d = (points[quads[:, k]] for k in range(4))
+    volume = sum(np.einsum("ij,ij->i", p, np.cross(q, r)).sum() / 6 for p, q, r in ((a, b, c), (a, c, d)))
+    k = len(points) // 4
+    x, y = points[k : 2 * k, :2].T
+    outline = 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    u, v = points[:k, :2].T
+    bore = 0.5 * (u @ np.roll(v, -1) - v @ np.roll(u, -1))
+    assert volume == pytest.approx((outline - bore) * gear.face_width, rel=1e-10)
+    assert bore == pytest.approx(math.pi * (0.5 * gear.bore_diameter) ** 2, rel=1e-3)
+    edges = np.sort(np.concatenate([quads[:, [i, (i + 1) % 4]] for i in range(4)]), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+    tip = np.hypot(*points[:, :2].T).max()
+    assert tip == pytest.approx(gear.tip_radius, rel=1e-9)
+
+
+def test_teeth_stand_in_spaces(scene):
+    """At each mesh driver's tooth and driven gear's space lie on the line of centres once the phase is turned back."""
+    angles = tooth_angles(scene, (1.0, -1.0))
+    for mesh, sense in zip(scene.meshes, (1.0, -1.0), strict=True):
+        driver, driven = scene.gear(mesh.driver).gear, scene.gear(mesh.driven).gear
+        back = angles[mesh.driver] - sense * mesh.phase
+        assert math.remainder(back, 2 * math.pi / driver.teeth) == pytest.approx(0.0, abs=1e-12)
+        other = angles[mesh.driven] + sense * mesh.phase * driver.teeth / driven.teeth
+        space = (other - math.pi) / (2 * math.pi / driven.teeth)
+        assert space % 1.0 == pytest.approx(0.5, abs=1e-9)
+
+
+def test_gears_turn_and_move_as_told(scene):
+    """A quarter turn about y takes z to x; tilt and displacement add to it."""
+    response = made_up()
+    pose = np.zeros((COUNT, 4, 6))
+    pose[1, :, 4] = 0.5 * math.pi
+    pose[2] = [1e-4, 2e-4, 3e-4, 1e-3, 0.5 * math.pi, -2e-3]
+    response = made_up(gear_pose=pose)
+    part, centre = solids(scene, response)[0], response.gear_centres[0]
+    before = part.points - centre
+    after = moved(part, response, scene.frame, 1) - centre
+    assert after == pytest.approx(np.column_stack([before[:, 2], before[:, 1], -before[:, 0]]), abs=1e-15)
+    both = moved(part, response, scene.frame, 2) - centre
+    assert both == pytest.approx(np.array([1e-4, 2e-4, 3e-4]) + after + np.cross([1e-3, 0.0, -2e-3], after), abs=1e-15)
+
+
+def test_the_series_of_the_gears(tmp_path, scene):
+    import h5py
+
+    response = made_up()
+    write_gears(tmp_path / "gears.vtkhdf", scene, response, [0, 100, 200])
+    with h5py.File(tmp_path / "gears.vtkhdf") as file:
+        assert list(file["VTKHDF/Steps/Values"]) == pytest.approx(response.time[[0, 100, 200]])
+        count = int(file["VTKHDF/NumberOfPoints"][0])
+        points = file["VTKHDF/Points"][...].reshape(-1, count, 3)
+        shift = file["VTKHDF/PointData/displacement_m"][...].reshape(-1, count, 3)
+        assert shift[0] == pytest.approx(0.0, abs=0)
+        assert shift[2] == pytest.approx(points[2] - points[0], abs=1e-8)
+        assert set(file["VTKHDF/PointData/gear"][:count]) == {1, 2, 3, 4}
+
+
+@pytest.fixture(scope="module")
+def block():
+    """A free block, two ends of which are attachments, reduced."""
+    size = np.array([0.15, 0.06, 0.03])
+    nodes, tets = box((4, 2, 1), tuple(size))
+    ends = [
+        Attachment(name, np.array([x, 0.03, 0.015]), np.array([1.0, 0.0, 0.0]), np.flatnonzero(nodes[:, 0] == x))
+        for name, x in (("1", nodes[:, 0].min()), ("2", nodes[:, 0].max()))
+    ]
+    return Housing.from_arrays(nodes, tets, attachments=ends).reduce(4)
+
+
+def test_the_series_of_the_housing(tmp_path, block):
+    """Displacement and acceleration of all nodes; on the upper side the normal acceleration is the one along z."""
+    import h5py
+
+    rng = np.random.default_rng(2)
+    q, a = (1e-6 * rng.standard_normal((COUNT, block.size)) for _ in range(2))
+    response = made_up(modal=q, modal_velocity=q, modal_acceleration=a)
+    write_housing(tmp_path / "housing.vtkhdf", block, response, [0, 7, 200])
+    with h5py.File(tmp_path / "housing.vtkhdf") as file:
+        assert list(file["VTKHDF/Steps/Values"]) == list(response.time[[0, 7, 200]])
+        shift = file["VTKHDF/PointData/displacement_m"][...].reshape(3, -1, 3)
+        normal = file["VTKHDF/PointData/normal_acceleration_m_per_s2"][...].reshape(3, -1)
+    nodes = block.nodes
+    for i, step in enumerate((0, 7, 200)):
+        field = (block.shapes @ q[step]).reshape(-1, 3)
+        assert shift[i] == pytest.approx(field, rel=1e-6, abs=1e-7 * np.abs(field).max())
+        push = (block.shapes @ a[step]).reshape(-1, 3)
+        inside = (nodes[:, 0] > 0) & (nodes[:, 0] < 0.15) & (nodes[:, 1] > 0) & (nodes[:, 1] < 0.06)
+        for side, sign in ((nodes[:, 2] == nodes[:, 2].max(), 1.0), (nodes[:, 2] == 0.0, -1.0)):
+            there = side & inside
+            assert normal[i][there] == pytest.approx(sign * push[there, 2], rel=1e-5, abs=1e-6 * np.abs(push).max())
+
+
+def test_a_picture_and_a_film(tmp_path, scene, block):
+    from PIL import Image
+
+    rng = np.random.default_rng(2)
+    q, a = (1e-6 * rng.standard_normal((COUNT, block.size)) for _ in range(2))
+    response = made_up(modal=q, modal_velocity=q, modal_acceleration=a)
+    housed = replace(scene, housing=block)
+    assert draw_scene(tmp_path / "one.png", frames(housed, response, [130]), "a block") == ""
+    assert draw_scene(tmp_path / "film.gif", frames(housed, response, [0, 50, 100]), "a block") == ""
+    with Image.open(tmp_path / "one.png") as picture:
+        colours = np.asarray(picture.convert("RGB").resize((100, 72))).reshape(-1, 3)
+        assert len(np.unique(colours, axis=0)) > 50  # something was drawn
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.n_frames == 3
+
+
+def test_a_scene_that_cannot_be_drawn_says_why(tmp_path):
+    assert "apt-get install" in draw_scene(tmp_path / "none.png", {"time": np.zeros(1)}, "nothing")
+    assert not list(tmp_path.iterdir())
+
+
+def test_instants(scene):
+    response = made_up()
+    assert step_at(response, 4.55e-3) == 130
+    with pytest.raises(InputError, match="outside of the run"):
+        step_at(response, 8e-3)
+
+
+def test_sharp_edges_of_a_tent():
+    """Two triangles at a right angle: their common edge is sharp, the rim is an edge; in one plane only the rim is."""
+    points = np.array([[0, 0, 0], [0, 1, 0], [1, 0, 0], [0, 0, 1.0]])
+    assert len(sharp_edges(points, np.array([[0, 1, 2], [0, 3, 1]]))) == 5
+    flat = np.array([[0, 0, 0], [0, 1, 0], [1, 0, 0], [-1, 0, 0.0]])
+    assert len(sharp_edges(flat, np.array([[0, 1, 2], [0, 3, 1]]))) == 4
