@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     if not 0.2 <= coarsen <= 5.0:
         raise InputError("--coarsen", coarsen, "must be >= 0.2 and <= 5", "1 is the default mesh, 2 twice its sizes")
     output_folder(Path(args.out).parent)
-    recipes = sector_recipes(job.pair, coarsen=coarsen)
+    recipes = sector_recipes(job.pair, coarsen=coarsen, flank_coarsen=job.table.flank_coarsen)
     parts: dict[str, Any] = {}
     for number, name in enumerate(("pinion", "wheel")):
         if args.gear in ("both", name):

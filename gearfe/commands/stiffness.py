@@ -148,7 +148,7 @@ def _animate(path: Path, job: StiffnessJob, elastic: Any, curve: Any, count: int
 
 
 def _points(job: StiffnessJob) -> dict[str, Any]:
-    return {"points_per_edge": job.table.points_per_edge, "coarsen": job.table.coarsen}
+    return {name: job.model[name] for name in ("points_per_edge", "coarsen", "flank_coarsen")}
 
 
 def _field_angles(given: list[str]) -> str | list[float]:

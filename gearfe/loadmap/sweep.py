@@ -70,6 +70,7 @@ def sweep_loads(
     kinematics: Literal["small", "finite"] = "finite",
     twist_from: Literal["centred", "contact"] = "centred",
     coarsen: float = 1.0,
+    flank_coarsen: float = 1.0,
     points_per_edge: int = 4,
     elastic: MeshingPair | None = None,
     progress: Progress | None = None,
@@ -85,7 +86,7 @@ def sweep_loads(
         solved once.
     root_stress
         Also the tension at the tooth roots, on refined meshes of its own, see `gearfe.loadmap.root_stress`.
-    materials, plane, law, kinematics, twist_from, coarsen, points_per_edge, elastic, progress
+    materials, plane, law, kinematics, twist_from, coarsen, flank_coarsen, points_per_edge, elastic, progress
         See `gearfe.stiffness.sweep.sweep_stiffness`.
 
     Returns
@@ -109,8 +110,8 @@ def sweep_loads(
         raise InputError("angles", angles, "must be a list of finite angles (rad)", "give at least one angle")
     lost, watch = lost_motion(pair, twist_from), Stopwatch()
     if elastic is None:
-        model: dict[str, Any] = {"plane": plane, "law": law, "points_per_edge": points_per_edge}
-        elastic = elastic_pair(pair, materials, coarsen=coarsen, watch=watch, **model)
+        sizes: dict[str, Any] = {"coarsen": coarsen, "flank_coarsen": flank_coarsen, "points_per_edge": points_per_edge}
+        elastic = elastic_pair(pair, materials, plane=plane, law=law, watch=watch, **sizes)
     solved_angles, source = distinct_angles(asked, cycle)
     if len(goals) * len(solved_angles) > MOST_CELLS:
         problem = f"makes more than {MOST_CELLS} cells with {len(solved_angles)} angles"

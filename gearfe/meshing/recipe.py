@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from ..gear.pair import GearPair
 from .tooth_sector import MINIMUM_BORE_EDGES, SectorRecipe
 
 
-def sector_recipes(pair: GearPair, *, coarsen: float = 1.0) -> tuple[SectorRecipe, SectorRecipe]:
-    """Recipes for pinion and wheel; `coarsen` multiplies every size (2 is about a quarter of the unknowns).
+def sector_recipes(
+    pair: GearPair, *, coarsen: float = 1.0, flank_coarsen: float = 1.0
+) -> tuple[SectorRecipe, SectorRecipe]:
+    """Recipes for pinion and wheel.
+
+    `coarsen` multiplies every size (2 is about a quarter of the unknowns), `flank_coarsen` besides those of the driving
+    flanks.
 
     The sizes are those at which the stiffness of common pairs lies within 0.1 % of its limit at operating loads.
     """
@@ -27,5 +33,6 @@ def sector_recipes(pair: GearPair, *, coarsen: float = 1.0) -> tuple[SectorRecip
             body=0.6 * module,
             bore=math.pi * gear.bore_diameter / MINIMUM_BORE_EDGES,
         )
-        made.append(recipe.scaled(coarsen))
+        recipe = recipe.scaled(coarsen)
+        made.append(replace(recipe, flank=flank_coarsen * recipe.flank, strip=flank_coarsen * recipe.strip))
     return made[0], made[1]

@@ -63,6 +63,7 @@ class StiffnessJob:
             "plane": t.plane,
             "law": self.law,
             "coarsen": t.coarsen,
+            "flank_coarsen": t.flank_coarsen,
             "points_per_edge": t.points_per_edge,
         }
 

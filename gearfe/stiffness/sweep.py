@@ -42,6 +42,8 @@ IntArray = NDArray[Any]
 
 #: Structural steel, the material where none is given.
 STEEL = Material()
+#: Finest flank elements, in default ones: some 1,200 on a flank, whose compliances take gigabytes.
+FINEST = 0.1
 
 
 def elastic_pair(
@@ -51,6 +53,7 @@ def elastic_pair(
     plane: Plane = "strain",
     law: str | ContactLaw = "nitsche",
     coarsen: float = 1.0,
+    flank_coarsen: float = 1.0,
     points_per_edge: int = 4,
     watch: Stopwatch | None = None,
 ) -> MeshingPair:
@@ -64,8 +67,8 @@ def elastic_pair(
         ``strain`` or ``stress``.
     law
         Contact law, or the name of one with its default parameter.
-    coarsen
-        Factor on all element sizes.
+    coarsen, flank_coarsen
+        Factor on all element sizes, and besides on those of the driving flanks.
     points_per_edge
         Contact points on each edge of a flank.
     watch
@@ -76,12 +79,16 @@ def elastic_pair(
     # the error estimate of a mesh at the limit is coarser by COARSENING
     if not (math.isfinite(coarsen) and 0.2 <= coarsen <= 5.0 * COARSENING):
         raise InputError("coarsen", coarsen, "must be >= 0.2 and <= 5", "1 is the default mesh, 2 twice its sizes")
+    least = FINEST / coarsen
+    if not (math.isfinite(flank_coarsen) and least * (1 - 1e-12) <= flank_coarsen <= 10.0):
+        problem = f"must be >= {least:g} with coarsen {coarsen:g}, and <= 10"
+        raise InputError("flank_coarsen", flank_coarsen, problem, "1 leaves the flanks to coarsen")
     chosen = law_named(law) if isinstance(law, str) else law
     both = (materials, materials) if isinstance(materials, Material) else materials
     watch = watch or Stopwatch()
     gears = (pair.pinion, pair.wheel)
     with watch.stage("meshes"):
-        recipes = sector_recipes(pair, coarsen=coarsen)
+        recipes = sector_recipes(pair, coarsen=coarsen, flank_coarsen=flank_coarsen)
         meshes = [sector_mesh(gear, recipe) for gear, recipe in zip(gears, recipes, strict=True)]
     width = min(gear.face_width for gear in gears)
     with watch.stage("condensation"), one_thread():
@@ -118,6 +125,7 @@ def sweep_stiffness(
     solve_all: bool = False,
     route: Route = "auto",
     coarsen: float = 1.0,
+    flank_coarsen: float = 1.0,
     points_per_edge: int = 4,
     estimate_error: bool = False,
     elastic: MeshingPair | None = None,
@@ -134,7 +142,7 @@ def sweep_stiffness(
     angles : array_like, shape (n,), optional
         Pinion angles (rad); without them, 20 over one mesh cycle. Positions that differ by whole mesh cycles are
         solved once.
-    materials, plane, law, coarsen, points_per_edge
+    materials, plane, law, coarsen, flank_coarsen, points_per_edge
         See `elastic_pair`.
     kinematics
         ``small``: small strain in each hub's frame; ``finite`` (default) adds the first-order effect of finite strain
@@ -150,8 +158,8 @@ def sweep_stiffness(
     estimate_error
         Solve again on a coarser mesh and estimate the discretisation error.
     elastic
-        The pair from `elastic_pair`, when it is there already; of its arguments only coarsen and points_per_edge are
-        then looked at, by the error estimate.
+        The pair from `elastic_pair`, when it is there already; of its arguments only coarsen, flank_coarsen and
+        points_per_edge are then looked at, by the error estimate.
     progress
         Called with positions done, positions in all, and the stage's name.
 
@@ -174,7 +182,8 @@ def sweep_stiffness(
     if asked.ndim != 1 or len(asked) == 0 or not np.isfinite(asked).all():
         raise InputError("angles", angles, "must be a list of finite angles (rad)", "give at least one angle")
     watch, finite = Stopwatch(), kinematics == "finite"
-    common: dict[str, Any] = {"plane": plane, "law": law, "points_per_edge": points_per_edge}
+    points = {"points_per_edge": points_per_edge, "flank_coarsen": flank_coarsen}
+    common: dict[str, Any] = {"plane": plane, "law": law, **points}
     if elastic is None:
         elastic = elastic_pair(pair, materials, coarsen=coarsen, watch=watch, **common)
     solved_angles, source = (asked, np.arange(len(asked))) if solve_all else distinct_angles(asked, cycle)
@@ -193,7 +202,7 @@ def sweep_stiffness(
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
             given = (elastic.pinion.material, elastic.wheel.material)
-            common = {"plane": elastic.pinion.plane, "law": elastic.law, "points_per_edge": points_per_edge}
+            common = {"plane": elastic.pinion.plane, "law": elastic.law, **points}
             coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
             routers = router, Router(pair, coarse, route)
             error = _estimate(routers, solved_angles, solved, finite=finite, coarsen=coarsen)

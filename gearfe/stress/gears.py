@@ -39,9 +39,9 @@ from .toml_text import toml_text
 #: Limits of the checks. The first four hold to the solver's residual of 1e-10, which the softest contacts amplify.
 BALANCE, PERIOD, SWAP = 1e-7, 1e-7, 1e-6
 #: The route for small loads is a formula about the place where the gears just touch with the wheel turned back. Seen
-#: from the other gear it is the pinion that is turned back, and what is left out is not the same. It claims 0.2 % on the
-#: default mesh. What it leaves out grows with the square of the contact's width; as the mesh takes over at a square of
-#: the width that grows with the element, the limit does (see `gearfe.stiffness.routes`).
+#: from the other gear it is the pinion that is turned back, and what is left out is not the same. It claims 0.2 % by
+#: default. What it leaves out grows with the square of the contact's width; as the mesh takes over at a square of the
+#: width that grows with the element, the limit does (see `gearfe.stiffness.routes`).
 SMALL_LOAD = 2e-3
 #: The ratio holds as the normals at the contact do: they lean with the elements that carry it (1e-4 to 1e-3 of the
 #: wheel's torque where the contact is two elements wide, more where it is narrower), and with the bending of the teeth.

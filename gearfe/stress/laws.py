@@ -28,10 +28,11 @@ from .outcome import Finding, Outcome
 from .pairs import running_pair
 from .toml_text import toml_text
 
-#: Parameters of a scene's cases: penalty in N/mm3 over ten decades, gamma0 over six, element sizes, twists (deg).
+#: Parameters of a scene's cases: penalty in N/mm3 over ten decades, gamma0 over six, sizes of the flanks'
+#: elements over two, twists (deg).
 PENALTY = tuple(10.0**k for k in range(3, 14))
 GAMMA = tuple(10.0**k for k in range(-3, 4))
-SIZES = (5.0, 3.2, 2.0, 1.4, 1.0, 0.7, 0.5, 0.35, 0.2)
+SIZES = (10.0, 5.0, 3.2, 2.0, 1.0, 0.5, 0.32, 0.2, 0.1)
 NOISE = (1e-3, 1e-2, 0.05, 0.5)
 #: Family -> theta of Nitsche's law.
 THETA: dict[str, Theta] = {"nitsche": 0, "nitsche symmetric": 1, "nitsche skew": -1}
@@ -75,7 +76,7 @@ def draw(random: np.random.Generator, number: int) -> Case:
     elif family in THETA:
         tables["stiffness"] |= {"law": "nitsche", "nitsche_theta": THETA[family], "nitsche_gamma0": value}
     elif family == "size":
-        tables["stiffness"]["coarsen"] = value
+        tables["stiffness"]["flank_coarsen"] = value
     else:
         tables["stiffness"] |= {"twist_deg": value, "angle_step_deg": FINE_STEP}
         tables["stiffness"]["law"] = "exact" if family == "noise exact" else "nitsche"
@@ -84,10 +85,10 @@ def draw(random: np.random.Generator, number: int) -> Case:
 
 
 @lru_cache(maxsize=6)
-def _pair(key: str, coarsen: float) -> MeshingPair:
+def _pair(key: str, size: float) -> MeshingPair:
     """Condensed gears of a scene (key: the text of its [pair]) with stress rows, so that any law can use them."""
     job = _read(key)
-    return elastic_pair(job.pair, **{**job.model, "law": Nitsche(), "coarsen": coarsen})
+    return elastic_pair(job.pair, **{**job.model, "law": Nitsche(), "flank_coarsen": size})
 
 
 @lru_cache(maxsize=4)
@@ -104,9 +105,9 @@ def _angles(job: StiffnessJob) -> Any:
 
 
 @lru_cache(maxsize=2)
-def _truth(key: str, coarsen: float, twist: float) -> Any:
+def _truth(key: str, size: float, twist: float) -> Any:
     """Torques by the exact law (N m): many cases of a scene are held against the same."""
-    return _torques(replace(_pair(key, coarsen), law=exact_law()), _angles(_read(key)), twist)[0]
+    return _torques(replace(_pair(key, size), law=exact_law()), _angles(_read(key)), twist)[0]
 
 
 def run(case: Case, folder: Path) -> Finding:

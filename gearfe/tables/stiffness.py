@@ -66,6 +66,9 @@ class StiffnessTable:
     coarsen: float = quantity(
         1.0, doc="factor on all element sizes; 2 is faster and about four times less accurate", low=0.2, high=5.0
     )
+    flank_coarsen: float = quantity(
+        1.0, doc="factor on the element sizes of the driving flanks, besides coarsen", low=0.1, high=10.0
+    )
     solve_all: bool = quantity(False, doc="true: solve also positions that differ by whole mesh cycles")
     interpolation: str = quantity(
         "cubic", doc="how the curve runs between its positions: cubic (monotone) or linear", choices=("cubic", "linear")
@@ -75,6 +78,10 @@ class StiffnessTable:
         """Raise `InputError` for keys that contradict each other."""
         if self.twist_deg is not None and self.torque_Nm is not None:
             raise InputError(f"{where}.torque_Nm", self.torque_Nm, "stands beside twist_deg", "leave one of them out")
+        least = 0.1 / self.coarsen
+        if self.flank_coarsen < least * (1 - 1e-12):
+            problem = f"must be >= {least:g} with coarsen = {self.coarsen:g}"
+            raise InputError(f"{where}.flank_coarsen", self.flank_coarsen, problem, "use a larger one")
         self.check_law(where)
         if self.angle_stop_deg is None:
             return

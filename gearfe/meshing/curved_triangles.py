@@ -1,0 +1,56 @@
+"""Triangles of second order: nodes in the middle of edges, and whether the elements are the right way out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+IntArray = NDArray[Any]
+
+#: Area coordinates of the six nodes.
+_NODES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]])
+
+
+def least_jacobian(points: Array, triangles: IntArray) -> Array:
+    r"""Smallest :math:`\det \partial x/\partial \xi` over the nodes of each triangle, in twice its straight area (-).
+
+    Where it is not positive, the element is inside out there.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        Positions (m).
+    triangles : ndarray, shape (m, 6)
+        Corners counter-clockwise, then the nodes in the middle of edges 01, 12, 20.
+    """
+    place = points[triangles]
+    least = np.full(len(triangles), np.inf)
+    for a, b, c in _NODES:
+        zero = 0 * a
+        along_b = np.array([1 - 4 * a, 4 * b - 1, zero, 4 * (a - b), 4 * c, -4 * c])
+        along_c = np.array([1 - 4 * a, zero, 4 * c - 1, -4 * b, 4 * b, 4 * (a - c)])
+        u, v = np.einsum("k,nkj->nj", along_b, place), np.einsum("k,nkj->nj", along_c, place)
+        least = np.minimum(least, u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    u, v = place[:, 1] - place[:, 0], place[:, 2] - place[:, 0]
+    return least / (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+
+
+def second_order(corners: Array, triangles: IntArray) -> tuple[Array, IntArray, IntArray]:
+    """Add a node in the middle of each edge of straight triangles.
+
+    Returns
+    -------
+    points, triangles
+        With the new nodes after the corners.
+    edges : ndarray, shape (e, 2)
+        Corners of the edges, the smaller number first, in lexical order; edge k has the middle node len(corners) + k.
+    """
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    _, first, inverse = np.unique(edges[:, 0] * len(corners) + edges[:, 1], return_index=True, return_inverse=True)
+    pairs = edges[first]
+    middles = 0.5 * (corners[pairs[:, 0]] + corners[pairs[:, 1]])
+    quadratic = np.concatenate([triangles, len(corners) + inverse.reshape(-1, 3)], axis=1)
+    return np.concatenate([corners, middles]), quadratic, pairs
