@@ -74,6 +74,7 @@ SWEEP_CHANGES = {
     "kinematics": "small",
     "penalty_stiffness_N_per_mm3": 1e7,
     "coarsen": 2.5,
+    "flank_coarsen": 2.5,
     "twist_from": "contact",
     "points_per_edge": 3,
     "route": "hertz",
