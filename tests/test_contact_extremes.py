@@ -9,13 +9,16 @@ import numpy as np
 import pytest
 
 from gearfe.contact.compliance import gear_body
-from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
+from gearfe.contact.laws import ContactLaw, Exact, Nitsche, Penalty
 from gearfe.contact.scene import MeshingPair
 from gearfe.contact.solver import solve_positions, stable
 from gearfe.elasticity import Material
 from gearfe.gear.pair import Gear, GearPair, TipRelief
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh
+from gearfe.stiffness.sweep import elastic_pair
+
+from .gears import pair as gear_pair
 
 RELIEF = TipRelief(20e-6, 1.5e-3, 2.0)
 CASES = {
@@ -92,3 +95,37 @@ def test_a_torque_that_falls_with_the_twist_is_no_answer() -> None:
     fallen = stable(replace(found, tangent=-found.tangent))
     assert fallen.status == "not_converged"
     assert math.isnan(fallen.torque_wheel)
+
+
+@pytest.mark.parametrize(("teeth", "degrees"), [((20, 30), 0.5), ((15, 60), 0.2), ((15, 60), 0.5)])
+def test_sharp_tips_dig_in_alike_under_penalty_and_the_exact_law(teeth: tuple[int, int], degrees: float) -> None:
+    """Points of the corner's own gear bear: on the other one they hold it from either side, which cost up to 0.5 %,
+    hundreds of steps and a second solution."""
+    gears = gear_pair(*teeth)
+    angles = gears.mesh_cycle * np.arange(16) / 16 + 0.003
+    penalty, exact = (
+        solve_positions(elastic_pair(gears, law=law), angles, math.radians(degrees)) for law in (Penalty(), Exact())
+    )
+    assert {p.status for p in (*penalty, *exact)} == {"converged"}
+    assert max(p.iterations for p in penalty) < 25
+    off = [abs(p.torque_wheel / q.torque_wheel - 1) for p, q in zip(penalty, exact, strict=True)]
+    assert max(off) < 1e-3
+
+
+def test_the_exact_law_on_fine_flanks_of_a_round() -> None:
+    """Where Newton's method from the Hertzian guess fails, the law starts from a penalty."""
+    form = {"module": 1.32e-3, "pressure_angle": 20.0, "width": 58.3e-3, "dedendum": 1.28, "rack_tip_radius": 0.185}
+    one = {"profile_shift": 0.577, "tip_round": 0.0761e-3}
+    two = {"profile_shift": -0.397, "tooth_thinning": 43e-6}
+    gears = gear_pair(
+        15, 32, pinion=one, wheel=two, centre_distance=31.2848e-3, bore=0.2, tip_shortening=0.0602, **form
+    )
+    angle = gears.mesh_cycle * np.array([5.37]) / 8
+    torques = []
+    for law in (Exact(), Nitsche()):
+        (found,) = solve_positions(
+            elastic_pair(gears, law=law, flank_coarsen=0.3), angle, math.radians(0.3) + gears.contact_twist
+        )
+        assert found.status == "converged"
+        torques.append(found.torque_wheel)
+    assert torques[0] == pytest.approx(torques[1], rel=5e-4)

@@ -27,6 +27,8 @@ CASES = [
     ("sharp", "stress", Nitsche(), 0.2),
     ("sharp", "strain", Nitsche(2.0, sides="wheel"), 0.02),
     ("sharp", "strain", Penalty(), 0.05),
+    ("sharp", "strain", Penalty(), 0.3),
+    ("sharp", "strain", Penalty(sides="pinion"), 0.05),
     ("modified", "strain", Nitsche(), 0.02),
     ("modified", "stress", Penalty(sides="both"), 0.3),
 ]

@@ -174,7 +174,7 @@ def test_at_the_kink_of_a_linear_relief_the_mate_gives_the_normal():
     assert seen >= 3
 
 
-@pytest.mark.parametrize("u", [1e-6, 0.4, 0.9, 0.999995, 1.0 - 2e-9])
+@pytest.mark.parametrize("u", [1e-6, 0.4, 0.9, 0.999995, 1.0 - 2e-9, 1.0])
 def test_curvature_of_an_involute_up_to_its_round(u):
     """The radius of curvature is the roll length (ISO 21771), also within a difference's step of the round."""
     face = face_of(pair(20, 30, pinion={"tip_round": 0.1e-3}).pinion)

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from gearfe import sweep_stiffness
+from gearfe.cli import main
 from gearfe.errors import InputError
+from gearfe.loadmap.sweep import sweep_loads
 from gearfe.meshing import tooth_sector
 from gearfe.meshing.curved_triangles import least_jacobian
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh
 
 from .gears import pair
+
+JOB = Path(__file__).parents[1] / "geometry" / "gear_train.toml"
 
 #: Gears whose coarse root edges bulge through the triangles behind them: (teeth, module, pressure angle, rack tip
 #: radius, profile shift, bore over pitch diameter, coarsen).
@@ -30,12 +36,11 @@ def bulging(teeth, module, alpha, tip, shift, bore, coarsen):
 
 
 def test_least_jacobian_of_a_bulging_edge():
-    """Middle of an edge moved outwards by s: det = 1 + 4 s (xi + eta) - ... is 1 - 4 s at the near corners' side."""
+    """Middle of one edge moved into the triangle by s: y = eta + 4 s xi (1 - xi - eta), least det where xi = 1."""
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     middles = np.array([[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
     for inwards in (0.0, 0.1, 0.2, 0.24, 0.26):
         points = np.concatenate([corners, middles + np.outer([1.0, 0.0, 0.0], [0.0, inwards])])
-        # y = eta + 4 s xi (1 - xi - eta), x = xi: det = dy/deta = 1 - 4 s xi, least where xi = 1
         assert least_jacobian(points, np.arange(6)[None]) == pytest.approx(1 - 4 * inwards, abs=1e-14)
 
 
@@ -92,3 +97,38 @@ def test_flanks_alone_converge():
 def test_flank_sizes_out_of_range(coarsen, flank):
     with pytest.raises(InputError, match="flank_coarsen"):
         sweep_stiffness(pair(20, 30), twist=1e-3, angles=[0.0], coarsen=coarsen, flank_coarsen=flank)
+
+
+@pytest.mark.parametrize("s", [0.15, 0.24, 0.3, -0.3])
+def test_an_element_with_two_bent_edges(s):
+    """x = xi + 4 s eta (1 - xi - eta), y = eta + 4 s xi (1 - xi - eta): det is a quadratic with its least inside."""
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    bent = np.array([[0.5, s], [0.5, 0.5], [s, 0.5]])
+    xi = np.linspace(0.0, 1.0, 201)
+    x, y = np.meshgrid(xi, xi)
+    det = (1 - 4 * s * y) * (1 - 4 * s * x) - 16 * s**2 * (1 - x - 2 * y) * (1 - 2 * x - y)
+    det = det[x + y <= 1 + 1e-12]
+    found = least_jacobian(np.concatenate([corners, bent]), np.arange(6)[None])
+    assert found == pytest.approx(det.min(), abs=0.02)
+    backwards = least_jacobian(np.concatenate([corners, bent]), np.array([[0, 2, 1, 5, 4, 3]]))
+    assert backwards == pytest.approx(-det.max(), abs=0.02)
+    flat = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [0.5, 0.0], [1.5, 0.0], [1.0, 0.0]])
+    assert not least_jacobian(flat, np.arange(6)[None]) > 0
+
+
+def test_flank_coarsen_reaches_load_maps_and_mesh_files(tmp_path, capsys):
+    gears = pair(20, 30, tip_round=0.1e-3)
+    one, two = (sweep_loads(gears, [100.0], angles=[0.1], coarsen=2.0, flank_coarsen=f) for f in (1.0, 3.0))
+    assert one.curves[0].k_mesh != pytest.approx(two.curves[0].k_mesh, rel=1e-6)
+    job = tmp_path / "job.toml"
+    text = JOB.read_text().replace("\n[stiffness]\n", "\n[stiffness]\nflank_coarsen = 0.5\n")
+    assert text != JOB.read_text()
+    nodes = []
+    for content in (JOB.read_text(), text):
+        job.write_text(content)
+        assert main(["mesh", str(job), "--out", str(tmp_path / "mesh.vtu"), "--gear", "pinion", "--sector"]) == 0
+        nodes.append(int(capsys.readouterr().out.split(" nodes")[0].rsplit(" ", 1)[-1]))
+    assert nodes[1] > 1.5 * nodes[0]
+    job.write_text(text.replace("= 0.5", "= 0.1"))
+    assert main(["mesh", str(job), "--out", str(tmp_path / "mesh.vtu"), "--coarsen", "0.5"]) == 2
+    assert "flank_coarsen" in capsys.readouterr().err

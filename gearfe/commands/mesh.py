@@ -28,14 +28,17 @@ def run(args: argparse.Namespace) -> int:
     from ..meshing.tooth_sector import sector_mesh
     from ..output.files import output_folder
     from ..stiffness.job import read_stiffness_job
+    from ..tables.stiffness import check_flank_coarsen
 
     format_of(args.out)
     job = read_stiffness_job(args.job)
     coarsen = job.table.coarsen if args.coarsen is None else args.coarsen
+    flank = job.table.flank_coarsen
     if not 0.2 <= coarsen <= 5.0:
         raise InputError("--coarsen", coarsen, "must be >= 0.2 and <= 5", "1 is the default mesh, 2 twice its sizes")
+    check_flank_coarsen(coarsen, flank, "stiffness.flank_coarsen")
     output_folder(Path(args.out).parent)
-    recipes = sector_recipes(job.pair, coarsen=coarsen, flank_coarsen=job.table.flank_coarsen)
+    recipes = sector_recipes(job.pair, coarsen=coarsen, flank_coarsen=flank)
     parts: dict[str, Any] = {}
     for number, name in enumerate(("pinion", "wheel")):
         if args.gear in ("both", name):

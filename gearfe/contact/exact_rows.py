@@ -153,7 +153,9 @@ def turning_stiffness(
     Parameters
     ----------
     normal, slide, turn, lift : ndarray, shape (20, n)
-        As in `ExactRows`.
+        Those of `ExactRows`, the two axes of each node one after the other.
+    metric, bow, gap : ndarray, shape (n,)
+        Those of `ExactRows` and of the projection (m).
     loads, cut : ndarray, shape (n,)
         Forces w p at the points (N), and how they shrink as the points slide past a sharp end (N).
     columns, count

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from .closest import Chains, Projection, chains_of, project
 from .corners import growths, shares
+from .law_data import slave_windows
 from .scene import MeshingPair, Window
 
 Array = NDArray[Any]
@@ -181,7 +182,11 @@ def gather(pair: MeshingPair, positions: Sequence[Sequence[Window]]) -> Group:
         angles = [(flat[min(i, m)].angle, flat[max(i, m)].angle) for i, m in zip(index, mate, strict=True)]
         share = np.array([shares(pair.corners, a)[g] for a, g in zip(angles, gear, strict=True)])
         growth = np.array([growths(pair.corners, a)[g] for a, g in zip(angles, gear, strict=True)])
-    made |= _contact_points(pair, gear, position, first_edge, counts, mate, made["first_node"], share)
+    carries = np.zeros(len(flat), dtype=bool)
+    for windows, places, first in zip(positions, order, first_window, strict=False):
+        bearing = slave_windows(pair, windows)
+        carries[first + np.flatnonzero(np.isin(places, bearing))] = True
+    made |= _contact_points(pair, gear, position, first_edge, counts, mate, made["first_node"], share, carries)
     made["growth"] = growth[made["owner"]]
     first_node, _first_point = made["first_node"], made["first_point"]
     operators = [_operator(pair, gear, windows[gear::2]) for windows in positions for gear in (0, 1)]
@@ -248,11 +253,11 @@ def _contact_points(
     mate: IntArray,
     first_node: IntArray,
     share: Array,
+    carries: NDArray[np.bool_],
 ) -> dict[str, Any]:
     law, flanks = pair.law, [body.flank for body in pair.bodies]
     quadrature = np.array([flank.shapes.shape[0] for flank in flanks])
-    carries = np.array([law.sides in ("both", "pinion"), law.sides in ("both", "wheel")])
-    per_window = np.where(carries[gear], quadrature[gear] * counts, 0)
+    per_window = np.where(carries, quadrature[gear] * counts, 0)
     owner = np.repeat(np.arange(len(gear)), per_window)
     within = ranges(np.zeros(len(gear), dtype=np.int64), per_window)
     edge = within // quadrature[gear[owner]]

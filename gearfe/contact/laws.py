@@ -105,11 +105,13 @@ class Penalty:
         0.07 mm then overlaps by 2 nm at 1.5 GPa. Far stiffer, the points over-constrain the edges and rounding shows
         in the pressures.
     sides
-        One side by default: two would ask twice for the same thing. ``tip`` is the safest with sharp tips.
+        One side: two would ask twice for the same thing. By default the one whose tip is nearer, for each tooth pair:
+        points of the flank that a sharp tip digs into hold the corner from either side of it, which costs up to 0.5 %
+        and lets deep overlaps have several solutions.
     """
 
     stiffness: float | None = None
-    sides: Sides = "pinion"
+    sides: Sides = "tip"
 
     def __post_init__(self) -> None:
         _check_sides(self.sides, get_args(Sides))

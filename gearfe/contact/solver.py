@@ -42,6 +42,9 @@ GROUP_BYTES = 60e6
 SOFTEST, SOFTNESS_STEP, SMALLEST_STEP = 0.01, 3.2, 1.1
 #: The same in lockstep, at fixed shares.
 SOFTER = (0.01, 0.03, 0.1, 0.3)
+#: A law with multipliers starts from a penalty so many times its complementarity parameter: near the contact without
+#: overlap, where that parameter's own overlap would tell too many points to bear.
+STIFFER = 30.0
 #: Accuracy of the softer solutions, and Newton steps for each.
 SOFT_TOLERANCE, SOFT_ITERATIONS = 1e-2, 20
 #: Newton steps spent on one difficult position before it is given up, where so many points lie inside the mate; where
@@ -204,10 +207,10 @@ def solve_group(
 
 
 def in_lockstep(law: ContactLaw) -> bool:
-    """Whether the lockstep iteration serves the law: p = max(0, -gamma g - s sigma_n) on sides that no position moves,
-    and no term in the variation of the stress.
+    """Whether the lockstep iteration serves the law: p = max(0, -gamma g - s sigma_n), and no term in the variation of
+    the stress.
     """
-    return law.theta == 0 and law.multiplier is None and law.sides != "tip"
+    return law.theta == 0 and law.multiplier is None
 
 
 def _groups(nodes: Sequence[int]) -> list[list[int]]:
@@ -278,7 +281,7 @@ def _with_care(
     scene = assemble(pair, windows)
     before, outcome = failed
     steps = outcome.iterations
-    if pair.law.uses_stress or list(windows) != list(before):
+    if pair.law.uses_stress or scene.hats is not None or list(windows) != list(before):
         outcome = _side_by_side([scene], [_solving(pair, scene, tolerance, by_penalty=True)])[0]
         steps += outcome.iterations
     inside = max(1, int((scene.rigid.gap < 0).sum()))
@@ -313,14 +316,17 @@ def _solving(pair: MeshingPair, scene: Scene, tolerance: float, *, by_penalty: b
     Parameters
     ----------
     by_penalty
-        Laws with stress start from what the law without its stress comes to, softened.
+        Laws with stress or multipliers start from what a penalty at their points comes to, softened.
     """
     state, steps = _start(pair, scene), 0
     if pair.law.uses_stress or scene.hats is not None:
-        if by_penalty and scene.hats is None:
+        if by_penalty:
             none = np.zeros((0, 0))
-            plain = replace(scene, theta=0, stress=none, stress_stress=none)
-            softly = yield from _softened(plain, state, SOFT_TOLERANCE)
+            stiffer = 1.0 if scene.hats is None else STIFFER
+            plain = replace(
+                scene, theta=0, stress=none, stress_stress=none, hats=None, parameter=stiffer * scene.parameter
+            )
+            softly = yield from _softened(plain, state, SOFT_TOLERANCE, SOFTEST / stiffer)
             steps = softly.iterations
             if softly.status == "converged":
                 state = replace(softly.state, place=softly.projection.place)
@@ -329,9 +335,9 @@ def _solving(pair: MeshingPair, scene: Scene, tolerance: float, *, by_penalty: b
     return (yield from _softened(scene, state, tolerance))
 
 
-def _softened(scene: Scene, state: State, tolerance: float) -> Dialogue:
+def _softened(scene: Scene, state: State, tolerance: float, softest: float = SOFTEST) -> Dialogue:
     """A law without stress by way of softer ones."""
-    share, factor, solved, steps = SOFTEST, SOFTNESS_STEP, 0.0, 0
+    share, factor, solved, steps = softest, SOFTNESS_STEP, 0.0, 0
     while True:
         softer = scene if share == 1.0 else replace(scene, parameter=share * scene.parameter)
         outcome = yield from newton(softer, state, SOFT_TOLERANCE if share < 1.0 else tolerance, SOFT_ITERATIONS)

@@ -27,12 +27,7 @@ IntArray = NDArray[Any]
 #: Raised whenever the recipe's meaning changes, so that stored meshes are not mistaken for new ones.
 RECIPE_NUMBER = 3
 
-#: Sizes of the recipe that cut a boundary into edges, with ``left`` as the fine flank or any.
-SIZES = {
-    "cut_right": ("body",), "root_right": ("root",), "flank_right": ("flank", "strip", "back"), "tip": ("back",),
-    "flank_left": ("flank", "strip", "back"), "root_left": ("root",), "cut_left": ("body",), "bore": ("bore",),
-}  # fmt: skip
-#: Factor on those of them that elements inside out ask for, and how often a sector is filled at most.
+#: Factor on the sizes of a boundary beside which elements are inside out, and how often a sector is filled at most.
 FINER, MOST_FILLINGS = 0.7, 12
 
 #: Fewer second-order edges round the whole bore stiffen the gear measurably (0.3 % with seven).
@@ -278,15 +273,23 @@ def _make(gear: Gear, recipe: SectorRecipe) -> dict[str, NDArray[np.generic]]:
     """
     for _ in range(MOST_FILLINGS):
         made = _filled(gear, recipe)
-        wrong = np.flatnonzero(least_jacobian(made["points"], made["triangles"]) <= 0)
+        wrong = np.flatnonzero(~(least_jacobian(made["points"], made["triangles"]) > 0))
         if len(wrong) == 0:
             return made
         bulging = np.unique(made["triangles"][wrong])
-        named = {name for name in made if name.startswith("on_") and np.isin(made[name][:, 1], bulging).any()}
-        finer = {size for name in named for size in SIZES[name[3:]]}
+        named = {name[3:] for name in made if name.startswith("on_") and np.isin(made[name][:, 1], bulging).any()}
+        finer = {size for name in named for size in _sizes_of(name, recipe.fine)}
         recipe = replace(recipe, **{size: FINER * getattr(recipe, size) for size in finer})
-    problem = f"leaves {len(wrong)} elements of the gear with {gear.teeth} teeth inside out"
-    raise InputError("coarsen", None, problem, "use a finer mesh")
+    problem = f"{len(wrong)} elements of the gear with {gear.teeth} teeth are inside out"
+    raise InputError("mesh", None, problem, "use smaller elements: coarsen or flank_coarsen")
+
+
+def _sizes_of(boundary: str, fine: str) -> tuple[str, ...]:
+    """Sizes of the recipe that cut a curved boundary into edges; the cuts between sectors are straight."""
+    name, _, side = boundary.partition("_")
+    if name == "flank":
+        return ("flank", "strip") if fine in (side, "both") else ("back",)
+    return {"root": ("root",), "tip": ("back",), "bore": ("bore",)}.get(name, ())
 
 
 def _filled(gear: Gear, recipe: SectorRecipe) -> dict[str, NDArray[np.generic]]:

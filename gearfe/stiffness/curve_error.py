@@ -88,7 +88,7 @@ def error_estimate(
         Torque of the curve there and on the coarser mesh (N m); not-a-number where that one failed. Such a position
         gets the largest error of the others.
     coarsen
-        The curve's own factor on the default element sizes.
+        The curve's own factor on the default element sizes, that of the flanks where it is larger.
     law : ndarray, shape (m,)
         What the law of small loads, from `law_error`, and the rounding of the gears' angles add.
     """

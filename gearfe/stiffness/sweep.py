@@ -27,6 +27,7 @@ from ..gear.pair import GearPair
 from ..meshing.recipe import sector_recipes
 from ..meshing.tooth_sector import sector_mesh
 from ..stopwatch import Stopwatch
+from ..tables.stiffness import check_flank_coarsen
 from ..threads import one_thread
 from .curve import SOLVED, ErrorEstimate, StiffnessCurve
 from .curve_error import COARSENING, error_estimate, law_error, solved_twice
@@ -42,8 +43,6 @@ IntArray = NDArray[Any]
 
 #: Structural steel, the material where none is given.
 STEEL = Material()
-#: Finest flank elements, in default ones: some 1,200 on a flank, whose compliances take gigabytes.
-FINEST = 0.1
 
 
 def elastic_pair(
@@ -79,10 +78,7 @@ def elastic_pair(
     # the error estimate of a mesh at the limit is coarser by COARSENING
     if not (math.isfinite(coarsen) and 0.2 <= coarsen <= 5.0 * COARSENING):
         raise InputError("coarsen", coarsen, "must be >= 0.2 and <= 5", "1 is the default mesh, 2 twice its sizes")
-    least = FINEST / coarsen
-    if not (math.isfinite(flank_coarsen) and least * (1 - 1e-12) <= flank_coarsen <= 10.0):
-        problem = f"must be >= {least:g} with coarsen {coarsen:g}, and <= 10"
-        raise InputError("flank_coarsen", flank_coarsen, problem, "1 leaves the flanks to coarsen")
+    check_flank_coarsen(coarsen, flank_coarsen, "flank_coarsen")
     chosen = law_named(law) if isinstance(law, str) else law
     both = (materials, materials) if isinstance(materials, Material) else materials
     watch = watch or Stopwatch()
@@ -205,7 +201,7 @@ def sweep_stiffness(
             common = {"plane": elastic.pinion.plane, "law": elastic.law, **points}
             coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
             routers = router, Router(pair, coarse, route)
-            error = _estimate(routers, solved_angles, solved, finite=finite, coarsen=coarsen)
+            error = _estimate(routers, solved_angles, solved, finite=finite, coarsen=coarsen * max(1.0, flank_coarsen))
     curve = assembled_curve(pair, asked, solved_angles, source, solved, touching, lost, searched=torque is not None)
     return replace(curve, law=law_text(elastic.law), timings=dict(watch.seconds), error=error)
 

@@ -28,7 +28,8 @@ from ..contact.solver import Position
 from ..gear.pair import GearPair
 from ..stiffness.curve import SOLVED
 from ..stiffness.job import read_stiffness_job
-from ..stiffness.routes import Router
+from ..stiffness.routes import RESOLVED, Router
+from ..stiffness.small_balance import balance as small_balance
 from ..stiffness.sweep import elastic_pair, sweep_stiffness
 from ..stiffness.torque_control import ANGLE_ROUNDING
 from .campaign import Campaign, Case
@@ -39,9 +40,9 @@ from .toml_text import toml_text
 #: Limits of the checks. The first four hold to the solver's residual of 1e-10, which the softest contacts amplify.
 BALANCE, PERIOD, SWAP = 1e-7, 1e-7, 1e-6
 #: The route for small loads is a formula about the place where the gears just touch with the wheel turned back. Seen
-#: from the other gear it is the pinion that is turned back, and what is left out is not the same. It claims 0.2 % by
-#: default. What it leaves out grows with the square of the contact's width; as the mesh takes over at a square of the
-#: width that grows with the element, the limit does (see `gearfe.stiffness.routes`).
+#: from the other gear it is the pinion that is turned back, and what is left out is not the same. It claims 0.2 % where
+#: the default mesh would not be asked. Coarser meshes leave wider contacts to it, and what it leaves out grows with the
+#: square of their width (see `gearfe.stiffness.routes`).
 SMALL_LOAD = 2e-3
 #: The ratio holds as the normals at the contact do: they lean with the elements that carry it (1e-4 to 1e-3 of the
 #: wheel's torque where the contact is two elements wide, more where it is narrower), and with the bending of the teeth.
@@ -199,19 +200,25 @@ def swap_checks(pair: GearPair, elastic: MeshingPair, angles: Any, twists: Any, 
     corners = corner_bearings(mirrored)
     other = MeshingPair(elastic.wheel, elastic.pinion, elastic.centre_distance, elastic.width, law, corners)
     turned = elastic.wheel_angle(angles, twists) + math.pi / elastic.wheel.teeth
-    router = Router(mirrored, other)
-    swapped = router.solve(turned, twists * elastic.wheel.teeth / elastic.pinion.teeth)
-    small = SMALL_LOAD * max(1.0, router.coarseness)
+    router, turns = Router(mirrored, other), twists * elastic.wheel.teeth / elastic.pinion.teeth
+    swapped = router.solve(turned, turns)
     checks = [
         Check(
             "swap",
             max(abs(q.torque_pinion / p.torque_wheel - 1), abs(q.torque_wheel / p.torque_pinion - 1)),
-            max(SWAP if p.route == q.route == "direct" else small, _rounding(p)),
+            max(SWAP if p.route == q.route == "direct" else small_load_limit(router, a, t), _rounding(p)),
         )
-        for p, q in zip(found, swapped, strict=True)
+        for p, q, a, t in zip(found, swapped, turned.tolist(), turns.tolist(), strict=True)
         if p.status == q.status == "converged"
     ]
     return [max(checks, key=lambda c: c.share)] if checks else []
+
+
+def small_load_limit(router: Router, angle: float, twist: float) -> float:
+    """What the law of small loads may leave out at a pinion angle and a twist (rad)."""
+    reference = router.reference(angle, twist)
+    width = router.mean_width(reference, small_balance(reference, twist))
+    return SMALL_LOAD * max(1.0, (width / RESOLVED[0]) ** 2)
 
 
 CAMPAIGN = Campaign("gears", 1000, tuple(range(6)), 120.0, draw, run)

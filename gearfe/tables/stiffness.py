@@ -11,6 +11,18 @@ from ..errors import InputError
 MOST_POSITIONS = 100_000
 
 
+#: Finest flank elements, in default ones: some 1,200 on a flank, whose compliances take gigabytes.
+FINEST = 0.1
+
+
+def check_flank_coarsen(coarsen: float, flank_coarsen: float, field: str) -> None:
+    """Raise `InputError` unless the flanks' elements are within the range that is known to work."""
+    least = max(FINEST, FINEST / coarsen)
+    if not least * (1 - 1e-12) <= flank_coarsen <= 10.0:
+        problem = f"must be >= {least:g} with coarsen {coarsen:g}, and <= 10"
+        raise InputError(field, flank_coarsen, problem, "1 leaves the flanks to coarsen")
+
+
 @dataclass(frozen=True)
 class StiffnessTable:
     """Load, positions, model and mesh of a rotation sweep."""
@@ -78,10 +90,7 @@ class StiffnessTable:
         """Raise `InputError` for keys that contradict each other."""
         if self.twist_deg is not None and self.torque_Nm is not None:
             raise InputError(f"{where}.torque_Nm", self.torque_Nm, "stands beside twist_deg", "leave one of them out")
-        least = 0.1 / self.coarsen
-        if self.flank_coarsen < least * (1 - 1e-12):
-            problem = f"must be >= {least:g} with coarsen = {self.coarsen:g}"
-            raise InputError(f"{where}.flank_coarsen", self.flank_coarsen, problem, "use a larger one")
+        check_flank_coarsen(self.coarsen, self.flank_coarsen, f"{where}.flank_coarsen")
         self.check_law(where)
         if self.angle_stop_deg is None:
             return
