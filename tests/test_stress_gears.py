@@ -11,15 +11,21 @@ import pytest
 from gearfe.contact.overlap import overlaps
 from gearfe.contact.scene import MeshingPair
 from gearfe.errors import InputError
+from gearfe.meshing.recipe import sector_recipes
 from gearfe.stiffness.job import read_stiffness_job
 from gearfe.stiffness.routes import Router
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 from gearfe.stress.campaign import Case
-from gearfe.stress.gears import run
+from gearfe.stress.gears import _element, run
+
+from .gears import pair
 
 KEPT = sorted((Path(__file__).parent / "test_stress_cases" / "gears").glob("*.toml"))
 #: Large windows, many Newton steps.
-LONG = {"bent_teeth", "blend_of_routes", "jump_of_the_moment", "nearer_tip", "points_on_the_other_gear", "teeth_missed"}
+LONG = {
+    "bent_teeth", "blend_of_routes", "corner_held_from_both_sides", "jump_of_the_moment", "nearer_tip",
+    "points_on_the_other_gear", "teeth_missed",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -46,6 +52,16 @@ def test_both_gears_see_the_same_teeth_overlap() -> None:
         assert {o.tooth for o in mine} == {-1 - o.tooth for o in theirs}
         depth = {-1 - o.tooth: o.depth for o in theirs}
         assert all(o.depth == pytest.approx(depth[o.tooth], rel=1e-6) for o in mine)
+
+
+def test_the_element_at_a_contact_is_the_one_there() -> None:
+    """At the pitch point the flank's, at the tip the strip's, which are most of all."""
+    gears = pair(20, 30)
+    body, recipe = elastic_pair(gears, coarsen=1.5).pinion, sector_recipes(gears, coarsen=1.5)[0]
+    base = gears.pinion.base_radius
+    pitch, tip = (math.sqrt(r**2 - base**2) for r in (0.5 * 20 * gears.pinion.module, gears.pinion.tip_radius))
+    assert _element(body, base, pitch) == pytest.approx(recipe.flank, rel=0.05)
+    assert _element(body, base, tip * (1 - 1e-9)) == pytest.approx(recipe.strip, rel=0.05)
 
 
 def test_small_loads_where_the_moment_of_the_pressure_has_a_jumping_rate() -> None:

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from ..contact.compliance import GearBody
 from ..contact.corners import corner_bearings
 from ..contact.laws import LAWS
 from ..contact.scene import MeshingPair
@@ -173,17 +174,26 @@ def ratio_checks(pair: GearPair, elastic: MeshingPair, angles: Any, twists: Any,
 
 
 def elements_within(pair: GearPair, elastic: MeshingPair, angle: float, found: Position) -> float:
-    """Width of the narrowest line contact, in flank elements: 2 b = 2 sqrt(4 F rho/(pi E* w)) (Johnson, ch. 4)."""
-    modulus = 1.0 / sum(body.material.contact_compliance(body.plane) for body in elastic.bodies)
-    size = max(float(np.median(body.flank.sizes)) for body in elastic.bodies)
+    """Width of the narrowest line contact, in the coarser flank's elements there: 2 b = 2 sqrt(4 F rho/(pi E* w))
+    (Johnson, ch. 4)."""
+    modulus = 1.0 / sum(elastic.contact_compliances)
     widths = []
     for k, torque in zip(found.pair_numbers, found.pair_torques, strict=True):
         if torque > 1e-9 * found.torque_wheel:
             roll = pair.pinion_roll_at(angle + k * pair.mesh_cycle)
             radius = roll * (pair.tangent_length - roll) / pair.tangent_length
             force = torque / pair.wheel.base_radius
-            widths.append(2 * math.sqrt(4 * force * radius / (math.pi * modulus * elastic.width)))
-    return max(min(widths) / size, 1e-2)
+            rolls = (roll, pair.tangent_length - roll)
+            size = max(map(_element, elastic.bodies, (pair.pinion.base_radius, pair.wheel.base_radius), rolls))
+            widths.append(2 * math.sqrt(4 * force * radius / (math.pi * modulus * elastic.width)) / size)
+    return max(min(widths), 1e-2)
+
+
+def _element(body: GearBody, base_radius: float, roll: float) -> float:
+    """Element (m) of a flank where the involute has a roll length (m)."""
+    radii = np.linalg.norm(body.flank.points[::2], axis=1)
+    number = int(np.searchsorted(radii, math.hypot(base_radius, roll))) - 1
+    return float(body.flank.sizes[min(max(number, 0), len(body.flank.sizes) - 1)])
 
 
 def swap_checks(pair: GearPair, elastic: MeshingPair, angles: Any, twists: Any, found: list[Position]) -> list[Check]:
