@@ -36,6 +36,8 @@ def test_kept_cases(path: Path, tmp_path: Path) -> None:
     assert found.outcome == "done"
     assert {c.name for c in found.checks} >= {"tangent", "balance", "swap", "period"}
     assert [c for c in found.checks if not c.share <= 1.0] == []
+    # ten times the law's estimate at edges would hide what was found on some of them
+    assert next(c.value for c in found.checks if c.name == "swap") < 2e-3
 
 
 def test_both_gears_see_the_same_teeth_overlap() -> None:

@@ -34,7 +34,8 @@ from numpy.typing import NDArray
 from ..contact.solver import solve_positions
 from .curve import ErrorEstimate
 from .routes import Router
-from .small_balance import balance
+from .small_balance import Balance, balance
+from .small_load import Reference
 
 Array = NDArray[Any]
 
@@ -65,14 +66,18 @@ def law_error(router: Router, angles: Array, twists: Array) -> Array:
         share = router.share(reference, found)[0]
         if not found.converged or share >= 1.0:
             continue
-        pairs = [(c, known) for c, known in zip(found.contacts, reference.local, strict=True) if c is not None]
-        smooth = all(contact.width <= known.clear for contact, known in pairs)
-        made[i] = (1 - share) * (LAW if smooth else LAW_AT_EDGES)
+        made[i] = (1 - share) * law_bound(reference, found)
         if share > 0:
             (direct,) = solve_positions(router.elastic, np.array([angle]), np.array([twist]))
             if direct.status == "converged":
                 made[i] += max(share, 1 - share) * abs(direct.torque_wheel / found.torque_wheel - 1)
     return made
+
+
+def law_bound(reference: Reference, found: Balance) -> float:
+    """Bound of the relative error of the law of small loads at a position."""
+    pairs = [(c, known) for c, known in zip(found.contacts, reference.local, strict=True) if c is not None]
+    return LAW if all(contact.width <= known.clear for contact, known in pairs) else LAW_AT_EDGES
 
 
 def error_estimate(

@@ -71,8 +71,7 @@ class Router:
         self.pair, self.elastic, self.route = pair, elastic, route
         self.flanks = Flanks(pair)
         largest = max(_largest(b, f.radii[0]) for b, f in zip(elastic.bodies, self.flanks.faces, strict=True))
-        self._default = DEFAULT_ELEMENT * pair.pinion.module
-        self.length = math.sqrt(largest * self._default)
+        self.length = math.sqrt(largest * DEFAULT_ELEMENT * pair.pinion.module)
         teeth = pair.pinion.teeth, pair.wheel.teeth
         self._modulus = 1 / sum(elastic.contact_compliances)
         self._radius = pair.tangent_length * teeth[0] * teeth[1] / sum(teeth) ** 2  # relative, at the pitch point
@@ -192,23 +191,13 @@ class Router:
             return (0.0, 0.0) if found.converged else (1.0, 0.0)
         low, high = RESOLVED
         on, total = np.flatnonzero(found.force > 0), found.force.sum()
-        each = self._widths(reference, found) / np.sqrt(reference.elements[on] * self._default)
+        widths = np.array([contact.width for contact in found.contacts if contact is not None])
+        each = self._counted(widths, found.force[on] / reference.width)
+        each = each / np.sqrt(reference.elements[on] * DEFAULT_ELEMENT * self.pair.pinion.module)
         b = float(found.force[on] @ each) / total
         rate = float(found.rate[on] @ (1.5 * each - b)) / total  # widths grow with the root of the forces
         x = min(1.0, max(0.0, (b - low) / (high - low)))
         return x * x * (3 - 2 * x), 6 * x * (1 - x) * rate / (high - low)
-
-    def mean_width(self, reference: Reference, found: Balance) -> float:
-        """Half width that decides, the mean over the forces, in default elements; 0 where nothing bears."""
-        on = np.flatnonzero(found.force > 0)
-        if not (found.converged and len(on)):
-            return 0.0
-        return float(found.force[on] @ self._widths(reference, found) / found.force.sum() / self._default)
-
-    def _widths(self, reference: Reference, found: Balance) -> Array:
-        """What the half widths of the contacts that bear count as (m)."""
-        widths = np.array([contact.width for contact in found.contacts if contact is not None])
-        return self._counted(widths, found.force[found.force > 0] / reference.width)
 
     def _touched(self, angles: Array) -> dict[float, Touching]:
         new = np.array(sorted({float(a) for a in angles} - self._touching.keys()))
