@@ -111,8 +111,9 @@ def _quarter_turn(vectors: Array) -> Array:
     return np.stack([-vectors[:, 1], vectors[:, 0]], axis=1)
 
 
-def outgrown(group: Group, motion: Motion) -> NDArray[np.bool_]:
-    """Whether a contact comes to the rim of a window that could be larger, shape (B,)."""
+def outgrown(group: Group, motion: Motion, rigid: Projection) -> NDArray[np.bool_]:
+    """Whether a contact comes to the rim of a window that could be larger, shape (B,); or would, were it longer: where
+    a pair of windows bears nothing, and the undeformed gears overlap most at the rim of one."""
     found, loaded = motion.found, motion.pressure > 0
     bad = np.zeros(group.size, dtype=bool)
     edge = (group.slave_nodes[:, 0] - group.first_node[group.owner]) // 2
@@ -124,6 +125,15 @@ def outgrown(group: Group, motion: Motion) -> NDArray[np.bool_]:
     behind, ahead = found.beyond & (found.place <= 0), found.beyond & (found.place > 0)
     bad[group.at[starts[facing] & (behind | (loaded & (found.place < 1)))]] = True
     bad[group.at[ends[facing] & (ahead | (loaded & (found.place > group.counts[facing] - 1)))]] = True
+    idle = np.ones(int(group.couple.max(initial=-1)) + 1, dtype=bool)
+    idle[group.couple[own[loaded]]] = False
+    by_depth = np.lexsort((rigid.gap, own))
+    deepest = by_depth[np.searchsorted(own[by_depth], np.unique(own))]
+    asked = deepest[idle[group.couple[own[deepest]]] & (rigid.gap[deepest] < 0)]
+    at_rim = (starts[own[asked]] & (edge[asked] == 0)) | (
+        ends[own[asked]] & (edge[asked] == group.counts[own[asked]] - 1)
+    )
+    bad[group.at[asked[at_rim]]] = True
     return bad
 
 

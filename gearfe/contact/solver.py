@@ -175,7 +175,7 @@ def solve_group(
         pressure = np.where(at_points, softer.motion.pressure, pressure)
         forces = np.where(np.repeat(at_nodes, 2), softer.motion.forces, forces)
     outcomes = iterate(group, pressure, forces, rigid, tolerance)
-    beyond = outgrown(group, outcomes.motion)
+    beyond = outgrown(group, outcomes.motion, rigid)
     outcomes = replace(outcomes, converged=outcomes.converged & ~beyond)
     results = results_of(pair, group, outcomes)
     scenes = scenes_of(pair, group, rigid, (results.forces, results.force_rate), outcomes.motion.pressure)
@@ -250,14 +250,20 @@ def _side_by_side(scenes: Sequence[Scene], dialogues: Sequence[Dialogue]) -> lis
 
 
 def _outgrown(pair: MeshingPair, scene: Scene, outcome: Outcome) -> bool:
-    """Whether the contact reaches the rim of a window that could be larger, or what lies behind it."""
+    """Whether the contact reaches the rim of a window that could be larger, or what lies behind it; or would, see
+    `group_results.outgrown`."""
     loaded, found = outcome.state.pressure > 0, outcome.projection
+    bearing = set((scene.owner[loaded] // 2).tolist())
     for i, w in enumerate(scene.windows):
         mine = np.flatnonzero(scene.owner == i)
         first, last = w.first_edge > 0, w.first_edge + w.edges < pair.bodies[w.gear].flank.edges
         if len(mine):
             q = len(mine) // w.edges
             if (first and loaded[mine[:q]].any()) or (last and loaded[mine[-q:]].any()):
+                return True
+            deepest = int(np.argmin(scene.rigid.gap[mine]))
+            at_rim = (first and deepest < q) or (last and deepest >= len(mine) - q)
+            if at_rim and scene.rigid.gap[mine[deepest]] < 0 and i // 2 not in bearing:
                 return True
         facing = (scene.mate == i) & found.beyond
         if (first and (found.place[facing] <= 0).any()) or (last and (found.place[facing] >= w.edges).any()):
