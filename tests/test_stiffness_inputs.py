@@ -1,14 +1,17 @@
 """Every key of [pair] and [stiffness] that can change the curve does change it: none is read and then forgotten."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from gearfe.config import build
+from gearfe.contact.position import unsolved
 from gearfe.gear.pair import GearPair
 from gearfe.stiffness.job import StiffnessJob
 from gearfe.stiffness.sweep import sweep_stiffness
+from gearfe.stiffness.torque_control import twists_for_torque
 from gearfe.tables.pair import PairTable
 from gearfe.tables.stiffness import StiffnessTable
 
@@ -125,3 +128,24 @@ def test_every_key_is_in_this_file():
     elsewhere = {"twist_deg", "nitsche_gamma0", "nitsche_theta", "solve_all", "interpolation"}
     elsewhere |= {"angle_stop_deg", "angle_step_deg"}
     assert set(StiffnessTable.__dataclass_fields__) <= {*SWEEP_CHANGES, *elsewhere}
+
+
+def test_a_torque_in_a_jump_is_given_up_soon():
+    """A corner that snaps on: below a twist of 1 mrad the torque is 1e6 times it, above 0.2 % more."""
+    asked = []
+
+    def solve(angles, twists):
+        asked.extend(twists)
+        torques = [1e6 * t * (1.002 if t > 1e-3 else 1.0) for t in twists]
+        return [
+            replace(unsolved("converged", 1), torque_wheel=torque, tangent=torque / t)
+            for torque, t in zip(torques, twists, strict=True)
+        ]
+
+    for goal, status in ((1001.0, "torque_not_reached"), (999.0, "converged"), (1003.0, "converged")):
+        asked.clear()
+        found = twists_for_torque(
+            solve, np.zeros(1), np.array([goal]), touching=np.zeros(1), first=np.array([0.7e-3]), most=0.1
+        )
+        assert found.status == [status]
+        assert len(asked) <= 15

@@ -139,7 +139,7 @@ def _with_shares(router: Router, angles: Array, goal: Array, touching: Array, fo
     """Move the twists until torque and finite-strain share at the same twist make the goal."""
     elastic = router.elastic
     sampled = sample_numbers(angles, elastic.pitch_angle)
-    iterations, before = found.iterations, np.zeros(len(angles))
+    iterations, before = found.iterations.copy(), np.zeros(len(angles))
     for _ in range(SHARE_PASSES):
         positions = router.solve(angles[sampled], found.twist[sampled], range(len(sampled)))
         shares = finite_strain_shares(elastic, positions)
@@ -147,13 +147,29 @@ def _with_shares(router: Router, angles: Array, goal: Array, touching: Array, fo
         reached, tangent = (np.array([getattr(p, n) for p in found.positions]) for n in ("torque_wheel", "tangent"))
         good = np.array(found.status) == "converged"
         step = np.divide(goal / (1 + every) - reached, tangent, out=np.zeros(len(goal)), where=good & (tangent > 0))
-        found = _search(router, angles, goal / (1 + every), touching, found.twist + step, None)
-        iterations = iterations + found.iterations
+        again = np.flatnonzero(good)  # what was not reached is not asked for once more
+        if len(again) == 0:
+            break
+        searched = _search(
+            router, angles[again], (goal / (1 + every))[again], touching[again], (found.twist + step)[again], None
+        )
+        found = _replaced(found, again, searched)
+        iterations[again] += searched.iterations
         if np.max(np.abs(every - before)) <= SHARE_TOLERANCE:
             break
         before = every
     raised = [with_share(p, c) for p, c in zip(found.positions, every, strict=True)]
     return found._replace(positions=raised, iterations=iterations)
+
+
+def _replaced(found: TorqueSolution, places: IntArray, others: TorqueSolution) -> TorqueSolution:
+    """The solutions `found`, with `others` at the places `places`."""
+    twist, iterations = found.twist.copy(), found.iterations.copy()
+    positions, status = list(found.positions), list(found.status)
+    twist[places], iterations[places] = others.twist, others.iterations
+    for place, position, one in zip(places.tolist(), others.positions, others.status, strict=True):
+        positions[place], status[place] = position, one
+    return TorqueSolution(twist, positions, iterations, status)
 
 
 def _search(

@@ -23,6 +23,9 @@ TOLERANCE, ANGLE_ROUNDING = 1e-10, 2e-15
 MAX_SOLUTIONS, MAX_FAILURES = 40, 3
 #: Relative width of the interval in which the torque is taken to jump past its goal.
 JUMP = 1e-3
+#: Between a twist that is too little and one that is too much, the torque jumps where it differs by so many times what
+#: the tangent has for that interval, and the interval is no wider than `JUMP`.
+STEEP = 10.0
 #: Status of a position whose torque was not found although single solutions converged.
 NOT_REACHED = "torque_not_reached"
 
@@ -74,6 +77,7 @@ def twists_for_torque(
     status = [NOT_REACHED] * len(angles)
     iterations, failures = np.zeros(len(angles), dtype=np.int64), np.zeros(len(angles), dtype=np.int64)
     missed, below = np.zeros(len(angles), dtype=bool), np.zeros(len(angles), dtype=bool)
+    little, much = np.full(len(angles), np.nan), np.full(len(angles), np.nan)  # torques at both ends
     open_ = np.arange(len(angles))
     for _ in range(MAX_SOLUTIONS):
         if len(open_) == 0:
@@ -89,7 +93,13 @@ def twists_for_torque(
                 if abs(excess) <= max(TOLERANCE * torque[i], ANGLE_ROUNDING * position.tangent):
                     status[i] = "converged"
                     continue
-                low[i], high[i] = (twist[i], high[i]) if excess < 0 else (low[i], twist[i])
+                if excess < 0:
+                    low[i], little[i] = twist[i], position.torque_wheel
+                else:
+                    high[i], much[i] = twist[i], position.torque_wheel
+                width = high[i] - low[i]
+                if width <= JUMP * high[i] and much[i] - little[i] > STEEP * position.tangent * width:
+                    continue  # a corner that snaps on: no twist has this torque
                 missed[i] &= excess >= 0
                 below[i] |= excess < 0
                 step = -excess / position.tangent if position.tangent > 0 else 0.0

@@ -51,6 +51,8 @@ TIMES = 10.0
 #: exact involutes, and taken off where the mesh was asked. What remains is of the second order in the faces' rotation,
 #: about 0.3 times the overlap in modules.
 RATIO, RATIO_BENT = 1.5e-3, 0.3**2
+#: Contact points on an edge that the limit of the ratio was measured with.
+USUAL_POINTS = 4
 
 
 def draw(random: np.random.Generator, number: int) -> Case:
@@ -175,7 +177,7 @@ def ratio_checks(pair: GearPair, elastic: MeshingPair, angles: Any, twists: Any,
 
 def elements_within(pair: GearPair, elastic: MeshingPair, angle: float, found: Position) -> float:
     """Width of the narrowest line contact, in the coarser flank's elements there: 2 b = 2 sqrt(4 F rho/(pi E* w))
-    (Johnson, ch. 4)."""
+    (Johnson, ch. 4). Elements with fewer than the usual contact points count for less."""
     modulus = 1.0 / sum(elastic.contact_compliances)
     widths = []
     for k, torque in zip(found.pair_numbers, found.pair_torques, strict=True):
@@ -186,7 +188,8 @@ def elements_within(pair: GearPair, elastic: MeshingPair, angle: float, found: P
             rolls = (roll, pair.tangent_length - roll)
             size = max(map(_element, elastic.bodies, (pair.pinion.base_radius, pair.wheel.base_radius), rolls))
             widths.append(2 * math.sqrt(4 * force * radius / (math.pi * modulus * elastic.width)) / size)
-    return max(min(widths), 1e-2)
+    usual = min(1.0, len(elastic.pinion.flank.shapes) / USUAL_POINTS)
+    return max(usual * min(widths), 1e-2)
 
 
 def _element(body: GearBody, base_radius: float, roll: float) -> float:
