@@ -17,7 +17,6 @@ from gearfe.stiffness.sweep import elastic_pair
 from .gears import pair
 
 E_STAR, RHO = 1.1e11, 4e-3
-COARSE = 2.0
 
 
 def local(gap, *, edges=(), low=-1e-3, high=1e-3, smooth=0.0, radius=RHO):
@@ -118,11 +117,10 @@ def test_a_contact_that_does_not_reach_the_round_is_hertz():
     k = int(np.argmin(np.where(below > 1e-7, below, np.inf)))
     contact = local_contact(gears, elastic, flanks, touching, k, 1e-4)
     assert 1e-7 < contact.smooth < 2e-5
-    load = (
-        math.pi * contact.modulus * (0.2 * contact.smooth) ** 2 * touching.curvature[k] / 4
-    )  # of the half width 0.2 smooth
+    width = 0.2 * contact.smooth
+    load = math.pi * contact.modulus * width**2 * touching.curvature[k] / 4  # Johnson, eq. 4.43
     found = contact.under(load)
-    assert found.width == pytest.approx(0.2 * contact.smooth, rel=1e-3)
+    assert found.width == pytest.approx(width, rel=1e-3)
     assert found.approach == pytest.approx(contact._numerical(load).approach, rel=1e-3)
 
 

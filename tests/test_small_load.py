@@ -20,7 +20,6 @@ from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import pair
 
-E_STAR, RHO = 1.1e11, 4e-3
 COARSE = 2.0
 
 

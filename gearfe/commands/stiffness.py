@@ -148,7 +148,9 @@ def _animate(path: Path, job: StiffnessJob, elastic: Any, curve: Any, count: int
 
 
 def _points(job: StiffnessJob) -> dict[str, Any]:
-    return {name: job.model[name] for name in ("points_per_edge", "coarsen", "flank_coarsen")}
+    from ..stiffness.job import MESH
+
+    return {name: getattr(job.table, name) for name in MESH}
 
 
 def _field_angles(given: list[str]) -> str | list[float]:

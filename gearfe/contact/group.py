@@ -183,9 +183,8 @@ def gather(pair: MeshingPair, positions: Sequence[Sequence[Window]]) -> Group:
         share = np.array([shares(pair.corners, a)[g] for a, g in zip(angles, gear, strict=True)])
         growth = np.array([growths(pair.corners, a)[g] for a, g in zip(angles, gear, strict=True)])
     carries = np.zeros(len(flat), dtype=bool)
-    for windows, places, first in zip(positions, order, first_window, strict=False):
-        bearing = slave_windows(pair, windows)
-        carries[first + np.flatnonzero(np.isin(places, bearing))] = True
+    for windows, places, first in zip(positions, order, first_window[:-1], strict=True):
+        carries[first : first + len(places)] = np.isin(places, slave_windows(pair, windows))
     made |= _contact_points(pair, gear, position, first_edge, counts, mate, made["first_node"], share, carries)
     made["growth"] = growth[made["owner"]]
     first_node, _first_point = made["first_node"], made["first_point"]

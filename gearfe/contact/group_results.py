@@ -119,21 +119,17 @@ def outgrown(group: Group, motion: Motion, rigid: Projection) -> NDArray[np.bool
     edge = (group.slave_nodes[:, 0] - group.first_node[group.owner]) // 2
     starts, ends = group.extendable[:, 0], group.extendable[:, 1]
     own, facing = group.owner, group.facing
-    bad[group.at[loaded & starts[own] & (edge == 0)]] = True
-    bad[group.at[loaded & ends[own] & (edge == group.counts[own] - 1)]] = True
+    at_rim = (starts[own] & (edge == 0)) | (ends[own] & (edge == group.counts[own] - 1))
+    bad[group.at[loaded & at_rim]] = True
     # on the last edge of the mate's window the normal is not blended into its neighbour's
     behind, ahead = found.beyond & (found.place <= 0), found.beyond & (found.place > 0)
     bad[group.at[starts[facing] & (behind | (loaded & (found.place < 1)))]] = True
     bad[group.at[ends[facing] & (ahead | (loaded & (found.place > group.counts[facing] - 1)))]] = True
-    idle = np.ones(int(group.couple.max(initial=-1)) + 1, dtype=bool)
-    idle[group.couple[own[loaded]]] = False
-    by_depth = np.lexsort((rigid.gap, own))
-    deepest = by_depth[np.searchsorted(own[by_depth], np.unique(own))]
-    asked = deepest[idle[group.couple[own[deepest]]] & (rigid.gap[deepest] < 0)]
-    at_rim = (starts[own[asked]] & (edge[asked] == 0)) | (
-        ends[own[asked]] & (edge[asked] == group.counts[own[asked]] - 1)
-    )
-    bad[group.at[asked[at_rim]]] = True
+    first = group.first_point[:-1][np.diff(group.first_point) > 0]
+    deepest = np.lexsort((rigid.gap, own))[first]
+    bears = np.bincount(group.couple[own[loaded]], minlength=len(group.gear)) > 0
+    missed = ~bears[group.couple[own[deepest]]] & (rigid.gap[deepest] < 0) & at_rim[deepest]
+    bad[group.at[deepest[missed]]] = True
     return bad
 
 

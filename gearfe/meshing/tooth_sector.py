@@ -279,6 +279,8 @@ def _make(gear: Gear, recipe: SectorRecipe) -> dict[str, NDArray[np.generic]]:
         bulging = np.unique(made["triangles"][wrong])
         named = {name[3:] for name in made if name.startswith("on_") and np.isin(made[name][:, 1], bulging).any()}
         finer = {size for name in named for size in _sizes_of(name, recipe.fine)}
+        if not finer:
+            break
         recipe = replace(recipe, **{size: FINER * getattr(recipe, size) for size in finer})
     problem = f"{len(wrong)} elements of the gear with {gear.teeth} teeth are inside out"
     raise InputError("mesh", None, problem, "use smaller elements: coarsen or flank_coarsen")

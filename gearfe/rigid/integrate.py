@@ -20,8 +20,8 @@ METHODS = ("auto", "taylor", "explicit", "implicit")
 #: Asked tolerance -> largest last term of a Taylor step. The benchmark mechanisms amplify local errors some
 #: hundred times.
 LOCAL_SHARE = 5e-4
-#: Ratio of masses from which on a link counts as massless, and least singular value of the
-#: constraints' unit gradients at a start that is no singular position.
+#: Ratio of masses from which on a link counts as massless, and least singular value of the constraints' unit gradients
+#: at a start that is no singular position.
 MASSLESS, REGULAR = 1e10, 1e-6
 COMPILING = "gearfe: compiling the kernels once (about a minute); backend='plain' does without"
 

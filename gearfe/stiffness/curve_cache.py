@@ -50,10 +50,11 @@ def cached_curve(
     found = None if path is None else _stored(path, pair)
     if found is not None:
         return found
+    from .job import MESH
     from .sweep import elastic_pair, sweep_stiffness
 
     elastic = elastic_pair(pair, watch=watch, **model)
-    points = {name: model[name] for name in ("coarsen", "flank_coarsen", "points_per_edge") if name in model}
+    points = {name: model[name] for name in MESH if name in model}
     curve = sweep_stiffness(pair, elastic=elastic, progress=progress, **sweep, **points)
     if watch is not None:
         for stage, seconds in curve.timings.items():

@@ -77,7 +77,7 @@ def twists_for_torque(
     status = [NOT_REACHED] * len(angles)
     iterations, failures = np.zeros(len(angles), dtype=np.int64), np.zeros(len(angles), dtype=np.int64)
     missed, below = np.zeros(len(angles), dtype=bool), np.zeros(len(angles), dtype=bool)
-    little, much = np.full(len(angles), np.nan), np.full(len(angles), np.nan)  # torques at both ends
+    little, much = np.full(len(angles), np.nan), np.full(len(angles), np.nan)  # torques there, as far as known
     open_ = np.arange(len(angles))
     for _ in range(MAX_SOLUTIONS):
         if len(open_) == 0:
@@ -108,11 +108,11 @@ def twists_for_torque(
                 if failures[i] == MAX_FAILURES:
                     continue
                 if below[i]:
-                    high[i] = twist[i]
+                    high[i], much[i] = twist[i], np.nan
                 else:  # first guesses are low rather than high: double the twist
                     step = twist[i] - touching[i]
             else:
-                low[i], missed[i] = twist[i], position.status == "under_resolved"
+                low[i], little[i], missed[i] = twist[i], np.nan, position.status == "under_resolved"
             tried = twist[i] + step
             if not low[i] < tried < high[i]:
                 tried = 0.5 * (low[i] + high[i]) if np.isfinite(high[i]) else 2 * twist[i] - touching[i]

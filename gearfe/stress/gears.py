@@ -23,6 +23,7 @@ import numpy as np
 
 from ..contact.compliance import GearBody
 from ..contact.corners import corner_bearings
+from ..contact.elliptic import Chain
 from ..contact.laws import LAWS
 from ..contact.scene import MeshingPair
 from ..contact.solver import Position
@@ -104,11 +105,12 @@ def run(case: Case, folder: Path) -> Finding:
     measures["iterations"] = int(curve.iterations.max(initial=0))
     if len(loaded):
         checks.append(Check("tangent", float((~(curve.k_tangent[loaded] > 0)).sum()), 0.5))
-        found = Router(job.pair, elastic).solve(curve.pinion_angle[loaded], total[loaded], range(len(loaded)))
+        router = Router(job.pair, elastic)
+        found = router.solve(curve.pinion_angle[loaded], total[loaded], range(len(loaded)))
         balances = [c for c in (balance(elastic, p) for p in found) if c is not None]
         checks += [max(balances, key=lambda c: c.share)] if balances else []
         checks += ratio_checks(job.pair, elastic, curve.pinion_angle[loaded], total[loaded], found)
-        checks += swap_checks(job.pair, elastic, curve.pinion_angle[loaded], total[loaded], found)
+        checks += swap_checks(router, curve.pinion_angle[loaded], total[loaded], found)
     checks += period_checks(curve, found)
     bad = {s: n for s, n in counts.items() if s not in SOLVED}
     told = ", ".join(f"{n} of {len(curve.status)} positions {s}" for s, n in bad.items())
@@ -194,16 +196,16 @@ def elements_within(pair: GearPair, elastic: MeshingPair, angle: float, found: P
 
 def _element(body: GearBody, base_radius: float, roll: float) -> float:
     """Element (m) of a flank where the involute has a roll length (m)."""
-    radii = np.linalg.norm(body.flank.points[::2], axis=1)
-    number = int(np.searchsorted(radii, math.hypot(base_radius, roll))) - 1
-    return float(body.flank.sizes[min(max(number, 0), len(body.flank.sizes) - 1)])
+    chain = Chain(body)
+    return chain.size_at(chain.arc_at(math.hypot(base_radius, roll)))
 
 
-def swap_checks(pair: GearPair, elastic: MeshingPair, angles: Any, twists: Any, found: list[Position]) -> list[Check]:
+def swap_checks(here: Router, angles: Any, twists: Any, found: list[Position]) -> list[Check]:
     """The same place seen from the other gear: turned by half a turn, the wheel is the pinion.
 
     Its tooth 0 then stands at the wheel's angle + pi/z2, and the twist of the other gear is twist z2/z1.
     """
+    pair, elastic = here.pair, here.elastic
     if elastic.law.theta:
         return []  # such gears are made for their law and their place
     sides = {"pinion": "wheel", "wheel": "pinion"}.get(elastic.law.sides, elastic.law.sides)
@@ -214,7 +216,7 @@ def swap_checks(pair: GearPair, elastic: MeshingPair, angles: Any, twists: Any, 
     other = MeshingPair(elastic.wheel, elastic.pinion, elastic.centre_distance, elastic.width, law, corners)
     turned = elastic.wheel_angle(angles, twists) + math.pi / elastic.wheel.teeth
     turns = twists * elastic.wheel.teeth / elastic.pinion.teeth
-    here, there = Router(pair, elastic), Router(mirrored, other)
+    there = Router(mirrored, other)
     checks = []
     for number, (p, q) in enumerate(zip(found, there.solve(turned, turns), strict=True)):
         if not p.status == q.status == "converged":
