@@ -54,9 +54,15 @@ def half_width(load: Any, modulus: float, radius: float) -> Any:
     return np.sqrt(4.0 * load * radius / (math.pi * modulus))
 
 
-def wedge_factor(interior_angle: float) -> float:
-    """A (-) for a load normal to one face of a wedge with the given angle (rad) between its faces; 2/pi for pi."""
-    alpha, beta = 0.5 * interior_angle, 0.5 * (math.pi - interior_angle)
+def wedge_factor(interior_angle: float, open_angle: float = 0.0) -> float:
+    """A (-) for a load on one face of a wedge with the given angle (rad) between its faces; 2/pi for pi.
+
+    Parameters
+    ----------
+    open_angle
+        Angle (rad) at which that face falls back from the mate's: the load is normal to the mate's.
+    """
+    alpha, beta = 0.5 * interior_angle, 0.5 * (math.pi - interior_angle) - open_angle
     along, across = alpha + 0.5 * math.sin(2 * alpha), alpha - 0.5 * math.sin(2 * alpha)
     return math.cos(beta) ** 2 / along + math.sin(beta) ** 2 / across
 

@@ -32,6 +32,8 @@ IntArray = NDArray[np.int64]
 
 #: Points of the first search along a flank and of each closer look, and how often it looks closer.
 COARSE, CLOSER, LOOKS = 97, 17, 16
+#: A place is an end of the range, or a mark, when it is so near to it: places have the rounding of angles and radii.
+AT_AN_END = 1e-9
 
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(12)
 
@@ -143,11 +145,11 @@ class Face:
 
         Its normal may be any of a fan there, and without friction the force takes that of the smooth mate.
         """
-        found = np.asarray((u >= self.end - 1e-9) & self.sharp)
+        found = np.asarray((u >= self.end - AT_AN_END) & self.sharp)
         if self.fall > 0.0:
-            found = found | (u <= 0.0)
+            found = found | (u < AT_AN_END)
         if self.flank.kinked:
-            found = found | (np.abs(u - self.relief_start) <= 1e-9)
+            found = found | (np.abs(u - self.relief_start) <= AT_AN_END)
         return found
 
     def curvature(self, u: Any, most: float) -> Any:
@@ -289,7 +291,7 @@ class Flanks:
             # not a difference of u: near an end of the face several of them are the end
             u = np.clip(best[:, None] + step * np.linspace(-1.0, 1.0, CLOSER), 0.0, self.pinion.end)
             step *= 2.0 / (CLOSER - 1)
-        best = np.where(best < 1e-9, 0.0, best)  # the start itself, but for rounding of D
+        best = np.where(best < AT_AN_END, 0.0, best)
         meets = np.isfinite(least)
         return self._described(position[meets], angle[meets], number[meets], best[meets], least[meets])
 
@@ -308,6 +310,7 @@ class Flanks:
         seen = self.placed(angle, number, u)
         radius = np.abs(seen)
         mate = self.wheel.at_radius(radius)
+        mate = np.where(mate < AT_AN_END, 0.0, np.where(mate > self.wheel.end - AT_AN_END, self.wheel.end, mate))
         turn = np.exp(1j * (angle + number * self.pair.mesh_cycle))
         normal = self.pinion.normals(u) * turn
         wheel_normal = -self.wheel.normals(mate) * np.exp(1j * (self.wheel_frame(angle, number) + twist))

@@ -40,7 +40,7 @@ def local_contact(
             distance = (1.0 if g == 0 else -1.0) * face.distance(place[g], mark)
             smooth = min(smooth, abs(distance))
             if mark == face.end and face.sharp:
-                factor = wedge_factor(face.tip_angle()) - 2 / math.pi
+                factor = wedge_factor(face.tip_angle(), _opening(flanks, touching, k, g)) - 2 / math.pi
                 edges.append(Edge(distance, factor * shares[g]))
     module = pair.pinion.module
     side = np.geomspace(NEAR * module, FAR * module, PLACES)
@@ -56,28 +56,43 @@ def local_contact(
     known[PLACES], gap[PLACES] = True, 0.0
     for g, face in enumerate(flanks.faces):
         if face.fall > 0.0:
-            start = (1.0 if g == 0 else -1.0) * face.distance(place[g], 0.0)
-            _fall_back(x, gap, known, start, 1.0 if g == 0 else -1.0, face.fall)
+            up, mate = (1.0, flanks.faces[1]) if g == 0 else (-1.0, flanks.faces[0])
+            tip = -up * mate.distance(place[1 - g], mate.end)
+            _fall_back(x, gap, known, up * face.distance(place[g], 0.0), tip, up, face.fall)
     x, gap = x[known], np.maximum(gap[known], 0.0)
     # lighter contacts than reach the next edge or jump know the curvature at the point alone
     radius = float(1 / bend) if smooth > 0 and 0 < bend < math.inf else _radius(x, gap, CURVED * module)
     return LocalContact(1 / sum(shares), radius, x, gap, tuple(edges), smooth)
 
 
-def _fall_back(x: Array, gap: Array, known: NDArray[np.bool_], start: float, up: float, fall: float) -> None:
+def _opening(flanks: Flanks, touching: Touching, k: int, g: int) -> float:
+    """Angle (rad) between the face of gear g where it ends and the mate's where they touch, > 0 where they part."""
+    if g == 0:
+        turned, sign = touching.angle[k] + touching.pair[k] * flanks.pair.mesh_cycle, 1.0
+    else:
+        turned, sign = flanks.wheel_frame(touching.angle[k], touching.pair[k]) + touching.twist[k], -1.0
+    normal = complex(flanks.faces[g].normals(np.array(flanks.faces[g].end))) * np.exp(1j * turned)
+    return float(np.angle(sign * normal / touching.normal[k]))
+
+
+def _fall_back(
+    x: Array, gap: Array, known: NDArray[np.bool_], start: float, tip: float, up: float, fall: float
+) -> None:
     """Fill in the gap beyond x = `start`, where a flank ends in an edge and its undercut root goes on: as a wedge.
 
     The concave root and the convex mate have about the same curvature, and contact at an edge is short.
 
     Parameters
     ----------
+    tip
+        Where the mate's face ends (m): there is no gap beyond it.
     up
         Sign of x on the flank's side of the edge.
     fall
         Angle (rad) between flank and root.
     """
-    beyond = up * (x - start) < 0
-    on = np.flatnonzero(known & ~beyond)
+    beyond = (up * (x - start) < 0) & (up * (x - tip) >= 0)
+    on = np.flatnonzero(known & (up * (x - start) >= 0))
     on = on[np.argsort(np.abs(x[on] - start))][:2]
     if len(on) < 2 or not beyond.any():
         return
