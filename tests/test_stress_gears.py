@@ -8,8 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.contact.overlap import overlaps
-from gearfe.contact.scene import MeshingPair
+from gearfe.contact.laws import ContactLaw, Exact, Nitsche, Penalty
+from gearfe.contact.overlap import WHOLE, overlaps, windows_of
+from gearfe.contact.position import finish
+from gearfe.contact.scene import MeshingPair, assemble
+from gearfe.contact.solver import _alone, _start, solve_positions
 from gearfe.errors import InputError
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.stiffness.job import read_stiffness_job
@@ -23,8 +26,8 @@ from .gears import pair
 KEPT = sorted((Path(__file__).parent / "test_stress_cases" / "gears").glob("*.toml"))
 #: Large windows, many Newton steps.
 LONG = {
-    "bent_teeth", "blend_of_routes", "corner_held_from_both_sides", "jump_of_the_moment", "nearer_tip",
-    "points_on_the_other_gear", "teeth_missed",
+    "bent_teeth", "blend_of_routes", "corner_held_from_both_sides", "corner_with_several_equilibria",
+    "jump_of_the_moment", "nearer_tip", "points_on_the_other_gear", "teeth_missed",
 }  # fmt: skip
 
 
@@ -54,6 +57,23 @@ def test_both_gears_see_the_same_teeth_overlap() -> None:
         assert {o.tooth for o in mine} == {-1 - o.tooth for o in theirs}
         depth = {-1 - o.tooth: o.depth for o in theirs}
         assert all(o.depth == pytest.approx(depth[o.tooth], rel=1e-6) for o in mine)
+
+
+@pytest.mark.parametrize("law", [Nitsche(), Penalty(), Exact()], ids=lambda law: law.name)
+def test_a_tip_that_lies_along_a_root_bears_wherever_it_does_on_larger_windows(law: ContactLaw) -> None:
+    """The overlap is as deep at its far end as at the deepest point: nothing is narrowed there."""
+    job = read_stiffness_job(Path(__file__).parent / "test_stress_cases" / "gears" / "tip_along_a_root.toml")
+    elastic = elastic_pair(job.pair, **{**job.model, "law": law})
+    angle = job.sweep["angles"][2:3]
+    twist = Router(job.pair, elastic).touching_twists(angle) + job.sweep["twist"]
+    (found,) = overlaps(elastic, angle, twist)
+    assert [overlap.flat for overlap in found] == [True, False, False]
+    (position,) = solve_positions(elastic, angle, twist)
+    scene = assemble(elastic, windows_of(elastic, found, float(angle[0]), float(twist[0]), WHOLE))
+    outcome = _alone(scene, _start(elastic, scene), 1e-10)
+    assert outcome.status == "converged"
+    whole = finish(scene, outcome, outcome.iterations)
+    assert position.torque_wheel == pytest.approx(whole.torque_wheel, rel=1e-9)
 
 
 def test_the_element_at_a_contact_is_the_one_there() -> None:

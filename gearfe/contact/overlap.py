@@ -47,6 +47,8 @@ CLOSE = Reach(0.36, 1, whole_tips=False)
 WHOLE = Reach(1.5, 3)
 #: Every so many nodes of the mate's flank the search for the closest point tries one.
 STRIDE = 3
+#: By how much of its depth an overlap must exceed that of parabolas somewhere to count as flat.
+FLAT = 0.15
 #: Overlap, as a share of the length of a tooth's contact surface, from which on the wheel's vertices are asked too.
 DEEP = 0.02
 
@@ -65,12 +67,15 @@ class Overlap:
         Edges (first, end) of pinion and wheel flank that overlap.
     deepest
         Edge of pinion and of wheel flank at the largest overlap.
+    flat
+        Whether it stays deep far from there, as where a tip lies along its mate's root: contact may be at both ends.
     """
 
     tooth: int
     depth: float
     ranges: tuple[tuple[int, int], tuple[int, int]]
     deepest: tuple[int, int]
+    flat: bool = False
 
 
 def overlaps(pair: MeshingPair, angles: Array, twists: Array) -> list[list[Overlap]]:
@@ -120,6 +125,8 @@ def _inside(
     if len(where) == 0:
         return found
     points = local[near]
+    sizes = pair.bodies[gear].flank.sizes
+    arc = np.concatenate([[0.0], np.cumsum(sizes)])
     chain = chains_of(two, np.array([(len(two) - 1) // 2]), np.zeros(len(points), dtype=np.int64))
     result = project(points, chain, STRIDE * nearest_places(points, two[::STRIDE]), iterations=8, tolerance=1e-6)
     inside = result.gap < 0
@@ -127,6 +134,7 @@ def _inside(
         mine = np.flatnonzero(inside & (where[:, 0] == case))
         vertex, place, gap = where[mine, 1], result.place[mine], result.gap[mine]
         bottom = int(np.argmin(gap))
+        element = float(sizes[np.minimum(vertex, len(sizes) - 1)].max())
         ranges = (int(vertex.min()), int(vertex.max())), (int(place.min()), int(place.max()) + 1)
         deepest = int(vertex[bottom]), int(place[bottom])
         found[int(position[case]), int(teeth[case])] = Overlap(
@@ -134,15 +142,25 @@ def _inside(
             depth=float(-gap[bottom]),
             ranges=(ranges[gear], ranges[1 - gear]),
             deepest=(deepest[gear], deepest[1 - gear]),
+            flat=_flat(arc[vertex] - arc[vertex[bottom]], gap / gap[bottom], element),
         )
     return found
+
+
+def _flat(along: Array, share: Array, element: float) -> bool:
+    """Whether shares of the largest overlap, at distances (m) along the flank, exceed those of parabolas.
+
+    What overlaps ends up to an element beyond the last vertex inside. Flanks and their reliefs stay below 0.13.
+    """
+    length = float(np.abs(along).max()) + element
+    return bool((share > 1 - (along / length) ** 2 + FLAT).any())
 
 
 def _merged(one: Overlap, two: Overlap) -> Overlap:
     """What both have found."""
     (a, b), (c, d) = (((min(x[0], y[0]), max(x[1], y[1]))) for x, y in zip(one.ranges, two.ranges, strict=True))
     deeper = one if one.depth >= two.depth else two
-    return replace(deeper, ranges=((a, b), (c, d)))
+    return replace(deeper, ranges=((a, b), (c, d)), flat=one.flat or two.flat)
 
 
 def _candidates(pair: MeshingPair, angles: Array, flank: Array) -> tuple[IntArray, IntArray]:
@@ -174,7 +192,7 @@ def windows_of(
     for number, overlap in enumerate(found):
         # a tip that digs in slides along its mate as the teeth bend: nothing is narrowed there
         whole = reach.whole_tips and any(_near_tip(arcs[gear], overlap.ranges[gear]) for gear in (0, 1))
-        kept = max(1.0, reach.share) if whole else reach.share
+        kept = max(1.0, reach.share) if whole or overlap.flat else reach.share
         for gear, tooth in ((0, overlap.tooth), (1, -1 - overlap.tooth)):
             first, end = _narrowed(
                 arcs[gear], overlap.ranges[gear], overlap.deepest[gear], kept, overlap.depth, reach.margin
