@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from gearfe.contact.laws import ContactLaw, Exact, Nitsche, Penalty
-from gearfe.contact.overlap import WHOLE, overlaps, windows_of
-from gearfe.contact.position import finish
-from gearfe.contact.scene import MeshingPair, assemble
-from gearfe.contact.solver import _alone, _start, solve_positions
+from gearfe.contact.overlap import overlaps
+from gearfe.contact.scene import MeshingPair
+from gearfe.contact.solver import solve_on_whole_windows, solve_positions
 from gearfe.errors import InputError
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.stiffness.job import read_stiffness_job
@@ -69,10 +68,8 @@ def test_a_tip_that_lies_along_a_root_bears_wherever_it_does_on_larger_windows(l
     (found,) = overlaps(elastic, angle, twist)
     assert [overlap.flat for overlap in found] == [True, False, False]
     (position,) = solve_positions(elastic, angle, twist)
-    scene = assemble(elastic, windows_of(elastic, found, float(angle[0]), float(twist[0]), WHOLE))
-    outcome = _alone(scene, _start(elastic, scene), 1e-10)
-    assert outcome.status == "converged"
-    whole = finish(scene, outcome, outcome.iterations)
+    whole = solve_on_whole_windows(elastic, float(angle[0]), float(twist[0]))
+    assert whole.status == "converged"
     assert position.torque_wheel == pytest.approx(whole.torque_wheel, rel=1e-9)
 
 

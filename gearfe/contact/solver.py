@@ -27,7 +27,15 @@ from .position import Position, finish, unsolved
 from .scene import MeshingPair, Scene, Window, assemble, assemble_all, project_all
 from .start import starting_state
 
-__all__ = ["Position", "in_lockstep", "solve_group", "solve_position", "solve_positions", "stable"]
+__all__ = [
+    "Position",
+    "in_lockstep",
+    "solve_group",
+    "solve_on_whole_windows",
+    "solve_position",
+    "solve_positions",
+    "stable",
+]
 
 Array = NDArray[Any]
 
@@ -83,6 +91,20 @@ def solve_positions(
         part = slice(first, first + BATCH)
         made += [stable(p) for p in _solve_batch(pair, angles[part], twist[part], tolerance)]
     return made
+
+
+def solve_on_whole_windows(pair: MeshingPair, angle: float, twist: float, *, tolerance: float = TOLERANCE) -> Position:
+    """One position (rad, rad) once more, from the Hertzian guess where all that overlaps may bear: a check of the usual
+    windows, which are narrower and take longer where contact reaches their rims.
+    """
+    (found,) = overlaps(pair, np.array([angle]), np.array([twist]))
+    if not found:
+        return unsolved("no_contact")
+    scene = assemble(pair, windows_of(pair, found, angle, twist, WHOLE))
+    (outcome,) = _side_by_side([scene], [_solving(pair, scene, tolerance)])
+    if outcome.status != "converged":
+        return unsolved(outcome.status, outcome.iterations)
+    return stable(finish(scene, outcome, outcome.iterations))
 
 
 def stable(position: Position) -> Position:

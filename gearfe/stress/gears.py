@@ -8,6 +8,7 @@ Checks of an answer, at every position that was solved:
   bending of the teeth makes of their normals;
 - *period*: one mesh cycle further the torque is the same;
 - *swap*: with the gears in each other's role, in the same place, the torques are the same;
+- *windows*: where contact may be wherever the rigid teeth overlap, and not in narrower windows, the torque is the same;
 - *tangent*: d T/d twist is positive.
 """
 
@@ -26,7 +27,7 @@ from ..contact.corners import corner_bearings
 from ..contact.elliptic import Chain
 from ..contact.laws import LAWS
 from ..contact.scene import MeshingPair
-from ..contact.solver import Position
+from ..contact.solver import Position, solve_on_whole_windows
 from ..gear.pair import GearPair
 from ..stiffness.curve import SOLVED
 from ..stiffness.curve_error import law_bound
@@ -40,8 +41,8 @@ from .outcome import Check, Finding
 from .pairs import log_uniform, random_pair, rounded, running_pair, spoiled
 from .toml_text import toml_text
 
-#: Limits of the checks. The first four hold to the solver's residual of 1e-10, which the softest contacts amplify.
-BALANCE, PERIOD, SWAP = 1e-7, 1e-7, 1e-6
+#: Limits of the checks. These hold to the solver's residual of 1e-10, which the softest contacts amplify.
+BALANCE, PERIOD, SWAP, WINDOWS = 1e-7, 1e-7, 1e-6, 1e-6
 #: The route for small loads is a formula about the place where the gears just touch with the wheel turned back. Seen
 #: from the other gear it is the pinion that is turned back, and what is left out is not the same. There is an estimate
 #: of it (0.02 % on smooth flanks, 0.1 % at edges, `gearfe.stiffness.curve_error`); more than ten times that is wrong.
@@ -52,6 +53,8 @@ TIMES = 10.0
 #: exact involutes, and taken off where the mesh was asked. What remains is of the second order in the faces' rotation,
 #: about 0.3 times the overlap in modules.
 RATIO, RATIO_BENT = 1.5e-3, 0.3**2
+#: Nodes up to which windows are asked whether larger ones change anything: from there on little is left out of them.
+NARROWED = 400
 #: Contact points on an edge that the limit of the ratio was measured with.
 USUAL_POINTS = 4
 
@@ -111,6 +114,7 @@ def run(case: Case, folder: Path) -> Finding:
         checks += [max(balances, key=lambda c: c.share)] if balances else []
         checks += ratio_checks(job.pair, elastic, curve.pinion_angle[loaded], total[loaded], found)
         checks += swap_checks(router, curve.pinion_angle[loaded], total[loaded], found)
+        checks += window_checks(elastic, curve.pinion_angle[loaded], total[loaded], found)
     checks += period_checks(curve, found)
     bad = {s: n for s, n in counts.items() if s not in SOLVED}
     told = ", ".join(f"{n} of {len(curve.status)} positions {s}" for s, n in bad.items())
@@ -229,6 +233,18 @@ def swap_checks(here: Router, angles: Any, twists: Any, found: list[Position]) -
             )
         apart = max(abs(q.torque_pinion / p.torque_wheel - 1), abs(q.torque_wheel / p.torque_pinion - 1))
         checks.append(Check("swap", apart, max(limit, _rounding(p))))
+    return [max(checks, key=lambda c: c.share)] if checks else []
+
+
+def window_checks(elastic: MeshingPair, angles: Any, twists: Any, found: list[Position]) -> list[Check]:
+    """Positions that the mesh alone answered, solved on windows that nothing narrows."""
+    checks = []
+    for angle, twist, p in zip(angles, twists, found, strict=True):
+        if p.status != "converged" or p.route != "direct" or p.scene is None or len(p.scene.points) > NARROWED:
+            continue
+        whole = solve_on_whole_windows(elastic, float(angle), float(twist))
+        if whole.status == "converged":
+            checks.append(Check("windows", abs(whole.torque_wheel / p.torque_wheel - 1), WINDOWS))
     return [max(checks, key=lambda c: c.share)] if checks else []
 
 
