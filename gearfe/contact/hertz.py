@@ -105,10 +105,13 @@ class Edge:
         Its coordinate x (m).
     factor
         (A - 2/pi)/E' (1/Pa).
+    body
+        Whose face ends, 0 or 1.
     """
 
     place: float
     factor: float
+    body: int = 0
 
 
 @dataclass(frozen=True)
@@ -153,14 +156,23 @@ class LocalContact:
 
     def elliptic_mean(self, low: float, high: float) -> float:
         """Mean displacement (m2/N) under an elliptic pressure of unit load from `low` to `high` (m)."""
-        a = 0.5 * (high - low)
-        made = -self.unit * (math.log(0.5 * a) - 0.25)
-        angle = math.pi * np.arange(1, 17) / 17.0
-        x, weight = 0.5 * (low + high) + a * np.cos(angle), np.sin(angle) ** 2 * 2.0 / 17.0
+        made = -self.unit * (math.log(0.25 * (high - low)) - 0.25)
         for edge in self.edges:
-            distance = np.abs(x - edge.place)
+            distance, weight = _elliptic(edge, low, high)
             made -= edge.factor * float(weight @ np.log(distance[:, None] + distance) @ weight)
         return made
+
+    def elliptic_turn(self, low: float, high: float) -> tuple[float, float]:
+        """Rotations (1/(Pa m2), per force on a unit width) of both faces under the same pressure, towards their edges.
+
+        The mean slope under it, weighed as the moment of an offset is. Beside no edge it is none.
+        """
+        made = [0.0, 0.0]
+        for edge in self.edges:
+            distance, weight = _elliptic(edge, low, high)
+            off = (distance - 0.5 * (distance[0] + distance[-1])) * 16.0 / (high - low) ** 2
+            made[edge.body] -= edge.factor * float((weight * off) @ np.log(distance[:, None] + distance) @ weight)
+        return made[0], made[1]
 
     def under(self, load: float) -> Approach:
         """Approach and contact under the force per width P = `load` > 0 (N/m)."""
@@ -241,6 +253,13 @@ class LocalContact:
                 break
             active = wanted
         return np.maximum(pressure, 0.0), change, float(approach), float(rate)
+
+
+def _elliptic(edge: Edge, low: float, high: float) -> tuple[Array, Array]:
+    """Distances (m) from an edge, and weights, of points that integrate an elliptic pressure of unit force."""
+    angle = math.pi * np.arange(1, 17) / 17.0
+    x = 0.5 * (low + high) + 0.5 * (high - low) * np.cos(angle)
+    return np.abs(x - edge.place), np.sin(angle) ** 2 * 2.0 / 17.0
 
 
 def _end(place: Array, pressure: Array, outer: int, node: float, inwards: int) -> float:

@@ -41,7 +41,7 @@ def local_contact(
             smooth = min(smooth, abs(distance))
             if mark == face.end and face.sharp:
                 factor = wedge_factor(face.tip_angle(), _opening(flanks, touching, k, g)) - 2 / math.pi
-                edges.append(Edge(distance, factor * shares[g]))
+                edges.append(Edge(distance, factor * shares[g], g))
     module = pair.pinion.module
     side = np.geomspace(NEAR * module, FAR * module, PLACES)
     x = np.concatenate([-side[::-1], [0.0], side])

@@ -156,6 +156,7 @@ def _reference(
     compliance, motion = _responses(elastic, touching, unit)
     for k in range(count):
         compliance[k, k] -= local[k].elliptic_mean(*spans[k]) / elastic.width
+        motion[k, :2, k] -= np.array(local[k].elliptic_turn(*spans[k])) / elastic.width
     tangent = -1j * touching.normal
     from_wheel = touching.point - pair.working_centre_distance
     zero, one = np.zeros(count), np.ones(count)
