@@ -275,6 +275,21 @@ class Flanks:
         apart = np.angle(seen * np.exp(-1j * self.wheel_frame(angle, number)) / mate)
         return np.where(inside, apart, np.inf)
 
+    def gap(self, found: Touching, k: int, u: Array) -> Array:
+        r"""Distance (m) of points of the pinion's flank from the wheel's flank where the pair number k of `found` touches.
+
+        Along the common normal n: with the wheel's own normal :math:`n_2` and its lever :math:`a_2` where a circle about
+        the wheel's centre meets its flank, :math:`(D - \varphi_k)\,a_2/(n\cdot n_2)`. Infinite as `twist` is.
+        """
+        angle, number = found.angle[k], found.pair[k]
+        seen = self.placed(angle, number, u)
+        mate = self.wheel.at_radius(np.abs(seen))
+        turn = np.exp(1j * (self.wheel_frame(angle, number) + found.twist[k]))
+        at, normal = self.wheel.points(mate) * turn, -self.wheel.normals(mate) * turn
+        apart = self.twist(angle, number, u) - found.twist[k]
+        made: Array = -apart * _cross(at, normal) / (np.conj(normal) * found.normal[k]).real
+        return made
+
     def touching(self, angles: Array) -> Touching:
         """First touch of every pair that can meet at the given pinion angles (rad), shape (p,)."""
         angle, number, position = self._candidates(angles)

@@ -50,8 +50,7 @@ def local_contact(
         return LocalContact(1 / sum(shares), 1 / bend, x, 0.5 * bend * x**2, tuple(edges), smooth)
     u = flanks.pinion.moved(place[0], x)
     inside = (u >= 0.0) & (u <= flanks.pinion.end)
-    apart = flanks.twist(touching.angle[k], touching.pair[k], np.where(inside, u, 0.0)) - touching.twist[k]
-    gap = touching.arm[k, 1] * apart
+    gap = flanks.gap(touching, k, np.where(inside, u, 0.0))
     known = inside & np.isfinite(gap)
     known[PLACES], gap[PLACES] = True, 0.0
     for g, face in enumerate(flanks.faces):
