@@ -67,15 +67,16 @@ class Overlap:
         Edges (first, end) of pinion and wheel flank that overlap.
     deepest
         Edge of pinion and of wheel flank at the largest overlap.
-    flat
-        Whether it stays deep far from there, as where a tip lies along its mate's root: contact may be at both ends.
+    whole
+        Whether contact may be anywhere in it: a hollow root takes part, which a tip can lie along and touch at both
+        ends, or the overlap stays deep far from the deepest point.
     """
 
     tooth: int
     depth: float
     ranges: tuple[tuple[int, int], tuple[int, int]]
     deepest: tuple[int, int]
-    flat: bool = False
+    whole: bool = False
 
 
 def overlaps(pair: MeshingPair, angles: Array, twists: Array) -> list[list[Overlap]]:
@@ -107,7 +108,8 @@ def _inside(
     found: dict[tuple[int, int], Overlap] = {}
     if len(position) == 0:
         return found
-    one, two = pair.bodies[gear].flank.points[::2], pair.bodies[1 - gear].flank.points
+    one_flank, two_flank = (pair.bodies[g].flank for g in (gear, 1 - gear))
+    one, two = one_flank.points[::2], two_flank.points
     # own vertices in the frame of the mate's tooth
     numbers = (teeth, -1 - teeth)
     angle1, angle2 = (pair.tooth_angle(g, numbers[g], angles[position], twists[position]) for g in (gear, 1 - gear))
@@ -125,7 +127,7 @@ def _inside(
     if len(where) == 0:
         return found
     points = local[near]
-    sizes = pair.bodies[gear].flank.sizes
+    sizes = one_flank.sizes
     arc = np.concatenate([[0.0], np.cumsum(sizes)])
     chain = chains_of(two, np.array([(len(two) - 1) // 2]), np.zeros(len(points), dtype=np.int64))
     result = project(points, chain, STRIDE * nearest_places(points, two[::STRIDE]), iterations=8, tolerance=1e-6)
@@ -142,7 +144,9 @@ def _inside(
             depth=float(-gap[bottom]),
             ranges=(ranges[gear], ranges[1 - gear]),
             deepest=(deepest[gear], deepest[1 - gear]),
-            flat=_flat(arc[vertex] - arc[vertex[bottom]], gap / gap[bottom], element),
+            whole=vertex.min() < one_flank.root
+            or place.min() < two_flank.root
+            or _flat(arc[vertex] - arc[vertex[bottom]], gap / gap[bottom], element),
         )
     return found
 
@@ -150,7 +154,7 @@ def _inside(
 def _flat(along: Array, share: Array, element: float) -> bool:
     """Whether shares of the largest overlap, at distances (m) along the flank, exceed those of parabolas.
 
-    What overlaps ends up to an element beyond the last vertex inside. Flanks and their reliefs stay below 0.13.
+    What overlaps ends up to an element beyond the last vertex inside.
     """
     length = float(np.abs(along).max()) + element
     return bool((share > 1 - (along / length) ** 2 + FLAT).any())
@@ -160,7 +164,7 @@ def _merged(one: Overlap, two: Overlap) -> Overlap:
     """What both have found."""
     (a, b), (c, d) = (((min(x[0], y[0]), max(x[1], y[1]))) for x, y in zip(one.ranges, two.ranges, strict=True))
     deeper = one if one.depth >= two.depth else two
-    return replace(deeper, ranges=((a, b), (c, d)), flat=one.flat or two.flat)
+    return replace(deeper, ranges=((a, b), (c, d)), whole=one.whole or two.whole)
 
 
 def _candidates(pair: MeshingPair, angles: Array, flank: Array) -> tuple[IntArray, IntArray]:
@@ -191,12 +195,13 @@ def windows_of(
     arcs = [np.concatenate([[0.0], np.cumsum(body.flank.sizes)]) for body in pair.bodies]
     for number, overlap in enumerate(found):
         # a tip that digs in slides along its mate as the teeth bend: nothing is narrowed there
-        whole = reach.whole_tips and any(_near_tip(arcs[gear], overlap.ranges[gear]) for gear in (0, 1))
-        kept = max(1.0, reach.share) if whole or overlap.flat else reach.share
+        tip = reach.whole_tips and any(_near_tip(arcs[gear], overlap.ranges[gear]) for gear in (0, 1))
+        kept = max(1.0, reach.share) if tip else reach.share
+        margin = reach.margin
+        if overlap.whole:
+            kept, margin = WHOLE.share, WHOLE.margin
         for gear, tooth in ((0, overlap.tooth), (1, -1 - overlap.tooth)):
-            first, end = _narrowed(
-                arcs[gear], overlap.ranges[gear], overlap.deepest[gear], kept, overlap.depth, reach.margin
-            )
+            first, end = _narrowed(arcs[gear], overlap.ranges[gear], overlap.deepest[gear], kept, overlap.depth, margin)
             placed = pair.tooth_angle(gear, tooth, angle, twist)
             windows.append(Window(gear, number, tooth, first, end - first, node, placed))
             node += 2 * (end - first) + 1

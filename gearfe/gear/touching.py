@@ -276,10 +276,10 @@ class Flanks:
         return np.where(inside, apart, np.inf)
 
     def gap(self, found: Touching, k: int, u: Array) -> Array:
-        r"""Distance (m) of points of the pinion's flank from the wheel's flank where the pair number k of `found` touches.
+        r"""Gap (m) at points of the pinion's flank where the pair number k of `found` touches.
 
-        Along the common normal n: with the wheel's own normal :math:`n_2` and its lever :math:`a_2` where a circle about
-        the wheel's centre meets its flank, :math:`(D - \varphi_k)\,a_2/(n\cdot n_2)`. Infinite as `twist` is.
+        Along the common normal n: with the wheel's own normal :math:`n_2` and its lever :math:`a_2` where a circle
+        about the wheel's centre meets its flank, :math:`(D - \varphi_k)\,a_2/(n\cdot n_2)`. Infinite as `twist` is.
         """
         angle, number = found.angle[k], found.pair[k]
         seen = self.placed(angle, number, u)
