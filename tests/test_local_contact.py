@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,9 +11,7 @@ from gearfe.contact.hertz import Edge, LocalContact, wedge_factor
 from gearfe.gear.pair import GearPair
 from gearfe.gear.spur_gear import TipRelief
 from gearfe.gear.touching import Flanks, face_of
-from gearfe.stiffness.job import read_stiffness_job
 from gearfe.stiffness.local_gap import local_contact
-from gearfe.stiffness.routes import Router
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import pair
@@ -129,40 +126,22 @@ def test_a_contact_that_does_not_reach_the_round_is_hertz():
     assert found.approach == pytest.approx(contact._numerical(load).approach, rel=1e-3)
 
 
-def tip_beside_an_undercut():
-    """Job in which the pinion's sharp tip bears 5 micrometres above the edge of the wheel's undercut, and where."""
-    job = read_stiffness_job(Path(__file__).parent / "test_stress_cases" / "gears" / "tip_beside_an_undercut.toml")
-    return job, np.array([job.sweep["angles"][2]])
-
-
-def test_the_gap_ends_with_both_faces():
-    """What is filled in beyond an undercut's edge ends at the mate's tip, and the pressure lies on the mate."""
-    job, angle = tip_beside_an_undercut()
-    flanks, elastic = Flanks(job.pair), elastic_pair(job.pair, **job.model)
-    touching = flanks.touching(angle)
-    (k,) = np.flatnonzero(touching.place[:, 0] > 1 - 1e-9)
-    assert 0 < -flanks.wheel.distance(float(touching.place[k, 1]), 0.0) < 1e-5
-    contact = local_contact(job.pair, elastic, flanks, touching, k, 1e-5)
-    assert contact.x.max() == 0.0
-    found = contact.under(5e3)
-    assert -2 * found.width * 5e3 < found.moment < 0
-
-
-def test_what_is_left_of_a_sharp_tip_s_compliance_does_not_know_the_mesh():
-    """The reference pressure spans two elements. What it presses in by itself is a wedge's and a half plane's, under a
-    load that is normal to the mate; without that turn, 3 deg here, it goes on by 6 % of their logarithm.
+def test_turn_under_an_ellipse():
+    """Far from the edge the face turns by factor/(2 d) per force, at the edge by the inverse of the length: it has no
+    other. Towards the edge of either body, of the other not at all.
     """
-    job, angle = tip_beside_an_undercut()
-    left, spans = [], []
-    for coarsen in (2.0, 0.5):
-        elastic = elastic_pair(job.pair, **{**job.model, "coarsen": coarsen})
-        reference = Router(job.pair, elastic, "hertz").reference(float(angle[0]), job.sweep["twist"])
-        (k,) = np.flatnonzero(reference.touching.place[:, 0] > 1 - 1e-9)
-        left.append(reference.compliance[k, k] * reference.width)
-        spans.append(-2 * reference.middle[k])
-    contact = reference.local[k]
-    logarithm = (contact.unit + sum(edge.factor for edge in contact.edges)) * math.log(spans[0] / spans[1])
-    assert abs(left[0] - left[1]) < 0.01 * logarithm
+    edge = Edge(1.0, 3e-12, 1)
+    assert local(lambda x: x**2, edges=[edge]).elliptic_turn(-1e-3, 1e-3) == pytest.approx((0.0, -1.5e-12), rel=1e-5)
+    law = local(lambda x: x**2, edges=[Edge(0.0, 3e-12, 0), edge])
+    near, far = (law.elliptic_turn(-length, 0.0)[0] for length in (1e-5, 2e-5))
+    assert near == pytest.approx(2 * far, rel=1e-9)
+    # against the definition: mean slope, weighed as a moment, of the displacement under the pressure
+    x = -1e-5 * (1 - np.cos(math.pi * (np.arange(4000) + 0.5) / 4000)) / 2
+    weight = np.sqrt(np.maximum(0.0, 1 - (1 + x / 5e-6) ** 2)) * np.gradient(x)
+    weight = weight / weight.sum()
+    sunk = -3e-12 * np.log(-x[:, None] - x) @ weight
+    # what sinks in lies against the normal, for body 0, along the tangent of which x runs
+    assert near == pytest.approx(float((weight * (x + 5e-6) * 4 / 5e-6**2) @ -sunk), rel=1e-3)
 
 
 # ---- where the rigid flanks touch -----------------------------------------------------------------------------------
@@ -211,17 +190,6 @@ def test_at_the_kink_of_a_linear_relief_the_mate_gives_the_normal():
             np.testing.assert_allclose(other.normal[j], one.normal[k], atol=1e-7)
             np.testing.assert_allclose(other.arm[j], one.arm[k, ::-1], atol=1e-9)
     assert seen >= 3
-
-
-def test_an_undercut_s_edge_bears_in_every_mesh_cycle():
-    """Its place on the wheel has the rounding of angles, which must not make it a point of the smooth flank."""
-    job = read_stiffness_job(Path(__file__).parent / "test_stress_cases" / "gears" / "undercut_edge_bears.toml")
-    angles = job.sweep["angles"][0] + job.pair.mesh_cycle * np.arange(12)
-    touching = Flanks(job.pair).touching(angles)
-    at_the_edge = np.flatnonzero(np.abs(touching.place[:, 1]) < 1e-6)
-    assert len(at_the_edge) >= 12
-    assert (touching.place[at_the_edge, 1] == 0.0).all()
-    assert np.isinf(touching.curvature[at_the_edge]).all()
 
 
 @pytest.mark.parametrize("u", [1e-6, 0.4, 0.9, 0.999995, 1.0 - 2e-9, 1.0])

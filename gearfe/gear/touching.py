@@ -34,6 +34,8 @@ IntArray = NDArray[np.int64]
 COARSE, CLOSER, LOOKS = 97, 17, 16
 #: A place is an end of the range, or a mark, when it is so near to it: places have the rounding of angles and radii.
 AT_AN_END = 1e-9
+#: Steps of the search along a normal, and least cosine between it and the wheel's face that they reckon with.
+NEWTON, STEEPEST = 10, 0.05
 
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(12)
 
@@ -276,19 +278,25 @@ class Flanks:
         return np.where(inside, apart, np.inf)
 
     def gap(self, found: Touching, k: int, u: Array) -> Array:
-        r"""Gap (m) at points of the pinion's flank where the pair number k of `found` touches.
+        """Gap (m) between points of the pinion's flank and the wheel's flank where the pair number k of `found` touches.
 
-        Along the common normal n: with the wheel's own normal :math:`n_2` and its lever :math:`a_2` where a circle
-        about the wheel's centre meets its flank, :math:`(D - \varphi_k)\,a_2/(n\cdot n_2)`. Infinite as `twist` is.
+        Along the common normal, which meets the wheel's flank where both have the same place along the tangent
+        (Newton's method for the wheel's arc length); infinite where it does not.
         """
-        angle, number = found.angle[k], found.pair[k]
-        seen = self.placed(angle, number, u)
-        mate = self.wheel.at_radius(np.abs(seen))
-        turn = np.exp(1j * (self.wheel_frame(angle, number) + found.twist[k]))
-        at, normal = self.wheel.points(mate) * turn, -self.wheel.normals(mate) * turn
-        apart = self.twist(angle, number, u) - found.twist[k]
-        made: Array = -apart * _cross(at, normal) / (np.conj(normal) * found.normal[k]).real
-        return made
+        angle, number, normal = found.angle[k], found.pair[k], found.normal[k]
+        turn = np.exp(1j * (self.wheel_frame(angle, number) + found.twist[k])) / normal  # then n is 1 and x is -i
+        start = float(found.place[k, 1])
+        from_touch = self.placed(angle, number, u) / normal - self.wheel.points(np.array(start)) * turn
+        arc, close = from_touch.imag, 1e-9 * (1e-6 + np.abs(from_touch))
+        for _ in range(NEWTON):
+            place = self.wheel.moved(start, arc)
+            on, at = (place >= 0.0) & (place <= self.wheel.end), np.clip(place, 0.0, self.wheel.end)
+            apart = (self.wheel.points(at) - self.wheel.points(np.array(start))) * turn - from_touch
+            met = on & (np.abs(apart.imag) <= close)
+            if (met | ~on).all():
+                break
+            arc = arc - apart.imag / np.maximum(STEEPEST, (-self.wheel.normals(at) * turn).real)
+        return np.where(met, apart.real, np.inf)
 
     def touching(self, angles: Array) -> Touching:
         """First touch of every pair that can meet at the given pinion angles (rad), shape (p,)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +11,14 @@ from numpy.typing import NDArray
 from ..contact.hertz import Edge, LocalContact, wedge_factor
 from ..contact.scene import MeshingPair
 from ..gear.pair import GearPair
-from ..gear.touching import Flanks, Touching
+from ..gear.touching import Face, Flanks, Touching
 
 Array = NDArray[np.float64]
 
 #: Nearest and farthest known places of the gap from the point of contact (modules), and their number on either side.
 NEAR, FAR, PLACES = 1e-8, 0.4, 90
+#: Distance, as a share of a gear's radius, up to which differences of places have too much rounding.
+ROUNDED = 1e-8
 #: Distance (modules) over which the radius of curvature is taken at an edge.
 CURVED = 0.01
 #: Elements between a contact and the nearest edge or jump of curvature, from which on it is that of smooth curves.
@@ -33,45 +36,85 @@ def local_contact(
         Element size there (m). Where all edges are `CLEAR` elements away, the gap is the parabola of the curvatures.
     """
     shares = elastic.contact_compliances
-    place = [float(u) for u in touching.place[k]]
-    edges, smooth = [], math.inf
-    for g, face in enumerate(flanks.faces):
-        for mark in face.marks():
-            distance = (1.0 if g == 0 else -1.0) * face.distance(place[g], mark)
-            smooth = min(smooth, abs(distance))
-            if mark == face.end and face.sharp:
-                factor = wedge_factor(face.tip_angle(), _opening(flanks, touching, k, g)) - 2 / math.pi
-                edges.append(Edge(distance, factor * shares[g], g))
+    sides = [_Side(face, float(touching.place[k, g]), g, _turned(flanks, touching, k, g))
+             for g, face in enumerate(flanks.faces)]  # fmt: skip
+    marks = [(side, mark, side.arc(mark)) for side in sides for mark in side.face.marks()]
+    ends = [(side, arc) for side, mark, arc in marks if mark == side.face.end and side.face.sharp]
+    smooth = min(abs(arc) for _, _, arc in marks)
+    factors = [
+        shares[side.gear] * (wedge_factor(side.face.tip_angle(), side.opening) - 2 / math.pi) for side, _ in ends
+    ]
     module = pair.pinion.module
-    side = np.geomspace(NEAR * module, FAR * module, PLACES)
-    x = np.concatenate([-side[::-1], [0.0], side])
-    bend = sum(f.curvature(u, math.inf) for f, u in zip(flanks.faces, place, strict=True))
+    beside = np.geomspace(NEAR * module, FAR * module, PLACES)
+    x = np.concatenate([-beside[::-1], [0.0], beside])
+    bend = sum(side.face.curvature(side.place, math.inf) for side in sides)
     if smooth > CLEAR * element and 0 < bend < math.inf:
-        return LocalContact(1 / sum(shares), 1 / bend, x, 0.5 * bend * x**2, tuple(edges), smooth)
-    u = flanks.pinion.moved(place[0], x)
+        edges = tuple(Edge(arc, f, side.gear) for (side, arc), f in zip(ends, factors, strict=True))
+        return LocalContact(1 / sum(shares), 1 / bend, x, 0.5 * bend * x**2, edges, smooth)
+    edges = tuple(Edge(side.along(arc), f, side.gear) for (side, arc), f in zip(ends, factors, strict=True))
+    u = flanks.pinion.moved(sides[0].place, x)
     inside = (u >= 0.0) & (u <= flanks.pinion.end)
-    gap = flanks.gap(touching, k, np.where(inside, u, 0.0))
+    gap, x = flanks.gap(touching, k, np.where(inside, u, 0.0)), sides[0].all_along(x)
     known = inside & np.isfinite(gap)
     known[PLACES], gap[PLACES] = True, 0.0
-    for g, face in enumerate(flanks.faces):
-        if face.fall > 0.0:
-            up, mate = (1.0, flanks.faces[1]) if g == 0 else (-1.0, flanks.faces[0])
-            tip = -up * mate.distance(place[1 - g], mate.end)
-            _fall_back(x, gap, known, up * face.distance(place[g], 0.0), tip, up, face.fall)
+    for side, mate in (sides, sides[::-1]):
+        if side.face.fall > 0.0:
+            start, tip = side.along(side.arc(0.0)), mate.along(mate.arc(mate.face.end))
+            _fall_back(x, gap, known, start, tip, side.up, side.face.fall)
     x, gap = x[known], np.maximum(gap[known], 0.0)
     # lighter contacts than reach the next edge or jump know the curvature at the point alone
     radius = float(1 / bend) if smooth > 0 and 0 < bend < math.inf else _radius(x, gap, CURVED * module)
-    return LocalContact(1 / sum(shares), radius, x, gap, tuple(edges), smooth)
+    return LocalContact(1 / sum(shares), radius, x, gap, edges, smooth)
 
 
-def _opening(flanks: Flanks, touching: Touching, k: int, g: int) -> float:
-    """Angle (rad) between the face of gear g where it ends and the mate's where they touch, > 0 where they part."""
+def _turned(flanks: Flanks, touching: Touching, k: int, g: int) -> complex:
+    """What turns the frame of the tooth of gear g so that the outward normals there become n, the pinion's."""
     if g == 0:
-        turned, sign = touching.angle[k] + touching.pair[k] * flanks.pair.mesh_cycle, 1.0
+        angle, sign = touching.angle[k] + touching.pair[k] * flanks.pair.mesh_cycle, 1.0
     else:
-        turned, sign = flanks.wheel_frame(touching.angle[k], touching.pair[k]) + touching.twist[k], -1.0
-    normal = complex(flanks.faces[g].normals(np.array(flanks.faces[g].end))) * np.exp(1j * turned)
-    return float(np.angle(sign * normal / touching.normal[k]))
+        angle, sign = flanks.wheel_frame(touching.angle[k], touching.pair[k]) + touching.twist[k], -1.0
+    return complex(sign * np.exp(1j * angle) / touching.normal[k])
+
+
+@dataclass(frozen=True)
+class _Side:
+    """One face as seen from the point where it touches: `turned` makes 1 of its normal there, but at an edge."""
+
+    face: Face
+    place: float
+    gear: int
+    turned: complex
+
+    @property
+    def up(self) -> float:
+        """Sign of x towards the tip of its tooth."""
+        return 1.0 if self.gear == 0 else -1.0
+
+    @property
+    def opening(self) -> float:
+        """Angle (rad) between the face where it ends and the common tangent, > 0 where an end that touches parts."""
+        return float(np.angle(complex(self.face.normals(np.array(self.face.end))) * self.turned))
+
+    def all_along(self, x: Array) -> Array:
+        """Coordinates along the common tangent of places at the arc lengths x (m), both towards the pinion's tip.
+
+        Of near ones by the direction of the face at half of the arc, that of the chord up to the third order: a
+        difference of places would be rounding.
+        """
+        half, at = (np.clip(self.face.moved(self.place, s * self.up * x), 0.0, self.face.end) for s in (0.5, 1.0))
+        near = x * (self.face.normals(half) * self.turned).real
+        chord = (self.face.points(at) - self.face.points(np.array(self.place))) * self.turned
+        ends = [(1 + ROUNDED) * self.face.distance(self.place, mark) for mark in (0.0, self.face.end)]
+        far = np.abs(x) > ROUNDED * abs(complex(self.face.points(np.array(self.place))))
+        return np.where(far & (self.up * x >= ends[0]) & (self.up * x <= ends[1]), -self.up * chord.imag, near)
+
+    def along(self, x: float) -> float:
+        """The same of one arc length."""
+        return float(self.all_along(np.array([x]))[0])
+
+    def arc(self, mark: float) -> float:
+        """Arc length (m) to a parameter of the face, towards the pinion's tip."""
+        return self.up * self.face.distance(self.place, mark)
 
 
 def _fall_back(
@@ -95,8 +138,9 @@ def _fall_back(
     on = on[np.argsort(np.abs(x[on] - start))][:2]
     if len(on) < 2 or not beyond.any():
         return
-    slope = (gap[on[1]] - gap[on[0]]) / (x[on[1]] - x[on[0]])
-    made = gap[on[0]] + slope * (x[beyond] - x[on[0]]) + fall * np.abs(x[beyond] - start)
+    outwards = -up * (gap[on[1]] - gap[on[0]]) / (x[on[1]] - x[on[0]])
+    at_the_edge = gap[on[0]] + outwards * -up * (start - x[on[0]])
+    made = at_the_edge + math.tan(math.atan(outwards) + fall) * np.abs(x[beyond] - start)
     gap[beyond], known[beyond] = made, made >= 0.0
 
 
