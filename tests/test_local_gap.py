@@ -1,4 +1,4 @@
-"""The gap beside a contact of rigid flanks, and small loads at edges: against the curves themselves and against meshes."""
+"""The gap beside a contact of rigid flanks, and small loads at edges: against the curves and against meshes."""
 
 from __future__ import annotations
 
@@ -94,6 +94,32 @@ def test_the_gap_is_that_of_the_curves(name: str) -> None:
         seen += len(x)
         np.testing.assert_allclose(gap, np.interp(x, *lines[1]) - np.interp(x, *lines[0]), rtol=1e-3, atol=1e-11)
     assert seen > 400
+
+
+@pytest.mark.parametrize(("name", "g"), [("undercut_edge_bears", 1), ("tip_along_a_root", 0)])
+def test_beyond_an_undercut_s_edge_the_gap_is_that_of_the_root(name: str, g: int) -> None:
+    """Near the edge, as a wedge between the mate and the tangent of the trochoid."""
+    gears = job_named(name).pair
+    flanks = Flanks(gears)
+    touching = flanks.touching(angles_of(gears, 20))
+    trochoid = (gears.pinion, gears.wheel)[g].profile.segment("trochoid").curve.point(np.linspace(0.99, 1.0, 5001))
+    at_the_edge = np.flatnonzero((touching.place[:, g] == 0.0) & (touching.twist < touching.twist.min() + 0.01))
+    assert len(at_the_edge) > 1
+    for k in at_the_edge:
+        turns = (
+            touching.angle[k] + touching.pair[k] * gears.mesh_cycle,
+            flanks.wheel_frame(touching.angle[k], touching.pair[k]) + touching.twist[k],
+        )
+        mate = flanks.faces[1 - g].points(touching.place[k, 1 - g] + np.linspace(-0.01, 0.01, 5001))
+        lines = []
+        for gear, points in ((g, trochoid[:, 0] + 1j * trochoid[:, 1]), (1 - g, mate)):
+            placed = points * np.exp(1j * turns[gear]) + gear * gears.working_centre_distance
+            seen_from = (placed - touching.point[k]) / touching.normal[k]
+            order = np.argsort(-seen_from.imag)
+            lines.append((-seen_from.imag[order], seen_from.real[order]))
+        x = np.array([-4e-5, -2e-5] if g == 0 else [2e-5, 4e-5]) * gears.pinion.module
+        exact = (1 - 2 * g) * (np.interp(x, *lines[1]) - np.interp(x, *lines[0]))
+        np.testing.assert_allclose(beside(flanks, touching, k).gap_at(x), exact, atol=1e-3 * abs(x).max())
 
 
 def test_the_gap_ends_with_both_faces() -> None:

@@ -278,7 +278,7 @@ class Flanks:
         return np.where(inside, apart, np.inf)
 
     def gap(self, found: Touching, k: int, u: Array) -> Array:
-        """Gap (m) between points of the pinion's flank and the wheel's flank where the pair number k of `found` touches.
+        """Gap (m) between points of the pinion's flank and the wheel's where the pair number k of `found` touches.
 
         Along the common normal, which meets the wheel's flank where both have the same place along the tangent
         (Newton's method for the wheel's arc length); infinite where it does not.
