@@ -19,9 +19,15 @@ line load has the two limits of a wedge: :math:`-\frac{2P}{\pi E'}\ln|x-s|` near
 
 .. math:: A = \frac{\cos^2\beta}{\alpha+\tfrac12\sin 2\alpha} + \frac{\sin^2\beta}{\alpha-\tfrac12\sin 2\alpha}
 
-for the half angle :math:`\alpha` of the wedge and the angle :math:`\beta = \pi/2-\alpha` between its middle and the
-load (Timoshenko & Goodier, *Theory of Elasticity*, art. 38). Between them the face is taken to move by
-:math:`-\frac{P}{E'}[\frac2\pi\ln|x-s| + (A-\frac2\pi)\ln(x+s)]`, symmetric as it must be (Betti).
+for the half angle :math:`\alpha` of the wedge and the angle :math:`\beta` between its middle and the load (Timoshenko
+& Goodier, *Theory of Elasticity*, art. 38): :math:`\pi/2-\alpha` where the load is normal to the face, less by the
+angle at which a bearing tip's face falls back from the mate's, to which the load is normal. Between them the face is
+taken to move by :math:`-\frac{P}{E'}[\frac2\pi\ln|x-s| + (A-\frac2\pi)\ln(x+s)]`, symmetric as it must be (Betti). Its
+second part turns the face too, by the mean slope
+
+.. math:: -\frac{A-2/\pi}{E'}\,\frac4{a^2}\int\!\!\int p(x)\,(x-\bar x)\ln(x+s)\,p(s)\,ds\,dx
+
+under an elliptic pressure of unit force and half width a.
 """
 
 from __future__ import annotations
@@ -60,7 +66,8 @@ def wedge_factor(interior_angle: float, open_angle: float = 0.0) -> float:
     Parameters
     ----------
     open_angle
-        Angle (rad) at which that face falls back from the mate's: the load is normal to the mate's.
+        Angle (rad) by which the normal of the mate, along which the load acts, leans to the other face: > 0 where the
+        tip itself bears, < 0 where a convex face touches below it.
     """
     alpha, beta = 0.5 * interior_angle, 0.5 * (math.pi - interior_angle) - open_angle
     along, across = alpha + 0.5 * math.sin(2 * alpha), alpha - 0.5 * math.sin(2 * alpha)

@@ -53,8 +53,9 @@ SOFTER = (0.01, 0.03, 0.1, 0.3)
 #: A law with multipliers starts from a penalty so many times its complementarity parameter: near the contact without
 #: overlap, where that parameter's own overlap would tell too many points to bear.
 STIFFER = 30.0
-#: Newton steps of a law with multipliers from the Hertzian guess. A corner that dents deeply has several equilibria on
-#: one mesh; what is not found soon is left to the penalty, by which both gears see the same one.
+#: Newton steps of a law with multipliers from the Hertzian guess, unless it is nearly done. A corner that dents deeply
+#: has several equilibria on one mesh; what is not found soon is left to the penalty, by way of which both gears have
+#: mostly found the same one.
 SOON = 15
 #: Accuracy of the softer solutions, and Newton steps for each.
 SOFT_TOLERANCE, SOFT_ITERATIONS = 1e-2, 20

@@ -92,7 +92,7 @@ class _Side:
 
     @property
     def opening(self) -> float:
-        """Angle (rad) between the face where it ends and the common tangent, > 0 where an end that touches parts."""
+        """Angle (rad) between the face where it ends and the common tangent: `gearfe.contact.hertz.wedge_factor`'s."""
         return float(np.angle(complex(self.face.normals(np.array(self.face.end))) * self.turned))
 
     def all_along(self, x: Array) -> Array:

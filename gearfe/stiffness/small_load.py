@@ -30,10 +30,11 @@ For any two loads this is :math:`\Delta = F\ln(F_{ref}/F)/(\pi E^* w)`.
 more than at their first point of contact (the largest difference of the two). Where a contact is not symmetric, its
 pressure has the moment m(F) about that point, the reference pressure the moment F r, and
 :math:`m(\theta_1-\theta_2)` adds to G, less :math:`F r(\theta_1-\theta_2)` of the elastic tilt, which C has.
-:math:`\theta_i, \tau_i` are linear in F and, for the wheel's rigid motion, in psi; on the path of contact the latter
-cancel, as the law of gearing has it. What the loads make of :math:`\tau_2`, :math:`\tau_2^F`, turns on with the wheel,
-which parts the faces by :math:`\psi\tau_2^F`: another :math:`-F\psi\tau_2^F` in G. Rotations of the whole gear pair
-then leave G as it is, so that the moments balance.
+:math:`\theta_i, \tau_i` are linear in F, without what a face turns under the reference pressure beside its own
+edge: that is part of the local contact, as :math:`\bar\lambda` is. For the wheel's rigid motion they are linear in psi;
+on the path of contact these cancel, as the law of gearing has it. What the loads make of :math:`\tau_2`,
+:math:`\tau_2^F`, turns on with the wheel, which parts the faces by :math:`\psi\tau_2^F`: another
+:math:`-F\psi\tau_2^F` in G. Rotations of the whole gear pair then leave G as it is, so that the moments balance.
 
 All of it follows from one potential :math:`W(\varphi) = \max_F [\,F\cdot\text{overlap} - \frac12 F^TCF -
 \Lambda(F) + G\,]`, so torques are its derivatives with respect to the rotations, and the tangent the second one.
