@@ -96,6 +96,20 @@ def test_the_gap_is_that_of_the_curves(name: str) -> None:
     assert seen > 400
 
 
+def test_the_gap_scales_with_the_gears() -> None:
+    """Rounding of the places of a gear of many metres costs no places of the gap."""
+    found = []
+    for module in (2.5e-3, 2.5):
+        flanks = Flanks(pair(20, 30, module=module, width=4 * module))
+        touching = flanks.touching(np.array([math.radians(8.2)]))
+        k = int(np.argmax(touching.place[:, 0] * (touching.twist < touching.twist.min() + 0.01)))
+        contact = beside(flanks, touching, k)
+        found.append(np.stack([contact.x, contact.gap]) / module)
+    assert found[0].shape == found[1].shape
+    far = found[0][1] > 1e-7
+    np.testing.assert_allclose(found[1][:, far], found[0][:, far], rtol=1e-6)
+
+
 @pytest.mark.parametrize(("name", "g"), [("undercut_edge_bears", 1), ("tip_along_a_root", 0)])
 def test_beyond_an_undercut_s_edge_the_gap_is_that_of_the_root(name: str, g: int) -> None:
     """Near the edge, as a wedge between the mate and the tangent of the trochoid."""

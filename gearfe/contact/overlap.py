@@ -47,7 +47,8 @@ CLOSE = Reach(0.36, 1, whole_tips=False)
 WHOLE = Reach(1.5, 3)
 #: Every so many nodes of the mate's flank the search for the closest point tries one.
 STRIDE = 3
-#: By how much of its depth an overlap must exceed that of parabolas somewhere to count as flat.
+#: By how much of its depth an overlap must exceed that of parabolas somewhere to count as flat. Usual flanks and
+#: reliefs stay below 0.13; where only two or three vertices overlap it may be more, which costs a wider window.
 FLAT = 0.15
 #: Overlap, as a share of the length of a tooth's contact surface, from which on the wheel's vertices are asked too.
 DEEP = 0.02

@@ -287,7 +287,7 @@ class Flanks:
         turn = np.exp(1j * (self.wheel_frame(angle, number) + found.twist[k])) / normal  # then n is 1 and x is -i
         start = float(found.place[k, 1])
         from_touch = self.placed(angle, number, u) / normal - self.wheel.points(np.array(start)) * turn
-        arc, close = from_touch.imag, 1e-9 * (1e-6 + np.abs(from_touch))
+        arc, close = from_touch.imag, 1e-9 * np.abs(from_touch) + 1e-14 * self.pair.working_centre_distance
         for _ in range(NEWTON):
             place = self.wheel.moved(start, arc)
             on, at = (place >= 0.0) & (place <= self.wheel.end), np.clip(place, 0.0, self.wheel.end)
