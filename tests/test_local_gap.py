@@ -50,8 +50,7 @@ def test_both_gears_see_the_same_local_contact(name: str) -> None:
     touching, seen = flanks.touching(angles_of(gears, 20)), 0
     for k in np.flatnonzero(touching.twist < touching.twist.min() + 0.01):
         number = -1 - int(touching.pair[k])
-        wheel = flanks.wheel_frame(touching.angle[k], touching.pair[k]) + touching.twist[k]
-        turned = float(wheel) - math.pi - number * mirrored.pair.mesh_cycle
+        turned = flanks.turns(touching, k)[1] - math.pi - number * mirrored.pair.mesh_cycle
         other = mirrored.touching(np.array([(turned + math.pi) % (2 * math.pi) - math.pi]))
         (j,) = np.flatnonzero(other.pair == number)
         mine, theirs = beside(flanks, touching, k), beside(mirrored, other, j, swapped=True)
@@ -72,10 +71,7 @@ def test_the_gap_is_that_of_the_curves(name: str) -> None:
     flanks = Flanks(gears)
     touching, seen = flanks.touching(angles_of(gears, 20)), 0
     for k in np.flatnonzero(touching.twist < touching.twist.min() + 0.01):
-        turns = (
-            touching.angle[k] + touching.pair[k] * gears.mesh_cycle,
-            flanks.wheel_frame(touching.angle[k], touching.pair[k]) + touching.twist[k],
-        )
+        turns = flanks.turns(touching, k)
         lines = []
         for g, face in enumerate(flanks.faces):
             near = touching.place[k, g] + np.array([[-1.0], [1.0]]) * np.geomspace(1e-7, 0.3, 2000)
@@ -120,10 +116,7 @@ def test_beyond_an_undercut_s_edge_the_gap_is_that_of_the_root(name: str, g: int
     at_the_edge = np.flatnonzero((touching.place[:, g] == 0.0) & (touching.twist < touching.twist.min() + 0.01))
     assert len(at_the_edge) > 1
     for k in at_the_edge:
-        turns = (
-            touching.angle[k] + touching.pair[k] * gears.mesh_cycle,
-            flanks.wheel_frame(touching.angle[k], touching.pair[k]) + touching.twist[k],
-        )
+        turns = flanks.turns(touching, k)
         mate = flanks.faces[1 - g].points(touching.place[k, 1 - g] + np.linspace(-0.01, 0.01, 5001))
         lines = []
         for gear, points in ((g, trochoid[:, 0] + 1j * trochoid[:, 1]), (1 - g, mate)):

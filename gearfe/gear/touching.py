@@ -6,9 +6,10 @@ twist, :math:`\varphi_2(r(u))`, that point of the pinion's flank is met at the t
 
 .. math:: D(u) = \varphi_1(u) - \varphi_2(r(u)),
 
-the pair touches at :math:`\varphi_k = \min_u D`, and :math:`a_k (D - \varphi_k)`, with the lever :math:`a_k` of the
-common normal about the wheel's centre, is the gap beside the point of contact. The minimum is smooth on the path of
-contact and on rounds and reliefs, an end of the range where a sharp tip bears before or after the path.
+the pair touches at :math:`\varphi_k = \min_u D`. The gap beside the point of contact is taken along the common normal
+(`Flanks.gap`); :math:`a_k (D - \varphi_k)`, with the lever :math:`a_k` of that normal about the wheel's centre, is its
+first order on smooth flanks only. The minimum is smooth on the path of contact and on rounds and reliefs, an end of the
+range where a sharp tip bears before or after the path.
 
 The working flank is the involute with its relief, then the tip round. Roots take no part, but where one is undercut the
 involute starts with an edge, which can bear as a sharp tip does.
@@ -277,21 +278,26 @@ class Flanks:
         apart = np.angle(seen * np.exp(-1j * self.wheel_frame(angle, number)) / mate)
         return np.where(inside, apart, np.inf)
 
+    def turns(self, found: Touching, k: int) -> tuple[float, float]:
+        """Angles (rad) of the teeth of pinion and wheel where the pair number k of `found` touches."""
+        pinion = found.angle[k] + found.pair[k] * self.pair.mesh_cycle
+        return float(pinion), float(self.wheel_frame(found.angle[k], found.pair[k]) + found.twist[k])
+
     def gap(self, found: Touching, k: int, u: Array) -> Array:
         """Gap (m) between points of the pinion's flank and the wheel's where the pair number k of `found` touches.
 
         Along the common normal, which meets the wheel's flank where both have the same place along the tangent
         (Newton's method for the wheel's arc length); infinite where it does not.
         """
-        angle, number, normal = found.angle[k], found.pair[k], found.normal[k]
-        turn = np.exp(1j * (self.wheel_frame(angle, number) + found.twist[k])) / normal  # then n is 1 and x is -i
-        start = float(found.place[k, 1])
-        from_touch = self.placed(angle, number, u) / normal - self.wheel.points(np.array(start)) * turn
+        normal, start = found.normal[k], float(found.place[k, 1])
+        turn = np.exp(1j * self.turns(found, k)[1]) / normal  # then n is 1 and x is -i
+        touch = self.wheel.points(np.array(start))
+        from_touch = self.placed(found.angle[k], found.pair[k], u) / normal - touch * turn
         arc, close = from_touch.imag, 1e-9 * np.abs(from_touch) + 1e-14 * self.pair.working_centre_distance
         for _ in range(NEWTON):
             place = self.wheel.moved(start, arc)
             on, at = (place >= 0.0) & (place <= self.wheel.end), np.clip(place, 0.0, self.wheel.end)
-            apart = (self.wheel.points(at) - self.wheel.points(np.array(start))) * turn - from_touch
+            apart = (self.wheel.points(at) - touch) * turn - from_touch
             met = on & (np.abs(apart.imag) <= close)
             if (met | ~on).all():
                 break

@@ -36,8 +36,11 @@ def local_contact(
         Element size there (m). Where all edges are `CLEAR` elements away, the gap is the parabola of the curvatures.
     """
     shares = elastic.contact_compliances
-    sides = [_Side(face, float(touching.place[k, g]), g, _turned(flanks, touching, k, g))
-             for g, face in enumerate(flanks.faces)]  # fmt: skip
+    sides = [
+        # the sign makes n of the wheel's outward normal too
+        _Side(face, float(touching.place[k, g]), g, (1 - 2 * g) * complex(np.exp(1j * turn) / touching.normal[k]))
+        for g, (face, turn) in enumerate(zip(flanks.faces, flanks.turns(touching, k), strict=True))
+    ]
     marks = [(side, mark, side.arc(mark)) for side in sides for mark in side.face.marks()]
     ends = [(side, arc) for side, mark, arc in marks if mark == side.face.end and side.face.sharp]
     smooth = min(abs(arc) for _, _, arc in marks)
@@ -48,10 +51,12 @@ def local_contact(
     beside = np.geomspace(NEAR * module, FAR * module, PLACES)
     x = np.concatenate([-beside[::-1], [0.0], beside])
     bend = sum(side.face.curvature(side.place, math.inf) for side in sides)
-    if smooth > CLEAR * element and 0 < bend < math.inf:
-        edges = tuple(Edge(arc, f, side.gear) for (side, arc), f in zip(ends, factors, strict=True))
+    clear = smooth > CLEAR * element and 0 < bend < math.inf
+    edges = tuple(
+        Edge(arc if clear else side.along(arc), f, side.gear) for (side, arc), f in zip(ends, factors, strict=True)
+    )
+    if clear:
         return LocalContact(1 / sum(shares), 1 / bend, x, 0.5 * bend * x**2, edges, smooth)
-    edges = tuple(Edge(side.along(arc), f, side.gear) for (side, arc), f in zip(ends, factors, strict=True))
     u = flanks.pinion.moved(sides[0].place, x)
     inside = (u >= 0.0) & (u <= flanks.pinion.end)
     gap, x = flanks.gap(touching, k, np.where(inside, u, 0.0)), sides[0].all_along(x)
@@ -65,15 +70,6 @@ def local_contact(
     # lighter contacts than reach the next edge or jump know the curvature at the point alone
     radius = float(1 / bend) if smooth > 0 and 0 < bend < math.inf else _radius(x, gap, CURVED * module)
     return LocalContact(1 / sum(shares), radius, x, gap, edges, smooth)
-
-
-def _turned(flanks: Flanks, touching: Touching, k: int, g: int) -> complex:
-    """What turns the frame of the tooth of gear g so that the outward normals there become n, the pinion's."""
-    if g == 0:
-        angle, sign = touching.angle[k] + touching.pair[k] * flanks.pair.mesh_cycle, 1.0
-    else:
-        angle, sign = flanks.wheel_frame(touching.angle[k], touching.pair[k]) + touching.twist[k], -1.0
-    return complex(sign * np.exp(1j * angle) / touching.normal[k])
 
 
 @dataclass(frozen=True)
@@ -103,9 +99,10 @@ class _Side:
         """
         half, at = (np.clip(self.face.moved(self.place, s * self.up * x), 0.0, self.face.end) for s in (0.5, 1.0))
         near = x * (self.face.normals(half) * self.turned).real
-        chord = (self.face.points(at) - self.face.points(np.array(self.place))) * self.turned
+        touch = complex(self.face.points(np.array(self.place)))
+        chord = (self.face.points(at) - touch) * self.turned
         ends = [(1 + ROUNDED) * self.face.distance(self.place, mark) for mark in (0.0, self.face.end)]
-        far = np.abs(x) > ROUNDED * abs(complex(self.face.points(np.array(self.place))))
+        far = np.abs(x) > ROUNDED * abs(touch)
         return np.where(far & (self.up * x >= ends[0]) & (self.up * x <= ends[1]), -self.up * chord.imag, near)
 
     def along(self, x: float) -> float:
