@@ -17,7 +17,8 @@ from dataclasses import MISSING
 from pathlib import Path
 from typing import Any, TypeVar
 
-from .errors import InputError, unknown_name
+from .errors import InputError, nearest, unknown_name
+from .textfile import read_text
 
 T = TypeVar("T")
 
@@ -62,14 +63,16 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     InputError
         When the file is missing, unreadable or not TOML.
     """
+    text = read_text(path, "job file")
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError("job file", str(path), "there is no such file", "check the path") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise InputError("job file", str(path), "is not valid TOML (lists within lists too deep)", "mend it") from None
+    except tomllib.TOMLDecodeError as error:
         raise InputError("job file", str(path), f"is not valid TOML ({error})", "mend that line") from None
-    except (OSError, ValueError) as error:
-        raise InputError("job file", str(path), f"cannot be read ({error})", "check the path and its rights") from None
+    except ValueError:  # Python reads no whole number of more than some thousand digits
+        problem = "holds a whole number with thousands of digits"
+        raise InputError("job file", str(path), problem, "write it as 1e300") from None
 
 
 def build(cls: type[T], table: Any, where: str) -> T:
@@ -87,12 +90,16 @@ def build(cls: type[T], table: Any, where: str) -> T:
         raise InputError(where, table, "must be a table of keys and values", f"write [{where}] and its keys below it")
     fields = {f.name: f for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
     hints = typing.get_type_hints(cls)
+    # what chooses among kinds first: a wrong kind brings keys of its own
+    for name, spec in fields.items():
+        if spec.metadata.get("choices") and name in table:
+            _convert(hints[name], table[name], _joined(where, name), spec.metadata)
     for key in table:
         if key not in fields:
-            raise unknown_name(where, key, fields)
+            raise unknown_name(where or "job file", key, fields)
     values: dict[str, Any] = {}
     for name, spec in fields.items():
-        label = f"{where}.{name}"
+        label = _joined(where, name)
         if name in table:
             values[name] = _convert(hints[name], table[name], label, spec.metadata)
         elif spec.default is MISSING and spec.default_factory is MISSING:
@@ -102,6 +109,10 @@ def build(cls: type[T], table: Any, where: str) -> T:
     if check is not None:
         check(where)
     return made
+
+
+def _joined(where: str, name: str) -> str:
+    return f"{where}.{name}" if where else name
 
 
 def load_job(path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -115,6 +126,8 @@ def load_job(path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...
     raw = read_toml(path)
     for name in raw:
         if name not in TABLES:
+            if {"run", "bodies"} <= raw.keys():
+                raise InputError("job file", str(path), "describes a mechanism", "run it: gearfe mechanism FILE")
             raise unknown_name(f"job file {Path(path).name}", name, TABLES)
     for name in needed:
         if name not in raw:
@@ -178,7 +191,8 @@ def _convert_scalar(hint: Any, value: Any, label: str, meta: Any) -> Any:
             raise InputError(label, value, f"must be {kind}", doc)
         choices = meta.get("choices")
         if choices and value not in choices:
-            raise InputError(label, value, "must be one of " + ", ".join(choices), doc)
+            problem = "must be one of " + ", ".join(choice or '""' for choice in choices)
+            raise InputError(label, value, problem, nearest(str(value), choices) or doc)
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise InputError(label, value, "must be a number", doc)

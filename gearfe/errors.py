@@ -3,7 +3,34 @@
 from __future__ import annotations
 
 import difflib
+import math
+import reprlib
 from collections.abc import Iterable
+
+#: Characters of a text, digits of a whole number and entries of a list that a message shows.
+LONGEST_TEXT, MOST_DIGITS, MOST_ENTRIES = 80, 18, 6
+
+
+class _Short(reprlib.Repr):
+    """Values as a message shows them: what is long is cut, what is huge is told by its power of ten."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxstring = self.maxother = LONGEST_TEXT
+        self.maxlist = self.maxtuple = self.maxdict = self.maxset = MOST_ENTRIES
+        self.maxlevel = 3
+
+    def repr_int(self, x: int, level: int) -> str:  # noqa: ARG002 - the base class calls it so
+        """A whole number; Python itself refuses to write those of more than some thousand digits."""
+        if abs(x) < 10**MOST_DIGITS:
+            return repr(x)
+        power = math.floor(math.log10(abs(x)))
+        return f"{'-' if x < 0 else ''}{10 ** (math.log10(abs(x)) - power):.3f}e+{power}"
+
+
+def shown(value: object) -> str:
+    """Text of a value for a message, never longer than a line or two."""
+    return _Short().repr(value)
 
 
 class InputError(ValueError):
@@ -23,8 +50,8 @@ class InputError(ValueError):
 
     def __init__(self, field: str, value: object, problem: str, cure: str = "") -> None:
         self.field, self.value, self.problem, self.cure = field, value, problem, cure
-        shown = "" if value is None else f" = {value!r}"
-        super().__init__(f"{field}{shown}: {problem}" + (f"; {cure}" if cure else ""))
+        given = "" if value is None else f" = {shown(value)}"
+        super().__init__(f"{field}{given}: {problem}" + (f"; {cure}" if cure else ""))
 
     def __reduce__(self) -> tuple[object, ...]:
         return (InputError, (self.field, self.value, self.problem, self.cure))
@@ -37,6 +64,15 @@ class MissingLibraryError(RuntimeError):
 def unknown_name(field: str, name: str, known: Iterable[str]) -> InputError:
     """Error for a name that does not exist, with the nearest one that does."""
     choices = sorted(known)
-    near = difflib.get_close_matches(name, choices, n=1)
-    cure = f"did you mean {near[0]!r}?" if near else "known names: " + ", ".join(choices)
-    return InputError(field, None, f"unknown name {name!r}", cure)
+    return InputError(field, None, f"unknown name {shown(name)}", nearest(name, choices) or listed(choices))
+
+
+def nearest(name: str, choices: Iterable[str]) -> str:
+    """Question for the known name that is nearest to a wrong one; empty when none is near."""
+    near = difflib.get_close_matches(name[:LONGEST_TEXT], choices, n=1)
+    return f"did you mean {near[0]!r}?" if near else ""
+
+
+def listed(choices: Iterable[str]) -> str:
+    """The known names."""
+    return "known names: " + (", ".join(choices) or "none")

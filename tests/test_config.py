@@ -79,12 +79,9 @@ def test_job_files(tmp_path):
     job = tmp_path / "job.toml"
     with pytest.raises(InputError, match="there is no such file"):
         read_toml(job)
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="is a folder"):
         read_toml(tmp_path)
     job.write_text("[pair\n")
-    with pytest.raises(InputError, match="not valid TOML"):
-        read_toml(job)
-    job.write_bytes(b"\xff\xfe")
     with pytest.raises(InputError, match="not valid TOML"):
         read_toml(job)
     job.write_text("[pear]\n")

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..config import build, read_toml
 from ..errors import InputError, unknown_name
 from ..rigid import (
     GROUND,
@@ -36,7 +35,7 @@ from ..rigid import (
     sine,
     smoothed_step,
 )
-from ..tables.mechanism import ForceTable, Function, FunctionTable, JointTable, MechanismFile
+from ..tables.mechanism import ForceTable, Function, FunctionTable, JointTable, MechanismFile, read_mechanism_file
 from .expressions import OF_POINT, PLAIN, Node, compute, parse, quantities
 
 Point = tuple[float, float]
@@ -209,8 +208,7 @@ def load_mechanism(path: str | Path) -> Mechanism:
     InputError
         For anything that the file has wrong, with the name of the entry and the cure.
     """
-    file: MechanismFile = build(MechanismFile, read_toml(path), "mechanism")
-    return make_mechanism(file, Path(path))
+    return make_mechanism(read_mechanism_file(path), Path(path))
 
 
 def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..textfile import read_text
 
 #: Far more digits than any double needs, so that a product is rounded once.
 _EXACT = Context(prec=50)
@@ -72,11 +73,7 @@ def read_columns(path: str | Path) -> dict[str, list[str]]:
     InputError
         When the file is missing, unreadable or not a rectangular table with a header.
     """
-    try:
-        content = Path(path).read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError("stiffness curve", str(path), f"cannot be read ({reason})", "check the path") from None
+    content = read_text(path, "stiffness curve")
     rows = [row for row in csv.reader(io.StringIO(content)) if row]
     if len(rows) < 2:
         raise InputError("stiffness curve", str(path), "has no rows", "give a CSV file with a header line and rows")

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
-from ..config import quantity
+from ..config import TABLES, build, quantity, read_toml
 from ..errors import InputError, unknown_name
 
 Pair = tuple[float, float]
@@ -237,6 +238,22 @@ class MechanismFile:
         for i, path in enumerate(self.paths):
             if path.body not in known:
                 raise unknown_name(f"paths[{i}].body", path.body, known)
+
+
+def read_mechanism_file(path: str | Path) -> MechanismFile:
+    """Read the tables of a mechanism file.
+
+    Raises
+    ------
+    InputError
+        For every mistake in them.
+    """
+    raw = read_toml(path)
+    others = [name for name in raw if name in TABLES]
+    if others and "bodies" not in raw:
+        cure = "run it with another command, or begin with gearfe new mechanism"
+        raise InputError("mechanism file", str(path), f"has no bodies but a table [{others[0]}]", cure)
+    return build(MechanismFile, raw, "")
 
 
 def _only(table: object, where: str, allowed: set[str], checked: tuple[str, ...] | list[str]) -> None:

@@ -1,0 +1,58 @@
+"""Text files of the user: UTF-8, with or without its byte order mark; anything else is named."""
+
+from __future__ import annotations
+
+import codecs
+from pathlib import Path
+
+from .errors import InputError
+
+#: More than any job file or table has (bytes).
+LARGEST = 2**28
+#: Byte order marks; the longer ones first, for those of UTF-32 begin like those of UTF-16.
+_MARKS = {
+    codecs.BOM_UTF32_LE: "UTF-32",
+    codecs.BOM_UTF32_BE: "UTF-32",
+    codecs.BOM_UTF16_LE: "UTF-16",
+    codecs.BOM_UTF16_BE: "UTF-16",
+}
+
+
+def read_text(path: str | Path, field: str) -> str:
+    """Text of a file; `field` names it in messages.
+
+    Raises
+    ------
+    InputError
+        When there is no such file, it cannot be read, or is no UTF-8 text.
+    """
+    try:
+        if Path(path).is_dir():
+            raise InputError(field, str(path), "is a folder, not a file", "name a file in it")
+        with Path(path).open("rb") as stream:
+            raw = stream.read(LARGEST + 1)
+    except FileNotFoundError:
+        raise InputError(field, str(path), "there is no such file", "check the path") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(field, str(path), f"cannot be read ({reason})", "check the path and its rights") from None
+    if len(raw) > LARGEST:
+        raise InputError(field, str(path), f"is larger than {LARGEST >> 20} MB", "is it the right file?")
+    encoding = next((name for mark, name in _MARKS.items() if raw.startswith(mark)), "")
+    if encoding:
+        raise InputError(field, str(path), f"is written in {encoding}", "save it as UTF-8")
+    if b"\0" in raw:
+        raise InputError(field, str(path), "is no text: it has bytes of zero", "name a text file, or save it as UTF-8")
+    try:
+        return raw.removeprefix(codecs.BOM_UTF8).decode()
+    except UnicodeDecodeError as error:
+        raise InputError(field, str(path), *_told(raw, error.start)) from None
+
+
+def _told(raw: bytes, at: int) -> tuple[str, str]:
+    """What bytes that are no UTF-8 are, and the cure; the first wrong one stands at `at`."""
+    line = raw.count(b"\n", 0, at) + 1
+    # Latin-1 has control characters where Windows-1252 has letters and quotes
+    name, codec = ("Windows-1252", "cp1252") if any(0x80 <= byte < 0xA0 for byte in raw) else ("Latin-1", "latin-1")
+    letter = raw[at : at + 1].decode(codec, "replace")
+    return f"is not UTF-8 but, it seems, {name}: line {line} has {letter!r} as byte {raw[at]:#x}", "save it as UTF-8"
