@@ -2,21 +2,68 @@
 
 from __future__ import annotations
 
-import argparse
 import importlib
+import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 
 from . import __version__
 from .commands import COMMANDS
+from .commands.arguments import CommandParser
 from .errors import InputError, MissingLibraryError, unknown_name
 
 USAGE = "gearfe COMMAND ... ('gearfe COMMAND --help' tells a command's options)"
 
 
+#: Exit code where the reader of the output went away, as the shell's other tools give it (128 + SIGPIPE).
+CLOSED = 141
+
+
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; return its exit code: 0 done, 1 done with failures, 2 bad input, 130 interrupted."""
-    arguments = list(sys.argv[1:] if argv is None else argv)
+    """Run one command; return its exit code.
+
+    0 done, 1 done with failures, 2 bad input, 130 interrupted, 141 the reader of the output closed it.
+    """
+    try:
+        code = _answered(list(sys.argv[1:] if argv is None else argv))
+        for stream in (sys.stdout, sys.stderr):
+            if stream is not None:
+                stream.flush()
+    except BrokenPipeError:
+        code = CLOSED
+    except OSError as error:  # the output itself: a full disk
+        code = 2
+        with suppress(OSError):
+            print(f"gearfe: error: the output cannot be written: {error.strerror or error}", file=sys.stderr)
+    else:
+        return code
+    _drop_output()
+    return code
+
+
+def _answered(arguments: list[str]) -> int:
+    """Run, and tell mistakes in one line."""
+    try:
+        return _run(arguments)
+    except BrokenPipeError:
+        raise
+    except SystemExit as leave:  # argparse has printed the help
+        return int(leave.code or 0)
+    except (InputError, MissingLibraryError) as error:
+        message, code = f"error: {error}", 2
+    except KeyboardInterrupt:
+        message, code = "interrupted", 130
+    except MemoryError:
+        message, code = "error: not enough memory for this job; coarser meshes or fewer outputs need less", 2
+    except OSError as error:
+        place = error.filename or "a file cannot be written or read"
+        message, code = f"error: {place}: {error.strerror or error}", 2
+    print(f"gearfe: {message}", file=sys.stderr)
+    return code
+
+
+def _run(arguments: list[str]) -> int:
     if not arguments or arguments[0] in ("-h", "--help"):
         print(f"usage: {USAGE}\n")
         for name in COMMANDS:
@@ -25,25 +72,23 @@ def main(argv: Sequence[str] | None = None) -> int:
     if arguments[0] in ("-V", "--version"):
         print(f"gearfe {__version__}")
         return 0
-    try:
-        if arguments[0] not in COMMANDS:
-            raise unknown_name("command", arguments[0], COMMANDS)
-        module = _module(arguments[0])
-        parser = argparse.ArgumentParser(prog=f"gearfe {arguments[0]}", description=module.HELP)
-        module.add_arguments(parser)
-        return int(module.run(parser.parse_args(arguments[1:])))
-    except (InputError, MissingLibraryError) as error:
-        print(f"gearfe: error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("gearfe: interrupted", file=sys.stderr)
-        return 130
-    except OSError as error:
-        print(
-            f"gearfe: error: {error.filename or 'a file cannot be written or read'}: {error.strerror or error}",
-            file=sys.stderr,
-        )
-        return 2
+    if arguments[0] not in COMMANDS:
+        raise unknown_name("command", arguments[0], COMMANDS)
+    module = _module(arguments[0])
+    parser = CommandParser(prog=f"gearfe {arguments[0]}", description=module.HELP)
+    module.add_arguments(parser)
+    return int(module.run(parser.parse_args(arguments[1:])))
+
+
+def _drop_output() -> None:
+    """Send what is left in the buffers nowhere: the interpreter would complain of it at its end."""
+    with suppress(OSError, ValueError, AttributeError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError, ValueError):
+                stream.flush()
+                continue
+            os.dup2(nowhere, stream.fileno())
 
 
 def _module(name: str):  # type: ignore[no-untyped-def]

@@ -20,16 +20,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the geometry, write gear_pair.png and gear_pair.json."""
+    from ..config import load_job
     from ..errors import InputError
+
+    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    tables = load_job(args.job, ("pair",), ("stiffness",))
+    if not math.isfinite(args.angle_deg):
+        raise InputError("--angle-deg", args.angle_deg, "must be finite")
+
     from ..gear.derived import derived_geometry, iso_values
     from ..gear.drawing import pair_drawing
     from ..output.figures import pair_figure
     from ..output.files import output_folder, whole_set, write_json
-    from ..stiffness.job import read_stiffness_job
+    from ..stiffness.job import stiffness_job
 
-    if not math.isfinite(args.angle_deg):
-        raise InputError("--angle-deg", args.angle_deg, "must be finite")
-    job = read_stiffness_job(args.job)
+    job = stiffness_job(tables)
     pair = job.pair
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
     geometry = derived_geometry(pair)

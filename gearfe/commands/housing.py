@@ -26,18 +26,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    import numpy as np
-
     from ..config import load_job
     from ..errors import InputError
+
+    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    table = load_job(args.job, ("housing",))["housing"]
+    if args.modes < 1:
+        raise InputError("--modes", args.modes, "must be 1 or more", "20 is the default")
+
+    import numpy as np
+
     from ..housing.build import material, reduced_housing
     from ..housing.mesh_error import frequency_errors
     from ..output.files import output_folder, whole_set
     from ..reduction.error import reduction_error
 
-    if args.modes < 1:
-        raise InputError("--modes", args.modes, "must be 1 or more", "20 is the default")
-    table = load_job(args.job, ("housing",))["housing"]
     folder = output_folder(args.out)
     started = time.perf_counter()
     body = reduced_housing(table)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .arguments import check_option
+
 if TYPE_CHECKING:
-    from ..stiffness.job import StiffnessJob
     from ..tables.loadmap import LoadMapTable
+    from ..tables.stiffness import StiffnessTable
 
 HELP = "stiffness, transmission error, load share, pressure, root stress over pinion angle and torque"
 
@@ -43,19 +45,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compute the map and write the files; 1 when a cell failed."""
     started = time.perf_counter()
+    from ..config import load_job
+    from ..tables.loadmap import LoadMapTable
+    from ..tables.stiffness import StiffnessTable
+
+    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    tables = load_job(args.job, ("pair",), ("stiffness", "loadmap"))
+    tables["stiffness"] = _overridden_model(tables.get("stiffness", StiffnessTable()), args)
+    table = _overridden_loads(tables.get("loadmap", LoadMapTable()), args)
+    torques = table.torques()
+
     import numpy as np
 
     from ..loadmap.report import figure_arguments, summary, told, torque_table, warnings
     from ..loadmap.sweep import sweep_loads
     from ..output.files import output_folder, whole_set, write_csv, write_json
-    from ..stiffness.job import read_stiffness_job
+    from ..stiffness.job import stiffness_job
     from ..stopwatch import Stopwatch
     from .stiffness import Progress
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("geometry"):
-        job, table = _overridden(read_stiffness_job(args.job), _table(args.job), args)
-        torques = table.torques()
+        job = stiffness_job(tables)
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
     show = Progress()
     made_map = sweep_loads(
@@ -91,57 +102,44 @@ def run(args: argparse.Namespace) -> int:
     return 1 if made_map.failed.any() else 0
 
 
-def _table(path: str) -> LoadMapTable:
-    from ..config import load_job
-    from ..tables.loadmap import LoadMapTable
-
-    table: LoadMapTable = load_job(path, (), ("loadmap",)).get("loadmap", LoadMapTable())
-    return table
-
-
-def _overridden(job: StiffnessJob, table: LoadMapTable, args: argparse.Namespace) -> tuple[StiffnessJob, LoadMapTable]:
-    """The job with the command's options in place of the file's values, checked like these."""
-    from ..errors import InputError
-    from ..tables.loadmap import LoadMapTable
+def _overridden_model(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTable:
+    """The table with the command's options in place of the file's values, checked like these."""
     from ..tables.stiffness import StiffnessTable
 
-    known = {f.name: f.metadata for cls in (StiffnessTable, LoadMapTable) for f in fields(cls)}
     changes: dict[str, Any] = {}
     for name, key in OVERRIDES.items():
         if getattr(args, name) is not None:
-            _check("--" + name, getattr(args, name), known[key])
+            check_option("--" + name, getattr(args, name), StiffnessTable, key)
             changes[key] = getattr(args, name)
+    made = replace(table, **changes)
+    made.check("stiffness")
+    return made
+
+
+def _overridden_loads(table: LoadMapTable, args: argparse.Namespace) -> LoadMapTable:
+    """The table with the command's options in place of the file's values, checked like these."""
+    from ..errors import InputError
+    from ..tables.loadmap import LoadMapTable
+
     more: dict[str, Any] = {}
     if args.torques_Nm is not None:
         for torque in args.torques_Nm:
-            _check("--torques-Nm", torque, known["torques_Nm"])
+            check_option("--torques-Nm", torque, LoadMapTable, "torques_Nm")
         more |= {"torques_Nm": tuple(args.torques_Nm), "torque_start_Nm": None, "torque_stop_Nm": None}
     if args.torque_range is not None:
         start, stop, count = args.torque_range
-        if count != int(count):
+        if not float(count).is_integer():
             raise InputError("--torque-range COUNT", count, "must be a whole number")
         ends = {"torque_start_Nm": start, "torque_stop_Nm": stop, "torque_count": int(count)}
         for key, value in ends.items():
-            _check("--torque-range", value, known[key])
+            check_option("--torque-range", value, LoadMapTable, key)
         more |= {"torques_Nm": None, **ends}
     for name, key in (("spacing", "torque_spacing"), ("positions", "positions")):
         if getattr(args, name) is not None:
-            _check("--" + name, getattr(args, name), known[key])
+            check_option("--" + name, getattr(args, name), LoadMapTable, key)
             more[key] = getattr(args, name)
     if args.root_stress:
         more["root_stress"] = True
     made = replace(table, **more)
     made.check("loadmap")
-    model = replace(job.table, **changes)
-    model.check("stiffness")
-    return replace(job, table=model), made
-
-
-def _check(option: str, value: Any, known: Any) -> None:
-    from ..config import check_range
-    from ..errors import InputError
-
-    if isinstance(value, (int, float)):
-        check_range(value, option, known)
-    elif known["choices"] and value not in known["choices"]:
-        raise InputError(option, value, "must be one of " + ", ".join(known["choices"]))
+    return made

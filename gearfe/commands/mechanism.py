@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
+
+from .arguments import check_option
 
 HELP = "trajectories, energies and reactions of a planar mechanism"
 
@@ -22,10 +25,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command; 1 when the run stopped before its end."""
+    from ..tables.mechanism import RunTable, read_mechanism_file
+
+    # a mistake in the file is told before NumPy and SciPy load
+    file = read_mechanism_file(args.file)
+    for name in ("tolerance", "method"):
+        if getattr(args, name) is not None:
+            check_option("--" + name, getattr(args, name), RunTable, name)
+
     from ..mechanisms.job import run_mechanism
+    from ..mechanisms.model import make_mechanism
 
     outcome = run_mechanism(
-        args.file,
+        make_mechanism(file, Path(args.file)),
         args.out,
         tolerance=args.tolerance,
         method=args.method,

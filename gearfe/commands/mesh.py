@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from .arguments import check_option
+
 HELP = "meshes of a gear pair with named boundaries, as .msh, .vtu or .inp"
 
 
@@ -22,21 +24,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the file and name its groups."""
-    from ..errors import InputError
+    from ..config import load_job
+    from ..tables.stiffness import StiffnessTable, check_flank_coarsen
+
+    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    tables = load_job(args.job, ("pair",), ("stiffness",))
+    table = tables.get("stiffness", StiffnessTable())
+    coarsen, flank = table.coarsen if args.coarsen is None else args.coarsen, table.flank_coarsen
+    check_option("--coarsen", coarsen, StiffnessTable, "coarsen")
+    check_flank_coarsen(coarsen, flank, "stiffness.flank_coarsen")
+
     from ..meshing.export import export_mesh, format_of
     from ..meshing.recipe import sector_recipes
     from ..meshing.tooth_sector import sector_mesh
     from ..output.files import output_folder
-    from ..stiffness.job import read_stiffness_job
-    from ..tables.stiffness import check_flank_coarsen
+    from ..stiffness.job import stiffness_job
 
     format_of(args.out)
-    job = read_stiffness_job(args.job)
-    coarsen = job.table.coarsen if args.coarsen is None else args.coarsen
-    flank = job.table.flank_coarsen
-    if not 0.2 <= coarsen <= 5.0:
-        raise InputError("--coarsen", coarsen, "must be >= 0.2 and <= 5", "1 is the default mesh, 2 twice its sizes")
-    check_flank_coarsen(coarsen, flank, "stiffness.flank_coarsen")
+    job = stiffness_job(tables)
     output_folder(Path(args.out).parent)
     recipes = sector_recipes(job.pair, coarsen=coarsen, flank_coarsen=flank)
     parts: dict[str, Any] = {}

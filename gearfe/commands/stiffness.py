@@ -5,12 +5,15 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .arguments import check_option
+
 if TYPE_CHECKING:
     from ..stiffness.job import StiffnessJob
+    from ..tables.stiffness import StiffnessTable
 
 HELP = "mesh stiffness of a gear pair over its rotation: table, picture, summary, fields"
 
@@ -61,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fields",
         nargs="*",
+        type=field_angle,
         metavar="ANGLE",
         help="write displacement and stress of whole gears: 'all' (also without a value), or pinion angles (deg)",
     )
@@ -77,26 +81,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compute the curve and write the files; 1 when a position failed."""
     started = time.perf_counter()
+    from ..config import load_job
+    from ..errors import InputError
+    from ..tables.stiffness import StiffnessTable
+
+    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    tables = load_job(args.job, ("pair",), ("stiffness",))
+    tables["stiffness"] = overridden(tables.get("stiffness", StiffnessTable()), args)
+    chosen = None if args.fields is None else _field_angles(args.fields)
+    if args.animate is not None and not 2 <= args.animate <= 1000:
+        raise InputError("--animate", args.animate, "must be >= 2 and <= 1000 frames", "40 are usual")
+
     import numpy as np
 
-    from ..errors import InputError
     from ..output.files import output_folder, whole_set, write_json
-    from ..stiffness.job import read_stiffness_job
+    from ..stiffness.job import stiffness_job
     from ..stiffness.report import figure_arguments, summary, told, warnings
     from ..stiffness.sweep import elastic_pair, sweep_stiffness
     from ..stopwatch import Stopwatch
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("geometry"):
-        job = overridden(read_stiffness_job(args.job), args)
+        job = stiffness_job(tables)
         sweep = job.sweep
-        chosen = None if args.fields is None else _field_angles(args.fields)
         if isinstance(chosen, list):
             from ..stiffness.fields_output import angle_numbers
 
             angle_numbers(np.degrees(sweep["angles"]), chosen)
-    if args.animate is not None and not 2 <= args.animate <= 1000:
-        raise InputError("--animate", args.animate, "must be >= 2 and <= 1000 frames", "40 are usual")
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
     elastic = elastic_pair(job.pair, watch=watch, **job.model)
     show = Progress()
@@ -153,31 +164,28 @@ def _points(job: StiffnessJob) -> dict[str, Any]:
     return {name: getattr(job.table, name) for name in MESH}
 
 
-def _field_angles(given: list[str]) -> str | list[float]:
+def field_angle(text: str) -> str | float:
+    """A value of ``--fields``: all, or a pinion angle (deg)."""
+    return text if text == "all" else float(text)
+
+
+def _field_angles(given: list[str | float]) -> str | list[float]:
     from ..errors import InputError
 
-    if given in ([], ["all"]):
-        return "all"
-    try:
-        return [float(text) for text in given]
-    except ValueError:
-        raise InputError("--fields", " ".join(given), "must be 'all' or pinion angles (deg)") from None
+    angles = [value for value in given if not isinstance(value, str)]
+    if angles and len(angles) < len(given):
+        raise InputError("--fields", given, "must be 'all' or pinion angles (deg), not both")
+    return angles or "all"
 
 
-def overridden(job: StiffnessJob, args: argparse.Namespace) -> StiffnessJob:
-    """The job with the command's options in place of the file's values, checked like these."""
-    from ..config import check_range
-    from ..errors import InputError
+def overridden(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTable:
+    """The table with the command's options in place of the file's values, checked like these."""
     from ..tables.stiffness import StiffnessTable
 
-    known = {f.name: f.metadata for f in fields(StiffnessTable)}
     changes: dict[str, Any] = {}
 
     def put(option: str, key: str, value: Any) -> None:
-        if isinstance(value, float | int):
-            check_range(value, option, known[key])
-        elif known[key]["choices"] and value not in known[key]["choices"]:
-            raise InputError(option, value, "must be one of " + ", ".join(known[key]["choices"]))
+        check_option(option, value, StiffnessTable, key)
         changes[key] = value
 
     for name, key in OVERRIDES.items():
@@ -192,10 +200,10 @@ def overridden(job: StiffnessJob, args: argparse.Namespace) -> StiffnessJob:
             put("--angles START STEP STOP", key, value)
     if args.solve_all:
         changes["solve_all"] = True
-    table = replace(job.table, **changes)
-    table.check_law("stiffness")
-    table.check("--angles" if args.angles is not None else "stiffness")
-    return replace(job, table=table)
+    made = replace(table, **changes)
+    made.check_law("stiffness")
+    made.check("--angles" if args.angles is not None else "stiffness")
+    return made
 
 
 class Progress:

@@ -10,6 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .arguments import check_option
+
 if TYPE_CHECKING:
     from ..train.response import TrainResponse
     from ..train.scene import TrainScene
@@ -47,20 +49,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compute and write; 1 when the run ended early or a picture could not be drawn."""
     started = time.perf_counter()
-    from ..config import check_range
+    from ..tables.train import TrainTable, read_train_tables
+
+    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    tables = read_train_tables(args.job, args.variant)
+    if args.tolerance is not None:
+        check_option("--tolerance", args.tolerance, TrainTable, "tolerance")
+        tables["train"] = replace(tables["train"], tolerance=args.tolerance)
+
     from ..output.files import output_folder
     from ..stopwatch import Stopwatch
-    from ..tables.train import TrainTable
     from ..vibration.files import OutputChoice, check_choice, write_all
-    from ..vibration.job import read_train_job
+    from ..vibration.job import train_job
     from .stiffness import Progress
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("reading"):
-        job = read_train_job(args.job, args.variant)
-        if args.tolerance is not None:
-            check_range(args.tolerance, "--tolerance", TrainTable.__dataclass_fields__["tolerance"].metadata)
-            job = replace(job, table=replace(job.table, tolerance=args.tolerance))
+        job = train_job(args.job, tables)
         choice = OutputChoice(
             pictures=not args.no_pictures,
             fields=args.fields,

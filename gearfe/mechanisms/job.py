@@ -16,7 +16,7 @@ from ..rigid import Start, Trajectory, compiled, integrate
 from ..rigid.backend import affordable_steps
 from ..rigid.integrate import choose_method
 from .error_estimate import TrajectoryError, trajectory_error
-from .model import Mechanism, load_mechanism
+from .model import Mechanism
 from .results import Results, evaluate, reactions
 
 #: Files that depend on the options: what is left of them from an earlier run is removed.
@@ -35,7 +35,7 @@ class Outcome:
 
 
 def run_mechanism(
-    path: str | Path,
+    mechanism: Mechanism,
     out: str | Path,
     *,
     tolerance: float | None = None,
@@ -46,12 +46,11 @@ def run_mechanism(
     animation: bool = False,
     estimate: bool = True,
 ) -> Outcome:
-    """Read the file, integrate, write ``trajectory.csv``, ``energy.csv``, ``summary.json`` and what else is asked.
+    """Integrate, write ``trajectory.csv``, ``energy.csv``, ``summary.json`` and what else is asked.
 
     All files appear together, or none. With `estimate` a second, finer run tells how far off the first one is.
     """
     began = clock.perf_counter()
-    mechanism = load_mechanism(path)
     run = mechanism.file.run
     end = run.end_s if until is None else until
     if not (math.isfinite(end) and end > 0.0):

@@ -6,8 +6,10 @@ All shafts run along y, in the frame of the housing. Lengths in millimetres; spe
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
-from ..config import quantity
+from ..config import load_job, quantity
 from ..errors import InputError, unknown_name
 from .pair import ToothFormTable
 
@@ -216,3 +218,19 @@ class TrainTable:
         if name not in self.variants:
             raise unknown_name("variant", name, self.variants)
         return replace(self, curves=self.variants[name].curves, damping=self.variants[name].damping, variant=name)
+
+
+def read_train_tables(path: str | Path, variant: str | None = None) -> dict[str, Any]:
+    """Tables of a train job by name: ``train`` with the chosen variant (None: that which the file names), and others.
+
+    Raises
+    ------
+    InputError
+        For every mistake in the tables, and an unknown variant.
+    """
+    tables = load_job(path, ("train",), ("pair", "stiffness", "housing"))
+    table: TrainTable = tables["train"]
+    table = table.chosen(table.variant if variant is None else variant)
+    if table.housing == "elastic" and "housing" not in tables:
+        raise InputError("train.housing", "elastic", "needs a table [housing]", 'add it, or write housing = "rigid"')
+    return {**tables, "train": table}

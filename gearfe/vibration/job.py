@@ -8,7 +8,7 @@ response = simulate(model, job.times, tolerance=job.table.tolerance)
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..config import load_job
 from ..errors import InputError
 from ..gear.pair import Gear, GearPair
 from ..rigid import TimeFunction, constant, smoothed_step
@@ -24,7 +23,7 @@ from ..stiffness.curve import StiffnessCurve
 from ..tables.housing import HousingTable
 from ..tables.pair import DEFAULTS, PairTable
 from ..tables.stiffness import StiffnessTable
-from ..tables.train import TrainGearTable, TrainMeshTable, TrainTable
+from ..tables.train import TrainGearTable, TrainMeshTable, TrainTable, read_train_tables
 from ..train.kinematics import steady_forces
 from ..train.scene import Bearing, Damping, Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
 
@@ -70,13 +69,13 @@ def read_train_job(path: str | Path, variant: str | None = None) -> TrainJob:
     InputError
         For every mistake in the file, and an unknown variant.
     """
-    tables = load_job(path, ("train",), ("pair", "stiffness", "housing"))
-    table: TrainTable = tables["train"]
-    table = table.chosen(table.variant if variant is None else variant)
-    if table.housing == "elastic" and "housing" not in tables:
-        raise InputError("train.housing", "elastic", "needs a table [housing]", 'add it, or write housing = "rigid"')
+    return train_job(path, read_train_tables(path, variant))
+
+
+def train_job(path: str | Path, tables: Mapping[str, Any]) -> TrainJob:
+    """The job of tables that are read; curves that they name lie beside `path`."""
     stiffness = tables.get("stiffness", StiffnessTable())
-    return TrainJob(Path(path), table, tables.get("pair"), stiffness, tables.get("housing"))
+    return TrainJob(Path(path), tables["train"], tables.get("pair"), stiffness, tables.get("housing"))
 
 
 def train_body(job: TrainJob) -> ModalBody | None:

@@ -1,0 +1,105 @@
+"""The argument parser of the commands: what follows an option belongs to it only where it can.
+
+``argparse`` hands everything up to the next option to one that takes any number of values, so that
+``--fields JOB.toml`` leaves no job. Here such an option takes the values that its type accepts; one that takes any text
+gives the last ones back while a positional argument is missing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from ..config import check_range
+from ..errors import InputError, nearest, unknown_name
+
+_NUMBER = re.compile(r"-(\d|\.\d|inf|nan)", re.IGNORECASE)
+
+
+class CommandParser(argparse.ArgumentParser):
+    """Parser of one command; mistakes are `InputError`."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options, allow_abbrev=False)
+        self._refused: dict[str, str] = {}  # word -> option that could not take it
+
+    def print_help(self, file: Any = None) -> None:
+        """Print the help; ``argparse`` itself keeps silent where it cannot be written."""
+        print(self.format_help(), end="", file=file)
+
+    def error(self, message: str) -> Any:
+        """Tell a mistake in the words of ``argparse``."""
+        raise InputError("command line", None, message, f"{self.prog} --help tells the options")
+
+    def parse_args(self, args: Sequence[str], namespace: Any = None) -> Any:  # type: ignore[override]
+        """Namespace of the arguments.
+
+        Raises
+        ------
+        InputError
+            For an unknown option, a missing argument, or a value that cannot be read.
+        """
+        made, rest = self.parse_known_args(self._sorted(args), namespace)
+        if rest:
+            if rest[0].startswith("-"):
+                raise unknown_name("command line", rest[0].split("=")[0], self._option_string_actions)
+            word, option = next(iter(self._refused.items()), (rest[0], ""))
+            problem = f"is no value of {option}" if option else "is one argument too many"
+            raise InputError("command line", word, problem, f"{self.prog} --help tells the usage")
+        return made
+
+    def _sorted(self, args: Sequence[str]) -> list[str]:
+        """Options with their values first, then ``--`` and the positional arguments."""
+        groups: list[tuple[list[str], int]] = []  # an option with its values, and how many it keeps
+        positionals: list[str] = []
+        left = list(args)
+        while left:
+            word = left.pop(0)
+            if word == "--":
+                positionals += left
+                break
+            if not _is_option(word):
+                positionals.append(word)
+                continue
+            action = self._option_string_actions.get(word)  # one with =VALUE, or unknown, stands alone
+            least, most = (0, 0) if action is None else _counts(action)
+            group = [word]
+            while left and len(group) <= most and left[0] != "--" and not _is_option(left[0]):
+                if len(group) > least and not self._accepts(action, left[0]):
+                    self._refused[left[0]] = word
+                    break
+                group.append(left.pop(0))
+            groups.append((group, least if action is None or action.type is None else len(group)))
+        needed = sum(not action.option_strings and action.nargs is None for action in self._actions)
+        for group, least in reversed(groups):
+            while len(positionals) < needed and len(group) - 1 > least:
+                positionals.insert(0, group.pop())
+        return [*(word for group, _ in groups for word in group), *(["--", *positionals] if positionals else [])]
+
+    def _accepts(self, action: Any, word: str) -> bool:
+        try:
+            self._get_values(action, [word])
+        except argparse.ArgumentError:
+            return False
+        return True
+
+
+def _is_option(word: str) -> bool:
+    return len(word) > 1 and word.startswith("-") and word != "--" and not _NUMBER.match(word)
+
+
+def _counts(action: argparse.Action) -> tuple[int, float]:
+    """Least and largest number of values of an option."""
+    several: dict[Any, tuple[int, float]] = {"?": (0, 1), "*": (0, float("inf")), "+": (1, float("inf")), None: (1, 1)}
+    return several[action.nargs] if action.nargs in several else (count := int(action.nargs or 0), count)
+
+
+def check_option(option: str, value: Any, table: type, key: str) -> None:
+    """Raise `InputError` for a value that the `key` of a table does not allow."""
+    known = table.__dataclass_fields__[key].metadata  # type: ignore[attr-defined]
+    if isinstance(value, (int, float)):
+        check_range(value, option, known)
+    elif (choices := known["choices"]) and value not in choices:
+        raise InputError(option, value, "must be one of " + ", ".join(choices), nearest(value, choices))
