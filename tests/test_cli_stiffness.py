@@ -169,7 +169,7 @@ def test_a_failed_position_is_told_and_in_the_table(tmp_path, capsys, monkeypatc
 def test_a_position_without_contact_is_told(tmp_path, capsys):
     job = tmp_path / "job.toml"
     job.write_text(JOB.read_text().replace("\n[pair]\n", "\n[pair]\ncentre_distance_mm = 62.6\n"))
-    options = ["--twist-deg", "0.02", "--angles", "3", "1", "4", *QUICK]
+    options = ["--twist-deg", "0.02", "--twist-from", "centred", "--angles", "3", "1", "4", *QUICK]
     assert main(["stiffness", str(job), "--out", str(tmp_path), *options]) == 0
     assert "2 positions have no contact" in capsys.readouterr().err
     assert main(["stiffness", str(job), "--out", str(tmp_path), *options, "--twist-from", "contact"]) == 0

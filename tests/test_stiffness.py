@@ -8,6 +8,7 @@ import pytest
 from gearfe import InputError, Material, sweep_stiffness
 from gearfe.contact.solver import Position, solve_position
 from gearfe.gear.spur_gear import TipRelief
+from gearfe.loadmap.sweep import sweep_loads
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import pair
@@ -197,7 +198,7 @@ def test_direction(case, gears, elastic):
     def middle(one, body):
         """k at the pitch point, where one pair carries."""
         angle = one.path["C"].pinion_angle
-        return float(at(one, [angle], body, twist_from="contact", **load).k_mesh[0])
+        return float(at(one, [angle], body, **load).k_mesh[0])
 
     change = middle(other, None) / middle(gears, elastic) - 1
     assert sign * change > 2e-3, change
@@ -315,20 +316,35 @@ def test_backlash_and_the_zero_of_the_twist():
     assert lost > 1.2 * TWIST
     body = elastic_pair(loose, coarsen=COARSE)
     angles = on_the_path(loose, 2)[0]
-    apart = at(loose, angles, body)
+    apart = at(loose, angles, body, twist_from="centred")
     assert set(apart.status) == {"no_contact"}
     assert not apart.failed.any()
     np.testing.assert_array_equal(apart.torque_wheel, 0.0)
     np.testing.assert_array_equal(apart.k_mesh, 0.0)
-    np.testing.assert_allclose(apart.transmission_error_unloaded, lost * loose.wheel.base_radius, rtol=1e-4)
-    touching = at(loose, angles, body, twist_from="contact")
-    centred = at(loose, angles, body, twist=TWIST + lost)
+    np.testing.assert_allclose(apart.transmission_error_unloaded, 0.0, atol=1e-9)
+    touching = at(loose, angles, body)
+    centred = at(loose, angles, body, twist=TWIST + lost, twist_from="centred")
     np.testing.assert_allclose(touching.torque_wheel, centred.torque_wheel, rtol=1e-12)
     np.testing.assert_allclose(touching.wheel_angle, centred.wheel_angle, rtol=1e-12)
-    np.testing.assert_allclose(touching.k_mesh * TWIST, centred.k_mesh * (TWIST + lost), rtol=1e-12)
-    np.testing.assert_allclose(touching.transmission_error_unloaded, 0.0, atol=1e-9)
-    loaded = at(loose, angles, body, twist=None, torque=100.0, twist_from="contact")
-    np.testing.assert_allclose(loaded.torque_wheel, 100.0, rtol=1e-10)
+    np.testing.assert_allclose(touching.k_mesh, centred.k_mesh, rtol=1e-12)
+    np.testing.assert_allclose(centred.twist, TWIST, rtol=1e-9)
+    np.testing.assert_allclose([touching.lost_motion, centred.lost_motion], lost, rtol=1e-12)
+
+
+@pytest.mark.parametrize("clearance", [{"centre_distance": 62.6e-3}, {"tooth_thinning": 40e-6}])
+def test_backlash_is_no_compliance(clearance):
+    """The deflection vanishes with the load, and a line contact's tangent lies a little above its secant; with the lost
+    motion in it, the deflection stays and the secant falls to a small part of the tangent."""
+    loose = pair(tip_round=0.1e-3, **clearance)
+    lost = loose.contact_twist * loose.wheel.base_radius
+    body, angles = elastic_pair(loose, coarsen=COARSE), on_the_path(loose, 2)[0]
+    light, loaded = (at(loose, angles, body, twist=None, torque=torque, route="auto") for torque in (0.1, 10.0))
+    assert (light.transmission_error < 2e-3 * lost).all()
+    assert (light.transmission_error > 0).all()
+    ratio = loaded.k_tangent / loaded.k_mesh
+    assert ((ratio > 1.0) & (ratio < 1.3)).all(), ratio
+    of_map = sweep_loads(loose, [5.0, 10.0], angles=angles, elastic=body, kinematics="small")
+    np.testing.assert_allclose(of_map.curves[1].k_mesh, loaded.k_mesh, rtol=1e-5)
 
 
 def test_a_contact_that_the_mesh_misses_is_under_resolved(gears, elastic, monkeypatch):
@@ -359,7 +375,7 @@ def test_a_contact_that_the_mesh_misses_is_under_resolved(gears, elastic, monkey
         ({"twist": 1e-3, "angles": [math.nan]}, "finite angles"),
         ({"twist": 1e-3, "plane": "strained"}, "strain or stress"),
         ({"twist": 1e-3, "law": "glue"}, "one of nitsche, penalty"),
-        ({"twist": 1e-3, "twist_from": "here"}, "centred or contact"),
+        ({"twist": 1e-3, "twist_from": "here"}, "contact or centred"),
         ({"twist": 1e-3, "route": "both"}, "auto, direct or hertz"),
         ({"twist": 1e-3, "coarsen": 0.0}, "coarsen = 0.0: must be >= 0.2"),
     ],

@@ -78,7 +78,6 @@ SWEEP_CHANGES = {
     "penalty_stiffness_N_per_mm3": 1e7,
     "coarsen": 2.5,
     "flank_coarsen": 2.5,
-    "twist_from": "contact",
     "points_per_edge": 3,
     "route": "hertz",
     "law_sides": "wheel",
@@ -125,7 +124,7 @@ def test_every_key_is_in_this_file():
     given = {key.rpartition(".")[2] for key in (*PAIR_CHANGES, *BASE)}
     per_gear = {"material", "pinion", "wheel", "teeth", "bore_diameter_mm", "pitch_diameter_mm", "density_kg_per_m3"}
     assert set(PairTable.__dataclass_fields__) <= given | per_gear
-    elsewhere = {"twist_deg", "nitsche_gamma0", "nitsche_theta", "solve_all", "interpolation"}
+    elsewhere = {"twist_deg", "twist_from", "nitsche_gamma0", "nitsche_theta", "solve_all", "interpolation"}
     elsewhere |= {"angle_stop_deg", "angle_step_deg"}
     assert set(StiffnessTable.__dataclass_fields__) <= {*SWEEP_CHANGES, *elsewhere}
 

@@ -1,8 +1,7 @@
 """Mesh stiffness against other programs (tests/data/README.md says which), default settings.
 
-Rows at pair changes (0, 9, 17 deg) react to the last micrometre. The GetFEM row at 17 deg and 0.05 deg lies 1.7 % below
-the limit that this package and CalculiX reach from opposite sides (docs/verification.md): CalculiX's value takes its
-place in plane strain, in plane stress the row is left out.
+At pair changes (0, 9, 10, 17 deg) a sharp corner bears, k reacts to the last micrometre: in plane strain at 0.05 deg
+the reference resolves the corner (elements of 3 um), elsewhere its rows there carry a trust of 0.6 to 1.7 %.
 """
 
 import csv
@@ -17,9 +16,7 @@ from gearfe import sweep_stiffness
 from .gears import pair
 
 DATA = Path(__file__).parent / "data" / "gear_pair_20_30.csv"
-CHANGES = (0.0, 9.0, 17.0)
-#: CalculiX 2.20, NLGEOM, surface to surface, corner strips of 0.01 mm (N/m).
-CALCULIX_17_DEG = 1.5259e8
+CHANGES = (0.0, 9.0, 10.0, 17.0)
 
 
 def reference(plane, twist_deg):
@@ -51,20 +48,12 @@ def test_a_few_positions():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("plane", "twist_deg", "on_path", "at_changes"),
-    [("strain", 0.05, 0.2e-2, 0.8e-2), ("stress", 0.05, 0.2e-2, 0.8e-2), ("strain", 0.01, 0.3e-2, 1.5e-2)],
+    [("strain", 0.05, 0.1e-2, 0.25e-2), ("stress", 0.05, 0.1e-2, 1.0e-2), ("strain", 0.01, 0.1e-2, 1.2e-2)],
 )
 def test_the_full_cycle(plane, twist_deg, on_path, at_changes):
     angles, k = reference(plane, twist_deg)
-    if twist_deg == 0.05:
-        k = np.where(angles == 17.0, CALCULIX_17_DEG, k)
-        keep = (angles != 17.0) | (plane == "strain")
-        angles, k = angles[keep], k[keep]
-    curve = computed(plane, twist_deg, angles)
-    off = curve.k_mesh / k - 1
+    off = computed(plane, twist_deg, angles).k_mesh / k - 1
     change = np.isin(angles, CHANGES)
-    # 10 deg stands at the end of the pinion's tip contact for 0.05 deg: it counts as a change there
-    if twist_deg == 0.05:
-        change |= angles == 10.0
     worst = {"path": np.abs(off[~change]).max(), "changes": np.abs(off[change]).max()}
     assert worst["path"] <= on_path, dict(zip(angles, off, strict=True))
     assert worst["changes"] <= at_changes, dict(zip(angles, off, strict=True))
@@ -74,7 +63,7 @@ def test_the_full_cycle(plane, twist_deg, on_path, at_changes):
 def test_torque_ratio_on_the_path():
     angles, _ = reference("strain", 0.05)
     curve = computed("strain", 0.05, angles)
-    path = ~np.isin(angles, [*CHANGES, 8.0, 10.0])
+    path = ~np.isin(angles, [*CHANGES, 8.0])
     np.testing.assert_allclose((curve.torque_wheel / curve.torque_pinion)[path], 1.5, rtol=1e-3)
     change = ~path
     assert np.abs((curve.torque_wheel / curve.torque_pinion)[change] / 1.5 - 1).max() > 1e-3  # tips bear off the path

@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--plane", metavar="STATE", help="plane state: strain or stress")
     parser.add_argument("--kinematics", metavar="STRAIN", help="small or finite strain")
-    parser.add_argument("--twist-from", metavar="ZERO", dest="twist_from", help="zero of the twist: centred or contact")
+    parser.add_argument("--twist-from", metavar="ZERO", help="where the twist counts from: contact or centred")
     parser.add_argument("--coarsen", type=float, metavar="C", help="factor on all element sizes")
     parser.add_argument("--solve-all", action="store_true", help="solve positions of later mesh cycles too")
     parser.add_argument("--no-estimate", action="store_true", help="leave out the error estimate")

@@ -34,8 +34,8 @@ from ..errors import InputError
 from ..gear.iso6336 import mesh_stiffness
 from ..gear.pair import GearPair
 from ..stiffness.positions import Progress, Solved, at_torque, at_twists, honest
-from ..stiffness.routes import Router
-from ..stiffness.sweep import STEEL, assembled_curve, distinct_angles, elastic_pair, lost_motion
+from ..stiffness.routes import Route, Router
+from ..stiffness.sweep import STEEL, assembled_curve, distinct_angles, elastic_pair
 from ..stopwatch import Stopwatch
 from ..threads import one_thread
 from .cells import closed_level, light, log_twist, one_cell, outward, spent_share
@@ -68,7 +68,7 @@ def sweep_loads(
     plane: Plane = "strain",
     law: str | ContactLaw = "nitsche",
     kinematics: Literal["small", "finite"] = "finite",
-    twist_from: Literal["centred", "contact"] = "centred",
+    route: Route = "auto",
     coarsen: float = 1.0,
     flank_coarsen: float = 1.0,
     points_per_edge: int = 4,
@@ -86,7 +86,7 @@ def sweep_loads(
         solved once.
     root_stress
         Also the tension at the tooth roots, on refined meshes of its own, see `gearfe.loadmap.root_stress`.
-    materials, plane, law, kinematics, twist_from, coarsen, flank_coarsen, points_per_edge, elastic, progress
+    materials, plane, law, kinematics, route, coarsen, flank_coarsen, points_per_edge, elastic, progress
         See `gearfe.stiffness.sweep.sweep_stiffness`.
 
     Returns
@@ -108,7 +108,7 @@ def sweep_loads(
     asked = np.arange(ANGLES) * cycle / ANGLES if angles is None else np.atleast_1d(np.asarray(angles, dtype=float))
     if asked.ndim != 1 or len(asked) == 0 or not np.isfinite(asked).all():
         raise InputError("angles", angles, "must be a list of finite angles (rad)", "give at least one angle")
-    lost, watch = lost_motion(pair, twist_from), Stopwatch()
+    watch = Stopwatch()
     if elastic is None:
         sizes: dict[str, Any] = {"coarsen": coarsen, "flank_coarsen": flank_coarsen, "points_per_edge": points_per_edge}
         elastic = elastic_pair(pair, materials, plane=plane, law=law, watch=watch, **sizes)
@@ -116,7 +116,7 @@ def sweep_loads(
     if len(goals) * len(solved_angles) > MOST_CELLS:
         problem = f"makes more than {MOST_CELLS} cells with {len(solved_angles)} angles"
         raise InputError("torques", len(goals), problem, "use fewer torques or angles")
-    router = Router(pair, elastic)
+    router = Router(pair, elastic, route)
     with watch.stage("unloaded flanks"):
         touching = router.touching_twists(solved_angles)
     recorder = None
@@ -130,7 +130,7 @@ def sweep_loads(
         levels = [honest(level, touching) for level in work.run(finite=kinematics == "finite")]
     curves = tuple(
         replace(
-            assembled_curve(pair, asked, solved_angles, source, level, touching, lost, searched=True),
+            assembled_curve(pair, asked, solved_angles, source, level, touching, searched=True),
             law=law_text(elastic.law),
         )
         for level in levels

@@ -106,13 +106,14 @@ class StiffnessCurve:
     pinion_angle, wheel_angle
         Rotations (rad), counter-clockwise; at pinion angle 0 a pinion tooth stands on the line of centres.
     twist
-        Twist of the wheel (rad), counted from `lost_motion` behind the position in which a wheel space faces a tooth.
+        Twist of the wheel (rad) from where unmodified driving flanks touch: the deflection, negative where less than
+        the lost motion was prescribed.
     torque_wheel, torque_pinion
         Moments that the hubs need (N m), energy-conjugate; positive when the driving flanks are pressed together.
     torque_wheel_reaction
         Moment of the bore reactions of the small-strain wheel (N m).
     k_torsional
-        torque_wheel/twist (N m/rad).
+        torque_wheel/twist (N m/rad); zero where nothing touches.
     k_mesh, k_tangent
         torque_wheel/twist/r_b^2 and d torque_wheel/d twist/r_b^2, along the line of action (N/m).
     transmission_error, transmission_error_unloaded
@@ -138,7 +139,8 @@ class StiffnessCurve:
     base_radius
         r_b of the wheel (m).
     lost_motion
-        Twist (rad) taken off before `twist` counts: half the backlash, or 0.
+        Twist (rad) from the centred position, in which a wheel space faces a pinion tooth, to where `twist` counts
+        from: half the backlash.
     law
         Contact law with its parameters; empty where unknown.
     timings

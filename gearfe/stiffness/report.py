@@ -48,6 +48,23 @@ def cycle_statistics(curve: StiffnessCurve, method: str) -> dict[str, float] | N
     return {"mean_N_per_m": float(k.mean()), "least_N_per_m": float(k.min()), "largest_N_per_m": float(k.max())}
 
 
+def load_statistics(job: StiffnessJob, curve: StiffnessCurve) -> dict[str, Any]:
+    """Torque at the wheel over the solved positions (N m), and where a prescribed twist counts from (deg)."""
+    torque = curve.torque_wheel[~curve.failed]
+    lost = math.degrees(curve.lost_motion)
+    given = None
+    if job.table.twist_deg is not None:
+        inside = lost if job.table.twist_from == "centred" else 0.0
+        given = {
+            "twist_deg": job.table.twist_deg,
+            "counted_from": job.table.twist_from,
+            "lost_motion_in_it_deg": inside,
+            "deflection_deg": job.table.twist_deg - inside,
+        }
+    known = {"mean": torque.mean(), "least": torque.min(), "largest": torque.max()} if len(torque) else None
+    return {"torque_wheel_Nm": known, "lost_motion_deg": lost, "prescribed_twist": given}
+
+
 def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, float]) -> dict[str, Any]:
     """Content of summary.json."""
     moduli = [material.youngs_modulus for material in job.materials]
@@ -70,6 +87,7 @@ def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, floa
             "pinion_angle_deg": np.degrees(error.pinion_angle),
             "relative": error.relative,
         },
+        "load": load_statistics(job, curve),
         "contact_law": curve.law,
         "statuses": dict(Counter(map(str, curve.status))),
         "routes": dict(Counter(map(str, curve.route))),
@@ -92,6 +110,7 @@ def told(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
         )
     if curve.law:
         lines.append(f"contact law: {curve.law}")
+    lines += _load_lines(load_statistics(job, curve))
     level = cycle_statistics(curve, job.table.interpolation)
     if level is not None:
         mean, low, high = (1e-6 * level[key] for key in ("mean_N_per_m", "least_N_per_m", "largest_N_per_m"))
@@ -110,13 +129,27 @@ def told(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
     return lines
 
 
+def _load_lines(load: Mapping[str, Any]) -> list[str]:
+    lines, torque, given = [], load["torque_wheel_Nm"], load["prescribed_twist"]
+    if given is not None and given["lost_motion_in_it_deg"]:
+        lines.append(
+            f"twist {given['twist_deg']:.6g} deg from the centred position: {given['lost_motion_in_it_deg']:.6g} deg "
+            f"of lost motion (half the backlash) and {given['deflection_deg']:.6g} deg of deflection"
+        )
+    if torque is not None:
+        mean, low, high = (torque[key] for key in ("mean", "least", "largest"))
+        lines.append(f"torque at the wheel: mean {mean:.4g}, least {low:.4g}, largest {high:.4g} N m")
+    return lines
+
+
 def warnings(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
     """Sentences about what deserves a look."""
     said = list(job.pair.warnings)
     apart = int(np.count_nonzero(curve.status == "no_contact"))
     if apart:
         sentence = f"{apart} positions have no contact: the twist does not take up backlash and relief there"
-        cure = "" if curve.lost_motion else ' (twist_from = "contact" counts it from where the flanks touch)'
+        centred = job.table.twist_from == "centred"
+        cure = ' (twist_from = "contact" counts it from where the flanks touch)' if centred else ""
         said.append(sentence + cure)
     if curve.failed.any():
         angles = ", ".join(f"{a:.6g}" for a in np.degrees(curve.pinion_angle[curve.failed])[:8])

@@ -1,8 +1,9 @@
 """Rotation sweep: from a gear pair to its mesh-stiffness curve.
 
 Conventions: pinion centre at the origin, wheel at +x; at pinion angle 0 a pinion tooth stands on the line of centres
-and a wheel space faces it; angles are counter-clockwise; wheel angle = -pinion angle z1/z2 + twist, and a positive
-twist presses the driving flanks together.
+and a wheel space faces it; angles are counter-clockwise; wheel angle = -pinion angle z1/z2 + lost motion + twist. The
+lost motion is half the backlash: it brings unmodified driving flanks to touch, and a positive twist presses them
+together.
 
     >>> curve = sweep_stiffness(pair, twist=math.radians(0.05))   # one mesh cycle in 20 positions
     >>> k, slope = curve.interpolate(math.radians(7.3))           # N/m and N/(m rad)
@@ -117,7 +118,7 @@ def sweep_stiffness(
     plane: Plane = "strain",
     law: str | ContactLaw = "nitsche",
     kinematics: Literal["small", "finite"] = "finite",
-    twist_from: Literal["centred", "contact"] = "centred",
+    twist_from: Literal["contact", "centred"] = "contact",
     solve_all: bool = False,
     route: Route = "auto",
     coarsen: float = 1.0,
@@ -132,7 +133,7 @@ def sweep_stiffness(
     Parameters
     ----------
     twist
-        Twist of the wheel (rad), > 0.
+        Twist of the wheel (rad), > 0, counted as `twist_from` says.
     torque
         Torque at the wheel's hub (N m), > 0, instead of `twist`.
     angles : array_like, shape (n,), optional
@@ -144,8 +145,8 @@ def sweep_stiffness(
         ``small``: small strain in each hub's frame; ``finite`` (default) adds the first-order effect of finite strain
         on the torque, see `gearfe.contact.finite_strain`.
     twist_from
-        Where the twist counts from: ``centred``, a wheel space faces the pinion tooth; ``contact``, half the backlash
-        further, where unmodified flanks touch.
+        Where the given `twist` counts from: ``contact``, where unmodified flanks touch; ``centred``, where a wheel
+        space faces the pinion tooth, half the backlash before. Results count from contact in either case.
     solve_all
         Solve every position, also those that differ by whole mesh cycles.
     route
@@ -171,8 +172,7 @@ def sweep_stiffness(
     """
     if kinematics not in ("small", "finite"):
         raise InputError("kinematics", kinematics, "must be small or finite")
-    lost = lost_motion(pair, twist_from)
-    load = _checked_load(pair, twist, torque, lost)
+    load = _checked_load(pair, twist, torque, twist_from)
     cycle = pair.mesh_cycle
     asked = np.arange(20) * cycle / 20 if angles is None else np.atleast_1d(np.asarray(angles, dtype=float))
     if asked.ndim != 1 or len(asked) == 0 or not np.isfinite(asked).all():
@@ -202,19 +202,15 @@ def sweep_stiffness(
             coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
             routers = router, Router(pair, coarse, route)
             error = _estimate(routers, solved_angles, solved, finite=finite, coarsen=coarsen * max(1.0, flank_coarsen))
-    curve = assembled_curve(pair, asked, solved_angles, source, solved, touching, lost, searched=torque is not None)
+    curve = assembled_curve(pair, asked, solved_angles, source, solved, touching, searched=torque is not None)
     return replace(curve, law=law_text(elastic.law), timings=dict(watch.seconds), error=error)
 
 
-def lost_motion(pair: GearPair, twist_from: str) -> float:
-    """Twist (rad) that is taken off before it counts, see `sweep_stiffness`."""
-    if twist_from not in ("centred", "contact"):
-        raise InputError("twist_from", twist_from, "must be centred or contact")
-    return pair.contact_twist if twist_from == "contact" else 0.0
-
-
-def _checked_load(pair: GearPair, twist: float | None, torque: float | None, lost: float) -> float:
-    """Twist in all (rad), or torque."""
+def _checked_load(pair: GearPair, twist: float | None, torque: float | None, twist_from: str) -> float:
+    """Twist from the centred position (rad), or torque."""
+    if twist_from not in ("contact", "centred"):
+        raise InputError("twist_from", twist_from, "must be contact or centred")
+    lost = pair.contact_twist if twist_from == "contact" else 0.0
     if (twist is None) == (torque is None):
         problem = "neither is given" if twist is None else "both are given"
         raise InputError("twist, torque", None, problem, "give exactly one of them")
@@ -261,16 +257,16 @@ def assembled_curve(
     source: IntArray,
     solved: Solved,
     touching: Array,
-    lost: float,
     *,
     searched: bool,
 ) -> StiffnessCurve:
     """The curve at all asked angles; `searched` says that the twist is a result, not given."""
-    radius = pair.wheel.base_radius
+    radius, lost = pair.wheel.base_radius, pair.contact_twist
     failed = ~np.isin(solved.status, SOLVED)
     total = np.where(failed & searched, np.nan, solved.twist)
     twist = total - lost
     torque = solved.numbers["torque_wheel"]
+    stiffness = np.divide(torque, twist, out=np.zeros_like(torque), where=torque != 0.0)  # not-a-number stays
     cycles = np.round((asked - angles[source]) / pair.mesh_cycle).astype(np.int64)
     leading, shares = load_shares(solved.pairs, torque)
     return StiffnessCurve(
@@ -280,8 +276,8 @@ def assembled_curve(
         torque_wheel=torque[source],
         torque_pinion=solved.numbers["torque_pinion"][source],
         torque_wheel_reaction=solved.numbers["torque_wheel_reaction"][source],
-        k_torsional=(torque / twist)[source],
-        k_mesh=(torque / twist / radius**2)[source],
+        k_torsional=stiffness[source],
+        k_mesh=(stiffness / radius**2)[source],
         k_tangent=(solved.numbers["tangent"] / radius**2)[source],
         transmission_error=(twist * radius)[source],
         transmission_error_unloaded=((touching - lost) * radius)[source],

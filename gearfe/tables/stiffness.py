@@ -32,10 +32,10 @@ class StiffnessTable:
     )
     torque_Nm: float | None = quantity(None, doc="torque at the wheel's hub (N m), or give twist_deg", above=0.0)
     twist_from: str = quantity(
-        "centred",
-        doc="where the twist counts from: centred (a wheel space faces the pinion tooth) or contact (half the backlash "
-        "further, where unmodified flanks touch)",
-        choices=("centred", "contact"),
+        "contact",
+        doc="where twist_deg counts from: contact (where unmodified driving flanks touch) or centred (a wheel space "
+        "faces the pinion tooth; half the backlash is then lost motion)",
+        choices=("contact", "centred"),
     )
     angle_start_deg: float = quantity(0.0, doc="first pinion angle (deg)")
     angle_step_deg: float = quantity(1.0, doc="step of the pinion angle (deg)", above=0.0)
@@ -45,7 +45,7 @@ class StiffnessTable:
     law_sides: str | None = quantity(
         None,
         doc="flanks that the law is integrated on: tip takes, of each tooth pair, the gear whose tip is nearer; by "
-        "default both for nitsche, pinion for penalty, tip for exact",
+        "default both for nitsche, tip for penalty and exact",
         choices=("both", "pinion", "wheel", "tip"),
     )
     kinematics: str = quantity(

@@ -338,7 +338,7 @@ def _computed_curve(job: TrainJob, scene: TrainScene, number: int, watch: Any, p
         "torque": torque,
         "angles": pair.mesh_cycle * np.arange(count) / count,
         "kinematics": job.stiffness.kinematics,
-        "twist_from": job.stiffness.twist_from,
+        "route": job.stiffness.route,
     }
     return cached_curve(pair, model, sweep, watch=watch, progress=progress)
 
