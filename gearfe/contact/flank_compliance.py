@@ -1,0 +1,187 @@
+r"""What loads on a flank do to it: finite elements for tooth and gear, half-plane and wedge near the load.
+
+A line load f per width at the arc t of a tooth moves the flank of the tooth k steps on at s by
+
+.. math::
+    u(s) = w\,H_k(s,t)\,f - \delta_{k0}\,\tfrac{1}{E'}\Big(\tfrac2\pi\ln|s-t|\,I + W\ln(y(s)+y(t))\Big) f
+
+with the width w and the surface of a half-plane and of a wedge (`.wedge`), y the distance from the corner in which
+flank and tip circle meet, virtual under a tip round. What is left, H, is smooth: no load is near it any more. It is
+known from the finite-element answers to elliptic bumps of pressure at some fifteen stations, less the bracket under the
+same bumps,
+
+.. math::
+    H_k(s_i, s_j) = b_i^T C^{FE}_k b_j
+    + \delta_{k0}\,\tfrac{1}{w E'}\,\langle\tfrac2\pi\ln|s-t|\,I + W\ln(y+y)\rangle_{ij},
+
+and runs between them on cubic splines, straight on beyond the last station. Bumps average over their half width a,
+which adds a^2/8 of the second derivative on either side; who evaluates H at a contact takes that off with the contact's
+own width (`gearfe.contact.half_plane`).
+
+The bumps are two elements wide, so a mesh whose flank elements are 0.1 module serves as well as a fine one, and at
+least 0.2 module, since second derivatives of H magnify the noise of the elements.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from ..gear.flank_curve import FlankCurve, flank_curve
+from ..gear.pair import GearPair
+from .compliance import GearBody
+from .elliptic import Chain
+from .scene import MeshingPair
+from .wedge import ELLIPSE_W, ELLIPSE_X, mean_log, wedge_tensor
+
+Array = NDArray[Any]
+
+#: Half width of a bump, in elements and at least in modules; distance of two stations in half widths.
+BUMP_ELEMENTS, BUMP_MODULES, SPACING = 2.0, 0.2, 0.8
+#: Nearer to an end of the flank than this share of an element there is no station.
+TOO_NEAR = 0.75
+
+
+@dataclass(frozen=True)
+class FlankCompliance:
+    """The working flank of one elastic gear: where it is, and what loads on it do to it.
+
+    Attributes
+    ----------
+    curve
+        The exact flank.
+    inverse_modulus
+        1/E' (1/Pa) per width of the contact.
+    corner
+        Where flank and tip circle meet, or would without the tip round, in the tooth's frame (m).
+    wedge : ndarray, shape (2, 2)
+        W in the tooth's axes (-).
+    stations, bumps : ndarray, shape (k,)
+        Arc lengths of the stations and half widths of their bumps (m).
+    smooth : dict of int to ndarray, shape (2k, 2k)
+        Step -> H between the stations of teeth so many steps apart, tooth axes, xy by station (m/N).
+    basis
+        Splines through the stations, their slopes and curvatures.
+    offset
+        Arc length on the mesh's chain of edges where the working flank starts (m).
+    """
+
+    curve: FlankCurve
+    inverse_modulus: float
+    corner: complex
+    wedge: Array
+    stations: Array
+    bumps: Array
+    smooth: dict[int, Array]
+    basis: tuple[CubicSpline, CubicSpline, CubicSpline]
+    offset: float
+
+    def distance(self, s: Array) -> Array:
+        """Distance y (m) of the flank at arc lengths s (m) from the corner."""
+        here = np.maximum(s, self.curve.low)
+        return np.maximum(np.abs(self.curve.at(here)[0] - self.corner), 1e-9) + (here - s)
+
+    def shapes(self, s: Array) -> tuple[Array, Array, Array]:
+        """Shape functions of the stations at arc lengths s (m), slopes (1/m) and curvatures (1/m2), shape (..., k)."""
+        inside = np.clip(s, self.stations[0], self.stations[-1])
+        value, slope, bend = (one(inside) for one in self.basis)
+        return value + (s - inside)[..., None] * slope, slope, bend * (inside == s)[..., None]
+
+
+def flank_compliances(pair: GearPair, elastic: MeshingPair) -> tuple[FlankCompliance, FlankCompliance]:
+    """Of pinion and wheel."""
+    pinion, wheel = (
+        flank_compliance(body, flank_curve(gear), inverse, elastic.width, pair.pinion.module)
+        for body, gear, inverse in zip(
+            elastic.bodies, (pair.pinion, pair.wheel), elastic.contact_compliances, strict=True
+        )
+    )
+    return pinion, wheel
+
+
+def flank_compliance(
+    body: GearBody, curve: FlankCurve, inverse_modulus: float, width: float, module: float
+) -> FlankCompliance:
+    """Reduce the finite-element flank of a gear to its stations.
+
+    Parameters
+    ----------
+    inverse_modulus
+        1/E' (1/Pa) per width of the contact.
+    width
+        Width of the contact (m).
+    """
+    chain = Chain(body)
+    offset = chain.arc_at(float(curve.face.radii[0]))
+    corner, wedge = _corner(curve)
+    stations, bumps, nodal = _stations(body, chain, offset + curve.low, module)
+    loads = np.kron(nodal, np.eye(2))
+    modes = loads @ body.far.flank
+    smooth = {step: modes @ (driven @ loads.T) for step, driven in body.far.driven.items()}
+    made = FlankCompliance(
+        curve, inverse_modulus, corner, wedge, stations - offset, bumps, smooth, _splines(stations - offset), offset
+    )
+    smooth[0] = smooth[0] + loads @ body.own @ loads.T + inverse_modulus / width * _local(made)
+    return made
+
+
+def _splines(stations: Array) -> tuple[CubicSpline, CubicSpline, CubicSpline]:
+    basis = CubicSpline(stations, np.eye(len(stations)))
+    return basis, basis.derivative(), basis.derivative(2)
+
+
+def _corner(curve: FlankCurve) -> tuple[complex, Array]:
+    """Corner (m) of flank and tip circle, and the tensor W of the wedge there in the tooth's axes."""
+    face = curve.face
+    end = np.array(1.0)
+    point, normal = complex(face.points(end)), complex(face.normals(end))
+    tangent, tip = -1j * normal, abs(complex(face.points(np.array(face.end))))
+    along = (point * tangent.conjugate()).real
+    if not face.sharp:  # straight on to the tip circle
+        point = point + tangent * (math.sqrt(along**2 - abs(point) ** 2 + tip**2) - along)
+    half_angle = 0.5 * (math.pi - math.acos((normal * point.conjugate()).real / abs(point)))
+    middle = -tangent * np.exp(1j * half_angle)
+    direction = np.array([middle.real, middle.imag])
+    along_middle = np.outer(direction, direction)
+    one, two = wedge_tensor(half_angle)
+    return point, one * along_middle + two * (np.eye(2) - along_middle)
+
+
+def _stations(body: GearBody, chain: Chain, start: float, module: float) -> tuple[Array, Array, Array]:
+    """Arc lengths of the stations on the chain, half widths of their bumps, and their nodal loads, shape (k, n)."""
+    end = float(chain.ends[-1])
+    places = np.sort(np.concatenate([chain.ends, 0.5 * (chain.ends[1:] + chain.ends[:-1])]))
+    places = places[(places > start - 2 * chain.size_at(start)) & (places < end - 1e-9)]
+    rows: list[Array] = []
+    kept: list[float] = []
+    widths: list[float] = []
+    for s in places.tolist():
+        here = chain.size_in(s, s)
+        a = BUMP_ELEMENTS * here
+        for _ in range(3):
+            a = 0.5 * (a + BUMP_ELEMENTS * chain.size_in(max(0.0, s - a), min(end, s + a)))
+        a = min(max(a, BUMP_MODULES * module), end - s, s)
+        if a < TOO_NEAR * here or (kept and s - kept[-1] < SPACING * a):
+            continue
+        made, row = chain.loads(s - a, s + a, 1.0 + 0j, sign=1.0), np.zeros(len(body.flank.points))
+        row[made.unknowns.start // 2 : made.unknowns.stop // 2] = made.probes[0].reshape(-1, 2)[:, 0]
+        rows.append(row)
+        kept.append(s)
+        widths.append(a)
+    return np.array(kept), np.array(widths), np.array(rows)
+
+
+def _local(flank: FlankCompliance) -> Array:
+    """Means of the bracket between the bumps of all stations, shape (2k, 2k) (-)."""
+    s, a = flank.stations, flank.bumps
+    x = s[:, None] + a[:, None] * ELLIPSE_X
+    log = np.einsum("q,iqj->ij", ELLIPSE_W, mean_log(x[:, :, None] - s, a))
+    y = flank.distance(x)
+    sums = np.log(y[:, :, None, None] + y[None, None])
+    edge = np.einsum("q,r,iqjr->ij", ELLIPSE_W, ELLIPSE_W, sums, optimize=True)
+    return np.kron((log + log.T) / math.pi, np.eye(2)) + np.kron(edge, flank.wedge)

@@ -1,0 +1,232 @@
+"""Solved positions of the half-plane law: arrays over positions, and arrays over the tooth pairs that carry load."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..gear.flank_curve import FlankCurve
+from ..gear.touching import Touching
+from .half_plane_step import HalfPlanePair, Step, cross
+from .moved_faces import WAY
+from .panels import PANELS
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+ComplexArray = NDArray[np.complex128]
+Record = TypeVar("Record")
+
+#: Sums over the pairs of a position.
+TORQUES = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "tangent", "energy")
+
+
+@dataclass(frozen=True)
+class PairContacts:
+    """Loaded tooth pairs, m of them over all positions, by position and pair number.
+
+    Attributes
+    ----------
+    position : ndarray, shape (m,)
+        Number of the position.
+    pair : ndarray, shape (m,)
+        Pair number k: pinion tooth k, wheel tooth -1 - k.
+    force : ndarray, shape (m,)
+        Contact force on the whole width (N).
+    torque_wheel, torque_pinion : ndarray, shape (m,)
+        Moments of the force about the hubs (N m), at the deformed place.
+    point, normal : ndarray of complex, shape (m,)
+        Centre of pressure (m) and common normal out of the pinion, global axes.
+    arc, parameter : ndarray, shape (m, 2)
+        The material there on pinion and wheel: arc length from the start of the working flank (m), and parameter u of
+        the `gearfe.gear.touching.Face` (in [0, 1] involute, above tip round, below 0 root).
+    half_width : ndarray, shape (m,)
+        b = 2 sqrt(variance of the pressure about its mean) (m): Hertz's where the pressure is elliptic.
+    hertz_pressure : ndarray, shape (m,)
+        Peak of the elliptic pressure with the same force and half width, 2 F / (pi b L) (Pa).
+    mark : ndarray of str, shape (m,)
+        Mark of a face that the pressure reaches: ``tip`` (a sharp end), ``round`` (start of a tip round), ``relief``
+        (kink of a linear relief), ``undercut`` (edge of an undercut), of several the first in this order, or nothing.
+    x, width, pressure : ndarray, shape (m, n)
+        Panels: middles along the tangent -i n from the centre of pressure, widths (m), and pressures (Pa).
+    panel_arc : ndarray, shape (m, 2, n)
+        Arc lengths of the panels' middles on both faces (m).
+    """
+
+    position: IntArray
+    pair: IntArray
+    force: Array
+    torque_wheel: Array
+    torque_pinion: Array
+    point: ComplexArray
+    normal: ComplexArray
+    arc: Array
+    parameter: Array
+    half_width: Array
+    hertz_pressure: Array
+    mark: NDArray[np.str_]
+    x: Array
+    width: Array
+    pressure: Array
+    panel_arc: Array
+
+    def __len__(self) -> int:
+        return len(self.pair)
+
+    def take(self, index: Any) -> PairContacts:
+        """The pairs `index`."""
+        return PairContacts(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+
+    @property
+    def marked(self) -> NDArray[np.bool_]:
+        """Whether the pressure reaches a mark, beside which it is not elliptic, shape (m,)."""
+        return np.asarray(self.mark != "")
+
+
+@dataclass(frozen=True)
+class HalfPlaneSolution:
+    """n positions.
+
+    Attributes
+    ----------
+    pinion_angle, twist : ndarray, shape (n,)
+        rad, the twist from where a wheel space faces the pinion tooth.
+    torque_wheel, torque_pinion : ndarray, shape (n,)
+        Moments that the hubs need (N m).
+    torque_wheel_reaction : ndarray, shape (n,)
+        Moment of the reactions at the wheel's bore: of the forces at undeformed places (N m).
+    tangent : ndarray, shape (n,)
+        d torque_wheel/d twist (N m/rad).
+    energy : ndarray, shape (n,)
+        Elastic energy (J).
+    status : ndarray of str, shape (n,)
+        ``converged``, ``no_contact`` or ``not_converged``; torques are not-a-number in the last case.
+    iterations : ndarray, shape (n,)
+        Steps of the balance.
+    contacts
+        Loaded tooth pairs.
+    """
+
+    pinion_angle: Array
+    twist: Array
+    torque_wheel: Array
+    torque_pinion: Array
+    torque_wheel_reaction: Array
+    tangent: Array
+    energy: Array
+    status: NDArray[np.str_]
+    iterations: IntArray
+    contacts: PairContacts
+
+    def __len__(self) -> int:
+        return len(self.twist)
+
+
+def joined(kind: type[Record], parts: Sequence[Record]) -> Record:
+    """Records of arrays put one after the other, records within them likewise."""
+    made: dict[str, Any] = {}
+    for field in fields(kind):  # type: ignore[arg-type]
+        values = [getattr(part, field.name) for part in parts]
+        arrays = isinstance(values[0], np.ndarray)
+        made[field.name] = np.concatenate(values) if arrays else joined(type(values[0]), values)
+    return kind(**made)
+
+
+def no_contacts() -> PairContacts:
+    """None."""
+    number, real = np.zeros(0, dtype=np.int64), np.zeros(0)
+    two, panels = np.zeros((0, 2)), np.zeros((0, PANELS))
+    point = np.zeros(0, dtype=complex)
+    mark = np.zeros(0, dtype="<U8")
+    return PairContacts(
+        number,
+        number,
+        real,
+        real,
+        real,
+        point,
+        point,
+        two,
+        two,
+        real,
+        real,
+        mark,
+        panels,
+        panels,
+        panels,
+        np.zeros((0, 2, PANELS)),
+    )
+
+
+def pair_torques(law: HalfPlanePair, made: Step) -> dict[str, Array]:
+    """What each pair adds to the sums over its position (N m, N m, N m, N m/rad, J)."""
+    frames, force = made.frames, made.solution.force * law.width
+    centre = frames.centre - 1j * frames.normal * made.place
+    wheel = -cross(centre - law.hub[1], frames.normal)
+    material = law.curves[1].at(frames.arc[:, 1] + WAY[1] * made.place)[0] * frames.turn[:, 1]
+    return {
+        "torque_wheel": force * wheel,
+        "torque_pinion": force * cross(centre, frames.normal),
+        "torque_wheel_reaction": -force * cross(material, frames.normal),
+        "tangent": made.rate * wheel * law.width,
+        "energy": made.energy * law.width,
+    }
+
+
+def contacts_of(
+    law: HalfPlanePair, found: Touching, made: Step, torques: dict[str, Array], index: IntArray
+) -> PairContacts:
+    """The pairs `index` of a step, which carry load."""
+    frames = made.frames.take(index)
+    force, spread = made.solution.force[index], made.spread[index]
+    place, pressure, width = made.place[index], made.solution.pressure[index], made.width[index]
+    arcs, half_width = made.arcs[index], 2 * np.sqrt(spread)
+    arc = frames.arc + place[:, None] * np.array(WAY)
+    return PairContacts(
+        position=found.position[index],
+        pair=found.pair[index],
+        force=force * law.width,
+        torque_wheel=torques["torque_wheel"][index],
+        torque_pinion=torques["torque_pinion"][index],
+        point=frames.centre - 1j * frames.normal * place,
+        normal=frames.normal,
+        arc=arc,
+        parameter=np.stack([curve.parameter_at(arc[:, g]) for g, curve in enumerate(law.curves)], axis=1),
+        half_width=half_width,
+        hertz_pressure=2 * force / (np.pi * half_width),
+        mark=_marks(law.curves, arcs, pressure, width),
+        x=made.x[index] - place[:, None],
+        width=width,
+        pressure=pressure,
+        panel_arc=arcs,
+    )
+
+
+def _marks(curves: Sequence[FlankCurve], arcs: Array, pressure: Array, width: Array) -> NDArray[np.str_]:
+    """Mark that each pressure reaches, see `PairContacts`: it ends within a panel beside the middle of the last one."""
+    bears = pressure > 0
+    reached = np.zeros(len(arcs), dtype="<U8")
+    low = np.where(bears[:, None], arcs - width[:, None], np.inf).min(axis=2)
+    high = np.where(bears[:, None], arcs + width[:, None], -np.inf).max(axis=2)
+    for name in ("undercut", "relief", "round", "tip"):  # what comes later wins
+        for gear, curve in enumerate(curves):
+            at = _mark(curve, name)
+            if at is not None:
+                reached = np.where((low[:, gear] <= at) & (at <= high[:, gear]), name, reached)
+    return reached
+
+
+def _mark(curve: FlankCurve, name: str) -> float | None:
+    """Arc length (m) of a mark of a flank."""
+    face = curve.face
+    found = {
+        "undercut": 0.0 if face.fall > 0.0 else None,
+        "relief": face.relief_start if face.flank.kinked else None,
+        "round": None if face.sharp else 1.0,
+        "tip": face.end if face.sharp else None,
+    }
+    at = found[name]
+    return None if at is None else float(curve.arc_at(at))

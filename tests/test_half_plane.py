@@ -1,0 +1,270 @@
+"""The half-plane law: identities of an equilibrium, Hertz's contact, and the finite elements it stands in for."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from gearfe.contact.half_plane import HalfPlanePair, half_plane_pair, solve_half_plane
+from gearfe.contact.panels import MIDDLES, WIDTHS, couplings, first_guess, influence, pressed
+from gearfe.contact.solver import solve_positions
+from gearfe.contact.wedge import ELLIPSE_W, ELLIPSE_X, mean_log, wedge_tensor
+from gearfe.elasticity import Material
+from gearfe.gear.flank_curve import flank_curve
+from gearfe.gear.pair import GearPair, TipRelief
+from gearfe.stiffness.sweep import elastic_pair
+
+from .gears import gear
+from .gears import pair as gear_pair
+
+PAIRS = {
+    "rounded": gear_pair(tip_round=1e-4),
+    "sharp": gear_pair(),
+    "shifted": gear_pair(
+        19, 48, pressure_angle=20.0, tip_round=5e-5, pinion={"profile_shift": 0.4}, wheel={"profile_shift": -0.2}
+    ),
+    "relieved": gear_pair(25, 25, pressure_angle=20.0, tip_relief=TipRelief(20e-6, 1.5e-3, 2.0), tip_round=5e-5),
+}
+
+
+@lru_cache
+def law_of(name: str, flank_coarsen: float = 4.0) -> HalfPlanePair:
+    return half_plane_pair(PAIRS[name], elastic_pair(PAIRS[name], law="penalty", flank_coarsen=flank_coarsen))
+
+
+def angles_of(pair: GearPair, count: int) -> np.ndarray:
+    return (np.arange(count) + 0.37) * pair.mesh_cycle / count
+
+
+# ---- parts ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_curve_is_the_exact_flank(name: str) -> None:
+    """Points of the table lie on the exact curve, and arc lengths are its own."""
+    for one in (PAIRS[name].pinion, PAIRS[name].wheel):
+        curve = flank_curve(one)
+        u = np.sort(np.random.default_rng(1).uniform(0, curve.face.end, 200))
+        exact = np.array(
+            [quad(lambda v, c=curve: float(c.face.speeds(np.array(v))), 0, x, points=[1.0])[0] for x in u[:20]]
+        )
+        s = np.interp(u, curve.parameter, curve.arc)
+        for _ in range(3):  # the table is linear in u between its knots, the points are not
+            point, tangent = curve.at(s)
+            s = s + ((curve.face.points(u) - point) * tangent.conj()).real
+        assert np.abs(curve.at(s)[0] - curve.face.points(u)).max() < 2e-12
+        assert np.abs(np.abs(curve.at(s)[1]) - 1).max() < 1e-6
+        assert s[:20] == pytest.approx(exact, abs=1e-11)
+
+
+def test_a_half_plane_is_a_wedge_of_two_right_angles() -> None:
+    assert wedge_tensor(math.pi / 2) == pytest.approx([0, 0], abs=1e-15)
+
+
+@pytest.mark.parametrize("x", [0.0, 0.3, -0.9, 1.0, 2.5])
+def test_mean_of_a_logarithm_under_an_ellipse(x: float) -> None:
+    a = 1.7
+    density = lambda s: 2 / (math.pi * a) * math.sqrt(1 - (s / a) ** 2)  # noqa: E731
+    exact = quad(lambda s: density(s) * math.log(abs(a * x - s)), -a, a, points=[np.clip(a * x, -a, a)], limit=200)[0]
+    assert mean_log(np.array(a * x), np.array(a)) == pytest.approx(exact, abs=1e-7)
+    assert pytest.approx(1 / 8, rel=1e-12) == ELLIPSE_W @ ELLIPSE_X**4
+
+
+def test_panels_give_hertz() -> None:
+    """Parabolic gap x^2/(2 R): b^2 = 4 F R/(pi E*), p = 2 F/(pi b) (Johnson, *Contact Mechanics*, 4.2)."""
+    radius, modulus, force = 0.02, 1.1e11, 2e5
+    b = math.sqrt(4 * force * radius / (math.pi * modulus))
+    half = np.array([1.2 * b])
+    compliance = 2 / (math.pi * modulus)
+    x = half[:, None] * MIDDLES
+    deep = compliance * force * (0.5 - math.log(b / 2))  # approach of the centre, which makes the force F
+    gap = x**2 / (2 * radius) - deep
+    alone = couplings(np.array([0]), np.array([0]), 1)
+    width = half[:, None] * WIDTHS
+    found = pressed(influence(half, compliance), gap, width, np.zeros(1), np.zeros(1), alone, bearing=first_guess(gap))
+    assert found.settled.all()
+    assert found.force[0] == pytest.approx(force, rel=1e-3)
+    inside = np.abs(x[0]) < 0.9 * b
+    ellipse = 2 * force / (math.pi * b) * np.sqrt(1 - (x[0][inside] / b) ** 2)
+    assert found.pressure[0][inside] == pytest.approx(ellipse, rel=5e-3)
+    assert 2 * math.sqrt((found.pressure * width * x**2).sum() / force) == pytest.approx(b, rel=3e-3)
+
+
+# ---- identities ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "bound"), [("rounded", 4e-4), ("sharp", 1.2e-3), ("shifted", 6e-4)])
+@pytest.mark.parametrize("degrees", [0.005, 0.05, 0.4])
+def test_torque_is_the_derivative_of_the_energy(name: str, bound: float, degrees: float) -> None:
+    """T = dU/dtwist: centre and normal of each contact make the energy stationary."""
+    law, twist, share = law_of(name), math.radians(degrees), 0.01
+    angles = angles_of(law.pair, 12)
+    low, middle, high = (solve_half_plane(law, angles, twist * f) for f in (1 - share, 1.0, 1 + share))
+    rate = (high.energy - low.energy) / (2 * share * twist)
+    assert np.abs(rate / middle.torque_wheel - 1).max() < bound
+    slope = (high.torque_wheel - low.torque_wheel) / (2 * share * twist)
+    assert np.median(np.abs(middle.tangent / slope - 1)) < 5e-3
+
+
+@pytest.mark.parametrize("name", ["rounded", "sharp", "shifted"])
+@pytest.mark.parametrize("degrees", [0.01, 0.3])
+def test_gears_exchanged(name: str, degrees: float) -> None:
+    """Pinion and wheel change their names: turned by half a turn, the same pair, with the torques exchanged."""
+    pair, twist = PAIRS[name], math.radians(degrees)
+    elastic = elastic_pair(pair, law="penalty", flank_coarsen=4.0)
+    other = GearPair(pair.wheel, pair.pinion, pair.centre_distance)
+    there = half_plane_pair(other, elastic_pair(other, law="penalty", flank_coarsen=4.0))
+    here = half_plane_pair(pair, elastic)
+    angles = angles_of(pair, 8)
+    one = solve_half_plane(here, angles, twist)
+    # the wheel, at -angle/i + twist, becomes a pinion that stands pi/z further, as a tooth faces its space
+    turned = -angles * pair.pinion.teeth / pair.wheel.teeth + twist + math.pi / pair.wheel.teeth
+    two = solve_half_plane(there, turned, twist * pair.wheel.teeth / pair.pinion.teeth)
+    assert two.torque_pinion == pytest.approx(one.torque_wheel, rel=3e-6)
+    assert two.torque_wheel == pytest.approx(one.torque_pinion, rel=3e-6)
+    assert two.energy == pytest.approx(one.energy, rel=3e-6)
+
+
+def test_a_mesh_cycle_on_all_is_the_same_and_batches_do_not_matter() -> None:
+    law, twist = law_of("rounded"), math.radians(0.1)
+    angles = angles_of(law.pair, 6)
+    here = solve_half_plane(law, angles, twist)
+    there = solve_half_plane(law, angles + 3 * law.pair.mesh_cycle, twist)
+    assert there.torque_wheel == pytest.approx(here.torque_wheel, rel=1e-9)
+    assert (there.contacts.pair == here.contacts.pair - 3).all()
+    alone = [solve_half_plane(law, angle, twist).torque_wheel[0] for angle in angles]
+    assert alone == pytest.approx(here.torque_wheel, rel=1e-11)
+
+
+def test_moments_are_those_of_the_forces() -> None:
+    """The hubs hold the moment of the contact forces: T_1 + T_2 = a F_y, and shares add up."""
+    law = law_of("shifted")
+    found = solve_half_plane(law, angles_of(law.pair, 10), math.radians(0.2))
+    c = found.contacts
+    across = np.bincount(c.position, c.force * c.normal.imag, len(found))
+    balance = found.torque_pinion + found.torque_wheel - law.pair.working_centre_distance * across
+    assert np.abs(balance).max() < 1e-9 * found.torque_wheel.max()
+    assert np.bincount(c.position, c.torque_wheel, len(found)) == pytest.approx(found.torque_wheel, rel=1e-12)
+    assert (c.pressure * c.width).sum(axis=1) * law.width == pytest.approx(c.force, rel=1e-12)
+
+
+# ---- Hertz ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["rounded", "shifted"])
+@pytest.mark.parametrize("degrees", [0.0005, 0.005])
+def test_hertz_at_the_pitch_point(name: str, degrees: float) -> None:
+    """Light load at the pitch point: half width and peak pressure are Hertz's for the involutes' curvatures."""
+    law = law_of(name)
+    pair = law.pair
+    # where the pitch point is contacted: the pinion's flank meets it at the roll length r_b tan(working angle)
+    roll = pair.pinion.base_radius * math.tan(pair.working_pressure_angle)
+    angles = np.linspace(0, pair.mesh_cycle, 400, endpoint=False)
+    touching = law.flanks.touching(angles)
+    face = law.sides[0].curve.face
+    u = (roll - face.flank.start) / (face.flank.end - face.flank.start)
+    angle = touching.angle[np.argmin(np.abs(touching.place[:, 0] - u))]
+    contacts = solve_half_plane(law, angle, math.radians(degrees)).contacts
+    k = int(np.argmin(np.abs(contacts.parameter[:, 0] - u)))
+    one, two = (one.base_radius * math.tan(pair.working_pressure_angle) for one in (pair.pinion, pair.wheel))
+    radius = one * two / (one + two)
+    steel = Material()
+    modulus = 0.5 * steel.youngs_modulus / (1 - steel.poisson_ratio**2)
+    line = contacts.force[k] / law.width
+    b = math.sqrt(4 * line * radius / (math.pi * modulus))
+    assert contacts.half_width[k] == pytest.approx(b, rel=5e-3)
+    assert contacts.hertz_pressure[k] == pytest.approx(2 * line / (math.pi * b), rel=5e-3)
+    assert contacts.pressure[k].max() == pytest.approx(2 * line / (math.pi * b), rel=5e-3)
+    assert not contacts.marked[k]
+
+
+# ---- finite elements -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degrees", [0.002, 0.05, 0.5])
+def test_independent_of_the_flank_mesh(degrees: float) -> None:
+    """A flank of 35 elements serves as well as one of 140: the contact is not on the mesh."""
+    angles, twist = angles_of(PAIRS["rounded"], 9), math.radians(degrees)
+    coarse, fine = (solve_half_plane(law_of("rounded", c), angles, twist) for c in (4.0, 1.0))
+    assert np.abs(coarse.torque_wheel / fine.torque_wheel - 1).max() < 3e-4
+
+
+def test_nitsche_where_its_elements_see_the_contact() -> None:
+    angles, twist = angles_of(PAIRS["rounded"], 4), math.radians(0.5)
+    reference = solve_positions(elastic_pair(PAIRS["rounded"]), angles, twist)
+    found = solve_half_plane(law_of("rounded"), angles, twist)
+    expected = np.array([p.torque_wheel for p in reference])
+    assert np.abs(found.torque_wheel / expected - 1).max() < 1e-3
+    pinion = np.array([p.torque_pinion for p in reference])
+    assert np.abs(found.torque_pinion / pinion - 1).max() < 1e-3
+    reaction = np.array([p.torque_wheel_reaction for p in reference])
+    assert np.abs(found.torque_wheel_reaction / reaction - 1).max() < 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("degrees", [0.05, 0.5])
+def test_nitsche_refined(degrees: float) -> None:
+    """Nitsche's law on elements less than half as large, also near the changes of the pairs."""
+    angles, twist = angles_of(PAIRS["rounded"], 12), math.radians(degrees)
+    reference = solve_positions(elastic_pair(PAIRS["rounded"], coarsen=0.45), angles, twist)
+    expected = np.array([p.torque_wheel for p in reference])
+    found = solve_half_plane(law_of("rounded"), angles, twist).torque_wheel
+    assert np.abs(found / expected - 1).max() < 6e-4
+
+
+# ---- smoothness and statuses ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["rounded", "sharp"])
+def test_no_kinks_in_the_angle(name: str) -> None:
+    """Fourth differences of the torque within the stretch of one pair in contact are rounding and panels, no kinks."""
+    law, twist = law_of(name), math.radians(0.05)
+    angles = np.linspace(0, law.pair.mesh_cycle, 240, endpoint=False)
+    found = solve_half_plane(law, angles, twist)
+    c = found.contacts
+    single = np.bincount(c.position, minlength=240) == 1
+    single &= ~np.isin(np.arange(240), c.position[c.marked])
+    kinks = np.abs(np.convolve(found.torque_wheel, [1, -4, 6, -4, 1], mode="valid")) / 16 / found.torque_wheel[2:-2]
+    inner = np.convolve(single, np.ones(13), mode="valid") == 13
+    assert inner.sum() > 40
+    assert kinks[4:-4][inner].max() < 4e-5
+
+
+def test_marks_are_told() -> None:
+    """At the ends of the path the pressure reaches the sharp tip or the round, in the middle nothing."""
+    for name, mark in (("sharp", "tip"), ("rounded", "round")):
+        law = law_of(name)
+        contacts = solve_half_plane(law, angles_of(law.pair, 30), math.radians(0.2)).contacts
+        ends = np.abs(contacts.parameter - 1.0).min(axis=1) < 1e-6
+        assert set(contacts.mark) == {"", mark}
+        if name == "sharp":
+            assert (contacts.mark[ends] == mark).all()
+        middle = (contacts.parameter > 0.4).all(axis=1) & (contacts.parameter < 0.7).all(axis=1)
+        assert middle.any()
+        assert not contacts.marked[middle].any()
+
+
+def test_no_contact_and_no_position() -> None:
+    """Backlash that is not taken up: zero torque, no contacts; an empty list of positions is answered likewise."""
+    pair = gear_pair(tip_round=1e-4, tooth_thinning=50e-6)
+    law = half_plane_pair(pair, elastic_pair(pair, law="penalty", flank_coarsen=4.0, coarsen=1.5))
+    found = solve_half_plane(law, angles_of(pair, 3), [0.9 * pair.contact_twist, 1.2 * pair.contact_twist, -1e-3])
+    assert found.status.tolist() == ["no_contact", "converged", "no_contact"]
+    assert found.torque_wheel[[0, 2]].tolist() == [0.0, 0.0]
+    assert set(found.contacts.position) == {1}
+
+
+@pytest.mark.slow
+def test_one_gear_softer_and_wider() -> None:
+    """A wheel of aluminium, 14 mm wide, against 10 mm of steel: Nitsche's law agrees."""
+    pair = GearPair(gear(20, tip_round=1e-4), gear(30, tip_round=1e-4, width=14e-3))
+    metals = (Material(), Material(70e9, 0.34))
+    angles, twist = angles_of(pair, 3), math.radians(0.5)
+    reference = solve_positions(elastic_pair(pair, metals, coarsen=1.5), angles, twist)
+    law = half_plane_pair(pair, elastic_pair(pair, metals, law="penalty", flank_coarsen=4.0))
+    expected = np.array([p.torque_wheel for p in reference])
+    assert np.abs(solve_half_plane(law, angles, twist).torque_wheel / expected - 1).max() < 1.5e-3
