@@ -12,6 +12,7 @@ from . import __version__
 from .commands import COMMANDS
 from .commands.arguments import CommandParser
 from .errors import InputError, MissingLibraryError, unknown_name
+from .progress import shown
 
 USAGE = "gearfe COMMAND ... ('gearfe COMMAND --help' tells a command's options)"
 
@@ -77,7 +78,9 @@ def _run(arguments: list[str]) -> int:
     module = _module(arguments[0])
     parser = CommandParser(prog=f"gearfe {arguments[0]}", description=module.HELP)
     module.add_arguments(parser)
-    return int(module.run(parser.parse_args(arguments[1:])))
+    parsed = parser.parse_args(arguments[1:])
+    with shown():
+        return int(module.run(parsed))
 
 
 def _drop_output() -> None:

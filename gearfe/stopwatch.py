@@ -1,4 +1,4 @@
-"""Seconds by stage."""
+"""Seconds by stage, told to whoever watches the run."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+
+from . import progress
 
 
 @dataclass
@@ -19,6 +21,7 @@ class Stopwatch:
         """Add the time spent inside to the stage `name`."""
         start = time.perf_counter()
         try:
-            yield
+            with progress.stage(name):
+                yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start

@@ -8,6 +8,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from ..progress import stage
+
 HELP = "derived geometry of a gear pair, and a drawing of it in mesh"
 
 
@@ -42,8 +44,9 @@ def run(args: argparse.Namespace) -> int:
     iso = iso_values(pair, moduli[0], moduli[1])
     title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, pinion angle {args.angle_deg:g}°"
     with whole_set(folder) as made:
-        drawing = pair_drawing(pair, math.radians(args.angle_deg))
-        pair_figure(made / "gear_pair.png", title=title, notes=_notes(geometry), **drawing)
+        with stage("drawing"):
+            drawing = pair_drawing(pair, math.radians(args.angle_deg))
+            pair_figure(made / "gear_pair.png", title=title, notes=_notes(geometry), **drawing)
         write_json(made / "gear_pair.json", {**geometry, "iso_6336": iso, "warnings": list(pair.warnings)})
     _show(geometry)
     _show({"iso_6336": iso})

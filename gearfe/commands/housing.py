@@ -8,6 +8,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..progress import stage
+
 if TYPE_CHECKING:
     from ..reduction.error import ReductionError
     from ..reduction.modal_body import ModalBody
@@ -46,14 +48,17 @@ def run(args: argparse.Namespace) -> int:
     body = reduced_housing(table)
     seconds = time.perf_counter() - started
     shown = min(args.modes, body.size)
-    fields = body.reconstruct(body.coupled.vectors[:, :shown].T)
-    mesh = frequency_errors(body.nodes, body.elements, material(table), fields)
-    mesh[body.coupled.frequencies_hz[:shown] <= 0.0] = 0.0
-    left_out = reduction_error(body, table.reduction.band_Hz)
+    with stage("error estimates"):
+        fields = body.reconstruct(body.coupled.vectors[:, :shown].T)
+        mesh = frequency_errors(body.nodes, body.elements, material(table), fields)
+        mesh[body.coupled.frequencies_hz[:shown] <= 0.0] = 0.0
+        left_out = reduction_error(body, table.reduction.band_Hz)
     _report(body, mesh, left_out, seconds)
     with whole_set(folder, ("housing.png", "modes.png")) as made:
-        _write(made, body, fields, mesh, left_out)
-        problem = "" if args.no_pictures else _draw(made, body, fields)
+        with stage("tables"):
+            _write(made, body, fields, mesh, left_out)
+        with stage("pictures"):
+            problem = "" if args.no_pictures else _draw(made, body, fields)
     if problem:
         print(f"warning: no pictures: {problem}")
     print(f"results in {folder}")

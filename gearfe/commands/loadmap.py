@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..progress import count
 from .arguments import check_option
 
 if TYPE_CHECKING:
@@ -62,13 +63,11 @@ def run(args: argparse.Namespace) -> int:
     from ..output.files import output_folder, whole_set, write_csv, write_json
     from ..stiffness.job import stiffness_job
     from ..stopwatch import Stopwatch
-    from .stiffness import Progress
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("geometry"):
         job = stiffness_job(tables)
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
-    show = Progress()
     made_map = sweep_loads(
         job.pair,
         torques,
@@ -76,10 +75,9 @@ def run(args: argparse.Namespace) -> int:
         root_stress=table.root_stress,
         kinematics=job.table.kinematics,  # type: ignore[arg-type]
         route=job.table.route,  # type: ignore[arg-type]
-        progress=show,
+        progress=count,
         **job.model,
     )
-    show.end()
     watch.seconds.update(made_map.timings)
     with whole_set(folder) as made:
         with watch.stage("table"):

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from ..progress import stage
 from .arguments import check_option
 
 HELP = "meshes of a gear pair with named boundaries, as .msh, .vtu or .inp"
@@ -49,8 +50,10 @@ def run(args: argparse.Namespace) -> int:
         if args.gear in ("both", name):
             gear = (job.pair.pinion, job.pair.wheel)[number]
             angle, place = (job.pair.wheel_phase, job.pair.working_centre_distance) if number else (0.0, 0.0)
-            parts[name] = _part(sector_mesh(gear, recipes[number]), angle, place, sector=args.sector)
-    counts = export_mesh(args.out, parts, plane=job.table.plane)
+            with stage(f"meshing the {name}"):
+                parts[name] = _part(sector_mesh(gear, recipes[number]), angle, place, sector=args.sector)
+    with stage("writing"):
+        counts = export_mesh(args.out, parts, plane=job.table.plane)
     nodes = sum(len(part.points) for part in parts.values())
     print(f"written to {args.out}: {nodes} nodes, millimetres, groups with their elements or edges:")
     for name, count in counts.items():

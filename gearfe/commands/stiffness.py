@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..progress import count
 from .arguments import check_option
 
 if TYPE_CHECKING:
@@ -110,11 +111,9 @@ def run(args: argparse.Namespace) -> int:
             angle_numbers(np.degrees(sweep["angles"]), chosen)
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
     elastic = elastic_pair(job.pair, watch=watch, **job.model)
-    show = Progress()
     curve = sweep_stiffness(
-        job.pair, elastic=elastic, estimate_error=not args.no_estimate, progress=show, **sweep, **_points(job)
+        job.pair, elastic=elastic, estimate_error=not args.no_estimate, progress=count, **sweep, **_points(job)
     )
-    show.end()
     for stage, seconds in curve.timings.items():
         watch.seconds[stage] = watch.seconds.get(stage, 0.0) + seconds
     with whole_set(folder, ("stiffness.png", "fields.vtkhdf", "stress_*deg.png")) as made:
@@ -125,11 +124,10 @@ def run(args: argparse.Namespace) -> int:
 
             angles = None if isinstance(chosen, str) else chosen
             with watch.stage("fields"):
-                write_fields(made, job.pair, elastic, curve, angles, progress=show)
+                write_fields(made, job.pair, elastic, curve, angles, progress=count)
         if args.animate is not None:
             with watch.stage("animation"):
-                _animate(made / "stress.gif", job, elastic, curve, args.animate, show)
-            show.end()
+                _animate(made / "stress.gif", job, elastic, curve, args.animate)
         if not args.no_picture:
             with watch.stage("picture"):
                 from ..output.figures import stiffness_figure
@@ -147,15 +145,14 @@ def run(args: argparse.Namespace) -> int:
     return 1 if curve.failed.any() else 0
 
 
-def _animate(path: Path, job: StiffnessJob, elastic: Any, curve: Any, count: int, show: Progress) -> None:
+def _animate(path: Path, job: StiffnessJob, elastic: Any, curve: Any, number: int) -> None:
     from ..output.animation import stress_animation
     from ..stiffness.fields_output import frames_of
 
-    frames, zone = frames_of(job.pair, elastic, curve, count, show)
+    frames, zone = frames_of(job.pair, elastic, curve, number, count)
     if frames:
         teeth = f"{job.pair.pinion.teeth}/{job.pair.wheel.teeth}"
-        stress_animation(path, frames, title=f"Gear pair {teeth}, von Mises stress", zoom=zone, progress=show)
-    show.end()
+        stress_animation(path, frames, title=f"Gear pair {teeth}, von Mises stress", zoom=zone, progress=count)
 
 
 def _points(job: StiffnessJob) -> dict[str, Any]:
@@ -204,21 +201,3 @@ def overridden(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTabl
     made.check_law("stiffness")
     made.check("--angles" if args.angles is not None else "stiffness")
     return made
-
-
-class Progress:
-    """One line that counts positions, on a terminal only."""
-
-    def __init__(self) -> None:
-        self._shown = False
-
-    def __call__(self, done: int, total: int, what: str) -> None:
-        if sys.stderr.isatty():
-            print(f"\r{what}: {done} of {total} ", end="", file=sys.stderr, flush=True)
-            self._shown = True
-
-    def end(self) -> None:
-        """Clear the line."""
-        if self._shown:
-            print("\r\033[K", end="", file=sys.stderr, flush=True)
-            self._shown = False

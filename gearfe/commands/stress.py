@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ..progress import count, stage
+
 HELP = "random campaigns that look for crashes, hangs and wrong results"
 
 
@@ -28,7 +30,6 @@ def run(args: argparse.Namespace) -> int:
     from ..stress.campaign import CAMPAIGNS, campaign_named
     from ..stress.outcome import CLASSES
     from ..stress.runner import run_campaign
-    from .stiffness import Progress
 
     if args.seed < 0:
         raise InputError("--seed", args.seed, "must be >= 0", "any whole number will do")
@@ -42,11 +43,10 @@ def run(args: argparse.Namespace) -> int:
     seconds = 60.0 * (30.0 if args.minutes is None else args.minutes)
     failed = False
     for name in names:
-        show = Progress()
-        ran = run_campaign(
-            name, folder, seed=args.seed, cases=args.cases, short=args.short, seconds=seconds, progress=show
-        )
-        show.end()
+        with stage(name):
+            ran = run_campaign(
+                name, folder, seed=args.seed, cases=args.cases, short=args.short, seconds=seconds, progress=count
+            )
         counts = {kind: sum(row.outcome == kind for row in ran.outcomes) for kind in CLASSES}
         told = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
         rest = "" if ran.complete else f" (of {ran.asked}: the time is over; run again to go on)"

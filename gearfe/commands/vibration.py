@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..progress import count
 from .arguments import check_option
 
 if TYPE_CHECKING:
@@ -61,7 +62,6 @@ def run(args: argparse.Namespace) -> int:
     from ..stopwatch import Stopwatch
     from ..vibration.files import OutputChoice, check_choice, write_all
     from ..vibration.job import train_job
-    from .stiffness import Progress
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("reading"):
@@ -78,9 +78,8 @@ def run(args: argparse.Namespace) -> int:
         )
         check_choice(choice, job.times, tuple(str(a) for s in job.table.shafts for a in s.attachments))
         folder = output_folder(args.out or Path("out") / Path(args.job).stem)
-    show = Progress()
     scene, response = simulated(
-        job, args.curve, watch=watch, progress=show, floquet=not args.no_floquet, estimate=not args.no_estimate
+        job, args.curve, watch=watch, progress=count, floquet=not args.no_floquet, estimate=not args.no_estimate
     )
     written = write_all(
         folder,
@@ -90,10 +89,9 @@ def run(args: argparse.Namespace) -> int:
         title=title(job),
         watch=watch,
         further=described(job, scene),
-        progress=show,
+        progress=count,
         started=started,
     )
-    show.end()
     for line in told(response, scene, written, choice):
         print(line)
     print(f"written to {folder}: " + ", ".join(written.names))

@@ -11,6 +11,7 @@ from .. import __version__
 from ..errors import InputError
 from ..meshing.cache import cache_folder, cache_key
 from ..meshing.housing_mesh import RECIPE, bore_ranges, housing_mesh
+from ..progress import stage
 from ..reduction.modal_body import FORMAT, ModalBody
 from ..solid import MassRule, SolidMaterial
 from ..tables.housing import HousingDampingTable, HousingReductionTable, HousingTable
@@ -103,13 +104,14 @@ def reduced_housing(table: HousingTable) -> ModalBody:
 
 def reduced(housing: Housing, table: HousingReductionTable) -> ModalBody:
     """Reduced body with what a ``[housing.reduction]`` table asks for."""
-    return housing.reduce(
-        table.modes,
-        below_hz=table.modes_below_Hz,
-        least_modes=table.least_modes,
-        quasi_static=table.quasi_static_levels,
-        solver=table.solver,
-    )
+    with stage("reducing the housing"):
+        return housing.reduce(
+            table.modes,
+            below_hz=table.modes_below_Hz,
+            least_modes=table.least_modes,
+            quasi_static=table.quasi_static_levels,
+            solver=table.solver,
+        )
 
 
 def damped(body: ModalBody, table: HousingTable) -> ModalBody:

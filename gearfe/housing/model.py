@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..config import load_job
 from ..errors import InputError
+from ..progress import stage
 from ..reduction.craig_bampton import reduce_model
 from ..reduction.modal_body import ModalBody
 from ..solid import MassRule, SolidMaterial, SolidMatrices, assemble
@@ -166,7 +167,8 @@ class Housing:
     @cached_property
     def matrices(self) -> SolidMatrices:
         """Nodal stiffness and mass, assembled on first use."""
-        return assemble(self.nodes, self.tets, self.material, mass_rule=self.mass_rule)
+        with stage("assembling"):
+            return assemble(self.nodes, self.tets, self.material, mass_rule=self.mass_rule)
 
     @cached_property
     def internal(self) -> Ints:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..progress import stage
 from ..solid import unfolded
 from ..tables.housing import HousingTable, ShaftAxisTable
 from .cache import cached_arrays
@@ -53,7 +54,8 @@ def housing_mesh(table: HousingTable) -> TetMesh:
         When gmsh is needed and cannot be imported.
     """
     recipe = {name: getattr(table, name) for name in _GEOMETRY} | {"mesh": _mesh_recipe(table), "version": RECIPE}
-    arrays = cached_arrays("housing", recipe, lambda: _make(table)._asdict())
+    with stage("meshing the housing"):
+        arrays = cached_arrays("housing", recipe, lambda: _make(table)._asdict())
     return TetMesh(arrays["nodes"], arrays["tets"])
 
 

@@ -38,6 +38,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import InputError
+from ..progress import stage
 from ..threads import one_thread
 from .lanczos import lowest_modes
 from .sparse_solver import Factorization, factorize
@@ -136,13 +137,15 @@ def reduce_model(
     k_ib, m_ib = ((rows @ boundary).toarray() for rows in (k_rows, m_rows))
     del k_rows, m_rows
     shift = rigid_shift(k_ii, m_ii) if m == 0 and free else 0.0
-    factor = factorize(k_ii + shift * m_ii if shift else k_ii, solver=solver)
-    psi = -factor.solve(k_ib) if m else k_ib
+    with stage("factorising"):
+        factor = factorize(k_ii + shift * m_ii if shift else k_ii, solver=solver)
+        psi = -factor.solve(k_ib) if m else k_ib
     coupling = m_ii @ psi + m_ib
     limit = (2.0 * math.pi * below_hz) ** 2
-    modes = lowest_modes(
-        factor.solve, m_ii, count=count, limit=limit, at_least=at_least if count is None else 0, shift=shift
-    )
+    with stage("modes"):
+        modes = lowest_modes(
+            factor.solve, m_ii, count=count, limit=limit, at_least=at_least if count is None else 0, shift=shift
+        )
     added, left, columns = _corrections(factor, m_ii, modes.vectors, coupling, corrections if m else 0)
     inner = np.concatenate([modes.vectors, added], axis=1)
     # principal axes of the whole inner space: the projection is exact whatever the modes' last digits are

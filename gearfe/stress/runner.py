@@ -89,7 +89,7 @@ def run_campaign(
             ledger.add(row)
             bad += row.bad
             if progress is not None:
-                progress(len(ledger.rows), len(wanted), f"{name}, {bad} bad")
+                progress(len(ledger.rows), len(wanted), f"cases, {bad} bad")
     finally:
         write_results(folder, campaign, seed, ledger.outcomes)
     return Ran(name, tuple(row for row in ledger.outcomes if row.case in wanted), len(wanted))

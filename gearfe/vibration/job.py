@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..gear.pair import Gear, GearPair
+from ..progress import stage
 from ..rigid import TimeFunction, constant, smoothed_step
 from ..stiffness.curve import StiffnessCurve
 from ..tables.housing import HousingTable
@@ -328,7 +329,8 @@ def _computed_curve(job: TrainJob, scene: TrainScene, number: int, watch: Any, p
     tables = StiffnessJob(job.pair, job.stiffness, pair)
     model = {**tables.model, "materials": _materials(job, mesh)}
     if job.table.curves.load == "stiffness":
-        return cached_curve(pair, model, tables.sweep, watch=watch, progress=progress)
+        with stage(mesh.name):
+            return cached_curve(pair, model, tables.sweep, watch=watch, progress=progress)
     torque = _carried_torque(scene, number)
     if not torque > 0.0:
         problem = 'carries no torque, so train.curves.load = "torque" has no load to compute its curve with'
@@ -340,7 +342,8 @@ def _computed_curve(job: TrainJob, scene: TrainScene, number: int, watch: Any, p
         "kinematics": job.stiffness.kinematics,
         "route": job.stiffness.route,
     }
-    return cached_curve(pair, model, sweep, watch=watch, progress=progress)
+    with stage(mesh.name):
+        return cached_curve(pair, model, sweep, watch=watch, progress=progress)
 
 
 def _materials(job: TrainJob, mesh: GearMesh) -> Any:

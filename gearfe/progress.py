@@ -1,0 +1,179 @@
+"""What a long run is doing, told on stderr: a line that is rewritten on a terminal, a line for each stage elsewhere.
+
+Work that may take long names itself with `stage` and tells how far it is with `count`. Both do nothing until a program
+opens `shown`, so a library call stays silent. The first two seconds of a run stay silent too.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from typing import TextIO
+
+#: Seconds after which a run tells what it does, between two looks at it, and of a count before its rate is told.
+SILENT, LOOK, SETTLED = 2.0, 0.2, 1.0
+#: Seconds after which a stage that still goes on is told again where lines stay; doubled each time.
+AGAIN = 60.0
+
+
+@dataclass
+class _Stage:
+    """A piece of work under way."""
+
+    name: str
+    done: float = 0.0
+    total: float = 0.0
+    what: str = ""
+    counted: float = 0.0  # when the count began
+
+    def text(self, now: float) -> str:
+        """Name, how far it is, its rate and the time that is left."""
+        if not self.total > 0.0:
+            return self.name
+        share = min(1.0, self.done / self.total)
+        whole = isinstance(self.total, int)
+        what = self.what if self.what and self.what != self.name else ""
+        far = f"{self.done} of {self.total}" if whole else f"{100.0 * share:.0f} %"
+        parts = [f"{what} {far}".strip()]
+        spent = now - self.counted
+        if spent >= SETTLED and 0.0 < share < 1.0:
+            parts += [f"{self.done / spent:.3g}/s"] if whole else []
+            parts.append(f"{_duration(spent * (1.0 - share) / share)} left")
+        return f"{self.name}: {', '.join(parts)}"
+
+
+class Display:
+    """Shows the innermost stages of a run; a thread looks at them, so that work itself never waits."""
+
+    def __init__(self, stream: TextIO, *, rewritten: bool, silent: float = SILENT) -> None:
+        self._stream, self._rewritten = stream, rewritten
+        self._begun, self._silent = time.monotonic(), silent
+        self._stages: list[_Stage] = []
+        self._lock = threading.RLock()
+        self._over = threading.Event()
+        self._line = ""  # on the terminal now
+        self._told: tuple[str, ...] = ()  # stages of the last line that stays
+        self._next = 0.0  # when they are told again
+        self._wait = AGAIN
+        self._thread = threading.Thread(target=self._look, name="progress", daemon=True)
+        self._thread.start()
+
+    def enter(self, name: str) -> None:
+        """A stage begins."""
+        with self._lock:
+            self._stages.append(_Stage(name))
+            if self._rewritten:
+                self._show()
+
+    def leave(self) -> None:
+        """The innermost stage is over."""
+        with self._lock:
+            if self._stages:
+                self._stages.pop()
+            if not self._stages:
+                self._clear()
+
+    def count(self, done: float, total: float, what: str) -> None:
+        """How far the innermost stage is."""
+        with self._lock:
+            if not self._stages:
+                self._stages.append(_Stage(what))
+            at = self._stages[-1]
+            if at.what != what or done < at.done or not at.counted:
+                at.counted = time.monotonic()
+            at.done, at.total, at.what = done, total, what
+
+    def close(self) -> None:
+        """Stop looking and clear the line."""
+        self._over.set()
+        self._thread.join(timeout=1.0)
+        with self._lock:
+            self._stages.clear()
+            self._clear()
+
+    def _look(self) -> None:
+        while not self._over.wait(LOOK):
+            with self._lock:
+                self._show()
+
+    def _show(self) -> None:
+        now = time.monotonic()
+        if now - self._begun < self._silent or not self._stages:
+            return
+        text = ": ".join([*(s.name for s in self._stages[:-1]), self._stages[-1].text(now)])
+        if self._rewritten:
+            width = shutil.get_terminal_size().columns - 1
+            line = f"{_duration(now - self._begun)} {text}"[:width]
+            if line != self._line:
+                self._write(f"\r{line}\033[K")
+                self._line = line
+            return
+        path = tuple(s.name for s in self._stages)
+        if path != self._told[: len(path)]:  # back in the outer stage is nothing new
+            self._told, self._wait, self._next = path, AGAIN, now + AGAIN
+        elif now < self._next:
+            return
+        else:
+            self._wait *= 2.0
+            self._next = now + self._wait
+        self._write(f"gearfe: {_duration(now - self._begun)}: {text}\n")
+
+    def _clear(self) -> None:
+        if self._line:
+            self._write("\r\033[K")
+            self._line = ""
+
+    def _write(self, text: str) -> None:
+        with suppress(OSError, ValueError):  # a closed pipe ends the telling, not the run
+            self._stream.write(text)
+            self._stream.flush()
+
+
+def _duration(seconds: float) -> str:
+    """Time for people."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest:02d} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+_displays: list[Display] = []
+
+
+@contextmanager
+def shown(stream: TextIO | None = None) -> Iterator[None]:
+    """Show stages inside on `stream` (stderr): as one line that is rewritten where it is a terminal."""
+    stream = sys.stderr if stream is None else stream
+    if stream is None or _displays:
+        yield
+        return
+    _displays.append(Display(stream, rewritten=stream.isatty()))
+    try:
+        yield
+    finally:
+        _displays.pop().close()
+
+
+@contextmanager
+def stage(name: str) -> Iterator[None]:
+    """Name the work inside for whoever watches; also as a decorator."""
+    display = _displays[-1] if _displays else None
+    if display is None or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    display.enter(name)
+    try:
+        yield
+    finally:
+        display.leave()
+
+
+def count(done: float, total: float, what: str = "") -> None:
+    """Tell how far the stage is: whole numbers of a whole number of things, or as floats a share."""
+    if _displays and threading.current_thread() is threading.main_thread():
+        _displays[-1].count(done, total, what)

@@ -1,0 +1,111 @@
+"""What a long run tells about itself: nothing at first, then its stages; a library call tells nothing at all."""
+
+from __future__ import annotations
+
+import io
+import threading
+import time
+
+import pytest
+
+from gearfe import progress
+from gearfe.progress import Display, _Stage, count, shown, stage
+from gearfe.stopwatch import Stopwatch
+
+
+def waited(stream: io.StringIO, text: str) -> str:
+    """What the stream holds as soon as it holds `text`, or after some seconds."""
+    end = time.monotonic() + 5.0
+    while text not in stream.getvalue() and time.monotonic() < end:
+        time.sleep(0.01)
+    return stream.getvalue()
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_stages_are_lines_where_lines_stay(monkeypatch):
+    monkeypatch.setattr(progress, "SILENT", 0.0)
+    display = Display(stream := io.StringIO(), rewritten=False, silent=0.0)
+    for _ in range(3):
+        display.enter("reducing")
+        display.enter("modes")
+        for done in range(1, 200):
+            display.count(done, 200, "")
+        waited(stream, "modes")
+        display.leave()
+        time.sleep(2.5 * progress.LOOK)  # back in the outer stage: no further line
+    display.close()
+    lines = stream.getvalue().splitlines()
+    assert 1 <= len(lines) <= 3
+    assert all(line.startswith("gearfe: ") for line in lines)
+    assert "reducing: modes: 199 of 200" in lines[0]
+    assert "\r" not in stream.getvalue()
+
+
+def test_a_terminal_has_one_line_that_is_cleared():
+    display = Display(stream := Terminal(), rewritten=True, silent=0.0)
+    display.enter("meshing")
+    display.enter("pinion")
+    display.leave()
+    display.leave()
+    display.close()
+    told = stream.getvalue()
+    assert "meshing: pinion" in told
+    assert "\n" not in told
+    assert told.endswith("\r\033[K")
+
+
+def test_short_runs_are_silent():
+    stream = io.StringIO()
+    with shown(stream), stage("meshing"):
+        count(1, 2)
+        time.sleep(2 * progress.LOOK)
+    assert stream.getvalue() == ""
+
+
+def test_rate_and_remaining_time():
+    assert _Stage("positions", 30, 120, "positions", 10.0).text(20.0) == "positions: 30 of 120, 3/s, 30 s left"
+    assert _Stage("integrating", 0.25, 1.0, "ms", 0.0).text(100.0) == "integrating: ms 25 %, 5 min 00 s left"
+    assert _Stage("meshing").text(50.0) == "meshing"
+    assert _Stage("a", 5, 5, "", 0.0).text(9.0) == "a: 5 of 5"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(3.4, "3 s"), (99.0, "99 s"), (150.0, "2 min 30 s"), (7300.0, "2 h 01 min")]
+)
+def test_durations(seconds, text):
+    assert progress._duration(seconds) == text
+
+
+def test_nobody_watches_and_other_threads():
+    with stage("meshing"):  # a library call
+        count(1, 2, "teeth")
+    stream = io.StringIO()
+    with shown(stream):
+        thread = threading.Thread(target=lambda: Stopwatch().stage("work").__enter__())
+        thread.start()
+        thread.join()
+        assert progress._displays[-1]._stages == []
+    assert progress._displays == []
+
+
+def test_a_closed_stream_ends_the_telling_only():
+    stream = io.StringIO()
+    stream.close()
+    display = Display(stream, rewritten=False, silent=0.0)
+    display.enter("meshing")
+    time.sleep(2 * progress.LOOK)
+    display.close()
+
+
+def test_an_exception_leaves_no_stage():
+    with shown(io.StringIO()):
+        with pytest.raises(KeyError), stage("a"), stage("b"):
+            raise KeyError
+        assert progress._displays[-1]._stages == []
+    with pytest.raises(KeyError), shown(io.StringIO()):
+        raise KeyError
+    assert progress._displays == []
