@@ -21,7 +21,6 @@ from gearfe.vibration.fields import (
     moved,
     solids,
     step_at,
-    tooth_angles,
     write_gears,
     write_housing,
 )
@@ -192,18 +191,6 @@ def test_a_gear_is_a_closed_solid():
     assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
     tip = np.hypot(*points[:, :2].T).max()
     assert tip == pytest.approx(gear.tip_radius, rel=1e-9)
-
-
-def test_teeth_stand_in_spaces(scene):
-    """At each mesh driver's tooth and driven gear's space lie on the line of centres once the phase is turned back."""
-    angles = tooth_angles(scene, (1.0, -1.0))
-    for mesh, sense in zip(scene.meshes, (1.0, -1.0), strict=True):
-        driver, driven = scene.gear(mesh.driver).gear, scene.gear(mesh.driven).gear
-        back = angles[mesh.driver] - sense * mesh.phase
-        assert math.remainder(back, 2 * math.pi / driver.teeth) == pytest.approx(0.0, abs=1e-12)
-        other = angles[mesh.driven] + sense * mesh.phase * driver.teeth / driven.teeth
-        space = (other - math.pi) / (2 * math.pi / driven.teeth)
-        assert space % 1.0 == pytest.approx(0.5, abs=1e-9)
 
 
 def test_gears_turn_and_move_as_told(scene):

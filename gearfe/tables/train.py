@@ -77,8 +77,10 @@ class TrainMeshTable:
 
     driver: str = quantity(doc="name of the driving gear")
     driven: str = quantity(doc="name of the driven gear")
-    phase_deg: float = quantity(
-        0.0, doc="rotation of the driver, in its driving sense, at which the curve starts (deg)"
+    phase_deg: float | None = quantity(
+        None,
+        doc="rotation of the driver, in its driving sense, past a tooth on the line of centres at the start (deg), for "
+        "a gear keyed at an angle; left out: 0, and where gears are shared by meshes what their teeth make it",
     )
     damping_N_s_per_m: float = quantity(0.0, low=0.0, doc="damping along the line of action (N s/m)")
     centre_distance_mm: float | None = quantity(

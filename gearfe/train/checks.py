@@ -11,6 +11,9 @@ from ..errors import InputError, unknown_name
 from ..gear.pair import GearPair
 from ..stiffness.curve import StiffnessCurve
 from ..stiffness.periodic import PeriodicInterpolant
+from .flanks import check_flanks
+from .kinematics import driving_senses
+from .phases import tooth_places
 from .scene import Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
 
 #: Agreement of lengths and angles that count as equal (relative).
@@ -33,6 +36,8 @@ def check_scene(scene: TrainScene) -> None:
         _check_mesh(scene, mesh)
     _check_room(scene)
     _check_damping(scene)
+    check_flanks(scene)
+    tooth_places(scene, driving_senses(scene))
 
 
 def _names(kind: str, names: list[str]) -> None:

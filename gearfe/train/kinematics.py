@@ -8,7 +8,8 @@ and fractions have a least common multiple.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -101,25 +102,52 @@ def steady_forces(scene: TrainScene) -> Array:
     At every shaft that is not driven the moments about the axis balance, base radius times force at each mesh. In a
     loop of gears the forces of least squares are returned: statics alone do not tell them.
     """
+    return balanced_forces(scene, driving_senses(scene), load_torques(scene, [load_end(scene)]))[:, 0]
+
+
+def load_end(scene: TrainScene) -> float:
+    """Time at which all load ramps have ended (s)."""
+    return max((b for load in scene.loads for b in load.torque.breaks), default=0.0)
+
+
+def load_torques(scene: TrainScene, times: Sequence[float] | Array) -> Array:
+    """Torque of the loads on each shaft without its oscillating part (N m), shape (shafts, times)."""
+    names = [s.name for s in scene.shafts]
+    found = np.zeros((len(names), len(times)))
+    for load in scene.loads:
+        found[names.index(load.shaft)] += replace(load.torque, sines=())(times)
+    return found
+
+
+def balanced_forces(scene: TrainScene, senses: Sequence[float], torques: Array) -> Array:
+    """Mesh forces (N), shape (meshes, n), that balance the torques (N m) on the shafts, shape (shafts, n)."""
     assert scene.drive is not None
-    kinematics = rolling(scene)
     names = [s.name for s in scene.shafts]
     arms = np.zeros((len(names), len(scene.meshes)))
-    for column, mesh in enumerate(scene.meshes):
-        one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
-        i = names.index(one.shaft)
-        sense = math.copysign(1.0, kinematics.ratios[i] * drive_sense(scene.drive.speed))
-        arms[i, column] += sense * one.gear.base_radius
-        arms[names.index(two.shaft), column] += sense * two.gear.base_radius
-    torque = np.zeros(len(names))
-    for load in scene.loads:
-        torque[names.index(load.shaft)] += float(load.torque(max(load.torque.breaks, default=0.0)))
+    for column, (mesh, sense) in enumerate(zip(scene.meshes, senses, strict=True)):
+        for gear in (scene.gear(mesh.driver), scene.gear(mesh.driven)):
+            arms[names.index(gear.shaft), column] += sense * gear.gear.base_radius
     free = [k for k, name in enumerate(names) if name != scene.drive.shaft]
-    return np.asarray(np.linalg.lstsq(arms[free], torque[free], rcond=None)[0])
+    return np.asarray(np.linalg.lstsq(arms[free], torques[free], rcond=None)[0])
+
+
+def driving_senses(scene: TrainScene) -> tuple[float, ...]:
+    """For each mesh, +1 or -1: sense about the axis in which the driver pushes, that of its rotation.
+
+    Where the drive stands still, the loads tell it.
+    """
+    assert scene.drive is not None
+    ratios = dict(zip((s.name for s in scene.shafts), rolling(scene).ratios, strict=True))
+    made = tuple(math.copysign(1.0, ratios[scene.gear(mesh.driver).shaft]) for mesh in scene.meshes)
+    sense = drive_sense(scene.drive.speed)
+    if sense == 0.0:
+        pressing = balanced_forces(scene, made, load_torques(scene, [load_end(scene)])).sum()
+        sense = math.copysign(1.0, pressing)
+    return tuple(sense * s for s in made)
 
 
 def drive_sense(speed: TimeFunction) -> float:
-    """Sense in which the drive turns: its first speed that is not zero."""
+    """Sense in which the drive turns: that of its first speed that is not zero; 0 where it stands still."""
     times = [0.0, *speed.breaks, *(0.5 * (a + b) for a, b in zip((0.0, *speed.breaks), speed.breaks, strict=False))]
     found = [float(speed(t)) for t in sorted(times)]
-    return next((math.copysign(1.0, s) for s in found if s != 0.0), 1.0)
+    return next((math.copysign(1.0, s) for s in found if s != 0.0), 0.0)

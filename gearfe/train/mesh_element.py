@@ -30,7 +30,6 @@ from ..rigid import Element, LinearJoint
 from ..stiffness.periodic import PeriodicInterpolant
 from .checks import interpolant
 from .elements import LinearForce, RigidShaft
-from .kinematics import drive_sense
 from .law import mesh_block
 from .scene import GearMesh, TrainScene
 
@@ -94,15 +93,13 @@ class MeshLine:
 
 def mesh_line(
     scene: TrainScene, mesh: GearMesh, shafts: Sequence[RigidShaft], first: NDArray[np.int64], ratios: Sequence[float],
-    size: int,
+    size: int, sense: float, phase: float,
 ) -> MeshLine:  # fmt: skip
     """Line of action of a mesh in a train whose shafts' coordinates begin at `first` of `size`."""
-    assert scene.drive is not None
     names = [s.name for s in scene.shafts]
     one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
     i, j = names.index(one.shaft), names.index(two.shaft)
     a = scene.frame[2]
-    sense = math.copysign(1.0, ratios[i] * drive_sense(scene.drive.speed))
     pair = GearPair(one.gear, two.gear, mesh.centre_distance)
     alpha = pair.working_pressure_angle
     base = np.array(scene.shaft(one.shaft).point)
@@ -121,7 +118,7 @@ def mesh_line(
         curve = interpolant(mesh)
         mean = mean_value(curve)
         damping = mesh.damping + scene.damping.beta * mean
-    return MeshLine(mesh.name, row, line, point, curve, mean, damping, i, ratios[i], sense, mesh.phase, one.gear.module)
+    return MeshLine(mesh.name, row, line, point, curve, mean, damping, i, ratios[i], sense, phase, one.gear.module)
 
 
 def mean_value(curve: PeriodicInterpolant) -> float:

@@ -21,7 +21,7 @@ from ..rigid.elimination import Minimal, minimal
 from .checks import check_scene
 from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge
 from .inertia import rotor
-from .kinematics import Rolling, rolling
+from .kinematics import Rolling, driving_senses, load_end, rolling
 from .law import (
     angle_block,
     derivative,
@@ -31,6 +31,7 @@ from .law import (
     torque_block,
 )
 from .mesh_element import MeshLine, mesh_line
+from .phases import tooth_places
 from .scene import Drive, TrainScene
 from .series import train_series
 
@@ -94,8 +95,8 @@ class TrainModel:
 
     @property
     def load_end(self) -> float:
-        """Time at which all ramps have ended (s)."""
-        return max((b for load in self.scene.loads for b in load.torque.breaks), default=0.0)
+        """Time at which all load ramps have ended (s)."""
+        return load_end(self.scene)
 
     @property
     def coupled_frequencies_hz(self) -> Array:
@@ -135,7 +136,12 @@ def build_train(scene: TrainScene) -> TrainModel:
     bodies: list[Element] = [*shafts] if housing is None else [housing, *shafts]
     first = np.array([0 if housing is None else housing.size] + [6] * (len(shafts) - 1)).cumsum()
     size = sum(b.size for b in bodies)
-    lines = tuple(mesh_line(scene, mesh, shafts, first, ratios, size) for mesh in scene.meshes)
+    senses = driving_senses(scene)
+    phases = tooth_places(scene, senses).phases
+    lines = tuple(
+        mesh_line(scene, mesh, shafts, first, ratios, size, sense, phase)
+        for mesh, sense, phase in zip(scene.meshes, senses, phases, strict=True)
+    )
     torques = _torques(scene, shafts, first, ratios, angle, size)
     forces = _forces(scene, bodies, lines, torques, angle, first, ratios, shafts)
     elements = [*bodies, *_supports(scene, shafts, housing), *(line.element(bodies) for line in lines), forces]

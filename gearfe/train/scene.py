@@ -89,7 +89,8 @@ class GearMesh:
         mesh: a constraint whose multiplier is the contact force.
     phase
         Angle of the driver (rad), counted in its driving sense, at which it starts; 0: a driver's tooth stands on the
-        line of centres.
+        line of centres. None: from the teeth of the gears that hang together, the first of whose meshes has 0; see
+        `gearfe.train.phases`.
     damping
         N s/m along the line of action.
     interpolation
@@ -101,7 +102,7 @@ class GearMesh:
     driver: str
     driven: str
     stiffness: StiffnessCurve | PeriodicInterpolant | float | None
-    phase: float = 0.0
+    phase: float | None = None
     damping: float = 0.0
     interpolation: str = "cubic"
     centre_distance: float | None = None

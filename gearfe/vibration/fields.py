@@ -20,6 +20,7 @@ from ..gear.drawing import gear_outline
 from ..gear.spur_gear import Gear
 from ..output.vtkhdf import VtkHdfSeries
 from ..reduction.modal_body import ModalBody
+from ..train.phases import tooth_places
 from ..train.response import TrainResponse
 from ..train.scene import ShaftGear, TrainScene
 
@@ -88,36 +89,12 @@ def cylinder_surface(radius: float, low: float, high: float) -> tuple[Array, Int
     return points, quads, np.concatenate([bottom, top])
 
 
-def tooth_angles(scene: TrainScene, senses: Sequence[float]) -> dict[str, float]:
-    """Gear -> angle (rad) at which its tooth 0 stands at the start, in the train's frame, so that flanks meet.
-
-    With u the direction from driver to driven, a driver's tooth stands at the mesh's phase past u in the driving sense,
-    and a driven gear has a space there. A gear in two meshes follows the first.
-
-    Parameters
-    ----------
-    senses
-        For each mesh, +1 or -1: the driver turns about the axis or against it.
-    """
-    frame = scene.frame
-    found: dict[str, float] = {}
-    for mesh, sense in zip(scene.meshes, senses, strict=True):
-        driver, driven = scene.gear(mesh.driver), scene.gear(mesh.driven)
-        centres = [np.array(scene.shaft(g.shaft).point) for g in (driver, driven)]
-        line = frame[:2] @ (centres[1] - centres[0])
-        towards = float(np.arctan2(line[1], line[0]))
-        ratio = driver.gear.teeth / driven.gear.teeth
-        start = found.setdefault(driver.name, towards + sense * mesh.phase)
-        found.setdefault(driven.name, towards + np.pi + np.pi / driven.gear.teeth - ratio * (start - towards))
-    return {gear.name: found.get(gear.name, 0.0) for gear in scene.gears}
-
-
 def solids(scene: TrainScene, response: TrainResponse, *, per_segment: int = 2) -> tuple[Solid, ...]:
     """Surfaces of all gears and of the shafts that carry them, where they stand at the start."""
     frame = scene.frame
     first = {gear.name: _spin(response, response.gear_names.index(gear.name), frame) for gear in scene.gears}
     senses = [-1.0 if first[mesh.driver][-1] < 0.0 else 1.0 for mesh in scene.meshes]
-    angles = tooth_angles(scene, senses)
+    angles = tooth_places(scene, senses).angles
     found = []
     carried: set[str] = set()
     for gear in scene.gears:

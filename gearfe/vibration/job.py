@@ -241,7 +241,7 @@ def _mesh(job: TrainJob, table: TrainMeshTable, stiffness: Stiffness) -> GearMes
         table.driver,
         table.driven,
         stiffness,
-        math.radians(table.phase_deg),
+        None if table.phase_deg is None else math.radians(table.phase_deg),
         table.damping_N_s_per_m,
         job.table.curves.interpolation,
         None if distance is None else 1e-3 * distance,

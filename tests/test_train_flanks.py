@@ -1,0 +1,102 @@
+"""Loads that press the back flanks are an error with its cure; statics by hand."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe.errors import InputError
+from gearfe.rigid import TimeFunction, constant, smoothed_step
+from gearfe.train import Drive, GearMesh, Load, build_train, simulate
+from gearfe.train.kinematics import steady_forces
+from gearfe.vibration.job import job_scene, read_train_job, train_curves
+
+from .test_train_job import BORES, SMALL, written
+from .trains import SHIPPED, base_radius, braking, changed, train
+
+BASE = train(SHIPPED)
+
+
+def loaded(*torques: TimeFunction | float, shafts: tuple[str, ...] = ("s2",), **changes: object):  # type: ignore[no-untyped-def]
+    loads = tuple(
+        Load(shaft, None, constant(t) if isinstance(t, float) else t) for shaft, t in zip(shafts, torques, strict=True)
+    )
+    return changed(BASE, loads=loads, **changes)
+
+
+def test_a_load_of_the_wrong_sign_says_so(tmp_path: Path) -> None:
+    """Before any curve is computed: the curves of the file are made in between."""
+    path = written(tmp_path, SMALL.replace("torque_Nm = -30.0", "torque_Nm = 30.0") + BORES)
+    job = read_train_job(path)
+    force = 30.0 / (0.027 * math.cos(math.radians(20.0)))
+    words = rf"load on 'out' torque_Nm = 30.0: drives the train.*is -{force:.6g} N.*write -30 to brake"
+    with pytest.raises(InputError, match=words):
+        train_curves(job)
+    with pytest.raises(InputError, match="drives the train"):
+        build_train(job_scene(job, [1e8], None))
+
+
+@pytest.mark.parametrize("speed", [600.0, -600.0])
+def test_signs_follow_the_sense_of_the_drive(speed: float) -> None:
+    drive = Drive("s0", "s0+", constant(speed))
+    build_train(loaded(-math.copysign(50.0, speed), drive=drive))
+    with pytest.raises(InputError, match="drives the train"):
+        build_train(loaded(math.copysign(50.0, speed), drive=drive))
+
+
+def test_a_ramp_of_the_drive_from_rest_has_its_final_sense() -> None:
+    ramp = Drive("s0", "s0+", smoothed_step(1e-3, 2e-3, -600.0))
+    build_train(loaded(50.0, drive=ramp))
+    with pytest.raises(InputError, match="drives the train"):
+        build_train(loaded(-50.0, drive=ramp))
+
+
+def test_several_loads_are_summed_at_all_times() -> None:
+    """s1 turns at -400 rad/s: +90 N m brake it. On the first mesh 2/3 of the 100 N m of s2 act as well."""
+    both = loaded(100.0, 90.0, shafts=("s2", "s1"))
+    with pytest.raises(InputError, match=r"load on 's2' torque_Nm = 100.*mesh 'd1-g1'"):
+        build_train(both)
+    helped = loaded(-100.0, -30.0, shafts=("s2", "s1"))  # the middle load drives, and the last one holds it
+    assert steady_forces(helped)[0] == pytest.approx((100.0 * 2 / 3 - 30.0) / base_radius(30))
+    build_train(helped)
+    with pytest.raises(InputError, match=r"load on 's1' torque_Nm = -70.*mesh 'd0-g0' is -2"):
+        build_train(loaded(-100.0, -70.0, shafts=("s2", "s1")))
+    early = loaded(smoothed_step(0.5e-3, 1e-3, -100.0), smoothed_step(2e-3, 1e-3, 150.0), shafts=("s2", "s2"))
+    with pytest.raises(InputError, match=r"torque_Nm = 150.*at 2\.5 ms"):
+        build_train(early)
+    late = loaded(50.0, smoothed_step(2e-3, 1e-3, -150.0), shafts=("s2", "s2"))
+    with pytest.raises(InputError, match=r"torque_Nm = 50.0"):
+        build_train(late)
+
+
+def test_a_mesh_written_the_wrong_way_round_is_told_from_a_wrong_torque() -> None:
+    turned = GearMesh("g0", "d0", 1e8)
+    with pytest.raises(InputError, match=r"brakes, but gear 'd0' drives gear 'g0'.*exchange driver and driven"):
+        build_train(changed(BASE, meshes=(turned, BASE.meshes[1])))
+
+
+def test_a_load_that_is_meant_to_drive() -> None:
+    """Named as drivers, the load's gears press the driving flanks: the mirror image of the train driven there."""
+    meshes = tuple(GearMesh(m.driven, m.driver, m.stiffness) for m in BASE.meshes)
+    lowering = changed(BASE, meshes=meshes, loads=(Load("s2", "s2+", -1.0 * braking(2)),))
+    times = np.linspace(0.0, 2e-3, 21)
+    one, two = (simulate(build_train(s), times, tolerance=1e-9).contact_force for s in (BASE, lowering))
+    assert one == pytest.approx(two, rel=1e-6, abs=1e-3)
+    assert one[-1].min() > 0.0
+
+
+def test_what_is_no_mistake() -> None:
+    """No load, inertia alone, oscillating torques, another initial speed; a drive at rest, its loads either way."""
+    build_train(changed(BASE, loads=()))
+    build_train(loaded(-20.0, drive=Drive("s0", "s0+", constant(600.0) + smoothed_step(1e-3, 1e-3, -300.0))))
+    build_train(loaded(constant(-20.0) + TimeFunction(sines=((50.0, 3000.0, 0.0),))))
+    fast = (*BASE.shafts[:2], dataclasses.replace(BASE.shafts[2], initial_speed=300.0))
+    build_train(changed(BASE, shafts=fast))
+    still = Drive("s0", "s0+", constant(0.0))
+    for torque in (50.0, -50.0):
+        made = simulate(build_train(loaded(torque, drive=still)), np.linspace(0.0, 1e-3, 5))
+        assert made.contact_force.min() >= -1e-9
