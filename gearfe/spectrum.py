@@ -50,7 +50,7 @@ class Spectrum:
     value : ndarray of complex, shape (m,) or (m, s)
         Complex amplitudes: the part at f is ``Re(value exp(2 pi i f (t - t0)))``, t0 the first sample's time.
     samples
-        N.
+        N; of a band-limited spectrum more than twice the lines.
     window
         Name of the window.
     noise_bandwidth
@@ -75,7 +75,7 @@ class Spectrum:
 
     @property
     def nyquist(self) -> float:
-        """Half the sampling frequency (Hz)."""
+        """Half the sampling frequency (Hz); the lines may end below it."""
         return 0.5 * self.samples * self.resolution
 
     @property
@@ -83,7 +83,7 @@ class Spectrum:
         """(m,) share of the squared amplitude in the mean square: 1/2, but 1 for the constant and at Nyquist."""
         weight = np.full(len(self.frequency), 0.5)
         weight[0] = 1.0
-        if self.samples % 2 == 0:
+        if 2 * (len(weight) - 1) == self.samples:
             weight[-1] = 1.0
         return weight
 
@@ -134,9 +134,14 @@ def uniform_step(time: ArrayLike) -> float:
 
 def window_values(name: str, length: int) -> Floats:
     """(length,) values of a window; see `WINDOWS`."""
+    return window_at(name, np.arange(length) / length)
+
+
+def window_at(name: str, place: Floats) -> Floats:
+    """Values of a window at places of the record, 0 at its beginning and 1 at its end."""
     if name not in WINDOWS:
         raise InputError("window", name, "must be one of " + ", ".join(WINDOWS), "")
-    angle = 2.0 * math.pi * np.arange(length) / length
+    angle = 2.0 * math.pi * place
     return np.asarray(sum((-1) ** j * a * np.cos(j * angle) for j, a in enumerate(WINDOWS[name])))
 
 
@@ -285,23 +290,6 @@ def line_amplitudes(values: ArrayLike, step: float, frequencies: ArrayLike) -> N
     return np.asarray(found[1 : 1 + len(f)] - 1j * found[1 + len(f) :])
 
 
-def aliasing_warning(frequencies: ArrayLike, step: float, share: float | None = None) -> str:
-    """A sentence when natural frequencies (Hz) lie above the Nyquist frequency of the step (s), else empty.
-
-    `share`: what that adds to the spectrum in the band of interest, relative to what belongs there; None: not known.
-    """
-    f, nyquist = np.asarray(frequencies, dtype=float), 0.5 / step
-    above = f[f > nyquist]
-    if not len(above):
-        return ""
-    told = "" if share is None else f" and adds up to {100 * share:.2g} % (rms) in the band of interest"
-    return (
-        f"{len(above)} of {len(f)} modes lie above {nyquist:.6g} Hz, half the output's sampling frequency (the highest "
-        f"at {above.max():.6g} Hz): their vibration is folded into the spectrum{told}; a step of "
-        f"{_below(0.5e6 / above.max()):.3g} us shows them where they are"
-    )
-
-
 def waterfall(
     values: ArrayLike, step: float, length: int, *, hop: int | None = None, window: str = "hann"
 ) -> Waterfall:
@@ -314,9 +302,3 @@ def waterfall(
     parts = [amplitude_spectrum(x, step, window=window, start=s, length=length) for s in starts]
     middle = step * (np.array(starts) + 0.5 * (length - 1))
     return Waterfall(middle, parts[0].frequency, np.array([p.amplitude for p in parts]))
-
-
-def _below(value: float) -> float:
-    """Three digits, rounded down: a step read off the text shall do what the text says."""
-    digits = 10.0 ** (2 - math.floor(math.log10(value)))
-    return math.floor(value * digits * (1.0 + 1e-12)) / digits

@@ -9,20 +9,24 @@ from __future__ import annotations
 import sys
 
 from gearfe.output.files import output_folder, write_csv
+from gearfe.record_spectrum import finer
 from gearfe.train import build_train, simulate
 from gearfe.vibration.job import job_scene, read_train_job, train_body, train_curves
-from gearfe.vibration.report import mean_over_periods, response_columns, spectra
+from gearfe.vibration.report import mean_over_periods
+from gearfe.vibration.spectra import response_columns, spectra
 
 
 def main(job_file: str = "geometry/gear_train.toml", out: str = "out/vibration", variant: str | None = None) -> int:
     """Simulate, write response.csv and spectrum.csv, print the mean contact forces."""
     job = read_train_job(job_file, variant)
     scene = job_scene(job, train_curves(job), train_body(job))
-    response = simulate(build_train(scene), job.times, tolerance=job.table.tolerance)
+    model = build_train(scene)
+    times, every = finer(job.times, model.coupled_frequencies_hz.max())  # what the fastest mode needs
+    response = simulate(model, times, tolerance=job.table.tolerance)
     radiation = None if scene.housing is None else scene.housing.radiation
     folder = output_folder(out)
-    write_csv(folder / "response.csv", response_columns(response, radiation))
-    write_csv(folder / "spectrum.csv", spectra(response, radiation).columns())
+    write_csv(folder / "response.csv", response_columns(response.every(every), radiation))
+    write_csv(folder / "spectrum.csv", spectra(response, radiation, every=every).columns())
     force, periods = mean_over_periods(
         response.time, response.contact_force, response.load_end_s, response.common_period_s
     )

@@ -9,7 +9,6 @@ from gearfe.errors import InputError
 from gearfe.spectrum import (
     WINDOWS,
     OrderLine,
-    aliasing_warning,
     amplitude_spectrum,
     band_rms,
     line_amplitudes,
@@ -146,20 +145,6 @@ def test_waterfall_of_a_run_up():
     line = fall.frequency[fall.amplitude.argmax(axis=1)]
     assert np.abs(line - (200 + rate * fall.time)).max() <= 5 * fall.frequency[1]
     assert np.diff(line).min() > 0
-
-
-def test_aliasing():
-    assert aliasing_warning([100.0, 14_000.0], STEP) == ""
-    said = aliasing_warning([100.0, 20_000.0, 30_000.0], STEP)
-    assert said.startswith("2 of 3 modes lie above 14285.7 Hz")
-    assert "16.6 us" in said  # 1/60000 s, rounded down
-    assert aliasing_warning([30_000.0], said_step(said)) == ""
-    assert "adds up to 31 % (rms)" in aliasing_warning([20_000.0], STEP, 0.31)
-
-
-def said_step(said: str) -> float:
-    """The step that a warning recommends (s)."""
-    return 1e-6 * float(said.partition("a step of ")[2].partition(" us")[0])
 
 
 def test_steps():

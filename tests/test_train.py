@@ -289,22 +289,3 @@ def test_reduced_against_full_housing_in_the_coupled_transient() -> None:
 def test_periods_of_other_trains() -> None:
     assert rolling(train([(17, 34)])).common_turns == pytest.approx(1 / 17)
     assert rolling(train([(20, 30), (30, 20)])).common_turns == pytest.approx(1 / 20)
-
-
-def test_what_the_output_step_folds_into_the_band() -> None:
-    """Against spectra of two runs of their own, the second with twelve times as many samples."""
-    scene = train([(20, 30)], stiffness=lambda z: curve(z, 1e8, 0.3))
-    model = build_train(scene)
-    highest = float(model.coupled_frequencies_hz.max())
-    count, band = 200, 0.2 * highest
-    step = 1.0 / (1.5 * highest)  # its half sampling frequency is three quarters of the highest mode
-    coarse = simulate(model, step * np.arange(count + 1), tolerance=1e-10, estimate=True, band_hz=band)
-    fine = simulate(model, step / 12 * np.arange(12 * count + 1), tolerance=1e-10)
-    seen = np.fft.rfft(coarse.contact_force[:count, 0]) / count
-    true = np.fft.rfft(fine.contact_force[: 12 * count, 0]) / (12 * count)
-    inside = slice(1, 1 + int(band * count * step))
-    off = np.linalg.norm(seen[inside] - true[inside]) / np.linalg.norm(true[inside])
-    assert off > 0.01
-    assert coarse.estimates["folding"] == pytest.approx(off, rel=0.1)
-    enough = simulate(model, step / 2 * np.arange(2 * count + 1), tolerance=1e-6, estimate=True, band_hz=band)
-    assert "folding" not in enough.estimates

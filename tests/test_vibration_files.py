@@ -25,7 +25,8 @@ from gearfe.vibration.fields import (
     write_housing,
 )
 from gearfe.vibration.files import OutputChoice, write_all
-from gearfe.vibration.report import mean_over_periods, response_columns, spectra
+from gearfe.vibration.report import mean_over_periods
+from gearfe.vibration.spectra import response_columns, spectra
 
 from .gears import pair
 from .housing_meshes import box
@@ -70,7 +71,9 @@ def test_columns_and_digits(tmp_path, scene):
     assert (by_name["speed_intermediate_rad_per_s"] == response.speed[:, 1]).all()
     assert (by_name["attachment_5_acceleration_m_per_s2"] == response.attachment_acceleration[:, 4]).all()
     assert by_name["drive_angle_deg"] == pytest.approx(np.degrees(600.0 * response.time), rel=1e-15)
+    assert (by_name["band_limited"] == 0).all()  # points of the motion
     lines, _ = table(tmp_path / "spectrum.csv")
+    assert "band_limited" not in lines
     assert lines[0] == "frequency_Hz"
     assert lines[1 : len(COLUMNS) - 1] == COLUMNS[2:]
     assert set(written.names) >= {"response.png", "spectrum.png", "summary.json"}

@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
         )
         check_choice(choice, job.times, tuple(str(a) for s in job.table.shafts for a in s.attachments))
         folder = output_folder(args.out or Path("out") / Path(args.job).stem)
-    scene, response = simulated(
+    scene, response, every = simulated(
         job, args.curve, watch=watch, progress=count, floquet=not args.no_floquet, estimate=not args.no_estimate
     )
     written = write_all(
@@ -88,6 +88,7 @@ def run(args: argparse.Namespace) -> int:
         choice,
         title=title(job),
         watch=watch,
+        every=every,
         further=described(job, scene),
         progress=count,
         started=started,
@@ -103,8 +104,9 @@ def run(args: argparse.Namespace) -> int:
 
 def simulated(
     job: TrainJob, curves: Sequence[str], *, watch: Any, progress: Any = None, floquet: bool, estimate: bool
-) -> tuple[TrainScene, TrainResponse]:
-    """Curves, housing and transient of a job, each from the cache where it can be."""
+) -> tuple[TrainScene, TrainResponse, int]:
+    """Curves, housing and transient of a job, each from the cache where it can be; samples in an output step."""
+    from ..record_spectrum import finer
     from ..train import build_train, simulate
     from ..vibration.job import job_scene, train_body, train_curves
 
@@ -118,8 +120,9 @@ def simulated(
     with watch.stage("transient"):
         options: dict[str, Any] = {"tolerance": job.table.tolerance, "method": job.table.method}
         band = 5000.0 if job.housing is None else job.housing.reduction.band_Hz
-        response = simulate(model, job.times, floquet=floquet, estimate=estimate, band_hz=band, **options)
-    return scene, response
+        times, every = finer(job.times, float(model.coupled_frequencies_hz.max(initial=0.0)))
+        response = simulate(model, times, floquet=floquet, estimate=estimate, band_hz=band, **options)
+    return scene, response, every
 
 
 def title(job: TrainJob) -> str:
@@ -195,7 +198,10 @@ def told(response: TrainResponse, scene: TrainScene, written: Written, choice: O
         lines.append(f"error estimate, {name}: {value:.2g}")
     if written.spectra is not None:
         made = written.spectra
-        lines.append(f"spectrum: resolution {made.spectrum.resolution:.4g} Hz, {made.spectrum.samples} samples")
+        lines.append(
+            f"spectrum: resolution {made.spectrum.resolution:.4g} Hz, up to {made.spectrum.frequency[-1]:.6g} Hz, "
+            f"from samples every {1e6 * made.step / made.every:.3g} us"
+        )
         loaded = next((load.bore for load in scene.loads if load.bore is not None), None)
         attachment = attachment_to_draw(response, choice.attachment, loaded)
         found = dominant(made, response, f"attachment_{attachment}_acceleration_m_per_s2", 4)

@@ -3,13 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+#: What has a row for each output time.
+SAMPLED = (
+    "time",
+    "drive_angle",
+    "contact_force",
+    "drive_torque",
+    "speed",
+    "speed_absolute",
+    "acceleration",
+    "acceleration_absolute",
+    "attachment_acceleration",
+    "gear_pose",
+    "modal",
+    "modal_velocity",
+    "modal_acceleration",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +81,7 @@ class TrainResponse:
         Time at which all load ramps have ended (s).
     statistics, estimates : mapping
         ``steps``, ``evaluations``, ``method``, ``seconds``, ``free_coordinates``, ``redundant_constraints`` (names),
-        ``smallest_contact_force_N``; error estimates asked for (``integration``, ``reduction``, ``folding``).
+        ``smallest_contact_force_N``; error estimates asked for (``integration``, ``reduction``).
     warnings : tuple of str
     """
 
@@ -98,3 +115,8 @@ class TrainResponse:
     statistics: Mapping[str, Any] = field(default_factory=dict)
     estimates: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+
+    def every(self, count: int) -> TrainResponse:
+        """The response at each `count`-th of its times, the first one included."""
+        values = {name: getattr(self, name) for name in SAMPLED}
+        return replace(self, **{name: v[::count] for name, v in values.items() if v is not None})

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..rigid import Trajectory, integrate
-from ..spectrum import UNEVEN, amplitude_spectrum
 from .floquet import train_multipliers
 from .model import TrainModel
 from .motion import Motion, motion
@@ -24,8 +23,6 @@ Array = NDArray[np.float64]
 SAFETY = 1.5
 #: An approach or a bore's displacement beyond this part of the module means that nothing holds any more.
 DIVERGED = 0.25
-#: Folding is measured with samples that hold this much more than the highest mode, and so many at most.
-SPARE, MOST_SAMPLES = 1.4, 20_000
 #: A multiplier beyond this is an instability, not round-off.
 STABLE = 1.0 + 1e-6
 
@@ -57,8 +54,7 @@ def simulate(
         Compute the multipliers over the common mesh period.
     estimate
         Estimate the errors: of the integration from a second run with a hundredth of the tolerance and shorter steps,
-        of the housing's reduction up to `band_hz` (Hz), and of the spectrum up to there where the output times are too
-        far apart for the highest modes (`folding`).
+        and of the housing's reduction up to `band_hz` (Hz).
     backend
         ``compiled``, ``plain`` or ``auto``.
 
@@ -93,8 +89,6 @@ def simulate(
     estimates: dict[str, float] = {}
     if estimate:
         estimates = _estimates(model, response, t[: len(moved.time)], tolerance, method, band_hz)
-        folded = _folded(model, trajectory, moved.time, band_hz)
-        estimates |= {} if folded is None else {"folding": folded}
     multipliers, note = (None, "not computed") if not floquet else train_multipliers(model)
     if multipliers is not None and abs(multipliers[0]) > STABLE:
         warnings.append(
@@ -244,30 +238,3 @@ def _estimates(
 
         found["reduction"] = reduction_error(body, band_hz).response
     return found
-
-
-def _folded(model: TrainModel, trajectory: Trajectory, t: Array, band_hz: float) -> float | None:
-    """What vibration above half the output's sampling frequency adds to the spectrum up to `band_hz`, rms.
-
-    The same run sampled `finer` times as often has the spectrum Y; taking each `finer`-th sample gives X, the bins of Y
-    that lie whole sampling frequencies apart summed up. The largest ``|X - Y|/|Y|`` over the contact forces and the
-    attachments' accelerations, constant left out. None where no mode lies above, the times are not evenly spaced, or
-    the run is too short.
-    """
-    highest = float(model.coupled_frequencies_hz.max(initial=0.0))
-    if len(t) < 4 or np.ptp(np.diff(t)) > UNEVEN * (step := float(t[1] - t[0])) or highest <= 0.5 / step:
-        return None
-    finer = math.ceil(SPARE * 2.0 * highest * step)
-    count = min(len(t) - 1, max(MOST_SAMPLES // finer, 4))
-    times = t[-1 - count] + step / finer * np.arange(count * finer)
-    with np.errstate(over="ignore", invalid="ignore"):
-        moved = motion(model, replace(trajectory, time=times))
-    signals = np.hstack([moved.contact_force, moved.a @ model.axial.T])
-    if not np.isfinite(signals).all():
-        return None
-    true, seen = amplitude_spectrum(signals, step / finer), amplitude_spectrum(signals[::finer], step)
-    inside = (seen.frequency > 0.0) & (seen.frequency <= band_hz) & (seen.frequency < seen.nyquist)
-    true_band, seen_band = true.value[: len(inside)][inside], seen.value[inside]
-    size = np.linalg.norm(true_band, axis=0)
-    off = np.linalg.norm(seen_band - true_band, axis=0)
-    return float((off / np.where(size > 0.0, size, np.inf)).max(initial=0.0))

@@ -15,7 +15,8 @@ from ..output.files import whole_set, write_csv, write_json
 from ..stopwatch import Stopwatch
 from ..train.response import TrainResponse
 from ..train.scene import TrainScene
-from .report import TrainSpectra, response_columns, spectra, train_summary
+from .report import train_summary
+from .spectra import TrainSpectra, record, response_columns, spectra
 
 #: Frames of the animation, and steps of the field files at most.
 FRAMES, FIELD_STEPS = 50, 101
@@ -45,7 +46,7 @@ class OutputChoice:
     picture_time
         Time of the picture of the fields (s); None: 4.55 ms, or the end of a shorter run.
     window, spectrum_start, spectrum_length
-        Record of the spectrum, see `gearfe.vibration.report.spectra` (s).
+        Record of the spectrum, see `gearfe.vibration.spectra.TrainRecord` (s).
     """
 
     pictures: bool = True
@@ -77,12 +78,10 @@ def check_choice(choice: OutputChoice, times: np.ndarray, attachments: tuple[str
         Unknown window or attachment, a record or a picture's time outside of the run.
     """
     from ..errors import unknown_name
-    from ..spectrum import amplitude_spectrum, uniform_step
-    from .report import record
+    from ..spectrum import window_values
 
-    step = uniform_step(times)
-    first, count = record(times, choice.spectrum_start, choice.spectrum_length)
-    amplitude_spectrum(np.zeros(len(times)), step, window=choice.window, start=first, length=count)
+    record(times, choice.spectrum_start, choice.spectrum_length)
+    window_values(choice.window, 2)
     if choice.attachment is not None and choice.attachment not in attachments:
         raise unknown_name("--attachment", choice.attachment, attachments)
     time = choice.picture_time
@@ -99,27 +98,29 @@ def write_all(
     *,
     title: str,
     watch: Stopwatch,
+    every: int = 1,
     further: Mapping[str, Any] | None = None,
     progress: Callable[[int, int, str], None] | None = None,
     started: float | None = None,
 ) -> Written:
     """Write ``response.csv``, ``spectrum.csv``, ``summary.json`` and what else is chosen.
 
-    A run that ended early gets the same files, as far as it came. With `started` (of `time.perf_counter`) the watch
-    gets the total.
+    `every` samples of the response make an output step. A run that ended early gets the same files, as far as it came.
+    With `started` (of `time.perf_counter`) the watch gets the total.
     """
     radiation = None if scene.housing is None else scene.housing.radiation
     made = None
     with watch.stage("spectra"):
         if response.status == "done":
-            options = {"start": choice.spectrum_start, "length": choice.spectrum_length}
-            made = spectra(response, radiation, window=choice.window, **options)  # type: ignore[arg-type]
-        elif len(response.time) > 3:
-            made = spectra(response, radiation, window=choice.window)
+            first, duration = choice.spectrum_start, choice.spectrum_length
+            made = spectra(response, radiation, every=every, window=choice.window, start=first, length=duration)
+        elif len(response.time) > 3 * every:
+            made = spectra(response, radiation, every=every, window=choice.window)
     problems: list[str] = []
+    outputs = response.every(every)
     with whole_set(folder, MAY_WRITE) as target:
         with watch.stage("tables"):
-            write_csv(target / "response.csv", _lists(response_columns(response, radiation)))
+            write_csv(target / "response.csv", _lists(response_columns(outputs, radiation)))
             if made is not None:
                 write_csv(target / "spectrum.csv", _lists(made.columns()))
         if choice.pictures and made is not None:
@@ -127,7 +128,7 @@ def write_all(
                 _pictures(target, scene, response, made, choice, title)
         if choice.fields:
             with watch.stage("fields"):
-                problems += _fields(target, scene, response, choice, title, progress)
+                problems += _fields(target, scene, outputs, choice, title, progress)
         if started is not None:
             watch.seconds["total"] = time.perf_counter() - started
         summary = train_summary(response, made, watch.seconds, **(further or {}))

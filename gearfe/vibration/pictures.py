@@ -10,7 +10,8 @@ from ..errors import unknown_name
 from ..output.train_figures import Mark, power_figure, response_figure, spectrum_figure
 from ..spectrum import nearest_line, peaks
 from ..train.response import TrainResponse
-from .report import TrainSpectra, lines_of, mean_over_periods
+from .report import lines_of, mean_over_periods
+from .spectra import TrainSpectra
 
 #: Lines that are named in the picture of a spectrum, and the least amplitude of such a line in parts of the largest.
 _NAMED, _LEAST = 5, 0.2
@@ -50,7 +51,7 @@ def draw_spectrum(path: Path, response: TrainResponse, made: TrainSpectra, attac
     """Amplitude spectrum of the acceleration at an attachment."""
     name, spectrum = f"attachment_{attachment}_acceleration_m_per_s2", made.spectrum
     amplitude = made.amplitude(name)
-    lines = lines_of(response, spectrum.nyquist)
+    lines = lines_of(response, float(spectrum.frequency[-1]))
     named = []
     for peak in peaks(spectrum.frequency, amplitude, _NAMED, above=_LEAST):
         line = nearest_line(peak.frequency, lines, 0.51 * spectrum.resolution)
@@ -107,7 +108,7 @@ def _first_shaft(response: TrainResponse) -> tuple[str, float]:
 
 def _highest(response: TrainResponse, made: TrainSpectra, lines: list[float]) -> float:
     """End of the frequency axis (kHz)."""
-    top = 1e-3 * made.spectrum.nyquist
+    top = 1e-3 * float(made.spectrum.frequency[-1])
     meshes = 1e-3 * float(np.max(np.abs(response.mesh_frequencies_Hz), initial=0.0))
     return min(top, max([_MESH_MULTIPLES * meshes, *(1.08 * f for f in lines)]) or top)
 
@@ -116,5 +117,5 @@ def _marks(response: TrainResponse, made: TrainSpectra) -> list[Mark]:
     first = {f"mesh {i + 1}": f for i, f in enumerate(response.mesh_frequencies_Hz)}
     return [
         Mark(f"{line.name}: {first[line.name]:.1f} Hz and its multiples", str(line.order), 1e-3 * line.frequency)
-        for line in lines_of(response, made.spectrum.nyquist)
+        for line in lines_of(response, float(made.spectrum.frequency[-1]))
     ]

@@ -1,144 +1,25 @@
-"""What the vibration command tells: columns of its tables, means, dominant lines, the summary."""
+"""What the vibration command tells: means, dominant lines, the summary."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..spectrum import (
-    OrderLine,
-    Spectrum,
-    aliasing_warning,
-    amplitude_spectrum,
-    nearest_line,
-    order_lines,
-    peaks,
-    uniform_step,
-)
+from ..spectrum import OrderLine, nearest_line, order_lines, peaks
 from ..stiffness.curve import StiffnessCurve
 from ..train.response import TrainResponse
 from ..train.scene import TrainScene
-from .radiation import RadiatedPower, instantaneous_power, radiated_power
+from .spectra import TrainSpectra
 
 Array = NDArray[np.float64]
 
-#: Columns of response.csv that are no signals of the spectrum.
-NO_SIGNALS = ("time_s", "drive_angle_deg", "instantaneous_radiated_power_W")
 #: Lines that the summary names for each signal.
 NAMED = 5
 #: Lines smaller than this part of the largest one are round-off.
 LEAST = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class TrainSpectra:
-    """Spectra of all signals over one record.
-
-    Attributes
-    ----------
-    names
-        Signals, as in response.csv.
-    spectrum
-        One column a signal.
-    power
-        Equivalent radiated power; None for a rigid housing.
-    start, step
-        Time of the first sample and between samples (s).
-    """
-
-    names: tuple[str, ...]
-    spectrum: Spectrum
-    power: RadiatedPower | None
-    start: float
-    step: float
-
-    def amplitude(self, name: str) -> Array:
-        """(m,) amplitudes of a signal."""
-        return self.spectrum.amplitude[:, self.names.index(name)]
-
-    def columns(self) -> dict[str, Array]:
-        """Columns of spectrum.csv."""
-        amplitude = self.spectrum.amplitude
-        made = {"frequency_Hz": self.spectrum.frequency}
-        made |= {name: amplitude[:, i] for i, name in enumerate(self.names)}
-        if self.power is not None:
-            made |= {"radiated_power_W": self.power.power, "radiated_power_level_dB": self.power.level}
-        return made
-
-
-def response_columns(response: TrainResponse, radiation: Array | None = None) -> dict[str, Array]:
-    """Columns of response.csv; `radiation` is the housing's surface matrix."""
-    made = {"time_s": response.time, "drive_angle_deg": np.degrees(response.drive_angle)}
-    for i in range(len(response.mesh_names)):
-        made[f"contact_force_{i + 1}_N"] = response.contact_force[:, i]
-    shafts = list(enumerate(response.shaft_names))
-    made |= {f"speed_{name}_rad_per_s": response.speed[:, i] for i, name in shafts}
-    made |= {f"acceleration_{name}_rad_per_s2": response.acceleration[:, i] for i, name in shafts}
-    for i, name in enumerate(response.attachment_names):
-        made[f"attachment_{name}_acceleration_m_per_s2"] = response.attachment_acceleration[:, i]
-    made |= {f"speed_absolute_{name}_rad_per_s": response.speed_absolute[:, i] for i, name in shafts}
-    made |= {f"acceleration_absolute_{name}_rad_per_s2": response.acceleration_absolute[:, i] for i, name in shafts}
-    if radiation is not None and response.modal_velocity is not None:
-        made["instantaneous_radiated_power_W"] = instantaneous_power(radiation, response.modal_velocity)
-    return made
-
-
-def spectra(
-    response: TrainResponse,
-    radiation: Array | None = None,
-    *,
-    window: str = "none",
-    start: float = 0.0,
-    length: float | None = None,
-) -> TrainSpectra:
-    """Spectra of all signals of a response.
-
-    The record holds its first sample and not its last: n steps are n samples, as a period that repeats has them, so
-    7 ms in 200 steps give lines 1/(7 ms) apart.
-
-    Parameters
-    ----------
-    window
-        See `gearfe.spectrum.WINDOWS`.
-    start, length
-        Begin and duration of the record (s); by default all of it.
-
-    Raises
-    ------
-    InputError
-        A record that is longer than the response or has fewer than two samples.
-    """
-    step = uniform_step(response.time)
-    first, count = record(response.time, start, length)
-    columns = {n: v for n, v in response_columns(response).items() if n not in NO_SIGNALS}
-    options: dict[str, Any] = {"window": window, "start": first, "length": count}
-    spectrum = amplitude_spectrum(np.column_stack(list(columns.values())), step, **options)
-    power = None
-    if radiation is not None and response.modal_velocity is not None:
-        power = radiated_power(radiation, response.modal_velocity, step, **options)
-    return TrainSpectra(tuple(columns), spectrum, power, float(response.time[first]), step)
-
-
-def record(time: Array, start: float = 0.0, length: float | None = None) -> tuple[int, int]:
-    """First sample and number of samples of the record of a spectrum; see `spectra`."""
-    step = uniform_step(time)
-    available = len(time) - 1
-    first = round((start - float(time[0])) / step)
-    if not 0 <= first <= available - 2:
-        problem = f"must leave two samples at least of {time[0]:g}..{time[-1]:g} s"
-        raise InputError("spectrum start", start, problem, "begin earlier")
-    count = available - first if length is None else round(length / step)
-    if count > available - first:
-        problem = f"the window is longer than the signal, which has {(available - first) * step:g} s from its start"
-        raise InputError("window length", length, problem, "shorten the window or compute for longer")
-    if count < 2:
-        raise InputError("window length", length, f"is less than two steps of {step:g} s", "lengthen the window")
-    return first, count
 
 
 def mean_over_periods(time: Array, values: Array, begin: float, period: float | None) -> tuple[Array, int]:
@@ -177,7 +58,7 @@ def lines_of(response: TrainResponse, highest: float) -> tuple[OrderLine, ...]:
 def dominant(spectra: TrainSpectra, response: TrainResponse, name: str, count: int = NAMED) -> list[dict[str, Any]]:
     """Largest lines of a signal, each with the multiple of a mesh frequency within one bin of it, if there is one."""
     spectrum = spectra.spectrum
-    lines = lines_of(response, spectrum.nyquist)
+    lines = lines_of(response, float(spectrum.frequency[-1]))
     drive = float(abs(response.shaft_frequencies_Hz[0]))
     found = []
     for peak in peaks(spectrum.frequency, spectra.amplitude(name), count, above=LEAST):
@@ -202,7 +83,7 @@ def train_summary(
         "status": response.status,
         "time_reached_s": response.time_reached,
         **further,
-        "warnings": all_warnings(response, made),
+        "warnings": list(response.warnings),
         "shafts": list(response.shaft_names),
         "meshes": list(response.mesh_names),
         "shaft_frequencies_Hz": response.shaft_frequencies_Hz,
@@ -237,7 +118,8 @@ def train_summary(
             "samples": spectrum.samples,
             "start_s": made.start,
             "resolution_Hz": spectrum.resolution,
-            "nyquist_Hz": spectrum.nyquist,
+            "highest_Hz": spectrum.frequency[-1],
+            "motion_sampled_every_us": 1e6 * made.step / made.every,
         }
         summary["dominant_lines"] = {n: dominant(made, response, n) for n in made.names if "absolute" not in n}
         if made.power is not None:
@@ -245,6 +127,7 @@ def train_summary(
             summary["radiated_power"] = {
                 "mean_W": made.power.mean,
                 "mean_level_dB": made.power.mean_level,
+                "mean_below_highest_Hz_W": made.power.power.sum() / spectrum.noise_bandwidth,
                 "largest_lines": [
                     {"frequency_Hz": p.frequency, "power_W": p.amplitude, "level_dB": made.power.level[p.bin]}
                     for p in found
@@ -269,12 +152,3 @@ def stiffness_ranges(scene: TrainScene) -> dict[str, tuple[float | None, float |
             values = given.k_mesh if isinstance(given, StiffnessCurve) else given.values
             found[mesh.name] = (float(np.nanmin(values)), float(np.nanmax(values)))
     return found
-
-
-def all_warnings(response: TrainResponse, made: TrainSpectra | None) -> list[str]:
-    """Warnings of the response, and of modes that the output step folds into the spectrum."""
-    said = list(response.warnings)
-    if made is None:
-        return said
-    folded = aliasing_warning(response.coupled_frequencies_Hz, made.step, response.estimates.get("folding"))
-    return [*said, folded] if folded else said

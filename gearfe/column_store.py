@@ -1,0 +1,38 @@
+"""A table that grows by rows and is read by columns, in memory while it is small, else in a temporary file."""
+
+from __future__ import annotations
+
+import tempfile
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+#: Bytes up to which the table stays in memory.
+IN_MEMORY = 32 << 20
+
+
+class ColumnStore:
+    """Rows of `columns` numbers, appended block by block; the file goes away with the object."""
+
+    def __init__(self, columns: int) -> None:
+        self.columns = columns
+        self._blocks: list[int] = []
+        self._file = tempfile.SpooledTemporaryFile(max_size=IN_MEMORY)  # noqa: SIM115 (lives as long as the table)
+
+    def append(self, rows: Floats) -> None:
+        """Add a block of rows, (n, columns)."""
+        if len(rows):
+            self._blocks.append(len(rows))
+            self._file.write(np.ascontiguousarray(rows.T).tobytes())
+
+    def column(self, number: int) -> Floats:
+        """(rows,) a whole column."""
+        parts, begin = [], 0
+        for count in self._blocks:
+            self._file.seek(8 * (begin + number * count))
+            parts.append(np.frombuffer(self._file.read(8 * count)))
+            begin += count * self.columns
+        self._file.seek(0, 2)
+        return np.concatenate(parts) if parts else np.zeros(0)

@@ -1,0 +1,197 @@
+r"""Spectrum of a record of motion that is known at all times: the Fourier coefficients, with nothing folded into them.
+
+For a record from :math:`t_0` to :math:`t_0 + T` with the window w of mean :math:`\bar w`,
+
+.. math::
+    \hat x_k = \frac{2}{T \bar w}\int_0^T w\, x\, e^{-2\pi i f_k t}\,dt, \qquad f_k = k/T \le \frac{1}{2 h},
+
+half of it for the constant. The output step h only says up to where there are lines. The integral is the trapezoidal
+sum over samples m times as fine as the output (`samples_per_step`), which is exact for a record that repeats; for one
+that ends elsewhere than it began, the ramp between its ends is integrated exactly.
+
+Samples may come piece by piece: they pass a linear-phase low-pass filter (a sinc with a Kaiser window; Oppenheim &
+Schafer, Discrete-Time Signal Processing, Sec. 7.5) and every (m/2)-th is kept, twice the output's number in all. What
+lies above three times the output's Nyquist frequency, which alone would fold below it, is weakened by 140 dB; what the
+filter does to lines below it is divided out. Its reach beyond the ends is wrapped round, as the coefficients of a
+record are those of its periodic continuation, so the filter has no transient either.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .column_store import ColumnStore
+from .errors import InputError
+from .spectrum import Spectrum, window_at
+
+Floats = NDArray[np.float64]
+
+#: Sampling frequency of the motion, in parts of twice the highest natural frequency, at least: with 2 the leakage of a
+#: fast mode through the ends of a record is within 1e-3 of the largest line; on lines of the record it would need 1.
+SPARE = 2.0
+#: Half length of the filter in kept samples, and the attenuation (dB) for which Kaiser's formulas ask that length.
+REACH, STOP_BAND_DB = 10, 145.0
+#: Kaiser's relation between the attenuation and the parameter of his window.
+_BETA = 0.1102 * (STOP_BAND_DB - 8.7)
+
+
+def samples_per_step(step: float, highest: float) -> int:
+    """How many samples a step of the output (s) needs for modes up to `highest` (Hz): 1, or an even number.
+
+    Half the sampling frequency then lies `SPARE` times above the highest mode.
+    """
+    needed = 2.0 * SPARE * highest * step * (1.0 - 1e-9)
+    return 1 if needed <= 1.0 else 2 * math.ceil(0.5 * needed)
+
+
+def finer(times: Floats, highest: float) -> tuple[Floats, int]:
+    """Times (s) at which to sample a motion with modes up to `highest` (Hz), and how many of them make an output step.
+
+    Parameters
+    ----------
+    times : (n,)
+        Output times, equally spaced.
+    """
+    count = len(times) - 1
+    step = float(times[-1] - times[0]) / count
+    every = samples_per_step(step, highest)
+    made = times[0] + step / every * np.arange(every * count + 1)
+    made[::every] = times
+    return made, every
+
+
+class RecordSpectrum:
+    """Spectrum of signals whose samples arrive piece by piece; see the module.
+
+    Parameters
+    ----------
+    signals
+        Number of signals.
+    steps
+        Output steps of the record.
+    step
+        Output step h (s).
+    every
+        Samples in an output step: 1, or an even number.
+    window
+        See `gearfe.spectrum.WINDOWS`.
+    """
+
+    def __init__(self, signals: int, steps: int, step: float, every: int, window: str = "none") -> None:
+        if every != 1 and every % 2:
+            raise InputError("samples per step", every, "must be 1 or an even number", "take samples_per_step")
+        self.signals, self.steps, self.step, self.every, self.window = signals, steps, step, every, window
+        self._last = steps * every
+        weights = window_at(window, np.arange(self._last) / self._last)
+        self._gain, self._square = float(weights.mean()), float(np.mean(weights**2))
+        self._keep = max(1, every // 2)
+        self._filter = low_pass(self._keep)
+        self._kept = ColumnStore(signals)
+        #: samples that do not fill a kept one yet, and what earlier ones add to the next rows
+        self._rest = self._overlap = np.zeros((0, signals))
+        #: windowed last sample less the first one
+        self._rise = np.zeros(signals)
+        self._next = 0
+
+    @property
+    def complete(self) -> bool:
+        """Whether all samples have arrived."""
+        return self._next == self._last + 1
+
+    def add(self, first: int, samples: Floats) -> None:
+        """Take the samples (n, signals) whose first is number `first` of the record; those beside it are left out."""
+        begin, end = max(0, first), min(self._last + 1, first + len(samples))
+        if end <= begin:
+            return
+        if begin != self._next:
+            raise InputError("samples", begin, f"must go on with number {self._next}", "give the pieces in order")
+        self._next = end
+        x = samples[begin - first : end - first] * window_at(self.window, np.arange(begin, end) / self._last)[:, None]
+        if not np.all(np.isfinite(x)):
+            raise InputError("signal", None, "holds values that are not finite", "cut them off")
+        if begin == 0:
+            self._rise -= x[0]
+            x[0] *= 0.5
+        if self.complete:
+            self._rise += x[-1]
+            x[-1] *= 0.5
+        x = np.concatenate([self._rest, x])
+        if self.complete:
+            x = np.concatenate([x, np.zeros((-len(x) % self._keep, self.signals))])
+        whole = len(x) // self._keep * self._keep
+        self._rest = x[whole:]
+        self._filtered(x[:whole])
+        if self.complete:
+            self._kept.append(self._overlap)
+
+    def _filtered(self, x: Floats) -> None:
+        """Store the rows that the samples x, a multiple of those kept, complete; row i lies at i keep - half of x."""
+        half = len(self._filter) // 2
+        before, after = (np.zeros((n, self.signals)) for n in (2 * half, max(0, 2 * half - self._keep + 1)))
+        padded = np.concatenate([before, x, after])
+        if len(x):
+            made = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1, axis=0)[:: self._keep] @ self._filter
+            made[: len(self._overlap)] += self._overlap
+            done = len(x) // self._keep
+            self._overlap = made[done:]
+            self._kept.append(made[:done])
+
+    @cached_property
+    def frequency(self) -> Floats:
+        """(lines,) frequencies (Hz) up to half the output's sampling frequency, 0 first."""
+        return np.arange(self.steps // 2 + 1) / (self.steps * self.step)
+
+    @cached_property
+    def _scale(self) -> Floats:
+        """(lines,) from sums of kept samples to amplitudes; the filter's response is divided out."""
+        half = len(self._filter) // 2
+        turn = 2.0 * np.pi * np.arange(self.steps // 2 + 1) / self._last
+        response = np.full(len(turn), self._filter[half])
+        for j in range(1, half + 1):
+            response += 2.0 * self._filter[half + j] * np.cos(j * turn)
+        scale = 2.0 * self._keep / (self._last * self._gain * response)
+        scale[0] *= 0.5
+        if self.every == 1 and self.steps % 2 == 0:
+            scale[-1] *= 0.5  # samples at the Nyquist frequency itself
+        return np.asarray(scale)
+
+    @cached_property
+    def _ramp(self) -> NDArray[np.complex128]:
+        """(lines,) amplitudes of a ramp from 0 to 1: those of the integral less those of the trapezoidal sum."""
+        half = np.pi * np.arange(1, self.steps // 2 + 1) / self._last  # half the angle between samples
+        missing = 1j * (1.0 / half - 1.0 / np.tan(half)) / (self._last * self._gain)
+        if self.every == 1 and self.steps % 2 == 0:
+            missing[-1] = 0.0  # no phase is known there
+        return np.concatenate([[0.0], missing])
+
+    def column(self, signal: int) -> NDArray[np.complex128]:
+        """(lines,) complex amplitudes of a signal."""
+        if not self.complete:
+            problem = f"{self._next} of {self._last + 1} samples have arrived"
+            raise InputError("record", None, problem, "give all of them")
+        period, linear = self._last // self._keep, self._kept.column(signal)
+        place = (np.arange(len(linear)) - len(self._filter) // 2 // self._keep) % period
+        kept = np.bincount(place, weights=linear, minlength=period)
+        return np.asarray(np.fft.rfft(kept)[: self.steps // 2 + 1] * self._scale + self._rise[signal] * self._ramp)
+
+    def spectrum(self, signals: int | None = None) -> Spectrum:
+        """Spectrum of the first `signals` signals, by default of all, one column each."""
+        value = np.column_stack([self.column(i) for i in range(self.signals if signals is None else signals)])
+        return Spectrum(self.frequency, value, self._last, self.window, self._square / self._gain**2)
+
+
+def low_pass(keep: int) -> Floats:
+    """(2 REACH keep + 1,) weights, of sum 1: half of the response at the frequency of half the kept samples' rate.
+
+    Passes up to half of that frequency, stops from one and a half on; with every sample kept there is nothing to stop.
+    """
+    if keep == 1:
+        return np.ones(1)
+    half = REACH * keep
+    weights: Any = np.sinc(np.arange(-half, half + 1) / keep) * np.kaiser(2 * half + 1, _BETA)
+    return np.asarray(weights / weights.sum())
