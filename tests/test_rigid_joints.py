@@ -322,8 +322,32 @@ def test_a_number_is_a_constant_moment():
     assert made.q[-1, 2] == pytest.approx(2.5, abs=1e-12)
 
 
-def test_a_spring_between_coincident_points_is_named():
+def test_arguments_in_another_order_are_told():
+    """Moment(body, function, reaction): a function where a body's name belongs is named, with the order."""
+    with pytest.raises(InputError, match=r"no name of a body; its arguments are body, function, reaction"):
+        Scene((Body("a", 1.0, 0.1),), (), (Moment("a", "ground", constant(1.0)),))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"3.0 is no name of a body; its arguments are a, b, point_a"):
+        Scene((Body("a", 1.0, 0.1),), (Hinge("a", 3.0),))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("given", [{"free_length": 1.0}, {"damping": 2.0}])
+def test_a_spring_between_coincident_points_is_named(given):
     """Its force has no direction: said so, instead of a division by zero somewhere below."""
-    scene = Scene((Body("m", 2.0, 0.1),), (), (Spring("ground", "m", stiffness=5.0, free_length=1.0),))
-    with pytest.raises(InputError, match="two points that coincide"):
+    springs = (Spring("ground", "m", point_a=(1.0, 0.0), stiffness=5.0), Spring("ground", "m", name="rope", **given))
+    scene = Scene((Body("m", 2.0, 0.1),), (), springs)
+    with pytest.raises(InputError, match=r"spring 'rope': joins two points that coincide.*neither a free length"):
         integrate(System((PlanarScene(scene),)), [0.0, 1.0], backend="plain")
+
+
+@pytest.mark.parametrize("method", ["taylor", "explicit", "implicit"])
+@pytest.mark.parametrize("start", [(0.0, 0.0), (0.3, 0.0)])
+def test_a_spring_without_free_length_passes_through_zero(method, start):
+    """The force is k times the span: q = q0 cos wt + v0/w sin wt, also from and through coinciding points."""
+    body = Body("m", 2.0, 0.1, position=start, velocity=(0.5, 0.0))
+    scene = Scene((body,), (), (Spring("ground", "m", stiffness=18.0),))
+    times = np.linspace(0.0, 5.0, 41)
+    made = integrate(System((PlanarScene(scene),)), times, method=method, backend="plain", tolerance=1e-9)
+    assert made.status == 0
+    exact = start[0] * np.cos(3.0 * times) + 0.5 / 3.0 * np.sin(3.0 * times)
+    np.testing.assert_allclose(made.q[:, 0], exact, atol=1e-7)
+    np.testing.assert_allclose(made.q[:, 1:], 0.0, atol=1e-12)

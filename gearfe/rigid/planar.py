@@ -140,7 +140,10 @@ class Gravity:
 
 @dataclass(frozen=True)
 class Spring:
-    """Spring-damper between two points: tension ``k (L - L0) + c L'`` along the line that joins them."""
+    """Spring-damper between two points: tension ``k (L - L0) + c L'`` along the line that joins them.
+
+    With neither free length nor damping the force is k times the span, so the points may coincide.
+    """
 
     a: str
     b: str
@@ -212,7 +215,7 @@ class Scene:
     body_index: Mapping[str, int] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        from ..errors import unknown_name
+        from ..errors import shown, unknown_name
 
         index: dict[str, int] = {GROUND: len(self.bodies)}
         for i, body in enumerate(self.bodies):
@@ -228,6 +231,9 @@ class Scene:
                 if hasattr(part, key)
             ]
             for name in used:
+                if not isinstance(name, str):
+                    order = ", ".join(type(part).__dataclass_fields__)
+                    raise InputError(label, None, f"{shown(name)} is no name of a body", f"its arguments are {order}")
                 if name not in index:
                     raise unknown_name(label, name, index)
             for key, value in vars(part).items():

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from .contract import Array, Element
-from .planar import Scene
+from .planar import Scene, Spring
 from .tables import Assembly, assemble
 
 
@@ -29,6 +29,9 @@ class PlanarScene(Element):
         self.rows = len(self.assembly.row_label)
         self.row_names = self.assembly.row_label
         self.breaks = self.assembly.breaks
+        # springs come first among the forces, in the order of the scene
+        springs = [force for force in scene.forces if isinstance(force, Spring)]
+        self._springs = [f"spring {force.name or number!r}" for number, force in enumerate(springs, start=1)]
         self._index = self.assembly.tables.rows.ints
         self._value = self.assembly.tables.rows.reals
 
@@ -146,24 +149,25 @@ class PlanarScene(Element):
         forces = self.assembly.tables.forces
         p = _pose(q)
         full = np.append(v, np.zeros(3)).reshape(-1, 3)
-        for index, value in zip(forces.ints, forces.reals, strict=True):
+        for number, (index, value) in enumerate(zip(forces.ints, forces.reals, strict=True)):
             a, b = int(index[1]), int(index[2])
             if index[0] == 0:
                 arms = _arms(p, index, value)
-                _, length, unit, speed = _span(p, full, index, arms)
-                k, damping, free = value[4:]
+                span, length, unit, speed = self._span(p, full, number, arms)
+                k, damping = value[4:6]
                 where = np.r_[3 * a : 3 * a + 3, 3 * b : 3 * b + 3]
                 J = np.zeros((2, 6))  # d(span)/d(poses)
                 J[:, :2], J[:, 3:5] = -np.eye(2), np.eye(2)
                 J[:, 2], J[:, 5] = (arms[0][1], -arms[0][0]), (-arms[1][1], arms[1][0])
-                tension = k * (length - free) + damping * (unit @ speed)
-                across = (np.eye(2) - np.outer(unit, unit)) / length
+                pull = _pull(value, length, float(unit @ speed))
+                across = np.eye(2) - np.outer(unit, unit)
+                turned = speed @ across / length if damping else np.zeros(2)
                 w = full[[a, b], 2]
                 Jt = np.zeros((2, 6))  # d(span velocity)/d(poses)
                 Jt[:, 2], Jt[:, 5] = w[0] * arms[0], -w[1] * arms[1]
-                dt_q = k * unit @ J + damping * (speed @ across @ J + unit @ Jt)
-                local = -J.T @ (np.outer(unit, dt_q) + tension * across @ J)
-                push = tension * unit
+                dt_q = k * unit @ J + damping * (turned @ J + unit @ Jt)
+                local = -J.T @ (np.outer(unit, dt_q) + pull * across @ J)
+                push = pull * span
                 local[2, 2] -= push @ arms[0]
                 local[5, 5] += push @ arms[1]
                 by_q[np.ix_(where, where)] += local
@@ -189,9 +193,9 @@ class PlanarScene(Element):
         p = _pose(q)
         flat = np.append(q, np.zeros(3))
         energy = -float(forces.weight @ flat)
-        for index, value in zip(forces.ints, forces.reals, strict=True):
+        for number, (index, value) in enumerate(zip(forces.ints, forces.reals, strict=True)):
             if index[0] == 0:
-                _, length, _, _ = _span(p, None, index, _arms(p, index, value))
+                _, length, _, _ = self._span(p, None, number, _arms(p, index, value))
                 energy += 0.5 * value[4] * (length - value[6]) ** 2
             elif index[0] == 1:
                 energy += 0.5 * value[0] * (flat[index[1]] - flat[index[2]] - value[2]) ** 2
@@ -204,14 +208,14 @@ class PlanarScene(Element):
         flat_q, flat = np.append(q, np.zeros(3)), np.append(v, np.zeros(3))
         full = flat.reshape(-1, 3)
         power = 0.0
-        for index, value in zip(forces.ints, forces.reals, strict=True):
+        for number, (index, value) in enumerate(zip(forces.ints, forces.reals, strict=True)):
             a, b = int(index[1]), int(index[2])
             if index[0] == 0:
                 arms = _arms(p, index, value)
-                _, length, unit, speed = _span(p, full, index, arms)
-                loss = value[5] * float(unit @ speed)
-                push = (value[4] * (length - value[6]) + loss) * unit
-                power -= loss * float(unit @ speed)
+                span, length, unit, speed = self._span(p, full, number, arms)
+                rate = float(unit @ speed)
+                push = _pull(value, length, rate) * span
+                power -= value[5] * rate * rate
                 for body, sign, arm in ((a, 1.0, arms[0]), (b, -1.0, arms[1])):
                     F[3 * body : 3 * body + 2] += sign * push
                     F[3 * body + 2] += sign * (arm[0] * push[1] - arm[1] * push[0])
@@ -234,6 +238,32 @@ class PlanarScene(Element):
                 F[3 * b + 2] -= moment
                 power += moment * (full[a, 2] - full[b, 2])
         return F[: self.size], power
+
+    def _span(self, p, full, number, arms):  # type: ignore[no-untyped-def]
+        """Span of a spring from its first to its second point, its length, direction and (with `full`) velocity."""
+        index, value = self.assembly.tables.forces.ints[number], self.assembly.tables.forces.reals[number]
+        a, b = index[1], index[2]
+        span = np.array([p[0][b] - p[0][a], p[1][b] - p[1][a]]) + arms[1] - arms[0]
+        length = float(np.hypot(*span))
+        if length == 0.0 and (value[5] > 0.0 or value[6] > 0.0):
+            problem = "joins two points that coincide, so its force has no direction"
+            cure = "move its points apart, or give it neither a free length nor damping"
+            raise InputError(self._springs[number], None, problem, cure)
+        speed = None
+        if full is not None:
+            turn = [w * np.array([-r[1], r[0]]) for w, r in zip(full[[a, b], 2], arms, strict=True)]
+            speed = full[b, :2] - full[a, :2] + turn[1] - turn[0]
+        return span, length, span / length if length > 0.0 else np.zeros(2), speed
+
+
+def _pull(value: Array, length: float, rate: float) -> float:
+    """Tension of a spring over its length (N/m): the stiffness itself where it has neither free length nor damping."""
+    pull = float(value[4])
+    if value[6] > 0.0:
+        pull -= float(value[4] * value[6]) / length
+    if value[5] > 0.0:
+        pull += float(value[5]) * rate / length
+    return pull
 
 
 def _evaluator(times, k):  # type: ignore[no-untyped-def]
@@ -270,17 +300,3 @@ def _line(value, p, index):  # type: ignore[no-untyped-def]
 
 def _arms(p, index, value):  # type: ignore[no-untyped-def]
     return _turned(p, index[1], value[0:2]), _turned(p, index[2], value[2:4])
-
-
-def _span(p, full, index, arms):  # type: ignore[no-untyped-def]
-    a, b = index[1], index[2]
-    span = np.array([p[0][b] - p[0][a], p[1][b] - p[1][a]]) + arms[1] - arms[0]
-    length = float(np.hypot(*span))
-    if length == 0.0:
-        problem = "joins two points that coincide, so its force has no direction"
-        raise InputError("spring-damper", None, problem, "start with its points apart, or use springs along x and y")
-    speed = None
-    if full is not None:
-        turn = [w * np.array([-r[1], r[0]]) for w, r in zip(full[[a, b], 2], arms, strict=True)]
-        speed = full[b, :2] - full[a, :2] + turn[1] - turn[0]
-    return span, length, span / length, speed
