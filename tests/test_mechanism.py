@@ -346,3 +346,26 @@ def test_the_core_knows_no_mechanism():
             if isinstance(word, str):
                 assert "andrews" not in word.lower(), path
                 assert "slider" not in word.lower(), path
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ("1 / (time - 0.1)", "column odd: 1 of 11 values are not finite (inf or nan), the first in row 2"),
+        ("sqrt(0.45 - time)", "column odd: 6 of 11 values"),
+        ("10**(400*time)", "column odd: 3 of 11 values"),
+    ],
+)
+def test_outputs_that_are_not_finite_are_no_success(tmp_path, capsys, value, message):
+    text = PENDULUM + f'[[outputs]]\nname = "odd"\nvalue = "{value}"\n'
+    out = tmp_path / "out"
+    assert main(["mechanism", str(write(tmp_path, text)), "--out", str(out), "--until", "1"]) == 1
+    assert f"gearfe: warning: {message}" in capsys.readouterr().err
+    assert message in json.loads((out / "summary.json").read_text())["warnings"][0]
+
+
+def test_a_wrong_type_is_told_what_exists(tmp_path, capsys):
+    """Also where the wrong type brings keys of its own."""
+    gear = '[joints.g]\ntype = "gear"\nratio = 2.0\nbody = "rod"\n'
+    assert main(["mechanism", str(write(tmp_path, PENDULUM + gear)), "--out", str(tmp_path)]) == 2
+    assert "joints.g.type = 'gear': must be one of hinge, slot, prismatic, fixed, prescribed" in capsys.readouterr().err

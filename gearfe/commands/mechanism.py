@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from .arguments import check_option
@@ -24,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; 1 when the run stopped before its end."""
+    """Run the command; 1 when the run stopped before its end or an output is not finite."""
     from ..tables.mechanism import RunTable, read_mechanism_file
 
     # a mistake in the file is told before NumPy and SciPy load
@@ -48,4 +49,6 @@ def run(args: argparse.Namespace) -> int:
         estimate=not args.no_estimate,
     )
     print(outcome.text)
+    for sentence in outcome.warnings:
+        print(f"gearfe: warning: {sentence}", file=sys.stderr)
     return 0 if outcome.complete else 1

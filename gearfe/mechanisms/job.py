@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..output.files import output_folder, whole_set, write_csv, write_json
+from ..output.files import not_finite, output_folder, whole_set, write_csv, write_json
 from ..rigid import Start, Trajectory, compiled, integrate
 from ..rigid.backend import affordable_steps
 from ..rigid.integrate import choose_method
@@ -27,11 +27,12 @@ PROBE = 8
 
 @dataclass(frozen=True)
 class Outcome:
-    """What was done: whether the end was reached, a text for people, the summary."""
+    """What was done: whether the end was reached with finite outputs, a text for people, the summary, warnings."""
 
     complete: bool
     text: str
     summary: dict[str, Any]
+    warnings: tuple[str, ...] = ()
 
 
 def run_mechanism(
@@ -73,6 +74,7 @@ def run_mechanism(
         results = evaluate(mechanism, trajectory)
     error = trajectory_error(mechanism, start, results, tolerance) if estimate else None
     estimated = clock.perf_counter()
+    warnings = tuple(not_finite({**results.outputs, **results.energy}))
     with whole_set(folder, MAY_WRITE) as made:
         write_tables(made, mechanism, results, reactions or run.reactions)
         written = clock.perf_counter()
@@ -92,8 +94,9 @@ def run_mechanism(
             "pictures_s": clock.perf_counter() - written,
         }
         summary = summarise(mechanism, start, results, tolerance, timings, error)
+        summary["warnings"] = list(warnings)
         write_json(made / "summary.json", summary)
-    return Outcome(trajectory.status == 0, _text(summary, folder), summary)
+    return Outcome(trajectory.status == 0 and not warnings, _text(summary, folder), summary, warnings)
 
 
 def output_times(end: float, step: float) -> np.ndarray:

@@ -75,6 +75,19 @@ def write_json(path: str | Path, content: Mapping[str, Any]) -> None:
         temporary.write_text(json.dumps(_plain(content), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
+def not_finite(columns: Mapping[str, Any]) -> list[str]:
+    """A sentence for each column with numbers that are infinite or none: such a table is no success."""
+    import numpy as np
+
+    found = []
+    for name, values in columns.items():
+        rows = np.flatnonzero(~np.isfinite(np.asarray(values, dtype=float))) + 1
+        if len(rows):
+            of = f"{len(rows)} of {len(values)} values are not finite (inf or nan)"
+            found.append(f"column {name}: {of}, the first in row {rows[0]}")
+    return found
+
+
 def _cell(value: Any) -> str:
     if isinstance(value, (str, bool)):
         return str(value)
