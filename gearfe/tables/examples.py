@@ -10,6 +10,8 @@ from typing import Any
 from ..config import table_class
 from .text import table_text
 
+OPTIONAL_KEYS = "Keys behind a # are optional and stand with their defaults; those that are not set have none."
+
 PAIR: dict[str, Any] = {
     "pressure_angle_deg": 25.0,
     "face_width_mm": 10.0,
@@ -87,22 +89,17 @@ MECHANISM: dict[str, Any] = {
 #: Kind -> what the file is about, and its tables.
 JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]]]] = {
     "stiffness": (
-        "Mesh stiffness of a gear pair. Run it: gearfe stiffness FILE --out DIR. Lines that begin with # are optional "
-        "keys with their defaults.",
+        "Mesh stiffness of a gear pair. Run it: gearfe stiffness FILE --out DIR. " + OPTIONAL_KEYS,
         {"pair": PAIR, "stiffness": STIFFNESS},
     ),
     "vibration": (
-        "A gear train in its housing: two shafts with one gear pair. Run it: gearfe vibration FILE --out DIR. Lines "
-        "that begin with # are optional keys with their defaults. Shafts run along y; speeds and torques count "
-        "positive about +y.",
+        "A gear train in its housing: two shafts with one gear pair. Run it: gearfe vibration FILE --out DIR. Shafts "
+        "run along y; speeds and torques count positive about +y. " + OPTIONAL_KEYS,
         {"pair": PAIR, "stiffness": {"twist_deg": 0.05}, "train": TRAIN, "housing": HOUSING},
     ),
 }
 
-MECHANISM_HEAD = (
-    "A planar mechanism. Run it: gearfe mechanism FILE --out DIR. Lines that begin with # are optional keys with their "
-    "defaults."
-)
+MECHANISM_HEAD = "A planar mechanism. Run it: gearfe mechanism FILE --out DIR. " + OPTIONAL_KEYS
 
 
 def job_file(kind: str) -> str:

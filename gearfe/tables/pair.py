@@ -45,17 +45,23 @@ class ToothFormTable:
         None, doc="pressure angle at the reference circle (deg)", low=5.0, high=45.0
     )
     face_width_mm: float | None = quantity(None, doc="face width (mm)", above=0.0)
-    profile_shift: float | None = quantity(None, doc="profile shift coefficient x (times module)")
-    addendum: float | None = quantity(None, doc="addendum (times module)", above=0.0)
-    dedendum: float | None = quantity(None, doc="dedendum (times module)", above=0.0)
-    rack_tip_radius: float | None = quantity(None, doc="tip radius of the generating rack (times module)", low=0.0)
-    tip_round_mm: float | None = quantity(None, doc="radius of the round between flank and tip circle (mm)", low=0.0)
-    tip_shortening: float | None = quantity(None, doc="tip shortening k (times module)", low=0.0)
-    tip_relief_amount_um: float | None = quantity(None, doc="tip relief at the tip circle (um)", low=0.0)
+    profile_shift: float | None = quantity(None, doc="profile shift coefficient x (times module), by default 0")
+    addendum: float | None = quantity(None, doc="addendum (times module), by default 1", above=0.0)
+    dedendum: float | None = quantity(None, doc="dedendum (times module), by default 1.25", above=0.0)
+    rack_tip_radius: float | None = quantity(
+        None, doc="tip radius of the generating rack (times module), by default 0.3", low=0.0
+    )
+    tip_round_mm: float | None = quantity(
+        None, doc="radius of the round between flank and tip circle (mm), by default 0", low=0.0
+    )
+    tip_shortening: float | None = quantity(None, doc="tip shortening k (times module), by default 0", low=0.0)
+    tip_relief_amount_um: float | None = quantity(None, doc="tip relief at the tip circle (um), by default 0", low=0.0)
     tip_relief_length_mm: float | None = quantity(None, doc="roll length of the relief from the tip (mm)", above=0.0)
-    tip_relief_exponent: float | None = quantity(None, doc="exponent of the relief: 1 linear, 2 parabolic", low=1.0)
+    tip_relief_exponent: float | None = quantity(
+        None, doc="exponent of the relief: 1 linear (default), 2 parabolic", low=1.0
+    )
     tooth_thinning_um: float | None = quantity(
-        None, doc="arc taken off each tooth at the reference circle, for backlash (um)", low=0.0
+        None, doc="arc taken off each tooth at the reference circle, for backlash (um), by default 0", low=0.0
     )
 
 

@@ -64,7 +64,7 @@ class StiffnessTable:
     )
     nitsche_gamma0: float | None = quantity(
         None,
-        doc="parameter of the law nitsche, gamma h/E (-), by default 1, the most accurate, or 20 with theta = 1",
+        doc="parameter of the law nitsche, gamma h/E (-), by default 1, the most accurate, or 20 with nitsche_theta 1",
         low=1e-6,
         high=1e9,
     )

@@ -20,6 +20,8 @@ def table_text(
 ) -> str:
     """TOML of a table: keys of `example` as they are, all others as comments with their defaults, each explained.
 
+    A commented key is valid TOML without its ``#``, and means what holds without it.
+
     Parameters
     ----------
     cls
@@ -79,10 +81,9 @@ def _line(field: Any, example: Mapping[str, Any], doc: str, brief: bool) -> str:
         default = field.default
         if field.default_factory is not dataclasses.MISSING:
             default = field.default_factory()
-        if default is dataclasses.MISSING or default is None or default in ((), {}):
-            code = f"# {field.name} ="
-        else:
-            code = f"# {field.name} = {_value(default)}"
+        if default is None:  # TOML has no word for it: the key is named, but nothing stands there to be switched on
+            return _wrapped(f"{field.name} (not set): {doc}").rstrip("\n")
+        code = f"# {field.name} = {_value(default)}"
     line = f"{code:<{_COMMENT}} # {doc}" if doc else code
     return line if len(line) <= _WIDTH else _wrapped(doc) + code
 
