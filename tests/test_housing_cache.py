@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gearfe.cache import cache_folder
 from gearfe.errors import MissingLibraryError
 from gearfe.meshing import session
-from gearfe.meshing.cache import cache_folder, cache_key, cached_arrays
+from gearfe.meshing.cache import cache_key, cached_arrays
 
 
 @dataclasses.dataclass(frozen=True)

@@ -194,7 +194,7 @@ def test_a_mechanism_loads_neither_finite_elements_nor_compiled_kernels(tmp_path
         "from gearfe.mechanisms.job import run_mechanism\n"
         f"made = run_mechanism({job!r}, {str(out)!r}, tolerance=1e-8, figures=False)\nassert made.complete"
     )
-    loaded, _ = loaded_after(code, XDG_CACHE_HOME=str(tmp_path / "empty"))
+    loaded, _ = loaded_after(code, GEARFE_CACHE=str(tmp_path / "empty"))
     assert not loaded & {"numba", "skfem", "gmsh", "meshio", "pyvista", "matplotlib", "h5py"}
     assert not list((tmp_path / "empty").rglob("*.nbi"))
     assert not list(out.glob("*.png"))

@@ -111,7 +111,7 @@ def oscillators(tolerance):
     made = kernels.modal_steps(
         squares, np.diag(diagonal), diagonal, False, np.zeros(3), np.zeros((1, 3)), np.zeros(1), np.zeros(1),
         np.zeros((1, 21)), np.zeros(1, dtype=np.int64), True, 0.0, 4.0, state, 0.1, np.abs(state[:3]), np.zeros(3),
-        np.array([0.7]), tolerance, np.inf, asked, 0, found, T, Y,
+        np.array([0.7]), tolerance, np.inf, asked, 0, found, T, Y, kernel_modal.work_space(3, 1, 21),
     )  # fmt: skip
     status, steps, _, _, _, passed = made
     assert (status, passed) == (0, 16)

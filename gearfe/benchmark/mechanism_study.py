@@ -281,7 +281,7 @@ def calls(record: Record) -> None:
             with tempfile.TemporaryDirectory(prefix="gearfe-cache-") as empty:
                 env = dict(os.environ, PYTHONPATH=os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
                 if not keep:
-                    env["XDG_CACHE_HOME"] = empty
+                    env["GEARFE_CACHE"] = empty
                 again = "20" if backend == "compiled" and not record.quick else "1"
                 command = [sys.executable, "-c", CALL, str(Path(GEOMETRY / "andrews.toml")), backend, again]
                 done = subprocess.run(command, check=True, capture_output=True, text=True, env=env, timeout=900)

@@ -186,7 +186,7 @@ def compiled_kernels(quick: bool) -> tuple[float, float, str]:
     with tempfile.TemporaryDirectory() as empty:
         return (
             short,
-            _process(code % "compiled", XDG_CACHE_HOME=empty),
+            _process(code % "compiled", GEARFE_CACHE=empty),
             "compiling once; worth it for long or many runs",
         )
 

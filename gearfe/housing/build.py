@@ -8,8 +8,9 @@ from typing import cast
 import numpy as np
 
 from .. import __version__
+from ..cache import cache_folder
 from ..errors import InputError
-from ..meshing.cache import cache_folder, cache_key
+from ..meshing.cache import cache_key
 from ..meshing.housing_mesh import RECIPE, bore_ranges, housing_mesh
 from ..progress import stage
 from ..reduction.modal_body import FORMAT, ModalBody

@@ -11,8 +11,6 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-import os
-import sys
 import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -21,29 +19,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cache import cache_folder
 from ..output.files import whole_file
 from .session import gmsh_version
 
-#: Environment variable that names the folder of stored meshes; ``off`` keeps none.
-CACHE_VARIABLE = "GEARFE_CACHE"
-
 Arrays = dict[str, NDArray[Any]]
-
-
-def cache_folder() -> Path | None:
-    """Folder of stored meshes: ``$GEARFE_CACHE``, else the user's cache folder of this platform; ``None`` when off."""
-    named = os.environ.get(CACHE_VARIABLE, "").strip()
-    if named.lower() == "off":
-        return None
-    if named:
-        return Path(named).expanduser()
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return base / "gearfe"
 
 
 def cache_key(kind: str, recipe: object) -> str:

@@ -1,23 +1,28 @@
 """Binding of the kernels: compiled by numba with a cache of their own, or left as plain Python where that is quicker.
 
 The kernel modules hold plain functions that call one another by name. `bind` puts them into one namespace, either as
-compiled functions or as they are, so one text serves both. Compiled code is cached below
-the user's cache folder under a hash of all kernel sources: no stale code after an upgrade, nothing written beside the
-installed package, and a read-only home only costs the compilation again.
+compiled functions or as they are, so one text serves both. Compiled code is kept in the cache folder
+(`gearfe.cache`) below a hash of all that it was made from and for: no stale code after an upgrade, one form for all
+installations of the same sources, nothing written beside the installed package.
 """
 
 from __future__ import annotations
 
 import hashlib
 import importlib.util
-import inspect
 import os
+import platform
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from types import FunctionType, SimpleNamespace
 from typing import Any
+
+from .. import cache
+
+#: One text of all sources in the folder of compiled code: numba files compiled code under the path of its source.
+SOURCE = "kernels.py"
 
 
 def available() -> bool:
@@ -26,27 +31,71 @@ def available() -> bool:
 
 
 def cache_folder(functions: Iterable[Callable[..., Any]]) -> Path | None:
-    """Writable folder for the compiled forms of `functions`, named by a hash of their sources; ``None`` without one."""
-    text = sys.version + Path(__file__).read_text() + "".join(inspect.getsource(f) for f in functions)
-    name = "kernels-" + hashlib.sha256(text.encode()).hexdigest()[:16]
-    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    user = os.getuid() if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
-    for root in (Path(base) / "gearfe", Path(tempfile.gettempdir()) / f"gearfe-{user}"):
+    """Writable folder for the compiled forms of `functions`; ``None`` without one.
+
+    Where the user names no folder and has none that can be written, a temporary one of this user serves.
+    """
+    text = _text(functions)
+    for root in _roots():
+        key = "\n".join((str(root), *_made_by(), text))
+        folder = root / ("kernels-" + hashlib.sha256(key.encode()).hexdigest()[:16])
         try:
-            (root / name).mkdir(parents=True, exist_ok=True, mode=0o700)
-            if hasattr(os, "getuid") and (root / name).stat().st_uid != os.getuid():
+            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            if hasattr(os, "getuid") and folder.stat().st_uid != os.getuid():
                 continue
-            with tempfile.TemporaryFile(dir=root / name):
-                return root / name
+            with tempfile.TemporaryFile(dir=folder):
+                return folder
         except OSError:
             continue
     return None
 
 
+def _text(functions: Iterable[Callable[..., Any]]) -> str:
+    """Names of the functions, and the modules that hold them."""
+    functions = tuple(functions)
+    files = dict.fromkeys(f.__code__.co_filename for f in functions if isinstance(f, FunctionType))
+    names = [f"# {f.__module__}.{f.__qualname__}" for f in functions]
+    return "\n".join([*names, *(Path(file).read_text(encoding="utf-8") for file in files)])
+
+
+def _roots() -> list[Path]:
+    """Folders that may hold the cache, best first."""
+    try:
+        first = cache.cache_folder()
+    except RuntimeError:  # a user without a home
+        first = None
+    if cache.named_folder():
+        return [] if first is None else [first.absolute()]
+    user = os.getuid() if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
+    temporary = Path(tempfile.gettempdir()) / f"gearfe-{user}"
+    return [temporary] if first is None else [first.absolute(), temporary]
+
+
+def _made_by() -> Iterator[str]:
+    """What decides compiled code beside its source: Python, the compiler, the processor."""
+    yield sys.version
+    yield Path(__file__).read_text(encoding="utf-8")
+    for name in ("numba", "llvmlite"):
+        found = importlib.util.find_spec(name)
+        place = Path(found.origin).parent / "_version.py" if found is not None and found.origin else None
+        yield place.read_text(encoding="utf-8") if place is not None and place.exists() else ""
+    yield from (f"{k}={v}" for k, v in sorted(os.environ.items()) if k.startswith("NUMBA_"))
+    yield f"{platform.system()} {platform.machine()} {os.environ.get('PROCESSOR_IDENTIFIER', '')}"
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
+            for line in lines:
+                if line.startswith(("model name", "flags", "Features", "CPU part")):
+                    yield line
+                if not line.strip():  # the first processor stands for all
+                    break
+    except OSError:  # not Linux
+        return
+
+
 def is_cached(functions: Iterable[Callable[..., Any]], entry: str) -> bool:
-    """Whether a compiled form of the function named `entry` waits in the cache."""
+    """Whether a compiled form of the function named `entry` waits in the cache, for this machine and these sources."""
     folder = cache_folder(functions)
-    return folder is not None and any(folder.rglob(f"*.{entry}-*.nbi"))
+    return folder is not None and any(folder.rglob(f"*.{entry}-*.nbc"))
 
 
 def bind(
@@ -91,12 +140,16 @@ def bind(
 def _compile(
     functions: tuple[Callable[..., Any], ...], scope: dict[str, Any], entries: tuple[str, ...], inline: tuple[str, ...]
 ) -> None:
-    """Only the entries get Python wrappers and a place in the cache: the others end up inside them."""
+    """Only the entries get Python wrappers and a place in the cache: the others end up inside them.
+
+    Without numba's reference counts, so kernels allocate nothing: they compile and run a sixth faster.
+    """
     import numba
 
     folder = cache_folder(functions)
+    source = None if folder is None else _source(folder, functions)
     before = numba.config.CACHE_DIR
-    common = {"fastmath": {"contract", "reassoc", "nsz"}, "error_model": "numpy"}
+    common = {"fastmath": {"contract", "reassoc", "nsz"}, "error_model": "numpy", "_nrt": False}
     try:
         numba.config.CACHE_DIR = str(folder or "")
         for function in functions:
@@ -104,10 +157,25 @@ def _compile(
             made = scope[name]
             made.__module__ = function.__module__
             if name in entries:
-                scope[name] = numba.njit(made, cache=folder is not None, no_cfunc_wrapper=True, **common)
+                if source is not None:
+                    made.__code__ = made.__code__.replace(co_filename=str(source))
+                scope[name] = numba.njit(made, cache=source is not None, no_cfunc_wrapper=True, **common)
             else:
                 scope[name] = numba.njit(
                     made, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=name in inline, **common
                 )
     finally:
         numba.config.CACHE_DIR = before
+
+
+def _source(folder: Path, functions: tuple[Callable[..., Any], ...]) -> Path | None:
+    """File with the text of the functions in their folder; None where it cannot be written."""
+    path = folder / SOURCE
+    try:
+        if not path.exists():
+            with tempfile.NamedTemporaryFile("w", dir=folder, encoding="utf-8", delete=False) as file:
+                file.write(_text(functions))
+            os.replace(file.name, path)
+    except OSError:
+        return None
+    return path

@@ -126,22 +126,17 @@ def set_weights(squares, reach, pull, tolerance, weight):
 
 def modal_steps(
     squares, damping, diagonal, full, constant, W, offset, parameters, memory, pieces, first, t, t1, state, h, reach,
-    pull, breaks, tolerance, longest, asked, at, found, T, Y,
+    pull, breaks, tolerance, longest, asked, at, found, T, Y, work,
 ):  # fmt: skip
     """Steps from t to t1, or until T is full; states at the `asked` times go to `found`, step ends to T, Y.
 
     h is the trial step; reach, pull are the largest coordinates and accelerations so far. A coordinate's limit is
-    `tolerance` of its reach, and of what its pull makes of it: accelerations then hold as well as coordinates. Returns
-    (status, steps, time, h, orders computed, number of asked times passed).
+    `tolerance` of its reach, and of what its pull makes of it: accelerations then hold as well as coordinates. `work`:
+    scratch arrays, see `work_space`. Returns (status, steps, time, h, orders computed, number of asked times passed).
     """
     n = squares.shape[0]
     most = memory.shape[1] - 1
-    y = np.zeros((most + 1, n))
-    u = np.zeros((W.shape[0], most + 1))
-    force = np.zeros(W.shape[0])
-    weight = np.empty(n)
-    value = np.empty(n)
-    rate = np.empty(n)
+    y, u, force, weight, value, rate = work
     sign = 1.0 if t1 >= t else -1.0
     begin = t
     count = 0
@@ -255,6 +250,12 @@ def modal_steps(
         else:
             h = max(h, 0.9 * step * end * most / last)
     return status, count, t, h, orders, at
+
+
+def work_space(n, directions, orders):
+    """Scratch arrays of `modal_steps`: series of coordinates and along directions, forces, three of size n."""
+    series = np.zeros((orders, n)), np.zeros((directions, orders)), np.zeros(directions)
+    return *series, np.zeros(n), np.zeros(n), np.zeros(n)
 
 
 FUNCTIONS = (project, add_forces, next_order, evaluate, widen, set_weights, modal_steps)

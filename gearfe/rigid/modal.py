@@ -109,6 +109,7 @@ class SeriesRun:
         full = not np.array_equal(core.damping, np.diag(diagonal))
         kernels = _kernels(series.begin, series.order, series.corner, series.helpers)
         memory, pieces = np.zeros((series.rows, ORDER + 1)), np.zeros(series.pieces, dtype=np.int64)
+        work = kernel_modal.work_space(n, W.shape[0], ORDER + 1)
         found = np.empty((len(asked), 2 * n))
         rates = np.sqrt(np.abs(core.squares).max(initial=0.0)) + np.abs(diagonal).max(initial=0.0)
         t, state, h, status, at, orders = t0, y0.copy(), 5.0 / max(rates, 1.0 / abs(t1 - t0)), 2, 0, 0
@@ -120,7 +121,7 @@ class SeriesRun:
             status, count, t, h, further, at = kernels.modal_steps(
                 core.squares, core.damping, diagonal, full, core.constant, W, offset, series.parameters, memory, pieces,
                 len(ends) == 1, t, t1, state, h, reach, pull, core.system.breaks, self.tolerance, self.longest, asked,
-                at, found, T, Y,
+                at, found, T, Y, work,
             )  # fmt: skip
             orders += further
             ends.append(T[:count])

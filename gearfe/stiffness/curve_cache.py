@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..cache import cache_folder
 from ..errors import InputError
 from ..gear.pair import GearPair
-from ..meshing.cache import cache_folder, cache_key
+from ..meshing.cache import cache_key
 from ..stopwatch import Stopwatch
 from .curve import StiffnessCurve
 

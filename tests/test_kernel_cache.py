@@ -1,0 +1,93 @@
+"""Compiled kernels in the cache: where they are kept, for whom, and what is said about them."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from gearfe.rigid import compiled
+
+ROOT = Path(__file__).resolve().parents[1]
+needs_numba = pytest.mark.skipif(not compiled.available(), reason="numba is not installed")
+KERNELS = """
+def doubled(x):
+    return 2.0 * x
+
+
+def entry(x):
+    return doubled(x) + 1.0
+"""
+#: Runs the kernel and says: was it told to be in the cache, is it now, how many compiled forms came from the cache.
+RUN = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import little_kernels as k
+from gearfe.rigid import compiled
+functions = (k.doubled, k.entry)
+before = compiled.is_cached(functions, "entry")
+bound = compiled.bind(functions, {}, compiled=True, entries=("entry",))
+assert bound.entry(3.0) == 7.0
+print(before, compiled.is_cached(functions, "entry"), sum(bound.entry.stats.cache_hits.values()))
+"""
+
+
+def installed(folder: Path) -> Path:
+    folder.mkdir()
+    (folder / "little_kernels.py").write_text(KERNELS)
+    return folder
+
+
+def ran(source: Path, **environment: str) -> str:
+    env = {**os.environ, "PYTHONPATH": str(ROOT), **environment}
+    done = subprocess.run([sys.executable, "-c", RUN, str(source)], env=env, capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+@needs_numba
+def test_installations_of_the_same_kernels_share_them_and_others_do_not(tmp_path: Path) -> None:
+    """numba keeps compiled code under its source's path, so another installation compiled while it was told ready."""
+    one, two, cache = installed(tmp_path / "one"), installed(tmp_path / "two"), tmp_path / "cache"
+    assert ran(one, GEARFE_CACHE=str(cache)) == "False True 0"
+    assert ran(two, GEARFE_CACHE=str(cache)) == "True True 1"
+    (two / "little_kernels.py").write_text(KERNELS.replace("2.0 * x", "x + x"))
+    assert ran(two, GEARFE_CACHE=str(cache)) == "False True 0"
+    cache.rename(tmp_path / "moved")
+    assert ran(one, GEARFE_CACHE=str(tmp_path / "moved")).startswith("False")
+
+
+@needs_numba
+def test_without_a_cache_nothing_is_kept(tmp_path: Path) -> None:
+    source = installed(tmp_path / "one")
+    assert ran(source, GEARFE_CACHE="off", XDG_CACHE_HOME=str(tmp_path / "user")) == "False False 0"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["one"]
+    assert not list(source.rglob("*.nb?"))
+
+
+def test_the_variable_governs_where_kernels_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    functions = (compiled.available,)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
+    monkeypatch.setenv("GEARFE_CACHE", str(tmp_path / "named"))
+    named = compiled.cache_folder(functions)
+    assert named is not None
+    assert named.parent == tmp_path / "named"
+    monkeypatch.setenv("GEARFE_CACHE", "off")
+    assert compiled.cache_folder(functions) is None
+    monkeypatch.delenv("GEARFE_CACHE")
+    folder = compiled.cache_folder(functions)
+    assert folder is not None
+    if sys.platform == "linux":
+        assert folder.parent == tmp_path / "user" / "gearfe"
+
+
+@needs_numba
+def test_another_compiler_or_processor_needs_kernels_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GEARFE_CACHE", str(tmp_path))
+    here = compiled.cache_folder((compiled.available,))
+    monkeypatch.setenv("NUMBA_CPU_NAME", "generic")
+    assert compiled.cache_folder((compiled.available,)) != here
