@@ -88,6 +88,12 @@ class Display:
                 at.counted = time.monotonic()
             at.done, at.total, at.what = done, total, what
 
+    def say(self, text: str) -> None:
+        """A line that stays."""
+        with self._lock:
+            self._clear()
+            self._write(f"gearfe: {text}\n")
+
     def close(self) -> None:
         """Stop looking and clear the line."""
         self._over.set()
@@ -177,3 +183,9 @@ def count(done: float, total: float, what: str = "") -> None:
     """Tell how far the stage is: whole numbers of a whole number of things, or as floats a share."""
     if _displays and threading.current_thread() is threading.main_thread():
         _displays[-1].count(done, total, what)
+
+
+def say(text: str) -> None:
+    """Tell something once, on a line that stays."""
+    if _displays and threading.current_thread() is threading.main_thread():
+        _displays[-1].say(text)

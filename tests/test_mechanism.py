@@ -233,9 +233,7 @@ def test_command_on_andrews(tmp_path):
 
 
 @pytest.mark.parametrize("method", ["explicit", "implicit"])
-def test_command_runs_other_methods_to_the_end(tmp_path, method, monkeypatch):
-    """However few plain steps of the series are worth it: the other methods have no compiled form to wait for."""
-    monkeypatch.setattr("gearfe.mechanisms.job.affordable_steps", lambda _system: 3)
+def test_command_runs_other_methods_to_the_end(tmp_path, method):
     file = write(tmp_path, PENDULUM)
     arguments = ["mechanism", str(file), "--out", str(tmp_path), "--no-figures", "--method", method]
     assert main([*arguments, "--tolerance", "1e-6"]) == 0

@@ -9,18 +9,16 @@ import re
 import time
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from gearfe.cli import main
 from gearfe.errors import InputError
-from gearfe.mechanisms import evaluate, job, load_mechanism
+from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.error_estimate import trajectory_error
 from gearfe.output.files import whole_set
-from gearfe.rigid import consistent_start, integrate
+from gearfe.rigid import integrate
 from gearfe.rigid.timefunctions import smoothed_step
 from gearfe.stress.campaign import campaign_named
 from gearfe.stress.worker import run_case
@@ -124,34 +122,6 @@ def test_multipliers_of_a_heavily_damped_mode(rate: float) -> None:
 def test_a_step_that_takes_no_time_is_refused(centre: float, width: float) -> None:
     with pytest.raises(InputError, match="smoothed step width"):
         smoothed_step(centre, width)
-
-
-def test_long_runs_turn_to_the_kernels_after_an_eighth_of_what_those_cost(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run of 1000 s made as many plain steps as compiling costs before it compiled."""
-    asked = []
-
-    def noted(*arguments: Any, backend: str, **options: Any) -> Any:
-        asked.append((backend, options.get("most_steps")))
-        return integrate(*arguments, backend="plain", **options)
-
-    monkeypatch.setattr(job, "integrate", noted)
-    monkeypatch.setattr(job.compiled, "available", lambda: True)
-    mechanism = SimpleNamespace(system=pendulum())
-    start = consistent_start(mechanism.system)
-
-    def backends(affordable: int) -> list[Any]:
-        asked.clear()
-        monkeypatch.setattr(job, "affordable_steps", lambda _system: affordable)
-        made = job.quickest(mechanism, np.linspace(0.0, 4.0, 5), start, "taylor", 1e-9)  # type: ignore[arg-type]
-        assert made.status == 0
-        return list(asked)
-
-    steps = integrate(mechanism.system, [0.0, 4.0], method="taylor", tolerance=1e-9, start=start, backend="plain")
-    total = int(steps.statistics["steps"])
-    assert total > 8
-    assert backends(total // 2) == [("plain", total // 16 or 1), ("compiled", None)]
-    assert backends(2 * total) == [("plain", total // 4), ("plain", 2 * total)]
-    assert backends(8 * total) == [("plain", total)]
 
 
 @pytest.mark.parametrize("number", [131, 140])

@@ -122,6 +122,10 @@ def simulated(
         band = 5000.0 if job.housing is None else job.housing.reduction.band_Hz
         times, every = finer(job.times, float(model.coupled_frequencies_hz.max(initial=0.0)))
         response = simulate(model, times, floquet=floquet, estimate=estimate, band_hz=band, **options)
+    compiling = float(response.statistics.get("compile_seconds", 0.0))
+    if compiling > 0.0:
+        watch.seconds["transient"] -= compiling
+        watch.seconds["compiling"] = compiling
     return scene, response, every
 
 

@@ -12,17 +12,13 @@ import numpy as np
 
 from ..errors import InputError
 from ..output.files import not_finite, output_folder, whole_set, write_csv, write_json
-from ..rigid import Start, Trajectory, compiled, integrate
-from ..rigid.backend import affordable_steps
-from ..rigid.integrate import choose_method
+from ..rigid import Start, integrate
 from .error_estimate import TrajectoryError, trajectory_error
 from .model import Mechanism
 from .results import Results, evaluate, reactions
 
 #: Files that depend on the options: what is left of them from an earlier run is removed.
 MAY_WRITE = ("reactions.csv", "curves.png", "picture.png", "animation.gif")
-#: Share of the affordable plain steps from which the number of all steps is told: 1/PROBE.
-PROBE = 8
 
 
 @dataclass(frozen=True)
@@ -64,8 +60,9 @@ def run_mechanism(
     times = output_times(end, run.step_s)
     method = run.method if method is None else method
     tolerance = run.tolerance if tolerance is None else tolerance
-    trajectory = quickest(mechanism, times, start, method, tolerance)
+    trajectory = integrate(mechanism.system, times, start=start, method=method, tolerance=tolerance)
     integrated = clock.perf_counter()
+    compiling = float(trajectory.statistics.get("compile_seconds", 0.0))
     if len(trajectory.dense.times) < 2:
         raise InputError(
             "start", None, trajectory.message, "give the bodies start velocities, or another start position"
@@ -88,7 +85,8 @@ def run_mechanism(
             draw_animation(made, mechanism, trajectory)
         timings = {
             "read_s": read - began,
-            "integrate_s": integrated - read,
+            "compile_s": compiling,
+            "integrate_s": integrated - read - compiling,
             "estimate_s": estimated - integrated,
             "tables_s": written - estimated,
             "pictures_s": clock.perf_counter() - written,
@@ -107,28 +105,6 @@ def output_times(end: float, step: float) -> np.ndarray:
         times[-1] = end
         return times
     return np.append(step * np.arange(math.floor(end / step) + 1), end)
-
-
-def quickest(mechanism: Mechanism, times: np.ndarray, start: Start, method: str, tolerance: float) -> Trajectory:
-    """Series: plain Python where the run takes less of it than loading (or compiling) the kernels; else the kernels.
-
-    The first steps tell how many the whole run takes: a long one turns to the kernels at once.
-    """
-    if method == "auto":
-        method = choose_method(mechanism.system, start, float(times[-1] - times[0]))
-    options: dict[str, Any] = {"start": start, "method": method, "tolerance": tolerance}
-    if method != "taylor":
-        return integrate(mechanism.system, times, **options)
-    steps = affordable_steps(mechanism.system)
-    first = max(1, steps // PROBE) if compiled.available() else steps
-    made = integrate(mechanism.system, times, backend="plain", most_steps=first, **options)
-    span = float(abs(times[-1] - times[0]))
-    reached = float(abs(made.reached - times[0]))
-    if made.status == 2 and made.statistics["steps"] * span <= steps * reached:
-        made = integrate(mechanism.system, times, backend="plain", most_steps=steps, **options)
-    if made.status != 2 or not compiled.available():
-        return made
-    return integrate(mechanism.system, times, backend="compiled", **options)
 
 
 def write_tables(folder: Path, mechanism: Mechanism, results: Results, with_reactions: bool) -> None:
@@ -170,6 +146,7 @@ def summarise(
     ]
     total = results.energy["total_J"]
     statistics = dict(trajectory.statistics)
+    statistics.pop("compile_seconds", None)  # stands under timings
     passages = np.asarray(statistics.pop("singular_passages", []), dtype=float)
     inside = passages[passages <= trajectory.reached]
     residual = np.array([mechanism.system.residual(t, q) for t, q in zip(trajectory.time, trajectory.q, strict=True)])

@@ -1,14 +1,15 @@
-"""Whether compiled kernels are at hand, and how much plain Python a one-off run may spend before compiling pays."""
+"""Whether compiled kernels are at hand, and what they cost beside plain Python."""
 
 from __future__ import annotations
 
 from . import compiled, taylor
-from .system import System
 
-#: Measured: CPU seconds to compile the kernels, to load numba with the cached ones, and of a plain step with n bodies.
-COMPILE_SECONDS = 50.0
-LOAD_SECONDS = 0.4
-STEP_SECONDS = (1.2e-3, 0.9e-3)
+#: Measured (processor seconds): compiling the kernels, loading numba with those of an earlier run; and how many times
+#: as fast as plain steps compiled ones are (170 with one body, 200 with seven).
+COMPILE_SECONDS, LOAD_SECONDS = 47.0, 0.9
+COMPILED_FASTER = 180.0
+
+_SPENT = [0.0]
 
 
 def compiled_is_ready() -> bool:
@@ -18,10 +19,18 @@ def compiled_is_ready() -> bool:
     return taylor.kernels_loaded() or compiled.is_cached(taylor.FUNCTIONS, "integrate_series")
 
 
-def affordable_steps(system: System) -> int:
-    """Plain steps that take about as long as compiling (or loading) the kernels; without numba there is no limit."""
-    if not compiled.available():
-        return 1_000_000
-    bodies = system.size // 3
-    price = LOAD_SECONDS if compiled_is_ready() else COMPILE_SECONDS
-    return int(price / (STEP_SECONDS[0] + STEP_SECONDS[1] * bodies))
+def loading_seconds() -> float:
+    """Seconds before the first compiled step."""
+    if taylor.kernels_loaded():
+        return 0.0
+    return LOAD_SECONDS if compiled_is_ready() else COMPILE_SECONDS
+
+
+def plain_seconds_spent() -> float:
+    """What plain steps have cost in this process: from the price of the kernels on, these would have paid."""
+    return _SPENT[0]
+
+
+def spend_plain_seconds(seconds: float) -> None:
+    """Add to them."""
+    _SPENT[0] += seconds

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .choice import STOPPED, Watch
 from .contract import Array
 from .elimination import is_linear, minimal
 from .start import Start, least_change
@@ -76,13 +77,15 @@ class Pieces:
 
 
 def run_explicit(  # type: ignore[no-untyped-def]
-    system: System, start: Start, times: Array, *, tolerance: float, longest: float, most: int, jit: bool = True
-):
+    system: System, start: Start, times: Array, *, tolerance: float, longest: float, most: int, jit: bool = True,
+    watch: Watch | None = None,
+):  # fmt: skip
     """Integrate; returns (dense output, status, statistics). `jit`: compiled laws run in a compiled loop."""
     if is_linear(system):
         from .modal import run_minimal
 
-        return run_minimal(minimal(system), start, times, tolerance=tolerance, longest=longest, most=most, jit=jit)
+        options: dict[str, Any] = {"tolerance": tolerance, "longest": longest, "most": most, "jit": jit, "watch": watch}
+        return run_minimal(minimal(system), start, times, **options)
     n = system.size
     active = start.active
 
@@ -96,7 +99,11 @@ def run_explicit(  # type: ignore[no-untyped-def]
         return y[:n], y[n:], system.acceleration(t, y[:n], y[n:], active)[0]
 
     y0 = np.concatenate([start.q, start.v])
-    made = step_through(rhs, project, start.time, y0, times[-1], system.breaks, tolerance, longest, most)
+
+    def told(t: float, steps: int, y: Array) -> bool:
+        return watch is None or watch(t, steps, lambda: (y[:n], y[n:]))
+
+    made = step_through(rhs, project, start.time, y0, times[-1], system.breaks, tolerance, longest, most, told)
     ends, states, polynomials, status, evaluations = made
     statistics: dict[str, Any] = {"steps": len(polynomials), "evaluations": evaluations}
     return Pieces(ends, states, polynomials, expand), status, statistics
@@ -117,11 +124,13 @@ def on_constraints(system: System, t: float, q: Array, v: Array, active: np.ndar
 
 
 def step_through(
-    rhs: Rhs, project: Rhs, t0: float, y0: Array, t1: float, breaks: Array, tolerance: float, longest: float, most: int
-) -> tuple[Array, Array, Array, int, int]:
+    rhs: Rhs, project: Rhs, t0: float, y0: Array, t1: float, breaks: Array, tolerance: float, longest: float, most: int,
+    watch: Callable[[float, int, Array], bool] | None = None,
+) -> tuple[Array, Array, Array, int, int]:  # fmt: skip
     """Adaptive steps from t0 to t1: (ends, states, polynomials, status, evaluations).
 
     The error is measured against the largest value that each component has had; steps end at `breaks`.
+    ``watch(t, steps, y)`` may end the run.
     """
     tab = tableau()
     sign = 1.0 if t1 >= t0 else -1.0
@@ -140,6 +149,9 @@ def step_through(
     while sign * (t1 - t) > 0.0:
         if len(polynomials) >= most:
             status = 2
+            break
+        if watch is not None and not watch(t, len(polynomials), y):
+            status = STOPPED
             break
         while sign * (goals[0] - t) <= 1e-14 * max(1.0, abs(t)):
             goals.pop(0)

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from .choice import STOPPED, Watch
 from .contract import Array, Element, LocalForce, ModalBlocks
 from .elimination import Minimal, is_linear, minimal
 from .explicit import on_constraints
@@ -73,13 +74,21 @@ class Hermite:
         return out / h**derivative
 
 
-def run_implicit(system: System, start: Start, times: Array, *, tolerance: float, longest: float, most: int):  # type: ignore[no-untyped-def]
+def run_implicit(  # type: ignore[no-untyped-def]
+    system: System, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
+    watch: Watch | None = None,
+):  # fmt: skip
     """Integrate; returns (dense output, status, statistics). Linear constant constraints are eliminated before."""
     if system.joints and is_linear(system) and all(isinstance(e, LocalForce) for e, _ in system.forces):
         core = minimal(system)
         inner, begin = in_modes(core, start)
         local = max(MODES_SHARE * tolerance, 1e-13)
-        dense, status, statistics = run_implicit(inner, begin, times, tolerance=local, longest=longest, most=most)
+
+        def told(t: float, steps: int, state: Callable[[], tuple[Array, Array]]) -> bool:
+            return watch is None or watch(t, steps, lambda: (core.origin + core.T @ state()[0], core.T @ state()[1]))
+
+        options: dict[str, Any] = {"tolerance": local, "longest": longest, "most": most, "watch": told}
+        dense, status, statistics = run_implicit(inner, begin, times, **options)
         q, v, a = core.origin + dense.q @ core.T.T, dense.v @ core.T.T, dense.a @ core.T.T
         return Hermite(dense.times, q, v, a), status, {**statistics, "free_coordinates": inner.size}
     t, t1 = start.time, float(times[-1])
@@ -99,6 +108,9 @@ def run_implicit(system: System, start: Start, times: Array, *, tolerance: float
     while sign * (t1 - t) > 0.0:
         if len(record) > most:
             status = 2
+            break
+        if watch is not None and not watch(t, len(record) - 1, lambda: record[-1][1:3]):
+            status = STOPPED
             break
         while sign * (goals[0] - t) <= 1e-14 * max(1.0, abs(t)):
             goals.pop(0)

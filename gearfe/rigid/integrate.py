@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,9 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from . import compiled, kernel_run, taylor
-from .backend import compiled_is_ready
+from .backend import COMPILED_FASTER, compiled_is_ready, loading_seconds, plain_seconds_spent, spend_plain_seconds
+from .choice import Choice, Watch, Way, joined, joined_statistics
+from .contract import Array
 from .start import Start, consistent_start
 from .system import System
 from .trajectory import Trajectory
@@ -20,6 +23,11 @@ METHODS = ("auto", "taylor", "explicit", "implicit")
 #: Asked tolerance -> largest last term of a Taylor step. The benchmark mechanisms amplify local errors some
 #: hundred times.
 LOCAL_SHARE = 5e-4
+#: Seconds of the shortest trials that tell a pace (measured): ten steps of Radau IIA, and before these loading
+#: scipy.linalg once; eight steps of plain series or Runge-Kutta.
+IMPLICIT_TRIAL, LOADING_LINALG, PLAIN_TRIAL = 0.02, 0.25, 0.01
+#: Rates from which on steps of a series or of Runge-Kutta are below the rounding of the run's time.
+HOPELESS = 1e12
 #: Ratio of masses from which on a link counts as massless, and least singular value of the constraints' unit gradients
 #: at a start that is no singular position.
 MASSLESS, REGULAR = 1e10, 1e-6
@@ -46,16 +54,19 @@ def integrate(
     times : array_like
         Times at which results are wanted (s), rising or falling; the first is the start.
     method : {"auto", "taylor", "explicit", "implicit"}
-        "taylor": series of the index-3 equations, planar scenes only, any accuracy. "explicit": Runge-Kutta of order 8
-        with projection, any smooth system. "implicit": Radau IIA of order 5 on the index-3 equations, for stiff ones.
-        "auto" takes "taylor" when the system is a planar scene that is not stiff and has no link without mass, else
-        "explicit", else "implicit".
+        "taylor": series of the index-3 equations, planar scenes only, any accuracy. "explicit": any smooth system;
+        Taylor series in modal coordinates where the constraints are linear and the only force has a compiled law
+        (gear trains), else Runge-Kutta of order 8 with projection. "implicit": Radau IIA of order 5, index 3,
+        for stiff ones. "auto" takes the one of "taylor" (planar scenes) or "explicit", and "implicit", that is
+        predicted to take the fewest seconds, and changes over when that proves wrong (`gearfe.rigid.choice`); scenes
+        with a link without mass go to "implicit".
     tolerance : float
         Accuracy asked for, relative to 1 rad and to the size of the mechanism; 1e-13 to 0.1.
     start : Start, optional
         From `consistent_start`; by default the start poses of the bodies, made consistent (and remembered).
     backend : {"auto", "compiled", "plain"}
-        Compiled kernels need a moment on their first use ever; "plain" runs the same algorithm in NumPy.
+        Compiled kernels need a moment on their first use ever; "plain" runs the same algorithm in NumPy. "auto" begins
+        with plain series as long as these cost less than compiling or loading the kernels would.
     longest : float
         Longest step (s).
     most_steps : int
@@ -64,25 +75,27 @@ def integrate(
     Returns
     -------
     Trajectory
-        With a status; what was computed is returned even when the end was not reached.
+        With a status; what was computed is returned even when the end was not reached. Where there was a choice,
+        ``statistics["choice"]`` lists what each method did, with predicted and real seconds; a program that shows
+        progress (`gearfe.progress`) tells predictions of more than two seconds beforehand.
     """
     asked = np.atleast_1d(np.asarray(times, dtype=float))
     _check(asked, method, tolerance, backend)
     if start is None:
         start = _default_start(system, float(asked[0]))
-    chosen = choose_method(system, start, float(asked[-1] - asked[0])) if method == "auto" else method
-    options: dict[str, Any] = {"tolerance": tolerance, "longest": longest, "most": most_steps}
+    ways = _ways(system, start, asked, method, backend, {"tolerance": tolerance, "longest": longest})
     with np.errstate(over="ignore", invalid="ignore"):  # a state that is not finite has a status of its own
-        if chosen == "taylor":
-            dense, status, statistics = _taylor(system, start, asked, backend, **options)
-        elif chosen == "explicit":
-            from .explicit import run_explicit
-
-            dense, status, statistics = run_explicit(system, start, asked, jit=use_compiled(backend), **options)
+        if len(ways) == 1:
+            dense, status, statistics = ways[0].run(start, asked, most_steps, None)
+            chosen = ways[0].method
         else:
-            from .implicit import run_implicit
-
-            dense, status, statistics = run_implicit(system, start, asked, **options)
+            choice = Choice(ways, start, asked, most=most_steps)
+            legs = choice.run()
+            spend_plain_seconds(sum(leg.seconds for leg in legs if leg.way.backend == "plain"))
+            statistics = joined_statistics(legs, choice.said)
+            used = {leg.way.method for leg in legs}
+            chosen, status = used.pop() if len(used) == 1 else "auto", legs[-1].status
+            dense = joined(legs)
     sign = 1.0 if asked[-1] >= asked[0] else -1.0
     reached = sign * dense.times[-1] + 1e-12 * max(1.0, abs(dense.times[-1]))
     kept = asked if status == 0 else asked[sign * asked <= reached]
@@ -104,24 +117,43 @@ def _dropped_rows_hold(system: System, start: Start, dense: Any, tolerance: floa
     return bool(max(gaps) <= max(1e-8, 1e3 * tolerance) * max(1.0, scale))
 
 
-def choose_method(system: System, start: Start, span: float) -> str:
-    """The method that "auto" takes: Taylor for planar scenes, explicit otherwise, implicit when the start is stiff or a
-    link of a planar scene has next to no mass.
+def _ways(system: System, start: Start, times: Array, method: str, backend: str, options: dict[str, Any]) -> list[Way]:
+    """Ways to integrate that `method` and `backend` leave open, the one to begin with first."""
+    planar = system.planar is not None
+    trial = IMPLICIT_TRIAL + (0.0 if "scipy.linalg" in sys.modules else LOADING_LINALG)
+    rate = partial(_rate, system) if planar else None  # it does not see singular positions
+    implicit = Way("implicit", "", partial(_implicit, system, options), trial, rate=rate)
+    auto = method == "auto"
+    if auto and (_hopeless(system, start, times) or (planar and _has_massless_links(system, start))):
+        return [implicit]
+    if method == "implicit":
+        return [implicit]
+    if method == "explicit" or (auto and not planar):
+        explicit = Way("explicit", "", partial(_explicit, system, backend, options), PLAIN_TRIAL)
+        return [explicit, implicit] if auto else [explicit]
+    plain = Way("taylor", "plain", partial(_taylor, system, False, options), PLAIN_TRIAL)
+    if not use_compiled(backend):
+        return [plain, implicit] if auto else [plain]
+    loading = loading_seconds()
+    quick = Way("taylor", "compiled", partial(_taylor, system, True, options), loading, loading, COMPILED_FASTER)
+    if backend == "compiled" or loading <= plain_seconds_spent():
+        return [quick, implicit] if auto else [quick]
+    return [plain, quick, implicit] if auto else [plain, quick]
 
-    Stiff: explicit steps would have to follow the damping or the fastest vibration more than 30,000 times over the run.
-    """
-    scene = system.planar
+
+def _hopeless(system: System, start: Start, times: Array) -> bool:
+    """Whether the fastest rate at the start leaves steps of series or Runge-Kutta no length."""
+    return abs(float(times[-1] - times[0])) * _rate(system, start) > HOPELESS
+
+
+def _rate(system: System, start: Start) -> float:
+    """Fastest rate (1/s) of springs and dampers in a state; that of the last one asked for is remembered."""
     from .stiffness_estimate import fastest_rate
 
-    key = id(start)
-    known: dict[int, tuple] = system.__dict__.setdefault("_rates", {})
-    if key not in known:
-        known[key] = (fastest_rate(system, start), start)  # the start is kept, so its id stays its own
-    decay, omega = known[key][0]
-    work = abs(span) * decay / 4.0 + abs(span) * omega / 4.0
-    if work > 30_000 or (scene is not None and _has_massless_links(system, start)):
-        return "implicit"
-    return "taylor" if scene is not None else "explicit"
+    known: tuple[Start, float] | None = system.__dict__.get("_rate")
+    if known is None or known[0] is not start:
+        known = system.__dict__["_rate"] = (start, max(fastest_rate(system, start)))
+    return known[1]
 
 
 def _has_massless_links(system: System, start: Start) -> bool:
@@ -140,14 +172,31 @@ def _has_massless_links(system: System, start: Start) -> bool:
     return len(gradients) > 0 and bool(np.linalg.svd(gradients, compute_uv=False)[-1] > REGULAR)
 
 
-def _taylor(system: System, start: Start, times, backend: str, *, tolerance, longest, most):  # type: ignore[no-untyped-def]
+def _explicit(  # type: ignore[no-untyped-def]
+    system: System, backend: str, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
+):
+    from .explicit import run_explicit
+
+    return run_explicit(system, start, times, jit=use_compiled(backend), most=most, watch=watch, **options)
+
+
+def _implicit(  # type: ignore[no-untyped-def]
+    system: System, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
+):
+    from .implicit import run_implicit
+
+    return run_implicit(system, start, times, most=most, watch=watch, **options)
+
+
+def _taylor(  # type: ignore[no-untyped-def]
+    system: System, jit: bool, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
+):
     scene = system.planar
     if scene is None:
         cure = "use method='explicit' or 'implicit'"
         raise InputError("method", "taylor", "needs a system that is one planar scene", cure)
-    local = max(LOCAL_SHARE * tolerance, 5e-16)
+    local = max(LOCAL_SHARE * options["tolerance"], 5e-16)
     order = taylor.order_for(local)
-    jit = use_compiled(backend)
     if jit and not compiled_is_ready():
         print(COMPILING, file=sys.stderr, flush=True)
     key = (order, jit)
@@ -157,7 +206,7 @@ def _taylor(system: System, start: Start, times, backend: str, *, tolerance, lon
     redundant = (~start.active).astype(np.int64)
     pieces = taylor.run(
         scene.assembly, start.q, start.v, (start.time, float(times[-1])), tolerance=local, redundant=redundant,
-        order=order, longest=longest, most=most, jit=jit, work=cache[key],
+        order=order, longest=options["longest"], most=most, jit=jit, work=cache[key], watch=watch,
     )  # fmt: skip
     status = 2 if pieces.status == kernel_run.FULL else pieces.status
     where = np.flatnonzero(pieces.folds)
@@ -165,6 +214,7 @@ def _taylor(system: System, start: Start, times, backend: str, *, tolerance, lon
         "steps": len(pieces.coefficients),
         "order": order,
         "backend": "compiled" if jit else "plain",
+        "compile_seconds": pieces.compiling,
         "singular_passages": pieces.times[where],
     }
     return pieces, status, statistics

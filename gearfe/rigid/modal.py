@@ -7,6 +7,7 @@ stage calls Python.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,7 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from ..progress import stage
 from . import compiled, kernel_modal
+from .choice import STOPPED, Watch
 from .contract import Array, LocalForce, SeriesLaw
 from .elimination import Minimal
 from .explicit import Pieces, step_through
@@ -29,8 +32,9 @@ PLAIN_SHARE = 0.03
 
 
 def run_minimal(  # type: ignore[no-untyped-def]
-    core: Minimal, start: Start, times: Array, *, tolerance: float, longest: float, most: int, jit: bool = True
-):
+    core: Minimal, start: Start, times: Array, *, tolerance: float, longest: float, most: int, jit: bool = True,
+    watch: Watch | None = None,
+):  # fmt: skip
     """Integrate a system in minimal coordinates; returns (dense output, status, statistics)."""
     n = core.T.shape[1]
     y0 = np.concatenate(core.reduce(start.q, start.v))
@@ -45,6 +49,12 @@ def run_minimal(  # type: ignore[no-untyped-def]
     def expand(t: float, y: Array) -> tuple[Array, Array, Array]:
         return core.origin + core.T @ y[:n], core.T @ y[n:], core.T @ acceleration(t, y)
 
+    def state(y: Array) -> tuple[Array, Array]:
+        return core.origin + core.T @ y[:n], core.T @ y[n:]
+
+    def told(t: float, steps: int, y: Array) -> bool:
+        return watch is None or watch(t, steps, lambda: state(y))
+
     series = _series(core) if jit else None
     if series is None:
         made = step_through(
@@ -57,14 +67,16 @@ def run_minimal(  # type: ignore[no-untyped-def]
             max(PLAIN_SHARE * tolerance, 1e-14),
             longest,
             most,
+            told,
         )
         ends, states, polynomials, status, evaluations = made
         statistics: dict[str, Any] = {"steps": len(polynomials), "evaluations": evaluations, "backend": "plain"}
         return Pieces(ends, states, polynomials, expand), status, {**statistics, "free_coordinates": n}
     run = SeriesRun(core, *series, tolerance, longest, expand)
-    ends, states, found, status, orders = run.steps(start.time, y0, float(times[-1]), times, most)
+    compiling = run.load()
+    ends, states, found, status, orders = run.steps(start.time, y0, float(times[-1]), times, most, told)
     dense = SeriesPieces(ends, states, times[: len(found)], found, run)
-    statistics = {"steps": len(ends) - 1, "evaluations": orders, "backend": "compiled"}
+    statistics = {"steps": len(ends) - 1, "evaluations": orders, "backend": "compiled", "compile_seconds": compiling}
     return dense, status, {**statistics, "free_coordinates": n}
 
 
@@ -99,7 +111,22 @@ class SeriesRun:
     longest: float
     expand: Callable[[float, Array], tuple[Array, Array, Array]]
 
-    def steps(self, t0: float, y0: Array, t1: float, asked: Array, most: int) -> tuple[Array, Array, Array, int, int]:
+    def load(self) -> float:
+        """Compile the kernels, or load them, by a run of no length; seconds that this took."""
+        series = self.series
+        kernels = _kernels(series.begin, series.order, series.corner, series.helpers)
+        if "loaded" in vars(kernels):
+            return 0.0
+        began = time.perf_counter()
+        with stage("compiling the kernels"):
+            self.steps(0.0, np.zeros(2 * self.core.T.shape[1]), 0.0, np.zeros(1), 1)
+        kernels.loaded = True
+        return time.perf_counter() - began
+
+    def steps(
+        self, t0: float, y0: Array, t1: float, asked: Array, most: int,
+        watch: Callable[[float, int, Array], bool] | None = None,
+    ) -> tuple[Array, Array, Array, int, int]:  # fmt: skip
         """(step ends, states there, states at the asked times passed, status, orders computed)."""
         core, series = self.core, self.series
         n = core.T.shape[1]
@@ -112,9 +139,11 @@ class SeriesRun:
         work = kernel_modal.work_space(n, W.shape[0], ORDER + 1)
         found = np.empty((len(asked), 2 * n))
         rates = np.sqrt(np.abs(core.squares).max(initial=0.0)) + np.abs(diagonal).max(initial=0.0)
-        t, state, h, status, at, orders = t0, y0.copy(), 5.0 / max(rates, 1.0 / abs(t1 - t0)), 2, 0, 0
+        t, state, h, status, at, orders = t0, y0.copy(), 5.0 / max(rates, 1.0 / max(abs(t1 - t0), 1e-300)), 2, 0, 0
         reach, pull = np.abs(y0[:n]), np.zeros(n)
         ends, states, room = [np.array([t0])], [y0[None, :]], 512
+        if watch is not None:
+            watch(t, 0, state)
         while status == 2 and sum(map(len, ends)) - 1 < most:
             room = min(room, most + 1 - sum(map(len, ends)))
             T, Y = np.empty(room), np.empty((room, 2 * n))
@@ -126,6 +155,8 @@ class SeriesRun:
             orders += further
             ends.append(T[:count])
             states.append(Y[:count])
+            if watch is not None and status == 2 and not watch(t, sum(map(len, ends)) - 1, state):
+                status = STOPPED
             room = min(4 * room, 20_000)
         return np.concatenate(ends), np.vstack(states), found[:at], status, orders
 

@@ -1,4 +1,4 @@
-"""How fast the fastest part of a system is at its start: decides between explicit and implicit integration."""
+"""How fast the springs and dampers of a system are in a state."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .system import System
 
 
 def fastest_rate(system: System, start: Start) -> tuple[float, float]:
-    """Fastest decay (1/s) and fastest vibration (rad/s) of the free motion at the start.
+    """Fastest decay (1/s) and fastest vibration (rad/s) of the free motion in a state.
 
     The linear part of forces is projected onto the directions that the constraints leave free.
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass
 from functools import lru_cache
 from types import SimpleNamespace
@@ -10,7 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..progress import stage
 from . import compiled, kernel_fold, kernel_forces, kernel_planes, kernel_rows, kernel_run, kernel_series
+from .choice import LEAST_STEPS, STOPPED, Watch
 from .tables import Array, Assembly, Ints, Tables
 from .within import within_run
 
@@ -113,6 +116,8 @@ class Pieces:
         Number of singular combinations of rows at the start of every step.
     begin : float
         Start of the run (s).
+    compiling : float
+        Seconds that compiling the kernels took, or loading those of an earlier run.
     """
 
     status: int
@@ -121,6 +126,7 @@ class Pieces:
     folds: Ints
     jit: bool
     begin: float
+    compiling: float = 0.0
 
     def __call__(self, t: Array, derivative: int = 0) -> Array:
         """Coordinates (or a derivative of them) at the times t."""
@@ -153,9 +159,25 @@ def kernels_loaded() -> bool:
 def kernels(jit: bool) -> SimpleNamespace:
     """The bound kernels, compiled or plain."""
     if jit:
-        _LOADED.append(True)
         return compiled.bind(FUNCTIONS, NAMES, compiled=True, entries=ENTRIES, inline=HOT)
     return compiled.bind((*FUNCTIONS, *kernel_run.STARTERS), NAMES, compiled=False)
+
+
+def load_kernels(assembly: Assembly, w: Work, order: int, redundant: Ints) -> float:
+    """Compile the kernels, or load them, by a run of no length; seconds that this took."""
+    if _LOADED:
+        return 0.0
+    began = time.perf_counter()
+    n3 = assembly.tables.mass.size
+    state, times, coefficients = np.array([0.0, 0.0, math.inf, 1.0, 0.0]), np.zeros(2), np.zeros((1, order + 1, n3))
+    with stage("compiling the kernels"):
+        kernels(True).integrate_series(
+            assembly.tables, w, 0.0, 0.0, np.zeros(n3), np.zeros(n3), order, 1e-9, assembly.length, redundant,
+            assembly.breaks, math.inf, state, times, coefficients, np.zeros(1, dtype=np.int64),
+        )  # fmt: skip
+        kernels(True).sample(times, coefficients, 1.0, np.zeros(1), 0, np.zeros((1, n3)))
+    _LOADED.append(True)
+    return time.perf_counter() - began
 
 
 def order_for(tolerance: float) -> int:
@@ -176,6 +198,7 @@ def run(
     most: int = 1_000_000,
     jit: bool = True,
     work: Work | None = None,
+    watch: Watch | None = None,
 ) -> Pieces:
     """Integrate the scene from the consistent state (q, v) of its moving bodies over `span`."""
     order = order or order_for(tolerance)
@@ -185,9 +208,16 @@ def run(
     v = np.concatenate([v, np.zeros(3)])
     t0, t1 = float(span[0]), float(span[1])
     state = np.array([t0, 0.0, math.inf, 0.0, 0.0])
+    compiling = load_kernels(assembly, w, order, redundant) if jit else 0.0
     advance = kernels(jit).integrate_series
     parts = []
-    room, done = min(64, most), 0
+    room, done = min(64 if jit else LEAST_STEPS, most), 0
+
+    def moving() -> tuple[Array, Array]:
+        return q[:-3], v[:-3]
+
+    if watch is not None:
+        watch(t0, 0, moving)
     while True:
         times, coefficients = np.empty(room + 1), np.empty((room, order + 1, q.size))
         folds = np.zeros(room, dtype=np.int64)
@@ -208,9 +238,12 @@ def run(
         done += count
         if status != kernel_run.FULL or done >= most:
             break
+        if watch is not None and state[1] == 0.0 and not watch(float(state[0]), done, moving):  # not on a fold
+            status = STOPPED
+            break
         room = min(2 * room, max(64, 2_000_000 // coefficients[0].size), most - done)
     ends = np.concatenate([parts[0][0], *(p[0][1:] for p in parts[1:])])
     if len(parts) == 1:
-        return Pieces(int(status), ends, parts[0][1], parts[0][2], jit, t0)
+        return Pieces(int(status), ends, parts[0][1], parts[0][2], jit, t0, compiling)
     coefficients, folds = (np.concatenate([p[k] for p in parts]) for k in (1, 2))
-    return Pieces(int(status), ends, coefficients, folds, jit, t0)
+    return Pieces(int(status), ends, coefficients, folds, jit, t0, compiling)

@@ -28,7 +28,9 @@ STATUS = {
 class Dense(Protocol):
     """Coordinates at any time within the run."""
 
-    times: Array
+    @property
+    def times(self) -> Array:
+        """Ends of the steps (s)."""
 
     def __call__(self, t: Array, derivative: int = 0) -> Array:
         """Coordinates (derivative 0), velocities (1), accelerations (2) at the times t; shape (times, size)."""
@@ -46,6 +48,8 @@ class Trajectory:
         Asked times (s), up to the time reached.
     status : int
         0 when the end was reached, see `STATUS`; `message` says it in words.
+    method : str
+        The one used; "auto" where it changed over.
     statistics
         Steps, order or evaluations, singular passages.
     dense

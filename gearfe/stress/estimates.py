@@ -115,7 +115,7 @@ def _draw_trajectory(random: np.random.Generator, number: int, kind: str) -> Cas
 def _run_trajectory(case: Case, job_path: Path) -> Found:
     """Worst error of a coordinate over the run (m or rad)."""
     from ..mechanisms.error_estimate import trajectory_error
-    from ..mechanisms.job import output_times, quickest
+    from ..mechanisms.job import output_times
     from ..mechanisms.model import load_mechanism
     from ..mechanisms.results import evaluate
     from ..rigid import integrate
@@ -125,12 +125,12 @@ def _run_trajectory(case: Case, job_path: Path) -> Found:
     mechanism = load_mechanism(job_path)
     start, run_table = mechanism.start(), mechanism.file.run
     times = output_times(run_table.end_s, run_table.step_s)
-    made = quickest(mechanism, times, start, "auto", run_table.tolerance)
+    made = integrate(mechanism.system, times, start=start, tolerance=run_table.tolerance)
     if made.status != 0:
         return made.message
     stated = trajectory_error(mechanism, start, evaluate(mechanism, made), run_table.tolerance).coordinates
     backend = "compiled" if compiled_is_ready() else "plain"
-    finest = 1e-12 if made.method != "implicit" else max(1e-11, 1e-5 * run_table.tolerance)
+    finest = 1e-12 if made.method == "taylor" else max(1e-11, 1e-5 * run_table.tolerance)
     options: dict[str, Any] = {"method": made.method, "start": start, "backend": backend}
     truth = integrate(mechanism.system, times, tolerance=finest, **options)
     while truth.status != 0 and 10.0 * finest <= FAR_FINER * run_table.tolerance:

@@ -73,7 +73,8 @@ def simulate(
         trajectory, moved = _run(model, t, tolerance, method, backend)
         status, keep, why = _ended(model, trajectory, moved)
     moved = _cut(moved, keep)
-    seconds = clock.perf_counter() - begin
+    compiling = float(trajectory.statistics.get("compile_seconds", 0.0))
+    seconds = clock.perf_counter() - begin - compiling
     statistics = {
         **trajectory.statistics,
         "method": trajectory.method,
@@ -101,9 +102,8 @@ def simulate(
 def _run(
     model: TrainModel, t: Array, tolerance: float, method: str, backend: str, longest: float = np.inf
 ) -> tuple[Trajectory, Motion]:
-    trajectory = integrate(
-        model.system, t, method=method, tolerance=tolerance, start=model.start, backend=backend, longest=longest
-    )
+    options: dict[str, Any] = {"tolerance": tolerance, "start": model.start, "backend": backend, "longest": longest}
+    trajectory = integrate(model.system, t, method=method, **options)
     return trajectory, motion(model, trajectory)
 
 
