@@ -350,7 +350,20 @@ def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
     assert "none of the sweep's angles" in capsys.readouterr().err
 
 
-def test_penalty_says_that_its_pressures_are_rough(tmp_path, capsys):
-    options = ("--twist-deg", "0.05", "--angles", "3", "3", "6", "--law", "penalty", "--no-picture")
+def test_load_and_pressure_are_told(tmp_path, capsys):
+    """At 0.5 deg the torque is beyond what the steel bears, and tip rounds bear at pair changes."""
+    options = ("--twist-deg", "0.5", "--angles", "0", "3", "15", "--no-picture")
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options]) == 0
-    assert "use nitsche" in capsys.readouterr().err
+    said = capsys.readouterr().out
+    assert "torque at the wheel: mean" in said
+    assert "beyond the 1500 MPa that case-hardened steel bears for long (ISO 6336-5)" in said
+    assert "a rounded edge bearing" in said
+    told = json.loads((tmp_path / "summary.json").read_text())
+    curve = StiffnessCurve.from_csv(tmp_path / "stiffness.csv")
+    torque = told["load"]["torque_wheel_Nm"]
+    assert torque["largest"] == pytest.approx(curve.torque_wheel.max(), rel=1e-12)
+    assert told["contact_pressure"]["largest_hertzian_MPa"] == pytest.approx(1e-6 * np.nanmax(curve.peak_pressure))
+    assert told["contact_pressure"]["positions_with_a_rounded_edge_bearing"] == (curve.edge == "rounded").sum() > 0
+    light = ("--twist-deg", "0.01", "--angles", "12", "1", "14", "--no-picture")
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *light]) == 0
+    assert "case-hardened" not in capsys.readouterr().out

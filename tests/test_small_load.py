@@ -126,7 +126,8 @@ def test_backlash_that_is_not_taken_up_is_no_contact():
     gears = pair(centre_distance=62.6e-3)
     body = elastic_pair(gears, coarsen=3.0)
     for share, status in ((1 - 1e-9, "no_contact"), (1 + 1e-9, "converged")):
-        curve = sweep_stiffness(gears, twist=share * gears.contact_twist, angles=[0.1, 0.2], elastic=body)
+        twist = share * gears.contact_twist
+        curve = sweep_stiffness(gears, twist=twist, angles=[0.1, 0.2], elastic=body, twist_from="centred")
         assert set(curve.status) == {status}
         assert (curve.torque_wheel > 0).all() == (status == "converged")
 

@@ -116,7 +116,7 @@ def test_a_foreign_table(tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (None, "cannot be read"),
+        (None, "there is no such file"),
         ("pinion_angle_deg,k_mesh_N_per_m\n", "has no rows"),
         ("pinion_angle_deg,k\n1,2\n", "has no column k_mesh_N_per_m"),
         ("pinion_angle_deg,k_mesh_N_per_m\n1,2,3\n", "line 2 has 3 cells"),

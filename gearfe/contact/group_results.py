@@ -13,6 +13,7 @@ from .closest import Projection
 from .group import Group, ranges
 from .group_newton import Motion, Outcomes, equilibrium
 from .group_rows import Rows, rows_of
+from .half_width import half_widths
 from .scene import MeshingPair, Scene
 
 Array = NDArray[Any]
@@ -29,6 +30,8 @@ class Results:
         See `gearfe.contact.solver.Position`.
     window_torque : ndarray, shape (W,)
         About the wheel's centre, of the wheel's windows (N m).
+    half_width : ndarray, shape (W/2,)
+        Of the contact of each couple of windows (m).
     forces, force_rate : ndarray, shape (2n,)
         N and N/rad, tooth axes.
     """
@@ -39,6 +42,7 @@ class Results:
     tangent: Array
     peak_pressure: Array
     window_torque: Array
+    half_width: Array
     forces: Array
     force_rate: Array
 
@@ -76,6 +80,12 @@ def results_of(pair: MeshingPair, group: Group, outcomes: Outcomes) -> Results:
         tangent=-np.bincount(group.position[window], weights=moment, minlength=group.size),
         peak_pressure=peak,
         window_torque=about,
+        half_width=half_widths(
+            group.couple[group.owner],
+            np.einsum("qa,qai->qi", group.slave_shapes, placed[group.slave_nodes]),
+            group.weight * np.maximum(motion.pressure, 0.0),
+            windows // 2,
+        ),
         forces=forces,
         force_rate=rate[0],
     )

@@ -91,6 +91,8 @@ class Approach(NamedTuple):
         Largest pressure (Pa).
     smooth
         Whether no sharp edge bears: under one linear elasticity has no bound for the pressure.
+    equivalent
+        Half width of Hertz's contact whose pressure has the same second moment (m), see `gearfe.contact.half_width`.
     """
 
     approach: float
@@ -100,6 +102,7 @@ class Approach(NamedTuple):
     width: float
     pressure: float
     smooth: bool
+    equivalent: float
 
 
 @dataclass(frozen=True)
@@ -188,7 +191,7 @@ class LocalContact:
             rigid = sum(e.factor * math.log(2.0 * abs(e.place)) for e in self.edges)
             lam = load * (self.unit * (0.5 - math.log(0.5 * b)) - rigid)
             rate = self.unit * -math.log(0.5 * b) - rigid
-            return Approach(lam, rate, 0.0, 0.0, b, 2.0 * load / (math.pi * b), True)
+            return Approach(lam, rate, 0.0, 0.0, b, 2.0 * load / (math.pi * b), True, b)
         return self._numerical(load)
 
     def gap_at(self, x: Array) -> Array:
@@ -231,6 +234,7 @@ class LocalContact:
             0.5 * (ends[1] - ends[0]),
             float(pressure.max()),
             smooth,
+            _equivalent(nodes, pressure),
         )
 
     def _panels(self, load: float, nodes: Array) -> tuple[Array, Array, float, float]:
@@ -285,6 +289,15 @@ def _end(place: Array, pressure: Array, outer: int, node: float, inwards: int) -
     beyond = outer - inwards
     most = place[beyond] if 0 <= beyond < len(place) else node
     return float(max(end, most) if inwards > 0 else min(end, most))
+
+
+def _equivalent(nodes: Array, pressure: Array) -> float:
+    """Twice the deviation of constant pressures on panels between `nodes` (m)."""
+    load = pressure * np.diff(nodes)
+    low, high = nodes[:-1], nodes[1:]
+    mean = float(load @ (0.5 * (low + high)) / load.sum())
+    low, high = low - mean, high - mean
+    return 2.0 * math.sqrt(float(load @ (low * low + low * high + high * high)) / (3.0 * float(load.sum())))
 
 
 def _primitive(z: Array) -> Array:

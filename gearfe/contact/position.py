@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .closest import unreached
+from .half_width import half_widths
 from .linearised import Linearised, linearise
 from .newton import Outcome
 from .scene import Scene
@@ -35,8 +36,10 @@ class Position:
         Pair k joins pinion tooth k and wheel tooth -1 - k.
     pair_torques : ndarray
         Share of each pair in `torque_wheel` (N m).
+    pair_widths : ndarray
+        Half width of each pair's contact by the second moment of its pressure (m), see `gearfe.contact.half_width`.
     peak_pressure
-        Largest pressure at a contact point (Pa).
+        Largest pressure at a contact point (Pa): it oscillates with the mesh, and a sharp edge gives it no bound.
     iterations
         Newton steps.
     scene, forces, force_rate
@@ -59,6 +62,7 @@ class Position:
     pair_torques: Array
     peak_pressure: float
     iterations: int
+    pair_widths: Array = field(default_factory=lambda: np.zeros(0))
     scene: Scene | None = None
     forces: Array | None = None
     force_rate: Array | None = None
@@ -97,6 +101,12 @@ def finish(scene: Scene, outcome: Outcome, iterations: int) -> Position:
         pair_torques=np.array([about_wheel[w.nodes].sum() for w in of_pair]),
         peak_pressure=float(state.pressure[~unreached(outcome.projection.gap)].max()),
         iterations=iterations,
+        pair_widths=half_widths(
+            scene.pair,
+            scene.slaves(scene.points),
+            scene.weight * np.where(unreached(outcome.projection.gap), 0.0, state.pressure),
+            scene.pairs,
+        ),
         scene=replace(  # without the megabytes
             scene, compliance=np.zeros((0, 0)), stress=np.zeros((0, 0)), stress_stress=np.zeros((0, 0))
         ),

@@ -223,6 +223,7 @@ def solve_group(
                 pair_torques=results.window_torque[(first + end) // 2 : end],
                 peak_pressure=float(results.peak_pressure[b]),
                 iterations=steps,
+                pair_widths=results.half_width[first // 2 : end // 2],
                 scene=scene,
                 forces=loads,
                 force_rate=rate,

@@ -89,7 +89,8 @@ def closed_level(cells: list[Solved], goal: float, share: Array, touching: Array
         moved[name] = numbers[name] * factor
     moved["torque_wheel"] = np.where(good, goal, moved["torque_wheel"])
     moved["tangent"] = tangent * (1 + 2 * share)
-    moved["peak_pressure"] = numbers["peak_pressure"] * root
+    for name in ("peak_pressure", "edge_pressure"):
+        moved[name] = numbers[name] * root
     pairs = [(c.pairs[0][0], c.pairs[0][1] * f) for c, f in zip(cells, factor, strict=True)]
     return replace(
         cells[0],

@@ -171,7 +171,10 @@ class LoadMap:
         first, radius = self.curves[after - 1], self.curves[0].base_radius
         leading, shares = self._shares_between(pair, along)
         values = {name: along(self.quantity(name) / self.torque[:, None]) * torque for name in _PER_TORQUE}
-        smooth = {name: np.exp(along(np.log(self.quantity(name)))) for name in ("k_tangent", "peak_pressure")}
+        smooth = {name: np.exp(along(np.log(self.quantity(name)))) for name in _POWER_LAWS}
+        # a pressure is known between torques that know it
+        for name in ("peak_pressure", "edge_pressure"):
+            smooth[name][~np.isfinite(self.quantity(name)[pair]).all(axis=0)] = np.nan
         made: dict[str, Any] = {name: np.where(lost, np.nan, v) for name, v in {**values, **smooth}.items()}
         return replace(
             first,
@@ -186,6 +189,8 @@ class LoadMap:
             teeth_in_contact=np.where(lost, -1, (shares > 0).sum(axis=1)),
             iterations=np.full(len(twist), -1),
             status=status,
+            peak_pressure_error=self.quantity("peak_pressure_error")[pair].max(axis=0),
+            edge=np.where(np.isfinite(smooth["edge_pressure"]), self.quantity("edge")[after], "none"),
             error=None,
             timings={},
             **made,
@@ -263,7 +268,8 @@ class LoadMap:
         return cls(torque[starts], tuple(curves), root_of(columns, (len(starts), int(counts[0])), path))
 
 
-#: Quantities that are nearly proportional to the torque.
+#: Quantities that nearly follow a power of the torque, and those that are nearly proportional to it.
+_POWER_LAWS = ("k_tangent", "peak_pressure", "edge_pressure")
 _PER_TORQUE = ("torque_pinion", "torque_wheel_reaction")
 assert set(_PER_TORQUE) <= set(COLUMNS.values()) - set(WHOLE)
 

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..gear.derived import derived_geometry
+from ..stiffness.contact_pressure import largest_pressures
 from ..stiffness.job import StiffnessJob
-from ..stiffness.report import versions
+from ..stiffness.report import pressure_lines, versions
 from ..tables.loadmap import LoadMapTable
 from .load_map import LoadMap
 from .root_map import GEARS
@@ -29,8 +30,12 @@ def torque_table(made: LoadMap) -> dict[str, list[float]]:
         "k_tangent_mean_N_per_m": made.quantity("k_tangent").mean(axis=1),
         "transmission_error_mean_um": 1e6 * error.mean(axis=1),
         "transmission_error_peak_to_peak_um": 1e6 * made.peak_to_peak,
-        "peak_pressure_largest_MPa": 1e-6 * made.quantity("peak_pressure").max(axis=1),
     }
+    found = [largest_pressures(curve) for curve in made.curves]
+    for name, key in (("peak_pressure_largest_MPa", "path"), ("edge_pressure_largest_MPa", "edge")):
+        table[name] = 1e-6 * np.array([one[key] for one in found])
+    for name in ("rounded", "singular"):
+        table[f"positions_with_{name}_edge"] = np.array([one[name] for one in found])
     if made.root is not None:
         for g, gear in enumerate(GEARS):
             table[f"root_stress_largest_{gear}_MPa"] = 1e-6 * made.root.largest[:, :, g].max(axis=1)
@@ -67,13 +72,12 @@ def told(made: LoadMap) -> list[str]:
         curve = made.curves[row]
         line = (
             f"at {made.torque[row]:.4g} N m: mean stiffness {1e-6 * curve.k_mesh.mean():.4g} N/um, transmission error "
-            f"{1e6 * curve.transmission_error.mean():.4g} um with {1e6 * made.peak_to_peak[row]:.3g} um peak to peak, "
-            f"peak pressure {1e-6 * curve.peak_pressure.max():.4g} MPa"
+            f"{1e6 * curve.transmission_error.mean():.4g} um with {1e6 * made.peak_to_peak[row]:.3g} um peak to peak"
         )
         if made.root is not None:
             pinion, wheel = 1e-6 * made.root.largest[row].max(axis=0)
             line += f", root stress {pinion:.4g} MPa (pinion), {wheel:.4g} MPa (wheel)"
-        lines.append(line)
+        lines += [line, *("  " + one for one in pressure_lines(curve))]
     missed = made.interpolation_error()
     if np.isfinite(missed).any():
         lines.append(
@@ -95,10 +99,6 @@ def warnings(job: StiffnessJob, made: LoadMap) -> list[str]:
             f"{int(made.failed.sum())} cells failed and have no numbers, only their status (torques {torques} N m): "
             "use less load or a finer mesh (coarsen below 1)"
         )
-    if job.table.law == "penalty":
-        said.append(
-            "peak pressures of the penalty law oscillate from point to point and are too high: use nitsche for them"
-        )
     return said
 
 
@@ -117,7 +117,7 @@ def figure_arguments(job: StiffnessJob, made: LoadMap) -> dict[str, Any]:
         "mesh stiffness k  (N/µm)": 1e-6 * made.quantity("k_mesh"),
         "transmission error  (µm)": 1e6 * made.quantity("transmission_error"),
         "largest load share of a pair  (–)": share,
-        "peak pressure  (MPa)": 1e-6 * made.quantity("peak_pressure"),
+        "Hertzian pressure  (MPa)": 1e-6 * made.quantity("peak_pressure"),
     }
     if made.root is not None:
         for g, gear in enumerate(GEARS):

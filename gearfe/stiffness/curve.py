@@ -48,6 +48,9 @@ COLUMNS: dict[str, str] = {
     "torque_wheel_reaction_Nm": "torque_wheel_reaction",
     "leading_pair": "leading_pair",
     "route": "route",
+    "peak_pressure_relative_error": "peak_pressure_error",
+    "edge_pressure_MPa": "edge_pressure",
+    "edge": "edge",
 }
 #: Constants of the curve, repeated on every row so that the file stands alone.
 CONSTANTS: dict[str, str] = {
@@ -56,7 +59,7 @@ CONSTANTS: dict[str, str] = {
     "lost_motion_deg": "lost_motion",
 }
 #: Columns of words.
-WORDS = ("status", "route")
+WORDS = ("status", "route", "edge")
 WHOLE = ("teeth_in_contact", "iterations")
 SHARE = "load_share_"
 
@@ -125,8 +128,14 @@ class StiffnessCurve:
         Share of the wheel's torque (-) that the pairs `leading_pair`, `leading_pair` - 1, ... carry.
     teeth_in_contact
         Tooth pairs that carry load; -1 where the position failed.
-    peak_pressure
-        Largest contact pressure (Pa).
+    peak_pressure, peak_pressure_error
+        Largest Hertzian pressure of the tooth pairs that bear on smooth flanks (Pa), and how far the computed contacts
+        are from Hertz's (-), see `gearfe.stiffness.contact_pressure`; not-a-number where none does.
+    edge_pressure
+        The like where an edge bears (Pa), blunted by a hundredth of a module; not-a-number where none bears.
+    edge
+        ``none``; ``rounded``: a tip round bears; ``singular``: a sharp edge bears, under which the pressure of linear
+        elasticity has no bound. Empty where unknown.
     iterations
         Newton iterations; -1 where unknown.
     status
@@ -173,10 +182,15 @@ class StiffnessCurve:
     timings: Mapping[str, float] = field(default_factory=dict)
     error: ErrorEstimate | None = None
     route: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=np.str_))
+    peak_pressure_error: Array = field(default_factory=lambda: np.zeros(0))
+    edge_pressure: Array = field(default_factory=lambda: np.zeros(0))
+    edge: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=np.str_))
 
     def __post_init__(self) -> None:
-        if len(self.route) != len(self.pinion_angle):
-            object.__setattr__(self, "route", np.full(len(self.pinion_angle), ""))
+        unknown = {"route": "", "peak_pressure_error": np.nan, "edge_pressure": np.nan, "edge": ""}
+        for name, value in unknown.items():
+            if len(getattr(self, name)) != len(self.pinion_angle):
+                object.__setattr__(self, name, np.full(len(self.pinion_angle), value))
 
     def __len__(self) -> int:
         return len(self.pinion_angle)
@@ -293,5 +307,6 @@ class StiffnessCurve:
         values["law"] = columns.get("contact_law", [""])[0].strip()
         default = ["converged" if np.isfinite(k) else "missing" for k in values["k_mesh"]]
         values["status"] = np.array([cell.strip() for cell in columns.get("status", default)])
-        values["route"] = np.array([cell.strip() for cell in columns.get("route", [""] * len(default))])
+        for word in ("route", "edge"):
+            values[word] = np.array([cell.strip() for cell in columns.get(word, [""] * len(default))])
         return cls(**values)

@@ -14,6 +14,7 @@ from ..contact.finite_strain import finite_strain_shares, interpolated_shares, s
 from ..contact.solver import Position
 from ..errors import InputError
 from ..gear.iso6336 import mesh_stiffness
+from .contact_pressure import contact_pressures
 from .curve import SOLVED
 from .routes import Router, bare
 from .torque_control import TorqueSolution, twists_for_torque
@@ -37,7 +38,8 @@ class Solved:
     twist : ndarray, shape (n,)
         Twist in all, lost motion included (rad).
     numbers : dict of str to ndarray, shape (n,)
-        ``torque_wheel``, ``torque_pinion``, ``torque_wheel_reaction``, ``tangent``, ``peak_pressure``, see `Position`.
+        ``torque_wheel``, ``torque_pinion``, ``torque_wheel_reaction``, ``tangent``, see `Position`, and the quantities
+        of `gearfe.stiffness.contact_pressure`.
     pairs : list of (ndarray, ndarray)
         For each position the numbers of the tooth pairs that carry load, and their torques (N m).
     iterations : ndarray, shape (n,)
@@ -87,7 +89,7 @@ def at_twists(
         every = interpolated_shares(angles, angles[sampled], shares, elastic.pitch_angle)
         positions = [bare(with_share(p, c)) for p, c in zip(positions, every, strict=True)]
     iterations = np.array([p.iterations for p in positions], dtype=np.int64)
-    return _collect(twists, positions, iterations, [p.status for p in positions])
+    return _collect(router, angles, twists, positions, iterations, [p.status for p in positions])
 
 
 #: Yield of a tooth pair (modules) by the standard's stiffness beyond which a torque is refused. Each tooth, 2 modules
@@ -132,7 +134,7 @@ def at_torque(
     found = _search(router, angles, goal, touching, touching + torque / guess, progress)
     if finite:
         found = _with_shares(router, angles, goal, touching, found)
-    return _collect(found.twist, found.positions, found.iterations, found.status)
+    return _collect(router, angles, found.twist, found.positions, found.iterations, found.status)
 
 
 def _with_shares(router: Router, angles: Array, goal: Array, touching: Array, found: TorqueSolution) -> TorqueSolution:
@@ -206,9 +208,12 @@ def _search(
     )
 
 
-def _collect(twists: Array, positions: list[Position], iterations: IntArray, status: list[str]) -> Solved:
-    names = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "tangent", "peak_pressure")
+def _collect(
+    router: Router, angles: Array, twists: Array, positions: list[Position], iterations: IntArray, status: list[str]
+) -> Solved:
+    names = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "tangent")
     numbers = {name: np.array([getattr(p, name) for p in positions], dtype=float) for name in names}
+    numbers |= contact_pressures(router.elastic, router.flanks, router.touching(angles), positions)
     pairs = []
     for p in positions:
         carry = np.asarray(p.pair_torques) > 0
@@ -223,7 +228,7 @@ def honest(solved: Solved, touching: Array) -> Solved:
         for s, twist, touch in zip(solved.status, solved.twist, touching, strict=True)
     ]
     bad = ~np.isin(status, SOLVED)
-    numbers = {name: np.where(bad, np.nan, values) for name, values in solved.numbers.items()}
+    numbers = {n: np.where(bad, 0 if n == "edge" else np.nan, values) for n, values in solved.numbers.items()}
     return replace(solved, numbers=numbers, status=status)
 
 

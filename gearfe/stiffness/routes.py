@@ -178,6 +178,11 @@ class Router:
             self._references[angle] = known
         return known[1]
 
+    def touching(self, angles: Array) -> list[Touching]:
+        """Of each pinion angle (rad) the tooth pairs whose rigid flanks can meet."""
+        found = self._touched(angles)
+        return [found[float(angle)] for angle in angles]
+
     def touching_twists(self, angles: Array) -> Array:
         """Twists (rad) at which the rigid gears just touch."""
         found = self._touched(angles)
@@ -253,15 +258,18 @@ def blended(elastic: MeshingPair, direct: Position, hertz: Position, share: floa
     mean: dict[str, Any] = {n: share * getattr(direct, n) + (1 - share) * getattr(hertz, n) for n in names}
     mean["tangent"] += slope * (direct.torque_wheel - hertz.torque_wheel)
     numbers = sorted({*direct.pair_numbers, *hertz.pair_numbers})
-    torques = np.zeros(len(numbers))
+    torques, variances = np.zeros(len(numbers)), np.zeros(len(numbers))
     for position, weight in ((direct, share), (hertz, 1 - share)):
-        for one, value in zip(position.pair_numbers, position.pair_torques, strict=True):
+        each = zip(position.pair_numbers, position.pair_torques, position.pair_widths, strict=True)
+        for one, value, width in each:
             torques[numbers.index(one)] += weight * value
+            variances[numbers.index(one)] += weight * value * width**2 if value > 0 else 0.0
     made = replace(
         direct,
         **mean,
         pair_numbers=tuple(numbers),
         pair_torques=torques,
+        pair_widths=np.sqrt(np.divide(variances, torques, out=np.full(len(numbers), np.nan), where=torques > 0)),
         iterations=direct.iterations + hertz.iterations,
         route="blend",
     )

@@ -237,6 +237,7 @@ def position_of(reference: Reference, found: Balance) -> Position:
         pair_torques=found.shares[order],
         peak_pressure=max(smooth or every),
         iterations=found.iterations,
+        pair_widths=np.array([found.contacts[k].equivalent for k in order]),
         route="hertz",
     )
 

@@ -30,6 +30,7 @@ from ..meshing.tooth_sector import sector_mesh
 from ..stopwatch import Stopwatch
 from ..tables.stiffness import check_flank_coarsen
 from ..threads import one_thread
+from .contact_pressure import EDGES
 from .curve import SOLVED, ErrorEstimate, StiffnessCurve
 from .curve_error import COARSENING, error_estimate, law_error, solved_twice
 from .periodic import fold
@@ -285,6 +286,9 @@ def assembled_curve(
         load_share=shares[source],
         teeth_in_contact=np.where(failed, -1, (shares > 0).sum(axis=1))[source],
         peak_pressure=solved.numbers["peak_pressure"][source],
+        peak_pressure_error=solved.numbers["peak_pressure_error"][source],
+        edge_pressure=solved.numbers["edge_pressure"][source],
+        edge=np.array(EDGES)[solved.numbers["edge"].astype(np.int64)][source],
         iterations=solved.iterations[source],
         status=np.array(solved.status)[source],
         route=np.array(solved.route)[source],

@@ -1,0 +1,81 @@
+"""Two plane bodies on supports at rest as a `MeshingPair`, so that the sweep's own solver presses them together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
+
+from gearfe.contact.bodies import Bodies, ElasticBody
+from gearfe.contact.compliance import REACH, FarField, GearBody
+from gearfe.contact.flank import flank_of, normal_stress_rows
+from gearfe.contact.laws import ContactLaw
+from gearfe.contact.scene import MeshingPair, turn
+
+Array = NDArray[Any]
+
+#: Teeth of the two make-believe gears, so far apart that only one pair meets, and their centre distance (m per size).
+TEETH, CENTRES = 8, 40.0
+
+
+def condensed_body(body: ElasticBody, surface: str, held: Mapping[str, tuple[bool, bool]], points: int) -> GearBody:
+    """Compliance of the boundary `surface` with some components of other boundaries held at zero."""
+    chain = body.boundary(surface)
+    mesh: Any = SimpleNamespace(
+        points=body.points, triangles=body.triangles, contact_edges=lambda: chain, teeth=TEETH, boundaries={}
+    )
+    flank = flank_of(mesh, points)
+    bodies = Bodies((body,))
+    unknowns = bodies.unknowns[bodies.node_of[0]]  # of each node of the body
+    fixed = np.unique(
+        np.concatenate(
+            [unknowns[np.unique(body.boundaries[n]), axis] for n, axes in held.items() for axis in (0, 1) if axes[axis]]
+        )
+    )
+    free = np.setdiff1d(np.arange(bodies.unknowns.size), fixed)
+    surface_unknowns = unknowns[flank.nodes].ravel()
+    right = np.zeros((bodies.unknowns.size, len(surface_unknowns)))
+    right[surface_unknowns, np.arange(len(surface_unknowns))] = 1.0
+    right[fixed] = 0.0
+    moved = np.zeros_like(right)
+    stiffness = bodies.stiffness.tocsc()
+    moved[free] = splu(stiffness[np.ix_(free, free)]).solve(right[free])
+    where, rows = normal_stress_rows(mesh, body.material, body.plane, points)
+    of_body = unknowns.ravel()  # node unknowns (2 n, 2 n + 1) of the body -> unknowns of the mesh
+    stress = np.einsum("eqa,eaf->eqf", rows, moved[of_body[where]]).reshape(-1, len(surface_unknowns))
+    none = np.zeros((len(surface_unknowns), 0))
+    far = FarField(none, np.zeros((len(stress), 0)), dict.fromkeys(range(-REACH, REACH + 1), none.T))
+    return GearBody(
+        mesh, flank, body.material, body.plane, body.thickness, moved[surface_unknowns], none, np.zeros((TEETH, 0, 0)),
+        stress, np.zeros((len(stress), 0)), far, None, body.thickness,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def turned(body: GearBody, angle: float, shift: Array) -> GearBody:
+    """The body in axes turned by `angle` (rad) about a centre at `shift` (m)."""
+    axes = turn(angle)
+    blocks = np.kron(np.eye(len(body.flank.points)), axes)
+    return replace(
+        body,
+        flank=replace(body.flank, points=(body.flank.points - shift) @ axes),
+        own=blocks.T @ body.own @ blocks,
+        stress_own=body.stress_own @ blocks,
+    )
+
+
+def pressed_pair(lower: GearBody, upper: GearBody, law: ContactLaw, overlap: float) -> MeshingPair:
+    """The upper body's top-down surface pressed by `overlap` (m) into the lower one's; both surfaces lie near y = 0.
+
+    The lower body is the pinion's tooth 0, the upper one the wheel's tooth -1, both at pinion angle 0 and twist 0.
+    """
+    size = float(np.ptp(lower.flank.points[:, 0]))
+    left = np.array([float(lower.flank.points[:, 0].min()) - 4.0 * size, 0.0])
+    centre = left + np.array([CENTRES * size, 0.0])
+    pinion = turned(lower, 0.0, left)
+    wheel = turned(upper, np.pi - np.pi / TEETH, centre + np.array([0.0, overlap]))
+    return MeshingPair(pinion, wheel, CENTRES * size, lower.thickness, law)
