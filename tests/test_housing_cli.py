@@ -25,6 +25,10 @@ modes = 10
 """
 
 
+#: Columns of modes.csv: error of a frequency, and what it is the sum of.
+PARTS = ("error_estimate", "mesh_error_estimate", "reduction_error_bound")
+
+
 @pytest.fixture
 def job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("GEARFE_CACHE", str(tmp_path / "cache"))
@@ -37,7 +41,7 @@ def test_command_writes_its_files(job: Path, tmp_path: Path, capsys: pytest.Capt
     out = tmp_path / "out"
     assert main(["housing", str(job), "--out", str(out), "--modes", "8"]) == 0
     printed = capsys.readouterr().out
-    for word in ("mass            4.14", "bore 6", "sparse solver", "mesh", "reduction error", "10 modes"):
+    for word in ("mass            4.14", "bore 6", "sparse solver", "mesh", "estimated error", "10 modes"):
         assert word in printed, word
     for name in ("modes.csv", "modes.vtkhdf", "housing.npz", "summary.json", "housing.png", "modes.png"):
         assert (out / name).stat().st_size > 500, name
@@ -48,6 +52,10 @@ def test_command_writes_its_files(job: Path, tmp_path: Path, capsys: pytest.Capt
     np.testing.assert_allclose(
         [float(row["frequency_Hz"]) for row in rows], body.coupled.frequencies_hz[:8], rtol=1e-12
     )
+    # one estimate for each frequency, the sum of its parts
+    parts = [[float(row[f"{part}_percent"]) for row in rows] for part in PARTS]
+    np.testing.assert_allclose(parts[0], np.add(parts[1], parts[2]), rtol=1e-12)
+    assert np.all(np.array(parts[0]) > 0.5)  # coarse elements and sharp edges
     # effective masses of all modes together are the mass that is not held
     masses = (body.momentum[:3] @ body.coupled.vectors) ** 2
     np.testing.assert_allclose([float(row["effective_mass_y_kg"]) for row in rows], masses[1, :8], rtol=1e-9)
@@ -56,6 +64,8 @@ def test_command_writes_its_files(job: Path, tmp_path: Path, capsys: pytest.Capt
     summary = json.loads((out / "summary.json").read_text())
     assert summary["mass_kg"] == pytest.approx(body.rigid_mass[0, 0])
     assert len(summary["attachments"]) == 6
+    np.testing.assert_allclose(100.0 * np.array(summary["frequency_error_estimates"]), parts[0], rtol=1e-12)
+    assert summary["response_error_estimate"] > summary["mesh_response_error_estimate"] > 0.0
 
 
 def test_second_run_needs_no_mesher(job: Path, tmp_path: Path) -> None:

@@ -127,12 +127,16 @@ def _sweep_peers(figure: Any, rows: list[Row]) -> None:
     _finish(axes)
 
 
+#: Elements of the size study by their order.
+KINDS_OF_ORDER = {1: "linear", 2: "second order", 3: "extruded, third order"}
+
+
 def _housing_sizes(figure: Any, rows: list[Row]) -> None:
     from .housing_study import frequency_errors
 
     left, right = figure.subplots(1, 2)
     own = [{**r, "error": e} for r, e in zip(rows, frequency_errors(rows), strict=True)]
-    own = [{**r, "kind": "second order" if r["order"] == 2 else "linear"} for r in own]
+    own = [{**r, "kind": KINDS_OF_ORDER[r["order"]]} for r in own]
     curves(left, groups(own, "kind"), "error", "cpu_s")
     left.set(xlabel="largest error of 20 frequencies", ylabel="processor time (s)", title="housing: mesh")
     for label, part in groups(own, "kind").items():

@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 from ..progress import stage
 
 if TYPE_CHECKING:
-    from ..reduction.error import ReductionError
+    from ..reduction.error import MeshError, ReductionError
     from ..reduction.modal_body import ModalBody
 
 HELP = "reduce a housing to a small elastic body: mass, bores, frequencies, mode shapes"
 
+#: Why a frequency has no estimate.
+_COARSE, _FEW = "the mesh is too coarse for one", "keep more modes (modes_below_Hz)"
 #: Modes drawn.
 _DRAWN = 6
 
@@ -38,10 +40,9 @@ def run(args: argparse.Namespace) -> int:
 
     import numpy as np
 
-    from ..housing.build import material, reduced_housing
-    from ..housing.mesh_error import frequency_errors
+    from ..housing.build import reduced_housing
     from ..output.files import output_folder, whole_set
-    from ..reduction.error import reduction_error
+    from ..reduction.error import mesh_error, reduction_error
 
     folder = output_folder(args.out)
     started = time.perf_counter()
@@ -50,13 +51,13 @@ def run(args: argparse.Namespace) -> int:
     shown = min(args.modes, body.size)
     with stage("error estimates"):
         fields = body.reconstruct(body.coupled.vectors[:, :shown].T)
-        mesh = frequency_errors(body.nodes, body.elements, material(table), fields)
-        mesh[body.coupled.frequencies_hz[:shown] <= 0.0] = 0.0
+        mesh = mesh_error(body, table.reduction.band_Hz)
         left_out = reduction_error(body, table.reduction.band_Hz)
-    _report(body, mesh, left_out, seconds)
+        errors = _frequency_errors(body, shown, mesh)
+    _report(body, errors, mesh, left_out, seconds)
     with whole_set(folder, ("housing.png", "modes.png")) as made:
         with stage("tables"):
-            _write(made, body, fields, mesh, left_out)
+            _write(made, body, fields, errors, mesh, left_out)
         with stage("pictures"):
             problem = "" if args.no_pictures else _draw(made, body, fields)
     if problem:
@@ -65,7 +66,21 @@ def run(args: argparse.Namespace) -> int:
     return int(bool(problem) or not np.all(np.isfinite(body.coupled.frequencies_hz)))
 
 
-def _report(body: ModalBody, mesh: Any, left_out: ReductionError, seconds: float) -> None:
+def _frequency_errors(body: ModalBody, shown: int, mesh: MeshError) -> dict[str, Any]:
+    """Relative errors of the first frequencies: of mesh, of reduction, of both; not-a-number beyond the modes kept."""
+    import numpy as np
+
+    from ..reduction.error import reduction_error
+
+    highest = body.coupled.frequencies_hz[shown - 1] * (1.0 + 1e-9)
+    known = reduction_error(body, max(min(highest, 0.999 * body.next_hz), 1e-9), points=1).frequency_errors[:shown]
+    reduction = np.full(shown, np.nan)
+    reduction[: len(known)] = known
+    own = np.where(np.isfinite(mesh.frequency_errors), mesh.frequency_errors, np.nan)[:shown]
+    return {"mesh": own, "reduction": reduction, "all": own + reduction}
+
+
+def _report(body: ModalBody, errors: dict[str, Any], mesh: MeshError, left_out: ReductionError, seconds: float) -> None:
     for note in body.notes:
         print(f"note: {note}")
     print(f"mass            {body.rigid_mass[0, 0]:.4f} kg")
@@ -77,17 +92,22 @@ def _report(body: ModalBody, mesh: Any, left_out: ReductionError, seconds: float
     for name, point in zip(body.attachment_names, body.attachment_points, strict=True):
         x, y, z = 1e3 * point
         print(f"bore {name:<10} reference point x {x:8.3f}  y {y:8.3f}  z {z:8.3f} mm")
-    print("frequencies, bores rigid and free to move; estimated errors of mesh and reduction (both towards too high):")
-    for number, estimate in enumerate(mesh):
+    print("frequencies, bores rigid and free to move; estimated error (mesh and reduction, all towards too high):")
+    for number, estimate in enumerate(errors["all"]):
         frequency = body.coupled.frequencies_hz[number]
-        lost = left_out.frequency_errors[number] if number < len(left_out.frequency_errors) else math.nan
-        reduction = f"{100.0 * lost:9.1e} %" if math.isfinite(lost) else "  beyond the band"
-        print(f"  {number + 1:3d} {frequency:10.2f} Hz   mesh {100.0 * estimate:5.2f} %   reduction <= {reduction}")
-    bound = f"{100.0 * left_out.response:.2g} %" if math.isfinite(left_out.response) else "unknown: keep more modes"
-    print(f"response of the bores up to {left_out.band_hz:.0f} Hz (1 % damping): reduction error <= {bound} rms")
+        said = f"<= {100.0 * estimate:5.2f} %   (reduction {100.0 * errors['reduction'][number]:.1e} %)"
+        if not math.isfinite(estimate):
+            said = "unknown: " + (_COARSE if number < body.modes else _FEW)
+        print(f"  {number + 1:3d} {frequency:10.2f} Hz   {said}")
+    bound = mesh.response + left_out.response
+    told = f"{100.0 * bound:.2g} % rms" if math.isfinite(bound) else "unknown: keep more modes"
+    part = f" (mesh {100.0 * mesh.response:.2g} %, reduction {100.0 * left_out.response:.2g} %)"
+    print(f"response of the bores up to {left_out.band_hz:.0f} Hz (1 % damping): estimated error <= {told}{part}")
 
 
-def _write(folder: Path, body: ModalBody, fields: Any, mesh: Any, left_out: ReductionError) -> None:
+def _write(
+    folder: Path, body: ModalBody, fields: Any, errors: dict[str, Any], mesh: MeshError, left_out: ReductionError
+) -> None:
     import numpy as np
 
     from ..output.files import write_csv, write_json
@@ -97,15 +117,14 @@ def _write(folder: Path, body: ModalBody, fields: Any, mesh: Any, left_out: Redu
     shown = len(fields)
     vectors = body.coupled.vectors[:, :shown]
     participation = body.momentum @ vectors
-    bounds = np.full(shown, np.nan)
-    bounds[: len(left_out.frequency_errors)] = left_out.frequency_errors[:shown]
     columns: dict[str, Any] = {"number": np.arange(1, shown + 1), "frequency_Hz": body.coupled.frequencies_hz[:shown]}
     for axis, name in enumerate("xyz"):
         columns[f"effective_mass_{name}_kg"] = participation[axis] ** 2
     for axis, name in enumerate("xyz"):
         columns[f"effective_inertia_{name}_kg_m2"] = participation[3 + axis] ** 2
-    columns["mesh_error_estimate_percent"] = 100.0 * mesh
-    columns["reduction_error_bound_percent"] = 100.0 * bounds
+    columns["error_estimate_percent"] = 100.0 * errors["all"]
+    columns["mesh_error_estimate_percent"] = 100.0 * errors["mesh"]
+    columns["reduction_error_bound_percent"] = 100.0 * errors["reduction"]
     write_csv(folder / "modes.csv", columns)
     cells = {"tetra" if body.elements.shape[1] == 4 else "tetra10": body.elements}
     names = [f"mode_{k + 1:02d}_{body.coupled.frequencies_hz[k]:.1f}_Hz" for k in range(shown)]
@@ -121,8 +140,11 @@ def _write(folder: Path, body: ModalBody, fields: Any, mesh: Any, left_out: Redu
         "frequencies_free_attachments_Hz": body.coupled.frequencies_hz[:shown],
         "frequencies_held_attachments_Hz": body.internal_hz[: body.modes],
         "band_Hz": left_out.band_hz,
+        "response_error_estimate": mesh.response + left_out.response,
+        "mesh_response_error_estimate": mesh.response,
         "reduction_response_error_bound": left_out.response,
-        "mesh_frequency_error_estimates": mesh,
+        "frequency_error_estimates": errors["all"],
+        "mesh_frequency_error_estimates": errors["mesh"],
         "attachments": {n: list(p) for n, p in zip(body.attachment_names, body.attachment_points, strict=True)},
         "notes": list(body.notes),
     }

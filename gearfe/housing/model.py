@@ -29,6 +29,7 @@ from .attachments import (
 )
 from .full import FullModel, full_model
 from .mesh_checks import boundary_faces, checked_mesh
+from .mesh_error import energy_lost
 from .surface import nodal_normals, radiation_matrix
 
 Floats = NDArray[np.float64]
@@ -197,6 +198,7 @@ class Housing:
         least_modes: int = 40,
         quasi_static: int = 1,
         solver: str = "auto",
+        estimate: bool = True,
     ) -> ModalBody:
         """Reduced body: static shapes, modes with the attachments held, quasi-static corrections.
 
@@ -212,6 +214,8 @@ class Housing:
             Levels of correction vectors; 0 for none.
         solver
             Sparse solver, see `gearfe.reduction.sparse_solver`.
+        estimate
+            Whether the body carries an estimate of the mesh's error (`ModalBody.softening`).
         """
         stiffness, mass = self.matrices.stiffness, self.matrices.mass
         found = reduce_model(
@@ -230,7 +234,7 @@ class Housing:
             raise InputError("modes", modes, "leaves no coordinate: there is no attachment either", "keep a mode")
         motions = rigid_motions(self.nodes)
         count = len(self.attachments)
-        return ModalBody(
+        body = ModalBody(
             mass=found.mass,
             damping=np.zeros_like(found.mass),
             stiffness=found.stiffness,
@@ -250,10 +254,24 @@ class Housing:
             tail=found.tail,
             levels=found.levels,
             next_hz=float(np.sqrt(max(found.next_eigenvalue, 0.0)) / (2.0 * np.pi)),
+            softening=np.zeros_like(found.mass),
             held=len(self.fixed) > 0,
             solver=found.solver,
             notes=self.notes,
         )
+        return self.with_estimate(body) if estimate else body
+
+    def with_estimate(self, body: ModalBody) -> ModalBody:
+        """The reduced body with an estimate of the mesh's error, for frequencies up to the highest mode kept."""
+        highest = body.internal_hz[body.modes - 1] if body.modes else np.inf
+        kept = body.coupled.frequencies_hz <= highest
+        vectors = body.coupled.vectors[:, kept]
+        squares = (2.0 * np.pi * body.coupled.frequencies_hz[kept]) ** 2
+        rigid = [self.fixed, *(attachment.nodes for attachment in self.attachments)]
+        with stage("estimating the mesh's error"):
+            lost = energy_lost(self.nodes, self.tets, self.material, body.shapes @ vectors, squares, rigid)
+        weighted = body.mass @ vectors
+        return replace(body, softening=np.asarray(weighted @ lost @ weighted.T))
 
     def full_model(self, solver: str = "auto") -> FullModel:
         """The same body without reduction, over [attachments | all internal unknowns]."""

@@ -1,10 +1,18 @@
-r"""What a reduced body leaves out, bounded without the full model.
+r"""How far a reduced body is from the housing: what the reduction leaves out, and what the mesh does.
 
-With the bound of `gearfe.reduction.craig_bampton` on the interfaces' dynamic stiffness, ``dD(w) <= E(w)``, follow
+**Reduction.** With the bound of `gearfe.reduction.craig_bampton` on the interfaces' dynamic stiffness,
+``dD(w) <= E(w)``, follow
 
 - natural frequencies with free attachments: ``d lambda_k <= v_b^T E(w_k) v_b``, v_b the attachment part of the mode of
   unit modal mass, so ``d f_k / f_k <= v_b^T E v_b / (2 w_k^2)``;
 - the response of the attachments to forces on them: ``dH = H E H`` with ``H = D^-1``, compared with H over the band.
+
+**Mesh.** The body that carries an estimate of its mesh's error (`ModalBody.softening`) is compared with the body
+softened by it: each frequency with that of the same number, and the response with those of several parts of the way,
+because a resonance that moves past a frequency raises the response there before it lowers it.
+
+Both stiffen, so frequencies err towards too high; the mesh by far the more. Joined they are added: the body that is
+reduced is the mesh's, so the errors follow each other, and of two bounds only the sum is one.
 """
 
 from __future__ import annotations
@@ -24,6 +32,10 @@ Floats = NDArray[np.float64]
 SAFETY = 1.5
 #: What the eigensolver leaves of the modes that are kept; it matters where next to nothing is left out.
 EIGENSOLVER = 1e-6
+#: No mesh is this good: a softening below this part of a mode's stiffness is one that was not estimated.
+UNKNOWN = 1e-12
+#: Parts of the way to the softest body, all of it last.
+PARTS = (0.25, 0.5, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +98,57 @@ def reduction_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, poi
         total += float(np.sum(np.abs(direct) ** 2))
     response = SAFETY * math.sqrt(lost / total) + EIGENSOLVER if lost else 0.0
     return ReductionError(band_hz, response, own, errors)
+
+
+@dataclass(frozen=True, eq=False)
+class MeshError:
+    """Estimates of what the mesh does to a body.
+
+    Attributes
+    ----------
+    band_hz
+        Upper end of the band (Hz).
+    response
+        Estimated error of the attachments' accelerations under forces on them: relative, rms over band and pairs.
+    frequency_errors : (N,)
+        Relative errors of the natural frequencies with free attachments; 0 for rigid-body modes. Infinite above the
+        highest mode that was kept, where the mesh's error is not estimated, and where the estimate is as large as the
+        stiffness itself: such a mesh (linear tetrahedra) is no approximation from which an error could be told.
+    """
+
+    band_hz: float
+    response: float
+    frequency_errors: Floats
+
+
+def mesh_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, points: int = 200) -> MeshError:
+    """Estimate the mesh's error of a reduced body up to `band_hz`; arguments as those of `reduction_error`."""
+    if not band_hz > 0.0:
+        raise InputError("band_hz", band_hz, "must be > 0", "give a frequency in Hz")
+    bodies = [body, *(body.softened(part) for part in PARTS)]
+    own, vectors = body.coupled.frequencies_hz, body.coupled.vectors
+    soft = np.maximum(bodies[-1].coupled.frequencies_hz, 1e-300)
+    lost = np.einsum("ik,ij,jk->k", vectors, body.softening, vectors, optimize=True)
+    stiffness = (2.0 * math.pi * own) ** 2
+    unknown = (own > 0.0) & ((lost <= UNKNOWN * stiffness) | (lost >= stiffness))
+    errors = np.where(unknown, math.inf, np.where(own > 0.0, own / soft - 1.0, 0.0))
+    if np.any(unknown & (own <= band_hz)):
+        return MeshError(band_hz, math.inf, errors)
+    direct, *softer = (accelerances(b, band_hz, ratio=ratio, points=points) for b in bodies)
+    size = float(np.linalg.norm(direct))
+    response = max(float(np.linalg.norm(h - direct)) for h in softer) / size if size else 0.0
+    return MeshError(band_hz, response, errors)
+
+
+def accelerances(body: ModalBody, band_hz: float, *, ratio: float = 0.01, points: int = 200) -> NDArray[np.complex128]:
+    """Accelerations of all attachments' points for forces on them, (points, 3 a, 3 a) over a band (1/kg)."""
+    m = 6 * len(body.attachment_names)
+    coupled = body.coupled
+    shapes = coupled.vectors[:m].reshape(-1, 6, body.size)[:, :3].reshape(-1, body.size)
+    own = 2.0 * math.pi * coupled.frequencies_hz
+    omega = 2.0 * math.pi * band_hz * (np.arange(points) + 0.5) / points
+    gains = omega[:, None] ** 2 / (own**2 - omega[:, None] ** 2 + 2j * ratio * own * omega[:, None])
+    return np.asarray((shapes * gains[:, None, :]) @ shapes.T)
 
 
 def lost_stiffness(body: ModalBody, omega: float) -> Floats:

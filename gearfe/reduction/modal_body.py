@@ -30,7 +30,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: Written to files; a file of another format is refused with a message.
-FORMAT = 2
+FORMAT = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +70,9 @@ class ModalBody:
         Mass, static moments and inertia about the origin: kinetic energy of rigid translations and rotations.
     tail, levels, next_hz
         Matrix S, levels of corrections and frequency of the error bound in `gearfe.reduction.craig_bampton`.
+    softening : (N, N)
+        Estimate of how much too stiff the mesh makes the body, a quadratic form like the stiffness (see
+        `gearfe.housing.mesh_error`); all zero where it was not asked for.
     held
         Whether a part of the body is fixed to the frame; a free body has six rigid-body modes.
     solver
@@ -97,6 +100,7 @@ class ModalBody:
     tail: Floats
     levels: int
     next_hz: float
+    softening: Floats
     held: bool
     solver: str
     notes: tuple[str, ...] = ()
@@ -174,6 +178,22 @@ class ModalBody:
             weighted = self.mass @ self.coupled.vectors
             damping = damping + (weighted * (2.0 * per_mode * omega)) @ weighted.T
         return dataclasses.replace(self, damping=0.5 * (damping + damping.T))
+
+    def softened(self, part: float = 1.0) -> ModalBody:
+        r"""The body as soft as the estimate of the mesh's error allows, or a `part` of the way there.
+
+        In the modes with free attachments, squares of their circular frequencies L, the stiffness L becomes
+        ``(L^-1 + part L^-1 S L^-1)^-1``, S the softening: L - part S where that is small, and never negative.
+        Rigid-body motions stay free, the damping stays.
+        """
+        squares = (2.0 * math.pi * self.coupled.frequencies_hz) ** 2
+        elastic = squares > 0.0
+        vectors, root = self.coupled.vectors[:, elastic], np.sqrt(squares[elastic])
+        lost = part * (vectors.T @ self.softening @ vectors) / np.outer(root, root)
+        stiffness = np.linalg.inv(np.eye(len(root)) + lost) * np.outer(root, root)
+        weighted = self.mass @ vectors
+        made = weighted @ stiffness @ weighted.T
+        return dataclasses.replace(self, stiffness=0.5 * (made + made.T))
 
     def save(self, path: str | Path) -> None:
         """Write one file with everything; `load` gives an equal body back."""
