@@ -150,6 +150,8 @@ def _convert(hint: Any, value: Any, label: str, meta: Any) -> Any:
     origin = typing.get_origin(hint)
     if origin in (typing.Union, types.UnionType):
         options = [a for a in typing.get_args(hint) if a is not type(None)]
+        # the option that is written like the value tells what is wrong with it
+        options.sort(key=lambda option: not _written_like(option, value))
         problem: InputError | None = None
         for option in options:
             try:
@@ -170,6 +172,15 @@ def _convert(hint: Any, value: Any, label: str, meta: Any) -> Any:
     if hint is Any:
         return value
     return _convert_scalar(hint, value, label, meta)
+
+
+def _written_like(hint: Any, value: Any) -> bool:
+    """Whether a value of this kind is written in TOML as `value` is: a list, a table, a text, a number."""
+    if isinstance(value, list):
+        return typing.get_origin(hint) is tuple
+    if isinstance(value, dict):
+        return typing.get_origin(hint) is dict or dataclasses.is_dataclass(hint)
+    return hint is str if isinstance(value, str) else hint in (int, float, bool)
 
 
 def _convert_tuple(hint: Any, value: Any, label: str, meta: Any) -> tuple[Any, ...]:

@@ -34,6 +34,8 @@ Floats = NDArray[np.float64]
 #: Sampling frequency of the motion, in parts of twice the highest natural frequency, at least: with 2 the leakage of a
 #: fast mode through the ends of a record is within 1e-3 of the largest line; on lines of the record it would need 1.
 SPARE = 2.0
+#: More samples than this are no spectrum but a mistake in a stiffness or a mass.
+MOST_SAMPLES = 10**9
 #: Half length of the filter in kept samples, and the attenuation (dB) for which Kaiser's formulas ask that length.
 REACH, STOP_BAND_DB = 10, 145.0
 #: Kaiser's relation between the attenuation and the parameter of his window.
@@ -60,6 +62,10 @@ def finer(times: Floats, highest: float) -> tuple[Floats, int]:
     count = len(times) - 1
     step = float(times[-1] - times[0]) / count
     every = samples_per_step(step, highest)
+    if every * count > MOST_SAMPLES:
+        problem = f"asks for {every * count:.3g} samples of the motion in {step * count:.3g} s"
+        cure = "leave such a stiff part rigid, or simulate a shorter time"
+        raise InputError("highest natural frequency (Hz)", highest, problem, cure)
     made = times[0] + step / every * np.arange(every * count + 1)
     made[::every] = times
     return made, every

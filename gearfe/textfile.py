@@ -27,12 +27,12 @@ def read_text(path: str | Path, field: str) -> str:
         When there is no such file, it cannot be read, or is no UTF-8 text.
     """
     try:
-        if Path(path).is_dir():
-            raise InputError(field, str(path), "is a folder, not a file", "name a file in it")
         with Path(path).open("rb") as stream:
             raw = stream.read(LARGEST + 1)
     except FileNotFoundError:
         raise InputError(field, str(path), "there is no such file", "check the path") from None
+    except IsADirectoryError:
+        raise InputError(field, str(path), "is a folder, not a file", "name a file in it") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(field, str(path), f"cannot be read ({reason})", "check the path and its rights") from None

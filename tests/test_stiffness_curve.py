@@ -120,8 +120,8 @@ def test_a_foreign_table(tmp_path):
         ("pinion_angle_deg,k_mesh_N_per_m\n", "has no rows"),
         ("pinion_angle_deg,k\n1,2\n", "has no column k_mesh_N_per_m"),
         ("pinion_angle_deg,k_mesh_N_per_m\n1,2,3\n", "line 2 has 3 cells"),
-        ("pinion_angle_deg,k_mesh_N_per_m\n1,stiff\n", "'stiff', which is no number"),
-        ("pinion_angle_deg,k_mesh_N_per_m\none,1\n", "'one', which is no number"),
+        ("pinion_angle_deg,k_mesh_N_per_m\n1,stiff\n", "'stiff', which is no finite number"),
+        ("pinion_angle_deg,k_mesh_N_per_m\none,1\n", "'one', which is no finite number"),
     ],
 )
 def test_mistakes_in_a_table(tmp_path, content, message):

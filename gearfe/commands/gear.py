@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..progress import stage
+from .arguments import check_option
 
 HELP = "derived geometry of a gear pair, and a drawing of it in mesh"
 
@@ -23,12 +24,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the geometry, write gear_pair.png and gear_pair.json."""
     from ..config import load_job
-    from ..errors import InputError
+    from ..tables.stiffness import StiffnessTable
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness",))
-    if not math.isfinite(args.angle_deg):
-        raise InputError("--angle-deg", args.angle_deg, "must be finite")
+    check_option("--angle-deg", args.angle_deg, StiffnessTable, "angle_start_deg")
 
     from ..gear.derived import derived_geometry, iso_values
     from ..gear.drawing import pair_drawing

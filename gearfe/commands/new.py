@@ -26,6 +26,8 @@ def run(args: argparse.Namespace) -> int:
     if args.kind not in KINDS:
         raise unknown_name("kind of job", args.kind, KINDS)
     target = Path(args.file or f"{args.kind}.toml")
+    if target.is_dir():
+        raise InputError("file", str(target), "is a folder", f"name a file in it, as {target / args.kind}.toml")
     if target.exists() and not args.force:
         raise InputError("file", str(target), "exists", "choose another name, or give --force to replace it")
     text = job_file(args.kind)

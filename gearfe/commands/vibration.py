@@ -50,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compute and write; 1 when the run ended early or a picture could not be drawn."""
     started = time.perf_counter()
+    from ..config import check_range
     from ..tables.train import TrainTable, read_train_tables
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
@@ -57,6 +58,9 @@ def run(args: argparse.Namespace) -> int:
     if args.tolerance is not None:
         check_option("--tolerance", args.tolerance, TrainTable, "tolerance")
         tables["train"] = replace(tables["train"], tolerance=args.tolerance)
+    check_range(args.spectrum_from_ms, "--spectrum-from-ms", {"low": 0.0, "doc": "begin of the record (ms)"})
+    if args.spectrum_ms is not None:
+        check_range(args.spectrum_ms, "--spectrum-ms", {"above": 0.0, "doc": "duration of the record (ms)"})
 
     from ..output.files import output_folder
     from ..stopwatch import Stopwatch

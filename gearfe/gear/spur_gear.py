@@ -197,7 +197,8 @@ class Gear:
             "pressure_angle": (math.radians(5.0), math.radians(45.0), True),
             "face_width": (0.0, LARGEST, False),
             "bore_diameter": (0.0, math.inf, False),
-            "profile_shift": (-math.inf, math.inf, True),
+            # -teeth/2 moves the reference line to the axis, and teeth are pointed long before teeth/2
+            "profile_shift": (-0.5 * self.teeth, 0.5 * self.teeth, True),
             "addendum": (0.0, math.inf, False),
             "dedendum": (0.0, math.inf, False),
             "rack_tip_radius": (0.0, math.inf, True),

@@ -54,6 +54,10 @@ def run_mechanism(
         raise InputError("--until", end, "must be finite and > 0 s", "give the end of the run")
     if end / run.step_s > 5e6:
         raise InputError("--until", end, "gives more than five million rows", "take a longer step_s or an earlier end")
+    if figures:
+        from ..output.mechanism_figures import reference_table
+
+        reference_table(mechanism)  # a mistake in it is told before the run
     folder = output_folder(out)
     start = mechanism.start()
     read = clock.perf_counter()
@@ -71,7 +75,8 @@ def run_mechanism(
         results = evaluate(mechanism, trajectory)
     error = trajectory_error(mechanism, start, results, tolerance) if estimate else None
     estimated = clock.perf_counter()
-    warnings = tuple(not_finite({**results.outputs, **results.energy}))
+    # a run that ended early has told so already
+    warnings = tuple(not_finite({**results.outputs, **results.energy}) if trajectory.status == 0 else ())
     with whole_set(folder, MAY_WRITE) as made:
         write_tables(made, mechanism, results, reactions or run.reactions)
         written = clock.perf_counter()

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..textfile import read_text
 from .files import whole_file
 
 
@@ -55,7 +56,7 @@ def _curves(plt: Any, path: Path, mechanism: Any, results: Any) -> None:
     if not names:
         return
     time = results.trajectory.time
-    reference = _reference(mechanism)
+    reference = reference_table(mechanism)
     figure, all_axes = plt.subplots(len(names), 1, sharex=True, figsize=(8, 1.2 + 1.7 * len(names)), squeeze=False)
     for axes, name in zip(all_axes[:, 0], names, strict=True):
         axes.plot(time, results.outputs[name], lw=1.2)
@@ -71,18 +72,24 @@ def _curves(plt: Any, path: Path, mechanism: Any, results: Any) -> None:
     _save(plt, figure, path)
 
 
-def _reference(mechanism: Any) -> dict[str, np.ndarray] | None:
+def reference_table(mechanism: Any) -> dict[str, np.ndarray] | None:
+    """Columns of the file that ``figure.reference`` names; None where it names none.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read, or lacks a column.
+    """
     table = mechanism.file.figure
     if table.reference is None:
         return None
     source = mechanism.path.parent / table.reference
+    lines = [line for line in read_text(source, "figure.reference").splitlines() if not line.startswith("#")]
     try:
-        with source.open(encoding="utf-8", newline="") as handle:
-            lines = [line for line in handle if not line.startswith("#")]
         rows = list(csv.DictReader(lines))
         made = {name: np.array([float(row[name]) for row in rows]) for name in (rows[0] if rows else {})}
-    except (OSError, ValueError, TypeError) as error:
-        raise InputError("figure.reference", str(source), f"cannot be read ({error})", "give a CSV table") from None
+    except (ValueError, TypeError, csv.Error) as error:
+        raise InputError("figure.reference", str(source), f"is no table of numbers ({error})", "mend it") from None
     for name in ("t", *table.reference_columns.values()):
         if name not in made:
             raise InputError("figure.reference", str(source), f"has no column {name!r}", "check its header")

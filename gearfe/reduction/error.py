@@ -80,6 +80,8 @@ def reduction_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, poi
     inside = coupled.frequencies_hz <= band_hz
     own = coupled.frequencies_hz[inside]
     m = 6 * len(body.attachment_names)
+    if not m:  # nothing outside sees the modes that are left out, and those that are kept are exact
+        return ReductionError(band_hz, 0.0, own, np.zeros(len(own)))
     if band_hz >= body.next_hz:
         return ReductionError(band_hz, math.inf, own, np.full(len(own), math.inf))
     shapes = coupled.vectors[:m]

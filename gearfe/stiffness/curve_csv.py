@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Mapping, Sequence
 from decimal import Context, Decimal
 from pathlib import Path
@@ -14,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, shown
 from ..textfile import read_text
 
 #: Far more digits than any double needs, so that a product is rounded once.
@@ -60,9 +61,12 @@ def from_text(text: str, column: str) -> float:
     if text.lower() in ("", "nan"):
         return float("nan")
     try:
-        return float(_EXACT.divide(Decimal(text), factor_of(column)))
+        value = float(_EXACT.divide(Decimal(text), factor_of(column)))
     except (ArithmeticError, ValueError) as error:
         raise ValueError(text) from error
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value
 
 
 def read_columns(path: str | Path) -> dict[str, list[str]]:
@@ -92,5 +96,5 @@ def numbers(columns: Mapping[str, Sequence[str]], name: str, path: str | Path) -
     try:
         return np.array([from_text(cell, name) for cell in columns[name]])
     except ValueError as error:
-        problem = f"column {name} holds {str(error)!r}, which is no number"
+        problem = f"column {name} holds {shown(str(error))}, which is no finite number"
         raise InputError("stiffness curve", str(path), problem, "write a number, or leave the cell empty") from None

@@ -11,6 +11,9 @@ from ..errors import InputError
 MOST_POSITIONS = 100_000
 
 
+#: Beyond these angles rounding is more than 1e-10 deg.
+FAR_DEG = 1e6
+
 #: Finest flank elements, in default ones: some 1,200 on a flank, whose compliances take gigabytes.
 FINEST = 0.1
 
@@ -37,9 +40,11 @@ class StiffnessTable:
         "faces the pinion tooth; half the backlash is then lost motion)",
         choices=("contact", "centred"),
     )
-    angle_start_deg: float = quantity(0.0, doc="first pinion angle (deg)")
+    angle_start_deg: float = quantity(0.0, doc="first pinion angle (deg)", low=-FAR_DEG, high=FAR_DEG)
     angle_step_deg: float = quantity(1.0, doc="step of the pinion angle (deg)", above=0.0)
-    angle_stop_deg: float | None = quantity(None, doc="last pinion angle (deg); without it, one mesh cycle")
+    angle_stop_deg: float | None = quantity(
+        None, doc="last pinion angle (deg); without it, one mesh cycle", low=-FAR_DEG, high=FAR_DEG
+    )
     plane: str = quantity("strain", doc="plane strain or plane stress", choices=("strain", "stress"))
     law: str = quantity("nitsche", doc="contact law", choices=("nitsche", "penalty", "exact"))
     law_sides: str | None = quantity(
