@@ -42,8 +42,9 @@ Array = NDArray[Any]
 #: Coarsening c, assumed order of convergence p, share of the meshes' common error at the default sizes, and largest
 #: number of positions solved twice.
 COARSENING, ORDER, COMMON, POSITIONS = 1.6, 1.0, 5e-5, 20
-#: Relative error of the law of small loads on smooth flanks and at their ends and edges.
-LAW, LAW_AT_EDGES = 2e-4, 1e-3
+#: Relative error of the law of small loads on smooth flanks and at their ends and edges: of random pairs on the path,
+#: 95 % of the positions were within the first (docs/verification.md, "Small loads").
+LAW, LAW_AT_EDGES = 5e-4, 1e-3
 
 
 def solved_twice(converged: NDArray[np.bool_]) -> NDArray[np.int64]:
