@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -10,8 +11,10 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from gearfe.train import Damping, build_train
-from gearfe.train.floquet import _monodromy, multipliers, train_multipliers
+from gearfe.rigid import constant, integrate
+from gearfe.train import Damping, Load, TrainModel, build_train
+from gearfe.train.floquet import Linearised, multipliers, train_multipliers
+from gearfe.train.monodromy import flow, kick_times, monodromy
 
 from .trains import SHIPPED, changed, curve, elastic, train
 
@@ -61,7 +64,10 @@ def test_order_four() -> None:
     def traced(steps: int) -> complex:
         one = np.ones((1, 1))
         gains = lambda t: 16.0 * np.cos(2 * t)[:, None]  # noqa: E731
-        return complex(np.linalg.eigvals(_monodromy(np.array([30.0]), 0 * one, one, gains, math.pi, steps)).sum())
+        edges = np.linspace(0.0, math.pi, steps + 1)
+        constant, reads = flow(np.array([30.0]), 0 * one, math.pi), np.array([[1.0], [0.0]])
+        strengths = gains(kick_times(edges).ravel()).reshape(steps, -1, 1, 1)
+        return complex(np.trace(monodromy(constant, edges, one, reads, strengths)))
 
     exact = traced(1024)
     errors = np.abs([traced(steps) - exact for steps in (6, 12, 24)])
@@ -77,47 +83,79 @@ def test_constant_system_with_gyroscopic_damping() -> None:
     assert np.sort(np.abs(found)) == pytest.approx(np.sort(np.abs(expected)), abs=1e-9)
 
 
-def test_train_against_an_independent_monodromy_matrix() -> None:
-    """Elastic housing, two meshes, gyroscopic moments and damping: columns integrated one by one."""
-    scene = elastic(train(SHIPPED, stiffness=lambda z: curve(z, swing=0.3), damping=Damping(beta=2e-7)), skew=0.3)
+def by_differences(model: TrainModel, at: np.ndarray, period: float) -> np.ndarray:
+    """Eigenvalues of the map over a period by central differences of the integrator about a state (y, v)."""
+    core, n = model.core, len(model.core.squares)
+    unit = np.concatenate([np.maximum(np.sqrt(core.squares), 1.0 / period), np.ones(n)])
+
+    def after(state: np.ndarray) -> np.ndarray:
+        start = dataclasses.replace(model.start, q=core.origin + core.T @ state[:n], v=core.T @ state[n:])
+        run = integrate(model.system, [0.0, period], method="explicit", tolerance=1e-12, start=start)
+        return np.concatenate(core.reduce(run.q[-1], run.v[-1]))
+
+    step = 3e-4 * float(np.abs(unit * at).max())
+    columns = [(after(at + d) - after(at - d)) / (2 * step) for d in np.diag(step / unit)]
+    assert np.abs(unit * (after(at) - at)).max() < 1e-4 * np.abs(unit * at).max()  # the motion repeats
+    return np.linalg.eigvals(unit[:, None] * np.array(columns).T)
+
+
+@pytest.mark.parametrize(
+    ("method", "damping", "load"),
+    [("linear", Damping(), -100.0), ("cubic", Damping(beta=2e-7), -100.0), ("linear", Damping(), 0.0)],
+    ids=["undamped", "damped", "no load"],
+)
+def test_multipliers_are_those_of_the_train_that_is_integrated(method: str, damping: Damping, load: float) -> None:
+    """Elastic housing, two meshes, gyroscopic moments: the integrator itself, state by state, over a period.
+
+    Under load k follows the rotation beside rolling, which makes multipliers of an undamped train leave the unit
+    circle; without load it makes no difference.
+    """
+    shape = train(SHIPPED, stiffness=lambda z: curve(z, swing=0.3, method=method, count=18), damping=damping)
+    scene = elastic(changed(shape, loads=(Load("s2", "s2+", constant(load)),)), skew=0.3)
     model = build_train(scene)
     found, note = train_multipliers(model)
-    assert note == ""
-    assert found is not None
-    n, core = len(model.core.squares), model.core
+    assert (note, found is None) == ("", False)
     period = 0.15 * 2 * math.pi / 600.0
+    orbit = Linearised(model, 600.0, period)
+    assert orbit.matrix(1024) is not None
+    if load == 0.0:
+        assert not orbit.state.any()
+        assert np.abs(found) == pytest.approx(1.0, abs=1e-5)
+        return
+    n = len(orbit.static)
+    state = np.concatenate([orbit.static + orbit.state[:n] / orbit.constant.scale, orbit.state[n:]])
+    expected = by_differences(model, state, period)
+    assert np.sort(np.abs(found))[::-1] == pytest.approx(np.sort(np.abs(expected))[::-1], abs=2e-6)
+    if damping.beta == 0.0:
+        assert np.abs(found).max() > 1.0 + 2e-5
 
-    def rhs(t: float, y: np.ndarray) -> np.ndarray:
-        q, v = core.T @ y[:n], core.T @ y[n:]
-        f = -model.system.stiffness @ q - model.system.damping @ v
-        for line in model.meshes:
-            f -= (line.stiffness(np.array(600.0 * t)) - line.mean) * (line.row @ q) * line.row
-        for body, first, g in zip(model.shafts, model.first, model.ratios, strict=True):
-            f[first + 3] -= body.rotor.polar * g * 600.0 * v[first + 4]
-            f[first + 4] += body.rotor.polar * g * 600.0 * v[first + 3]
-        return np.concatenate([y[n:], core.T.T @ f])
 
-    rng = np.random.default_rng(3)
-    start = rng.standard_normal(2 * n)
-    start[n:] *= 2e4
-    end = solve_ivp(rhs, (0, period), start, method="DOP853", rtol=1e-10, atol=1e-10).y[:, -1]
-    directions = np.array([line.row @ core.T for line in model.meshes]).T
-    damping = core.damping.copy()
-    for body, first, g in zip(model.shafts, model.first, model.ratios, strict=True):
-        one, two = core.T[first + 3], core.T[first + 4]
-        damping += body.rotor.polar * g * 600.0 * (np.outer(one, two) - np.outer(two, one))
-    scale = np.maximum(np.sqrt(core.squares), 1 / period)
-    A = np.block([[np.zeros((n, n)), np.diag(scale)], [np.diag(-core.squares / scale), -damping]])
-    V = np.linalg.eig(A)[1]
-    X = _monodromy(
-        core.squares, damping, directions,
-        lambda t: np.array([x.mean - x.stiffness(600.0 * t) for x in model.meshes]).T, period, 512,
-    )  # fmt: skip
-    full = np.real(V @ X @ np.linalg.inv(V))
-    unit = np.concatenate([scale, np.ones(n)])
-    assert np.abs(full @ (unit * start) - unit * end).max() < 2e-5 * np.abs(unit * end).max()
-    assert np.abs(found[0]) == pytest.approx(np.abs(np.linalg.eigvals(X)).max(), rel=1e-5)
-    assert np.abs(found).max() < 1.0
+def test_a_critically_damped_mode_has_no_eigenvectors_of_its_own() -> None:
+    """The constant part alone, where two eigenvalues fall together: (1 + t) exp(-t) still."""
+    found = multipliers(np.array([4.0]), np.array([[4.0]]), np.ones((1, 1)), lambda t: np.zeros((len(t), 1)), 0.7)
+    assert np.abs(found) == pytest.approx(math.exp(-1.4), rel=1e-7)
+
+
+def test_rigid_meshes_in_a_rigid_housing_leave_nothing_to_vibrate() -> None:
+    found, note = train_multipliers(build_train(train(SHIPPED, stiffness=None)))
+    assert found is None
+    assert "nothing can vibrate" in note
+
+
+def test_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The stage holds the dense linear algebra at one thread."""
+    from threadpoolctl import threadpool_info
+
+    from gearfe.train import floquet
+
+    seen = []
+
+    def looked(found: object, **options: object) -> None:
+        seen.extend(p["num_threads"] for p in threadpool_info() if p["user_api"] == "blas")
+
+    monkeypatch.setattr(floquet, "settled", looked)
+    train_multipliers(build_train(train([(20, 30)], stiffness=curve)))
+    assert set(seen) == {1}
 
 
 def test_no_common_period_says_why() -> None:
@@ -131,7 +169,6 @@ def test_undamped_rigid_train_can_be_unstable() -> None:
     """One mesh, tuned so that twice its natural frequency is the mesh frequency: the principal Mathieu tongue."""
     scene = train([(20, 30)], stiffness=lambda z: curve(z, 1e8, 0.4))
     frequency = build_train(scene).coupled_frequencies_hz[-1]
-    from gearfe.rigid import constant
     from gearfe.train import Drive
 
     speed = 2 * frequency * 2 * math.pi / 20

@@ -12,7 +12,7 @@ import pytest
 
 from gearfe.errors import InputError
 from gearfe.rigid import constant, integrate, smoothed_step
-from gearfe.train import Bearing, Damping, Drive, Load, build_train, simulate
+from gearfe.train import Bearing, Damping, Drive, GearMesh, Load, build_train, simulate
 from gearfe.train.inertia import outline_moments
 from gearfe.train.kinematics import rolling, steady_forces
 from gearfe.train.motion import forces, motion
@@ -126,6 +126,32 @@ def test_ideal_rigid_mesh(rigid_housing: bool) -> None:
         np.abs(two.contact_force - ideal.contact_force).max()
         < 0.7 * np.abs(one.contact_force - ideal.contact_force).max()
     )
+
+
+@pytest.mark.parametrize("method", ["auto", "explicit", "implicit"])
+def test_rigid_meshes_in_a_rigid_housing_are_statics(method: str) -> None:
+    """Nothing is left to integrate: forces and the drive's torque by hand, stability said to be no question."""
+    model = build_train(train(SHIPPED, stiffness=None))
+    made = simulate(model, uniform(2e-3, 5), method=method, floquet=True, estimate=True)
+    assert made.status == "done"
+    force = abs(TORQUE) / base_radius(30)
+    assert made.contact_force[-1] == pytest.approx([force * 2 / 3, force])
+    assert made.drive_torque[-1] == pytest.approx(abs(TORQUE) * 4 / 9)
+    assert made.floquet is None
+    assert "nothing can vibrate" in made.floquet_note
+
+
+def test_a_loop_of_rigid_meshes_is_refused() -> None:
+    """How two rigid paths share a load in a rigid housing is open; springs or an elastic housing tell it."""
+    base = train([(20, 30)])
+    sides = (("a", -0.02), ("b", 0.02))
+    twice = tuple(dataclasses.replace(g, name=g.name + s, along=y) for g in base.gears for s, y in sides)
+    meshes = tuple(GearMesh("d0" + s, "g0" + s, None) for s in "ab")
+    one_stage = changed(base, gears=twice, meshes=meshes)
+    with pytest.raises(InputError, match=r"mesh 'd0b-g0b' rigid.*leaves the forces open"):
+        build_train(one_stage)
+    build_train(changed(one_stage, meshes=(meshes[0], dataclasses.replace(meshes[1], stiffness=1e8))))
+    build_train(elastic(one_stage))
 
 
 def test_drive_of_changing_speed() -> None:

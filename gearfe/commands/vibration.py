@@ -191,7 +191,8 @@ def told(response: TrainResponse, scene: TrainScene, written: Written, choice: O
             f"common mesh period {1e3 * response.common_period_s:.4g} ms; means are over the last {count} of them"
         )
     shown = ", ".join(f"{f:.0f}" for f in response.coupled_frequencies_Hz[:10])
-    lines.append(f"natural frequencies of the coupled system: {shown} Hz ...")
+    more = f"{shown} Hz ..." if shown else "none, nothing is left to vibrate"
+    lines.append(f"natural frequencies of the coupled system: {more}")
     statistics = response.statistics
     lines.append(
         f"transient: {response.status}, {1e3 * response.time_reached:.4g} ms in {statistics.get('steps', '?')} steps "

@@ -1,141 +1,202 @@
-r"""Floquet multipliers: does a periodic linear system grow from one period to the next?
+r"""Stability of a train: Floquet multipliers of the motion that is integrated, not of stiffnesses k(Omega t).
+
+In steady running the train has a motion that repeats with the common mesh period, the orbit. A mesh force
+:math:`-k(\varphi)\,\delta` depends on the driver's real rotation :math:`\varphi = s(g\Omega t + u) + \varphi_0`, so
+small motions beside the orbit :math:`\delta^*, u^*` feel
 
 .. math::
-    \dot y = v,\qquad \dot v = -\Omega^2 y - D v + \sum_m p_m(t)\, w_m w_m^T y ,\qquad p_m(t + T) = p_m(t)
+    -\big(k(\varphi^*)\, w^T + s\,k'(\varphi^*)\,\delta^*\, e^T\big)\, \Delta q , \qquad \delta = w^T q,\ u = e^T q ,
 
-The multipliers are the eigenvalues of the monodromy matrix, the map of (y, v) over T; one of modulus > 1 means
-parametric instability (Nayfeh & Mook, Nonlinear Oscillations, Sec. 5.2). The constant part is solved exactly
-(exponentials of its eigenvalues), the periodic part changes v by an amount that depends on y only, so both alternate
-in the splitting of order 4 with six stages for such systems (Blanes & Moan, J. Comput. Appl. Math. 142, 2002, SRKN6b);
-steps are halved until the moduli stand still.
+and the gyroscopic moments of a spin that swings. The orbit is found by Newton's method on the map over a period, whose
+derivative is the monodromy matrix; steps end on the corners of the curves. All modes are kept.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from .model import TrainModel
+from ..threads import one_thread
+from .model import TrainModel
+from .monodromy import Complex, Flow, flow, kick_times, monodromy, multipliers, settled, walk
+
+__all__ = ["Linearised", "multipliers", "train_multipliers"]
 
 Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
-_B = (0.0829844064174052, 0.396309801498368, -0.0390563049223486)
-_A = (0.245298957184271, 0.604872665711080)
-KICKS = np.array([*_B, 1 - 2 * sum(_B), *_B[::-1]])
-DRIFTS = np.array([*_A, 0.5 - sum(_A), 0.5 - sum(_A), *_A[::-1]])
-#: Eigenvectors worse conditioned than this are not used; the exponentials then come from the matrix itself.
-WORST_CONDITION = 1e8
-MOST_STEPS = 1 << 14
-
-
-def multipliers(
-    squares: Array, damping: Array, directions: Array, gains: Callable[[Array], Array], period: float, *,
-    tolerance: float = 1e-6, first: int = 64,
-) -> Complex | None:  # fmt: skip
-    """Floquet multipliers, largest modulus first; None when numbers overflow even with the shortest steps.
-
-    Parameters
-    ----------
-    squares : (n,)
-        Omega^2 (rad2/s2); negative ones are allowed.
-    damping : (n, n)
-        D (1/s), gyroscopic terms included.
-    directions : (n, m)
-        w_m.
-    gains
-        Times (k,) to p_m (k, m).
-    period
-        T (s).
-    tolerance
-        Change of any multiplier's modulus from one number of steps to the next, relative to the largest.
-    first
-        Fewest steps.
-
-    Returns
-    -------
-    ndarray of complex, shape (2n,)
-    """
-
-    def found(steps: int) -> Complex | None:
-        # the splitting also steps back: heavy damping then grows, and overflows where steps are long
-        with np.errstate(over="ignore", invalid="ignore"):
-            X = _monodromy(squares, damping, directions, gains, period, steps)
-        return _sorted(np.linalg.eigvals(X)) if np.isfinite(X).all() else None
-
-    steps = first
-    before = found(steps)
-    while steps < MOST_STEPS:
-        steps *= 2
-        now = found(steps)
-        settled = False
-        if now is not None and before is not None:
-            settled = bool(np.abs(np.abs(now) - np.abs(before)).max() < tolerance * np.abs(now).max())
-        before = now
-        if settled:
-            break
-    return before
-
-
-def _sorted(values: NDArray[Any]) -> Complex:
-    return np.asarray(values[np.argsort(-np.abs(values), kind="stable")])
-
-
-def _monodromy(
-    squares: Array, damping: Array, directions: Array, gains: Callable[[Array], Array], period: float, steps: int
-) -> Complex:
-    """Map of (omega y, v) over the period: scaled so, the undamped constant part is a rotation."""
-    n, h = len(squares), period / steps
-    scale = np.maximum(np.sqrt(np.abs(squares)), 1.0 / period)
-    A = np.block([[np.zeros((n, n)), np.diag(scale)], [np.diag(-squares / scale), -damping]])
-    values, V = np.linalg.eig(A)
-    good = np.isfinite(V).all() and np.linalg.cond(V) < WORST_CONDITION
-    into = np.vstack([np.zeros_like(directions), directions])
-    out = np.vstack([directions / scale[:, None], np.zeros_like(directions)]).T
-    if good:
-        X: Complex = np.eye(2 * n, dtype=complex)
-        into, out = np.linalg.solve(V, into), out @ V
-        flows = [np.exp(h * a * values)[:, None] for a in DRIFTS]
-    else:
-        from scipy.linalg import expm
-
-        X = np.eye(2 * n, dtype=complex)
-        flows = [expm(h * a * A) for a in DRIFTS]
-    places = np.concatenate([[0.0], np.cumsum(DRIFTS)])
-    times = h * (np.arange(steps)[:, None] + places[None, :])
-    strength = h * KICKS[None, :, None] * np.asarray(gains(times.ravel())).reshape(steps, len(places), -1)
-    for number in range(steps):
-        for stage in range(len(places)):
-            X += into @ (strength[number, stage][:, None] * (out @ X))
-            if stage < len(flows):
-                X = flows[stage] * X if good else flows[stage] @ X
-    return X
+#: Newton steps to the orbit, and what may be left of the way round it, relative to the state.
+MOST_TRIES, CLOSED = 12, 1e-9
+#: Corners nearer than this part of the period are one.
+SAME = 1e-9
 
 
 def train_multipliers(model: TrainModel) -> tuple[Complex | None, str]:
     """Multipliers of a train at its steady speed over the common period of its meshes, or the reason for none."""
-    speed = model.steady_speed
-    assert model.scene.drive is not None
-    if model.scene.drive.speed.sines or speed == 0.0:
+    speed, scene = model.steady_speed, model.scene
+    assert scene.drive is not None
+    if scene.drive.speed.sines or speed == 0.0:
         return None, "the drive has no steady speed"
+    if any(load.torque.sines for load in scene.loads):
+        return None, "a load oscillates: no motion repeats with the meshes"
     if model.rolling.common_turns is None:
         return None, model.rolling.note
-    core, lines = model.core, [line for line in model.meshes if line.curve is not None]
+    if not len(model.core.squares):
+        return None, "nothing can vibrate: rigid meshes in a rigid housing follow the drive"
     period = float(model.rolling.common_turns) * 2 * math.pi / abs(speed)
-    damping = core.damping.copy()
-    if model.scene.damping.gyroscopic:
-        for body, first, ratio in zip(model.shafts, model.first, model.ratios, strict=True):
-            one, two = core.T[first + 3], core.T[first + 4]
-            damping += body.rotor.polar * ratio * speed * (np.outer(one, two) - np.outer(two, one))
-    directions = np.array([line.row @ core.T for line in lines]).reshape(len(lines), core.T.shape[1]).T
+    with one_thread():
+        made = settled(Linearised(model, speed, period).matrix)
+    if made is not None:
+        return made, ""
+    return None, f"no motion was found that repeats with the common mesh period of {1e3 * period:.4g} ms"
 
-    def gains(t: Array) -> Array:
-        return np.array([line.mean - line.stiffness(speed * t) for line in lines]).reshape(len(lines), len(t)).T
 
-    made = multipliers(core.squares, damping, directions, gains, period)
-    return made, "" if made is not None else f"numbers overflow within the common mesh period of {1e3 * period:.4g} ms"
+@dataclass(eq=False)
+class Linearised:
+    """Motion of a train beside its orbit, in minimal coordinates about the static place with mean stiffnesses.
+
+    Parameters
+    ----------
+    model
+        The train.
+    speed
+        Of the drive (rad/s).
+    period
+        Common mesh period (s).
+    """
+
+    model: TrainModel
+    speed: float
+    period: float
+
+    def __post_init__(self) -> None:
+        core, model = self.model.core, self.model
+        n = len(core.squares)
+        torque = core.constant + core.T.T @ sum(
+            (d * float(f(model.torque_end)) for d, f in model.torques), start=np.zeros(len(core.T))
+        )
+        held = core.squares > 0.0
+        self.static = np.where(held, torque / np.where(held, core.squares, 1.0), 0.0)
+        self.rest = np.where(held, 0.0, torque)
+        self.lines = [line for line in model.meshes if line.curve is not None]
+        self.approach = np.array([line.row @ core.T for line in self.lines]).reshape(-1, n).T
+        self.spin = np.array([core.T[model.first[line.driver] + 5] for line in self.lines]).reshape(-1, n).T
+        turning = zip(model.shafts, model.first, strict=True) if model.scene.damping.gyroscopic else ()
+        rotors = [(body.rotor.polar, first) for body, first in turning]
+        self.polar = np.array([polar for polar, _ in rotors])
+        self.tilts = [np.array([core.T[i + j] for _, i in rotors]).reshape(-1, n).T for j in (3, 4, 5)]
+        self.state = np.zeros(2 * n)
+
+    @cached_property
+    def constant(self) -> Flow:
+        """Mean stiffnesses, damping and the gyroscopic moments of steady spins."""
+        core, model = self.model.core, self.model
+        damping = core.damping.copy()
+        for k, polar in enumerate(self.polar):
+            one, two = self.tilts[0][:, k], self.tilts[1][:, k]
+            damping += polar * model.ratios[k] * self.speed * (np.outer(one, two) - np.outer(two, one))
+        return flow(core.squares, damping, self.period)
+
+    @property
+    def directions(self) -> Array:
+        """Along which forces change: approaches of the meshes, both tilts of the shafts; (n, m + 2 s)."""
+        return np.hstack([self.approach, *self.tilts[:2]])
+
+    @property
+    def reads(self) -> Array:
+        """What they depend on: approaches and spins of drivers, rates of tilts and spins; rows (2n, 2 m + 3 s)."""
+        places, rates = np.hstack([self.approach, self.spin]), np.hstack(self.tilts)
+        return np.block(
+            [
+                [places, np.zeros((len(places), rates.shape[1]))],
+                [np.zeros((len(rates), places.shape[1])), rates],
+            ]
+        )
+
+    def edges(self, steps: int) -> Array:
+        """Step ends over a period: the corners of the curves, and between them as many as make `steps` in all."""
+        if self.constant.values is None:  # one length of steps for all
+            return np.linspace(0.0, self.period, steps + 1)
+        found = [np.array([0.0, self.period])]
+        for line, spin in zip(self.lines, self.spin.T, strict=True):
+            assert line.curve is not None
+            rate = line.sense * line.ratio * self.speed
+            begin = line.phase + line.sense * float(spin @ self.static)
+            cycles = round(abs(rate) * self.period / line.curve.period)
+            if cycles:
+                nodes = (np.arange(-1, cycles + 1)[:, None] * line.curve.period + line.curve.nodes[:-1]).ravel()
+                found.append(((nodes - begin) / rate) % self.period)
+        corners = np.sort(np.concatenate(found))
+        corners = corners[np.append(np.diff(corners) > SAME * self.period, True)]
+        corners[0], corners[-1] = 0.0, self.period
+        parts = [
+            np.linspace(a, b, math.ceil((b - a) * steps / self.period) + 1)[:-1] for a, b in itertools.pairwise(corners)
+        ]
+        return np.append(np.concatenate(parts), self.period)
+
+    def round(self, edges: Array, state: Array) -> tuple[Array, Array]:
+        """State after a period, and the strengths of the linearised forces at the kicks on the way."""
+        n, m, s = len(self.static), len(self.lines), len(self.polar)
+        times = kick_times(edges)
+        strengths = np.zeros((*times.shape, m + 2 * s, 2 * m + 3 * s))
+        constant, directions = self.constant, self.directions
+        into = constant.into @ np.vstack([np.zeros_like(directions), directions])
+        push = constant.into @ np.concatenate([np.zeros(n), self.rest])
+        rows = (self.reads.T / np.concatenate([constant.scale, np.ones(n)])) @ constant.out
+        base = np.concatenate([self.approach.T @ self.static, self.spin.T @ self.static, np.zeros(3 * s)])
+        across = np.hstack(self.tilts).T @ directions
+        turns = np.array([x.sense * x.ratio * self.speed for x in self.lines])
+        senses, phases, means = (np.array([getattr(x, k) for x in self.lines]) for k in ("sense", "phase", "mean"))
+        meshes, shafts = np.arange(m), np.arange(s)
+
+        def kick(step: int, stage: int, length: float, x: Complex) -> None:
+            read = base + (rows @ x[:, 0]).real
+            delta, turned = read[:m], read[m : 2 * m]
+            found = [
+                line.curve(phase)  # type: ignore[misc]
+                for line, phase in zip(self.lines, turns * times[step, stage] + senses * turned + phases, strict=True)
+            ]
+            k = np.array([float(f.value) for f in found]) - means
+            slope = np.array([float(f.slope) for f in found])
+            force = np.zeros(m + 2 * s)
+            force[:m] = -k * delta
+            C = strengths[step, stage]
+            C[meshes, meshes] = -k
+            C[meshes, m + meshes] = -senses * slope * delta
+            one, two, spin = (read[2 * m :] + 0.5 * length * (across @ force)).reshape(
+                3, s
+            )  # in the middle of the kick
+            force[m : m + s], force[m + s :] = -self.polar * spin * two, self.polar * spin * one
+            C[m + shafts, 2 * m + s + shafts] = -self.polar * spin
+            C[m + shafts, 2 * m + 2 * s + shafts] = -self.polar * two
+            C[m + s + shafts, 2 * m + shafts] = self.polar * spin
+            C[m + s + shafts, 2 * m + 2 * s + shafts] = self.polar * one
+            x[:, 0] += length * (into @ force + push)
+
+        return walk(constant, edges, state[:, None], kick)[:, 0], strengths
+
+    def matrix(self, steps: int) -> Array | None:
+        """Monodromy matrix of the orbit with so many steps; None where no orbit is found."""
+        edges = self.edges(steps)
+        found = None
+        for _ in range(MOST_TRIES):
+            after, strengths = self.round(edges, self.state)
+            gap = after - self.state
+            if not np.isfinite(gap).all():
+                self.state = np.zeros_like(self.state)
+                return None
+            static = self.constant.scale * self.static
+            size = max(float(np.abs(x).max(initial=0.0)) for x in (self.state, static))
+            if np.abs(gap).max(initial=0.0) <= CLOSED * size:
+                return monodromy(self.constant, edges, self.directions, self.reads, strengths)
+            if found is None:
+                found = monodromy(self.constant, edges, self.directions, self.reads, strengths)
+                if not np.isfinite(found).all():
+                    return None
+                back = np.linalg.pinv(found - np.eye(len(found)), rcond=1e-12)
+            self.state = self.state - back @ gap
+        return None

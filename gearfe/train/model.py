@@ -94,6 +94,11 @@ class TrainModel:
         return float(self.scene.drive.speed(max(breaks, default=0.0)))
 
     @property
+    def torque_end(self) -> float:
+        """Time at which all torques have reached what they stay at (s)."""
+        return max((b for _, torque in self.torques for b in torque.breaks), default=0.0)
+
+    @property
     def load_end(self) -> float:
         """Time at which all load ramps have ended (s)."""
         return load_end(self.scene)
@@ -289,6 +294,13 @@ def _damped(scene: TrainScene, elements: list[Element], bodies: list[Element]) -
 def _start(scene: TrainScene, system: System, shafts: tuple[RigidShaft, ...], first: NDArray[np.int64]) -> Start:
     """At rest beside rolling but for the asked speeds, which the constraints must allow."""
     start = consistent_start(system, 0.0)
+    open_rows = {system.row_names()[i] for i in start.freedoms.redundant}
+    for mesh in scene.meshes:
+        if f"mesh {mesh.name} (0)" in open_rows:
+            problem = (
+                "leaves the forces open: rigid meshes close a loop in a rigid housing, and statics do not share it"
+            )
+            raise InputError(f"mesh {mesh.name!r} rigid", True, problem, "give the meshes of the loop a stiffness")
     for shaft, body, i in zip(scene.shafts, shafts, first, strict=True):
         off = float(start.v[i + 5]) - body.start_rate
         if shaft.initial_speed is not None and abs(off) > 1e-6 * max(1.0, abs(shaft.initial_speed)):

@@ -102,6 +102,8 @@ def simulate(
 def _run(
     model: TrainModel, t: Array, tolerance: float, method: str, backend: str, longest: float = np.inf
 ) -> tuple[Trajectory, Motion]:
+    if not len(model.core.squares):
+        method = "explicit"  # nothing is left to integrate
     options: dict[str, Any] = {"tolerance": tolerance, "start": model.start, "backend": backend, "longest": longest}
     trajectory = integrate(model.system, t, method=method, **options)
     return trajectory, motion(model, trajectory)
