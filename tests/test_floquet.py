@@ -117,7 +117,7 @@ def test_multipliers_are_those_of_the_train_that_is_integrated(method: str, damp
     assert (note, found is None) == ("", False)
     period = 0.15 * 2 * math.pi / 600.0
     orbit = Linearised(model, 600.0, period)
-    assert orbit.matrix(1024) is not None
+    assert orbit.matrix(256) is not None
     if load == 0.0:
         assert not orbit.state.any()
         assert np.abs(found) == pytest.approx(1.0, abs=1e-5)

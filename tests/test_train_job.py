@@ -82,7 +82,7 @@ def written(folder: Path, text: str) -> Path:
 
 def test_the_shipped_job_is_what_it_says() -> None:
     job = read_train_job(SHIPPED)
-    assert job.table.variant == "tutorial"
+    assert job.table.variant == "standard"
     assert len(job.times) == 201
     assert job.times[-1] == pytest.approx(7e-3)
     scene = job_scene(job, [1e8, 1e8], None, geometry_only=True)
@@ -94,7 +94,9 @@ def test_the_shipped_job_is_what_it_says() -> None:
 
 
 def test_variants_differ_in_curves_and_damping() -> None:
-    tutorial, operating = (read_train_job(SHIPPED, name).table for name in ("tutorial", "operating"))
+    standard, tutorial, operating = (read_train_job(SHIPPED, name).table for name in (None, "tutorial", "operating"))
+    assert (standard.curves, standard.damping.ratio) == (operating.curves, 0.0)
+    assert math.pi * 2000.0 * standard.damping.rayleigh_beta_s == pytest.approx(0.01, rel=0.01)  # 1 % at 2 kHz
     assert (tutorial.curves.interpolation, tutorial.curves.load, tutorial.damping.ratio) == ("linear", "stiffness", 0.0)
     assert (operating.curves.interpolation, operating.curves.load, operating.damping.ratio) == ("cubic", "torque", 0.01)
     with pytest.raises(InputError, match="did you mean 'tutorial'"):

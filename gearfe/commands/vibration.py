@@ -200,7 +200,7 @@ def told(response: TrainResponse, scene: TrainScene, written: Written, choice: O
         f"{statistics.get('free_coordinates', '?')} unknowns"
     )
     if response.floquet is not None:
-        lines.append(f"largest Floquet multiplier over the common period: {abs(response.floquet[0]):.4f}")
+        lines.append(f"largest Floquet multiplier over the common period: {abs(response.floquet[0]):.6g}")
     elif response.floquet_note:
         lines.append(f"Floquet multipliers: {response.floquet_note}")
     for name, value in response.estimates.items():
