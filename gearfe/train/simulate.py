@@ -94,8 +94,8 @@ def simulate(
     if multipliers is not None and abs(multipliers[0]) > STABLE:
         growth, period = abs(multipliers[0]) - 1.0, float(response.common_period_s or 0.0)
         warnings.append(
-            f"the train is parametrically unstable: its vibration grows by {100 * growth:.3g} % in each common mesh period "
-            f"of {1e3 * period:.4g} ms; add damping, or change the speed"
+            f"the train is parametrically unstable: its vibration grows by {100 * growth:.3g} % in each common mesh "
+            f"period of {1e3 * period:.4g} ms; add damping, or change the speed"
         )
     return replace(response, floquet=multipliers, floquet_note=note, estimates=estimates, warnings=tuple(warnings))
 
