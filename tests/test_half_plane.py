@@ -107,7 +107,8 @@ def test_torque_is_the_derivative_of_the_energy(name: str, bound: float, degrees
     rate = (high.energy - low.energy) / (2 * share * twist)
     assert np.abs(rate / middle.torque_wheel - 1).max() < bound
     slope = (high.torque_wheel - low.torque_wheel) / (2 * share * twist)
-    assert np.median(np.abs(middle.tangent / slope - 1)) < 5e-3
+    # within the range of the differences pairs come and go at one or two angles
+    assert np.median(np.abs(middle.tangent / slope - 1)) < 1e-3
 
 
 @pytest.mark.parametrize("name", ["rounded", "sharp", "shifted"])
@@ -124,9 +125,9 @@ def test_gears_exchanged(name: str, degrees: float) -> None:
     # the wheel, at -angle/i + twist, becomes a pinion that stands pi/z further, as a tooth faces its space
     turned = -angles * pair.pinion.teeth / pair.wheel.teeth + twist + math.pi / pair.wheel.teeth
     two = solve_half_plane(there, turned, twist * pair.wheel.teeth / pair.pinion.teeth)
-    assert two.torque_pinion == pytest.approx(one.torque_wheel, rel=3e-6)
-    assert two.torque_wheel == pytest.approx(one.torque_pinion, rel=3e-6)
-    assert two.energy == pytest.approx(one.energy, rel=3e-6)
+    assert two.torque_pinion == pytest.approx(one.torque_wheel, rel=1e-6)
+    assert two.torque_wheel == pytest.approx(one.torque_pinion, rel=1e-6)
+    assert two.energy == pytest.approx(one.energy, rel=1e-6)
 
 
 def test_a_mesh_cycle_on_all_is_the_same_and_batches_do_not_matter() -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.laws import LAWS
+from ..contact.laws import MESH_LAWS
 from ..gear.pair import GearPair
 from ..meshing.recipe import sector_recipes
 from ..meshing.tooth_sector import sector_mesh
@@ -101,7 +101,7 @@ def sizes(record: Record) -> None:
         found = errors(pair, curve, converged(record.quick, TWIST, True, tuple(at)))
         return {"flank_mm": flank, "positions": len(at), **found, **cost.columns, "meshing_cpu_s": mesher.cpu_s}
 
-    for law in LAWS:
+    for law in MESH_LAWS:
         for coarsen in QUICK_SIZES if record.quick else SIZES:
             record.row(table, {"law": law, "coarsen": coarsen}, partial(make, law, coarsen))
 

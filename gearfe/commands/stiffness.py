@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     load.add_argument("--twist-deg", type=float, metavar="X", dest="twist_deg", help="twist of the wheel (deg)")
     load.add_argument("--torque-Nm", type=float, metavar="X", dest="torque_Nm", help="torque at the wheel's hub (N m)")
     parser.add_argument("--angles", type=float, nargs=3, metavar=("START", "STEP", "STOP"), help="pinion angles (deg)")
-    parser.add_argument("--law", metavar="LAW", help="contact law: nitsche, penalty or exact")
+    parser.add_argument("--law", metavar="LAW", help="contact law: nitsche, penalty, exact or half_plane")
     parser.add_argument(
         "--law-sides", metavar="GEAR", help="flanks that the law is integrated on: both, pinion, wheel, tip"
     )

@@ -34,18 +34,33 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..gear.touching import Touching
-from .half_plane_result import TORQUES, HalfPlaneSolution, PairContacts, contacts_of, joined, no_contacts, pair_torques
-from .half_plane_step import HalfPlanePair, half_plane_pair, moved_on, smooth_influence, step
+from .half_plane_result import (
+    SUMS,
+    HalfPlaneSolution,
+    PairContacts,
+    contact_rates,
+    contacts_of,
+    no_contacts,
+    pair_sums,
+)
+from .half_plane_step import Before, HalfPlanePair, Step, half_plane_pair, moved_on, smooth_influence, step
 from .moved_faces import Frames
 from .panels import Couplings, couplings, forces_of_overlaps
+from .records import joined, taken
 
 __all__ = ["HalfPlanePair", "HalfPlaneSolution", "PairContacts", "half_plane_pair", "solve_half_plane"]
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-#: Relative change of the forces at which a position is done, and most steps.
+#: Relative change of the forces from step to step at which a position is solved but for its last steps; most steps.
 TOLERANCE, STEPS = 1e-5, 20
+#: Last steps, with the windows and the bearing panels held: after so many, derivatives err by 1e-3.
+HELD_STEPS = 3
+#: What the twist is ahead for derivatives: share of its way since the touch, and at least (rad).
+AHEAD, LEAST_AHEAD = 1e-3, 1e-10
+#: Force per width (N/m) below which there is none.
+TINY = 1e-300
 #: Approach of a contact per force in units of 2/pi (1/E_1' + 1/E_2'), with which the first forces are made.
 USUAL_APPROACH = 6.0
 #: Rigid clearance (rad) up to which a tooth pair is looked at.
@@ -54,7 +69,9 @@ CLEAR = 1e-7
 BATCH = 128
 
 
-def solve_half_plane(law: HalfPlanePair, pinion_angles: ArrayLike, twists: ArrayLike) -> HalfPlaneSolution:
+def solve_half_plane(
+    law: HalfPlanePair, pinion_angles: ArrayLike, twists: ArrayLike, *, touching: Touching | None = None
+) -> HalfPlaneSolution:
     """Solve the contact of a gear pair at several positions.
 
     Parameters
@@ -63,55 +80,77 @@ def solve_half_plane(law: HalfPlanePair, pinion_angles: ArrayLike, twists: Array
         rad.
     twists : array_like, shape (n,) or ()
         Twist of the wheel (rad), from where a wheel space faces the pinion tooth.
+    touching
+        What `law.flanks.touching` says of these angles, when it is there already.
     """
     angles = np.atleast_1d(np.asarray(pinion_angles, dtype=float))
     twist = np.broadcast_to(np.asarray(twists, dtype=float), angles.shape)
-    parts = [slice(first, first + BATCH) for first in range(0, len(angles), BATCH)]
-    made = [_batch(law, angles[part], twist[part]) for part in parts]
-    for part, one in zip(parts, made, strict=True):
-        one.contacts.position[:] += part.start
-    return joined(HalfPlaneSolution, made)
+    met = law.flanks.touching(angles) if touching is None else touching
+    met = met.take(np.flatnonzero(met.twist < twist[met.position] + CLEAR))
+    made = []
+    for start in range(0, max(1, len(angles)), BATCH):
+        part = slice(start, start + BATCH)
+        found = met.take(slice(*np.searchsorted(met.position, [start, start + BATCH])))
+        one = _batch(law, angles[part], twist[part], replace(found, position=found.position - start))
+        one.contacts.position[:] += start
+        made.append(one)
+    return joined(made)
 
 
 @dataclass(frozen=True)
 class _Open:
-    """Positions that are not done yet, with their p tooth pairs.
+    """Positions on the way to their solution, with their p tooth pairs, sorted by position.
 
     Attributes
     ----------
     numbers : ndarray, shape (m,)
         Of the positions in the batch, in rising order.
-    found
-        Where the rigid flanks of the pairs touch.
-    frames, force, spread, bearing
-        Where the next step starts from: forces per width (N/m), variances of the pressure (m2), panels that bore.
+    pairs
+        The tooth pairs.
     """
 
     numbers: IntArray
-    found: Touching
-    frames: Frames
-    force: Array
-    spread: Array
-    bearing: NDArray[np.bool_] | None
+    pairs: _Pairs
 
     @cached_property
     def couples(self) -> Couplings:
         """Which pairs share a position."""
-        return couplings(np.searchsorted(self.numbers, self.found.position), self.found.pair, len(self.numbers))
+        found = self.pairs.found
+        return couplings(np.searchsorted(self.numbers, found.position), found.pair, len(self.numbers))
 
     def kept(self, positions: NDArray[np.bool_]) -> _Open:
         """Only some of the positions, shape (m,)."""
-        on = np.flatnonzero(positions[self.couples.position])
-        bearing = None if self.bearing is None else self.bearing[on]
-        return _Open(
-            self.numbers[positions], self.found.take(on), self.frames.take(on), self.force[on], self.spread[on], bearing
-        )
+        return _Open(self.numbers[positions], taken(self.pairs, np.flatnonzero(positions[self.couples.position])))
+
+    def change(self, made: Step) -> Array:
+        """Relative change of the forces that a step made, shape (m,)."""
+        new = made.solution.force
+        return self.couples.total(np.abs(new - self.pairs.force)) / np.maximum(self.couples.total(new), TINY)
+
+    def moved_on(self, law: HalfPlanePair, made: Step) -> _Open:
+        """What the next step starts from."""
+        frames, before = moved_on(law, made)
+        return _Open(self.numbers, _Pairs(self.pairs.found, frames, made.solution.force, made.spread, before))
 
 
-def _first(law: HalfPlanePair, angles: Array, twists: Array) -> _Open:
+@dataclass(frozen=True)
+class _Pairs:
+    """Where the rigid flanks of p tooth pairs touch, and where their next `half_plane_step.step` starts from."""
+
+    found: Touching
+    frames: Frames
+    force: Array
+    spread: Array
+    before: Before | None
+
+
+def _stepped(law: HalfPlanePair, open_: _Open, *, held: bool = False) -> Step:
+    pairs = open_.pairs
+    return step(law, pairs.frames, pairs.force, pairs.spread, open_.couples, pairs.before, held=held)
+
+
+def _first(law: HalfPlanePair, twists: Array, found: Touching) -> _Open:
     """Forces to begin with: the overlaps of the rigid gears, taken up by the teeth and usual contacts."""
-    found = law.flanks.touching(angles)
-    found = found.take(np.flatnonzero(found.twist < twists[found.position] + CLEAR))
     turn = [
         found.angle + found.pair * law.pair.mesh_cycle,
         law.flanks.wheel_frame(found.angle, found.pair) + twists[found.position],
@@ -121,59 +160,84 @@ def _first(law: HalfPlanePair, angles: Array, twists: Array) -> _Open:
         centre=found.point,
         normal=found.normal,
         turn=np.exp(1j * np.stack(turn, axis=1)),
-        hub=law.hub,
+        hub=np.broadcast_to(law.hub, (len(found), 2)),
         arc=np.stack([curve.arc_at(found.place[:, g]) for g, curve in enumerate(law.curves)], axis=1),
         shift=none,
         stretch=none,
     )
     nothing = np.zeros(len(found))
-    start = _Open(np.unique(found.position), found, frames, nothing, nothing, None)
+    start = _Open(np.unique(found.position), _Pairs(found, frames, nothing, nothing, None))
     if len(found) == 0:
         return start
     overlap = found.arm[:, 1] * (twists[found.position] - found.twist)
     T = smooth_influence(law, frames, start.couples).compliance
     force = forces_of_overlaps(overlap, USUAL_APPROACH * law.compliance, T, start.couples)
-    return replace(start, force=force)
+    return _Open(start.numbers, replace(start.pairs, force=force))
 
 
-def _batch(law: HalfPlanePair, angles: Array, twists: Array) -> HalfPlaneSolution:
-    count = len(angles)
-    status, iterations = np.full(count, "no_contact", dtype="<U13"), np.zeros(count, dtype=np.int64)
-    numbers = {name: np.zeros(count) for name in TORQUES}
-    contacts: list[PairContacts] = []
-    open_ = _first(law, angles, twists)
+def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) -> HalfPlaneSolution:
+    status, iterations = np.full(len(angles), "no_contact", dtype="<U13"), np.zeros(len(angles), dtype=np.int64)
+    done: list[_Open] = []
+    open_ = _first(law, twists, found)
     status[open_.numbers] = "not_converged"
     for number in range(1, STEPS + 1):
         if len(open_.numbers) == 0:
             break
-        couples = open_.couples
-        made = step(law, open_.frames, open_.force, open_.spread, couples, open_.bearing)
-        new = made.solution.force
-        total = couples.total(new)
-        change = couples.total(np.abs(new - open_.force))
-        unsettled = couples.total((~made.solution.settled).astype(float)) > 0
-        done = ~unsettled & (change <= TOLERANCE * total) & (number > 1)
+        made, couples = _stepped(law, open_), open_.couples
         iterations[open_.numbers] = number
-        if done.any():
-            bears = total[done] > 0
-            status[open_.numbers[done]] = np.where(bears, "converged", "no_contact")
-            mine = np.flatnonzero(done[couples.position] & (new > 0))
-            torques = pair_torques(law, made)
-            for name in TORQUES:
-                numbers[name][open_.numbers[done]] = couples.total(torques[name])[done]
-            contacts.append(contacts_of(law, open_.found, made, torques, mine))
-        bearing = made.solution.pressure > 0
-        onward = replace(open_, frames=moved_on(law, made), force=new, spread=made.spread, bearing=bearing)
-        open_ = onward.kept(~done)
-    for values in numbers.values():
-        values[status == "not_converged"] = np.nan
-    gathered = joined(PairContacts, contacts) if contacts else no_contacts()
-    order = np.lexsort((gathered.pair, gathered.position))
+        unsettled = couples.total((~made.solution.settled).astype(float)) > 0
+        near = ~unsettled & (open_.change(made) <= TOLERANCE) & (number > 1)
+        bears = couples.total(made.solution.force) > 0
+        status[open_.numbers[near & ~bears]] = "no_contact"
+        open_ = open_.moved_on(law, made)
+        if (near & bears).any():
+            done.append(open_.kept(near & bears))
+        if near.any():
+            open_ = open_.kept(~near)
+    names = (*SUMS, "tangent")
+    numbers = {name: np.where(status == "no_contact", 0.0, np.nan) for name in names}
+    contacts = no_contacts()
+    if done:
+        pairs = joined([part.pairs for part in done])
+        order = np.lexsort((pairs.found.pair, pairs.found.position))
+        all_ = _Open(np.sort(np.concatenate([part.numbers for part in done])), taken(pairs, order))
+        settled, sums, contacts = _finished(law, all_, twists)
+        status[all_.numbers] = np.where(settled, "converged", "not_converged")
+        iterations[all_.numbers] += HELD_STEPS
+        for name in names:
+            numbers[name][all_.numbers] = np.where(settled, sums[name], np.nan)
+        contacts = taken(contacts, status[contacts.position] == "converged")
     return HalfPlaneSolution(
-        pinion_angle=angles,
-        twist=twists,
-        status=status,
-        iterations=iterations,
-        contacts=gathered.take(order),
-        **numbers,
+        pinion_angle=angles, twist=twists, status=status, iterations=iterations, contacts=contacts, **numbers
     )
+
+
+def _finished(
+    law: HalfPlanePair, open_: _Open, twists: Array
+) -> tuple[NDArray[np.bool_], dict[str, Array], PairContacts]:
+    """Last steps of positions that are near their solution, there and at a slightly larger twist: whether they settled,
+    their sums over the pairs, and the contacts.
+
+    Windows and bearing panels are held, so that the differences are derivatives.
+    """
+    pairs, couples, count = open_.pairs, open_.couples, len(open_.numbers)
+    touch = np.full(count, np.inf)
+    np.minimum.at(touch, couples.position, pairs.found.twist)
+    ahead = np.maximum(AHEAD * (twists[open_.numbers] - touch), LEAST_AHEAD)
+    turn = pairs.frames.turn * np.array([1.0, 1.0])
+    turn[:, 1] *= np.exp(1j * ahead[couples.position])
+    shifted = replace(pairs.found, position=pairs.found.position + len(twists))
+    there = replace(pairs, found=shifted, frames=replace(pairs.frames, turn=turn))
+    both = _Open(np.concatenate([open_.numbers, open_.numbers + len(twists)]), joined([pairs, there]))
+    for _ in range(HELD_STEPS):
+        made = _stepped(law, both, held=True)
+        change = both.change(made)
+        both = both.moved_on(law, made)
+    here, on = taken(made, slice(0, len(couples.position))), taken(made, slice(len(couples.position), None))
+    one, two = pair_sums(law, here), pair_sums(law, on)
+    sums = {name: couples.total(one[name]) for name in SUMS}
+    sums["tangent"] = couples.total(two["torque_wheel"] - one["torque_wheel"]) / ahead
+    settled = (change[:count] <= TOLERANCE) & (sums["tangent"] > 0)
+    loaded = np.flatnonzero(here.solution.force > 0)
+    rates = contact_rates(law, here, on, ahead[couples.position])
+    return settled, sums, contacts_of(law, pairs.found, here, one | rates, loaded)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +14,14 @@ from ..gear.touching import Touching
 from .half_plane_step import HalfPlanePair, Step, cross
 from .moved_faces import WAY
 from .panels import PANELS
+from .records import taken
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 ComplexArray = NDArray[np.complex128]
-Record = TypeVar("Record")
 
 #: Sums over the pairs of a position.
-TORQUES = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "tangent", "energy")
+SUMS = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "energy")
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,10 @@ class PairContacts:
         Pair number k: pinion tooth k, wheel tooth -1 - k.
     force : ndarray, shape (m,)
         Contact force on the whole width (N).
+    force_rate, normal_rate, growth : ndarray, shape (m,)
+        d force/d twist (N/rad), the normal's rotation per twist (-), and d ln b/d twist (1/rad).
+    arc_rate : ndarray, shape (m, 2)
+        d arc/d twist (m/rad).
     torque_wheel, torque_pinion : ndarray, shape (m,)
         Moments of the force about the hubs (N m), at the deformed place.
     point, normal : ndarray of complex, shape (m,)
@@ -52,13 +56,17 @@ class PairContacts:
         (kink of a linear relief), ``undercut`` (edge of an undercut), of several the first in this order, or nothing.
     x, width, pressure : ndarray, shape (m, n)
         Panels: middles along the tangent -i n from the centre of pressure, widths (m), and pressures (Pa).
-    panel_arc : ndarray, shape (m, 2, n)
-        Arc lengths of the panels' middles on both faces (m).
+    panel_arc, panel_radius : ndarray, shape (m, 2, n)
+        Arc lengths of the panels' middles on both faces, and their undeformed distances from the gears' centres (m).
     """
 
     position: IntArray
     pair: IntArray
     force: Array
+    force_rate: Array
+    normal_rate: Array
+    growth: Array
+    arc_rate: Array
     torque_wheel: Array
     torque_pinion: Array
     point: ComplexArray
@@ -72,13 +80,10 @@ class PairContacts:
     width: Array
     pressure: Array
     panel_arc: Array
+    panel_radius: Array
 
     def __len__(self) -> int:
         return len(self.pair)
-
-    def take(self, index: Any) -> PairContacts:
-        """The pairs `index`."""
-        return PairContacts(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
 
     @property
     def marked(self) -> NDArray[np.bool_]:
@@ -125,44 +130,18 @@ class HalfPlaneSolution:
         return len(self.twist)
 
 
-def joined(kind: type[Record], parts: Sequence[Record]) -> Record:
-    """Records of arrays put one after the other, records within them likewise."""
-    made: dict[str, Any] = {}
-    for field in fields(kind):  # type: ignore[arg-type]
-        values = [getattr(part, field.name) for part in parts]
-        arrays = isinstance(values[0], np.ndarray)
-        made[field.name] = np.concatenate(values) if arrays else joined(type(values[0]), values)
-    return kind(**made)
-
-
 def no_contacts() -> PairContacts:
     """None."""
-    number, real = np.zeros(0, dtype=np.int64), np.zeros(0)
-    two, panels = np.zeros((0, 2)), np.zeros((0, PANELS))
-    point = np.zeros(0, dtype=complex)
-    mark = np.zeros(0, dtype="<U8")
-    return PairContacts(
-        number,
-        number,
-        real,
-        real,
-        real,
-        point,
-        point,
-        two,
-        two,
-        real,
-        real,
-        mark,
-        panels,
-        panels,
-        panels,
-        np.zeros((0, 2, PANELS)),
-    )
+    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(("arc", "parameter", "arc_rate"), (0, 2))
+    shapes |= dict.fromkeys(("x", "width", "pressure"), (0, PANELS))
+    shapes |= dict.fromkeys(("panel_arc", "panel_radius"), (0, 2, PANELS))
+    kinds: dict[str, Any] = {"position": np.int64, "pair": np.int64, "point": complex, "normal": complex, "mark": "<U8"}
+    names = [f.name for f in fields(PairContacts)]
+    return PairContacts(**{name: np.zeros(shapes.get(name, (0,)), kinds.get(name, float)) for name in names})
 
 
-def pair_torques(law: HalfPlanePair, made: Step) -> dict[str, Array]:
-    """What each pair adds to the sums over its position (N m, N m, N m, N m/rad, J)."""
+def pair_sums(law: HalfPlanePair, made: Step) -> dict[str, Array]:
+    """What each pair adds to the sums over its position (N m, N m, N m, J)."""
     frames, force = made.frames, made.solution.force * law.width
     centre = frames.centre - 1j * frames.normal * made.place
     wheel = -cross(centre - law.hub[1], frames.normal)
@@ -171,16 +150,15 @@ def pair_torques(law: HalfPlanePair, made: Step) -> dict[str, Array]:
         "torque_wheel": force * wheel,
         "torque_pinion": force * cross(centre, frames.normal),
         "torque_wheel_reaction": -force * cross(material, frames.normal),
-        "tangent": made.rate * wheel * law.width,
         "energy": made.energy * law.width,
     }
 
 
 def contacts_of(
-    law: HalfPlanePair, found: Touching, made: Step, torques: dict[str, Array], index: IntArray
+    law: HalfPlanePair, found: Touching, made: Step, known: dict[str, Array], index: IntArray
 ) -> PairContacts:
-    """The pairs `index` of a step, which carry load."""
-    frames = made.frames.take(index)
+    """The pairs `index` of a step, which carry load; `known` are their torques and rates."""
+    frames = taken(made.frames, index)
     force, spread = made.solution.force[index], made.spread[index]
     place, pressure, width = made.place[index], made.solution.pressure[index], made.width[index]
     arcs, half_width = made.arcs[index], 2 * np.sqrt(spread)
@@ -189,8 +167,12 @@ def contacts_of(
         position=found.position[index],
         pair=found.pair[index],
         force=force * law.width,
-        torque_wheel=torques["torque_wheel"][index],
-        torque_pinion=torques["torque_pinion"][index],
+        force_rate=known["force_rate"][index],
+        normal_rate=known["normal_rate"][index],
+        growth=known["growth"][index],
+        arc_rate=known["arc_rate"][index],
+        torque_wheel=known["torque_wheel"][index],
+        torque_pinion=known["torque_pinion"][index],
         point=frames.centre - 1j * frames.normal * place,
         normal=frames.normal,
         arc=arc,
@@ -202,7 +184,20 @@ def contacts_of(
         width=width,
         pressure=pressure,
         panel_arc=arcs,
+        panel_radius=np.abs(np.stack([curve.at(arcs[:, g])[0] for g, curve in enumerate(law.curves)], axis=1)),
     )
+
+
+def contact_rates(law: HalfPlanePair, here: Step, ahead: Step, by: Array) -> dict[str, Array]:
+    """Rates of `PairContacts` for all pairs, from the same step at twists larger by `by` (rad), shape (p,)."""
+    one, two = (made.frames.arc + made.place[:, None] * np.array(WAY) for made in (here, ahead))
+    wider = np.divide(ahead.spread, here.spread, out=np.ones(len(by)), where=here.spread > 0)
+    return {
+        "force_rate": (ahead.solution.force - here.solution.force) * law.width / by,
+        "normal_rate": np.angle(ahead.frames.normal / here.frames.normal) / by,
+        "growth": 0.5 * (wider - 1) / by,
+        "arc_rate": (two - one) / by[:, None],
+    }
 
 
 def _marks(curves: Sequence[FlankCurve], arcs: Array, pressure: Array, width: Array) -> NDArray[np.str_]:

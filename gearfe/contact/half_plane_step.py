@@ -14,7 +14,7 @@ from ..gear.pair import GearPair
 from ..gear.touching import Flanks
 from .flank_compliance import FlankCompliance, flank_compliances
 from .moved_faces import WAY, Frames, Windows, windows
-from .panels import MIDDLES, WIDTHS, Couplings, Pressed, first_guess, force_rates, influence, pressed
+from .panels import MIDDLES, WIDTHS, Couplings, Pressed, first_guess, influence, pressed
 from .scene import MeshingPair
 
 Array = NDArray[np.float64]
@@ -60,7 +60,7 @@ class HalfPlanePair:
 
     @cached_property
     def hub(self) -> Array:
-        """x of the gears' centres (m)."""
+        """x of the gears' centres (m), shape (2,)."""
         return np.array([0.0, self.pair.working_centre_distance])
 
 
@@ -98,6 +98,8 @@ class Step:
     ----------
     frames
         Frames in which it was solved.
+    window
+        Where the panels are.
     solution
         Pressures and forces.
     x, width, gap : ndarray, shape (p, n)
@@ -110,11 +112,10 @@ class Step:
         Mean slope of the deformed faces under the pressure (-).
     energy : ndarray, shape (p,)
         Elastic energy of each pair per width (J/m).
-    rate : ndarray, shape (p,)
-        d force/d twist with the contacts held (N/(m rad)).
     """
 
     frames: Frames
+    window: Windows
     solution: Pressed
     x: Array
     width: Array
@@ -124,7 +125,22 @@ class Step:
     spread: Array
     slope: Array
     energy: Array
-    rate: Array
+
+
+@dataclass(frozen=True)
+class Before:
+    """What a step takes from the step before.
+
+    Attributes
+    ----------
+    window
+        Windows, seen from where the pressure was then.
+    bearing : ndarray of bool, shape (p, n)
+        Panels that bore.
+    """
+
+    window: Windows
+    bearing: NDArray[np.bool_]
 
 
 def cross(a: ComplexArray, b: ComplexArray) -> Array:
@@ -212,31 +228,40 @@ def step(
     force: Array,
     spread: Array,
     couples: Couplings,
-    before: NDArray[np.bool_] | None,
+    before: Before | None,
+    *,
+    held: bool = False,
 ) -> Step:
     """Solve the panels of all pairs with the faces displaced by `force` (N/m) and its spread (m2).
 
-    `before` are the panels that bore in the step before.
+    Parameters
+    ----------
+    before
+        Windows and bearing panels of the step before; None at first.
+    held
+        Whether these stay, so that the step is a smooth function of what it starts from.
     """
     smooth = smooth_influence(law, frames, couples)
     frames, wider = displaced(law, frames, smooth, force, spread, couples)
     frames = recentred(law, frames)
-    floor = np.maximum(force, LEAST_FORCE * couples.total(force)[couples.position])
-    scale = np.sqrt(0.2 * law.compliance * floor * law.pair.pinion.module)
-    window = windows(frames, law.curves, scale, WINDOW * law.compliance * floor)
+    if held and before is not None:
+        window = before.window
+    else:
+        floor = np.maximum(force, LEAST_FORCE * couples.total(force)[couples.position])
+        scale = np.sqrt(0.2 * law.compliance * floor * law.pair.pinion.module)
+        window = windows(frames, law.curves, scale, WINDOW * law.compliance * floor)
     x, width = window.middle[:, None] + window.half[:, None] * MIDDLES, window.half[:, None] * WIDTHS
     one, two = (frames.heights(curve, gear, x) for gear, curve in enumerate(law.curves))
     gap, arcs = two[1] - one[1], np.stack([one[0], two[0]], axis=1)
     edges = _edges(law, frames, arcs, width)
     K = influence(window.half, law.compliance) + edges[0] + edges[1]
     T = smooth.compliance
-    guess = first_guess(gap) if before is None else before
-    found = pressed(K, gap, width, T, force, couples, bearing=guess)
+    guess = first_guess(gap) if before is None else before.bearing
+    found = pressed(K, gap, width, T, force, couples, guess, held=held)
     place, variance, slope = _moments(law, window, x, width, frames.arc, (one[1], two[1]), edges, found)
     own = 0.5 * (found.pressure * width * np.einsum("pij,pj->pi", K, found.pressure)).sum(axis=1)
     energy = own + 0.5 * found.force * couples.times(T, found.force) + wider
-    arm = -cross(frames.centre - 1j * frames.normal * place - law.hub[1], frames.normal)
-    return Step(frames, found, x, width, gap, arcs, place, variance, slope, energy, force_rates(found, arm, T, couples))
+    return Step(frames, window, found, x, width, gap, arcs, place, variance, slope, energy)
 
 
 def _moments(
@@ -265,16 +290,18 @@ def _moments(
     return place, variance, np.where(area > 0, rise / np.where(area > 0, area, 1.0), window.lean)
 
 
-def moved_on(law: HalfPlanePair, made: Step) -> Frames:
-    """Frames for the next step: at the mean place of the pressure, along the mean normal under it."""
+def moved_on(law: HalfPlanePair, made: Step) -> tuple[Frames, Before]:
+    """What the next step starts from: frames at the mean place of the pressure, along the mean normal under it."""
     frames = made.frames
     arc = frames.arc + made.place[:, None] * np.array(WAY)
     for gear, curve in enumerate(law.curves):
         arc[:, gear] = np.clip(arc[:, gear], curve.low, curve.high)
     turned = 1 + 1j * made.slope
-    return replace(
+    onward = replace(
         frames,
         centre=frames.centre - 1j * frames.normal * made.place,
         normal=frames.normal * turned / np.abs(turned),
         arc=arc,
     )
+    window = replace(made.window, middle=made.window.middle - made.place, nearest=made.window.nearest - made.place)
+    return onward, Before(window, made.solution.pressure > 0)

@@ -16,12 +16,14 @@ half of both integrals. Past a sharp end of the mate only the right-hand side is
 :math:`z\,\sigma_n(v)` have neither resultant nor moment, since :math:`\sigma_n` of a rigid motion is zero: torques
 follow from :math:`p\,\delta g` alone.
 
+**The half-plane law** (half_plane) has no contact elements: `gearfe.contact.half_plane`.
+
 **Laws on a multiplier space** (exact). The pressure is :math:`p = \sum_i \lambda_i \psi_i` and fulfils
 
 .. math::
     \lambda_i \ge 0, \qquad \int \psi_i\, g \ge 0, \qquad \lambda_i \int \psi_i\, g = 0 .
 
-A law provides, and nothing else needs to be touched to add one:
+A law on the mesh provides, and nothing else needs to be touched to add one:
 
 1. ``name``: the text that selects it;
 2. ``uses_stress``: s above (0 or 1); with 1 the bodies keep the stress rows of their flanks;
@@ -80,6 +82,8 @@ def law_text(law: ContactLaw) -> str:
     if isinstance(law, Penalty):
         stiffness = "300E/h" if law.stiffness is None else f"{law.stiffness * 1e-9:.12g}N/mm3"
         return f"penalty stiffness={stiffness} sides={law.sides}"
+    if isinstance(law, HalfPlane):
+        return law.name
     space = f" multipliers={law.multiplier}" if law.multiplier else ""
     return f"{law.name} sides={law.sides}{space}"
 
@@ -224,8 +228,44 @@ class Exact:
         return youngs_modulus / sizes
 
 
+@dataclass(frozen=True)
+class HalfPlane:
+    """No overlap, no tension, on the panels of `gearfe.contact.half_plane`: half-planes instead of contact elements."""
+
+    @property
+    def name(self) -> str:
+        return "half_plane"
+
+    @property
+    def uses_stress(self) -> bool:
+        return False
+
+    @property
+    def theta(self) -> int:
+        return 0
+
+    @property
+    def multiplier(self) -> None:
+        return None
+
+    @property
+    def sides(self) -> Sides:
+        return "both"
+
+    def parameter(self, youngs_modulus: float, sizes: Array) -> Array:  # noqa: ARG002
+        """None: only its own solver knows the law."""
+        problem = "has no pressure at points of a mesh: gearfe.contact.half_plane solves it"
+        raise InputError("law", self.name, problem, "use " + ", ".join(MESH_LAWS) + " here")
+
+
+#: Laws on the elements of the flanks.
+MESH_LAWS: dict[str, type[Penalty] | type[Nitsche] | type[Exact]] = {
+    "nitsche": Nitsche,
+    "penalty": Penalty,
+    "exact": Exact,
+}
 #: Selectable laws.
-LAWS: dict[str, type[Penalty] | type[Nitsche] | type[Exact]] = {"nitsche": Nitsche, "penalty": Penalty, "exact": Exact}
+LAWS: dict[str, type[Penalty] | type[Nitsche] | type[Exact] | type[HalfPlane]] = {**MESH_LAWS, "half_plane": HalfPlane}
 
 
 def law_named(name: str) -> ContactLaw:

@@ -13,8 +13,7 @@ their heights h at the same x: exact for any rotation and displacement of the fa
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from typing import Any, Self
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +39,7 @@ class Frames:
         O (m) and n, global axes.
     turn : ndarray of complex, shape (p, 2)
         q of the teeth: tooth axes to global ones.
-    hub : ndarray, shape (2,)
+    hub : ndarray, shape (p, 2)
         x of the gears' centres (m).
     arc : ndarray, shape (p, 2)
         s_0 of the material at O (m).
@@ -56,11 +55,6 @@ class Frames:
     shift: ComplexArray
     stretch: ComplexArray
 
-    def take(self, index: Any) -> Self:
-        """The pairs `index`."""
-        given = {f.name: getattr(self, f.name) for f in fields(self)}
-        return type(self)(**{name: value if name == "hub" else value[index] for name, value in given.items()})
-
     def heights(self, curve: FlankCurve, gear: int, x: Array, steps: int = NEWTON) -> tuple[Array, Array, Array]:
         """Arcs (m), heights h and places x' (m) of one face at places x (m), shape (p, n).
 
@@ -68,7 +62,7 @@ class Frames:
         """
         start, stretch = self.arc[:, gear, None], self.stretch[:, gear, None]
         turn = (self.turn[:, gear] / self.normal)[:, None]
-        moved = ((self.hub[gear] - self.centre) / self.normal)[:, None] + self.shift[:, gear, None] * turn
+        moved = ((self.hub[:, gear] - self.centre) / self.normal)[:, None] + self.shift[:, gear, None] * turn
         s = np.clip(start + WAY[gear] * x, curve.low, curve.high)
         for _ in range(steps):
             point, tangent = curve.at(s)
@@ -86,7 +80,7 @@ class Frames:
             here = (
                 curve.at(s)[0] + self.shift[:, gear, None] + self.stretch[:, gear, None] * (s - self.arc[:, gear, None])
             )
-            seen = (here * self.turn[:, gear, None] + self.hub[gear] - self.centre[:, None]) / self.normal[:, None]
+            seen = (here * self.turn[:, gear, None] + (self.hub[:, gear] - self.centre)[:, None]) / self.normal[:, None]
             ends.append(-seen.imag)
         return np.maximum(ends[0][:, 0], ends[1][:, 1]), np.minimum(ends[0][:, 1], ends[1][:, 0])
 

@@ -100,15 +100,12 @@ class Pressed:
         Force per width of each pair (N/m).
     pressure : ndarray, shape (p, n)
         On the panels (Pa).
-    stiffness : ndarray, shape (p,)
-        S: force per width that an approach of a pair, all else held, adds (N/m2).
     settled : ndarray of bool, shape (p,)
         Whether the set of panels that bear was found.
     """
 
     force: Array
     pressure: Array
-    stiffness: Array
     settled: NDArray[np.bool_]
 
 
@@ -119,7 +116,15 @@ def influence(half: Array, compliance: float) -> Array:
 
 
 def pressed(
-    K: Array, gap: Array, widths: Array, T: Array, carried: Array, couples: Couplings, *, bearing: NDArray[np.bool_]
+    K: Array,
+    gap: Array,
+    widths: Array,
+    T: Array,
+    carried: Array,
+    couples: Couplings,
+    bearing: NDArray[np.bool_],
+    *,
+    held: bool = False,
 ) -> Pressed:
     """Solve the unilateral problem.
 
@@ -135,14 +140,17 @@ def pressed(
         F_0, the forces per width (N/m) that the gap holds.
     bearing : ndarray of bool, shape (p, n)
         First guess of the panels that bear.
+    held
+        Whether that is no guess but what bears.
     """
     n = gap.shape[1]
     diagonal = np.arange(n)
     on = bearing.copy()
-    on[:, n // 2] |= ~on.any(axis=1)
+    if not held:
+        on[:, n // 2] |= ~on.any(axis=1)
     right = np.stack([-gap, np.ones_like(gap)], axis=2)
     bound = ROUNDING * K[:, diagonal, diagonal].max()
-    for _ in range(CHANGES):
+    for _ in range(1 if held else CHANGES):
         system = np.where(on[:, :, None] & on[:, None, :], K, 0.0)
         system[:, diagonal, diagonal] = np.where(on, system[:, diagonal, diagonal], 1.0)
         both = np.linalg.solve(system, np.where(on[:, :, None], right, 0.0))
@@ -157,7 +165,7 @@ def pressed(
         if settled.all():
             break
         on = now
-    return Pressed(force, np.where(on, p, 0.0), stiffness, settled)
+    return Pressed(force, np.where(on, p, 0.0), settled)
 
 
 def first_guess(gap: Array) -> NDArray[np.bool_]:
@@ -177,8 +185,3 @@ def forces_of_overlaps(overlap: Array, compliance: float, T: Array, couples: Cou
             break
         on = on & (force > 0)
     return np.maximum(force, 0.0)
-
-
-def force_rates(solution: Pressed, approach: Array, T: Array, couples: Couplings) -> Array:
-    """Forces per width for approaches of all pairs (m), shape (p,), with the panels that bear held."""
-    return couples.solved(solution.stiffness * approach, solution.stiffness, T)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .closest import unreached
+from .half_plane_result import PairContacts
 from .half_width import half_widths
 from .linearised import Linearised, linearise
 from .newton import Outcome
@@ -48,7 +49,10 @@ class Position:
     pressure : ndarray, shape (q,)
         Pressure at the scene's contact points (Pa); None without a solution.
     route
-        ``direct``: solved on the mesh; ``hertz`` or ``blend``: see `gearfe.stiffness.routes`.
+        ``direct``: solved on the mesh; ``hertz`` or ``blend``: see `gearfe.stiffness.routes`; ``half_plane``: by the
+        law of that name.
+    contacts
+        Loaded tooth pairs of the half-plane law with their panels; None for other laws.
     stress_loads, stress_load_rate
         Loads on the normal stress at the contact points (N m2) and their derivatives (N m2/rad); empty with theta = 0.
     """
@@ -70,6 +74,7 @@ class Position:
     pressure: Array | None = None
     stress_loads: Array | None = None
     stress_load_rate: Array | None = None
+    contacts: PairContacts | None = None
 
 
 def finish(scene: Scene, outcome: Outcome, iterations: int) -> Position:

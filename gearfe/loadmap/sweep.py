@@ -33,8 +33,9 @@ from ..elasticity import Material, Plane
 from ..errors import InputError
 from ..gear.iso6336 import mesh_stiffness
 from ..gear.pair import GearPair
+from ..stiffness.position_solver import PositionSolver, position_solver
 from ..stiffness.positions import Progress, Solved, at_torque, at_twists, honest
-from ..stiffness.routes import Route, Router
+from ..stiffness.routes import Route
 from ..stiffness.sweep import STEEL, assembled_curve, distinct_angles, elastic_pair
 from ..stopwatch import Stopwatch
 from ..threads import one_thread
@@ -116,7 +117,7 @@ def sweep_loads(
     if len(goals) * len(solved_angles) > MOST_CELLS:
         problem = f"makes more than {MOST_CELLS} cells with {len(solved_angles)} angles"
         raise InputError("torques", len(goals), problem, "use fewer torques or angles")
-    router = Router(pair, elastic, route)
+    router = position_solver(pair, elastic, route)
     with watch.stage("unloaded flanks"):
         touching = router.touching_twists(solved_angles)
     recorder = None
@@ -145,7 +146,7 @@ class _Sweep:
     """The cells of a map while they are being solved; `raw` holds their last solutions, level by level."""
 
     pair: GearPair
-    router: Router
+    router: PositionSolver
     angles: Array
     goals: Array
     touching: Array

@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 
 from ..contact.solver import solve_positions
 from .curve import ErrorEstimate
+from .position_solver import PositionSolver
 from .routes import Router
 from .small_balance import Balance, balance
 from .small_load import Reference
@@ -55,10 +56,10 @@ def solved_twice(converged: NDArray[np.bool_]) -> NDArray[np.int64]:
     return good[np.unique(np.linspace(0, len(good) - 1, min(len(good), POSITIONS)).round().astype(np.int64))]
 
 
-def law_error(router: Router, angles: Array, twists: Array) -> Array:
+def law_error(router: PositionSolver, angles: Array, twists: Array) -> Array:
     """What the law of small loads adds to the relative error at n pinion angles and twists (rad), shape (n,)."""
     made = np.zeros(len(angles))
-    if router.route == "direct":
+    if not isinstance(router, Router) or router.route == "direct":
         return made
     for i in np.flatnonzero(router.light(angles, twists)):
         angle, twist = float(angles[i]), float(twists[i])

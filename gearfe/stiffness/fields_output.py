@@ -24,7 +24,7 @@ from ..threads import one_thread
 from .curve import StiffnessCurve
 from .fields import GearField, pair_recovery, straight_triangles
 from .flank_pressure import FlankPressure, flank_pressures
-from .routes import Router
+from .position_solver import PositionSolver, position_solver
 
 Array = NDArray[Any]
 Progress = Callable[[int, int, str], None]
@@ -118,15 +118,14 @@ def _place(curve: StiffnessCurve, number: int) -> tuple[float, float]:
     return float(curve.pinion_angle[number]), float(curve.twist[number] + curve.lost_motion)
 
 
-def _router(pair: GearPair, elastic: MeshingPair, curve: StiffnessCurve) -> Router:
-    """The route that the curve took: the same at all of its positions, or each by the width of its contact."""
+def _router(pair: GearPair, elastic: MeshingPair, curve: StiffnessCurve) -> PositionSolver:
+    """The way that the curve took: the same at all of its positions, or each by the width of its contact."""
     taken = set(curve.route.tolist())
-    if taken == {"direct"}:
-        return Router(pair, elastic, "direct")
-    return Router(pair, elastic, "hertz" if taken == {"hertz"} else "auto")
+    alone = taken in ({"direct"}, {"hertz"})
+    return position_solver(pair, elastic, taken.pop() if alone else "auto")
 
 
-def _solved(router: Router, curve: StiffnessCurve, chosen: NDArray[np.int64]) -> Iterator[tuple[int, Position]]:
+def _solved(router: PositionSolver, curve: StiffnessCurve, chosen: NDArray[np.int64]) -> Iterator[tuple[int, Position]]:
     """Positions of the curve solved again, a few side by side; one that does not converge again is left out."""
     for first in range(0, len(chosen), SIDE_BY_SIDE):
         part = chosen[first : first + SIDE_BY_SIDE]

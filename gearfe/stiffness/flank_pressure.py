@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.flank import Flank, edge_nodes, edge_shapes
+from ..contact.half_plane_result import PairContacts
 from ..contact.scene import MeshingPair
 from ..contact.solver import Position
 
@@ -17,7 +18,7 @@ Array = NDArray[Any]
 
 @dataclass(frozen=True)
 class FlankPressure:
-    """Pressure along one tooth's contact surface; arrays have one entry per contact point, from root to tip.
+    """Pressure along one tooth's contact surface; arrays have one entry per contact point or panel, from root to tip.
 
     Attributes
     ----------
@@ -51,6 +52,8 @@ def flank_pressures(pair: MeshingPair, position: Position) -> list[FlankPressure
     On a gear whose flank carries no contact points of its own (one-sided laws) it is what the mate's points press on
     it, at their closest places before deformation.
     """
+    if position.contacts is not None:
+        return _of_panels(pair, position.contacts)
     scene, pressure = position.scene, position.pressure
     if scene is None or pressure is None:
         return []
@@ -69,6 +72,20 @@ def flank_pressures(pair: MeshingPair, position: Position) -> list[FlankPressure
             radius = np.linalg.norm(_points(flank, place), axis=1)
             number = w.tooth if w.gear == 0 else -1 - w.tooth
             made.append(FlankPressure(w.gear, number, w.tooth, place, radius, pressure[mine]))
+    return made
+
+
+def _of_panels(pair: MeshingPair, contacts: PairContacts) -> list[FlankPressure]:
+    """Pressure on the panels of the half-plane law."""
+    made = []
+    for k, number in enumerate(contacts.pair.tolist()):
+        for g, tooth in enumerate((number, -1 - number)):
+            nodes = np.linalg.norm(pair.bodies[g].flank.points, axis=1)
+            radius, pressure = contacts.panel_radius[k, g], contacts.pressure[k]
+            if g == 1:  # the panels run along the pinion's flank, against the wheel's
+                radius, pressure = radius[::-1], pressure[::-1]
+            place = 0.5 * np.interp(radius, nodes, np.arange(len(nodes)))
+            made.append(FlankPressure(g, number, tooth, place, radius, pressure))
     return made
 
 

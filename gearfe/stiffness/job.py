@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..config import load_job
-from ..contact.laws import ContactLaw, Exact, Nitsche, Penalty
+from ..contact.laws import ContactLaw, Exact, HalfPlane, Nitsche, Penalty
 from ..elasticity import Material
 from ..errors import InputError
 from ..gear.pair import GearPair
@@ -49,6 +49,8 @@ class StiffnessJob:
         """Contact law with its parameter."""
         t = self.table
         sides: dict[str, Any] = {} if t.law_sides is None else {"sides": t.law_sides}
+        if t.law == "half_plane":
+            return HalfPlane()
         if t.law == "exact":
             return Exact(**sides)
         if t.law == "penalty":

@@ -16,7 +16,8 @@ from ..errors import InputError
 from ..gear.iso6336 import mesh_stiffness
 from .contact_pressure import contact_pressures
 from .curve import SOLVED
-from .routes import Router, bare
+from .position_solver import PositionSolver
+from .routes import bare
 from .torque_control import TorqueSolution, twists_for_torque
 
 Array = NDArray[Any]
@@ -57,7 +58,7 @@ class Solved:
 
 
 def at_twists(
-    router: Router,
+    router: PositionSolver,
     angles: Array,
     twists: Array,
     progress: Progress | None,
@@ -97,7 +98,7 @@ def at_twists(
 MOST_YIELD = 0.25
 
 
-def check_torque(router: Router, torque: float) -> None:
+def check_torque(router: PositionSolver, torque: float) -> None:
     """Raise `InputError` for a torque (N m) that small strain is not meant for."""
     pair = router.pair
     most = MOST_YIELD * pair.pinion.module * _usual_stiffness(router) * pair.wheel.base_radius
@@ -106,7 +107,7 @@ def check_torque(router: Router, torque: float) -> None:
         raise InputError("torque", torque, problem, "linear elasticity does not reach so far; give less")
 
 
-def _usual_stiffness(router: Router) -> float:
+def _usual_stiffness(router: PositionSolver) -> float:
     """Mesh stiffness by the standard (N/m)."""
     pair, elastic = router.pair, router.elastic
     moduli = [body.material.youngs_modulus for body in elastic.bodies]
@@ -114,7 +115,7 @@ def _usual_stiffness(router: Router) -> float:
 
 
 def at_torque(
-    router: Router,
+    router: PositionSolver,
     angles: Array,
     torque: float,
     touching: Array,
@@ -137,7 +138,9 @@ def at_torque(
     return _collect(router, angles, found.twist, found.positions, found.iterations, found.status)
 
 
-def _with_shares(router: Router, angles: Array, goal: Array, touching: Array, found: TorqueSolution) -> TorqueSolution:
+def _with_shares(
+    router: PositionSolver, angles: Array, goal: Array, touching: Array, found: TorqueSolution
+) -> TorqueSolution:
     """Move the twists until torque and finite-strain share at the same twist make the goal."""
     elastic = router.elastic
     sampled = sample_numbers(angles, elastic.pitch_angle)
@@ -175,7 +178,7 @@ def _replaced(found: TorqueSolution, places: IntArray, others: TorqueSolution) -
 
 
 def _search(
-    router: Router,
+    router: PositionSolver,
     angles: Array,
     goal: Array,
     touching: Array,
@@ -194,6 +197,7 @@ def _search(
             touching=touching[part],
             first=first[part],
             most=math.pi / router.pair.wheel.teeth,
+            tolerance=router.torque_tolerance,
         )
         parts.append(found)
         if start == 0 and found.status[0] == "converged":
@@ -209,7 +213,12 @@ def _search(
 
 
 def _collect(
-    router: Router, angles: Array, twists: Array, positions: list[Position], iterations: IntArray, status: list[str]
+    router: PositionSolver,
+    angles: Array,
+    twists: Array,
+    positions: list[Position],
+    iterations: IntArray,
+    status: list[str],
 ) -> Solved:
     names = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "tangent")
     numbers = {name: np.array([getattr(p, name) for p in positions], dtype=float) for name in names}

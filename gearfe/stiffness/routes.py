@@ -65,6 +65,9 @@ class Router:
         ``auto``, or ``direct`` or ``hertz`` for all positions.
     """
 
+    #: Relative accuracy to which torques can be searched for.
+    torque_tolerance = 1e-10
+
     def __init__(self, pair: GearPair, elastic: MeshingPair, route: Route = "auto") -> None:
         if route not in ("auto", "direct", "hertz"):
             raise InputError("route", route, "must be auto, direct or hertz", "auto chooses by the contact's width")

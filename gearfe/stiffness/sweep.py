@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..contact.compliance import gear_body
 from ..contact.corners import corner_bearings
-from ..contact.laws import ContactLaw, law_named, law_text
+from ..contact.laws import ContactLaw, HalfPlane, law_named, law_text
 from ..contact.scene import MeshingPair
 from ..elasticity import Material, Plane
 from ..errors import InputError
@@ -34,14 +34,19 @@ from .contact_pressure import EDGES
 from .curve import SOLVED, ErrorEstimate, StiffnessCurve
 from .curve_error import COARSENING, error_estimate, law_error, solved_twice
 from .periodic import fold
+from .position_solver import PositionSolver, position_solver
 from .positions import Progress, Solved, at_torque, at_twists, check_torque, honest, load_shares
-from .routes import Route, Router
+from .routes import Route
 from .torque_control import ANGLE_ROUNDING
 
 __all__ = ["ErrorEstimate", "StiffnessCurve", "elastic_pair", "sweep_stiffness"]
 
 Array = NDArray[Any]
 IntArray = NDArray[Any]
+
+#: Flank elements of the half-plane law, which need not resolve contacts: times those of the laws on the mesh, and at
+#: most so many times the default ones.
+HALF_PLANE_FLANK, HALF_PLANE_COARSEST = 4.0, 6.0
 
 #: Structural steel, the material where none is given.
 STEEL = Material()
@@ -69,7 +74,8 @@ def elastic_pair(
     law
         Contact law, or the name of one with its default parameter.
     coarsen, flank_coarsen
-        Factor on all element sizes, and besides on those of the driving flanks.
+        Factor on all element sizes, and besides on those of the driving flanks. The half-plane law's flanks are coarser
+        by `HALF_PLANE_FLANK`, as far as `HALF_PLANE_COARSEST` allows.
     points_per_edge
         Contact points on each edge of a flank.
     watch
@@ -82,6 +88,8 @@ def elastic_pair(
         raise InputError("coarsen", coarsen, "must be >= 0.2 and <= 5", "1 is the default mesh, 2 twice its sizes")
     check_flank_coarsen(coarsen, flank_coarsen, "flank_coarsen")
     chosen = law_named(law) if isinstance(law, str) else law
+    if isinstance(chosen, HalfPlane):
+        flank_coarsen = min(HALF_PLANE_FLANK * flank_coarsen, max(1.0, HALF_PLANE_COARSEST / coarsen))
     both = (materials, materials) if isinstance(materials, Material) else materials
     watch = watch or Stopwatch()
     gears = (pair.pinion, pair.wheel)
@@ -184,7 +192,7 @@ def sweep_stiffness(
     if elastic is None:
         elastic = elastic_pair(pair, materials, coarsen=coarsen, watch=watch, **common)
     solved_angles, source = (asked, np.arange(len(asked))) if solve_all else distinct_angles(asked, cycle)
-    router = Router(pair, elastic, route)
+    router = position_solver(pair, elastic, route)
     if torque is not None:
         check_torque(router, load)
     with watch.stage("unloaded flanks"):
@@ -201,7 +209,7 @@ def sweep_stiffness(
             given = (elastic.pinion.material, elastic.wheel.material)
             common = {"plane": elastic.pinion.plane, "law": elastic.law, **points}
             coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
-            routers = router, Router(pair, coarse, route)
+            routers = router, position_solver(pair, coarse, route)
             error = _estimate(routers, solved_angles, solved, finite=finite, coarsen=coarsen * max(1.0, flank_coarsen))
     curve = assembled_curve(pair, asked, solved_angles, source, solved, touching, searched=torque is not None)
     return replace(curve, law=law_text(elastic.law), timings=dict(watch.seconds), error=error)
@@ -238,7 +246,7 @@ def distinct_angles(angles: Array, cycle: float) -> tuple[Array, IntArray]:
 
 
 def _estimate(
-    routers: tuple[Router, Router], angles: Array, solved: Solved, *, finite: bool, coarsen: float
+    routers: tuple[PositionSolver, PositionSolver], angles: Array, solved: Solved, *, finite: bool, coarsen: float
 ) -> ErrorEstimate:
     """Error of positions solved by the first router, from the second's on a coarser mesh."""
     own, coarse = routers

@@ -17,8 +17,8 @@ from ..contact.solver import Position
 
 Array = NDArray[np.float64]
 
-#: Relative accuracy of the torque, and the rounding of the gears' angles (rad) below which no twist can be told apart.
-TOLERANCE, ANGLE_ROUNDING = 1e-10, 2e-15
+#: Rounding of the gears' angles (rad) below which no twist can be told apart.
+ANGLE_ROUNDING = 2e-15
 #: Solutions of a position, and failed ones among them, after which it is given up.
 MAX_SOLUTIONS, MAX_FAILURES = 40, 3
 #: Relative width of the interval in which the torque is taken to jump past its goal.
@@ -54,7 +54,7 @@ Solve = Callable[[Array, Array], list[Position]]
 
 
 def twists_for_torque(
-    solve: Solve, angles: Array, torque: Array, *, touching: Array, first: Array, most: float
+    solve: Solve, angles: Array, torque: Array, *, touching: Array, first: Array, most: float, tolerance: float = 1e-10
 ) -> TorqueSolution:
     """Find the twist of each position.
 
@@ -70,6 +70,8 @@ def twists_for_torque(
         Twists (rad) at which the rigid flanks touch, and first guesses above them.
     most
         Largest twist tried (rad).
+    tolerance
+        Relative accuracy of the torque.
     """
     low, high = touching.copy(), np.full(len(angles), np.inf)
     twist = np.minimum(first, most)
@@ -90,7 +92,7 @@ def twists_for_torque(
             step = 0.0
             if position.status == "converged":
                 excess = position.torque_wheel - torque[i]
-                if abs(excess) <= max(TOLERANCE * torque[i], ANGLE_ROUNDING * position.tangent):
+                if abs(excess) <= max(tolerance * torque[i], ANGLE_ROUNDING * position.tangent):
                     status[i] = "converged"
                     continue
                 if excess < 0:

@@ -25,7 +25,7 @@ import numpy as np
 from ..contact.compliance import GearBody
 from ..contact.corners import corner_bearings
 from ..contact.elliptic import Chain
-from ..contact.laws import LAWS
+from ..contact.laws import MESH_LAWS
 from ..contact.scene import MeshingPair
 from ..contact.solver import Position, solve_on_whole_windows
 from ..gear.pair import GearPair
@@ -72,7 +72,7 @@ def draw(random: np.random.Generator, number: int) -> Case:
         "angle_stop_deg": start + cycle,
         "solve_all": True,
         "twist_from": str(random.choice(["contact", "contact", "centred"])),
-        "law": str(random.choice(sorted(LAWS))),
+        "law": str(random.choice(sorted(MESH_LAWS))),
         "plane": str(random.choice(["strain", "stress"])),
         "kinematics": str(random.choice(["finite", "small"])),
         "coarsen": rounded(log_uniform(random, 1.0, 3.0), 2),

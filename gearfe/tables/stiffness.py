@@ -46,7 +46,7 @@ class StiffnessTable:
         None, doc="last pinion angle (deg); without it, one mesh cycle", low=-FAR_DEG, high=FAR_DEG
     )
     plane: str = quantity("strain", doc="plane strain or plane stress", choices=("strain", "stress"))
-    law: str = quantity("nitsche", doc="contact law", choices=("nitsche", "penalty", "exact"))
+    law: str = quantity("nitsche", doc="contact law", choices=("nitsche", "penalty", "exact", "half_plane"))
     law_sides: str | None = quantity(
         None,
         doc="flanks that the law is integrated on: tip takes, of each tooth pair, the gear whose tip is nearer; by "
@@ -108,6 +108,11 @@ class StiffnessTable:
 
     def check_law(self, where: str) -> None:
         """Raise `InputError` for keys that the contact law cannot take."""
+        if self.law == "half_plane":
+            for key, usual in (("law_sides", None), ("route", "auto")):
+                if getattr(self, key) != usual:
+                    problem = "has no meaning with the law half_plane"
+                    raise InputError(f"{where}.{key}", getattr(self, key), problem, "leave it out")
         if self.law == "exact" and self.law_sides == "both":
             problem = "must be tip, pinion or wheel with the law exact: its multipliers lie on one gear"
             raise InputError(f"{where}.law_sides", self.law_sides, problem, "leave it out")

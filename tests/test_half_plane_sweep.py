@@ -1,0 +1,153 @@
+"""The half-plane law in sweeps, at torques, in load maps and fields: it stands beside the laws on the mesh."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe import InputError
+from gearfe.cli import main
+from gearfe.contact.finite_strain import finite_strain_shares
+from gearfe.contact.laws import HalfPlane
+from gearfe.contact.recovery import position_loads
+from gearfe.contact.scene import MeshingPair
+from gearfe.contact.solver import solve_positions
+from gearfe.loadmap.sweep import sweep_loads
+from gearfe.stiffness.curve import StiffnessCurve
+from gearfe.stiffness.position_solver import HalfPlaneSolver, position_solver
+from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
+
+from .gears import pair as gear_pair
+
+PAIR = gear_pair(tip_round=1e-4)
+ANGLES = (np.arange(5) + 0.3) * PAIR.mesh_cycle / 5
+
+
+@lru_cache
+def elastic_of(law: str) -> MeshingPair:
+    return elastic_pair(PAIR, law=law)
+
+
+@pytest.mark.parametrize("kinematics", ["small", "finite"])
+def test_curve_beside_nitsches(kinematics: str) -> None:
+    options = {"twist": math.radians(0.3), "angles": ANGLES, "kinematics": kinematics}
+    found = sweep_stiffness(PAIR, elastic=elastic_of("half_plane"), law="half_plane", **options)
+    expected = sweep_stiffness(PAIR, elastic=elastic_of("nitsche"), route="direct", **options)
+    assert set(found.route) == {"half_plane"}
+    assert found.law == "half_plane"
+    for name, bound in (
+        ("k_mesh", 1e-3),
+        ("torque_pinion", 1e-3),
+        ("torque_wheel_reaction", 1e-3),
+        ("k_tangent", 5e-3),
+    ):
+        assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=bound), name
+    assert found.load_share == pytest.approx(expected.load_share, abs=2e-3)
+    assert found.transmission_error_unloaded == pytest.approx(expected.transmission_error_unloaded, abs=1e-15)
+
+
+def test_share_of_finite_strain() -> None:
+    """From the forces and their rates on a coarse flank as from Nitsche's on a fine one."""
+    twist = math.radians(0.4)
+    solver = position_solver(PAIR, elastic_of("half_plane"))
+    found = finite_strain_shares(solver.elastic, solver.solve(ANGLES, np.full(5, twist), range(5)))
+    fine = elastic_of("nitsche")
+    expected = finite_strain_shares(fine, solve_positions(fine, ANGLES, twist))
+    assert found == pytest.approx(expected, rel=0.03)
+
+
+def test_nodal_loads_have_the_moments_of_the_contacts() -> None:
+    """What fields are recovered from: forces on both gears cancel and make the reactions at the wheel's bore."""
+    solver = position_solver(PAIR, elastic_of("half_plane"))
+    for position, angle in zip(solver.solve(ANGLES, np.full(5, 2e-3), range(5)), ANGLES, strict=True):
+        total, wheel = 0j, 0.0
+        for gear, body in enumerate(solver.elastic.bodies):
+            for tooth, load in position_loads(body, gear, position).items():
+                turn = np.exp(1j * solver.elastic.tooth_angle(gear, tooth, angle, 2e-3))
+                forces, places = load.view(complex) * turn, body.flank.points @ np.array([1, 1j]) * turn
+                total += forces.sum()
+                wheel -= gear * (np.conj(places) * forces).imag.sum()
+        size = np.abs(position.contacts.force).sum()
+        assert abs(total) < 1e-9 * size
+        assert wheel == pytest.approx(position.torque_wheel_reaction, rel=1e-6)
+
+
+def test_rates_are_those_of_differences() -> None:
+    solver = position_solver(PAIR, elastic_of("half_plane"))
+    twist, step = 3e-3, 1e-5
+    low, middle, high = (solver.solve(ANGLES, np.full(5, twist + k * step), range(5)) for k in (-1, 0, 1))
+    for one, two, three in zip(low, middle, high, strict=True):
+        rate = (three.contacts.force - one.contacts.force) / (2 * step)
+        assert two.contacts.force_rate == pytest.approx(rate, rel=1e-2)
+        assert two.tangent == pytest.approx((three.torque_wheel - one.torque_wheel) / (2 * step), rel=3e-3)
+
+
+def test_given_torque() -> None:
+    torque = 150.0
+    found = sweep_stiffness(PAIR, torque=torque, angles=ANGLES, law="half_plane", elastic=elastic_of("half_plane"))
+    assert set(found.status) == {"converged"}
+    assert found.torque_wheel == pytest.approx(torque, rel=1e-6)
+    again = sweep_stiffness(
+        PAIR, twist=found.twist[2], angles=ANGLES[2:3], law="half_plane", elastic=elastic_of("half_plane")
+    )
+    assert again.torque_wheel == pytest.approx(torque, rel=2e-4)  # its own share of finite strain
+
+
+def test_load_map() -> None:
+    torques = [20.0, 60.0, 200.0]
+    found = sweep_loads(PAIR, torques, angles=ANGLES, law="half_plane", elastic=elastic_of("half_plane"))
+    for curve, torque in zip(found.curves, torques, strict=True):
+        assert set(curve.status) == {"converged"}
+        direct = sweep_stiffness(PAIR, torque=torque, angles=ANGLES, law="half_plane", elastic=elastic_of("half_plane"))
+        assert curve.k_mesh == pytest.approx(direct.k_mesh, rel=3e-4)
+
+
+def test_no_other_solver_takes_it() -> None:
+    with pytest.raises(InputError, match=r"gearfe.contact.half_plane solves it"):
+        solve_positions(elastic_of("half_plane"), ANGLES, 1e-3)
+    with pytest.raises(InputError, match="route"):
+        position_solver(PAIR, elastic_of("half_plane"), "direct")
+    assert isinstance(position_solver(PAIR, elastic_of("half_plane")), HalfPlaneSolver)
+    assert isinstance(elastic_of("half_plane").law, HalfPlane)
+
+
+JOB = """
+[pair]
+pressure_angle_deg = 25.0
+face_width_mm = 10.0
+tip_round_mm = 0.1
+[pair.pinion]
+teeth = 20
+pitch_diameter_mm = 50.0
+bore_diameter_mm = 10.0
+[pair.wheel]
+teeth = 30
+pitch_diameter_mm = 75.0
+bore_diameter_mm = 15.0
+[pair.material]
+youngs_modulus_GPa = 200.0
+poisson_ratio = 0.3
+[stiffness]
+twist_deg = 0.05
+angle_step_deg = 6.0
+law = "half_plane"
+"""
+
+
+def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    job = tmp_path / "job.toml"
+    job.write_text(JOB)
+    assert main(["stiffness", str(job), "--out", str(tmp_path / "out"), "--no-picture", "--fields"]) == 0
+    assert "half_plane" in capsys.readouterr().out
+    curve = StiffnessCurve.from_csv(tmp_path / "out" / "stiffness.csv")
+    assert set(curve.route) == {"half_plane"}
+    rows = np.genfromtxt(tmp_path / "out" / "pressure.csv", delimiter=",", names=True, dtype=None, encoding="utf8")
+    pressed = rows["pressure_MPa"][np.abs(rows["pinion_angle_deg"] - 6.0) < 1e-6]
+    assert pressed.max() == pytest.approx(1e-6 * curve.peak_pressure[1], rel=0.02)
+    job.write_text(JOB + 'law_sides = "pinion"\n')
+    assert main(["stiffness", str(job), "--out", str(tmp_path / "out")]) != 0
+    assert "law_sides" in capsys.readouterr().err
