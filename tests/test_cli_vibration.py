@@ -118,6 +118,7 @@ def test_a_rigid_train(job, tmp_path, capsys):
     force = 75.0 / (37.5e-3 * math.cos(math.radians(25.0)))
     assert summary["mean_contact_forces_N"][0] == pytest.approx(force, rel=5e-3)
     assert summary["housing"] == "rigid"
+    assert summary["mesh_phases_deg"] == {"pinion-wheel": 0.0}
     assert {"curves", "transient", "pictures", "total"} <= set(summary["timings_s"])
 
 

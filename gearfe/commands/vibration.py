@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import time
 from collections.abc import Sequence
@@ -150,6 +151,8 @@ def described(job: TrainJob, scene: TrainScene) -> dict[str, Any]:
     from dataclasses import asdict
 
     from ..stiffness.report import versions
+    from ..train.kinematics import driving_senses
+    from ..train.phases import tooth_places
     from ..vibration.report import stiffness_ranges
 
     body = scene.housing
@@ -166,6 +169,10 @@ def described(job: TrainJob, scene: TrainScene) -> dict[str, Any]:
         "variant": job.table.variant,
         "housing": housing or "rigid",
         "mesh_stiffness_N_per_m": stiffness_ranges(scene),
+        "mesh_phases_deg": {
+            mesh.name: math.degrees(phase)
+            for mesh, phase in zip(scene.meshes, tooth_places(scene, driving_senses(scene)).phases, strict=True)
+        },
         "job": {"train": asdict(job.table), "stiffness": asdict(job.stiffness)},
         "versions": versions(),
     }

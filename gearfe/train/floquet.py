@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 
 #: Newton steps to the orbit, and what may be left of the way round it, relative to the state.
 MOST_TRIES, CLOSED = 12, 1e-9
+#: Squares of frequencies below this part of the largest are round-off: the mode moves freely.
+ROUND_OFF = 1e-12
 #: Corners nearer than this part of the period are one.
 SAME = 1e-9
 
@@ -79,7 +81,7 @@ class Linearised:
         torque = core.constant + core.T.T @ sum(
             (d * float(f(model.torque_end)) for d, f in model.torques), start=np.zeros(len(core.T))
         )
-        held = core.squares > 0.0
+        held = core.squares > ROUND_OFF * core.squares.max(initial=0.0)
         self.static = np.where(held, torque / np.where(held, core.squares, 1.0), 0.0)
         self.rest = np.where(held, 0.0, torque)
         self.lines = [line for line in model.meshes if line.curve is not None]
