@@ -185,6 +185,14 @@ def count(done: float, total: float, what: str = "") -> None:
         _displays[-1].count(done, total, what)
 
 
+def announce(text: str) -> None:
+    """Tell a wait of a minute also where nobody watches: a library call that stands still looks broken."""
+    if _displays:
+        say(text)
+    elif sys.stderr is not None:
+        print(f"gearfe: {text}", file=sys.stderr, flush=True)
+
+
 def say(text: str) -> None:
     """Tell something once, on a line that stays."""
     if _displays and threading.current_thread() is threading.main_thread():

@@ -9,8 +9,10 @@ import time
 import pytest
 
 from gearfe import progress
+from gearfe.cli import main
 from gearfe.progress import Display, _Stage, count, shown, stage
 from gearfe.stopwatch import Stopwatch
+from gearfe.tables.examples import job_file
 
 
 def waited(stream: io.StringIO, text: str) -> str:
@@ -109,3 +111,38 @@ def test_an_exception_leaves_no_stage():
     with pytest.raises(KeyError), shown(io.StringIO()):
         raise KeyError
     assert progress._displays == []
+
+
+def test_a_wait_of_a_minute_is_announced_to_library_users_too(capsys):
+    progress.announce("compiling")
+    assert capsys.readouterr().err == "gearfe: compiling\n"
+    with shown(stream := io.StringIO()):
+        progress.announce("compiling")
+    assert (stream.getvalue(), capsys.readouterr().err) == ("gearfe: compiling\n", "")
+
+
+TRAIN = job_file("vibration").replace('# housing = "elastic"', 'housing = "rigid" #').replace('load = "torque"', "")
+
+
+@pytest.mark.parametrize(
+    ("command", "text", "options", "stages"),
+    [
+        ("gear", job_file("stiffness"), [], ["drawing"]),
+        ("mesh", job_file("stiffness"), ["--gear", "pinion"], ["meshing the pinion", "writing"]),
+        ("mechanism", job_file("mechanism"), ["--until", "0.1"], ["integrating", "outputs", "tables", "pictures"]),
+        (
+            "vibration",
+            TRAIN.replace("# stiffness_N_per_m (not set):", "stiffness_N_per_m = 2e8 #"),
+            ["--no-pictures"],
+            ["curves", "transient", "integrating", "error estimates", "stability of the steady motion", "tables"],
+        ),
+    ],
+)
+def test_commands_name_their_stages(tmp_path, monkeypatch, command, text, options, stages):
+    entered = []
+    monkeypatch.setattr(Display, "enter", lambda self, name: entered.append(name))
+    (tmp_path / "job.toml").write_text(text)
+    out = tmp_path / ("gear.msh" if command == "mesh" else "out")
+    assert main([command, str(tmp_path / "job.toml"), "--out", str(out), *options]) == 0
+    places = [entered.index(name) for name in stages]
+    assert places == sorted(places), entered

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..progress import stage
 from ..rigid import Start, Trajectory, integrate
 from ..rigid.contract import Array
 from .model import Mechanism
@@ -44,6 +45,7 @@ class TrajectoryError:
     tolerance: float = math.nan
 
 
+@stage("error estimate by a finer run")
 def trajectory_error(mechanism: Mechanism, start: Start, results: Results, tolerance: float) -> TrajectoryError:
     """Run again, finer, and compare at the output times."""
     made = results.trajectory

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..output.files import not_finite, output_folder, whole_set, write_csv, write_json
+from ..progress import stage
 from ..rigid import Start, integrate
 from .error_estimate import TrajectoryError, trajectory_error
 from .model import Mechanism
@@ -112,6 +113,7 @@ def output_times(end: float, step: float) -> np.ndarray:
     return np.append(step * np.arange(math.floor(end / step) + 1), end)
 
 
+@stage("tables")
 def write_tables(folder: Path, mechanism: Mechanism, results: Results, with_reactions: bool) -> None:
     """trajectory.csv, energy.csv and, when asked, reactions.csv."""
     time: Any = results.trajectory.time

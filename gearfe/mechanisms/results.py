@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..progress import stage
 from ..rigid import Moment, PointForce, Prescribed, Spring, Trajectory
 from ..rigid.contract import Array
 from ..rigid.planar import CoordinateSpring
@@ -33,6 +34,7 @@ class Results:
     energy: dict[str, Array] = field(repr=False)
 
 
+@stage("outputs")
 def evaluate(mechanism: Mechanism, trajectory: Trajectory) -> Results:
     """Outputs and energies at the times of the trajectory."""
     energy = energies(mechanism, trajectory)

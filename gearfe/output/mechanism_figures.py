@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..progress import count, stage
 from ..textfile import read_text
 from .files import whole_file
 
 
+@stage("pictures")
 def draw_figures(folder: Path, mechanism: Any, results: Any) -> None:
     """curves.png (outputs over time, with reference markers where the file names a table) and picture.png."""
     plt = _pyplot()
@@ -29,6 +31,7 @@ def draw_figures(folder: Path, mechanism: Any, results: Any) -> None:
     _save(plt, figure, folder / "picture.png")
 
 
+@stage("animation")
 def draw_animation(folder: Path, mechanism: Any, trajectory: Any) -> None:
     """animation.gif with the number of frames that the file asks for."""
     plt = _pyplot()
@@ -40,7 +43,8 @@ def draw_animation(folder: Path, mechanism: Any, trajectory: Any) -> None:
     figure, axes = plt.subplots(figsize=(4.8, 4.2), dpi=80)
     writer = PillowWriter(fps=25)
     with whole_file(folder / "animation.gif") as temporary, writer.saving(figure, str(temporary), dpi=80):
-        for time, q in zip(times, states, strict=True):
+        for done, (time, q) in enumerate(zip(times, states, strict=True)):
+            count(done, len(times), "frames")
             axes.clear()
             _paths(axes, mechanism, trajectory.q)
             _draw(axes, mechanism, q[None, :])

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..progress import announce, count, stage
 from . import compiled, kernel_run, taylor
 from .backend import COMPILED_FASTER, compiled_is_ready, loading_seconds, plain_seconds_spent, spend_plain_seconds
 from .choice import Choice, Watch, Way, joined, joined_statistics
@@ -31,9 +32,10 @@ HOPELESS = 1e12
 #: Ratio of masses from which on a link counts as massless, and least singular value of the constraints' unit gradients
 #: at a start that is no singular position.
 MASSLESS, REGULAR = 1e10, 1e-6
-COMPILING = "gearfe: compiling the kernels once (about a minute); backend='plain' does without"
+COMPILING = "compiling the kernels once, about a minute; backend='plain' does without"
 
 
+@stage("integrating")
 def integrate(
     system: System,
     times: ArrayLike,
@@ -86,7 +88,7 @@ def integrate(
     ways = _ways(system, start, asked, method, backend, {"tolerance": tolerance, "longest": longest})
     with np.errstate(over="ignore", invalid="ignore"):  # a state that is not finite has a status of its own
         if len(ways) == 1:
-            dense, status, statistics = ways[0].run(start, asked, most_steps, None)
+            dense, status, statistics = ways[0].run(start, asked, most_steps, partial(_counted, start.time, asked[-1]))
             chosen = ways[0].method
         else:
             choice = Choice(ways, start, asked, most=most_steps)
@@ -102,6 +104,12 @@ def integrate(
     if status == 0 and not _dropped_rows_hold(system, start, dense, tolerance):
         status = 6
     return Trajectory(system, start, kept, status, chosen, statistics, dense)
+
+
+def _counted(begin: float, end: float, t: float, steps: int, state: Any) -> bool:  # noqa: ARG001 - a `choice.Watch`
+    """Tell how far the only way is."""
+    count(abs(t - begin), abs(float(end) - begin))
+    return True
 
 
 def _dropped_rows_hold(system: System, start: Start, dense: Any, tolerance: float) -> bool:
@@ -198,7 +206,7 @@ def _taylor(  # type: ignore[no-untyped-def]
     local = max(LOCAL_SHARE * options["tolerance"], 5e-16)
     order = taylor.order_for(local)
     if jit and not compiled_is_ready():
-        print(COMPILING, file=sys.stderr, flush=True)
+        announce(COMPILING)
     key = (order, jit)
     cache = scene.__dict__.setdefault("_work", {})
     if key not in cache:

@@ -21,6 +21,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..progress import stage
 from ..threads import one_thread
 from .model import TrainModel
 from .monodromy import Complex, Flow, flow, kick_times, monodromy, multipliers, settled, walk
@@ -37,6 +38,7 @@ ROUND_OFF = 1e-12
 SAME = 1e-9
 
 
+@stage("stability of the steady motion")
 def train_multipliers(model: TrainModel) -> tuple[Complex | None, str]:
     """Multipliers of a train at its steady speed over the common period of its meshes, or the reason for none."""
     speed, scene = model.steady_speed, model.scene

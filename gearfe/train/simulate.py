@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..progress import stage
 from ..rigid import Trajectory, integrate
 from .floquet import train_multipliers
 from .model import TrainModel
@@ -220,6 +221,7 @@ def _pulls(model: TrainModel, moved: Motion) -> list[str]:
     return said
 
 
+@stage("error estimates")
 def _estimates(
     model: TrainModel, response: TrainResponse, t: Array, tolerance: float, method: str, band_hz: float
 ) -> dict[str, float]:
