@@ -22,6 +22,9 @@ from .textfile import read_text
 
 T = TypeVar("T")
 
+#: No number in everyday units is larger: the fourth powers of such numbers overflow.
+LARGEST = 1e75
+
 #: Table name in a job file -> "module:class" of the dataclass that describes it. Each module is light (no numpy).
 TABLES: dict[str, str] = {
     "pair": "gearfe.tables.pair:PairTable",
@@ -221,7 +224,8 @@ def check_range(number: float, label: str, meta: Any) -> None:
     """Raise `InputError` when a number leaves the range that a field's metadata allow."""
     low, high, above, below = (meta.get(k) for k in ("low", "high", "above", "below"))
     outside = (
-        (isinstance(number, float) and not math.isfinite(number))
+        abs(number) > LARGEST
+        or (isinstance(number, float) and not math.isfinite(number))
         or (low is not None and number < low)
         or (high is not None and number > high)
         or (above is not None and number <= above)
@@ -230,5 +234,6 @@ def check_range(number: float, label: str, meta: Any) -> None:
     if outside:
         left = f">= {low:g}" if low is not None else f"> {above:g}" if above is not None else ""
         right = f"<= {high:g}" if high is not None else f"< {below:g}" if below is not None else ""
-        allowed = " and ".join(part for part in ("finite", left, right) if part)
+        size = f"of a size up to {LARGEST:g}" if LARGEST < abs(number) < math.inf and not (right and number > 0) else ""
+        allowed = " and ".join(part for part in ("finite", left, right, size) if part)
         raise InputError(label, number, f"must be {allowed}", meta.get("doc", ""))

@@ -30,6 +30,8 @@ MECHANISM = job_file("mechanism")
         ("stiffness", PAIR, "angle_stop_deg = 40.0", "angle_stop_deg = 1e300", "must be finite and >= -1e+06"),
         ("vibration", RIGID_TRAIN, "torque_Nm = 75.0", "torque_Nm = 1e300", "torque_Nm = 1e+300: must be"),
         ("vibration", RIGID_TRAIN, "= 2e8 ", "= 1e300 ", "stiffness_N_per_m = 1e+300: must be"),
+        ("vibration", RIGID_TRAIN, "# rayleigh_beta_s = 0.0", "rayleigh_beta_s = 1e300", "of a size up to 1e+75"),
+        ("vibration", RIGID_TRAIN, "length_mm = 82.0", "length_mm = 1e300", "of a size up to 1e+75"),
         ("vibration", RIGID_TRAIN, "= 2e8 ", "= 1e60 ", "samples of the motion"),
         ("housing", HOUSING, "[housing.material]", "[housing.material]\ndensity_kg_per_m3 = 1e-300", ">= 1e-09"),
         ("mechanism", MECHANISM, 'point = "A"', "point = [1, 2, 3]", "must have 2 entries"),

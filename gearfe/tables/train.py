@@ -13,9 +13,6 @@ from ..config import load_job, quantity
 from ..errors import InputError, unknown_name
 from .pair import ToothFormTable
 
-#: Forces, speeds and stiffnesses beyond this overflow in squares of squares.
-LARGEST = 1e75
-
 Five = tuple[float, float, float, float, float]
 
 
@@ -93,7 +90,7 @@ class TrainMeshTable:
     load_map: str | None = quantity(
         None, doc="CSV file of gearfe loadmap, beside the job file: its curve at the torque that the mesh carries"
     )
-    stiffness_N_per_m: float | None = quantity(None, above=0.0, high=LARGEST, doc="constant stiffness (N/m)")
+    stiffness_N_per_m: float | None = quantity(None, above=0.0, doc="constant stiffness (N/m)")
     rigid: bool = quantity(False, doc="true: an ideal rigid mesh, a constraint")
 
     def check(self, where: str) -> None:
@@ -113,7 +110,7 @@ class TrainDriveTable:
 
     shaft: str = quantity(doc="shaft that is driven")
     attachment: int | str = quantity(doc="bore against which its rotation is prescribed")
-    speed_rad_per_s: float = quantity(low=-LARGEST, high=LARGEST, doc="speed about +y (rad/s)")
+    speed_rad_per_s: float = quantity(doc="speed about +y (rad/s)")
     ramp_centre_ms: float = quantity(0.0, doc="middle of the smoothed step from rest to the speed (ms)")
     ramp_width_ms: float | None = quantity(None, above=0.0, doc="duration of that step (ms); left out: constant speed")
     stiffness_Nm_per_rad: float | None = quantity(
@@ -128,7 +125,7 @@ class TrainLoadTable:
 
     shaft: str = quantity(doc="shaft that is loaded")
     attachment: int | str | None = quantity(None, doc="bore on which the torque reacts; left out: outside of the train")
-    torque_Nm: float = quantity(low=-LARGEST, high=LARGEST, doc="torque about +y on the shaft (N m)")
+    torque_Nm: float = quantity(doc="torque about +y on the shaft (N m)")
     ramp_centre_ms: float = quantity(0.0, doc="middle of the smoothed step from 0 to the torque (ms)")
     ramp_width_ms: float | None = quantity(None, above=0.0, doc="duration of that step (ms); left out: constant torque")
 
