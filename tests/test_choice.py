@@ -14,7 +14,7 @@ from gearfe.progress import shown
 from gearfe.rigid import Body, CoordinateSpring, Gravity, Hinge, ModalBlocks, PlanarScene, Scene, System
 from gearfe.rigid.choice import STOPPED, Choice, Leg, Watch, Way, joined, joined_statistics
 from gearfe.rigid.contract import Array
-from gearfe.rigid.integrate import _ways, integrate
+from gearfe.rigid.integrate import integrate, ways_of
 from gearfe.rigid.start import Freedoms, Start, consistent_start
 
 from .rigid_cases import pendulum
@@ -185,7 +185,7 @@ def test_a_change_over_between_series_and_radau_keeps_the_motion(first: str, bac
     if back:  # from the state at 2 s to the start
         made = integrate(system, times, method="taylor", tolerance=1e-12, start=start, backend="plain")
         start, times = Start(2.0, made.q[-1], made.v[-1], start.freedoms, start.active), times[::-1]
-    ways = _ways(system, start, times, "auto", "plain", {"tolerance": 1e-8, "longest": np.inf})
+    ways = ways_of(system, start, times, "auto", "plain", {"tolerance": 1e-8, "longest": np.inf})
     clock = Clock()
     slow: Cost = lambda t: 1e-3 if (t > 1.0) == back else 1e3  # noqa: E731
     made_ways = [slowed(w, clock, slow if w.method == first else lambda _: 1.0) for w in ways]
@@ -204,7 +204,7 @@ def test_a_change_over_of_modal_coordinates_keeps_the_motion() -> None:
     body = ModalBlocks(np.eye(2), np.diag([0.4, 1.0]), np.diag([100.0, 900.0]), q0=np.array([1.0, -1.0]))
     system = System([body])
     start, times, clock = consistent_start(system), np.linspace(0.0, 2.0, 21), Clock()
-    one, two = _ways(system, start, times, "auto", "plain", {"tolerance": 1e-8, "longest": np.inf})
+    one, two = ways_of(system, start, times, "auto", "plain", {"tolerance": 1e-8, "longest": np.inf})
     one = slowed(one, clock, lambda t: 1e-3 if t < 1.0 else 1e3)
     legs = Choice([one, slowed(two, clock, lambda _: 1.0)], start, times, clock=clock).run()
     assert [leg.way.method for leg in legs] == ["explicit", "implicit"]
@@ -223,7 +223,7 @@ def test_only_series_pass_singular_positions_so_springs_must_set_the_steps() -> 
     )
     for system in (pendulum(), System([PlanarScene(soft)])):
         start, times, clock = consistent_start(system), np.array([0.0, 40.0]), Clock()
-        ways = _ways(system, start, times, "auto", "plain", {"tolerance": 1e-6, "longest": np.inf})
+        ways = ways_of(system, start, times, "auto", "plain", {"tolerance": 1e-6, "longest": np.inf})
         assert [w.method for w in ways] == ["taylor", "implicit"]
         made = [slowed(w, clock, (lambda _: 1e3) if w.method == "taylor" else (lambda _: 1e-3)) for w in ways]
         assert [leg.way.method for leg in Choice(made, start, times, clock=clock).run()] == ["taylor"]

@@ -203,7 +203,7 @@ def told(response: TrainResponse, scene: TrainScene, written: Written, choice: O
     statistics = response.statistics
     lines.append(
         f"transient: {response.status}, {1e3 * response.time_reached:.4g} ms in {statistics.get('steps', '?')} steps "
-        f"({statistics.get('method', '')}), {statistics.get('seconds', 0.0):.3f} s; "
+        f"({statistics.get('method', '')}: {statistics.get('scheme', '')}), {statistics.get('seconds', 0.0):.3f} s; "
         f"{statistics.get('free_coordinates', '?')} unknowns"
     )
     if response.floquet is not None:

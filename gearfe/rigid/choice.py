@@ -27,7 +27,7 @@ from .start import Start
 from .trajectory import Dense
 
 #: A trial may cost this part of what the running way has left: with less, one that is lost might have been the best.
-SHARE, EARLY = 0.9, 0.1
+SHARE, EARLY = 0.75, 0.1
 #: How many times faster a way must be to take over (clocks are noisy); how many times its prediction a run may take.
 FASTER, WRONG = 1.5, 2.0
 #: The shortest trial must cost less than this part of what the running way has left.
@@ -42,7 +42,7 @@ RECENT = 8
 #: half of that are set by it, shorter ones by the motion of the mechanism.
 STIFF = 1.5
 #: Statistics that add up.
-SUMS = ("steps", "evaluations", "newton_iterations", "rejected")
+SUMS = ("steps", "evaluations", "orders", "newton_iterations", "rejected")
 #: Status of a run that its watch ended.
 STOPPED = -1
 
@@ -142,6 +142,12 @@ class Pace:
         return now - self.told[0][0], left
 
     @property
+    def shortest(self) -> float:
+        """Seconds of the shortest run: twice the steps after which a pace counts (the first may have loaded things)."""
+        steps = len(self.told) - 2
+        return 2 * LEAST_STEPS * (self.told[-1][0] - self.told[1][0]) / steps if steps > 0 else 0.0
+
+    @property
     def grows(self) -> bool:
         """Whether the second half of the progress told came further than the first."""
         times = [t for _, t in self.told]
@@ -200,7 +206,7 @@ class Choice:
                     trial, predicted = None, spent + left
                     self._say(way, left, start.time)
                     return True
-                lost = spent > SHARE * trial or (spent > EARLY * trial and not pace.grows)
+                lost = max(spent, pace.shortest) > SHARE * trial or (spent > EARLY * trial and not pace.grows)
                 return not lost
             if steps < LEAST_STEPS or (predicted is not None and spent + left <= WRONG * predicted):
                 return True

@@ -30,9 +30,8 @@ elastic body in
 eliminated at
    set-up by `gearfe.rigid.elimination` where an integrator profits. Absent: treated as any constraint.
 8. ``scene`` (a `Scene` and its tables): the Taylor recurrences of planar bodies known to the compiled kernels.
-The Taylor
-   method runs when every element has one; otherwise ``method="auto"`` takes the explicit method of order 8 with
-   projection, or, when the start is stiff, the implicit one.
+   The Taylor method runs when every element has one; ``method="auto"`` takes it or else the explicit method, or the
+   implicit one, whichever is predicted to take the fewest seconds.
 9. ``energy(q, v)``: (kinetic, potential) of the element. Absent: 1/2 v M v of its own coordinates, and zero.
 10. Being a `LocalForce`: a force along few directions, ``f = W phi(t, W^T q, W^T v)``, with a law that can be compiled.
     Absent: the force is called as it is; the integration in modal coordinates then calls Python in every stage.

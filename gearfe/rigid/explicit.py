@@ -3,7 +3,8 @@
 Constrained systems are integrated in (q, v) with the accelerations of the index-1 form and projected onto position and
 velocity constraints after every step. Systems whose constraints are linear and constant run in minimal
 coordinates, where
-the projection has nothing to do; there, forces with compiled laws run in a compiled loop (`gearfe.rigid.modal`).
+the projection has nothing to do; there, a force with a compiled law is integrated by Taylor series instead
+(`gearfe.rigid.modal`).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from .start import Start, least_change
 from .system import System
 from .within import within_run
 
+SCHEME = "Runge-Kutta of order 8"
 Rhs = Callable[[float, Array], Array]
 
 
@@ -105,7 +107,7 @@ def run_explicit(  # type: ignore[no-untyped-def]
 
     made = step_through(rhs, project, start.time, y0, times[-1], system.breaks, tolerance, longest, most, told)
     ends, states, polynomials, status, evaluations = made
-    statistics: dict[str, Any] = {"steps": len(polynomials), "evaluations": evaluations}
+    statistics: dict[str, Any] = {"scheme": SCHEME, "steps": len(polynomials), "evaluations": evaluations}
     return Pieces(ends, states, polynomials, expand), status, statistics
 
 

@@ -140,7 +140,8 @@ def run_implicit(  # type: ignore[no-untyped-def]
         before = made.error
         h = max(h, step) if fixed and made.error < 0.01 else step * min(5.0, max(0.2, factor))
     dense = Hermite(*(np.array([r[k] for r in record]) for k in range(4)))
-    return dense, status, {"steps": len(record) - 1, "newton_iterations": newton, "rejected": rejected}
+    counts = {"scheme": "Radau IIA of order 5", "steps": len(record) - 1}
+    return dense, status, {**counts, "newton_iterations": newton, "rejected": rejected}
 
 
 def in_modes(core: Minimal, start: Start) -> tuple[System, Start]:

@@ -16,6 +16,7 @@ from . import compiled, kernel_run, taylor
 from .backend import COMPILED_FASTER, compiled_is_ready, loading_seconds, plain_seconds_spent, spend_plain_seconds
 from .choice import Choice, Watch, Way, joined, joined_statistics
 from .contract import Array
+from .elimination import is_linear
 from .start import Start, consistent_start
 from .system import System
 from .trajectory import Trajectory
@@ -85,7 +86,7 @@ def integrate(
     _check(asked, method, tolerance, backend)
     if start is None:
         start = _default_start(system, float(asked[0]))
-    ways = _ways(system, start, asked, method, backend, {"tolerance": tolerance, "longest": longest})
+    ways = ways_of(system, start, asked, method, backend, {"tolerance": tolerance, "longest": longest})
     with np.errstate(over="ignore", invalid="ignore"):  # a state that is not finite has a status of its own
         if len(ways) == 1:
             dense, status, statistics = ways[0].run(start, asked, most_steps, partial(_counted, start.time, asked[-1]))
@@ -115,7 +116,7 @@ def _counted(begin: float, end: float, t: float, steps: int, state: Any) -> bool
 def _dropped_rows_hold(system: System, start: Start, dense: Any, tolerance: float) -> bool:
     """Whether all rows are met along the run, whichever of a redundant set was left out on the way."""
     left_out = ~start.active
-    if not left_out.any() or len(dense.times) < 2:
+    if not left_out.any() or len(dense.times) < 2 or is_linear(system):  # constant rows hold as they did at the start
         return True
     times = dense.times[:: max(1, len(dense.times) // 50)]
     times = np.append(times, dense.times[-1])
@@ -125,7 +126,9 @@ def _dropped_rows_hold(system: System, start: Start, dense: Any, tolerance: floa
     return bool(max(gaps) <= max(1e-8, 1e3 * tolerance) * max(1.0, scale))
 
 
-def _ways(system: System, start: Start, times: Array, method: str, backend: str, options: dict[str, Any]) -> list[Way]:
+def ways_of(
+    system: System, start: Start, times: Array, method: str, backend: str, options: dict[str, Any]
+) -> list[Way]:
     """Ways to integrate that `method` and `backend` leave open, the one to begin with first."""
     planar = system.planar is not None
     trial = IMPLICIT_TRIAL + (0.0 if "scipy.linalg" in sys.modules else LOADING_LINALG)
@@ -219,6 +222,7 @@ def _taylor(  # type: ignore[no-untyped-def]
     status = 2 if pieces.status == kernel_run.FULL else pieces.status
     where = np.flatnonzero(pieces.folds)
     statistics = {
+        "scheme": "Taylor series",
         "steps": len(pieces.coefficients),
         "order": order,
         "backend": "compiled" if jit else "plain",

@@ -1,7 +1,7 @@
-"""Explicit integration of order 8 in minimal (modal) coordinates: y'' = -omega^2 y - C y' + W^T phi(t, W y, W y').
+"""Explicit integration in minimal (modal) coordinates: y'' = -omega^2 y - C y' + W^T phi(t, W y, W y').
 
-With forces that are all `LocalForce` with one ``compiled_law`` the whole loop is compiled; otherwise each
-stage calls Python.
+Where the only force is a `LocalForce` whose law has a series, the motion is a Taylor series of up to `ORDER` terms,
+in a compiled loop; otherwise Runge-Kutta of order 8, each stage of which calls Python.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from . import compiled, kernel_modal
 from .choice import STOPPED, Watch
 from .contract import Array, LocalForce, SeriesLaw
 from .elimination import Minimal
-from .explicit import Pieces, step_through
+from .explicit import SCHEME, Pieces, step_through
 from .start import Start
 from .within import within_run
 
@@ -71,12 +71,14 @@ def run_minimal(  # type: ignore[no-untyped-def]
         )
         ends, states, polynomials, status, evaluations = made
         statistics: dict[str, Any] = {"steps": len(polynomials), "evaluations": evaluations, "backend": "plain"}
+        statistics["scheme"] = SCHEME
         return Pieces(ends, states, polynomials, expand), status, {**statistics, "free_coordinates": n}
     run = SeriesRun(core, *series, tolerance, longest, expand)
     compiling = run.load()
     ends, states, found, status, orders = run.steps(start.time, y0, float(times[-1]), times, most, told)
     dense = SeriesPieces(ends, states, times[: len(found)], found, run)
-    statistics = {"steps": len(ends) - 1, "evaluations": orders, "backend": "compiled", "compile_seconds": compiling}
+    statistics = {"scheme": "Taylor series", "steps": len(ends) - 1, "orders": orders, "backend": "compiled"}
+    statistics["compile_seconds"] = compiling
     return dense, status, {**statistics, "free_coordinates": n}
 
 

@@ -51,7 +51,7 @@ class Trajectory:
     method : str
         The one used; "auto" where it changed over.
     statistics
-        Steps, order or evaluations, singular passages.
+        Scheme, steps, order or evaluations, singular passages, seconds to compile; the choice made.
     dense
         Coordinates at any time of the run, by derivative.
     """

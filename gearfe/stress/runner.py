@@ -138,7 +138,7 @@ def _worker(name: str, seed: int) -> tuple[Any, Any]:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     worker = context.Process(target=work, args=(theirs, name, seed), daemon=False)
-    with _environment({"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "GEARFE_CACHE": "off"}):
+    with _environment({"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}):
         worker.start()
     theirs.close()
     return worker, ours
@@ -158,7 +158,7 @@ def _end(worker: Any, pipe: Any = None) -> None:
 
 @contextmanager
 def _environment(values: dict[str, str]) -> Any:
-    """Environment of a child: one thread (the campaign measures times), no mesh cache (cases are met once)."""
+    """Environment of a child: one thread (the campaign measures times)."""
     before = {key: os.environ.get(key) for key in values}
     os.environ.update(values)
     try:

@@ -58,6 +58,8 @@ def work(pipe: Any, name: str, seed: int) -> None:
     """Answer case numbers from `pipe` with rows, until None comes."""
     os.environ.setdefault("MPLBACKEND", "Agg")
     campaign = campaign_named(name)
+    if not campaign.compiles:
+        os.environ["GEARFE_CACHE"] = "off"  # cases are met once
 
     def late(signum: int, frame: Any) -> None:  # noqa: ARG001 - the handler's signature
         raise OverTime
@@ -66,6 +68,7 @@ def work(pipe: Any, name: str, seed: int) -> None:
     if campaign.compiles:  # an interrupted compilation would leave the compiler unusable
         run_case(campaign, seed, 0)
         compile_series()
+        os.environ["GEARFE_CACHE"] = "off"  # from here on: the kernels are loaded
     if hasattr(signal, "SIGALRM"):
         signal.signal(signal.SIGALRM, late)
         signal.signal(signal.SIGPROF, late)
