@@ -33,7 +33,7 @@ GEOMETRY = Path(__file__).resolve().parents[1] / "geometry"
 GRAVITY = Gravity((0.0, -9.81))
 LEAST_PATIENCE = 2.0
 #: So many runs of those below so many seconds.
-RUNS, SHORT = 3, 0.2
+RUNS, SHORT = 3, 0.5
 
 
 class Case(NamedTuple):

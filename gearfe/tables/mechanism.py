@@ -178,7 +178,7 @@ class RunTable:
     step_s: float = quantity(above=0.0, doc="distance of the output times in s, > 0")
     tolerance: float = quantity(1e-9, low=1e-13, high=0.1, doc="accuracy relative to 1 rad and the mechanism's size")
     method: str = quantity(
-        "auto", choices=("auto", "taylor", "explicit", "implicit"), doc="integrator; auto: the quickest"
+        "auto", choices=("auto", "taylor", "explicit", "implicit"), doc="integrator (auto: quickest)"
     )
     reactions: bool = quantity(False, doc="write reactions.csv")
     picture_s: float | None = quantity(None, low=0.0, doc="time of the picture in s (default: the end)")

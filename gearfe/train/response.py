@@ -80,7 +80,8 @@ class TrainResponse:
     load_end_s : float
         Time at which all load ramps have ended (s).
     statistics, estimates : mapping
-        ``steps``, ``method``, ``scheme``, ``seconds``, ``compile_seconds``, ``choice``, ``free_coordinates``, ``redundant_constraints`` (names),
+        ``steps``, ``method``, ``scheme``, ``seconds``, ``compile_seconds``, ``choice``, ``free_coordinates``,
+        ``redundant_constraints`` (names),
         ``smallest_contact_force_N``; error estimates asked for (``integration``, ``reduction``).
     warnings : tuple of str
     """
