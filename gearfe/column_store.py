@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +15,12 @@ IN_MEMORY = 32 << 20
 
 
 class ColumnStore:
-    """Rows of `columns` numbers, appended block by block; the file goes away with the object."""
+    """Rows of `columns` numbers, appended block by block; the file, in `folder`, goes away with the object."""
 
-    def __init__(self, columns: int) -> None:
+    def __init__(self, columns: int, folder: Path | None = None) -> None:
         self.columns = columns
         self._blocks: list[int] = []
-        self._file = tempfile.SpooledTemporaryFile(max_size=IN_MEMORY)  # noqa: SIM115 (lives as long as the table)
+        self._file = tempfile.SpooledTemporaryFile(max_size=IN_MEMORY, dir=None if folder is None else str(folder))  # noqa: SIM115 (lives as long as the table)
 
     def append(self, rows: Floats) -> None:
         """Add a block of rows, (n, columns)."""

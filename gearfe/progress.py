@@ -111,7 +111,9 @@ class Display:
         now = time.monotonic()
         if now - self._begun < self._silent or not self._stages:
             return
-        text = ": ".join([*(s.name for s in self._stages[:-1]), self._stages[-1].text(now)])
+        counted = next((i for i, at in enumerate(self._stages) if at.total > 0.0), len(self._stages) - 1)
+        stages = self._stages[: counted + 1]  # what goes on inside of a count is a part of it
+        text = ": ".join([*(s.name for s in stages[:-1]), stages[-1].text(now)])
         if self._rewritten:
             width = shutil.get_terminal_size().columns - 1
             line = f"{_duration(now - self._begun)} {text}"[:width]
@@ -119,7 +121,7 @@ class Display:
                 self._write(f"\r{line}\033[K")
                 self._line = line
             return
-        path = tuple(s.name for s in self._stages)
+        path = tuple(s.name for s in stages)
         if path != self._told[: len(path)]:  # back in the outer stage is nothing new
             self._told, self._wait, self._next = path, AGAIN, now + AGAIN
         elif now < self._next:

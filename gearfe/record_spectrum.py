@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,8 @@ Floats = NDArray[np.float64]
 SPARE = 2.0
 #: More samples than this are no spectrum but a mistake in a stiffness or a mass.
 MOST_SAMPLES = 10**9
+#: Modes beyond this (Hz) are springs in place of constraints: their motion follows that of the others.
+FASTEST = 1e6
 #: Half length of the filter in kept samples, and the attenuation (dB) for which Kaiser's formulas ask that length.
 REACH, STOP_BAND_DB = 10, 145.0
 #: Kaiser's relation between the attenuation and the parameter of his window.
@@ -45,9 +48,9 @@ _BETA = 0.1102 * (STOP_BAND_DB - 8.7)
 def samples_per_step(step: float, highest: float) -> int:
     """How many samples a step of the output (s) needs for modes up to `highest` (Hz): 1, or an even number.
 
-    Half the sampling frequency then lies `SPARE` times above the highest mode.
+    Half the sampling frequency then lies `SPARE` times above the highest mode, of those up to `FASTEST`.
     """
-    needed = 2.0 * SPARE * highest * step * (1.0 - 1e-9)
+    needed = 2.0 * SPARE * min(highest, FASTEST) * step * (1.0 - 1e-9)
     return 1 if needed <= 1.0 else 2 * math.ceil(0.5 * needed)
 
 
@@ -86,9 +89,13 @@ class RecordSpectrum:
         Samples in an output step: 1, or an even number.
     window
         See `gearfe.spectrum.WINDOWS`.
+    folder
+        For the temporary file of a long record.
     """
 
-    def __init__(self, signals: int, steps: int, step: float, every: int, window: str = "none") -> None:
+    def __init__(
+        self, signals: int, steps: int, step: float, every: int, window: str = "none", *, folder: Path | None = None
+    ) -> None:
         if every != 1 and every % 2:
             raise InputError("samples per step", every, "must be 1 or an even number", "take samples_per_step")
         self.signals, self.steps, self.step, self.every, self.window = signals, steps, step, every, window
@@ -97,7 +104,7 @@ class RecordSpectrum:
         self._gain, self._square = float(weights.mean()), float(np.mean(weights**2))
         self._keep = max(1, every // 2)
         self._filter = low_pass(self._keep)
-        self._kept = ColumnStore(signals)
+        self._kept = ColumnStore(signals, folder)
         #: samples that do not fill a kept one yet, and what earlier ones add to the next rows
         self._rest = self._overlap = np.zeros((0, signals))
         #: windowed last sample less the first one

@@ -6,7 +6,7 @@ import argparse
 import math
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..output.files import output_folder
     from ..stopwatch import Stopwatch
-    from ..vibration.files import OutputChoice, check_choice, write_all
+    from ..vibration.files import OutputChoice, check_choice, write_run
     from ..vibration.job import train_job
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
@@ -83,13 +83,14 @@ def run(args: argparse.Namespace) -> int:
         )
         check_choice(choice, job.times, tuple(str(a) for s in job.table.shafts for a in s.attachments))
         folder = output_folder(args.out or Path("out") / Path(args.job).stem)
-    scene, response, every = simulated(
+    scene, pieces, every = simulated(
         job, args.curve, watch=watch, progress=count, floquet=not args.no_floquet, estimate=not args.no_estimate
     )
-    written = write_all(
+    written = write_run(
         folder,
         scene,
-        response,
+        pieces,
+        job.times,
         choice,
         title=title(job),
         watch=watch,
@@ -98,6 +99,7 @@ def run(args: argparse.Namespace) -> int:
         progress=count,
         started=started,
     )
+    response = written.response
     for line in told(response, scene, written, choice):
         print(line)
     print(f"written to {folder}: " + ", ".join(written.names))
@@ -109,10 +111,11 @@ def run(args: argparse.Namespace) -> int:
 
 def simulated(
     job: TrainJob, curves: Sequence[str], *, watch: Any, progress: Any = None, floquet: bool, estimate: bool
-) -> tuple[TrainScene, TrainResponse, int]:
-    """Curves, housing and transient of a job, each from the cache where it can be; samples in an output step."""
+) -> tuple[TrainScene, Callable[[Any], Iterator[TrainResponse]], int]:
+    """Curves and housing of a job, each from the cache where it can be; the run over given times; samples in a step."""
     from ..record_spectrum import finer
-    from ..train import build_train, simulate
+    from ..train import build_train
+    from ..train.simulate import simulate_in_pieces
     from ..vibration.job import job_scene, train_body, train_curves
 
     with watch.stage("curves"):
@@ -122,16 +125,14 @@ def simulated(
     with watch.stage("model"):
         scene = job_scene(job, stiffness, body)
         model = build_train(scene)
-    with watch.stage("transient"):
-        options: dict[str, Any] = {"tolerance": job.table.tolerance, "method": job.table.method}
-        band = 5000.0 if job.housing is None else job.housing.reduction.band_Hz
-        times, every = finer(job.times, float(model.coupled_frequencies_hz.max(initial=0.0)))
-        response = simulate(model, times, floquet=floquet, estimate=estimate, band_hz=band, **options)
-    compiling = float(response.statistics.get("compile_seconds", 0.0))
-    if compiling > 0.0:
-        watch.seconds["transient"] -= compiling
-        watch.seconds["compiling"] = compiling
-    return scene, response, every
+        highest = float(model.coupled_frequencies_hz.max(initial=0.0))
+    options: dict[str, Any] = {"tolerance": job.table.tolerance, "method": job.table.method}
+    options["band_hz"] = 5000.0 if job.housing is None else job.housing.reduction.band_Hz
+
+    def pieces(times: Any) -> Iterator[TrainResponse]:
+        return simulate_in_pieces(model, finer(times, highest)[0], floquet=floquet, estimate=estimate, **options)
+
+    return scene, pieces, finer(job.times, highest)[1]
 
 
 def title(job: TrainJob) -> str:

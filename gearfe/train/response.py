@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -117,7 +117,24 @@ class TrainResponse:
     estimates: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
-    def every(self, count: int) -> TrainResponse:
-        """The response at each `count`-th of its times, the first one included."""
+    def every(self, count: int, first: int = 0) -> TrainResponse:
+        """The response at each `count`-th of its times from number `first` on."""
+        return self._at(slice(first, None, count))
+
+    def at(self, rows: Sequence[int] | NDArray[np.int64]) -> TrainResponse:
+        """The response at some of its times."""
+        return self._at(np.asarray(rows, dtype=np.int64))
+
+    def _at(self, rows: Any) -> TrainResponse:
         values = {name: getattr(self, name) for name in SAMPLED}
-        return replace(self, **{name: v[::count] for name, v in values.items() if v is not None})
+        return replace(self, **{name: v[rows] for name, v in values.items() if v is not None})
+
+
+def joined(pieces: Sequence[TrainResponse]) -> TrainResponse:
+    """One response of pieces that follow each other; what is no sample is that of the last one."""
+    last = pieces[-1]
+    if len(pieces) == 1:
+        return last
+    held = [name for name in SAMPLED if getattr(last, name) is not None]
+    whole: dict[str, Any] = {name: np.concatenate([getattr(piece, name) for piece in pieces]) for name in held}
+    return replace(last, **whole)

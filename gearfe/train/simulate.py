@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 import time as clock
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ..progress import stage
-from ..rigid import Trajectory, integrate
+from ..progress import count, stage
+from ..record_spectrum import FASTEST, SPARE
+from ..rigid import Start, Trajectory, integrate
 from .floquet import train_multipliers
 from .model import TrainModel
 from .motion import Motion, motion
-from .response import TrainResponse
+from .response import TrainResponse, joined
 
 Array = NDArray[np.float64]
 
@@ -26,6 +28,12 @@ SAFETY = 1.5
 DIVERGED = 0.25
 #: A multiplier beyond this is an instability, not round-off.
 STABLE = 1.0 + 1e-6
+#: A piece holds so many numbers of the state (4 MB) and is evaluated in some ten times that memory ...
+PIECE_NUMBERS = 500_000
+#: ... but has so many samples at least.
+LEAST_SAMPLES = 256
+#: What a run counts, piece by piece.
+COUNTED = ("steps", "evaluations", "newton_iterations", "rejected", "compile_seconds")
 
 
 def simulate(
@@ -64,33 +72,197 @@ def simulate(
     TrainResponse
         Up to the time reached; its status says why it ended earlier than asked.
     """
+    options = {"tolerance": tolerance, "method": method, "floquet": floquet, "estimate": estimate, "band_hz": band_hz}
+    return joined(list(simulate_in_pieces(model, times, backend=backend, **options)))  # type: ignore[arg-type]
+
+
+def simulate_in_pieces(
+    model: TrainModel,
+    times: ArrayLike,
+    *,
+    tolerance: float = 1e-6,
+    method: str = "auto",
+    floquet: bool = False,
+    estimate: bool = False,
+    band_hz: float = 5000.0,
+    backend: str = "auto",
+) -> Iterator[TrainResponse]:
+    """What `simulate` does, handed over piece by piece, so that a long run needs no more memory than a short one.
+
+    The pieces follow each other without gaps. What is no sample (status, statistics, estimates, warnings, multipliers)
+    holds for the whole run in the last piece.
+    """
     t = np.atleast_1d(np.asarray(times, dtype=float))
     if t.size < 2 or not np.isfinite(t).all() or t[0] != 0.0 or not (np.diff(t) > 0).all():
         raise InputError(
             "times", None, "must be at least two rising numbers that begin with 0", "give the output times in s"
         )
-    begin = clock.perf_counter()
-    with np.errstate(over="ignore", invalid="ignore"):
-        trajectory, moved = _run(model, t, tolerance, method, backend)
-        status, keep, why = _ended(model, trajectory, moved)
-    moved = _cut(moved, keep)
-    compiling = float(trajectory.statistics.get("compile_seconds", 0.0))
-    seconds = clock.perf_counter() - begin - compiling
-    statistics = {
-        **trajectory.statistics,
-        "method": trajectory.method,
-        "seconds": seconds,
-        "free_coordinates": model.core.T.shape[1],
-        "redundant_constraints": redundant_names(model),
-        "smallest_contact_force_N": [float(f.min(initial=np.inf)) for f in moved.contact_force.T],
-    }
-    response = _response(model, moved, status, statistics)
-    warnings = _pulls(model, moved)
-    if status != "done":
-        warnings.append(f"the run ended at {1e3 * response.time_reached:.6g} ms of {1e3 * t[-1]:.6g} ms: {status}{why}")
+    return _pieces(model, t, tolerance, method, floquet, band_hz if estimate else None, backend)
+
+
+def _pieces(
+    model: TrainModel, t: Array, tolerance: float, method: str, floquet: bool, band_hz: float | None, backend: str
+) -> Iterator[TrainResponse]:
+    so_far, begin, start = _SoFar(), 0, model.start
+    finer = None if band_hz is None else _Finer(max(1e-2 * tolerance, 1e-13), method, model.start)
+    for end in _ends(model, t):
+        if begin or end < len(t) - 1:
+            count(begin, len(t) - 1, "times")
+        clocked = clock.perf_counter()
+        with np.errstate(over="ignore", invalid="ignore"):
+            trajectory, moved = _run(model, t[begin : end + 1], tolerance, method, backend, start)
+            status, keep, why = _ended(model, trajectory, moved)
+        kept = _cut(moved, min(1, begin), keep)
+        so_far.add(trajectory, kept, clock.perf_counter() - clocked)
+        last = status != "done" or end == len(t) - 1
+        if finer is not None:
+            finer.compare(model, t[begin : end + 1], kept, int(trajectory.statistics["steps"]))
+        response = _response(model, kept, status, so_far.reached, so_far.statistics(model, trajectory))
+        if last:
+            if begin:
+                count(0, 0)  # what follows is no part of the count
+            yield _whole(model, response, so_far, finer, float(t[-1]), why, floquet, band_hz)
+            return
+        yield response
+        begin, start = end, replace(start, time=float(t[end]), q=moved.q[-1].copy(), v=moved.v[-1].copy())
+        method = _chosen(method, trajectory)
+
+
+def _chosen(method: str, trajectory: Trajectory) -> str:
+    """Method of the next piece: the one that the choice took for this one, unless it took several."""
+    return trajectory.method if method == "auto" else method
+
+
+def _ends(model: TrainModel, t: Array) -> Iterator[int]:
+    """Number of the last time of each piece: a piece is as long as its samples and its steps allow."""
+    samples = max(LEAST_SAMPLES, PIECE_NUMBERS // model.system.size)
+    highest = min(float(model.coupled_frequencies_hz.max(initial=0.0)), FASTEST)
+    span = samples / max(2.0 * SPARE * highest, 1e-300)
+    at = 0
+    while at < len(t) - 1:
+        far = int(np.searchsorted(t, t[at] + span, side="right")) - 1
+        at = min(max(at + 1, min(at + samples, far)), len(t) - 1)
+        yield at
+
+
+def _run(
+    model: TrainModel, t: Array, tolerance: float, method: str, backend: str, start: Start, longest: float = np.inf
+) -> tuple[Trajectory, Motion]:
+    if not len(model.core.squares):
+        method = "explicit"  # nothing is left to integrate
+    options: dict[str, Any] = {"tolerance": tolerance, "start": start, "backend": backend, "longest": longest}
+    trajectory = integrate(model.system, t, method=method, **options)
+    return trajectory, motion(model, trajectory)
+
+
+@dataclass
+class _SoFar:
+    """What a run adds up from piece to piece."""
+
+    seconds: float = 0.0
+    reached: float = 0.0
+    counted: dict[str, Any] = field(default_factory=dict)
+    least: Array = field(default_factory=lambda: np.zeros(0))
+    least_at: Array = field(default_factory=lambda: np.zeros(0))
+    most: Array = field(default_factory=lambda: np.zeros(0))
+
+    def add(self, trajectory: Trajectory, moved: Motion, seconds: float) -> None:
+        """Count steps and seconds, keep each mesh's least force, its time, and the largest size."""
+        self.seconds += seconds - float(trajectory.statistics.get("compile_seconds", 0.0))
+        for name in COUNTED:
+            if name in trajectory.statistics:
+                self.counted[name] = self.counted.get(name, 0) + trajectory.statistics[name]
+        force = moved.contact_force
+        if not len(self.least):
+            self.least, self.most = np.full(force.shape[1], np.inf), np.zeros(force.shape[1])
+            self.least_at = np.zeros(force.shape[1])
+        if len(force):
+            self.reached = float(moved.time[-1])
+            low = force.min(axis=0)
+            self.least_at = np.where(low < self.least, moved.time[force.argmin(axis=0)], self.least_at)
+            self.least = np.minimum(low, self.least)
+            self.most = np.maximum(np.abs(force).max(axis=0), self.most)
+
+    def statistics(self, model: TrainModel, trajectory: Trajectory) -> dict[str, Any]:
+        """Statistics of the response."""
+        return {
+            **trajectory.statistics,
+            **self.counted,
+            "method": trajectory.method,
+            "seconds": self.seconds,
+            "free_coordinates": model.core.T.shape[1],
+            "redundant_constraints": redundant_names(model),
+            "smallest_contact_force_N": self.least.tolist(),
+        }
+
+    def pulls(self, model: TrainModel) -> list[str]:
+        """Sentences about meshes whose spring pulls."""
+        return [
+            f"mesh {line.name} pulls: {force:.5g} N at {1e3 * at:.5g} ms; the spring acts both ways, real teeth would "
+            "part there"
+            for line, force, at, most in zip(model.meshes, self.least, self.least_at, self.most, strict=True)
+            if force < -1e-6 * most
+        ]
+
+
+@dataclass
+class _Finer:
+    """A second run beside the first, with a hundredth of the tolerance and steps half as long."""
+
+    tolerance: float
+    method: str
+    start: Start
+    off: Array = field(default_factory=lambda: np.zeros(0))
+    size: Array = field(default_factory=lambda: np.zeros(0))
+
+    @stage("error estimates")
+    def compare(self, model: TrainModel, t: Array, kept: Motion, steps: int) -> None:
+        """Go on to the end of the piece `t` and compare forces and accelerations where both runs hold."""
+        # where the corners of the curves set the steps, a tolerance alone would repeat them
+        longest = 0.5 * float(t[-1] - t[0]) / max(1, steps)
+        with np.errstate(over="ignore", invalid="ignore"):
+            trajectory, finer = _run(model, t, self.tolerance, self.method, "auto", self.start, longest)
+            one = np.hstack([kept.contact_force, kept.a @ model.axial.T])
+            two = np.hstack([finer.contact_force, finer.a @ model.axial.T])
+        shared, places = np.searchsorted(finer.time, kept.time), np.arange(len(kept.time))
+        inside = shared < len(finer.time)
+        one, two = one[places[inside]], two[shared[inside]]
+        if not len(self.off):
+            self.off = self.size = np.zeros(one.shape[1])
+        self.off = np.maximum(self.off, np.abs(one - two).max(axis=0, initial=0.0))
+        self.size = np.maximum(self.size, np.abs(two).max(axis=0, initial=0.0))
+        self.method = _chosen(self.method, trajectory)
+        if len(finer.time) == len(t):
+            self.start = replace(self.start, time=float(t[-1]), q=finer.q[-1].copy(), v=finer.v[-1].copy())
+
+    @property
+    def error(self) -> float:
+        """Largest error of a force or acceleration, relative to its largest value."""
+        return SAFETY * float((self.off / np.maximum(self.size, 1e-300)).max(initial=0.0))
+
+
+def _whole(
+    model: TrainModel,
+    response: TrainResponse,
+    so_far: _SoFar,
+    finer: _Finer | None,
+    asked: float,
+    why: str,
+    floquet: bool,
+    band_hz: float | None,
+) -> TrainResponse:
+    """The last piece with what holds for the whole run."""
+    warnings = so_far.pulls(model)
+    if response.status != "done":
+        reached = response.time_reached
+        warnings.append(f"the run ended at {1e3 * reached:.6g} ms of {1e3 * asked:.6g} ms: {response.status}{why}")
     estimates: dict[str, float] = {}
-    if estimate:
-        estimates = _estimates(model, response, t[: len(moved.time)], tolerance, method, band_hz)
+    if finer is not None and band_hz is not None:
+        estimates["integration"] = finer.error
+        if model.scene.housing is not None:
+            from ..reduction.error import reduction_error
+
+            estimates["reduction"] = reduction_error(model.scene.housing, band_hz).response
     multipliers, note = (None, "not computed") if not floquet else train_multipliers(model)
     if multipliers is not None and abs(multipliers[0]) > STABLE:
         growth, period = abs(multipliers[0]) - 1.0, float(response.common_period_s or 0.0)
@@ -99,16 +271,6 @@ def simulate(
             f"period of {1e3 * period:.4g} ms; add damping, or change the speed"
         )
     return replace(response, floquet=multipliers, floquet_note=note, estimates=estimates, warnings=tuple(warnings))
-
-
-def _run(
-    model: TrainModel, t: Array, tolerance: float, method: str, backend: str, longest: float = np.inf
-) -> tuple[Trajectory, Motion]:
-    if not len(model.core.squares):
-        method = "explicit"  # nothing is left to integrate
-    options: dict[str, Any] = {"tolerance": tolerance, "start": model.start, "backend": backend, "longest": longest}
-    trajectory = integrate(model.system, t, method=method, **options)
-    return trajectory, motion(model, trajectory)
 
 
 def _ended(model: TrainModel, trajectory: Trajectory, moved: Motion) -> tuple[str, int, str]:
@@ -142,11 +304,14 @@ def _too_far(model: TrainModel, reach: Array, shafts: Array, limit: float) -> st
     )
 
 
-def _cut(moved: Motion, keep: int) -> Motion:
-    return Motion(*(getattr(moved, name)[:keep] for name in ("time", "q", "v", "a", "contact_force", "drive_torque")))
+def _cut(moved: Motion, first: int, keep: int) -> Motion:
+    names = ("time", "q", "v", "a", "contact_force", "drive_torque")
+    return Motion(*(getattr(moved, name)[first:keep] for name in names))
 
 
-def _response(model: TrainModel, moved: Motion, status: str, statistics: dict[str, Any]) -> TrainResponse:
+def _response(
+    model: TrainModel, moved: Motion, status: str, reached: float, statistics: dict[str, Any]
+) -> TrainResponse:
     scene, t = model.scene, moved.time
     spin = [int(i) + 5 for i in model.first]
     rate, push = (model.angle(t, k)[:, None] * model.ratios for k in (1, 2))
@@ -180,7 +345,7 @@ def _response(model: TrainModel, moved: Motion, status: str, statistics: dict[st
         floquet=None,
         floquet_note="not computed",
         status=status,
-        time_reached=float(t[-1]) if len(t) else 0.0,
+        time_reached=reached,
         load_end_s=model.load_end,
         statistics=statistics,
     )
@@ -207,39 +372,3 @@ def redundant_names(model: TrainModel) -> list[str]:
     """Constraints that add nothing: two hinges of a rigid shaft in a rigid housing share five."""
     names = model.system.row_names()
     return [names[i] for i in model.start.freedoms.redundant]
-
-
-def _pulls(model: TrainModel, moved: Motion) -> list[str]:
-    said = []
-    for line, force in zip(model.meshes, moved.contact_force.T, strict=True):
-        if len(force) and force.min() < -1e-6 * np.abs(force).max():
-            at = int(force.argmin())
-            said.append(
-                f"mesh {line.name} pulls: {force[at]:.5g} N at {1e3 * moved.time[at]:.5g} ms; the spring acts both "
-                "ways, real teeth would part there"
-            )
-    return said
-
-
-@stage("error estimates")
-def _estimates(
-    model: TrainModel, response: TrainResponse, t: Array, tolerance: float, method: str, band_hz: float
-) -> dict[str, float]:
-    """Errors relative to each signal's largest value (integration), and of the reduction up to a frequency."""
-    found = {}
-    if len(t) >= 2:
-        with np.errstate(over="ignore", invalid="ignore"):
-            # where the corners of the curves set the steps, a tolerance alone would repeat them
-            longest = 0.5 * float(t[-1]) / max(1, int(response.statistics["steps"]))
-            _, finer = _run(model, t, max(1e-2 * tolerance, 1e-13), method, "auto", longest)
-        kept = min(len(finer.time), len(t))
-        pairs = [(response.contact_force[:kept], finer.contact_force[:kept])]
-        pairs.append((response.attachment_acceleration[:kept], finer.a[:kept] @ model.axial.T))
-        worst = [np.abs(x - y).max(axis=0) / np.maximum(np.abs(y).max(axis=0), 1e-300) for x, y in pairs if np.any(y)]
-        found["integration"] = SAFETY * float(max((w.max() for w in worst), default=0.0))
-    body = model.scene.housing
-    if body is not None:
-        from ..reduction.error import reduction_error
-
-        found["reduction"] = reduction_error(body, band_hz).response
-    return found

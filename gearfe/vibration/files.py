@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..output.files import whole_set, write_csv, write_json
 from ..stopwatch import Stopwatch
 from ..train.response import TrainResponse
 from ..train.scene import TrainScene
+from .follow import Followed, follow
 from .report import train_summary
-from .spectra import TrainSpectra, record, response_columns, spectra
+from .spectra import TrainRecord, TrainSpectra, record
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 #: Frames of the animation, and steps of the field files at most.
 FRAMES, FIELD_STEPS = 50, 101
@@ -61,9 +66,11 @@ class OutputChoice:
 
 @dataclass(frozen=True)
 class Written:
-    """Names of the files, the spectra (None where the run was too short), problems of the drawing, the summary."""
+    """Names of the files, the last piece of the response, the spectra (None where the run was too short), problems of
+    the drawing, the summary."""
 
     names: tuple[str, ...]
+    response: TrainResponse
     spectra: TrainSpectra | None
     problems: tuple[str, ...]
     summary: dict[str, Any]
@@ -96,6 +103,22 @@ def write_all(
     response: TrainResponse,
     choice: OutputChoice,
     *,
+    every: int = 1,
+    **options: Any,
+) -> Written:
+    """Write the files of a response at hand, `every` samples of which make an output step; see `write_run`."""
+    if response.status != "done":
+        choice = replace(choice, spectrum_start=0.0, spectrum_length=None)
+    return write_run(folder, scene, lambda _: [response], response.time[::every], choice, every=every, **options)
+
+
+def write_run(
+    folder: Path,
+    scene: TrainScene,
+    pieces: Callable[[Array], Iterable[TrainResponse]],
+    times: Array,
+    choice: OutputChoice,
+    *,
     title: str,
     watch: Stopwatch,
     every: int = 1,
@@ -103,78 +126,117 @@ def write_all(
     progress: Callable[[int, int, str], None] | None = None,
     started: float | None = None,
 ) -> Written:
-    """Write ``response.csv``, ``spectrum.csv``, ``summary.json`` and what else is chosen.
+    """Write ``response.csv``, ``spectrum.csv``, ``summary.json`` and what else is chosen while a run goes on.
 
-    `every` samples of the response make an output step. A run that ended early gets the same files, as far as it came.
-    With `started` (of `time.perf_counter`) the watch gets the total.
+    A run that ended early is made once more up to where it came, and gets the same files.
+
+    Parameters
+    ----------
+    pieces
+        Makes the run over the given output times, `every` samples in a step, and hands it over piece by piece.
+    times : (n,)
+        Output times (s).
+    started
+        Of `time.perf_counter`: the watch gets the total.
     """
     radiation = None if scene.housing is None else scene.housing.radiation
-    made = None
-    with watch.stage("spectra"):
-        if response.status == "done":
-            first, duration = choice.spectrum_start, choice.spectrum_length
-            made = spectra(response, radiation, every=every, window=choice.window, start=first, length=duration)
-        elif len(response.time) > 3 * every:
-            made = spectra(response, radiation, every=every, window=choice.window)
     problems: list[str] = []
-    outputs = response.every(every)
     with whole_set(folder, MAY_WRITE) as target:
+
+        def followed(times: Array, choice: OutputChoice) -> Followed:
+            first, duration = choice.spectrum_start, choice.spectrum_length
+            options: dict[str, Any] = {"window": choice.window, "start": first, "length": duration, "folder": folder}
+            record = TrainRecord(times, every, radiation, **options) if len(times) > 2 else None
+            table, keep = target / "response.csv", field_steps(times, choice) if choice.fields else None
+            with watch.stage("transient"):
+                run = _timed(pieces(times), watch)
+                return follow(run, times, every, table=table, radiation=radiation, record=record, keep=keep)
+
+        made = followed(times, choice)
+        response = made.response
+        if response.status != "done" and 2 <= made.outputs < len(times):
+            again = followed(times[: made.outputs], replace(choice, spectrum_start=0.0, spectrum_length=None))
+            made = replace(again, response=response)
+        compiling = float(response.statistics.get("compile_seconds", 0.0))
+        if compiling > 0.0:
+            watch.seconds["transient"] -= compiling
+            watch.seconds["compiling"] = compiling
+        spectra = made.spectra
         with watch.stage("tables"):
-            write_csv(target / "response.csv", _lists(response_columns(outputs, radiation)))
-            if made is not None:
-                write_csv(target / "spectrum.csv", _lists(made.columns()))
-        if choice.pictures and made is not None:
+            if spectra is not None:
+                write_csv(target / "spectrum.csv", spectra.columns())
+        if choice.pictures and spectra is not None:
             with watch.stage("pictures"):
-                _pictures(target, scene, response, made, choice, title)
-        if choice.fields:
+                _pictures(target, scene, made, spectra, choice, title)
+        if choice.fields and made.outputs:
             with watch.stage("fields"):
-                problems += _fields(target, scene, outputs, choice, title, progress)
+                problems += _fields(target, scene, made.kept, times[: made.outputs], choice, title, progress)
         if started is not None:
             watch.seconds["total"] = time.perf_counter() - started
-        summary = train_summary(response, made, watch.seconds, **(further or {}))
+        summary = train_summary(made, watch.seconds, **(further or {}))
         write_json(target / "summary.json", summary)
         names = tuple(sorted(path.name for path in target.iterdir()))
-    return Written(names, made, tuple(problems), summary)
+    return Written(names, response, spectra, tuple(problems), summary)
 
 
-def _lists(columns: Mapping[str, np.ndarray]) -> dict[str, list[float]]:
-    return {name: values.tolist() for name, values in columns.items()}
+def _timed(pieces: Iterable[TrainResponse], watch: Stopwatch) -> Iterator[TrainResponse]:
+    """The pieces; what is done with them is timed as ``tables`` and not as ``transient``."""
+    for piece in pieces:
+        handed = time.perf_counter()
+        yield piece
+        spent = time.perf_counter() - handed
+        watch.seconds["tables"] = watch.seconds.get("tables", 0.0) + spent
+        watch.seconds["transient"] = watch.seconds.get("transient", 0.0) - spent
+
+
+def field_steps(times: Array, choice: OutputChoice) -> Ints:
+    """Numbers of the output times that the files and pictures of the fields show, rising."""
+    series, still, film = _shown(times, choice)
+    return np.unique(np.concatenate([series, [still], film]))
+
+
+def _shown(times: Array, choice: OutputChoice) -> tuple[Ints, int, Ints]:
+    """Output times of the series, of the picture, and of the animation."""
+    last = len(times) - 1
+    series = np.arange(0, last + 1, max(1, -(-last // (FIELD_STEPS - 1))))
+    wanted = 4.55e-3 if choice.picture_time is None else choice.picture_time
+    film = np.unique(np.linspace(0, last, min(FRAMES, last + 1)).round().astype(np.int64))
+    return series, int(np.abs(times - wanted).argmin()), film
 
 
 def _pictures(
-    target: Path, scene: TrainScene, response: TrainResponse, made: TrainSpectra, choice: OutputChoice, title: str
+    target: Path, scene: TrainScene, made: Followed, spectra: TrainSpectra, choice: OutputChoice, title: str
 ) -> None:
     from .pictures import attachment_to_draw, draw_power, draw_response, draw_spectrum
 
+    response = made.curves
     loaded = next((load.bore for load in scene.loads if load.bore is not None), None)
     attachment = attachment_to_draw(response, choice.attachment, loaded)
-    draw_response(target / "response.png", response, attachment, title)
-    draw_spectrum(target / "spectrum.png", response, made, attachment, title)
-    if made.power is not None:
-        draw_power(target / "radiated_power.png", response, made, title)
+    draw_response(target / "response.png", response, attachment, title, made.mean_force)
+    draw_spectrum(target / "spectrum.png", response, spectra, attachment, title)
+    if spectra.power is not None:
+        draw_power(target / "radiated_power.png", response, spectra, title)
 
 
 def _fields(
     target: Path,
     scene: TrainScene,
-    response: TrainResponse,
+    kept: TrainResponse,
+    times: Array,
     choice: OutputChoice,
     title: str,
     progress: Callable[[int, int, str], None] | None,
 ) -> list[str]:
+    """Write and draw the fields of the response at the output times of `field_steps`."""
     from ..output.train_scene import draw_scene
-    from .fields import frames, step_at, write_gears, write_housing
+    from .fields import frames, write_gears, write_housing
 
-    last = len(response.time) - 1
-    stride = max(1, -(-last // (FIELD_STEPS - 1)))
-    steps = np.arange(0, last + 1, stride)
-    write_gears(target / "gears.vtkhdf", scene, response, steps)
+    steps = field_steps(times, choice)
+    series, still, film = (np.searchsorted(steps, some) for some in _shown(times, choice))
+    write_gears(target / "gears.vtkhdf", scene, kept, series)
     if scene.housing is not None:
-        write_housing(target / "housing.vtkhdf", scene.housing, response, steps, progress=progress)
-    wanted = min(4.55e-3, float(response.time[-1])) if choice.picture_time is None else choice.picture_time
-    still = step_at(response, min(wanted, float(response.time[-1])))
-    problem = draw_scene(target / "fields.png", frames(scene, response, [still]), title)
+        write_housing(target / "housing.vtkhdf", scene.housing, kept, series, progress=progress)
+    problem = draw_scene(target / "fields.png", frames(scene, kept, [int(still)]), title)
     if choice.animation and not problem:
-        film = np.unique(np.linspace(0, last, min(FRAMES, last + 1)).round().astype(int))
-        problem = draw_scene(target / "fields.gif", frames(scene, response, film), title)
+        problem = draw_scene(target / "fields.gif", frames(scene, kept, film), title)
     return [f"fields were not drawn: {problem}"] if problem else []

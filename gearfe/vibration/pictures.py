@@ -10,7 +10,7 @@ from ..errors import unknown_name
 from ..output.train_figures import Mark, power_figure, response_figure, spectrum_figure
 from ..spectrum import nearest_line, peaks
 from ..train.response import TrainResponse
-from .report import lines_of, mean_over_periods
+from .report import lines_of
 from .spectra import TrainSpectra
 
 #: Lines that are named in the picture of a spectrum, and the least amplitude of such a line in parts of the largest.
@@ -19,21 +19,16 @@ _NAMED, _LEAST = 5, 0.2
 _MESH_MULTIPLES = 4.2
 
 
-def draw_response(path: Path, response: TrainResponse, attachment: str, title: str) -> None:
+def draw_response(path: Path, response: TrainResponse, attachment: str, title: str, mean: np.ndarray) -> None:
     """Contact forces, speeds, angular accelerations, and the acceleration at an attachment over the drive's rotation.
 
-    Shafts that turn against the drive are drawn with their sign reversed.
+    Shafts that turn against the drive are drawn with their sign reversed. `mean`: of each contact force (N).
     """
     sense = float(np.sign(response.drive_angle[-1])) or 1.0
     signs = np.where(np.sign(response.speed.mean(axis=0)) * sense < 0.0, -1.0, 1.0)
     drive = sense if len(signs) else 1.0
     labels = [n if s > 0.0 else f"{n} (sign reversed)" for n, s in zip(response.shaft_names, signs, strict=True)]
-    means = {}
-    if len(response.time) >= 4:
-        mean, _ = mean_over_periods(
-            response.time, response.contact_force, response.load_end_s, response.common_period_s
-        )
-        means = {f"mesh {i + 1}, mean {m / 1e3:.4g} kN": m / 1e3 for i, m in enumerate(mean)}
+    means = {f"mesh {i + 1}, mean {m / 1e3:.4g} kN": m / 1e3 for i, m in enumerate(mean)}
     names = list(means) or [f"mesh {i + 1}" for i in range(len(response.mesh_names))]
     response_figure(
         path,

@@ -12,6 +12,7 @@ from ..spectrum import OrderLine, nearest_line, order_lines, peaks
 from ..stiffness.curve import StiffnessCurve
 from ..train.response import TrainResponse
 from ..train.scene import TrainScene
+from .follow import Followed, RunningMean
 from .spectra import TrainSpectra
 
 Array = NDArray[np.float64]
@@ -37,12 +38,9 @@ def mean_over_periods(time: Array, values: Array, begin: float, period: float | 
     period
         Common period (s) or None.
     """
-    from scipy.interpolate import CubicSpline
-
-    end = float(time[-1])
-    count = 0 if not period else int((end - begin) / period * (1.0 + 1e-12))
-    low = end - count * period if count and period else min(begin, float(time[-2]))
-    return np.asarray(CubicSpline(time, values).integrate(max(low, float(time[0])), end)) / (end - low), count
+    mean = RunningMean(time, begin, period)
+    mean.add(time, values)
+    return mean.value, mean.periods
 
 
 def fundamentals(response: TrainResponse) -> dict[str, float]:
@@ -74,10 +72,9 @@ def dominant(spectra: TrainSpectra, response: TrainResponse, name: str, count: i
     return found
 
 
-def train_summary(
-    response: TrainResponse, made: TrainSpectra | None, timings: Mapping[str, float], **further: Any
-) -> dict[str, Any]:
+def train_summary(followed: Followed, timings: Mapping[str, float], **further: Any) -> dict[str, Any]:
     """Content of summary.json; `further` entries are put after the status."""
+    response, made = followed.response, followed.spectra
     period, floquet = response.common_period_s, response.floquet
     summary: dict[str, Any] = {
         "status": response.status,
@@ -96,18 +93,18 @@ def train_summary(
             "note": response.floquet_note,
         },
     }
-    if len(response.time) >= 4:
-        loaded = response.time >= response.load_end_s
-        force, count = mean_over_periods(response.time, response.contact_force, response.load_end_s, period)
+    if followed.outputs >= 2:
+        force = followed.mean_force
         summary |= {
             "mean_contact_forces_N": force,
-            "mean_over_common_periods": count,
-            "smallest_contact_forces_N": response.contact_force.min(axis=0),
-            "smallest_contact_forces_under_load_N": response.contact_force[loaded if loaded.any() else ...].min(axis=0),
-            "largest_contact_forces_N": response.contact_force.max(axis=0),
+            "mean_over_common_periods": followed.periods,
+            "smallest_contact_forces_N": followed.least_force,
+            "smallest_contact_forces_under_load_N": followed.least_loaded_force,
+            "largest_contact_forces_N": followed.largest_force,
             "peak_attachment_accelerations_m_per_s2": dict(
-                zip(response.attachment_names, np.abs(response.attachment_acceleration).max(axis=0), strict=True)
+                zip(response.attachment_names, followed.peak_acceleration, strict=True)
             ),
+            "response_band_limited": False,
         }
         if len(force) and force[0] != 0.0:
             summary["contact_force_ratios_to_first"] = force / force[0]

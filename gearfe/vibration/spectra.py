@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..record_spectrum import RecordSpectrum
+from ..record_spectrum import FASTEST, RecordSpectrum
 from ..spectrum import Spectrum, uniform_step
 from ..train.response import TrainResponse
 from .radiation import AIR_DENSITY, AIR_SPEED, RadiatedPower, instantaneous_power
@@ -95,6 +96,8 @@ class TrainRecord:
         See `gearfe.spectrum.WINDOWS`.
     start, length
         Begin and duration of the record (s); by default all of it.
+    folder
+        For temporary files of a long record.
 
     Raises
     ------
@@ -111,7 +114,9 @@ class TrainRecord:
         window: str = "none",
         start: float = 0.0,
         length: float | None = None,
+        folder: Path | None = None,
     ) -> None:
+        self._folder = folder
         self.step, self.every, self.window = uniform_step(times), every, window
         self.first, self.count = record(times, start, length)
         self.start = float(times[self.first])
@@ -130,7 +135,7 @@ class TrainRecord:
             When they are too far apart for the highest modes, whose vibration would fold into the spectrum.
         """
         highest, nyquist = float(piece.coupled_frequencies_Hz.max(initial=0.0)), 0.5 * self.every / self.step
-        if highest > nyquist:
+        if min(highest, FASTEST) > nyquist:
             problem = f"modes up to {highest:.6g} Hz would fold, half the sampling frequency is {nyquist:.6g} Hz"
             raise InputError("response", None, problem, "simulate at the times of gearfe.record_spectrum.finer")
         columns = {name: values for name, values in response_columns(piece).items() if name not in NO_SIGNALS}
@@ -144,8 +149,15 @@ class TrainRecord:
             values = np.column_stack([values, rates])
         if self._made is None:
             self._names = tuple(columns)
-            self._made = RecordSpectrum(values.shape[1], self.count, self.step, self.every, self.window)
+            self._made = RecordSpectrum(
+                values.shape[1], self.count, self.step, self.every, self.window, folder=self._folder
+            )
         self._made.add(number, values)
+
+    @property
+    def complete(self) -> bool:
+        """Whether all samples have arrived."""
+        return self._made is not None and self._made.complete
 
     def spectra(self) -> TrainSpectra:
         """The spectra, when all samples have arrived."""

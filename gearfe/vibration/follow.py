@@ -1,0 +1,263 @@
+"""What is kept of a run whose pieces go by: its table, its spectra, means and extremes, curves and fields to draw."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..output.files import csv_table
+from ..train.response import TrainResponse, joined
+from .spectra import TrainRecord, TrainSpectra, response_columns
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Parts of the curves in a picture: more than it has columns of pixels.
+DRAWN = 4000
+#: Samples that a spline through a piece shares with the piece before.
+_SHARED = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """What is kept of a run.
+
+    Attributes
+    ----------
+    response
+        The last piece: what is no sample holds for the whole run.
+    outputs
+        Number of output times.
+    least_force, least_loaded_force, largest_force, mean_force : (meshes,)
+        Of all samples (N); under load: after the load's ramps; the mean over `periods` common mesh periods at the end.
+    periods
+        Whole periods of the mean, 0 where it is over all times under load.
+    peak_acceleration : (attachments,)
+        Largest size (m/s2).
+    curves
+        The response for pictures: all samples, or the least and the largest ones of equal parts of the run.
+    kept
+        The response at the output times that were asked for.
+    spectra
+        None where the run was too short.
+    """
+
+    response: TrainResponse
+    outputs: int
+    least_force: Array
+    least_loaded_force: Array
+    largest_force: Array
+    mean_force: Array
+    periods: int
+    peak_acceleration: Array
+    curves: TrainResponse
+    kept: TrainResponse
+    spectra: TrainSpectra | None
+
+
+def follow(
+    pieces: Iterable[TrainResponse],
+    times: Array,
+    every: int,
+    *,
+    table: Path,
+    radiation: Array | None = None,
+    record: TrainRecord | None = None,
+    keep: Ints | None = None,
+) -> Followed:
+    """Follow a run to its end; each piece is dropped when the next one comes.
+
+    Parameters
+    ----------
+    pieces
+        Samples of the response, `every` of them in an output step.
+    times : (n,)
+        Output times (s) of the whole run.
+    table
+        File to write: ``response.csv``.
+    radiation
+        Surface matrix of the housing.
+    record
+        Makes the spectra.
+    keep
+        Numbers of output times whose response is kept, rising.
+
+    Raises
+    ------
+    InputError
+        When there is no piece.
+    """
+    wanted = np.zeros(0, dtype=np.int64) if keep is None else every * keep
+    envelope = Envelope(every * (len(times) - 1) + 1)
+    extremes: _Extremes | None = None
+    kept: list[TrainResponse] = []
+    passed = 0
+    with csv_table(table) as write:
+        for piece in pieces:
+            if extremes is None:
+                mean = RunningMean(times, piece.load_end_s, piece.common_period_s)
+                extremes = _Extremes(piece.load_end_s)
+            count = len(piece.time)
+            write(response_columns(piece.every(every, -passed % every), radiation))
+            if record is not None and count:
+                record.add(piece)
+            envelope.add(passed, _drawn(piece))
+            mean.add(piece.time, piece.contact_force)
+            extremes.add(piece)
+            inside = wanted[(wanted >= passed) & (wanted < passed + count)]
+            kept.append(piece.at(inside - passed))
+            passed += count
+    if extremes is None:
+        raise InputError("response", None, "the run has no piece", "give the response")
+    return Followed(
+        piece,
+        (passed + every - 1) // every,
+        extremes.least,
+        extremes.least_loaded if np.isfinite(extremes.least_loaded).all() else extremes.least,
+        extremes.largest,
+        mean.value,
+        mean.periods,
+        extremes.peak,
+        _curves(piece, envelope.values()),
+        joined(kept),
+        record.spectra() if record is not None and record.complete else None,
+    )
+
+
+class RunningMean:
+    """Mean over the last whole periods after `begin` of values that arrive piece by piece.
+
+    The integral is that of cubic splines through the samples, so its ends need not lie on them. Without a whole period
+    (or without any) the mean is that of all times after `begin`, and the number of periods 0.
+
+    Parameters
+    ----------
+    times : (n,)
+        Times of the run (s), of which the last two count.
+    begin
+        Where the start-up ends (s).
+    period
+        Common period (s) or None.
+    """
+
+    def __init__(self, times: Array, begin: float, period: float | None) -> None:
+        end = float(times[-1])
+        self.periods = 0 if not period else int((end - begin) / period * (1.0 + 1e-12))
+        low = end - self.periods * period if self.periods and period else min(begin, float(times[-2]))
+        self._low = max(low, float(times[0]))
+        self._total: Array | float = 0.0
+        self._last: tuple[Array, Array] | None = None
+        self._from = self._to = self._low
+
+    def add(self, time: Array, values: Array) -> None:
+        """Go on with samples (n,), (n, k)."""
+        from scipy.interpolate import CubicSpline
+
+        if not len(time):
+            return
+        if self._last is not None:
+            time, values = (np.concatenate([one, two]) for one, two in zip(self._last, (time, values), strict=True))
+        self._last = time[-_SHARED:], values[-_SHARED:]
+        end = float(time[-1])
+        if len(time) > 1 and end > self._to:
+            self._total = self._total + CubicSpline(time, values).integrate(max(self._to, float(time[0])), end)
+            self._to = end
+
+    @property
+    def value(self) -> Array:
+        """(k,) the mean."""
+        return np.asarray(self._total) / (self._to - self._from) if self._to > self._from else np.zeros(0)
+
+
+@dataclass
+class _Extremes:
+    """Least and largest forces and accelerations so far."""
+
+    load_end: float
+    least: Array = field(default_factory=lambda: np.zeros(0))
+    least_loaded: Array = field(default_factory=lambda: np.zeros(0))
+    largest: Array = field(default_factory=lambda: np.zeros(0))
+    peak: Array = field(default_factory=lambda: np.zeros(0))
+
+    def add(self, piece: TrainResponse) -> None:
+        force, push = piece.contact_force, np.abs(piece.attachment_acceleration)
+        if not len(self.peak):
+            meshes = force.shape[1]
+            self.least, self.least_loaded = np.full(meshes, np.inf), np.full(meshes, np.inf)
+            self.largest, self.peak = np.full(meshes, -np.inf), np.zeros(push.shape[1])
+        loaded = force[piece.time >= self.load_end]
+        self.least = np.minimum(self.least, _min(force))
+        self.least_loaded = np.minimum(self.least_loaded, _min(loaded))
+        self.largest = np.maximum(self.largest, -_min(-force))
+        self.peak = np.maximum(self.peak, -_min(-push))
+
+
+def _min(values: Array) -> Array:
+    return np.asarray(values.min(axis=0, initial=np.inf))
+
+
+class Envelope:
+    """Least and largest values of signals in equal parts of a run, or the samples where these are few.
+
+    Parameters
+    ----------
+    samples
+        Of the whole run.
+    parts
+        At most.
+    """
+
+    def __init__(self, samples: int, parts: int = DRAWN) -> None:
+        self.width = -(-samples // parts)
+        self._number = -1  # of the part under way
+        self._rows: list[Array] = []
+
+    def add(self, first: int, values: Array) -> None:
+        """Take samples (n, k) whose first is number `first` of the run."""
+        if not len(values):
+            return
+        if self.width == 1:
+            self._rows.append(np.array(values))
+            return
+        number = (first + np.arange(len(values))) // self.width
+        starts = np.flatnonzero(np.diff(number, prepend=number[0] - 1))
+        low, high = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
+        both = np.stack([low, high], axis=1)
+        if number[0] == self._number:
+            before = self._rows[-1][-1:]
+            both[0] = np.minimum(both[0, 0], before[0, 0]), np.maximum(both[0, 1], before[0, 1])
+            self._rows[-1] = self._rows[-1][:-1]
+        self._number = int(number[-1])
+        self._rows.append(both)
+
+    def values(self) -> Array:
+        """(rows, k) samples, or two rows a part: the least and the largest values."""
+        if not self._rows:
+            return np.zeros((0, 0))
+        whole = np.concatenate(self._rows)
+        return whole if self.width == 1 else whole.reshape(-1, whole.shape[-1])
+
+
+#: What the pictures draw.
+_CURVES = ("drive_angle", "contact_force", "speed", "acceleration", "attachment_acceleration")
+
+
+def _drawn(piece: TrainResponse) -> Array:
+    return np.column_stack([piece.time, *(getattr(piece, name) for name in _CURVES)])
+
+
+def _curves(piece: TrainResponse, values: Array) -> TrainResponse:
+    """The response whose curves are the columns of `_drawn`."""
+    empty = piece.every(1, len(piece.time))
+    if not len(values):
+        return empty
+    widths = [1] + [1 if getattr(piece, n).ndim == 1 else getattr(piece, n).shape[1] for n in _CURVES]
+    parts = np.split(values, np.cumsum(widths)[:-1], axis=1)
+    made = dict(zip(("time", *_CURVES), parts, strict=True))
+    made |= {name: made[name][:, 0] for name in ("time", "drive_angle")}
+    return replace(empty, **made)  # type: ignore[arg-type]
