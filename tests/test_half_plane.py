@@ -16,6 +16,7 @@ from gearfe.contact.wedge import ELLIPSE_W, ELLIPSE_X, mean_log, wedge_tensor
 from gearfe.elasticity import Material
 from gearfe.gear.flank_curve import flank_curve
 from gearfe.gear.pair import GearPair, TipRelief
+from gearfe.stiffness.routes import Router
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import gear
@@ -269,3 +270,20 @@ def test_one_gear_softer_and_wider() -> None:
     law = half_plane_pair(pair, elastic_pair(pair, metals, law="penalty", flank_coarsen=4.0))
     expected = np.array([p.torque_wheel for p in reference])
     assert np.abs(solve_half_plane(law, angles, twist).torque_wheel / expected - 1).max() < 1.5e-3
+
+
+def test_an_undercuts_edge_on_a_nearly_flat_mate() -> None:
+    """Steps that go to and fro are damped; the law of small loads, which knows the edge exactly, agrees."""
+    sharp = gear_pair(12, 51, module=1.5e-3, pressure_angle=20.0, width=6e-3, bore=0.25)
+    law = half_plane_pair(sharp, elastic_pair(sharp, law="half_plane"))
+    assert law.flanks.pinion.fall > 0.1
+    angles = np.linspace(0, sharp.mesh_cycle, 80, endpoint=False)
+    for module_share in (0.002, 0.008, 0.03):
+        found = solve_half_plane(law, angles, module_share * sharp.wheel.module / sharp.wheel.base_radius)
+        assert set(found.status) == {"converged"}
+        assert "undercut" in found.contacts.mark
+    twist = 0.002 * sharp.wheel.module / sharp.wheel.base_radius
+    at_edge = angles[::8]
+    small = Router(sharp, elastic_pair(sharp), "hertz").solve(at_edge, np.full(len(at_edge), twist))
+    found = solve_half_plane(law, at_edge, twist).torque_wheel
+    assert found == pytest.approx([p.torque_wheel for p in small], rel=1.5e-3)

@@ -151,3 +151,15 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     job.write_text(JOB + 'law_sides = "pinion"\n')
     assert main(["stiffness", str(job), "--out", str(tmp_path / "out")]) != 0
     assert "law_sides" in capsys.readouterr().err
+
+
+def test_estimate_covers_what_a_finer_mesh_shows() -> None:
+    """From influence functions of two meshes; against elements half as large."""
+    options = {"twist": math.radians(0.05), "angles": ANGLES, "law": "half_plane", "kinematics": "small"}
+    found = sweep_stiffness(PAIR, estimate_error=True, elastic=elastic_of("half_plane"), **options)
+    finer = sweep_stiffness(PAIR, coarsen=0.5, flank_coarsen=0.5, **options)
+    error = found.error
+    assert error is not None
+    true = np.abs(finer.k_mesh / found.k_mesh - 1)
+    assert (true <= error.relative).all()
+    assert error.worst < 3e-3

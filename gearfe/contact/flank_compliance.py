@@ -43,6 +43,8 @@ Array = NDArray[Any]
 
 #: Half width of a bump, in elements and at least in modules; distance of two stations in half widths.
 BUMP_ELEMENTS, BUMP_MODULES, SPACING = 2.0, 0.2, 0.8
+#: Distance (m) that is none.
+TINY = 1e-12
 #: Nearer to an end of the flank than this share of an element there is no station.
 TOO_NEAR = 0.75
 
@@ -85,6 +87,13 @@ class FlankCompliance:
         """Distance y (m) of the flank at arc lengths s (m) from the corner."""
         here = np.maximum(s, self.curve.low)
         return np.maximum(np.abs(self.curve.at(here)[0] - self.corner), 1e-9) + (here - s)
+
+    def clearance(self, s: Array) -> Array:
+        """Square of the distance (m2) from the corner and from the edge of an undercut, at arc lengths s (m)."""
+        corner = self.distance(s) ** 2
+        if self.curve.face.fall == 0.0:
+            return corner
+        return 1 / (1 / corner + 1 / (s * s + TINY**2))
 
     def shapes(self, s: Array) -> tuple[Array, Array, Array]:
         """Shape functions of the stations at arc lengths s (m), slopes (1/m) and curvatures (1/m2), shape (..., k)."""

@@ -13,7 +13,7 @@ faces as moved by the loads :math:`F_0` of the step before (`.moved_faces`),
     + \sum_i \frac{n W_i n}{E_i'}\int -\ln(y_i+\eta_i)\,p + \sum_l T_l\,(F_l-F_{0,l}) \ge 0,
 
 complementary, :math:`T = w\, n H n` over all tooth pairs l of the position. Then O moves to the mean place of p, n to
-the mean normal of the deformed faces under p (of the face that is further from its corner), H is taken at the material
+the mean normal of the deformed faces under p (of the face that is further from its edges), H is taken at the material
 that is at O now, and so on until F stays.
 
 **Why this is an equilibrium.** H is symmetric, and with O at the mean place of p the energy does not change to first
@@ -55,6 +55,8 @@ IntArray = NDArray[np.int64]
 
 #: Relative change of the forces from step to step at which a position is solved but for its last steps; most steps.
 TOLERANCE, STEPS = 1e-5, 20
+#: Steps that most positions need; where more are needed, their moves are damped.
+USUAL_STEPS = 5
 #: Last steps, with the windows and the bearing panels held: after so many, derivatives err by 1e-3.
 HELD_STEPS = 3
 #: What the twist is ahead for derivatives: share of its way since the touch, and at least (rad).
@@ -127,9 +129,9 @@ class _Open:
         new = made.solution.force
         return self.couples.total(np.abs(new - self.pairs.force)) / np.maximum(self.couples.total(new), TINY)
 
-    def moved_on(self, law: HalfPlanePair, made: Step) -> _Open:
+    def moved_on(self, law: HalfPlanePair, made: Step, *, damped: bool = False) -> _Open:
         """What the next step starts from."""
-        frames, before = moved_on(law, made)
+        frames, before = moved_on(law, made, self.pairs.before, damped=damped)
         return _Open(self.numbers, _Pairs(self.pairs.found, frames, made.solution.force, made.spread, before))
 
 
@@ -189,7 +191,7 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
         near = ~unsettled & (open_.change(made) <= TOLERANCE) & (number > 1)
         bears = couples.total(made.solution.force) > 0
         status[open_.numbers[near & ~bears]] = "no_contact"
-        open_ = open_.moved_on(law, made)
+        open_ = open_.moved_on(law, made, damped=number >= USUAL_STEPS)
         if (near & bears).any():
             done.append(open_.kept(near & bears))
         if near.any():

@@ -23,6 +23,8 @@ ComplexArray = NDArray[np.complex128]
 
 #: Gap at the window's ends in units of that at the ends of Hertz's contact of the same force.
 WINDOW = 1.25
+#: A move of a contact is damped that is followed by one of more than this share of it, and at most so much.
+SLOW, LEAST_SHARE = 0.3, 0.3
 #: Force, of all pairs of a position, below which a window is not made smaller.
 LEAST_FORCE = 1e-4
 
@@ -137,10 +139,16 @@ class Before:
         Windows, seen from where the pressure was then.
     bearing : ndarray of bool, shape (p, n)
         Panels that bore.
+    place : ndarray, shape (p,)
+        Mean places of the pressure that the step found (m).
+    taken : ndarray, shape (p,)
+        Share of the move to there that was taken.
     """
 
     window: Windows
     bearing: NDArray[np.bool_]
+    place: Array
+    taken: Array
 
 
 def cross(a: ComplexArray, b: ComplexArray) -> Array:
@@ -281,8 +289,8 @@ def _moments(
     variance = np.where(loaded, (p * width * (x - place[:, None]) ** 2).sum(axis=1) / safe, 0.0)
     between = 0.5 * (p[:, 1:] + p[:, :-1])
     area = (between * np.diff(x, axis=1)).sum(axis=1)
-    # of both faces the one further from its corner tells the normal better
-    far = [side.distance(arc[:, gear]) ** 2 for gear, side in enumerate(law.sides)]
+    # both faces have the same, and the one further from its edges changes less with where it is taken
+    far = [side.clearance(arc[:, gear]) for gear, side in enumerate(law.sides)]
     rise = np.zeros(len(x))
     for gear in (0, 1):
         deformed = heights[gear] - WAY[gear] * np.einsum("pij,pj->pi", edges[gear], p)
@@ -290,18 +298,31 @@ def _moments(
     return place, variance, np.where(area > 0, rise / np.where(area > 0, area, 1.0), window.lean)
 
 
-def moved_on(law: HalfPlanePair, made: Step) -> tuple[Frames, Before]:
-    """What the next step starts from: frames at the mean place of the pressure, along the mean normal under it."""
+def moved_on(law: HalfPlanePair, made: Step, before: Before | None, *, damped: bool) -> tuple[Frames, Before]:
+    """What the next step starts from: frames at the mean place of the pressure, along the mean normal under it.
+
+    Places that go to and fro (an edge bears whose mate is nearly flat) are `damped` on demand: then only the share of
+    the move is taken that would have ended it (Aitken's; Kuettler & Wall, *Comput. Mech.* 43, 2008).
+    """
     frames = made.frames
-    arc = frames.arc + made.place[:, None] * np.array(WAY)
+    if before is None:
+        share = np.ones(len(made.place))
+    elif damped:
+        slow = np.abs(made.place) > SLOW * np.abs(before.place)
+        fall = np.where(slow & (before.place != made.place), before.place - made.place, np.inf)
+        share = np.where(slow, np.clip(before.taken * before.place / fall, LEAST_SHARE, 1.0), before.taken)
+    else:
+        share = before.taken
+    place = share * made.place
+    arc = frames.arc + place[:, None] * np.array(WAY)
     for gear, curve in enumerate(law.curves):
         arc[:, gear] = np.clip(arc[:, gear], curve.low, curve.high)
-    turned = 1 + 1j * made.slope
+    turned = 1 + 1j * share * made.slope
     onward = replace(
         frames,
-        centre=frames.centre - 1j * frames.normal * made.place,
+        centre=frames.centre - 1j * frames.normal * place,
         normal=frames.normal * turned / np.abs(turned),
         arc=arc,
     )
-    window = replace(made.window, middle=made.window.middle - made.place, nearest=made.window.nearest - made.place)
-    return onward, Before(window, made.solution.pressure > 0)
+    window = replace(made.window, middle=made.window.middle - place, nearest=made.window.nearest - place)
+    return onward, Before(window, made.solution.pressure > 0, made.place, share)

@@ -19,6 +19,9 @@ the second term, measured on the curve's own mesh, for 0 < s < 1 only. :math:`\e
 against fine meshes: `LAW` where every contact is that of smooth curves, `LAW_AT_EDGES` where one reaches a tip's end,
 the start of a relief or the edge of an undercut.
 
+The half-plane law is solved twice in the same way, with influence functions from two meshes; what they share (bumps,
+panels, half-planes and wedges) is `HALF_PLANE`, by what bears besides smooth flanks.
+
 Not in it: the model (plane, no friction, rigid bores, small strain with its first-order correction) and what no
 refinement of one mesh family shows. `scripts/measure_curve_accuracy.py` measures over random pairs how often it covers
 the true error.
@@ -46,6 +49,9 @@ COARSENING, ORDER, COMMON, POSITIONS = 1.6, 1.0, 5e-5, 20
 #: Relative error of the law of small loads on smooth flanks and at their ends and edges: of random pairs on the path,
 #: 95 % of the positions were within the first (docs/verification.md, "Small loads").
 LAW, LAW_AT_EDGES = 5e-4, 1e-3
+#: Relative error of the half-plane law that no mesh shows: on smooth flanks, at rounded and at sharp edges (as in
+#: `contact_pressure.EDGES`); with it the estimates cover 95 % of random pairs (docs/contact_laws.md).
+HALF_PLANE = (1e-4, 2e-4, 1.5e-3)
 
 
 def solved_twice(converged: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -56,10 +62,20 @@ def solved_twice(converged: NDArray[np.bool_]) -> NDArray[np.int64]:
     return good[np.unique(np.linspace(0, len(good) - 1, min(len(good), POSITIONS)).round().astype(np.int64))]
 
 
-def law_error(router: PositionSolver, angles: Array, twists: Array) -> Array:
-    """What the law of small loads adds to the relative error at n pinion angles and twists (rad), shape (n,)."""
+def law_error(router: PositionSolver, angles: Array, twists: Array, edge: Array | None = None) -> Array:
+    """What the half-plane law and that of small loads add to the relative error, shape (n,).
+
+    Parameters
+    ----------
+    angles, twists : ndarray, shape (n,)
+        rad.
+    edge : ndarray, shape (n,)
+        What bears besides smooth flanks, the place in `contact_pressure.EDGES`; only the half-plane law asks for it.
+    """
     made = np.zeros(len(angles))
-    if not isinstance(router, Router) or router.route == "direct":
+    if not isinstance(router, Router):
+        return made if edge is None else np.array(HALF_PLANE)[edge.astype(np.int64)]
+    if router.route == "direct":
         return made
     for i in np.flatnonzero(router.light(angles, twists)):
         angle, twist = float(angles[i]), float(twists[i])

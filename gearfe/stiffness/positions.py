@@ -160,7 +160,7 @@ def _with_shares(
         )
         found = _replaced(found, again, searched)
         iterations[again] += searched.iterations
-        if np.max(np.abs(every - before)) <= SHARE_TOLERANCE:
+        if np.max(np.abs(every - before)) <= max(SHARE_TOLERANCE, router.torque_tolerance):
             break
         before = every
     raised = [with_share(p, c) for p, c in zip(found.positions, every, strict=True)]

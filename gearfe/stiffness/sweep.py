@@ -255,7 +255,8 @@ def _estimate(
     other = np.where(np.array(again.status, dtype=object) == "converged", again.numbers["torque_wheel"], np.nan)
     torque, tangent = solved.numbers["torque_wheel"][chosen], solved.numbers["tangent"][chosen]
     # a twist of some bits of the gears' angles is not what the gears are turned by
-    law = law_error(own, angles[chosen], solved.twist[chosen]) + ANGLE_ROUNDING * np.abs(tangent / torque)
+    law = law_error(own, angles[chosen], solved.twist[chosen], solved.numbers["edge"][chosen])
+    law += ANGLE_ROUNDING * np.abs(tangent / torque)
     return error_estimate(angles[chosen], torque, other, coarsen=coarsen, law=law)
 
 
