@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,10 +16,12 @@ from gearfe.progress import shown
 from gearfe.rigid import Body, CoordinateSpring, Gravity, Hinge, ModalBlocks, PlanarScene, Scene, System
 from gearfe.rigid.choice import STOPPED, Choice, Leg, Watch, Way, joined, joined_statistics
 from gearfe.rigid.contract import Array
-from gearfe.rigid.integrate import integrate, ways_of
+from gearfe.rigid.integrate import _dropped_rows_hold, integrate, ways_of
 from gearfe.rigid.start import Freedoms, Start, consistent_start
+from gearfe.train import build_train, simulate
 
 from .rigid_cases import pendulum
+from .trains import train
 
 Cost = Callable[[float], float]
 START = Start(0.0, np.zeros(1), np.zeros(1), Freedoms(1, 0), np.zeros(0, dtype=bool))
@@ -106,6 +110,15 @@ def test_steps_that_do_not_grow_are_given_up_early() -> None:
     two = stub("two", clock, lambda _: 1e-2, lambda _: 1e-4)
     assert names(chosen(one, two, clock=clock)[0]) == ["one"]
     assert clock.now < 1.25 * 2.0
+
+
+def test_a_trial_whose_steps_are_too_dear_for_a_run_is_given_up() -> None:
+    """A run takes sixteen steps at least: 3.2 s of the second way, where the first needs 2 s."""
+    clock = Clock()
+    one = stub("one", clock, lambda _: 2e-3, lambda _: 1e-3)
+    two = stub("two", clock, lambda _: 0.2, lambda _: 1e-6)
+    assert names(chosen(one, two, clock=clock)[0]) == ["one"]
+    assert clock.now < 2.0 + 3 * 0.2
 
 
 def test_a_prediction_that_proves_wrong_changes_the_way_over() -> None:
@@ -241,3 +254,29 @@ def test_the_choice_and_its_prediction_are_told_before_the_end() -> None:
     assert made.method == "taylor"
     assert [leg["method"].split()[0] for leg in made.statistics["choice"]] == ["taylor"]
     assert made.statistics["choice"][0]["predicted_s"] > 0.0
+
+
+def test_the_compiler_is_no_integration(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Seconds of compiling are told apart: of 5 s that it claims, none is left in the integration's."""
+
+    def compiling(*arguments: Any, **options: Any) -> Any:
+        made = integrate(*arguments, **options)
+        return replace(made, statistics={**made.statistics, "compile_seconds": 1e6})
+
+    monkeypatch.setattr(importlib.import_module("gearfe.train.simulate"), "integrate", compiling)
+    made = simulate(build_train(train([(20, 30)])), np.linspace(0.0, 1e-4, 3), backend="plain")
+    assert made.statistics["compile_seconds"] == 1e6
+    assert made.statistics["seconds"] < 0.0
+
+
+def test_constant_rows_are_not_checked_by_another_run() -> None:
+    """Two hinges of a rigid shaft share constraints; the check of what was left out integrated all of it again."""
+    model = build_train(train([(20, 30)]))
+    assert not model.start.active.all()
+
+    def again(*_: Any) -> Any:
+        raise AssertionError("was integrated again")
+
+    made = integrate(model.system, [0.0, 1e-5], start=model.start, method="explicit", backend="plain")
+    monkey = SimpleNamespace(times=made.dense.times, __call__=again)
+    assert _dropped_rows_hold(model.system, model.start, monkey, 1e-6)
