@@ -221,11 +221,11 @@ class Choice:
 
         sign = math.copysign(1.0, self.times[-1] - start.time)
         ahead = self.times if start is self.start else self.times[sign * self.times > sign * start.time]
-        began = self.clock()
         dense, status, statistics = way.run(start, ahead, self.most - used, watch)
         if trial is not None and (lost or status != 0):
             return None
-        own = Leg(way, dense, status, statistics, predicted, self.clock() - began - pace.away)
+        began = pace.told[0][0] if pace.told else self.clock()
+        own = Leg(way, dense, status, statistics, predicted, self.clock() - pace.away - began)
         if rest is None:
             return [own]
         return rest if whole else [own, *rest]
