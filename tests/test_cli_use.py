@@ -12,6 +12,7 @@ import pytest
 from gearfe.cli import CLOSED, main
 from gearfe.commands.arguments import CommandParser
 from gearfe.errors import InputError, shown
+from gearfe.tables.examples import job_file
 
 JOB = Path(__file__).parents[1] / "geometry" / "gear_train.toml"
 #: Every command that reads a job file, with what it needs besides.
@@ -49,6 +50,19 @@ def test_a_bad_file_is_answered_before_the_libraries_load(tmp_path):
         f"    for name in {list(WRONG)!r}:\n"
         "        assert main([command, f'{sys.argv[1]}/{name}.toml', *options]) == 2, (command, name)\n"
         "heavy = {'numpy', 'scipy', 'skfem', 'gmsh', 'numba', 'matplotlib', 'h5py'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+    )
+    ran(code, str(tmp_path))
+
+
+def test_gears_that_cannot_run_together_are_told_before_scipy_loads(tmp_path):
+    text = job_file("stiffness").replace("# centre_distance_mm (not set):", "centre_distance_mm = 68.0 #")
+    (tmp_path / "job.toml").write_text(text)
+    code = (
+        "import sys\nfrom gearfe.cli import main\n"
+        "for line in (['stiffness'], ['loadmap', '--torques-Nm', '5'], ['gear'], ['mesh', '--out', 'x.msh']):\n"
+        "    assert main([*line, sys.argv[1] + '/job.toml']) == 2, line\n"
+        "heavy = {'scipy', 'skfem', 'gmsh', 'numba', 'matplotlib', 'h5py'} & set(sys.modules)\n"
         "assert not heavy, heavy\n"
     )
     ran(code, str(tmp_path))

@@ -147,7 +147,7 @@ def built(path: Path) -> None:
     ("old", "new", "words"),
     [
         ("x_mm = 45.0\nlength", "x_mm = 46.0\nlength", "off the axis|46 mm apart"),
-        ('shaft = "out"\ny_mm', 'shaft = "oat"\ny_mm', "unknown shaft 'oat'; did you mean 'out'"),
+        ('shaft = "out"\ny_mm', 'shaft = "oat"\ny_mm', "gears\\[1\\].shaft: unknown name 'oat'; did you mean 'out'"),
         ("teeth = 27", "tooth = 27", "did you mean 'teeth'"),
         ("module_mm = 2.0", "", "module_mm.*is required"),
         ("stiffness_N_per_m = 2e8", "", "has no stiffness: there is no table"),

@@ -30,14 +30,17 @@ def run(args: argparse.Namespace) -> int:
     tables = load_job(args.job, ("pair",), ("stiffness",))
     check_option("--angle-deg", args.angle_deg, StiffnessTable, "angle_start_deg")
 
+    from ..gear.pair import GearPair
+
+    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together: NumPy alone tells
+
     from ..gear.derived import derived_geometry, iso_values
     from ..gear.drawing import pair_drawing
     from ..output.figures import pair_figure
     from ..output.files import output_folder, whole_set, write_json
-    from ..stiffness.job import stiffness_job
+    from ..stiffness.job import StiffnessJob
 
-    job = stiffness_job(tables)
-    pair = job.pair
+    job = StiffnessJob(tables["pair"], tables.get("stiffness", StiffnessTable()), pair)
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
     geometry = derived_geometry(pair)
     moduli = [material.youngs_modulus for material in job.materials]

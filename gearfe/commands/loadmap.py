@@ -56,17 +56,21 @@ def run(args: argparse.Namespace) -> int:
     table = _overridden_loads(tables.get("loadmap", LoadMapTable()), args)
     torques = table.torques()
 
+    from ..gear.pair import GearPair
+
+    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together: NumPy alone tells
+
     import numpy as np
 
     from ..loadmap.report import figure_arguments, summary, told, torque_table, warnings
     from ..loadmap.sweep import sweep_loads
     from ..output.files import output_folder, whole_set, write_csv, write_json
-    from ..stiffness.job import stiffness_job
+    from ..stiffness.job import StiffnessJob
     from ..stopwatch import Stopwatch
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("geometry"):
-        job = stiffness_job(tables)
+        job = StiffnessJob(tables["pair"], tables["stiffness"], pair)
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
     made_map = sweep_loads(
         job.pair,

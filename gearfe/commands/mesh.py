@@ -35,14 +35,18 @@ def run(args: argparse.Namespace) -> int:
     check_option("--coarsen", coarsen, StiffnessTable, "coarsen")
     check_flank_coarsen(coarsen, flank, "stiffness.flank_coarsen")
 
+    from ..gear.pair import GearPair
+
+    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together: NumPy alone tells
+
     from ..meshing.export import export_mesh, format_of
     from ..meshing.recipe import sector_recipes
     from ..meshing.tooth_sector import sector_mesh
     from ..output.files import output_folder
-    from ..stiffness.job import stiffness_job
+    from ..stiffness.job import StiffnessJob
 
     format_of(args.out)
-    job = stiffness_job(tables)
+    job = StiffnessJob(tables["pair"], table, pair)
     output_folder(Path(args.out).parent)
     recipes = sector_recipes(job.pair, coarsen=coarsen, flank_coarsen=flank)
     parts: dict[str, Any] = {}

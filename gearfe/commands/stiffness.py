@@ -93,17 +93,21 @@ def run(args: argparse.Namespace) -> int:
     if args.animate is not None and not 2 <= args.animate <= 1000:
         raise InputError("--animate", args.animate, "must be >= 2 and <= 1000 frames", "40 are usual")
 
+    from ..gear.pair import GearPair
+
+    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together: NumPy alone tells
+
     import numpy as np
 
     from ..output.files import output_folder, whole_set, write_json
-    from ..stiffness.job import stiffness_job
+    from ..stiffness.job import StiffnessJob
     from ..stiffness.report import figure_arguments, summary, told, warnings
     from ..stiffness.sweep import elastic_pair, sweep_stiffness
     from ..stopwatch import Stopwatch
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("geometry"):
-        job = stiffness_job(tables)
+        job = StiffnessJob(tables["pair"], tables["stiffness"], pair)
         sweep = job.sweep
         if isinstance(chosen, list):
             from ..stiffness.fields_output import angle_numbers

@@ -29,7 +29,10 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     The temporary name keeps the suffix of `path`, because writers choose their format from it.
     """
     target = Path(path)
-    handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
+    except OSError as error:  # tell the file that is wanted, not the temporary one
+        raise type(error)(error.errno, error.strerror, str(target)) from None
     os.close(handle)
     temporary = Path(name)
     try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -118,10 +117,6 @@ def read_stiffness_job(path: str | Path) -> StiffnessJob:
     InputError
         For every mistake in the file, and for gears that cannot run together.
     """
-    return stiffness_job(load_job(path, ("pair",), ("stiffness",)))
-
-
-def stiffness_job(tables: Mapping[str, Any]) -> StiffnessJob:
-    """The job of tables that are read: ``pair`` and, where there is one, ``stiffness``."""
+    tables = load_job(path, ("pair",), ("stiffness",))
     table = tables.get("stiffness", StiffnessTable())
     return StiffnessJob(tables["pair"], table, GearPair.from_table(tables["pair"]))

@@ -212,6 +212,24 @@ class TrainTable:
             raise InputError(f"{where}.step_us", self.step_us, "makes more than 5 million outputs", "use a larger step")
         if self.variant:
             self.chosen(self.variant)
+        self._check_names(where)
+
+    def _check_names(self, where: str) -> None:
+        """Shafts and gears have names of their own, and what names one names one that is there."""
+        names: dict[str, list[str]] = {}
+        for kind, rows in (("shafts", self.shafts), ("gears", self.gears)):
+            known = names[kind] = [row.name for row in rows]
+            for i, name in enumerate(known):
+                if name in known[:i]:
+                    raise InputError(f"{where}.{kind}[{i}].name", name, "is used twice", "give each its own name")
+        used = [(f"gears[{i}].shaft", gear.shaft, "shafts") for i, gear in enumerate(self.gears)]
+        for i, mesh in enumerate(self.meshes):
+            used += [(f"meshes[{i}].{key}", getattr(mesh, key), "gears") for key in ("driver", "driven")]
+        used += [] if self.drive is None else [("drive.shaft", self.drive.shaft, "shafts")]
+        used += [(f"loads[{i}].shaft", load.shaft, "shafts") for i, load in enumerate(self.loads)]
+        for key, name, kind in used:
+            if name not in names[kind]:
+                raise unknown_name(f"{where}.{key}", name, names[kind])
 
     def chosen(self, name: str) -> TrainTable:
         """The table with the curves and damping of a variant; an empty name leaves it as it stands."""
