@@ -69,9 +69,15 @@ def finer(times: Floats, highest: float) -> tuple[Floats, int]:
         problem = f"asks for {every * count:.3g} samples of the motion in {step * count:.3g} s"
         cure = "leave such a stiff part rigid, or simulate a shorter time"
         raise InputError("highest natural frequency (Hz)", highest, problem, cure)
-    made = times[0] + step / every * np.arange(every * count + 1)
+    return subdivided(times, every), every
+
+
+def subdivided(times: Floats, every: int) -> Floats:
+    """Equally spaced times (n,) with `every` steps in place of each one."""
+    count = len(times) - 1
+    made = times[0] + float(times[-1] - times[0]) / (every * count) * np.arange(every * count + 1)
     made[::every] = times
-    return made, every
+    return np.asarray(made)
 
 
 class RecordSpectrum:

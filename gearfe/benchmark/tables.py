@@ -277,7 +277,7 @@ SECTIONS: tuple[Section, ...] = (
         "first 20 frequencies "
         "against extruded elements of order 3 that are 1.5 mm thin across the re-entrant edges (last row; by its own "
         "rate its first six are another 0.1 to 0.2 % too high, single ones of the 20 up to 0.5 %), and largest error "
-        "that the estimate tells. Times are without the estimate, which takes a sixth to a fifth of them more.",
+        "that the estimate tells. Times are without the estimate, which takes a quarter to a third of them more.",
         {
             "order": ("order", digits),
             "size_mm": ("size (mm)", digits),

@@ -83,8 +83,9 @@ def run(args: argparse.Namespace) -> int:
         )
         check_choice(choice, job.times, tuple(str(a) for s in job.table.shafts for a in s.attachments))
         folder = output_folder(args.out or Path("out") / Path(args.job).stem)
+    estimate = not args.no_estimate
     scene, pieces, every = simulated(
-        job, args.curve, watch=watch, progress=count, floquet=not args.no_floquet, estimate=not args.no_estimate
+        job, args.curve, watch=watch, progress=count, floquet=not args.no_floquet, estimate=estimate
     )
     written = write_run(
         folder,
@@ -97,6 +98,8 @@ def run(args: argparse.Namespace) -> int:
         every=every,
         further=described(job, scene),
         progress=count,
+        again=repeater(job, every) if estimate else None,
+        band_hz=band(job),
         started=started,
     )
     response = written.response
@@ -119,20 +122,39 @@ def simulated(
     from ..vibration.job import job_scene, train_body, train_curves
 
     with watch.stage("curves"):
-        stiffness = train_curves(job, curves, progress=progress)
+        stiffness = train_curves(job, curves, progress=progress, estimate=estimate)
     with watch.stage("housing"):
         body = train_body(job)
     with watch.stage("model"):
         scene = job_scene(job, stiffness, body)
         model = build_train(scene)
         highest = float(model.coupled_frequencies_hz.max(initial=0.0))
-    options: dict[str, Any] = {"tolerance": job.table.tolerance, "method": job.table.method}
-    options["band_hz"] = 5000.0 if job.housing is None else job.housing.reduction.band_Hz
+    options: dict[str, Any] = {"tolerance": job.table.tolerance, "method": job.table.method, "band_hz": band(job)}
 
     def pieces(times: Any) -> Iterator[TrainResponse]:
         return simulate_in_pieces(model, finer(times, highest)[0], floquet=floquet, estimate=estimate, **options)
 
     return scene, pieces, finer(job.times, highest)[1]
+
+
+def band(job: TrainJob) -> float:
+    """Highest frequency of interest (Hz)."""
+    return 5000.0 if job.housing is None else job.housing.reduction.band_Hz
+
+
+def repeater(job: TrainJob, every: int) -> Callable[[TrainScene], Callable[[Any], Iterator[TrainResponse]]]:
+    """The same run with another train, as many samples in an output step."""
+
+    def again(scene: TrainScene) -> Callable[[Any], Iterator[TrainResponse]]:
+        from ..record_spectrum import subdivided
+        from ..train import build_train
+        from ..train.simulate import simulate_in_pieces
+
+        model = build_train(scene)
+        options: dict[str, Any] = {"tolerance": job.table.tolerance, "method": job.table.method}
+        return lambda times: simulate_in_pieces(model, subdivided(times, every), **options)
+
+    return again
 
 
 def title(job: TrainJob) -> str:
@@ -181,24 +203,30 @@ def described(job: TrainJob, scene: TrainScene) -> dict[str, Any]:
 
 def told(response: TrainResponse, scene: TrainScene, written: Written, choice: OutputChoice) -> list[str]:
     """Lines for the terminal."""
+    from ..vibration.errors import with_error
     from ..vibration.pictures import attachment_to_draw
-    from ..vibration.report import dominant
 
     summary = written.summary
     stiffness = summary["mesh_stiffness_N_per_m"]
+    errors = summary.get("headline_errors", {})
+
+    def off(name: str, number: int) -> str:
+        return with_error(errors[name][number]) if name in errors else ""
+
     lines = []
     for i, (name, frequency) in enumerate(zip(response.mesh_names, response.mesh_frequencies_Hz, strict=True)):
         low, high = stiffness[name]
         k = "rigid" if low is None else f"k {low / 1e6:.4g} to {high / 1e6:.4g} N/um"
         mean = summary.get("mean_contact_forces_N")
-        force = "" if mean is None else f", mean contact force {mean[i]:.1f} N"
+        force = "" if mean is None else f", mean contact force {mean[i]:.1f}{off('mean_contact_forces_N', i)} N"
         lines.append(f"mesh {i + 1} ({name}): {frequency:.1f} Hz, {k}{force}")
     if response.common_period_s:
         count = summary.get("mean_over_common_periods", 0)
         lines.append(
             f"common mesh period {1e3 * response.common_period_s:.4g} ms; means are over the last {count} of them"
         )
-    shown = ", ".join(f"{f:.0f}" for f in response.coupled_frequencies_Hz[:10])
+    frequencies = enumerate(response.coupled_frequencies_Hz[:10])
+    shown = ", ".join(f"{f:.0f}{off('coupled_frequencies_Hz', i)}" for i, f in frequencies)
     more = f"{shown} Hz ..." if shown else "none, nothing is left to vibrate"
     lines.append(f"natural frequencies of the coupled system: {more}")
     statistics = response.statistics
@@ -221,9 +249,11 @@ def told(response: TrainResponse, scene: TrainScene, written: Written, choice: O
         )
         loaded = next((load.bore for load in scene.loads if load.bore is not None), None)
         attachment = attachment_to_draw(response, choice.attachment, loaded)
-        found = dominant(made, response, f"attachment_{attachment}_acceleration_m_per_s2", 4)
-        texts = [f"{x['frequency_Hz']:.0f} Hz {x['amplitude']:.3g}" for x in found]
+        found = summary["dominant_lines"][f"attachment_{attachment}_acceleration_m_per_s2"][:4]
+        texts = [f"{x['frequency_Hz']:.0f} Hz {x['amplitude']:.3g}{with_error(x.get('error_estimate'))}" for x in found]
         lines.append(f"normal acceleration at attachment {attachment} (m/s2): " + ", ".join(texts))
         if made.power is not None:
-            lines.append(f"radiated power: mean {made.power.mean_level:.1f} dB re 1e-12 W")
+            part = errors.get("radiated_power_mean_W")
+            decibels = None if part is None else 10.0 * math.log10(1.0 + float(part) / max(made.power.mean, 1e-300))
+            lines.append(f"radiated power: mean {made.power.mean_level:.1f}{with_error(decibels)} dB re 1e-12 W")
     return lines

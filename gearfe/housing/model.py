@@ -41,6 +41,8 @@ LINEAR_NOTE = (
 )
 FREE_NOTE = "nothing is fixed: the housing is free and has six rigid-body modes"
 STEEL = SolidMaterial()
+#: Part of the largest energy below which a field is contained in the others.
+DEPENDENT = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,16 +264,24 @@ class Housing:
         return self.with_estimate(body) if estimate else body
 
     def with_estimate(self, body: ModalBody) -> ModalBody:
-        """The reduced body with an estimate of the mesh's error, for frequencies up to the highest mode kept."""
-        highest = body.internal_hz[body.modes - 1] if body.modes else np.inf
-        kept = body.coupled.frequencies_hz <= highest
-        vectors = body.coupled.vectors[:, kept]
+        """The reduced body with an estimate of the mesh's error, for frequencies up to the highest mode kept.
+
+        The fields are those in which forces on the attachments move the body, by the mode acceleration method: its
+        static shapes, and the modes with free attachments. What else there is in the body counts as without error.
+        """
+        kept = body.coupled.frequencies_hz <= body.highest_hz
         squares = (2.0 * np.pi * body.coupled.frequencies_hz[kept]) ** 2
+        static = np.eye(body.size, 6 * len(self.attachments))
+        fields = np.hstack([static, body.coupled.vectors[:, kept]])
+        squares = np.concatenate([np.zeros(static.shape[1]), squares])
         rigid = [self.fixed, *(attachment.nodes for attachment in self.attachments)]
         with stage("estimating the mesh's error"):
-            lost = energy_lost(self.nodes, self.tets, self.material, body.shapes @ vectors, squares, rigid)
-        weighted = body.mass @ vectors
-        return replace(body, softening=np.asarray(weighted @ lost @ weighted.T))
+            lost = energy_lost(self.nodes, self.tets, self.material, body.shapes @ fields, squares, rigid)
+        # weights of the fields in any motion, orthogonal in energy to the rest; a free body's energy needs some mass
+        slow = np.min(squares[squares > 0.0], initial=np.inf)
+        metric = body.stiffness + (body.mass * slow if len(self.fixed) == 0 else 0.0)
+        share = np.linalg.pinv(fields.T @ metric @ fields, rcond=DEPENDENT, hermitian=True) @ (fields.T @ metric)
+        return replace(body, softening=np.asarray(share.T @ lost @ share))
 
     def full_model(self, solver: str = "auto") -> FullModel:
         """The same body without reduction, over [attachments | all internal unknowns]."""

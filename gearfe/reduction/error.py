@@ -32,8 +32,6 @@ Floats = NDArray[np.float64]
 SAFETY = 1.5
 #: What the eigensolver leaves of the modes that are kept; it matters where next to nothing is left out.
 EIGENSOLVER = 1e-6
-#: No mesh is this good: a softening below this part of a mode's stiffness is one that was not estimated.
-UNKNOWN = 1e-12
 #: Parts of the way to the softest body, all of it last.
 PARTS = (0.25, 0.5, 1.0)
 
@@ -132,7 +130,7 @@ def mesh_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, points: 
     soft = np.maximum(bodies[-1].coupled.frequencies_hz, 1e-300)
     lost = np.einsum("ik,ij,jk->k", vectors, body.softening, vectors, optimize=True)
     stiffness = (2.0 * math.pi * own) ** 2
-    unknown = (own > 0.0) & ((lost <= UNKNOWN * stiffness) | (lost >= stiffness))
+    unknown = (own > 0.0) & ((lost == 0.0) | (lost >= stiffness) | (own > body.highest_hz))
     errors = np.where(unknown, math.inf, np.where(own > 0.0, own / soft - 1.0, 0.0))
     if np.any(unknown & (own <= band_hz)):
         return MeshError(band_hz, math.inf, errors)

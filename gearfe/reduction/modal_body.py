@@ -110,6 +110,11 @@ class ModalBody:
         """Number of coordinates N."""
         return len(self.mass)
 
+    @property
+    def highest_hz(self) -> float:
+        """Frequency of the highest mode that was kept (Hz), up to which errors can be told; 0 without modes."""
+        return float(self.internal_hz[self.modes - 1]) if self.modes else 0.0
+
     @cached_property
     def coupled(self) -> CoupledModes:
         """Modes of the body with its attachments free to move, bores rigid."""

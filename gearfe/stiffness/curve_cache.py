@@ -8,7 +8,9 @@ versions of numpy, scipy and gmsh, and the text of this package's own rooms that
 from __future__ import annotations
 
 import hashlib
+import json
 import math
+from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,8 +22,9 @@ from ..cache import cache_folder
 from ..errors import InputError
 from ..gear.pair import GearPair
 from ..meshing.cache import cache_key
+from ..output.files import write_json
 from ..stopwatch import Stopwatch
-from .curve import StiffnessCurve
+from .curve import ErrorEstimate, StiffnessCurve
 
 #: Rooms whose text decides a curve, beside `gearfe.elasticity`.
 ROOMS = ("contact", "gear", "meshing", "stiffness")
@@ -34,6 +37,7 @@ def cached_curve(
     *,
     watch: Stopwatch | None = None,
     progress: Any = None,
+    estimate_error: bool = False,
 ) -> StiffnessCurve:
     """Curve of `gearfe.sweep_stiffness`, from disk when it was computed before. Failed curves are not kept.
 
@@ -45,10 +49,15 @@ def cached_curve(
         Keyword arguments of `sweep_stiffness`, such as those of `gearfe.stiffness.job.StiffnessJob`.
     watch, progress
         See `sweep_stiffness`.
+    estimate_error
+        Whether the curve carries an estimate of its error, which is kept in a file beside it.
     """
     folder = cache_folder()
     path = None if folder is None else folder / f"curve-{curve_key(pair, model, sweep)[:32]}.csv"
     found = None if path is None else _stored(path, pair)
+    if found is not None and path is not None and estimate_error:
+        error = _stored_error(path)
+        found = None if error is None else replace(found, error=error)
     if found is not None:
         return found
     from .job import MESH
@@ -56,7 +65,8 @@ def cached_curve(
 
     elastic = elastic_pair(pair, watch=watch, **model)
     points = {name: model[name] for name in MESH if name in model}
-    curve = sweep_stiffness(pair, elastic=elastic, progress=progress, **sweep, **points)
+    options = {**sweep, **points, "estimate_error": estimate_error}
+    curve = sweep_stiffness(pair, elastic=elastic, progress=progress, **options)
     if watch is not None:
         for stage, seconds in curve.timings.items():
             watch.seconds[stage] = watch.seconds.get(stage, 0.0) + seconds
@@ -64,6 +74,8 @@ def cached_curve(
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             curve.to_csv(path)
+            if curve.error is not None:
+                write_json(path.with_suffix(".error.json"), asdict(curve.error))
         except OSError:
             pass
     return curve
@@ -86,6 +98,16 @@ def _stored(path: Path, pair: GearPair) -> StiffnessCurve | None:
         return None
     whole = math.isclose(curve.mesh_cycle, pair.mesh_cycle, rel_tol=1e-12) and not curve.failed.any()
     return curve if whole else None
+
+
+def _stored_error(path: Path) -> ErrorEstimate | None:
+    """The estimate beside a stored curve; null stands for not-a-number."""
+    try:
+        found = json.loads(path.with_suffix(".error.json").read_text(encoding="utf-8"))
+        arrays = {name: np.array(found[name], dtype=float) for name in ("pinion_angle", "relative")}
+        return ErrorEstimate(**arrays, coarsening=float(found["coarsening"]), order=float(found["order"]))
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
 
 
 @cache

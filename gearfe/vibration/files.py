@@ -16,6 +16,7 @@ from ..output.files import whole_set, write_csv, write_json
 from ..stopwatch import Stopwatch
 from ..train.response import TrainResponse
 from ..train.scene import TrainScene
+from .errors import Run, with_errors
 from .follow import Followed, follow
 from .report import train_summary
 from .spectra import TrainRecord, TrainSpectra, record
@@ -124,6 +125,8 @@ def write_run(
     every: int = 1,
     further: Mapping[str, Any] | None = None,
     progress: Callable[[int, int, str], None] | None = None,
+    again: Callable[[TrainScene], Callable[[Array], Iterable[TrainResponse]]] | None = None,
+    band_hz: float = 5000.0,
     started: float | None = None,
 ) -> Written:
     """Write ``response.csv``, ``spectrum.csv``, ``summary.json`` and what else is chosen while a run goes on.
@@ -136,6 +139,10 @@ def write_run(
         Makes the run over the given output times, `every` samples in a step, and hands it over piece by piece.
     times : (n,)
         Output times (s).
+    again
+        Makes the same of a changed train: the summary's numbers then have estimates of their errors.
+    band_hz
+        Upper end of the band (Hz) in which the reduction's error is told.
     started
         Of `time.perf_counter`: the watch gets the total.
     """
@@ -144,24 +151,36 @@ def write_run(
     with whole_set(folder, MAY_WRITE) as target:
 
         def followed(times: Array, choice: OutputChoice) -> Followed:
-            first, duration = choice.spectrum_start, choice.spectrum_length
-            options: dict[str, Any] = {"window": choice.window, "start": first, "length": duration, "folder": folder}
-            record = TrainRecord(times, every, radiation, **options) if len(times) > 2 else None
             table, keep = target / "response.csv", field_steps(times, choice) if choice.fields else None
             with watch.stage("transient"):
                 run = _timed(pieces(times), watch)
+                record = recorded(times, choice)
                 return follow(run, times, every, table=table, radiation=radiation, record=record, keep=keep)
+
+        def recorded(times: Array, choice: OutputChoice) -> TrainRecord | None:
+            first, duration = choice.spectrum_start, choice.spectrum_length
+            options: dict[str, Any] = {"window": choice.window, "start": first, "length": duration, "folder": folder}
+            return TrainRecord(times, every, radiation, **options) if len(times) > 2 else None
+
+        def repeated(changed: TrainScene) -> Run:
+            assert again is not None
+            found = follow(again(changed)(times), times, every, record=recorded(times, choice))
+            return Run(train_summary(found, {}), found.spectra)
 
         made = followed(times, choice)
         response = made.response
         if response.status != "done" and 2 <= made.outputs < len(times):
-            again = followed(times[: made.outputs], replace(choice, spectrum_start=0.0, spectrum_length=None))
-            made = replace(again, response=response)
+            shorter = followed(times[: made.outputs], replace(choice, spectrum_start=0.0, spectrum_length=None))
+            made = replace(shorter, response=response)
         compiling = float(response.statistics.get("compile_seconds", 0.0))
         if compiling > 0.0:
             watch.seconds["transient"] -= compiling
             watch.seconds["compiling"] = compiling
         spectra = made.spectra
+        run = Run(train_summary(made, {}, **(further or {})), spectra)
+        if again is not None:
+            with watch.stage("error estimates"):
+                run = Run(with_errors(run, scene, repeated, band_hz=band_hz), spectra)
         with watch.stage("tables"):
             if spectra is not None:
                 write_csv(target / "spectrum.csv", spectra.columns())
@@ -173,7 +192,7 @@ def write_run(
                 problems += _fields(target, scene, made.kept, times[: made.outputs], choice, title, progress)
         if started is not None:
             watch.seconds["total"] = time.perf_counter() - started
-        summary = train_summary(made, watch.seconds, **(further or {}))
+        summary = {**run.summary, "timings_s": dict(watch.seconds)}
         write_json(target / "summary.json", summary)
         names = tuple(sorted(path.name for path in target.iterdir()))
     return Written(names, response, spectra, tuple(problems), summary)

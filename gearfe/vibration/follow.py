@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -65,7 +66,7 @@ def follow(
     times: Array,
     every: int,
     *,
-    table: Path,
+    table: Path | None = None,
     radiation: Array | None = None,
     record: TrainRecord | None = None,
     keep: Ints | None = None,
@@ -79,7 +80,7 @@ def follow(
     times : (n,)
         Output times (s) of the whole run.
     table
-        File to write: ``response.csv``.
+        File to write: ``response.csv``; None for none.
     radiation
         Surface matrix of the housing.
     record
@@ -97,13 +98,14 @@ def follow(
     extremes: _Extremes | None = None
     kept: list[TrainResponse] = []
     passed = 0
-    with csv_table(table) as write:
+    with nullcontext() if table is None else csv_table(table) as write:
         for piece in pieces:
             if extremes is None:
                 mean = RunningMean(times, piece.load_end_s, piece.common_period_s)
                 extremes = _Extremes(piece.load_end_s)
             count = len(piece.time)
-            write(response_columns(piece.every(every, -passed % every), radiation))
+            if write is not None:
+                write(response_columns(piece.every(every, -passed % every), radiation))
             if record is not None and count:
                 record.add(piece)
             envelope.add(passed, _drawn(piece))

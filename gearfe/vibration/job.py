@@ -90,7 +90,12 @@ def train_body(job: TrainJob) -> ModalBody | None:
 
 
 def train_curves(
-    job: TrainJob, files: Sequence[str | Path] = (), *, watch: Any = None, progress: Any = None
+    job: TrainJob,
+    files: Sequence[str | Path] = (),
+    *,
+    watch: Any = None,
+    progress: Any = None,
+    estimate: bool = False,
 ) -> tuple[Stiffness, ...]:
     """Stiffness of each mesh: from `files`, from the file or number its table names, or computed (and cached).
 
@@ -100,6 +105,8 @@ def train_curves(
         CSV files, one for all meshes or one a mesh; they win over the job's.
     watch, progress
         See `gearfe.stiffness.sweep.sweep_stiffness`.
+    estimate
+        Whether computed curves carry an estimate of their error.
     """
     meshes = job.table.meshes
     if files and len(files) not in (1, len(meshes)):
@@ -120,7 +127,7 @@ def train_curves(
         elif mesh.load_map is not None:
             found.append(_mapped_curve(job.path.parent / mesh.load_map, scene, number))
         else:
-            found.append(_computed_curve(job, scene, number, watch, progress))
+            found.append(_computed_curve(job, scene, number, watch, progress, estimate))
     return tuple(found)
 
 
@@ -315,7 +322,9 @@ def _mapped_curve(path: Path, scene: TrainScene, number: int) -> StiffnessCurve:
     return made.curve_at(torque)
 
 
-def _computed_curve(job: TrainJob, scene: TrainScene, number: int, watch: Any, progress: Any) -> StiffnessCurve:
+def _computed_curve(
+    job: TrainJob, scene: TrainScene, number: int, watch: Any, progress: Any, estimate: bool
+) -> StiffnessCurve:
     """Curve of a mesh with the driver as pinion, by [stiffness] or at the torque that the mesh carries."""
     from ..stiffness.curve_cache import cached_curve
     from ..stiffness.job import StiffnessJob
@@ -330,7 +339,7 @@ def _computed_curve(job: TrainJob, scene: TrainScene, number: int, watch: Any, p
     model = {**tables.model, "materials": _materials(job, mesh)}
     if job.table.curves.load == "stiffness":
         with stage(mesh.name):
-            return cached_curve(pair, model, tables.sweep, watch=watch, progress=progress)
+            return cached_curve(pair, model, tables.sweep, watch=watch, progress=progress, estimate_error=estimate)
     torque = _carried_torque(scene, number)
     if not torque > 0.0:
         problem = 'carries no torque, so train.curves.load = "torque" has no load to compute its curve with'
@@ -343,7 +352,7 @@ def _computed_curve(job: TrainJob, scene: TrainScene, number: int, watch: Any, p
         "route": job.stiffness.route,
     }
     with stage(mesh.name):
-        return cached_curve(pair, model, sweep, watch=watch, progress=progress)
+        return cached_curve(pair, model, sweep, watch=watch, progress=progress, estimate_error=estimate)
 
 
 def _materials(job: TrainJob, mesh: GearMesh) -> Any:

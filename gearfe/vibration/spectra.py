@@ -47,6 +47,10 @@ class TrainSpectra:
         """(m,) amplitudes of a signal."""
         return self.spectrum.amplitude[:, self.names.index(name)]
 
+    def value(self, name: str) -> NDArray[np.complex128]:
+        """(m,) complex amplitudes of a signal."""
+        return self.spectrum.value[:, self.names.index(name)]
+
     def columns(self) -> dict[str, Array]:
         """Columns of spectrum.csv."""
         amplitude = self.spectrum.amplitude

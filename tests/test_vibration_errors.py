@@ -1,0 +1,131 @@
+"""Errors of the numbers that a run is read for: the truth is a train that differs by what the estimates allow."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gearfe.cli import main
+from gearfe.record_spectrum import finer
+from gearfe.stiffness.curve import ErrorEstimate, StiffnessCurve
+from gearfe.train import TrainScene, build_train, simulate
+from gearfe.vibration.errors import FORCES, PEAKS, Run, with_errors
+from gearfe.vibration.follow import follow
+from gearfe.vibration.report import train_summary
+from gearfe.vibration.spectra import TrainRecord
+from tests.test_cli_vibration import SMALL
+from tests.trains import SHIPPED, curve, elastic, train
+
+TIMES = 20e-6 * np.arange(301)
+
+
+def ran(scene: TrainScene, times: np.ndarray, every: int, **options: Any) -> Run:
+    """Summary and spectra of a train."""
+    response = simulate(build_train(scene), times, tolerance=1e-8, **options)
+    made = follow([response], TIMES, every, record=TrainRecord(TIMES, every))
+    return Run(train_summary(made, {}), made.spectra)
+
+
+def estimated(scene: TrainScene) -> tuple[Run, dict[str, Any], Any]:
+    """A run, its summary with errors, and how to repeat it."""
+    highest = float(build_train(scene).coupled_frequencies_hz.max())
+    times, every = finer(TIMES, 1.2 * highest)
+    run = ran(scene, times, every, estimate=True)
+    return run, with_errors(run, scene, lambda one: ran(one, times, every)), lambda one: ran(one, times, every)
+
+
+def softened(scene: TrainScene, part: float) -> TrainScene:
+    """In a housing whose mesh is known to err by 6 % of its stiffness."""
+    assert scene.housing is not None
+    body = dataclasses.replace(scene.housing, softening=0.06 * scene.housing.stiffness)
+    return dataclasses.replace(scene, housing=body if part == 0.0 else body.softened(part))
+
+
+def lines(summary: dict[str, Any], key: str) -> np.ndarray:
+    return np.array([line[key] for found in summary["dominant_lines"].values() for line in found])
+
+
+@pytest.mark.parametrize("part", [0.35, 0.6])
+def test_truth_within_the_softening_is_covered(part: float) -> None:
+    scene = elastic(train(SHIPPED, stiffness=curve), uneven=0.2, skew=0.3)
+    run, summary, again = estimated(softened(scene, 0.0))
+    truth = again(softened(scene, part))
+    parts = summary["headline_error_parts"]
+    assert set(parts) == {"mesh", "reduction", "integration"}
+    ratios = []
+    for name in (*FORCES, "coupled_frequencies_Hz"):
+        told, true = np.array(summary["headline_errors"][name]), np.abs(truth.summary[name] - run.summary[name])
+        np.testing.assert_allclose(told, sum(np.array(part[name]) for part in parts.values()))
+        low = np.isfinite(told) & (true > 1e-9 * np.abs(run.summary[name]))
+        assert np.all(true[low] <= told[low]), name
+        ratios.append(told[low] / true[low])
+    for name, told in summary["headline_errors"][PEAKS].items():
+        assert abs(truth.summary[PEAKS][name] - run.summary[PEAKS][name]) <= told
+    bins = np.rint(lines(summary, "frequency_Hz") / run.spectra.spectrum.resolution).astype(int)
+    names = [name for name, found in summary["dominant_lines"].items() for _ in found]
+    there = np.array([truth.spectra.amplitude(name)[k] for name, k in zip(names, bins, strict=True)])
+    true, told = np.abs(there - lines(summary, "amplitude")), lines(summary, "error_estimate")
+    known = np.isfinite(told) & (true > 1e-9 * there.max())
+    assert np.mean(true[known] <= told[known]) >= 0.95
+    # above the highest mode of the body the mesh's error is not known, and is not none
+    assert np.array_equal(np.isfinite(told), lines(summary, "frequency_Hz") <= scene.housing.highest_hz)
+    # the whole softening is 1 / part of the true one
+    assert np.median(np.concatenate([*ratios, told[known] / true[known]])) < 4.0 / part
+
+
+def test_body_without_estimate_has_unknown_errors() -> None:
+    _, summary, _ = estimated(elastic(train([(20, 30)])))
+    assert np.isnan(summary["headline_errors"]["mean_contact_forces_N"]).all()
+
+
+def known_curve(error: float) -> StiffnessCurve:
+    """k over a mesh cycle with an estimate of its error."""
+    count, cycle = 24, 2.0 * math.pi / 20
+    angle = cycle * np.arange(count) / count
+    k = 1.2e8 * (1.0 + 0.15 * np.cos(20.0 * angle))
+    numbers = {f.name: np.ones(count) for f in dataclasses.fields(StiffnessCurve) if f.type == "Array"}
+    numbers |= {"pinion_angle": angle, "k_mesh": k}
+    words = {"status": np.full(count, "converged")}
+    whole = {f.name: np.ones(count, dtype=int) for f in dataclasses.fields(StiffnessCurve) if f.type == "IntArray"}
+    estimate = ErrorEstimate(angle, np.full(count, 0.5 * error), 1.6, 1.0)
+    shares = {"load_share": np.ones((count, 1))}
+    known = {f.name for f in dataclasses.fields(StiffnessCurve)}
+    made = {**numbers, **words, **whole, **shares, "mesh_cycle": cycle, "base_radius": 0.03, "error": estimate}
+    return StiffnessCurve(**{name: value for name, value in made.items() if name in known})
+
+
+def test_error_of_the_curve_is_that_of_a_stiffer_one() -> None:
+    scene = train([(20, 30)])
+    given = known_curve(0.01)
+    assert given.error is not None
+    assert given.error.worst == pytest.approx(0.01)
+    scene = dataclasses.replace(scene, meshes=(dataclasses.replace(scene.meshes[0], stiffness=given),))
+    run, summary, again = estimated(scene)
+    assert set(summary["headline_error_parts"]) == {"curve", "integration"}
+    other = dataclasses.replace(given, k_mesh=0.995 * given.k_mesh)
+    truth = again(dataclasses.replace(scene, meshes=(dataclasses.replace(scene.meshes[0], stiffness=other),)))
+    for name in ("largest_contact_forces_N", "coupled_frequencies_Hz"):
+        true = np.abs(truth.summary[name] - run.summary[name])
+        assert np.all(true <= np.array(summary["headline_errors"][name]) + 1e-9)
+
+
+def test_command_tells_one_error_for_each_number(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    job, out = tmp_path / "job.toml", tmp_path / "out"
+    job.write_text(SMALL)
+    assert main(["vibration", str(job), "--out", str(out), "--no-pictures"]) == 0
+    printed = capsys.readouterr().out
+    assert "N, " in printed or " N" in printed
+    assert "mean contact force" in printed
+    assert " +- " in printed
+    summary = json.loads((out / "summary.json").read_text())
+    assert len(summary["headline_errors"]["mean_contact_forces_N"]) == 1
+    assert all("error_estimate" in line for found in summary["dominant_lines"].values() for line in found)
+    assert main(["vibration", str(job), "--out", str(out), "--no-pictures", "--no-estimate"]) == 0
+    assert " +- " not in capsys.readouterr().out
+    assert "headline_errors" not in json.loads((out / "summary.json").read_text())
