@@ -6,6 +6,7 @@ import importlib
 import io
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -280,3 +281,23 @@ def test_constant_rows_are_not_checked_by_another_run() -> None:
     made = integrate(model.system, [0.0, 1e-5], start=model.start, method="explicit", backend="plain")
     monkey = SimpleNamespace(times=made.dense.times, __call__=again)
     assert _dropped_rows_hold(model.system, model.start, monkey, 1e-6)
+
+
+def test_a_train_that_changes_over_keeps_its_forces(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forces and accelerations through a change-over against the series all along: no corner, so both are smooth."""
+    model, times, clock = build_train(train([(20, 30)])), np.linspace(0.0, 1e-3, 41), Clock()
+    alone = simulate(model, times, tolerance=1e-9, method="explicit", backend="plain")
+
+    def slow(*arguments: Any) -> list[Way]:
+        one, two = ways_of(*arguments)
+        return [slowed(one, clock, lambda t: 1e-3 if t < 5e-4 else 1e3), slowed(two, clock, lambda _: 1.0)]
+
+    module = importlib.import_module("gearfe.rigid.integrate")
+    monkeypatch.setattr(module, "ways_of", slow)
+    monkeypatch.setattr(module, "Choice", partial(Choice, clock=clock))
+    made = simulate(model, times, tolerance=1e-6, backend="plain")
+    assert [leg["method"] for leg in made.statistics["choice"]] == ["explicit", "implicit"]
+    assert made.statistics["method"] == "auto"
+    for name in ("contact_force", "acceleration", "speed"):
+        one, two = getattr(alone, name), getattr(made, name)
+        np.testing.assert_allclose(two, one, atol=1e-4 * np.abs(one).max())
