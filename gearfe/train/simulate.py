@@ -33,7 +33,7 @@ PIECE_NUMBERS = 500_000
 #: ... but has so many samples at least.
 LEAST_SAMPLES = 256
 #: What a run counts, piece by piece.
-COUNTED = ("steps", "evaluations", "newton_iterations", "rejected", "compile_seconds")
+COUNTED = ("steps", "evaluations", "orders", "newton_iterations", "rejected", "compile_seconds")
 
 
 def simulate(
