@@ -19,6 +19,7 @@ from gearfe.train.response import SAMPLED, joined
 from gearfe.train.simulate import simulate_in_pieces
 from gearfe.vibration.files import OutputChoice, write_all, write_run
 from gearfe.vibration.follow import Envelope, RunningMean
+from gearfe.vibration.pictures import _largest
 
 from .train_responses import made_up, table
 from .trains import TORQUE, curve, train
@@ -170,3 +171,18 @@ def test_envelopes(pieces):
     parts = [values[i : i + 11] for i in range(0, 1003, 11)]
     assert (rows[::2] == [part.min(axis=0) for part in parts]).all()
     assert (rows[1::2] == [part.max(axis=0) for part in parts]).all()
+
+
+def test_the_largest_of_many_lines():
+    """No line is lost to the eye: each group of neighbours shows its largest; few lines are shown as they are."""
+    value = np.abs(np.random.default_rng(3).standard_normal(50_001))
+    value[[7, 12_345, 40_000]] = 50.0, 60.0, 70.0
+    frequency = 1e-3 * np.arange(50_001)
+    shown, height = _largest(frequency, value, 45.0)
+    assert len(shown) <= 2001
+    assert height[0] == value[0]
+    tall = shown[1:][height[1:] > 10.0]
+    assert tall == pytest.approx([0.007, 12.345, 40.0], abs=0.5 * 45.0 / 1999)
+    assert np.diff(shown).min() > 0.0
+    few = _largest(frequency[:101], value[:101], 1.0)
+    assert (few[1] == value[:101]).all()

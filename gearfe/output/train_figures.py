@@ -187,7 +187,7 @@ def power_figure(
     shown = (frequency <= highest) & (frequency > 0.0) & np.isfinite(level)
     top = float(level[shown].max(initial=-300.0)) if shown.any() else 0.0
     bottom = max(top - 60.0, float(level[shown].min(initial=300.0)) - 3.0) if shown.any() else -10.0
-    width = 0.72 * float(frequency[1] - frequency[0])
+    width = 0.72 * float(np.median(np.diff(frequency)))
     axes.bar(frequency[shown], level[shown] - bottom, width=width, bottom=bottom, color=BLUE, linewidth=0)
     axes.set_ylim(bottom, top + 0.18 * (top - bottom) + 1.0)
     axes.set_ylabel("radiated power level  (dB re 1 pW)")

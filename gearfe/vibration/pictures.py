@@ -13,6 +13,8 @@ from ..train.response import TrainResponse
 from .report import lines_of
 from .spectra import TrainSpectra
 
+#: Lines that a picture shows at most: more than it has columns of pixels.
+_DRAWN = 2000
 #: Lines that are named in the picture of a spectrum, and the least amplitude of such a line in parts of the largest.
 _NAMED, _LEAST = 5, 0.2
 #: End of the frequency axis: this multiple of the highest mesh frequency, unless larger lines lie above it.
@@ -53,17 +55,19 @@ def draw_spectrum(path: Path, response: TrainResponse, made: TrainSpectra, attac
         what = "" if line is None else f"\n{line.name} × {line.order}"
         named.append((1e-3 * peak.frequency, peak.amplitude, f"{peak.frequency:.0f} Hz: {peak.amplitude:.3g}{what}"))
     window = "no window" if spectrum.window == "none" else f"window: {spectrum.window}"
+    highest = _highest(response, made, [f for f, _, _ in named])
+    frequency, amplitude = _largest(1e-3 * spectrum.frequency, amplitude, highest)
     spectrum_figure(
         path,
         title=f"Normal acceleration at attachment {attachment}\n{title}",
-        frequency=1e-3 * spectrum.frequency,
+        frequency=frequency,
         amplitude=amplitude,
         quantity="amplitude  (m/s²)",
         peaks=named,
         marks=_marks(response, made),
         shaft=_first_shaft(response),
         note=f"resolution {spectrum.resolution:.1f} Hz, {window}",
-        highest=_highest(response, made, [f for f, _, _ in named]),
+        highest=highest,
     )
 
 
@@ -71,16 +75,33 @@ def draw_power(path: Path, response: TrainResponse, made: TrainSpectra, title: s
     """Level of the equivalent radiated power; the housing is elastic."""
     assert made.power is not None
     found = peaks(made.power.frequency, made.power.power, 3)
+    highest = _highest(response, made, [1e-3 * p.frequency for p in found])
+    frequency, level = _largest(1e-3 * made.power.frequency, made.power.level, highest)
     power_figure(
         path,
         title=f"Equivalent radiated power of the housing\n{title}",
-        frequency=1e-3 * made.power.frequency,
-        level=made.power.level,
+        frequency=frequency,
+        level=level,
         marks=_marks(response, made),
         shaft=_first_shaft(response),
         note=f"mean power {made.power.mean_level:.1f} dB, resolution {made.spectrum.resolution:.1f} Hz",
-        highest=_highest(response, made, [1e-3 * p.frequency for p in found]),
+        highest=highest,
     )
+
+
+def _largest(frequency: np.ndarray, value: np.ndarray, highest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Lines up to `highest`; of so many that they would lie on each other the largest of each group of neighbours.
+
+    A group stands at the middle of its frequencies, the constant by itself.
+    """
+    count = int(np.searchsorted(frequency, highest, side="right"))
+    group = -(-(count - 1) // _DRAWN)
+    if group <= 1:
+        return frequency[:count], value[:count]
+    starts = np.arange(1, count, group)
+    ends = np.append(starts[1:], count)
+    middle = 0.5 * (frequency[starts] + frequency[ends - 1])
+    return np.append(frequency[0], middle), np.append(value[0], np.maximum.reduceat(value[:count], starts))
 
 
 def attachment_to_draw(response: TrainResponse, asked: str | None, loaded: str | None) -> str:
