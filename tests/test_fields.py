@@ -18,7 +18,7 @@ from gearfe.meshing.whole_gear import whole_gear
 from gearfe.output import animation
 from gearfe.output.figures import color_limit
 from gearfe.stiffness.fields import gear_recovery, pair_recovery, straight_triangles
-from gearfe.stiffness.fields_output import chosen_positions, frames_of, write_fields
+from gearfe.stiffness.fields_output import chosen_positions, fields_size, frames_of, told_size, write_fields
 from gearfe.stiffness.flank_pressure import flank_pressures
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 
@@ -208,6 +208,9 @@ def test_the_series_and_the_table_of_pressures(gears, elastic, tmp_path):
         root = file["VTKHDF"]
         np.testing.assert_allclose(root["Steps/Values"][:], [1.0, 2.0])
         count = int(root["NumberOfPoints"][0])
+        arrays = [root[name] for name in ("Points", "Connectivity", "Offsets", "Types")]
+        arrays += [values for group in ("PointData", "CellData") for values in root[group].values()]
+        assert fields_size(elastic, 2) == pytest.approx(sum(a.nbytes for a in arrays), rel=1e-4)
         data = {name: root["PointData"][name][:] for name in root["PointData"]}
         points = root["Points"][:]
     assert set(data) == {
@@ -279,3 +282,17 @@ def test_choosing_positions(gears, elastic):
     assert list(chosen_positions(curve, None)) == [0, 1, 2]
     with pytest.raises(InputError, match=r"none of the sweep's angles; the nearest is 3 deg"):
         chosen_positions(curve, [3.4])
+
+
+def test_the_size_is_told_before(elastic):
+    """Positions of the second mesh cycle are those of the first again: what is offered instead is one cycle."""
+    teeth = elastic.bodies[0].teeth
+    whole = np.arange(1.0, 41.0)
+    one = int(np.ceil(360 / teeth - 1e-9))
+    said = told_size(elastic, whole, None)
+    assert said.startswith(
+        f"fields of 40 positions take {fields_size(elastic, 40) / 1e6:.3g} MB; less: --fields 1 ... "
+    )
+    assert f"the {one} angles of one mesh cycle, take {fields_size(elastic, one) / 1e6:.3g} MB" in said
+    assert told_size(elastic, whole, [3.0]) == f"fields of 1 position take {fields_size(elastic, 1) / 1e6:.3g} MB"
+    assert "fewer: --fields 1 3" in told_size(elastic, whole[:4], None)

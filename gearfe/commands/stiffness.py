@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..progress import count
+from ..progress import announce, count
 from .arguments import check_option
 
 if TYPE_CHECKING:
@@ -115,6 +115,10 @@ def run(args: argparse.Namespace) -> int:
             angle_numbers(np.degrees(sweep["angles"]), chosen)
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
     elastic = elastic_pair(job.pair, watch=watch, **job.model)
+    if chosen is not None:
+        from ..stiffness.fields_output import told_size
+
+        announce(told_size(elastic, np.degrees(sweep["angles"]), None if isinstance(chosen, str) else chosen))
     curve = sweep_stiffness(
         job.pair, elastic=elastic, estimate_error=not args.no_estimate, progress=count, **sweep, **_points(job)
     )

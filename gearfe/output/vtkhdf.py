@@ -175,7 +175,7 @@ class VtkHdfSeries:
         if len(values) != count or values.ndim > 2:
             raise InputError(f"{group}.{name}", values.shape, f"must have {count} rows", "one for each point or cell")
         if values.ndim == 2 and values.shape[1] == 2:
-            values = np.column_stack([values, np.zeros(len(values))])
+            values = np.column_stack([values, np.zeros(len(values), dtype=values.dtype)])
         path = f"{group}/{name}"
         self._steps.setdefault(f"{group}Offsets/{name}", []).append(self._length(path))
         self._append(path, values)

@@ -113,6 +113,35 @@ def write_fields(
     return names
 
 
+def fields_size(elastic: MeshingPair, positions: int) -> int:
+    """Bytes of ``fields.vtkhdf`` with so many positions, but for headers and what rounds its arrays up to whole MB.
+
+    A position has at each node three coordinates of 8 bytes and eight values of 4, and a byte for each element; the
+    elements themselves, six numbers of 8 bytes, an offset and a kind, stand once.
+    """
+    nodes = sum(body.teeth * (len(body.mesh.points) - len(body.mesh.cut_left)) for body in elastic.bodies)
+    elements = sum(body.teeth * len(body.mesh.triangles) for body in elastic.bodies)
+    return positions * (56 * nodes + elements) + 57 * elements
+
+
+def told_size(elastic: MeshingPair, known_deg: Array, angles_deg: Sequence[float] | None) -> str:
+    """How large the fields become, and what makes them smaller."""
+    count = len(known_deg) if angles_deg is None else len(angles_deg)
+    text = f"fields of {count} position{'s' if count > 1 else ''} take {fields_size(elastic, count) / 1e6:.3g} MB"
+    cycle = np.degrees(2.0 * math.pi / elastic.bodies[0].teeth)
+    first = int((known_deg < known_deg[0] + cycle * (1.0 - 1e-9)).sum())
+    if angles_deg is not None or count == 1:
+        return text
+    if first == count:
+        few = known_deg[[0, count // 2]]
+        return f"{text}; fewer: --fields " + " ".join(f"{angle:.6g}" for angle in few)
+    less = fields_size(elastic, first) / 1e6
+    return (
+        f"{text}; less: --fields {known_deg[0]:.6g} ... {known_deg[first - 1]:.6g}, the {first} angles of one mesh "
+        f"cycle, take {less:.3g} MB, a single angle {fields_size(elastic, 1) / 1e6:.3g} MB"
+    )
+
+
 def _place(curve: StiffnessCurve, number: int) -> tuple[float, float]:
     """Pinion angle and twist in all (rad) of a position of the curve."""
     return float(curve.pinion_angle[number]), float(curve.twist[number] + curve.lost_motion)
