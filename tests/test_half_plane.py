@@ -98,15 +98,15 @@ def test_panels_give_hertz() -> None:
 # ---- identities ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("name", "bound"), [("rounded", 4e-4), ("sharp", 1.2e-3), ("shifted", 6e-4)])
+@pytest.mark.parametrize("name", ["rounded", "sharp", "shifted"])
 @pytest.mark.parametrize("degrees", [0.005, 0.05, 0.4])
-def test_torque_is_the_derivative_of_the_energy(name: str, bound: float, degrees: float) -> None:
-    """T = dU/dtwist: centre and normal of each contact make the energy stationary."""
+def test_torque_is_the_derivative_of_the_energy(name: str, degrees: float) -> None:
+    """T = dU/dtwist: centre and normal of each contact make the energy stationary, and windows hold all pressure."""
     law, twist, share = law_of(name), math.radians(degrees), 0.01
     angles = angles_of(law.pair, 12)
     low, middle, high = (solve_half_plane(law, angles, twist * f) for f in (1 - share, 1.0, 1 + share))
     rate = (high.energy - low.energy) / (2 * share * twist)
-    assert np.abs(rate / middle.torque_wheel - 1).max() < bound
+    assert np.abs(rate / middle.torque_wheel - 1).max() < 4e-4
     slope = (high.torque_wheel - low.torque_wheel) / (2 * share * twist)
     # within the range of the differences pairs come and go at one or two angles
     assert np.median(np.abs(middle.tangent / slope - 1)) < 1e-3
@@ -287,3 +287,15 @@ def test_an_undercuts_edge_on_a_nearly_flat_mate() -> None:
     small = Router(sharp, elastic_pair(sharp), "hertz").solve(at_edge, np.full(len(at_edge), twist))
     found = solve_half_plane(law, at_edge, twist).torque_wheel
     assert found == pytest.approx([p.torque_wheel for p in small], rel=1.5e-3)
+
+
+def test_windows_hold_the_pressure_beside_edges() -> None:
+    """A sharp tip that bears makes a wider contact than Hertz's: no pressure ends where its window does."""
+    pair = gear_pair(bore=0.35)
+    law = half_plane_pair(pair, elastic_pair(pair, law="half_plane"))
+    found = solve_half_plane(law, np.radians([0.0, 9.5, 12.0, 16.0]), math.radians(0.5))
+    assert set(found.status) == {"converged"}
+    c = found.contacts
+    at_tip = np.stack([c.panel_arc[:, g] > law.curves[g].high - 2 * c.width for g in (0, 1)]).any(axis=0)
+    cut = (c.pressure[:, [0, -1]] > 0) & ~at_tip[:, [0, -1]]
+    assert not cut.any()

@@ -43,7 +43,7 @@ from .half_plane_result import (
     no_contacts,
     pair_sums,
 )
-from .half_plane_step import Before, HalfPlanePair, Step, half_plane_pair, moved_on, smooth_influence, step
+from .half_plane_step import Before, HalfPlanePair, Step, half_plane_pair, moved_on, outgrown, smooth_influence, step
 from .moved_faces import Frames
 from .panels import Couplings, couplings, forces_of_overlaps
 from .records import joined, taken
@@ -55,6 +55,8 @@ IntArray = NDArray[np.int64]
 
 #: Relative change of the forces from step to step at which a position is solved but for its last steps; most steps.
 TOLERANCE, STEPS = 1e-5, 20
+#: Steps after which most positions are within some per mille of their solution.
+NEAR_STEPS = 3
 #: Steps that most positions need; where more are needed, their moves are damped.
 USUAL_STEPS = 5
 #: Last steps, with the windows and the bearing panels held: after so many, derivatives err by 1e-3.
@@ -129,9 +131,9 @@ class _Open:
         new = made.solution.force
         return self.couples.total(np.abs(new - self.pairs.force)) / np.maximum(self.couples.total(new), TINY)
 
-    def moved_on(self, law: HalfPlanePair, made: Step, *, damped: bool = False) -> _Open:
+    def moved_on(self, law: HalfPlanePair, made: Step, *, near: bool = False, damped: bool = False) -> _Open:
         """What the next step starts from."""
-        frames, before = moved_on(law, made, self.pairs.before, damped=damped)
+        frames, before = moved_on(law, made, self.pairs.before, near=near, damped=damped)
         return _Open(self.numbers, _Pairs(self.pairs.found, frames, made.solution.force, made.spread, before))
 
 
@@ -187,11 +189,11 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
             break
         made, couples = _stepped(law, open_), open_.couples
         iterations[open_.numbers] = number
-        unsettled = couples.total((~made.solution.settled).astype(float)) > 0
+        unsettled = couples.total((~made.solution.settled | outgrown(made)).astype(float)) > 0
         near = ~unsettled & (open_.change(made) <= TOLERANCE) & (number > 1)
         bears = couples.total(made.solution.force) > 0
         status[open_.numbers[near & ~bears]] = "no_contact"
-        open_ = open_.moved_on(law, made, damped=number >= USUAL_STEPS)
+        open_ = open_.moved_on(law, made, near=number >= NEAR_STEPS, damped=number >= USUAL_STEPS)
         if (near & bears).any():
             done.append(open_.kept(near & bears))
         if near.any():

@@ -21,8 +21,9 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 ComplexArray = NDArray[np.complex128]
 
-#: Gap at the window's ends in units of that at the ends of Hertz's contact of the same force.
-WINDOW = 1.25
+#: Gap at the window's ends in units of that at the ends of Hertz's contact of the same force, and what it grows by
+#: where the pressure reaches an end: beside edges contacts are wider.
+WINDOW, WIDER = 1.25, 1.6
 #: A move of a contact is damped that is followed by one of more than this share of it, and at most so much.
 SLOW, LEAST_SHARE = 0.3, 0.3
 #: Force, of all pairs of a position, below which a window is not made smaller.
@@ -143,12 +144,15 @@ class Before:
         Mean places of the pressure that the step found (m).
     taken : ndarray, shape (p,)
         Share of the move to there that was taken.
+    reach : ndarray, shape (p,)
+        Gap at the next windows' ends, in units of that at the ends of Hertz's contact.
     """
 
     window: Windows
     bearing: NDArray[np.bool_]
     place: Array
     taken: Array
+    reach: Array
 
 
 def cross(a: ComplexArray, b: ComplexArray) -> Array:
@@ -257,7 +261,8 @@ def step(
     else:
         floor = np.maximum(force, LEAST_FORCE * couples.total(force)[couples.position])
         scale = np.sqrt(0.2 * law.compliance * floor * law.pair.pinion.module)
-        window = windows(frames, law.curves, scale, WINDOW * law.compliance * floor)
+        reach = WINDOW if before is None else before.reach
+        window = windows(frames, law.curves, scale, reach * law.compliance * floor)
     x, width = window.middle[:, None] + window.half[:, None] * MIDDLES, window.half[:, None] * WIDTHS
     one, two = (frames.heights(curve, gear, x) for gear, curve in enumerate(law.curves))
     gap, arcs = two[1] - one[1], np.stack([one[0], two[0]], axis=1)
@@ -298,11 +303,19 @@ def _moments(
     return place, variance, np.where(area > 0, rise / np.where(area > 0, area, 1.0), window.lean)
 
 
-def moved_on(law: HalfPlanePair, made: Step, before: Before | None, *, damped: bool) -> tuple[Frames, Before]:
+def outgrown(made: Step) -> NDArray[np.bool_]:
+    """Pairs whose pressure reaches an end of its window beyond which both faces go on, shape (p,)."""
+    return np.asarray(((made.solution.pressure[:, [0, -1]] > 0) & made.window.free).any(axis=1))
+
+
+def moved_on(
+    law: HalfPlanePair, made: Step, before: Before | None, *, near: bool, damped: bool
+) -> tuple[Frames, Before]:
     """What the next step starts from: frames at the mean place of the pressure, along the mean normal under it.
 
-    Places that go to and fro (an edge bears whose mate is nearly flat) are `damped` on demand: then only the share of
-    the move is taken that would have ended it (Aitken's; Kuettler & Wall, *Comput. Mech.* 43, 2008).
+    Windows grow only `near` the solution, so that they do not depend on the way to it. Places that go to and fro (an
+    edge bears whose mate is nearly flat) are `damped` on demand: then only the share of the move is taken that would
+    have ended it (Aitken's; Kuettler & Wall, *Comput. Mech.* 43, 2008).
     """
     frames = made.frames
     if before is None:
@@ -325,4 +338,6 @@ def moved_on(law: HalfPlanePair, made: Step, before: Before | None, *, damped: b
         arc=arc,
     )
     window = replace(made.window, middle=made.window.middle - place, nearest=made.window.nearest - place)
-    return onward, Before(window, made.solution.pressure > 0, made.place, share)
+    reach = np.full(len(place), WINDOW) if before is None else before.reach
+    reach = np.where(outgrown(made), WIDER * reach, reach) if near else reach
+    return onward, Before(window, made.solution.pressure > 0, made.place, share, reach)

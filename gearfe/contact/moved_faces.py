@@ -97,12 +97,15 @@ class Windows:
         x where the faces are nearest to each other (m).
     lean : ndarray, shape (p,)
         Slope of the mean of both faces there (-).
+    free : ndarray of bool, shape (p, 2)
+        Whether both faces go on beyond the window's ends.
     """
 
     middle: Array
     half: Array
     nearest: Array
     lean: Array
+    free: NDArray[np.bool_]
 
 
 #: Places at which a window is searched for, in units of the contact's expected half width.
@@ -136,4 +139,5 @@ def windows(frames: Frames, curves: Sequence[FlankCurve], scale: Array, depth: A
     rise = 0.5 * sum(h[row, right] - h[row, left] for h in heights)
     lean = rise / np.maximum(1e-12, x[row, right] - x[row, left])
     half = np.maximum(0.5 * (ends[1] - ends[0]), 1e-4 * scale)
-    return Windows(0.5 * (ends[1] + ends[0]), half, x[row, nearest], lean)
+    free = np.stack([ends[0] > low, ends[1] < high], axis=1)
+    return Windows(0.5 * (ends[1] + ends[0]), half, x[row, nearest], lean, free)
