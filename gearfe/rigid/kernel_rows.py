@@ -136,9 +136,10 @@ def add_transposed(rows, G, mu, factor, out):
             out[b + 2] += G[r, side, 2] * value
 
 
-def factorise(rows, plan, mass, G, skip, val, diag):
+def factorise(rows, plan, mass, G, skip, val, diag, bound):
     """L D L^T of S in val (m reciprocals of D, then the entries of L); rows with skip != 0 become unit rows.
 
+    Rows whose pivot falls below `bound` of their diagonal become unit rows, too, and get skip = 2.
     Returns the smallest pivot relative to its diagonal of S, and its row (-1 when there is none).
     """
     m = rows.ints.shape[0]
@@ -157,6 +158,7 @@ def factorise(rows, plan, mass, G, skip, val, diag):
             )
     least = 1.0
     where = -1
+    dropped = False
     for r in range(m):
         if skip[r] != 0 or val[r] <= 0.0:
             diag[r] = 1.0
@@ -166,6 +168,13 @@ def factorise(rows, plan, mass, G, skip, val, diag):
             diag[r] = val[r]
     for j in range(m):
         ratio = val[j] / diag[j]
+        if ratio < bound and skip[j] == 0:
+            skip[j] = 2
+            val[j] = 1.0
+            dropped = True
+            for e in range(plan.start[j], plan.start[j + 1]):
+                val[m + e] = 0.0
+            continue
         if skip[j] == 0 and ratio < least:
             least = ratio
             where = j
@@ -176,6 +185,10 @@ def factorise(rows, plan, mass, G, skip, val, diag):
             val[m + e] /= d
         for u in range(plan.update_start[j], plan.update_start[j + 1]):
             val[plan.update[u, 0]] -= val[m + plan.update[u, 1]] * val[m + plan.update[u, 2]] * d
+    if dropped:
+        for e in range(plan.row.shape[0]):
+            if skip[plan.row[e]] == 2:
+                val[m + e] = 0.0
     for j in range(m):
         val[j] = 1.0 / val[j]
     return least, where
@@ -198,7 +211,7 @@ def time_series(times, t, forward, orders, out):
     width = times.factor.shape[1]
     for k in range(times.first.shape[0] - 1):
         p = times.first[k]
-        slack = 1e-13 * (1.0 + abs(t))
+        slack = 1e-13 * abs(t)
         for i in range(times.first[k] + 1, times.first[k + 1]):
             begin = times.start[i]
             if (forward and t >= begin - slack) or (not forward and t > begin + slack):
@@ -218,9 +231,9 @@ def time_series(times, t, forward, orders, out):
                 scale *= times.sine[i, 1] / (j + 1)
 
 
-def least_norm(rows, plan, mass, G, val, skip, rhs, work, u):
+def least_norm(rows, plan, mass, G, val, skip, length, rhs, work, u):
     """u -= M^-1 G^T S^-1 rhs: the smallest change (in the mass norm) that lowers G u by rhs. Returns its
-    largest entry."""
+    largest entry, in units of `length` and 1 rad."""
     for r in range(rhs.shape[0]):
         if skip[r] != 0:
             rhs[r] = 0.0
@@ -231,7 +244,7 @@ def least_norm(rows, plan, mass, G, val, skip, rhs, work, u):
     for i in range(u.shape[0]):
         change = work[i] * mass[i]
         u[i] -= change
-        biggest = max(biggest, abs(change))
+        biggest = max(biggest, abs(change) / (1.0 if i % 3 == 2 else length))
     return biggest
 
 

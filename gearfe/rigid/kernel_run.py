@@ -12,15 +12,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kernel_fold import evaluate, fold_ahead, locate_fold, project
+from .kernel_fold import evaluate, next_fold, project
+from .kernel_locate import exchange, locate_fold
 from .kernel_rows import copy, factorise, fill, gradients, trigonometry
 from .kernel_series import expand
 
 DONE, TOO_SMALL, FULL, SINGULAR, NOT_FINITE, AT_FOLD = 0, 1, 2, 3, 4, 6
-#: Pivot of S relative to its diagonal below which a fold is looked for.
-NEAR = 0.3
-#: Angle (rad) from which on a step is looked at within, too: it could jump a fold.
-FAR = 0.6
+#: Angle (rad) that bodies turn against each other between two looks for folds.
+FAR = 0.5
 
 
 def step_length(QS, order, tolerance, length):
@@ -41,11 +40,6 @@ def step_length(QS, order, tolerance, length):
     return step
 
 
-def same_moment(tolerance):
-    """Pivot below which a row passes its fold together with another, as far as the accuracy of the state can tell."""
-    return min(1e-6, max(1e-14, (300.0 * tolerance) ** 2))
-
-
 def clear_series(w, q, v, order):
     """Series that holds position and velocity only."""
     copy(q, w.QS[0])
@@ -63,139 +57,128 @@ def fold_behind(tb, t, sign, q, v, order, tolerance, length, base, where, ahead,
     step = step_length(w.QS, order, tolerance, length)
     if abs(ahead) > step:
         return 0, 0.0
-    folds, found = locate_fold(
-        tb, t, forward, w.QS, order, ahead, abs(ahead), base, where, length, same_moment(tolerance), w, qn, vn
-    )
+    folds, found = locate_fold(tb, t, forward, w.QS, order, ahead, abs(ahead), base, where, length, w, qn, vn)
     if folds > 0 and sign * found > 0.0:
         folds = 0
     return folds, found
 
 
 def begin(tb, t, sign, q, v, order, tolerance, length, base, none, w, qn, vn):
-    """Consistent start: (folds, time shift, time to the fold ahead, status); the state is in q, v."""
+    """Consistent start beside a fold: (folds, time shift, time to the fold ahead, its row, status); state in q, v."""
     rows, plan, mass = tb.rows, tb.plan, tb.mass
     forward = sign > 0.0
-    copy(q, qn)
-    copy(v, vn)
-    copy(base, w.skip)
-    first, least, where = project(tb, t, forward, qn, vn, base, length, w)
-    if where < 0 or (least > NEAR and np.isfinite(first)):
-        copy(qn, q)
-        copy(vn, v)
-        return 0, 0.0, np.inf, DONE
-    trigonometry(q, w.c, w.s)
-    gradients(rows, q, w.c, w.s, w.G)
-    least, where = factorise(rows, plan, mass, w.G, base, w.val, w.diag)
-    ahead, share = fold_ahead(tb, q, v, base, where, w)
-    if least < 1e-10:
+    while True:
+        trigonometry(q, w.c, w.s)
+        gradients(rows, q, w.c, w.s, w.G)
+        least, where = factorise(rows, plan, mass, w.G, base, w.val, w.diag, 0.0)
+        if least >= 1e-10:
+            break
         speed = 1e-300
         for i in range(v.shape[0]):
             speed = max(speed, abs(v[i]) / (1.0 if i % 3 == 2 else length))
         clear_series(w, q, v, order)
-        folds, found = locate_fold(
-            tb, t, forward, w.QS, order, 0.0, 1e-3 / speed, base, where, length, same_moment(tolerance), w, qn, vn
-        )
+        folds, found = locate_fold(tb, t, forward, w.QS, order, 0.0, 1e-3 / speed, base, where, length, w, qn, vn)
         if folds == 0:
-            return 0, 0.0, np.inf, SINGULAR
-        copy(qn, q)
-        copy(vn, v)
-        return folds, found, np.inf, DONE
-    first, least, where = project(tb, t, forward, q, v, base, length, w)
-    ahead, share = fold_ahead(tb, q, v, base, where, w)
-    if share < 0.5:
-        ahead = np.inf
-    if sign * ahead < 0.0:
+            return 0, 0.0, np.inf, -1, SINGULAR
+        folds = exchange(tb, base, folds, w, qn, vn)
+        if folds > 0:
+            copy(qn, q)
+            copy(vn, v)
+            return folds, found, np.inf, -1, DONE
+    project(tb, t, forward, q, v, base, length, w)
+    ahead, where = next_fold(tb, q, v, base, sign, -np.inf, np.inf, w)
+    if where >= 0 and sign * ahead < 0.0:
         folds, found = fold_behind(tb, t, sign, q, v, order, tolerance, length, base, where, ahead, none, w, qn, vn)
         if folds > 0:
             copy(qn, q)
             copy(vn, v)
-            return folds, found, np.inf, DONE
+            return folds, found, np.inf, -1, DONE
         project(tb, t, forward, q, v, base, length, w)
-    return 0, 0.0, ahead, DONE
+        ahead, where = np.inf, -1
+    return 0, 0.0, ahead, where, DONE
 
 
 def turned(QS, q):
-    """Largest angle by which a body turned since the point of expansion."""
+    """Largest angle by which two bodies (or a body and the ground) turned against each other in the series."""
     most = 0.0
+    least = 0.0
     for i in range(2, q.shape[0], 3):
-        most = max(most, abs(q[i] - QS[0, i]))
-    return most
+        most = max(most, q[i] - QS[0, i])
+        least = min(least, q[i] - QS[0, i])
+    return most - least
 
 
-def fold_between(tb, h, order, base, w, q, v):
-    """A fold inside a long step, judged from two points within: (time from its beginning, row), infinite without."""
-    for third in range(1, 3):
-        place = h * third / 3.0
+def fold_within(tb, sign, h, order, base, low, high, w, q, v):
+    """First fold of the series within low < sign tau < high, from looks inside the step: (time, row), row -1 for
+    none."""
+    evaluate(w.QS, order, h, q, v)
+    looks = int(np.ceil(turned(w.QS, q) / FAR))
+    for k in range(1, looks):
+        place = h * k / looks
         evaluate(w.QS, order, place, q, v)
         trigonometry(q, w.c, w.s)
         gradients(tb.rows, q, w.c, w.s, w.G)
-        least, where = factorise(tb.rows, tb.plan, tb.mass, w.G, base, w.val, w.diag)
-        if where >= 0 and least < NEAR:
-            tau, share = fold_ahead(tb, q, v, base, where, w)
-            found = (place + tau) / h
-            if share > 0.5 and abs(tau) < 0.5 * abs(h) and 0.0 < found < 1.0:
-                return place + tau, where
+        factorise(tb.rows, tb.plan, tb.mass, w.G, base, w.val, w.diag, 0.0)
+        spacing = abs(h) / looks
+        tau, row = next_fold(
+            tb, q, v, base, sign, max(-spacing, low - sign * place), min(spacing, high - sign * place), w
+        )
+        if row >= 0:
+            return place + tau, row
     return np.inf, -1
 
 
-def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, close, w, qn, vn):
-    """End of a step of at most |h|: (step, folds there, time to the next fold, status); the state is in qn, vn.
+def land(tb, t, sign, h, order, tolerance, length, base, folds, ahead, row, close, w, qn, vn):
+    """End of a step of at most |h|: (step, folds there, time to the next fold, its row, status); state in qn, vn.
 
     A fold ahead within `close` (0.7 of the last step) is landed on even when |h| is shorter: so close to it,
     round-off in
     the last coefficients and not the motion sets |h|.
     """
     forward = sign > 0.0
-    for _ in range(40):
-        evaluate(w.QS, order, h, qn, vn)
-        between, through = np.inf, -1
-        if turned(w.QS, qn) > FAR:
-            between, through = fold_between(tb, h, order, base, w, qn, vn)
-            evaluate(w.QS, order, h, qn, vn)
-        first, least, where = project(tb, t + h, forward, qn, vn, base, length, w)
-        guess = np.inf
-        tau = np.inf
-        if where >= 0 and least < NEAR:
-            tau, share = fold_ahead(tb, qn, vn, base, where, w)
-            if share > 0.5:
-                guess = h + tau
-            else:
-                tau = np.inf
-        if through >= 0 and base[through] == 0 and not 0.0 < sign * guess < abs(h):
-            guess = between
-            where = through
+    passed = 0.0  # up to there no fold is left to find
+    for _ in range(40 + 4 * base.shape[0]):
+        lowest = max(passed, 1e-3 * abs(h)) if folds > 0 else passed
         near = max(1.3 * abs(h), close)
-        if through < 0 and 0.0 < sign * ahead < near:
+        guess, where = fold_within(tb, sign, h, order, base, lowest, near, w, qn, vn)
+        evaluate(w.QS, order, h, qn, vn)
+        first, least = project(tb, t + h, forward, qn, vn, base, length, w)
+        tau, after = next_fold(tb, qn, vn, base, sign, lowest - abs(h), np.inf, w)
+        if where < 0 and after >= 0:
+            guess = h + tau
+            where = after
+        if (where < 0 or sign * guess >= near) and row >= 0 and lowest < sign * ahead < near:
             guess = ahead
-        lowest = 0.05 * abs(h) if folds > 0 else 0.0
-        if lowest < sign * guess < near:
+            where = row
+        if where >= 0 and base[where] == 0 and lowest < sign * guess < near:
             reach = 0.5 * max(abs(h), abs(guess))
-            found_folds, found = locate_fold(
-                tb, t, forward, w.QS, order, guess, reach, base, where, length, same_moment(tolerance), w, qn, vn
-            )
+            found_folds, found = locate_fold(tb, t, forward, w.QS, order, guess, reach, base, where, length, w, qn, vn)
             if found_folds > 0 and lowest < sign * found:
                 if sign * found <= max(1.000001 * abs(h), close):
-                    return found, found_folds, np.inf, DONE
+                    found_folds = exchange(tb, base, found_folds, w, qn, vn)
+                    if found_folds == 0:  # it was one of the chosen rows only: look again
+                        continue
+                    tau, after = next_fold(tb, qn, vn, w.skip, sign, 0.0, np.inf, w)
+                    return found, found_folds, tau, after, DONE
                 h = 0.6 * found
                 evaluate(w.QS, order, h, qn, vn)
-                copy(base, w.skip)
-                first, least, where = project(tb, t + h, forward, qn, vn, base, length, w)
+                first, least = project(tb, t + h, forward, qn, vn, base, length, w)
                 if first < 1e3 * tolerance + 1e-10:
-                    return h, 0, found - h, DONE
-            evaluate(w.QS, order, h, qn, vn)
-            copy(base, w.skip)
-            first, least, where = project(tb, t + h, forward, qn, vn, base, length, w)
-        if first < 1e3 * tolerance + 1e-10 and (where < 0 or least > 1e-12):
-            return h, 0, tau, DONE
+                    return h, 0, found - h, where, DONE
+                continue
+            passed = 1.01 * abs(guess)  # no fold, or the one at the beginning of the step
+            continue
+        if first < 1e3 * tolerance + 1e-10 and least > 1e-12:
+            return h, 0, tau, after, DONE
         h = 0.7 * h
-    return h, 0, np.inf, TOO_SMALL
+    return h, 0, np.inf, -1, TOO_SMALL
 
 
 def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks, longest, state, T, C, kind):
     """Integrate from (q, v) to t1, or until the arrays are full; call again with the same arguments to go on.
 
-    `state` holds (time, folds, time to the fold ahead, 1 once begun, last step); T (room + 1,) receives step ends, C
-    (room, order + 1, n) coefficients, kind (room,) the number of folds at the start of every step.
+    `state` holds (time, folds, time to the fold ahead, 1 once begun, last step, row of the fold ahead); T (room + 1,)
+    receives step ends, C (room, order + 1, n) coefficients, kind (room,) the number of folds at the start of each.
 
     Returns status, number of steps. AT_FOLD asks for `begin` (rare, so it stays in Python) before the next call.
     """
@@ -205,21 +188,19 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
     folds = int(state[1])
     ahead = state[2]
     last = state[4]
+    row = int(state[5])
     status = DONE
     count = 0
     if state[3] == 0.0:
         copy(q, w.qn)
         copy(v, w.vn)
         copy(base, w.skip)
-        first, least, where = project(tb, t, forward, q, v, base, length, w)
-        if where >= 0 and (least < 1e-6 or not np.isfinite(first)):
+        first, least = project(tb, t, forward, q, v, base, length, w)
+        if least < 1e-6 or not np.isfinite(first):
             copy(w.qn, q)
             copy(w.vn, v)
             return AT_FOLD, 0
-        if where >= 0 and least < NEAR:
-            tau, share = fold_ahead(tb, q, v, base, where, w)
-            if share > 0.5:
-                ahead = tau
+        ahead, row = next_fold(tb, q, v, base, sign, 0.0, np.inf, w)
         state[3] = 1.0
     T[0] = t
     edge = 0 if forward else breaks.shape[0] - 1
@@ -234,7 +215,7 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
         if not size > 1e-14 * max(abs(t), abs(t1 - t0)):
             status = TOO_SMALL
             break
-        while 0 <= edge < breaks.shape[0] and sign * (breaks[edge] - t) <= 1e-13 * (1.0 + abs(t)):
+        while 0 <= edge < breaks.shape[0] and sign * (breaks[edge] - t) <= 1e-13 * abs(t):
             edge += 1 if forward else -1
         goal = t1
         if 0 <= edge < breaks.shape[0] and sign * (t1 - breaks[edge]) > 0.0:
@@ -244,7 +225,7 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
             size = remains
         elif size > 0.5 * remains:
             size = 0.5 * remains
-        h, next_folds, next_ahead, status = land(
+        h, next_folds, next_ahead, next_row, status = land(
             tb,
             t,
             sign,
@@ -255,6 +236,7 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
             base,
             folds,
             ahead,
+            row,
             min(0.7 * last, remains),
             w,
             w.qn,
@@ -274,6 +256,7 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
         copy(w.vn, v)
         folds = next_folds
         ahead = next_ahead
+        row = next_row
         last = abs(h)
     for i in range(q.shape[0]):
         if not (np.isfinite(q[i]) and np.isfinite(v[i])):
@@ -282,6 +265,7 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
     state[1] = folds
     state[2] = ahead
     state[4] = last
+    state[5] = row
     return status, count
 
 
@@ -305,7 +289,7 @@ def sample(T, C, sign, times, derivative, out):
                 out[i, c] = out[i, c] * h + factor * C[piece, j, c]
 
 
-FUNCTIONS = (sample, step_length, same_moment, turned, fold_between, land, integrate_series)
+FUNCTIONS = (sample, step_length, turned, fold_within, land, integrate_series)
 STARTERS = (clear_series, fold_behind, begin)
 NAMES = {
     "DONE": DONE,
@@ -314,6 +298,5 @@ NAMES = {
     "SINGULAR": SINGULAR,
     "NOT_FINITE": NOT_FINITE,
     "AT_FOLD": AT_FOLD,
-    "NEAR": NEAR,
     "FAR": FAR,
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import Counter
 from dataclasses import dataclass
 from functools import lru_cache
 from types import SimpleNamespace
@@ -12,16 +13,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..progress import stage
-from . import compiled, kernel_fold, kernel_forces, kernel_planes, kernel_rows, kernel_run, kernel_series
+from . import compiled, kernel_fold, kernel_forces, kernel_locate, kernel_planes, kernel_rows, kernel_run, kernel_series
 from .choice import LEAST_STEPS, STOPPED, Watch
-from .tables import Array, Assembly, Ints, Tables
+from .tables import Array, Assembly, Ints, Rows, Tables
 from .within import within_run
 
 FUNCTIONS = (
     *kernel_rows.FUNCTIONS, *kernel_forces.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_fold.FUNCTIONS,
-    *kernel_run.FUNCTIONS,
+    *kernel_locate.FUNCTIONS, *kernel_run.FUNCTIONS,
 )  # fmt: skip
-NAMES = {**kernel_rows.GLOBALS, **kernel_planes.NAMES, **kernel_run.NAMES}
+NAMES = {**kernel_rows.GLOBALS, **kernel_planes.NAMES, **kernel_fold.NAMES, **kernel_locate.NAMES, **kernel_run.NAMES}
 ENTRIES = ("integrate_series", "sample")
 HOT = (
     "fill", "copy", "trigonometry", "gradients", "residuals", "times_gradients", "add_transposed", "solve",
@@ -29,7 +30,6 @@ HOT = (
     "angle_orders", "slot_orders", "row_orders", "spring_orders", "force_orders", "spring_force", "slot_forces",
     "slot_arms", "add_multipliers", "add_line_multipliers", "torque_orders", "finish_order",
 )  # fmt: skip
-MOST_FOLDS = 4
 
 
 class FoldFrame(NamedTuple):
@@ -74,9 +74,32 @@ class Work(NamedTuple):
     skip: Ints  # (m,)
 
 
+def most_folds(rows: Rows) -> int:
+    """How many rows can lose their gradients at once: those that close loops, for a tree of joints is never singular.
+
+    Rows of one joint follow one another and join the same two bodies.
+    """
+    root: dict[int, int] = {}
+
+    def top(body: int) -> int:
+        while root.setdefault(body, body) != body:
+            body = root[body]
+        return body
+
+    pairs: Counter[tuple[int, int]] = Counter((int(min(a, b)), int(max(a, b))) for a, b in rows.ints[:, :2])
+    closing = 0
+    for (a, b), count in pairs.items():
+        if top(a) == top(b):
+            closing += count
+        else:
+            root[top(a)] = top(b)
+            closing += max(0, count - 2)
+    return max(1, closing)
+
+
 def work_space(tables: Tables, order: int) -> Work:
     """Scratch arrays for series up to `order`."""
-    K, n3, m, d = order + 3, tables.mass.size, len(tables.rows.ints), MOST_FOLDS
+    K, n3, m, d = order + 3, tables.mass.size, len(tables.rows.ints), most_folds(tables.rows)
     n, lines, springs = n3 // 3, tables.rows.lines.size, int((tables.forces.ints[:, 0] == kernel_planes.SPRING).sum())
 
     def zeros(count: int, *shape: int) -> list[Any]:
@@ -169,7 +192,11 @@ def load_kernels(assembly: Assembly, w: Work, order: int, redundant: Ints) -> fl
         return 0.0
     began = time.perf_counter()
     n3 = assembly.tables.mass.size
-    state, times, coefficients = np.array([0.0, 0.0, math.inf, 1.0, 0.0]), np.zeros(2), np.zeros((1, order + 1, n3))
+    state, times, coefficients = (
+        np.array([0.0, 0.0, math.inf, 1.0, 0.0, -1.0]),
+        np.zeros(2),
+        np.zeros((1, order + 1, n3)),
+    )
     with stage("compiling the kernels"):
         kernels(True).integrate_series(
             assembly.tables, w, 0.0, 0.0, np.zeros(n3), np.zeros(n3), order, 1e-9, assembly.length, redundant,
@@ -207,7 +234,8 @@ def run(
     q = np.concatenate([q, np.zeros(3)])
     v = np.concatenate([v, np.zeros(3)])
     t0, t1 = float(span[0]), float(span[1])
-    state = np.array([t0, 0.0, math.inf, 0.0, 0.0])
+    redundant = redundant.copy()  # which rows are left out changes along the motion
+    state = np.array([t0, 0.0, math.inf, 0.0, 0.0, -1.0])
     compiling = load_kernels(assembly, w, order, redundant) if jit else 0.0
     advance = kernels(jit).integrate_series
     parts = []
@@ -227,10 +255,11 @@ def run(
         )  # fmt: skip
         if status == kernel_run.AT_FOLD:
             sign = 1.0 if t1 >= t0 else -1.0
-            folds_here, shift, ahead, status = kernels(False).begin(
+            folds_here, shift, ahead, row, status = kernels(False).begin(
                 tb, t0, sign, q, v, order, float(tolerance), assembly.length, redundant, 0, w, w.qn, w.vn
             )
             state[:4] = t0 + shift, folds_here, ahead, 1.0
+            state[5] = row
             if status == kernel_run.DONE:
                 continue
             times[0] = t0
