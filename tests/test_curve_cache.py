@@ -73,3 +73,18 @@ def test_a_damaged_file_is_made_anew(folder):
 def test_without_a_cache(monkeypatch):
     monkeypatch.setattr(curve_cache, "cache_folder", lambda: None)
     assert len(cached_curve(pair(20, 30), MODEL, SWEEP)) == 3
+
+
+def test_the_estimate_of_a_stored_curve_is_kept_beside_it(folder, monkeypatch):
+    gears = pair(20, 30)
+    bare = cached_curve(gears, MODEL, SWEEP)
+    assert bare.error is None
+    first = cached_curve(gears, MODEL, SWEEP, estimate_error=True)  # asked for later: made, and kept
+    assert first.error is not None
+    assert first.error.worst > 0.0
+    monkeypatch.setattr("gearfe.stiffness.sweep.elastic_pair", lambda *_, **__: pytest.fail("computed again"))
+    second = cached_curve(gears, MODEL, SWEEP, estimate_error=True)
+    np.testing.assert_array_equal(second.error.relative, first.error.relative)
+    assert second.error.worst == first.error.worst
+    np.testing.assert_array_equal(second.k_mesh, first.k_mesh)
+    assert cached_curve(gears, MODEL, SWEEP).error is None
