@@ -200,7 +200,9 @@ class RecordSpectrum:
 
     def spectrum(self, signals: int | None = None) -> Spectrum:
         """Spectrum of the first `signals` signals, by default of all, one column each."""
-        value = np.column_stack([self.column(i) for i in range(self.signals if signals is None else signals)])
+        value = np.empty((len(self.frequency), self.signals if signals is None else signals), dtype=complex)
+        for i in range(value.shape[1]):
+            value[:, i] = self.column(i)
         return Spectrum(self.frequency, value, self._last, self.window, self._square / self._gain**2)
 
 

@@ -45,7 +45,7 @@ class TrainSpectra:
 
     def amplitude(self, name: str) -> Array:
         """(m,) amplitudes of a signal."""
-        return self.spectrum.amplitude[:, self.names.index(name)]
+        return np.abs(self.value(name))
 
     def value(self, name: str) -> NDArray[np.complex128]:
         """(m,) complex amplitudes of a signal."""
