@@ -221,7 +221,11 @@ def told(response: TrainResponse, scene: TrainScene, written: Written, choice: O
         low, high = stiffness[name]
         k = "rigid" if low is None else f"k {low / 1e6:.4g} to {high / 1e6:.4g} N/um"
         mean = summary.get("mean_contact_forces_N")
-        force = "" if mean is None else f", mean contact force {mean[i]:.1f}{off('mean_contact_forces_N', i)} N"
+        force = (
+            ""
+            if mean is None or not math.isfinite(mean[i])
+            else f", mean contact force {mean[i]:.1f}{off('mean_contact_forces_N', i)} N"
+        )
         lines.append(f"mesh {i + 1} ({name}): {frequency:.1f} Hz, {k}{force}")
     if response.common_period_s:
         count = summary.get("mean_over_common_periods", 0)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..cache import cache_folder
 from .campaign import Case
 from .outcome import Check, Finding
 from .worker import OverTime
@@ -85,7 +86,13 @@ def mutated_run(case: Case, folder: Path) -> Finding:
     said, told = io.StringIO(), io.StringIO()
     caches = tuple(
         str(Path(p).resolve())
-        for p in (tempfile.gettempdir(), sys.prefix, Path.home() / ".cache", Path.home() / ".config")
+        for p in (
+            tempfile.gettempdir(),
+            sys.prefix,
+            Path.home() / ".cache",
+            Path.home() / ".config",
+            cache_folder() or sys.prefix,
+        )
     )
     _WATCH.inside = (str(folder), *_bytecode(), *caches[1:], *_own_temporary(caches[0]))
     _WATCH.outside, _WATCH.started, _WATCH.run = [], [], []

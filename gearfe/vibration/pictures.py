@@ -30,8 +30,9 @@ def draw_response(path: Path, response: TrainResponse, attachment: str, title: s
     signs = np.where(np.sign(response.speed.mean(axis=0)) * sense < 0.0, -1.0, 1.0)
     drive = sense if len(signs) else 1.0
     labels = [n if s > 0.0 else f"{n} (sign reversed)" for n, s in zip(response.shaft_names, signs, strict=True)]
-    means = {f"mesh {i + 1}, mean {m / 1e3:.4g} kN": m / 1e3 for i, m in enumerate(mean)}
-    names = list(means) or [f"mesh {i + 1}" for i in range(len(response.mesh_names))]
+    told = [f", mean {m / 1e3:.4g} kN" if np.isfinite(m) else "" for m in mean]
+    names = [f"mesh {i + 1}{text}" for i, text in enumerate(told)]
+    means = {name: m / 1e3 for name, m in zip(names, mean, strict=True) if np.isfinite(m)}
     response_figure(
         path,
         title=title,
