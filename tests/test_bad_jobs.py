@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from gearfe import Housing
 from gearfe.cli import main
-from gearfe.errors import InputError
-from gearfe.record_spectrum import finer
 from gearfe.reduction.error import reduction_error
 from gearfe.tables.examples import job_file
 
@@ -53,7 +50,6 @@ MECHANISM = job_file("mechanism")
             'driven = "whel"',
             "meshes[0].driven: unknown name 'whel'",
         ),
-        ("vibration", RIGID_TRAIN, "= 2e8 ", "= 1e60 ", "samples of the motion"),
         ("housing", HOUSING, "[housing.material]", "[housing.material]\ndensity_kg_per_m3 = 1e-300", ">= 1e-09"),
         ("mechanism", MECHANISM, 'point = "A"', "point = [1, 2, 3]", "must have 2 entries"),
         ("mechanism", MECHANISM, '"vx(rod.B)" = -4.0', '"vx(rod.B)" = "fast"', "must be a number"),
@@ -121,11 +117,6 @@ def test_a_reference_is_read_before_the_run(tmp_path, capsys, monkeypatch, raw, 
 def test_new_names_a_folder(tmp_path, capsys):
     assert main(["new", "stiffness", str(tmp_path), "--force"]) == 2
     assert "is a folder; name a file in it" in capsys.readouterr().err
-
-
-def test_a_motion_with_far_too_many_samples():
-    with pytest.raises(InputError, match=r"samples of the motion in 0.007 s; leave such a stiff part rigid"):
-        finer(np.linspace(0.0, 7e-3, 201), 1e150)
 
 
 def test_a_housing_without_bores_has_no_reduction_error():
