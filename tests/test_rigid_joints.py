@@ -24,6 +24,7 @@ from gearfe.rigid import (
     Scene,
     Slot,
     Spring,
+    Status,
     System,
     consistent_start,
     constant,
@@ -297,7 +298,7 @@ def test_bad_input_says_what_and_how(make, text):
 
 def test_a_run_that_cannot_go_on_returns_what_it_has():
     made = integrate(chain(2), np.linspace(0, 5, 51), tolerance=1e-9, backend="plain", most_steps=5)
-    assert made.status == 2
+    assert made.status is Status.MOST_STEPS
     assert 0.0 < made.reached < 5.0
     assert len(made.time) == len(made.q) < 51
 

@@ -18,6 +18,7 @@ from gearfe.rigid import (
     Prescribed,
     Scene,
     Start,
+    Status,
     System,
     consistent_start,
     integrate,
@@ -130,7 +131,7 @@ def test_two_folds_at_the_same_moment():
 def test_start_at_rest_on_the_fold_selects_no_branch():
     """The status says so, and the start is returned."""
     made = integrate(folding_links(pi / 2, 0.0), [0.0, 1.0], backend="plain")
-    assert made.status == 3
+    assert made.status is Status.NO_BRANCH
     assert made.reached == 0.0
     assert made.q.shape == (1, 6)
     assert made.q[0, 2] == pytest.approx(pi / 2)
@@ -246,4 +247,4 @@ def test_prescribed_motions_that_contradict_each_other_later():
         made = integrate(system, [0.0, 1.0], backend="plain")
     except InputError:
         return
-    assert made.status != 0
+    assert made.status is Status.REDUNDANT_NOT_MET

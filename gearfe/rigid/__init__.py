@@ -24,7 +24,7 @@ from .scene import PlanarScene
 from .start import Forced, Freedoms, Start, consistent_start, count_freedoms
 from .system import System
 from .timefunctions import TimeFunction, constant, polynomial, sine, smoothed_step
-from .trajectory import Trajectory
+from .trajectory import Status, Trajectory
 
 __all__ = [
     "GROUND",
@@ -49,6 +49,7 @@ __all__ = [
     "Slot",
     "Spring",
     "Start",
+    "Status",
     "System",
     "TimeFunction",
     "Trajectory",

@@ -19,7 +19,7 @@ from .contract import Array
 from .elimination import is_linear
 from .start import Start, consistent_start
 from .system import System
-from .trajectory import Trajectory
+from .trajectory import Status, Trajectory
 
 METHODS = ("auto", "taylor", "explicit", "implicit")
 #: Asked tolerance -> largest last term of a Taylor step. The benchmark mechanisms amplify local errors some
@@ -103,8 +103,8 @@ def integrate(
     reached = sign * dense.times[-1] + 1e-12 * max(1.0, abs(dense.times[-1]))
     kept = asked if status == 0 else asked[sign * asked <= reached]
     if status == 0 and not _dropped_rows_hold(system, start, dense, tolerance):
-        status = 6
-    return Trajectory(system, start, kept, status, chosen, statistics, dense)
+        status = Status.REDUNDANT_NOT_MET
+    return Trajectory(system, start, kept, Status(status), chosen, statistics, dense)
 
 
 def _counted(begin: float, end: float, t: float, steps: int, state: Any) -> bool:  # noqa: ARG001 - a `choice.Watch`

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import IntEnum
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -13,15 +14,35 @@ from .contract import Array
 from .start import Start
 from .system import System
 
-#: Status -> message. Failure is data: what was computed up to the time reached is returned.
-STATUS = {
-    0: "done",
-    1: "the step became too small for the tolerance",
-    2: "the largest number of steps was reached",
-    3: "the start is a singular position and its velocity selects no branch",
-    4: "the state is not finite",
-    5: "the equations could not be solved in a step",
-    6: "constraints that were taken for redundant at the start are not met by the motion",
+
+class Status(IntEnum):
+    """Why a run ended. Failure is data: what was computed up to the time reached is returned."""
+
+    DONE = 0
+    STEP_TOO_SMALL = 1
+    MOST_STEPS = 2
+    NO_BRANCH = 3
+    NOT_FINITE = 4
+    NOT_SOLVED = 5
+    REDUNDANT_NOT_MET = 7
+
+    @property
+    def message(self) -> str:
+        """The status in words."""
+        return _MESSAGES[self]
+
+    def __str__(self) -> str:
+        return self.name.lower()
+
+
+_MESSAGES = {
+    Status.DONE: "done",
+    Status.STEP_TOO_SMALL: "the step became too small for the tolerance",
+    Status.MOST_STEPS: "the largest number of steps was reached",
+    Status.NO_BRANCH: "the start is a singular position and its velocity selects no branch",
+    Status.NOT_FINITE: "the state is not finite",
+    Status.NOT_SOLVED: "the equations could not be solved in a step",
+    Status.REDUNDANT_NOT_MET: "constraints that were taken for redundant at the start are not met by the motion",
 }
 
 
@@ -46,8 +67,8 @@ class Trajectory:
         What was integrated, and its consistent start.
     time : ndarray, shape (n,)
         Asked times (s), up to the time reached.
-    status : int
-        0 when the end was reached, see `STATUS`; `message` says it in words.
+    status : Status
+        `Status.DONE` when the end was reached; `message` says it in words.
     method : str
         The one used; "auto" where it changed over.
     statistics
@@ -59,7 +80,7 @@ class Trajectory:
     system: System
     start: Start
     time: Array
-    status: int
+    status: Status
     method: str
     statistics: Mapping[str, Any]
     dense: Dense = field(repr=False)
@@ -67,7 +88,7 @@ class Trajectory:
     @property
     def message(self) -> str:
         """The status in words."""
-        return STATUS[self.status]
+        return self.status.message
 
     @property
     def reached(self) -> float:

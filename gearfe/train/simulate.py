@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from ..progress import count, stage
 from ..record_spectrum import FASTEST, SPARE
-from ..rigid import Start, Trajectory, integrate
+from ..rigid import Start, Status, Trajectory, integrate
 from .floquet import train_multipliers
 from .model import TrainModel
 from .motion import Motion, motion
@@ -287,7 +287,7 @@ def _ended(model: TrainModel, trajectory: Trajectory, moved: Motion) -> tuple[st
     if bad.any():
         at = int(np.argmax(bad))
         return "diverged", at, _too_far(model, reach[at], shafts[at], limit)
-    return ("diverged" if trajectory.status == 4 else trajectory.message), len(moved.time), ""
+    return ("diverged" if trajectory.status is Status.NOT_FINITE else trajectory.message), len(moved.time), ""
 
 
 def _too_far(model: TrainModel, reach: Array, shafts: Array, limit: float) -> str:
