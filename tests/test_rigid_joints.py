@@ -16,6 +16,7 @@ from gearfe.rigid import (
     Fixed,
     Gravity,
     Hinge,
+    IntegrationError,
     Moment,
     PlanarScene,
     PointForce,
@@ -296,8 +297,12 @@ def test_bad_input_says_what_and_how(make, text):
         make()
 
 
-def test_a_run_that_cannot_go_on_returns_what_it_has():
-    made = integrate(chain(2), np.linspace(0, 5, 51), tolerance=1e-9, backend="plain", most_steps=5)
+def test_a_run_that_cannot_go_on_is_an_exception_that_holds_what_it_has():
+    options = {"tolerance": 1e-9, "backend": "plain", "most_steps": 5}
+    with pytest.raises(IntegrationError, match=r"ended at .* s of 5 s: the largest number of steps") as raised:
+        integrate(chain(2), np.linspace(0, 5, 51), **options)
+    made = integrate(chain(2), np.linspace(0, 5, 51), raise_on_failure=False, **options)
+    np.testing.assert_array_equal(raised.value.result.q, made.q)
     assert made.status is Status.MOST_STEPS
     assert 0.0 < made.reached < 5.0
     assert len(made.time) == len(made.q) < 51

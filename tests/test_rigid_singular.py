@@ -130,7 +130,7 @@ def test_two_folds_at_the_same_moment():
 
 def test_start_at_rest_on_the_fold_selects_no_branch():
     """The status says so, and the start is returned."""
-    made = integrate(folding_links(pi / 2, 0.0), [0.0, 1.0], backend="plain")
+    made = integrate(folding_links(pi / 2, 0.0), [0.0, 1.0], backend="plain", raise_on_failure=False)
     assert made.status is Status.NO_BRANCH
     assert made.reached == 0.0
     assert made.q.shape == (1, 6)
@@ -244,7 +244,7 @@ def test_prescribed_motions_that_contradict_each_other_later():
     motions = (Prescribed("a", "x", polynomial((0.0,))), Prescribed("a", "x", polynomial((0.0, 0.0, 0.5))))
     system = System([PlanarScene(Scene((body,), motions, ()))])
     try:
-        made = integrate(system, [0.0, 1.0], backend="plain")
+        made = integrate(system, [0.0, 1.0], backend="plain", raise_on_failure=False)
     except InputError:
         return
     assert made.status is Status.REDUNDANT_NOT_MET

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.rigid import constant, integrate, smoothed_step
+from gearfe.rigid import IntegrationError, constant, integrate, smoothed_step
 from gearfe.train import Bearing, Damping, Drive, GearMesh, Load, build_train, simulate
 from gearfe.train.inertia import outline_moments
 from gearfe.train.kinematics import rolling, steady_forces
@@ -266,8 +266,10 @@ def test_instability_ends_with_a_status() -> None:
     frequency = build_train(scene).coupled_frequencies_hz[-1]
     fast = changed(scene, drive=Drive("s0", "s0+", constant(2 * frequency * 2 * math.pi / 20)))
     times = uniform(0.05, 1001)
-    response = simulate(build_train(fast), times, floquet=True)
-    assert response.status == "diverged"
+    with pytest.raises(IntegrationError, match=r"of 0.05 s: diverged") as raised:
+        simulate(build_train(fast), times)
+    response = simulate(build_train(fast), times, floquet=True, raise_on_failure=False)
+    assert raised.value.result.status == response.status == "diverged"
     assert 0.0 < response.time_reached < 0.05
     assert len(response.time) == len(response.contact_force) < 1001
     assert np.isfinite(response.contact_force).all()

@@ -43,6 +43,8 @@ FREE_NOTE = "nothing is fixed: the housing is free and has six rigid-body modes"
 STEEL = SolidMaterial()
 #: Part of the largest energy below which a field is contained in the others.
 DEPENDENT = 1e-10
+#: Part of the square of the highest frequency below which a mode is a rigid motion.
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,7 +280,8 @@ class Housing:
         with stage("estimating the mesh's error"):
             lost = energy_lost(self.nodes, self.tets, self.material, body.shapes @ fields, squares, rigid)
         # weights of the fields in any motion, orthogonal in energy to the rest; a free body's energy needs some mass
-        slow = np.min(squares[squares > 0.0], initial=np.inf)
+        highest = (2.0 * np.pi * body.highest_hz) ** 2
+        slow = np.min(squares[squares > ROUNDING * highest], initial=highest)  # rigid motions are round-off
         metric = body.stiffness + (body.mass * slow if len(self.fixed) == 0 else 0.0)
         share = np.linalg.pinv(fields.T @ metric @ fields, rcond=DEPENDENT, hermitian=True) @ (fields.T @ metric)
         return replace(body, softening=np.asarray(share.T @ lost @ share))

@@ -72,6 +72,7 @@ def finer_run(mechanism: Mechanism, start: Start, made: Trajectory, tolerance: f
     longest = SHORTER * float(np.abs(np.diff(ends)).max())
     backend = "compiled" if made.statistics.get("backend") == "compiled" else "plain"
     options: dict[str, Any] = {"method": made.method, "backend": backend, "start": start, "longest": longest}
+    options["raise_on_failure"] = False
     try:
         return integrate(mechanism.system, made.time, tolerance=max(tolerance / SHARPER, LEAST_TOLERANCE), **options)
     except InputError:

@@ -24,7 +24,7 @@ from .scene import PlanarScene
 from .start import Forced, Freedoms, Start, consistent_start, count_freedoms
 from .system import System
 from .timefunctions import TimeFunction, constant, polynomial, sine, smoothed_step
-from .trajectory import Status, Trajectory
+from .trajectory import IntegrationError, Status, Trajectory
 
 __all__ = [
     "GROUND",
@@ -36,6 +36,7 @@ __all__ = [
     "Freedoms",
     "Gravity",
     "Hinge",
+    "IntegrationError",
     "LinearJoint",
     "LocalForce",
     "ModalBlocks",

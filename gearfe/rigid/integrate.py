@@ -19,7 +19,7 @@ from .contract import Array
 from .elimination import is_linear
 from .start import Start, consistent_start
 from .system import System
-from .trajectory import Status, Trajectory
+from .trajectory import IntegrationError, Status, Trajectory
 
 METHODS = ("auto", "taylor", "explicit", "implicit")
 #: Asked tolerance -> largest last term of a Taylor step. The benchmark mechanisms amplify local errors some
@@ -47,6 +47,7 @@ def integrate(
     backend: str = "auto",
     longest: float = math.inf,
     most_steps: int = 1_000_000,
+    raise_on_failure: bool = True,
 ) -> Trajectory:
     """Integrate a system over the given times.
 
@@ -74,13 +75,22 @@ def integrate(
         Longest step (s).
     most_steps : int
         Give up after this number of steps.
+    raise_on_failure : bool
+        Raise where the end is not reached; without it the trajectory as far as it came is returned, with its status.
 
     Returns
     -------
     Trajectory
-        With a status; what was computed is returned even when the end was not reached. Where there was a choice,
-        ``statistics["choice"]`` lists what each method did, with predicted and real seconds; a program that shows
-        progress (`gearfe.progress`) tells predictions of more than two seconds beforehand.
+        With a status. Where there was a choice, ``statistics["choice"]`` lists what each method did, with predicted and
+        real seconds; a program that shows progress (`gearfe.progress`) tells predictions of more than two seconds
+        beforehand.
+
+    Raises
+    ------
+    IntegrationError
+        For a run that ended early; its ``result`` is the trajectory.
+    InputError
+        For values out of range, and starts that cannot be made consistent.
     """
     asked = np.atleast_1d(np.asarray(times, dtype=float))
     _check(asked, method, tolerance, backend)
@@ -104,7 +114,10 @@ def integrate(
     kept = asked if status == 0 else asked[sign * asked <= reached]
     if status == 0 and not _dropped_rows_hold(system, start, dense, tolerance):
         status = Status.REDUNDANT_NOT_MET
-    return Trajectory(system, start, kept, Status(status), chosen, statistics, dense)
+    made = Trajectory(system, start, kept, Status(status), chosen, statistics, dense)
+    if raise_on_failure and made.status is not Status.DONE:
+        raise IntegrationError(made, made.message, made.reached, float(asked[-1]))
+    return made
 
 
 def _counted(begin: float, end: float, t: float, steps: int, state: Any) -> bool:  # noqa: ARG001 - a `choice.Watch`

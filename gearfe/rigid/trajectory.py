@@ -16,7 +16,7 @@ from .system import System
 
 
 class Status(IntEnum):
-    """Why a run ended. Failure is data: what was computed up to the time reached is returned."""
+    """Why a run ended."""
 
     DONE = 0
     STEP_TOO_SMALL = 1
@@ -44,6 +44,22 @@ _MESSAGES = {
     Status.NOT_SOLVED: "the equations could not be solved in a step",
     Status.REDUNDANT_NOT_MET: "constraints that were taken for redundant at the start are not met by the motion",
 }
+
+
+class IntegrationError(RuntimeError):
+    """A run that ended before the end asked for.
+
+    Attributes
+    ----------
+    result
+        What was computed: a `Trajectory`, or the response of a train.
+    """
+
+    def __init__(self, result: Any, why: str, reached: float, end: float) -> None:
+        self.result = result
+        super().__init__(
+            f"the run ended at {reached:.6g} s of {end:.6g} s: {why}; raise_on_failure=False returns what was computed"
+        )
 
 
 class Dense(Protocol):

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from ..progress import count, stage
 from ..record_spectrum import FASTEST, SPARE
-from ..rigid import Start, Status, Trajectory, integrate
+from ..rigid import IntegrationError, Start, Status, Trajectory, integrate
 from .floquet import train_multipliers
 from .model import TrainModel
 from .motion import Motion, motion
@@ -46,6 +46,7 @@ def simulate(
     estimate: bool = False,
     band_hz: float = 5000.0,
     backend: str = "auto",
+    raise_on_failure: bool = True,
 ) -> TrainResponse:
     """Integrate a train and evaluate it at the asked times.
 
@@ -67,13 +68,23 @@ def simulate(
     backend
         ``compiled``, ``plain`` or ``auto``.
 
+    raise_on_failure
+        Raise where the end is not reached; without it the response as far as it came is returned, with its status.
+
     Returns
     -------
     TrainResponse
-        Up to the time reached; its status says why it ended earlier than asked.
+
+    Raises
+    ------
+    IntegrationError
+        For a run that ended early; its ``result`` is the response.
     """
     options = {"tolerance": tolerance, "method": method, "floquet": floquet, "estimate": estimate, "band_hz": band_hz}
-    return joined(list(simulate_in_pieces(model, times, backend=backend, **options)))  # type: ignore[arg-type]
+    made = joined(list(simulate_in_pieces(model, times, backend=backend, **options)))  # type: ignore[arg-type]
+    if raise_on_failure and made.status != "done":
+        raise IntegrationError(made, made.status, made.time_reached, float(np.max(times)))
+    return made
 
 
 def simulate_in_pieces(
@@ -89,8 +100,8 @@ def simulate_in_pieces(
 ) -> Iterator[TrainResponse]:
     """What `simulate` does, handed over piece by piece, so that a long run needs no more memory than a short one.
 
-    The pieces follow each other without gaps. What is no sample (status, statistics, estimates, warnings, multipliers)
-    holds for the whole run in the last piece.
+    The pieces follow each other without gaps; the status of the last one says whether the run reached its end. What is
+    no sample (status, statistics, estimates, warnings, multipliers) holds for the whole run in the last piece.
     """
     t = np.atleast_1d(np.asarray(times, dtype=float))
     if t.size < 2 or not np.isfinite(t).all() or t[0] != 0.0 or not (np.diff(t) > 0).all():
@@ -151,6 +162,7 @@ def _run(
     if not len(model.core.squares):
         method = "explicit"  # nothing is left to integrate
     options: dict[str, Any] = {"tolerance": tolerance, "start": start, "backend": backend, "longest": longest}
+    options["raise_on_failure"] = False  # a response has a status of its own
     trajectory = integrate(model.system, t, method=method, **options)
     return trajectory, motion(model, trajectory)
 
