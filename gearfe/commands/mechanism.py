@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--until", type=float, metavar="T", help="end of the run in s (default: the file's)")
     parser.add_argument("--reactions", action="store_true", help="write reactions.csv")
     parser.add_argument("--no-figures", action="store_true", help="tables and summary only")
-    parser.add_argument("--no-estimate", action="store_true", help="leave out the second run that estimates the error")
+    parser.add_argument("--no-estimate", action="store_true", help="leave out the finer runs that estimate the error")
     parser.add_argument("--animation", action="store_true", help="write animation.gif")
 
 

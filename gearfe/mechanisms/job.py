@@ -46,7 +46,7 @@ def run_mechanism(
 ) -> Outcome:
     """Integrate, write ``trajectory.csv``, ``energy.csv``, ``summary.json`` and what else is asked.
 
-    All files appear together, or none. With `estimate` a second, finer run tells how far off the first one is.
+    All files appear together, or none. With `estimate` two finer runs tell how far off it is.
     """
     began = clock.perf_counter()
     run = mechanism.file.run
@@ -183,7 +183,7 @@ def summarise(
         else {
             "coordinates_m_or_rad": error.coordinates,
             "outputs": dict(error.outputs),
-            "tolerance_of_the_second_run": error.tolerance,
+            "tolerance_of_the_finer_runs": error.tolerance,
         },
         "timings": timings,
     }
@@ -192,8 +192,8 @@ def summarise(
 def _told_error(error: dict[str, Any]) -> str:
     largest = error["coordinates_m_or_rad"]
     if not math.isfinite(largest):
-        return "error estimate: none, the second, finer run did not reach as far"
-    return f"error estimate from a second, finer run: {largest:.2g} (m or rad) at worst"
+        return "error estimate: none, a finer run did not reach as far"
+    return f"error estimate from finer runs: {largest:.2g} (m or rad) at worst"
 
 
 def _text(summary: dict[str, Any], folder: Path) -> str:

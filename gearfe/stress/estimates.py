@@ -136,7 +136,7 @@ def _run_trajectory(case: Case, job_path: Path) -> Found:
     if truth.status != 0:
         return f"the truth: {truth.message}"
     if not math.isfinite(stated):
-        return "no estimate: the finer run ended early"
+        return "no estimate: a finer run ended early"
     return float(np.abs(made.q - truth.q).max()), stated, "m or rad"
 
 
