@@ -162,10 +162,10 @@ class Mechanism:
             return float(np.asarray(compute(node, self.values(wanted, q[None, :]))).reshape(-1)[0])
 
         def slope(q):  # type: ignore[no-untyped-def]
-            steps = 1e-6 * np.eye(len(q))
+            steps = 1e-6 * np.diag(self.system.units)
             states = np.concatenate([q + steps, q - steps])
             ends = np.broadcast_to(compute(node, self.values(wanted, states)), len(states))
-            return (ends[: len(q)] - ends[len(q) :]) / 2e-6
+            return (ends[: len(q)] - ends[len(q) :]) / (2e-6 * self.system.units)
 
         def rate_slope(q):  # type: ignore[no-untyped-def]
             n = len(q)
@@ -190,12 +190,12 @@ class Mechanism:
         """What the expression of a velocity adds to its linear part; refuses one that is not linear."""
         random = np.random.default_rng(2)
         q = np.broadcast_to(self.system.start_q, (5, self.system.size))
-        v = random.standard_normal((5, self.system.size))
+        v = random.standard_normal((5, self.system.size)) * self.system.units
         v[0], v[3], v[4] = 0.0, 2.0 * v[1] - 3.0 * v[2], -v[1]
         at = np.broadcast_to(compute(node, self.values(wanted, q, v)), 5)
         part = at - at[0]
         rest = max(abs(part[3] - 2.0 * part[1] + 3.0 * part[2]), abs(part[4] + part[1]))
-        if not np.isfinite(at).all() or rest > 1e-9 * max(1.0, float(np.abs(at).max())):
+        if not np.isfinite(at).all() or rest > 1e-9 * float(np.abs(at).max()):
             raise InputError(label, None, "is not linear in the velocities", "force a sum of multiples of velocities")
         return float(at[0])
 

@@ -35,7 +35,9 @@ eliminated at
 9. ``energy(q, v)``: (kinetic, potential) of the element. Absent: 1/2 v M v of its own coordinates, and zero.
 10. Being a `LocalForce`: a force along few directions, ``f = W phi(t, W^T q, W^T v)``, with a law that can be compiled.
     Absent: the force is called as it is; the integration in modal coordinates then calls Python in every stage.
-11. ``breaks``: times at which a force or joint is not smooth. Steps of all integrators end there. Absent: none.
+11. ``units()``: sizes of the own coordinates and of the rows that count as much as 1 rad, so that bounds do not depend
+    on the unit of length. Absent: ones.
+12. ``breaks``: times at which a force or joint is not smooth. Steps of all integrators end there. Absent: none.
 
 An element has no state of its own that changes during a run: integrators call it at trial points in any order.
 """
@@ -79,6 +81,10 @@ class Element:
     def velocity_terms(self, t: float, q: Array, v: Array) -> Array:  # noqa: ARG002
         """Second time derivative of the residual without its acceleration part."""
         return np.zeros(self.rows)
+
+    def units(self) -> tuple[Array, Array]:
+        """Sizes of the own coordinates and of the rows that bounds are relative to."""
+        return np.ones(self.size), np.ones(self.rows)
 
 
 @dataclass(frozen=True, eq=False)

@@ -105,7 +105,9 @@ def run_explicit(  # type: ignore[no-untyped-def]
     def told(t: float, steps: int, y: Array) -> bool:
         return watch is None or watch(t, steps, lambda: (y[:n], y[n:]))
 
-    made = step_through(rhs, project, start.time, y0, times[-1], system.breaks, tolerance, longest, most, told)
+    made = step_through(
+        rhs, project, start.time, y0, times[-1], system.breaks, tolerance, longest, most, told, system.units
+    )
     ends, states, polynomials, status, evaluations = made
     statistics: dict[str, Any] = {"scheme": SCHEME, "steps": len(polynomials), "evaluations": evaluations}
     return Pieces(ends, states, polynomials, expand), status, statistics
@@ -115,24 +117,25 @@ def on_constraints(system: System, t: float, q: Array, v: Array, active: np.ndar
     """State projected onto g = 0 and G v = -dg/dt; rows that are redundant follow by themselves."""
     if system.rows == 0:
         return np.concatenate([q, v])
+    sizes = system.row_units[active]
     for _ in range(5):
         gap = system.residual(t, q)[active]
-        if np.abs(gap).max(initial=0.0) < 1e-14:
+        if np.abs(gap / sizes).max(initial=0.0) < 1e-14:
             break
         G = system.jacobian(t, q)[active]
-        q = q - least_change(system, G, gap)
+        q = q - least_change(system, G, gap, sizes)
     G = system.jacobian(t, q)[active]
-    return np.concatenate([q, v - least_change(system, G, G @ v + system.rate(t, q)[active])])
+    return np.concatenate([q, v - least_change(system, G, G @ v + system.rate(t, q)[active], sizes)])
 
 
 def step_through(
     rhs: Rhs, project: Rhs, t0: float, y0: Array, t1: float, breaks: Array, tolerance: float, longest: float, most: int,
-    watch: Callable[[float, int, Array], bool] | None = None,
+    watch: Callable[[float, int, Array], bool] | None = None, units: Array | None = None,
 ) -> tuple[Array, Array, Array, int, int]:  # fmt: skip
     """Adaptive steps from t0 to t1: (ends, states, polynomials, status, evaluations).
 
     The error is measured against the largest value that each component has had; steps end at `breaks`.
-    ``watch(t, steps, y)`` may end the run.
+    ``watch(t, steps, y)`` may end the run. `units` are sizes of the coordinates that compare (ones by default).
     """
     tab = tableau()
     sign = 1.0 if t1 >= t0 else -1.0
@@ -141,7 +144,8 @@ def step_through(
     K[0] = rhs(t, y)
     n = y.size // 2
     scale = np.abs(y)
-    h = first_step(y, K[0], abs(t1 - t0))
+    sizes = np.ones(2 * n) if units is None else np.tile(units, 2)
+    h = first_step(y / sizes, K[0] / sizes, abs(t1 - t0))
     ends, states = [t], [y]
     polynomials: list[Array] = []
     status, evaluations = 0, 1
@@ -155,7 +159,7 @@ def step_through(
         if watch is not None and not watch(t, len(polynomials), y):
             status = STOPPED
             break
-        while sign * (goals[0] - t) <= 1e-14 * max(1.0, abs(t)):
+        while sign * (goals[0] - t) <= 1e-14 * max(abs(t), abs(t1 - t0)):
             goals.pop(0)
         step = min(h, longest, abs(goals[0] - t))
         fixed = step == abs(goals[0] - t)
@@ -178,7 +182,8 @@ def step_through(
         evaluations += 12
         reach = np.maximum(scale, np.abs(new))
         limit = np.maximum(reach, step * np.abs(K[12])) * tolerance + 1e-300
-        limit = limit + 1e-6 * tolerance * np.repeat([limit[:n].max(), limit[n:].max()], n) / tolerance
+        relative = limit / sizes
+        limit = limit + 1e-6 * sizes * np.repeat([relative[:n].max(), relative[n:].max()], n)
         five, three = (tab.E5 @ K[:13]) / limit, (tab.E3 @ K[:13]) / limit
         big, small = float(five @ five), float(three @ three)
         error = step * big / math.sqrt((big + 0.01 * small) * y.size) if big > 0.0 else 0.0
@@ -227,10 +232,11 @@ def finite(y: Array) -> Array:
 
 
 def first_step(y: Array, dy: Array, span: float) -> float:
-    """A careful first step: a hundredth of the time in which the state changes by itself."""
+    """A careful first step: a hundredth of the time in which the speeds change by themselves, or the one from rest in
+    which the accelerations move the coordinates by 5e-9 of themselves."""
     n = y.size // 2
-    speed, pull = float(np.abs(dy[:n]).max(initial=0.0)), float(np.abs(dy[n:]).max(initial=0.0))
+    far, speed, pull = (float(np.abs(x).max(initial=0.0)) for x in (y[:n], dy[:n], dy[n:]))
     guess = 1e-3 * span
     if pull > 0.0:
-        guess = min(guess, 0.01 * max(speed, float(np.abs(y).max(initial=0.0)) * 1e-3, 1e-12) / pull)
+        guess = min(guess, max(0.01 * speed / pull, 1e-4 * math.sqrt(far / pull)))
     return max(guess, 1e-9 * span)

@@ -22,7 +22,7 @@ import numpy as np
 from .choice import STOPPED, Watch
 from .contract import Array, Element, LocalForce, ModalBlocks
 from .elimination import Minimal, is_linear, minimal
-from .explicit import on_constraints
+from .explicit import first_step, on_constraints
 from .start import Start
 from .system import System
 from .within import within_run
@@ -98,9 +98,9 @@ def run_implicit(  # type: ignore[no-untyped-def]
     a, multipliers = system.acceleration(t, q, v, active)
     span = abs(t1 - t)
     reach = np.maximum(np.abs(q), 1e-300)
-    pull = float(np.abs(a).max(initial=0.0))
-    h = min(longest, 1e-3 * span, 0.01 * max(float(np.abs(v).max(initial=0.0)), 1e-6) / pull if pull > 0 else span)
-    h = max(h, 1e-9 * span)
+    units = system.units
+    pair = [np.concatenate([x, y]) / np.tile(units, 2) for x, y in ((q, v), (v, a))]
+    h = min(longest, first_step(pair[0], pair[1], span))
     goals = sorted((b for b in system.breaks if sign * (b - t) > 0 and sign * (t1 - b) > 0), key=lambda b: sign * b)
     goals.append(t1)
     record = [(t, q, v, a)]
@@ -112,14 +112,15 @@ def run_implicit(  # type: ignore[no-untyped-def]
         if watch is not None and not watch(t, len(record) - 1, lambda: record[-1][1:3]):
             status = STOPPED
             break
-        while sign * (goals[0] - t) <= 1e-14 * max(1.0, abs(t)):
+        while sign * (goals[0] - t) <= 1e-14 * max(abs(t), span):
             goals.pop(0)
         step = min(h, longest, abs(goals[0] - t))
         fixed = step == abs(goals[0] - t)
         if step < 1e-13 * max(abs(t), span):
             status = 1 if rejected < 50 else 5
             break
-        limit = tolerance * np.maximum(np.maximum(reach, step * np.abs(v)), 1e-3 * max(reach.max(), 1e-12))
+        least = 1e-3 * units * max(float((reach / units).max()), 1e-12)
+        limit = tolerance * np.maximum(np.maximum(reach, step * np.abs(v)), least)
         made = radau_step(system, t, q, v, a, multipliers, sign * step, limit, active)
         newton += made.iterations
         if not made.converged:
@@ -194,7 +195,7 @@ def radau_step(
     for mu in MU[:2]:
         factor = mu.real if abs(mu.imag) < 1e-12 else mu
         top = factor**2 / h**2 * M - factor / h * by_v - by_q + curvature
-        solves.append(saddle_solver(top, G))
+        solves.append(saddle_solver(top, G, system.units, system.row_units[active]))
     Z = 0.5 * (C * h)[:, None] ** 2 * a
     L = np.tile(multipliers[active], (3, 1))
     moved = math.inf
@@ -261,9 +262,12 @@ def joint_stiffness(system: System, t: float, q: Array, multipliers: Array) -> A
     return full
 
 
-def saddle_solver(top: Array, G: Array) -> Callable[[Array, Array], tuple[Array, Array]]:
-    """Solver of [[top, G^T], [G, 0]], scaled; sparse when it is large."""
+def saddle_solver(
+    top: Array, G: Array, units: Array, row_units: Array
+) -> Callable[[Array, Array], tuple[Array, Array]]:
+    """Solver of [[top, G^T], [G, 0]], scaled by the units of coordinates and rows; sparse when it is large."""
     n, m = len(top), len(G)
+    top, G = top * np.outer(units, units), G * units / row_units[:, None]
     scale = 1.0 / max(1e-300, float(np.abs(np.diagonal(top)).max()))
     matrix = np.zeros((n + m, n + m), dtype=top.dtype)
     matrix[:n, :n] = top * scale
@@ -283,7 +287,7 @@ def saddle_solver(top: Array, G: Array) -> Callable[[Array, Array], tuple[Array,
             return lu_solve(factor, b, check_finite=False)
 
     def apply(force: Array, gap: Array) -> tuple[Array, Array]:
-        x = solve(np.concatenate([force * scale, gap]).astype(matrix.dtype))
-        return x[:n], x[n:] / scale
+        x = solve(np.concatenate([force * units * scale, gap / row_units]).astype(matrix.dtype))
+        return x[:n] * units, x[n:] / scale / row_units
 
     return apply

@@ -110,7 +110,7 @@ def integrate(
             chosen, status = used.pop() if len(used) == 1 else "auto", legs[-1].status
             dense = joined(legs)
     sign = 1.0 if asked[-1] >= asked[0] else -1.0
-    reached = sign * dense.times[-1] + 1e-12 * max(1.0, abs(dense.times[-1]))
+    reached = sign * dense.times[-1] + 1e-12 * max(abs(asked[0]), abs(asked[-1]))
     kept = asked if status == 0 else asked[sign * asked <= reached]
     if status == 0 and not _dropped_rows_hold(system, start, dense, tolerance):
         status = Status.REDUNDANT_NOT_MET
@@ -134,9 +134,9 @@ def _dropped_rows_hold(system: System, start: Start, dense: Any, tolerance: floa
     times = dense.times[:: max(1, len(dense.times) // 50)]
     times = np.append(times, dense.times[-1])
     states = dense(times, 0)
-    gaps = [np.abs(system.residual(t, q)).max() for t, q in zip(times, states, strict=True)]
-    scale = system.planar.assembly.length if system.planar is not None else max(1.0, float(np.abs(states).max()))
-    return bool(max(gaps) <= max(1e-8, 1e3 * tolerance) * max(1.0, scale))
+    gaps = [np.abs(system.residual(t, q) / system.row_units).max() for t, q in zip(times, states, strict=True)]
+    scale = 1.0 if system.planar is not None else max(1.0, float(np.abs(states / system.units).max()))
+    return bool(max(gaps) <= max(1e-8, 1e3 * tolerance) * scale)
 
 
 def ways_of(

@@ -43,6 +43,16 @@ class PlanarScene(Element):
         """Start state of the mass centres."""
         return self.assembly.start_q, self.assembly.start_v
 
+    def units(self) -> tuple[Array, Array]:
+        """The mechanism's length where a coordinate or a row is a length, 1 where it is an angle."""
+        length = self.assembly.length
+        return np.tile([length, length, 1.0], self.size // 3), np.where(self.holds_points, length, 1.0)
+
+    @cached_property
+    def holds_points(self) -> np.ndarray:
+        """Whether each row holds points (m) rather than an angle (rad)."""
+        return np.asarray(self._value[:, [0, 1, 3, 4, 5, 6, 8, 9, 10, 11]].any(axis=1))
+
     # constraints ------------------------------------------------------------------------------------------------
     @cached_property
     def _columns(self) -> np.ndarray:

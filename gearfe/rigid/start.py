@@ -3,6 +3,7 @@ passing-singular rows."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -14,6 +15,12 @@ from .system import System
 
 #: A row is dependent on earlier ones when this share of its gradient is left (noise of redundant rows: up to 3e-9).
 DEPENDENT = 1e-7
+#: Singular values of constraint gradients below this share of the largest count as zero.
+RANK = 1e-11
+#: Largest turn of a body in one step towards a closed position (rad), and most of these steps.
+TURN, MOST_STEPS = 0.3, 200
+#: Gaps of closed loops, relative to the mechanism's length or 1 rad.
+CLOSED = 1e-10
 
 
 @dataclass(frozen=True)
@@ -65,7 +72,10 @@ def consistent_start(
     positions: Sequence[Forced] = (),
     velocities: Sequence[Forced] = (),
 ) -> Start:
-    """Nearest state (in the mass norm) to (q, v) that meets the constraints and the forced values.
+    """State near (q, v) that meets the constraints and the forced values.
+
+    The coordinates are guesses: they close on the branch next to them (`close`). Velocities change least in the mass
+    norm.
 
     Raises
     ------
@@ -89,19 +99,18 @@ def count_freedoms(system: System, time: float, q: Array, seed: int = 5) -> Free
         return Freedoms(system.size, system.rows)
     random = np.random.default_rng(seed)
     fewest = here
-    G = system.jacobian(time, q)
+    G = system.jacobian(time, q) * system.units / system.row_units[:, None]
     _, sizes, right = np.linalg.svd(G, full_matrices=True)
     rank = int((sizes > 1e-9 * sizes.max(initial=0.0)).sum())
     free = right[rank:].T
-    moving = bool(np.any(system.rate(time + 0.037, q)) or np.any(system.rate(time, q)))
     tried = 0
     for size in (0.1, 0.03, 0.01, 0.1, 0.03):
         step = free @ random.standard_normal(free.shape[1])
         length = np.abs(step).max(initial=0.0)
-        near = q + (size / length * step if length > 0 else 0.0)
-        at = time + (size * random.uniform(0.3, 1.0) if moving else 0.0)
-        found, residual = close(system, at, near, ())
-        if residual > 1e-11 or np.abs(found - q).max(initial=0.0) < 1e-3 * size:
+        near = q + (size / length * system.units * step if length > 0 else 0.0)
+        at = time + _time_of_change(system, time, q, size * random.uniform(0.3, 1.0))
+        found, gap = close(system, at, near, ())
+        if not closes(system, found, gap) or np.abs((found - q) / system.units).max(initial=0.0) < 1e-3 * size:
             continue
         tried += 1
         there = dependent_rows(system, at, found)
@@ -111,6 +120,18 @@ def count_freedoms(system: System, time: float, q: Array, seed: int = 5) -> Free
             break
     passing = tuple(r for r in here if r not in fewest)
     return Freedoms(system.size, system.rows, tuple(fewest), passing[: len(here) - len(fewest)])
+
+
+def _time_of_change(system: System, time: float, q: Array, size: float) -> float:
+    """Time until prescribed motions have changed a row by `size` of its unit, or the most they do; 0 without motion."""
+    here, most, found = system.residual(time, q), 0.0, 0.0
+    for step in 2.0 ** np.arange(-60.0, 40.0):
+        change = float((np.abs(system.residual(time + step, q) - here) / system.row_units).max(initial=0.0))
+        if change > most:
+            most, found = change, float(step)
+        if change >= size:
+            break
+    return found
 
 
 def dependent_rows(system: System, time: float, q: Array) -> list[int]:
@@ -143,76 +164,146 @@ def dependent_rows(system: System, time: float, q: Array) -> list[int]:
     return found
 
 
-def close(system: System, time: float, q: Array, forced: Sequence[Forced]) -> tuple[Array, float]:
-    """Newton onto g = 0 and the forced values by least changes; the best state and its largest residual."""
+def close(system: System, time: float, q: Array, forced: Sequence[Forced]) -> tuple[Array, Array]:
+    """The closed position nearest to the guess q, or the least gap found; the gaps of all rows in their units.
+
+    Gauss-Newton with least changes in coordinates divided by their units. Levenberg's damping keeps a body from turning
+    by more than `TURN` in one step, which stays on the branch of the guess, and makes every step lessen the gaps.
+    """
+    sizes = np.concatenate([system.row_units, [_forced_unit(system, f, q) for f in forced]])
 
     def rest(state: Array) -> Array:
-        return np.concatenate([system.residual(time, state), [f.value(state) - f.target for f in forced]])
+        return np.concatenate([system.residual(time, state), [f.value(state) - f.target for f in forced]]) / sizes
 
     best, gap = q.copy(), rest(q)
-    for _ in range(80):
-        size = float(np.abs(gap).max(initial=0.0))
-        if size < 1e-15:
+    size, damping = float(np.linalg.norm(gap)), 0.0
+    for _ in range(MOST_STEPS):
+        if not 1e-15 < size < math.inf:
             break
         G = np.vstack([system.jacobian(time, best), *(f.gradient(best)[None, :] for f in forced)])
-        change = least_change(system, G, gap)
-        length = float(np.abs(change).max(initial=0.0))
-        factor = min(1.0, 0.5 / length) if length > 0 else 1.0
-        for _ in range(12):
-            trial = best - factor * change
-            new = rest(trial)
-            if np.abs(new).max() < size:
-                break
-            factor *= 0.5
+        G = G * system.units / sizes[:, None]
+        if not np.isfinite(G).all():
+            break
+        left, values, right = np.linalg.svd(G, full_matrices=False)
+        largest = float(values.max(initial=0.0))
+        part, kept = left.T @ gap, values > RANK * largest
+        if size > 1e-9 and np.linalg.norm(part[kept]) < 1e-7 * size:  # no change of the coordinates lessens the gaps
+            break
+        while damping <= 1e3 * largest:
+            change = (part * np.where(kept, values / (values**2 + damping**2 + (values == 0.0)), 0.0)) @ right
+            turn = float(np.abs(change[system.turns]).max(initial=0.0))
+            if turn <= 1.01 * TURN:
+                trial = best - system.units * change
+                new = rest(trial)
+                reached = float(np.linalg.norm(new))
+                if reached < size:
+                    break
+                damping = max(4.0 * damping, 1e-3 * largest)
+            else:
+                damping = max(damping * min(turn / TURN, 4.0), 1e-3 * largest)
         else:
             break
-        best, gap = trial, new
-        if np.abs(gap).max() > 0.5 * size and size < 1e-13:
+        before, best, gap, size = size, trial, new, reached
+        damping = 0.0 if damping < 1e-2 * largest else 0.25 * damping
+        if size > 0.5 * before and size < 1e-13:
             break
-    return best, float(np.abs(gap).max(initial=0.0))
+    return best, np.abs(gap)
 
 
-def least_change(system: System, G: Array, right: Array) -> Array:
+def _forced_unit(system: System, forced: Forced, q: Array) -> float:
+    """What a forced value changes by when the coordinates change by their units."""
+    change = float(np.abs(forced.gradient(q) * system.units).max(initial=0.0))
+    return change if change > 0.0 else max(abs(forced.value(q)), abs(forced.target)) or 1.0
+
+
+def closes(system: System, q: Array, gap: Array) -> bool:
+    """Whether gaps (in units of the rows) are nothing but rounding, of coordinates far from the origin, too."""
+    far = float(np.abs(q / system.units).max(initial=0.0))
+    return bool(gap.max(initial=0.0) <= CLOSED + 8 * np.finfo(float).eps * far)
+
+
+def least_change(system: System, G: Array, right: Array, sizes: Array) -> Array:
     """The change of least mass norm with G change = right, in the least-squares sense where G has lost rank.
 
-    Not-a-number where the rows or the right side are not finite: the callers look at what comes back.
+    The rows are divided by their `sizes`. Not-a-number where the rows or the right side are not finite: the callers
+    look at what comes back.
     """
     if not (np.isfinite(G).all() and np.isfinite(right).all()):
         return np.full(system.size, np.nan)
+    G, right = G / sizes[:, None], right / sizes
     if system.diagonal_mass:
         root = np.sqrt(np.diagonal(system.inverse_mass))
-        return root * np.linalg.lstsq(G * root, right, rcond=1e-11)[0]
+        return root * np.linalg.lstsq(G * root, right, rcond=RANK)[0]
     root = np.linalg.cholesky(system.inverse_mass)
-    return root @ np.linalg.lstsq(G @ root, right, rcond=1e-11)[0]
+    return root @ np.linalg.lstsq(G @ root, right, rcond=RANK)[0]
 
 
 def _positions(system: System, time: float, q: Array, forced: Sequence[Forced]) -> Array:
     if system.rows == 0 and not forced:
         return q
-    found, residual = close(system, time, q, forced)
-    if residual <= 1e-10:
+    found, gap = assemble_near(system, time, q, forced)
+    if closes(system, found, gap):
         return found
-    names = system.row_names()
-    gap = np.abs(system.residual(time, found))
-    worst = names[int(gap.argmax())] if len(gap) else ""
+    name, much = _worst_gap(system, time, found)
     if forced:
-        free, alone = close(system, time, q, ())
-        if alone <= 1e-10:
-            off = max(forced, key=lambda f: abs(f.value(free) - f.target))
-            other = _at_odds(system, time, q, forced, off)
-            against = worst if other is None else f"start value {other.label} = {other.target:g}"
-            problem = f"contradicts {against}: a residual of {residual:.3g} is left"
-            raise InputError(f"start value {off.label}", off.target, problem, "force another value, or leave it free")
+        free, alone = assemble_near(system, time, q, ())
+        if closes(system, free, alone):
+            sizes = [_forced_unit(system, f, q) for f in forced]
+            off = max(range(len(forced)), key=lambda k: abs(forced[k].value(free) - forced[k].target) / sizes[k])
+            other = _at_odds(system, time, q, forced, forced[off])
+            against = name if other is None else f"start value {other.label} = {other.target:g}"
+            problem = f"contradicts {against}: a residual of {float(gap.max()):.3g} of its size is left"
+            label = f"start value {forced[off].label}"
+            raise InputError(label, forced[off].target, problem, "force another value, or leave it free")
     cure = "check lengths and start poses: the nearest closed position was searched from them"
-    raise InputError(worst, None, f"the loop cannot close: a residual of {residual:.3g} (m or rad) is left", cure)
+    raise InputError(name, None, f"the loop cannot close: a residual of {much} is left", cure)
+
+
+def assemble_near(system: System, time: float, q: Array, forced: Sequence[Forced]) -> tuple[Array, Array]:
+    """As `close`; where that ends in a least gap that is none, the nearest of what closes from guesses beside q."""
+    found, gap = close(system, time, q, forced)
+    if closes(system, found, gap) or not np.isfinite(gap).all():
+        return found, gap
+    turns = np.flatnonzero(system.turns)
+    random = np.random.default_rng(3)
+    nearest = math.inf
+    for size in np.repeat([0.1, 0.3, 0.6], 4 if len(turns) else 0):
+        guess = q.copy()
+        guess[turns] += size * random.standard_normal(len(turns))
+        other, rest = close(system, time, guess, forced)
+        far = float(np.linalg.norm((other - q) / system.units))
+        if closes(system, other, rest) and far < nearest:
+            found, gap, nearest = other, rest, far
+    return found, gap
+
+
+def _worst_gap(system: System, time: float, q: Array) -> tuple[str, str]:
+    """Row with the largest gap, and this gap in words: in its unit and against the mechanism's length."""
+    gap = np.abs(system.residual(time, q))
+    if not len(gap):
+        return "", "nothing"
+    worst = int((gap / system.row_units).argmax())
+    name, much, planar = system.row_names()[worst], float(gap[worst]), system.planar
+    if planar is None:
+        return name, f"{much:.3g}"
+    if not planar.holds_points[worst]:
+        return name, f"{much:.3g} rad"
+    joint = planar.assembly.row_joint
+    same = [r for r in range(len(gap)) if joint[r] == joint[worst] and planar.holds_points[r]]
+    much, length = float(np.linalg.norm(gap[same])), planar.assembly.length
+    return name, f"{much:.3g} m ({much / length:.2g} of the mechanism's length, {length:.3g} m)"
 
 
 def _at_odds(system: System, time: float, q: Array, forced: Sequence[Forced], blamed: Forced) -> Forced | None:
     """The other forced value that `blamed` contradicts: without it the rest can be met, and `blamed` alone, too."""
-    if len(forced) < 2 or close(system, time, q, [blamed])[1] > 1e-10:
+
+    def met(some: Sequence[Forced]) -> bool:
+        return closes(system, *assemble_near(system, time, q, some))
+
+    if len(forced) < 2 or not met([blamed]):
         return None
     others = [f for f in forced if f is not blamed]
-    return next((o for o in others if close(system, time, q, [f for f in forced if f is not o])[1] <= 1e-10), None)
+    return next((o for o in others if met([f for f in forced if f is not o])), None)
 
 
 def _velocities(system: System, time: float, q: Array, v: Array, forced: Sequence[Forced]) -> Array:
@@ -225,28 +316,30 @@ def _velocities(system: System, time: float, q: Array, v: Array, forced: Sequenc
         right = np.concatenate([rate, [f.target for f in forced]])
     else:
         rows, right = G, rate
-    made = v - least_change(system, rows, rows @ v - right)
+    sizes = np.concatenate([system.row_units, [_forced_unit(system, f, q) for f in forced]])
+    made = v - least_change(system, rows, rows @ v - right, sizes)
     if not np.isfinite(made).all():
         cure = "look for start values, speeds and forced velocities that are too large"
         raise InputError("start velocities", None, "are not finite numbers once they meet the constraints", cure)
-    gap = np.abs(rows @ made - right)
-    scale = max(1.0, float(np.abs(right).max(initial=0.0)))
+    gap = np.abs(rows @ made - right) / sizes
+    scale = max(float(np.abs(x).max(initial=0.0)) for x in (right / sizes, v / system.units, made / system.units))
     if gap.max(initial=0.0) > 1e-8 * scale:
         names = [*system.row_names(), *(f"start velocity {f.label}" for f in forced)]
-        left = np.linalg.svd(rows.T)[2][-1] if len(rows) > 1 else np.ones(1)
-        part = int(np.abs(left[: system.rows]).argmax()) if system.rows else 0
+        share = np.linalg.svd((rows * system.units / sizes[:, None]).T)[2][-1] if len(rows) > 1 else np.ones(1)
+        part = int(np.abs(share[: system.rows]).argmax()) if system.rows else 0
         worst = names[int(gap.argmax())]
+        much = f"residual {float(gap.max() * sizes[gap.argmax()]):.3g}"
         if forced:
-            off = max(range(len(forced)), key=lambda k: abs(left[system.rows + k]))
+            off = max(range(len(forced)), key=lambda k: abs(share[system.rows + k]))
             blame = forced[off]
-            weights = np.abs(left)
+            weights = np.abs(share)
             weights[system.rows + off] = 0.0
             weights[: system.rows] *= 1.0 - 1e-6  # another forced value before a joint, where both are as much to blame
             second = int(weights.argmax()) if weights.any() else part
             against = names[second]
             if second >= system.rows:
                 against += f" = {forced[second - system.rows].target:g}"
-            problem = f"contradicts {against} (residual {gap.max():.3g})"
+            problem = f"contradicts {against} ({much})"
             raise InputError(f"start velocity {blame.label}", blame.target, problem, "force another value")
-        raise InputError(worst, None, f"velocities cannot meet it (residual {gap.max():.3g})", "check the motion")
+        raise InputError(worst, None, f"velocities cannot meet it ({much})", "check the motion")
     return made

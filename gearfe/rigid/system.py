@@ -61,6 +61,15 @@ class System:
         starts = [e.start() for e in self.elements]
         self.start_q = np.concatenate([s[0] for s in starts]) if starts else np.zeros(0)
         self.start_v = np.concatenate([s[1] for s in starts]) if starts else np.zeros(0)
+        sizes = [e.units() for e in self.elements]
+        #: Sizes of the coordinates and of the rows: divided by them, lengths and angles compare.
+        self.units = np.concatenate([s[0] for s in sizes])
+        self.row_units = np.concatenate([s[1] for s in sizes])
+        #: Which coordinates are angles of bodies.
+        self.turns = np.zeros(total, dtype=bool)
+        for element in self.elements:
+            if isinstance(element, PlanarScene):
+                self.turns[place[id(element)][2::3]] = True
         breaks = [getattr(e, "breaks", ()) for e in self.elements]
         self.breaks = np.unique(np.concatenate([np.asarray(b, dtype=float) for b in breaks])) if breaks else np.zeros(0)
 
@@ -161,7 +170,14 @@ def solve_semidefinite(S: Array, right: Array) -> Array:
             return np.asarray(np.linalg.solve(S, right), dtype=float)
     except np.linalg.LinAlgError:
         pass
-    return np.asarray(np.linalg.lstsq(S, right, rcond=1e-12)[0], dtype=float)
+    return least_norm_solution(S, right, 1e-12)
+
+
+def least_norm_solution(S: Array, right: Array, least: float) -> Array:
+    """Solution of S x = right of least norm in rows of equal size; singular values below the share `least` are zero."""
+    scale = np.sqrt(np.abs(np.diagonal(S)))
+    scale[scale == 0.0] = 1.0
+    return np.asarray(np.linalg.lstsq(S / np.outer(scale, scale), right / scale, rcond=least)[0] / scale, dtype=float)
 
 
 def element_jacobian(element: Element, t: float, q: Array, v: Array) -> tuple[Array, Array]:

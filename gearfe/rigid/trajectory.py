@@ -12,7 +12,7 @@ import numpy as np
 
 from .contract import Array
 from .start import Start
-from .system import System
+from .system import System, least_norm_solution
 
 
 class Status(IntEnum):
@@ -154,5 +154,5 @@ class Trajectory:
             if not np.isfinite(right).all():  # forces so large that sums of them overflow
                 out[i] = np.nan
                 continue
-            out[i, keep] = np.linalg.lstsq(S, right, rcond=1e-14)[0]
+            out[i, keep] = least_norm_solution(S, right, 1e-14)
         return out

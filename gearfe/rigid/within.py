@@ -29,7 +29,7 @@ def within_run(run: Array, times: ArrayLike) -> Array:
     """
     asked = np.atleast_1d(np.asarray(times, dtype=float))
     low, high = min(run[0], run[-1]), max(run[0], run[-1])
-    slack = SLACK * (high - low) + 1e-12 * max(1.0, abs(low), abs(high))
+    slack = SLACK * (high - low) + 1e-12 * max(abs(low), abs(high))
     outside = ~((asked >= low - slack) & (asked <= high + slack))
     if outside.any():
         problem = f"lies outside of the run, which goes from {run[0]:.9g} to {run[-1]:.9g} s"
