@@ -100,7 +100,10 @@ def test_a_closed_stream_ends_the_telling_only():
     display = Display(stream, rewritten=False, silent=0.0)
     display.enter("meshing")
     time.sleep(2 * progress.LOOK)
+    assert [s.name for s in display._stages] == ["meshing"]  # the work goes on
     display.close()
+    display._thread.join(5.0)
+    assert not display._thread.is_alive()
 
 
 def test_an_exception_leaves_no_stage():
