@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from gearfe.contact.bodies import Bodies, ElasticBody
 from gearfe.contact.compliance import REACH, FarField, GearBody
 from gearfe.contact.flank import flank_of, normal_stress_rows
 from gearfe.contact.laws import ContactLaw
 from gearfe.contact.scene import MeshingPair, turn
+from gearfe.verification.bodies import Bodies, ElasticBody
 
 Array = NDArray[Any]
 

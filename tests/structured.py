@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from gearfe.contact.bodies import ElasticBody
 from gearfe.elasticity import Material
+from gearfe.verification.bodies import ElasticBody
 
 Array = NDArray[np.float64]
 

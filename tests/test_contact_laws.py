@@ -22,6 +22,7 @@ from gearfe.errors import InputError
 from gearfe.meshing.whole_gear import whole_gear
 from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.stiffness.sweep import sweep_stiffness
+from gearfe.verification.monolithic import solve_monolithic
 
 from .contact_cases import IRON, STEEL, WIDTH, gears, meshes, whole
 
@@ -299,9 +300,6 @@ def test_the_curve_names_its_law(law: ContactLaw, tmp_path) -> None:
 @pytest.mark.parametrize("law", [SYMMETRIC, SKEW, Nitsche(1.0, "pinion", -1), Exact("pinion")], ids=law_text)
 @pytest.mark.parametrize(("name", "angle"), [("sharp", 15.0), ("modified", 20.0)])
 def test_monolithic_route_agrees(law: ContactLaw, name: str, angle: float) -> None:
-    pytest.importorskip("gearfe.contact.problem", reason="the monolithic route has Nitsche's law with theta = 0 only")
-    from gearfe.contact.monolithic import solve_monolithic
-
     place = math.radians(angle), TWIST
     small = solve_position(pair(name, 5.0, law), *place, tolerance=1e-11)
     full = solve_monolithic(whole(name, 5.0, "strain"), law, *place)

@@ -7,10 +7,10 @@ import pytest
 from scipy.sparse import coo_matrix
 
 from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
-from gearfe.contact.monolithic import solve_monolithic
 from gearfe.contact.solver import solve_position
 from gearfe.elasticity import element_stiffness
 from gearfe.meshing.whole_gear import whole_gear
+from gearfe.verification.monolithic import solve_monolithic
 
 from .contact_cases import STEEL, WIDTH, condensed, meshes, whole
 

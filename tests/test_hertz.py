@@ -23,11 +23,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gearfe.contact.bodies import Bodies, ElasticBody
-from gearfe.contact.body_contact import solve_contact
 from gearfe.contact.laws import ContactLaw, Exact, Nitsche, Penalty
-from gearfe.contact.problem import ContactProblem, contact_problem
 from gearfe.elasticity import Material
+from gearfe.verification.bodies import Bodies, ElasticBody
+from gearfe.verification.body_contact import solve_contact
+from gearfe.verification.problem import ContactProblem, contact_problem
 
 from .structured import mapped_grid
 

@@ -12,14 +12,14 @@ from gearfe.contact import finite_strain
 from gearfe.contact.compliance import gear_body
 from gearfe.contact.finite_strain import finite_strain_shares
 from gearfe.contact.laws import Nitsche
-from gearfe.contact.monolithic import solve_monolithic
 from gearfe.contact.scene import MeshingPair
 from gearfe.contact.solver import solve_position
-from gearfe.contact.whole_pair import ElasticGear, WholePair
 from gearfe.elasticity import Material
 from gearfe.gear.pair import Gear, GearPair
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh
+from gearfe.verification.monolithic import solve_monolithic
+from gearfe.verification.whole_pair import ElasticGear, WholePair
 
 from .contact_cases import whole
 from .test_patch import PRESS, two_blocks

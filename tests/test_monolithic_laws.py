@@ -6,10 +6,10 @@ import pytest
 
 from gearfe.contact.compliance import gear_body
 from gearfe.contact.laws import ContactLaw, Exact, Nitsche
-from gearfe.contact.monolithic import solve_monolithic
 from gearfe.contact.scene import MeshingPair
 from gearfe.contact.solver import solve_position
 from gearfe.elasticity import Plane
+from gearfe.verification.monolithic import solve_monolithic
 
 from .contact_cases import IRON, STEEL, WIDTH, gears, meshes, whole
 

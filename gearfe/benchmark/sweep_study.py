@@ -121,7 +121,7 @@ def routes(record: Record) -> None:
 
     def whole(coarsen: float) -> Mapping[str, Any]:
         from ..contact.laws import Nitsche
-        from ..contact.monolithic import solve_monolithic
+        from ..verification.monolithic import solve_monolithic
 
         gears, setup = measured(lambda: whole_pair(pair, coarsen), runs=1)
         solved, cost = measured(lambda: [solve_monolithic(gears, Nitsche(), a, TWIST) for a in at], runs=1)
@@ -137,8 +137,8 @@ def routes(record: Record) -> None:
 
 def whole_pair(pair: GearPair, coarsen: float) -> Any:
     """Both whole gears, assembled (plane strain, steel)."""
-    from ..contact.whole_pair import ElasticGear, WholePair
     from ..elasticity import Material
+    from ..verification.whole_pair import ElasticGear, WholePair
 
     made = [
         ElasticGear(sector_mesh(gear, recipe), Material(), "strain", gear.face_width)

@@ -1,7 +1,7 @@
 r"""The verification route: two whole gears in contact, solved in all unknowns at once.
 
 The gears are a `ContactProblem` like any other bodies' (the blocks and rings of the patch tests, those of Hertz), and
-`gearfe.contact.body_contact` solves it, with strains small or of Saint Venant-Kirchhoff bodies. Nothing but the
+`gearfe.verification.body_contact` solves it, with strains small or of Saint Venant-Kirchhoff bodies. Nothing but the
 closest-point search is shared with the condensed route: no compliance, no cyclic symmetry, no windows of flank. On the
 same mesh and quadrature points both must give the same torques; what they cost differs a hundredfold.
 """
@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact.laws import ContactLaw
 from .body_contact import TOLERANCE, ContactSolution, solve_contact
 from .contact_state import contact_at
-from .laws import ContactLaw
 from .problem import ContactProblem
 from .whole_pair import WholePair
 

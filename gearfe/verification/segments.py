@@ -20,7 +20,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .flank import gauss_rule
+from ..contact.flank import gauss_rule
 
 Array = NDArray[Any]
 IntArray = NDArray[Any]

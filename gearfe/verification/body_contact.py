@@ -8,8 +8,8 @@ Find the displacements u of all bodies, with prescribed values, such that for al
     [v] = v(x_s) - v(x_m), \qquad p = \max(0,\; -\gamma g(u) - s\,\sigma_n(u)),
 
 with a the elastic energy's form on the undeformed bodies in their present places (or its finite-strain counterpart,
-`gearfe.contact.constitution`), x_m the closest point of the deformed mate, n its normal there and sigma_n the normal
-stress at x_s. Newton's tangent adds, with the variations of `gearfe.contact.closest`,
+`gearfe.verification.constitution`), x_m the closest point of the deformed mate, n its normal there and sigma_n the
+normal stress at x_s. Newton's tangent adds, with the variations of `gearfe.contact.closest`,
 
 .. math::
     \int_{\Gamma_s} H(p)\,(\gamma\,\delta g(u) + s\,\sigma_n(u))\,(n\cdot[v] + \tfrac{\theta}{\gamma}\sigma_n(v))
@@ -165,7 +165,7 @@ def _step(problem: ContactProblem, state: ContactState, free: IntArray, closing:
 
 
 def _reached_share(state: ContactState) -> Array:
-    from .closest import unreached
+    from ..contact.closest import unreached
 
     return np.where(unreached(state.projection.gap), 0.0, np.asarray(state.fields["share"])[:, 0])
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact.flank import edge_shapes, gauss_rule
 from ..elasticity import Material, Plane, stiffness_form, triangle_rule
 from ..errors import InputError, unknown_name
-from .flank import edge_shapes, gauss_rule
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix, diags
 
+from ..contact.closest import Projection, chains_of, nearest_places, project, unreached
+from ..contact.flank import edge_shapes
 from .bodies import point_basis
-from .closest import Projection, chains_of, nearest_places, project, unreached
-from .flank import edge_shapes
 from .problem import ContactProblem, Points
 
 Array = NDArray[np.float64]
