@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearfe.contact import finite_strain
+from gearfe.contact import finite_strain, laws
 from gearfe.contact.compliance import gear_body
 from gearfe.contact.finite_strain import finite_strain_shares
-from gearfe.contact.laws import Nitsche
 from gearfe.contact.scene import MeshingPair
 from gearfe.contact.solver import solve_position
 from gearfe.elasticity import Material
 from gearfe.gear.pair import Gear, GearPair
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh
+from gearfe.verification.laws import Nitsche
 from gearfe.verification.monolithic import solve_monolithic
 from gearfe.verification.whole_pair import ElasticGear, WholePair
 
@@ -64,7 +64,7 @@ def both_routes(angle_deg: float, twist_deg: float) -> tuple[float, float]:
     ]
     steel, width = Material(), 10e-3
     bodies = [gear_body(mesh, steel, "strain", width) for mesh in meshes]
-    condensed = MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, Nitsche())
+    condensed = MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, laws.Nitsche())
     pinion, wheel = (ElasticGear(mesh, steel, "strain", width) for mesh in meshes)
     full = WholePair(pinion, wheel, pair.working_centre_distance, width, kinematics="finite")
     place = math.radians(angle_deg), math.radians(twist_deg)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gearfe.contact.laws import ContactLaw, Exact, Nitsche, Penalty
 from gearfe.elasticity import Material
 from gearfe.errors import InputError
 from gearfe.verification.bodies import Bodies
 from gearfe.verification.body_contact import ContactSolution, solve_contact
+from gearfe.verification.laws import ContactLaw, Exact, Nitsche, Penalty
 from gearfe.verification.problem import ContactProblem, contact_problem
 
 from .structured import block, quarter_ring

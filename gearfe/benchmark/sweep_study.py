@@ -120,7 +120,7 @@ def routes(record: Record) -> None:
         return {"error": found["error"], "setup_cpu_s": setup.cpu_s, "position_cpu_s": cost.cpu_s / len(at)}
 
     def whole(coarsen: float) -> Mapping[str, Any]:
-        from ..contact.laws import Nitsche
+        from ..verification.laws import Nitsche
         from ..verification.monolithic import solve_monolithic
 
         gears, setup = measured(lambda: whole_pair(pair, coarsen), runs=1)

@@ -131,7 +131,7 @@ def _out_of_balance(problem: ContactProblem, state: ContactState, internal: Arra
     """Forces that nothing balances, and what is left of the complementarity, relative to the contact forces."""
     scale = _scale(problem, state)
     left = float(np.abs((state.forces + problem.loads - internal)[free]).sum())
-    if problem.law.multiplier is not None:
+    if problem.law.name == "exact":
         _, areas, gaps, parameter = _mean_gaps(problem, state)
         asked = np.maximum(0.0, state.multipliers - parameter * gaps)
         left += float(areas @ np.abs(state.multipliers - asked))
@@ -145,7 +145,7 @@ def _step(problem: ContactProblem, state: ContactState, free: IntArray, closing:
     step[problem.fixed] = problem.values - state.u[problem.fixed]
     out = problem.loads - problem.constitution.forces(state.u) - matrix @ step
     factor = splu(csc_matrix(matrix[free][:, free]), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-    if problem.law.multiplier is None:
+    if problem.law.name != "exact":
         step[free] = factor.solve((out + state.forces)[free])
         return step, state.multipliers, matrix.diagonal()
     hats, areas, gaps, parameter = _mean_gaps(problem, state)

@@ -104,7 +104,7 @@ def contact_at(
     }
     fields = fields | {name: DiscreteField(value[..., None]) for name, value in numbers.items()} | {"state": moved}
     reached = ~unreached(projection.gap)
-    if problem.law.multiplier is None:
+    if problem.law.name != "exact":
         multipliers = np.zeros(0)
         pressure = -problem.slaves.parameter[points.edge] * projection.gap
         if problem.law.uses_stress:
@@ -114,7 +114,7 @@ def contact_at(
         hats, _ = hat_functions(problem, points)
         multipliers = np.zeros(hats.shape[1]) if multipliers is None else multipliers
         pressure, active = hats @ multipliers, np.zeros(len(reached), dtype=bool)
-    pressure = np.where(reached & (active | (problem.law.multiplier is not None)), pressure, 0.0)
+    pressure = np.where(reached & (active | (problem.law.name == "exact")), pressure, 0.0)
     fields |= {"p": DiscreteField(pressure[:, None]), "active": DiscreteField(active.astype(float)[:, None])}
 
     @LinearForm
@@ -218,7 +218,7 @@ def contact_tangent(problem: ContactProblem, state: ContactState) -> csr_matrix:
 def hat_functions(problem: ContactProblem, points: Points) -> tuple[csr_matrix, Array]:
     """Values of the multiplier space's functions at the points, shape (q, m), and the law's parameter of each (Pa/m).
 
-    Hats on half edges, one for each node (`gearfe.contact.multiplier`). A node that two couples share counts once for
+    Hats on half edges, one for each node (`gearfe.verification.laws`). A node that two couples share counts once for
     each.
     """
     slaves = problem.slaves

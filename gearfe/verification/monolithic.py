@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.laws import ContactLaw
 from .body_contact import TOLERANCE, ContactSolution, solve_contact
 from .contact_state import contact_at
+from .laws import ContactLaw
 from .problem import ContactProblem
 from .whole_pair import WholePair
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from ..contact.closest import Projection, chains_of, nearest_places, project
 from ..contact.flank import edge_shapes, gauss_rule
-from ..contact.laws import ContactLaw, side_share
 from ..errors import InputError
 from .bodies import Bodies, Value
 from .constitution import Constitution, Kinematics, SaintVenantKirchhoff, SmallStrain
+from .laws import ContactLaw, side_share
 from .segments import Quadrature, segments, whole_edges
 from .stress_term import stress_term
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..contact.flank import edge_shapes
-from ..contact.laws import side_share
 from .bodies import point_basis
+from .laws import side_share
 from .segments import whole_edges
 
 if TYPE_CHECKING:

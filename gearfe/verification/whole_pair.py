@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from ..contact.closest import chains_of, nearest_places, project
 from ..contact.flank import edge_shapes, gauss_rule
-from ..contact.laws import ContactLaw
 from ..elasticity import Material, Plane
 from ..meshing.tooth_sector import SectorMesh
 from ..meshing.whole_gear import WholeGear, whole_gear
 from .bodies import Bodies, ElasticBody
 from .constitution import Kinematics
+from .laws import ContactLaw
 from .problem import ContactProblem, Surface, edge_lengths
 from .segments import Quadrature
 
