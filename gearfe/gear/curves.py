@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -24,8 +24,13 @@ import numpy as np
 Array = np.ndarray[Any, Any]
 Point = tuple[float, float]
 
-_GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(12)
 _PANELS = 24
+
+
+@cache
+def _gauss() -> tuple[Array, Array]:
+    """Points and weights on -1..1; made on first use, because gears that cannot run are told before that."""
+    return np.polynomial.legendre.leggauss(12)
 
 
 def inv(angle: float) -> float:
@@ -250,9 +255,9 @@ class Segment:
         return knots, np.concatenate([[0.0], np.cumsum(self._integral(knots[:-1], knots[1:]))])
 
     def _integral(self, low: Array, high: Array) -> Array:
-        half = 0.5 * (high - low)
-        nodes = (0.5 * (high + low))[..., None] + half[..., None] * _GAUSS_X
-        return half * (self.curve.speed(nodes) @ _GAUSS_W)
+        half, (x, w) = 0.5 * (high - low), _gauss()
+        nodes = (0.5 * (high + low))[..., None] + half[..., None] * x
+        return half * (self.curve.speed(nodes) @ w)
 
 
 def _unit(angle: Array) -> Array:
