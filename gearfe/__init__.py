@@ -6,7 +6,10 @@ Public names load on first use (PEP 562), so ``import gearfe`` costs millisecond
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
+
+TYPE_CHECKING = False  # `typing` itself would be a third of the import
+if TYPE_CHECKING:
+    from typing import Any
 
 __version__ = "0.1.0"
 

@@ -1,24 +1,24 @@
-"""The ``gearfe`` program: finds the command, runs it, turns user mistakes into one line and an exit code of 2."""
+"""The ``gearfe`` program: listens to Ctrl-C from its first lines on, then loads the commands."""
 
 from __future__ import annotations
 
-import importlib
-import os
 import sys
-from collections.abc import Sequence
-from contextlib import suppress
 
-from . import __version__
-from .commands import COMMANDS
-from .commands.arguments import CommandParser
-from .errors import InputError, MissingLibraryError, unknown_name
-from .progress import shown
+TYPE_CHECKING = False  # nothing that takes time is imported before Ctrl-C is listened to
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from types import FrameType
 
-USAGE = "gearfe COMMAND ... ('gearfe COMMAND --help' tells a command's options)"
+#: Exit code of an interrupted program, as shells give it (128 + SIGINT).
+INTERRUPTED = 130
 
 
-#: Exit code where the reader of the output went away, as the shell's other tools give it (128 + SIGPIPE).
-CLOSED = 141
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C.
+
+    Not KeyboardInterrupt itself: where that one leaves source text that is executed, and standard modules make their
+    classes so, CPython ends the process by the signal, whatever handles it later (``run_eval_code_obj``).
+    """
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -26,76 +26,36 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     0 done, 1 done with failures, 2 bad input, 130 interrupted, 141 the reader of the output closed it.
     """
+    listening = False
     try:
-        code = _answered(list(sys.argv[1:] if argv is None else argv))
-        for stream in (sys.stdout, sys.stderr):
-            if stream is not None:
-                stream.flush()
-    except BrokenPipeError:
-        code = CLOSED
-    except OSError as error:  # the output itself: a full disk
-        code = 2
-        with suppress(OSError):
-            print(f"gearfe: error: the output cannot be written: {error.strerror or error}", file=sys.stderr)
-    else:
-        return code
-    _drop_output()
-    return code
+        import signal
 
+        # who has put another handler there, or none, wants it so
+        listening = signal.getsignal(signal.SIGINT) is signal.default_int_handler and _listen()
+        from .commands.program import answer
 
-def _answered(arguments: list[str]) -> int:
-    """Run, and tell mistakes in one line."""
-    try:
-        return _run(arguments)
-    except BrokenPipeError:
-        raise
-    except SystemExit as leave:  # argparse has printed the help
-        return int(leave.code or 0)
-    except (InputError, MissingLibraryError) as error:
-        message, code = f"error: {error}", 2
+        return answer(list(sys.argv[1:] if argv is None else argv))
     except KeyboardInterrupt:
-        message, code = "interrupted", 130
-    except MemoryError:
-        message, code = "error: not enough memory for this job; coarser meshes or fewer outputs need less", 2
-    except OSError as error:
-        place = error.filename or "a file cannot be written or read"
-        message, code = f"error: {place}: {error.strerror or error}", 2
-    print(f"gearfe: {message}", file=sys.stderr)
-    return code
+        print("gearfe: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    finally:
+        if listening:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def _run(arguments: list[str]) -> int:
-    if not arguments or arguments[0] in ("-h", "--help"):
-        print(f"usage: {USAGE}\n")
-        for name in COMMANDS:
-            print(f"  {name:<12} {_module(name).HELP}")
-        return 0
-    if arguments[0] in ("-V", "--version"):
-        print(f"gearfe {__version__}")
-        return 0
-    if arguments[0] not in COMMANDS:
-        raise unknown_name("command", arguments[0], COMMANDS)
-    module = _module(arguments[0])
-    parser = CommandParser(prog=f"gearfe {arguments[0]}", description=module.HELP)
-    module.add_arguments(parser)
-    parsed = parser.parse_args(arguments[1:])
-    with shown():
-        return int(module.run(parsed))
+def _listen() -> bool:
+    """Whether Ctrl-C raises `Interrupted` from now on; only the main thread may ask for that."""
+    import signal
+
+    try:
+        signal.signal(signal.SIGINT, _interrupt)
+    except ValueError:
+        return False
+    return True
 
 
-def _drop_output() -> None:
-    """Send what is left in the buffers nowhere: the interpreter would complain of it at its end."""
-    with suppress(OSError, ValueError, AttributeError):
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        for stream in (sys.stdout, sys.stderr):
-            with suppress(OSError, ValueError):
-                stream.flush()
-                continue
-            os.dup2(nowhere, stream.fileno())
-
-
-def _module(name: str):  # type: ignore[no-untyped-def]
-    return importlib.import_module(f".commands.{COMMANDS[name]}", __package__)
+def _interrupt(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - as handlers are called
+    raise Interrupted
 
 
 if __name__ == "__main__":

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from gearfe.cli import CLOSED, main
+from gearfe.cli import main
 from gearfe.commands.arguments import CommandParser
+from gearfe.commands.program import CLOSED
 from gearfe.errors import InputError, shown
 from gearfe.tables.examples import job_file
 
@@ -66,6 +67,30 @@ def test_gears_that_cannot_run_together_are_told_before_scipy_loads(tmp_path):
         "assert not heavy, heavy\n"
     )
     ran(code, str(tmp_path))
+
+
+#: Ctrl-C as a module is looked for, and in a text that is executed to make a class.
+FOUND = """
+class Finder:
+    def find_spec(self, name, *rest):
+        if name == 'gearfe.{}':
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Finder())
+"""
+EXECUTED = """
+import dataclasses
+def interrupted(*rest, **options):
+    exec('os.kill(os.getpid(), signal.SIGINT); x = 1')
+dataclasses._create_fn = interrupted
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("when", [FOUND.format("commands.program"), FOUND.format("config"), EXECUTED])
+def test_an_interruption_while_the_program_loads_is_told_as_later(when: str) -> None:
+    code = f"import os, signal, sys\n{when}\nfrom gearfe.cli import main\nsys.exit(main(['stiffness', 'job.toml']))"
+    made = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=120)
+    assert (made.returncode, made.stderr) == (130, "gearfe: interrupted\n")
 
 
 @pytest.mark.parametrize("command", READERS)
