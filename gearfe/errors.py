@@ -57,6 +57,10 @@ class InputError(ValueError):
         return (InputError, (self.field, self.value, self.problem, self.cure))
 
 
+class NotFiniteWarning(UserWarning):
+    """A table that was written holds numbers that are infinite, or none where there must be one."""
+
+
 class MissingLibraryError(RuntimeError):
     """A system library or optional package is absent; the message says how to install it."""
 

@@ -7,12 +7,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gearfe.cli import main
 from gearfe.commands.arguments import CommandParser
 from gearfe.commands.program import CLOSED
-from gearfe.errors import InputError, shown
+from gearfe.errors import InputError, NotFiniteWarning, shown
+from gearfe.output.files import csv_table, write_csv
 from gearfe.tables.examples import job_file
 
 JOB = Path(__file__).parents[1] / "geometry" / "gear_train.toml"
@@ -91,6 +93,27 @@ def test_an_interruption_while_the_program_loads_is_told_as_later(when: str) -> 
     code = f"import os, signal, sys\n{when}\nfrom gearfe.cli import main\nsys.exit(main(['stiffness', 'job.toml']))"
     made = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=120)
     assert (made.returncode, made.stderr) == (130, "gearfe: interrupted\n")
+
+
+def test_every_table_with_infinite_numbers_is_told(tmp_path, capsys, monkeypatch):
+    """The room that writes tables looks, whatever the command; where a table may have gaps, these are no numbers."""
+    values = {"place": ["a", "b", "c"], "size_mm": np.array([1.0, np.inf, np.nan]), "count": np.arange(3)}
+    with pytest.warns(NotFiniteWarning, match=r"t\.csv: column size_mm: 2 of 3 .* the first in row 2"):
+        write_csv(tmp_path / "t.csv", values, gaps=False)
+
+    def written_in_pieces() -> None:
+        with csv_table(tmp_path / "t.csv") as table:
+            table.write(values)
+            table.write(values)
+
+    with pytest.warns(NotFiniteWarning, match="2 of 6 .* the first in row 2"):
+        written_in_pieces()
+    monkeypatch.setattr("gearfe.commands.gear.run", lambda _: len(write_csv(tmp_path / "t.csv", values)) - 1)
+    for _ in range(2):  # Python tells a warning once
+        assert main(["gear", str(JOB)]) == 1
+        assert capsys.readouterr().err.startswith(
+            "gearfe: warning: t.csv: column size_mm: 1 of 3 values are not finite"
+        )
 
 
 @pytest.mark.parametrize("command", READERS)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
+from gearfe.errors import InputError, NotFiniteWarning
 from gearfe.housing import Attachment, Housing
 from gearfe.output.train_scene import draw_scene, sharp_edges
 from gearfe.stopwatch import Stopwatch
@@ -79,6 +79,13 @@ def test_columns_and_digits(tmp_path, scene):
     assert set(written.names) >= {"response.png", "spectrum.png", "summary.json"}
     for name in ("response.png", "spectrum.png"):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_response_with_numbers_that_are_none_is_told(tmp_path, scene):
+    made = made_up()
+    made.drive_angle[7] = math.nan
+    with pytest.warns(NotFiniteWarning, match=r"response.csv: column drive_angle_deg: 1 of .* the first in row 8"):
+        write_all(tmp_path, scene, made, OutputChoice(pictures=False), title="", watch=Stopwatch())
 
 
 def test_spectrum_of_known_lines(tmp_path, scene):

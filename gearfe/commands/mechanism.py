@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from .arguments import check_option
@@ -49,6 +48,4 @@ def run(args: argparse.Namespace) -> int:
         estimate=not args.no_estimate,
     )
     print(outcome.text)
-    for sentence in outcome.warnings:
-        print(f"gearfe: warning: {sentence}", file=sys.stderr)
     return 0 if outcome.complete else 1

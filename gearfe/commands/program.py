@@ -5,10 +5,13 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from contextlib import suppress
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import TextIO
 
 from .. import __version__
-from ..errors import InputError, MissingLibraryError, unknown_name
+from ..errors import InputError, MissingLibraryError, NotFiniteWarning, unknown_name
 from ..progress import shown
 from . import COMMANDS
 from .arguments import CommandParser
@@ -73,8 +76,35 @@ def _run(arguments: list[str]) -> int:
     parser = CommandParser(prog=f"gearfe {arguments[0]}", description=module.HELP)
     module.add_arguments(parser)
     parsed = parser.parse_args(arguments[1:])
-    with shown():
-        return int(module.run(parsed))
+    with shown(), _tables_watched() as told:
+        code = int(module.run(parsed))
+        return code or int(bool(told))
+
+
+@contextmanager
+def _tables_watched() -> Iterator[list[str]]:
+    """Print what the writer of tables warns of, and yield these sentences: such a table is no success."""
+    told: list[str] = []
+    with warnings.catch_warnings():
+        other = warnings.showwarning
+
+        def show(
+            message: Warning | str,
+            category: type[Warning],
+            filename: str,
+            lineno: int,
+            file: TextIO | None = None,
+            line: str | None = None,
+        ) -> None:
+            if not issubclass(category, NotFiniteWarning):
+                other(message, category, filename, lineno, file, line)
+                return
+            told.append(str(message))
+            print(f"gearfe: warning: {message}", file=sys.stderr)
+
+        warnings.simplefilter("always", NotFiniteWarning)
+        warnings.showwarning = show
+        yield told
 
 
 def _drop_output() -> None:

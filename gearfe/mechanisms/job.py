@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..output.files import not_finite, output_folder, whole_set, write_csv, write_json
+from ..output.files import output_folder, whole_set, write_csv, write_json
 from ..progress import stage
 from ..rigid import Start, integrate
 from .error_estimate import TrajectoryError, trajectory_error
@@ -77,10 +77,8 @@ def run_mechanism(
         results = evaluate(mechanism, trajectory)
     error = trajectory_error(mechanism, start, results, tolerance) if estimate else None
     estimated = clock.perf_counter()
-    # a run that ended early has told so already
-    warnings = tuple(not_finite({**results.outputs, **results.energy}) if trajectory.status == 0 else ())
     with whole_set(folder, MAY_WRITE) as made:
-        write_tables(made, mechanism, results, reactions or run.reactions)
+        warnings = tuple(write_tables(made, mechanism, results, reactions or run.reactions))
         written = clock.perf_counter()
         if figures:
             from ..output.mechanism_figures import draw_figures
@@ -115,16 +113,17 @@ def output_times(end: float, step: float) -> np.ndarray:
 
 
 @stage("tables")
-def write_tables(folder: Path, mechanism: Mechanism, results: Results, with_reactions: bool) -> None:
-    """trajectory.csv, energy.csv and, when asked, reactions.csv."""
+def write_tables(folder: Path, mechanism: Mechanism, results: Results, with_reactions: bool) -> list[str]:
+    """trajectory.csv, energy.csv and, when asked, reactions.csv; what is warned of their numbers."""
     time: Any = results.trajectory.time
     outputs: dict[str, Any] = {**results.outputs}
     energy: dict[str, Any] = {**results.energy}
-    write_csv(folder / "trajectory.csv", {"time_s": time, **outputs})
-    write_csv(folder / "energy.csv", {"time_s": time, **energy})
+    told = write_csv(folder / "trajectory.csv", {"time_s": time, **outputs}, gaps=False)
+    told += write_csv(folder / "energy.csv", {"time_s": time, **energy}, gaps=False)
     if with_reactions:
         forces: dict[str, Any] = {**reactions(mechanism, results.trajectory)}
-        write_csv(folder / "reactions.csv", {"time_s": time, **forces})
+        told += write_csv(folder / "reactions.csv", {"time_s": time, **forces})
+    return told
 
 
 def summarise(

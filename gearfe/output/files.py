@@ -7,12 +7,14 @@ import os
 import shutil
 import tempfile
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, NotFiniteWarning
 
 #: Name -> values, a sequence or an array.
 Columns = Mapping[str, Any]
@@ -66,20 +68,43 @@ def output_folder(path: str | Path) -> Path:
     return folder
 
 
-def write_csv(path: str | Path, columns: Columns) -> None:
-    """Write a table: one header line of names with units, then one line per row; floats carry 17 significant digits."""
-    with csv_table(path) as write:
-        write(columns)
+def write_csv(path: str | Path, columns: Columns, *, gaps: bool = True) -> list[str]:
+    """Write a table: one header line of names with units, then one line per row; floats carry 17 significant digits.
+
+    Returns what `csv_table` warns of.
+    """
+    with csv_table(path, gaps=gaps) as table:
+        table.write(columns)
+    return table.warnings
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table under way: what writes its next rows, given as columns, and what its numbers are warned of at the end."""
+
+    write: Callable[[Columns], None]
+    warnings: list[str]
 
 
 @contextmanager
-def csv_table(path: str | Path) -> Iterator[Callable[[Columns], None]]:
-    """Yield a function that writes the next rows of a table, given as columns; the file appears whole at the end."""
+def csv_table(path: str | Path, *, gaps: bool = True) -> Iterator[Table]:
+    """Yield a table; the file appears whole at the end.
+
+    Columns with infinite numbers are told by a `NotFiniteWarning`; without `gaps`, where not-a-number says nothing that
+    the table means, those with such numbers too.
+    """
+    found: dict[str, list[int]] = {}  # column -> how many, and the first row
+    rows = 0
     with whole_file(path) as temporary, temporary.open("w", encoding="utf-8") as stream:
         begun = False
 
         def write(columns: Columns) -> None:
-            nonlocal begun
+            nonlocal begun, rows
+            for name, values in columns.items():
+                bad = _not_finite(values, gaps)
+                if len(bad):
+                    found.setdefault(name, [0, rows + int(bad[0]) + 1])[0] += len(bad)
+            rows += max(map(len, columns.values()), default=0)
             if not begun:
                 stream.write(",".join(columns) + "\n")
                 begun = True
@@ -87,7 +112,23 @@ def csv_table(path: str | Path) -> Iterator[Callable[[Columns], None]]:
                 some = [_listed(values[first : first + AT_ONCE]) for values in columns.values()]
                 stream.writelines(",".join(map(_cell, row)) + "\n" for row in zip(*some, strict=True))
 
-        yield write
+        table = Table(write, [])
+        yield table
+    for name, (count, first) in found.items():
+        of = f"{count} of {rows} values are not finite (inf or nan)"
+        table.warnings.append(f"{Path(path).name}: column {name}: {of}, the first in row {first}")
+        warnings.warn(NotFiniteWarning(table.warnings[-1]), stacklevel=4)
+
+
+def _not_finite(values: Any, gaps: bool) -> Any:
+    """Numbers of the rows whose value is infinite, or without `gaps` no number; none in a column of words."""
+    import numpy as np
+
+    try:
+        numbers = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        return ()
+    return np.flatnonzero(np.isinf(numbers) if gaps else ~np.isfinite(numbers))
 
 
 def _listed(values: Any) -> Sequence[Any]:
@@ -99,19 +140,6 @@ def write_json(path: str | Path, content: Mapping[str, Any]) -> None:
     """Write a summary file; numpy scalars and arrays become plain numbers and lists, not-a-number becomes null."""
     with whole_file(path) as temporary:
         temporary.write_text(json.dumps(_plain(content), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-
-
-def not_finite(columns: Mapping[str, Any]) -> list[str]:
-    """A sentence for each column with numbers that are infinite or none: such a table is no success."""
-    import numpy as np
-
-    found = []
-    for name, values in columns.items():
-        rows = np.flatnonzero(~np.isfinite(np.asarray(values, dtype=float))) + 1
-        if len(rows):
-            of = f"{len(rows)} of {len(values)} values are not finite (inf or nan)"
-            found.append(f"column {name}: {of}, the first in row {rows[0]}")
-    return found
 
 
 def _cell(value: Any) -> str:

@@ -98,14 +98,14 @@ def follow(
     extremes: _Extremes | None = None
     kept: list[TrainResponse] = []
     passed = 0
-    with nullcontext() if table is None else csv_table(table) as write:
+    with nullcontext() if table is None else csv_table(table, gaps=False) as written:
         for piece in pieces:
             if extremes is None:
                 mean = RunningMean(times, piece.load_end_s, piece.common_period_s)
                 extremes = _Extremes(piece.load_end_s)
             count = len(piece.time)
-            if write is not None:
-                write(response_columns(piece.every(every, -passed % every), radiation))
+            if written is not None:
+                written.write(response_columns(piece.every(every, -passed % every), radiation))
             if record is not None and count:
                 record.add(piece)
             envelope.add(passed, _drawn(piece))

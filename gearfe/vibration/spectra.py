@@ -57,7 +57,8 @@ class TrainSpectra:
         made = {"frequency_Hz": self.spectrum.frequency}
         made |= {name: amplitude[:, i] for i, name in enumerate(self.names)}
         if self.power is not None:
-            made |= {"radiated_power_W": self.power.power, "radiated_power_level_dB": self.power.level}
+            level = np.where(self.power.power > 0.0, self.power.level, np.nan)  # what radiates nothing has none
+            made |= {"radiated_power_W": self.power.power, "radiated_power_level_dB": level}
         return made
 
 
