@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from gearfe.contact.half_plane import HalfPlanePair, half_plane_pair, solve_half_plane
+from gearfe.contact.half_plane import TOLERANCE, HalfPlanePair, _first, _stepped, half_plane_pair, solve_half_plane
 from gearfe.contact.panels import MIDDLES, WIDTHS, couplings, first_guess, influence, pressed
 from gearfe.contact.solver import solve_positions
 from gearfe.contact.wedge import ELLIPSE_W, ELLIPSE_X, mean_log, wedge_tensor
@@ -270,6 +271,33 @@ def test_one_gear_softer_and_wider() -> None:
     law = half_plane_pair(pair, elastic_pair(pair, metals, law="penalty", flank_coarsen=4.0))
     expected = np.array([p.torque_wheel for p in reference])
     assert np.abs(solve_half_plane(law, angles, twist).torque_wheel / expected - 1).max() < 1.5e-3
+
+
+def test_no_jump_at_the_last_station() -> None:
+    """A contact between the last station and the tip: influence and its derivatives go on without a jump, and every
+    position around there has its equilibrium."""
+    pair = gear_pair(bore=0.35)
+    law = half_plane_pair(pair, elastic_pair(pair, law="half_plane", flank_coarsen=4.0))
+    for side in law.sides:
+        for at in side.stations[[0, -1]]:
+            inside, outside = (side.shapes(np.array([at + way * 1e-12])) for way in (-1, 1))
+            for one, two in zip(inside, outside, strict=True):
+                assert np.abs(one - two).max() < 1e-6 * np.abs(one).max()
+    angles = 1e-3 + (195 + np.linspace(-3, 3, 25)) * pair.mesh_cycle / 400
+    for degrees in (0.2, 0.4, 0.6):
+        found = solve_half_plane(law, angles, math.radians(degrees))
+        assert set(found.status) == {"converged"}
+        assert found.iterations.max() < 15
+
+
+def test_forces_that_stand_still_by_chance_are_no_solution() -> None:
+    """Places and widths count too: the first step moves the contacts by micrometres."""
+    law, twist = law_of("rounded"), np.array([math.radians(0.05)])
+    open_ = _first(law, twist, law.flanks.touching(np.array([0.1])).take([0]))
+    made = _stepped(law, open_)
+    assert np.abs(made.place).max() > 1e-6
+    still = replace(open_, pairs=replace(open_.pairs, force=made.solution.force))
+    assert still.change(made).min() > 10 * TOLERANCE
 
 
 def test_an_undercuts_edge_on_a_nearly_flat_mate() -> None:

@@ -14,7 +14,7 @@ same bumps,
     H_k(s_i, s_j) = b_i^T C^{FE}_k b_j
     + \delta_{k0}\,\tfrac{1}{w E'}\,\langle\tfrac2\pi\ln|s-t|\,I + W\ln(y+y)\rangle_{ij},
 
-and runs between them on cubic splines, straight on beyond the last station. Bumps average over their half width a,
+and runs between them on cubic splines, as a parabola beyond the last station. Bumps average over their half width a,
 which adds a^2/8 of the second derivative on either side; who evaluates H at a contact takes that off with the contact's
 own width (`gearfe.contact.half_plane`).
 
@@ -99,7 +99,9 @@ class FlankCompliance:
         """Shape functions of the stations at arc lengths s (m), slopes (1/m) and curvatures (1/m2), shape (..., k)."""
         inside = np.clip(s, self.stations[0], self.stations[-1])
         value, slope, bend = (one(inside) for one in self.basis)
-        return value + (s - inside)[..., None] * slope, slope, bend * (inside == s)[..., None]
+        # on beyond the last station with its curvature: without, the equations would jump there
+        on = (s - inside)[..., None]
+        return value + on * (slope + 0.5 * on * bend), slope + on * bend, bend
 
 
 def flank_compliances(pair: GearPair, elastic: MeshingPair) -> tuple[FlankCompliance, FlankCompliance]:

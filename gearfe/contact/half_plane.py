@@ -55,10 +55,10 @@ IntArray = NDArray[np.int64]
 
 #: Relative change of the forces from step to step at which a position is solved but for its last steps; most steps.
 TOLERANCE, STEPS = 1e-5, 20
+#: What moves of contacts by their width count as changes of force: they are of second order there (see above).
+MOVED = 0.1
 #: Steps after which most positions are within some per mille of their solution.
 NEAR_STEPS = 3
-#: Steps that most positions need; where more are needed, their moves are damped.
-USUAL_STEPS = 5
 #: Last steps, with the windows and the bearing panels held: after so many, derivatives err by 1e-3.
 HELD_STEPS = 3
 #: What the twist is ahead for derivatives: share of its way since the touch, and at least (rad).
@@ -127,13 +127,20 @@ class _Open:
         return _Open(self.numbers[positions], taken(self.pairs, np.flatnonzero(positions[self.couples.position])))
 
     def change(self, made: Step) -> Array:
-        """Relative change of the forces that a step made, shape (m,)."""
-        new = made.solution.force
-        return self.couples.total(np.abs(new - self.pairs.force)) / np.maximum(self.couples.total(new), TINY)
+        """What a step changed, shape (m,): the forces in units of their sum, and weighted by them the places and widths
+        of the contacts, in units of these.
+        """
+        new, spread = made.solution.force, made.spread
+        safe = np.where(spread > 0, spread, 1.0)
+        moved = np.where(
+            spread > 0, 0.5 * np.abs(made.place) / np.sqrt(safe) + np.abs(1 - self.pairs.spread / safe), 0.0
+        )
+        all_ = np.abs(new - self.pairs.force) + MOVED * new * moved
+        return self.couples.total(all_) / np.maximum(self.couples.total(new), TINY)
 
-    def moved_on(self, law: HalfPlanePair, made: Step, *, near: bool = False, damped: bool = False) -> _Open:
+    def moved_on(self, law: HalfPlanePair, made: Step, *, near: bool = False) -> _Open:
         """What the next step starts from."""
-        frames, before = moved_on(law, made, self.pairs.before, near=near, damped=damped)
+        frames, before = moved_on(law, made, self.pairs.before, near=near)
         return _Open(self.numbers, _Pairs(self.pairs.found, frames, made.solution.force, made.spread, before))
 
 
@@ -193,7 +200,7 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
         near = ~unsettled & (open_.change(made) <= TOLERANCE) & (number > 1)
         bears = couples.total(made.solution.force) > 0
         status[open_.numbers[near & ~bears]] = "no_contact"
-        open_ = open_.moved_on(law, made, near=number >= NEAR_STEPS, damped=number >= USUAL_STEPS)
+        open_ = open_.moved_on(law, made, near=number >= NEAR_STEPS)
         if (near & bears).any():
             done.append(open_.kept(near & bears))
         if near.any():

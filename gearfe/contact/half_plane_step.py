@@ -24,8 +24,6 @@ ComplexArray = NDArray[np.complex128]
 #: Gap at the window's ends in units of that at the ends of Hertz's contact of the same force, and what it grows by
 #: where the pressure reaches an end: beside edges contacts are wider.
 WINDOW, WIDER = 1.25, 1.6
-#: A move of a contact is damped that is followed by one of more than this share of it, and at most so much.
-SLOW, LEAST_SHARE = 0.3, 0.3
 #: Force, of all pairs of a position, below which a window is not made smaller.
 LEAST_FORCE = 1e-4
 
@@ -140,18 +138,12 @@ class Before:
         Windows, seen from where the pressure was then.
     bearing : ndarray of bool, shape (p, n)
         Panels that bore.
-    place : ndarray, shape (p,)
-        Mean places of the pressure that the step found (m).
-    taken : ndarray, shape (p,)
-        Share of the move to there that was taken.
     reach : ndarray, shape (p,)
         Gap at the next windows' ends, in units of that at the ends of Hertz's contact.
     """
 
     window: Windows
     bearing: NDArray[np.bool_]
-    place: Array
-    taken: Array
     reach: Array
 
 
@@ -291,7 +283,8 @@ def _moments(
     p, loaded = found.pressure, found.force > 0
     safe = np.where(loaded, found.force, 1.0)
     place = np.where(loaded, (p * width * x).sum(axis=1) / safe, window.nearest)
-    variance = np.where(loaded, (p * width * (x - place[:, None]) ** 2).sum(axis=1) / safe, 0.0)
+    square = (x - place[:, None]) ** 2 + width**2 / 12  # a panel's pressure is constant
+    variance = np.where(loaded, (p * width * square).sum(axis=1) / safe, 0.0)
     between = 0.5 * (p[:, 1:] + p[:, :-1])
     area = (between * np.diff(x, axis=1)).sum(axis=1)
     # both faces have the same, and the one further from its edges changes less with where it is taken
@@ -308,29 +301,16 @@ def outgrown(made: Step) -> NDArray[np.bool_]:
     return np.asarray(((made.solution.pressure[:, [0, -1]] > 0) & made.window.free).any(axis=1))
 
 
-def moved_on(
-    law: HalfPlanePair, made: Step, before: Before | None, *, near: bool, damped: bool
-) -> tuple[Frames, Before]:
+def moved_on(law: HalfPlanePair, made: Step, before: Before | None, *, near: bool) -> tuple[Frames, Before]:
     """What the next step starts from: frames at the mean place of the pressure, along the mean normal under it.
 
-    Windows grow only `near` the solution, so that they do not depend on the way to it. Places that go to and fro (an
-    edge bears whose mate is nearly flat) are `damped` on demand: then only the share of the move is taken that would
-    have ended it (Aitken's; Kuettler & Wall, *Comput. Mech.* 43, 2008).
+    Windows grow only `near` the solution, so that they do not depend on the way to it.
     """
-    frames = made.frames
-    if before is None:
-        share = np.ones(len(made.place))
-    elif damped:
-        slow = np.abs(made.place) > SLOW * np.abs(before.place)
-        fall = np.where(slow & (before.place != made.place), before.place - made.place, np.inf)
-        share = np.where(slow, np.clip(before.taken * before.place / fall, LEAST_SHARE, 1.0), before.taken)
-    else:
-        share = before.taken
-    place = share * made.place
+    frames, place = made.frames, made.place
     arc = frames.arc + place[:, None] * np.array(WAY)
     for gear, curve in enumerate(law.curves):
         arc[:, gear] = np.clip(arc[:, gear], curve.low, curve.high)
-    turned = 1 + 1j * share * made.slope
+    turned = 1 + 1j * made.slope
     onward = replace(
         frames,
         centre=frames.centre - 1j * frames.normal * place,
@@ -340,4 +320,4 @@ def moved_on(
     window = replace(made.window, middle=made.window.middle - place, nearest=made.window.nearest - place)
     reach = np.full(len(place), WINDOW) if before is None else before.reach
     reach = np.where(outgrown(made), WIDER * reach, reach) if near else reach
-    return onward, Before(window, made.solution.pressure > 0, made.place, share, reach)
+    return onward, Before(window, made.solution.pressure > 0, reach)

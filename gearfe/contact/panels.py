@@ -165,7 +165,7 @@ def pressed(
         if settled.all():
             break
         on = now
-    return Pressed(force, np.where(on, p, 0.0), settled)
+    return Pressed(np.where(on.any(axis=1), force, 0.0), np.where(on, p, 0.0), settled)  # without panels: no rounding
 
 
 def first_guess(gap: Array) -> NDArray[np.bool_]:
