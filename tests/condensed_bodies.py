@@ -25,7 +25,7 @@ TEETH, CENTRES = 8, 40.0
 
 def condensed_body(body: ElasticBody, surface: str, held: Mapping[str, tuple[bool, bool]], points: int) -> GearBody:
     """Compliance of the boundary `surface` with some components of other boundaries held at zero."""
-    chain = body.boundary(surface)
+    chain = body.chain(surface)
     mesh: Any = SimpleNamespace(
         points=body.points, triangles=body.triangles, contact_edges=lambda: chain, teeth=TEETH, boundaries={}
     )

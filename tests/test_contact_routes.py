@@ -69,10 +69,10 @@ def test_scikit_fem_form_and_batched_element_stiffness_agree() -> None:
     pair = whole("modified", COARSE, "stress")
     gear = pair.gears[0]
     blocks = element_stiffness(gear.points[gear.triangles], STEEL, "stress", WIDTH)
-    unknowns = pair.unknowns[pair.node_of[0]][gear.triangles].reshape(-1, 12)
+    unknowns = pair.bodies.unknowns[pair.bodies.node_of[0]][gear.triangles].reshape(-1, 12)
     rows, columns = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
-    size = pair.hub_stiffness.shape[0]
+    size = pair.bodies.stiffness.shape[0]
     mine = coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)).tocsr()
     own = np.unique(unknowns)
-    difference = abs(pair.hub_stiffness[own][:, own] - mine[own][:, own]).max()
+    difference = abs(pair.bodies.stiffness[own][:, own] - mine[own][:, own]).max()
     assert difference < 1e-13 * abs(mine).max()

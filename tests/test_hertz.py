@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 
 from gearfe.elasticity import Material
 from gearfe.verification.bodies import Bodies, ElasticBody
-from gearfe.verification.body_contact import solve_contact
 from gearfe.verification.laws import ContactLaw, Exact, Nitsche, Penalty
+from gearfe.verification.newton import solve_contact
 from gearfe.verification.problem import ContactProblem, contact_problem
 
 from .structured import mapped_grid

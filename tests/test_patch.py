@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from gearfe.elasticity import Material
 from gearfe.errors import InputError
 from gearfe.verification.bodies import Bodies
-from gearfe.verification.body_contact import ContactSolution, solve_contact
 from gearfe.verification.laws import ContactLaw, Exact, Nitsche, Penalty
+from gearfe.verification.newton import ContactSolution, solve_contact
 from gearfe.verification.problem import ContactProblem, contact_problem
 
 from .structured import block, quarter_ring
@@ -71,7 +71,7 @@ def patch_errors(problem: ContactProblem, solution: ContactSolution, pressure: f
     y = problem.mesh.doflocs[1]
     exact = np.zeros_like(y)
     upper, lower = problem.bodies.node_of
-    overlap = pressure / problem.slaves.parameter[0] if problem.law.name == "penalty" else 0.0
+    overlap = pressure / problem.law.parameter(1.0, np.ones(1))[0] if problem.law.name == "penalty" else 0.0
     exact[lower] = strains[1] * (y[lower] + HEIGHTS[1])
     exact[upper] = strains[1] * HEIGHTS[1] - overlap + strains[0] * y[upper]
     u = solution.u[problem.unknowns]
@@ -133,7 +133,7 @@ def test_flat_interface_is_exact_at_finite_strain(law: ContactLaw) -> None:
         stretches.append(float(max(roots[np.isreal(roots)].real)))
     y = problem.mesh.doflocs[1]
     upper, lower = problem.bodies.node_of
-    overlap = pressure / problem.slaves.parameter[0] if law.name == "penalty" else 0.0
+    overlap = pressure / problem.law.parameter(1.0, np.ones(1))[0] if law.name == "penalty" else 0.0
     exact = np.zeros_like(y)
     exact[lower] = (stretches[1] - 1) * (y[lower] + HEIGHTS[1])
     exact[upper] = (stretches[1] - 1) * HEIGHTS[1] - overlap + (stretches[0] - 1) * y[upper]

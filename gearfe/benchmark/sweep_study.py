@@ -146,7 +146,7 @@ def whole_pair(pair: GearPair, coarsen: float) -> Any:
     ]
     width = min(gear.face_width for gear in (pair.pinion, pair.wheel))
     gears = WholePair(made[0], made[1], pair.working_centre_distance, width)
-    _ = gears.hub_stiffness  # assembled on first use, shared by all positions
+    _ = gears.bodies.stiffness  # assembled on first use, shared by all positions
     return gears
 
 

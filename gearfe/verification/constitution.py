@@ -6,41 +6,32 @@ for Finite Element Analysis*, 2008, sec. 6.4),
 
 .. math::
     f(v) = \int F S : \nabla v, \qquad
-    K(u, v) = \int \mathrm{sym}(F^T\nabla v) : C : \mathrm{sym}(F^T\nabla u) + (\nabla u\, S):\nabla v .
+    K(u, v) = \int \mathrm{sym}(F^T\nabla u) : C : \mathrm{sym}(F^T\nabla v) + (\nabla u\, S):\nabla v .
 
-The reference is each gear as it stands at the given angles, undeformed; the material does not notice that turn. Plane
-stress takes the reduced lambda of small strain.
+The reference is each body as it stands, undeformed; the material does not notice that turn. Plane stress takes the
+reduced lambda of small strain.
 
 The normal stress that Nitsche's law compares with the pressure is :math:`n_0\cdot\sigma n_0` at small strain. At finite
-strain the pressure p acts on the undeformed area along the mate's present normal n, so it is
-:math:`-n\cdot F S\, n_0`.
-Its change with n is left out of the tangent: without friction FS n_0 is parallel to n at the solution.
+strain the pressure acts on the undeformed area along the mate's present normal n, so it is
+:math:`-n\cdot F S\, n_0`. Its change with n is left out of the tangent: without friction F S n_0 is parallel to n at
+the solution.
 """
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
+from skfem import BilinearForm, LinearForm
+from skfem.helpers import ddot, dot, eye, grad, mul, prod, trace, transpose
 
 from .bodies import Bodies
 
 Array = NDArray[np.float64]
 Kinematics = Literal["small", "finite"]
-
-
-class Constitution(Protocol):
-    """What the solver asks of the bodies; `w` holds the contact points' fields."""
-
-    def forces(self, u: Array) -> Array: ...
-    def tangent(self, u: Array) -> Any: ...
-    def normal_stress(self, u: Any, w: Any) -> Any: ...
-    def normal_stress_rate(self, u: Any, w: Any) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -53,20 +44,37 @@ class SmallStrain:
         """Internal forces (N)."""
         return np.asarray(self.stiffness @ u)
 
-    def tangent(self, u: Array) -> Any:  # noqa: ARG002 (the protocol's)
+    def tangent(self, u: Array) -> Any:  # noqa: ARG002 (that of the other)
         """Their derivative, sparse (N/m)."""
         return self.stiffness
 
-    def normal_stress(self, u: Any, w: Any) -> Any:
-        """n0 . sigma(u) n0 with the normal n0 of the undeformed surface."""
-        from skfem.helpers import dot, grad, mul, trace
+    def surface_stress(self, h: Array, n: Array, n0: Array, lam: Array, mu: Array) -> tuple[Array, Array]:  # noqa: ARG002
+        """sigma_n = n0 . sigma n0 at points of the surface, and P = lam I + 2 mu n0 n0: delta sigma_n = P : grad v.
 
-        n0, lam, mu = (w[name] for name in ("slave_normal", "lam", "mu"))
-        return lam * trace(grad(u)) + 2 * mu * dot(n0, mul(grad(u), n0))
+        Parameters
+        ----------
+        h : ndarray, shape (2, 2, q, 1)
+            grad u.
+        n, n0 : ndarray, shape (2, q, 1)
+            The mate's present normal and the outward normal of the undeformed surface.
+        lam, mu : ndarray, shape (q, 1)
+            Lame constants (Pa).
+        """
+        rate = eye(lam, 2) + 2 * mu * prod(n0, n0)
+        return ddot(rate, h), rate
 
-    def normal_stress_rate(self, u: Any, w: Any) -> Any:
-        """Its variation: the same, being linear."""
-        return self.normal_stress(u, w)
+
+@LinearForm
+def internal_work(v: Any, w: Any) -> Any:
+    """F S : grad v."""
+    return w.thickness * ddot(mul(w.F, w.S), grad(v))
+
+
+@BilinearForm
+def internal_tangent(u: Any, v: Any, w: Any) -> Any:
+    """sym(F^T grad u) : C : sym(F^T grad v) + (grad u S) : grad v."""
+    strain_u, strain_v = _sym(mul(transpose(w.F), grad(u))), _sym(mul(transpose(w.F), grad(v)))
+    return w.thickness * (ddot(isotropic(strain_u, w.lam, w.mu), strain_v) + ddot(mul(grad(u), w.S), grad(v)))
 
 
 @dataclass(frozen=True)
@@ -83,89 +91,39 @@ class SaintVenantKirchhoff:
 
     def forces(self, u: Array) -> Array:
         """Internal forces (N)."""
-        from skfem import LinearForm
-        from skfem.helpers import ddot, grad, mul
-
-        total = np.zeros(len(u))
-        for part, basis in zip(self.bodies.parts, self.bases, strict=True):
-            lam, mu = part.material.lame(part.plane)
-            h = grad(basis.interpolate(u))
-            nominal = part.thickness * mul(_deformation(h), _second_stress(h, lam, mu))
-            form = LinearForm(lambda v, w: ddot(w.nominal, grad(v)))
-            total += form.assemble(basis, nominal=nominal)
-        return total
+        return np.asarray(self._assembled(internal_work, u))
 
     def tangent(self, u: Array) -> Any:
-        """Their derivative, sparse (N/m): int v_iJ A_iJkL d_kL, A = S_JL d_ik + F_iI C_IJKL F_kK, block by block."""
+        """Their derivative, sparse (N/m)."""
+        return self._assembled(internal_tangent, u)
+
+    def _assembled(self, form: Any, u: Array) -> Any:
         total: Any = 0
         for part, basis in zip(self.bodies.parts, self.bases, strict=True):
             lam, mu = part.material.lame(part.plane)
-            h = np.asarray(basis.interpolate(u).grad)
-            f, s = _deformation(h), _second_stress(h, lam, mu)
-            left = np.einsum("iI...,kI...->ik...", f, f)
-            # a vector function is a scalar one times a unit vector: dN_a/dX_J, shape (2, elements, points, 6)
-            slopes = np.stack([np.asarray(made[0].grad[0]) for made in basis.basis[::2]], axis=-1)
-            weight = part.thickness * basis.dx
-            blocks = np.empty((basis.nelems, 6, 2, 6, 2))
-            for i, k, j in itertools.product(range(2), range(2), range(2)):
-                # A_ijkL d_kL, summed over L, for all six functions
-                bent = sum(
-                    (
-                        (i == k) * s[j, m]
-                        + lam * f[i, j] * f[k, m]
-                        + (j == m) * mu * left[i, k]
-                        + mu * f[i, m] * f[k, j]
-                    )[..., None]
-                    * slopes[m]
-                    for m in range(2)
-                )
-                block = np.matmul(slopes[j].transpose(0, 2, 1), weight[..., None] * bent)
-                blocks[:, :, i, :, k] = block if j == 0 else blocks[:, :, i, :, k] + block
-            dofs = basis.element_dofs.T
-            rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None, :])
-            total = (
-                total + coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(len(u), len(u))).tocsr()
-            )
+            f, s = deformation(np.asarray(basis.interpolate(u).grad), lam, mu)
+            total = total + form.assemble(basis, F=f, S=s, lam=lam, mu=mu, thickness=part.thickness)
         return total
 
-    def normal_stress(self, u: Any, w: Any) -> Any:
-        """-n . F S n0 with the mate's present normal n and the undeformed surface's n0."""
-        from skfem.helpers import dot, grad, mul
-
-        h = grad(u)
-        return -dot(w["n"], mul(mul(_deformation(h), _second_stress(h, w["lam"], w["mu"])), w["slave_normal"]))
-
-    def normal_stress_rate(self, u: Any, w: Any) -> Any:
-        """Its variation with u at given n."""
-        from skfem.helpers import dot, grad, mul, transpose
-
-        h, d = grad(w["state"]), grad(u)
-        f, lam, mu = _deformation(h), w["lam"], w["mu"]
-        product = mul(transpose(f), d)
-        strain = 0.5 * (product + transpose(product))
-        rate = mul(d, _second_stress(h, lam, mu)) + mul(f, _isotropic(strain, lam, mu))
-        return -dot(w["n"], mul(rate, w["slave_normal"]))
+    def surface_stress(self, h: Array, n: Array, n0: Array, lam: Array, mu: Array) -> tuple[Array, Array]:
+        """sigma_n = -n . F S n0; with b = F^T n, delta sigma_n = -n . grad v S n0 - b . (C : sym(F^T grad v)) n0."""
+        f, s = deformation(h, lam, mu)
+        b = mul(transpose(f), n)
+        rate = prod(n, mul(s, n0)) + lam * dot(b, n0) * f + mu * (prod(mul(f, b), n0) + prod(mul(f, n0), b))
+        return -dot(n, mul(mul(f, s), n0)), -rate
 
 
-def _deformation(h: Any) -> Any:
-    """F = I + grad u."""
-    f = np.array(h)
-    f[0, 0] += 1.0
-    f[1, 1] += 1.0
-    return f
+def deformation(h: Array, lam: Any, mu: Any) -> tuple[Array, Array]:
+    """F = I + grad u and S = C : E of h = grad u."""
+    one = eye(np.ones(h.shape[2:]), 2)
+    f = one + h
+    return f, isotropic(0.5 * (mul(transpose(f), f) - one), lam, mu)
 
 
-def _second_stress(h: Any, lam: Any, mu: Any) -> Any:
-    """S = C : E of the displacement gradient h."""
-    h = np.asarray(h)
-    strain = 0.5 * (h + np.swapaxes(h, 0, 1) + np.einsum("kI...,kJ...->IJ...", h, h))
-    return _isotropic(strain, lam, mu)
+def isotropic(strain: Array, lam: Any, mu: Any) -> Array:
+    """C : E = lam tr(E) I + 2 mu E."""
+    return np.asarray(eye(lam * trace(strain), 2) + 2 * mu * strain)
 
 
-def _isotropic(strain: Any, lam: Any, mu: Any) -> Any:
-    """lam tr(E) I + 2 mu E."""
-    stress = 2 * mu * np.asarray(strain)
-    trace = lam * (strain[0, 0] + strain[1, 1])
-    stress[0, 0] += trace
-    stress[1, 1] += trace
-    return stress
+def _sym(a: Array) -> Array:
+    return 0.5 * (a + transpose(a))

@@ -1,24 +1,23 @@
-r"""Contact of a `ContactProblem` at one displacement: closest points, pressures, forces and their tangent.
-
-All integrals are sums over the contact points, each a scikit-fem element of its own (`bodies.point_basis`), once on the
-slave's side and once at the closest points of the mate.
-"""
+"""Contact of a `ContactProblem` at one displacement: pairs of points, their pressures and forces."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix, csr_matrix, diags
+from scipy.sparse import coo_matrix, csr_matrix
+from skfem import DiscreteField
 
 from ..contact.closest import Projection, chains_of, nearest_places, project, unreached
-from ..contact.flank import edge_shapes
-from .bodies import point_basis
+from . import forms
+from .bodies import edge_points, edge_tangents
 from .problem import ContactProblem, Points
 
 Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -31,25 +30,29 @@ class ContactState:
         Displacements of all unknowns (m).
     points, projection
         Contact points and their closest points.
-    slave, mate
-        scikit-fem bases at both.
-    fields
-        Numbers at the points by name, as the forms use them.
-    pressure : ndarray, shape (q,)
-        Pa.
-    contact : ndarray
-        Nodal forces of the pressures (N); `stress_loads` are those of (theta/gamma) p sigma_n(v).
+    slave
+        scikit-fem basis at the contact points.
+    pressure, share : ndarray, shape (q,)
+        Pressure (Pa), and the part of each point's stretch of surface that faces the mate.
+    on : ndarray of int, shape (k,)
+        Points that act: all that face the mate with the exact law, else those under pressure.
+    pairs, fields
+        scikit-fem basis of these with their closest points, and what `gearfe.verification.forms` takes there.
+    contact, stress_loads : ndarray
+        Nodal forces (N) of p n . [v] and of theta/gamma p sigma_n(v).
     multipliers : ndarray, shape (m,)
-        Pressures at the vertices (Pa) of a law on a multiplier space; else none.
+        lambda of the exact law (Pa); else none.
     """
 
     u: Array
     points: Points
     projection: Projection
     slave: Any
-    mate: Any
-    fields: dict[str, Any]
     pressure: Array
+    share: Array
+    on: IntArray
+    pairs: Any
+    fields: dict[str, Any]
     contact: Array
     stress_loads: Array
     multipliers: Array
@@ -59,206 +62,103 @@ class ContactState:
         """Nodal forces of the contact (N)."""
         return self.contact + self.stress_loads
 
+    def tangent(self) -> csr_matrix:
+        """Their derivative, sparse (N/m); with the exact law at given multipliers.
+
+        The form takes all 24 x 24 functions of the pairs in one call; `BilinearForm.assemble` would call it for each.
+        """
+        basis, dofs = self.pairs.basis, self.pairs.element_dofs
+        values = [np.stack([both[k] for both in basis], axis=1) for k in (0, 1)]
+        grads = [np.stack([both[k].grad for both in basis], axis=2) for k in (0, 1)]
+        trial = (DiscreteField(v[:, :, None], g[:, :, :, None]) for v, g in zip(values, grads, strict=True))
+        test = (DiscreteField(v[:, None], g[:, :, None]) for v, g in zip(values, grads, strict=True))
+        density = forms.contact_tangent.form(*trial, *test, SimpleNamespace(**self.fields))
+        entries = np.sum(density * self.pairs.dx, axis=-1)
+        columns, rows = np.broadcast_arrays(dofs[:, None], dofs[None])
+        return coo_matrix((entries.ravel(), (rows.ravel(), columns.ravel())), (len(self.u), len(self.u))).tocsr()
+
+    def rows(self, form: Any) -> csr_matrix:
+        """A linear form point by point, shape (q, unknowns)."""
+        dofs = self.pairs.element_dofs  # (functions, points), as the element vectors are stored
+        entries = form.elemental(self.pairs, **self.fields).data
+        points = np.broadcast_to(self.on, dofs.shape)
+        return coo_matrix((entries, (points.ravel(), dofs.ravel())), (len(self.pressure), len(self.u))).tocsr()
+
 
 def contact_at(
-    problem: ContactProblem,
-    u: Array,
-    before: ContactState | None = None,
-    multipliers: Array | None = None,
-    closing: float = 0.0,
+    problem: ContactProblem, u: Array, multipliers: Array | None = None, closing: float = 0.0
 ) -> ContactState:
-    """Closest points, pressures and contact forces at the displacement u; `before` is a state near by."""
-    from skfem import DiscreteField, LinearForm, asm
-    from skfem.helpers import dot
+    """Contact at the displacement u.
 
-    nodes = (problem.mesh.doflocs.T + u[problem.unknowns])[problem.chain_nodes]
-    fixed_points = problem.quadrature == "points" and before is not None
-    if fixed_points:
-        assert before is not None
-        points, slave, place = before.points, before.slave, before.projection.place
-        fields = {name: before.fields[name] for name in CONSTANT}
-    else:
-        points = problem.points(nodes)
-        slave, fields = _slave_side(problem, points)
-        place = np.empty(len(points.edge))
-    moved = slave.interpolate(u)
+    Parameters
+    ----------
+    multipliers
+        Those of the exact law; nothing without them.
+    closing
+        Gap (m) below which a point counts as closed.
+    """
+    law, places = problem.law, problem.mesh.doflocs.T + u[problem.unknowns]
+    points = problem.points(places)
+    slave, surface = problem.at(points)
+    moved, fade = slave.interpolate(u), problem.fade(points)
     where = (slave.global_coordinates() + moved)[:, :, 0].T
-    mate_of = problem.slaves.mate[points.edge]
-    if not fixed_points:
-        for k in np.unique(mate_of):
-            own = mate_of == k
-            place[own] = nearest_places(where[own], nodes[problem.chains[k]])
-    projection = project(where, chains_of(nodes, problem.counts, mate_of, points.fade), place)
-    elements, local, tangent = problem.on_mate(projection)
-    mate = point_basis(problem.mesh, elements, local, points.weight)
-    share = np.clip(0.5 + (problem.counts[mate_of] - projection.place) / (2 * points.fade), 0.0, 1.0)
-    numbers = {
-        "g": projection.gap,
-        "n": projection.normal.T,
-        "a": projection.tangent.T,
-        "undeformed_a": tangent,
-        "kappa": projection.curvature,
-        "m": np.einsum("ni,ni->n", projection.tangent, projection.tangent),
-        "share": share,
-        "share_slope": np.where((share > 0) & (share < 1), -0.5 / points.fade, 0.0),
-    }
-    fields = fields | {name: DiscreteField(value[..., None]) for name, value in numbers.items()} | {"state": moved}
-    reached = ~unreached(projection.gap)
-    if problem.law.name != "exact":
-        multipliers = np.zeros(0)
-        pressure = -problem.slaves.parameter[points.edge] * projection.gap
-        if problem.law.uses_stress:
-            pressure = pressure - problem.constitution.normal_stress(moved, fields)[:, 0]
-        active = reached & ((pressure > 0) | (projection.gap < closing))
-    else:
-        hats, _ = hat_functions(problem, points)
+    found = _closest(problem, places[problem.chain_nodes], where, points.mate, fade)
+    reached = ~unreached(found.gap)
+    over = (problem.counts[points.mate] - found.place) / (2 * fade)
+    share = np.where(reached, np.clip(0.5 + over, 0.0, 1.0), 0.0)
+    stress, rate = problem.constitution.surface_stress(np.asarray(moved.grad), found.normal.T[:, :, None], **surface)
+    if law.name == "exact":
+        hats, _ = hat_functions(points)
         multipliers = np.zeros(hats.shape[1]) if multipliers is None else multipliers
-        pressure, active = hats @ multipliers, np.zeros(len(reached), dtype=bool)
-    pressure = np.where(reached & (active | (problem.law.name == "exact")), pressure, 0.0)
-    fields |= {"p": DiscreteField(pressure[:, None]), "active": DiscreteField(active.astype(float)[:, None])}
-
-    @LinearForm
-    def push(v: Any, w: Any) -> Any:
-        return w.share * w.p * dot(w.n, jump(v, w.idx[0]))
-
-    stress_loads = np.zeros(len(u))
-    if problem.law.theta:
-        rate = problem.constitution.normal_stress_rate
-        form = LinearForm(lambda v, w: w.share * w.p * w.theta_by_gamma * rate(v, w))
-        stress_loads = asm(form, slave, **fields)
-    return ContactState(
-        u=u,
-        points=points,
-        projection=projection,
-        slave=slave,
-        mate=mate,
-        fields=fields,
-        pressure=pressure,
-        contact=asm(push, [slave, mate], **fields),
-        stress_loads=stress_loads,
-        multipliers=multipliers,
-    )
-
-
-#: Fields that depend on the points alone.
-CONSTANT = ("slave_normal", "lam", "mu", "gamma", "theta_by_gamma")
-
-
-def _slave_side(problem: ContactProblem, points: Points) -> tuple[Any, dict[str, Any]]:
-    """Basis at the contact points and the fields that go with them."""
-    from skfem import DiscreteField
-
-    slaves, edge = problem.slaves, points.edge
-    local = slaves.start[:, edge] + points.xi * (slaves.end - slaves.start)[:, edge]
-    _, slopes, _ = edge_shapes(points.xi)
-    slope = np.einsum("qa,qai->iq", slopes, problem.mesh.doflocs.T[slaves.nodes[edge]])
-    gamma = slaves.parameter[edge]
-    numbers = {
-        "slave_normal": np.stack([-slope[1], slope[0]]) / np.linalg.norm(slope, axis=0),
-        "lam": slaves.lam[edge],
-        "mu": slaves.mu[edge],
-        "gamma": gamma,
-        "theta_by_gamma": problem.law.theta / gamma,
+        pressure, active = np.where(reached, hats @ multipliers, 0.0), np.zeros(len(where), dtype=bool)
+        on = np.flatnonzero(reached)
+    else:
+        multipliers = np.zeros(0)
+        trial = forms.trial_pressure(found.gap, stress[:, 0], points.gamma, law.uses_stress)
+        active = reached & ((trial > 0) | (found.gap < closing))
+        pressure, on = np.where(active, trial, 0.0), np.flatnonzero(active)
+    mate = problem.chain_nodes[found.edge[on, None] + np.arange(3)]
+    mate_xi = found.shapes[on] @ [0.0, 0.5, 1.0]
+    own = edge_points(problem.mesh, points.edges[on], points.xi[on], points.weight[on])
+    pairs = own @ edge_points(problem.mesh, mate, mate_xi, points.weight[on])
+    at_points = {
+        "g": found.gap,
+        "n": found.normal.T,
+        "a": found.tangent.T,
+        "kappa": found.curvature,
+        "gamma": points.gamma,
+        "p": pressure,
+        "active": active.astype(float),
+        "share": share,
+        "share_rate": np.where((share > 0) & (share < 1), -0.5 / fade, 0.0),
     }
-    fields = {name: DiscreteField(value[..., None]) for name, value in numbers.items()}
-    return point_basis(problem.mesh, slaves.element[edge], local, points.weight), fields
+    fields: dict[str, Any] = {name: value[..., on, None] for name, value in at_points.items()}
+    fields["X_xi"] = edge_tangents(problem.mesh, mate, mate_xi)[:, :, None]
+    fields |= {"stress_rate": rate[:, :, on], "s": float(law.uses_stress), "theta": float(law.theta)}
+    contact, stress_loads = (f.assemble(pairs, **fields) for f in (forms.pressure_work, forms.stress_work))
+    return ContactState(u, points, found, slave, pressure, share, on, pairs, fields, contact, stress_loads, multipliers)
 
 
-def jump(v: Any, side: int) -> Any:
-    """[v]: v at the slave point (side 0), -v at the closest point of the mate (side 1)."""
-    return v if side == 0 else -v
+def _closest(problem: ContactProblem, nodes: Array, where: Array, mate: IntArray, fade: Array) -> Projection:
+    """Closest points of points at `where` on the chains with these nodes."""
+    start = np.empty(len(where))
+    for k, chain in enumerate(np.split(nodes, np.cumsum(2 * problem.counts + 1)[:-1])):
+        start[mate == k] = nearest_places(where[mate == k], chain)
+    return project(where, chains_of(nodes, problem.counts, mate, fade), start)
 
 
-def _tilt(v: Any, side: int, w: Any) -> Any:
-    """N = n . dv/dxi on the mate."""
-    from skfem.helpers import dot, grad, mul
+def hat_functions(points: Points) -> tuple[csr_matrix, Array]:
+    """Values of the exact law's hats at the points, shape (q, m), and the law's parameter of each (Pa/m).
 
-    return dot(w.n, mul(grad(v), w.undeformed_a)) if side == 1 else 0.0 * w.g
-
-
-def _slide(v: Any, side: int, w: Any) -> Any:
-    """Variation of the closest point's xi."""
-    from skfem.helpers import dot
-
-    return (dot(w.a, jump(v, side)) + w.g * _tilt(v, side, w)) / (w.m - w.g * w.kappa)
-
-
-def _opening(v: Any, side: int, w: Any) -> Any:
-    """Variation of the gap."""
-    from skfem.helpers import dot
-
-    return dot(w.n, jump(v, side)) - dot(w.n, w.a) * _slide(v, side, w)
-
-
-def contact_tangent(problem: ContactProblem, state: ContactState) -> csr_matrix:
-    """Minus the derivative of the contact forces, sparse (N/m); of a multiplier law that at given multipliers."""
-    p, f, w = state.projection, state.fields, state.points.weight
-    share, active, pressure = (np.asarray(f[name])[:, 0] for name in ("share", "active", "p"))
-    metric = np.asarray(f["m"])[:, 0]
-    virtual, opening = contact_rows(state)
-    tilt, slide = _rows(state, _tilt), _rows(state, _slide)
-    relief = diags(np.asarray(f["gamma"])[:, 0]) @ opening
-    tested = virtual
-    if problem.law.uses_stress:
-        stress = _rows(state, lambda v, _, w: problem.constitution.normal_stress_rate(v, w), one_sided=True)
-        relief = relief + stress
-        if problem.law.theta:
-            tested = virtual + diags(np.asarray(f["theta_by_gamma"])[:, 0]) @ stress
-    opposed = diags(w * share * active) @ relief
-    cut = w * np.asarray(f["share_slope"])[:, 0] * pressure
-    if cut.any():
-        opposed = opposed - diags(cut) @ slide
-    load = w * share * pressure
-    bent = load * (1 - p.gap * p.curvature / metric)
-    turning = tilt.T @ (diags(load * p.gap / metric) @ tilt - diags(bent) @ slide)
-    turning = turning - slide.T @ (diags(bent) @ tilt + diags(bent * p.curvature) @ slide)
-    return tested.T @ opposed - turning
-
-
-def hat_functions(problem: ContactProblem, points: Points) -> tuple[csr_matrix, Array]:
-    """Values of the multiplier space's functions at the points, shape (q, m), and the law's parameter of each (Pa/m).
-
-    Hats on half edges, one for each node (`gearfe.verification.laws`). A node that two couples share counts once for
-    each.
+    A node that two couples share counts once for each.
     """
-    slaves = problem.slaves
-    keys = slaves.mate[:, None] * len(problem.unknowns) + slaves.nodes
-    _, number = np.unique(keys, return_inverse=True)
+    keys = points.mate[:, None] * (points.edges.max() + 1) + points.edges
+    kinds, number = np.unique(keys, return_inverse=True)
     number = number.reshape(keys.shape)
-    late = (points.xi > 0.5).astype(np.int64)
-    along = 2 * points.xi - late
-    columns = number[points.edge[:, None], np.stack([late, late + 1], axis=1)]
-    rows = np.repeat(np.arange(len(late)), 2)
-    shape = (len(late), int(number.max()) + 1)
-    parameter = np.zeros(shape[1])
-    np.maximum.at(parameter, number, slaves.parameter[:, None])
-    values = np.stack([1 - along, along], axis=1)
-    return coo_matrix((values.ravel(), (rows, columns.ravel())), shape=shape).tocsr(), parameter
-
-
-def contact_rows(state: ContactState) -> tuple[csr_matrix, csr_matrix]:
-    """n . [v] and the gap's variation at every point, shape (q, unknowns)."""
-    from skfem.helpers import dot
-
-    virtual = _rows(state, lambda v, side, w: dot(w.n, jump(v, side)))
-    return virtual, _rows(state, _opening)
-
-
-def _rows(state: ContactState, value: Any, *, one_sided: bool = False) -> csr_matrix:
-    """A quantity linear in v at every point: element vectors of one-point elements, divided by their areas.
-
-    `value(v, side, w)` is the integrand; with `one_sided` it lives on the slave's side only.
-    """
-    from skfem import LinearForm
-
-    total: Any = 0
-    for side, basis in ((0, state.slave), (1, state.mate)):
-        if side == 1 and one_sided:
-            continue
-        local = LinearForm(lambda v, w, side=side: value(v, side, w)).elemental(basis, **state.fields)
-        dofs = basis.element_dofs  # (functions, points); the element vectors are stored function by function
-        entries = local.data.reshape(dofs.shape) / state.points.weight
-        points = np.broadcast_to(np.arange(dofs.shape[1]), dofs.shape)
-        shape = (dofs.shape[1], len(state.u))
-        total = total + coo_matrix((entries.ravel(), (points.ravel(), dofs.ravel())), shape=shape).tocsr()
-    return total
+    late = (points.xi > 0.5).astype(np.int64)[:, None]
+    columns = np.take_along_axis(number, late + np.arange(2), axis=1)
+    along = 2 * points.xi - late[:, 0]
+    values, rows = np.stack([1 - along, along], axis=1), np.repeat(np.arange(len(along)), 2)
+    parameter = np.zeros(len(kinds))
+    np.maximum.at(parameter, number, points.gamma[:, None])
+    return coo_matrix((values.ravel(), (rows, columns.ravel())), (len(along), len(kinds))).tocsr(), parameter

@@ -1,22 +1,20 @@
-r"""The verification route: two whole gears in contact, solved in all unknowns at once.
+"""Two whole gears in contact, solved in all unknowns at once.
 
-The gears are a `ContactProblem` like any other bodies' (the blocks and rings of the patch tests, those of Hertz), and
-`gearfe.verification.body_contact` solves it, with strains small or of Saint Venant-Kirchhoff bodies. Nothing but the
-closest-point search is shared with the condensed route: no compliance, no cyclic symmetry, no windows of flank. On the
-same mesh and quadrature points both must give the same torques; what they cost differs a hundredfold.
+The gears are a `ContactProblem` like any other bodies' (the blocks and rings of the patch tests, those of Hertz), with
+strains small or of Saint Venant-Kirchhoff bodies. No compliance, no cyclic symmetry, no windows of flank: on the same
+mesh and quadrature points the condensed route must give the same torques; what they cost differs a hundredfold.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .body_contact import TOLERANCE, ContactSolution, solve_contact
 from .contact_state import contact_at
 from .laws import ContactLaw
+from .newton import TOLERANCE, ContactSolution, solve_contact
 from .problem import ContactProblem
 from .whole_pair import WholePair
 
@@ -24,6 +22,8 @@ Array = NDArray[np.float64]
 
 #: Smallest step of the twist, as a share of it, when it is raised in steps.
 SMALLEST_STEP = 0.02
+#: Tolerance of solutions that only start another.
+ROUGHLY = 1e-4
 
 
 @dataclass(frozen=True)
@@ -32,14 +32,19 @@ class MonolithicPosition:
 
     Attributes
     ----------
-    status, torque_wheel, torque_pinion, torque_wheel_reaction, peak_pressure, iterations
-        As in `gearfe.contact.solver.Position`.
-    mesh
-        scikit-fem mesh of both gears in their present places (pinion's triangles first).
-    displacement : ndarray
-        Unknowns on second-order vector elements (m).
-    pressure, place : ndarray, shape (q,)
-        Pressure at the contact points (Pa) and where they are (edge of the mate's flank plus xi).
+    status
+        ``converged``; ``no_contact``; ``under_resolved``, the rigid gears overlap but no contact point does;
+        ``not_converged``.
+    torque_wheel, torque_pinion
+        Moments of the contact pressure about the shafts (N m).
+    torque_wheel_reaction
+        Moment of the reactions at the wheel's bore (N m).
+    peak_pressure
+        Pa.
+    iterations
+        Newton iterations of all steps.
+    problem, solution
+        What was solved, and displacements, pressures and places of the contact points; None without contact.
     """
 
     status: str
@@ -47,11 +52,12 @@ class MonolithicPosition:
     torque_pinion: float
     torque_wheel_reaction: float
     peak_pressure: float
-    iterations: int
-    mesh: Any
-    displacement: Array
-    pressure: Array
-    place: Array
+    iterations: int = 0
+    problem: ContactProblem | None = None
+    solution: ContactSolution | None = None
+
+
+FAILED = (float("nan"),) * 4
 
 
 def solve_monolithic(
@@ -73,82 +79,71 @@ def solve_monolithic(
     """
     problem = pair.problem(law, pinion_angle, twist)
     if problem is None:
-        return _empty("no_contact", None)
+        return MonolithicPosition("no_contact", 0.0, 0.0, 0.0, 0.0)
     start = contact_at(problem, np.zeros(problem.unknowns.size))
     if not (start.projection.gap < 0).any():
-        return _empty("under_resolved" if pair.rigid_overlap(problem) else "no_contact", problem.mesh)
-    if problem.kinematics == "finite":
+        if any((problem.node_gaps(*couple) < 0).any() for couple in problem.facing):
+            return MonolithicPosition("under_resolved", *FAILED)
+        return MonolithicPosition("no_contact", 0.0, 0.0, 0.0, 0.0)
+    if pair.kinematics == "finite":
         # strains of the rigid overlap are out of all proportion: start from the solution of small strain
-        small = solve_monolithic(replace(pair, kinematics="small"), law, pinion_angle, twist, tolerance=1e-4)
-        if small.status == "converged":
-            start = contact_at(problem, small.displacement)
+        small = solve_monolithic(replace(pair, kinematics="small"), law, pinion_angle, twist, tolerance=ROUGHLY)
+        if small.solution is not None:
+            start = contact_at(problem, small.solution.u)
     solution: ContactSolution | None = solve_contact(problem, start, tolerance=tolerance)
     assert solution is not None
     iterations = solution.iterations
     if solution.status != "converged":
         solution, more = _raised(pair, law, pinion_angle, twist, tolerance)
         iterations += more
-    if solution is None or solution.status != "converged":
-        return _empty("not_converged", problem.mesh, iterations)
-    return _finish(pair, problem, solution, iterations)
+    if solution is None:
+        return MonolithicPosition("not_converged", *FAILED, iterations)
+    return _position(pair, problem, solution, iterations)
 
 
 def _raised(
     pair: WholePair, law: ContactLaw, pinion_angle: float, twist: float, tolerance: float
 ) -> tuple[ContactSolution | None, int]:
     """Solution at the end of steps of the twist, and the iterations of all of them."""
-    done, step, iterations = 0.0, 0.25, 0
-    last: Array | None = None
+    done, step, iterations, u = 0.0, 0.25, 0, None
     while step > SMALLEST_STEP:
         share = min(1.0, done + step)
-        part = pair.problem(law, pinion_angle, share * twist)
-        if part is None:  # nothing touches yet
+        problem = pair.problem(law, pinion_angle, share * twist)
+        if problem is not None:
+            start = contact_at(problem, np.zeros(problem.unknowns.size) if u is None else u * (share / done))
+        if problem is None or (share < 1 and not (start.projection.gap < 0).any()):  # nothing touches yet
             done = share
             continue
-        guess = contact_at(part, np.zeros(part.unknowns.size) if last is None else last * (share / done))
-        if not (guess.projection.gap < 0).any() and share < 1.0:
-            done = share
-            continue
-        tried = solve_contact(part, guess, tolerance=tolerance if share == 1.0 else 1e-4)
+        tried = solve_contact(problem, start, tolerance=tolerance if share == 1 else ROUGHLY)
         iterations += tried.iterations
         if tried.status != "converged":
             step *= 0.5
-        elif share == 1.0:
+        elif share == 1:
             return tried, iterations
         else:
-            done, step, last = share, 1.5 * step, tried.u
+            done, step, u = share, 1.5 * step, tried.u
     return None, iterations
 
 
-def _finish(pair: WholePair, problem: ContactProblem, solution: ContactSolution, iterations: int) -> MonolithicPosition:
-    state = solution.state
-    placed = problem.mesh.doflocs.T + state.u[problem.unknowns]
-    force, internal = state.contact[problem.unknowns], solution.internal[problem.unknowns]
-    wheel = np.zeros(len(placed), dtype=bool)
-    wheel[pair.node_of[1]] = True
-    centre = np.array([pair.centre_distance, 0.0])
-    bore = wheel & np.isin(problem.unknowns[:, 0], problem.fixed)
+def _position(
+    pair: WholePair, problem: ContactProblem, solution: ContactSolution, iterations: int
+) -> MonolithicPosition:
+    placed = problem.mesh.doflocs.T + solution.u[problem.unknowns]
+    force, internal = solution.state.contact[problem.unknowns], solution.internal[problem.unknowns]
+    pinion, wheel = pair.bodies.node_of
+    bore = wheel[np.isin(problem.unknowns[wheel, 0], problem.fixed)]
+    from_wheel = placed - [pair.centre_distance, 0.0]
     return MonolithicPosition(
         status="converged",
-        torque_wheel=-_moment((placed - centre)[wheel], force[wheel]),
-        torque_pinion=-_moment(placed[~wheel], force[~wheel]),
-        torque_wheel_reaction=_moment((placed - centre)[bore], internal[bore]),
-        peak_pressure=float(state.pressure.max()),
+        torque_wheel=-_moment(from_wheel[wheel], force[wheel]),
+        torque_pinion=-_moment(placed[pinion], force[pinion]),
+        torque_wheel_reaction=_moment(from_wheel[bore], internal[bore]),
+        peak_pressure=float(solution.state.pressure.max()),
         iterations=iterations,
-        mesh=problem.mesh,
-        displacement=state.u,
-        pressure=state.pressure,
-        place=state.projection.place,
+        problem=problem,
+        solution=solution,
     )
 
 
 def _moment(arm: Array, force: Array) -> float:
     return float(np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]))
-
-
-def _empty(status: str, mesh: Any, iterations: int = 0) -> MonolithicPosition:
-    nothing = 0.0 if status == "no_contact" else float("nan")
-    none = np.zeros(0)
-    return MonolithicPosition(
-        status, nothing, nothing, nothing, nothing, iterations, mesh, displacement=none, pressure=none, place=none
-    )

@@ -1,4 +1,4 @@
-"""A contact problem of elastic bodies, and where its contact points are: what the monolithic solver works on."""
+"""A contact problem of elastic bodies, and where its contact points are."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.closest import Projection, chains_of, nearest_places, project
-from ..contact.flank import edge_shapes, gauss_rule
+from ..contact.closest import chains_of, nearest_places, project
 from ..errors import InputError
-from .bodies import Bodies, Value
-from .constitution import Constitution, Kinematics, SaintVenantKirchhoff, SmallStrain
+from .bodies import Bodies, Value, edge_lengths, edge_points, edge_tangents
+from .constitution import Kinematics, SaintVenantKirchhoff, SmallStrain
+from .forms import stress_term
 from .laws import ContactLaw, side_share
 from .segments import Quadrature, segments, whole_edges
-from .stress_term import stress_term
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -33,13 +32,13 @@ class Surface:
         Number of the body.
     edges : ndarray, shape (e, 3)
         Nodes of the joined mesh: one chain with the material on its right.
-    near : ndarray of bool, shape (e,)
-        Edges that get contact points.
+    near : ndarray of int
+        Edges that may get contact points.
     """
 
     part: int
     edges: IntArray
-    near: NDArray[np.bool_]
+    near: IntArray
 
     @property
     def nodes(self) -> IntArray:
@@ -48,56 +47,33 @@ class Surface:
 
 
 @dataclass(frozen=True)
-class SlaveEdges:
-    """Edges that carry contact points, of all surfaces.
-
-    Attributes
-    ----------
-    nodes : ndarray, shape (k, 3)
-    element : ndarray, shape (k,)
-        Triangle behind each edge; `start`, `end`, shape (2, k), are the reference coordinates of its ends in it.
-    mate : ndarray, shape (k,)
-        Chain that its points are projected onto (chains 2 i and 2 i + 1 are the couple i).
-    width : ndarray, shape (k,)
-        Contact width times the side's share (m).
-    size : ndarray, shape (k,)
-        Length (m).
-    parameter, lam, mu : ndarray, shape (k,)
-        The law's gamma (Pa/m), Lame constants (Pa).
-    """
-
-    nodes: IntArray
-    element: IntArray
-    start: Array
-    end: Array
-    mate: IntArray
-    width: Array
-    size: Array
-    parameter: Array
-    lam: Array
-    mu: Array
-
-
-@dataclass(frozen=True)
 class Points:
     """Contact points at one state.
 
     Attributes
     ----------
-    edge : ndarray, shape (q,)
-        Row of `SlaveEdges`.
+    edges : ndarray, shape (q, 3)
+        Nodes of each point's edge.
     xi : ndarray, shape (q,)
         Place on it, 0 to 1.
     weight : ndarray, shape (q,)
         Undeformed area times the side's share (m2).
-    fade : ndarray, shape (q,)
-        See `gearfe.contact.scene.Scene`; next to nothing for segments, which end where the mate does.
+    stretch : ndarray, shape (q,)
+        Length of the surface that a point stands for (m).
+    mate : ndarray, shape (q,)
+        Chain that it is projected onto (chains 2 i and 2 i + 1 are the couple i).
+    gamma, lam, mu : ndarray, shape (q,)
+        The law's parameter (Pa/m), Lame constants (Pa).
     """
 
-    edge: IntArray
+    edges: IntArray
     xi: Array
     weight: Array
-    fade: Array
+    stretch: Array
+    mate: IntArray
+    gamma: Array
+    lam: Array
+    mu: Array
 
 
 @dataclass(frozen=True)
@@ -129,8 +105,7 @@ class ContactProblem:
     stiffness
         Small-strain stiffness in the mesh's places (N/m); assembled when left out.
     skins
-        Body, side and edges of the whole contact surfaces for the stress term of theta = 1 and -1; the facing
-        surfaces of the law's sides when left out.
+        Body, side and edges of the contact surfaces of theta's stress term; the facing surfaces when left out.
     closing
         Gap (m) below which a point counts as closed before the first step; for bodies that contact alone holds.
     """
@@ -163,12 +138,22 @@ class ContactProblem:
         return self.bodies.unknowns
 
     @cached_property
-    def constitution(self) -> Constitution:
-        """What the bodies do inside."""
+    def constitution(self) -> SmallStrain | SaintVenantKirchhoff:
+        """What the bodies do inside, theta's stress term included."""
         if self.kinematics == "finite":
             return SaintVenantKirchhoff(self.bodies, self.mesh)
         stiffness = self.bodies.stiffness if self.stiffness is None else self.stiffness
-        return SmallStrain(stiffness - stress_term(self) if self.law.theta else stiffness)
+        for part, side, edges in self.skins or [
+            (s.part, k, s.edges) for pair in self.facing for k, s in enumerate(pair)
+        ]:
+            if self.law.theta and side_share(self.law, side) > 0:
+                every = whole_edges(np.arange(len(edges)), self.points_per_edge)
+                points = self._points(part, edges, 0, side_share(self.law, side), *every)
+                basis, surface = self.at(points)
+                _, rate = SmallStrain(None).surface_stress(np.zeros((2, 2, 1, 1)), np.zeros(2), **surface)
+                fields = {"stress_rate": rate, "gamma": points.gamma[:, None], "theta": self.law.theta}
+                stiffness = stiffness - stress_term.assemble(basis, **fields)
+        return SmallStrain(stiffness)
 
     @cached_property
     def chain_nodes(self) -> IntArray:
@@ -181,95 +166,71 @@ class ContactProblem:
         return np.array([len(surface.edges) for couple in self.facing for surface in couple])
 
     @cached_property
-    def chains(self) -> tuple[slice, ...]:
-        """Where the nodes of each chain are in `chain_nodes`."""
-        ends = np.cumsum(2 * self.counts + 1)
-        return tuple(slice(a, b) for a, b in zip(ends - 2 * self.counts - 1, ends, strict=True))
-
-    @cached_property
-    def slaves(self) -> SlaveEdges:
-        """Edges that carry contact points."""
-        columns: dict[str, list[NDArray[Any]]] = {}
-        for couple, surfaces in enumerate(self.facing):
+    def carriers(self) -> list[tuple[Surface, Surface, int, float]]:
+        """Surfaces that carry contact points, with mate, number of the mate's chain and share of the pressure."""
+        made = []
+        for couple, pair in enumerate(self.facing):
             shares = [side_share(self.law, side) for side in (0, 1)]
             if self.law.sides == "tip":
-                shares = [1.0, 0.0] if self._ends_nearer(*surfaces) else [0.0, 1.0]
-            for side, (surface, share) in enumerate(zip(surfaces, shares, strict=True)):
-                if share == 0 or not surface.near.any():
-                    continue
-                made = self.edge_data(surface.part, surface.edges)
-                made["mate"] = np.full(len(surface.edges), 2 * couple + 1 - side)
-                made["width"] = np.full(len(surface.edges), share * self.width)
-                for name, value in made.items():
-                    columns.setdefault(name, []).append(value[..., surface.near])
-        joined: dict[str, Any] = {name: np.concatenate(parts, axis=-1) for name, parts in columns.items()}
-        joined["nodes"] = joined["nodes"].T
-        return SlaveEdges(**joined)
+                shares = [1.0, 0.0] if self._ends_nearer(*pair) else [0.0, 1.0]
+            made += [(pair[k], pair[1 - k], 2 * couple + 1 - k, shares[k]) for k in (0, 1) if shares[k] > 0]
+        return made
 
     def _ends_nearer(self, one: Surface, two: Surface) -> bool:
         """Whether the first surface ends (in a tooth's tip) nearer to where the undeformed bodies overlap."""
-        places, left = self.mesh.doflocs.T, []
+        left = []
         for own, mate in ((one, two), (two, one)):
-            points, nodes = places[own.nodes[::2]], places[mate.nodes]
-            chain = chains_of(nodes, np.array([len(mate.edges)]), np.zeros(len(points), dtype=np.int64))
-            inside = np.flatnonzero(project(points, chain, nearest_places(points, nodes)).gap < 0)
+            inside = np.flatnonzero(self.node_gaps(own, mate)[::2] < 0)
             middle = int(inside.mean()) if len(inside) else len(own.edges)
-            left.append(float(edge_lengths(places[own.edges], self.points_per_edge)[middle:].sum()))
-        return left[0] <= left[1]
+            left.append(edge_lengths(self.mesh.doflocs.T[own.edges], self.points_per_edge)[middle:].sum())
+        return bool(left[0] <= left[1])
 
-    def edge_data(self, part: int, edges: IntArray) -> dict[str, Any]:
-        """Geometry and constants of a body's surface edges, edges last."""
-        elements = self.mesh.f2t[0, edges[:, 1] - self.mesh.nvertices].astype(np.int64)
+    def node_gaps(self, own: Surface, mate: Surface) -> Array:
+        """Gaps (m) of a surface's nodes to its mate, undeformed."""
+        points, nodes = self.mesh.doflocs.T[own.nodes], self.mesh.doflocs.T[mate.nodes]
+        chain = chains_of(nodes, np.array([len(mate.edges)]), np.zeros(len(points), dtype=np.int64))
+        return project(points, chain, nearest_places(points, nodes)).gap
+
+    def points(self, places: Array) -> Points:
+        """Contact points when the nodes are at `places`, shape (n, 2) (m)."""
+        made = []
+        for own, mate, chain, share in self.carriers:
+            if self.quadrature == "points":
+                rule = whole_edges(own.near, self.points_per_edge)
+            else:
+                rule = segments(own.near, places[own.edges], places[mate.nodes], self.points_per_edge)
+            made.append(vars(self._points(own.part, own.edges, chain, share, *rule)))
+        return Points(**{name: np.concatenate([part[name] for part in made]) for name in made[0]})
+
+    def _points(
+        self, part: int, edges: IntArray, mate: int, share: float, edge: IntArray, xi: Array, weight: Array
+    ) -> Points:
+        """Points at xi of some of the `edges` of a body that stand for the parts `weight` of them."""
         body = self.bodies.parts[part]
-        size = edge_lengths(self.mesh.doflocs.T[edges], self.points_per_edge)
         spread = body.thickness / self.width  # a pressure on the width of the contact spreads over the thickness
-        lam, mu = (spread * modulus for modulus in body.material.lame(body.plane))
-        return {
-            "nodes": edges.T,
-            "element": elements,
-            "start": corner(self.mesh, elements, edges[:, 0]),
-            "end": corner(self.mesh, elements, edges[:, 2]),
-            "size": size,
-            "parameter": self.law.parameter(spread * body.material.youngs_modulus, size),
-            "lam": np.full(len(edges), lam),
-            "mu": np.full(len(edges), mu),
-        }
+        sizes = edge_lengths(self.mesh.doflocs.T[edges], self.points_per_edge)
+        gamma = self.law.parameter(spread * body.material.youngs_modulus, sizes)[edge]
+        lam, mu = (np.full(len(edge), spread * modulus) for modulus in body.material.lame(body.plane))
+        stretch = weight * np.linalg.norm(edge_tangents(self.mesh, edges[edge], xi), axis=0)
+        return Points(edges[edge], xi, share * self.width * stretch, stretch, np.full(len(edge), mate), gamma, lam, mu)
 
-    def points(self, nodes: Array) -> Points:
-        """Contact points when the chains' nodes are at `nodes`, shape (k, 2) (m)."""
-        slaves = self.slaves
-        if self.quadrature == "points":
-            edge, xi, weight = whole_edges(len(slaves.mate), self.points_per_edge)
-        else:
-            place = np.full((len(self.unknowns), 2), np.nan)
-            place[self.chain_nodes] = nodes
-            parts = []
-            for mate in np.unique(slaves.mate):
-                own = np.flatnonzero(slaves.mate == mate)
-                at, *rest = segments(place[slaves.nodes[own]], nodes[self.chains[mate]], self.points_per_edge)
-                parts.append((own[at], *rest))
-            edge, xi, weight = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-        _, slopes, _ = edge_shapes(xi)
-        slope = np.einsum("qa,qai->qi", slopes, self.mesh.doflocs.T[slaves.nodes[edge]])
-        length = np.linalg.norm(slope, axis=1) * weight
-        if self.quadrature == "points":
-            ends = np.stack([couple[side].edges[-1] for couple in self.facing for side in (0, 1)])
-            mate_end = edge_lengths(self.mesh.doflocs.T[ends], self.points_per_edge)
-            fade = 0.5 * length / mate_end[slaves.mate[edge]]
-        else:
-            fade = np.full(len(edge), 1e-12)
-        return Points(edge, xi, slaves.width[edge] * length, fade)
+    def at(self, points: Points) -> tuple[Any, dict[str, Array]]:
+        """scikit-fem basis at the points, and outward normal and Lame constants there as the forms take them."""
+        tangent = edge_tangents(self.mesh, points.edges, points.xi)
+        n0 = np.stack([-tangent[1], tangent[0]]) / np.linalg.norm(tangent, axis=0)
+        fields = {"n0": n0[:, :, None], "lam": points.lam[:, None], "mu": points.mu[:, None]}
+        return edge_points(self.mesh, points.edges, points.xi, points.weight), fields
 
-    def on_mate(self, projection: Projection) -> tuple[IntArray, Array, Array]:
-        """Triangle of each closest point, reference coordinates in it, and dX/dxi of the undeformed edge there."""
-        first = self.chain_nodes[projection.edge]
-        last = self.chain_nodes[projection.edge + 2]
-        middle = self.chain_nodes[projection.edge + 1]
-        xi = projection.shapes @ np.array([0.0, 0.5, 1.0])
-        elements = self.mesh.f2t[0, middle - self.mesh.nvertices].astype(np.int64)
-        start, end = corner(self.mesh, elements, first), corner(self.mesh, elements, last)
-        corners = self.mesh.doflocs[:, np.stack([first, middle, last], axis=1)]
-        return elements, start + xi * (end - start), np.einsum("na,ina->in", projection.slopes, corners)
+    def fade(self, points: Points) -> Array:
+        """Distance from the mate's sharp end (edges) within which a point counts in part: half its stretch of surface.
+
+        Next to nothing for segments, which end where the mate does.
+        """
+        if self.quadrature == "segments":
+            return np.full(len(points.xi), 1e-12)
+        ends = np.stack([surface.edges[-1] for couple in self.facing for surface in couple])
+        last = edge_lengths(self.mesh.doflocs.T[ends], self.points_per_edge)
+        return 0.5 * points.stretch / last[points.mate]
 
 
 def contact_problem(
@@ -281,12 +242,10 @@ def contact_problem(
     tractions: Mapping[tuple[int, str], tuple[Value, Value]] | None = None,
     **options: Any,
 ) -> ContactProblem:
-    """Contact problem of bodies whose boundaries go by their names.
+    """Contact problem of bodies that stand undeformed.
 
     Parameters
     ----------
-    bodies
-        Bodies as they stand, undeformed.
     facing
         Couples of boundaries, each (number of the body, name).
     law
@@ -298,25 +257,13 @@ def contact_problem(
     options
         `points_per_edge`, `quadrature`, `kinematics`, `closing` of `ContactProblem`.
     """
-    couples = []
-    for one, two in facing:
-        chains = bodies.chain(*one), bodies.chain(*two)
-        surfaces = [Surface(p, c, np.ones(len(c), bool)) for (p, _), c in zip((one, two), chains, strict=True)]
-        couples.append((surfaces[0], surfaces[1]))
+
+    def surface(part: int, name: str) -> Surface:
+        edges = bodies.chain(part, name)
+        return Surface(part, edges, np.arange(len(edges)))
+
+    couples = tuple((surface(*one), surface(*two)) for one, two in facing)
     fixed, values = bodies.prescribed(prescribed)
     loads = bodies.tractions(tractions or {})
     width = min(part.thickness for part in bodies.parts)
-    return ContactProblem(bodies, bodies.mesh, tuple(couples), law, width, fixed, values, loads, **options)
-
-
-def corner(mesh: Any, elements: IntArray, vertices: IntArray) -> Array:
-    """Reference coordinates of vertices in their triangles, shape (2, n)."""
-    local = np.argmax(mesh.t[:, elements] == vertices, axis=0)
-    return np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])[:, local]
-
-
-def edge_lengths(corners: Array, count: int) -> Array:
-    """Lengths of quadratic edges, shape (e, 3, 2), by the Gauss rule of the contact (m)."""
-    xi, weight = gauss_rule(count)
-    slopes = edge_shapes(xi)[1]
-    return np.asarray(np.linalg.norm(np.einsum("qa,eai->eqi", slopes, corners), axis=-1) @ weight)
+    return ContactProblem(bodies, bodies.mesh, couples, law, width, fixed, values, loads, **options)

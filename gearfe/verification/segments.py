@@ -30,38 +30,35 @@ Quadrature = Literal["points", "segments"]
 SHORTEST = 1e-9
 
 
-def whole_edges(count: int, points_per_edge: int) -> tuple[IntArray, Array, Array]:
-    """Edge, place on it (0 to 1) and weight (1 in sum) of the points of `count` edges with a Gauss rule on each."""
-    xi, weight = gauss_rule(points_per_edge)
-    return np.repeat(np.arange(count), len(xi)), np.tile(xi, count), np.tile(weight, count)
+def whole_edges(edge: IntArray, count: int) -> tuple[IntArray, Array, Array]:
+    """Edge, place on it (0 to 1) and weight (1 in sum) of the points of a Gauss rule on each edge."""
+    return _gauss(edge, np.zeros(len(edge)), np.ones(len(edge)), count)
 
 
-def segments(slave: Array, mate: Array, points_per_segment: int) -> tuple[IntArray, Array, Array]:
+def segments(edge: IntArray, slave: Array, mate: Array, count: int) -> tuple[IntArray, Array, Array]:
     """The same with a Gauss rule on each segment.
 
     Parameters
     ----------
+    edge : ndarray, shape (k,)
+        Slave edges that get points.
     slave : ndarray, shape (e, 3, 2)
-        Present places of the nodes of the slave edges (m).
+        Present places of the nodes of all slave edges (m).
     mate : ndarray, shape (2 f + 1, 2)
         Present places of the nodes of the mate's chain (m).
     """
-    edge, xi = breaks(slave, mate)
-    count = len(slave)
-    edge = np.concatenate([np.arange(count), edge])
-    start = np.concatenate([np.zeros(count), xi])
-    order = np.lexsort((start, edge))
-    edge, start = edge[order], start[order]
-    last = np.append(edge[1:] != edge[:-1], True)
-    end = np.where(last, 1.0, np.append(start[1:], 1.0))
+    cut, xi = breaks(slave[edge], mate)
+    pieces = np.concatenate([np.stack([edge, 0 * edge], axis=1), np.stack([edge[cut], xi], axis=1)])
+    of, start = pieces[np.lexsort(pieces.T[::-1])].T
+    end = np.where(np.append(of[1:] != of[:-1], True), 1.0, np.append(start[1:], 1.0))
     kept = end - start > SHORTEST
-    edge, start, length = edge[kept], start[kept], (end - start)[kept]
-    at, weight = gauss_rule(points_per_segment)
-    return (
-        np.repeat(edge, len(at)),
-        (start[:, None] + length[:, None] * at).ravel(),
-        (length[:, None] * weight).ravel(),
-    )
+    return _gauss(of[kept].astype(np.int64), start[kept], end[kept], count)
+
+
+def _gauss(edge: IntArray, start: Array, end: Array, count: int) -> tuple[IntArray, Array, Array]:
+    at, weight = gauss_rule(count)
+    length = (end - start)[:, None]
+    return np.repeat(edge, count), (start[:, None] + length * at).ravel(), (length * weight).ravel()
 
 
 def breaks(slave: Array, mate: Array) -> tuple[IntArray, Array]:
