@@ -49,7 +49,7 @@ class SmallStrain:
         return self.stiffness
 
     def surface_stress(self, h: Array, n: Array, n0: Array, lam: Array, mu: Array) -> tuple[Array, Array]:  # noqa: ARG002
-        """sigma_n = n0 . sigma n0 at points of the surface, and P = lam I + 2 mu n0 n0: delta sigma_n = P : grad v.
+        """sigma_n = n0 . sigma n0 at points of the surface, and P with delta sigma_n = P : grad v.
 
         Parameters
         ----------
@@ -60,8 +60,13 @@ class SmallStrain:
         lam, mu : ndarray, shape (q, 1)
             Lame constants (Pa).
         """
-        rate = eye(lam, 2) + 2 * mu * prod(n0, n0)
+        rate = linear_stress_rate(n0, lam, mu)
         return ddot(rate, h), rate
+
+
+def linear_stress_rate(n0: Array, lam: Array, mu: Array) -> Array:
+    """P = lam I + 2 mu n0 n0: n0 . sigma n0 = P : grad u."""
+    return np.asarray(eye(lam, 2) + 2 * mu * prod(n0, n0))
 
 
 @LinearForm

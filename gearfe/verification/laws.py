@@ -1,23 +1,11 @@
 r"""Contact laws of the oracle: what the pressure is, given gap and stress.
 
-**Laws at points.** Nitsche's family and the penalty method (Chouly, Mlika & Renard, *Numer. Math.* 139, 2018, written
-with the gap g in place of its negative): find u such that for all v
-
-.. math::
-    a(u, v) - \int_{\Gamma_C} \frac{\theta}{\gamma}\,\sigma_n(u)\,\sigma_n(v)
-    = \ell(v) + \int_{\Gamma_C} p\,n\cdot[v] + \int_{\Gamma_C} \frac{\theta}{\gamma}\,p\,\sigma_n(v), \qquad
-    p = \max(0,\; -\gamma g - s\,\sigma_n).
-
-====================  ===  ==========
-law                    s     theta
-====================  ===  ==========
-penalty                0    0
-Nitsche                1    1, 0, -1
-====================  ===  ==========
-
-For theta = 1 this is the derivative of the energy :math:`\tfrac12 a(u,u) + \int_{\Gamma_C} (p^2 - \sigma_n^2)/(2
-\gamma)`, convex only for gamma0 above a bound (some 4 to 20); theta = -1 converges for every gamma0; theta = 0 has no
-term in the variation of the stress. Where two sides carry points, each takes half of the integrals.
+**Laws at points.** :math:`p = \max(0, -\gamma g - s\,\sigma_n)` in the weak form of `gearfe.verification.forms`:
+penalty with s = theta = 0, Nitsche's family with s = 1 and theta = 1, 0 or -1 (Chouly, Mlika & Renard, *Numer. Math.*
+139, 2018, written with the gap g in place of its negative). For theta = 1 it is the derivative of the energy
+:math:`\tfrac12 a(u,u) + \int (p^2 - \sigma_n^2)/(2 \gamma)`, convex only for gamma0 above a bound (some 4 to 20);
+theta = -1 converges for every gamma0; theta = 0 has no term in the variation of the stress. Where two sides carry
+points, each takes half of the integrals.
 
 **The exact law.** The pressure is :math:`p = \sum_i \lambda_i\psi_i` with
 

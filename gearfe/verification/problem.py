@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..contact.closest import chains_of, nearest_places, project
 from ..errors import InputError
 from .bodies import Bodies, Value, edge_lengths, edge_points, edge_tangents
-from .constitution import Kinematics, SaintVenantKirchhoff, SmallStrain
+from .constitution import Kinematics, SaintVenantKirchhoff, SmallStrain, linear_stress_rate
 from .forms import stress_term
 from .laws import ContactLaw, side_share
 from .segments import Quadrature, segments, whole_edges
@@ -143,16 +143,14 @@ class ContactProblem:
         if self.kinematics == "finite":
             return SaintVenantKirchhoff(self.bodies, self.mesh)
         stiffness = self.bodies.stiffness if self.stiffness is None else self.stiffness
-        for part, side, edges in self.skins or [
-            (s.part, k, s.edges) for pair in self.facing for k, s in enumerate(pair)
-        ]:
+        skins = self.skins or [(s.part, k, s.edges) for couple in self.facing for k, s in enumerate(couple)]
+        for part, side, edges in skins:
             if self.law.theta and side_share(self.law, side) > 0:
                 every = whole_edges(np.arange(len(edges)), self.points_per_edge)
                 points = self._points(part, edges, 0, side_share(self.law, side), *every)
                 basis, surface = self.at(points)
-                _, rate = SmallStrain(None).surface_stress(np.zeros((2, 2, 1, 1)), np.zeros(2), **surface)
-                fields = {"stress_rate": rate, "gamma": points.gamma[:, None], "theta": self.law.theta}
-                stiffness = stiffness - stress_term.assemble(basis, **fields)
+                fields = {"stress_rate": linear_stress_rate(**surface), "gamma": points.gamma[:, None]}
+                stiffness = stiffness - stress_term.assemble(basis, theta=self.law.theta, **fields)
         return SmallStrain(stiffness)
 
     @cached_property
