@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 from gearfe.housing.attachments import Attachment
+from gearfe.housing.build import inside_faces
 from gearfe.housing.extruded import assemble as assemble_extruded
-from gearfe.housing.extruded import extruded_body
+from gearfe.housing.extruded import extruded_body, outer_velocity
+from gearfe.housing.mesh_checks import boundary_faces
 from gearfe.housing.mesh_error import energy_lost
 from gearfe.housing.model import Housing, rigid_motions
+from gearfe.housing.surface import radiation_matrix
 from gearfe.meshing.extruded_housing import Sizes, extruded_housing
 from gearfe.reduction.error import accelerances, mesh_error
 from gearfe.reduction.lanczos import lowest_modes
@@ -139,6 +142,27 @@ def test_extruded_elements() -> None:
     assert energy == pytest.approx(200e9 * made.nodal_mass.sum() / 7850.0, rel=1e-10)
 
 
+def test_outer_surface_of_extruded_elements() -> None:
+    """What rigid motions of the bracket push aside: areas of its outer faces, by hand and by the tetrahedra's faces."""
+    mesh = extruded_housing(BRACKET, Sizes(5.0, 24.0, 7.0, 40.0))
+    pushed = outer_velocity(mesh, BRACKET, [])
+    count = pushed.shape[1] // 3
+    squares = np.sum((pushed @ np.tile(np.eye(3), (count, 1))) ** 2, axis=0)
+    (x0, x1), (z0, z1), feet = BRACKET.wall_x_mm, BRACKET.wall_z_mm, BRACKET.feet
+    shaft = BRACKET.shafts[0]
+    holes = math.pi * shaft.bore_radius_mm**2
+    walls = (x1 - x0) * (z1 - z0) - holes + (x1 - x0) * BRACKET.base_thickness_mm  # outer faces with bosses, one side
+    ends = 2.0 * feet.length_x_mm * feet.height_mm
+    # seen along y: both outer faces, and both sides of the feet, whose outer ones are flush with the walls
+    assert squares[1] == pytest.approx(1e-6 * 2.0 * (walls + 2.0 * ends), rel=1e-3)
+    nodes = Housing.from_table(BRACKET).nodes
+    tets = Housing.from_table(BRACKET).tets
+    faces = boundary_faces(tets)
+    faces = faces[~inside_faces(BRACKET, nodes[faces[:, :3]].mean(axis=1))]
+    other = np.diag(radiation_matrix(nodes, faces, np.tile(np.eye(3), (len(nodes), 1))))
+    np.testing.assert_allclose(squares, other, rtol=5e-3)
+
+
 def test_bracket_against_extruded_elements() -> None:
     """Frequencies and responses of the tetrahedra against elements that are thin at the re-entrant edges."""
     body = Housing.from_table(BRACKET).reduce(modes=15)
@@ -148,6 +172,7 @@ def test_bracket_against_extruded_elements() -> None:
     assert np.all(true > 0.005)  # they share no error
     assert np.all(true < told.frequency_errors[:8]), told.frequency_errors[:8] / true
     assert np.median(told.frequency_errors[:8] / true) < 4.0
+    np.testing.assert_allclose(np.diag(truth.radiation)[:6], np.diag(body.radiation)[:6], rtol=0.05)
     one, two = accelerances(body, 8000.0), accelerances(truth, 8000.0)
     off = float(np.linalg.norm(one - two) / np.linalg.norm(two))
     assert off < told.response < 5.0 * off

@@ -26,7 +26,7 @@ from ..reduction.craig_bampton import reduce_model
 from ..reduction.modal_body import ModalBody
 from ..tables.housing import HousingTable
 from .attachments import bore_attachment, interface_matrix
-from .build import bores, foot_nodes, material
+from .build import bores, foot_nodes, inside_faces, material
 from .model import rigid_motions
 
 Floats = NDArray[np.float64]
@@ -49,7 +49,8 @@ class Model(NamedTuple):
 
 def extruded_body(table: HousingTable, sizes: Sizes, *, modes: int | None = None) -> ModalBody:
     """Reduced body of a housing from the extruded mesh: attachments as in the product's own, no faces to draw."""
-    model = assemble(extruded_housing(table, sizes), table)
+    mesh = extruded_housing(table, sizes)
+    model = assemble(mesh, table)
     nodes = model.nodes
     attachments = [bore_attachment(bore, i + 1, nodes)[0] for i, bore in enumerate(bores(table))]
     held = foot_nodes(table, nodes) if table.feet.fixed else np.zeros(len(nodes), dtype=bool)
@@ -65,6 +66,7 @@ def extruded_body(table: HousingTable, sizes: Sizes, *, modes: int | None = None
         at_least=given.least_modes, corrections=given.quasi_static_levels, free=not held.any(), solver=given.solver,
     )  # fmt: skip
     motions, count, empty = rigid_motions(nodes), len(attachments), np.zeros((0, 10), dtype=np.int64)
+    normal = outer_velocity(mesh, table, [np.flatnonzero(held), *(a.nodes for a in attachments)]) @ found.shapes
     return ModalBody(
         mass=found.mass,
         damping=np.zeros_like(found.mass),
@@ -79,7 +81,7 @@ def extruded_body(table: HousingTable, sizes: Sizes, *, modes: int | None = None
         shapes=found.shapes,
         faces=empty[:, :6],
         normals=np.zeros_like(nodes),
-        radiation=np.zeros_like(found.mass),
+        radiation=normal.T @ normal,
         momentum=np.asarray((mass @ motions).T @ found.shapes),
         rigid_mass=motions.T @ (mass @ motions),
         tail=found.tail,
@@ -143,6 +145,77 @@ def assemble(mesh: Extrusion, table: HousingTable) -> Model:
     return Model(1e-3 * place_mm, stiffness, nodal)
 
 
+def outer_velocity(mesh: Extrusion, table: HousingTable, without: list[Ints]) -> sparse.csr_array:
+    """G with ``|G v|^2`` the integral of the squared normal velocity over the outer surface, v the nodal velocities.
+
+    One row a quadrature point, for faces that do not lie wholly within one of the sets of nodes `without`.
+    """
+    levels, ends = len(mesh.levels), []
+    layers = [ORDER * layer + np.arange(ORDER + 1) for layer in range(len(mesh.solid))]
+    above, below = (np.zeros_like(mesh.solid[:1]),) * 2
+    tops = mesh.solid & ~np.concatenate([mesh.solid[1:], above])
+    bottoms = mesh.solid & ~np.concatenate([below, mesh.solid[:-1]])
+    used = np.zeros(len(mesh.points) * levels, dtype=bool)
+    for own, solid, top, bottom in zip(layers, mesh.solid, tops, bottoms, strict=True):
+        used[mesh.triangles[solid][..., None] * levels + own] = True
+        ends += [mesh.triangles[top] * levels + own[-1], mesh.triangles[bottom] * levels + own[0]]
+    sides = [
+        (edges[..., None] * levels + own).reshape(len(edges), -1)
+        for own, solid in zip(layers, mesh.solid, strict=True)
+        for edges in [_outline(mesh.triangles[solid])]
+    ]
+    place = np.column_stack([np.repeat(mesh.points, levels, axis=0), np.tile(mesh.levels, len(mesh.points))])
+    place, new = 1e-3 * place[:, [0, 2, 1]], np.cumsum(used) - 1
+    parts = []
+    for found, quadrature in ((np.concatenate(ends), _end_quadrature), (np.concatenate(sides), _side_quadrature)):
+        outer = ~inside_faces(table, place[found].mean(axis=1))
+        for nodes in without:
+            within = np.zeros(int(new[-1]) + 1, dtype=bool)
+            within[nodes] = True
+            outer &= ~within[new[found]].all(axis=1)
+        faces = found[outer]
+        values, areas = quadrature(place[faces])
+        scaled = areas / np.sqrt(np.maximum(np.linalg.norm(areas, axis=2), 1e-300))[..., None]
+        entries = np.einsum("ap,fpk->fpak", values, scaled)
+        columns = np.broadcast_to(3 * new[faces][:, None, :, None] + np.arange(3), entries.shape)
+        f, p, a, _ = entries.shape
+        starts = np.arange(0, f * p * a * 3 + 1, a * 3)
+        shape = (f * p, 3 * (int(new[-1]) + 1))
+        parts.append(sparse.csr_array((entries.ravel(), columns.ravel(), starts), shape=shape))
+    return sparse.csr_array(sparse.vstack(parts))
+
+
+def _outline(triangles: Ints) -> Ints:
+    """(e, 4) edges of only one of the triangles: ends, then the nodes between."""
+    edges = np.concatenate([triangles[:, [0, 1, 3, 4]], triangles[:, [1, 2, 5, 6]], triangles[:, [2, 0, 7, 8]]])
+    _, first, times = np.unique(np.sort(edges[:, :2], axis=1), axis=0, return_index=True, return_counts=True)
+    return np.asarray(edges[first[times == 1]])
+
+
+def _end_quadrature(place: Floats) -> tuple[Floats, Floats]:
+    """Functions (10, p) and area vectors (f, p, 3) of plane triangles at their points (f, 10, 3)."""
+    values, slopes, weights = triangle_functions()
+    one, two = (np.einsum("fak,ap->fpk", place, slopes[..., axis]) for axis in range(2))
+    return values, np.cross(one, two) * weights[:, None]
+
+
+def _side_quadrature(place: Floats) -> tuple[Floats, Floats]:
+    """The same of faces (f, 16, 3) over an edge, its four nodes in gmsh's order, times four levels."""
+    x, w = np.polynomial.legendre.leggauss(ORDER + 1)
+    line = _lagrange()
+    edge = [line[k] for k in (0, ORDER, 1, 2)]
+    along, level = np.array([[one(x) for one in functions] for functions in (edge, line)])
+    d_along, d_level = np.array([[one.deriv()(x) for one in functions] for functions in (edge, line)])
+
+    def product(one: Floats, two: Floats) -> Floats:
+        return np.einsum("as,bt->abst", one, two).reshape(len(one) * len(two), -1)
+
+    one, two = (
+        np.einsum("fak,ap->fpk", place, slopes) for slopes in (product(d_along, level), product(along, d_level))
+    )
+    return product(along, level), np.cross(one, two) * np.outer(w, w).reshape(-1, 1)
+
+
 def _plane_integrals(points: Floats, triangles: Ints) -> dict[str, Floats]:
     """(m, 10, 10) integrals over the triangles: ``xz`` of d/dx of the row's function times d/dz of the column's, ..."""
     values, slopes, weights = triangle_functions()
@@ -159,9 +232,7 @@ def _plane_integrals(points: Floats, triangles: Ints) -> dict[str, Floats]:
 def _line_integrals(levels: Floats, layers: Ints) -> dict[str, Floats]:
     """(l, l) integrals over the chosen layers: mass, slope (of the row's function), stiffness; which levels touch."""
     x, w = np.polynomial.legendre.leggauss(_POINTS)
-    grid = np.linspace(-1.0, 1.0, ORDER + 1)
-    lagrange = [np.polynomial.Polynomial.fromroots(np.delete(grid, k)) for k in range(ORDER + 1)]
-    lagrange = [one / one(grid[k]) for k, one in enumerate(lagrange)]
+    lagrange = _lagrange()
     values = np.array([one(x) for one in lagrange])
     slopes = np.array([one.deriv()(x) for one in lagrange])
     made = {name: np.zeros((len(levels), len(levels))) for name in ("mass", "slope", "stiffness", "touch")}
@@ -174,3 +245,10 @@ def _line_integrals(levels: Floats, layers: Ints) -> dict[str, Floats]:
         made["touch"][at, at] = 1.0
     made["slope of the column's"] = made["slope"].T
     return made
+
+
+def _lagrange() -> list[np.polynomial.Polynomial]:
+    """Functions of a line element on -1..1, its nodes equally spaced from end to end."""
+    grid = np.linspace(-1.0, 1.0, ORDER + 1)
+    made = [np.polynomial.Polynomial.fromroots(np.delete(grid, k)) for k in range(ORDER + 1)]
+    return [one / one(grid[k]) for k, one in enumerate(made)]
