@@ -13,9 +13,10 @@ import pytest
 
 from gearfe.cli import main
 from gearfe.record_spectrum import finer
+from gearfe.rigid import constant
 from gearfe.stiffness.curve import ErrorEstimate, StiffnessCurve
 from gearfe.train import TrainScene, build_train, simulate
-from gearfe.vibration.errors import FORCES, PEAKS, Run, with_errors
+from gearfe.vibration.errors import FORCES, PEAKS, STARTS, Run, with_errors
 from gearfe.vibration.follow import follow
 from gearfe.vibration.report import train_summary
 from gearfe.vibration.spectra import TrainRecord
@@ -40,11 +41,12 @@ def estimated(scene: TrainScene) -> tuple[Run, dict[str, Any], Any]:
     return run, with_errors(run, scene, lambda one: ran(one, times, every)), lambda one: ran(one, times, every)
 
 
-def softened(scene: TrainScene, part: float) -> TrainScene:
-    """In a housing whose mesh is known to err by 6 % of its stiffness."""
+def softened(scene: TrainScene, part: float | None, seed: int = 0) -> TrainScene:
+    """In a housing whose mesh is known to err by 6 % of its stiffness, or what part of that; None: of each mode one."""
     assert scene.housing is not None
     body = dataclasses.replace(scene.housing, softening=0.06 * scene.housing.stiffness)
-    return dataclasses.replace(scene, housing=body if part == 0.0 else body.softened(part))
+    parts = np.random.default_rng(seed).uniform(size=body.size) if part is None else part
+    return dataclasses.replace(scene, housing=body if part == 0.0 else body.softened(parts))
 
 
 def lines(summary: dict[str, Any], key: str) -> np.ndarray:
@@ -57,7 +59,7 @@ def test_truth_within_the_softening_is_covered(part: float) -> None:
     run, summary, again = estimated(softened(scene, 0.0))
     truth = again(softened(scene, part))
     parts = summary["headline_error_parts"]
-    assert set(parts) == {"mesh", "reduction", "integration"}
+    assert set(parts) == {"mesh", "reduction", "start", "integration"}
     ratios = []
     for name in (*FORCES, "coupled_frequencies_Hz"):
         told, true = np.array(summary["headline_errors"][name]), np.abs(truth.summary[name] - run.summary[name])
@@ -77,6 +79,41 @@ def test_truth_within_the_softening_is_covered(part: float) -> None:
     assert np.array_equal(np.isfinite(told), lines(summary, "frequency_Hz") <= scene.housing.highest_hz)
     # the whole softening is 1 / part of the true one
     assert np.median(np.concatenate([*ratios, told[known] / true[known]])) < 4.0 / part
+
+
+def alternating(scene: TrainScene) -> Run:
+    """A made-up run whose numbers feel the modes of the housing with alternating signs, so that all together cancel."""
+    assert scene.housing is not None
+    logarithms = np.log(scene.housing.coupled.frequencies_hz)
+    number = [1000.0 + 100.0 * float(np.sum(logarithms[::2] - logarithms[1::2]))]
+    summary: dict[str, Any] = {"status": "done", **dict.fromkeys(FORCES, number)}
+    summary |= {name: dict.fromkeys(scene.housing.attachment_names, number[0]) for name in (PEAKS, STARTS)}
+    summary["coupled_frequencies_Hz"] = build_train(scene).coupled_frequencies_hz
+    summary["error_estimates"] = {"integration": 0.0, "reduction": 0.0}
+    return Run(summary, None)
+
+
+def test_modes_that_cancel_while_they_soften_together_are_covered() -> None:
+    scene = softened(elastic(train([(20, 30)]), uneven=0.2, skew=0.3), 0.0)
+    run = alternating(scene)
+    told = with_errors(run, scene, alternating)["headline_errors"]["largest_contact_forces_N"][0]
+    together = alternating(softened(scene, 1.0)).summary[FORCES[2]][0] - run.summary[FORCES[2]][0]
+    true = [alternating(softened(scene, None, k)).summary[FORCES[2]][0] - run.summary[FORCES[2]][0] for k in range(40)]
+    assert abs(together) < 0.01 * np.median(np.abs(true))  # what a run in the softest housing says
+    assert np.mean(np.abs(true) <= told) >= 0.95
+    assert told < 5.0 * np.max(np.abs(true))
+
+
+def test_a_load_that_is_there_at_once_leaves_peaks_unknown() -> None:
+    """The acceleration of the first instant depends on the finest element: a lighter bore doubles it."""
+    scene = elastic(train(SHIPPED, stiffness=curve), uneven=0.2)
+    loads = tuple(dataclasses.replace(load, torque=constant(-100.0)) for load in scene.loads)
+    run, summary, _ = estimated(dataclasses.replace(scene, loads=loads))
+    first = np.array(list(run.summary[STARTS].values()))
+    assert first.max() > 0.1 * max(run.summary[PEAKS].values())
+    assert list(summary["headline_error_parts"]["start"][PEAKS].values()) == first.tolist()
+    _, summary, _ = estimated(scene)
+    assert max(summary["headline_error_parts"]["start"][PEAKS].values()) < 1e-6 * max(summary[PEAKS].values())
 
 
 def test_body_without_estimate_has_unknown_errors() -> None:

@@ -184,17 +184,20 @@ class ModalBody:
             damping = damping + (weighted * (2.0 * per_mode * omega)) @ weighted.T
         return dataclasses.replace(self, damping=0.5 * (damping + damping.T))
 
-    def softened(self, part: float = 1.0) -> ModalBody:
+    def softened(self, part: float | Floats = 1.0) -> ModalBody:
         r"""The body as soft as the estimate of the mesh's error allows, or a `part` of the way there.
 
         In the modes with free attachments, squares of their circular frequencies L, the stiffness L becomes
-        ``(L^-1 + part L^-1 S L^-1)^-1``, S the softening: L - part S where that is small, and never negative.
-        Rigid-body motions stay free, the damping stays.
+        ``L^(1/2) (1 + P)^-1 L^(1/2)`` with P = E^(1/2) part E^(1/2) and E = L^(-1/2) S L^(-1/2), S the softening:
+        L - part S where that is small, and never negative. A `part` may be given for each mode, N of them: parts that
+        add up to one then share the softening out. Rigid-body motions stay free, the damping stays.
         """
         squares = (2.0 * math.pi * self.coupled.frequencies_hz) ** 2
         elastic = squares > 0.0
         vectors, root = self.coupled.vectors[:, elastic], np.sqrt(squares[elastic])
-        lost = part * (vectors.T @ self.softening @ vectors) / np.outer(root, root)
+        values, axes = np.linalg.eigh((vectors.T @ self.softening @ vectors) / np.outer(root, root))
+        half = (axes * np.sqrt(np.maximum(values, 0.0))) @ axes.T
+        lost = (half * np.broadcast_to(part, elastic.shape)[elastic]) @ half
         stiffness = np.linalg.inv(np.eye(len(root)) + lost) * np.outer(root, root)
         weighted = self.mass @ vectors
         made = weighted @ stiffness @ weighted.T

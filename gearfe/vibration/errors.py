@@ -1,13 +1,16 @@
-"""One estimate of the error for each number that a run is read for: housing's mesh and reduction, curve, integration.
+"""One estimate of the error for each number that a run is read for: housing's mesh and reduction, start, curve, steps.
 
 The number is computed again with what may be wrong changed by its own estimate:
 
-- *mesh*: the housing as soft as the estimate of its mesh's error allows, and half the way there, because a number that
-  resonances move past does not change evenly; the larger difference counts, times `SAFETY` for what lies between them
-  (`gearfe.housing.mesh_error`). Of lines the complex amplitudes are compared: that of a resonance moved past turns its
-  phase, while its size may be back where it was;
+- *mesh*: what the estimate of the mesh's error allows the housing to be softer (`gearfe.housing.mesh_error`). The true
+  error softens each mode by a share of its own. Modes that are softened together may change a number to both sides and
+  seem to leave it alone, and a resonance may move past a line and leave it as high as it was. So random halves of the
+  modes are softened, each half and the other one, `PAIRS` times. To first order the changes by two halves add up to
+  that by all, so the larger one times two covers that, too;
 - *curve*: each computed stiffness larger by the worst relative error of its curve; given ones are taken as exact;
 - *reduction*: its bound on the response, relative, of the vibrating part of the number (statics are exact);
+- *start*: a load that is there at once accelerates an elastic body as fast as its finest element lets it. The
+  acceleration of the first instant is known to its own size only, and so is a peak;
 - *integration*: its estimate, relative, of the signal's largest value.
 
 The parts are added. Each covers its own source whatever its sign, and nothing says that the signs differ, so only the
@@ -17,7 +20,7 @@ sum is an estimate that covers all; the mesh is by far the largest, so little is
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,20 +29,19 @@ from numpy.typing import NDArray
 
 from ..reduction.modal_body import ModalBody
 from ..stiffness.curve import StiffnessCurve
+from ..train import build_train
 from ..train.scene import TrainScene
 from .spectra import TrainSpectra
 
 Array = NDArray[np.float64]
 
-#: Parts of the way to the softest housing at which the run is repeated.
-PARTS = (0.5, 1.0)
-#: On random trains in random housings the bare differences covered 81 to 95 % of the true ones, these 95 % and more.
-SAFETY = 1.5
+#: How often the modes are parted into halves: two runs each.
+PAIRS = 2
 #: Frequencies of a band at which the reduction's bound is taken.
 POINTS = 50
 #: Numbers of the summary that have an estimate, and the signal whose vibration they contain.
 FORCES = ("mean_contact_forces_N", "smallest_contact_forces_under_load_N", "largest_contact_forces_N")
-PEAKS = "peak_attachment_accelerations_m_per_s2"
+PEAKS, STARTS = "peak_attachment_accelerations_m_per_s2", "start_attachment_accelerations_m_per_s2"
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,13 +99,18 @@ def _parts(
     body = scene.housing
     parts = {}
     if body is not None:
-        softer = [_numbers(again(replace(scene, housing=body.softened(part))), run) for part in PARTS]
-        parts["mesh"] = {name: SAFETY * np.max([abs(x[name] - base[name]) for x in softer], axis=0) for name in base}
-        parts["mesh"]["coupled_frequencies_Hz"] /= SAFETY  # these fall all the way
+        softer = [_numbers(again(replace(scene, housing=half)), run) for half in _halves(body)]
+        parts["mesh"] = {
+            name: 2.0 * np.max([abs(abs(x[name]) - abs(base[name])) for x in softer], axis=0) for name in base
+        }
+        softest = build_train(replace(scene, housing=body.softened())).coupled_frequencies_hz  # these fall all the way
+        parts["mesh"]["coupled_frequencies_Hz"] = base["coupled_frequencies_Hz"] - softest
         _forget(parts["mesh"], run, body.highest_hz)
         if not body.softening.any():  # no estimate is not no error
             parts["mesh"] = {name: np.full(values.shape, math.nan) for name, values in base.items()}
         parts["reduction"] = _reduction(run, body, base, band_hz)
+        parts["start"] = {name: np.zeros(values.shape) for name, values in base.items()}
+        parts["start"][PEAKS] = np.array(list(run.summary[STARTS].values()), dtype=float)
     stiffer = _stiffer(scene)
     if stiffer is not None:
         changed = _numbers(again(stiffer), run)
@@ -112,6 +119,15 @@ def _parts(
         name: float(estimates.get("integration", math.nan)) * scale for name, scale in _largest(run, base).items()
     }
     return parts
+
+
+def _halves(body: ModalBody) -> Iterator[ModalBody]:
+    """The body softened in a random half of its modes with free attachments, and in the other half, `PAIRS` times."""
+    random = np.random.default_rng(0)
+    for _ in range(PAIRS):
+        half = np.asarray(random.permutation(body.size) % 2, dtype=float)
+        yield body.softened(half)
+        yield body.softened(1.0 - half)
 
 
 def _numbers(run: Run, like: Run) -> dict[str, Array]:

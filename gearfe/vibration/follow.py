@@ -38,8 +38,8 @@ class Followed:
         Of all samples (N); under load: after the load's ramps; the mean over `periods` common mesh periods at the end.
     periods
         Whole periods of the mean, 0 where it is over all times under load.
-    peak_acceleration : (attachments,)
-        Largest size (m/s2).
+    peak_acceleration, start_acceleration : (attachments,)
+        Largest size, and size at the first sample (m/s2).
     curves
         The response for pictures: all samples, or the least and the largest ones of equal parts of the run.
     kept
@@ -56,6 +56,7 @@ class Followed:
     mean_force: Array
     periods: int
     peak_acceleration: Array
+    start_acceleration: Array
     curves: TrainResponse
     kept: TrainResponse
     spectra: TrainSpectra | None
@@ -125,6 +126,7 @@ def follow(
         mean.value,
         mean.periods,
         extremes.peak,
+        extremes.start,
         _curves(piece, envelope.values()),
         joined(kept),
         record.spectra() if record is not None and record.complete else None,
@@ -187,6 +189,7 @@ class _Extremes:
     least_loaded: Array = field(default_factory=lambda: np.zeros(0))
     largest: Array = field(default_factory=lambda: np.zeros(0))
     peak: Array = field(default_factory=lambda: np.zeros(0))
+    start: Array = field(default_factory=lambda: np.zeros(0))
 
     def add(self, piece: TrainResponse) -> None:
         force, push = piece.contact_force, np.abs(piece.attachment_acceleration)
@@ -194,6 +197,7 @@ class _Extremes:
             meshes = force.shape[1]
             self.least, self.least_loaded = np.full(meshes, np.inf), np.full(meshes, np.inf)
             self.largest, self.peak = np.full(meshes, -np.inf), np.zeros(push.shape[1])
+            self.start = push[:1].sum(axis=0)
         loaded = force[piece.time >= self.load_end]
         self.least = np.minimum(self.least, _min(force))
         self.least_loaded = np.minimum(self.least_loaded, _min(loaded))

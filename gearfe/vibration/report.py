@@ -104,6 +104,9 @@ def train_summary(followed: Followed, timings: Mapping[str, float], **further: A
             "peak_attachment_accelerations_m_per_s2": dict(
                 zip(response.attachment_names, followed.peak_acceleration, strict=True)
             ),
+            "start_attachment_accelerations_m_per_s2": dict(
+                zip(response.attachment_names, followed.start_acceleration, strict=True)
+            ),
             "response_band_limited": False,
         }
         if len(force) and force[0] != 0.0:
