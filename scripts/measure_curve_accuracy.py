@@ -89,6 +89,7 @@ def main() -> None:
     parser.add_argument("--pairs", type=int, default=25)
     parser.add_argument("--positions", type=int, default=18)
     parser.add_argument("--twists", type=float, nargs="+", default=[0.02, 0.05, 0.2, 0.5], help="deg")
+    parser.add_argument("--law", default="half_plane", help="law that is measured; the truth is by Nitsche's")
     parser.add_argument("--finest", type=float, default=0.4, help="factor on all sizes for the truth")
     parser.add_argument("--most-load", type=float, default=6.0, help="twist (deg) times wheel teeth")
     args = parser.parse_args()
@@ -100,7 +101,8 @@ def main() -> None:
     for _ in range(args.pairs):
         pair, materials, plane = draw(random)
         angles = positions(pair, random, args.positions)
-        coarse, fine = (elastic_pair(pair, materials, plane=plane, coarsen=c) for c in (1.0, args.finest))
+        coarse = elastic_pair(pair, materials, plane=plane, law=args.law)
+        fine = elastic_pair(pair, materials, plane=plane, law="nitsche", coarsen=args.finest)
         for twist in args.twists:
             if twist * pair.wheel.teeth > args.most_load:
                 continue

@@ -154,7 +154,7 @@ def test_a_failed_position_is_told_and_in_the_table(tmp_path, capsys, monkeypatc
         bad = solver.Position("not_converged", *[math.nan] * 4, (), np.zeros(0), math.nan, 40)
         return [bad if abs(a - math.radians(4)) < 1e-9 else p for a, p in zip(angles, made, strict=True)]
 
-    monkeypatch.setattr("gearfe.stiffness.routes.solve_positions", weak)
+    monkeypatch.setattr("gearfe.stiffness.position_solver.solve_positions", weak)
     code = main(["stiffness", str(JOB), "--out", str(tmp_path), "--twist-deg", "0.3", *QUICK])
     assert code == 1
     said = capsys.readouterr()
@@ -193,7 +193,7 @@ def test_a_position_without_contact_is_told(tmp_path, capsys):
         ({"twist_deg": -0.5}, "stiffness.twist_deg = -0.5: must be finite and > 0"),
         ({"twist_deg": "true"}, "must be a number"),
         ({"twsit_deg": 0.5}, "did you mean 'twist_deg'?"),
-        ({"law": '"nitshe"'}, "must be one of nitsche, penalty, exact"),
+        ({"law": '"nitshe"'}, "must be one of half_plane, nitsche, penalty"),
         ({"plane": '"strained"'}, "must be one of strain, stress"),
         ({"angle_step_deg": 0.0}, "angle_step_deg = 0.0: must be finite and > 0"),
         ({"angle_stop_deg": -3.0}, "must be >= angle_start_deg = 1"),
@@ -218,7 +218,7 @@ def test_mistakes_in_the_file(tmp_path, capsys, changes, message):
     [
         (["--twist-deg", "0"], "--twist-deg = 0.0: must be finite and > 0"),
         (["--torque-Nm", "-1"], "--torque-Nm = -1.0"),
-        (["--law", "glue"], "--law = 'glue': must be one of nitsche, penalty, exact"),
+        (["--law", "glue"], "--law = 'glue': must be one of half_plane, nitsche, penalty"),
         (["--angles", "5", "1", "2"], "must be >= angle_start_deg = 5"),
         (["--angles", "0", "-1", "2"], "START STEP STOP = -1.0"),
         (["--fields", "x"], "'x': is no value of --fields"),
@@ -341,7 +341,7 @@ def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
         bad = np.isclose(np.degrees(angles), 6.0)
         return [unsolved("not_converged", 40) if b else p for p, b in zip(made, bad, strict=True)]
 
-    monkeypatch.setattr("gearfe.stiffness.routes.solve_positions", one_fails)
+    monkeypatch.setattr("gearfe.stiffness.position_solver.solve_positions", one_fails)
     options = ("--twist-deg", "0.3", "--angles", "3", "3", "9", "--fields", "9", "6", "3", "--no-picture")
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options]) == 1
     assert [r["status"] for r in rows(tmp_path)] == ["converged", "not_converged", "converged"]

@@ -289,9 +289,9 @@ def test_laws_that_do_not_exist(make, message: str) -> None:
 @pytest.mark.parametrize("law", [Exact(), SYMMETRIC], ids=law_text)
 def test_the_curve_names_its_law(law: ContactLaw, tmp_path) -> None:
     curve = sweep_stiffness(gears("sharp"), twist=TWIST, angles=[0.1], law=law, coarsen=4.0)
-    assert curve.law == law_text(law)
+    assert curve.contact_law == law_text(law)
     curve.to_csv(tmp_path / "curve.csv")
-    assert StiffnessCurve.from_csv(tmp_path / "curve.csv").law == curve.law
+    assert StiffnessCurve.from_csv(tmp_path / "curve.csv").contact_law == curve.contact_law
 
 
 # ---- the other route ------------------------------------------------------------------------------------------------

@@ -11,21 +11,16 @@ import pytest
 from gearfe import sweep_stiffness
 from gearfe.contact import solver
 from gearfe.contact.corners import RISE, corner_bearings, shares
-from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.contact.laws import Nitsche, Penalty
 from gearfe.contact.solver import solve_positions
 from gearfe.elasticity import Material
 from gearfe.stiffness.curve_error import (
     COARSENING,
     COMMON,
-    LAW,
-    LAW_AT_EDGES,
     ORDER,
     error_estimate,
-    law_error,
     solved_twice,
 )
-from gearfe.stiffness.routes import Router
 from gearfe.stiffness.sweep import elastic_pair
 
 from . import gears
@@ -77,7 +72,7 @@ def test_the_tangent_follows_the_share_of_the_wheels_corner(lockstep, monkeypatc
     """The wheel's corner bears the more, the further the twist turns it: central differences of the torque see that."""
     if not lockstep:
         monkeypatch.setattr(solver, "in_lockstep", lambda law: False)
-    elastic, twist = elastic_pair(SHARP, coarsen=3.0), math.radians(0.2)
+    elastic, twist = elastic_pair(SHARP, law="nitsche", coarsen=3.0), math.radians(0.2)
     start, _ = SHARP.path_limits()
     half_risen = start - 0.5 * RISE * SHARP.pinion.module
     angle = SHARP.pinion_angle_at(half_risen) + (twist - SHARP.contact_twist) * SHARP.gear_ratio
@@ -92,7 +87,7 @@ def test_a_corner_pushes_along_the_normal_of_the_smooth_flank():
     Arms are those about the undeformed places of a bent tooth: within 2e-3 of the base radius for pairs on the path
     too. Points on both bodies would take half of their normals from the corner's own flank.
     """
-    elastic = elastic_pair(SHARP)
+    elastic = elastic_pair(SHARP, law="nitsche")
     off = []
     for one in (elastic, replace(elastic, corners=(None, None))):
         position = solve_positions(one, np.radians([17.0]), math.radians(0.05))[0]
@@ -154,56 +149,21 @@ def test_positions_solved_twice_have_converged_and_span_the_sweep():
     assert len(solved_twice(np.zeros(3, dtype=bool))) == 0
 
 
-def test_what_the_law_of_small_loads_adds():
-    """Nothing to the mesh alone; its own bound below; between, mesh and law lie within the term of their mean."""
-    elastic = elastic_pair(SHARP, coarsen=1.5)
-    angles, twists = np.full(9, math.radians(13.0)), np.radians(np.geomspace(0.002, 0.4, 9))
-    router = Router(SHARP, elastic)
-    routes = [p.route for p in router.solve(angles, twists)]
-    found = law_error(router, angles, twists)
-    assert set(routes) == {"hertz", "blend", "direct"}
-    for route, value in zip(routes, found, strict=True):
-        assert value == LAW if route == "hertz" else (value == 0.0) == (route == "direct")
-    chosen = [routes.index("blend")]
-    mean, mesh, law = (
-        Router(SHARP, elastic, r).solve(angles[chosen], twists[chosen])[0] for r in ("auto", "direct", "hertz")
-    )
-    apart = max(abs(one.torque_wheel / mean.torque_wheel - 1) for one in (mesh, law))
-    assert apart > 0
-    assert found[chosen[0]] >= apart * (1 - 1e-2)
-    assert (law_error(Router(SHARP, elastic, "direct"), angles, twists) == 0).all()
-    # a sharp tip that bears before the path
-    assert law_error(Router(SHARP, elastic, "hertz"), np.radians([17.0]), np.radians([0.05]))[0] == LAW_AT_EDGES
-
-
-@pytest.mark.parametrize("twist_deg", [0.03, pytest.param(0.2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("twist_deg", [0.06, pytest.param(0.2, marks=pytest.mark.slow)])
 def test_the_estimate_covers_the_true_error(twist_deg):
     """Coarse settings against a mesh 2.5 times as fine, pair changes included: nearly all, within ten in the median."""
     pair = gears.pair(17, 25, pressure_angle=20.0, pinion={"profile_shift": 0.3, "tip_round": 0.1e-3, "width": 14e-3})
     given = {"twist": math.radians(twist_deg), "kinematics": "small"}
-    curve = sweep_stiffness(pair, coarsen=1.5, estimate_error=True, **given)
-    fine = sweep_stiffness(pair, coarsen=0.6, **given)
+    curve = sweep_stiffness(pair, law="nitsche", coarsen=1.5, estimate_error=True, **given)
+    fine = sweep_stiffness(pair, law="nitsche", coarsen=0.6, **given)
     true = np.abs(curve.k_mesh / fine.k_mesh - 1)
     assert len(curve.error.relative) == len(true)
     assert (curve.error.relative >= true).sum() >= 19
     assert np.median(curve.error.relative / true) < 10
 
 
-def test_the_estimate_covers_the_error_of_small_loads_against_another_law():
-    """29/53 teeth at 0.007 deg, nearly all positions by the law of small loads: against the half-plane law on a finer
-    mesh, which shares neither the contact nor the mesh, 19 of 20 positions are covered."""
-    pair = gears.pair(29, 53, tip_round=0.1e-3)
-    angles, twist = np.arange(20) * pair.mesh_cycle / 20, math.radians(0.007)
-    curve = sweep_stiffness(pair, twist=twist, angles=angles, kinematics="small", estimate_error=True)
-    assert (curve.route != "direct").sum() >= 15
-    law = half_plane_pair(pair, elastic_pair(pair, coarsen=0.6, flank_coarsen=2.0))
-    off = np.abs(curve.torque_wheel / solve_half_plane(law, angles, twist).torque_wheel - 1)
-    assert (off <= curve.error.relative).mean() >= 0.95
-    assert off.max() <= curve.error.worst
-
-
 def test_finer_settings_are_estimated_finer():
-    given = {"twist": math.radians(0.05), "kinematics": "small", "estimate_error": True}
+    given = {"twist": math.radians(0.05), "kinematics": "small", "estimate_error": True, "law": "nitsche"}
     angles = np.radians([3.0, 5.0, 12.0, 14.0])
     coarse, fine = (sweep_stiffness(SHARP, angles=angles, coarsen=c, **given).error for c in (2.0, 1.0))
     assert fine.typical < coarse.typical / 1.5

@@ -36,9 +36,9 @@ def elastic_of(law: str) -> MeshingPair:
 def test_curve_beside_nitsches(kinematics: str) -> None:
     options = {"twist": math.radians(0.3), "angles": ANGLES, "kinematics": kinematics}
     found = sweep_stiffness(PAIR, elastic=elastic_of("half_plane"), law="half_plane", **options)
-    expected = sweep_stiffness(PAIR, elastic=elastic_of("nitsche"), route="direct", **options)
-    assert set(found.route) == {"half_plane"}
-    assert found.law == "half_plane"
+    expected = sweep_stiffness(PAIR, elastic=elastic_of("nitsche"), **options)
+    assert set(found.law) == {"half_plane"}
+    assert found.contact_law == "half_plane"
     for name, bound in (
         ("k_mesh", 1e-3),
         ("torque_pinion", 1e-3),
@@ -109,8 +109,6 @@ def test_load_map() -> None:
 def test_no_other_solver_takes_it() -> None:
     with pytest.raises(InputError, match=r"gearfe.contact.half_plane solves it"):
         solve_positions(elastic_of("half_plane"), ANGLES, 1e-3)
-    with pytest.raises(InputError, match="route"):
-        position_solver(PAIR, elastic_of("half_plane"), "direct")
     assert isinstance(position_solver(PAIR, elastic_of("half_plane")), HalfPlaneSolver)
     assert isinstance(elastic_of("half_plane").law, HalfPlane)
 
@@ -144,7 +142,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["stiffness", str(job), "--out", str(tmp_path / "out"), "--no-picture", "--fields"]) == 0
     assert "half_plane" in capsys.readouterr().out
     curve = StiffnessCurve.from_csv(tmp_path / "out" / "stiffness.csv")
-    assert set(curve.route) == {"half_plane"}
+    assert set(curve.law) == {"half_plane"}
     rows = np.genfromtxt(tmp_path / "out" / "pressure.csv", delimiter=",", names=True, dtype=None, encoding="utf8")
     pressed = rows["pressure_MPa"][np.abs(rows["pinion_angle_deg"] - 6.0) < 1e-6]
     assert pressed.max() == pytest.approx(1e-6 * curve.peak_pressure[1], rel=0.02)

@@ -234,17 +234,17 @@ def test_a_train_refuses_the_map_of_other_gears(tmp_path, made):
         train_curves(train_with_map(tmp_path, "map.csv"))
 
 
-def test_backlash_and_route_of_the_job_reach_maps_and_trains(tmp_path):
-    """A pair with backlash: k of the map and of the train's own curve is that of a sweep, on the job's route."""
+def test_backlash_and_law_of_the_job_reach_maps_and_trains(tmp_path):
+    """A pair with backlash: k of the map and of the train's own curve is that of a sweep, by the job's law."""
     text = JOB.read_text().replace("\n[pair]\n", "\n[pair]\ncentre_distance_mm = 62.6\n")
-    text = text.replace("\n[stiffness]\n", '\n[stiffness]\nroute = "hertz"\ncoarsen = 3.0\nkinematics = "small"\n')
+    text = text.replace("\n[stiffness]\n", '\n[stiffness]\nlaw = "half_plane"\ncoarsen = 3.0\nkinematics = "small"\n')
     text = text.replace("x_mm = 62.5\n", "x_mm = 62.6\n").replace("x_mm = 125.0\n", "x_mm = 125.2\n")
     text = text.replace("positions = 36", "positions = 8")
     (tmp_path / "job.toml").write_text(text)
     job = read_train_job(tmp_path / "job.toml", "operating")
     curves = train_curves(job)
     for curve, torque in zip(curves, (100.0 / 1.5, 100.0), strict=True):
-        assert set(curve.route) == {"hertz"}
+        assert set(curve.law) == {"half_plane"}
         np.testing.assert_allclose(curve.torque_wheel, torque, rtol=1e-9)
         # half the backlash is 43 um, a tooth pair yields by some 20: with it in, k is a third
         assert (curve.k_tangent / curve.k_mesh < 1.3).all()
@@ -252,7 +252,7 @@ def test_backlash_and_route_of_the_job_reach_maps_and_trains(tmp_path):
     options = ["--torques-Nm", "66.66666666666667", "100", "--positions", "8", "--no-picture"]
     assert main(["loadmap", str(tmp_path / "job.toml"), "--out", str(tmp_path / "out"), *options]) == 0
     mapped = LoadMap.from_csv(tmp_path / "out" / "loadmap.csv")
-    assert set(mapped.quantity("route").ravel()) == {"hertz"}
+    assert set(mapped.quantity("law").ravel()) == {"half_plane"}
     for of_map, of_train in zip(mapped.curves, curves, strict=True):
         np.testing.assert_allclose(of_map.k_mesh, of_train.k_mesh, rtol=1e-4)
 

@@ -39,7 +39,6 @@ BASE = {
 }
 SWEEP = {
     "torque_Nm": 150.0,
-    "route": "direct",
     "law": "penalty",
     "coarsen": 3.0,
     "angle_start_deg": 1.0,
@@ -79,7 +78,6 @@ SWEEP_CHANGES = {
     "coarsen": 2.5,
     "flank_coarsen": 2.5,
     "points_per_edge": 3,
-    "route": "hertz",
     "law_sides": "wheel",
     "angle_start_deg": 1.2,
 }

@@ -50,7 +50,7 @@ def one_sector(quick: bool) -> tuple[float, float, str]:
     from ..reduction.sparse_solver import factorize
 
     pair, coarsen = shipped_pair(), 5.0 if quick else 2.0
-    short = _cpu(lambda: elastic_pair(pair, coarsen=coarsen))
+    short = _cpu(lambda: elastic_pair(pair, law="nitsche", coarsen=coarsen))
 
     def whole() -> None:
         gears = whole_pair(pair, coarsen)
@@ -65,7 +65,7 @@ def one_sector(quick: bool) -> tuple[float, float, str]:
 def one_cycle(quick: bool) -> tuple[float, float, str]:
     """40 positions over more than two mesh cycles: 18 of them differ."""
     pair = shipped_pair()
-    elastic = elastic_pair(pair, coarsen=4.0 if quick else 1.0)
+    elastic = elastic_pair(pair, law="nitsche", coarsen=4.0 if quick else 1.0)
     at = np.radians(np.array([2.0, 20.0]) if quick else np.arange(1.0, 41.0))
     times = [
         _cpu(partial(sweep_stiffness, pair, twist=TWIST, angles=at, elastic=elastic, solve_all=s))
@@ -81,7 +81,7 @@ def neighbours(quick: bool) -> tuple[float, float, str]:
     from ..contact.solver import solve_positions
 
     pair = shipped_pair()
-    elastic = elastic_pair(pair, coarsen=4.0 if quick else 1.0)
+    elastic = elastic_pair(pair, law="nitsche", coarsen=4.0 if quick else 1.0)
     short = _cpu(lambda: solve_positions(elastic, np.array([0.1]), np.array([TWIST])))
     every = sum(body.teeth * body.own.shape[0] for body in elastic.bodies)
     size = min(every, 500 if quick else 4000)
@@ -95,7 +95,7 @@ def fields(quick: bool) -> tuple[float, float, str]:
     from ..stiffness.fields import pair_recovery
 
     pair = shipped_pair()
-    elastic = elastic_pair(pair, coarsen=5.0 if quick else 1.0)
+    elastic = elastic_pair(pair, law="nitsche", coarsen=5.0 if quick else 1.0)
     at = pair.mesh_cycle * np.arange(1 if quick else 8) / 8
     short = _cpu(lambda: sweep_stiffness(pair, twist=TWIST, angles=at, elastic=elastic))
     solved = solve_positions(elastic, at, np.full(len(at), TWIST))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.laws import MESH_LAWS
+from ..contact.laws import LAWS
 from ..gear.pair import GearPair
 from ..meshing.recipe import sector_recipes
 from ..meshing.tooth_sector import sector_mesh
@@ -28,7 +28,7 @@ SIZES, QUICK_SIZES = (2.8, 2.0, 1.4, 1.0, 0.7, 0.5), (4.0, 2.5)
 #: Numbers of distinct positions in one mesh cycle.
 POSITIONS, QUICK_POSITIONS = (18, 40, 400, 4000), (3, 6)
 #: Twists (deg).
-TWISTS, QUICK_TWISTS = (1e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5), (0.05, 0.2)
+TWISTS, QUICK_TWISTS = (1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5), (0.05, 0.2)
 #: `coarsen` and positions of the route over whole gears; its time is that of so few positions.
 WHOLE_SIZES, QUICK_WHOLE_SIZES = (2.8, 2.0), ()
 WHOLE_ANGLES = (4.0,)
@@ -61,6 +61,7 @@ def converged(quick: bool, twist: float, finite: bool, at: tuple[float, ...]) ->
         shipped_pair(),
         twist=twist,
         angles=np.array(at),
+        law="nitsche",
         coarsen=QUICK_REFERENCE if quick else REFERENCE,
         kinematics="finite" if finite else "small",
     )
@@ -101,7 +102,7 @@ def sizes(record: Record) -> None:
         found = errors(pair, curve, converged(record.quick, TWIST, True, tuple(at)))
         return {"flank_mm": flank, "positions": len(at), **found, **cost.columns, "meshing_cpu_s": mesher.cpu_s}
 
-    for law in MESH_LAWS:
+    for law in LAWS:
         for coarsen in QUICK_SIZES if record.quick else SIZES:
             record.row(table, {"law": law, "coarsen": coarsen}, partial(make, law, coarsen))
 
@@ -112,7 +113,7 @@ def routes(record: Record) -> None:
     at = tuple(np.radians(WHOLE_ANGLES[:1] if record.quick else WHOLE_ANGLES))
 
     def condensed(coarsen: float) -> Mapping[str, Any]:
-        elastic, setup = measured(lambda: elastic_pair(pair, coarsen=coarsen), runs=1)
+        elastic, setup = measured(lambda: elastic_pair(pair, law="nitsche", coarsen=coarsen), runs=1)
         curve, cost = measured(
             lambda: sweep_stiffness(pair, twist=TWIST, angles=at, kinematics="small", elastic=elastic), runs=1
         )

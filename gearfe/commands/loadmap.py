@@ -78,7 +78,6 @@ def run(args: argparse.Namespace) -> int:
         angles=np.arange(table.positions) * job.pair.mesh_cycle / table.positions,
         root_stress=table.root_stress,
         kinematics=job.table.kinematics,  # type: ignore[arg-type]
-        route=job.table.route,  # type: ignore[arg-type]
         progress=count,
         **job.model,
     )

@@ -179,8 +179,9 @@ def _stations(body: GearBody, chain: Chain, start: float, module: float) -> tupl
         a = min(max(a, BUMP_MODULES * module), end - s, s)
         if a < TOO_NEAR * here or (kept and s - kept[-1] < SPACING * a):
             continue
-        made, row = chain.loads(s - a, s + a, 1.0 + 0j, sign=1.0), np.zeros(len(body.flank.points))
-        row[made.unknowns.start // 2 : made.unknowns.stop // 2] = made.probes[0].reshape(-1, 2)[:, 0]
+        row = np.zeros(len(body.flank.points))
+        nodes, shares = chain.loads(s - a, s + a)
+        row[nodes] = shares
         rows.append(row)
         kept.append(s)
         widths.append(a)

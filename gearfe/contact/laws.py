@@ -265,7 +265,7 @@ MESH_LAWS: dict[str, type[Penalty] | type[Nitsche] | type[Exact]] = {
     "exact": Exact,
 }
 #: Selectable laws.
-LAWS: dict[str, type[Penalty] | type[Nitsche] | type[Exact] | type[HalfPlane]] = {**MESH_LAWS, "half_plane": HalfPlane}
+LAWS: dict[str, type[Penalty] | type[Nitsche] | type[Exact] | type[HalfPlane]] = {"half_plane": HalfPlane, **MESH_LAWS}
 
 
 def law_named(name: str) -> ContactLaw:

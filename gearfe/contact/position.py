@@ -25,8 +25,9 @@ class Position:
     Attributes
     ----------
     status
-        ``converged``, ``no_contact`` (the undeformed gears are clear of each other), ``under_resolved`` (they overlap,
-        yet no contact point does) or ``not_converged``. Torques are 0 without contact, not-a-number when not solved.
+        ``converged``, ``no_contact`` (the undeformed gears are clear of each other), ``under_resolved`` (the
+        contact is narrower than the elements, or none of their points sees it) or ``not_converged``. Torques are 0
+        without contact, not-a-number when not solved.
     torque_wheel, torque_pinion
         Moments that the hubs need, energy-conjugate: sum of (x - c) x f over the current places (N m).
     torque_wheel_reaction
@@ -48,9 +49,6 @@ class Position:
         respect to the twist (N/rad), for recovering fields; None without a solution.
     pressure : ndarray, shape (q,)
         Pressure at the scene's contact points (Pa); None without a solution.
-    route
-        ``direct``: solved on the mesh; ``hertz`` or ``blend``: see `gearfe.stiffness.routes`; ``half_plane``: by the
-        law of that name.
     contacts
         Loaded tooth pairs of the half-plane law with their panels; None for other laws.
     stress_loads, stress_load_rate
@@ -70,7 +68,6 @@ class Position:
     scene: Scene | None = None
     forces: Array | None = None
     force_rate: Array | None = None
-    route: str = "direct"
     pressure: Array | None = None
     stress_loads: Array | None = None
     stress_load_rate: Array | None = None

@@ -65,7 +65,7 @@ def one_cell(made: Solved, k: int) -> Solved:
     """Cell k of some that were solved together."""
     part = slice(k, k + 1)
     numbers = {name: values[part] for name, values in made.numbers.items()}
-    return Solved(made.twist[part], numbers, [made.pairs[k]], made.iterations[part], [made.status[k]], [made.route[k]])
+    return Solved(made.twist[part], numbers, [made.pairs[k]], made.iterations[part], [made.status[k]])
 
 
 def closed_level(cells: list[Solved], goal: float, share: Array, touching: Array, tally: IntArray) -> Solved:
@@ -99,5 +99,4 @@ def closed_level(cells: list[Solved], goal: float, share: Array, touching: Array
         pairs=pairs,
         iterations=tally,
         status=status,
-        route=[c.route[0] for c in cells],
     )

@@ -19,14 +19,14 @@ where c may be off by more than 5e-5.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..contact.finite_strain import finite_strain_shares, interpolated_shares
-from ..contact.laws import ContactLaw, law_text
+from ..contact.laws import ContactLaw
 from ..contact.scene import MeshingPair
 from ..contact.solver import Position
 from ..elasticity import Material, Plane
@@ -35,7 +35,6 @@ from ..gear.iso6336 import mesh_stiffness
 from ..gear.pair import GearPair
 from ..stiffness.position_solver import PositionSolver, position_solver
 from ..stiffness.positions import Progress, Solved, at_torque, at_twists, honest
-from ..stiffness.routes import Route
 from ..stiffness.sweep import STEEL, assembled_curve, distinct_angles, elastic_pair
 from ..stopwatch import Stopwatch
 from ..threads import one_thread
@@ -67,9 +66,8 @@ def sweep_loads(
     root_stress: bool = False,
     materials: Material | tuple[Material, Material] = STEEL,
     plane: Plane = "strain",
-    law: str | ContactLaw = "nitsche",
+    law: str | ContactLaw = "half_plane",
     kinematics: Literal["small", "finite"] = "finite",
-    route: Route = "auto",
     coarsen: float = 1.0,
     flank_coarsen: float = 1.0,
     points_per_edge: int = 4,
@@ -87,7 +85,7 @@ def sweep_loads(
         solved once.
     root_stress
         Also the tension at the tooth roots, on refined meshes of its own, see `gearfe.loadmap.root_stress`.
-    materials, plane, law, kinematics, route, coarsen, flank_coarsen, points_per_edge, elastic, progress
+    materials, plane, law, kinematics, coarsen, flank_coarsen, points_per_edge, elastic, progress
         See `gearfe.stiffness.sweep.sweep_stiffness`.
 
     Returns
@@ -117,9 +115,9 @@ def sweep_loads(
     if len(goals) * len(solved_angles) > MOST_CELLS:
         problem = f"makes more than {MOST_CELLS} cells with {len(solved_angles)} angles"
         raise InputError("torques", len(goals), problem, "use fewer torques or angles")
-    router = position_solver(pair, elastic, route)
+    solver = position_solver(pair, elastic)
     with watch.stage("unloaded flanks"):
-        touching = router.touching_twists(solved_angles)
+        touching = solver.touching_twists(solved_angles)
     recorder = None
     if root_stress:
         from .root_stress import RootRecorder, pair_roots
@@ -127,13 +125,10 @@ def sweep_loads(
         with watch.stage("root meshes"), one_thread():
             recorder = RootRecorder(pair_roots(pair, elastic))
     with watch.stage("cells"), one_thread():
-        work = _Sweep(pair, router, solved_angles, goals, touching, progress, recorder)
-        levels = [honest(level, touching) for level in work.run(finite=kinematics == "finite")]
+        work = _Sweep(pair, solver, solved_angles, goals, touching, progress, recorder)
+        levels = [honest(level) for level in work.run(finite=kinematics == "finite")]
     curves = tuple(
-        replace(
-            assembled_curve(pair, asked, solved_angles, source, level, touching, searched=True),
-            law=law_text(elastic.law),
-        )
+        assembled_curve(pair, elastic.law, asked, solved_angles, source, level, touching, searched=True)
         for level in levels
     )
     failed = np.stack([curve.failed for curve in curves])
@@ -146,7 +141,7 @@ class _Sweep:
     """The cells of a map while they are being solved; `raw` holds their last solutions, level by level."""
 
     pair: GearPair
-    router: PositionSolver
+    solver: PositionSolver
     angles: Array
     goals: Array
     touching: Array
@@ -156,7 +151,7 @@ class _Sweep:
     @property
     def elastic(self) -> MeshingPair:
         """The elastic gears."""
-        return self.router.elastic
+        return self.solver.elastic
 
     def run(self, *, finite: bool) -> list[Solved]:
         """Solve all levels."""
@@ -250,12 +245,12 @@ class _Sweep:
                 if self.recorder is not None:
                     self.recorder.record(row, int(numbers[k]), position)
 
-        return at_twists(self.router, self.angles[numbers], twists, None, observe=observe)
+        return at_twists(self.solver, self.angles[numbers], twists, None, observe=observe)
 
     def _searched(self, row: int, i: int, goal: float) -> Solved:
         """A cell that the prediction did not lead to, like any position at a torque."""
         part = slice(i, i + 1)
-        made = at_torque(self.router, self.angles[part], goal, self.touching[part], None)
+        made = at_torque(self.solver, self.angles[part], goal, self.touching[part], None)
         self.tally[row, i] += made.iterations[0]
         if made.status[0] == "converged":
             self._solved(row, np.array([i]), made.twist)

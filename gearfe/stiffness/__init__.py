@@ -1,8 +1,8 @@
-"""Mesh stiffness of a gear pair: the sweep over rotations, its routes for all loads, curve, error estimate, fields.
+"""Mesh stiffness of a gear pair: the sweep over rotations, curve, error estimate, fields.
 
-``sweep`` is the front door; ``positions`` and ``routes`` solve, ``small_load`` and ``small_balance`` take over where
-the contact is narrower than the elements; ``curve`` is the result and needs no finite elements; ``job`` and ``report``
-belong to the command. The names below load on first use, so that reading a curve does not load the solver.
+``sweep`` is the front door; ``positions`` and ``position_solver`` solve; ``curve`` is the result and needs no finite
+elements; ``job`` and ``report`` belong to the command. The names below load on first use, so that reading a curve does
+not load the solver.
 """
 
 from importlib import import_module

@@ -47,7 +47,7 @@ COLUMNS: dict[str, str] = {
     "transmission_error_unloaded_um": "transmission_error_unloaded",
     "torque_wheel_reaction_Nm": "torque_wheel_reaction",
     "leading_pair": "leading_pair",
-    "route": "route",
+    "law": "law",
     "peak_pressure_relative_error": "peak_pressure_error",
     "edge_pressure_MPa": "edge_pressure",
     "edge": "edge",
@@ -59,7 +59,7 @@ CONSTANTS: dict[str, str] = {
     "lost_motion_deg": "lost_motion",
 }
 #: Columns of words.
-WORDS = ("status", "route", "edge")
+WORDS = ("status", "law", "edge")
 WHOLE = ("teeth_in_contact", "iterations")
 SHARE = "load_share_"
 
@@ -140,9 +140,8 @@ class StiffnessCurve:
         Newton iterations; -1 where unknown.
     status
         ``converged``, ``no_contact`` (the teeth do not reach each other, torques are zero), or what went wrong.
-    route
-        ``direct``: solved on the mesh; ``hertz``: by the law of small loads, where the contact is narrower than the
-        mesh sees; ``blend``: the mean of both in between (`gearfe.stiffness.routes`); empty where unknown.
+    law
+        Name of the contact law; empty where unknown.
     mesh_cycle
         Pinion angle after which everything repeats, 2 pi/z1 (rad).
     base_radius
@@ -150,7 +149,7 @@ class StiffnessCurve:
     lost_motion
         Twist (rad) from the centred position, in which a wheel space faces a pinion tooth, to where `twist` counts
         from: half the backlash.
-    law
+    contact_law
         Contact law with its parameters; empty where unknown.
     timings
         Seconds by stage; not in the CSV file.
@@ -178,16 +177,16 @@ class StiffnessCurve:
     mesh_cycle: float
     base_radius: float
     lost_motion: float = 0.0
-    law: str = ""
+    contact_law: str = ""
     timings: Mapping[str, float] = field(default_factory=dict)
     error: ErrorEstimate | None = None
-    route: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=np.str_))
+    law: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=np.str_))
     peak_pressure_error: Array = field(default_factory=lambda: np.zeros(0))
     edge_pressure: Array = field(default_factory=lambda: np.zeros(0))
     edge: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=np.str_))
 
     def __post_init__(self) -> None:
-        unknown = {"route": "", "peak_pressure_error": np.nan, "edge_pressure": np.nan, "edge": ""}
+        unknown = {"law": "", "peak_pressure_error": np.nan, "edge_pressure": np.nan, "edge": ""}
         for name, value in unknown.items():
             if len(getattr(self, name)) != len(self.pinion_angle):
                 object.__setattr__(self, name, np.full(len(self.pinion_angle), value))
@@ -233,7 +232,7 @@ class StiffnessCurve:
             columns[f"{SHARE}{j + 1}"] = [curve_csv.to_text(v, SHARE) for v in self.load_share[:, j]]
         for name, attribute in CONSTANTS.items():
             columns[name] = [curve_csv.to_text(getattr(self, attribute), name)] * len(self)
-        columns["contact_law"] = [self.law] * len(self)
+        columns["contact_law"] = [self.contact_law] * len(self)
         return columns
 
     def _cells(self, name: str, attribute: str) -> list[str]:
@@ -304,9 +303,9 @@ class StiffnessCurve:
             if shares
             else np.zeros((len(values["k_mesh"]), 0))
         )
-        values["law"] = columns.get("contact_law", [""])[0].strip()
+        values["contact_law"] = columns.get("contact_law", [""])[0].strip()
         default = ["converged" if np.isfinite(k) else "missing" for k in values["k_mesh"]]
         values["status"] = np.array([cell.strip() for cell in columns.get("status", default)])
-        for word in ("route", "edge"):
+        for word in ("law", "edge"):
             values[word] = np.array([cell.strip() for cell in columns.get(word, [""] * len(default))])
         return cls(**values)

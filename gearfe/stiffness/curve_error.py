@@ -10,15 +10,6 @@ with the curve's own factor :math:`c_0` on the default sizes. p is 1, the lowest
 about one element's half width; 1.5 to 2 where the mesh sees the contact well). The last term stands for what both
 meshes share.
 
-The law of small loads (`.small_load`) has an error that no refinement shows, both meshes share it. Where a
-position takes the share 1 - s from the law and s from the mesh (`gearfe.stiffness.routes`), there is added
-
-.. math:: (1-s)\,\epsilon + \max(s, 1-s)\,|T_\mathrm{direct}/T_\mathrm{hertz} - 1| ,
-
-the second term, measured on the curve's own mesh, for 0 < s < 1 only. :math:`\epsilon` is a bound of the law's error
-against fine meshes: `LAW` where every contact is that of smooth curves, `LAW_AT_EDGES` where one reaches a tip's end,
-the start of a relief or the edge of an undercut.
-
 The half-plane law is solved twice in the same way, with influence functions from two meshes; what they share (bumps,
 panels, half-planes and wedges) is `HALF_PLANE`, by what bears besides smooth flanks.
 
@@ -34,21 +25,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.solver import solve_positions
+from ..contact.laws import ContactLaw, HalfPlane
 from .curve import ErrorEstimate
-from .position_solver import PositionSolver
-from .routes import Router
-from .small_balance import Balance, balance
-from .small_load import Reference
 
 Array = NDArray[Any]
 
 #: Coarsening c, assumed order of convergence p, share of the meshes' common error at the default sizes, and largest
 #: number of positions solved twice.
 COARSENING, ORDER, COMMON, POSITIONS = 1.6, 1.0, 5e-5, 20
-#: Relative error of the law of small loads on smooth flanks and at their ends and edges: of random pairs on the path,
-#: 95 % of the positions were within the first (docs/verification.md, "Small loads").
-LAW, LAW_AT_EDGES = 5e-4, 1e-3
 #: Relative error of the half-plane law that no mesh shows: on smooth flanks, at rounded and at sharp edges (as in
 #: `contact_pressure.EDGES`); with it the estimates cover 95 % of random pairs (docs/contact_laws.md).
 HALF_PLANE = (1e-4, 2e-4, 1.5e-3)
@@ -62,44 +46,19 @@ def solved_twice(converged: NDArray[np.bool_]) -> NDArray[np.int64]:
     return good[np.unique(np.linspace(0, len(good) - 1, min(len(good), POSITIONS)).round().astype(np.int64))]
 
 
-def law_error(router: PositionSolver, angles: Array, twists: Array, edge: Array | None = None) -> Array:
-    """What the half-plane law and that of small loads add to the relative error, shape (n,).
+def unseen_error(law: ContactLaw, edge: Array) -> Array:
+    """Relative error of a law that no refinement of the mesh shows, shape (n,).
 
     Parameters
     ----------
-    angles, twists : ndarray, shape (n,)
-        rad.
     edge : ndarray, shape (n,)
-        What bears besides smooth flanks, the place in `contact_pressure.EDGES`; only the half-plane law asks for it.
+        What bears besides smooth flanks: the place in `contact_pressure.EDGES`.
     """
-    made = np.zeros(len(angles))
-    if not isinstance(router, Router):
-        return made if edge is None else np.array(HALF_PLANE)[edge.astype(np.int64)]
-    if router.route == "direct":
-        return made
-    for i in np.flatnonzero(router.light(angles, twists)):
-        angle, twist = float(angles[i]), float(twists[i])
-        reference = router.reference(angle, twist)
-        found = balance(reference, twist)
-        share = router.share(reference, found)[0]
-        if not found.converged or share >= 1.0:
-            continue
-        made[i] = (1 - share) * law_bound(reference, found)
-        if share > 0:
-            (direct,) = solve_positions(router.elastic, np.array([angle]), np.array([twist]))
-            if direct.status == "converged":
-                made[i] += max(share, 1 - share) * abs(direct.torque_wheel / found.torque_wheel - 1)
-    return made
-
-
-def law_bound(reference: Reference, found: Balance) -> float:
-    """Bound of the relative error of the law of small loads at a position."""
-    pairs = [(c, known) for c, known in zip(found.contacts, reference.local, strict=True) if c is not None]
-    return LAW if all(contact.width <= known.clear for contact, known in pairs) else LAW_AT_EDGES
+    return np.array(HALF_PLANE)[edge.astype(np.int64)] if isinstance(law, HalfPlane) else np.zeros(len(edge))
 
 
 def error_estimate(
-    angles: Array, torque: Array, coarse: Array, *, coarsen: float = 1.0, law: Array | float = 0.0
+    angles: Array, torque: Array, coarse: Array, *, coarsen: float = 1.0, unseen: Array | float = 0.0
 ) -> ErrorEstimate:
     """Estimated relative error at the positions solved twice.
 
@@ -112,8 +71,8 @@ def error_estimate(
         gets the largest error of the others.
     coarsen
         The curve's own factor on the default element sizes, that of the flanks where it is larger.
-    law : ndarray, shape (m,)
-        What the law of small loads, from `law_error`, and the rounding of the gears' angles add.
+    unseen : ndarray, shape (m,)
+        What no mesh shows: `unseen_error`, and the rounding of the gears' angles.
     """
     single = np.abs(coarse / torque - 1) / (COARSENING**ORDER - 1)
     known = np.isfinite(single)
@@ -122,5 +81,5 @@ def error_estimate(
         count = int(known.sum())
         usual = (1 + 1 / count) * float(np.sqrt(np.mean(single[known] ** 2)))
         relative = np.where(known, np.maximum(single, usual), max(usual, float(single[known].max())))
-        relative = relative + COMMON * coarsen**ORDER + law
+        relative = relative + COMMON * coarsen**ORDER + unseen
     return ErrorEstimate(angles, relative, COARSENING, ORDER)

@@ -88,12 +88,12 @@ def write_fields(
     chosen = chosen_positions(curve, angles_deg)
     if len(chosen) == 0:
         return []
-    recovery, router = pair_recovery(elastic), _router(pair, elastic, curve)
+    recovery, solver = pair_recovery(elastic), position_solver(pair, elastic)
     names = ["fields.vtkhdf", "pressure.csv", "pressure.png"]
     worst: tuple[float, int, tuple[GearField, GearField]] | None = None
     pressures: list[tuple[float, list[FlankPressure]]] = []
     with VtkHdfSeries(folder / "fields.vtkhdf") as series, one_thread():
-        for done, (number, position) in enumerate(_solved(router, curve, chosen), start=1):
+        for done, (number, position) in enumerate(_solved(solver, curve, chosen), start=1):
             angle, twist = _place(curve, number)
             fields = recovery.at(position, angle, twist)
             pressures.append((math.degrees(angle), flank_pressures(elastic, position)))
@@ -147,18 +147,11 @@ def _place(curve: StiffnessCurve, number: int) -> tuple[float, float]:
     return float(curve.pinion_angle[number]), float(curve.twist[number] + curve.lost_motion)
 
 
-def _router(pair: GearPair, elastic: MeshingPair, curve: StiffnessCurve) -> PositionSolver:
-    """The way that the curve took: the same at all of its positions, or each by the width of its contact."""
-    taken = set(curve.route.tolist())
-    alone = taken in ({"direct"}, {"hertz"})
-    return position_solver(pair, elastic, taken.pop() if alone else "auto")
-
-
-def _solved(router: PositionSolver, curve: StiffnessCurve, chosen: NDArray[np.int64]) -> Iterator[tuple[int, Position]]:
+def _solved(solver: PositionSolver, curve: StiffnessCurve, chosen: NDArray[np.int64]) -> Iterator[tuple[int, Position]]:
     """Positions of the curve solved again, a few side by side; one that does not converge again is left out."""
     for first in range(0, len(chosen), SIDE_BY_SIDE):
         part = chosen[first : first + SIDE_BY_SIDE]
-        made = router.solve(curve.pinion_angle[part], curve.twist[part] + curve.lost_motion, kept=range(len(part)))
+        made = solver.solve(curve.pinion_angle[part], curve.twist[part] + curve.lost_motion, kept=range(len(part)))
         for number, position in zip(part.tolist(), made, strict=True):
             if position.scene is not None:
                 yield number, position
@@ -247,12 +240,12 @@ def frames_of(
     """
     angles = np.arange(count) * curve.mesh_cycle / count
     twists = curve.interpolant("twist")(angles).value + curve.lost_motion
-    recovery, router, place = pair_recovery(elastic), _router(pair, elastic, curve), zone(pair, modules=1.5)
+    recovery, solver, place = pair_recovery(elastic), position_solver(pair, elastic), zone(pair, modules=1.5)
     frames: list[Frame] = []
     with one_thread():
         for first in range(0, count, SIDE_BY_SIDE):
             part = slice(first, first + SIDE_BY_SIDE)
-            made = router.solve(angles[part], twists[part], kept=range(len(angles[part])))
+            made = solver.solve(angles[part], twists[part], kept=range(len(angles[part])))
             for angle, twist, position in zip(angles[part], twists[part], made, strict=True):
                 if position.scene is not None:
                     fields = recovery.at(position, float(angle), float(twist))

@@ -96,7 +96,6 @@ class StiffnessJob:
             "kinematics": t.kinematics,
             "twist_from": t.twist_from,
             "solve_all": t.solve_all,
-            "route": t.route,
         }
 
 

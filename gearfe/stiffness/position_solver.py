@@ -1,4 +1,4 @@
-"""Who solves positions of a pair for sweeps, maps and fields: the half-plane solver, or the routes of other laws."""
+"""Who solves positions of a pair for sweeps, maps and fields: the half-plane law, or finite elements at the contact."""
 
 from __future__ import annotations
 
@@ -15,13 +15,12 @@ from ..contact.half_plane import half_plane_pair, solve_half_plane
 from ..contact.half_plane_loads import with_loads
 from ..contact.half_plane_result import HalfPlaneSolution
 from ..contact.laws import HalfPlane
+from ..contact.position import unsolved
 from ..contact.records import joined, taken
 from ..contact.scene import MeshingPair
-from ..contact.solver import Position
-from ..errors import InputError
+from ..contact.solver import Position, solve_positions
 from ..gear.pair import GearPair
 from ..gear.touching import Flanks, Touching
-from .routes import Route, Router
 
 Array = NDArray[Any]
 
@@ -42,13 +41,13 @@ class PositionSolver(Protocol):
     def touching(self, angles: Array) -> list[Touching]: ...
 
 
-def position_solver(pair: GearPair, elastic: MeshingPair, route: Route = "auto") -> PositionSolver:
-    """The solver of the elastic pair's law; `route` is for the laws on the mesh, see `gearfe.stiffness.routes`."""
-    if not isinstance(elastic.law, HalfPlane):
-        return Router(pair, elastic, route)
-    if route != "auto":
-        raise InputError("route", route, "has no meaning with the law half_plane", "leave it out")
-    return HalfPlaneSolver(pair, elastic)
+def position_solver(
+    pair: GearPair, elastic: MeshingPair, *, resolved_only: bool = True
+) -> HalfPlaneSolver | ElementSolver:
+    """The solver of the elastic pair's law; see `ElementSolver` for `resolved_only`."""
+    if isinstance(elastic.law, HalfPlane):
+        return HalfPlaneSolver(pair, elastic)
+    return ElementSolver(pair, elastic, resolved_only=resolved_only)
 
 
 class HalfPlaneSolver:
@@ -120,8 +119,76 @@ def _position(found: HalfPlaneSolution, i: int, pairs: slice) -> Position:
         peak_pressure=0.0 if status == "no_contact" else math.nan,
         iterations=int(found.iterations[i]),
         pair_widths=contacts.half_width,
-        route="half_plane",
     )
     if len(contacts) == 0:
         return position
     return replace(position, contacts=contacts, peak_pressure=float(contacts.pressure.max()))
+
+
+class ElementSolver:
+    r"""Positions of one pair by a law on the finite elements of its flanks, where these resolve the contact.
+
+    The half-plane law of the same gears tells beforehand which tooth pairs bear, with the forces :math:`F_k`, and how
+    wide their contacts are (:math:`2b_k`). Where
+
+    .. math:: \sum_k F_k\,\frac{h_k}{2b_k} > \sum_k F_k
+
+    with the longer of both flanks' elements there, :math:`h_k`, the contact is narrower than an element. The torque
+    then swings with the place of the nodes (docs/contact_laws.md), and the position is ``under_resolved``.
+
+    Parameters
+    ----------
+    resolved_only
+        False solves what the elements do not resolve, too: to measure the error that this makes.
+    """
+
+    #: Relative accuracy to which torques can be searched for.
+    torque_tolerance = 1e-10
+
+    def __init__(self, pair: GearPair, elastic: MeshingPair, *, resolved_only: bool = True) -> None:
+        self.pair, self.elastic, self.resolved_only = pair, elastic, resolved_only
+        self.half_plane = HalfPlaneSolver(pair, elastic)
+        self.flanks = self.half_plane.flanks
+
+    def solve(self, angles: Array, twists: Array, kept: Collection[int] = ()) -> list[Position]:
+        """Positions at pinion angles and twists (rad), both of shape (n,); `kept` ones with what fields need."""
+        twists = np.broadcast_to(np.asarray(twists, dtype=float), np.shape(angles))
+        expected = self.half_plane.solve(angles, twists)
+        made = [unsolved(p.status, p.iterations) for p in expected]
+        for i, position in enumerate(expected):
+            if position.status == "converged" and self.resolved_only and self.elements_per_contact(position) < 1.0:
+                made[i] = unsolved("under_resolved", position.iterations)
+        open_ = np.array([i for i, p in enumerate(made) if p.status == "converged"], dtype=np.int64)
+        for i, position in zip(open_, solve_positions(self.elastic, angles[open_], twists[open_]), strict=True):
+            missed = position.status == "no_contact"
+            made[i] = unsolved("under_resolved", position.iterations) if missed else position
+        return [p if i in kept else bare(p) for i, p in enumerate(made)]
+
+    def elements_per_contact(self, position: Position) -> float:
+        """Elements of the flank within the width 2b of a contact: harmonic mean, by force, over the tooth pairs of a
+        position of `half_plane`.
+        """
+        contacts = position.contacts
+        assert contacts is not None
+        sizes = np.zeros(len(contacts))
+        for gear, (side, body) in enumerate(zip(self.half_plane.law.sides, self.elastic.bodies, strict=True)):
+            ends = np.cumsum(body.flank.sizes)
+            edge = np.searchsorted(ends, contacts.arc[:, gear] + side.offset)
+            sizes = np.maximum(sizes, body.flank.sizes[np.minimum(edge, len(ends) - 1)])
+        return float(contacts.force.sum() / (contacts.force @ (sizes / (2 * contacts.half_width))))
+
+    def touching_twists(self, angles: Array) -> Array:
+        """Twists (rad) at which the rigid gears just touch."""
+        return self.half_plane.touching_twists(angles)
+
+    def touching(self, angles: Array) -> list[Touching]:
+        """Tooth pairs whose rigid flanks can meet, one entry an angle (rad)."""
+        return self.half_plane.touching(angles)
+
+
+def bare(position: Position) -> Position:
+    """The position without what only fields need: a scene holds megabytes."""
+    nothing: dict[str, Any] = dict.fromkeys(
+        ("scene", "forces", "force_rate", "pressure", "stress_loads", "stress_load_rate")
+    )
+    return replace(position, **nothing)

@@ -16,8 +16,7 @@ from ..errors import InputError
 from ..gear.iso6336 import mesh_stiffness
 from .contact_pressure import contact_pressures
 from .curve import SOLVED
-from .position_solver import PositionSolver
-from .routes import bare
+from .position_solver import ElementSolver, PositionSolver, bare
 from .torque_control import TorqueSolution, twists_for_torque
 
 Array = NDArray[Any]
@@ -45,8 +44,6 @@ class Solved:
         For each position the numbers of the tooth pairs that carry load, and their torques (N m).
     iterations : ndarray, shape (n,)
     status : list of str
-    route : list of str
-        See `gearfe.stiffness.routes`.
     """
 
     twist: Array
@@ -54,11 +51,10 @@ class Solved:
     pairs: list[tuple[IntArray, Array]]
     iterations: IntArray
     status: list[str]
-    route: list[str]
 
 
 def at_twists(
-    router: PositionSolver,
+    solver: PositionSolver,
     angles: Array,
     twists: Array,
     progress: Progress | None,
@@ -71,14 +67,14 @@ def at_twists(
     `observe` is called with the number of each position and its small-strain solution, forces included, which are not
     kept.
     """
-    elastic = router.elastic
+    elastic = solver.elastic
     sampled = sample_numbers(angles, elastic.pitch_angle) if finite else np.zeros(0, dtype=np.int64)
     keep = set(sampled.tolist())
     positions: list[Position] = []
     for start in range(0, len(angles), BATCH):
         part = slice(start, start + BATCH)
         kept = (sampled - start).tolist() if observe is None else range(len(angles[part]))
-        made = router.solve(angles[part], twists[part], kept)
+        made = solver.solve(angles[part], twists[part], kept)
         if observe is not None:
             for i, position in enumerate(made, start=start):
                 observe(i, position)
@@ -90,7 +86,7 @@ def at_twists(
         every = interpolated_shares(angles, angles[sampled], shares, elastic.pitch_angle)
         positions = [bare(with_share(p, c)) for p, c in zip(positions, every, strict=True)]
     iterations = np.array([p.iterations for p in positions], dtype=np.int64)
-    return _collect(router, angles, twists, positions, iterations, [p.status for p in positions])
+    return _collect(solver, angles, twists, positions, iterations, [p.status for p in positions])
 
 
 #: Yield of a tooth pair (modules) by the standard's stiffness beyond which a torque is refused. Each tooth, 2 modules
@@ -98,24 +94,24 @@ def at_twists(
 MOST_YIELD = 0.25
 
 
-def check_torque(router: PositionSolver, torque: float) -> None:
+def check_torque(solver: PositionSolver, torque: float) -> None:
     """Raise `InputError` for a torque (N m) that small strain is not meant for."""
-    pair = router.pair
-    most = MOST_YIELD * pair.pinion.module * _usual_stiffness(router) * pair.wheel.base_radius
+    pair = solver.pair
+    most = MOST_YIELD * pair.pinion.module * _usual_stiffness(solver) * pair.wheel.base_radius
     if torque > most:
         problem = f"must be <= {most:.3g} N m: the teeth would yield by more than {MOST_YIELD:g} modules"
         raise InputError("torque", torque, problem, "linear elasticity does not reach so far; give less")
 
 
-def _usual_stiffness(router: PositionSolver) -> float:
+def _usual_stiffness(solver: PositionSolver) -> float:
     """Mesh stiffness by the standard (N/m)."""
-    pair, elastic = router.pair, router.elastic
+    pair, elastic = solver.pair, solver.elastic
     moduli = [body.material.youngs_modulus for body in elastic.bodies]
     return mesh_stiffness(pair, moduli[0], moduli[1]) * elastic.width
 
 
 def at_torque(
-    router: PositionSolver,
+    solver: PositionSolver,
     angles: Array,
     torque: float,
     touching: Array,
@@ -125,28 +121,30 @@ def at_torque(
 ) -> Solved:
     """Find the twists at which positions carry `torque` (N m), and solve them.
 
-    The first position starts from the standard's stiffness, the others from the compliance that it showed. `touching`
-    are the twists (rad), shape (n,), at which the rigid flanks touch. With finite strain the share of the torque is
+    The first position starts from the standard's stiffness, the others from the compliance that it showed; laws on
+    elements start from the twists of the half-plane law, so that they are asked for loads near the goal. `touching` are
+    the twists (rad), shape (n,), at which the rigid flanks touch. With finite strain the share of the torque is
     evaluated at the twists so found, which then move by that share.
     """
-    pair = router.pair
-    guess = _usual_stiffness(router) * pair.wheel.base_radius**2
+    guess = touching + torque / (_usual_stiffness(solver) * solver.pair.wheel.base_radius**2)
     goal = np.full(len(angles), torque)
-    found = _search(router, angles, goal, touching, touching + torque / guess, progress)
+    if isinstance(solver, ElementSolver):
+        guess = _search(solver.half_plane, angles, goal, touching, guess, None).twist
+    found = _search(solver, angles, goal, touching, guess, progress)
     if finite:
-        found = _with_shares(router, angles, goal, touching, found)
-    return _collect(router, angles, found.twist, found.positions, found.iterations, found.status)
+        found = _with_shares(solver, angles, goal, touching, found)
+    return _collect(solver, angles, found.twist, found.positions, found.iterations, found.status)
 
 
 def _with_shares(
-    router: PositionSolver, angles: Array, goal: Array, touching: Array, found: TorqueSolution
+    solver: PositionSolver, angles: Array, goal: Array, touching: Array, found: TorqueSolution
 ) -> TorqueSolution:
     """Move the twists until torque and finite-strain share at the same twist make the goal."""
-    elastic = router.elastic
+    elastic = solver.elastic
     sampled = sample_numbers(angles, elastic.pitch_angle)
     iterations, before = found.iterations.copy(), np.zeros(len(angles))
     for _ in range(SHARE_PASSES):
-        positions = router.solve(angles[sampled], found.twist[sampled], range(len(sampled)))
+        positions = solver.solve(angles[sampled], found.twist[sampled], range(len(sampled)))
         shares = finite_strain_shares(elastic, positions)
         every = interpolated_shares(angles, angles[sampled], shares, elastic.pitch_angle)
         reached, tangent = (np.array([getattr(p, n) for p in found.positions]) for n in ("torque_wheel", "tangent"))
@@ -156,11 +154,11 @@ def _with_shares(
         if len(again) == 0:
             break
         searched = _search(
-            router, angles[again], (goal / (1 + every))[again], touching[again], (found.twist + step)[again], None
+            solver, angles[again], (goal / (1 + every))[again], touching[again], (found.twist + step)[again], None
         )
         found = _replaced(found, again, searched)
         iterations[again] += searched.iterations
-        if np.max(np.abs(every - before)) <= max(SHARE_TOLERANCE, router.torque_tolerance):
+        if np.max(np.abs(every - before)) <= max(SHARE_TOLERANCE, solver.torque_tolerance):
             break
         before = every
     raised = [with_share(p, c) for p, c in zip(found.positions, every, strict=True)]
@@ -178,7 +176,7 @@ def _replaced(found: TorqueSolution, places: IntArray, others: TorqueSolution) -
 
 
 def _search(
-    router: PositionSolver,
+    solver: PositionSolver,
     angles: Array,
     goal: Array,
     touching: Array,
@@ -191,13 +189,13 @@ def _search(
     for start, stop in zip(starts, [*starts[1:], len(angles)], strict=True):
         part = slice(start, stop)
         found = twists_for_torque(
-            router.solve,
+            solver.solve,
             angles[part],
             goal[part],
             touching=touching[part],
             first=first[part],
-            most=math.pi / router.pair.wheel.teeth,
-            tolerance=router.torque_tolerance,
+            most=math.pi / solver.pair.wheel.teeth,
+            tolerance=solver.torque_tolerance,
         )
         parts.append(found)
         if start == 0 and found.status[0] == "converged":
@@ -213,7 +211,7 @@ def _search(
 
 
 def _collect(
-    router: PositionSolver,
+    solver: PositionSolver,
     angles: Array,
     twists: Array,
     positions: list[Position],
@@ -222,23 +220,19 @@ def _collect(
 ) -> Solved:
     names = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "tangent")
     numbers = {name: np.array([getattr(p, name) for p in positions], dtype=float) for name in names}
-    numbers |= contact_pressures(router.elastic, router.flanks, router.touching(angles), positions)
+    numbers |= contact_pressures(solver.elastic, solver.flanks, solver.touching(angles), positions)
     pairs = []
     for p in positions:
         carry = np.asarray(p.pair_torques) > 0
         pairs.append((np.asarray(p.pair_numbers, dtype=np.int64)[carry], np.asarray(p.pair_torques)[carry]))
-    return Solved(twists, numbers, pairs, iterations, status, [p.route for p in positions])
+    return Solved(twists, numbers, pairs, iterations, status)
 
 
-def honest(solved: Solved, touching: Array) -> Solved:
-    """Mark positions without contact whose exact rigid flanks overlap, and take all numbers off failed ones."""
-    status = [
-        "under_resolved" if s == "no_contact" and twist > touch else s
-        for s, twist, touch in zip(solved.status, solved.twist, touching, strict=True)
-    ]
-    bad = ~np.isin(status, SOLVED)
+def honest(solved: Solved) -> Solved:
+    """Take all numbers off failed positions."""
+    bad = ~np.isin(solved.status, SOLVED)
     numbers = {n: np.where(bad, 0 if n == "edge" else np.nan, values) for n, values in solved.numbers.items()}
-    return replace(solved, numbers=numbers, status=status)
+    return replace(solved, numbers=numbers)
 
 
 def load_shares(pairs: list[tuple[IntArray, Array]], torque: Array) -> tuple[Array, Array]:

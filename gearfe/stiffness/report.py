@@ -93,9 +93,8 @@ def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, floa
         },
         "load": load_statistics(job, curve),
         "contact_pressure": _pressure_summary(curve),
-        "contact_law": curve.law,
+        "contact_law": curve.contact_law,
         "statuses": dict(Counter(map(str, curve.status))),
-        "routes": dict(Counter(map(str, curve.route))),
         "failed_pinion_angles_deg": failed,
         "timings_s": dict(timings),
     }
@@ -107,14 +106,8 @@ def told(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
     iso = iso_values(job.pair, moduli[0], moduli[1])
     count = Counter(map(str, curve.status))
     lines = [f"{len(curve)} positions: " + ", ".join(f"{n} {status}" for status, n in count.items())]
-    routes = Counter(map(str, curve.route[~curve.failed]))
-    if routes.keys() & {"hertz", "blend"}:
-        lines.append(
-            f"contacts narrower than the mesh resolves: {routes['hertz']} positions by the law of small loads, "
-            f"{routes['blend']} by its mean with the mesh (column route)"
-        )
-    if curve.law:
-        lines.append(f"contact law: {curve.law}")
+    if curve.contact_law:
+        lines.append(f"contact law: {curve.contact_law}")
     lines += _load_lines(load_statistics(job, curve))
     level = cycle_statistics(curve, job.table.interpolation)
     if level is not None:
@@ -200,7 +193,10 @@ def warnings(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
         more = " ..." if curve.failed.sum() > 8 else ""
         cure = "use less load or a finer mesh (coarsen below 1)"
         if set(curve.status[curve.failed]) == {"under_resolved"}:
-            cure = "no contact point overlaps there: use another load (more, if it is small) or a finer mesh"
+            cure = (
+                'their contacts are narrower than the elements of the flanks; law = "half_plane" answers every load, '
+                "a finer flank (flank_coarsen below 1) resolves lighter ones"
+            )
         said.append(
             f"{int(curve.failed.sum())} positions failed and have no numbers, only their status (pinion angle {angles}"
             f"{more} deg): {cure}"

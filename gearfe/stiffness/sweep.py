@@ -32,11 +32,10 @@ from ..tables.stiffness import check_flank_coarsen
 from ..threads import one_thread
 from .contact_pressure import EDGES
 from .curve import SOLVED, ErrorEstimate, StiffnessCurve
-from .curve_error import COARSENING, error_estimate, law_error, solved_twice
+from .curve_error import COARSENING, error_estimate, solved_twice, unseen_error
 from .periodic import fold
 from .position_solver import PositionSolver, position_solver
 from .positions import Progress, Solved, at_torque, at_twists, check_torque, honest, load_shares
-from .routes import Route
 from .torque_control import ANGLE_ROUNDING
 
 __all__ = ["ErrorEstimate", "StiffnessCurve", "elastic_pair", "sweep_stiffness"]
@@ -57,7 +56,7 @@ def elastic_pair(
     materials: Material | tuple[Material, Material] = STEEL,
     *,
     plane: Plane = "strain",
-    law: str | ContactLaw = "nitsche",
+    law: str | ContactLaw = "half_plane",
     coarsen: float = 1.0,
     flank_coarsen: float = 1.0,
     points_per_edge: int = 4,
@@ -125,11 +124,10 @@ def sweep_stiffness(
     angles: ArrayLike | None = None,
     materials: Material | tuple[Material, Material] = STEEL,
     plane: Plane = "strain",
-    law: str | ContactLaw = "nitsche",
+    law: str | ContactLaw = "half_plane",
     kinematics: Literal["small", "finite"] = "finite",
     twist_from: Literal["contact", "centred"] = "contact",
     solve_all: bool = False,
-    route: Route = "auto",
     coarsen: float = 1.0,
     flank_coarsen: float = 1.0,
     points_per_edge: int = 4,
@@ -158,9 +156,6 @@ def sweep_stiffness(
         space faces the pinion tooth, half the backlash before. Results count from contact in either case.
     solve_all
         Solve every position, also those that differ by whole mesh cycles.
-    route
-        ``auto`` (default): on the mesh where its elements see the contact, by the law of small loads where they do not,
-        see `gearfe.stiffness.routes`; or ``direct`` or ``hertz`` everywhere.
     estimate_error
         Solve again on a coarser mesh and estimate the discretisation error.
     elastic
@@ -192,27 +187,28 @@ def sweep_stiffness(
     if elastic is None:
         elastic = elastic_pair(pair, materials, coarsen=coarsen, watch=watch, **common)
     solved_angles, source = (asked, np.arange(len(asked))) if solve_all else distinct_angles(asked, cycle)
-    router = position_solver(pair, elastic, route)
+    solver = position_solver(pair, elastic)
     if torque is not None:
-        check_torque(router, load)
+        check_torque(solver, load)
     with watch.stage("unloaded flanks"):
-        touching = router.touching_twists(solved_angles)
+        touching = solver.touching_twists(solved_angles)
     with watch.stage("positions"), one_thread():
         if torque is None:
-            solved = at_twists(router, solved_angles, np.full(len(solved_angles), load), progress, finite=finite)
+            solved = at_twists(solver, solved_angles, np.full(len(solved_angles), load), progress, finite=finite)
         else:
-            solved = at_torque(router, solved_angles, load, touching, progress, finite=finite)
-    solved = honest(solved, touching)
+            solved = at_torque(solver, solved_angles, load, touching, progress, finite=finite)
+    solved = honest(solved)
     error = None
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
             given = (elastic.pinion.material, elastic.wheel.material)
             common = {"plane": elastic.pinion.plane, "law": elastic.law, **points}
             coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
-            routers = router, position_solver(pair, coarse, route)
-            error = _estimate(routers, solved_angles, solved, finite=finite, coarsen=coarsen * max(1.0, flank_coarsen))
-    curve = assembled_curve(pair, asked, solved_angles, source, solved, touching, searched=torque is not None)
-    return replace(curve, law=law_text(elastic.law), timings=dict(watch.seconds), error=error)
+            both = solver, position_solver(pair, coarse, resolved_only=False)
+            error = _estimate(both, solved_angles, solved, finite=finite, coarsen=coarsen * max(1.0, flank_coarsen))
+    searched = torque is not None
+    curve = assembled_curve(pair, elastic.law, asked, solved_angles, source, solved, touching, searched=searched)
+    return replace(curve, timings=dict(watch.seconds), error=error)
 
 
 def _checked_load(pair: GearPair, twist: float | None, torque: float | None, twist_from: str) -> float:
@@ -246,22 +242,23 @@ def distinct_angles(angles: Array, cycle: float) -> tuple[Array, IntArray]:
 
 
 def _estimate(
-    routers: tuple[PositionSolver, PositionSolver], angles: Array, solved: Solved, *, finite: bool, coarsen: float
+    solvers: tuple[PositionSolver, PositionSolver], angles: Array, solved: Solved, *, finite: bool, coarsen: float
 ) -> ErrorEstimate:
-    """Error of positions solved by the first router, from the second's on a coarser mesh."""
-    own, coarse = routers
+    """Error of positions solved by the first solver, from the second's on a coarser mesh, resolved there or not."""
+    own, coarse = solvers
     chosen = solved_twice(np.array(solved.status) == "converged")
     again = at_twists(coarse, angles[chosen], solved.twist[chosen], None, finite=finite)
     other = np.where(np.array(again.status, dtype=object) == "converged", again.numbers["torque_wheel"], np.nan)
     torque, tangent = solved.numbers["torque_wheel"][chosen], solved.numbers["tangent"][chosen]
+    unseen = unseen_error(own.elastic.law, solved.numbers["edge"][chosen])
     # a twist of some bits of the gears' angles is not what the gears are turned by
-    law = law_error(own, angles[chosen], solved.twist[chosen], solved.numbers["edge"][chosen])
-    law += ANGLE_ROUNDING * np.abs(tangent / torque)
-    return error_estimate(angles[chosen], torque, other, coarsen=coarsen, law=law)
+    unseen += ANGLE_ROUNDING * np.abs(tangent / torque)
+    return error_estimate(angles[chosen], torque, other, coarsen=coarsen, unseen=unseen)
 
 
 def assembled_curve(
     pair: GearPair,
+    law: ContactLaw,
     asked: Array,
     angles: Array,
     source: IntArray,
@@ -300,7 +297,8 @@ def assembled_curve(
         edge=np.array(EDGES)[solved.numbers["edge"].astype(np.int64)][source],
         iterations=solved.iterations[source],
         status=np.array(solved.status)[source],
-        route=np.array(solved.route)[source],
+        law=np.full(len(source), law.name),
+        contact_law=law_text(law),
         mesh_cycle=pair.mesh_cycle,
         base_radius=radius,
         lost_motion=lost,

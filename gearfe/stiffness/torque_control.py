@@ -78,7 +78,7 @@ def twists_for_torque(
     found: list[Position | None] = [None] * len(angles)
     status = [NOT_REACHED] * len(angles)
     iterations, failures = np.zeros(len(angles), dtype=np.int64), np.zeros(len(angles), dtype=np.int64)
-    missed, below = np.zeros(len(angles), dtype=bool), np.zeros(len(angles), dtype=bool)
+    below = np.zeros(len(angles), dtype=bool)
     little, much = np.full(len(angles), np.nan), np.full(len(angles), np.nan)  # torques there, as far as known
     open_ = np.arange(len(angles))
     for _ in range(MAX_SOLUTIONS):
@@ -102,7 +102,6 @@ def twists_for_torque(
                 width = high[i] - low[i]
                 if width <= JUMP * high[i] and much[i] - little[i] > STEEP * position.tangent * width:
                     continue  # a corner that snaps on: no twist has this torque
-                missed[i] &= excess >= 0
                 below[i] |= excess < 0
                 step = -excess / position.tangent if position.tangent > 0 else 0.0
             elif position.status == "not_converged":
@@ -113,15 +112,14 @@ def twists_for_torque(
                     high[i], much[i] = twist[i], np.nan
                 else:  # first guesses are low rather than high: double the twist
                     step = twist[i] - touching[i]
+            elif position.status == "no_contact":
+                low[i], little[i] = twist[i], np.nan
             else:
-                low[i], little[i], missed[i] = twist[i], np.nan, position.status == "under_resolved"
+                continue
             tried = twist[i] + step
             if not low[i] < tried < high[i]:
                 tried = 0.5 * (low[i] + high[i]) if np.isfinite(high[i]) else 2 * twist[i] - touching[i]
-            # between a contact that the mesh misses and one that carries too much lies nothing to be found
-            width = JUMP if missed[i] else 1e-14
-            if np.isfinite(high[i]) and high[i] - low[i] <= width * high[i]:
-                status[i] = "under_resolved" if missed[i] else status[i]
+            if np.isfinite(high[i]) and high[i] - low[i] <= 1e-14 * high[i]:
                 continue
             if tried == twist[i] or twist[i] >= most:
                 continue

@@ -149,7 +149,7 @@ def exact_law() -> Any:
 
 
 def _torques(elastic: MeshingPair, angles: Any, twist: float) -> tuple[Any, Any, Counter]:
-    """Straight through the contact solver: at small loads a sweep takes another route, on which no law acts."""
+    """Straight through the contact solver, also where the elements do not resolve the contact."""
     found = solve_positions(elastic, angles, twist)
     torque = np.array([p.torque_wheel if p.status == "converged" else np.nan for p in found])
     return torque, np.array([p.iterations for p in found]), Counter(p.status for p in found)

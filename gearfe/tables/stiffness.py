@@ -46,7 +46,7 @@ class StiffnessTable:
         None, doc="last pinion angle (deg); without it, one mesh cycle", low=-FAR_DEG, high=FAR_DEG
     )
     plane: str = quantity("strain", doc="plane strain or plane stress", choices=("strain", "stress"))
-    law: str = quantity("nitsche", doc="contact law", choices=("nitsche", "penalty", "exact", "half_plane"))
+    law: str = quantity("half_plane", doc="contact law", choices=("half_plane", "nitsche", "penalty", "exact"))
     law_sides: str | None = quantity(
         None,
         doc="flanks that the law is integrated on: tip takes, of each tooth pair, the gear whose tip is nearer; by "
@@ -57,12 +57,6 @@ class StiffnessTable:
         "finite",
         doc="small (small strain) or finite (with the first-order effect of finite strain on the torque)",
         choices=("small", "finite"),
-    )
-    route: str = quantity(
-        "auto",
-        doc="how positions are solved: auto (on the mesh, or by the law of small loads where a contact is narrower "
-        "than its elements), direct (on the mesh) or hertz (law of small loads)",
-        choices=("auto", "direct", "hertz"),
     )
     nitsche_theta: int = quantity(
         0, doc="variant of the law nitsche: 0 (cheapest), 1 (symmetric, large gamma0 only) or -1", low=-1, high=1
@@ -108,11 +102,9 @@ class StiffnessTable:
 
     def check_law(self, where: str) -> None:
         """Raise `InputError` for keys that the contact law cannot take."""
-        if self.law == "half_plane":
-            for key, usual in (("law_sides", None), ("route", "auto")):
-                if getattr(self, key) != usual:
-                    problem = "has no meaning with the law half_plane"
-                    raise InputError(f"{where}.{key}", getattr(self, key), problem, "leave it out")
+        if self.law == "half_plane" and self.law_sides is not None:
+            problem = "has no meaning with the law half_plane"
+            raise InputError(f"{where}.law_sides", self.law_sides, problem, "leave it out")
         if self.law == "exact" and self.law_sides == "both":
             problem = "must be tip, pinion or wheel with the law exact: its multipliers lie on one gear"
             raise InputError(f"{where}.law_sides", self.law_sides, problem, "leave it out")

@@ -349,7 +349,6 @@ def _computed_curve(
         "torque": torque,
         "angles": pair.mesh_cycle * np.arange(count) / count,
         "kinematics": job.stiffness.kinematics,
-        "route": job.stiffness.route,
     }
     with stage(mesh.name):
         return cached_curve(pair, model, sweep, watch=watch, progress=progress, estimate_error=estimate)
