@@ -19,7 +19,7 @@ from gearfe.contact.position import unsolved
 
 ROOT = Path(__file__).parents[1]
 JOB = ROOT / "geometry" / "gear_train.toml"
-QUICK = ("--coarsen", "3", "--no-estimate")
+QUICK = ("--coarsen", "3", "--no-estimate", "--law", "half_plane")
 
 
 def rows(folder):
@@ -46,7 +46,9 @@ def only_stages(told: str) -> bool:
 
 def test_the_whole_command(tmp_path, capsys):
     out = tmp_path / "new" / "folder"
-    code = main(["stiffness", str(JOB), "--out", str(out), "--twist-deg", "0.05", "--coarsen", "3"])
+    code = main(
+        ["stiffness", str(JOB), "--out", str(out), "--twist-deg", "0.05", "--coarsen", "3", "--law", "half_plane"]
+    )
     said = capsys.readouterr()
     assert code == 0
     assert sorted(p.name for p in out.iterdir()) == ["stiffness.csv", "stiffness.png", "summary.json"]
@@ -70,14 +72,14 @@ def test_the_whole_command(tmp_path, capsys):
 
 
 def test_options_override_the_file(tmp_path):
-    options = ["--torque-Nm", "80", "--angles", "0", "4.5", "9", "--law", "penalty", "--plane", "stress"]
-    assert main(["stiffness", str(JOB), "--out", str(tmp_path), *options, *QUICK]) == 0
+    options = ["--torque-Nm", "400", "--angles", "0", "4.5", "9", "--law", "penalty", "--plane", "stress"]
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options]) == 0
     table = rows(tmp_path)
     assert [float(r["pinion_angle_deg"]) for r in table] == [0, 4.5, 9]
-    np.testing.assert_allclose([float(r["torque_wheel_Nm"]) for r in table], 80, rtol=1e-10)
+    np.testing.assert_allclose([float(r["torque_wheel_Nm"]) for r in table], 400, rtol=1e-10)
     job = json.loads((tmp_path / "summary.json").read_text())["job"]["stiffness"]
-    assert (job["law"], job["plane"], job["twist_deg"], job["torque_Nm"]) == ("penalty", "stress", None, 80)
-    main(["stiffness", str(JOB), "--out", str(tmp_path / "b"), *options[:-1], "strain", *QUICK])
+    assert (job["law"], job["plane"], job["twist_deg"], job["torque_Nm"]) == ("penalty", "stress", None, 400)
+    main(["stiffness", str(JOB), "--out", str(tmp_path / "b"), *QUICK, *options[:-1], "strain"])
     assert float(rows(tmp_path / "b")[1]["k_mesh_N_per_m"]) > 1.02 * float(table[1]["k_mesh_N_per_m"])
 
 
@@ -155,7 +157,7 @@ def test_a_failed_position_is_told_and_in_the_table(tmp_path, capsys, monkeypatc
         return [bad if abs(a - math.radians(4)) < 1e-9 else p for a, p in zip(angles, made, strict=True)]
 
     monkeypatch.setattr("gearfe.stiffness.position_solver.solve_positions", weak)
-    code = main(["stiffness", str(JOB), "--out", str(tmp_path), "--twist-deg", "0.3", *QUICK])
+    code = main(["stiffness", str(JOB), "--out", str(tmp_path), "--twist-deg", "0.3", *QUICK, "--law", "nitsche"])
     assert code == 1
     said = capsys.readouterr()
     assert "3 positions failed" in said.err  # 4, 22 and 40 deg
@@ -316,7 +318,7 @@ def test_as_a_process(tmp_path):
 
 def test_the_script(tmp_path):
     script = [sys.executable, str(ROOT / "scripts" / "stiffness_sweep.py")]
-    job = job_with(tmp_path, twist_deg=0.05, coarsen=3, angle_stop_deg=4)
+    job = job_with(tmp_path, twist_deg=0.3, coarsen=3, angle_stop_deg=4)
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [*script, str(job), str(tmp_path / "k.csv")], capture_output=True, text=True, env=environment, check=False
@@ -327,7 +329,7 @@ def test_the_script(tmp_path):
 
 
 def test_the_estimate_reaches_beyond_the_coarsest_mesh(tmp_path, capsys):
-    options = ("--twist-deg", "0.05", "--angles", "2", "6", "8", "--coarsen", "4.5", "--no-picture")
+    options = ("--twist-deg", "0.5", "--angles", "2", "6", "8", "--coarsen", "4.5", "--no-picture")
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *options]) == 0
     assert "discretisation error" in capsys.readouterr().out
 
@@ -343,7 +345,7 @@ def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
 
     monkeypatch.setattr("gearfe.stiffness.position_solver.solve_positions", one_fails)
     options = ("--twist-deg", "0.3", "--angles", "3", "3", "9", "--fields", "9", "6", "3", "--no-picture")
-    assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options]) == 1
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, "--law", "nitsche", *options]) == 1
     assert [r["status"] for r in rows(tmp_path)] == ["converged", "not_converged", "converged"]
     assert {p.name for p in tmp_path.glob("stress_*.png")} == {"stress_3deg.png", "stress_9deg.png"}
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options[:6], "--fields", "5.3"]) == 2

@@ -13,7 +13,7 @@ from gearfe.stiffness.curve_cache import cached_curve, curve_key
 from .gears import pair
 
 STEEL = Material(200e9, 0.3, density=7850.0)
-MODEL = {"materials": (STEEL, STEEL), "plane": "strain", "law": Nitsche(1.0), "coarsen": 4.0, "points_per_edge": 4}
+MODEL = {"materials": (STEEL, STEEL), "plane": "strain", "law": Nitsche(1.0), "coarsen": 1.5, "points_per_edge": 4}
 SWEEP = {"twist": 1e-3, "angles": np.radians([0.0, 6.0, 12.0]), "kinematics": "small"}
 
 

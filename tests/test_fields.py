@@ -24,7 +24,7 @@ from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 
 from .gears import pair
 
-ANGLE, TWIST = math.radians(3.0), math.radians(0.1)
+ANGLE, TWIST = math.radians(3.0), math.radians(0.15)
 
 
 @pytest.fixture(scope="module")

@@ -76,7 +76,7 @@ SWEEP_CHANGES = {
     "kinematics": "small",
     "penalty_stiffness_N_per_mm3": 1e7,
     "coarsen": 2.5,
-    "flank_coarsen": 2.5,
+    "flank_coarsen": 0.8,
     "points_per_edge": 3,
     "law_sides": "wheel",
     "angle_start_deg": 1.2,

@@ -38,7 +38,7 @@ def test_a_tip_that_lies_along_a_root_bears_wherever_it_does_on_larger_windows(
     job = read_stiffness_job(Path(__file__).parent / "test_stress_cases" / "gears" / "tip_along_a_root.toml")
     elastic = elastic_pair(job.pair, **{**job.model, "law": law})
     angle = job.sweep["angles"][2:3] + cycles * job.pair.mesh_cycle
-    twist = Flanks(job.pair).touching(angle).twist.min() + factor * job.sweep["twist"]
+    twist = Flanks(job.pair).touching(angle).twist.min(keepdims=True) + factor * job.sweep["twist"]
     (position,) = solve_positions(elastic, angle, twist)
     whole = solve_on_whole_windows(elastic, float(angle[0]), float(twist[0]))
     assert position.status == whole.status == "converged"
