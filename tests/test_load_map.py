@@ -245,7 +245,7 @@ def test_backlash_and_law_of_the_job_reach_maps_and_trains(tmp_path):
     curves = train_curves(job)
     for curve, torque in zip(curves, (100.0 / 1.5, 100.0), strict=True):
         assert set(curve.law) == {"half_plane"}
-        np.testing.assert_allclose(curve.torque_wheel, torque, rtol=1e-9)
+        np.testing.assert_allclose(curve.torque_wheel, torque, rtol=1e-7)
         # half the backlash is 43 um, a tooth pair yields by some 20: with it in, k is a third
         assert (curve.k_tangent / curve.k_mesh < 1.3).all()
         assert curve.lost_motion > 0
