@@ -289,7 +289,7 @@ def test_figures_and_animation(tmp_path):
 
 
 def test_bad_file_is_one_line_and_exit_code_two(tmp_path, capsys):
-    bad = write(tmp_path, PENDULUM.replace("mass_kg = 2.0", "mass_kg = 0.0"))
+    bad = write(tmp_path, PENDULUM.replace("mass_kg = 2.0", "mass_kg = -1.0"))
     assert main(["mechanism", str(bad), "--out", str(tmp_path / "out")]) == 2
     message = capsys.readouterr().err
     assert message.count("\n") == 1

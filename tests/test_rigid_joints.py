@@ -282,7 +282,7 @@ def test_loop_that_cannot_close_is_named():
 @pytest.mark.parametrize(
     ("make", "text"),
     [
-        (lambda: Body("a", -1.0, 1.0), "mass = -1.0: must be finite and > 0"),
+        (lambda: Body("a", -1.0, 1.0), "mass = -1.0: must be finite and >= 0"),
         (lambda: Scene((Body("a", 1, 1),), (Hinge("a", "a"),)), "joins a body to itself"),
         (lambda: Scene((Body("rod", 1, 1),), (Hinge("rod", "grund"),)), "did you mean 'ground'"),
         (lambda: Scene((Body("a", 1, 1), Body("a", 1, 1))), "used twice"),

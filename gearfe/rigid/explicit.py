@@ -17,11 +17,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .carried import RANK
 from .choice import STOPPED, Watch
 from .contract import Array
 from .elimination import is_linear, minimal
-from .start import Start, least_change
-from .system import System
+from .start import Start
+from .system import System, own_motion
 from .within import within_run
 
 SCHEME = "Runge-Kutta of order 8"
@@ -92,13 +93,13 @@ def run_explicit(  # type: ignore[no-untyped-def]
     active = start.active
 
     def rhs(t: float, y: Array) -> Array:
-        return np.concatenate([y[n:], system.acceleration(t, y[:n], y[n:], active)[0]])
+        return np.concatenate([y[n:], system.acceleration(t, y[:n], y[n:], active, start.excess)[0]])
 
     def project(t: float, y: Array) -> Array:
-        return on_constraints(system, t, y[:n], y[n:], active)
+        return on_constraints(system, t, y[:n], y[n:], active, start.excess)
 
     def expand(t: float, y: Array) -> tuple[Array, Array, Array]:
-        return y[:n], y[n:], system.acceleration(t, y[:n], y[n:], active)[0]
+        return y[:n], y[n:], system.acceleration(t, y[:n], y[n:], active, start.excess)[0]
 
     y0 = np.concatenate([start.q, start.v])
 
@@ -113,19 +114,37 @@ def run_explicit(  # type: ignore[no-untyped-def]
     return Pieces(ends, states, polynomials, expand), status, statistics
 
 
-def on_constraints(system: System, t: float, q: Array, v: Array, active: np.ndarray) -> Array:
-    """State projected onto g = 0 and G v = -dg/dt; rows that are redundant follow by themselves."""
+def on_constraints(
+    system: System, t: float, q: Array, v: Array, active: np.ndarray, excess: Array | None = None
+) -> Array:
+    """State projected onto g = 0 and G v = -dg/dt; rows that are redundant follow by themselves.
+
+    By the least changes in the mass norm; `excess` as in `System.acceleration`.
+    """
     if system.rows == 0:
         return np.concatenate([q, v])
     sizes = system.row_units[active]
+    extra = np.zeros(system.size) if excess is None or not excess.any() else excess
+    inverse, light = system.inverse_of(extra) if extra.any() else system.inverse_mass, np.flatnonzero(extra)
+    root = np.sqrt(inverse) if system.diagonal_mass else np.linalg.cholesky(inverse)
+
+    def change(G: Array, gap: Array) -> Array:
+        """Not-a-number where rows or gaps are not finite: the callers look at what comes back."""
+        if not (np.isfinite(G).all() and np.isfinite(gap).all()):
+            return np.full(system.size, np.nan)
+        free = np.column_stack([np.zeros(system.size), (inverse * extra)[:, light]])
+        right = G @ free
+        right[:, 0] -= gap
+        made = free - root @ np.linalg.lstsq(G @ root / sizes[:, None], right / sizes[:, None], rcond=RANK)[0]
+        return own_motion(made, light)[0]
+
     for _ in range(5):
         gap = system.residual(t, q)[active]
         if np.abs(gap / sizes).max(initial=0.0) < 1e-14:
             break
-        G = system.jacobian(t, q)[active]
-        q = q - least_change(system, G, gap, sizes)
+        q = q - change(system.jacobian(t, q)[active], gap)
     G = system.jacobian(t, q)[active]
-    return np.concatenate([q, v - least_change(system, G, G @ v + system.rate(t, q)[active], sizes)])
+    return np.concatenate([q, v - change(G, G @ v + system.rate(t, q)[active])])
 
 
 def step_through(

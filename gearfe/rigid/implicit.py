@@ -95,7 +95,7 @@ def run_implicit(  # type: ignore[no-untyped-def]
     sign = 1.0 if t1 >= t else -1.0
     n, active = system.size, start.active
     q, v = start.q.copy(), start.v.copy()
-    a, multipliers = system.acceleration(t, q, v, active)
+    a, multipliers = system.acceleration(t, q, v, active, start.excess)
     span = abs(t1 - t)
     reach = np.maximum(np.abs(q), 1e-300)
     units = system.units
@@ -130,9 +130,9 @@ def run_implicit(  # type: ignore[no-untyped-def]
             h, rejected = step * max(0.2, 0.9 * made.error**-0.25), rejected + 1
             continue
         t = goals[0] if fixed else t + sign * step
-        state = on_constraints(system, t, made.q, made.v, active)
+        state = on_constraints(system, t, made.q, made.v, active, start.excess)
         q, v = state[:n], state[n:]
-        a, multipliers = system.acceleration(t, q, v, active)
+        a, multipliers = system.acceleration(t, q, v, active, start.excess)
         reach = np.maximum(reach, np.abs(q))
         record.append((t, q, v, a))
         factor = 0.9 * max(made.error, 1e-8) ** -0.25
@@ -159,7 +159,7 @@ def in_modes(core: Minimal, start: Start) -> tuple[System, Start]:
         elements.append(LocalForce((body,), core.T[index].T @ force.W, law, breaks=force.breaks))
     elements.append(LocalForce((body,), core.constant[:, None], lambda *_: np.ones(1)))
     q, v = core.reduce(start.q, start.v)
-    return System(elements), replace(start, q=q, v=v, active=np.zeros(0, dtype=bool))
+    return System(elements), replace(start, q=q, v=v, active=np.zeros(0, dtype=bool), excess=np.zeros(0))
 
 
 @dataclass(frozen=True)

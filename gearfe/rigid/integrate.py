@@ -14,11 +14,13 @@ from ..errors import InputError
 from ..progress import announce, count, stage
 from . import compiled, kernel_run, taylor
 from .backend import COMPILED_FASTER, compiled_is_ready, loading_seconds, plain_seconds_spent, spend_plain_seconds
+from .carried import loose_link
 from .choice import Choice, Watch, Way, joined, joined_statistics
 from .contract import Array
 from .elimination import is_linear
 from .start import Start, consistent_start
 from .system import System
+from .tables import carrying
 from .trajectory import IntegrationError, Status, Trajectory
 
 METHODS = ("auto", "taylor", "explicit", "implicit")
@@ -30,9 +32,6 @@ LOCAL_SHARE = 5e-4
 IMPLICIT_TRIAL, LOADING_LINALG, PLAIN_TRIAL = 0.02, 0.25, 0.01
 #: Rates from which on steps of a series or of Runge-Kutta are below the rounding of the run's time.
 HOPELESS = 1e12
-#: Ratio of masses from which on a link counts as massless, and least singular value of the constraints' unit gradients
-#: at a start that is no singular position.
-MASSLESS, REGULAR = 1e10, 1e-6
 COMPILING = "compiling the kernels once, about a minute; backend='plain' does without"
 
 
@@ -62,8 +61,7 @@ def integrate(
         Taylor series in modal coordinates where the constraints are linear and the only force has a compiled law
         (gear trains), else Runge-Kutta of order 8 with projection. "implicit": Radau IIA of order 5, index 3,
         for stiff ones. "auto" takes the one of "taylor" (planar scenes) or "explicit", and "implicit", that is
-        predicted to take the fewest seconds, and changes over when that proves wrong (`gearfe.rigid.choice`); scenes
-        with a link without mass go to "implicit".
+        predicted to take the fewest seconds, and changes over when that proves wrong (`gearfe.rigid.choice`).
     tolerance : float
         Accuracy asked for, relative to 1 rad and to the size of the mechanism; 1e-13 to 0.1.
     start : Start, optional
@@ -114,6 +112,10 @@ def integrate(
     kept = asked if status == 0 else asked[sign * asked <= reached]
     if status == 0 and not _dropped_rows_hold(system, start, dense, tolerance):
         status = Status.REDUNDANT_NOT_MET
+    if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE, Status.NOT_SOLVED) and len(dense.times) > 1:
+        last = dense.times[-6:]  # the very last ones may be beyond all numbers
+        link = loose_link(system, last, dense(last, 0), dense(last, 1), start)
+        statistics = statistics if link is None else {**statistics, "loose_link": link}
     made = Trajectory(system, start, kept, Status(status), chosen, statistics, dense)
     if raise_on_failure and made.status is not Status.DONE:
         raise IntegrationError(made, made.message, made.reached, float(asked[-1]))
@@ -148,7 +150,7 @@ def ways_of(
     rate = partial(_rate, system) if planar else None  # it does not see singular positions
     implicit = Way("implicit", "", partial(_implicit, system, options), trial, rate=rate)
     auto = method == "auto"
-    if auto and (_hopeless(system, start, times) or (planar and _has_massless_links(system, start))):
+    if auto and _hopeless(system, start, times):
         return [implicit]
     if method == "implicit":
         return [implicit]
@@ -180,22 +182,6 @@ def _rate(system: System, start: Start) -> float:
     return known[1]
 
 
-def _has_massless_links(system: System, start: Start) -> bool:
-    """Whether masses differ so much that the series cannot tell a link without mass from a singular position.
-
-    They eliminate on G M^-1 G^T, which tells singular positions by its pivots; the implicit method solves for M and G
-    side by side. At a truly singular start the series stay, for they alone follow the branch that the velocity selects.
-    """
-    assert system.planar is not None
-    inverse = system.planar.assembly.tables.mass.reshape(-1, 3)[:-1]
-    moving = inverse[:, 0][inverse[:, 0] > 0]  # moments of inertia follow masses and sizes
-    if len(moving) == 0 or moving.max() < MASSLESS * moving.min():
-        return False
-    gradients = system.jacobian(start.time, start.q)[start.active]
-    gradients = gradients / np.linalg.norm(gradients, axis=1, keepdims=True)
-    return len(gradients) > 0 and bool(np.linalg.svd(gradients, compute_uv=False)[-1] > REGULAR)
-
-
 def _explicit(  # type: ignore[no-untyped-def]
     system: System, backend: str, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
 ):
@@ -223,13 +209,14 @@ def _taylor(  # type: ignore[no-untyped-def]
     order = taylor.order_for(local)
     if jit and not compiled_is_ready():
         announce(COMPILING)
-    key = (order, jit)
+    assembly = carrying(scene.assembly, start.excess)
+    key = (order, jit, assembly.tables.light.size)
     cache = scene.__dict__.setdefault("_work", {})
     if key not in cache:
-        cache[key] = taylor.work_space(scene.assembly.tables, order)
+        cache[key] = taylor.work_space(assembly.tables, order)
     redundant = (~start.active).astype(np.int64)
     pieces = taylor.run(
-        scene.assembly, start.q, start.v, (start.time, float(times[-1])), tolerance=local, redundant=redundant,
+        assembly, start.q, start.v, (start.time, float(times[-1])), tolerance=local, redundant=redundant,
         order=order, longest=options["longest"], most=most, jit=jit, work=cache[key], watch=watch,
     )  # fmt: skip
     status = 2 if pieces.status == kernel_run.FULL else pieces.status

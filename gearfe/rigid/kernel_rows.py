@@ -168,7 +168,7 @@ def factorise(rows, plan, mass, G, skip, val, diag, bound):
             diag[r] = val[r]
     for j in range(m):
         ratio = val[j] / diag[j]
-        if ratio < bound and skip[j] == 0:
+        if bound > 0.0 and ratio < bound and skip[j] == 0:  # rounding may leave less than nothing
             skip[j] = 2
             val[j] = 1.0
             dropped = True

@@ -26,7 +26,9 @@ def step_length(QS, order, tolerance, length):
     """Longest step whose last two terms stay below the tolerance."""
     last = 0.0
     before = 0.0
+    both = 0.0
     for i in range(QS.shape[1]):
+        both += abs(QS[order, i]) + abs(QS[order - 1, i])  # unlike a maximum, a sum keeps what is not a number
         unit = 1.0 if i % 3 == 2 else length
         last = max(last, abs(QS[order, i]) / unit)
         before = max(before, abs(QS[order - 1, i]) / unit)
@@ -35,7 +37,7 @@ def step_length(QS, order, tolerance, length):
         step = min(step, (tolerance / last) ** (1.0 / order))
     if before > 0.0:
         step = min(step, (tolerance / before) ** (1.0 / (order - 1)))
-    if not (np.isfinite(last) and np.isfinite(before)):
+    if not np.isfinite(both):
         step = 0.0
     return step
 

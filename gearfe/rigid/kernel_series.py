@@ -15,6 +15,13 @@ At a passing singular position (fold) some rows Z^T G_0 vanish while B = Z^T dG/
 fixes q_{k+2} along B, and the multipliers have a simple pole: lambda = (Z nu_0)/t + ... . Both conditions
 together give the
 bordered system with the rows B; multipliers are then stored one order up ("shift").
+
+Light links: where the joints make a link carry far more than its own mass, M^-1 of the link hides the heavy ones in S.
+The elimination then uses N = M + D with the excess D on these few coordinates c, and
+
+    N q + G^T lambda = f + D q,    q = q_N + sum_c X_c q_c,    X_c = D_c times the answer of N to a unit force on c
+
+is solved exactly: (1 - X) q_c = (q_N)_c once per order. No 1/m of a light link appears, so it may be without mass.
 """
 
 from __future__ import annotations
@@ -151,13 +158,15 @@ def expand(tb, t, forward, order, folds, w):
 
     `folds` is the number of singular rows: 0 at a regular position.
     """
-    rows, plan, forces, mass = tb.rows, tb.plan, tb.forces, tb.mass
+    rows, forces, mass = tb.rows, tb.forces, tb.mass
     bs, ls, es, fold = w.bs, w.ls, w.es, w.fold
-    QS, TF, LM, G, val, skip = w.QS, w.TF, w.LM, w.G, w.val, w.skip
+    QS, TF, LM, G, skip = w.QS, w.TF, w.LM, w.G, w.skip
     mu, rhs, F, u = w.mu, w.rhs, w.F, w.u
     shift = 1 if folds > 0 else 0
     time_series(tb.times, t, forward, order + 2, TF)
     start_series(rows, forces, order, QS, LM, bs, ls, es)
+    if tb.light.shape[0] > 0:
+        carry_responses(tb, folds, w)
     for k in range(order - 1):
         j = k + 2
         at = k + shift
@@ -176,17 +185,9 @@ def expand(tb, t, forward, order, folds, w):
         times_gradients(rows, G, u, mu)
         for r in range(mu.shape[0]):
             mu[r] = mu[r] + rhs[r] if skip[r] == 0 else 0.0
-        if folds > 0:
-            fold_solve(plan, val, fold, mu, folds)
-        else:
-            solve(plan, val, mu)
-        fill(F, 0.0)
-        add_transposed(rows, G, mu, 1.0, F)
-        for p in range(folds):
-            for i in range(F.shape[0]):
-                F[i] += fold.B[p, i] * fold.nu[p]
-        for i in range(F.shape[0]):
-            QS[j, i] = u[i] - F[i] * mass[i]
+        constrained(tb, folds, w, mu, u, QS[j])
+        if tb.light.shape[0] > 0:
+            add_carried(tb, folds, w, mu, QS[j])
         for r in range(mu.shape[0]):
             mu[r] *= alpha
         add_multipliers(rows, LM, bs, ls, at, mu)
@@ -198,6 +199,76 @@ def expand(tb, t, forward, order, folds, w):
             add_multipliers(rows, LM, bs, ls, at - 1, mu)
             add_line_multipliers(rows, bs, ls, at, 1, mu)
         finish_order(rows, forces, QS, bs, ls, es, j)
+
+
+def constrained(tb, folds, w, mu, u, q):
+    """q := the motion that a free motion u becomes under the constraints; mu (and fold.nu): gaps in, multipliers
+    out."""
+    fold, F = w.fold, w.F
+    if folds > 0:
+        fold_solve(tb.plan, w.val, fold, mu, folds)
+    else:
+        solve(tb.plan, w.val, mu)
+    fill(F, 0.0)
+    add_transposed(tb.rows, w.G, mu, 1.0, F)
+    for p in range(folds):
+        for i in range(F.shape[0]):
+            F[i] += fold.B[p, i] * fold.nu[p]
+    for i in range(F.shape[0]):
+        q[i] = u[i] - F[i] * tb.mass[i]
+
+
+def carry_responses(tb, folds, w):
+    """w.carry: what a unit of every light coordinate adds to coordinates (X) and multipliers (Y, W); 1 - X = L U.
+
+    D (1 - X) is symmetric and positive definite, so it needs no pivots.
+    """
+    carry, light, fold, u = w.carry, tb.light, w.fold, w.u
+    k = light.shape[0]
+    for c in range(k):
+        at = light[c]
+        fill(u, 0.0)
+        u[at] = tb.excess[c] * tb.mass[at]
+        times_gradients(tb.rows, w.G, u, carry.Y[c])
+        for r in range(carry.Y.shape[1]):
+            if w.skip[r] != 0:
+                carry.Y[c, r] = 0.0
+        for p in range(folds):
+            fold.nu[p] = fold.B[p, at] * u[at]
+        constrained(tb, folds, w, carry.Y[c], u, carry.X[c])
+        for p in range(folds):
+            carry.W[c, p] = fold.nu[p]
+    lu = carry.lu
+    for e in range(k):
+        for c in range(k):
+            lu[e, c] = (1.0 if e == c else 0.0) - carry.X[c, light[e]]
+            for i in range(min(e, c)):
+                lu[e, c] -= lu[e, i] * lu[i, c]
+            if c < e:
+                lu[e, c] /= lu[c, c]
+
+
+def add_carried(tb, folds, w, mu, q):
+    """Motion q and multipliers mu (and fold.nu) of the masses N become those of the masses M."""
+    carry, light = w.carry, tb.light
+    lu, own = carry.lu, carry.own
+    k = light.shape[0]
+    for e in range(k):
+        own[e] = q[light[e]]
+        for c in range(e):
+            own[e] -= lu[e, c] * own[c]
+    for e in range(k - 1, -1, -1):
+        for c in range(e + 1, k):
+            own[e] -= lu[e, c] * own[c]
+        own[e] /= lu[e, e]
+    for c in range(k):
+        value = own[c]
+        for i in range(q.shape[0]):
+            q[i] += carry.X[c, i] * value
+        for r in range(mu.shape[0]):
+            mu[r] += carry.Y[c, r] * value
+        for p in range(folds):
+            w.fold.nu[p] += carry.W[c, p] * value
 
 
 def start_series(rows, forces, order, QS, LM, bs, ls, es):
@@ -286,6 +357,9 @@ FUNCTIONS = (
     torque_orders,
     finish_order,
     expand,
+    constrained,
+    carry_responses,
+    add_carried,
     start_series,
     fold_rows,
     fold_solve,

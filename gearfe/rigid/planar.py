@@ -29,9 +29,9 @@ class Body:
     name : str
         Name used by joints and forces.
     mass : float
-        Mass (kg), > 0.
+        Mass (kg), >= 0; without mass where the joints hold the body to others that have some.
     inertia : float
-        Moment of inertia about the mass centre (kg m2), > 0.
+        Moment of inertia about the mass centre (kg m2), >= 0, likewise.
     centre : (float, float)
         Mass centre in the body's frame (m).
     position, angle : (float, float), float
@@ -56,9 +56,9 @@ class Body:
             if math.isfinite(value) and value > 0.0 and not LEAST_MASS <= value <= 1.0 / LEAST_MASS:
                 problem = f"must be >= {LEAST_MASS:g} and <= {1.0 / LEAST_MASS:g}: its inverse or its square overflows"
                 raise InputError(f"body {self.name!r} {key}", value, problem, f"give it in {unit}")
-            if not (math.isfinite(value) and value > 0.0):
-                cure = f"give a positive number in {unit}; a massless point on a line is a slot joint, not a body"
-                raise InputError(f"body {self.name!r} {key}", value, "must be finite and > 0", cure)
+            if not (math.isfinite(value) and value >= 0.0):
+                cure = f"give a number in {unit}; 0 for a link without {key}"
+                raise InputError(f"body {self.name!r} {key}", value, "must be finite and >= 0", cure)
 
 
 @dataclass(frozen=True)

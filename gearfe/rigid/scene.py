@@ -37,7 +37,7 @@ class PlanarScene(Element):
 
     def mass(self) -> Array:
         """Diagonal of masses and inertias."""
-        return np.diag(1.0 / self.assembly.tables.mass[: self.size])
+        return np.diag([m for b in self.scene.bodies for m in (b.mass, b.mass, b.inertia)])
 
     def start(self) -> tuple[Array, Array]:
         """Start state of the mass centres."""

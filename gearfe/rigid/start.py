@@ -10,13 +10,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import InputError
+from .carried import RANK, free_motions, mass_excess
 from .contract import Array
 from .system import System
 
 #: A row is dependent on earlier ones when this share of its gradient is left (noise of redundant rows: up to 3e-9).
 DEPENDENT = 1e-7
-#: Singular values of constraint gradients below this share of the largest count as zero.
-RANK = 1e-11
 #: Largest turn of a body in one step towards a closed position (rad), and most of these steps.
 TURN, MOST_STEPS = 0.3, 200
 #: Gaps of closed loops, relative to the mechanism's length or 1 rad.
@@ -54,13 +53,17 @@ class Freedoms:
 
 @dataclass(frozen=True)
 class Start:
-    """A consistent state: time, coordinates, velocities, freedoms; `active` marks the rows that are not redundant."""
+    """A consistent state: time, coordinates, velocities, freedoms; `active` marks the rows that are not redundant.
+
+    `excess`, shape (size,) or (0,), is the mass by which the elimination raises light links (`gearfe.rigid.carried`).
+    """
 
     time: float
     q: Array
     v: Array
     freedoms: Freedoms
     active: np.ndarray = field(repr=False)
+    excess: Array = field(default_factory=lambda: np.zeros(0), repr=False)
 
 
 def consistent_start(
@@ -89,7 +92,7 @@ def consistent_start(
     freedoms = count_freedoms(system, time, q)
     active = np.ones(system.rows, dtype=bool)
     active[list(freedoms.redundant)] = False
-    return Start(float(time), q, v, freedoms, active)
+    return Start(float(time), q, v, freedoms, active, mass_excess(system, time, q, v, active))
 
 
 def count_freedoms(system: System, time: float, q: Array, seed: int = 5) -> Freedoms:
@@ -135,14 +138,10 @@ def _time_of_change(system: System, time: float, q: Array, size: float) -> float
 
 
 def dependent_rows(system: System, time: float, q: Array) -> list[int]:
-    """Rows of G that depend on the ones before them, in the metric of the mass matrix."""
+    """Rows of G that depend on the ones before them, in coordinates and rows that compare."""
     if system.rows == 0:
         return []
-    G = system.jacobian(time, q)
-    if system.diagonal_mass:
-        B = G * np.sqrt(np.diagonal(system.inverse_mass))
-    else:
-        B = G @ np.linalg.cholesky(system.inverse_mass)
+    B = system.jacobian(time, q) * system.units / system.row_units[:, None]
     lengths = np.sqrt((B * B).sum(axis=1))
     lengths[lengths == 0.0] = 1.0
     B = B / lengths[:, None]
@@ -225,17 +224,16 @@ def closes(system: System, q: Array, gap: Array) -> bool:
 def least_change(system: System, G: Array, right: Array, sizes: Array) -> Array:
     """The change of least mass norm with G change = right, in the least-squares sense where G has lost rank.
 
-    The rows are divided by their `sizes`. Not-a-number where the rows or the right side are not finite: the callers
-    look at what comes back.
+    The rows are divided by their `sizes`. Links may be without mass. Not-a-number where the rows or the right side are
+    not finite: the callers look at what comes back.
     """
     if not (np.isfinite(G).all() and np.isfinite(right).all()):
         return np.full(system.size, np.nan)
-    G, right = G / sizes[:, None], right / sizes
-    if system.diagonal_mass:
-        root = np.sqrt(np.diagonal(system.inverse_mass))
-        return root * np.linalg.lstsq(G * root, right, rcond=RANK)[0]
-    root = np.linalg.cholesky(system.inverse_mass)
-    return root @ np.linalg.lstsq(G @ root, right, rcond=RANK)[0]
+    G, right = G * system.units / sizes[:, None], right / sizes
+    some = np.linalg.lstsq(G, right, rcond=RANK)[0]
+    free = free_motions(G)
+    root = system.mass_root() * system.units
+    return system.units * (some - free @ np.linalg.lstsq(root @ free, root @ some, rcond=None)[0])
 
 
 def _positions(system: System, time: float, q: Array, forced: Sequence[Forced]) -> Array:

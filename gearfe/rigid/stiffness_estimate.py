@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .carried import free_motions
 from .start import Start
 from .system import System
 
@@ -16,14 +17,9 @@ def fastest_rate(system: System, start: Start) -> tuple[float, float]:
     if not (system.linear or _has_springs(system)):
         return 0.0, 0.0
     by_q, by_v = system.force_jacobian(start.time, start.q, start.v)
-    G = system.jacobian(start.time, start.q)[start.active]
-    if system.diagonal_mass:
-        root = np.diag(np.sqrt(np.diagonal(system.inverse_mass)))
-    else:
-        root = np.linalg.cholesky(system.inverse_mass)
-    if len(G):
-        basis = np.linalg.qr((G @ root).T, mode="complete")[0][:, len(G) :]
-        root = root @ basis
+    G = system.jacobian(start.time, start.q)[start.active] / system.row_units[start.active, None]
+    free = system.units[:, None] * free_motions(G * system.units)
+    root = np.linalg.solve(np.linalg.qr(system.mass_root() @ free)[1].T, free.T).T  # root^T M root = 1
     K, C = -root.T @ by_q @ root, -root.T @ by_v @ root
     if K.size == 0:
         return 0.0, 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -57,7 +58,6 @@ class System:
         self.linear = bool(self.damping.any() or self.stiffness.any())
         diagonal = np.diagonal(self.mass)
         self.diagonal_mass = bool(np.array_equal(self.mass, np.diag(diagonal)))
-        self.inverse_mass = np.diag(1.0 / diagonal) if self.diagonal_mass else np.linalg.inv(self.mass)
         starts = [e.start() for e in self.elements]
         self.start_q = np.concatenate([s[0] for s in starts]) if starts else np.zeros(0)
         self.start_v = np.concatenate([s[1] for s in starts]) if starts else np.zeros(0)
@@ -72,6 +72,27 @@ class System:
                 self.turns[place[id(element)][2::3]] = True
         breaks = [getattr(e, "breaks", ()) for e in self.elements]
         self.breaks = np.unique(np.concatenate([np.asarray(b, dtype=float) for b in breaks])) if breaks else np.zeros(0)
+
+    @cached_property
+    def inverse_mass(self) -> Array:
+        """M^-1, shape (size, size); infinite for links without mass."""
+        return self.inverse_of(np.zeros(0))
+
+    def inverse_of(self, excess: Array) -> Array:
+        """(M + D)^-1 with D = diag(excess); no entries mean no excess."""
+        mass = self.mass + np.diag(excess) if excess.any() else self.mass
+        if not self.diagonal_mass:
+            return np.asarray(np.linalg.inv(mass), dtype=float)
+        with np.errstate(divide="ignore"):
+            return np.diag(1.0 / np.diagonal(mass))
+
+    def mass_root(self) -> Array:
+        """R with R^T R = M, shape (size, size)."""
+        held = np.diagonal(self.mass) > 0.0
+        root = np.zeros_like(self.mass)
+        part = self.mass[np.ix_(held, held)]
+        root[np.ix_(held, held)] = np.sqrt(part) if self.diagonal_mass else np.linalg.cholesky(part).T
+        return root
 
     @property
     def planar(self) -> PlanarScene | None:
@@ -131,18 +152,29 @@ class System:
             names += list(own) if own else [f"{label} ({k})" for k in range(element.rows)]
         return names
 
-    def acceleration(self, t: float, q: Array, v: Array, active: np.ndarray | None = None) -> tuple[Array, Array]:
-        """Accelerations and multipliers at a consistent state; rows that are not `active` carry none."""
+    def acceleration(
+        self, t: float, q: Array, v: Array, active: np.ndarray | None = None, excess: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Accelerations and multipliers at a consistent state; rows that are not `active` carry none.
+
+        `excess` is that of the start (`gearfe.rigid.carried`), which the elimination needs where links are light.
+        """
         f = self.force(t, q, v)
+        extra = np.zeros(self.size) if excess is None or not excess.any() else excess
+        inverse = self.inverse_of(extra) if extra.any() else self.inverse_mass
         if self.rows == 0:
-            return self.inverse_mass @ f, np.zeros(0)
+            return inverse @ f, np.zeros(0)
         keep = np.ones(self.rows, dtype=bool) if active is None else active
         G = self.jacobian(t, q)[keep]
-        right = G @ (self.inverse_mass @ f) + self.velocity_terms(t, q, v)[keep]
-        S = G @ self.inverse_mass @ G.T
+        light = np.flatnonzero(extra)
+        free = np.column_stack([f, np.diag(extra)[:, light]])  # and the answers to units of the light accelerations
+        right = G @ (inverse @ free)
+        right[:, 0] += self.velocity_terms(t, q, v)[keep]
+        pulls = solve_semidefinite(G @ inverse @ G.T, right)
+        made, shares = own_motion(inverse @ (free - G.T @ pulls), light)
         multipliers = np.zeros(self.rows)
-        multipliers[keep] = solve_semidefinite(S, right)
-        return self.inverse_mass @ (f - G.T @ multipliers[keep]), multipliers
+        multipliers[keep] = pulls @ shares
+        return made, multipliers
 
     def energy(self, q: Array, v: Array) -> tuple[float, float]:
         """Kinetic and potential energy (J)."""
@@ -159,10 +191,20 @@ class System:
         return np.concatenate(parts) if parts else np.zeros(0)
 
 
+def own_motion(answers: Array, light: np.ndarray) -> tuple[Array, Array]:
+    """Motion with the own masses, and the shares of the answers in it, from answers of masses with an excess.
+
+    `answers`, shape (size, 1 + k), hold the motion that the forces give, and those for a unit of each `light`
+    coordinate.
+    """
+    shares = np.append(1.0, np.linalg.solve(np.eye(len(light)) - answers[light, 1:], answers[light, 0]))
+    return answers @ shares, shares
+
+
 def solve_semidefinite(S: Array, right: Array) -> Array:
     """Solution of S x = right; the one of least norm where S has lost rank."""
     if len(S) == 0:
-        return np.zeros(0)
+        return np.zeros_like(right)
     try:
         factor = np.linalg.cholesky(S)
         scale = np.sqrt(np.abs(np.diagonal(S)))
@@ -177,7 +219,8 @@ def least_norm_solution(S: Array, right: Array, least: float) -> Array:
     """Solution of S x = right of least norm in rows of equal size; singular values below the share `least` are zero."""
     scale = np.sqrt(np.abs(np.diagonal(S)))
     scale[scale == 0.0] = 1.0
-    return np.asarray(np.linalg.lstsq(S / np.outer(scale, scale), right / scale, rcond=least)[0] / scale, dtype=float)
+    x = np.linalg.lstsq(S / np.outer(scale, scale), (right.T / scale).T, rcond=least)[0]
+    return np.asarray((x.T / scale).T, dtype=float)
 
 
 def element_jacobian(element: Element, t: float, q: Array, v: Array) -> tuple[Array, Array]:

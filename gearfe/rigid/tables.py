@@ -80,7 +80,9 @@ class Times(NamedTuple):
 class Tables(NamedTuple):
     """Everything the planar kernels need, for n bodies and m rows."""
 
-    mass: Array  # (3 (n + 1),) inverse: 1/m, 1/m, 1/I of each body, zero for the ground
+    mass: Array  # (3 (n + 1),) inverse of m, m, I of each body (with the excess of light ones), zero for the ground
+    light: Ints  # (k,) coordinates that are eliminated with more than their own mass, see `gearfe.rigid.carried`
+    excess: Array  # (k,) by how much
     rows: Rows
     plan: Factor
     forces: Forces
@@ -131,14 +133,28 @@ def assemble(scene: Scene) -> Assembly:
             for i, body in enumerate(scene.bodies):
                 weight[3 * i : 3 * i + 2] += body.mass * np.asarray(force.acceleration)
     inverse = np.zeros(3 * (n + 1))
-    for i, body in enumerate(scene.bodies):
-        inverse[3 * i : 3 * i + 3] = 1 / body.mass, 1 / body.mass, 1 / body.inertia
+    with np.errstate(divide="ignore"):  # a link may be without mass: see `carrying`
+        inverse[:-3] = 1.0 / np.array([(b.mass, b.mass, b.inertia) for b in scene.bodies], dtype=float).ravel()
     forces = Forces(weight, *_force_arrays(scene, local, time))
-    tables = Tables(inverse, _row_arrays(rows), plan.factor, forces, _time_arrays(functions))
+    tables = Tables(inverse, *_NONE, _row_arrays(rows), plan.factor, forces, _time_arrays(functions))
     breaks = np.unique([t for f in functions for t in f.breaks if math.isfinite(t)]).astype(float)
     return Assembly(
         tables, tuple(r.joint for r in rows), tuple(r.label for r in rows), q0, v0, breaks, _length(tables, q0), centre
     )
+
+
+_NONE = (np.zeros(0, dtype=np.int64), np.zeros(0))
+
+
+def carrying(assembly: Assembly, excess: Array) -> Assembly:
+    """The assembly with masses raised by `excess`, shape (3n,), in the elimination."""
+    light = np.flatnonzero(excess)
+    if light.size == 0:
+        return assembly
+    tables = assembly.tables
+    inverse = tables.mass.copy()
+    inverse[light] = 1.0 / (1.0 / inverse[light] + excess[light])
+    return assembly._replace(tables=tables._replace(mass=inverse, light=light, excess=excess[light]))
 
 
 class _Row(NamedTuple):

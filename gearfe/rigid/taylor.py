@@ -28,7 +28,7 @@ HOT = (
     "fill", "copy", "trigonometry", "gradients", "residuals", "times_gradients", "add_transposed", "solve",
     "least_norm",
     "angle_orders", "slot_orders", "row_orders", "spring_orders", "force_orders", "spring_force", "slot_forces",
-    "slot_arms", "add_multipliers", "add_line_multipliers", "torque_orders", "finish_order",
+    "slot_arms", "add_multipliers", "add_line_multipliers", "torque_orders", "finish_order", "constrained",
 )  # fmt: skip
 
 
@@ -46,6 +46,16 @@ class FoldFrame(NamedTuple):
     drop: Ints  # (d,) rows left out
 
 
+class Carry(NamedTuple):
+    """Answers of the masses N to k light coordinates, see kernel_series."""
+
+    X: Array  # (k, 3n) coordinates
+    Y: Array  # (k, m) multipliers
+    W: Array  # (k, d) multipliers of the fold
+    lu: Array  # (k, k)
+    own: Array  # (k,)
+
+
 class Work(NamedTuple):
     """Scratch arrays; n bodies with the ground, m rows, K orders."""
 
@@ -56,6 +66,7 @@ class Work(NamedTuple):
     ls: Array  # (6, K, moving lines)
     es: Array  # (5, K, springs)
     fold: FoldFrame
+    carry: Carry
     G: Array  # (m, 2, 3)
     H: Array  # (m, 2, 3) dG/dt
     val: Array  # (m + nnz,) factor
@@ -100,6 +111,7 @@ def most_folds(rows: Rows) -> int:
 def work_space(tables: Tables, order: int) -> Work:
     """Scratch arrays for series up to `order`."""
     K, n3, m, d = order + 3, tables.mass.size, len(tables.rows.ints), most_folds(tables.rows)
+    k = tables.light.size
     n, lines, springs = n3 // 3, tables.rows.lines.size, int((tables.forces.ints[:, 0] == kernel_planes.SPRING).sum())
 
     def zeros(count: int, *shape: int) -> list[Any]:
@@ -115,6 +127,7 @@ def work_space(tables: Tables, order: int) -> Work:
         np.zeros((6, K, lines)),
         np.zeros((5, K, springs)),
         FoldFrame._make(fold),
+        Carry(np.zeros((k, n3)), np.zeros((k, m)), np.zeros((k, d)), np.zeros((k, k)), np.zeros(k)),
         *zeros(2, m, 2, 3),
         np.zeros(m + tables.plan.row.size),
         *zeros(3, m),

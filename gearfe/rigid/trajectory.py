@@ -88,7 +88,8 @@ class Trajectory:
     method : str
         The one used; "auto" where it changed over.
     statistics
-        Scheme, steps, order or evaluations, singular passages, seconds to compile; the choice made.
+        Scheme, steps, order or evaluations, singular passages, seconds to compile; the choice made; the link without
+        mass that ended the run.
     dense
         Coordinates at any time of the run, by derivative.
     """
@@ -103,8 +104,14 @@ class Trajectory:
 
     @property
     def message(self) -> str:
-        """The status in words."""
-        return self.status.message
+        """The status in words, with the link that is to blame where one is known."""
+        link = self.statistics.get("loose_link")
+        if link is None:
+            return self.status.message
+        return (
+            f"{self.status.message}: body {link!r} has next to no mass and came where nothing with mass holds it "
+            "(a dead centre); give it mass and inertia"
+        )
 
     @property
     def reached(self) -> float:
@@ -141,6 +148,8 @@ class Trajectory:
 
     def multipliers_at(self, times: Array) -> Array:
         """Multipliers from M a = f - G^T lambda at the given times; not-a-number where they are beyond all numbers."""
+        excess = self.start.excess
+        inverse, light = self.system.inverse_of(excess), np.flatnonzero(excess)
         states = [self.dense(times, k) for k in range(3)]
         out = np.zeros((len(times), self.system.rows))
         keep = self.start.active
@@ -149,8 +158,10 @@ class Trajectory:
         for i, t in enumerate(times):
             q, v, a = (s[i] for s in states)
             G = self.system.jacobian(t, q)[keep]
-            right = G @ (self.system.inverse_mass @ (self.system.force(t, q, v)) - a)
-            S = G @ self.system.inverse_mass @ G.T
+            force = self.system.force(t, q, v)
+            force[light] += excess[light] * a[light]
+            right = G @ (inverse @ force - a)
+            S = G @ inverse @ G.T
             if not np.isfinite(right).all():  # forces so large that sums of them overflow
                 out[i] = np.nan
                 continue

@@ -17,8 +17,8 @@ Pair = tuple[float, float]
 class BodyTable:
     """[bodies.NAME]"""
 
-    mass_kg: float = quantity(above=0.0, doc="mass in kg, > 0; a massless point on a line is a joint, 'slot'")
-    inertia_kg_m2: float = quantity(above=0.0, doc="moment of inertia about the mass centre in kg m2, > 0")
+    mass_kg: float = quantity(low=0.0, doc="mass in kg, >= 0; 0 where the joints hold the body to others with mass")
+    inertia_kg_m2: float = quantity(low=0.0, doc="moment of inertia about the mass centre in kg m2, >= 0, likewise")
     centre_m: Pair = quantity((0.0, 0.0), doc="mass centre in the body's frame, [x, y] in m")
     position_m: Pair = quantity((0.0, 0.0), doc="start position of the frame's origin, [x, y] in m")
     angle_deg: float | None = quantity(None, doc="start angle in degrees (or give angle_rad)")
