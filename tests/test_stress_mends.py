@@ -150,7 +150,7 @@ def test_estimates_that_ended_without_a_reason(number: int) -> None:
         assert "shaft s1 moves by" in row.reason
 
 
-@pytest.mark.parametrize("share", [1e-13, 3e-12])
+@pytest.mark.parametrize("share", [0.0, 1e-13, 3e-12])
 def test_a_link_without_mass_does_not_stop_a_run(share: float, tmp_path: Path) -> None:
     """Campaign mechanisms, seed 61, case 67: the pivots of so light a coupler looked like a singular position.
 
@@ -167,7 +167,7 @@ def test_a_link_without_mass_does_not_stop_a_run(share: float, tmp_path: Path) -
         mechanism = load_mechanism(tmp_path / "job.toml")
         times = np.linspace(0.0, mechanism.file.run.end_s, 11)
         made[factor] = integrate(mechanism.system, times, tolerance=1e-8, start=mechanism.start(), backend="plain")
-    assert [m.method for m in made.values()] == ["implicit", "taylor"]
+    assert [m.method for m in made.values()] == ["taylor", "taylor"]
     assert [m.status for m in made.values()] == [0, 0]
     np.testing.assert_allclose(made[share].q, made[1e-8].q, atol=3e-6)
 

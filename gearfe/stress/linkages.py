@@ -109,9 +109,9 @@ def springs(random: np.random.Generator) -> Made:
 
 
 def light(random: np.random.Generator) -> Made:
-    """A four-bar linkage whose coupler has next to no mass, or none."""
+    """A four-bar linkage whose coupler has next to no mass."""
     tables, data = four_bar(random)
-    share = float(random.choice([rounded(log_uniform(random, 1e-15, 1e-2), 3), 0.0], p=[0.8, 0.2]))
+    share = rounded(log_uniform(random, 1e-15, 1e-2), 3)
     for key in ("mass_kg", "inertia_kg_m2"):
         tables["bodies"]["coupler"][key] *= share
     return tables, {**data, "mass_share": share}
