@@ -293,7 +293,7 @@ def test_bad_file_is_one_line_and_exit_code_two(tmp_path, capsys):
     assert main(["mechanism", str(bad), "--out", str(tmp_path / "out")]) == 2
     message = capsys.readouterr().err
     assert message.count("\n") == 1
-    assert "mass_kg = 0.0" in message
+    assert "mass_kg = -1.0" in message
 
 
 @pytest.mark.parametrize("script", ["andrews.py", "slider_crank.py"])
