@@ -25,6 +25,7 @@ least 0.2 module, since second derivatives of H magnify the noise of the element
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -67,8 +68,6 @@ class FlankCompliance:
         Arc lengths of the stations and half widths of their bumps (m).
     smooth : dict of int to ndarray, shape (2k, 2k)
         Step -> H between the stations of teeth so many steps apart, tooth axes, xy by station (m/N).
-    basis
-        Splines through the stations, their slopes and curvatures.
     offset
         Arc length on the mesh's chain of edges where the working flank starts (m).
     """
@@ -80,7 +79,6 @@ class FlankCompliance:
     stations: Array
     bumps: Array
     smooth: dict[int, Array]
-    basis: tuple[CubicSpline, CubicSpline, CubicSpline]
     offset: float
 
     def distance(self, s: Array) -> Array:
@@ -88,20 +86,54 @@ class FlankCompliance:
         here = np.maximum(s, self.curve.low)
         return np.maximum(np.abs(self.curve.at(here)[0] - self.corner), 1e-9) + (here - s)
 
-    def clearance(self, s: Array) -> Array:
-        """Square of the distance (m2) from the corner and from the edge of an undercut, at arc lengths s (m)."""
-        corner = self.distance(s) ** 2
-        if self.curve.face.fall == 0.0:
-            return corner
-        return 1 / (1 / corner + 1 / (s * s + TINY**2))
 
-    def shapes(self, s: Array) -> tuple[Array, Array, Array]:
-        """Shape functions of the stations at arc lengths s (m), slopes (1/m) and curvatures (1/m2), shape (..., k)."""
-        inside = np.clip(s, self.stations[0], self.stations[-1])
-        value, slope, bend = (one(inside) for one in self.basis)
-        # on beyond the last station with its curvature: without, the equations would jump there
-        on = (s - inside)[..., None]
-        return value + on * (slope + 0.5 * on * bend), slope + on * bend, bend
+@dataclass(frozen=True)
+class Shapes:
+    """Shape functions of the stations of pinion and wheel, k each: cubic splines, a parabola beyond the last station.
+
+    Without the parabola the curvature of the influence would jump at the last station, and with it the equations.
+
+    Attributes
+    ----------
+    stations : ndarray, shape (2, k)
+        Arc lengths (m), infinite where a gear has fewer.
+    origin : ndarray, shape (2 (k + 1),)
+        Arc lengths from which the pieces count, one before the first station and one behind each (m).
+    powers : ndarray, shape (2 (k + 1), 3 k, 4)
+        Coefficients of the rising powers of the arc length from there: of the functions, slopes and curvatures.
+    """
+
+    stations: Array
+    origin: Array
+    powers: Array
+
+    def at(self, s: Array) -> Array:
+        """At arc lengths s (m) of shape (p, 2): shape functions, slopes (1/m) and curvatures (1/m2), (p, 2, 3, k)."""
+        count = self.stations.shape[1]
+        piece = (s[:, :, None] >= self.stations).sum(axis=2) + np.array([0, count + 1])
+        t = s - self.origin.take(piece)
+        powers = t[:, :, None, None] ** np.arange(4)[:, None]
+        return np.asarray((self.powers.take(piece, axis=0) @ powers).reshape(*s.shape, 3, count))
+
+
+def shapes_of(stations: Sequence[Array]) -> Shapes:
+    """Shape functions of the stations (m) of pinion and wheel."""
+    most = max(len(one) for one in stations)
+    padded, origin = np.full((2, most), np.inf), np.zeros((2, most + 1))
+    powers = np.zeros((2, most + 1, 3, most, 4))
+    for gear, at in enumerate(stations):
+        k = len(at)
+        padded[gear, :k] = at
+        origin[gear, : k + 1] = at[[0, *range(k)]]
+        spline = CubicSpline(at, np.eye(k))
+        value = np.zeros((k + 1, k, 4))
+        value[1:k] = np.moveaxis(spline.c[::-1], 0, -1)
+        for piece, end in ((0, at[0]), (k, at[-1])):
+            value[piece, :, :3] = np.stack([spline(end), spline(end, 1), 0.5 * spline(end, 2)], axis=-1)
+        slope = value[..., 1:] * np.array([1, 2, 3])
+        for order, made in enumerate((value, slope, slope[..., 1:] * np.array([1, 2]))):
+            powers[gear, : k + 1, order, :k, : made.shape[-1]] = made
+    return Shapes(padded, origin.ravel(), powers.reshape(2 * (most + 1), 3 * most, 4))
 
 
 def flank_compliances(pair: GearPair, elastic: MeshingPair) -> tuple[FlankCompliance, FlankCompliance]:
@@ -134,16 +166,9 @@ def flank_compliance(
     loads = np.kron(nodal, np.eye(2))
     modes = loads @ body.far.flank
     smooth = {step: modes @ (driven @ loads.T) for step, driven in body.far.driven.items()}
-    made = FlankCompliance(
-        curve, inverse_modulus, corner, wedge, stations - offset, bumps, smooth, _splines(stations - offset), offset
-    )
+    made = FlankCompliance(curve, inverse_modulus, corner, wedge, stations - offset, bumps, smooth, offset)
     smooth[0] = smooth[0] + loads @ body.own @ loads.T + inverse_modulus / width * _local(made)
     return made
-
-
-def _splines(stations: Array) -> tuple[CubicSpline, CubicSpline, CubicSpline]:
-    basis = CubicSpline(stations, np.eye(len(stations)))
-    return basis, basis.derivative(), basis.derivative(2)
 
 
 def _corner(curve: FlankCurve) -> tuple[complex, Array]:

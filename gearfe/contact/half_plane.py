@@ -27,6 +27,7 @@ add :math:`(\langle x^2\rangle - a^2/4)\,H_{ss}`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -43,9 +44,8 @@ from .half_plane_result import (
     no_contacts,
     pair_sums,
 )
-from .half_plane_step import Before, HalfPlanePair, Step, half_plane_pair, moved_on, outgrown, smooth_influence, step
-from .moved_faces import Frames
-from .panels import Couplings, couplings, forces_of_overlaps
+from .half_plane_step import WINDOW, HalfPlanePair, State, Step, half_plane_pair, moved_on, smooth_influence, step
+from .panels import PANELS, Couplings, couplings, forces_of_overlaps
 from .records import joined, taken
 
 __all__ = ["HalfPlanePair", "HalfPlaneSolution", "PairContacts", "half_plane_pair", "solve_half_plane"]
@@ -53,14 +53,18 @@ __all__ = ["HalfPlanePair", "HalfPlaneSolution", "PairContacts", "half_plane_pai
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-#: Relative change of the forces from step to step at which a position is solved but for its last steps; most steps.
-TOLERANCE, STEPS = 1e-5, 20
+#: Most steps; change of the forces, in units of their sum, from which on windows and bearing panels are held.
+STEPS, NEAR = 30, 2e-5
 #: What moves of contacts by their width count as changes of force: they are of second order there (see above).
 MOVED = 0.1
-#: Steps after which most positions are within some per mille of their solution.
-NEAR_STEPS = 3
-#: Last steps, with the windows and the bearing panels held: after so many, derivatives err by 1e-3.
-HELD_STEPS = 3
+#: Change from which on windows grow that cut a pressure.
+GROWING = 5e-3
+#: Steps in which windows are searched for: where the pressure moves by what one panel makes of its end, a window that
+#: follows it might do so for ever.
+SEARCHES = 8
+#: Steps with windows and bearing panels held, after which derivatives err by 1e-3, and the change in the last of them
+#: with which a position is solved.
+HELD_STEPS, TOLERANCE = 3, 1e-6
 #: What the twist is ahead for derivatives: share of its way since the touch, and at least (rad).
 AHEAD, LEAST_AHEAD = 1e-3, 1e-10
 #: Force per width (N/m) below which there is none.
@@ -130,34 +134,24 @@ class _Open:
         """What a step changed, shape (m,): the forces in units of their sum, and weighted by them the places and widths
         of the contacts, in units of these.
         """
-        new, spread = made.solution.force, made.spread
+        new, old, spread = made.solution.force, self.pairs.state, made.spread
         safe = np.where(spread > 0, spread, 1.0)
-        moved = np.where(
-            spread > 0, 0.5 * np.abs(made.place) / np.sqrt(safe) + np.abs(1 - self.pairs.spread / safe), 0.0
-        )
-        all_ = np.abs(new - self.pairs.force) + MOVED * new * moved
+        moved = (spread > 0) * (0.5 * np.abs(made.place) / np.sqrt(safe) + np.abs(1 - old.spread / safe))
+        all_ = np.abs(new - old.force) + MOVED * new * moved
         return self.couples.total(all_) / np.maximum(self.couples.total(new), TINY)
 
-    def moved_on(self, law: HalfPlanePair, made: Step, *, near: bool = False) -> _Open:
+    def moved_on(self, law: HalfPlanePair, made: Step, *, near: NDArray[np.bool_] | bool = False) -> _Open:
         """What the next step starts from."""
-        frames, before = moved_on(law, made, self.pairs.before, near=near)
-        return _Open(self.numbers, _Pairs(self.pairs.found, frames, made.solution.force, made.spread, before))
+        state = moved_on(law, self.pairs.state, made, near=near)
+        return _Open(self.numbers, _Pairs(self.pairs.found, state))
 
 
 @dataclass(frozen=True)
 class _Pairs:
-    """Where the rigid flanks of p tooth pairs touch, and where their next `half_plane_step.step` starts from."""
+    """Where the rigid flanks of p tooth pairs touch, and what their next `half_plane_step.step` starts from."""
 
     found: Touching
-    frames: Frames
-    force: Array
-    spread: Array
-    before: Before | None
-
-
-def _stepped(law: HalfPlanePair, open_: _Open, *, held: bool = False) -> Step:
-    pairs = open_.pairs
-    return step(law, pairs.frames, pairs.force, pairs.spread, open_.couples, pairs.before, held=held)
+    state: State
 
 
 def _first(law: HalfPlanePair, twists: Array, found: Touching) -> _Open:
@@ -166,68 +160,90 @@ def _first(law: HalfPlanePair, twists: Array, found: Touching) -> _Open:
         found.angle + found.pair * law.pair.mesh_cycle,
         law.flanks.wheel_frame(found.angle, found.pair) + twists[found.position],
     ]
-    none = np.zeros((len(found), 2), dtype=complex)
-    frames = Frames(
+    nothing = np.zeros(len(found))
+    state = State(
         centre=found.point,
         normal=found.normal,
         turn=np.exp(1j * np.stack(turn, axis=1)),
-        hub=np.broadcast_to(law.hub, (len(found), 2)),
         arc=np.stack([curve.arc_at(found.place[:, g]) for g, curve in enumerate(law.curves)], axis=1),
-        shift=none,
-        stretch=none,
+        force=nothing,
+        spread=nothing,
+        low=nothing,
+        high=nothing,
+        bearing=np.zeros((len(found), PANELS), dtype=bool),
+        reach=np.full(len(found), WINDOW),
     )
-    nothing = np.zeros(len(found))
-    start = _Open(np.unique(found.position), _Pairs(found, frames, nothing, nothing, None))
+    start = _Open(np.unique(found.position), _Pairs(found, state))
     if len(found) == 0:
         return start
     overlap = found.arm[:, 1] * (twists[found.position] - found.twist)
-    T = smooth_influence(law, frames, start.couples).compliance
+    T = smooth_influence(law, state, start.couples).compliance
     force = forces_of_overlaps(overlap, USUAL_APPROACH * law.compliance, T, start.couples)
-    return _Open(start.numbers, replace(start.pairs, force=force))
+    return _Open(start.numbers, _Pairs(found, replace(state, force=force)))
 
 
 def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) -> HalfPlaneSolution:
     status, iterations = np.full(len(angles), "no_contact", dtype="<U13"), np.zeros(len(angles), dtype=np.int64)
-    done: list[_Open] = []
-    open_ = _first(law, twists, found)
-    status[open_.numbers] = "not_converged"
-    for number in range(1, STEPS + 1):
-        if len(open_.numbers) == 0:
-            break
-        made, couples = _stepped(law, open_), open_.couples
-        iterations[open_.numbers] = number
-        unsettled = couples.total((~made.solution.settled | outgrown(made)).astype(float)) > 0
-        near = ~unsettled & (open_.change(made) <= TOLERANCE) & (number > 1)
-        bears = couples.total(made.solution.force) > 0
-        status[open_.numbers[near & ~bears]] = "no_contact"
-        open_ = open_.moved_on(law, made, near=number >= NEAR_STEPS)
-        if (near & bears).any():
-            done.append(open_.kept(near & bears))
-        if near.any():
-            open_ = open_.kept(~near)
     names = (*SUMS, "tangent")
-    numbers = {name: np.where(status == "no_contact", 0.0, np.nan) for name in names}
-    contacts = no_contacts()
-    if done:
-        pairs = joined([part.pairs for part in done])
-        order = np.lexsort((pairs.found.pair, pairs.found.position))
-        all_ = _Open(np.sort(np.concatenate([part.numbers for part in done])), taken(pairs, order))
-        settled, sums, contacts = _finished(law, all_, twists)
-        status[all_.numbers] = np.where(settled, "converged", "not_converged")
+    numbers = {name: np.zeros(len(angles)) for name in names}
+    contacts = [no_contacts()]
+    open_ = _first(law, twists, found)
+    number = 0
+    while len(open_.numbers) and number < STEPS:  # again for those that are not settled in the last steps
+        done: list[_Open] = []
+        while len(open_.numbers) and number < STEPS:
+            number += 1
+            couples = open_.couples
+            made = step(law, open_.pairs.state, couples, search=number <= SEARCHES)
+            iterations[open_.numbers] += 1
+            unsettled = couples.total(~made.solution.settled | made.outgrown) > 0
+            change = open_.change(made)
+            near = (change <= NEAR) & ~unsettled & (number > 1)
+            bears = couples.total(made.solution.force) > 0
+            open_ = open_.moved_on(law, made, near=(change <= GROWING)[couples.position])
+            if (near & bears).any():
+                done.append(open_.kept(near & bears))
+            if near.any():
+                open_ = open_.kept(~near)
+        if not done:
+            break
+        all_ = _joined(done)
+        settled, sums, loaded, all_ = _finished(law, all_, twists)
         iterations[all_.numbers] += HELD_STEPS
+        number += HELD_STEPS
+        solved = all_.numbers[settled]
+        status[solved] = "converged"
         for name in names:
-            numbers[name][all_.numbers] = np.where(settled, sums[name], np.nan)
-        contacts = taken(contacts, status[contacts.position] == "converged")
+            numbers[name][solved] = sums[name][settled]
+        contacts.append(taken(loaded, status[loaded.position] == "converged"))
+        if not settled.all():
+            open_ = _joined([open_, all_.kept(~settled)])
+    failed = open_.numbers
+    status[failed] = "not_converged"
+    for name in names:
+        numbers[name][failed] = np.nan
+    found_ = contacts[1] if len(contacts) == 2 else joined(contacts)
+    if len(contacts) > 2:
+        found_ = taken(found_, np.lexsort((found_.pair, found_.position)))
     return HalfPlaneSolution(
-        pinion_angle=angles, twist=twists, status=status, iterations=iterations, contacts=contacts, **numbers
+        pinion_angle=angles, twist=twists, status=status, iterations=iterations, contacts=found_, **numbers
     )
+
+
+def _joined(parts: Sequence[_Open]) -> _Open:
+    """One after the other, in rising order."""
+    if len(parts) == 1:
+        return parts[0]
+    pairs = joined([part.pairs for part in parts])
+    order = np.lexsort((pairs.found.pair, pairs.found.position))
+    return _Open(np.sort(np.concatenate([part.numbers for part in parts])), taken(pairs, order))
 
 
 def _finished(
     law: HalfPlanePair, open_: _Open, twists: Array
-) -> tuple[NDArray[np.bool_], dict[str, Array], PairContacts]:
+) -> tuple[NDArray[np.bool_], dict[str, Array], PairContacts, _Open]:
     """Last steps of positions that are near their solution, there and at a slightly larger twist: whether they settled,
-    their sums over the pairs, and the contacts.
+    their sums over the pairs, the contacts, and where they are now.
 
     Windows and bearing panels are held, so that the differences are derivatives.
     """
@@ -235,20 +251,23 @@ def _finished(
     touch = np.full(count, np.inf)
     np.minimum.at(touch, couples.position, pairs.found.twist)
     ahead = np.maximum(AHEAD * (twists[open_.numbers] - touch), LEAST_AHEAD)
-    turn = pairs.frames.turn * np.array([1.0, 1.0])
+    turn = pairs.state.turn.copy()
     turn[:, 1] *= np.exp(1j * ahead[couples.position])
     shifted = replace(pairs.found, position=pairs.found.position + len(twists))
-    there = replace(pairs, found=shifted, frames=replace(pairs.frames, turn=turn))
+    there = _Pairs(shifted, replace(pairs.state, turn=turn))
     both = _Open(np.concatenate([open_.numbers, open_.numbers + len(twists)]), joined([pairs, there]))
-    for _ in range(HELD_STEPS):
-        made = _stepped(law, both, held=True)
-        change = both.change(made)
+    made = step(law, both.pairs.state, both.couples, search=False, held=True)
+    for _ in range(HELD_STEPS - 1):
         both = both.moved_on(law, made)
-    here, on = taken(made, slice(0, len(couples.position))), taken(made, slice(len(couples.position), None))
-    one, two = pair_sums(law, here), pair_sums(law, on)
-    sums = {name: couples.total(one[name]) for name in SUMS}
-    sums["tangent"] = couples.total(two["torque_wheel"] - one["torque_wheel"]) / ahead
-    settled = (change[:count] <= TOLERANCE) & (sums["tangent"] > 0)
-    loaded = np.flatnonzero(here.solution.force > 0)
-    rates = contact_rates(law, here, on, ahead[couples.position])
-    return settled, sums, contacts_of(law, pairs.found, here, one | rates, loaded)
+        made = step(law, both.pairs.state, both.couples, search=False, held=True)
+    here, on = slice(0, len(couples.position)), slice(len(couples.position), None)
+    change, state = both.change(made)[:count], both.pairs.state
+    now = _Open(open_.numbers, _Pairs(pairs.found, taken(moved_on(law, state, made, near=False), here)))
+    one, two = (taken(state, here), taken(made, here)), (taken(state, on), taken(made, on))
+    of_pairs, ahead_of_pairs = pair_sums(law, *one), pair_sums(law, *two)
+    sums = {name: couples.total(of_pairs[name]) for name in SUMS}
+    sums["tangent"] = couples.total(ahead_of_pairs["torque_wheel"] - of_pairs["torque_wheel"]) / ahead
+    right = couples.total(~one[1].solution.settled) == 0
+    settled = right & (change <= TOLERANCE) & (sums["tangent"] > 0)
+    known = of_pairs | contact_rates(law, one, two, ahead[couples.position])
+    return settled, sums, contacts_of(law, pairs.found, one, known), now

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gear.flank_curve import FlankCurve
 from ..gear.touching import Touching
-from .half_plane_step import HalfPlanePair, Step, cross
+from .half_plane_step import HalfPlanePair, State, Step, cross
 from .moved_faces import WAY
 from .panels import PANELS
 from .records import taken
@@ -140,29 +138,37 @@ def no_contacts() -> PairContacts:
     return PairContacts(**{name: np.zeros(shapes.get(name, (0,)), kinds.get(name, float)) for name in names})
 
 
-def pair_sums(law: HalfPlanePair, made: Step) -> dict[str, Array]:
+def pair_sums(law: HalfPlanePair, state: State, made: Step) -> dict[str, Array]:
     """What each pair adds to the sums over its position (N m, N m, N m, J)."""
-    frames, force = made.frames, made.solution.force * law.width
-    centre = frames.centre - 1j * frames.normal * made.place
-    wheel = -cross(centre - law.hub[1], frames.normal)
-    material = law.curves[1].at(frames.arc[:, 1] + WAY[1] * made.place)[0] * frames.turn[:, 1]
+    force, normal = made.solution.force * law.width, state.normal
+    centre = _centres(state, made)
+    wheel = law.tables.at(_material(made)[:, :, None])[0][:, 1, 0] * state.turn[:, 1]
     return {
-        "torque_wheel": force * wheel,
-        "torque_pinion": force * cross(centre, frames.normal),
-        "torque_wheel_reaction": -force * cross(material, frames.normal),
+        "torque_wheel": -force * cross(centre - law.hub[1], normal),
+        "torque_pinion": force * cross(centre, normal),
+        "torque_wheel_reaction": -force * cross(wheel, normal),
         "energy": made.energy * law.width,
     }
 
 
+def _centres(state: State, made: Step) -> ComplexArray:
+    """Centres of pressure (m), global axes."""
+    return np.asarray(state.centre + state.normal * (made.height - 1j * made.place))
+
+
+def _material(made: Step) -> Array:
+    """Arc lengths (m) of the material there, shape (p, 2)."""
+    return made.arc + made.place[:, None] * WAY
+
+
 def contacts_of(
-    law: HalfPlanePair, found: Touching, made: Step, known: dict[str, Array], index: IntArray
+    law: HalfPlanePair, found: Touching, solved: tuple[State, Step], known: dict[str, Array]
 ) -> PairContacts:
-    """The pairs `index` of a step, which carry load; `known` are their torques and rates."""
-    frames = taken(made.frames, index)
-    force, spread = made.solution.force[index], made.spread[index]
-    place, pressure, width = made.place[index], made.solution.pressure[index], made.width[index]
-    arcs, half_width = made.arcs[index], 2 * np.sqrt(spread)
-    arc = frames.arc + place[:, None] * np.array(WAY)
+    """The pairs of a step that carry load; `known` are the torques and rates of all."""
+    index = np.flatnonzero(solved[1].solution.force > 0)
+    state, made = taken(solved[0], index), taken(solved[1], index)
+    force, pressure, width = made.solution.force, made.solution.pressure, made.width
+    arc, half_width = _material(made), 2 * np.sqrt(made.spread)
     return PairContacts(
         position=found.position[index],
         pair=found.pair[index],
@@ -173,55 +179,41 @@ def contacts_of(
         arc_rate=known["arc_rate"][index],
         torque_wheel=known["torque_wheel"][index],
         torque_pinion=known["torque_pinion"][index],
-        point=frames.centre - 1j * frames.normal * place,
-        normal=frames.normal,
+        point=_centres(state, made),
+        normal=state.normal,
         arc=arc,
         parameter=np.stack([curve.parameter_at(arc[:, g]) for g, curve in enumerate(law.curves)], axis=1),
         half_width=half_width,
         hertz_pressure=2 * force / (np.pi * half_width),
-        mark=_marks(law.curves, arcs, pressure, width),
-        x=made.x[index] - place[:, None],
+        mark=_reached(law, made.arcs, pressure, width),
+        x=made.x - made.place[:, None],
         width=width,
         pressure=pressure,
-        panel_arc=arcs,
-        panel_radius=np.abs(np.stack([curve.at(arcs[:, g])[0] for g, curve in enumerate(law.curves)], axis=1)),
+        panel_arc=made.arcs,
+        panel_radius=np.abs(law.tables.at(made.arcs)[0]),
     )
 
 
-def contact_rates(law: HalfPlanePair, here: Step, ahead: Step, by: Array) -> dict[str, Array]:
+def contact_rates(
+    law: HalfPlanePair, here: tuple[State, Step], ahead: tuple[State, Step], by: Array
+) -> dict[str, Array]:
     """Rates of `PairContacts` for all pairs, from the same step at twists larger by `by` (rad), shape (p,)."""
-    one, two = (made.frames.arc + made.place[:, None] * np.array(WAY) for made in (here, ahead))
-    wider = np.divide(ahead.spread, here.spread, out=np.ones(len(by)), where=here.spread > 0)
+    (state, one), (state_on, two) = here, ahead
+    wider = np.divide(two.spread, one.spread, out=np.ones(len(by)), where=one.spread > 0)
     return {
-        "force_rate": (ahead.solution.force - here.solution.force) * law.width / by,
-        "normal_rate": np.angle(ahead.frames.normal / here.frames.normal) / by,
+        "force_rate": (two.solution.force - one.solution.force) * law.width / by,
+        "normal_rate": np.angle(state_on.normal / state.normal) / by,
         "growth": 0.5 * (wider - 1) / by,
-        "arc_rate": (two - one) / by[:, None],
+        "arc_rate": (_material(two) - _material(one)) / by[:, None],
     }
 
 
-def _marks(curves: Sequence[FlankCurve], arcs: Array, pressure: Array, width: Array) -> NDArray[np.str_]:
+def _reached(law: HalfPlanePair, arcs: Array, pressure: Array, width: Array) -> NDArray[np.str_]:
     """Mark that each pressure reaches, see `PairContacts`: it ends within a panel beside the middle of the last one."""
-    bears = pressure > 0
+    bears = (pressure > 0)[:, None]
     reached = np.zeros(len(arcs), dtype="<U8")
-    low = np.where(bears[:, None], arcs - width[:, None], np.inf).min(axis=2)
-    high = np.where(bears[:, None], arcs + width[:, None], -np.inf).max(axis=2)
-    for name in ("undercut", "relief", "round", "tip"):  # what comes later wins
-        for gear, curve in enumerate(curves):
-            at = _mark(curve, name)
-            if at is not None:
-                reached = np.where((low[:, gear] <= at) & (at <= high[:, gear]), name, reached)
+    low = np.where(bears, arcs - width[:, None], np.inf).min(axis=2)
+    high = np.where(bears, arcs + width[:, None], -np.inf).max(axis=2)
+    for name, gear, at in law.marks:  # what comes later wins
+        reached[(low[:, gear] <= at) & (at <= high[:, gear])] = name
     return reached
-
-
-def _mark(curve: FlankCurve, name: str) -> float | None:
-    """Arc length (m) of a mark of a flank."""
-    face = curve.face
-    found = {
-        "undercut": 0.0 if face.fall > 0.0 else None,
-        "relief": face.relief_start if face.flank.kinked else None,
-        "round": None if face.sharp else 1.0,
-        "tip": face.end if face.sharp else None,
-    }
-    at = found[name]
-    return None if at is None else float(curve.arc_at(at))

@@ -2,30 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gear.flank_curve import FlankCurve
+from ..gear.flank_curve import FlankCurve, FlankTables, flank_tables
 from ..gear.pair import GearPair
 from ..gear.touching import Flanks
-from .flank_compliance import FlankCompliance, flank_compliances
-from .moved_faces import WAY, Frames, Windows, windows
+from .flank_compliance import FlankCompliance, Shapes, flank_compliances, shapes_of
+from .moved_faces import WAY, Faces, Windows, windows
 from .panels import MIDDLES, WIDTHS, Couplings, Pressed, first_guess, influence, pressed
 from .scene import MeshingPair
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 ComplexArray = NDArray[np.complex128]
 
 #: Gap at the window's ends in units of that at the ends of Hertz's contact of the same force, and what it grows by
 #: where the pressure reaches an end: beside edges contacts are wider.
 WINDOW, WIDER = 1.25, 1.6
-#: Force, of all pairs of a position, below which a window is not made smaller.
-LEAST_FORCE = 1e-4
+#: Force, of all pairs of a position, and half width in modules below which a window is not made smaller.
+LEAST_FORCE, LEAST_WIDTH = 1e-4, 1e-6
+#: Distance (m) from an edge that is none.
+LEAST_DISTANCE = 1e-9
+#: Directions of the forces of a contact on pinion and wheel along n.
+_SIGN = np.array([-1.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -55,14 +59,87 @@ class HalfPlanePair:
         return self.sides[0].curve, self.sides[1].curve
 
     @cached_property
+    def tables(self) -> FlankTables:
+        """Both flanks in one table."""
+        return flank_tables(self.curves)
+
+    @cached_property
+    def shapes(self) -> Shapes:
+        """Shape functions of the stations."""
+        return shapes_of([side.stations for side in self.sides])
+
+    @cached_property
+    def inverse_modulus(self) -> Array:
+        """1/E' (1/Pa), shape (2,)."""
+        return np.array([side.inverse_modulus for side in self.sides])
+
+    @cached_property
     def compliance(self) -> float:
         """2/pi (1/E_1' + 1/E_2') (1/Pa)."""
-        return 2 / np.pi * sum(side.inverse_modulus for side in self.sides)
+        return float(2 / np.pi * self.inverse_modulus.sum())
 
     @cached_property
     def hub(self) -> Array:
         """x of the gears' centres (m), shape (2,)."""
         return np.array([0.0, self.pair.working_centre_distance])
+
+    @cached_property
+    def corner(self) -> ComplexArray:
+        """Corners of flanks and tip circles (m), shape (2,)."""
+        return np.array([side.corner for side in self.sides])
+
+    @cached_property
+    def wedge(self) -> tuple[Array, ComplexArray]:
+        """W of both gears as W v = a v + b conj(v), both of shape (2,) (-)."""
+        W = np.array([side.wedge for side in self.sides])
+        return 0.5 * (W[:, 0, 0] + W[:, 1, 1]), 0.5 * (W[:, 0, 0] - W[:, 1, 1]) + 1j * W[:, 0, 1]
+
+    @cached_property
+    def undercut(self) -> Array:
+        """1 where the working flank starts with the edge of an undercut, shape (2,)."""
+        return np.array([float(curve.face.fall > 0.0) for curve in self.curves])
+
+    @cached_property
+    def marks(self) -> list[tuple[str, int, float]]:
+        """Name, gear and arc length (m) of the flanks' marks, see `half_plane_result.PairContacts`, by rising rank."""
+        found = []
+        for name in ("undercut", "relief", "round", "tip"):
+            for gear, curve in enumerate(self.curves):
+                face = curve.face
+                at = {
+                    "undercut": 0.0 if face.fall > 0.0 else None,
+                    "relief": face.relief_start if face.flank.kinked else None,
+                    "round": None if face.sharp else 1.0,
+                    "tip": face.end if face.sharp else None,
+                }[name]
+                if at is not None:
+                    found.append((name, gear, float(curve.arc_at(at))))
+        return found
+
+    @cached_property
+    def bump_squares(self) -> Array:
+        """Mean squares a^2/4 of the stations' bumps (m2), shape (2, k)."""
+        made = np.zeros_like(self.shapes.stations)
+        for gear, side in enumerate(self.sides):
+            made[gear, : len(side.bumps)] = 0.25 * side.bumps**2
+        return made
+
+    def influence(self, steps: int) -> Array:
+        """w H between the stations of teeth -steps ... steps apart, shape (2, 2k, (2 steps + 1) 2k) (m2/N)."""
+        if steps not in self._influences:
+            k = self.shapes.stations.shape[1]
+            made = np.zeros((2, k, 2, 2 * steps + 1, k, 2))
+            for gear, side in enumerate(self.sides):
+                n = len(side.stations)
+                for step in range(-steps, steps + 1):
+                    smooth = side.smooth[step if gear == 0 else -step]
+                    made[gear, :n, :, step + steps, :n] = self.width * smooth.T.reshape(n, 2, n, 2)
+            self._influences[steps] = made.reshape(2, 2 * k, -1)
+        return self._influences[steps]
+
+    @cached_property
+    def _influences(self) -> dict[int, Array]:
+        return {}
 
 
 def half_plane_pair(pair: GearPair, elastic: MeshingPair) -> HalfPlanePair:
@@ -71,24 +148,61 @@ def half_plane_pair(pair: GearPair, elastic: MeshingPair) -> HalfPlanePair:
 
 
 @dataclass(frozen=True)
-class Smooth:
-    """Influence of loads along the normals on the smooth displacements of p faces.
+class State:
+    """What a step of the balance of p tooth pairs starts from; pinion and wheel in the second axis.
 
     Attributes
     ----------
-    compliance : ndarray, shape (c,)
-        T = w n H n, by couple (m2/N).
-    values, slopes, bends : tuple of ndarray, shape (p, k)
-        Shape functions of the stations at the arcs, for pinion and wheel.
-    moved : tuple of dict of int to ndarray, shape (p, 2k)
-        For each gear: step -> displacements of the stations so many teeth on for a force per width along n (m2/N).
+    centre, normal : ndarray of complex, shape (p,)
+        O (m) and n, global axes.
+    turn : ndarray of complex, shape (p, 2)
+        Turn of the teeth: tooth axes to global ones.
+    arc : ndarray, shape (p, 2)
+        The material at O (m).
+    force, spread : ndarray, shape (p,)
+        Force per width (N/m) that displaces the faces, and the variance of its pressure (m2).
+    low, high : ndarray, shape (p,)
+        Ends of the windows of the step before along the tangent from O (m).
+    bearing : ndarray of bool, shape (p, n)
+        Panels that bore then; none at first.
+    reach : ndarray, shape (p,)
+        Gap at the window's ends, in units of that at the ends of Hertz's contact.
     """
 
+    centre: ComplexArray
+    normal: ComplexArray
+    turn: ComplexArray
+    arc: Array
+    force: Array
+    spread: Array
+    low: Array
+    high: Array
+    bearing: BoolArray
+    reach: Array
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """Influence of the loads of p tooth pairs along n on the smooth displacements of the faces, in c couples.
+
+    Attributes
+    ----------
+    normal : ndarray of complex, shape (p, 2)
+        n in the teeth's axes.
+    values, bends : ndarray, shape (p, 2, k)
+        Shape functions of the stations at the arcs, and their curvatures (1/m2).
+    moved : ndarray of complex, shape (c, 2, 3)
+        Displacement, its slope and curvature of the first face of each couple by a unit force per width on the second,
+        tooth axes (m2/N, m/N, 1/N).
+    compliance : ndarray, shape (c,)
+        T = w n H n (m2/N).
+    """
+
+    normal: ComplexArray
+    values: Array
+    bends: Array
+    moved: ComplexArray
     compliance: Array
-    values: tuple[Array, Array]
-    slopes: tuple[Array, Array]
-    bends: tuple[Array, Array]
-    moved: tuple[dict[int, Array], dict[int, Array]]
 
 
 @dataclass(frozen=True)
@@ -97,16 +211,18 @@ class Step:
 
     Attributes
     ----------
-    frames
-        Frames in which it was solved.
-    window
-        Where the panels are.
     solution
         Pressures and forces.
-    x, width, gap : ndarray, shape (p, n)
-        Panels' middles, widths and the gap there (m).
+    low, high : ndarray, shape (p,)
+        Ends of the windows (m).
+    outgrown : ndarray of bool, shape (p,)
+        Pairs whose pressure reaches an end of its window beyond which both faces go on.
+    x, width : ndarray, shape (p, n)
+        Panels' middles and widths (m).
     arcs : ndarray, shape (p, 2, n)
         Arc lengths of the panels' middles (m).
+    arc, height : ndarray, shape (p, 2), (p,)
+        The material at O, and the height of the faces' middle there (m).
     place, spread : ndarray, shape (p,)
         Mean place of the pressure (m) and its variance about it (m2).
     slope : ndarray, shape (p,)
@@ -115,36 +231,19 @@ class Step:
         Elastic energy of each pair per width (J/m).
     """
 
-    frames: Frames
-    window: Windows
     solution: Pressed
+    low: Array
+    high: Array
+    outgrown: BoolArray
     x: Array
     width: Array
-    gap: Array
     arcs: Array
+    arc: Array
+    height: Array
     place: Array
     spread: Array
     slope: Array
     energy: Array
-
-
-@dataclass(frozen=True)
-class Before:
-    """What a step takes from the step before.
-
-    Attributes
-    ----------
-    window
-        Windows, seen from where the pressure was then.
-    bearing : ndarray of bool, shape (p, n)
-        Panels that bore.
-    reach : ndarray, shape (p,)
-        Gap at the next windows' ends, in units of that at the ends of Hertz's contact.
-    """
-
-    window: Windows
-    bearing: NDArray[np.bool_]
-    reach: Array
 
 
 def cross(a: ComplexArray, b: ComplexArray) -> Array:
@@ -152,172 +251,123 @@ def cross(a: ComplexArray, b: ComplexArray) -> Array:
     return np.asarray((np.conj(a) * b).imag)
 
 
-def _components(vectors: ComplexArray) -> Array:
-    return np.stack([vectors.real, vectors.imag], axis=-1)
-
-
-def smooth_influence(law: HalfPlanePair, frames: Frames, couples: Couplings) -> Smooth:
+def smooth_influence(law: HalfPlanePair, state: State, couples: Couplings) -> Smooth:
     """H at the arcs and along the normals of all pairs."""
-    total = np.zeros(len(couples.first))
-    parts: list[tuple[Array, Array, Array]] = []
-    moved: list[dict[int, Array]] = []
-    for gear, side in enumerate(law.sides):
-        shapes = side.shapes(frames.arc[:, gear])
-        normal = _components(frames.normal / frames.turn[:, gear])
-        load = (shapes[0][:, :, None] * normal[:, None, :]).reshape(len(normal), -1)
-        steps = couples.step if gear == 0 else -couples.step
-        made = {int(k): law.width * (load @ side.smooth[int(k)].T) for k in np.unique(steps)}
-        for k, answer in made.items():
-            on = np.flatnonzero(steps == k)
-            total[on] += np.einsum("ij,ij->i", load[couples.first[on]], answer[couples.second[on]])
-        parts.append(shapes)
-        moved.append(made)
-    values, slopes, bends = zip(*parts, strict=True)
-    return Smooth(total, values, slopes, bends, (moved[0], moved[1]))
+    normal = state.normal[:, None] / state.turn
+    shapes = law.shapes.at(state.arc)
+    values = shapes[:, :, 0]
+    pairs, k = len(normal), values.shape[2]
+    load = (values[..., None] * normal.view(float).reshape(pairs, 2, 1, 2)).reshape(pairs, 2, 2 * k)
+    most = int(np.abs(couples.step).max(initial=0))
+    answer = np.matmul(load.swapaxes(0, 1), law.influence(most)).reshape(2, pairs, 2 * most + 1, k, 2)
+    at_stations = answer[:, couples.second, couples.step + most].swapaxes(0, 1)
+    moved = (shapes.take(couples.first, axis=0) @ at_stations).view(complex)[..., 0]
+    compliance = (moved[:, :, 0] * normal.take(couples.first, axis=0).conj()).real.sum(axis=1)
+    return Smooth(normal, values, shapes[:, :, 2], moved, compliance)
 
 
-def displaced(
-    law: HalfPlanePair, frames: Frames, smooth: Smooth, force: Array, spread: Array, couples: Couplings
-) -> tuple[Frames, Array]:
-    """Frames with the faces displaced by the forces per width (N/m), and the energy per width (J/m) that the contacts'
-    own widths make.
-    """
-    shift, stretch = np.zeros_like(frames.shift), np.zeros_like(frames.stretch)
-    energy = np.zeros(len(force))
-    for gear, side in enumerate(law.sides):
-        load = (2 * gear - 1) * force
-        steps = couples.step if gear == 0 else -couples.step
-        stations = np.zeros((len(force), 2 * len(side.stations)))
-        for k, answer in smooth.moved[gear].items():
-            on = np.flatnonzero(steps == k)
-            first, second = couples.first[on], couples.second[on]
-            stations[first] += load[second, None] * answer[second]  # one couple at most has this step from a pair
-        at_stations = stations.reshape(len(force), -1, 2) @ np.array([1, 1j])
-        own = (load[:, None] * smooth.moved[gear][0]).reshape(len(force), -1, 2) @ np.array([1, 1j])
-        normal = frames.normal / frames.turn[:, gear]
-        across = np.einsum("pi,ij,pj->p", _components(-1j * normal), side.wedge, _components(normal))
-        edge = -side.inverse_modulus * across * np.log(2 * side.distance(frames.arc[:, gear])) * load
-        wider = (spread - smooth.values[gear] @ (0.25 * side.bumps**2)) * (smooth.bends[gear] * own).sum(axis=1)
-        shift[:, gear] = (smooth.values[gear] * at_stations).sum(axis=1) + edge * -1j * normal + wider
-        stretch[:, gear] = (smooth.slopes[gear] * at_stations).sum(axis=1)
-        energy += 0.5 * load * (wider * normal.conj()).real
-    return replace(frames, shift=shift, stretch=stretch), energy
-
-
-def recentred(law: HalfPlanePair, frames: Frames) -> Frames:
-    """Frames about the middle between both faces at x = 0, with the material that is there."""
-    arc, shift, height = frames.arc.copy(), frames.shift.copy(), np.zeros(len(frames.arc))
-    for gear, curve in enumerate(law.curves):
-        s, h, _ = frames.heights(curve, gear, np.zeros((len(arc), 1)))
-        shift[:, gear] += frames.stretch[:, gear] * (s[:, 0] - arc[:, gear])
-        arc[:, gear] = s[:, 0]
-        height += 0.5 * h[:, 0]
-    return replace(frames, arc=arc, shift=shift, centre=frames.centre + height * frames.normal)
-
-
-def _edges(law: HalfPlanePair, frames: Frames, arcs: Array, width: Array) -> list[Array]:
-    """What the wedge of each gear adds to the influence of the panels, shape (p, n, n) (m/Pa)."""
-    made = []
-    for gear, side in enumerate(law.sides):
-        v = _components(frames.normal / frames.turn[:, gear])
-        along = side.inverse_modulus * np.einsum("pi,ij,pj->p", v, side.wedge, v)
-        y = side.distance(arcs[:, gear])
-        made.append(-along[:, None, None] * np.log(y[:, :, None] + y[:, None, :]) * width[:, None, :])
-    return made
-
-
-def step(
-    law: HalfPlanePair,
-    frames: Frames,
-    force: Array,
-    spread: Array,
-    couples: Couplings,
-    before: Before | None,
-    *,
-    held: bool = False,
-) -> Step:
-    """Solve the panels of all pairs with the faces displaced by `force` (N/m) and its spread (m2).
+def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool = True, held: bool = False) -> Step:
+    """Solve the panels of all pairs with the faces displaced by the state's forces.
 
     Parameters
     ----------
-    before
-        Windows and bearing panels of the step before; None at first.
+    search
+        Whether windows are searched for; else they stay.
     held
-        Whether these stay, so that the step is a smooth function of what it starts from.
+        Whether the bearing panels stay too, so that the step is a smooth function of its state.
     """
-    smooth = smooth_influence(law, frames, couples)
-    frames, wider = displaced(law, frames, smooth, force, spread, couples)
-    frames = recentred(law, frames)
-    if held and before is not None:
-        window = before.window
-    else:
-        floor = np.maximum(force, LEAST_FORCE * couples.total(force)[couples.position])
-        scale = np.sqrt(0.2 * law.compliance * floor * law.pair.pinion.module)
-        reach = WINDOW if before is None else before.reach
-        window = windows(frames, law.curves, scale, reach * law.compliance * floor)
-    x, width = window.middle[:, None] + window.half[:, None] * MIDDLES, window.half[:, None] * WIDTHS
-    one, two = (frames.heights(curve, gear, x) for gear, curve in enumerate(law.curves))
-    gap, arcs = two[1] - one[1], np.stack([one[0], two[0]], axis=1)
-    edges = _edges(law, frames, arcs, width)
-    K = influence(window.half, law.compliance) + edges[0] + edges[1]
-    T = smooth.compliance
-    guess = first_guess(gap) if before is None else before.bearing
-    found = pressed(K, gap, width, T, force, couples, guess, held=held)
-    place, variance, slope = _moments(law, window, x, width, frames.arc, (one[1], two[1]), edges, found)
-    own = 0.5 * (found.pressure * width * np.einsum("pij,pj->pi", K, found.pressure)).sum(axis=1)
-    energy = own + 0.5 * found.force * couples.times(T, found.force) + wider
-    return Step(frames, window, found, x, width, gap, arcs, place, variance, slope, energy)
+    smooth = smooth_influence(law, state, couples)
+    normal, force = smooth.normal, state.force
+    tension, shear = law.wedge
+    shear = shear * normal.conj() ** 2
+    y, far = _distances(law, state.arc)
+    load = force[:, None] * _SIGN
+    displaced = np.add.reduceat(smooth.moved * (force.take(couples.second)[:, None] * _SIGN)[..., None], couples.starts)
+    # the contact's own width, and that of the bumps
+    bend = smooth.moved[couples.own, :, 2] * load
+    wider = (state.spread[:, None] - np.einsum("pgk,gk->pg", smooth.values, law.bump_squares)) * bend
+    # across n the wedge moves the faces as a whole: n W along the tangent -i n
+    edge = law.inverse_modulus * shear.imag * np.log(2 * y) * load * (-1j * normal)
+    turn = state.turn / state.normal[:, None]
+    offset = (law.hub - state.centre[:, None]) / state.normal[:, None] + turn * (displaced[:, :, 0] + edge + wider)
+    faces = Faces(turn, offset, displaced[:, :, 1], state.arc)
 
+    low, high, found = state.low, state.high, None
+    if search:
+        found = _searched(law, state, faces, couples)
+        low, high = found.low, found.high
+    half = 0.5 * (high - low)
+    x = np.empty((len(half), len(MIDDLES) + 1))
+    np.add(0.5 * (high + low)[:, None], half[:, None] * MIDDLES, out=x[:, :-1])
+    x[:, -1] = 0.0  # O itself
+    arcs, heights, points = faces.heights(law.tables, x)
+    arc, height = arcs[:, :, -1], 0.5 * (heights[:, 0, -1] + heights[:, 1, -1])
+    x, width, arcs, heights = x[:, :-1], half[:, None] * WIDTHS, arcs[:, :, :-1], heights[:, :, :-1]
+    gap = heights[:, 1] - heights[:, 0]
+    y = np.maximum(np.abs(points[:, :, :-1] - law.corner[:, None]), LEAST_DISTANCE)
+    along = law.inverse_modulus * (tension + shear.real)
+    edges = np.log(y[:, :, :, None] + y[:, :, None, :]) * (-along[:, :, None, None] * width[:, None, None, :])
+    K = influence(half, law.compliance) + edges[:, 0] + edges[:, 1]
+    bearing = state.bearing if state.bearing.any() else first_guess(gap)
+    solution = pressed(K, gap, width, smooth.compliance, force, couples, bearing, held=held)
 
-def _moments(
-    law: HalfPlanePair,
-    window: Windows,
-    x: Array,
-    width: Array,
-    arc: Array,
-    heights: Sequence[Array],
-    edges: Sequence[Array],
-    found: Pressed,
-) -> tuple[Array, Array, Array]:
-    """Mean place of the pressures, their variance, and the mean slope of the deformed faces under them."""
-    p, loaded = found.pressure, found.force > 0
-    safe = np.where(loaded, found.force, 1.0)
-    place = np.where(loaded, (p * width * x).sum(axis=1) / safe, window.nearest)
-    square = (x - place[:, None]) ** 2 + width**2 / 12  # a panel's pressure is constant
-    variance = np.where(loaded, (p * width * square).sum(axis=1) / safe, 0.0)
+    p, loaded = solution.pressure, solution.force > 0
+    shares = p * width / np.where(loaded, solution.force, 1.0)[:, None]
+    place = (shares * x).sum(axis=1)
+    spread = (shares * ((x - place[:, None]) ** 2 + width**2 / 12)).sum(axis=1)
     between = 0.5 * (p[:, 1:] + p[:, :-1])
-    area = (between * np.diff(x, axis=1)).sum(axis=1)
-    # both faces have the same, and the one further from its edges changes less with where it is taken
-    far = [side.clearance(arc[:, gear]) for gear, side in enumerate(law.sides)]
-    rise = np.zeros(len(x))
-    for gear in (0, 1):
-        deformed = heights[gear] - WAY[gear] * np.einsum("pij,pj->pi", edges[gear], p)
-        rise += far[gear] / (far[0] + far[1]) * (between * np.diff(deformed, axis=1)).sum(axis=1)
-    return place, variance, np.where(area > 0, rise / np.where(area > 0, area, 1.0), window.lean)
+    # both deformed faces have the same slope; the one further from its edges changes less with where it is taken
+    deformed = heights - WAY[:, None] * (edges @ p[:, None, :, None])[..., 0]
+    middle = (far[:, :, None] * deformed).sum(axis=1)
+    area = (between * np.diff(x)).sum(axis=1)
+    slope = (between * np.diff(middle)).sum(axis=1) / np.where(area > 0, area, 1.0)
+    outgrown: BoolArray = np.zeros(len(p), dtype=bool)
+    if found is not None:
+        place, slope = np.where(loaded, place, found.nearest), np.where(loaded, slope, found.lean)
+        outgrown = np.asarray(((p[:, [0, -1]] > 0) & found.free).any(axis=1))
+    energy = 0.5 * (
+        (p * width * solution.approach).sum(axis=1)
+        + solution.force * couples.times(smooth.compliance, solution.force)
+        + ((wider * normal.conj()).real * load).sum(axis=1)
+    )
+    return Step(solution, low, high, outgrown, x, width, arcs, arc, height, place, spread, slope, energy)
 
 
-def outgrown(made: Step) -> NDArray[np.bool_]:
-    """Pairs whose pressure reaches an end of its window beyond which both faces go on, shape (p,)."""
-    return np.asarray(((made.solution.pressure[:, [0, -1]] > 0) & made.window.free).any(axis=1))
+def _distances(law: HalfPlanePair, arc: Array) -> tuple[Array, Array]:
+    """Distances y (m) of the faces at arcs (m) from their corners, and shares of the faces by the square of their
+    distance from all edges, both of shape (p, 2).
+    """
+    y = np.maximum(np.abs(law.tables.at(arc[:, :, None])[0][:, :, 0] - law.corner), LEAST_DISTANCE)
+    near = 1 / y**2 + law.undercut / np.maximum(np.abs(arc), LEAST_DISTANCE) ** 2
+    return y, near[:, ::-1] / near.sum(axis=1, keepdims=True)
 
 
-def moved_on(law: HalfPlanePair, made: Step, before: Before | None, *, near: bool) -> tuple[Frames, Before]:
+def _searched(law: HalfPlanePair, state: State, faces: Faces, couples: Couplings) -> Windows:
+    """Windows by the gap beside its least."""
+    module = law.pair.pinion.module
+    least = LEAST_WIDTH**2 * module / (0.2 * law.compliance)
+    floor = np.maximum(state.force, LEAST_FORCE * couples.total(state.force)[couples.position] + least)
+    scale = np.sqrt(0.2 * law.compliance * floor * module)
+    return windows(faces, law.tables, scale, state.reach * law.compliance * floor)
+
+
+def moved_on(law: HalfPlanePair, state: State, made: Step, *, near: BoolArray | bool) -> State:
     """What the next step starts from: frames at the mean place of the pressure, along the mean normal under it.
 
     Windows grow only `near` the solution, so that they do not depend on the way to it.
     """
-    frames, place = made.frames, made.place
-    arc = frames.arc + place[:, None] * np.array(WAY)
-    for gear, curve in enumerate(law.curves):
-        arc[:, gear] = np.clip(arc[:, gear], curve.low, curve.high)
+    found, place = made.solution, made.place
+    arc = made.arc + place[:, None] * WAY
     turned = 1 + 1j * made.slope
-    onward = replace(
-        frames,
-        centre=frames.centre - 1j * frames.normal * place,
-        normal=frames.normal * turned / np.abs(turned),
-        arc=arc,
+    return State(
+        centre=state.centre + state.normal * (made.height - 1j * place),
+        normal=state.normal * turned / np.abs(turned),
+        turn=state.turn,
+        arc=np.minimum(np.maximum(arc, law.tables.low[:, 0]), law.tables.high[:, 0]),
+        force=found.force,
+        spread=made.spread,
+        low=made.low - place,
+        high=made.high - place,
+        bearing=found.pressure > 0,
+        reach=np.where(made.outgrown & near, WIDER * state.reach, state.reach),
     )
-    window = replace(made.window, middle=made.window.middle - place, nearest=made.window.nearest - place)
-    reach = np.full(len(place), WINDOW) if before is None else before.reach
-    reach = np.where(outgrown(made), WIDER * reach, reach) if near else reach
-    return onward, Before(window, made.solution.pressure > 0, reach)

@@ -7,82 +7,79 @@ the arc s_0, is
 .. math:: Z(s) = q\,(z(s) + d + d'\,(s-s_0)) + c, \qquad h - i x = (Z(s) - O)/n .
 
 At a given x its arc follows from Newton's method on the exact curve, and the gap between the faces is the difference of
-their heights h at the same x: exact for any rotation and displacement of the faces.
+their heights h at the same x: exact for any rotation and displacement of the faces. Arrays hold pinion and wheel in
+their second axis.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gear.flank_curve import FlankCurve
+from ..gear.flank_curve import FlankTables
 
 Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 ComplexArray = NDArray[np.complex128]
 
-#: Steps of Newton's method for the arc at a place along the tangent, and least cosine between tangent and face.
-NEWTON, STEEPEST = 2, 0.2
+#: Most steps of Newton's method for the arc at a place along the tangent, its last move in windows, and least cosine
+#: between tangent and face.
+NEWTON, NEAR, STEEPEST = 4, 1e-3, 0.2
 #: Along the pinion's flank x grows with the arc, along the wheel's it falls.
-WAY = (1.0, -1.0)
+WAY = np.array([1.0, -1.0])
+_WAYS = WAY[:, None]
 
 
 @dataclass(frozen=True)
-class Frames:
-    """Where the faces of p tooth pairs are; pinion and wheel in the second axis.
+class Faces:
+    """Both faces of p tooth pairs as seen from O along n.
 
     Attributes
     ----------
-    centre, normal : ndarray of complex, shape (p,)
-        O (m) and n, global axes.
     turn : ndarray of complex, shape (p, 2)
-        q of the teeth: tooth axes to global ones.
-    hub : ndarray, shape (p, 2)
-        x of the gears' centres (m).
+        q/n.
+    offset : ndarray of complex, shape (p, 2)
+        ((c - O) + q d)/n (m).
+    stretch : ndarray of complex, shape (p, 2)
+        d' (-), tooth axes.
     arc : ndarray, shape (p, 2)
-        s_0 of the material at O (m).
-    shift, stretch : ndarray of complex, shape (p, 2)
-        d (m) and d' (-), tooth axes.
+        s_0 (m).
     """
 
-    centre: ComplexArray
-    normal: ComplexArray
     turn: ComplexArray
-    hub: Array
-    arc: Array
-    shift: ComplexArray
+    offset: ComplexArray
     stretch: ComplexArray
+    arc: Array
 
-    def heights(self, curve: FlankCurve, gear: int, x: Array, steps: int = NEWTON) -> tuple[Array, Array, Array]:
-        """Arcs (m), heights h and places x' (m) of one face at places x (m), shape (p, n).
+    def heights(self, flanks: FlankTables, x: Array) -> tuple[Array, Array, ComplexArray]:
+        """Arcs (m), heights (m) and undeformed points (m, tooth axes) of the faces at places x (m) of shape (p, n).
 
-        x' is x but for rounding, and where the face ends before: there it is the place of its end.
+        All have the shape (p, 2, n). Where a face ends before, they are those of its end.
         """
-        start, stretch = self.arc[:, gear, None], self.stretch[:, gear, None]
-        turn = (self.turn[:, gear] / self.normal)[:, None]
-        moved = ((self.hub[:, gear] - self.centre) / self.normal)[:, None] + self.shift[:, gear, None] * turn
-        s = np.clip(start + WAY[gear] * x, curve.low, curve.high)
-        for _ in range(steps):
-            point, tangent = curve.at(s)
-            off = x + ((point + stretch * (s - start)) * turn + moved).imag
-            along = np.minimum(-STEEPEST, ((tangent + stretch) * turn).imag * WAY[gear])
-            s = np.clip(s - WAY[gear] * off / along, curve.low, curve.high)
-        seen = (curve.at(s)[0] + stretch * (s - start)) * turn + moved
-        return s, seen.real, -seen.imag
+        start, turn = self.arc[:, :, None], self.turn[:, :, None]
+        stretch, offset = self.stretch[:, :, None], self.offset[:, :, None]
+        x = x[:, None, :]
+        close = NEAR * np.ptp(x, axis=2, keepdims=True)
+        s = np.minimum(np.maximum(start + _WAYS * x, flanks.low), flanks.high)
+        for _ in range(NEWTON):
+            (a, b, c, d), t = flanks.pieces(s)
+            tangent = ((3 * d * t + 2 * c) * t + b + stretch) * turn
+            seen = (((d * t + c) * t + b) * t + a + stretch * (s - start)) * turn + offset
+            move = _WAYS * (x + seen.imag) / np.maximum(STEEPEST, -_WAYS * tangent.imag)
+            new = np.minimum(np.maximum(s + move, flanks.low), flanks.high)
+            t, s = t + (new - s), new
+            if (np.abs(move) <= close).all():
+                break
+        point = ((d * t + c) * t + b) * t + a
+        return s, ((point + stretch * (s - start)) * turn + offset).real, point
 
-    def range(self, curves: Sequence[FlankCurve]) -> tuple[Array, Array]:
+    def range(self, flanks: FlankTables) -> tuple[Array, Array]:
         """Least and largest x (m) that both faces reach, shape (p,)."""
-        ends = []
-        for gear, curve in enumerate(curves):
-            s = curve.arc[[0, -1]]
-            here = (
-                curve.at(s)[0] + self.shift[:, gear, None] + self.stretch[:, gear, None] * (s - self.arc[:, gear, None])
-            )
-            seen = (here * self.turn[:, gear, None] + (self.hub[:, gear] - self.centre)[:, None]) / self.normal[:, None]
-            ends.append(-seen.imag)
-        return np.maximum(ends[0][:, 0], ends[1][:, 1]), np.minimum(ends[0][:, 1], ends[1][:, 0])
+        seen = flanks.end_points + self.stretch[:, :, None] * (flanks.ends - self.arc[:, :, None])
+        x = -(seen * self.turn[:, :, None] + self.offset[:, :, None]).imag
+        return np.maximum(x[:, 0, 0], x[:, 1, 1]), np.minimum(x[:, 0, 1], x[:, 1, 0])
 
 
 @dataclass(frozen=True)
@@ -91,8 +88,8 @@ class Windows:
 
     Attributes
     ----------
-    middle, half : ndarray, shape (p,)
-        Of the window along x (m).
+    low, high : ndarray, shape (p,)
+        Ends of the window along x (m).
     nearest : ndarray, shape (p,)
         x where the faces are nearest to each other (m).
     lean : ndarray, shape (p,)
@@ -101,8 +98,8 @@ class Windows:
         Whether both faces go on beyond the window's ends.
     """
 
-    middle: Array
-    half: Array
+    low: Array
+    high: Array
     nearest: Array
     lean: Array
     free: NDArray[np.bool_]
@@ -112,7 +109,7 @@ class Windows:
 _LOOK = np.concatenate([-np.geomspace(0.03, 30, 20)[::-1], [0.0], np.geomspace(0.03, 30, 20)])
 
 
-def windows(frames: Frames, curves: Sequence[FlankCurve], scale: Array, depth: Array) -> Windows:
+def windows(faces: Faces, flanks: FlankTables, scale: Array, depth: Array) -> Windows:
     """Windows in which the gap is at most `depth` (m) above its least, linear in its root between places of a search.
 
     Parameters
@@ -120,10 +117,10 @@ def windows(frames: Frames, curves: Sequence[FlankCurve], scale: Array, depth: A
     scale, depth : ndarray, shape (p,)
         Expected half width and largest gap of the contacts (m).
     """
-    low, high = frames.range(curves)
-    x = np.clip(scale[:, None] * _LOOK, low[:, None], high[:, None])
-    heights = [frames.heights(curve, gear, x)[1] for gear, curve in enumerate(curves)]
-    gap = heights[1] - heights[0]
+    low, high = faces.range(flanks)
+    x = np.minimum(np.maximum(scale[:, None] * _LOOK, low[:, None]), high[:, None])
+    h = faces.heights(flanks, x)[1]
+    gap = h[:, 1] - h[:, 0]
     row, count, nearest = np.arange(len(x)), x.shape[1], np.argmin(gap, axis=1)
     over = np.sqrt(gap - gap.min(axis=1, keepdims=True)) - np.sqrt(depth)[:, None]
     ends = []
@@ -136,8 +133,7 @@ def windows(frames: Frames, curves: Sequence[FlankCurve], scale: Array, depth: A
         share = np.where(b > np.maximum(a, 0), -a / np.where(b > a, b - a, 1.0), 1.0)
         ends.append(x[row, inner] + np.clip(share, 0, 1) * (x[row, first] - x[row, inner]))
     left, right = np.maximum(nearest - 1, 0), np.minimum(nearest + 1, count - 1)
-    rise = 0.5 * sum(h[row, right] - h[row, left] for h in heights)
+    rise = 0.5 * (h[row, :, right] - h[row, :, left]).sum(axis=1)
     lean = rise / np.maximum(1e-12, x[row, right] - x[row, left])
-    half = np.maximum(0.5 * (ends[1] - ends[0]), 1e-4 * scale)
     free = np.stack([ends[0] > low, ends[1] < high], axis=1)
-    return Windows(0.5 * (ends[1] + ends[0]), half, x[row, nearest], lean, free)
+    return Windows(ends[0], np.maximum(ends[1], ends[0] + 2e-4 * scale), x[row, nearest], lean, free)

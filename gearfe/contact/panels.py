@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +60,17 @@ class Couplings:
     positions: int
     slots: int
 
-    def total(self, of_pairs: Array) -> Array:
+    @cached_property
+    def starts(self) -> IntArray:
+        """Where the couples of each first pair start, shape (p,)."""
+        return np.searchsorted(self.first, np.arange(len(self.position)))
+
+    @cached_property
+    def own(self) -> IntArray:
+        """Couple of each pair with itself, shape (p,)."""
+        return np.flatnonzero(self.first == self.second)
+
+    def total(self, of_pairs: Array | NDArray[np.bool_]) -> Array:
         """Sums over the pairs of each position, shape (positions,)."""
         return np.bincount(self.position, of_pairs, self.positions).astype(float)
 
@@ -100,12 +111,15 @@ class Pressed:
         Force per width of each pair (N/m).
     pressure : ndarray, shape (p, n)
         On the panels (Pa).
+    approach : ndarray, shape (p, n)
+        K p (m).
     settled : ndarray of bool, shape (p,)
         Whether the set of panels that bear was found.
     """
 
     force: Array
     pressure: Array
+    approach: Array
     settled: NDArray[np.bool_]
 
 
@@ -145,27 +159,29 @@ def pressed(
     """
     n = gap.shape[1]
     diagonal = np.arange(n)
-    on = bearing.copy()
-    if not held:
-        on[:, n // 2] |= ~on.any(axis=1)
+    on = bearing
     right = np.stack([-gap, np.ones_like(gap)], axis=2)
-    bound = ROUNDING * K[:, diagonal, diagonal].max()
+    y0 = -couples.times(T, carried)
     for _ in range(1 if held else CHANGES):
-        system = np.where(on[:, :, None] & on[:, None, :], K, 0.0)
-        system[:, diagonal, diagonal] = np.where(on, system[:, diagonal, diagonal], 1.0)
-        both = np.linalg.solve(system, np.where(on[:, :, None], right, 0.0))
-        free, stiffness = np.einsum("pn,pnk->kp", widths, both)
-        y = -couples.times(T, carried)
-        force = couples.solved(free - stiffness * y, stiffness, T)
-        y = couples.times(T, force - carried)
-        p = both[:, :, 0] - both[:, :, 1] * y[:, None]
-        overlap = -gap - y[:, None] - (K @ p[..., None])[..., 0]
-        now = np.where(on, p > 0, overlap > bound * np.abs(p).max())
+        if on.all():
+            both = np.linalg.solve(K, right)
+        else:
+            system = np.where(on[:, :, None] & on[:, None, :], K, 0.0)
+            system[:, diagonal, diagonal] = np.where(on, K[:, diagonal, diagonal], 1.0)
+            both = np.linalg.solve(system, np.where(on[:, :, None], right, 0.0))
+        free, stiffness = (widths[:, None, :] @ both)[:, 0].T
+        force = couples.solved(free - stiffness * y0, stiffness, T)
+        y = (couples.times(T, force) + y0)[:, None]
+        p = both[:, :, 0] - both[:, :, 1] * y
+        approach = (K @ p[:, :, None])[:, :, 0]
+        bound = ROUNDING * np.abs(approach).max(axis=1, keepdims=True)
+        now = np.where(on, p > 0, gap + y + approach < -bound)
         settled = (now == on).all(axis=1)
         if settled.all():
             break
         on = now
-    return Pressed(np.where(on.any(axis=1), force, 0.0), np.where(on, p, 0.0), settled)  # without panels: no rounding
+    # without a bearing panel the force is rounding
+    return Pressed(np.where(on.any(axis=1), force, 0.0), np.where(on, p, 0.0), approach, settled)
 
 
 def first_guess(gap: Array) -> NDArray[np.bool_]:

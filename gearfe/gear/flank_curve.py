@@ -7,6 +7,8 @@ marks, so kinks stay sharp; the error is :math:`h^4\kappa''/384` of the curvatur
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -23,6 +25,8 @@ ComplexArray = NDArray[np.complex128]
 
 #: Knots on the involute, on the tip round and on the upper half of the root.
 INVOLUTE, ROUND, ROOT = 513, 65, 129
+#: Most cells of the grid that finds the piece at an arc length.
+MOST_CELLS = 1 << 15
 #: One-sided parameter (of a length of 1) at which the tangent at a knot is taken.
 BESIDE = 1e-9
 
@@ -61,26 +65,13 @@ class FlankCurve:
         return float(self.arc[-1])
 
     @cached_property
-    def _finder(self) -> tuple[float, NDArray[np.int64]]:
-        """Cells per metre of a uniform grid, and the last knot before each cell."""
-        count = 8 * len(self.arc)
-        cells = self.low + (self.high - self.low) * np.arange(count + 1) / count
-        return count / (self.high - self.low), np.searchsorted(self.arc, cells, side="right") - 1
+    def _tables(self) -> FlankTables:
+        return flank_tables((self,))
 
     def at(self, s: Array) -> tuple[ComplexArray, ComplexArray]:
         """Points (m) and unit tangents towards the tip at arc lengths s (m) within the curve."""
-        scale, before = self._finder
-        i = before[((s - self.low) * scale).astype(np.int64)]
-        last = len(self.arc) - 2
-        # a cell is shorter than most pieces: at most a few steps on
-        ahead = (i < last) & (s >= self.arc[np.minimum(i + 1, last)])
-        while ahead.any():
-            i = i + ahead
-            ahead = (i < last) & (s >= self.arc[np.minimum(i + 1, last)])
-        i = np.minimum(i, last)
-        t = s - self.arc[i]
-        a, b, c, d = (one[i] for one in self.cubic)
-        return ((d * t + c) * t + b) * t + a, (3 * d * t + 2 * c) * t + b
+        made = self._tables.at(np.asarray(s)[None])
+        return made[0][0], made[1][0]
 
     def arc_at(self, parameter: Any) -> Array:
         """Arc lengths (m) of parameters u, linear between the knots."""
@@ -89,6 +80,85 @@ class FlankCurve:
     def parameter_at(self, s: Any) -> Array:
         """Parameters u of arc lengths s (m), linear between the knots."""
         return np.interp(s, self.arc, self.parameter)
+
+
+@dataclass(frozen=True)
+class FlankTables:
+    """Several flanks in one table of k pieces, so that one look-up serves all: flanks in an axis of the arc lengths.
+
+    Attributes
+    ----------
+    low, high : ndarray, shape (f, 1)
+        First and last arc length of the f flanks (m).
+    cells, start : ndarray, shape (f, 1)
+        Cells per metre of a uniform grid on each flank, and the number of its first cell.
+    piece : ndarray, shape (all cells,)
+        The piece in which each cell starts.
+    arc, beyond : ndarray, shape (k,)
+        Arc length where each piece starts, and where the next one of the flank does (m).
+    cubic : ndarray of complex, shape (4, k)
+        As in `FlankCurve`.
+    steps
+        Most pieces that start within a cell.
+    """
+
+    low: Array
+    high: Array
+    cells: Array
+    start: NDArray[np.int64]
+    piece: NDArray[np.int64]
+    arc: Array
+    beyond: Array
+    cubic: ComplexArray
+    steps: int
+
+    @cached_property
+    def ends(self) -> Array:
+        """First and last arc lengths (m), shape (f, 2)."""
+        return np.concatenate([self.low, self.high], axis=1)
+
+    @cached_property
+    def end_points(self) -> ComplexArray:
+        """Points there (m), shape (f, 2)."""
+        return self.at(self.ends)[0]
+
+    def pieces(self, s: Array) -> tuple[ComplexArray, Array]:
+        """Coefficients, shape (4, ..., f, m), and arc lengths within the pieces, for arc lengths s (m), (..., f, m)."""
+        i = self.piece.take(((s - self.low) * self.cells).astype(np.int64) + self.start)
+        for _ in range(self.steps):
+            i = i + (s >= self.beyond.take(i))
+        return self.cubic.take(i, axis=1), s - self.arc.take(i)
+
+    def at(self, s: Array) -> tuple[ComplexArray, ComplexArray]:
+        """Points (m) and unit tangents towards the tips at arc lengths s (m), shape (..., f, m), within the flanks."""
+        (a, b, c, d), t = self.pieces(s)
+        return ((d * t + c) * t + b) * t + a, (3 * d * t + 2 * c) * t + b
+
+
+def flank_tables(curves: Sequence[FlankCurve]) -> FlankTables:
+    """One table of several flanks."""
+    counts, pieces, steps, first = [], [], 1, 0
+    for curve in curves:
+        length = curve.high - curve.low
+        count = min(MOST_CELLS, math.ceil(length / np.diff(curve.arc).min()))
+        ends = curve.low + length * np.arange(count + 1) / count
+        found = np.clip(np.searchsorted(curve.arc, ends, side="right") - 1, 0, len(curve.arc) - 2)
+        steps = max(steps, int(np.diff(found).max()))  # rounding beside a piece's end does not matter
+        pieces.append(found + first)
+        counts.append(count)
+        first += len(curve.arc) - 1
+    low, high = (np.array([[curve.arc[end]] for curve in curves]) for end in (0, -1))
+    return FlankTables(
+        low=low,
+        high=high,
+        cells=np.array(counts)[:, None] / (high - low),
+        start=(np.cumsum([0, *(count + 1 for count in counts[:-1])]))[:, None],
+        piece=np.concatenate(pieces),
+        arc=np.concatenate([curve.arc[:-1] for curve in curves]),
+        beyond=np.concatenate([np.append(curve.arc[1:-1], np.inf) for curve in curves]),
+        cubic=np.concatenate([curve.cubic for curve in curves], axis=1),
+        steps=steps,
+    )
 
 
 def flank_curve(gear: Gear) -> FlankCurve:
