@@ -9,12 +9,6 @@ Fourier transform over the teeth splits into one small system per harmonic (Thom
 .. math:: C_{ji} = \delta_{ij} A + P\,X_{j-i}\,P^T .
 
 Everything is expressed in the frame of the tooth that it belongs to.
-
-A law with theta other than 0 (`gearfe.contact.laws`) loads the gear through the rows B of its flank's normal stress as
-well, :math:`K_\theta u = f + B^T z` with :math:`K_\theta = K - \theta B^T W \gamma^{-1} B`, and asks for
-:math:`B u`. B acts on the skin, the nodes of the triangles behind the flank: these are then retained too, the term is
-taken off the condensed stiffness, and with R = (1_F, B) all four blocks of :math:`R\,C\,R^T` come out as above. By
-symmetry :math:`u_F` for stress loads is the transpose of the stress for forces.
 """
 
 from __future__ import annotations
@@ -27,11 +21,9 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 
 from ..elasticity import Material, Plane, element_stiffness
-from ..errors import InputError
 from ..meshing.tooth_sector import SectorMesh
 from .dissection import Condensed, condense
 from .flank import Flank, flank_of, normal_stress_rows
-from .laws import ContactLaw, side_share
 
 Array = NDArray[Any]
 
@@ -53,33 +45,6 @@ class FarField:
     flank: Array
     stress: Array | None
     driven: dict[int, Array]
-
-
-@dataclass(frozen=True)
-class StressLoads:
-    """What loads through the flank's normal stress cause, for laws with theta other than 0; see the module's docstring.
-
-    Attributes
-    ----------
-    law, width, share
-        The law whose term is in the body's stiffness, the common face width (m), and `laws.side_share` of the gear.
-    own : ndarray, shape (e q, e q)
-        Normal stress at the quadrature points for stress loads there with the cut sides held (Pa/(N m2)).
-    driven : dict of int to ndarray, shape (r, e q)
-        As in `FarField`, for stress loads on tooth 0.
-    skin : ndarray, shape (s, f + e q)
-        Displacements of the skin for flank forces and stress loads with the cut sides held.
-    skin_interface : ndarray, shape (s, b)
-        The same for displacements of the cut sides (-).
-    """
-
-    law: ContactLaw
-    width: float
-    share: float
-    own: Array
-    driven: dict[int, Array]
-    skin: Array
-    skin_interface: Array
 
 
 @dataclass(frozen=True)
@@ -109,8 +74,6 @@ class GearBody:
         The same cyclic part in its numerical rank.
     condensed
         The way back to the full field.
-    stress_loads
-        Only for a law with theta other than 0 that integrates over this gear.
     """
 
     mesh: SectorMesh
@@ -126,7 +89,6 @@ class GearBody:
     far: FarField
     condensed: Condensed
     width: float
-    stress_loads: StressLoads | None = None
 
     @property
     def teeth(self) -> int:
@@ -147,8 +109,6 @@ def gear_body(
     *,
     points_per_edge: int = 4,
     with_stress: bool = True,
-    law: ContactLaw | None = None,
-    gear: int = 0,
     width: float | None = None,
 ) -> GearBody:
     """Condense a meshed tooth to the compliance of the whole gear.
@@ -160,72 +120,39 @@ def gear_body(
     points_per_edge
         Quadrature points on each contact edge.
     with_stress
-        Whether the normal stress on the contact surface is wanted (Nitsche's law needs it, penalty does not).
-    law, gear
-        Looked at only for a law with theta other than 0: the law, and whether the gear is pinion (0) or wheel (1).
+        Whether the normal stress on the contact surface is wanted (Nitsche's law needs it).
     width
         Width of the contact (m), the narrower gear's; by default `thickness`.
-
-    Raises
-    ------
-    InputError
-        Where theta = 1 makes the stiffness indefinite: gamma0 is too small.
     """
     flank = flank_of(mesh, points_per_edge)
     width = thickness if width is None else width
     bore = np.unique(mesh.boundaries["bore"])
     sides = np.concatenate([mesh.cut_right[:-1], mesh.cut_left[:-1]])  # the last node of a cut lies on the bore
     coordinates = mesh.points[mesh.triangles]
-    share = 0.0 if law is None or law.theta == 0 else side_share(law, gear)
-    row_unknowns, rows = np.zeros((0, 12), dtype=np.int64), np.zeros((0, 0, 12))
-    if with_stress or share:
-        row_unknowns, rows = normal_stress_rows(mesh, material, plane, points_per_edge)
-        rows = rows * (thickness / width)
-    skin = flank.nodes
-    if share:
-        behind = np.setdiff1d(row_unknowns[:, ::2] // 2, np.concatenate([flank.nodes, sides, bore]))
-        skin = np.concatenate([flank.nodes, behind])
     condensed = condense(
         mesh.triangles,
         element_stiffness(coordinates, material, plane, thickness),
         coordinates[:, :3].mean(axis=1),
         nodes=len(mesh.points),
-        retained=np.concatenate([skin, sides]),
+        retained=np.concatenate([flank.nodes, sides]),
         fixed=bore,
     )
-    f, s = 2 * len(flank.nodes), 2 * len(skin)
-    stiffness, stress = condensed.schur, None
-    if share or with_stress:
-        every = np.repeat(row_unknowns, rows.shape[1], axis=0)
-        stress = condensed.on_retained(rows.reshape(len(every), -1), every)
-    if share:
-        assert law is not None
-        assert stress is not None
-        gamma = law.parameter(material.youngs_modulus * thickness / width, flank.sizes)
-        term = (law.theta * share * width * flank.weights / gamma[:, None]).ravel()
-        stiffness = stiffness - stress.T @ (term[:, None] * stress)
-    factor, info = dpotrf(stiffness[:s, :s], lower=1)
+    f, stiffness = 2 * len(flank.nodes), condensed.schur
+    factor, info = dpotrf(stiffness[:f, :f], lower=1)
     if info != 0:
-        if share and law is not None and law.theta > 0:
-            assert stress is not None
-            raise _not_coercive(law, condensed.schur[:s, :s], stress[:, :s], term)
         raise np.linalg.LinAlgError("the tooth's stiffness is not positive definite: an element is inside out")
-    on_skin = -dpotrs(factor, stiffness[:s, s:], lower=1)[0]
-    inverse = dpotri(factor, lower=1)[0]
-    inverse = np.tril(inverse) + np.tril(inverse, -1).T
-    coupling = _cyclic_compliance(stiffness[s:, s:] + stiffness[s:, :s] @ on_skin, mesh.teeth)
-    own, interface = inverse[:f, :f], on_skin[:f]
-    stress_own = stress_interface = loads = None
-    if stress is not None:
-        stress_own = stress[:, :s] @ inverse[:, :f]
-        stress_interface = stress[:, :s] @ on_skin + stress[:, s:]
-    far, basis = _far_field(interface, stress_interface, coupling)
-    if share and stress is not None and law is not None and far.stress is not None:
-        moved = inverse @ stress[:, :s].T
-        driven = _driven(basis, coupling, far.stress)
-        columns = np.concatenate([inverse[:, :f], moved], axis=1)
-        loads = StressLoads(law, width, share, stress[:, :s] @ moved, driven, columns, on_skin)
-        own = own.copy()
+    interface = -dpotrs(factor, stiffness[:f, f:], lower=1)[0]
+    own = dpotri(factor, lower=1)[0]
+    own = np.tril(own) + np.tril(own, -1).T
+    coupling = _cyclic_compliance(stiffness[f:, f:] + stiffness[f:, :f] @ interface, mesh.teeth)
+    stress_own = stress_interface = None
+    if with_stress:
+        unknowns, rows = normal_stress_rows(mesh, material, plane, points_per_edge)
+        every = np.repeat(unknowns, rows.shape[1], axis=0)
+        stress = condensed.on_retained((thickness / width * rows).reshape(len(every), -1), every)
+        stress_own = stress[:, :f] @ own
+        stress_interface = stress[:, :f] @ interface + stress[:, f:]
+    far = _far_field(interface, stress_interface, coupling)
     return GearBody(
         mesh,
         flank,
@@ -240,21 +167,6 @@ def gear_body(
         far,
         condensed,
         width,
-        loads,
-    )
-
-
-def _not_coercive(law: ContactLaw, stiffness: Array, stress: Array, term: Array) -> InputError:
-    """By what factor gamma0 is too small: the largest eigenvalue of W^1/2 gamma^-1/2 B K^-1 B^T gamma^-1/2 W^1/2."""
-    scaled = np.sqrt(term)[:, None] * stress
-    bound = float(np.linalg.eigvalsh(scaled @ np.linalg.solve(stiffness, scaled.T))[-1])
-    gamma0 = float(getattr(law, "gamma0", 1.0))
-    problem = f"with theta = 1 it must be > {bound * gamma0:.3g} on this mesh, or the bodies lose their stiffness"
-    return InputError(
-        "gamma0",
-        gamma0,
-        problem,
-        "raise it (nitsche_gamma0 in a job file), or take theta = -1 or 0, which have no such bound",
     )
 
 
@@ -262,24 +174,15 @@ def _not_coercive(law: ContactLaw, stiffness: Array, stress: Array, term: Array)
 REACH = 12
 
 
-def _far_field(interface: Array, stress: Array | None, coupling: Array) -> tuple[FarField, Array]:
-    """Compress displacements and stresses onto the side motions that reach the flank (Saint-Venant: a dozen or two).
-
-    Returns the far field and its modes, shape (b, r).
-    """
+def _far_field(interface: Array, stress: Array | None, coupling: Array) -> FarField:
+    """Compress displacements and stresses onto the side motions that reach the flank (Saint-Venant: a dozen or two)."""
     rows = interface if stress is None else np.concatenate([interface, stress * (_norm(interface) / _norm(stress))])
     triangular = np.linalg.qr(rows, mode="r")
     _, values, modes = np.linalg.svd(triangular, full_matrices=False)
     basis = modes[values > 1e-13 * values[0]].T
-    flank = interface @ basis
-    driven = _driven(basis, coupling, flank)
-    return FarField(flank, None if stress is None else stress @ basis, driven), basis
-
-
-def _driven(basis: Array, coupling: Array, rows: Array) -> dict[int, Array]:
-    """Step k -> modes of tooth k for loads on tooth 0 that push its sides by the transpose of `rows`."""
-    teeth = len(coupling)
-    return {k: (basis.T @ coupling[k % teeth] @ basis) @ rows.T for k in range(-REACH, REACH + 1)}
+    flank, teeth = interface @ basis, len(coupling)
+    driven = {k: (basis.T @ coupling[k % teeth] @ basis) @ flank.T for k in range(-REACH, REACH + 1)}
+    return FarField(flank, None if stress is None else stress @ basis, driven)
 
 
 def _norm(matrix: Array) -> float:

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 from ..elasticity import physical_gradients, triangle_shapes
 from .compliance import GearBody
-from .recovery import position_loads, sector_displacements
+from .recovery import position_forces, sector_displacements
 from .scene import MeshingPair
-from .solver import Position
+from .position import Position
 
 Array = NDArray[Any]
 
@@ -85,7 +85,7 @@ def _extra_torques(pair: MeshingPair, gear: int, positions: Sequence[Position]) 
     body = pair.bodies[gear]
     cases, counts = [], []
     for position in positions:
-        loads, rates = (position_loads(body, gear, position, rate=rate) for rate in (False, True))
+        loads, rates = (position_forces(body, gear, position, rate=rate) for rate in (False, True))
         teeth = sorted({(t + k) % body.teeth for t in loads for k in range(-NEIGHBOURS, NEIGHBOURS + 1)})
         cases += [(case, tooth) for tooth in teeth for case in (loads, rates)]
         counts.append(len(teeth))

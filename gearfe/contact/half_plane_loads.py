@@ -14,13 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .closest import Projection
 from .flank import edge_shapes
 from .flank_compliance import FlankCompliance
 from .half_plane_result import PairContacts
 from .moved_faces import WAY
 from .position import Position
-from .scene import MeshingPair, Scene, Window
+from .scene import MeshingPair, Window
 
 Array = NDArray[Any]
 
@@ -52,25 +51,17 @@ def with_loads(
         for g, tooth in enumerate((int(contacts.pair[k]), -1 - int(contacts.pair[k]))):
             first, (shares, moved) = _nodal(sides[g], elastic.bodies[g].flank.sizes, contacts, k, g)
             edges = (len(shares) - 1) // 2
-            placed = elastic.tooth_angle(g, tooth, angle, twist)
-            windows.append(Window(g, k, tooth, first, edges, node, placed))
+            windows.append(Window(g, tooth, first, edges, node))
             node += 2 * edges + 1
-            along = (2 * g - 1) * contacts.normal[k] * np.exp(-1j * placed)
+            along = (2 * g - 1) * contacts.normal[k] * np.exp(-1j * elastic.tooth_angle(g, tooth, angle, twist))
             # the wheel's axes turn on with the twist
             rate = contacts.force_rate[k] + 1j * (contacts.normal_rate[k] - g) * contacts.force[k]
             forces.append((contacts.force[k] * along * shares).view(float))
             rates.append((along * (rate * shares + contacts.force[k] * moved)).view(float))
     if not windows:
         return position
-    none = np.zeros(0)
     return replace(
-        position,
-        scene=_pieces(windows),
-        forces=np.concatenate(forces),
-        force_rate=np.concatenate(rates),
-        contacts=contacts,
-        stress_loads=none,
-        stress_load_rate=none,
+        position, windows=tuple(windows), forces=np.concatenate(forces), force_rate=np.concatenate(rates), contacts=contacts
     )
 
 
@@ -91,22 +82,3 @@ def _nodal(side: FlankCompliance, sizes: Array, contacts: PairContacts, k: int, 
     moves = contacts.arc_rate[k, gear] + WAY[gear] * contacts.x[k] * contacts.growth[k]
     np.add.at(nodal[1], nodes, (slope * (moves / sizes[edge])[:, None] * share)[inside])
     return first, nodal
-
-
-def _pieces(windows: Sequence[Window]) -> Scene:
-    """A scene of pieces of flank alone, without contact points: what recovering fields from forces looks at."""
-    none, whole = np.zeros(0), np.zeros(0, dtype=np.int64)
-    empty: dict[str, Any] = dict.fromkeys(("counts", "mate", "owner", "pair"), whole)
-    empty |= dict.fromkeys(
-        ("points", "rotation", "compliance", "stress", "weight", "growth", "fade", "parameter"), none
-    )
-    nothing = np.zeros((0, 3))
-    return Scene(
-        windows=tuple(windows),
-        of_wheel=np.zeros(0, dtype=bool),
-        wheel_centre=none,
-        slave_nodes=nothing.astype(np.int64),
-        slave_shapes=nothing,
-        rigid=Projection(none, none, none, whole, none, none, none, none, np.zeros(0, dtype=bool)),
-        **empty,
-    )

@@ -75,6 +75,14 @@ def side_share(law: ContactLaw, gear: int) -> float:
     return float((law.sides == "wheel") == (gear == 1))
 
 
+def carrying(law: ContactLaw, to_tip: Array) -> NDArray[np.bool_]:
+    """Which gears carry contact points at contacts that lie `to_tip` (m) from their tips, shape (m, 2)."""
+    if law.sides == "both":
+        return np.ones(to_tip.shape, dtype=bool)
+    nearer = np.argmin(to_tip, axis=1) if law.sides == "tip" else np.full(len(to_tip), law.sides == "wheel")
+    return np.stack([nearer == 0, nearer == 1], axis=1)
+
+
 def law_text(law: ContactLaw) -> str:
     """Name and parameters in one line without commas, for tables and reports."""
     if isinstance(law, Nitsche):

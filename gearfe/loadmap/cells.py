@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.solver import Position
 from ..stiffness.positions import Solved
 
 Array = NDArray[Any]
@@ -16,16 +15,6 @@ IntArray = NDArray[Any]
 
 #: p: the share of finite strain of a single pair of teeth grows about like this power of its load.
 SHARE_POWER = 0.75
-
-
-def light(position: Position) -> Position:
-    """A position with its forces and the pieces of flank that they act on, without the scene's arrays."""
-    scene = position.scene
-    assert scene is not None
-    none = np.zeros(0)
-    names = [f.name for f in fields(scene) if isinstance(getattr(scene, f.name), np.ndarray) and f.name != "owner"]
-    arrays: dict[str, Any] = dict.fromkeys(names, none)
-    return replace(position, pressure=None, scene=replace(scene, **arrays, rigid=scene.rigid.take(slice(0, 0))))
 
 
 def spent_share(pair_torques: Array) -> float:

@@ -30,8 +30,9 @@ from numpy.typing import NDArray
 
 from ..contact.compliance import GearBody, gear_body
 from ..contact.flank import Flank, edge_nodes, edge_shapes
-from ..contact.scene import MeshingPair, Window
-from ..contact.solver import Position
+from ..contact.position import Position
+from ..contact.recovery import position_forces
+from ..contact.scene import MeshingPair
 from ..gear.pair import Gear, GearPair
 from ..meshing.recipe import sector_recipes
 from ..meshing.tooth_sector import SectorRecipe, sector_mesh
@@ -197,10 +198,7 @@ class PairRoots:
 
     def at(self, position: Position) -> dict[int, tuple[ToothRoot, ToothRoot]]:
         """Pair number -> root of its pinion tooth and of its wheel tooth, for the pairs that carry load."""
-        scene, forces = position.scene, position.forces
-        if scene is None or forces is None:
-            raise ValueError(f"a position without a solution has no root stress: {position.status}")
-        loads = [_forces(body, g, scene.windows, forces) for g, body in enumerate(self.pair.bodies)]
+        loads = [position_forces(body, g, position) for g, body in enumerate(self.pair.bodies)]
         found = {}
         for number, torque in zip(position.pair_numbers, position.pair_torques, strict=True):
             if torque > 0:
@@ -211,19 +209,6 @@ class PairRoots:
         teeth = self.pair.bodies[gear].teeth
         coarse, fine = (mesh.largest(tooth % teeth, loads, teeth) for mesh in self.meshes[gear])
         return ToothRoot(fine[0], 2 * fine[1], abs(fine[0] - coarse[0]) / abs(fine[0]))
-
-
-def _forces(body: GearBody, gear: int, windows: Sequence[Window], forces: Array) -> dict[int, Array]:
-    """Forces on the flank of each loaded tooth: number -> shape (f,) (N, tooth axes).
-
-    What a contact law adds to them beside forces balances itself within an element of the flank: no root feels it.
-    """
-    loaded: dict[int, Array] = {}
-    for w in windows:
-        if w.gear == gear:
-            whole = loaded.setdefault(w.tooth % body.teeth, np.zeros(2 * len(body.flank.nodes)))
-            whole[w.flank_unknowns] += forces[w.unknowns]
-    return loaded
 
 
 def pair_roots(gears: GearPair, pair: MeshingPair, *, coarsen: float = 1.0) -> PairRoots:

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.compliance import GearBody
-from ..contact.recovery import position_loads, sector_displacements
+from ..contact.recovery import position_forces, sector_displacements
 from ..contact.scene import MeshingPair, turn
-from ..contact.solver import Position
+from ..contact.position import Position
 from ..elasticity import physical_gradients, principal_stresses, triangle_shapes, von_mises
 from ..meshing.whole_gear import WholeGear, whole_gear
 from .flank_pressure import flank_pressures
@@ -122,7 +122,7 @@ def gear_field(recovery: GearRecovery, pair: MeshingPair, position: Position, an
         0 pinion, 1 wheel.
     """
     body, whole = recovery.body, recovery.whole
-    loads = position_loads(body, gear, position)
+    loads = position_forces(body, gear, position)
     local = sector_displacements(body, [(loads, tooth) for tooth in range(body.teeth)])  # (s, 2, z)
     teeth = body.teeth
     turns = angle + 2 * np.pi * np.arange(teeth) / teeth

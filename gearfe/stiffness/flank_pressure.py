@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..contact.flank import Flank, edge_nodes, edge_shapes
 from ..contact.half_plane_result import PairContacts
 from ..contact.scene import MeshingPair
-from ..contact.solver import Position
+from ..contact.position import Position
 
 Array = NDArray[Any]
 
@@ -50,28 +50,23 @@ def flank_pressures(pair: MeshingPair, position: Position) -> list[FlankPressure
     """Pressure on each piece of flank of a solved position.
 
     On a gear whose flank carries no contact points of its own (one-sided laws) it is what the mate's points press on
-    it, at their closest places before deformation.
+    it, at their closest places.
     """
     if position.contacts is not None:
         return _of_panels(pair, position.contacts)
-    scene, pressure = position.scene, position.pressure
-    if scene is None or pressure is None:
-        return []
     made = []
-    for i, w in enumerate(scene.windows):
-        flank = pair.bodies[w.gear].flank
-        mine = np.flatnonzero(scene.owner == i)
+    for i, w in enumerate(position.windows if position.points is not None else ()):
+        flank, points = pair.bodies[w.gear].flank, position.points
+        mine = np.flatnonzero(points.owner == i)
         if len(mine):
             place = w.first_edge + _own_places(flank, w.edges, len(mine))
         else:
-            mine = np.flatnonzero((scene.mate == i) & ~scene.rigid.beyond)
-            place = w.first_edge + scene.rigid.place[mine]
-            order = np.argsort(place, kind="stable")
-            mine, place = mine[order], place[order]
-        if len(mine):
-            radius = np.linalg.norm(_points(flank, place), axis=1)
-            number = w.tooth if w.gear == 0 else -1 - w.tooth
-            made.append(FlankPressure(w.gear, number, w.tooth, place, radius, pressure[mine]))
+            mine = np.flatnonzero(points.facing == i)
+            mine = mine[np.argsort(points.place[mine], kind="stable")]
+            place = w.first_edge + points.place[mine]
+        radius = np.linalg.norm(_points(flank, place), axis=1)
+        number = w.tooth if w.gear == 0 else -1 - w.tooth
+        made.append(FlankPressure(w.gear, number, w.tooth, place, radius, points.pressure[mine]))
     return made
 
 

@@ -1,0 +1,359 @@
+"""Pieces of flank of many positions side by side in flat arrays, so that one array operation serves them all.
+
+Windows are sorted by position, within it by gear, within that by tooth pair. Nodes and contact points of one gear in
+one position are then one stretch, a *block*, and its elastic response is one matrix,
+
+    (displacements, normal stresses) = matrix @ forces.
+
+Vectors are complex numbers x + i y. Displacements and forces are in the axes of the tooth that a node belongs to, in
+which the matrices are the same at every position.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .closest import Projection, chains_of, project
+from .laws import carrying
+from .scene import MeshingPair, Window
+
+Array = NDArray[Any]
+IntArray = NDArray[Any]
+ComplexArray = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class FirstContacts:
+    """Where m contacts are taken to be before they are solved, sampled at n places along each.
+
+    Attributes
+    ----------
+    position, pair : ndarray, shape (m,)
+        Number of the position, in rising order, and of the tooth pair: pinion tooth k, wheel tooth -1 - k.
+    normal : ndarray of complex, shape (m,)
+        Common normal out of the pinion, global axes.
+    arc : ndarray, shape (m, 2, n)
+        Arc length (m) of the samples on the chains of edges of pinion and wheel: what touches each other.
+    pressure, width : ndarray, shape (m, n)
+        Pressure at the samples (Pa) and the length that each stands for (m).
+    """
+
+    position: IntArray
+    pair: IntArray
+    normal: ComplexArray
+    arc: Array
+    pressure: Array
+    width: Array
+
+    def __len__(self) -> int:
+        return len(self.pair)
+
+    def take(self, index: Any) -> FirstContacts:
+        """The contacts `index`."""
+        return FirstContacts(**{name: getattr(self, name)[index] for name in self.__dataclass_fields__})
+
+
+@dataclass(frozen=True)
+class Block:
+    """One gear in one position: its nodes and contact points in the batch, and its response.
+
+    Attributes
+    ----------
+    nodes, points : slice
+    matrix : ndarray, shape (2 n + q, 2 n)
+        Displacements of its n nodes (m/N), then normal stresses at its q contact points (Pa/N; no rows for laws
+        without stress), for forces on the nodes.
+    """
+
+    nodes: slice
+    points: slice
+    matrix: Array
+
+    @property
+    def unknowns(self) -> slice:
+        """Components x, y of its nodes in turn."""
+        return slice(2 * self.nodes.start, 2 * self.nodes.stop)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """B positions side by side: W windows, n nodes, q contact points.
+
+    Attributes
+    ----------
+    elastic
+        The gears.
+    size
+        B.
+    position, gear, tooth, couple, mate, first_edge, counts : ndarray, shape (W,)
+        Of each window: its position, gear and tooth, its contact, the window that it faces, and its edges.
+    turn : ndarray of complex, shape (W,)
+        Unit number that turns tooth axes to global ones.
+    first_node : ndarray, shape (W + 1,)
+    window : ndarray, shape (n,)
+        Of each node.
+    points : ndarray of complex, shape (n,)
+        Undeformed nodes, tooth axes (m).
+    owner, at, facing : ndarray, shape (q,)
+        Of each contact point: its window, its position, and the window that it is projected onto.
+    slave_nodes, slave_shapes : ndarray, shape (q, 3)
+        Nodes and shape functions of each contact point.
+    weight : ndarray, shape (q,)
+        Area of each contact point (m2).
+    fade : ndarray, shape (q,)
+        Half of the point's own stretch of surface, in edges of the mate. Where a stretch lies across the end of the
+        mate's surface (a sharp tip), the part that is past it does not count, so that sliding past the corner is
+        continuous.
+    parameter : ndarray, shape (q,)
+        The law's gamma (Pa/m).
+    blocks : list of Block
+        Pinion and wheel of each position in turn.
+    """
+
+    elastic: MeshingPair
+    size: int
+    position: IntArray
+    gear: IntArray
+    tooth: IntArray
+    couple: IntArray
+    mate: IntArray
+    first_edge: IntArray
+    counts: IntArray
+    turn: ComplexArray
+    first_node: IntArray
+    window: IntArray
+    points: ComplexArray
+    owner: IntArray
+    at: IntArray
+    facing: IntArray
+    slave_nodes: IntArray
+    slave_shapes: Array
+    weight: Array
+    fade: Array
+    parameter: Array
+    blocks: list[Block]
+
+    def windows(self, chosen: slice) -> tuple[Window, ...]:
+        """Some consecutive windows, their nodes counted from the first of them."""
+        first = self.first_node[chosen] - self.first_node[chosen.start]
+        each = (self.gear[chosen], self.tooth[chosen], self.first_edge[chosen], self.counts[chosen], first)
+        return tuple(Window(*one) for one in zip(*(values.tolist() for values in each), strict=True))
+
+    @property
+    def node_position(self) -> IntArray:
+        """Position of each node, shape (n,)."""
+        return self.position[self.window]
+
+    def respond(self, forces: ComplexArray, chosen: Iterable[int]) -> tuple[ComplexArray, Array]:
+        """Displacements (m), shape (n,), and stresses at the contact points (Pa), shape (q,), for forces (N).
+
+        Only the positions `chosen` are computed; the others' numbers are 0.
+        """
+        moved, stress = np.zeros_like(forces), np.zeros(len(self.weight))
+        loads, out = forces.view(float), moved.view(float)
+        for b in chosen:
+            for block in self.blocks[2 * b : 2 * b + 2]:
+                both = block.matrix @ loads[block.unknowns]
+                count = block.unknowns.stop - block.unknowns.start
+                out[block.unknowns] = both[:count]
+                if len(both) > count:
+                    stress[block.points] = both[count:]
+        return moved, stress
+
+    def placed(self, displacement: ComplexArray, turn: ComplexArray) -> ComplexArray:
+        """Nodes in their places (m) when displaced (m) and with the windows turned by `turn`, shape (W,)."""
+        hub = self.gear * self.elastic.centre_distance
+        return np.asarray(turn[self.window] * (self.points + displacement) + hub[self.window])
+
+    def slaves(self, placed: ComplexArray, points: IntArray) -> ComplexArray:
+        """Places of contact points (m) for places of the nodes."""
+        return np.asarray((self.slave_shapes[points] * placed[self.slave_nodes[points]]).sum(axis=1))
+
+    def project(self, placed: ComplexArray, points: IntArray, start: Array) -> Projection:
+        """Closest points of the contact points `points` on their mates, from starting places."""
+        nodes, slaves = parts(placed), parts(self.slaves(placed, points))
+        return project(slaves, chains_of(nodes, self.counts, self.facing[points], self.fade[points]), start)
+
+    def areas(self, place: Array, points: IntArray) -> Array:
+        """Areas of contact points (m2) as far as they lie before the end of the mate's surface."""
+        past = self.counts[self.facing[points]] - place
+        return self.weight[points] * np.clip(0.5 + past / (2 * self.fade[points]), 0.0, 1.0)
+
+
+def parts(values: ComplexArray) -> Array:
+    """Components x, y in a second axis."""
+    return np.ascontiguousarray(values).view(float).reshape(-1, 2)
+
+
+def windows_of(elastic: MeshingPair, first: FirstContacts, share: float, margin: int) -> tuple[IntArray, IntArray]:
+    """First edge and number of edges of the window of each contact on either gear, shape (m, 2).
+
+    They reach beyond the pressure by `share` of its length and `margin` edges.
+    """
+    low, count = np.zeros((len(first), 2), dtype=np.int64), np.zeros((len(first), 2), dtype=np.int64)
+    for g, body in enumerate(elastic.bodies):
+        ends = np.concatenate([[0.0], np.cumsum(body.flank.sizes)])
+        arc = first.arc[:, g]
+        least = np.where(first.pressure > 0, arc, np.inf).min(axis=1)
+        most = np.where(first.pressure > 0, arc, -np.inf).max(axis=1)
+        more = share * (most - least)
+        low[:, g] = np.maximum(np.searchsorted(ends, least - more, side="right") - 1 - margin, 0)
+        count[:, g] = np.minimum(np.searchsorted(ends, most + more) + margin, body.flank.edges) - low[:, g]
+    return low, count
+
+
+def batch_of(elastic: MeshingPair, first: FirstContacts, angles: Array, twists: Array, reach: tuple[float, int]) -> Batch:
+    """Lay the positions of these contacts side by side.
+
+    Parameters
+    ----------
+    angles, twists : ndarray, shape (B,)
+        Pinion angles and twists of the positions (rad); every position has a contact.
+    reach
+        `share` and `margin` of `windows_of`.
+    """
+    size, flanks = len(angles), [body.flank for body in elastic.bodies]
+    per_position = np.bincount(first.position, minlength=size)
+    start = np.cumsum(per_position) - per_position
+    rank = np.arange(len(first)) - start[first.position]
+    number = 2 * start[first.position] + rank
+    of = np.stack([number, number + per_position[first.position]], axis=1)  # window of each contact and gear
+    edges = windows_of(elastic, first, *reach)
+
+    def windows(pinion: Any, wheel: Any) -> Array:
+        made = np.empty(2 * len(first), dtype=np.result_type(pinion, wheel))
+        made[of[:, 0]], made[of[:, 1]] = pinion, wheel
+        return made
+
+    here = angles[first.position], twists[first.position]
+    gear, mate = windows(0, 1), windows(of[:, 1], of[:, 0])
+    tooth, position = windows(first.pair, -1 - first.pair), windows(first.position, first.position)
+    couple = windows(np.arange(len(first)), np.arange(len(first)))
+    first_edge, counts = (windows(part[:, 0], part[:, 1]) for part in edges)
+    turned = [elastic.tooth_angle(g, tooth[of[:, g]], *here) for g in (0, 1)]
+    nodes = 2 * counts + 1
+    first_node = np.concatenate([[0], np.cumsum(nodes)])
+    begin = np.array([0, len(flanks[0].points)])[gear] + 2 * first_edge
+    local = np.concatenate([f.points for f in flanks])[ranges(begin, nodes)]
+    bears = carried_by(elastic, first)[couple, gear]
+    at_points = _contact_points(elastic, gear, first_edge, counts, mate, first_node, bears)
+    owner = at_points["owner"]
+    made = Batch(
+        elastic=elastic,
+        size=size,
+        position=position,
+        gear=gear,
+        tooth=tooth,
+        couple=couple,
+        mate=mate,
+        first_edge=first_edge,
+        counts=counts,
+        turn=windows(np.exp(1j * turned[0]), np.exp(1j * turned[1])),
+        first_node=first_node,
+        window=np.repeat(np.arange(len(gear)), nodes),
+        points=np.ascontiguousarray(local).view(complex)[:, 0],
+        at=position[owner],
+        blocks=[],
+        **at_points,
+    )
+    return replace(made, blocks=_blocks(made, bears))
+
+
+def carried_by(elastic: MeshingPair, first: FirstContacts) -> NDArray[np.bool_]:
+    """Whether pinion and wheel carry contact points of the law at each contact, shape (m, 2)."""
+    load = first.pressure * first.width
+    mean = (first.arc * load[:, None, :]).sum(axis=2) / load.sum(axis=1)[:, None]
+    length = np.array([body.flank.sizes.sum() for body in elastic.bodies])
+    return carrying(elastic.law, length - mean)
+
+
+def ranges(starts: IntArray, lengths: IntArray) -> IntArray:
+    """All of start, start + 1, ..., start + length - 1, one after the other."""
+    ends = np.cumsum(lengths)
+    return np.repeat(starts - ends + lengths, lengths) + np.arange(ends[-1] if len(ends) else 0)
+
+
+def _contact_points(
+    elastic: MeshingPair,
+    gear: IntArray,
+    first_edge: IntArray,
+    counts: IntArray,
+    mate: IntArray,
+    first_node: IntArray,
+    bears: NDArray[np.bool_],
+) -> dict[str, Any]:
+    law, flanks = elastic.law, [body.flank for body in elastic.bodies]
+    quadrature = np.array([flank.shapes.shape[0] for flank in flanks])
+    per_window = np.where(bears, quadrature[gear] * counts, 0)
+    owner = np.repeat(np.arange(len(gear)), per_window)
+    within = ranges(np.zeros(len(gear), dtype=np.int64), per_window)
+    own, facing = gear[owner], mate[owner]
+    edge = within // quadrature[own]
+    number = np.array([0, flanks[0].weights.size])[own] + quadrature[own] * first_edge[owner] + within
+    lengths = np.concatenate([f.weights.ravel() for f in flanks])[number]
+    gammas = [
+        np.repeat(law.parameter(body.surface_modulus, f.sizes), n)
+        for body, f, n in zip(elastic.bodies, flanks, quadrature, strict=True)
+    ]
+    sizes = np.concatenate([f.sizes for f in flanks])
+    last_size = sizes[np.array([0, flanks[0].edges])[gear] + first_edge + counts - 1]
+    shapes = np.concatenate([f.shapes for f in flanks])
+    share = np.where(bears[owner] & bears[facing], 0.5, 1.0)
+    return {
+        "owner": owner,
+        "facing": facing,
+        "slave_nodes": (first_node[owner] + 2 * edge)[:, None] + np.arange(3),
+        "slave_shapes": shapes[np.array([0, quadrature[0]])[own] + within % quadrature[own]],
+        "weight": elastic.width * share * lengths,
+        "fade": 0.5 * lengths / last_size[facing],
+        "parameter": np.concatenate(gammas)[number],
+    }
+
+
+def _blocks(batch: Batch, bears: NDArray[np.bool_]) -> list[Block]:
+    """The response of pinion and wheel in each position."""
+    made = []
+    edges = np.searchsorted(2 * batch.position + batch.gear, np.arange(2 * batch.size + 1)).tolist()
+    for start, end in itertools.pairwise(edges):
+        mine = slice(start, end)
+        points = slice(*np.searchsorted(batch.owner, [start, end]).tolist())
+        nodes = slice(int(batch.first_node[start]), int(batch.first_node[end]))
+        matrix = _response(batch.elastic, batch.windows(mine), bears[mine].tolist())
+        made.append(Block(nodes, points, matrix))
+    return made
+
+
+def _response(elastic: MeshingPair, windows: Sequence[Window], bears: list[bool]) -> Array:
+    """Displacements and stresses of one gear's windows for forces on them, see `Block`."""
+    body, unknowns = elastic.bodies[windows[0].gear], [w.unknowns for w in windows]
+    q, row = body.flank.shapes.shape[0], unknowns[-1].stop
+    stressed: list[slice | None] = []
+    for w, carries in zip(windows, bears, strict=True):
+        rows = q * w.edges if carries and elastic.law.uses_stress else 0
+        stressed.append(slice(row, row + rows) if rows else None)
+        row += rows
+    matrix = np.empty((row, unknowns[-1].stop))
+    for j, loaded in enumerate(windows):
+        columns = loaded.flank_unknowns
+        for i, moved in enumerate(windows):
+            driven = body.far.driven[moved.tooth - loaded.tooth][:, columns]
+            part = matrix[unknowns[i], unknowns[j]]
+            np.matmul(body.far.flank[moved.flank_unknowns], driven, out=part)
+            if i == j:
+                part += body.own[moved.flank_unknowns, columns]
+            if stressed[i] is None:
+                continue
+            assert body.far.stress is not None
+            assert body.stress_own is not None
+            rows_of = slice(q * moved.first_edge, q * (moved.first_edge + moved.edges))
+            part = matrix[stressed[i], unknowns[j]]
+            np.matmul(body.far.stress[rows_of], driven, out=part)
+            if i == j:
+                part += body.stress_own[rows_of, columns]
+    return matrix

@@ -1,0 +1,204 @@
+"""Nitsche's and the penalty law by finite elements: positions of a gear pair from first contacts.
+
+The first contacts are those of the half-plane law (`first_contacts`): where each tooth pair touches, how wide and under
+which pressure. They place the windows in which the mesh's own contact is solved and start Newton's method within a per
+cent of its end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .element_batch import Batch, FirstContacts, batch_of, parts, windows_of
+from .element_newton import STEPS, Outcome, State, seen, solve, step
+from .flank import edge_shapes
+from .flank_compliance import FlankCompliance
+from .half_plane_result import PairContacts
+from .half_width import half_widths
+from .position import PointPressures, Position, unsolved
+from .scene import MeshingPair
+
+Array = NDArray[Any]
+IntArray = NDArray[Any]
+ComplexArray = NDArray[np.complex128]
+
+#: Relative error of pressures and forces at which a position counts as converged.
+TOLERANCE = 1e-9
+#: Windows reach beyond the first pressure by this share of its length and so many edges; again where the contact came
+#: to a window's rim.
+REACHES = ((0.2, 2), (1.0, 6))
+#: What the twist is ahead for derivatives, as a share of what it has deformed the gears by, and relative accuracy there.
+AHEAD, SETTLED = 1e-4, 1e-5
+#: Moments of a position.
+TORQUES = ("torque_wheel", "torque_pinion", "torque_wheel_reaction")
+#: Memory for the matrices of positions that are solved side by side.
+BATCH_BYTES = 60e6
+
+
+def first_contacts(sides: Sequence[FlankCompliance], contacts: PairContacts) -> FirstContacts:
+    """The contacts that the half-plane law has found, as places on the chains of edges."""
+    arc = contacts.panel_arc + np.array([side.offset for side in sides])[:, None]
+    return FirstContacts(contacts.position, contacts.pair, contacts.normal, arc, contacts.pressure, contacts.width)
+
+
+def solve_elements(
+    elastic: MeshingPair, angles: Array, twists: Array, first: FirstContacts, *, tolerance: float = TOLERANCE
+) -> list[Position]:
+    """Solve the contact of several positions on the mesh.
+
+    Parameters
+    ----------
+    angles, twists : ndarray, shape (n,)
+        Pinion angles and twists (rad).
+    first
+        Contacts to start from; positions without one have ``no_contact``.
+    tolerance
+        Relative error of pressures and forces.
+    """
+    made = [unsolved("no_contact")] * len(angles)
+    open_ = np.unique(first.position)
+    for reach in REACHES:
+        outgrown: list[int] = []
+        for chosen in _batches(elastic, first, open_, reach):
+            mine = first.take(np.isin(first.position, chosen))
+            mine = replace(mine, position=np.searchsorted(chosen, mine.position))
+            batch = batch_of(elastic, mine, angles[chosen], twists[chosen], reach)
+            outcome = solve(batch, _start(batch, mine), tolerance)
+            rims = _at_rims(batch, outcome.state)
+            for i, position in zip(chosen.tolist(), _positions(batch, outcome), strict=True):
+                made[i] = position
+            outgrown += chosen[rims].tolist()
+        open_ = np.array(outgrown, dtype=np.int64)
+    for i in open_.tolist():
+        made[i] = unsolved("not_converged", made[i].iterations)
+    return made
+
+
+def _batches(elastic: MeshingPair, first: FirstContacts, positions: IntArray, reach: tuple[float, int]) -> list[IntArray]:
+    """Positions in parts whose matrices fit into `BATCH_BYTES`."""
+    nodes = 2 * windows_of(elastic, first, *reach)[1] + 1
+    size = sum(np.bincount(first.position, one, minlength=1 + int(positions.max(initial=0))) ** 2 for one in nodes.T)
+    held = np.cumsum(96 * size[positions])  # 8 bytes, four numbers a pair of nodes, and twice as many stress rows
+    return [part for part in np.split(positions, np.flatnonzero(np.diff(held // BATCH_BYTES)) + 1) if len(part)]
+
+
+def _start(batch: Batch, first: FirstContacts) -> State:
+    """Pressures at the contact points and forces on the nodes from those at the samples of the first contacts."""
+    pressure, place = np.zeros(len(batch.owner)), np.zeros(len(batch.owner))
+    forces = np.zeros(len(batch.points), dtype=complex)
+    flanks = [body.flank for body in batch.elastic.bodies]
+    ends = [np.concatenate([[0.0], np.cumsum(flank.sizes)]) for flank in flanks]
+    bounds = np.searchsorted(batch.owner, np.arange(len(batch.gear) + 1))
+    for w, (m, g) in enumerate(zip(batch.couple.tolist(), batch.gear.tolist(), strict=True)):
+        arc, mate, load = first.arc[m, g], first.arc[m, 1 - g], first.pressure[m] * first.width[m]
+        edge = np.clip(np.searchsorted(ends[g], arc, side="right") - 1, 0, flanks[g].edges - 1)
+        on = np.flatnonzero(load > 0)
+        shapes = edge_shapes(np.clip((arc - ends[g][edge]) / flanks[g].sizes[edge], 0.0, 1.0))[0]
+        nodes = batch.first_node[w] + 2 * (edge[on, None] - batch.first_edge[w]) + np.arange(3)
+        along = batch.elastic.width * (2 * g - 1) * first.normal[m] * batch.turn[w].conj()
+        np.add.at(forces, nodes, shapes[on] * (along * load[on])[:, None])
+        mine = slice(bounds[w], bounds[w + 1])
+        if mine.start == mine.stop:
+            continue
+        at = batch.slave_shapes[mine] @ [0.0, 0.5, 1.0] + (batch.slave_nodes[mine, 0] - batch.first_node[w]) // 2
+        s = np.interp(at + batch.first_edge[w], np.arange(len(ends[g])), ends[g])
+        order = np.argsort(arc)
+        pressure[mine] = np.interp(s, arc[order], first.pressure[m][order], left=0.0, right=0.0)
+        inside = np.clip(s, arc[order[0]], arc[order[-1]])
+        way = np.sign(mate[order[-1]] - mate[order[0]])
+        facing = np.interp(inside, arc[order], mate[order]) + way * (s - inside)
+        chain = np.interp(facing, ends[1 - g], np.arange(len(ends[1 - g]))) - batch.first_edge[batch.mate[w]]
+        place[mine] = np.clip(chain, 0.0, batch.counts[batch.mate[w]])
+    displacement, stress = batch.respond(forces, range(batch.size))
+    return State(pressure, stress, place, forces, displacement)
+
+
+def _at_rims(batch: Batch, state: State) -> NDArray[np.bool_]:
+    """Whether a contact has come to the rim of a window that could be longer, shape (B,)."""
+    edges = np.array([body.flank.edges for body in batch.elastic.bodies])[batch.gear]
+    low, high = batch.first_edge > 0, batch.first_edge + batch.counts < edges
+    bears = np.flatnonzero(state.pressure > 0)
+    own, facing, place = batch.owner[bears], batch.facing[bears], state.place[bears]
+    edge = (batch.slave_nodes[bears, 0] - batch.first_node[own]) // 2
+    rim = (low[own] & (edge == 0)) | (high[own] & (edge == batch.counts[own] - 1))
+    # on the last edge of the mate's window the normal is not blended into its neighbour's
+    rim |= (low[facing] & (place < 1)) | (high[facing] & (place > batch.counts[facing] - 1))
+    return np.bincount(batch.at[bears[rim]], minlength=batch.size) > 0
+
+
+def _positions(batch: Batch, outcome: Outcome) -> list[Position]:
+    """The solved positions, with derivatives by the same equations at a slightly larger twist."""
+    here, of = outcome.state, batch.node_position
+    bearing = [piece.points for _, piece in sorted(outcome.pieces.items())]
+    points = np.concatenate(bearing) if bearing else np.zeros(0, dtype=np.int64)
+    forces = seen(batch, here, batch.turn, points).forces(here.pressure[points], len(batch.points))
+    one = _torques(batch, here, forces, batch.turn)
+    work = np.bincount(of, (forces.conj() * here.displacement).real, batch.size)
+    ahead = AHEAD * np.divide(work, one["torque_wheel"], out=np.ones(batch.size), where=one["torque_wheel"] > 0)
+    turn = batch.turn * np.exp(1j * batch.gear * ahead[batch.position])
+    there = here
+    for _ in range(STEPS):
+        before, there = there, step(batch, there, seen(batch, there, turn, points), outcome.pieces)
+        moved, last = (np.bincount(of, np.abs(there.forces - f), batch.size) for f in (forces, before.forces))
+        if (last <= SETTLED * moved).all():
+            break
+    tangent = (_torques(batch, there, there.forces, turn)["torque_wheel"] - one["torque_wheel"]) / ahead
+    rate = (there.forces - forces) / ahead[of]
+    every = np.arange(len(batch.owner))
+    places = batch.slaves(batch.placed(here.displacement, batch.turn), every)
+    loads = batch.weight * np.maximum(here.pressure, 0.0)
+    widths = half_widths(batch.couple[batch.owner], parts(places), loads, len(batch.gear) // 2)
+    made = []
+    for b in range(batch.size):
+        steps = int(outcome.iterations[b])
+        if not (b in outcome.pieces and tangent[b] > 0):
+            made.append(unsolved("not_converged", steps))
+            continue
+        windows, mine = (slice(*np.searchsorted(at, [b, b + 1]).tolist()) for at in (batch.position, batch.at))
+        nodes = slice(batch.first_node[windows.start], batch.first_node[windows.stop])
+        wheel = windows.start + np.flatnonzero(batch.gear[windows] == 1)
+        made.append(
+            Position(
+                status="converged",
+                **{name: float(one[name][b]) for name in TORQUES},
+                tangent=float(tangent[b]),
+                pair_numbers=tuple((-1 - batch.tooth[wheel]).tolist()),
+                pair_torques=one["of_window"][wheel],
+                peak_pressure=float(here.pressure[mine].max()),
+                iterations=steps,
+                pair_widths=widths[batch.couple[wheel]],
+                windows=batch.windows(windows),
+                forces=forces[nodes].view(float),
+                force_rate=rate[nodes].view(float),
+                points=PointPressures(
+                    batch.owner[mine] - windows.start,
+                    batch.facing[mine] - windows.start,
+                    here.place[mine],
+                    np.maximum(here.pressure[mine], 0.0),
+                ),
+            )
+        )
+    return made
+
+
+def _torques(batch: Batch, state: State, forces: ComplexArray, turn: ComplexArray) -> dict[str, Array]:
+    """Moments that the hubs need (N m): shape (B,), and of each window about its own hub, shape (W,)."""
+    hub = (batch.gear * batch.elastic.centre_distance)[batch.window]
+    force, wheel = turn[batch.window] * forces, batch.gear[batch.window] == 1
+    placed, still = (batch.placed(u, turn) - hub for u in (state.displacement, np.zeros_like(forces)))
+    moment, reaction = (-(arm.conj() * force).imag for arm in (placed, still))
+
+    def of_positions(values: Array, chosen: NDArray[np.bool_]) -> Array:
+        return np.bincount(batch.node_position, np.where(chosen, values, 0.0), batch.size)
+
+    return {
+        "torque_wheel": of_positions(moment, wheel),
+        "torque_pinion": of_positions(moment, ~wheel),
+        "torque_wheel_reaction": of_positions(reaction, wheel),
+        "of_window": np.bincount(batch.window, moment, len(batch.gear)),
+    }
