@@ -15,8 +15,8 @@ and
     \Delta(n\cdot D) = -(1 - g\kappa/m)(N_\Delta\,\delta\xi + N_\delta\,\Delta\xi + \kappa\,\delta\xi\,\Delta\xi)
     + \frac{g}{m} N_\Delta N_\delta
 
-(Laursen, *Computational Contact and Impact Mechanics*, 2002, ch. 5, written out for two dimensions). The last two take
-the normal's turning from the point's own edge; `gearfe.contact.exact_rows` has them with kinks between edges.
+(Laursen, *Computational Contact and Impact Mechanics*, 2002, ch. 5, written out for two dimensions; the last two take
+the normal's turning from the point's own edge).
 """
 
 from __future__ import annotations
@@ -224,39 +224,3 @@ def _evaluate(x: Array, y: Array, chains: Chains, place: Array, chosen: IntArray
 def unreached(gap: Array) -> NDArray[np.bool_]:
     """Points whose projection runs off the end of the mate's surface."""
     return gap >= OFF_END
-
-
-@dataclass(frozen=True)
-class Rows:
-    """Variations n.D of the gaps over the six nodes of each point: three of its own edge, three of the mate's.
-
-    Attributes
-    ----------
-    nodes : ndarray, shape (n, 6)
-        Node numbers.
-    normal : ndarray, shape (n, 6, 2)
-        Coefficients, in the axes of the tooth that each node belongs to.
-    """
-
-    nodes: IntArray
-    normal: Array
-
-
-def gap_rows(projection: Projection, slave_nodes: IntArray, slave_shapes: Array, rotation: Array) -> Rows:
-    """Rows of n.D; `gearfe.contact.exact_rows` has all that Newton's tangent needs.
-
-    Parameters
-    ----------
-    slave_nodes, slave_shapes : ndarray, shape (n, 3)
-        Nodes of each point's own edge and its shape functions there.
-    rotation : ndarray, shape (nodes, 2, 2)
-        Tooth axes to global axes, of each node.
-    """
-    p = projection
-    normal = np.empty((len(p.gap), 6, 2))
-    for part, shapes, axes in (
-        (slice(0, 3), slave_shapes, rotation[slave_nodes[:, 0]]),
-        (slice(3, 6), -p.shapes, rotation[p.edge]),
-    ):
-        np.multiply(shapes[:, :, None], np.matmul(p.normal[:, None], axes), out=normal[:, part])
-    return Rows(np.concatenate([slave_nodes, p.edge[:, None] + np.arange(3)], axis=1), normal)

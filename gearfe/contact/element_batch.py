@@ -208,7 +208,9 @@ def windows_of(elastic: MeshingPair, first: FirstContacts, share: float, margin:
     return low, count
 
 
-def batch_of(elastic: MeshingPair, first: FirstContacts, angles: Array, twists: Array, reach: tuple[float, int]) -> Batch:
+def batch_of(
+    elastic: MeshingPair, first: FirstContacts, angles: Array, twists: Array, reach: tuple[float, int]
+) -> Batch:
     """Lay the positions of these contacts side by side.
 
     Parameters

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .element_batch import Batch, FirstContacts, batch_of, parts, windows_of
-from .element_newton import STEPS, Outcome, State, seen, solve, step
+from .element_newton import STEPS, Outcome, solve, step
+from .element_rows import State, seen
 from .flank import edge_shapes
 from .flank_compliance import FlankCompliance
 from .half_plane_result import PairContacts
@@ -32,10 +33,8 @@ TOLERANCE = 1e-9
 #: Windows reach beyond the first pressure by this share of its length and so many edges; again where the contact came
 #: to a window's rim.
 REACHES = ((0.2, 2), (1.0, 6))
-#: What the twist is ahead for derivatives, as a share of what it has deformed the gears by, and relative accuracy there.
+#: What the twist is ahead for derivatives, as a share of the gears' deformation; relative accuracy of the differences.
 AHEAD, SETTLED = 1e-4, 1e-5
-#: Moments of a position.
-TORQUES = ("torque_wheel", "torque_pinion", "torque_wheel_reaction")
 #: Memory for the matrices of positions that are solved side by side.
 BATCH_BYTES = 60e6
 
@@ -79,10 +78,13 @@ def solve_elements(
     return made
 
 
-def _batches(elastic: MeshingPair, first: FirstContacts, positions: IntArray, reach: tuple[float, int]) -> list[IntArray]:
+def _batches(
+    elastic: MeshingPair, first: FirstContacts, positions: IntArray, reach: tuple[float, int]
+) -> list[IntArray]:
     """Positions in parts whose matrices fit into `BATCH_BYTES`."""
     nodes = 2 * windows_of(elastic, first, *reach)[1] + 1
-    size = sum(np.bincount(first.position, one, minlength=1 + int(positions.max(initial=0))) ** 2 for one in nodes.T)
+    count = 1 + int(positions.max(initial=0))
+    size = np.sum([np.bincount(first.position, of_gear, count) ** 2 for of_gear in nodes.T], axis=0)
     held = np.cumsum(96 * size[positions])  # 8 bytes, four numbers a pair of nodes, and twice as many stress rows
     return [part for part in np.split(positions, np.flatnonzero(np.diff(held // BATCH_BYTES)) + 1) if len(part)]
 
@@ -134,7 +136,7 @@ def _at_rims(batch: Batch, state: State) -> NDArray[np.bool_]:
 def _positions(batch: Batch, outcome: Outcome) -> list[Position]:
     """The solved positions, with derivatives by the same equations at a slightly larger twist."""
     here, of = outcome.state, batch.node_position
-    bearing = [piece.points for _, piece in sorted(outcome.pieces.items())]
+    bearing = [own.points for own in outcome.equations.values()]
     points = np.concatenate(bearing) if bearing else np.zeros(0, dtype=np.int64)
     forces = seen(batch, here, batch.turn, points).forces(here.pressure[points], len(batch.points))
     one = _torques(batch, here, forces, batch.turn)
@@ -143,7 +145,7 @@ def _positions(batch: Batch, outcome: Outcome) -> list[Position]:
     turn = batch.turn * np.exp(1j * batch.gear * ahead[batch.position])
     there = here
     for _ in range(STEPS):
-        before, there = there, step(batch, there, seen(batch, there, turn, points), outcome.pieces)
+        before, there = there, step(batch, there, seen(batch, there, turn, points), outcome.equations, held=True)
         moved, last = (np.bincount(of, np.abs(there.forces - f), batch.size) for f in (forces, before.forces))
         if (last <= SETTLED * moved).all():
             break
@@ -156,7 +158,7 @@ def _positions(batch: Batch, outcome: Outcome) -> list[Position]:
     made = []
     for b in range(batch.size):
         steps = int(outcome.iterations[b])
-        if not (b in outcome.pieces and tangent[b] > 0):
+        if not (b in outcome.equations and tangent[b] > 0):
             made.append(unsolved("not_converged", steps))
             continue
         windows, mine = (slice(*np.searchsorted(at, [b, b + 1]).tolist()) for at in (batch.position, batch.at))
@@ -165,7 +167,9 @@ def _positions(batch: Batch, outcome: Outcome) -> list[Position]:
         made.append(
             Position(
                 status="converged",
-                **{name: float(one[name][b]) for name in TORQUES},
+                torque_wheel=float(one["torque_wheel"][b]),
+                torque_pinion=float(one["torque_pinion"][b]),
+                torque_wheel_reaction=float(one["torque_wheel_reaction"][b]),
                 tangent=float(tangent[b]),
                 pair_numbers=tuple((-1 - batch.tooth[wheel]).tolist()),
                 pair_torques=one["of_window"][wheel],

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 from ..elasticity import physical_gradients, triangle_shapes
 from .compliance import GearBody
+from .position import Position
 from .recovery import position_forces, sector_displacements
 from .scene import MeshingPair
-from .position import Position
 
 Array = NDArray[Any]
 

@@ -61,7 +61,11 @@ def with_loads(
     if not windows:
         return position
     return replace(
-        position, windows=tuple(windows), forces=np.concatenate(forces), force_rate=np.concatenate(rates), contacts=contacts
+        position,
+        windows=tuple(windows),
+        forces=np.concatenate(forces),
+        force_rate=np.concatenate(rates),
+        contacts=contacts,
     )
 
 

@@ -1,39 +1,28 @@
-r"""Contact laws: what the pressure on a flank is, given gap and stress there.
+r"""Contact laws: what the pressure on a flank is.
 
-**Laws at points** (penalty, Nitsche's family). With the gap g (negative where the bodies overlap), the normal stress
-:math:`\sigma_n` of the body that carries a point, and the law's parameter :math:`\gamma` (Pa/m), find u such that for
-all v (Chouly, Mlika & Renard, *Numer. Math.* 139, 2018, written with the gap in place of its negative)
-
-.. math::
-    a(u, v) - \int_{\Gamma_C} \frac{\theta}{\gamma}\,\sigma_n(u)\,\sigma_n(v)
-    = \int_{\Gamma_C} p\,\delta g(v) + \int_{\Gamma_C} \frac{\theta}{\gamma}\,p\,\sigma_n(v), \qquad
-    p = \max(0,\; -\gamma g - s\,\sigma_n).
-
-For theta = 1 this is the derivative of the energy :math:`\tfrac12 a(u,u) + \int_{\Gamma_C} (p^2 - \sigma_n^2)/(2
-\gamma)`. The part :math:`\Gamma_C` is the whole contact surface (round of the tip included) of every tooth of the gears
-on the law's `sides`, so that the left-hand side is one stiffness for all positions; with both gears on it, each takes
-half of both integrals. Past a sharp end of the mate only the right-hand side is cut. Stress loads
-:math:`z\,\sigma_n(v)` have neither resultant nor moment, since :math:`\sigma_n` of a rigid motion is zero: torques
-follow from :math:`p\,\delta g` alone.
-
-**The half-plane law** (half_plane) has no contact elements: `gearfe.contact.half_plane`.
-
-**Laws on a multiplier space** (exact). The pressure is :math:`p = \sum_i \lambda_i \psi_i` and fulfils
+**On the elements of the flanks** (nitsche, penalty; `gearfe.contact.elements`). With the gap g (negative where
+the bodies overlap), the normal stress :math:`\sigma_n` of the body that carries a point, and the law's parameter
+:math:`\gamma` (Pa/m), find u such that for all v (Chouly, Mlika & Renard, *Numer. Math.* 139, 2018, with theta = 0 and
+the gap in place of its negative)
 
 .. math::
-    \lambda_i \ge 0, \qquad \int \psi_i\, g \ge 0, \qquad \lambda_i \int \psi_i\, g = 0 .
+    a(u, v) = \int_{\Gamma_C} p\,\delta g(v), \qquad p = \max(0,\; -\gamma g - s\,\sigma_n).
 
-A law on the mesh provides, and nothing else needs to be touched to add one:
+The part :math:`\Gamma_C` is the contact surface (round of the tip included) of the gears on the law's `sides`; with
+both gears on it, each takes half of the integral. The variants theta = 1 and -1, and exact multipliers, are laws of the
+whole-gear route alone (`gearfe.verification.laws`).
+
+**On half-planes** (half_plane): `gearfe.contact.half_plane`, without contact elements.
+
+A law on the elements provides, and nothing else needs to be touched to add one:
 
 1. ``name``: the text that selects it;
 2. ``uses_stress``: s above (0 or 1); with 1 the bodies keep the stress rows of their flanks;
-3. ``theta``: 0, 1 or -1; other than 0 the bodies also keep what stress loads cause;
-4. ``multiplier``: name of the multiplier space, or None for laws at points;
-5. ``parameter(youngs_modulus, sizes)``: gamma at the edges of a flank, from the body's modulus (Pa) and its edge
-lengths (m); of a multiplier law the complementarity parameter, which moves no solution;
-6. ``sides``: ``both`` (unbiased: each flank carries half of the pressure), ``pinion``, ``wheel``, or ``tip``: of each
+3. ``parameter(youngs_modulus, sizes)``: gamma at the edges of a flank, from the body's modulus (Pa) and its edge
+lengths (m);
+4. ``sides``: ``both`` (unbiased: each flank carries half of the pressure), ``pinion``, ``wheel``, or ``tip``: of each
 tooth pair the gear whose tip is nearer to the contact. A corner that digs into the other flank then lies on the side
-that is integrated, which nothing cuts. Routes that do not tell tooth pairs apart take the pinion for it.
+that is integrated, which nothing cuts.
 """
 
 from __future__ import annotations
@@ -49,7 +38,6 @@ from ..errors import InputError
 
 Array = NDArray[Any]
 Sides = Literal["both", "pinion", "wheel", "tip"]
-Theta = Literal[1, 0, -1]
 
 
 class ContactLaw(Protocol):
@@ -60,19 +48,8 @@ class ContactLaw(Protocol):
     @property
     def uses_stress(self) -> bool: ...
     @property
-    def theta(self) -> int: ...
-    @property
-    def multiplier(self) -> str | None: ...
-    @property
     def sides(self) -> Sides: ...
     def parameter(self, youngs_modulus: float, sizes: Array) -> Array: ...
-
-
-def side_share(law: ContactLaw, gear: int) -> float:
-    """Part of the pressure's integral that runs over the pinion (gear 0) or the wheel (gear 1): 0, 1/2 or 1."""
-    if law.sides == "both":
-        return 0.5
-    return float((law.sides == "wheel") == (gear == 1))
 
 
 def carrying(law: ContactLaw, to_tip: Array) -> NDArray[np.bool_]:
@@ -86,14 +63,13 @@ def carrying(law: ContactLaw, to_tip: Array) -> NDArray[np.bool_]:
 def law_text(law: ContactLaw) -> str:
     """Name and parameters in one line without commas, for tables and reports."""
     if isinstance(law, Nitsche):
-        return f"nitsche theta={law.theta} gamma0={law.gamma0:.12g} sides={law.sides}"
+        return f"nitsche gamma0={law.gamma0:.12g} sides={law.sides}"
     if isinstance(law, Penalty):
         stiffness = "300E/h" if law.stiffness is None else f"{law.stiffness * 1e-9:.12g}N/mm3"
         return f"penalty stiffness={stiffness} sides={law.sides}"
     if isinstance(law, HalfPlane):
         return law.name
-    space = f" multipliers={law.multiplier}" if law.multiplier else ""
-    return f"{law.name} sides={law.sides}{space}"
+    return f"{law.name} sides={law.sides}"
 
 
 def _check_sides(sides: str, allowed: tuple[str, ...]) -> None:
@@ -138,14 +114,6 @@ class Penalty:
     def uses_stress(self) -> bool:
         return False
 
-    @property
-    def theta(self) -> int:
-        return 0
-
-    @property
-    def multiplier(self) -> None:
-        return None
-
     def parameter(self, youngs_modulus: float, sizes: Array) -> Array:
         """gamma at each edge (Pa/m)."""
         stiffness = self.stiffness
@@ -162,20 +130,14 @@ class Nitsche:
         gamma h/E (-); about 1 is the most accurate, far above it the law turns into a stiff penalty.
     sides
         ``both``: unbiased, neither gear is the master.
-    theta
-        0: no term in the variation of the stress, the cheapest. 1: symmetric, the derivative of an energy, which is
-        convex only for gamma0 above some 10. -1: converges for every gamma0.
     """
 
     gamma0: float = 1.0
     sides: Sides = "both"
-    theta: Theta = 0
 
     def __post_init__(self) -> None:
         _check_sides(self.sides, ("both", "pinion", "wheel"))
         _check_positive("gamma0", self.gamma0, "gamma h/E")
-        if self.theta not in get_args(Theta):
-            raise InputError("theta", self.theta, "must be 1, 0 or -1", "0 is the cheapest, -1 the most robust")
 
     @property
     def name(self) -> str:
@@ -185,55 +147,9 @@ class Nitsche:
     def uses_stress(self) -> bool:
         return True
 
-    @property
-    def multiplier(self) -> None:
-        return None
-
     def parameter(self, youngs_modulus: float, sizes: Array) -> Array:
         """gamma at each edge (Pa/m)."""
         return self.gamma0 * youngs_modulus / sizes
-
-
-@dataclass(frozen=True)
-class Exact:
-    """No overlap in the mean, no tension: multipliers on one gear's flank, continuous and linear on half edges.
-
-    The space P1(h/2) on second-order edges is stable (why: `gearfe.contact.multiplier`) and its hats are not negative,
-    so neither are the pressures. It has one condition for each displacement node, where a stiff penalty at four
-    points an edge has two and over-constrains. Half as many, hats on the vertices alone, is as stable, but the pressure
-    of a contact that spans two or three edges then costs a tenth to a third of the accuracy.
-
-    Parameters
-    ----------
-    sides
-        The gear that carries the multipliers, by default the one whose tip is nearer, for each tooth pair. ``both``
-        would ask twice for the same thing and is not offered.
-    """
-
-    sides: Sides = "tip"
-
-    def __post_init__(self) -> None:
-        _check_sides(self.sides, ("tip", "pinion", "wheel"))
-
-    @property
-    def name(self) -> str:
-        return "exact"
-
-    @property
-    def uses_stress(self) -> bool:
-        return False
-
-    @property
-    def theta(self) -> int:
-        return 0
-
-    @property
-    def multiplier(self) -> str:
-        return "P1(h/2)"
-
-    def parameter(self, youngs_modulus: float, sizes: Array) -> Array:
-        """Complementarity parameter at each edge (Pa/m): active where lambda > parameter x mean gap."""
-        return youngs_modulus / sizes
 
 
 @dataclass(frozen=True)
@@ -249,31 +165,21 @@ class HalfPlane:
         return False
 
     @property
-    def theta(self) -> int:
-        return 0
-
-    @property
-    def multiplier(self) -> None:
-        return None
-
-    @property
     def sides(self) -> Sides:
         return "both"
 
     def parameter(self, youngs_modulus: float, sizes: Array) -> Array:  # noqa: ARG002
         """None: only its own solver knows the law."""
         problem = "has no pressure at points of a mesh: gearfe.contact.half_plane solves it"
-        raise InputError("law", self.name, problem, "use " + ", ".join(MESH_LAWS) + " here")
+        raise InputError("law", self.name, problem, "use nitsche or penalty here")
 
 
-#: Laws on the elements of the flanks.
-MESH_LAWS: dict[str, type[Penalty] | type[Nitsche] | type[Exact]] = {
+#: Selectable laws; those after the first live on the elements of the flanks.
+LAWS: dict[str, type[Penalty] | type[Nitsche] | type[HalfPlane]] = {
+    "half_plane": HalfPlane,
     "nitsche": Nitsche,
     "penalty": Penalty,
-    "exact": Exact,
 }
-#: Selectable laws.
-LAWS: dict[str, type[Penalty] | type[Nitsche] | type[Exact] | type[HalfPlane]] = {"half_plane": HalfPlane, **MESH_LAWS}
 
 
 def law_named(name: str) -> ContactLaw:

@@ -11,14 +11,14 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact.elements import first_contacts, solve_elements
 from ..contact.half_plane import half_plane_pair, solve_half_plane
 from ..contact.half_plane_loads import with_loads
 from ..contact.half_plane_result import HalfPlaneSolution
 from ..contact.laws import HalfPlane
-from ..contact.position import unsolved
+from ..contact.position import Position, unsolved
 from ..contact.records import joined, taken
 from ..contact.scene import MeshingPair
-from ..contact.solver import Position, solve_positions
 from ..gear.pair import GearPair
 from ..gear.touching import Flanks, Touching
 
@@ -159,9 +159,12 @@ class ElementSolver:
             if position.status == "converged" and self.resolved_only and self.elements_per_contact(position) < 1.0:
                 made[i] = unsolved("under_resolved", position.iterations)
         open_ = np.array([i for i, p in enumerate(made) if p.status == "converged"], dtype=np.int64)
-        for i, position in zip(open_, solve_positions(self.elastic, angles[open_], twists[open_]), strict=True):
-            missed = position.status == "no_contact"
-            made[i] = unsolved("under_resolved", position.iterations) if missed else position
+        if len(open_):
+            contacts = joined([expected[i].contacts for i in open_])
+            first = first_contacts(self.half_plane.law.sides, contacts)
+            solved = solve_elements(self.elastic, angles, twists, first)
+            for i in open_:
+                made[i] = solved[i]
         return [p if i in kept else bare(p) for i, p in enumerate(made)]
 
     def elements_per_contact(self, position: Position) -> float:
@@ -188,7 +191,4 @@ class ElementSolver:
 
 def bare(position: Position) -> Position:
     """The position without what only fields need: a scene holds megabytes."""
-    nothing: dict[str, Any] = dict.fromkeys(
-        ("scene", "forces", "force_rate", "pressure", "stress_loads", "stress_load_rate")
-    )
-    return replace(position, **nothing)
+    return replace(position, windows=(), forces=None, force_rate=None, points=None)
