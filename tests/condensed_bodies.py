@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -13,7 +13,10 @@ from scipy.sparse.linalg import splu
 
 from gearfe.contact.compliance import REACH, FarField, GearBody
 from gearfe.contact.flank import flank_of, normal_stress_rows
+from gearfe.contact.element_batch import FirstContacts
+from gearfe.contact.elements import solve_elements
 from gearfe.contact.laws import ContactLaw
+from gearfe.contact.position import Position
 from gearfe.contact.scene import MeshingPair, turn
 from gearfe.verification.bodies import Bodies, ElasticBody
 
@@ -52,7 +55,7 @@ def condensed_body(body: ElasticBody, surface: str, held: Mapping[str, tuple[boo
     far = FarField(none, np.zeros((len(stress), 0)), dict.fromkeys(range(-REACH, REACH + 1), none.T))
     return GearBody(
         mesh, flank, body.material, body.plane, body.thickness, moved[surface_unknowns], none, np.zeros((TEETH, 0, 0)),
-        stress, np.zeros((len(stress), 0)), far, None, body.thickness,  # type: ignore[arg-type]
+        stress, far, None, body.thickness,  # type: ignore[arg-type]
     )  # fmt: skip
 
 
@@ -79,3 +82,23 @@ def pressed_pair(lower: GearBody, upper: GearBody, law: ContactLaw, overlap: flo
     pinion = turned(lower, 0.0, left)
     wheel = turned(upper, np.pi - np.pi / TEETH, centre + np.array([0.0, overlap]))
     return MeshingPair(pinion, wheel, CENTRES * size, lower.thickness, law)
+
+
+def pressed(pair: MeshingPair, low: float, high: float, pressure: Callable[[Array], Array]) -> Position:
+    """The pair solved from a guessed pressure (Pa) as a function of x between `low` and `high` (m)."""
+    ends = np.linspace(low, high, 201)
+    x = 0.5 * (ends[1:] + ends[:-1])
+    origin = float(pair.pinion.flank.points[:, 0].min())
+    arcs = []
+    for gear, tooth in ((0, 0), (1, -1)):
+        body = pair.bodies[gear]
+        placed = body.flank.points @ turn(pair.tooth_angle(gear, tooth, 0.0, 0.0)).T + pair.centre(gear)
+        along = placed[::2, 0] - origin
+        order = np.argsort(along)
+        arcs.append(np.interp(x, along[order], np.concatenate([[0.0], np.cumsum(body.flank.sizes)])[order]))
+    none = np.zeros(1, dtype=np.int64)
+    first = FirstContacts(
+        none, none, np.array([1j]), np.array([arcs]), pressure(x)[None], np.diff(ends)[None]
+    )  # fmt: skip
+    (found,) = solve_elements(pair, np.zeros(1), np.zeros(1), first)
+    return found

@@ -16,26 +16,27 @@ from gearfe import Material, sweep_stiffness
 from gearfe.contact.half_width import half_widths
 from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
 from gearfe.contact.position import Position
-from gearfe.contact.solver import solve_positions
 from gearfe.gear.spur_gear import TipRelief
 from gearfe.stiffness.sweep import elastic_pair
 
-from .condensed_bodies import condensed_body, pressed_pair
+from .condensed_bodies import condensed_body, pressed, pressed_pair
 from .gears import pair
 from .structured import block, mapped_grid
 
 SOFT, HARD = Material(70e9, 0.30), Material(210e9, 0.25)
 
 
-def solved(lower, upper, law: ContactLaw, overlap: float) -> Position:
-    (found,) = solve_positions(pressed_pair(lower, upper, law, overlap), np.zeros(1), np.zeros(1))
+def solved(lower, upper, law: ContactLaw, overlap: float, low: float, high: float, guess) -> Position:
+    """From a guessed pressure (Pa) as a function of x between `low` and `high` (m)."""
+    found = pressed(pressed_pair(lower, upper, law, overlap), low, high, guess)
     assert found.status == "converged"
     return found
 
 
 def normal_force(found: Position) -> float:
     """Of the upper body on the lower one (N per m of thickness)."""
-    return -float(found.forces.reshape(-1, 2)[~found.scene.of_wheel].sum(axis=0)[1])
+    (lower,) = (w for w in found.windows if w.gear == 0)
+    return -float(found.forces[lower.unknowns][1::2].sum())
 
 
 # ---- patch test ------------------------------------------------------------------------------------------------------
@@ -63,7 +64,8 @@ def test_patch_force_converges_through_the_sweeps_solver(law: ContactLaw) -> Non
     compliance += 1 / 1e15 if law.name == "penalty" else 0.0
     off = []
     for cells in (1, 2, 4):
-        found = solved(confined(HEIGHTS[1], cells, False, HARD), confined(HEIGHTS[0], cells, True, SOFT), law, OVERLAP)
+        bodies = confined(HEIGHTS[1], cells, False, HARD), confined(HEIGHTS[0], cells, True, SOFT)
+        found = solved(*bodies, law, OVERLAP, 0.0, 1.0, lambda x: np.full(len(x), 0.3 * OVERLAP * 70e9))
         off.append(abs(normal_force(found) * compliance / OVERLAP - 1))
     assert off[2] < 3e-4
     assert law.name == "penalty" or 0.5 * math.log2(off[0] / off[2]) > 1.4
@@ -102,7 +104,8 @@ def hertz_bodies(n: int):
 
 def hertz_errors(n: int, law: ContactLaw) -> tuple[float, float]:
     """Relative errors of the half width by the second moment, and of the largest pressure at a contact point."""
-    found = solved(*hertz_bodies(n), law, 3.2 * 2 / math.pi * math.pi / (4 * RADIUS))
+    guess = SIZE - 0.8, SIZE + 0.8, lambda x: np.full(len(x), 1e8)
+    found = solved(*hertz_bodies(n), law, 3.2 / (2 * RADIUS), *guess)
     force = normal_force(found)
     b = math.sqrt(4 * force * RADIUS / (math.pi * MODULUS))  # Johnson, eq. 4.43
     assert 0.5 < b < FINE

@@ -68,8 +68,6 @@ class GearBody:
     stress_own : ndarray, shape (e q, f), or None
         Normal stress at the quadrature points for flank forces with the cut sides held (Pa/N), per area of contact: the
         body's own times thickness/width, as a pressure on the width of the contact spreads over the thickness.
-    stress_interface : ndarray, shape (e q, b), or None
-        Normal stress for displacements of the cut sides (Pa/m).
     far : FarField
         The same cyclic part in its numerical rank.
     condensed
@@ -85,7 +83,6 @@ class GearBody:
     interface: Array
     coupling: Array
     stress_own: Array | None
-    stress_interface: Array | None
     far: FarField
     condensed: Condensed
     width: float
@@ -163,7 +160,6 @@ def gear_body(
         interface,
         coupling,
         stress_own,
-        stress_interface,
         far,
         condensed,
         width,
