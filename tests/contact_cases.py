@@ -78,5 +78,5 @@ def whole(name: str, coarsen: float, plane: Plane) -> WholePair:
 
 def oracle_law(law: ContactLaw) -> oracle.ContactLaw:
     """A law of the sweep as the verification route's own."""
-    made = {"nitsche": oracle.Nitsche, "penalty": oracle.Penalty, "exact": oracle.Exact}[law.name]
+    made = {"nitsche": oracle.Nitsche, "penalty": oracle.Penalty}[law.name]
     return made(**asdict(law))  # type: ignore[call-overload]

@@ -14,7 +14,7 @@ import pytest
 
 from gearfe import StiffnessCurve
 from gearfe.cli import main
-from gearfe.contact import solver
+from gearfe.contact.elements import solve_elements
 from gearfe.contact.position import unsolved
 
 ROOT = Path(__file__).parents[1]
@@ -149,14 +149,12 @@ for step in range(2):
 
 
 def test_a_failed_position_is_told_and_in_the_table(tmp_path, capsys, monkeypatch):
-    real = solver.solve_positions
-
-    def weak(pair, angles, twists):
-        made = real(pair, angles, twists)
-        bad = solver.Position("not_converged", *[math.nan] * 4, (), np.zeros(0), math.nan, 40)
+    def weak(pair, angles, twists, first):
+        made = solve_elements(pair, angles, twists, first)
+        bad = unsolved("not_converged", 40)
         return [bad if abs(a - math.radians(4)) < 1e-9 else p for a, p in zip(angles, made, strict=True)]
 
-    monkeypatch.setattr("gearfe.stiffness.position_solver.solve_positions", weak)
+    monkeypatch.setattr("gearfe.stiffness.position_solver.solve_elements", weak)
     code = main(["stiffness", str(JOB), "--out", str(tmp_path), "--twist-deg", "0.3", *QUICK, "--law", "nitsche"])
     assert code == 1
     said = capsys.readouterr()
@@ -336,14 +334,13 @@ def test_the_estimate_reaches_beyond_the_coarsest_mesh(tmp_path, capsys):
 
 def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
     """Angles are sorted; one without a solution is left out of the series, and the table has its status."""
-    solve = solver.solve_positions
 
-    def one_fails(pair, angles, twists, **options):
-        made = solve(pair, angles, twists, **options)
+    def one_fails(pair, angles, twists, first):
+        made = solve_elements(pair, angles, twists, first)
         bad = np.isclose(np.degrees(angles), 6.0)
         return [unsolved("not_converged", 40) if b else p for p, b in zip(made, bad, strict=True)]
 
-    monkeypatch.setattr("gearfe.stiffness.position_solver.solve_positions", one_fails)
+    monkeypatch.setattr("gearfe.stiffness.position_solver.solve_elements", one_fails)
     options = ("--twist-deg", "0.3", "--angles", "3", "3", "9", "--fields", "9", "6", "3", "--no-picture")
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, "--law", "nitsche", *options]) == 1
     assert [r["status"] for r in rows(tmp_path)] == ["converged", "not_converged", "converged"]

@@ -7,12 +7,12 @@ import pytest
 from scipy.sparse import coo_matrix
 
 from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
-from gearfe.contact.solver import solve_position
 from gearfe.elasticity import element_stiffness
 from gearfe.meshing.whole_gear import whole_gear
 from gearfe.verification.monolithic import solve_monolithic
 
-from .contact_cases import STEEL, WIDTH, condensed, meshes, oracle_law, whole
+from .contact_cases import STEEL, WIDTH, condensed, gears, meshes, oracle_law, whole
+from .solving import solve_position
 
 COARSE = 5.0
 
@@ -36,7 +36,7 @@ def test_both_routes_give_the_same_position(
     name: str, plane: str, law: ContactLaw, angle: float, twist: float, pairs: int
 ) -> None:
     place = math.radians(angle), math.radians(twist)
-    small = solve_position(condensed(name, COARSE, plane, law), *place, tolerance=1e-11)  # type: ignore[arg-type]
+    small = solve_position(gears(name), condensed(name, COARSE, plane, law), *place)  # type: ignore[arg-type]
     full = solve_monolithic(whole(name, COARSE, plane), oracle_law(law), *place)  # type: ignore[arg-type]
     assert small.status == full.status == "converged"
     assert np.count_nonzero(small.pair_torques > 1e-3 * small.torque_wheel) == pairs
@@ -46,7 +46,9 @@ def test_both_routes_give_the_same_position(
 
 def test_without_twist_nothing_touches_on_either_route() -> None:
     apart = math.radians(5.0), math.radians(-0.05)
-    assert solve_position(condensed("sharp", COARSE, "strain", Nitsche()), *apart).status == "no_contact"
+    assert (
+        solve_position(gears("sharp"), condensed("sharp", COARSE, "strain", Nitsche()), *apart).status == "no_contact"
+    )
     assert solve_monolithic(whole("sharp", COARSE, "strain"), oracle_law(Nitsche()), *apart).status == "no_contact"
 
 

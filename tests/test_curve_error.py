@@ -1,18 +1,14 @@
-"""Default accuracy at the cause: face widths, sharp corners, and the error estimate that stands beside a curve."""
+"""Default accuracy at the cause: face widths, and the error estimate that stands beside a curve."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from gearfe import sweep_stiffness
-from gearfe.contact import solver
-from gearfe.contact.corners import RISE, corner_bearings, shares
 from gearfe.contact.laws import Nitsche, Penalty
-from gearfe.contact.solver import solve_positions
 from gearfe.elasticity import Material
 from gearfe.stiffness.curve_error import (
     COARSENING,
@@ -24,6 +20,7 @@ from gearfe.stiffness.curve_error import (
 from gearfe.stiffness.sweep import elastic_pair
 
 from . import gears
+from .solving import solve_positions
 
 SHARP = gears.pair(20, 30, bore=0.35)
 
@@ -40,75 +37,9 @@ def test_a_wider_gear_is_one_of_the_common_width_and_a_higher_modulus(law):
     given = {"law": law, "coarsen": 2.0}
     one = elastic_pair(wide, (Material(200e9, 0.3), Material(110e9, 0.3)), **given)
     other = elastic_pair(same, (Material(600e9, 0.3), Material(110e9, 0.3)), **given)
-    found = [[p.torque_wheel for p in solve_positions(e, angles, twist)] for e in (one, other)]
+    made = [solve_positions(*both, angles, twist) for both in ((wide, one), (same, other))]
+    found = [[p.torque_wheel for p in positions] for positions in made]
     np.testing.assert_allclose(found[0], found[1], rtol=1e-8)
-
-
-# ---- sharp corners ---------------------------------------------------------------------------------------------------
-
-
-def test_shares_of_a_corner_rise_from_a_half_and_rounded_tips_keep_it():
-    start, end = (SHARP.path[name].pinion_angle for name in ("A", "E"))
-    bearings = corner_bearings(SHARP)
-
-    def at(angle):
-        """Tooth pair 0 touching without a load: the wheel's tooth -1 stands above the line of centres."""
-        wheel = SHARP.wheel_angle_at(angle, SHARP.contact_twist) + SHARP.wheel_phase - 2 * math.pi / SHARP.wheel.teeth
-        return shares(bearings, (angle, wheel))
-
-    assert at(0.5 * (start + end)) == (0.5, 0.5)
-    assert at(end) == (0.5, 0.5)
-    assert at(start) == pytest.approx((0.5, 0.5), abs=1e-9)
-    assert at(end + 0.05) == (1.0, 0.0)
-    assert at(start - 0.05) == (0.0, 1.0)
-    sweep = np.array([at(a)[0] for a in np.linspace(start - 0.05, end + 0.05, 20001)])
-    assert (np.diff(sweep) >= 0).all()
-    assert np.diff(sweep).max() < 0.01
-    assert corner_bearings(gears.pair(20, 30, tip_round=0.1e-3)) == (None, None)
-
-
-@pytest.mark.parametrize("lockstep", [True, False])
-def test_the_tangent_follows_the_share_of_the_wheels_corner(lockstep, monkeypatch):
-    """The wheel's corner bears the more, the further the twist turns it: central differences of the torque see that."""
-    if not lockstep:
-        monkeypatch.setattr(solver, "in_lockstep", lambda law: False)
-    elastic, twist = elastic_pair(SHARP, law="nitsche", coarsen=3.0), math.radians(0.2)
-    start, _ = SHARP.path_limits()
-    half_risen = start - 0.5 * RISE * SHARP.pinion.module
-    angle = SHARP.pinion_angle_at(half_risen) + (twist - SHARP.contact_twist) * SHARP.gear_ratio
-    less, here, more = (solve_positions(elastic, [angle], t)[0] for t in (0.9999 * twist, twist, 1.0001 * twist))
-    assert (here.scene.growth != 0).any()
-    assert here.tangent == pytest.approx((more.torque_wheel - less.torque_wheel) / (2e-4 * twist), rel=1e-6)
-
-
-def test_a_corner_pushes_along_the_normal_of_the_smooth_flank():
-    """Without friction the force that the wheel's corner puts on the pinion's involute touches its base circle.
-
-    Arms are those about the undeformed places of a bent tooth: within 2e-3 of the base radius for pairs on the path
-    too. Points on both bodies would take half of their normals from the corner's own flank.
-    """
-    elastic = elastic_pair(SHARP, law="nitsche")
-    off = []
-    for one in (elastic, replace(elastic, corners=(None, None))):
-        position = solve_positions(one, np.radians([17.0]), math.radians(0.05))[0]
-        corner, path = _arms(position)
-        assert path == pytest.approx(SHARP.pinion.base_radius, rel=2e-3)
-        off.append(abs(corner / SHARP.pinion.base_radius - 1))
-    assert off[0] < 2.5e-3
-    assert off[0] < off[1] / 3
-
-
-def _arms(position):
-    """Arms (m) of the forces on the pinion: the pair whose wheel's corner bears before the path, the pair on it."""
-    arms = {}
-    for window in (w for w in position.scene.windows if w.gear == 0):
-        turned = position.scene.rotation[window.nodes]
-        force = np.matmul(turned, position.forces.reshape(-1, 2)[window.nodes][..., None])[..., 0]
-        place = position.scene.points[window.nodes]
-        moment = float((place[:, 0] * force[:, 1] - place[:, 1] * force[:, 0]).sum())
-        before = SHARP.pinion_roll_at(window.angle) < SHARP.path["A"].pinion_roll
-        arms[before] = abs(moment) / np.linalg.norm(force.sum(axis=0))
-    return arms[True], arms[False]
 
 
 # ---- the estimate ----------------------------------------------------------------------------------------------------

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from gearfe.cli import main
-from gearfe.contact.position import unsolved
 from gearfe.contact.scene import MeshingPair
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.meshing.recipe import sector_recipes
@@ -103,14 +102,6 @@ def test_a_finer_flank_resolves_more() -> None:
     )
     assert set(coarse.status) == {"under_resolved"}
     assert set(fine.status) == {"converged"}
-
-
-def test_a_contact_that_no_point_sees_is_under_resolved(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The exact flanks overlap, so a silent zero would be wrong."""
-    blind = [unsolved("no_contact")] * len(MIDDLE)
-    monkeypatch.setattr("gearfe.stiffness.position_solver.solve_positions", lambda *_: blind)
-    found = ElementSolver(PAIR, elastic_of("nitsche")).solve(MIDDLE, np.full(5, math.radians(WIDE)))
-    assert {p.status for p in found} == {"under_resolved"}
 
 
 def test_the_command_says_the_cure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

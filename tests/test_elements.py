@@ -15,9 +15,9 @@ from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
 from gearfe.contact.position import Position
 from gearfe.contact.scene import MeshingPair
-from gearfe.stiffness.position_solver import position_solver
 
 from .contact_cases import IRON, STEEL, WIDTH, condensed, gears, meshes
+from .solving import nodal, solve_positions
 
 TWIST = math.radians(0.05)
 #: Pinion angles of the 20/30 pair (deg) with one and with two tooth pairs, away from the changes.
@@ -25,10 +25,7 @@ ON_PATH = np.radians([1.0, 3.0, 5.0, 7.0, 12.0, 14.0, 16.0])
 
 
 def solve(name: str, pair: MeshingPair, angles, twists) -> list[Position]:
-    """Positions from the half-plane law's contacts, whether the mesh resolves them or not."""
-    angles = np.atleast_1d(np.asarray(angles, dtype=float))
-    solver = position_solver(gears(name), pair, resolved_only=False)
-    return solver.solve(angles, np.broadcast_to(twists, angles.shape), kept=range(len(angles)))
+    return solve_positions(gears(name), pair, angles, twists)
 
 
 def solve_one(name: str, pair: MeshingPair, angle: float, twist: float) -> Position:
@@ -41,15 +38,6 @@ def torques(coarsen: float, law: ContactLaw) -> np.ndarray:
     found = solve("reference", condensed("reference", coarsen, "strain", law), ON_PATH, TWIST)
     assert all(p.status == "converged" for p in found)
     return np.array([p.torque_wheel for p in found])
-
-
-def nodal(pair: MeshingPair, position: Position, angle: float, twist: float):
-    """Window, undeformed nodes (m) and forces (N) of each piece of flank, as complex numbers in global axes."""
-    for w in position.windows:
-        turn = np.exp(1j * pair.tooth_angle(w.gear, w.tooth, angle, twist))
-        nodes = slice(w.flank_unknowns.start // 2, w.flank_unknowns.stop // 2)
-        points = pair.bodies[w.gear].flank.points[nodes] @ [1, 1j]
-        yield w, turn * points + w.gear * pair.centre_distance, turn * position.forces[w.unknowns].view(complex)
 
 
 # ---- balance and derivatives ----------------------------------------------------------------------------------------

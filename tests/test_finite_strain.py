@@ -12,13 +12,15 @@ import pytest
 from gearfe.contact import finite_strain
 from gearfe.contact.compliance import gear_body
 from gearfe.contact.laws import Nitsche
-from gearfe.contact.recovery import flank_forces, sector_displacements
+from gearfe.contact.position import Position
+from gearfe.contact.recovery import position_forces, sector_displacements
 from gearfe.contact.scene import MeshingPair
-from gearfe.contact.solver import Position, solve_position, solve_positions
 from gearfe.elasticity import Material, physical_gradients, triangle_shapes
 from gearfe.gear.pair import Gear, GearPair
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh
+
+from .solving import solve_position, solve_positions
 
 REFERENCE = Path(__file__).parent / "data" / "gear_pair_20_30.csv"
 
@@ -40,7 +42,7 @@ def extra_energy(pair: MeshingPair, position: Position) -> float:
     """Integral of W_SVK - W_linear over both gears (J), from full tensors, all sectors."""
     total = 0.0
     for gear, body in enumerate(pair.bodies):
-        loads = flank_forces(body, gear, position.scene.windows, position.forces)
+        loads = position_forces(body, gear, position)
         fields = sector_displacements(body, [(loads, tooth) for tooth in range(body.teeth)])
         r, s = np.array([1, 4, 1]) / 6, np.array([1, 1, 4]) / 6
         triangles = body.mesh.triangles
@@ -61,19 +63,19 @@ def extra_energy(pair: MeshingPair, position: Position) -> float:
 def test_share_is_the_rate_of_the_extra_energy(angle_deg: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Delta T = d(W_SVK - W_linear)/d twist, by central differences, with every sector taken along."""
     monkeypatch.setattr(finite_strain, "NEIGHBOURS", 15)
-    _, pair = meshing_pair(coarsen=2.0)
+    gears, pair = meshing_pair(coarsen=2.0)
     angle, twist = math.radians(angle_deg), math.radians(0.05)
     step = 0.02 * twist
-    energies = [extra_energy(pair, solve_position(pair, angle, twist + sign * step)) for sign in (-1, 1)]
-    position = solve_position(pair, angle, twist)
+    energies = [extra_energy(pair, solve_position(gears, pair, angle, twist + sign * step)) for sign in (-1, 1)]
+    position = solve_position(gears, pair, angle, twist)
     share = finite_strain.finite_strain_shares(pair, [position])[0]
     assert share * position.torque_wheel == pytest.approx((energies[1] - energies[0]) / (2 * step), rel=3e-3)
 
 
 def test_few_neighbours_suffice(monkeypatch: pytest.MonkeyPatch) -> None:
     """The effect is cubic in the strain: the loaded teeth and their neighbours carry all but a few parts in 1e5."""
-    _, pair = meshing_pair(coarsen=2.0)
-    position = solve_position(pair, math.radians(13), math.radians(0.05))
+    gears, pair = meshing_pair(coarsen=2.0)
+    position = solve_position(gears, pair, math.radians(13), math.radians(0.05))
     near = finite_strain.finite_strain_shares(pair, [position])[0]
     monkeypatch.setattr(finite_strain, "NEIGHBOURS", 15)
     assert near == pytest.approx(finite_strain.finite_strain_shares(pair, [position])[0], abs=5e-5)
@@ -81,9 +83,9 @@ def test_few_neighbours_suffice(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_sampled_shares_follow_the_curve() -> None:
     """A sweep's shares, interpolated between few positions, differ from each position's own by little of the curve."""
-    _, pair = meshing_pair(coarsen=2.0)
+    gears, pair = meshing_pair(coarsen=2.0)
     angles = np.linspace(0, pair.pitch_angle, 25)[:-1]
-    small = solve_positions(pair, angles, math.radians(0.05))
+    small = solve_positions(gears, pair, angles, math.radians(0.05))
     shares = finite_strain.finite_strain_shares(pair, small)
     chosen = finite_strain.sample_numbers(angles, pair.pitch_angle)
     assert len(chosen) == finite_strain.SAMPLES
@@ -101,7 +103,7 @@ def test_against_a_finite_strain_program() -> None:
     for twist_deg, angles in ((0.05, (2.0, 4.0, 6.0, 12.0, 13.0, 15.0)), (0.5, (4.0, 6.0))):
         expected = {float(r["pinion_angle_deg"]): r for r in rows if float(r["twist_deg"]) == twist_deg}
         twist = math.radians(twist_deg)
-        positions = solve_positions(pair, np.radians(angles), twist)
+        positions = solve_positions(gears, pair, np.radians(angles), twist)
         shares = finite_strain.finite_strain_shares(pair, positions)
         for angle, position, share in zip(angles, positions, shares, strict=True):
             stiffness = position.torque_wheel * (1 + share) / twist / gears.wheel.base_radius**2

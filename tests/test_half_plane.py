@@ -13,7 +13,6 @@ from scipy.integrate import quad
 from gearfe.contact.half_plane import NEAR, HalfPlanePair, _first, half_plane_pair, solve_half_plane
 from gearfe.contact.half_plane_step import step
 from gearfe.contact.panels import MIDDLES, WIDTHS, couplings, first_guess, influence, pressed
-from gearfe.contact.solver import solve_positions
 from gearfe.contact.wedge import ELLIPSE_W, ELLIPSE_X, mean_log, wedge_tensor
 from gearfe.elasticity import Material
 from gearfe.gear.flank_curve import flank_curve
@@ -22,6 +21,7 @@ from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import gear
 from .gears import pair as gear_pair
+from .solving import solve_positions
 
 PAIRS = {
     "rounded": gear_pair(tip_round=1e-4),
@@ -198,7 +198,7 @@ def test_independent_of_the_flank_mesh(degrees: float) -> None:
 
 def test_nitsche_where_its_elements_see_the_contact() -> None:
     angles, twist = angles_of(PAIRS["rounded"], 4), math.radians(0.5)
-    reference = solve_positions(elastic_pair(PAIRS["rounded"], law="nitsche"), angles, twist)
+    reference = solve_positions(PAIRS["rounded"], elastic_pair(PAIRS["rounded"], law="nitsche"), angles, twist)
     found = solve_half_plane(law_of("rounded"), angles, twist)
     expected = np.array([p.torque_wheel for p in reference])
     assert np.abs(found.torque_wheel / expected - 1).max() < 1e-3
@@ -213,7 +213,9 @@ def test_nitsche_where_its_elements_see_the_contact() -> None:
 def test_nitsche_refined(degrees: float) -> None:
     """Nitsche's law on elements less than half as large, also near the changes of the pairs."""
     angles, twist = angles_of(PAIRS["rounded"], 12), math.radians(degrees)
-    reference = solve_positions(elastic_pair(PAIRS["rounded"], law="nitsche", coarsen=0.45), angles, twist)
+    reference = solve_positions(
+        PAIRS["rounded"], elastic_pair(PAIRS["rounded"], law="nitsche", coarsen=0.45), angles, twist
+    )
     expected = np.array([p.torque_wheel for p in reference])
     found = solve_half_plane(law_of("rounded"), angles, twist).torque_wheel
     assert np.abs(found / expected - 1).max() < 6e-4
@@ -267,7 +269,7 @@ def test_one_gear_softer_and_wider() -> None:
     pair = GearPair(gear(20, tip_round=1e-4), gear(30, tip_round=1e-4, width=14e-3))
     metals = (Material(), Material(70e9, 0.34))
     angles, twist = angles_of(pair, 3), math.radians(0.5)
-    reference = solve_positions(elastic_pair(pair, metals, law="nitsche", coarsen=1.5), angles, twist)
+    reference = solve_positions(pair, elastic_pair(pair, metals, law="nitsche", coarsen=1.5), angles, twist)
     law = half_plane_pair(pair, elastic_pair(pair, metals, law="penalty", flank_coarsen=4.0))
     expected = np.array([p.torque_wheel for p in reference])
     assert np.abs(solve_half_plane(law, angles, twist).torque_wheel / expected - 1).max() < 1.5e-3
@@ -310,7 +312,7 @@ def test_an_undercuts_edge_on_a_nearly_flat_mate() -> None:
         found = solve_half_plane(law, angles, module_share * sharp.wheel.module / sharp.wheel.base_radius)
         assert set(found.status) == {"converged"}
         assert "undercut" in found.contacts.mark
-    reference = solve_positions(elastic_pair(sharp, law="nitsche"), angles[::8], found.twist[0])
+    reference = solve_positions(sharp, elastic_pair(sharp, law="nitsche"), angles[::8], found.twist[0])
     assert found.torque_wheel[::8] == pytest.approx([p.torque_wheel for p in reference], rel=2e-3)
 
 

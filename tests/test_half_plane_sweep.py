@@ -13,15 +13,15 @@ from gearfe import InputError
 from gearfe.cli import main
 from gearfe.contact.finite_strain import finite_strain_shares
 from gearfe.contact.laws import HalfPlane
-from gearfe.contact.recovery import position_loads
+from gearfe.contact.recovery import position_forces
 from gearfe.contact.scene import MeshingPair
-from gearfe.contact.solver import solve_positions
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.stiffness.position_solver import HalfPlaneSolver, position_solver
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 
 from .gears import pair as gear_pair
+from .solving import solve_positions
 
 PAIR = gear_pair(tip_round=1e-4)
 ANGLES = (np.arange(5) + 0.3) * PAIR.mesh_cycle / 5
@@ -56,7 +56,7 @@ def test_share_of_finite_strain() -> None:
     solver = position_solver(PAIR, elastic_of("half_plane"))
     found = finite_strain_shares(solver.elastic, solver.solve(ANGLES, np.full(5, twist), range(5)))
     fine = elastic_of("nitsche")
-    expected = finite_strain_shares(fine, solve_positions(fine, ANGLES, twist))
+    expected = finite_strain_shares(fine, solve_positions(PAIR, fine, ANGLES, twist))
     assert found == pytest.approx(expected, rel=0.03)
 
 
@@ -66,7 +66,7 @@ def test_nodal_loads_have_the_moments_of_the_contacts() -> None:
     for position, angle in zip(solver.solve(ANGLES, np.full(5, 2e-3), range(5)), ANGLES, strict=True):
         total, wheel = 0j, 0.0
         for gear, body in enumerate(solver.elastic.bodies):
-            for tooth, load in position_loads(body, gear, position).items():
+            for tooth, load in position_forces(body, gear, position).items():
                 turn = np.exp(1j * solver.elastic.tooth_angle(gear, tooth, angle, 2e-3))
                 forces, places = load.view(complex) * turn, body.flank.points @ np.array([1, 1j]) * turn
                 total += forces.sum()
@@ -108,7 +108,7 @@ def test_load_map() -> None:
 
 def test_no_other_solver_takes_it() -> None:
     with pytest.raises(InputError, match=r"gearfe.contact.half_plane solves it"):
-        solve_positions(elastic_of("half_plane"), ANGLES, 1e-3)
+        HalfPlane().parameter(200e9, np.ones(1))
     assert isinstance(position_solver(PAIR, elastic_of("half_plane")), HalfPlaneSolver)
     assert isinstance(elastic_of("half_plane").law, HalfPlane)
 

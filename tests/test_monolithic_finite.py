@@ -12,7 +12,6 @@ from gearfe.contact import finite_strain, laws
 from gearfe.contact.compliance import gear_body
 from gearfe.contact.finite_strain import finite_strain_shares
 from gearfe.contact.scene import MeshingPair
-from gearfe.contact.solver import solve_position
 from gearfe.elasticity import Material
 from gearfe.gear.pair import Gear, GearPair
 from gearfe.meshing.recipe import sector_recipes
@@ -22,6 +21,7 @@ from gearfe.verification.monolithic import solve_monolithic
 from gearfe.verification.whole_pair import ElasticGear, WholePair
 
 from .contact_cases import whole
+from .solving import solve_position
 from .test_patch import PRESS, two_blocks
 
 
@@ -68,7 +68,7 @@ def both_routes(angle_deg: float, twist_deg: float) -> tuple[float, float]:
     pinion, wheel = (ElasticGear(mesh, steel, "strain", width) for mesh in meshes)
     full = WholePair(pinion, wheel, pair.working_centre_distance, width, kinematics="finite")
     place = math.radians(angle_deg), math.radians(twist_deg)
-    position = solve_position(condensed, *place)
+    position = solve_position(pair, condensed, *place)
     finite = solve_monolithic(full, Nitsche(), *place, tolerance=1e-8)
     assert finite.status == "converged"
     share = finite_strain_shares(condensed, [position])[0]

@@ -7,7 +7,6 @@ import pytest
 
 from gearfe.contact.compliance import gear_body
 from gearfe.contact.flank import flank_of
-from gearfe.contact.solver import solve_position
 from gearfe.elasticity import element_stiffness
 from gearfe.loadmap.root_stress import fillet_radius, pair_roots, peak, root_mesh, root_recipe, spread_of
 from gearfe.meshing.recipe import sector_recipes
@@ -17,6 +16,7 @@ from gearfe.stiffness.fields import gear_recovery
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import gear, pair
+from .solving import solve_position
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,7 @@ def test_the_stress_converges(gears, elastic):
 def test_the_estimate_covers_the_error(form):
     gears = pair(18, 27, **form)
     elastic = elastic_pair(gears, law="nitsche", coarsen=3.0)
-    position = solve_position(elastic, math.radians(2.0), math.radians(0.05))
+    position = solve_position(gears, elastic, math.radians(2.0), math.radians(0.05))
     found, exact = (pair_roots(gears, elastic, coarsen=c).at(position) for c in (1.0, 0.5))
     for number, roots in found.items():
         for one, truth in zip(roots, exact[number], strict=True):
@@ -175,7 +175,7 @@ def test_iso_6336_3_is_near(z1, z2, angle):
     gears = pair(z1, z2, pressure_angle=angle, bore=0.5)
     elastic = elastic_pair(gears, law="nitsche", coarsen=2.0)
     point = gears.path["D"]  # the next pair comes into contact: the pinion's outer point of single contact
-    position = solve_position(elastic, point.pinion_angle - 0.06 * gears.mesh_cycle, 1.5e-4)
+    position = solve_position(gears, elastic, point.pinion_angle - 0.06 * gears.mesh_cycle, 1.5e-4)
     assert (position.pair_torques > 0).sum() == 1
     (roots,) = pair_roots(gears, elastic).at(position).values()
     alpha, m = math.radians(angle), 2.5e-3

@@ -12,7 +12,6 @@ import pytest
 
 from gearfe import sweep_stiffness
 from gearfe.cli import main
-from gearfe.contact.solver import solve_position
 from gearfe.housing import Housing
 from gearfe.meshing import tooth_sector
 from gearfe.meshing.recipe import sector_recipes
@@ -22,6 +21,7 @@ from gearfe.train import build_train, simulate
 
 from .gears import pair
 from .housing_meshes import box
+from .solving import solve_position
 from .trains import SHIPPED, frame_body, train
 from .trains import elastic as in_frame
 
@@ -89,7 +89,7 @@ def test_one_mesh_cycle_instead_of_two(gears, elastic, monkeypatch):
 def test_neighbour_teeth_only(gears, elastic):
     """A position looks at the pairs of teeth that can touch, and they carry the whole torque."""
     for angle in np.radians([0.0, 4.0, 12.0]):
-        position = solve_position(elastic, float(angle), TWIST)
+        position = solve_position(gears, elastic, float(angle), TWIST)
         assert position.status == "converged"
         assert len(position.pair_numbers) <= 4 < gears.pinion.teeth
         assert position.pair_torques.sum() == pytest.approx(position.torque_wheel, rel=1e-9)

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from ..stiffness.position_solver import position_solver
 from ..stiffness.sweep import elastic_pair, sweep_stiffness
 from .record import Record
 from .subject import GEOMETRY, ROOT, housing_of, shipped_housing, shipped_pair
@@ -78,11 +79,10 @@ def neighbours(quick: bool) -> tuple[float, float, str]:
     """One position from the pairs of teeth that can touch; one factorisation of a dense system of all flanks."""
     from scipy.linalg import cho_factor
 
-    from ..contact.solver import solve_positions
-
     pair = shipped_pair()
-    elastic = elastic_pair(pair, law="nitsche", coarsen=4.0 if quick else 1.0)
-    short = _cpu(lambda: solve_positions(elastic, np.array([0.1]), np.array([TWIST])))
+    elastic = elastic_pair(pair, coarsen=4.0 if quick else 1.0)
+    solver = position_solver(pair, elastic)
+    short = _cpu(lambda: solver.solve(np.array([0.1]), np.array([TWIST])))
     every = sum(body.teeth * body.own.shape[0] for body in elastic.bodies)
     size = min(every, 500 if quick else 4000)
     matrix = np.eye(size) + 1e-3
@@ -91,14 +91,13 @@ def neighbours(quick: bool) -> tuple[float, float, str]:
 
 def fields(quick: bool) -> tuple[float, float, str]:
     """A sweep without fields; with displacement and stress of the whole gears at every position."""
-    from ..contact.solver import solve_positions
     from ..stiffness.fields import pair_recovery
 
     pair = shipped_pair()
     elastic = elastic_pair(pair, law="nitsche", coarsen=5.0 if quick else 1.0)
     at = pair.mesh_cycle * np.arange(1 if quick else 8) / 8
     short = _cpu(lambda: sweep_stiffness(pair, twist=TWIST, angles=at, elastic=elastic))
-    solved = solve_positions(elastic, at, np.full(len(at), TWIST))
+    solved = position_solver(pair, elastic).solve(at, np.full(len(at), TWIST), range(len(at)))
 
     def recovered() -> None:
         recovery = pair_recovery(elastic)

@@ -21,7 +21,6 @@ error itself, because the little that is left (0.1 %) no longer falls smoothly e
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -19,7 +19,7 @@ where c may be off by more than 5e-5.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -27,8 +27,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..contact.finite_strain import finite_strain_shares, interpolated_shares
 from ..contact.laws import ContactLaw
+from ..contact.position import Position
 from ..contact.scene import MeshingPair
-from ..contact.solver import Position
 from ..elasticity import Material, Plane
 from ..errors import InputError
 from ..gear.iso6336 import mesh_stiffness
@@ -38,7 +38,7 @@ from ..stiffness.positions import Progress, Solved, at_torque, at_twists, honest
 from ..stiffness.sweep import STEEL, assembled_curve, distinct_angles, elastic_pair
 from ..stopwatch import Stopwatch
 from ..threads import one_thread
-from .cells import closed_level, light, log_twist, one_cell, outward, spent_share
+from .cells import closed_level, log_twist, one_cell, outward, spent_share
 from .load_map import LoadMap
 
 Array = NDArray[Any]
@@ -241,7 +241,7 @@ class _Sweep:
 
         def observe(k: int, position: Position) -> None:
             if position.status == "converged":
-                self.held[row, int(numbers[k])] = light(position)
+                self.held[row, int(numbers[k])] = replace(position, points=None)
                 if self.recorder is not None:
                     self.recorder.record(row, int(numbers[k]), position)
 

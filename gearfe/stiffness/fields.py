@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.compliance import GearBody
+from ..contact.position import Position
 from ..contact.recovery import position_forces, sector_displacements
 from ..contact.scene import MeshingPair, turn
-from ..contact.position import Position
 from ..elasticity import physical_gradients, principal_stresses, triangle_shapes, von_mises
 from ..meshing.whole_gear import WholeGear, whole_gear
 from .flank_pressure import flank_pressures

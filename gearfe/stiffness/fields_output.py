@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact.position import Position
 from ..contact.scene import MeshingPair
-from ..contact.solver import Position
 from ..errors import InputError
 from ..gear.drawing import zone
 from ..gear.pair import GearPair
@@ -153,7 +153,7 @@ def _solved(solver: PositionSolver, curve: StiffnessCurve, chosen: NDArray[np.in
         part = chosen[first : first + SIDE_BY_SIDE]
         made = solver.solve(curve.pinion_angle[part], curve.twist[part] + curve.lost_motion, kept=range(len(part)))
         for number, position in zip(part.tolist(), made, strict=True):
-            if position.scene is not None:
+            if position.forces is not None:
                 yield number, position
 
 
@@ -247,7 +247,7 @@ def frames_of(
             part = slice(first, first + SIDE_BY_SIDE)
             made = solver.solve(angles[part], twists[part], kept=range(len(angles[part])))
             for angle, twist, position in zip(angles[part], twists[part], made, strict=True):
-                if position.scene is not None:
+                if position.forces is not None:
                     fields = recovery.at(position, float(angle), float(twist))
                     parts = [
                         cut_out(1e3 * (f.points + f.displacement), f.triangles, 1e-6 * f.von_mises, place)

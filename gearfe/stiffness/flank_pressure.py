@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..contact.flank import Flank, edge_nodes, edge_shapes
 from ..contact.half_plane_result import PairContacts
-from ..contact.scene import MeshingPair
 from ..contact.position import Position
+from ..contact.scene import MeshingPair
 
 Array = NDArray[Any]
 
@@ -54,9 +54,12 @@ def flank_pressures(pair: MeshingPair, position: Position) -> list[FlankPressure
     """
     if position.contacts is not None:
         return _of_panels(pair, position.contacts)
-    made = []
-    for i, w in enumerate(position.windows if position.points is not None else ()):
-        flank, points = pair.bodies[w.gear].flank, position.points
+    made: list[FlankPressure] = []
+    points = position.points
+    if points is None:
+        return made
+    for i, w in enumerate(position.windows):
+        flank = pair.bodies[w.gear].flank
         mine = np.flatnonzero(points.owner == i)
         if len(mine):
             place = w.first_edge + _own_places(flank, w.edges, len(mine))

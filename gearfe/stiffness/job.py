@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..config import load_job
-from ..contact.laws import ContactLaw, Exact, HalfPlane, Nitsche, Penalty
+from ..contact.laws import ContactLaw, HalfPlane, Nitsche, Penalty
 from ..elasticity import Material
 from ..errors import InputError
 from ..gear.pair import GearPair
@@ -50,14 +50,10 @@ class StiffnessJob:
         sides: dict[str, Any] = {} if t.law_sides is None else {"sides": t.law_sides}
         if t.law == "half_plane":
             return HalfPlane()
-        if t.law == "exact":
-            return Exact(**sides)
         if t.law == "penalty":
             stiffness = t.penalty_stiffness_N_per_mm3
             return Penalty(None if stiffness is None else stiffness * 1e9, **sides)
-        theta: Any = t.nitsche_theta
-        usual = 20.0 if theta == 1 else 1.0
-        return Nitsche(usual if t.nitsche_gamma0 is None else t.nitsche_gamma0, theta=theta, **sides)
+        return Nitsche(1.0 if t.nitsche_gamma0 is None else t.nitsche_gamma0, **sides)
 
     @property
     def model(self) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.finite_strain import finite_strain_shares, interpolated_shares, sample_numbers, with_share
-from ..contact.solver import Position
+from ..contact.position import Position
 from ..errors import InputError
 from ..gear.iso6336 import mesh_stiffness
 from .contact_pressure import contact_pressures

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..contact.compliance import gear_body
-from ..contact.corners import corner_bearings
 from ..contact.laws import ContactLaw, HalfPlane, law_named, law_text
 from ..contact.scene import MeshingPair
 from ..elasticity import Material, Plane
@@ -105,15 +104,11 @@ def elastic_pair(
                 gear.face_width,
                 points_per_edge=points_per_edge,
                 with_stress=chosen.uses_stress,
-                law=chosen,
-                gear=number,
                 width=width,
             )
-            for number, (mesh, material, gear) in enumerate(zip(meshes, both, gears, strict=True))
+            for mesh, material, gear in zip(meshes, both, gears, strict=True)
         ]
-    # stress loads of theta = +-1 stand in the gears' stiffness with the same halves at every position
-    corners = corner_bearings(pair) if chosen.theta == 0 else (None, None)
-    return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen, corners=corners)
+    return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen)
 
 
 def sweep_stiffness(

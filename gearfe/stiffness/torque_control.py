@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.solver import Position
+from ..contact.position import Position
 
 Array = NDArray[np.float64]
 
