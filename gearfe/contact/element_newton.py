@@ -113,6 +113,11 @@ class Outcome:
     equations: dict[int, Equations]
     iterations: IntArray
 
+    @property
+    def points(self) -> IntArray:
+        """Contact points of those equations."""
+        return np.concatenate([np.zeros(0, dtype=np.int64), *(own.points for own in self.equations.values())])
+
 
 def solve(batch: Batch, state: State, tolerance: float) -> Outcome:
     """Solve all positions of a batch from a first state, whose pressures choose the points that bear at first."""
@@ -143,6 +148,32 @@ def solve(batch: Batch, state: State, tolerance: float) -> Outcome:
         for b in np.flatnonzero(live).tolist():
             _mix(batch, b, past[b], old, state)
     return Outcome(state, {b: equations[b] for b in sorted(done)}, iterations)
+
+
+def turned(batch: Batch, outcome: Outcome, turn: ComplexArray, tolerance: float) -> State:
+    """The converged positions with their windows turned on to `turn`, shape (W,), and the same points bearing.
+
+    Parameters
+    ----------
+    tolerance
+        Accuracy of the forces relative to their change; a position that does not reach it gets not-a-number.
+    """
+    start, of = outcome.state, batch.node_position
+    points = outcome.points
+    rows = seen(batch, start, batch.turn, points)
+    forces = rows.forces(start.pressure[points], len(of))
+    state, open_ = start, np.isin(np.arange(batch.size), list(outcome.equations))
+    past: dict[int, list[tuple[Array, Array]]] = {b: [] for b in outcome.equations}
+    for _ in range(STEPS):
+        if not open_.any():
+            break
+        old = state
+        state = step(batch, old, seen(batch, old, turn, points[open_[batch.at[points]]]), outcome.equations, held=True)
+        moved, last = (np.bincount(of, np.abs(state.forces - f), batch.size) for f in (forces, old.forces))
+        open_ &= last > tolerance * moved
+        for b in np.flatnonzero(open_).tolist():
+            _mix(batch, b, past[b], old, state)
+    return replace(state, forces=np.where(open_[of], np.nan, state.forces))
 
 
 def _spread(values: Array, points: IntArray, whole: Array | int) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .element_batch import Batch, FirstContacts, batch_of, parts, windows_of
-from .element_newton import STEPS, Outcome, solve, step
+from .element_newton import Outcome, solve, turned
 from .element_rows import State, seen
 from .flank import edge_shapes
 from .flank_compliance import FlankCompliance
@@ -136,19 +136,13 @@ def _at_rims(batch: Batch, state: State) -> NDArray[np.bool_]:
 def _positions(batch: Batch, outcome: Outcome) -> list[Position]:
     """The solved positions, with derivatives by the same equations at a slightly larger twist."""
     here, of = outcome.state, batch.node_position
-    bearing = [own.points for own in outcome.equations.values()]
-    points = np.concatenate(bearing) if bearing else np.zeros(0, dtype=np.int64)
-    forces = seen(batch, here, batch.turn, points).forces(here.pressure[points], len(batch.points))
+    rows = seen(batch, here, batch.turn, outcome.points)
+    forces = rows.forces(here.pressure[rows.points], len(batch.points))
     one = _torques(batch, here, forces, batch.turn)
     work = np.bincount(of, (forces.conj() * here.displacement).real, batch.size)
     ahead = AHEAD * np.divide(work, one["torque_wheel"], out=np.ones(batch.size), where=one["torque_wheel"] > 0)
     turn = batch.turn * np.exp(1j * batch.gear * ahead[batch.position])
-    there = here
-    for _ in range(STEPS):
-        before, there = there, step(batch, there, seen(batch, there, turn, points), outcome.equations, held=True)
-        moved, last = (np.bincount(of, np.abs(there.forces - f), batch.size) for f in (forces, before.forces))
-        if (last <= SETTLED * moved).all():
-            break
+    there = turned(batch, outcome, turn, SETTLED)
     tangent = (_torques(batch, there, there.forces, turn)["torque_wheel"] - one["torque_wheel"]) / ahead
     rate = (there.forces - forces) / ahead[of]
     every = np.arange(len(batch.owner))
