@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -71,7 +72,10 @@ class Face:
 
     def points(self, u: Array) -> NDArray[np.complex128]:
         """Points (m) as complex numbers."""
-        made = _complex(self.flank.point(np.clip(u, 0.0, 1.0)))
+        flank = self.flank
+        s = flank.roll(np.minimum(np.maximum(u, 0.0), 1.0))
+        beside = s if flank.amount == 0.0 else s - flank.relief(s)[0]
+        made = np.exp(1j * (flank.base_angle - s / flank.base_radius)) * (flank.base_radius + 1j * beside)
         return made if self.round_ is None else np.where(u > 1.0, _complex(self.round_.point(u - 1.0)), made)
 
     def normals(self, u: Array) -> NDArray[np.complex128]:
@@ -90,7 +94,7 @@ class Face:
         flank = self.flank
         return (flank.relief_start - flank.start) / (flank.end - flank.start)
 
-    @property
+    @cached_property
     def radii(self) -> tuple[float, float, float]:
         """Radii (m) of the start, of the end of the involute and of the end."""
         low, middle, high = np.abs(self.points(np.array([0.0, 1.0, self.end])))
@@ -105,7 +109,7 @@ class Face:
             for _ in range(12):
                 depth, slope = flank.relief(s)
                 s = s - (s - depth - forward) / (1.0 - slope)
-        u = np.clip((s - flank.start) / (flank.end - flank.start), 0.0, 1.0)
+        u = np.minimum(np.maximum((s - flank.start) / (flank.end - flank.start), 0.0), 1.0)
         if self.round_ is None:
             return u
         arc = self.round_
