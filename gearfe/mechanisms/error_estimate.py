@@ -27,6 +27,9 @@ from .results import Results, evaluate
 #: The finer runs' tolerance is that much smaller, their longest step that share of the median step of the first one.
 SHARPER, SHORTER, SAFETY = 30.0, 0.6, 2.0
 LEAST_TOLERANCE = 1e-13
+#: Below this a smaller tolerance leaves the steps of series as they are, so that the longest step alone makes a run
+#: finer: then it is that share of the shortest step, for at most so many times the steps.
+SHARPEST, MOST_STEPS = 1e-12, 6.0
 
 
 @dataclass(frozen=True)
@@ -92,7 +95,10 @@ def finer_run(mechanism: Mechanism, start: Start, made: Trajectory, tolerance: f
     ends: Array = np.asarray(made.dense.times)
     if len(ends) < 2 or len(made.time) < 2:
         return None
-    longest = SHORTER * float(np.median(np.abs(np.diff(ends))))
+    steps = np.abs(np.diff(ends))
+    longest = SHORTER * float(np.median(steps))
+    if tolerance < SHARPEST:  # a step that both runs take is an error that both make
+        longest = max(SHORTER * float(steps.min()), float(steps.mean()) / MOST_STEPS)
     backend = "compiled" if made.statistics.get("backend") == "compiled" else "plain"
     options: dict[str, Any] = {"method": made.method, "backend": backend, "start": start, "longest": longest}
     options["raise_on_failure"] = False
