@@ -326,3 +326,26 @@ def test_windows_hold_the_pressure_beside_edges() -> None:
     at_tip = np.stack([c.panel_arc[:, g] > law.curves[g].high - 2 * c.width for g in (0, 1)]).any(axis=0)
     cut = (c.pressure[:, [0, -1]] > 0) & ~at_tip[:, [0, -1]]
     assert not cut.any()
+
+
+@pytest.mark.parametrize("rim", [0.25, 0.5])
+def test_bores_beside_the_roots(rim: float) -> None:
+    """Where the teeth alone yield, T is below zero: forces to begin with had left tooth pairs out, silently."""
+    thick = gear_pair(20, 30, tip_round=1e-4)
+    pair = GearPair(
+        *(replace(g, bore_diameter=2 * (g.root_radius - rim * g.module)) for g in (thick.pinion, thick.wheel))
+    )
+    angles, twist = angles_of(pair, 10), 0.05 * pair.pinion.module / pair.wheel.base_radius
+    reference = solve_positions(elastic_pair(pair, law="nitsche"), angles, twist)
+    found = solve_half_plane(half_plane_pair(pair, elastic_pair(pair)), angles, twist)
+    assert found.torque_wheel == pytest.approx([p.torque_wheel for p in reference], rel=2e-3)
+
+
+@pytest.mark.parametrize("factor", [0.01, 100.0])
+def test_gears_of_another_size(factor: float) -> None:
+    """Plane elasticity has no length: at the same twist torques grow with the square of the size, at the same width."""
+    form = {"bore": 0.35, "width": 10e-3}
+    one, other = (gear_pair(module=m, tip_round=0.04 * m, **form) for m in (2.5e-3, factor * 2.5e-3))
+    angles, twist = angles_of(one, 8), math.radians(0.3)
+    small, large = (solve_half_plane(half_plane_pair(p, elastic_pair(p)), angles, twist) for p in (one, other))
+    assert large.torque_wheel == pytest.approx(factor**2 * small.torque_wheel, rel=2e-5)

@@ -69,8 +69,9 @@ HELD_STEPS, TOLERANCE = 3, 1e-6
 AHEAD, LEAST_AHEAD = 1e-3, 1e-10
 #: Force per width (N/m) below which there is none.
 TINY = 1e-300
-#: Approach of a contact per force in units of 2/pi (1/E_1' + 1/E_2'), with which the first forces are made.
-USUAL_APPROACH = 6.0
+#: Half width (modules) of Hertz's contacts whose approach the first forces are made with: a length, as T in them is
+#: what the logarithms of lengths in metres leave.
+USUAL_WIDTH = 0.01
 #: Rigid clearance (rad) up to which a tooth pair is looked at.
 CLEAR = 1e-7
 #: Positions solved side by side.
@@ -178,7 +179,8 @@ def _first(law: HalfPlanePair, twists: Array, found: Touching) -> _Open:
         return start
     overlap = found.arm[:, 1] * (twists[found.position] - found.twist)
     T = smooth_influence(law, state, start.couples).compliance
-    force = forces_of_overlaps(overlap, USUAL_APPROACH * law.compliance, T, start.couples)
+    approach = law.compliance * (0.5 - np.log(0.5 * USUAL_WIDTH * law.pair.pinion.module))
+    force = forces_of_overlaps(overlap, approach, T, start.couples)
     return _Open(start.numbers, _Pairs(found, replace(state, force=force)))
 
 

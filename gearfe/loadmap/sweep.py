@@ -37,6 +37,7 @@ from ..stiffness.position_solver import PositionSolver, position_solver
 from ..stiffness.positions import Progress, Solved, at_torque, at_twists, honest
 from ..stiffness.sweep import STEEL, assembled_curve, distinct_angles, elastic_pair
 from ..stopwatch import Stopwatch
+from ..tables.laws import DEFAULT_LAW
 from ..threads import one_thread
 from .cells import closed_level, log_twist, one_cell, outward, spent_share
 from .load_map import LoadMap
@@ -66,7 +67,7 @@ def sweep_loads(
     root_stress: bool = False,
     materials: Material | tuple[Material, Material] = STEEL,
     plane: Plane = "strain",
-    law: str | ContactLaw = "half_plane",
+    law: str | ContactLaw = DEFAULT_LAW,
     kinematics: Literal["small", "finite"] = "finite",
     coarsen: float = 1.0,
     flank_coarsen: float = 1.0,
@@ -126,7 +127,7 @@ def sweep_loads(
             recorder = RootRecorder(pair_roots(pair, elastic))
     with watch.stage("cells"), one_thread():
         work = _Sweep(pair, solver, solved_angles, goals, touching, progress, recorder)
-        levels = [honest(level) for level in work.run(finite=kinematics == "finite")]
+        levels = [honest(level, touching) for level in work.run(finite=kinematics == "finite")]
     curves = tuple(
         assembled_curve(pair, elastic.law, asked, solved_angles, source, level, touching, searched=True)
         for level in levels

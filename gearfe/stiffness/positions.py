@@ -17,7 +17,7 @@ from ..gear.iso6336 import mesh_stiffness
 from .contact_pressure import contact_pressures
 from .curve import SOLVED
 from .position_solver import ElementSolver, PositionSolver, bare
-from .torque_control import TorqueSolution, twists_for_torque
+from .torque_control import ANGLE_ROUNDING, TorqueSolution, twists_for_torque
 
 Array = NDArray[Any]
 IntArray = NDArray[Any]
@@ -228,11 +228,18 @@ def _collect(
     return Solved(twists, numbers, pairs, iterations, status)
 
 
-def honest(solved: Solved) -> Solved:
-    """Take all numbers off failed positions."""
-    bad = ~np.isin(solved.status, SOLVED)
+def honest(solved: Solved, touching: Array) -> Solved:
+    """Mark positions without contact whose exact rigid flanks overlap, and take all numbers off failed ones.
+
+    `touching` are the twists (rad), shape (n,), at which the rigid flanks touch.
+    """
+    status = [
+        "not_converged" if s == "no_contact" and twist > touch + ANGLE_ROUNDING else s
+        for s, twist, touch in zip(solved.status, solved.twist, touching, strict=True)
+    ]
+    bad = ~np.isin(status, SOLVED)
     numbers = {n: np.where(bad, 0 if n == "edge" else np.nan, values) for n, values in solved.numbers.items()}
-    return replace(solved, numbers=numbers)
+    return replace(solved, numbers=numbers, status=status)
 
 
 def load_shares(pairs: list[tuple[IntArray, Array]], torque: Array) -> tuple[Array, Array]:

@@ -27,6 +27,7 @@ from ..gear.pair import GearPair
 from ..meshing.recipe import sector_recipes
 from ..meshing.tooth_sector import sector_mesh
 from ..stopwatch import Stopwatch
+from ..tables.laws import DEFAULT_LAW
 from ..tables.stiffness import check_flank_coarsen
 from ..threads import one_thread
 from .contact_pressure import EDGES
@@ -55,7 +56,7 @@ def elastic_pair(
     materials: Material | tuple[Material, Material] = STEEL,
     *,
     plane: Plane = "strain",
-    law: str | ContactLaw = "half_plane",
+    law: str | ContactLaw = DEFAULT_LAW,
     coarsen: float = 1.0,
     flank_coarsen: float = 1.0,
     points_per_edge: int = 4,
@@ -119,7 +120,7 @@ def sweep_stiffness(
     angles: ArrayLike | None = None,
     materials: Material | tuple[Material, Material] = STEEL,
     plane: Plane = "strain",
-    law: str | ContactLaw = "half_plane",
+    law: str | ContactLaw = DEFAULT_LAW,
     kinematics: Literal["small", "finite"] = "finite",
     twist_from: Literal["contact", "centred"] = "contact",
     solve_all: bool = False,
@@ -192,7 +193,7 @@ def sweep_stiffness(
             solved = at_twists(solver, solved_angles, np.full(len(solved_angles), load), progress, finite=finite)
         else:
             solved = at_torque(solver, solved_angles, load, touching, progress, finite=finite)
-    solved = honest(solved)
+    solved = honest(solved, touching)
     error = None
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
