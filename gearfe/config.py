@@ -82,7 +82,8 @@ def build(cls: type[T], table: Any, where: str) -> T:
     """Frozen dataclass `cls` from a parsed TOML table; `where` is the table's name for messages.
 
     Understands ``int``, ``float``, ``bool``, ``str``, ``X | None``, ``tuple[X, ...]``, fixed tuples, ``dict[str, X]``,
-    and nested dataclasses. A dataclass may define ``check(self, where)`` for rules that join several fields.
+    and nested dataclasses. A dataclass may define ``check(self, where)`` for rules that join several fields, and
+    ``REMOVED``: key that was -> what became of it, and what to write instead.
 
     Raises
     ------
@@ -98,6 +99,8 @@ def build(cls: type[T], table: Any, where: str) -> T:
         if spec.metadata.get("choices") and name in table:
             _convert(hints[name], table[name], _joined(where, name), spec.metadata)
     for key in table:
+        if key in getattr(cls, "REMOVED", ()):
+            raise InputError(_joined(where, key), table[key], *cls.REMOVED[key])  # type: ignore[attr-defined]
         if key not in fields:
             raise unknown_name(where or "job file", key, fields)
     values: dict[str, Any] = {}

@@ -14,7 +14,7 @@ from gearfe.benchmark.record import Table, open_record, read_rows
 from gearfe.benchmark.tables import SECTIONS
 from gearfe.benchmark.timing import measured
 from gearfe.cli import main
-from gearfe.contact.laws import LAWS
+from gearfe.tables.laws import LAWS
 
 QUICK = ("--quick", "--no-peers")
 

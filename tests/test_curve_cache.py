@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearfe.contact.laws import Nitsche, Penalty
+from gearfe.contact.laws import HalfPlane, Nitsche, Penalty
 from gearfe.elasticity import Material
 from gearfe.stiffness import curve_cache
 from gearfe.stiffness.curve_cache import cached_curve, curve_key
@@ -57,6 +57,9 @@ def test_everything_that_decides_a_curve_is_in_its_key():
         curve_key(gears, MODEL, SWEEP | {"kinematics": "finite"}),
     ]
     assert len(set(keys)) == len(keys)
+    unnamed = {name: value for name, value in MODEL.items() if name != "law"}
+    assert curve_key(gears, unnamed, SWEEP) == curve_key(gears, MODEL | {"law": HalfPlane()}, SWEEP)
+    assert curve_key(gears, MODEL | {"law": "half_plane"}, SWEEP) == curve_key(gears, unnamed, SWEEP) not in keys
     assert curve_key(pair(20, 30), dict(MODEL), dict(SWEEP)) == keys[0]
 
 

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.laws import LAWS
 from ..gear.pair import GearPair
 from ..meshing.recipe import sector_recipes
 from ..meshing.tooth_sector import sector_mesh
 from ..stiffness.curve import StiffnessCurve
 from ..stiffness.sweep import elastic_pair, sweep_stiffness
+from ..tables.laws import LAWS
 from .record import Record
 from .subject import off_changes, shipped_pair
 from .timing import measured

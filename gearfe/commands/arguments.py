@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..config import check_range
@@ -103,3 +103,28 @@ def check_option(option: str, value: Any, table: type, key: str) -> None:
         check_range(value, option, known)
     elif (choices := known["choices"]) and value not in choices:
         raise InputError(option, value, "must be one of " + ", ".join(choices), nearest(value, choices))
+
+
+class _Removed(argparse.Action):
+    """Option of a key that is gone: what to write instead."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, told: tuple[str, str]) -> None:
+        super().__init__(option_strings, dest, nargs="?", help=argparse.SUPPRESS)
+        self.told = told
+
+    def __call__(self, _parser: Any, _namespace: Any, values: Any, option_string: str | None = None) -> None:
+        raise InputError(str(option_string), values, *self.told)
+
+
+def add_removed(parser: argparse.ArgumentParser, removed: Mapping[str, tuple[str, str]]) -> None:
+    """Options of keys that are gone, which the help does not show; see ``REMOVED`` in `gearfe.config.build`."""
+    for key, told in removed.items():
+        parser.add_argument("--" + key.replace("_", "-"), action=_Removed, told=told)
+
+
+def number(option: str, text: str) -> float:
+    """The number that an option's text is."""
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(option, text, "must be a number", "write it as 1e-3 or 2") from None

@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..progress import count
-from .arguments import check_option
+from ..tables.laws import check_law
+from ..tables.stiffness import StiffnessTable
+from .arguments import add_removed, check_option
 
 if TYPE_CHECKING:
     from ..tables.loadmap import LoadMapTable
-    from ..tables.stiffness import StiffnessTable
 
 HELP = "stiffness, transmission error, load share, pressure, root stress over pinion angle and torque"
 
@@ -37,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--positions", type=int, metavar="N", help="pinion angles in one mesh cycle (default 18)")
     parser.add_argument("--root-stress", action="store_true", help="also the tension at the tooth roots")
     parser.add_argument("--law", metavar="LAW", help="contact law, as in the table [stiffness]")
+    add_removed(parser, StiffnessTable.REMOVED)
     parser.add_argument("--plane", metavar="STATE", help="plane state: strain or stress")
     parser.add_argument("--kinematics", metavar="STRAIN", help="small or finite strain")
     parser.add_argument("--coarsen", type=float, metavar="C", help="factor on all element sizes")
@@ -48,7 +50,6 @@ def run(args: argparse.Namespace) -> int:
     started = time.perf_counter()
     from ..config import load_job
     from ..tables.loadmap import LoadMapTable
-    from ..tables.stiffness import StiffnessTable
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness", "loadmap"))
@@ -105,9 +106,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _overridden_model(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTable:
     """The table with the command's options in place of the file's values, checked like these."""
-    from ..tables.stiffness import StiffnessTable
-
     changes: dict[str, Any] = {}
+    if args.law is not None:
+        check_law("--law", args.law)
     for name, key in OVERRIDES.items():
         if getattr(args, name) is not None:
             check_option("--" + name, getattr(args, name), StiffnessTable, key)

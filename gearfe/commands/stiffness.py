@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..progress import announce, count
-from .arguments import check_option
+from ..tables.laws import check_law
+from ..tables.stiffness import StiffnessTable
+from .arguments import add_removed, check_option, number
 
 if TYPE_CHECKING:
     from ..stiffness.job import StiffnessJob
-    from ..tables.stiffness import StiffnessTable
 
 HELP = "mesh stiffness of a gear pair over its rotation: table, picture, summary, fields"
 
@@ -23,8 +24,6 @@ OVERRIDES = {
     "twist_deg": "twist_deg",
     "torque_Nm": "torque_Nm",
     "law": "law",
-    "law_sides": "law_sides",
-    "nitsche_theta": "nitsche_theta",
     "nitsche_gamma0": "nitsche_gamma0",
     "penalty_stiffness_N_per_mm3": "penalty_stiffness_N_per_mm3",
     "plane": "plane",
@@ -42,11 +41,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     load.add_argument("--twist-deg", type=float, metavar="X", dest="twist_deg", help="twist of the wheel (deg)")
     load.add_argument("--torque-Nm", type=float, metavar="X", dest="torque_Nm", help="torque at the wheel's hub (N m)")
     parser.add_argument("--angles", type=float, nargs=3, metavar=("START", "STEP", "STOP"), help="pinion angles (deg)")
-    parser.add_argument("--law", metavar="LAW", help="contact law: nitsche, penalty, exact or half_plane")
+    parser.add_argument("--law", metavar="LAW", help="contact law: half_plane, nitsche, penalty or another package's")
     parser.add_argument(
-        "--law-sides", metavar="GEAR", help="flanks that the law is integrated on: both, pinion, wheel, tip"
+        "--law-parameter",
+        nargs=2,
+        action="append",
+        metavar=("NAME", "X"),
+        help="parameter of a law of another package; may stand several times",
     )
-    parser.add_argument("--nitsche-theta", type=int, metavar="T", help="variant of the law nitsche: 0, 1 or -1")
+    add_removed(parser, StiffnessTable.REMOVED)
     parser.add_argument("--nitsche-gamma0", type=float, metavar="G", help="parameter gamma h/E of the law nitsche")
     parser.add_argument(
         "--penalty-stiffness-N-per-mm3",
@@ -84,7 +87,6 @@ def run(args: argparse.Namespace) -> int:
     started = time.perf_counter()
     from ..config import load_job
     from ..errors import InputError
-    from ..tables.stiffness import StiffnessTable
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness",))
@@ -185,9 +187,10 @@ def _field_angles(given: list[str | float]) -> str | list[float]:
 
 def overridden(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTable:
     """The table with the command's options in place of the file's values, checked like these."""
-    from ..tables.stiffness import StiffnessTable
-
     changes: dict[str, Any] = {}
+
+    if args.law is not None:
+        check_law("--law", args.law)
 
     def put(option: str, key: str, value: Any) -> None:
         check_option(option, value, StiffnessTable, key)
@@ -205,7 +208,8 @@ def overridden(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTabl
             put("--angles START STEP STOP", key, value)
     if args.solve_all:
         changes["solve_all"] = True
+    if args.law_parameter is not None:
+        changes["law_parameters"] = {name: number("--law-parameter", text) for name, text in args.law_parameter}
     made = replace(table, **changes)
-    made.check_law("stiffness")
     made.check("--angles" if args.angles is not None else "stiffness")
     return made

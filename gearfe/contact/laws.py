@@ -14,7 +14,9 @@ whole-gear route alone (`gearfe.verification.laws`).
 
 **On half-planes** (half_plane): `gearfe.contact.half_plane`, without contact elements.
 
-A law on the elements provides, and nothing else needs to be touched to add one:
+A law is a frozen dataclass whose fields are its parameters, and a line that names it (`gearfe.tables.laws`; for another
+package an entry point). One that derives from `HalfPlane` is solved as that is. One on the elements provides, and
+nothing else needs to be touched to add it:
 
 1. ``name``: the text that selects it;
 2. ``uses_stress``: s above (0 or 1); with 1 the bodies keep the stress rows of their flanks;
@@ -28,13 +30,14 @@ that is integrated, which nothing cuts.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..tables.laws import law_class
 
 Array = NDArray[Any]
 Sides = Literal["both", "pinion", "wheel", "tip"]
@@ -67,9 +70,12 @@ def law_text(law: ContactLaw) -> str:
     if isinstance(law, Penalty):
         stiffness = "300E/h" if law.stiffness is None else f"{law.stiffness * 1e-9:.12g}N/mm3"
         return f"penalty stiffness={stiffness} sides={law.sides}"
-    if isinstance(law, HalfPlane):
-        return law.name
-    return f"{law.name} sides={law.sides}"
+    made = [law.name, *(f"{field.name}={_short(getattr(law, field.name))}" for field in fields(law))]  # type: ignore[arg-type]
+    return " ".join(made)
+
+
+def _short(value: object) -> str:
+    return f"{value:.12g}" if isinstance(value, float) else str(value).replace(",", "")
 
 
 def _check_sides(sides: str, allowed: tuple[str, ...]) -> None:
@@ -174,16 +180,14 @@ class HalfPlane:
         raise InputError("law", self.name, problem, "use nitsche or penalty here")
 
 
-#: Selectable laws; those after the first live on the elements of the flanks.
-LAWS: dict[str, type[Penalty] | type[Nitsche] | type[HalfPlane]] = {
-    "half_plane": HalfPlane,
-    "nitsche": Nitsche,
-    "penalty": Penalty,
-}
-
-
-def law_named(name: str) -> ContactLaw:
-    """The law called `name` with its default parameter."""
-    if name not in LAWS:
-        raise InputError("law", name, "must be one of " + ", ".join(LAWS))
-    return LAWS[name]()
+def law_named(name: str, **parameters: Any) -> ContactLaw:
+    """The law called `name` (`gearfe.tables.laws`) with the parameters given, the others by default."""
+    kind = law_class(name)
+    known = [field.name for field in fields(kind)]
+    for key, value in parameters.items():
+        if key not in known:
+            problem = "is no parameter of the law " + name
+            cure = "it has " + ", ".join(known) if known else "it has none"
+            raise InputError(f"law_parameters.{key}", value, problem, cure)
+    made: ContactLaw = kind(**parameters)
+    return made

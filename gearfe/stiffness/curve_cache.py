@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import sys
 from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
@@ -19,11 +20,13 @@ import numpy as np
 
 from .. import __version__
 from ..cache import cache_folder
+from ..contact.laws import law_named
 from ..errors import InputError
 from ..gear.pair import GearPair
 from ..meshing.cache import cache_key
 from ..output.files import write_json
 from ..stopwatch import Stopwatch
+from ..tables.laws import DEFAULT_LAW
 from .curve import ErrorEstimate, StiffnessCurve
 
 #: Rooms whose text decides a curve, beside `gearfe.elasticity`.
@@ -86,7 +89,18 @@ def curve_key(pair: GearPair, model: dict[str, Any], sweep: dict[str, Any]) -> s
     import scipy
 
     versions = {"numpy": np.__version__, "scipy": scipy.__version__, "gearfe": __version__, "source": _source()}
-    return cache_key("curve", {"pair": pair, "model": model, "sweep": sweep, "versions": versions})
+    law = model.get("law", DEFAULT_LAW)
+    law = law_named(law) if isinstance(law, str) else law
+    kind = type(law)
+    versions["law"] = f"{kind.__module__}:{kind.__qualname__} {_text_of(kind.__module__)}"
+    return cache_key("curve", {"pair": pair, "model": {**model, "law": law}, "sweep": sweep, "versions": versions})
+
+
+@cache
+def _text_of(module: str) -> str:
+    """Hash of the text of a law's module: laws of other packages have no version here."""
+    file = getattr(sys.modules.get(module), "__file__", None)
+    return "" if file is None else hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
 def _stored(path: Path, pair: GearPair) -> StiffnessCurve | None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..config import load_job
-from ..contact.laws import ContactLaw, HalfPlane, Nitsche, Penalty
+from ..contact.laws import ContactLaw, law_named
 from ..elasticity import Material
 from ..errors import InputError
 from ..gear.pair import GearPair
@@ -47,13 +47,12 @@ class StiffnessJob:
     def law(self) -> ContactLaw:
         """Contact law with its parameter."""
         t = self.table
-        sides: dict[str, Any] = {} if t.law_sides is None else {"sides": t.law_sides}
-        if t.law == "half_plane":
-            return HalfPlane()
-        if t.law == "penalty":
-            stiffness = t.penalty_stiffness_N_per_mm3
-            return Penalty(None if stiffness is None else stiffness * 1e9, **sides)
-        return Nitsche(1.0 if t.nitsche_gamma0 is None else t.nitsche_gamma0, **sides)
+        parameters = dict(t.law_parameters)
+        if t.law == "nitsche" and t.nitsche_gamma0 is not None:
+            parameters["gamma0"] = t.nitsche_gamma0
+        if t.law == "penalty" and t.penalty_stiffness_N_per_mm3 is not None:
+            parameters["stiffness"] = 1e9 * t.penalty_stiffness_N_per_mm3
+        return law_named(t.law, **parameters)
 
     @property
     def model(self) -> dict[str, Any]:

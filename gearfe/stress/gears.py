@@ -21,7 +21,6 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.laws import LAWS
 from ..contact.position import Position
 from ..contact.scene import MeshingPair
 from ..gear.pair import GearPair
@@ -30,6 +29,7 @@ from ..stiffness.job import read_stiffness_job
 from ..stiffness.position_solver import PositionSolver, position_solver
 from ..stiffness.sweep import elastic_pair, sweep_stiffness
 from ..stiffness.torque_control import ANGLE_ROUNDING
+from ..tables.laws import LAWS
 from .campaign import Campaign, Case
 from .outcome import Check, Finding
 from .pairs import log_uniform, random_pair, rounded, running_pair, spoiled

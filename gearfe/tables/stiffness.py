@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from ..config import quantity
 from ..errors import InputError
+from .laws import DEFAULT_LAW, check_law
 
 #: More positions than this are a slip of the keyboard.
 MOST_POSITIONS = 100_000
@@ -30,6 +32,22 @@ def check_flank_coarsen(coarsen: float, flank_coarsen: float, field: str) -> Non
 class StiffnessTable:
     """Load, positions, model and mesh of a rotation sweep."""
 
+    #: Keys that were: what became of them, and what to write instead.
+    REMOVED: ClassVar[dict[str, tuple[str, str]]] = {
+        "route": (
+            "is gone: one law answers every load",
+            'leave it out; law = "half_plane" (the default) needs no mesh that resolves the contact',
+        ),
+        "law_sides": (
+            "is gone: the law fixes the flanks that it is integrated on (nitsche both, penalty the nearer tip's)",
+            "leave it out; other sides are in Python: gearfe.contact.laws, gearfe.verification.laws",
+        ),
+        "nitsche_theta": (
+            "is gone: sweeps have theta = 0; 1 and -1 are variants of the verification route",
+            "leave it out; in Python: gearfe.verification.laws.Nitsche(theta=...)",
+        ),
+    }
+
     twist_deg: float | None = quantity(
         None, doc="twist of the wheel against the pinion (deg), or give torque_Nm", above=0.0, below=36.0
     )
@@ -46,26 +64,20 @@ class StiffnessTable:
         None, doc="last pinion angle (deg); without it, one mesh cycle", low=-FAR_DEG, high=FAR_DEG
     )
     plane: str = quantity("strain", doc="plane strain or plane stress", choices=("strain", "stress"))
-    law: str = quantity("half_plane", doc="contact law", choices=("half_plane", "nitsche", "penalty", "exact"))
-    law_sides: str | None = quantity(
-        None,
-        doc="flanks that the law is integrated on: tip takes, of each tooth pair, the gear whose tip is nearer; by "
-        "default both for nitsche, tip for penalty and exact",
-        choices=("both", "pinion", "wheel", "tip"),
+    law: str = quantity(
+        DEFAULT_LAW,
+        doc="contact law: half_plane (every load), nitsche or penalty (on the flanks' elements), or another package's",
+    )
+    law_parameters: dict[str, float] = quantity(  # noqa: RUF009
+        dict, doc="parameters of a law of another package, by name (in its own units)"
     )
     kinematics: str = quantity(
         "finite",
         doc="small (small strain) or finite (with the first-order effect of finite strain on the torque)",
         choices=("small", "finite"),
     )
-    nitsche_theta: int = quantity(
-        0, doc="variant of the law nitsche: 0 (cheapest), 1 (symmetric, large gamma0 only) or -1", low=-1, high=1
-    )
     nitsche_gamma0: float | None = quantity(
-        None,
-        doc="parameter of the law nitsche, gamma h/E (-), by default 1, the most accurate, or 20 with nitsche_theta 1",
-        low=1e-6,
-        high=1e9,
+        None, doc="parameter of the law nitsche, gamma h/E (-), by default 1, the most accurate", low=1e-6, high=1e9
     )
     penalty_stiffness_N_per_mm3: float | None = quantity(
         None,
@@ -90,7 +102,7 @@ class StiffnessTable:
         if self.twist_deg is not None and self.torque_Nm is not None:
             raise InputError(f"{where}.torque_Nm", self.torque_Nm, "stands beside twist_deg", "leave one of them out")
         check_flank_coarsen(self.coarsen, self.flank_coarsen, f"{where}.flank_coarsen")
-        self.check_law(where)
+        check_law(f"{where}.law", self.law)
         if self.angle_stop_deg is None:
             return
         if self.angle_stop_deg < self.angle_start_deg:
@@ -99,21 +111,6 @@ class StiffnessTable:
         if (self.angle_stop_deg - self.angle_start_deg) / self.angle_step_deg > MOST_POSITIONS:
             problem = f"makes more than {MOST_POSITIONS} positions"
             raise InputError(f"{where}.angle_step_deg", self.angle_step_deg, problem, "use a larger step")
-
-    def check_law(self, where: str) -> None:
-        """Raise `InputError` for keys that the contact law cannot take."""
-        if self.law == "half_plane" and self.law_sides is not None:
-            problem = "has no meaning with the law half_plane"
-            raise InputError(f"{where}.law_sides", self.law_sides, problem, "leave it out")
-        if self.law == "exact" and self.law_sides == "both":
-            problem = "must be tip, pinion or wheel with the law exact: its multipliers lie on one gear"
-            raise InputError(f"{where}.law_sides", self.law_sides, problem, "leave it out")
-        if self.law == "nitsche" and self.law_sides == "tip":
-            problem = "must be both, pinion or wheel with the law nitsche"
-            raise InputError(f"{where}.law_sides", self.law_sides, problem, "leave it out (both)")
-        if self.law == "exact" and self.points_per_edge < 3:
-            problem = "must be >= 3 with the law exact: it has two multipliers an edge"
-            raise InputError(f"{where}.points_per_edge", self.points_per_edge, problem, "leave it out (4)")
 
     def angles_deg(self, mesh_cycle_deg: float) -> list[float]:
         """Pinion angles (deg), the last one included."""

@@ -1,0 +1,118 @@
+"""A contact law of another package: one class and one entry point, known to job files, command line and Python."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import types
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe import InputError, sweep_stiffness
+from gearfe.cli import main
+from gearfe.contact.laws import Penalty, law_named
+from gearfe.stiffness.curve import StiffnessCurve
+from gearfe.stiffness.curve_cache import curve_key
+from gearfe.stiffness.job import read_stiffness_job
+
+from .gears import pair as gear_pair
+
+JOB = Path(__file__).parents[1] / "geometry" / "gear_train.toml"
+ELSEWHERE = """
+from dataclasses import dataclass
+from typing import ClassVar
+import numpy as np
+
+@dataclass(frozen=True)
+class Springs:
+    '''A bed of springs: p = max(0, -g times bed E/h).'''
+
+    bed: float = 100.0
+    name: ClassVar[str] = "springs"
+    uses_stress: ClassVar[bool] = False
+    sides: ClassVar[str] = "tip"
+
+    def parameter(self, youngs_modulus, sizes):
+        return np.full(len(sizes), self.bed * youngs_modulus / sizes.max())
+"""
+
+
+@pytest.fixture
+def springs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> type:
+    """A module outside of the package, and an entry point that names its law."""
+    (tmp_path / "package_of_springs.py").write_text(ELSEWHERE)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    point = metadata.EntryPoint("springs", "package_of_springs:Springs", "gearfe.laws")
+    found = metadata.entry_points
+
+    def with_springs(**options: str) -> object:
+        return [point] if options.get("group") == "gearfe.laws" else found(**options)
+
+    monkeypatch.setattr(metadata, "entry_points", with_springs)
+    monkeypatch.delitem(sys.modules, "package_of_springs", raising=False)
+    return point.load()
+
+
+def test_in_python(springs: type) -> None:
+    """With 300 E/h it is the penalty by default; softer, its overlap grows."""
+    gears = gear_pair(tip_round=1e-4)
+    given = {"twist": math.radians(0.1), "angles": gears.mesh_cycle * np.array([0.2, 0.7]), "kinematics": "small"}
+    same, penalty = (sweep_stiffness(gears, law=law, **given) for law in (springs(300.0), Penalty()))
+    np.testing.assert_allclose(same.torque_wheel, penalty.torque_wheel, rtol=1e-12)
+    by_name = sweep_stiffness(gears, law="springs", **given)
+    assert set(by_name.law) == {"springs"}
+    assert (by_name.torque_wheel < same.torque_wheel).all()
+    assert law_named("springs", bed=7.0) == springs(7.0)
+    keys = {curve_key(gears, {"law": law}, given) for law in (springs(300.0), springs(7.0), Penalty())}
+    assert len(keys) == 3
+
+
+def test_in_a_job_file_and_on_the_command_line(springs: type, tmp_path: Path) -> None:
+    job = tmp_path / "job.toml"
+    text = JOB.read_text().replace('law = "nitsche"', 'law = "springs"\nlaw_parameters = { bed = 300.0 }\n#')
+    job.write_text(text)
+    assert read_stiffness_job(job).law == springs(300.0)
+    options = ["--twist-deg", "0.1", "--angles", "2", "6", "8", "--no-picture", "--no-estimate"]
+    assert main(["stiffness", str(job), "--out", str(tmp_path / "one"), *options]) == 0
+    line = ["--law", "springs", "--law-parameter", "bed", "300"]
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path / "two"), *options, *line]) == 0
+    one, two = (StiffnessCurve.from_csv(tmp_path / name / "stiffness.csv") for name in ("one", "two"))
+    np.testing.assert_array_equal(one.torque_wheel, two.torque_wheel)
+    assert set(one.law) == {"springs"}
+    assert "bed=300" in one.contact_law
+    told = json.loads((tmp_path / "one" / "summary.json").read_text())
+    assert told["job"]["stiffness"]["law_parameters"] == {"bed": 300.0}
+
+
+def test_mistakes_are_told(springs: type, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["stiffness", str(JOB), "--law", "spring"]) == 2
+    assert "must be one of half_plane, nitsche, penalty, springs; did you mean 'springs'?" in capsys.readouterr().err
+    with pytest.raises(InputError, match=r"law_parameters.bet.*is no parameter of the law springs; it has bed"):
+        law_named("springs", bet=1.0)
+    with pytest.raises(InputError, match=r"it has none"):
+        law_named("half_plane", bed=1.0)
+
+
+def test_a_law_whose_package_is_broken_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    point = metadata.EntryPoint("lost", "no_such_module:Law", "gearfe.laws")
+    monkeypatch.setattr(metadata, "entry_points", lambda **_: [point])
+    with pytest.raises(InputError, match=r"law = 'lost': cannot be loaded from no_such_module:Law"):
+        law_named("lost")
+
+
+def test_no_package_takes_a_name_of_ours(monkeypatch: pytest.MonkeyPatch) -> None:
+    @dataclass(frozen=True)
+    class Other:
+        pass
+
+    module = types.ModuleType("other_package")
+    module.Other = Other  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "other_package", module)
+    point = metadata.EntryPoint("penalty", "other_package:Other", "gearfe.laws")
+    monkeypatch.setattr(metadata, "entry_points", lambda **_: [point])
+    assert isinstance(law_named("penalty"), Penalty)
