@@ -112,7 +112,7 @@ def test_every_key_of_the_table_is_documented():
 @pytest.mark.parametrize(
     ("old", "new", "field", "says"),
     [
-        ("teeth = 20", "teeth = 4", "pair.pinion.teeth", ">= 5"),
+        ("teeth = 20", "teeth = 7", "pair.pinion.teeth", ">= 8"),
         ("teeth = 20", "teeth = 20.0", "pair.pinion.teeth", "whole number"),
         ("teeth = 20", 'teeth = "20"', "pair.pinion.teeth", "number"),
         ("teeth = 20", "tooth = 20", "pair.pinion", "'tooth'.*did you mean 'teeth'"),
@@ -143,7 +143,7 @@ def test_every_key_of_the_table_is_documented():
         ),
         ("module_mm = 2.5", "module_mm = 2.5\ncentre_distance_mm = 60", "pair.centre_distance_mm", "= 60.0: jams"),
         ("module_mm = 2.5", "module_mm = 2.5\ncentre_distance_mm = 0", "pair.centre_distance_mm", "> 0"),
-        ("teeth = 20", "teeth = 7", "pair.pinion.profile_shift", "undercut"),
+        ("teeth = 20", "teeth = 8", "pair.pinion.profile_shift", "undercut"),
         ("module_mm = 2.5", "module_mm = 2.5\nmaterial = 3", "pair.material", "table"),
         (
             "module_mm = 2.5",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -232,12 +233,14 @@ def test_waist_of_a_severely_undercut_tooth():
 
     The half angle 0.00196 of that waist was found by sweeping the rack tip in another program.
     """
-    sharp = {"addendum": 1.0, "rack_tip_radius": 0.0}
-    whole = Gear(7, 1e-3, math.radians(14.5), 10e-3, 0.5e-3, profile_shift=-0.6, **sharp)
-    points = whole.profile.segment("trochoid").points(np.linspace(0.0, 1.0, 4001))
+    form = {"module": 1e-3, "pressure_angle": math.radians(14.5), "addendum": 1.0, "dedendum": 1.25}
+    form |= dict.fromkeys(("rack_tip_radius", "tip_round", "tip_shortening", "tooth_thinning"), 0.0)
+    form["tip_relief"] = None  # gears have 8 teeth at least, profiles have not
+    whole = tooth_profile(SimpleNamespace(teeth=7, profile_shift=-0.6, **form))
+    points = whole.segment("trochoid").points(np.linspace(0.0, 1.0, 4001))
     assert np.arctan2(points[:, 1], points[:, 0]).min() == pytest.approx(0.00196, abs=5e-6)
     with pytest.raises(ValueError, match="cuts the tooth through"):
-        Gear(6, 1e-3, math.radians(14.5), 10e-3, 0.5e-3, profile_shift=-0.5, **sharp)
+        tooth_profile(SimpleNamespace(teeth=6, profile_shift=-0.5, **form))
 
 
 def test_zero_length_segments_are_left_out():

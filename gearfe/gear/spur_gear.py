@@ -8,16 +8,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from numbers import Integral, Real
+from numbers import Real
 
 from ..errors import InputError
 from .involute import ToothProfile, inv, tooth_profile
 from .tooth_root import half_tooth_angle
+from .validity import check_rim, check_teeth
 
-#: Least rim between bore and root circle, times module.
-LEAST_RIM = 0.25
-#: Least bore, times module: plane elasticity gives a point no stiffness, and a bore of a hundredth tears loose.
-LEAST_BORE = 0.05
 #: Least tip round that is not a sharp corner, times module: meshers need seconds for less, and elements degenerate.
 LEAST_ROUND = 1e-6
 #: Modules and face widths beyond it (m) are mistakes, and large ones overflow.
@@ -95,27 +92,13 @@ class Gear:
             name = "tooth_thinning" if self.tooth_thinning > 0.0 else "profile_shift"
             problem = "leaves no tooth thickness at the reference circle"
             raise InputError(name, getattr(self, name), problem, "use less thinning or more profile shift")
-        if self.root_radius <= LEAST_RIM * self.module:
-            most = self.teeth / 2 + self.profile_shift - LEAST_RIM
-            problem = f"leaves no material inside the root circle: must be < {most:.6g}"
-            raise InputError("dedendum", self.dedendum, problem, "use less dedendum, more teeth or more profile shift")
-        if not self.bore_diameter >= LEAST_BORE * self.module:
-            problem = f"must be >= {1e3 * LEAST_BORE * self.module:.6g} mm, {LEAST_BORE:g} module"
-            cure = "use a larger bore: the gear is held there, and a point holds nothing"
-            raise InputError("bore_diameter", self.bore_diameter, problem, cure)
+        check_rim(self)
         if 0.0 < self.tip_round < LEAST_ROUND * self.module:
             problem = f"must be 0 or >= {1e3 * LEAST_ROUND * self.module:.6g} mm, {LEAST_ROUND:g} module"
             raise InputError("tip_round", self.tip_round, problem, "write 0 for a sharp corner")
         if self.tip_round > self.module:
             problem = f"must be <= {1e3 * self.module:.6g} mm, one module"
             raise InputError("tip_round", self.tip_round, problem, "use a smaller tip round")
-        limit = 2.0 * (self.root_radius - LEAST_RIM * self.module)
-        if not self.bore_diameter <= limit:
-            problem = (
-                f"must be <= {1e3 * limit:.6g} mm, so that a rim of {LEAST_RIM:g} module is left inside the root "
-                f"circle of {2e3 * self.root_radius:.6g} mm"
-            )
-            raise InputError("bore_diameter", self.bore_diameter, problem, "use a smaller bore")
         _ = self.profile
 
     @property
@@ -188,10 +171,7 @@ class Gear:
         return math.sqrt(max(0.0, (radius - self.base_radius) * (radius + self.base_radius)))
 
     def _check_numbers(self) -> None:
-        if isinstance(self.teeth, bool) or not isinstance(self.teeth, Integral) or not 5 <= self.teeth <= 1000:
-            raise InputError(
-                "teeth", self.teeth, "must be a whole number >= 5 and <= 1000", "use another number of teeth"
-            )
+        check_teeth(self.teeth)
         ranges = {
             "module": (0.0, LARGEST, False),
             "pressure_angle": (math.radians(5.0), math.radians(45.0), True),

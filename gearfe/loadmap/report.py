@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..gear.derived import derived_geometry
+from ..gear.validity import overlaps, told_overlaps
 from ..stiffness.contact_pressure import largest_pressures
 from ..stiffness.job import StiffnessJob
-from ..stiffness.report import pressure_lines, versions
+from ..stiffness.report import cure_of, pressure_lines, versions
 from ..tables.loadmap import LoadMapTable
 from .load_map import LoadMap
 from .root_map import GEARS
@@ -92,12 +93,14 @@ def told(made: LoadMap) -> list[str]:
 def warnings(job: StiffnessJob, made: LoadMap) -> list[str]:
     """Sentences about what deserves a look."""
     said = list(job.pair.warnings)
+    beyond = made.quantity("beyond_validity")
+    said += told_overlaps(beyond, overlaps(job.pair, made.quantity("twist")[beyond == 1]).max(initial=0.0))
     if made.failed.any():
         rows = np.flatnonzero(made.failed.any(axis=1))
         torques = ", ".join(f"{made.torque[row]:.4g}" for row in rows[:6]) + (" ..." if len(rows) > 6 else "")
         said.append(
             f"{int(made.failed.sum())} cells failed and have no numbers, only their status (torques {torques} N m): "
-            "use less load or a finer mesh (coarsen below 1)"
+            + cure_of(made.status[made.failed])
         )
     return said
 

@@ -51,6 +51,7 @@ COLUMNS: dict[str, str] = {
     "peak_pressure_relative_error": "peak_pressure_error",
     "edge_pressure_MPa": "edge_pressure",
     "edge": "edge",
+    "beyond_validity": "beyond_validity",
 }
 #: Constants of the curve, repeated on every row so that the file stands alone.
 CONSTANTS: dict[str, str] = {
@@ -60,7 +61,7 @@ CONSTANTS: dict[str, str] = {
 }
 #: Columns of words.
 WORDS = ("status", "law", "edge")
-WHOLE = ("teeth_in_contact", "iterations")
+WHOLE = ("teeth_in_contact", "iterations", "beyond_validity")
 SHARE = "load_share_"
 
 
@@ -136,6 +137,9 @@ class StiffnessCurve:
     edge
         ``none``; ``rounded``: a tip round bears; ``singular``: a sharp edge bears, under which the pressure of linear
         elasticity has no bound. Empty where unknown.
+    beyond_validity
+        1 where the overlap of the flanks is beyond what the laws hold for (`gearfe.gear.validity`), else 0; -1 where
+        unknown.
     iterations
         Newton iterations; -1 where unknown.
     status
@@ -184,9 +188,10 @@ class StiffnessCurve:
     peak_pressure_error: Array = field(default_factory=lambda: np.zeros(0))
     edge_pressure: Array = field(default_factory=lambda: np.zeros(0))
     edge: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=np.str_))
+    beyond_validity: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
-        unknown = {"law": "", "peak_pressure_error": np.nan, "edge_pressure": np.nan, "edge": ""}
+        unknown = {"law": "", "peak_pressure_error": np.nan, "edge_pressure": np.nan, "edge": "", "beyond_validity": -1}
         for name, value in unknown.items():
             if len(getattr(self, name)) != len(self.pinion_angle):
                 object.__setattr__(self, name, np.full(len(self.pinion_angle), value))
@@ -240,8 +245,7 @@ class StiffnessCurve:
         if attribute in WORDS:
             return [str(v) for v in values]
         if attribute in WHOLE:
-            known = ~self.failed if attribute != "iterations" else values >= 0
-            return [str(int(v)) if ok else "nan" for v, ok in zip(values, known, strict=True)]
+            return [str(int(v)) if v >= 0 else "nan" for v in values]
         return [curve_csv.to_text(v, name) for v in values]
 
     def to_csv(self, path: str | Path) -> None:

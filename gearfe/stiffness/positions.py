@@ -14,6 +14,7 @@ from ..contact.finite_strain import finite_strain_shares, interpolated_shares, s
 from ..contact.position import Position
 from ..errors import InputError
 from ..gear.iso6336 import mesh_stiffness
+from ..gear.validity import MOST_YIELD
 from .contact_pressure import contact_pressures
 from .curve import SOLVED
 from .position_solver import ElementSolver, PositionSolver, bare
@@ -87,11 +88,6 @@ def at_twists(
         positions = [bare(with_share(p, c)) for p, c in zip(positions, every, strict=True)]
     iterations = np.array([p.iterations for p in positions], dtype=np.int64)
     return _collect(solver, angles, twists, positions, iterations, [p.status for p in positions])
-
-
-#: Yield of a tooth pair (modules) by the standard's stiffness beyond which a torque is refused. Each tooth, 2 modules
-#: high and 1.8 thick, then yields by d = 1/8 module: as a cantilever it has the strain 3 t d/(2 h^2), 8 %, at its root.
-MOST_YIELD = 0.25
 
 
 def check_torque(solver: PositionSolver, torque: float) -> None:

@@ -17,6 +17,7 @@ from .. import __version__
 from ..errors import InputError
 from ..gear.derived import derived_geometry, iso_values
 from ..gear.drawing import single_pair_stretches
+from ..gear.validity import overlaps, told_overlaps
 from .contact_pressure import largest_pressures
 from .curve import StiffnessCurve
 from .job import StiffnessJob
@@ -96,6 +97,7 @@ def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, floa
         "contact_law": curve.contact_law,
         "statuses": dict(Counter(map(str, curve.status))),
         "failed_pinion_angles_deg": failed,
+        "positions_beyond_validity": int(np.count_nonzero(curve.beyond_validity == 1)),
         "timings_s": dict(timings),
     }
 
@@ -179,6 +181,16 @@ def _load_lines(load: Mapping[str, Any]) -> list[str]:
     return lines
 
 
+def cure_of(statuses: NDArray[np.str_]) -> str:
+    """What to do about failed positions of these statuses."""
+    if "under_resolved" not in statuses:
+        return "use less load or a finer mesh (coarsen below 1)"
+    return (
+        'where under_resolved, contacts are narrower than the elements of the flanks: law = "half_plane" answers every '
+        "load, a finer flank (flank_coarsen below 1) resolves lighter ones"
+    )
+
+
 def warnings(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
     """Sentences about what deserves a look."""
     said = list(job.pair.warnings)
@@ -188,18 +200,14 @@ def warnings(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
         centred = job.table.twist_from == "centred"
         cure = ' (twist_from = "contact" counts it from where the flanks touch)' if centred else ""
         said.append(sentence + cure)
+    beyond = curve.beyond_validity
+    said += told_overlaps(beyond, overlaps(job.pair, curve.twist[beyond == 1]).max(initial=0.0))
     if curve.failed.any():
         angles = ", ".join(f"{a:.6g}" for a in np.degrees(curve.pinion_angle[curve.failed])[:8])
         more = " ..." if curve.failed.sum() > 8 else ""
-        cure = "use less load or a finer mesh (coarsen below 1)"
-        if set(curve.status[curve.failed]) == {"under_resolved"}:
-            cure = (
-                'their contacts are narrower than the elements of the flanks; law = "half_plane" answers every load, '
-                "a finer flank (flank_coarsen below 1) resolves lighter ones"
-            )
         said.append(
             f"{int(curve.failed.sum())} positions failed and have no numbers, only their status (pinion angle {angles}"
-            f"{more} deg): {cure}"
+            f"{more} deg): {cure_of(curve.status[curve.failed])}"
         )
     return said
 

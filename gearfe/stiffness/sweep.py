@@ -24,6 +24,7 @@ from ..contact.scene import MeshingPair
 from ..elasticity import Material, Plane
 from ..errors import InputError
 from ..gear.pair import GearPair
+from ..gear.validity import MOST_OVERLAP, overlaps
 from ..meshing.recipe import sector_recipes
 from ..meshing.tooth_sector import sector_mesh
 from ..stopwatch import Stopwatch
@@ -293,6 +294,7 @@ def assembled_curve(
         edge=np.array(EDGES)[solved.numbers["edge"].astype(np.int64)][source],
         iterations=solved.iterations[source],
         status=np.array(solved.status)[source],
+        beyond_validity=np.where(np.isnan(twist), -1, overlaps(pair, twist) > MOST_OVERLAP)[source],
         law=np.full(len(source), law.name),
         contact_law=law_text(law),
         mesh_cycle=pair.mesh_cycle,

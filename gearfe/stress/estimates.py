@@ -21,10 +21,12 @@ from typing import Any
 import numpy as np
 
 from ..config import load_job
+from ..gear.validity import MOST_OVERLAP
+from ..tables.laws import LAWS
 from .campaign import Campaign, Case, Columns
 from .linkages import linkage
 from .outcome import Check, Finding, Outcome
-from .pairs import log_uniform, rounded, running_pair
+from .pairs import log_uniform, rounded, running_pair, twist_of_overlap
 from .rows import housing, row
 from .toml_text import toml_text
 
@@ -73,14 +75,15 @@ Found = tuple[float, float, str] | str
 
 
 def _draw_curve(random: np.random.Generator, number: int, kind: str) -> Case:
+    pair = running_pair(random, most_teeth=80)
     sweep = {
-        "twist_deg": rounded(log_uniform(random, 0.01, 0.3)),
+        "twist_deg": twist_of_overlap(pair, log_uniform(random, 0.02, MOST_OVERLAP)),
         "twist_from": "contact",
-        "law": str(random.choice(["nitsche", "penalty"])),
+        "law": str(random.choice(sorted(LAWS))),
         "coarsen": rounded(random.uniform(1.0, 2.0), 2),
         "kinematics": "small",
     }
-    tables = {"pair": running_pair(random, most_teeth=80), "stiffness": sweep}
+    tables = {"pair": pair, "stiffness": sweep}
     return Case(number, kind, {"job.toml": toml_text(tables)}, "gearfe stiffness job.toml --out out")
 
 

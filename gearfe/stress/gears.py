@@ -24,15 +24,16 @@ import numpy as np
 from ..contact.position import Position
 from ..contact.scene import MeshingPair
 from ..gear.pair import GearPair
+from ..gear.validity import MOST_OVERLAP
 from ..stiffness.curve import SOLVED
 from ..stiffness.job import read_stiffness_job
 from ..stiffness.position_solver import PositionSolver, position_solver
 from ..stiffness.sweep import elastic_pair, sweep_stiffness
 from ..stiffness.torque_control import ANGLE_ROUNDING
-from ..tables.laws import LAWS
+from ..tables.laws import DEFAULT_LAW, LAWS
 from .campaign import Campaign, Case
 from .outcome import Check, Finding
-from .pairs import log_uniform, random_pair, rounded, running_pair, spoiled
+from .pairs import log_uniform, random_pair, rounded, running_pair, spoiled, twist_of_overlap
 from .toml_text import toml_text
 
 #: Limits of the checks. These hold to the solvers' residuals, which the softest contacts amplify.
@@ -42,12 +43,14 @@ BALANCE, PERIOD, SWAP = 1e-7, 1e-7, 1e-6
 #: on elements. What remains is of the second order in the faces' rotation, about 0.3 times the overlap in modules; for
 #: the half-plane law itself that of first order stays.
 RATIO, BENT, RATIO_BENT = 1.5e-3, 0.1, 0.3**2
+#: Least overlaps (modules) that are drawn: of the half-plane law, and of laws whose elements must resolve the contact.
+LIGHTEST, RESOLVED = 1e-6, 0.01
 
 
 def draw(random: np.random.Generator, number: int) -> Case:
     """A random [pair] and [stiffness]: two of three pairs can run, one in eight jobs has a value without sense."""
     pair = random_pair(random) if random.random() < 0.35 else running_pair(random)
-    cycle = 360.0 / max(5, pair["pinion"]["teeth"])
+    cycle = 360.0 / max(8, pair["pinion"]["teeth"])
     start = rounded(random.uniform(0.0, cycle))
     sweep: dict[str, Any] = {
         "angle_start_deg": start,
@@ -62,7 +65,8 @@ def draw(random: np.random.Generator, number: int) -> Case:
         "points_per_edge": int(random.choice([4, 4, 4, 2, 3, 6])),
     }
     if random.random() < 0.85:
-        sweep["twist_deg"] = rounded(log_uniform(random, 1e-6, 0.5))
+        least = LIGHTEST if sweep["law"] == DEFAULT_LAW else RESOLVED
+        sweep["twist_deg"] = twist_of_overlap(pair, log_uniform(random, least, MOST_OVERLAP))
     else:
         sweep["torque_Nm"] = rounded(log_uniform(random, 1e-3, 1e4))
     tables = {"pair": pair, "stiffness": sweep}

@@ -29,7 +29,7 @@ def rounded(value: float, digits: int = 4) -> float:
 
 
 def random_pair(random: np.random.Generator, *, most_teeth: int = 150) -> Table:
-    """A [pair] table: 5 to 150 teeth, 14.5 to 30 deg, shifts, reliefs, tip rounds, bores. Some cannot run together."""
+    """A [pair] table: 8 to 150 teeth, 14.5 to 30 deg, shifts, reliefs, tip rounds, bores. Some cannot run together."""
     alpha = 20.0 if random.random() < 0.3 else rounded(random.uniform(14.5, 30.0))
     module = rounded(log_uniform(random, 0.3, 12.0), 3)
     addendum = 1.0 if random.random() < 0.6 else rounded(random.uniform(0.7, 1.15), 3)
@@ -45,7 +45,7 @@ def random_pair(random: np.random.Generator, *, most_teeth: int = 150) -> Table:
     }
     shifts = []
     for side in ("pinion", "wheel"):
-        teeth = round(log_uniform(random, 5, most_teeth))
+        teeth = round(log_uniform(random, 8, most_teeth))
         least = dedendum - rack_tip * (1 - math.sin(math.radians(alpha)))
         least -= 0.5 * teeth * math.sin(math.radians(alpha)) ** 2  # no undercut from here on
         low = max(-0.5, least) if random.random() < 0.85 else -0.5
@@ -85,6 +85,12 @@ def running_pair(random: np.random.Generator, **options: Any) -> Table:
             continue
         break
     return table
+
+
+def twist_of_overlap(table: Table, overlap: float) -> float:
+    """Twist (deg) at which the rigid flanks of a pair overlap by so many modules."""
+    radius = 0.5 * table["wheel"]["teeth"] * math.cos(math.radians(table["pressure_angle_deg"]))  # of the base circle
+    return rounded(math.degrees(overlap / radius))
 
 
 def spoiled(random: np.random.Generator, table: Table) -> Table:

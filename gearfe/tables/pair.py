@@ -69,7 +69,7 @@ class ToothFormTable:
 class GearTable(ToothFormTable):
     """One gear of a pair."""
 
-    teeth: int = quantity(doc="number of teeth", low=5, high=1000)
+    teeth: int = quantity(doc="number of teeth", low=8, high=1000)
     bore_diameter_mm: float = quantity(doc="diameter of the rigid bore (mm); it decides the stiffness level", above=0.0)
     pitch_diameter_mm: float | None = quantity(None, doc="reference diameter (mm), instead of module_mm", above=0.0)
     material: MaterialTable | None = quantity(None, doc="material of this gear, if not the shared one")  # noqa: RUF009
