@@ -35,6 +35,7 @@ from scipy.interpolate import CubicSpline
 
 from ..gear.flank_curve import FlankCurve, flank_curve
 from ..gear.pair import GearPair
+from ..gear.touching import Deviations
 from .compliance import GearBody
 from .elliptic import Chain
 from .scene import MeshingPair
@@ -136,12 +137,14 @@ def shapes_of(stations: Sequence[Array]) -> Shapes:
     return Shapes(padded, origin.ravel(), powers.reshape(2 * (most + 1), 3 * most, 4))
 
 
-def flank_compliances(pair: GearPair, elastic: MeshingPair) -> tuple[FlankCompliance, FlankCompliance]:
-    """Of pinion and wheel."""
+def flank_compliances(
+    pair: GearPair, elastic: MeshingPair, deviations: Deviations = (None, None)
+) -> tuple[FlankCompliance, FlankCompliance]:
+    """Of pinion and wheel: the deviations are in the curves, not in the mesh."""
     pinion, wheel = (
-        flank_compliance(body, flank_curve(gear), inverse, elastic.width, pair.pinion.module)
-        for body, gear, inverse in zip(
-            elastic.bodies, (pair.pinion, pair.wheel), elastic.contact_compliances, strict=True
+        flank_compliance(body, flank_curve(gear, deviation), inverse, elastic.width, pair.pinion.module)
+        for body, gear, deviation, inverse in zip(
+            elastic.bodies, (pair.pinion, pair.wheel), deviations, elastic.contact_compliances, strict=True
         )
     )
     return pinion, wheel

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..gear.flank_curve import FlankCurve, FlankTables, flank_tables
 from ..gear.pair import GearPair
-from ..gear.touching import Flanks
+from ..gear.touching import Deviations, Flanks
 from .flank_compliance import FlankCompliance, Shapes, flank_compliances, shapes_of
 from .moved_faces import WAY, Faces, Windows, windows
 from .panels import MIDDLES, WIDTHS, Couplings, Pressed, first_guess, influence, pressed
@@ -142,9 +142,13 @@ class HalfPlanePair:
         return {}
 
 
-def half_plane_pair(pair: GearPair, elastic: MeshingPair) -> HalfPlanePair:
-    """Prepare the law for meshed and condensed gears; their flanks may be coarse (a tenth of a module)."""
-    return HalfPlanePair(pair, Flanks(pair), flank_compliances(pair, elastic), elastic.width)
+def half_plane_pair(pair: GearPair, elastic: MeshingPair, *, deviations: Deviations = (None, None)) -> HalfPlanePair:
+    """Prepare the law for meshed and condensed gears; their flanks may be coarse (a tenth of a module).
+
+    Deviations of micrometres are in the flanks' curves alone: gears need not be meshed anew.
+    """
+    sides = flank_compliances(pair, elastic, deviations)
+    return HalfPlanePair(pair, Flanks(pair, deviations), sides, elastic.width)
 
 
 @dataclass(frozen=True)

@@ -122,6 +122,33 @@ class Trochoid:
 
 
 @dataclass(frozen=True)
+class Deviation:
+    """Deviation of a flank along the normal of its involute, as measured or wanted; the same on every tooth.
+
+    Attributes
+    ----------
+    roll : tuple of float
+        Roll lengths (m), rising.
+    height : tuple of float
+        Deviation there (m), > 0: more material. A cubic spline between them, constant beyond them.
+    """
+
+    roll: tuple[float, ...]
+    height: tuple[float, ...]
+
+    @cached_property
+    def _spline(self) -> Any:
+        from scipy.interpolate import CubicSpline  # only deviations need it
+
+        return CubicSpline(self.roll, self.height)
+
+    def at(self, s: Array) -> tuple[Array, Array]:
+        """Deviation (m) and its slope (-) at roll lengths s (m)."""
+        inside = np.clip(s, self.roll[0], self.roll[-1])
+        return self._spline(inside), np.where(inside == s, self._spline(inside, 1), 0.0)
+
+
+@dataclass(frozen=True)
 class Flank:
     """Involute, moved inwards along its normal by a tip relief delta(s) = amount ((s - relief_start)/length)^exponent.
 
@@ -139,6 +166,12 @@ class Flank:
     relief_start: float = math.inf
     length: float = 1.0
     exponent: float = 1.0
+    deviation: Deviation | None = None
+
+    @property
+    def modified(self) -> bool:
+        """Whether it is not the involute itself."""
+        return self.amount > 0.0 or self.deviation is not None
 
     @property
     def kinked(self) -> bool:
@@ -146,13 +179,17 @@ class Flank:
         return self.amount > 0.0 and self.exponent == 1.0 and self.start < self.relief_start < self.end
 
     def relief(self, s: Array) -> tuple[Array, Array]:
-        """Relief (m) and its slope d delta/ds (-) at roll lengths s (m)."""
+        """Relief (m), less the deviation, and its slope d delta/ds (-) at roll lengths s (m)."""
         s = np.asarray(s, dtype=float)
-        if self.amount == 0.0:
-            return np.zeros_like(s), np.zeros_like(s)
-        x = np.maximum(0.0, (s - self.relief_start) / self.length)
-        slope = np.where(x > 0.0, self.amount * self.exponent / self.length * x ** (self.exponent - 1.0), 0.0)
-        return self.amount * x**self.exponent, slope
+        depth, slope = np.zeros_like(s), np.zeros_like(s)
+        if self.amount > 0.0:
+            x = np.maximum(0.0, (s - self.relief_start) / self.length)
+            depth = self.amount * x**self.exponent
+            slope = np.where(x > 0.0, self.amount * self.exponent / self.length * x ** (self.exponent - 1.0), 0.0)
+        if self.deviation is not None:
+            height, rise = self.deviation.at(s)
+            depth, slope = depth - height, slope - rise
+        return depth, slope
 
     def at(self, s: Array) -> Array:
         """Points (m) at roll lengths s (m), shape (n, 2)."""

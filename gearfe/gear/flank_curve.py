@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .curves import Trochoid
+from .curves import Deviation, Trochoid
 from .spur_gear import Gear
 from .touching import Face, face_of
 
@@ -161,9 +161,11 @@ def flank_tables(curves: Sequence[FlankCurve]) -> FlankTables:
     )
 
 
-def flank_curve(gear: Gear) -> FlankCurve:
-    """Tabulate the flank of a gear, from the middle of the root's trochoid (if it has one) to the end at the tip."""
-    face = face_of(gear)
+def flank_curve(gear: Gear, deviation: Deviation | None = None) -> FlankCurve:
+    """Tabulate the flank of a gear with its deviation, from the middle of the root's trochoid (if any) to the end
+    at the tip.
+    """
+    face = face_of(gear, deviation)
     marks = [m for m in face.marks() if 0 < m < face.end]
     u = np.unique(np.concatenate([np.linspace(0, 1, INVOLUTE), np.linspace(1, face.end, ROUND), marks]))
     points, size = face.points(u), _lengths(face.speeds, u)

@@ -8,12 +8,12 @@ after ISO 21771; the curves themselves are in `gearfe.gear.curves`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..errors import InputError
-from .curves import Arc, Array, Flank, Point, Segment, Trochoid, bisect, inv, inverse_inv
+from .curves import Arc, Array, Deviation, Flank, Point, Segment, Trochoid, bisect, inv, inverse_inv
 from .tooth_root import NIL_ANGLE, ToothForm, half_tooth_angle, tip_radius, tooth_root
 
 __all__ = ["Segment", "ToothForm", "ToothProfile", "inv", "inverse_inv", "tooth_profile"]
@@ -210,6 +210,30 @@ def _largest_round(gear: ToothForm, flank: Flank) -> float:
         return 1.0 if land < 0.0 or rho + roll < flank.start else -1.0
 
     return bisect(too_large, 0.0, tip - base)
+
+
+def deviated(gear: ToothForm, profile: ToothProfile, deviation: Deviation) -> tuple[Flank, Arc | None]:
+    """Flank of a profile with a deviation of micrometres, and its tip round fitted anew.
+
+    The flank starts at the same radius and ends on the same tip circle; its round is tangent to both as before.
+    """
+    flank, tip, rho = replace(profile.flank, deviation=deviation), tip_radius(gear), gear.tip_round
+
+    def roll_at(radius: float) -> float:
+        forward = math.sqrt((radius - flank.base_radius) * (radius + flank.base_radius))
+        return bisect(lambda s: s - float(flank.relief(np.array(s))[0]) - forward, forward - reach, forward + reach)
+
+    # twice as far as any point moves
+    reach = 2 * (max(map(abs, deviation.height)) + flank.amount) + 1e-12
+    start = roll_at(_radius(profile.flank, flank.start)) if flank.start > reach else flank.start
+    if rho == 0.0:
+        return replace(flank, start=start, end=roll_at(tip)), None
+    inner = tip - rho
+    slope = float(np.abs(flank.relief(np.linspace(start, flank.end, 65))[1]).max())
+    reach += 2 * rho * slope
+    end = bisect(lambda s: math.hypot(*_round_centre(gear, flank, s)) - inner, flank.end - reach, flank.end + reach)
+    flank = replace(flank, start=start, end=end)
+    return flank, _tip_arc(gear, flank, end)[0]
 
 
 def _addendum_to(gear: ToothForm, radius: float) -> float:

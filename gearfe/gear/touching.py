@@ -25,12 +25,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .curves import Arc, Flank
+from .curves import Arc, Deviation, Flank
+from .involute import deviated
 from .mesh_geometry import MeshGeometry
 from .spur_gear import Gear
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+#: Of the flanks of pinion and wheel.
+Deviations = tuple[Deviation | None, Deviation | None]
 
 #: Points of the first search along a flank and of each closer look, and how often it looks closer.
 COARSE, CLOSER, LOOKS = 97, 17, 16
@@ -74,7 +78,7 @@ class Face:
         """Points (m) as complex numbers."""
         flank = self.flank
         s = flank.roll(np.minimum(np.maximum(u, 0.0), 1.0))
-        beside = s if flank.amount == 0.0 else s - flank.relief(s)[0]
+        beside = s - flank.relief(s)[0] if flank.modified else s
         made = np.exp(1j * (flank.base_angle - s / flank.base_radius)) * (flank.base_radius + 1j * beside)
         return made if self.round_ is None else np.where(u > 1.0, _complex(self.round_.point(u - 1.0)), made)
 
@@ -105,7 +109,7 @@ class Face:
         flank = self.flank
         forward = np.sqrt(np.maximum(0.0, (radius - flank.base_radius) * (radius + flank.base_radius)))
         s = forward
-        if flank.amount > 0.0:  # s - relief(s) = forward
+        if flank.modified:  # s - relief(s) = forward
             for _ in range(12):
                 depth, slope = flank.relief(s)
                 s = s - (s - depth - forward) / (1.0 - slope)
@@ -196,17 +200,21 @@ def _complex(points: Any) -> NDArray[np.complex128]:
     return np.asarray(points[..., 0] + 1j * points[..., 1])
 
 
-def face_of(gear: Gear) -> Face:
-    """Working flank of a gear."""
+def face_of(gear: Gear, deviation: Deviation | None = None) -> Face:
+    """Working flank of a gear, with a deviation of micrometres."""
     profile = gear.profile
-    round_ = next((s.curve for s in profile.segments if s.name == "tip_round"), None)
-    arc = round_ if isinstance(round_, Arc) else None
+    flank, arc = profile.flank, None
+    if deviation is not None:
+        flank, arc = deviated(gear, profile, deviation)
+    else:
+        round_ = next((s.curve for s in profile.segments if s.name == "tip_round"), None)
+        arc = round_ if isinstance(round_, Arc) else None
     if not profile.undercut:
-        return Face(profile.flank, arc)
+        return Face(flank, arc)
     root = profile.segment("trochoid").curve
     # going up a convex flank its normal turns clockwise
-    fall = np.angle(_complex(root.normal(np.array(1.0))) / _complex(profile.flank.normal(np.array(0.0))))
-    return Face(profile.flank, arc, max(0.0, float(fall)))
+    fall = np.angle(_complex(root.normal(np.array(1.0))) / _complex(flank.normal(np.array(0.0))))
+    return Face(flank, arc, max(0.0, float(fall)))
 
 
 @dataclass(frozen=True)
@@ -257,9 +265,9 @@ class Touching:
 class Flanks:
     """The working flanks of both gears of a pair, and the twist D at which a point of the pinion's is met."""
 
-    def __init__(self, pair: MeshGeometry) -> None:
+    def __init__(self, pair: MeshGeometry, deviations: Deviations = (None, None)) -> None:
         self.pair = pair
-        self.pinion, self.wheel = face_of(pair.pinion), face_of(pair.wheel)
+        self.pinion, self.wheel = face_of(pair.pinion, deviations[0]), face_of(pair.wheel, deviations[1])
         self.faces = (self.pinion, self.wheel)
         self._radii = self.wheel.radii
 
