@@ -338,7 +338,7 @@ def test_bores_beside_the_roots(rim: float) -> None:
         *(replace(g, bore_diameter=2 * (g.root_radius - rim * g.module)) for g in (thick.pinion, thick.wheel))
     )
     angles, twist = angles_of(pair, 10), 0.05 * pair.pinion.module / pair.wheel.base_radius
-    reference = solve_positions(elastic_pair(pair, law="nitsche"), angles, twist)
+    reference = solve_positions(pair, elastic_pair(pair, law="nitsche"), angles, twist)
     found = solve_half_plane(half_plane_pair(pair, elastic_pair(pair)), angles, twist)
     assert found.torque_wheel == pytest.approx([p.torque_wheel for p in reference], rel=2e-3)
 
