@@ -51,13 +51,13 @@ def one_sector(quick: bool) -> tuple[float, float, str]:
     from ..reduction.sparse_solver import factorize
 
     pair, coarsen = shipped_pair(), 5.0 if quick else 2.0
-    short = _cpu(lambda: elastic_pair(pair, law="nitsche", coarsen=coarsen))
+    short = _cpu(lambda: elastic_pair(pair, coarsen=coarsen))
 
     def whole() -> None:
         gears = whole_pair(pair, coarsen)
-        stiffness = gears.hub_stiffness.tocsr()
-        bores = [n[np.unique(g.boundaries["bore"])] for n, g in zip(gears.node_of, gears.gears, strict=True)]
-        free = np.setdiff1d(np.arange(stiffness.shape[0]), gears.unknowns[np.concatenate(bores)].ravel())
+        stiffness = gears.bodies.stiffness.tocsr()
+        bores = [n[np.unique(g.boundaries["bore"])] for n, g in zip(gears.bodies.node_of, gears.gears, strict=True)]
+        free = np.setdiff1d(np.arange(stiffness.shape[0]), gears.bodies.unknowns[np.concatenate(bores)].ravel())
         factorize(stiffness[free][:, free], block=2)
 
     return short, _cpu(whole, 1), f"both gears at coarsen {coarsen:g}"
@@ -66,7 +66,7 @@ def one_sector(quick: bool) -> tuple[float, float, str]:
 def one_cycle(quick: bool) -> tuple[float, float, str]:
     """40 positions over more than two mesh cycles: 18 of them differ."""
     pair = shipped_pair()
-    elastic = elastic_pair(pair, law="nitsche", coarsen=4.0 if quick else 1.0)
+    elastic = elastic_pair(pair, coarsen=4.0 if quick else 1.0)
     at = np.radians(np.array([2.0, 20.0]) if quick else np.arange(1.0, 41.0))
     times = [
         _cpu(partial(sweep_stiffness, pair, twist=TWIST, angles=at, elastic=elastic, solve_all=s))
@@ -94,7 +94,7 @@ def fields(quick: bool) -> tuple[float, float, str]:
     from ..stiffness.fields import pair_recovery
 
     pair = shipped_pair()
-    elastic = elastic_pair(pair, law="nitsche", coarsen=5.0 if quick else 1.0)
+    elastic = elastic_pair(pair, coarsen=5.0 if quick else 1.0)
     at = pair.mesh_cycle * np.arange(1 if quick else 8) / 8
     short = _cpu(lambda: sweep_stiffness(pair, twist=TWIST, angles=at, elastic=elastic))
     solved = position_solver(pair, elastic).solve(at, np.full(len(at), TWIST), range(len(at)))
