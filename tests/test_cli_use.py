@@ -90,7 +90,9 @@ dataclasses._create_fn = interrupted
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize("when", [FOUND.format("commands.program"), FOUND.format("config"), EXECUTED])
 def test_an_interruption_while_the_program_loads_is_told_as_later(when: str) -> None:
-    code = f"import os, signal, sys\n{when}\nfrom gearfe.cli import main\nsys.exit(main(['stiffness', 'job.toml']))"
+    # a shell's job in the background ignores interruptions, and so would what it starts
+    listening = "import os, signal, sys\nsignal.signal(signal.SIGINT, signal.default_int_handler)"
+    code = f"{listening}\n{when}\nfrom gearfe.cli import main\nsys.exit(main(['stiffness', 'job.toml']))"
     made = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=120)
     assert (made.returncode, made.stderr) == (130, "gearfe: interrupted\n")
 

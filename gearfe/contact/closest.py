@@ -56,9 +56,6 @@ class Projection:
         a (m).
     curvature : ndarray, shape (n,)
         kappa (m).
-    beyond : ndarray of bool, shape (n,)
-        Points that run off an end, but not far, and overlap the last edge continued: where the chain is a piece of a
-        longer one, the contact has outgrown it.
     """
 
     place: Array
@@ -69,7 +66,6 @@ class Projection:
     slopes: Array
     tangent: Array
     curvature: Array
-    beyond: NDArray[np.bool_]
 
     def take(self, index: IntArray | slice) -> Projection:
         """The projections of the points `index`."""
@@ -180,12 +176,11 @@ def project(slave: Array, chains: Chains, place: Array, *, iterations: int = 15,
     ends = (place <= 0) | (place >= last)
     sideways = np.abs(at.dx * at.ny - at.dy * at.nx)
     off = ends & (sideways > 1e-9 * at.length)
-    beyond = off & (gap < 0) & (sideways < 2 * at.length)
     gap[off] = OFF_END
     shapes, slopes, _ = edge_shapes(place - at.edge)
     normal, tangent = np.stack([at.nx, at.ny], axis=1), np.stack([at.ax, at.ay], axis=1)
     curvature = -(at.ax * at.tx + at.ay * at.ty)
-    return Projection(place, gap, normal, chains.node[at.number], shapes, slopes, tangent, curvature, beyond)
+    return Projection(place, gap, normal, chains.node[at.number], shapes, slopes, tangent, curvature)
 
 
 class _Foot(NamedTuple):

@@ -7,7 +7,6 @@ lies to the right of the chain, so the outward normal is the tangent turned by +
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -56,14 +55,6 @@ class Flank:
     def edges(self) -> int:
         """Number of edges."""
         return len(self.sizes)
-
-    @cached_property
-    def root(self) -> int:
-        """Number of edges from the root's end up to where the surface is hollow last: the fillet or trochoid."""
-        along = np.diff(self.points, axis=0)
-        turn = along[:-1, 0] * along[1:, 1] - along[:-1, 1] * along[1:, 0]
-        hollow = np.flatnonzero(turn > 1e-6 * np.linalg.norm(along[:-1], axis=1) * np.linalg.norm(along[1:], axis=1))
-        return int(hollow[-1] + 2) // 2 if len(hollow) else 0
 
 
 def flank_of(mesh: SectorMesh, points_per_edge: int) -> Flank:

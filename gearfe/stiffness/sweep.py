@@ -88,8 +88,7 @@ def elastic_pair(
         raise InputError("coarsen", coarsen, "must be >= 0.2 and <= 5", "1 is the default mesh, 2 twice its sizes")
     check_flank_coarsen(coarsen, flank_coarsen, "flank_coarsen")
     chosen = law_named(law) if isinstance(law, str) else law
-    if isinstance(chosen, HalfPlane):
-        flank_coarsen = min(HALF_PLANE_FLANK * flank_coarsen, max(1.0, HALF_PLANE_COARSEST / coarsen))
+    flank_coarsen = flank_factor(chosen, coarsen, flank_coarsen)
     both = (materials, materials) if isinstance(materials, Material) else materials
     watch = watch or Stopwatch()
     gears = (pair.pinion, pair.wheel)
@@ -111,6 +110,13 @@ def elastic_pair(
             for mesh, material, gear in zip(meshes, both, gears, strict=True)
         ]
     return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen)
+
+
+def flank_factor(law: ContactLaw, coarsen: float, flank_coarsen: float = 1.0) -> float:
+    """`flank_coarsen` of the mesh that a law gets: the half-plane law's is coarser, see `elastic_pair`."""
+    if not isinstance(law, HalfPlane):
+        return flank_coarsen
+    return min(HALF_PLANE_FLANK * flank_coarsen, max(1.0, HALF_PLANE_COARSEST / coarsen))
 
 
 def sweep_stiffness(
