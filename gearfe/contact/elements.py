@@ -1,8 +1,7 @@
 """Nitsche's and the penalty law by finite elements: positions of a gear pair from first contacts.
 
 The first contacts are those of the half-plane law (`first_contacts`): where each tooth pair touches, how wide and under
-which pressure. They place the windows in which the mesh's own contact is solved and start Newton's method within a per
-cent of its end.
+which pressure. They place the windows in which the mesh's own contact is solved, and Newton's method starts there.
 """
 
 from __future__ import annotations
@@ -45,9 +44,7 @@ def first_contacts(sides: Sequence[FlankCompliance], contacts: PairContacts) -> 
     return FirstContacts(contacts.position, contacts.pair, contacts.normal, arc, contacts.pressure, contacts.width)
 
 
-def solve_elements(
-    elastic: MeshingPair, angles: Array, twists: Array, first: FirstContacts, *, tolerance: float = TOLERANCE
-) -> list[Position]:
+def solve_elements(elastic: MeshingPair, angles: Array, twists: Array, first: FirstContacts) -> list[Position]:
     """Solve the contact of several positions on the mesh.
 
     Parameters
@@ -56,8 +53,6 @@ def solve_elements(
         Pinion angles and twists (rad).
     first
         Contacts to start from; positions without one have ``no_contact``.
-    tolerance
-        Relative error of pressures and forces.
     """
     made = [unsolved("no_contact")] * len(angles)
     open_ = np.unique(first.position)
@@ -67,14 +62,14 @@ def solve_elements(
             mine = first.take(np.isin(first.position, chosen))
             mine = replace(mine, position=np.searchsorted(chosen, mine.position))
             batch = batch_of(elastic, mine, angles[chosen], twists[chosen], reach)
-            outcome = solve(batch, _start(batch, mine), tolerance)
+            outcome = solve(batch, _start(batch, mine), TOLERANCE)
             rims = _at_rims(batch, outcome.state)
+            held = {b: own for b, own in outcome.equations.items() if not rims[b]}
+            outcome = replace(outcome, equations=held)  # what has outgrown its windows is not solved
             for i, position in zip(chosen.tolist(), _positions(batch, outcome), strict=True):
                 made[i] = position
             outgrown += chosen[rims].tolist()
         open_ = np.array(outgrown, dtype=np.int64)
-    for i in open_.tolist():
-        made[i] = unsolved("not_converged", made[i].iterations)
     return made
 
 
