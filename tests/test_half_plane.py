@@ -15,7 +15,7 @@ from gearfe.contact.half_plane_step import step
 from gearfe.contact.panels import MIDDLES, WIDTHS, couplings, first_guess, influence, pressed
 from gearfe.contact.wedge import ELLIPSE_W, ELLIPSE_X, mean_log, wedge_tensor
 from gearfe.elasticity import Material
-from gearfe.gear.curves import Deviation
+from gearfe.gear.deviation import Deviation, ToothDeviations
 from gearfe.gear.flank_curve import flank_curve
 from gearfe.gear.pair import GearPair, TipRelief
 from gearfe.gear.touching import face_of
@@ -365,7 +365,7 @@ def test_relief_as_a_deviation() -> None:
         for one in (relieved.pinion, relieved.wheel):
             flank = face_of(one).flank
             roll = np.linspace(flank.start, flank.end, 400)
-            deviations.append(Deviation(tuple(roll), tuple(-flank.relief(roll)[0])))
+            deviations.append(ToothDeviations((Deviation.sampled(flank.relief, roll).scaled(-1.0),)))
         elastic = elastic_pair(plain, law="half_plane")
         found = half_plane_pair(plain, elastic, deviations=(deviations[0], deviations[1]))
         without = half_plane_pair(plain, elastic)
@@ -386,10 +386,10 @@ def test_an_even_deviation_turns_the_wheel() -> None:
     """A layer h on an involute is the involute turned by h/r_b: on the path the pair touches h/r_b2 earlier."""
     pair, height = PAIRS["rounded"], 5e-6
     flank = face_of(pair.pinion).flank
-    layer = Deviation(tuple(np.linspace(flank.start, flank.end, 5)), (height,) * 5)
+    layer = ToothDeviations((Deviation.straight([flank.start, flank.end], [height, height]),))
     plain = law_of("rounded")
     elastic = elastic_pair(pair, law="half_plane")
-    law = half_plane_pair(pair, elastic, deviations=(layer, None))
+    law = half_plane_pair(pair, elastic, deviations=(layer, ToothDeviations()))
     angles = angles_of(pair, 7)
     found, expected = law.flanks.touching(angles), plain.flanks.touching(angles)
     on_path = ((expected.place > 0.05) & (expected.place < 0.95)).all(axis=1)

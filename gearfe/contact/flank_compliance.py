@@ -35,7 +35,6 @@ from scipy.interpolate import CubicSpline
 
 from ..gear.flank_curve import FlankCurve, flank_curve
 from ..gear.pair import GearPair
-from ..gear.touching import Deviations
 from .compliance import GearBody
 from .elliptic import Chain
 from .scene import MeshingPair
@@ -137,14 +136,12 @@ def shapes_of(stations: Sequence[Array]) -> Shapes:
     return Shapes(padded, origin.ravel(), powers.reshape(2 * (most + 1), 3 * most, 4))
 
 
-def flank_compliances(
-    pair: GearPair, elastic: MeshingPair, deviations: Deviations = (None, None)
-) -> tuple[FlankCompliance, FlankCompliance]:
-    """Of pinion and wheel: the deviations are in the curves, not in the mesh."""
+def flank_compliances(pair: GearPair, elastic: MeshingPair) -> tuple[FlankCompliance, FlankCompliance]:
+    """Of pinion and wheel."""
     pinion, wheel = (
-        flank_compliance(body, flank_curve(gear, deviation), inverse, elastic.width, pair.pinion.module)
-        for body, gear, deviation, inverse in zip(
-            elastic.bodies, (pair.pinion, pair.wheel), deviations, elastic.contact_compliances, strict=True
+        flank_compliance(body, flank_curve(gear), inverse, elastic.width, pair.pinion.module)
+        for body, gear, inverse in zip(
+            elastic.bodies, (pair.pinion, pair.wheel), elastic.contact_compliances, strict=True
         )
     )
     return pinion, wheel
@@ -164,7 +161,7 @@ def flank_compliance(
     """
     chain = Chain(body)
     offset = chain.arc_at(float(curve.face.radii[0]))
-    corner, wedge = _corner(curve)
+    corner, wedge = corner_of(curve)
     stations, bumps, nodal = _stations(body, chain, offset + curve.low, module)
     loads = np.kron(nodal, np.eye(2))
     modes = loads @ body.far.flank
@@ -174,7 +171,7 @@ def flank_compliance(
     return made
 
 
-def _corner(curve: FlankCurve) -> tuple[complex, Array]:
+def corner_of(curve: FlankCurve) -> tuple[complex, Array]:
     """Corner (m) of flank and tip circle, and the tensor W of the wedge there in the tooth's axes."""
     face = curve.face
     end = np.array(1.0)

@@ -90,11 +90,11 @@ def solve_half_plane(
     twists : array_like, shape (n,) or ()
         Twist of the wheel (rad), from where a wheel space faces the pinion tooth.
     touching
-        What `law.flanks.touching` says of these angles, when it is there already.
+        What `law.teeth.touching` says of these angles, when it is there already.
     """
     angles = np.atleast_1d(np.asarray(pinion_angles, dtype=float))
     twist = np.broadcast_to(np.asarray(twists, dtype=float), angles.shape)
-    met = law.flanks.touching(angles) if touching is None else touching
+    met = law.teeth.touching(angles) if touching is None else touching
     met = met.take(np.flatnonzero(met.twist < twist[met.position] + CLEAR))
     made = []
     for start in range(0, max(1, len(angles)), BATCH):
@@ -158,15 +158,16 @@ class _Pairs:
 def _first(law: HalfPlanePair, twists: Array, found: Touching) -> _Open:
     """Forces to begin with: the overlaps of the rigid gears, taken up by the teeth and usual contacts."""
     turn = [
-        found.angle + found.pair * law.pair.mesh_cycle,
-        law.flanks.wheel_frame(found.angle, found.pair) + twists[found.position],
+        found.angle + found.pair * law.pair.mesh_cycle + found.turn[:, 0],
+        law.flanks.wheel_frame(found.angle, found.pair) + twists[found.position] + found.turn[:, 1],
     ]
     nothing = np.zeros(len(found))
     state = State(
         centre=found.point,
         normal=found.normal,
         turn=np.exp(1j * np.stack(turn, axis=1)),
-        arc=np.stack([curve.arc_at(found.place[:, g]) for g, curve in enumerate(law.curves)], axis=1),
+        flank=found.flank,
+        arc=law.arc_at(found.flank, found.place),
         force=nothing,
         spread=nothing,
         low=nothing,

@@ -142,7 +142,7 @@ def pair_sums(law: HalfPlanePair, state: State, made: Step) -> dict[str, Array]:
     """What each pair adds to the sums over its position (N m, N m, N m, J)."""
     force, normal = made.solution.force * law.width, state.normal
     centre = _centres(state, made)
-    wheel = law.tables.at(_material(made)[:, :, None])[0][:, 1, 0] * state.turn[:, 1]
+    wheel = law.tables.of(state.flank).at(_material(made)[:, :, None])[0][:, 1, 0] * state.turn[:, 1]
     return {
         "torque_wheel": -force * cross(centre - law.hub[1], normal),
         "torque_pinion": force * cross(centre, normal),
@@ -182,15 +182,15 @@ def contacts_of(
         point=_centres(state, made),
         normal=state.normal,
         arc=arc,
-        parameter=np.stack([curve.parameter_at(arc[:, g]) for g, curve in enumerate(law.curves)], axis=1),
+        parameter=law.parameter_at(state.flank, arc),
         half_width=half_width,
         hertz_pressure=2 * force / (np.pi * half_width),
-        mark=_reached(law, made.arcs, pressure, width),
+        mark=_reached(law, state.flank, made.arcs, pressure, width),
         x=made.x - made.place[:, None],
         width=width,
         pressure=pressure,
         panel_arc=made.arcs,
-        panel_radius=np.abs(law.tables.at(made.arcs)[0]),
+        panel_radius=np.abs(law.tables.of(state.flank).at(made.arcs)[0]),
     )
 
 
@@ -208,12 +208,12 @@ def contact_rates(
     }
 
 
-def _reached(law: HalfPlanePair, arcs: Array, pressure: Array, width: Array) -> NDArray[np.str_]:
+def _reached(law: HalfPlanePair, flank: IntArray, arcs: Array, pressure: Array, width: Array) -> NDArray[np.str_]:
     """Mark that each pressure reaches, see `PairContacts`: it ends within a panel beside the middle of the last one."""
     bears = (pressure > 0)[:, None]
     reached = np.zeros(len(arcs), dtype="<U8")
     low = np.where(bears, arcs - width[:, None], np.inf).min(axis=2)
     high = np.where(bears, arcs + width[:, None], -np.inf).max(axis=2)
-    for name, gear, at in law.marks:  # what comes later wins
-        reached[(low[:, gear] <= at) & (at <= high[:, gear])] = name
+    for name, of, at in law.marks:  # what comes later wins
+        reached[((flank == of) & (low <= at) & (at <= high)).any(axis=1)] = name
     return reached

@@ -8,10 +8,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gear.flank_curve import FlankCurve, FlankTables, flank_tables
+from ..gear.deviation import NOMINAL, ToothDeviations
+from ..gear.flank_curve import FlankCurve, FlankTables, flank_curve, flank_tables
 from ..gear.pair import GearPair
-from ..gear.touching import Deviations, Flanks
-from .flank_compliance import FlankCompliance, Shapes, flank_compliances, shapes_of
+from ..gear.tooth_flanks import ToothFlanks
+from ..gear.touching import Flanks
+from .flank_compliance import FlankCompliance, Shapes, corner_of, flank_compliances, shapes_of
 from .moved_faces import WAY, Faces, Windows, windows
 from .panels import MIDDLES, WIDTHS, Couplings, Pressed, first_guess, influence, pressed
 from .scene import MeshingPair
@@ -40,28 +42,48 @@ class HalfPlanePair:
     ----------
     pair
         Geometry.
-    flanks
-        Working flanks of both gears, where their first touch is searched for.
+    teeth
+        Working flanks of all teeth, where their first touch is searched for.
     sides
-        Compliance of pinion's and wheel's flank.
+        Compliance of pinion's and wheel's flank, without deviations.
     width
         Width of the contact (m).
     """
 
     pair: GearPair
-    flanks: Flanks
+    teeth: ToothFlanks
     sides: tuple[FlankCompliance, FlankCompliance]
     width: float
 
+    @property
+    def flanks(self) -> Flanks:
+        """The first profiles of both gears."""
+        return self.teeth.first
+
     @cached_property
-    def curves(self) -> tuple[FlankCurve, FlankCurve]:
-        """Exact flanks."""
-        return self.sides[0].curve, self.sides[1].curve
+    def curves(self) -> tuple[FlankCurve, ...]:
+        """Exact flanks, f of them: the faces of `teeth`."""
+        gears = (self.pair.pinion, self.pair.wheel)
+        return tuple(flank_curve(gears[self.teeth.gear_of(i)], face) for i, face in enumerate(self.teeth.faces))
 
     @cached_property
     def tables(self) -> FlankTables:
-        """Both flanks in one table."""
+        """These in one table."""
         return flank_tables(self.curves)
+
+    def arc_at(self, flank: IntArray, parameter: Array) -> Array:
+        """Arc lengths (m) of parameters u on the flanks `flank`, both of shape (p, 2)."""
+        made = np.empty(np.shape(parameter))
+        for i in np.unique(flank):
+            made[flank == i] = self.curves[i].arc_at(parameter[flank == i])
+        return made
+
+    def parameter_at(self, flank: IntArray, arc: Array) -> Array:
+        """Parameters u of arc lengths (m) on the flanks `flank`, both of shape (p, 2)."""
+        made = np.empty(np.shape(arc))
+        for i in np.unique(flank):
+            made[flank == i] = self.curves[i].parameter_at(arc[flank == i])
+        return made
 
     @cached_property
     def shapes(self) -> Shapes:
@@ -85,8 +107,8 @@ class HalfPlanePair:
 
     @cached_property
     def corner(self) -> ComplexArray:
-        """Corners of flanks and tip circles (m), shape (2,)."""
-        return np.array([side.corner for side in self.sides])
+        """Corners of flanks and tip circles (m), shape (f,)."""
+        return np.array([corner_of(curve)[0] for curve in self.curves])
 
     @cached_property
     def wedge(self) -> tuple[Array, ComplexArray]:
@@ -97,23 +119,22 @@ class HalfPlanePair:
     @cached_property
     def undercut(self) -> Array:
         """1 where the working flank starts with the edge of an undercut, shape (2,)."""
-        return np.array([float(curve.face.fall > 0.0) for curve in self.curves])
+        return np.array([float(side.curve.face.fall > 0.0) for side in self.sides])
 
     @cached_property
     def marks(self) -> list[tuple[str, int, float]]:
-        """Name, gear and arc length (m) of the flanks' marks, see `half_plane_result.PairContacts`, by rising rank."""
+        """Name, flank and arc length (m) of the flanks' marks, see `half_plane_result.PairContacts`, by rising rank."""
         found = []
         for name in ("undercut", "relief", "round", "tip"):
-            for gear, curve in enumerate(self.curves):
+            for flank, curve in enumerate(self.curves):
                 face = curve.face
-                at = {
-                    "undercut": 0.0 if face.fall > 0.0 else None,
-                    "relief": face.relief_start if face.flank.kinked else None,
-                    "round": None if face.sharp else 1.0,
-                    "tip": face.end if face.sharp else None,
+                places = {
+                    "undercut": [0.0] if face.fall > 0.0 else [],
+                    "relief": face.kinks.tolist(),
+                    "round": [] if face.sharp else [1.0],
+                    "tip": [face.end] if face.sharp else [],
                 }[name]
-                if at is not None:
-                    found.append((name, gear, float(curve.arc_at(at))))
+                found += [(name, flank, float(curve.arc_at(at))) for at in places]
         return found
 
     @cached_property
@@ -141,14 +162,16 @@ class HalfPlanePair:
     def _influences(self) -> dict[int, Array]:
         return {}
 
+    def deviated(self, deviations: tuple[ToothDeviations, ToothDeviations]) -> HalfPlanePair:
+        """The same elastic gears with other deviations of micrometres, which are in the flanks' curves alone."""
+        return HalfPlanePair(self.pair, ToothFlanks(self.pair, deviations), self.sides, self.width)
 
-def half_plane_pair(pair: GearPair, elastic: MeshingPair, *, deviations: Deviations = (None, None)) -> HalfPlanePair:
-    """Prepare the law for meshed and condensed gears; their flanks may be coarse (a tenth of a module).
 
-    Deviations of micrometres are in the flanks' curves alone: gears need not be meshed anew.
-    """
-    sides = flank_compliances(pair, elastic, deviations)
-    return HalfPlanePair(pair, Flanks(pair, deviations), sides, elastic.width)
+def half_plane_pair(
+    pair: GearPair, elastic: MeshingPair, *, deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL
+) -> HalfPlanePair:
+    """Prepare the law for meshed and condensed gears; their flanks may be coarse (a tenth of a module)."""
+    return HalfPlanePair(pair, ToothFlanks(pair, deviations), flank_compliances(pair, elastic), elastic.width)
 
 
 @dataclass(frozen=True)
@@ -161,6 +184,8 @@ class State:
         O (m) and n, global axes.
     turn : ndarray of complex, shape (p, 2)
         Turn of the teeth: tooth axes to global ones.
+    flank : ndarray, shape (p, 2)
+        Numbers of their flanks in `HalfPlanePair.curves`.
     arc : ndarray, shape (p, 2)
         The material at O (m).
     force, spread : ndarray, shape (p,)
@@ -176,6 +201,7 @@ class State:
     centre: ComplexArray
     normal: ComplexArray
     turn: ComplexArray
+    flank: IntArray
     arc: Array
     force: Array
     spread: Array
@@ -284,7 +310,8 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
     normal, force = smooth.normal, state.force
     tension, shear = law.wedge
     shear = shear * normal.conj() ** 2
-    y, far = _distances(law, state.arc)
+    tables, corner = law.tables.of(state.flank), law.corner[state.flank]
+    y, far = _distances(law, tables, corner, state.arc)
     load = force[:, None] * _SIGN
     displaced = np.add.reduceat(smooth.moved * (force.take(couples.second)[:, None] * _SIGN)[..., None], couples.starts)
     # the contact's own width, and that of the bumps
@@ -298,17 +325,17 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
 
     low, high, found = state.low, state.high, None
     if search:
-        found = _searched(law, state, faces, couples)
+        found = _searched(law, tables, state, faces, couples)
         low, high = found.low, found.high
     half = 0.5 * (high - low)
     x = np.empty((len(half), len(MIDDLES) + 1))
     np.add(0.5 * (high + low)[:, None], half[:, None] * MIDDLES, out=x[:, :-1])
     x[:, -1] = 0.0  # O itself
-    arcs, heights, points = faces.heights(law.tables, x)
+    arcs, heights, points = faces.heights(tables, x)
     arc, height = arcs[:, :, -1], 0.5 * (heights[:, 0, -1] + heights[:, 1, -1])
     x, width, arcs, heights = x[:, :-1], half[:, None] * WIDTHS, arcs[:, :, :-1], heights[:, :, :-1]
     gap = heights[:, 1] - heights[:, 0]
-    y = np.maximum(np.abs(points[:, :, :-1] - law.corner[:, None]), LEAST_DISTANCE)
+    y = np.maximum(np.abs(points[:, :, :-1] - corner[:, :, None]), LEAST_DISTANCE)
     along = law.inverse_modulus * (tension + shear.real)
     edges = np.log(y[:, :, :, None] + y[:, :, None, :]) * (-along[:, :, None, None] * width[:, None, None, :])
     K = influence(half, law.compliance) + edges[:, 0] + edges[:, 1]
@@ -337,22 +364,22 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
     return Step(solution, low, high, outgrown, x, width, arcs, arc, height, place, spread, slope, energy)
 
 
-def _distances(law: HalfPlanePair, arc: Array) -> tuple[Array, Array]:
+def _distances(law: HalfPlanePair, tables: FlankTables, corner: ComplexArray, arc: Array) -> tuple[Array, Array]:
     """Distances y (m) of the faces at arcs (m) from their corners, and shares of the faces by the square of their
     distance from all edges, both of shape (p, 2).
     """
-    y = np.maximum(np.abs(law.tables.at(arc[:, :, None])[0][:, :, 0] - law.corner), LEAST_DISTANCE)
+    y = np.maximum(np.abs(tables.at(arc[:, :, None])[0][:, :, 0] - corner), LEAST_DISTANCE)
     near = 1 / y**2 + law.undercut / np.maximum(np.abs(arc), LEAST_DISTANCE) ** 2
     return y, near[:, ::-1] / near.sum(axis=1, keepdims=True)
 
 
-def _searched(law: HalfPlanePair, state: State, faces: Faces, couples: Couplings) -> Windows:
+def _searched(law: HalfPlanePair, tables: FlankTables, state: State, faces: Faces, couples: Couplings) -> Windows:
     """Windows by the gap beside its least."""
     module = law.pair.pinion.module
     least = LEAST_WIDTH**2 * module / (0.2 * law.compliance)
     floor = np.maximum(state.force, LEAST_FORCE * couples.total(state.force)[couples.position] + least)
     scale = np.sqrt(0.2 * law.compliance * floor * module)
-    return windows(faces, law.tables, scale, state.reach * law.compliance * floor)
+    return windows(faces, tables, scale, state.reach * law.compliance * floor)
 
 
 def moved_on(law: HalfPlanePair, state: State, made: Step, *, near: BoolArray | bool) -> State:
@@ -367,7 +394,8 @@ def moved_on(law: HalfPlanePair, state: State, made: Step, *, near: BoolArray | 
         centre=state.centre + state.normal * (made.height - 1j * place),
         normal=state.normal * turned / np.abs(turned),
         turn=state.turn,
-        arc=np.minimum(np.maximum(arc, law.tables.low[:, 0]), law.tables.high[:, 0]),
+        flank=state.flank,
+        arc=np.minimum(np.maximum(arc, law.tables.low[state.flank, 0]), law.tables.high[state.flank, 0]),
         force=found.force,
         spread=made.spread,
         low=made.low - place,

@@ -21,6 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from .deviation import Deviation
+
 Array = np.ndarray[Any, Any]
 Point = tuple[float, float]
 
@@ -122,33 +124,6 @@ class Trochoid:
 
 
 @dataclass(frozen=True)
-class Deviation:
-    """Deviation of a flank along the normal of its involute, as measured or wanted; the same on every tooth.
-
-    Attributes
-    ----------
-    roll : tuple of float
-        Roll lengths (m), rising.
-    height : tuple of float
-        Deviation there (m), > 0: more material. A cubic spline between them, constant beyond them.
-    """
-
-    roll: tuple[float, ...]
-    height: tuple[float, ...]
-
-    @cached_property
-    def _spline(self) -> Any:
-        from scipy.interpolate import CubicSpline  # only deviations need it
-
-        return CubicSpline(self.roll, self.height)
-
-    def at(self, s: Array) -> tuple[Array, Array]:
-        """Deviation (m) and its slope (-) at roll lengths s (m)."""
-        inside = np.clip(s, self.roll[0], self.roll[-1])
-        return self._spline(inside), np.where(inside == s, self._spline(inside, 1), 0.0)
-
-
-@dataclass(frozen=True)
 class Flank:
     """Involute, moved inwards along its normal by a tip relief delta(s) = amount ((s - relief_start)/length)^exponent.
 
@@ -173,10 +148,13 @@ class Flank:
         """Whether it is not the involute itself."""
         return self.amount > 0.0 or self.deviation is not None
 
-    @property
-    def kinked(self) -> bool:
-        """Whether the relief starts with a kink within the flank."""
-        return self.amount > 0.0 and self.exponent == 1.0 and self.start < self.relief_start < self.end
+    @cached_property
+    def kinks(self) -> tuple[float, ...]:
+        """Rising roll lengths (m) within the flank where its normal jumps: of a linear relief, of the deviation."""
+        found = set() if self.deviation is None else set(self.deviation.kinks)
+        if self.amount > 0.0 and self.exponent == 1.0:
+            found.add(self.relief_start)
+        return tuple(sorted(s for s in found if self.start < s < self.end))
 
     def relief(self, s: Array) -> tuple[Array, Array]:
         """Relief (m), less the deviation, and its slope d delta/ds (-) at roll lengths s (m)."""

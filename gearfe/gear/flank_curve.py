@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .curves import Deviation, Trochoid
+from .curves import Trochoid
 from .spur_gear import Gear
 from .touching import Face, face_of
 
@@ -115,12 +115,18 @@ class FlankTables:
     @cached_property
     def ends(self) -> Array:
         """First and last arc lengths (m), shape (f, 2)."""
-        return np.concatenate([self.low, self.high], axis=1)
+        return np.concatenate([self.low, self.high], axis=-1)
 
     @cached_property
     def end_points(self) -> ComplexArray:
         """Points there (m), shape (f, 2)."""
         return self.at(self.ends)[0]
+
+    def of(self, flank: NDArray[np.int64]) -> FlankTables:
+        """The same table with other axes of flanks: the flanks `flank`, shape (..., g), for arc lengths (..., g, m)."""
+        return replace(
+            self, low=self.low[flank], high=self.high[flank], cells=self.cells[flank], start=self.start[flank]
+        )
 
     def pieces(self, s: Array) -> tuple[ComplexArray, Array]:
         """Coefficients, shape (4, ..., f, m), and arc lengths within the pieces, for arc lengths s (m), (..., f, m)."""
@@ -161,11 +167,11 @@ def flank_tables(curves: Sequence[FlankCurve]) -> FlankTables:
     )
 
 
-def flank_curve(gear: Gear, deviation: Deviation | None = None) -> FlankCurve:
-    """Tabulate the flank of a gear with its deviation, from the middle of the root's trochoid (if any) to the end
-    at the tip.
+def flank_curve(gear: Gear, face: Face | None = None) -> FlankCurve:
+    """Tabulate a flank of a gear, that without deviation if none is given, from the middle of the root's trochoid
+    (if any) to the end at the tip.
     """
-    face = face_of(gear, deviation)
+    face = face or face_of(gear)
     marks = [m for m in face.marks() if 0 < m < face.end]
     u = np.unique(np.concatenate([np.linspace(0, 1, INVOLUTE), np.linspace(1, face.end, ROUND), marks]))
     points, size = face.points(u), _lengths(face.speeds, u)

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import InputError
-from .curves import Arc, Array, Deviation, Flank, Point, Segment, Trochoid, bisect, inv, inverse_inv
+from .curves import Arc, Array, Flank, Point, Segment, Trochoid, bisect, inv, inverse_inv
+from .deviation import Deviation
 from .tooth_root import NIL_ANGLE, ToothForm, half_tooth_angle, tip_radius, tooth_root
 
 __all__ = ["Segment", "ToothForm", "ToothProfile", "inv", "inverse_inv", "tooth_profile"]
@@ -224,7 +225,7 @@ def deviated(gear: ToothForm, profile: ToothProfile, deviation: Deviation) -> tu
         return bisect(lambda s: s - float(flank.relief(np.array(s))[0]) - forward, forward - reach, forward + reach)
 
     # twice as far as any point moves
-    reach = 2 * (max(map(abs, deviation.height)) + flank.amount) + 1e-12
+    reach = 2 * (deviation.most + flank.amount) + 1e-12
     start = roll_at(_radius(profile.flank, flank.start)) if flank.start > reach else flank.start
     if rho == 0.0:
         return replace(flank, start=start, end=roll_at(tip)), None

@@ -25,7 +25,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .curves import Arc, Deviation, Flank
+from .curves import Arc, Flank
+from .deviation import Deviation
 from .involute import deviated
 from .mesh_geometry import MeshGeometry
 from .spur_gear import Gear
@@ -33,13 +34,12 @@ from .spur_gear import Gear
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-#: Of the flanks of pinion and wheel.
-Deviations = tuple[Deviation | None, Deviation | None]
-
 #: Points of the first search along a flank and of each closer look, and how often it looks closer.
 COARSE, CLOSER, LOOKS = 97, 17, 16
 #: A place is an end of the range, or a mark, when it is so near to it: places have the rounding of angles and radii.
 AT_AN_END = 1e-9
+#: Moves of a roll length that are rounding, in parts of the longest.
+ROLL_ROUNDING = 1e-15
 #: Steps of the search along a normal, and least cosine between it and the wheel's face that they reckon with.
 NEWTON, STEEPEST = 10, 0.05
 
@@ -92,11 +92,14 @@ class Face:
         made: Array = self.flank.speed(np.clip(u, 0.0, 1.0))
         return made if self.round_ is None else np.where(u > 1.0, self.round_.speed(u - 1.0), made)
 
-    @property
-    def relief_start(self) -> float:
-        """Parameter at which the relief starts."""
-        flank = self.flank
-        return (flank.relief_start - flank.start) / (flank.end - flank.start)
+    def parameter(self, roll: Any) -> Any:
+        """Parameter at a roll length (m)."""
+        return (roll - self.flank.start) / (self.flank.end - self.flank.start)
+
+    @cached_property
+    def kinks(self) -> Array:
+        """Rising parameters of the kinks of relief and deviation."""
+        return np.array([self.parameter(roll) for roll in self.flank.kinks])
 
     @cached_property
     def radii(self) -> tuple[float, float, float]:
@@ -112,7 +115,10 @@ class Face:
         if flank.modified:  # s - relief(s) = forward
             for _ in range(12):
                 depth, slope = flank.relief(s)
-                s = s - (s - depth - forward) / (1.0 - slope)
+                move = (s - depth - forward) / (1.0 - slope)
+                s = s - move
+                if (np.abs(move) <= ROLL_ROUNDING * flank.end).all():
+                    break
         u = np.minimum(np.maximum((s - flank.start) / (flank.end - flank.start), 0.0), 1.0)
         if self.round_ is None:
             return u
@@ -152,25 +158,26 @@ class Face:
         return sign * made
 
     def corners(self, u: Array) -> NDArray[np.bool_]:
-        """Whether the face has a corner at u: a sharp tip, an undercut's edge, the kink where a linear relief starts.
+        """Whether the face has a corner at u: a sharp tip, an undercut's edge, a kink (where a linear relief starts).
 
         Its normal may be any of a fan there, and without friction the force takes that of the smooth mate.
         """
         found = np.asarray((u >= self.end - AT_AN_END) & self.sharp)
         if self.fall > 0.0:
             found = found | (u < AT_AN_END)
-        if self.flank.kinked:
-            found = found | (np.abs(u - self.relief_start) <= AT_AN_END)
+        for kink in self.kinks:
+            found = found | (np.abs(u - kink) <= AT_AN_END)
         return found
 
     def curvature(self, u: Any, most: float) -> Any:
         """Curvature (1/m) at u (a number or an array), at most `most`, which a corner has."""
         step, at = 1e-5, np.clip(u, 0.0, 1.0)
         before, after = np.maximum(at - step, 0.0), np.minimum(at + step, 1.0)
-        if self.flank.amount > 0.0 and self.relief_start > 0.0:  # not across its start, beside which it is another
-            below = at <= self.relief_start
-            before = np.where(below, before, np.maximum(before, self.relief_start))
-            after = np.where(below, np.minimum(after, self.relief_start), after)
+        for mark in self.marks():  # not across it, beside which it is another
+            if 0.0 < mark < 1.0:
+                below = at <= mark
+                before = np.where(below, before, np.maximum(before, mark))
+                after = np.where(below, np.minimum(after, mark), after)
         turned = -np.angle(self.normals(after) / self.normals(before)) / (self.speeds(at) * (after - before))
         made = np.where(self.corners(np.asarray(u)), most, np.maximum(0.0, turned))
         if self.round_ is not None:
@@ -193,7 +200,9 @@ class Face:
     def marks(self) -> list[float]:
         """Parameters where the curvature jumps or the flank ends sharply."""
         found = [0.0, 1.0] if self.fall > 0.0 else [1.0]
-        return [*found, self.relief_start] if self.flank.amount > 0.0 else found
+        if self.flank.amount > 0.0:
+            found.append(float(self.parameter(self.flank.relief_start)))
+        return sorted({*found, *self.kinks.tolist()})
 
 
 def _complex(points: Any) -> NDArray[np.complex128]:
@@ -219,7 +228,7 @@ def face_of(gear: Gear, deviation: Deviation | None = None) -> Face:
 
 @dataclass(frozen=True)
 class Touching:
-    """Tooth pairs whose rigid flanks meet, n of them over all positions.
+    """Tooth pairs whose rigid flanks meet, n of them over all positions; pinion and wheel in second axes.
 
     Attributes
     ----------
@@ -241,6 +250,10 @@ class Touching:
         Torques of pinion and wheel per force (m).
     curvature : ndarray, shape (n,)
         Relative curvature of both flanks there (1/m), infinite at a sharp corner.
+    flank : ndarray, shape (n, 2)
+        Numbers of their flanks in `gearfe.gear.tooth_flanks.ToothFlanks.faces`.
+    turn : ndarray, shape (n, 2)
+        Turns of their flanks by pitch errors (rad).
     """
 
     position: IntArray
@@ -253,6 +266,8 @@ class Touching:
     normal: NDArray[np.complex128]
     arm: Array
     curvature: Array
+    flank: IntArray
+    turn: Array
 
     def take(self, index: Any) -> Touching:
         """The pairs `index`."""
@@ -263,12 +278,12 @@ class Touching:
 
 
 class Flanks:
-    """The working flanks of both gears of a pair, and the twist D at which a point of the pinion's is met."""
+    """A working flank of each gear of a pair, and the twist D at which a point of the pinion's is met."""
 
-    def __init__(self, pair: MeshGeometry, deviations: Deviations = (None, None)) -> None:
+    def __init__(self, pair: MeshGeometry, faces: tuple[Face, Face] | None = None) -> None:
         self.pair = pair
-        self.pinion, self.wheel = face_of(pair.pinion, deviations[0]), face_of(pair.wheel, deviations[1])
-        self.faces = (self.pinion, self.wheel)
+        self.faces = (face_of(pair.pinion), face_of(pair.wheel)) if faces is None else faces
+        self.pinion, self.wheel = self.faces
         self._radii = self.wheel.radii
 
     def wheel_frame(self, angle: Array, number: IntArray) -> Array:
@@ -318,7 +333,10 @@ class Flanks:
 
     def touching(self, angles: Array) -> Touching:
         """First touch of every pair that can meet at the given pinion angles (rad), shape (p,)."""
-        angle, number, position = self._candidates(angles)
+        return self.met(*candidates(self.pair, angles))
+
+    def met(self, position: IntArray, angle: Array, number: IntArray) -> Touching:
+        """First touch of the tooth pairs `number` at pinion angles (rad), of those of them that meet, shape (n,)."""
         u = np.broadcast_to(np.linspace(0.0, self.pinion.end, COARSE), (len(angle), COARSE))
         rows = np.arange(len(angle))
         best, least = np.zeros(len(angle)), np.full(len(angle), np.inf)
@@ -336,17 +354,6 @@ class Flanks:
         meets = np.isfinite(least)
         return self._described(position[meets], angle[meets], number[meets], best[meets], least[meets])
 
-    def _candidates(self, angles: Array) -> tuple[Array, IntArray, IntArray]:
-        """Pinion teeth whose tip can reach the wheel's tip circle: angles, tooth numbers and positions."""
-        pair = self.pair
-        a, tip1, tip2 = pair.working_centre_distance, pair.pinion.tip_radius, pair.wheel.tip_radius
-        reach = math.acos(min(1.0, max(-1.0, (a * a + tip1 * tip1 - tip2 * tip2) / (2 * a * tip1))))
-        reach += pair.pinion.profile.tip_half_angle + 0.5 * pair.mesh_cycle
-        half = math.ceil(reach / pair.mesh_cycle)
-        number = np.round(-angles / pair.mesh_cycle).astype(np.int64)[:, None] + np.arange(-half, half + 1)
-        position, tooth = np.nonzero(np.abs(angles[:, None] + number * pair.mesh_cycle) <= reach)
-        return angles[position], number[position, tooth], position
-
     def _described(self, position: IntArray, angle: Array, number: IntArray, u: Array, twist: Array) -> Touching:
         seen = self.placed(angle, number, u)
         radius = np.abs(seen)
@@ -361,7 +368,19 @@ class Flanks:
         arm = np.stack([_cross(point, normal), -_cross(seen, normal)], axis=1)
         place, radii = np.stack([u, mate], axis=1), np.stack([np.abs(point), radius], axis=1)
         bent = self.pinion.curvature(u, math.inf) + self.wheel.curvature(mate, math.inf)
-        return Touching(position, number, angle, twist, place, radii, point, normal, arm, bent)
+        flank, turn = np.tile(np.array([0, 1]), (len(angle), 1)), np.zeros((len(angle), 2))
+        return Touching(position, number, angle, twist, place, radii, point, normal, arm, bent, flank, turn)
+
+
+def candidates(pair: MeshGeometry, angles: Array) -> tuple[IntArray, Array, IntArray]:
+    """Pinion teeth whose tip can reach the wheel's tip circle: positions, pinion angles (rad) and tooth numbers."""
+    a, tip1, tip2 = pair.working_centre_distance, pair.pinion.tip_radius, pair.wheel.tip_radius
+    reach = math.acos(min(1.0, max(-1.0, (a * a + tip1 * tip1 - tip2 * tip2) / (2 * a * tip1))))
+    reach += pair.pinion.profile.tip_half_angle + 0.5 * pair.mesh_cycle
+    half = math.ceil(reach / pair.mesh_cycle)
+    number = np.round(-angles / pair.mesh_cycle).astype(np.int64)[:, None] + np.arange(-half, half + 1)
+    position, tooth = np.nonzero(np.abs(angles[:, None] + number * pair.mesh_cycle) <= reach)
+    return position, angles[position], number[position, tooth]
 
 
 def _cross(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> Array:

@@ -113,7 +113,7 @@ class _Line:
         middle, size = 0.5 * (u[1:] + u[:-1]), np.diff(u)
         self.u, self.arc = u, np.concatenate([[0.0], np.cumsum(face.speeds(middle) * size)])
         sharp = [0.0] if face.fall > 0.0 else []
-        sharp += [face.relief_start] if face.flank.kinked else []
+        sharp += face.kinks.tolist()
         sharp += [face.end] if face.sharp else []
         self.sharp = self.at(np.array(sharp))
         self.round = math.inf if face.sharp else float(self.at(1.0))
