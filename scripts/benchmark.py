@@ -1,23 +1,18 @@
 #!/usr/bin/env python3
-"""Run time against error, beside other programs: what ``gearfe benchmark`` does.
+"""Run time against error of every job, beside other programs: docs/development/accuracy.md.
 
-Usage: python scripts/benchmark.py [sweep|mechanism|housing|transient|skipped|references|all] [OUT]
+Usage: python scripts/benchmark.py [sweep|mechanism|housing|transient|skipped|references|all] [--out DIR] ...
 """
 
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
-from gearfe.benchmark.run import JOBS, run_jobs
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-
-def main(job: str = "all", out: str = "out/benchmark") -> int:
-    """Run, and tell what failed."""
-    record = run_jobs(tuple(JOBS) if job == "all" else (job,), out)
-    for failure in record.failures:
-        print(f"failed: {failure}", file=sys.stderr)
-    return int(bool(record.failures))
-
+from tests.benchmarks import command
+from tests.script import answered
 
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:3]))
+    sys.exit(answered(command, "scripts/benchmark.py"))

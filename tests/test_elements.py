@@ -183,7 +183,7 @@ def test_peak_pressure_is_hertzs(law: ContactLaw, degrees: float) -> None:
 @pytest.mark.parametrize("law", [Nitsche(), Penalty()], ids=["nitsche", "penalty"])
 @pytest.mark.parametrize(("degrees", "stiffness"), [(17.0, 1.5259e8), (10.0, 1.3837e8)])
 def test_where_a_sharp_corner_bears_calculix_agrees(law: ContactLaw, degrees: float, stiffness: float) -> None:
-    """CalculiX 2.20, surface to surface, NLGEOM, corner strips of 0.01 mm: see docs/verification.md."""
+    """CalculiX 2.20, surface to surface, NLGEOM, corner strips of 0.01 mm: see docs/development/verification.md."""
     pair = gears("reference")
     elastic = [gear_body(mesh, STEEL, "strain", WIDTH) for mesh in meshes("reference", 1.0)]
     both = MeshingPair(elastic[0], elastic[1], pair.working_centre_distance, WIDTH, law)

@@ -110,7 +110,7 @@ def test_fields_only_where_asked(tmp_path):
 
 
 RIGID = """
-from gearfe.benchmark.subject import train_model, train_times
+from tests.benchmarks.subject import train_model, train_times
 from gearfe.train import simulate
 made = simulate(train_model("tutorial", quick=True), train_times(True), backend="plain")
 print(made.contact_force[-1, 0], made.statistics["backend"])
@@ -173,7 +173,7 @@ def test_cached_meshes_start_no_mesher(gears, tmp_path, monkeypatch):
 def test_a_cached_reduced_housing_loads_no_finite_elements(tmp_path):
     table = """
 from dataclasses import replace
-from gearfe.benchmark.subject import shipped_housing
+from tests.benchmarks.subject import shipped_housing
 from gearfe.housing.build import reduced_housing
 table = shipped_housing()
 small = replace(table, mesh=replace(table.mesh, order=1, size_mm=40.0), reduction=replace(table.reduction, modes=5))
@@ -207,4 +207,4 @@ def test_a_mechanism_loads_neither_finite_elements_nor_compiled_kernels(tmp_path
 
 def test_help_of_the_benchmark_loads_no_numerics():
     loaded, _ = loaded_after("from gearfe.cli import main; main(['--help'])")
-    assert not loaded & {"numpy", "scipy", "matplotlib", "exudyn", "gearfe.benchmark"}
+    assert not loaded & {"numpy", "scipy", "matplotlib", "exudyn", "tests.benchmarks"}

@@ -13,7 +13,5 @@ COMMANDS: dict[str, str] = {
     "mechanism": "mechanism",
     "housing": "housing",
     "vibration": "vibration",
-    "benchmark": "benchmark",
     "new": "new",
-    "stress": "stress",
 }

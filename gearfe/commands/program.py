@@ -6,9 +6,9 @@ import importlib
 import os
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import TextIO
+from typing import Any, TextIO
 
 from .. import __version__
 from ..errors import InputError, MissingLibraryError, NotFiniteWarning, unknown_name
@@ -19,14 +19,20 @@ from .arguments import CommandParser
 USAGE = "gearfe COMMAND ... ('gearfe COMMAND --help' tells a command's options)"
 
 
+#: Commands that were, and where they went.
+MOVED = {
+    "benchmark": "in a copy of the repository: python scripts/benchmark.py",
+    "stress": "in a copy of the repository: python scripts/stress.py",
+}
+
 #: Exit code where the reader of the output went away, as the shell's other tools give it (128 + SIGPIPE).
 CLOSED = 141
 
 
-def answer(arguments: list[str]) -> int:
-    """Run one command; return its exit code: that of `gearfe.cli.main`, which tells of an interruption."""
+def answer(arguments: list[str], run: Callable[[list[str]], int] | None = None) -> int:
+    """Run one command, or `run`; return its exit code: that of `gearfe.cli.main`, which tells of an interruption."""
     try:
-        code = _answered(arguments)
+        code = _answered(arguments, run or _run)
         for stream in (sys.stdout, sys.stderr):
             if stream is not None:
                 stream.flush()
@@ -42,10 +48,10 @@ def answer(arguments: list[str]) -> int:
     return code
 
 
-def _answered(arguments: list[str]) -> int:
+def _answered(arguments: list[str], run: Callable[[list[str]], int]) -> int:
     """Run, and tell mistakes in one line."""
     try:
-        return _run(arguments)
+        return run(arguments)
     except BrokenPipeError:
         raise
     except SystemExit as leave:  # argparse has printed the help
@@ -70,12 +76,18 @@ def _run(arguments: list[str]) -> int:
     if arguments[0] in ("-V", "--version"):
         print(f"gearfe {__version__}")
         return 0
+    if arguments[0] in MOVED:
+        raise InputError("command", None, f"unknown name {arguments[0]!r}", MOVED[arguments[0]])
     if arguments[0] not in COMMANDS:
         raise unknown_name("command", arguments[0], COMMANDS)
-    module = _module(arguments[0])
-    parser = CommandParser(prog=f"gearfe {arguments[0]}", description=module.HELP)
+    return run_command(_module(arguments[0]), f"gearfe {arguments[0]}", arguments[1:])
+
+
+def run_command(module: Any, name: str, arguments: list[str]) -> int:
+    """Run a command module (its contract is in `gearfe.commands`), called by `name`, with these arguments."""
+    parser = CommandParser(prog=name, description=module.HELP)
     module.add_arguments(parser)
-    parsed = parser.parse_args(arguments[1:])
+    parsed = parser.parse_args(arguments)
     with shown(), _tables_watched() as told:
         code = int(module.run(parsed))
         return code or int(bool(told))

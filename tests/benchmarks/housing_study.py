@@ -1,0 +1,254 @@
+"""Elastic housing: mesh, reduction, size and sparse solver against error and time; other programs on the same mesh.
+
+Frequencies are those with rigid bores that are free to move. Errors of the mesh are taken against other elements, of
+order 3 and thin across the re-entrant edges: finer tetrahedra of the same grading would share the slow error that these
+edges make. Errors of the reduction are taken against the full model under a ramp on bore 5.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy as np
+
+from gearfe.housing import Housing
+from gearfe.reduction.craig_bampton import reduce_model
+from gearfe.reduction.sparse_solver import installed_solvers
+from gearfe.reduction.transient import newmark, smooth_ramp
+
+from .peers.process import missing, run_python
+from .record import Record
+from .subject import DATA, given_file, housing_of, shipped_housing
+from .timing import measured
+
+#: Element sizes (mm), coarse to fine.
+SIZES, QUICK_SIZES = (20.0, 14.0, 11.0, 9.0, 7.0, 6.0, 4.6, 4.0), (40.0, 24.0)
+LINEAR_SIZES = (11.0, 7.0, 4.6)
+#: Sizes of the extruded elements across re-entrant edges (mm); the last one is the truth of all others.
+ACROSS, QUICK_ACROSS = (4.0, 3.0, 1.5), (8.0,)
+#: (modes, correction levels) of the reduction.
+REDUCTIONS = (
+    (10, 0),
+    (20, 0),
+    (40, 0),
+    (80, 0),
+    (160, 0),
+    (10, 1),
+    (20, 1),
+    (40, 1),
+    (60, 1),
+    (80, 1),
+    (20, 2),
+    (40, 2),
+)
+QUICK_REDUCTIONS = ((10, 0), (10, 1))
+FREQUENCIES = 20
+BETA = 1.6e-6  # Rayleigh damping (s)
+
+
+def run_housing(record: Record) -> None:
+    """All tables of the housing."""
+    if record.peers:
+        others(record)
+    reductions(record)
+    sizes(record)
+    solvers(record)
+
+
+def fresh(housing: Housing) -> Housing:
+    """The same housing with nothing assembled yet."""
+    from dataclasses import replace
+
+    return replace(housing)
+
+
+def reduced(housing: Housing, modes: int = 40, levels: int = 1, solver: str = "auto") -> Any:
+    """Assembly and reduction, nothing kept from before; the estimate of the mesh's error apart."""
+    return fresh(housing).reduce(modes, quasi_static=levels, solver=solver, estimate=False)
+
+
+def sizes(record: Record) -> None:
+    """Mesh to reduced model (40 modes, one level): seconds against unknowns, frequencies and their estimated errors."""
+    from gearfe.housing.extruded import extruded_body
+    from gearfe.meshing.extruded_housing import Sizes
+    from gearfe.reduction.error import mesh_error
+
+    table = record.table("housing_sizes", "order", "size_mm")
+
+    def make(size: float, order: int) -> Mapping[str, Any]:
+        housing = housing_of(size, order)
+        body, cost = measured(lambda: reduced(housing), runs=1 if record.quick else 2, most_s=12.0)
+        told = mesh_error(housing.with_estimate(body), 1.0).frequency_errors[:FREQUENCIES]
+        largest = float(told.max()) if np.isfinite(told).all() else math.nan  # linear elements have no estimate
+        return {"unknowns": housing.unknowns, **cost.columns, "told": largest, **named(body)}
+
+    def truth(across: float) -> Mapping[str, Any]:
+        sizes = Sizes(across, far=20.0 * across) if record.quick else Sizes(across)
+        body, cost = measured(lambda: extruded_body(shipped_housing(), sizes, modes=40), runs=1)
+        return {"unknowns": body.nodes.size, **cost.columns, "told": math.nan, **named(body)}
+
+    def named(body: Any) -> dict[str, Any]:
+        found = body.coupled.frequencies_hz[:FREQUENCIES]
+        return {"solver": body.solver} | {f"f{k + 1}_Hz": float(f) for k, f in enumerate(found)}
+
+    for order, sizes_mm in ((1, QUICK_SIZES),) if record.quick else ((2, SIZES), (1, LINEAR_SIZES)):
+        for size in sizes_mm:
+            record.row(table, {"order": order, "size_mm": size}, partial(make, size, order))
+    for across in QUICK_ACROSS if record.quick else ACROSS:
+        record.row(table, {"order": 3, "size_mm": across}, partial(truth, across))
+
+
+def frequency_errors(rows: list[dict[str, Any]]) -> list[float]:
+    """Largest relative error of the frequencies of each row against the finest elements of the highest order."""
+    finest = max(rows, key=lambda r: (r["order"], r["unknowns"]))
+    names = [f"f{k + 1}_Hz" for k in range(FREQUENCIES)]
+    return [max(abs(r[n] / finest[n] - 1.0) for n in names) for r in rows]
+
+
+def reductions(record: Record) -> None:
+    """Modes and correction levels against the response of the full model, below 5 kHz, at bore 5 along the shaft."""
+    table = record.table("housing_reductions", "modes", "levels")
+    size = QUICK_SIZES[0] if record.quick else 11.0
+    step, steps = 10e-6, 100 if record.quick else 700
+
+    @lru_cache(maxsize=1)
+    def truth() -> tuple[Housing, Any]:
+        housing = housing_of(size, 1 if record.quick else 2)
+        full = housing.full_model()
+        return housing, newmark(
+            full.mass, BETA * full.stiffness, full.stiffness, load, step=step, steps=steps, watch=range(36)
+        )
+
+    def load(time: float) -> np.ndarray:
+        force = np.zeros(36)
+        force[6 * 4 + 1] = 100.0 * smooth_ramp(time, 1e-3)
+        return force
+
+    def make(modes: int, levels: int) -> Mapping[str, Any]:
+        housing, right = truth()
+        body, cost = measured(lambda: reduced(housing, modes, levels), runs=1 if record.quick else 2, most_s=5.0)
+        small = newmark(body.mass, BETA * body.stiffness, body.stiffness, load, step=step, steps=steps, watch=range(36))
+        found = []
+        for row in range(36):
+            a, b = (below(signal.acceleration[:, row], step, 5000.0) for signal in (right, small))
+            found.append(float(np.sqrt(np.mean((a - b) ** 2) / np.mean(a**2))))
+        return {"coordinates": body.size, "error": found[6 * 4 + 1], "largest_error": max(found), **cost.columns}
+
+    for modes, levels in QUICK_REDUCTIONS if record.quick else REDUCTIONS:
+        record.row(table, {"modes": modes, "levels": levels}, partial(make, modes, levels))
+
+
+def below(signal: np.ndarray, step: float, limit_hz: float) -> np.ndarray:
+    """The part of a signal below a frequency."""
+    spectrum = np.fft.rfft(signal)
+    spectrum[np.fft.rfftfreq(len(signal), step) > limit_hz] = 0.0
+    return np.fft.irfft(spectrum, len(signal))
+
+
+def solvers(record: Record) -> None:
+    """Every sparse solver that is there, reduction to 40 modes; the slowest one is spared the large meshes."""
+    table = record.table("housing_solvers", "solver", "size_mm")
+    for size in QUICK_SIZES[-1:] if record.quick else (9.0, 7.0, 6.0):
+        for solver in installed_solvers():
+            if solver == "superlu" and size < 9.0:
+                continue
+
+            def make(solver: str = solver, size: float = size) -> Mapping[str, Any]:
+                housing = housing_of(size, 1 if record.quick else 2)
+                _ = housing.matrices
+                _, cost = measured(lambda: reduced_from(housing, solver), runs=1 if record.quick else 2, most_s=10.0)
+                return {"unknowns": housing.unknowns, **cost.columns}
+
+            record.row(table, {"solver": solver, "size_mm": size}, make)
+
+
+def reduced_from(housing: Housing, solver: str) -> Any:
+    """Reduction only, matrices assembled."""
+    from gearfe.housing.attachments import interface_matrix
+
+    return reduce_model(
+        housing.matrices.stiffness, housing.matrices.mass, interface_matrix(housing.attachments, housing.nodes),
+        housing.internal, count=40, below_hz=np.inf, at_least=40, corrections=1, free=False, solver=solver,
+    )  # fmt: skip
+
+
+def reference_housing(mass: Any = "4-point") -> Housing:
+    """The stored mesh of `tests/data/gearbox_housing_mesh.npz` with its six bores and clamped feet."""
+    import json
+
+    from gearfe.solid import SolidMaterial
+
+    p = json.loads(given_file(DATA / "gearbox_housing.json").read_text(encoding="utf-8"))["params"]
+    with np.load(given_file(DATA / "gearbox_housing_mesh.npz")) as stored:
+        nodes, tets = stored["points_p2"], stored["tets_p2"]
+    inner, outer = p["yin"] / 2, p["yin"] / 2 + p["tw"] + p["hb"]
+    bores: list[Any] = []
+    for x, z in zip(p["xs"], p["zs"], strict=True):
+        bores += [((x, 0.0, z), (0.0, 1.0, 0.0), p["rb"], side) for side in ((inner, outer), (-outer, -inner))]
+    bottom = np.abs(nodes[:, 2] - (p["z0"] - p["tb"])) < 1e-9
+    feet = bottom & ((nodes[:, 0] < p["x0"] + 1e-9) | (nodes[:, 0] > p["x1"] - 1e-9))
+    return Housing.from_arrays(nodes, tets, bores, feet, material=SolidMaterial(p["E"], p["nu"], p["rho"]), mass=mass)
+
+
+def others(record: Record) -> None:
+    """Mesh to 40 modes with clamped bores on the stored mesh: this program, CalculiX, exudyn.
+
+    The truth is this program's full model solved to rounding with the same mass (4-point for CalculiX, exact for the
+    others).
+    """
+    table = record.table("housing_peers", "program", "what")
+    count = 10 if record.quick else 40
+
+    @lru_cache(maxsize=2)
+    def exact(mass: str) -> np.ndarray:
+        body = _body(reference_or_small(record, mass), count + 10)
+        return np.asarray(body.internal_hz[:count])
+
+    def ours() -> Mapping[str, Any]:
+        housing = reference_or_small(record, "exact")
+        body, cost = measured(lambda: reduced(housing, count, 1), runs=1 if record.quick else 3)
+        error = float(np.max(np.abs(body.internal_hz[:count] / exact("exact") - 1.0)))
+        return {"unknowns": housing.unknowns, "error": error, **cost.columns}
+
+    def calculix() -> Mapping[str, Any]:
+        from .peers.calculix import clamped_modes
+
+        housing = reference_or_small(record, "4-point")
+        found, spent = clamped_modes(housing, count)
+        error = float(np.max(np.abs(found / exact("4-point") - 1.0)))
+        used = {"cpu_s": spent.cpu_s, "wall_s": spent.wall_s, "peak_MB": spent.peak_MB, "runs": 1}
+        return {"unknowns": housing.unknowns, "error": error, **used}
+
+    def exudyn() -> Mapping[str, Any]:
+        answer = run_python("exudyn_housing", {"quick": record.quick, "modes": count}, limit=400.0)
+        found = np.array(answer.pop("frequencies_hz"))
+        error = float(np.max(np.abs(found / exact("exact") - 1.0)))
+        return {"unknowns": reference_or_small(record, "exact").unknowns, "error": error, **answer}
+
+    record.row(table, {"program": "gearfe", "what": "modes, static shapes, corrections, assembly included"}, ours)
+    for name, what, make in (
+        ("calculix", "modes only, assembly included", calculix),
+        ("exudyn", "modes and static shapes, matrices given", exudyn),
+    ):
+        why = missing(name)
+        if why:
+            record.say(f"  left out: {why}")
+        else:
+            record.row(table, {"program": name, "what": what}, make)
+
+
+def reference_or_small(record: Record, mass: str) -> Housing:
+    """The stored mesh, or a coarse one of the shipped housing for a smoke run."""
+    return small_housing() if record.quick else reference_housing(mass)
+
+
+def small_housing() -> Housing:
+    """A coarse mesh of the shipped housing."""
+    return housing_of(QUICK_SIZES[0], order=1)
+
+
+def _body(housing: Housing, modes: int) -> Any:
+    return housing.reduce(modes, quasi_static=1)

@@ -1,0 +1,217 @@
+"""The shipped gear train by general-purpose integrators: SUNDIALS (scikit-sundae), scipy, exudyn.
+
+All get the same right-hand side in the same modal coordinates, y'' = -w^2 y - D y' + W^T f(t, W y, W y'), compiled by
+numba; they return the state at the output times and the study evaluates the same signals. exudyn holds mass, damping
+and
+stiffness itself (ObjectGenericODE2) and calls the compiled forces from a Python function, which is the only way it
+offers for
+forces that depend on all coordinates.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from gearfe.train.law import time_function, train_law
+
+from ..subject import train_model, train_times
+from ..timing import measured
+from .process import PeerError, serve
+
+Rhs = Callable[[float, Any, Any], None]
+States = tuple[np.ndarray, np.ndarray]
+
+
+def answer(task: dict[str, Any]) -> dict[str, Any]:
+    """Integrate and measure; making the solver counts, the model and compiling do not."""
+    model, times = train_model(task["variant"], quick=task["quick"]), train_times(task["quick"])
+    core = model.core
+    start = np.concatenate(core.reduce(model.start.q, model.start.v))
+    rhs = plain_rhs(core) if task["quick"] else compiled_rhs(core)
+    rhs(0.0, start, np.empty_like(start))
+    runs = {"sundials": _sundials, "scipy_ivp": _scipy, "exudyn": _exudyn}
+    (at, states), cost = measured(lambda: runs[task["peer"]](task, core, rhs, start, times), runs=3, most_s=30.0)
+    return {"times": at.tolist(), "states": states.tolist(), **cost.columns, "unknowns": len(core.squares)}
+
+
+def plain_rhs(core: Any) -> Rhs:
+    """Right-hand side in NumPy."""
+    n = len(core.squares)
+
+    def rhs(t: float, y: Any, dy: Any) -> None:
+        dy[:n] = y[n:]
+        dy[n:] = core.constant - core.squares * y[:n] - core.damping @ y[n:] + core.force(t, y[:n], y[n:])
+
+    return rhs
+
+
+def compiled_rhs(core: Any) -> Rhs:
+    """The same in compiled code."""
+    from gearfe.rigid import compiled
+
+    [(force, index)] = core.system.forces
+    names = {"np": np, "math": math}
+    functions = (modal_rhs, time_function, train_law)
+    kernels = compiled.bind(functions, names, compiled=True, entries=("modal_rhs",))
+    W = np.ascontiguousarray((core.T[index].T @ force.W).T)
+    offset = np.atleast_1d(core.origin[index] @ force.W)
+    diagonal = np.diagonal(core.damping).copy()
+    if not np.array_equal(core.damping, np.diag(diagonal)):
+        raise PeerError("the damping of the shipped train is modal")
+    u, du, out = (np.zeros(len(W)) for _ in range(3))
+    fixed = (core.squares, diagonal, core.constant, W, offset, force.series.parameters)
+
+    def rhs(t: float, y: Any, dy: Any) -> None:
+        kernels.modal_rhs(*fixed, t, np.asarray(y), np.asarray(dy), u, du, out)
+
+    return rhs
+
+
+def modal_rhs(squares, diagonal, constant, W, offset, parameters, t, y, dy, u, du, out):  # type: ignore[no-untyped-def]
+    """dy of the state y = (coordinates, velocities); four directions at a time, so that y is read once for all."""
+    n = squares.shape[0]
+    rows = W.shape[0]
+    p = 0
+    while p < rows:
+        q1, q2, q3 = min(p + 1, rows - 1), min(p + 2, rows - 1), min(p + 3, rows - 1)
+        a0, a1, a2, a3 = 0.0, 0.0, 0.0, 0.0
+        b0, b1, b2, b3 = 0.0, 0.0, 0.0, 0.0
+        for i in range(n):
+            value, rate = y[i], y[n + i]
+            a0 += W[p, i] * value
+            a1 += W[q1, i] * value
+            a2 += W[q2, i] * value
+            a3 += W[q3, i] * value
+            b0 += W[p, i] * rate
+            b1 += W[q1, i] * rate
+            b2 += W[q2, i] * rate
+            b3 += W[q3, i] * rate
+        u[p], u[q1], u[q2], u[q3] = a0, a1, a2, a3
+        du[p], du[q1], du[q2], du[q3] = b0, b1, b2, b3
+        p += 4
+    for k in range(rows):
+        u[k] += offset[k]
+    train_law(t, u, du, parameters, out)
+    for i in range(n):
+        dy[i] = y[n + i]
+        dy[n + i] = constant[i] - squares[i] * y[i] - diagonal[i] * y[n + i]
+    p = 0
+    while p < rows:
+        f0 = out[p]
+        f1 = out[p + 1] if p + 1 < rows else 0.0
+        f2 = out[p + 2] if p + 2 < rows else 0.0
+        f3 = out[p + 3] if p + 3 < rows else 0.0
+        q1, q2, q3 = min(p + 1, rows - 1), min(p + 2, rows - 1), min(p + 3, rows - 1)
+        for i in range(n):
+            dy[n + i] += W[p, i] * f0 + W[q1, i] * f1 + W[q2, i] * f2 + W[q3, i] * f3
+        p += 4
+
+
+def _sundials(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray) -> States:
+    from sksundae.cvode import CVODE
+
+    scale = _scale(core)
+    solver = CVODE(
+        lambda t, y, dy: rhs(t, y.copy(), dy),
+        method=task["method"].split("-")[1],
+        rtol=task["tolerance"],
+        atol=task["tolerance"] * scale,
+        max_num_steps=1_000_000,
+    )
+    made = solver.solve(times, start)
+    return times, np.asarray(made.y)
+
+
+def _scale(core: Any) -> np.ndarray:
+    """Sizes of coordinates and rates (the absolute tolerance's unit): a displacement of a micrometre of unit mass."""
+    omega = np.sqrt(np.maximum(core.squares, 1.0))
+    rate = 1e-2
+    return np.concatenate([rate / omega, np.full(len(omega), rate)])
+
+
+def _scipy(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray) -> States:
+    from scipy.integrate import solve_ivp
+
+    work = np.empty_like(start)
+
+    def right(t: float, y: np.ndarray) -> np.ndarray:
+        rhs(t, y, work)
+        return work.copy()
+
+    made = solve_ivp(
+        right, (times[0], times[-1]), start, task["method"], t_eval=times, rtol=task["tolerance"],
+        atol=task["tolerance"] * _scale(core),
+    )  # fmt: skip
+    if not made.success:
+        raise PeerError(made.message)
+    return times, np.asarray(made.y.T)
+
+
+def _exudyn(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray) -> States:
+    """Its explicit solvers choose their own steps and do not meet the output times: theirs come back."""
+    import exudyn
+    import exudyn.itemInterface as items
+
+    n = len(core.squares)
+    y, dy = np.zeros(2 * n), np.zeros(2 * n)
+    container = exudyn.SystemContainer()
+    system: Any = container.AddSystem()
+    node = system.AddNode(
+        items.NodeGenericODE2(
+            referenceCoordinates=np.zeros(n),
+            initialCoordinates=start[:n],
+            initialCoordinates_t=start[n:],
+            numberOfODE2Coordinates=n,
+        )
+    )
+    stiffness, damping = core.squares, core.damping
+
+    def forces(_system: Any, t: float, _number: int, q: Any, v: Any) -> Any:
+        y[:n], y[n:] = q, v
+        rhs(t, y, dy)
+        return dy[n:] + stiffness * y[:n] + damping @ y[n:]
+
+    system.AddObject(
+        items.ObjectGenericODE2(
+            nodeNumbers=[node],
+            massMatrix=np.eye(n),
+            stiffnessMatrix=np.diag(stiffness),
+            dampingMatrix=damping,
+            forceUserFunction=forces,
+        )
+    )
+    kinds = exudyn.OutputVariableType
+    sensors = [
+        system.AddSensor(items.SensorNode(nodeNumber=node, storeInternal=True, outputVariableType=kind))
+        for kind in (kinds.Coordinates, kinds.Coordinates_t)
+    ]
+    system.Assemble()
+    settings: Any = exudyn.SimulationSettings()
+    time = settings.timeIntegration
+    time.endTime, time.verboseMode = float(times[-1]), 0
+    settings.solutionSettings.writeSolutionToFile = False
+    settings.solutionSettings.sensorsWritePeriod = float(times[1] - times[0])
+    intervals = len(times) - 1
+    if task["method"] == "generalized-alpha":
+        kind = exudyn.DynamicSolverType.GeneralizedAlpha
+        time.numberOfSteps = intervals * max(1, round(1.0 / (task["tolerance"] * intervals)))
+        time.generalizedAlpha.spectralRadius = 1.0
+    else:
+        kind = getattr(exudyn.DynamicSolverType, task["method"])
+        time.numberOfSteps = intervals
+        time.relativeTolerance = task["tolerance"]
+        time.absoluteTolerance = task["tolerance"] * float(np.median(_scale(core)))
+        time.minimumStepSize = 1e-12
+    system.SolveDynamic(settings, solverType=kind)
+    data = [np.asarray(system.GetSensorStoredData(s)) for s in sensors]
+    at = data[0][:, 0].copy()
+    keep = np.concatenate([[True], np.diff(at) > 1e-12])
+    return at[keep], np.hstack([d[keep, 1 : n + 1] for d in data])
+
+
+if __name__ == "__main__":
+    serve(answer)

@@ -1,0 +1,183 @@
+"""One picture a table: run time against error (or size), drawn by matplotlib from the rows on disk."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearfe.output.files import whole_file
+
+from .record import Row, read_rows
+
+Draw = Callable[[Any, list[Row]], None]
+#: Curves above which a legend stands below the axes, where it covers none.
+MANY = 6
+NAMES = {"scipy_ivp": "scipy", "sundials": "SUNDIALS", "calculix": "CalculiX", "getfem": "GetFEM"}
+
+
+def draw_all(folder: Path) -> list[str]:
+    """Draw every table of the folder that has a picture; returns the names of the files."""
+    made = []
+    for name, draw in PICTURES.items():
+        table = folder / f"{name}.csv"
+        if table.exists():
+            draw_one(folder / f"{name}.png", read_rows(table), draw)
+            made.append(f"{name}.png")
+    return made
+
+
+def draw_one(path: Path, rows: list[Row], draw: Draw) -> None:
+    """One picture."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.0, 4.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    draw(figure, rows)
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, dpi=110)
+
+
+def groups(rows: Iterable[Row], *names: str) -> dict[str, list[Row]]:
+    """Rows by the text of some columns."""
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        label = " ".join(NAMES.get(str(row[n]), str(row[n])) for n in names if row.get(n, "") not in ("", None))
+        found.setdefault(label, []).append(row)
+    return found
+
+
+def curves(axes: Any, rows: dict[str, list[Row]], x: str, y: str, **marked: Any) -> None:
+    """A line a group, in the order of x."""
+    styles = ["-", "--", ":", "-."]
+    for number, (label, own) in enumerate(rows.items()):
+        points = [(r[x], r[y]) for r in own if _positive(r.get(x)) and _positive(r.get(y))]
+        if points:
+            a, b = zip(*sorted(points), strict=True)
+            axes.loglog(a, b, styles[number // 10 % 4], marker="o", ms=4, label=label, **marked)
+
+
+def _positive(value: Any) -> bool:
+    return isinstance(value, (int, float)) and math.isfinite(value) and value > 0
+
+
+def time_error(by: tuple[str, ...], title: str, *, time: str = "cpu_s", error: str = "error") -> Draw:
+    """Processor time over error."""
+
+    def draw(figure: Any, rows: list[Row]) -> None:
+        axes = figure.subplots()
+        curves(axes, groups(rows, *by), error, time)
+        axes.set(xlabel="relative error", ylabel="processor time (s)", title=title)
+        _finish(axes)
+
+    return draw
+
+
+def over(x: str, y: str, labels: tuple[str, str], title: str, by: tuple[str, ...] = (), *, fit: bool = False) -> Draw:
+    """Any column over any other, with the fitted exponent when asked."""
+
+    def draw(figure: Any, rows: list[Row]) -> None:
+        axes = figure.subplots()
+        for label, own in groups(rows, *by).items():
+            text = label
+            if fit and len([r for r in own if _positive(r.get(y))]) > 1:
+                text = f"{label} (exponent {exponent(own, x, y):.2f})".strip()
+            curves(axes, {text: own}, x, y)
+        axes.set(xlabel=labels[0], ylabel=labels[1], title=title)
+        _finish(axes)
+
+    return draw
+
+
+def exponent(rows: list[Row], x: str, y: str) -> float:
+    """Slope of log y over log x."""
+    points = [(r[x], r[y]) for r in rows if _positive(r.get(x)) and _positive(r.get(y))]
+    a, b = np.log(np.array(points)).T
+    return float(np.polyfit(a, b, 1)[0])
+
+
+def _finish(axes: Any) -> None:
+    axes.grid(visible=True, which="both", alpha=0.25)
+    handles, labels = axes.get_legend_handles_labels()
+    if any(labels):
+        if len(labels) > MANY:
+            axes.legend(handles, labels, fontsize=7, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.12))
+            axes.figure.set_figheight(6.2)
+        else:
+            axes.legend(handles, labels, fontsize=8)
+
+
+def _mechanisms(figure: Any, rows: list[Row]) -> None:
+    for axes, name in zip(figure.subplots(1, 2), ("andrews", "slider_crank"), strict=True):
+        own = [r for r in rows if r["mechanism"] == name]
+        curves(axes, groups(own, "program", "method"), "error", "cpu_s")
+        axes.set(xlabel="largest error (rad)", ylabel="processor time (s)", title=name.replace("_", " "))
+        _finish(axes)
+
+
+def _sweep_peers(figure: Any, rows: list[Row]) -> None:
+    from .sweep_peers import own_errors
+
+    axes = figure.subplots()
+    curves(axes, groups(own_errors(rows), "program"), "error", "sweep_cpu_s")
+    axes.set(xlabel="difference from its own finest mesh", ylabel="processor time (s)", title="sweep of 40 positions")
+    _finish(axes)
+
+
+#: Elements of the size study by their order.
+KINDS_OF_ORDER = {1: "linear", 2: "second order", 3: "extruded, third order"}
+
+
+def _housing_sizes(figure: Any, rows: list[Row]) -> None:
+    from .housing_study import frequency_errors
+
+    left, right = figure.subplots(1, 2)
+    own = [{**r, "error": e} for r, e in zip(rows, frequency_errors(rows), strict=True)]
+    own = [{**r, "kind": KINDS_OF_ORDER[r["order"]]} for r in own]
+    curves(left, groups(own, "kind"), "error", "cpu_s")
+    left.set(xlabel="largest error of 20 frequencies", ylabel="processor time (s)", title="housing: mesh")
+    for label, part in groups(own, "kind").items():
+        text = f"{label} (exponent {exponent(part, 'unknowns', 'cpu_s'):.2f})" if len(part) > 1 else label
+        curves(right, {text: part}, "unknowns", "cpu_s")
+    right.set(xlabel="unknowns", ylabel="processor time (s)", title="mesh to reduced body, 40 modes")
+    for axes in (left, right):
+        _finish(axes)
+
+
+def bars(label: str, value: str, axis: str, title: str) -> Draw:
+    """Horizontal bars."""
+
+    def draw(figure: Any, rows: list[Row]) -> None:
+        axes = figure.subplots()
+        own = [r for r in rows if _positive(r.get(value))]
+        axes.barh([str(r[label]) for r in own], [r[value] for r in own])
+        axes.invert_yaxis()
+        axes.set(xlabel=axis, title=title)
+        axes.grid(visible=True, axis="x", alpha=0.25)
+
+    return draw
+
+
+PICTURES: Mapping[str, Draw] = {
+    "sweep_sizes": time_error(("law",), "stiffness, 40 positions at 0.05 deg: element size and law"),
+    "sweep_routes": time_error(("route",), "one position: condensed route and whole gears", time="position_cpu_s"),
+    "sweep_peers": _sweep_peers,
+    "sweep_stages": bars("stage", "wall_s", "seconds", "stages of a default sweep of 40 positions"),
+    "sweep_positions": over("positions", "cpu_s", ("positions", "processor time (s)"), "distinct positions", fit=True),
+    "sweep_twists": over("twist_deg", "error", ("twist (deg)", "largest error"), "default settings against load"),
+    "mechanism_tolerance": _mechanisms,
+    "mechanism_chains": over("bodies", "us_a_step", ("bodies", "microseconds a step"), "chain of bodies", fit=True),
+    "housing_sizes": _housing_sizes,
+    "housing_reductions": time_error(("levels",), "housing: modes and correction levels", error="largest_error"),
+    "housing_solvers": over(
+        "unknowns", "cpu_s", ("unknowns", "processor time (s)"), "sparse solvers", ("solver",), fit=True
+    ),
+    "transient_tolerance": time_error(
+        ("variant", "program", "method"), "gear train, 7 ms: largest error of all signals"
+    ),
+    "transient_modes": over("modes", "acceleration_error", ("modes", "error below 5 kHz"), "modes of the housing"),
+}

@@ -1,0 +1,106 @@
+"""What the studies work on: the shipped job, or small stand-ins for a smoke run."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from gearfe.gear.pair import GearPair
+    from gearfe.housing import Housing
+    from gearfe.tables.housing import HousingTable
+
+ROOT = Path(__file__).resolve().parents[2]
+GEOMETRY = ROOT / "geometry"
+DATA = ROOT / "tests" / "data"
+
+
+def given_file(path: Path) -> Path:
+    """A file of the repository.
+
+    Raises
+    ------
+    InputError
+        When it is not there: the benchmark runs in a copy of the repository.
+    """
+    if not path.exists():
+        from gearfe.errors import InputError
+
+        cure = "run the benchmark in a copy of the repository, which holds the shipped jobs and the reference data"
+        raise InputError("benchmark", str(path), "is not there", cure)
+    return path
+
+
+def shipped_pair() -> GearPair:
+    """20/30 teeth with tip rounds of 0.1 mm, `geometry/gear_train.toml`."""
+    from gearfe.stiffness.job import read_stiffness_job
+
+    return read_stiffness_job(given_file(GEOMETRY / "gear_train.toml")).pair
+
+
+def reference_pair() -> GearPair:
+    """The sharp-tipped pair of `tests/data/gear_pair_20_30.csv`, bores of 0.35 times the pitch diameter."""
+    from gearfe.gear.pair import Gear, GearPair
+
+    form: dict[str, Any] = {"module": 2.5e-3, "pressure_angle": math.radians(25.0), "face_width": 10e-3}
+    pinion, wheel = (Gear(z, bore_diameter=0.35 * z * 2.5e-3, **form) for z in (20, 30))
+    return GearPair(pinion, wheel)
+
+
+def off_changes(pair: GearPair, angles: np.ndarray, margin: float) -> np.ndarray:
+    """(n,) whether positions are farther than `margin` (rad) from where a pair of teeth comes or goes."""
+    cycle = pair.mesh_cycle
+    changes = [pair.path[name].pinion_angle for name in ("B", "D")]
+    apart = [np.abs((angles - change + 0.5 * cycle) % cycle - 0.5 * cycle) for change in changes]
+    return np.asarray(np.min(apart, axis=0) > margin)
+
+
+@lru_cache(maxsize=1)
+def shipped_housing() -> HousingTable:
+    """Table ``[housing]`` of the shipped job."""
+    from gearfe.config import load_job
+
+    table: HousingTable = load_job(given_file(GEOMETRY / "gear_train.toml"), ("housing",))["housing"]
+    return table
+
+
+def housing_of(size_mm: float, order: int = 2) -> Housing:
+    """The shipped housing with elements of `size_mm` in its walls."""
+    from gearfe.housing import Housing
+
+    table = shipped_housing()
+    return Housing.from_table(replace(table, mesh=replace(table.mesh, order=order, size_mm=size_mm)))
+
+
+def train_model(variant: str, *, quick: bool = False, modes: int | None = None) -> Any:
+    """The shipped gear train ready to be simulated; quick: in a rigid housing with constant mesh stiffness.
+
+    Parameters
+    ----------
+    variant
+        ``tutorial`` or ``operating``.
+    modes
+        Of the housing with held bores, in place of the job's choice by frequency.
+    """
+    from gearfe.train import build_train
+    from gearfe.vibration.job import job_scene, read_train_job, train_body, train_curves
+
+    job = read_train_job(given_file(GEOMETRY / "gear_train.toml"), variant)
+    if quick:
+        job = replace(job, table=replace(job.table, housing="rigid"))
+        return build_train(job_scene(job, (1.1e8, 1.1e8), None))
+    if modes is not None:
+        assert job.housing is not None
+        reduction = replace(job.housing.reduction, modes=modes)
+        job = replace(job, housing=replace(job.housing, reduction=reduction))
+    return build_train(job_scene(job, train_curves(job), train_body(job)))
+
+
+def train_times(quick: bool) -> np.ndarray:
+    """Output times of the shipped train, 0..7 ms in steps of 35 us (s)."""
+    return 35e-6 * np.arange(21 if quick else 201)

@@ -1,0 +1,19 @@
+"""How the scripts of the repository run what no user's command is: as the program runs its commands."""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+from types import ModuleType
+
+from gearfe.cli import INTERRUPTED
+from gearfe.commands.program import answer, run_command
+
+
+def answered(module: ModuleType, name: str, arguments: list[str] | None = None) -> int:
+    """Exit code of a module with ``HELP``, ``add_arguments`` and ``run`` (see `gearfe.commands`), called by `name`."""
+    try:
+        return answer(sys.argv[1:] if arguments is None else arguments, partial(run_command, module, name))
+    except KeyboardInterrupt:
+        print(f"{name}: interrupted", file=sys.stderr)
+        return INTERRUPTED
