@@ -274,3 +274,23 @@ def _finished(
     settled = right & (change <= TOLERANCE) & (sums["tangent"] > 0)
     known = of_pairs | contact_rates(law, one, two, ahead[couples.position])
     return settled, sums, contacts_of(law, pairs.found, one, known), now
+
+
+def coupling_compliances(law: HalfPlanePair, pinion_angles: Array, twists: Array) -> tuple[Array, IntArray, Array]:
+    """Compliance between tooth pairs through the gear bodies, for all couples of pairs that touch at given twists.
+
+    Returns
+    -------
+    angle, apart, compliance : ndarray, shape (c,)
+        Pinion angle of the tooth of the couple's lower pair (rad), teeth between both pairs, and the approach of the
+        gears at one pair by a unit force on the other (m/N); forces count as moments on the wheel over its base radius.
+    """
+    met = law.teeth.touching(pinion_angles)
+    met = met.take(np.flatnonzero(met.twist < twists[met.position]))
+    start = _first(law, twists, met)
+    couples = start.couples
+    arm = met.arm[:, 1] / law.pair.wheel.base_radius
+    found = smooth_influence(law, start.pairs.state, couples).compliance / law.width
+    found = found / (arm[couples.first] * arm[couples.second])
+    upper, own = couples.step > 0, met.angle + met.pair * law.pair.mesh_cycle
+    return own[couples.second[upper]], couples.step[upper], found[upper]

@@ -1,0 +1,213 @@
+r"""A mesh law from pair forces: what each tooth pair yields, by linear least squares.
+
+The pair law is :math:`\Lambda/F = 2b + b_y + a_0 - B\,(y - y_0)` with :math:`y = \ln F`, b a tensor of cubic splines
+over :math:`(\psi, y)`: so :math:`\Phi = F^2 [b + a_0/2 + B/4 - B(y - y_0)/2]` is its energy. :math:`B = 1/(\pi E^* w)`
+is Hertz's line contact, which makes b smooth where a pair comes into contact and where it leaves. Each contact solution
+gives :math:`\Lambda = \delta - t(\psi_k) - \sum_l C F_l` for the pairs that bear in it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.interpolate import BSpline, PchipInterpolator
+from scipy.sparse.linalg import spsolve
+
+from .law import NEVER, MeshLaw
+
+Array = NDArray[np.float64]
+
+#: Weights of the second difference of b over the phase, and of the second and first over ln F (in nm/N): they decide
+#: where no pair force was found, such as below the smallest share.
+SMOOTH_PHASE, SMOOTH_FORCE, LEVEL_FORCE = 0.01, 0.05, 0.02
+#: Pairs with less than this share of the mesh force count less: what they yield is divided by their force.
+SHARE = 0.5
+#: Cells of the pair force end at these parts of the largest: a cubic errs by 3e-5 of the approach in a cell of ratio 2.
+PARTS = (0.0, 0.001, 0.004, 0.016, 0.0625, 0.125, 0.25, 0.5, 1.0)
+#: Nodes of b over ln F.
+FORCE_NODES = 7
+NANO = 1e-9
+
+
+@dataclass(frozen=True)
+class PairForces:
+    """Forces of p tooth pairs in contact solutions, all of shape (p,).
+
+    Attributes
+    ----------
+    angle
+        psi_k, pinion angle of the pair's own tooth (rad).
+    force
+        F_k (N).
+    share
+        F_k over the mesh force.
+    approach
+        Approach less that of the rigid touch of this pair, less what the other pairs' forces make (m).
+    """
+
+    angle: Array
+    force: Array
+    share: Array
+    approach: Array
+
+
+@dataclass(frozen=True)
+class TouchCurve:
+    """t and its slope at all nodes of the phase that a pair passes (rad, m, m/rad); `NEVER` where flanks never meet."""
+
+    angle: Array
+    value: Array
+    slope: Array
+
+
+@dataclass(frozen=True)
+class Couple:
+    """C (m/N) over the pinion angle (rad) of the lower pair's tooth, from values at rising angles; constant outside."""
+
+    angle: Array
+    compliance: Array
+
+    def __call__(self, angle: Array, derivative: int = 0) -> Array:
+        """C or its slope (m/(N rad))."""
+        inside = np.clip(angle, self.angle[0], self.angle[-1])
+        made: Array = PchipInterpolator(self.angle, self.compliance)(inside, derivative)
+        return made if derivative == 0 else np.where(inside == angle, made, 0.0)
+
+
+def fit_law(
+    found: PairForces,
+    touch: TouchCurve,
+    couples: Sequence[Couple],
+    *,
+    cells: int,
+    hertz: float,
+    base_radii: tuple[float, float],
+    backlash: float,
+    reach: float,
+) -> MeshLaw:
+    """Law through the pair forces found.
+
+    Parameters
+    ----------
+    touch
+        Rigid touch at whole mesh cycles of `cells` nodes each.
+    couples
+        C of pairs one, two, ... teeth apart.
+    hertz
+        B (m/N).
+    """
+    y = np.log(found.force)
+    parts = np.array(PARTS) * found.force.max() * 1.02
+    ends = np.log(parts[[1, -1]])
+    knots = np.linspace(float(ends[0]), float(ends[1]), FORCE_NODES)
+    phase, force = _clamped(touch.angle), _clamped(knots)
+    P = BSpline.design_matrix(found.angle, phase, 3).tocsr()
+    at = np.clip(y, *ends)
+    Y = [_columns(force, at, order) for order in (0, 1)]
+    middle, level = float(y.mean()), float(np.average(found.approach / found.force, weights=found.share))
+    right = (found.approach / found.force - level + hertz * (y - middle)) / NANO
+    A = _rows_kron(P, 2 * Y[0] + Y[1])
+    weight = sparse.diags_array(np.minimum(1.0, found.share / SHARE))
+    n, m = P.shape[1], Y[0].shape[1]
+    second = [sparse.diags_array([1.0, -2.0, 1.0], offsets=[0, 1, 2], shape=(k - 2, k)) for k in (n, m)]
+    first = sparse.diags_array([-1.0, 1.0], offsets=[0, 1], shape=(m - 1, m))
+    rows = [
+        weight @ A,
+        SMOOTH_PHASE * sparse.kron(second[0], sparse.eye_array(m)),
+        SMOOTH_FORCE * sparse.kron(sparse.eye_array(n), second[1]),
+        LEVEL_FORCE * sparse.kron(sparse.eye_array(n), first),
+        1e-6 * sparse.eye_array(n * m),
+    ]
+    normal = sum((row.T @ row for row in rows[1:]), rows[0].T @ rows[0])
+    b = NANO * spsolve(sparse.csc_matrix(normal), rows[0].T @ (weight @ right)).reshape(n, m)
+    # Lambda and its slope at the forces between the cells: splines over the phase
+    at = np.log(parts[1:])
+    values, slopes, bends = (_columns(force, at, order).T for order in (0, 1, 2))
+    line = level - hertz * (at - middle)
+    approach = (b @ (2 * values + slopes) + line) * parts[1:]
+    slope = b @ (2 * values + 3 * slopes + bends) + line - hertz
+    return MeshLaw(
+        nodes=touch.angle[: cells + 1],
+        forces=parts,
+        touch=_by_slots(touch_cubics(touch), cells),
+        energies=_by_slots(_energies(phase, parts, approach, slope), cells),
+        coupling=_couplings(touch.angle, couples, cells),
+        base_radii=base_radii,
+        backlash=backlash,
+        reach=reach,
+    )
+
+
+def _clamped(x: Array) -> Array:
+    return np.concatenate([[x[0]] * 3, x, [x[-1]] * 3])
+
+
+def _columns(knots: Array, x: Array, order: int) -> Array:
+    """All cubic B-splines, or a derivative, at x: (points, splines)."""
+    made: Array = BSpline(knots, np.eye(len(knots) - 4), 3)(x, nu=order)
+    return made
+
+
+def _rows_kron(A: sparse.csr_array, B: Array) -> sparse.csr_array:
+    """Row by row the Kronecker product."""
+    A = A.tocoo()
+    width = B.shape[1]
+    column = (A.col[:, None] * width + np.arange(width)).ravel()
+    data = (A.data[:, None] * B[A.row]).ravel()
+    return sparse.csr_array((data, (np.repeat(A.row, width), column)), shape=(A.shape[0], A.shape[1] * width))
+
+
+def _cubics(x: Array, value: Array, slope: Array) -> Array:
+    """Hermite's cubics between nodes, (cells, 4)."""
+    h = np.diff(x)
+    secant = np.diff(value) / h
+    bend = (3 * secant - 2 * slope[:-1] - slope[1:]) / h
+    return np.stack([value[:-1], slope[:-1], bend, (slope[:-1] + slope[1:] - 2 * secant) / h**2], axis=1)
+
+
+def _couplings(angle: Array, couples: Sequence[Couple], cells: int) -> Array:
+    """Cubics of C, (teeth apart, lower slot, cells, 4)."""
+    slots = (len(angle) - 1) // cells
+    made = np.zeros((slots - 1, slots - 1, cells, 4))
+    for k, couple in enumerate(couples[: slots - 1]):
+        whole = _cubics(angle, couple(angle), couple(angle, 1))
+        made[k, : slots - 1 - k] = _by_slots(whole, cells)[: slots - 1 - k]
+    return made
+
+
+def touch_cubics(touch: TouchCurve) -> Array:
+    """Cubics of t between the nodes, (cells, 4); constant at `NEVER` beside places where flanks never meet."""
+    a, b = touch.value[:-1], touch.value[1:]
+    made = _cubics(touch.angle, touch.value, touch.slope)
+    made[(a >= NEVER) | (b >= NEVER)] = (NEVER, 0.0, 0.0, 0.0)
+    return made
+
+
+def _energies(phase: Array, parts: Array, approach: Array, slope: Array) -> Array:
+    """Coefficients (phase cells, force cells, 4, 5) from the splines of Lambda and its slope at the cells' ends."""
+    made = np.zeros((len(approach), len(parts) - 1, 5))
+    for j, h in enumerate(np.diff(parts)):
+        one, d1 = approach[:, j], slope[:, j]
+        if j == 0:  # from no force on: what meets value and slope at the first node
+            made[:, 0, 2], made[:, 0, 3] = 0.5 * (2 * one / h - d1), (d1 - one / h) / (3 * h)
+            continue
+        low, d0 = approach[:, j - 1], slope[:, j - 1]
+        secant = (one - low) / h
+        cubic = [low, d0, (3 * secant - 2 * d0 - d1) / h, (d0 + d1 - 2 * secant) / h**2]
+        before = parts[j] - parts[j - 1]
+        made[:, j, 0] = made[:, j - 1] @ before ** np.arange(5)
+        made[:, j, 1:] = np.stack(cubic, axis=1) / np.arange(1, 5)
+    spline, begin = BSpline(phase, made.reshape(len(made), -1), 3), np.unique(phase)[:-1]
+    orders = np.stack([spline(begin, nu=a) / math.factorial(a) for a in range(4)], axis=1)  # cells, order, rest
+    whole = orders.reshape(len(begin), 4, len(parts) - 1, 5)
+    return np.ascontiguousarray(whole.transpose(0, 2, 1, 3))
+
+
+def _by_slots(cells_of_pair: Array, cells: int) -> Array:
+    """From the cells that one pair passes to slots: slot k holds those of pair k while the phase runs one cycle."""
+    return np.ascontiguousarray(cells_of_pair.reshape(-1, cells, *cells_of_pair.shape[1:]))

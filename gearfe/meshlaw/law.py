@@ -1,0 +1,249 @@
+r"""Mesh law with a potential: each tooth pair a compliance, neighbouring pairs coupled.
+
+With the pinion angle :math:`\varphi`, the approach :math:`\delta` of the gears along the line of action and
+:math:`\psi_k = \varphi + 2\pi k/z_1` of tooth pair k, the elastic energy is
+
+.. math::
+    W(\varphi, \delta) = \max_{F_k \ge 0} \sum_k \big[F_k\,(\delta - t(\psi_k)) - \Phi(\psi_k, F_k)\big]
+    - \sum_{k<l} C_{l-k}(\psi_k)\,F_k F_l ,
+
+t the approach at which the rigid flanks of a pair touch (transmission error and reliefs are in it), :math:`\Phi` the
+pair's complementary energy and C the compliance of the gear bodies that pairs share. Where the maximum lies,
+
+.. math::
+    t(\psi_k) + \Lambda(\psi_k, F_k) + \sum_{l \ne k} C_{|k-l|} F_l = \delta,\qquad
+    \Lambda = \partial\Phi/\partial F
+
+for the pairs that bear, and the derivatives of W need none of :math:`F_k`:
+
+.. math::
+    F = \frac{\partial W}{\partial\delta} = \sum_k F_k,\qquad
+    M = \frac{\partial W}{\partial\varphi} = -\sum_k\big[F_k t'(\psi_k) + \Phi_\psi(\psi_k, F_k)\big]
+    - \sum_{k<l} C_{l-k}' F_k F_l,
+
+.. math::
+    \frac{\partial F}{\partial\delta} = 1^T J^{-1} 1,\quad J = \mathrm{diag}(\Lambda_F) + C .
+
+On the driver acts the torque :math:`-r_{b1} F - M`, on the driven gear :math:`r_{b2} F`. :math:`\Phi` is a polynomial
+on each cell of phase and pair force: cubic splines over the phase, of degree 4 over the force (:math:`\Lambda` is
+cubic, with continuous slope), so the law has Taylor series.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+#: Approach (m) at which flanks touch that do not meet at all.
+NEVER = 1.0
+#: Newton steps for the pair forces, and their relative change in the last one.
+STEPS, CHANGE = 60, 1e-10
+
+
+@dataclass(frozen=True)
+class MeshForces:
+    """The law at n places.
+
+    Attributes
+    ----------
+    force : ndarray, shape (n,)
+        F (N), along the line of action.
+    moment : ndarray, shape (n,)
+        M (N m), derivative of the energy with the pinion angle.
+    tangent : ndarray, shape (n,)
+        dF/d approach (N/m).
+    energy : ndarray, shape (n,)
+        W (J).
+    pair_forces : ndarray, shape (n, slots)
+        F_k (N); slot s holds the pair of psi between s and s + 1 mesh cycles from the law's first node.
+    """
+
+    force: Array
+    moment: Array
+    tangent: Array
+    energy: Array
+    pair_forces: Array
+
+
+@dataclass(frozen=True, eq=False)
+class MeshLaw:
+    """Law of a gear pair's driving flanks; s slots for tooth pairs, n cells of the phase, m of the pair force.
+
+    Parameters
+    ----------
+    nodes : ndarray, shape (n + 1,)
+        Pinion angles (rad) between which the law is a polynomial; the last is the first plus a mesh cycle.
+    forces : ndarray, shape (m + 1,)
+        Pair forces (N) between which the law is a polynomial, from 0.
+    touch : ndarray, shape (s, n, 4)
+        Coefficients of t over the angle from the cell's first node (m, m/rad, ...).
+    energies : ndarray, shape (s, n, m, 4, 5)
+        Coefficients of the complementary energy over that angle and the force from the cell's first one (J, ...).
+    coupling : ndarray, shape (s - 1, s - 1, n, 4)
+        Coefficients of C over that angle for pairs one, two, ... teeth apart, by the slot of the lower pair (m/N, ...).
+    base_radii
+        Of pinion and wheel (m).
+    backlash
+        Normal backlash of the pair's geometry (m).
+    reach
+        Approach beyond the first touch (m) up to which the law is known.
+    """
+
+    nodes: Array
+    forces: Array
+    touch: Array
+    energies: Array
+    coupling: Array
+    base_radii: tuple[float, float]
+    backlash: float
+    reach: float
+
+    @property
+    def cycle(self) -> float:
+        """Pinion angle from one tooth to the next (rad)."""
+        return float(self.nodes[-1] - self.nodes[0])
+
+    @property
+    def slots(self) -> int:
+        """Most tooth pairs that are looked at."""
+        return len(self.touch)
+
+    def place(self, angles: Array) -> tuple[IntArray, IntArray, Array]:
+        """Mesh cycle, cell and angle beyond its first node (rad)."""
+        turn = np.floor((angles - self.nodes[0]) / self.cycle)
+        rest = angles - turn * self.cycle
+        cell = np.clip(np.searchsorted(self.nodes, rest, side="right") - 1, 0, len(self.nodes) - 2)
+        return turn.astype(np.int64), cell, rest - self.nodes[cell]
+
+    def touching(self, angles: ArrayLike) -> Array:
+        """Approach (m) at which the first pair touches."""
+        _, cell, z = self.place(np.asarray(angles, dtype=float))
+        found: Array = _powers(self.touch[:, cell], z[None])[0].min(axis=0)
+        return found
+
+    def __call__(self, angles: ArrayLike, approaches: ArrayLike, shifts: ArrayLike = 0.0) -> MeshForces:
+        """Forces at pinion angles (rad) and approaches (m), both of shape (n,).
+
+        Parameters
+        ----------
+        shifts : array_like, shape (n, slots)
+            Further approach (m) at which each pair touches, such as its pitch error.
+        """
+        angle, delta = np.broadcast_arrays(
+            np.atleast_1d(np.asarray(angles, dtype=float)), np.asarray(approaches, dtype=float)
+        )
+        _, cell, z = self.place(angle)
+        t, slope = (x.T for x in _powers(self.touch[:, cell], z[None]))
+        gap = delta[:, None] - t - np.asarray(shifts, dtype=float)
+        C, C_slope = self._couplings(cell, z)
+        F = np.zeros_like(gap)
+        largest = np.zeros(len(angle))
+        for _ in range(STEPS):
+            compliance = _at(self, cell, z, F)
+            off = compliance.approach + _times(C, F) - gap
+            bears = (F > 0.0) | (off < 0.0)
+            J = np.where(bears[:, :, None] & bears[:, None, :], C, 0.0)
+            diagonal = np.arange(self.slots)
+            J[:, diagonal, diagonal] = np.where(bears, compliance.slope, 1.0)
+            step = np.linalg.solve(J, np.where(bears, -off, -F)[..., None])[..., 0]
+            new = np.maximum(F + step, 0.0)
+            largest = np.maximum(new.max(axis=1), 1e-300)
+            done = np.abs(new - F).max(axis=1) <= CHANGE * largest
+            F = new
+            if done.all():
+                break
+        else:
+            raise ArithmeticError("the pair forces of the mesh law do not settle")
+        made = _at(self, cell, z, F)
+        bears = F > 0.0
+        J = np.where(bears[:, :, None] & bears[:, None, :], C, 0.0)
+        J[:, diagonal, diagonal] = np.where(bears, made.slope, 1.0)
+        tangent = np.linalg.solve(J, bears[..., None].astype(float))[..., 0].sum(axis=1)
+        energy = (F * (gap - 0.5 * _times(C, F)) - made.energy).sum(axis=1)
+        moment = -(F * (slope + 0.5 * _times(C_slope, F)) + made.turn).sum(axis=1)
+        return MeshForces(F.sum(axis=1), moment, tangent, energy, F)
+
+    def _couplings(self, cell: IntArray, z: Array) -> tuple[Array, Array]:
+        """C between all slots and its slope, shape (n, s, s)."""
+        made = np.zeros((2, len(z), self.slots, self.slots))
+        for apart in range(1, self.slots):
+            for low in range(self.slots - apart):
+                found = _powers(self.coupling[apart - 1, low, cell], z)
+                for value, one in zip(made, found, strict=True):
+                    value[:, low, low + apart] = value[:, low + apart, low] = one
+        return made[0], made[1]
+
+    def approach(self, angles: ArrayLike, forces: ArrayLike) -> Array:
+        """Approach (m) that makes a mesh force (N): the static transmission error under load.
+
+        Raises
+        ------
+        InputError
+            For a force beyond what the law is known for.
+        """
+        angle, force = np.broadcast_arrays(
+            np.atleast_1d(np.asarray(angles, dtype=float)), np.asarray(forces, dtype=float)
+        )
+        first = self.touching(angle)
+        low, high = first.copy(), first + self.reach
+        most = self(angle, high).force
+        if (force > most).any():
+            raise InputError(
+                "force", float(force.max()), f"must be <= {most.min():.6g} N", "make the law for larger torques"
+            )
+        delta = first + self.reach * np.maximum(force, 0.0) / most
+        for _ in range(STEPS):
+            made = self(angle, delta)
+            off = made.force - force
+            low, high = np.where(off < 0.0, delta, low), np.where(off > 0.0, delta, high)
+            new = delta - off / np.maximum(made.tangent, 1e-300)
+            new = np.where((new >= low) & (new <= high), new, 0.5 * (low + high))
+            if (np.abs(new - delta) <= 1e-15 * self.reach).all():
+                break
+            delta = new
+        return np.where(force > 0.0, delta, first)
+
+
+@dataclass(frozen=True)
+class _Pairs:
+    """A pair law and its derivatives, (n, slots): J, J/rad, m, m/N."""
+
+    energy: Array
+    turn: Array
+    approach: Array
+    slope: Array
+
+
+def _times(matrices: Array, vectors: Array) -> Array:
+    """(n, s, s) times (n, s)."""
+    made: Array = (matrices @ vectors[..., None])[..., 0]
+    return made
+
+
+def _powers(c: Array, z: Array) -> tuple[Array, Array]:
+    """Value and slope of cubics at z."""
+    value = c[..., 0] + z * (c[..., 1] + z * (c[..., 2] + z * c[..., 3]))
+    return value, c[..., 1] + z * (2 * c[..., 2] + 3 * z * c[..., 3])
+
+
+def _at(law: MeshLaw, cell: IntArray, z: Array, F: Array) -> _Pairs:
+    """Complementary energy of all pairs and its derivatives at forces (n, slots)."""
+    part = np.clip(np.searchsorted(law.forces, F, side="right") - 1, 0, len(law.forces) - 2)
+    f = F - law.forces[part]
+    c = law.energies[np.arange(law.slots), cell[:, None], part]
+    value, turn = _powers(np.moveaxis(c, 3, 2), z[:, None, None])
+    e = [value[..., b] for b in range(5)]
+    g = [turn[..., b] for b in range(5)]
+    return _Pairs(
+        e[0] + f * (e[1] + f * (e[2] + f * (e[3] + f * e[4]))),
+        g[0] + f * (g[1] + f * (g[2] + f * (g[3] + f * g[4]))),
+        e[1] + f * (2 * e[2] + f * (3 * e[3] + f * 4 * e[4])),
+        2 * e[2] + f * (6 * e[3] + f * 12 * e[4]),
+    )

@@ -1,0 +1,203 @@
+"""A mesh law from contact solutions of the half-plane law: which positions, and what they tell of each tooth pair."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contact.half_plane import (
+    HalfPlanePair,
+    HalfPlaneSolution,
+    coupling_compliances,
+    half_plane_pair,
+    solve_half_plane,
+)
+from ..contact.laws import law_named
+from ..errors import InputError
+from ..gear.pair import GearPair
+from ..gear.touching import Touching
+from ..meshing.cache import cached_arrays
+from ..progress import stage
+from ..stiffness.curve_cache import curve_key
+from ..stiffness.sweep import elastic_pair
+from .fit import Couple, PairForces, TouchCurve, fit_law
+from .law import NEVER, MeshLaw
+from .store import law_arrays, law_of_arrays
+
+Array = NDArray[np.float64]
+
+#: Cells of the phase and pinion angles in a mesh cycle.
+CELLS, ANGLES = 36, 72
+#: Approaches beyond the first touch, in parts of the largest: light ones tell how a pair comes into contact.
+DEPTHS = (0.0025, 0.008, 0.025, 0.06, 0.12, 0.2, 0.32, 0.5, 0.75, 1.0)
+#: The law's tables go on to where pairs touch at this many times its reach, so that no pair bears at their ends.
+BEYOND = 1.1
+#: Pinion angles at which the approach is searched for that makes the largest force.
+LOOKS = 6
+#: Corners of the touching curve are nodes; others are left out so near to them, and of corners so near to each other
+#: one stays (parts of a cell).
+NEAR, SAME = 0.4, 0.02
+
+
+def cached_law(pair: GearPair, model: Mapping[str, Any], force: float) -> MeshLaw:
+    """Law of a pair for mesh forces up to `force` (N), from disk when it was made before.
+
+    Parameters
+    ----------
+    model
+        Keyword arguments of `gearfe.stiffness.sweep.elastic_pair`; the contact law is the half-plane law in any case.
+    """
+    own = {**model, "law": law_named("half_plane")}
+
+    def made() -> dict[str, Array]:
+        with stage("mesh law"):
+            return law_arrays(mesh_law(half_plane_pair(pair, elastic_pair(pair, **own)), force))
+
+    recipe = [curve_key(pair, own, {"force": force}), _source()]
+    return law_of_arrays(cached_arrays("mesh-law", recipe, made))
+
+
+@cache
+def _source() -> str:
+    """Hash of the text of this room."""
+    files = sorted(Path(__file__).parent.glob("*.py"))
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
+def mesh_law(pair: HalfPlanePair, force: float) -> MeshLaw:
+    """Law of a pair for mesh forces up to `force` (N).
+
+    Raises
+    ------
+    InputError
+        For forces that contact solutions do not reach.
+    """
+    geometry = pair.pair
+    cycle, radius = geometry.mesh_cycle, geometry.wheel.base_radius
+    reach = _reach(pair, force)
+    nodes, slots = _nodes(pair, reach)
+    phases = np.concatenate([nodes[:-1] + k * cycle for k in range(slots)] + [[nodes[-1] + (slots - 1) * cycle]])
+    angles = nodes[0] + cycle * (np.arange(ANGLES) + 0.5) / ANGLES
+    met, first = _touching(pair, angles)
+    deep = reach * np.array(DEPTHS)
+    twists = first[:, None] + deep / radius
+    solved = solve_half_plane(pair, np.repeat(angles, len(deep)), twists.ravel())
+    C = coupling_curve(pair, phases, reach)
+    return fit_law(
+        pair_forces(pair, solved, met, C),
+        touch_curve(pair, phases),
+        C,
+        cells=len(nodes) - 1,
+        hertz=0.5 * pair.compliance / pair.width,
+        base_radii=(geometry.pinion.base_radius, radius),
+        backlash=geometry.normal_backlash,
+        reach=reach,
+    )
+
+
+def pair_forces(
+    pair: HalfPlanePair, solved: HalfPlaneSolution, met: Touching, coupling: Sequence[Couple]
+) -> PairForces:
+    """What contact solutions tell of their loaded pairs; forces are torques of the wheel over its base radius."""
+    radius = pair.pair.wheel.base_radius
+    c = solved.contacts
+    force = c.torque_wheel / radius
+    k = c.pair - c.pair.min()
+    table = np.zeros((len(solved), int(k.max()) + 1))
+    table[c.position, k] = force
+    own = solved.pinion_angle[c.position] + c.pair * pair.pair.mesh_cycle
+    others = np.zeros(len(force))
+    for apart, couple in enumerate(coupling, start=1):
+        for other, lower in ((k - apart, own - apart * pair.pair.mesh_cycle), (k + apart, own)):
+            inside = (other >= 0) & (other < table.shape[1])
+            others[inside] += couple(lower[inside]) * table[c.position[inside], other[inside]]
+    touch = _of_pairs(met, solved.pinion_angle[c.position], c.pair)
+    approach = radius * (solved.twist[c.position] - touch) - others
+    return PairForces(own, force, force / table.sum(axis=1)[c.position], approach)
+
+
+def touch_curve(pair: HalfPlanePair, phases: Array) -> TouchCurve:
+    """t and its slope at pinion angles of a pair's own tooth (rad), from where the rigid driving flanks touch."""
+    geometry = pair.pair
+    radius = geometry.wheel.base_radius
+    met = pair.teeth.touching(phases)
+    own = np.flatnonzero(met.pair == 0)
+    value, slope = np.full(len(phases), NEVER), np.zeros(len(phases))
+    at = met.position[own]
+    value[at] = radius * (met.twist[own] - geometry.contact_twist)
+    slope[at] = radius * (1.0 / geometry.gear_ratio - met.arm[own, 0] / met.arm[own, 1])
+    return TouchCurve(phases, value, slope)
+
+
+def coupling_curve(pair: HalfPlanePair, phases: Array, reach: float) -> list[Couple]:
+    """C of pairs one, two, ... teeth apart over the angle of the lower pair's tooth; constant beyond its ends."""
+    cycle, radius = pair.pair.mesh_cycle, pair.pair.wheel.base_radius
+    angles = phases[phases < phases[0] + cycle * (1 - 1e-9)]
+    _, first = _touching(pair, angles)
+    angle, apart, compliance = coupling_compliances(pair, angles, first + BEYOND * reach / radius)
+    made = []
+    for number in range(1, int(apart.max(initial=0)) + 1):
+        here = apart == number
+        order = np.argsort(angle[here])
+        made.append(Couple(angle[here][order], compliance[here][order]))
+    return made
+
+
+def _touching(pair: HalfPlanePair, angles: Array) -> tuple[Touching, Array]:
+    """All touches at pinion angles, and the first twist at each (rad)."""
+    met = pair.teeth.touching(angles)
+    first = np.full(len(angles), np.inf)
+    np.minimum.at(first, met.position, met.twist)
+    return met, first
+
+
+def _of_pairs(met: Touching, angle: Array, number: NDArray[np.int64]) -> Array:
+    """Twists (rad) at which pairs touch, by pinion angle and pair number."""
+    known = {(a, k): t for a, k, t in zip(met.angle.tolist(), met.pair.tolist(), met.twist.tolist(), strict=True)}
+    return np.array([known[a, k] for a, k in zip(angle.tolist(), number.tolist(), strict=True)])
+
+
+def _reach(pair: HalfPlanePair, force: float) -> float:
+    """Approach beyond the first touch (m) at which the mesh force is at least `force` at every phase."""
+    geometry = pair.pair
+    radius = geometry.wheel.base_radius
+    angles = geometry.mesh_cycle * np.arange(LOOKS) / LOOKS
+    _, first = _touching(pair, angles)
+    reach = 1e-2 * geometry.pinion.module
+    for _ in range(4):
+        solved = solve_half_plane(pair, angles, first + reach / radius)
+        least = float(solved.torque_wheel.min()) / radius
+        if not math.isfinite(least):
+            break
+        if force <= least <= 1.1 * force:
+            return reach
+        reach *= 1.03 * (force / least) ** (0.95 if least < force else 1.0)
+    problem = f"no contact solution of this pair makes a mesh force of {force:.6g} N at all phases"
+    raise InputError("force", force, problem, "ask for a law up to smaller forces")
+
+
+def _nodes(pair: HalfPlanePair, reach: float) -> tuple[Array, int]:
+    """Nodes of one mesh cycle (rad), and how many mesh cycles a pair's contact takes."""
+    geometry = pair.pair
+    cycle = geometry.mesh_cycle
+    step = cycle / (4 * ANGLES)
+    wide = step * np.arange(-3.0 * 4 * ANGLES, 3 * 4 * ANGLES + 1)
+    bears = np.flatnonzero(touch_curve(pair, wide).value < BEYOND * reach)
+    low, high = wide[bears[0]] - step, wide[bears[-1]] + step
+    slots = math.ceil((high - low) / cycle)
+    begin = 0.5 * (low + high - slots * cycle)
+    width = cycle / CELLS
+    limits = {s for relieved in (False, True) for s in geometry.path_limits(relieved=relieved)}
+    corners = np.sort([(geometry.pinion_angle_at(s) - begin) % cycle for s in limits])
+    corners = corners[np.diff(corners, prepend=-np.inf) > SAME * width]
+    corners = corners[(corners > SAME * width) & (corners < cycle - SAME * width)]
+    even = width * np.arange(1, CELLS)
+    even = even[np.abs(even[:, None] - corners).min(axis=1, initial=np.inf) > NEAR * width]
+    return begin + np.sort(np.concatenate([[0.0, cycle], corners, even])), slots

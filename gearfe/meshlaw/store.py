@@ -1,0 +1,65 @@
+"""Mesh laws as files: NPZ, exact in both directions, and CSV to look at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..output.arrays import load_arrays, save_arrays
+from ..output.files import write_csv
+from .law import NEVER, MeshLaw
+
+#: Fields that are arrays, with the number of their axes.
+ARRAYS = {"nodes": 1, "forces": 1, "touch": 3, "energies": 5, "coupling": 4}
+
+
+def law_arrays(law: MeshLaw) -> dict[str, NDArray[np.float64]]:
+    """A law as named arrays."""
+    numbers = np.array([*law.base_radii, law.backlash, law.reach])
+    return {**{name: getattr(law, name) for name in ARRAYS}, "numbers": numbers}
+
+
+def law_of_arrays(arrays: Mapping[str, NDArray[np.float64]]) -> MeshLaw:
+    """The law of `law_arrays`."""
+    pinion, wheel, backlash, reach = arrays["numbers"].tolist()
+    nodes, forces, touch, energies, coupling = (np.ascontiguousarray(arrays[name], dtype=float) for name in ARRAYS)
+    return MeshLaw(nodes, forces, touch, energies, coupling, (pinion, wheel), backlash, reach)
+
+
+def save_law(law: MeshLaw, path: str | Path) -> None:
+    """Write a law (NPZ)."""
+    save_arrays(path, law_arrays(law))
+
+
+def load_law(path: str | Path) -> MeshLaw:
+    """Read a law.
+
+    Raises
+    ------
+    InputError
+        For a file that is not there, or holds no mesh law.
+    """
+    found = load_arrays(path)
+    missing = [name for name, axes in ARRAYS.items() if name not in found or found[name].ndim != axes]
+    if missing or "numbers" not in found or found["numbers"].shape != (4,):
+        problem = "holds no mesh law" + (f": no array {missing[0]!r} of {ARRAYS[missing[0]]} axes" if missing else "")
+        raise InputError("mesh law", str(path), problem, "write it with gearfe.meshlaw.store.save_law")
+    return law_of_arrays(found)
+
+
+def write_law_csv(law: MeshLaw, path: str | Path) -> None:
+    """A row for each node of the angle of a pair's own tooth: rigid touch, and what the pair yields to each force."""
+    touch, angle = law.touch[:, :, 0].ravel(), law.nodes[:-1] + law.cycle * np.arange(law.slots)[:, None]
+    columns = {
+        "pair_angle_deg": np.degrees(angle).ravel(),
+        "touch_um": np.where(touch < NEVER, 1e6 * touch, math.nan),
+    }
+    for part, (low, high) in enumerate(zip(law.forces[:-1], law.forces[1:], strict=True)):
+        c = law.energies[:, :, part, 0].reshape(-1, 5)
+        columns[f"yield_um_at_{high:.6g}_N"] = 1e6 * (c[:, 1:] * np.arange(1, 5)) @ (high - low) ** np.arange(4)
+    write_csv(path, columns)
