@@ -12,7 +12,7 @@ which the matrices are the same at every position.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 
 from .closest import Projection, chains_of, project
 from .laws import carrying
-from .scene import MeshingPair, Window
+from .records import ranges
+from .scene import MeshingPair
 
 Array = NDArray[Any]
 IntArray = NDArray[Any]
@@ -53,10 +54,6 @@ class FirstContacts:
 
     def __len__(self) -> int:
         return len(self.pair)
-
-    def take(self, index: Any) -> FirstContacts:
-        """The contacts `index`."""
-        return FirstContacts(**{name: getattr(self, name)[index] for name in self.__dataclass_fields__})
 
 
 @dataclass(frozen=True)
@@ -138,12 +135,6 @@ class Batch:
     fade: Array
     parameter: Array
     blocks: list[Block]
-
-    def windows(self, chosen: slice) -> tuple[Window, ...]:
-        """Some consecutive windows, their nodes counted from the first of them."""
-        first = self.first_node[chosen] - self.first_node[chosen.start]
-        each = (self.gear[chosen], self.tooth[chosen], self.first_edge[chosen], self.counts[chosen], first)
-        return tuple(Window(*one) for one in zip(*(values.tolist() for values in each), strict=True))
 
     @property
     def node_position(self) -> IntArray:
@@ -275,12 +266,6 @@ def carried_by(elastic: MeshingPair, first: FirstContacts) -> NDArray[np.bool_]:
     return carrying(elastic.law, length - mean)
 
 
-def ranges(starts: IntArray, lengths: IntArray) -> IntArray:
-    """All of start, start + 1, ..., start + length - 1, one after the other."""
-    ends = np.cumsum(lengths)
-    return np.repeat(starts - ends + lengths, lengths) + np.arange(ends[-1] if len(ends) else 0)
-
-
 def _contact_points(
     elastic: MeshingPair,
     gear: IntArray,
@@ -323,39 +308,39 @@ def _blocks(batch: Batch, bears: NDArray[np.bool_]) -> list[Block]:
     made = []
     edges = np.searchsorted(2 * batch.position + batch.gear, np.arange(2 * batch.size + 1)).tolist()
     for start, end in itertools.pairwise(edges):
-        mine = slice(start, end)
         points = slice(*np.searchsorted(batch.owner, [start, end]).tolist())
         nodes = slice(int(batch.first_node[start]), int(batch.first_node[end]))
-        matrix = _response(batch.elastic, batch.windows(mine), bears[mine].tolist())
-        made.append(Block(nodes, points, matrix))
+        made.append(Block(nodes, points, _response(batch, range(start, end), bears)))
     return made
 
 
-def _response(elastic: MeshingPair, windows: Sequence[Window], bears: list[bool]) -> Array:
+def _response(batch: Batch, windows: range, bears: NDArray[np.bool_]) -> Array:
     """Displacements and stresses of one gear's windows for forces on them, see `Block`."""
-    body, unknowns = elastic.bodies[windows[0].gear], [w.unknowns for w in windows]
-    q, row = body.flank.shapes.shape[0], unknowns[-1].stop
-    stressed: list[slice | None] = []
-    for w, carries in zip(windows, bears, strict=True):
-        rows = q * w.edges if carries and elastic.law.uses_stress else 0
-        stressed.append(slice(row, row + rows) if rows else None)
-        row += rows
-    matrix = np.empty((row, unknowns[-1].stop))
-    for j, loaded in enumerate(windows):
-        columns = loaded.flank_unknowns
-        for i, moved in enumerate(windows):
-            driven = body.far.driven[moved.tooth - loaded.tooth][:, columns]
-            part = matrix[unknowns[i], unknowns[j]]
-            np.matmul(body.far.flank[moved.flank_unknowns], driven, out=part)
+    body, stressed = batch.elastic.bodies[batch.gear[windows[0]]], batch.elastic.law.uses_stress
+    q, tooth = body.flank.shapes.shape[0], batch.tooth.tolist()
+    nodes = batch.first_node - batch.first_node[windows[0]]
+    row = 2 * int(nodes[windows[-1] + 1])
+    moved, of_flank, of_points, rows = {}, {}, {}, {}
+    for w in windows:
+        first, end = int(batch.first_edge[w]), int(batch.first_edge[w] + batch.counts[w])
+        moved[w], of_flank[w] = slice(2 * nodes[w], 2 * nodes[w + 1]), slice(4 * first, 4 * end + 2)
+        if stressed and bears[w]:
+            of_points[w], rows[w] = slice(q * first, q * end), slice(row, row + q * (end - first))
+            row = rows[w].stop
+    matrix = np.empty((row, 2 * int(nodes[windows[-1] + 1])))
+    for j in windows:
+        for i in windows:
+            driven = body.far.driven[tooth[i] - tooth[j]][:, of_flank[j]]
+            part = matrix[moved[i], moved[j]]
+            np.matmul(body.far.flank[of_flank[i]], driven, out=part)
             if i == j:
-                part += body.own[moved.flank_unknowns, columns]
-            if stressed[i] is None:
+                part += body.own[of_flank[i], of_flank[j]]
+            if i not in rows:
                 continue
             assert body.far.stress is not None
             assert body.stress_own is not None
-            rows_of = slice(q * moved.first_edge, q * (moved.first_edge + moved.edges))
-            part = matrix[stressed[i], unknowns[j]]
-            np.matmul(body.far.stress[rows_of], driven, out=part)
+            part = matrix[rows[i], moved[j]]
+            np.matmul(body.far.stress[of_points[i]], driven, out=part)
             if i == j:
-                part += body.stress_own[rows_of, columns]
+                part += body.stress_own[of_points[i], of_flank[j]]
     return matrix

@@ -20,7 +20,8 @@ from .flank import edge_shapes
 from .flank_compliance import FlankCompliance
 from .half_plane_result import PairContacts
 from .half_width import half_widths
-from .position import PointPressures, Position, unsolved
+from .position import TORQUES, Contacts, FlankLoads, PointPressures, Positions
+from .records import of_positions
 from .scene import MeshingPair
 
 Array = NDArray[Any]
@@ -44,7 +45,7 @@ def first_contacts(sides: Sequence[FlankCompliance], contacts: PairContacts) -> 
     return FirstContacts(contacts.position, contacts.pair, contacts.normal, arc, contacts.pressure, contacts.width)
 
 
-def solve_elements(elastic: MeshingPair, angles: Array, twists: Array, first: FirstContacts) -> list[Position]:
+def solve_elements(elastic: MeshingPair, angles: Array, twists: Array, first: FirstContacts) -> Positions:
     """Solve the contact of several positions on the mesh.
 
     Parameters
@@ -54,23 +55,37 @@ def solve_elements(elastic: MeshingPair, angles: Array, twists: Array, first: Fi
     first
         Contacts to start from; positions without one have ``no_contact``.
     """
-    made = [unsolved("no_contact")] * len(angles)
+    made = _clear(elastic, angles, twists)
     open_ = np.unique(first.position)
     for reach in REACHES:
         outgrown: list[int] = []
         for chosen in _batches(elastic, first, open_, reach):
-            mine = first.take(np.isin(first.position, chosen))
-            mine = replace(mine, position=np.searchsorted(chosen, mine.position))
+            mine = of_positions(first, chosen)
             batch = batch_of(elastic, mine, angles[chosen], twists[chosen], reach)
             outcome = solve(batch, _start(batch, mine), TOLERANCE)
             rims = _at_rims(batch, outcome.state)
             held = {b: own for b, own in outcome.equations.items() if not rims[b]}
             outcome = replace(outcome, equations=held)  # what has outgrown its windows is not solved
-            for i, position in zip(chosen.tolist(), _positions(batch, outcome), strict=True):
-                made[i] = position
+            made = made.replaced(chosen, _positions(batch, outcome, made.take(chosen)))
             outgrown += chosen[rims].tolist()
         open_ = np.array(outgrown, dtype=np.int64)
     return made
+
+
+def _clear(elastic: MeshingPair, angles: Array, twists: Array) -> Positions:
+    """Positions without contact."""
+    none, count = np.zeros(0, dtype=np.int64), len(angles)
+    empty = [np.zeros((0, len(body.own))) for body in elastic.bodies]
+    return Positions(
+        pinion_angle=angles,
+        twist=twists,
+        status=np.full(count, "no_contact", dtype="<U18"),
+        iterations=np.zeros(count, dtype=np.int64),
+        contacts=Contacts(none, none, np.zeros(0), np.zeros(0)),
+        loads=(FlankLoads(none, none, empty[0], empty[0]), FlankLoads(none, none, empty[1], empty[1])),
+        points=PointPressures(none, none, none, np.zeros(0), np.zeros(0)),
+        **{name: np.zeros(count) for name in TORQUES},
+    )
 
 
 def _batches(
@@ -128,70 +143,83 @@ def _at_rims(batch: Batch, state: State) -> NDArray[np.bool_]:
     return np.bincount(batch.at[bears[rim]], minlength=batch.size) > 0
 
 
-def _positions(batch: Batch, outcome: Outcome) -> list[Position]:
+def _positions(batch: Batch, outcome: Outcome, places: Positions) -> Positions:
     """The solved positions, with derivatives by the same equations at a slightly larger twist."""
     here, of = outcome.state, batch.node_position
     rows = seen(batch, here, batch.turn, outcome.points)
     forces = rows.forces(here.pressure[rows.points], len(batch.points))
-    one = _torques(batch, here, forces, batch.turn)
+    one, of_windows = _torques(batch, here, forces, batch.turn)
     work = np.bincount(of, (forces.conj() * here.displacement).real, batch.size)
     ahead = AHEAD * np.divide(work, one["torque_wheel"], out=np.ones(batch.size), where=one["torque_wheel"] > 0)
     turn = batch.turn * np.exp(1j * batch.gear * ahead[batch.position])
     there = turned(batch, outcome, turn, SETTLED)
-    tangent = (_torques(batch, there, there.forces, turn)["torque_wheel"] - one["torque_wheel"]) / ahead
+    tangent = (_torques(batch, there, there.forces, turn)[0]["torque_wheel"] - one["torque_wheel"]) / ahead
     rate = (there.forces - forces) / ahead[of]
     every = np.arange(len(batch.owner))
-    places = batch.slaves(batch.placed(here.displacement, batch.turn), every)
+    x = batch.slaves(batch.placed(here.displacement, batch.turn), every)
     loads = batch.weight * np.maximum(here.pressure, 0.0)
-    widths = half_widths(batch.couple[batch.owner], parts(places), loads, len(batch.gear) // 2)
+    widths = half_widths(batch.couple[batch.owner], parts(x), loads, len(batch.gear) // 2)
+    pinion, wheel = (np.flatnonzero(batch.gear == g) for g in (0, 1))
+    contacts = Contacts(batch.position[wheel], -1 - batch.tooth[wheel], of_windows[wheel], widths[batch.couple[wheel]])
+    solved = np.isin(np.arange(batch.size), list(outcome.equations)) & (tangent > 0)
+    made = replace(
+        places,
+        iterations=outcome.iterations,
+        contacts=contacts,
+        loads=(_loads(batch, pinion, forces, rate), _loads(batch, wheel, forces, rate)),
+        points=_points(batch, here),
+        tangent=tangent,
+        **one,
+    )
+    return made.stated(np.where(solved, "converged", "not_converged"))
+
+
+def _loads(batch: Batch, windows: IntArray, forces: ComplexArray, rate: ComplexArray) -> FlankLoads:
+    """Loads on the nodes of one gear's windows, by those of whole flanks."""
+    gear = batch.gear[windows[0]] if len(windows) else 0
+    shape = len(windows), len(batch.elastic.bodies[gear].flank.nodes)
+    row = np.full(len(batch.gear), -1)
+    row[windows] = np.arange(len(windows))
+    nodes = np.flatnonzero(row[batch.window] >= 0)
+    window = batch.window[nodes]
+    at = row[window], 2 * batch.first_edge[window] + nodes - batch.first_node[window]
     made = []
-    for b in range(batch.size):
-        steps = int(outcome.iterations[b])
-        if not (b in outcome.equations and tangent[b] > 0):
-            made.append(unsolved("not_converged", steps))
-            continue
-        windows, mine = (slice(*np.searchsorted(at, [b, b + 1]).tolist()) for at in (batch.position, batch.at))
-        nodes = slice(batch.first_node[windows.start], batch.first_node[windows.stop])
-        wheel = windows.start + np.flatnonzero(batch.gear[windows] == 1)
-        made.append(
-            Position(
-                status="converged",
-                torque_wheel=float(one["torque_wheel"][b]),
-                torque_pinion=float(one["torque_pinion"][b]),
-                torque_wheel_reaction=float(one["torque_wheel_reaction"][b]),
-                tangent=float(tangent[b]),
-                pair_numbers=tuple((-1 - batch.tooth[wheel]).tolist()),
-                pair_torques=one["of_window"][wheel],
-                peak_pressure=float(here.pressure[mine].max()),
-                iterations=steps,
-                pair_widths=widths[batch.couple[wheel]],
-                windows=batch.windows(windows),
-                forces=forces[nodes].view(float),
-                force_rate=rate[nodes].view(float),
-                points=PointPressures(
-                    batch.owner[mine] - windows.start,
-                    batch.facing[mine] - windows.start,
-                    here.place[mine],
-                    np.maximum(here.pressure[mine], 0.0),
-                ),
-            )
-        )
-    return made
+    for values in (forces, rate):
+        whole = np.zeros(shape, dtype=complex)
+        whole[at] = values[nodes]
+        made.append(whole.view(float))
+    return FlankLoads(batch.position[windows], batch.tooth[windows], *made)
 
 
-def _torques(batch: Batch, state: State, forces: ComplexArray, turn: ComplexArray) -> dict[str, Array]:
+def _points(batch: Batch, state: State) -> PointPressures:
+    """Pressures on every loaded flank, by its own contact points or by those of its mate."""
+    mates = np.flatnonzero(~np.isin(batch.facing, batch.owner))
+    own = batch.slave_shapes @ [0.0, 0.5, 1.0] + (batch.slave_nodes[:, 0] - batch.first_node[batch.owner]) // 2
+    window = np.concatenate([batch.owner, batch.facing[mates]])
+    place = np.concatenate([own, state.place[mates]]) + batch.first_edge[window]
+    pressure = np.maximum(state.pressure, 0.0)
+    order = np.lexsort((place, window))
+    window = window[order]
+    number = np.where(batch.gear == 0, batch.tooth, -1 - batch.tooth)[window]
+    pressure = np.concatenate([pressure, pressure[mates]])[order]
+    return PointPressures(batch.position[window], batch.gear[window], number, place[order], pressure)
+
+
+def _torques(
+    batch: Batch, state: State, forces: ComplexArray, turn: ComplexArray
+) -> tuple[dict[str, Array], Array]:
     """Moments that the hubs need (N m): shape (B,), and of each window about its own hub, shape (W,)."""
     hub = (batch.gear * batch.elastic.centre_distance)[batch.window]
     force, wheel = turn[batch.window] * forces, batch.gear[batch.window] == 1
     placed, still = (batch.placed(u, turn) - hub for u in (state.displacement, np.zeros_like(forces)))
     moment, reaction = (-(arm.conj() * force).imag for arm in (placed, still))
 
-    def of_positions(values: Array, chosen: NDArray[np.bool_]) -> Array:
+    def total(values: Array, chosen: NDArray[np.bool_]) -> Array:
         return np.bincount(batch.node_position, np.where(chosen, values, 0.0), batch.size)
 
-    return {
-        "torque_wheel": of_positions(moment, wheel),
-        "torque_pinion": of_positions(moment, ~wheel),
-        "torque_wheel_reaction": of_positions(reaction, wheel),
-        "of_window": np.bincount(batch.window, moment, len(batch.gear)),
+    torques = {
+        "torque_wheel": total(moment, wheel),
+        "torque_pinion": total(moment, ~wheel),
+        "torque_wheel_reaction": total(reaction, wheel),
     }
+    return torques, np.bincount(batch.window, moment, len(batch.gear))

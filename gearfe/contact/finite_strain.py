@@ -14,7 +14,6 @@ linear one. The equilibrium minimises the whole energy, so by the envelope theor
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,15 +22,16 @@ from numpy.typing import NDArray
 
 from ..elasticity import physical_gradients, triangle_shapes
 from .compliance import GearBody
-from .position import Position
-from .recovery import position_forces, sector_displacements
+from .position import TORQUES, Positions
+from .recovery import sector_displacements
 from .scene import MeshingPair
 
 Array = NDArray[Any]
 
 #: Sectors on either side of a loaded tooth that take part: the effect is cubic in the strain and dies out fast.
 NEIGHBOURS = 1
-#: Numbers (of displacement gradients) worked on at a time.
+#: Positions whose fields are in memory together, and numbers (of displacement gradients) worked on at a time.
+TOGETHER = 24
 BLOCK = 40_000
 #: Positions at which a sweep evaluates the share; over a mesh cycle it varies by about a third of itself.
 SAMPLES = 9
@@ -51,50 +51,41 @@ def interpolated_shares(angles: Array, samples: Array, shares: Array, cycle: flo
     return np.interp(np.mod(angles, cycle), np.mod(samples[good], cycle), shares[good], period=cycle)
 
 
-def with_share(position: Position, share: float) -> Position:
-    """The position with its torques raised by the finite-strain share c = Delta T / T.
+def with_shares(found: Positions, share: Array) -> Positions:
+    """Positions with their torques raised by the finite-strain shares c = Delta T / T, shape (n,).
 
     Both hubs' torques take the same factor: the force changes, not its line. The share grows with the twist about as
     the torque does, so the tangent takes 1 + 2 c.
     """
-    if position.status != "converged":
-        return position
-    return replace(
-        position,
-        torque_wheel=position.torque_wheel * (1 + share),
-        torque_pinion=position.torque_pinion * (1 + share),
-        torque_wheel_reaction=position.torque_wheel_reaction * (1 + share),
-        pair_torques=position.pair_torques * (1 + share),
-        tangent=position.tangent * (1 + 2 * share),
-    )
+    made = {name: getattr(found, name) * (1 + share) for name in TORQUES} | {"tangent": found.tangent * (1 + 2 * share)}
+    contacts = found.contacts
+    raised = contacts.torque_wheel * (1 + share)[contacts.position]
+    return replace(found, contacts=replace(contacts, torque_wheel=raised), **made)
 
 
-def finite_strain_shares(pair: MeshingPair, positions: Sequence[Position]) -> Array:
-    """Delta T / T of each position, shape (n,); not-a-number where it has no solution."""
-    good = [p for p in positions if p.status == "converged"]
-    shares = np.full(len(positions), np.nan)
-    if good:
-        extra = sum(_extra_torques(pair, gear, good) for gear in (0, 1))
-        solved = np.array([p.status == "converged" for p in positions])
-        shares[solved] = np.asarray(extra) / np.array([p.torque_wheel for p in good])
+def finite_strain_shares(pair: MeshingPair, found: Positions) -> Array:
+    """Delta T / T of each position, shape (n,), from its loads; not-a-number where there are none."""
+    shares = np.full(len(found), np.nan)
+    loaded = np.unique(found.loads[0].position)
+    for first in range(0, len(loaded), TOGETHER):
+        mine = loaded[first : first + TOGETHER]
+        part = found.take(mine)
+        shares[mine] = sum(_extra_torques(pair, gear, part) for gear in (0, 1)) / part.torque_wheel
     return shares
 
 
-def _extra_torques(pair: MeshingPair, gear: int, positions: Sequence[Position]) -> Array:
+def _extra_torques(pair: MeshingPair, gear: int, found: Positions) -> Array:
     """Delta T from one gear (N m), shape (n,)."""
-    body = pair.bodies[gear]
-    cases, counts = [], []
-    for position in positions:
-        loads, rates = (position_forces(body, gear, position, rate=rate) for rate in (False, True))
-        teeth = sorted({(t + k) % body.teeth for t in loads for k in range(-NEIGHBOURS, NEIGHBOURS + 1)})
-        cases += [(case, tooth) for tooth in teeth for case in (loads, rates)]
-        counts.append(len(teeth))
-    energy = _energy_rates(body, sector_displacements(body, cases))
-    return np.add.reduceat(energy, np.concatenate([[0], np.cumsum(counts)[:-1]]))
+    body, loads = pair.bodies[gear], found.loads[gear]
+    near = (loads.tooth[:, None] + np.arange(-NEIGHBOURS, NEIGHBOURS + 1)) % body.teeth
+    sectors = np.unique(loads.position[:, None] * body.teeth + near)
+    position, tooth = np.divmod(sectors, body.teeth)
+    energy = _energy_rates(body, sector_displacements(body, loads, position, tooth, rates=True))
+    return np.bincount(position, energy, len(found))
 
 
 def _energy_rates(body: GearBody, fields: Array) -> Array:
-    """d Delta W / d twist of s sectors, from displacements and displacement rates in turn, shape (nodes, 2, 2s)."""
+    """d Delta W / d twist of s sectors, from their displacements, then their rates, shape (nodes, 2, 2s)."""
     r, s = np.array([1, 4, 1]) / 6, np.array([1, 1, 4]) / 6  # three points, exact to degree 2
     triangles = body.mesh.triangles
     gradients, det = physical_gradients(body.mesh.points[triangles], triangle_shapes(r, s)[1])
@@ -102,13 +93,11 @@ def _energy_rates(body: GearBody, fields: Array) -> Array:
     lam, mu = body.material.lame(body.plane)
     m, sectors = len(triangles), fields.shape[2] // 2
     at = gradients.transpose(0, 1, 3, 2).reshape(m, 6, 6)  # (point, derivative) x node
-    # displacements before their rates; a block of triangles at a time, so that all its numbers stay in the cache
-    ordered = np.concatenate([fields[..., ::2], fields[..., 1::2]], axis=2)
     energy = np.zeros(sectors)
-    step = max(1, BLOCK // (12 * sectors))
+    step = max(1, BLOCK // max(1, 12 * sectors))  # triangles whose numbers stay in the cache
     for first in range(0, m, step):
         part = slice(first, first + step)
-        own = ordered[triangles[part]]
+        own = fields[triangles[part]]
         h = np.matmul(at[part], own.reshape(len(own), 6, -1)).reshape(len(own), 3, 2, 2, 2 * sectors)
         # h[m, q, j, i] = d u_i / d x_j
         energy += volume[part].ravel() @ _density(lam, mu, h[..., :sectors], h[..., sectors:]).reshape(-1, sectors)

@@ -8,81 +8,61 @@ they show what the coarse flank makes of the pressure.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .flank import edge_shapes
+from .flank import Flank, edge_shapes
 from .flank_compliance import FlankCompliance
 from .half_plane_result import PairContacts
 from .moved_faces import WAY
-from .position import Position
-from .scene import MeshingPair, Window
+from .position import FlankLoads
+from .scene import MeshingPair
 
 Array = NDArray[Any]
 
 
-def with_loads(
-    position: Position,
-    sides: Sequence[FlankCompliance],
-    elastic: MeshingPair,
-    contacts: PairContacts,
-    angle: float,
-    twist: float,
-) -> Position:
-    """The position with pieces of flank, the nodal forces on them, and their rates with the twist.
+def flank_loads(
+    sides: Sequence[FlankCompliance], elastic: MeshingPair, contacts: PairContacts, angles: Array, twists: Array
+) -> tuple[FlankLoads, FlankLoads]:
+    """Loads on the flanks of pinion and wheel.
 
     Parameters
     ----------
     sides
         Flanks of pinion and wheel.
     contacts
-        Loaded pairs of this position.
-    angle, twist
-        Pinion angle and twist from the centred position (rad).
+        m loaded pairs.
+    angles, twists : ndarray, shape (n,)
+        Pinion angles and twists from the centred position (rad) of the positions that they are of.
     """
-    windows: list[Window] = []
-    forces: list[Array] = []
-    rates: list[Array] = []
-    node = 0
-    for k in range(len(contacts)):
-        for g, tooth in enumerate((int(contacts.pair[k]), -1 - int(contacts.pair[k]))):
-            first, (shares, moved) = _nodal(sides[g], elastic.bodies[g].flank.sizes, contacts, k, g)
-            edges = (len(shares) - 1) // 2
-            windows.append(Window(g, tooth, first, edges, node))
-            node += 2 * edges + 1
-            along = (2 * g - 1) * contacts.normal[k] * np.exp(-1j * elastic.tooth_angle(g, tooth, angle, twist))
-            # the wheel's axes turn on with the twist
-            rate = contacts.force_rate[k] + 1j * (contacts.normal_rate[k] - g) * contacts.force[k]
-            forces.append((contacts.force[k] * along * shares).view(float))
-            rates.append((along * (rate * shares + contacts.force[k] * moved)).view(float))
-    if not windows:
-        return position
-    return replace(
-        position,
-        windows=tuple(windows),
-        forces=np.concatenate(forces),
-        force_rate=np.concatenate(rates),
-        contacts=contacts,
-    )
+    place = angles[contacts.position], twists[contacts.position]
+    made = []
+    for g, tooth in enumerate((contacts.pair, -1 - contacts.pair)):
+        shares, moved = _nodal(sides[g], elastic.bodies[g].flank, contacts, g)
+        along = (2 * g - 1) * contacts.normal * np.exp(-1j * elastic.tooth_angle(g, tooth, *place))
+        # the wheel's axes turn on with the twist
+        rate = contacts.force_rate + 1j * (contacts.normal_rate - g) * contacts.force
+        force = (contacts.force * along)[:, None] * shares
+        change = along[:, None] * (rate[:, None] * shares + contacts.force[:, None] * moved)
+        made.append(FlankLoads(contacts.position, tooth, force.view(float), change.view(float)))
+    return made[0], made[1]
 
 
-def _nodal(side: FlankCompliance, sizes: Array, contacts: PairContacts, k: int, gear: int) -> tuple[int, Array]:
-    """First edge under the pressure of a pair, and for the nodes from there on the shares of the force, which add up to
-    1, and their rates with the twist (1/rad) as the pressure moves along the flank and widens, shape (2, nodes).
+def _nodal(side: FlankCompliance, flank: Flank, contacts: PairContacts, gear: int) -> tuple[Array, Array]:
+    """Of each pair the shares of the force on the nodes of the flank, which add up to 1, and their rates with the twist
+    (1/rad) as the pressure moves along the flank and widens, both of shape (m, nodes).
     """
+    sizes, load = flank.sizes, contacts.pressure * contacts.width
     ends = np.concatenate([[0.0], np.cumsum(sizes)])
-    load = contacts.pressure[k] * contacts.width[k]
-    arc = contacts.panel_arc[k, gear] + side.offset
+    arc = contacts.panel_arc[:, gear] + side.offset
     edge = np.clip(np.searchsorted(ends, arc, side="right") - 1, 0, len(sizes) - 1)
     value, slope, _ = edge_shapes(np.clip((arc - ends[edge]) / sizes[edge], 0.0, 1.0))
-    first, last = int(edge[load > 0].min()), int(edge[load > 0].max())
-    nodal = np.zeros((2, 2 * (last - first + 1) + 1))
-    inside, share = load > 0, (load / load[load > 0].sum())[:, None]
-    nodes = 2 * (edge[inside, None] - first) + np.arange(3)
-    np.add.at(nodal[0], nodes, (value * share)[inside])
-    moves = contacts.arc_rate[k, gear] + WAY[gear] * contacts.x[k] * contacts.growth[k]
-    np.add.at(nodal[1], nodes, (slope * (moves / sizes[edge])[:, None] * share)[inside])
-    return first, nodal
+    share = load / load.sum(axis=1, keepdims=True)
+    moves = contacts.arc_rate[:, gear, None] + WAY[gear] * contacts.x * contacts.growth[:, None]
+    shape = len(load), len(flank.nodes)
+    at = (np.arange(shape[0])[:, None] * shape[1] + 2 * edge)[:, :, None] + np.arange(3)
+    weights = value * share[:, :, None], slope * (moves / sizes[edge] * share)[:, :, None]
+    shares, moved = (np.bincount(at.ravel(), w.ravel(), shape[0] * shape[1]).reshape(shape) for w in weights)
+    return shares, moved

@@ -1,93 +1,200 @@
-"""A solved position: its torques, its tangent, and what recovering fields needs."""
+"""Solved positions of a gear pair: what the hubs feel, the contacts, and the nodal loads that fields are recovered from.
+
+Arrays have one entry a position. What belongs to the contacts, teeth and points of the positions stands in records of
+its own, sorted by the number of the position that they are of.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .half_plane_result import PairContacts
-from .scene import Window
+from .records import joined, of_positions, ranges, taken
 
 Array = NDArray[Any]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Loaded tooth pairs of laws on the mesh, m of them; the half-plane law says more of its `PairContacts`.
+
+    Attributes
+    ----------
+    position, pair : ndarray, shape (m,)
+        Number of the position, and of the pair: pair k joins pinion tooth k and wheel tooth -1 - k.
+    torque_wheel : ndarray, shape (m,)
+        Share in the position's `torque_wheel` (N m).
+    half_width : ndarray, shape (m,)
+        By the second moment of the pressure (m), see `gearfe.contact.half_width`.
+    """
+
+    position: IntArray
+    pair: IntArray
+    torque_wheel: Array
+    half_width: Array
+
+
+@dataclass(frozen=True)
+class FlankLoads:
+    """Loads on the contact surfaces of m teeth of one gear, tooth axes.
+
+    Attributes
+    ----------
+    position, tooth : ndarray, shape (m,)
+        Number of the position, and of the tooth.
+    force, rate : ndarray, shape (m, f)
+        Forces on the nodes of the tooth's contact surface (N) and their derivatives with respect to the twist (N/rad).
+    """
+
+    position: IntArray
+    tooth: IntArray
+    force: Array
+    rate: Array
+
+    def felt(self, position: IntArray, tooth: IntArray, teeth: int) -> tuple[IntArray, IntArray, IntArray]:
+        """All couples of c teeth at positions, both of shape (c,), with the loads of the same position.
+
+        Returns the numbers of the tooth and of the load, and how many teeth the first is ahead of the second: the least
+        in size on a gear with so many `teeth`.
+        """
+        first, end = (np.searchsorted(self.position, position, side=side) for side in ("left", "right"))
+        of, load = np.repeat(np.arange(len(position)), end - first), ranges(first, end - first)
+        return of, load, (tooth[of] - self.tooth[load] + teeth // 2) % teeth - teeth // 2
 
 
 @dataclass(frozen=True)
 class PointPressures:
-    """Pressures at the contact points of a law on the mesh.
+    """Pressures at the contact points of a law on the mesh, q of them: tooth by tooth, from root to tip.
 
     Attributes
     ----------
-    owner, facing : ndarray, shape (q,)
-        Window that each point is on, and the one that it faces, by their places among the position's windows.
+    position, gear, pair : ndarray, shape (q,)
+        Number of the position, gear (0 pinion, 1 wheel) and tooth pair.
     place : ndarray, shape (q,)
-        Closest place on that window: edge number plus position in the edge.
+        Edge number plus position in the edge, along the tooth's whole contact surface. On a gear without contact points
+        of its own (one-sided laws) the closest places to those of the mate.
     pressure : ndarray, shape (q,)
         Pa.
     """
 
-    owner: NDArray[np.int64]
-    facing: NDArray[np.int64]
+    position: IntArray
+    gear: IntArray
+    pair: IntArray
     place: Array
     pressure: Array
 
 
 @dataclass(frozen=True)
-class Position:
-    """Solution of one position.
+class Positions:
+    """Solutions of n positions. `positions[i]` is one of them, with numbers in place of arrays of shape (n,).
 
     Attributes
     ----------
-    status
+    pinion_angle, twist : ndarray, shape (n,)
+        rad, the twist from where a wheel space faces the pinion tooth.
+    status : ndarray of str, shape (n,)
         ``converged``, ``no_contact`` (the undeformed gears are clear of each other), ``under_resolved`` (elements too
         coarse for the contact) or ``not_converged``. Torques are 0 without contact, not-a-number when not solved.
-    torque_wheel, torque_pinion
+    torque_wheel, torque_pinion : ndarray, shape (n,)
         Moments that the hubs need, energy-conjugate: sum of (x - c) x f over the current places (N m).
-    torque_wheel_reaction
+    torque_wheel_reaction : ndarray, shape (n,)
         Moment of the reactions at the wheel's bore: sum of (x - u - c) x f (N m).
-    tangent
+    tangent : ndarray, shape (n,)
         d torque_wheel / d twist (N m/rad).
-    pair_numbers : tuple of int
-        Pair k joins pinion tooth k and wheel tooth -1 - k.
-    pair_torques : ndarray
-        Share of each pair in `torque_wheel` (N m).
-    pair_widths : ndarray
-        Half width of each pair's contact by the second moment of its pressure (m), see `gearfe.contact.half_width`.
-    peak_pressure
-        Largest pressure at a contact point (Pa): it oscillates with the mesh, and a sharp edge gives it no bound.
-    iterations
+    iterations : ndarray, shape (n,)
         Newton steps.
-    windows : tuple of Window
-        Pieces of flank under load.
-    forces, force_rate : ndarray, shape (2n,)
-        Forces on their nodes in tooth axes (N) and their derivatives with respect to the twist (N/rad), for recovering
-        fields; None without a solution.
+    contacts
+        Loaded tooth pairs.
+    loads
+        What fields need, of pinion and wheel, at the positions where it was asked for.
     points
         Pressures at the contact points of a law on the mesh; None for other laws.
-    contacts
-        Loaded tooth pairs of the half-plane law with their panels; None for other laws.
     """
 
-    status: str
-    torque_wheel: float
-    torque_pinion: float
-    torque_wheel_reaction: float
-    tangent: float
-    pair_numbers: tuple[int, ...]
-    pair_torques: Array
-    peak_pressure: float
-    iterations: int
-    pair_widths: Array = field(default_factory=lambda: np.zeros(0))
-    windows: tuple[Window, ...] = ()
-    forces: Array | None = None
-    force_rate: Array | None = None
+    pinion_angle: Array
+    twist: Array
+    status: NDArray[np.str_]
+    torque_wheel: Array
+    torque_pinion: Array
+    torque_wheel_reaction: Array
+    tangent: Array
+    iterations: IntArray
+    contacts: Contacts | PairContacts
+    loads: tuple[FlankLoads, FlankLoads]
     points: PointPressures | None = None
-    contacts: PairContacts | None = None
+
+    def __len__(self) -> int:
+        return len(self.twist)
+
+    def __getitem__(self, i: int) -> Positions:
+        return self._of(np.arange(len(self))[[i]], i)
+
+    def take(self, chosen: IntArray | slice) -> Positions:
+        """The positions `chosen`."""
+        return self._of(np.arange(len(self))[chosen], chosen)
+
+    def _of(self, numbers: IntArray, index: Any) -> Positions:
+        made: dict[str, Any] = {}
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                made[field.name] = value[index]
+            elif isinstance(value, tuple):
+                made[field.name] = tuple(of_positions(one, numbers) for one in value)
+            else:
+                made[field.name] = None if value is None else of_positions(value, numbers)
+        return Positions(**made)
+
+    def replaced(self, places: IntArray, others: Positions) -> Positions:
+        """These with `others` at the numbers `places`."""
+        index = np.arange(len(self))
+        index[places] = len(self) + np.arange(len(others))
+        return together([self, others]).take(index)
+
+    def stated(self, status: NDArray[np.str_]) -> Positions:
+        """These with another status: what has not converged has no contacts, loads and numbers."""
+        good = status == "converged"
+        none = np.where(status == "no_contact", 0.0, np.nan)
+        numbers = {name: np.where(good, getattr(self, name), none) for name in TORQUES}
+        return replace(self.told(good), status=status, contacts=_among(self.contacts, good), **numbers)
+
+    def told(self, kept: NDArray[np.bool_]) -> Positions:
+        """These with loads and point pressures of some alone, shape (n,)."""
+        pinion, wheel = (_among(one, kept) for one in self.loads)
+        points = None if self.points is None else _among(self.points, kept)
+        return replace(self, loads=(pinion, wheel), points=points)
 
 
-def unsolved(status: str, iterations: int = 0) -> Position:
-    """A position without a solution: torques are 0 without contact, not-a-number otherwise."""
-    nothing = 0.0 if status == "no_contact" else float("nan")
-    return Position(status, nothing, nothing, nothing, nothing, (), np.zeros(0), nothing, iterations)
+#: Numbers of a position that are moments about the hubs, or their rate.
+TORQUES = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "tangent")
+
+
+def _among(record: Any, kept: NDArray[np.bool_]) -> Any:
+    """The entries of the positions that are kept, shape (n,)."""
+    return taken(record, kept[record.position])
+
+
+def together(parts: Sequence[Positions]) -> Positions:
+    """Positions one after the other."""
+    starts = np.cumsum([0, *(len(part) for part in parts)]).tolist()
+
+    def moved(records: Sequence[Any]) -> Any:
+        own = zip(records, starts, strict=False)
+        return joined([replace(record, position=record.position + start) for record, start in own])
+
+    made: dict[str, Any] = {}
+    for field in fields(Positions):
+        values = [getattr(part, field.name) for part in parts]
+        if isinstance(values[0], np.ndarray):
+            made[field.name] = np.concatenate(values)
+        elif isinstance(values[0], tuple):
+            made[field.name] = tuple(moved(one) for one in zip(*values, strict=True))
+        else:
+            made[field.name] = None if values[0] is None else moved(values)
+    return Positions(**made)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+IntArray = NDArray[np.int64]
 Record = TypeVar("Record")
 
 
@@ -33,3 +35,17 @@ def joined(parts: Sequence[Record]) -> Record:
         else:
             made[field.name] = None if values[0] is None else joined(values)
     return type(parts[0])(**made)
+
+
+def of_positions(record: Record, chosen: IntArray) -> Record:
+    """The entries of the positions `chosen`, numbered in their order; the record's are sorted by `position`."""
+    position: IntArray = record.position  # type: ignore[attr-defined]
+    first, end = (np.searchsorted(position, chosen, side=side) for side in ("left", "right"))
+    made: Any = taken(record, ranges(first, end - first))
+    return replace(made, position=np.repeat(np.arange(len(chosen)), end - first))  # type: ignore[no-any-return]
+
+
+def ranges(starts: IntArray, lengths: IntArray) -> IntArray:
+    """All of start, start + 1, ..., start + length - 1, one after the other."""
+    ends = np.cumsum(lengths)
+    return np.repeat(starts - ends + lengths, lengths) + np.arange(ends[-1] if len(ends) else 0)

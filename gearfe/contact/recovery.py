@@ -1,59 +1,44 @@
-"""From the contact forces of a position back to displacements of whole tooth sectors."""
+"""From the loads on the teeth of a gear back to displacements of whole tooth sectors."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .compliance import GearBody
-from .position import Position
+from .position import FlankLoads
 
 Array = NDArray[Any]
+IntArray = NDArray[np.int64]
 
 
-def position_forces(body: GearBody, gear: int, position: Position, *, rate: bool = False) -> dict[int, Array]:
-    """Forces on the whole contact surface of each loaded tooth of one gear: tooth number -> shape (f,) (N, tooth axes).
+def sector_displacements(
+    body: GearBody, loads: FlankLoads, position: IntArray, tooth: IntArray, *, rates: bool = False
+) -> Array:
+    """Nodal displacements of c sectors, by their teeth, in the axes of each (m).
 
     Parameters
     ----------
-    gear
-        0 pinion, 1 wheel.
-    rate
-        Their derivatives with respect to the twist instead (N/rad).
-    """
-    forces = position.force_rate if rate else position.forces
-    if forces is None:
-        raise ValueError(f"a position without a solution has no forces: {position.status}")
-    loaded: dict[int, Array] = {}
-    for w in position.windows:
-        if w.gear == gear:
-            whole = loaded.setdefault(w.tooth % body.teeth, np.zeros(len(body.own)))
-            whole[w.flank_unknowns] += forces[w.unknowns]
-    return loaded
-
-
-def retained_displacements(body: GearBody, loaded: dict[int, Array], tooth: int) -> Array:
-    """Displacements (m) of the retained unknowns (flank, then cut sides) of one sector, in its own axes."""
-    sides = np.zeros(body.interface.shape[1])
-    for number, load in loaded.items():
-        sides += body.coupling[(tooth - number) % body.teeth] @ (load @ body.interface)
-    flank = body.interface @ sides
-    own = loaded.get(tooth % body.teeth)
-    if own is not None:
-        flank += body.own @ own
-    return np.concatenate([flank, sides])
-
-
-def sector_displacements(body: GearBody, cases: Sequence[tuple[dict[int, Array], int]]) -> Array:
-    """Nodal displacements of sectors: one case is (loads on the loaded teeth, tooth number).
+    position, tooth : ndarray, shape (c,)
+        Number of the position, and of the tooth.
+    rates
+        Whether their derivatives with respect to the twist (m/rad) follow, another c.
 
     Returns
     -------
-    ndarray, shape (nodes, 2, cases)
-        m, in the axes of each case's tooth.
+    ndarray, shape (nodes, 2, c or 2 c)
     """
-    values = np.stack([retained_displacements(body, loaded, tooth) for loaded, tooth in cases], axis=1)
-    return body.condensed.recover(values).reshape(-1, 2, len(cases))
+    of, load, step = loads.felt(position, tooth, body.teeth)
+    parts = []
+    for force in (loads.force, loads.rate) if rates else (loads.force,):
+        on_sides = force @ body.interface
+        sides, flank = np.zeros((len(position), body.interface.shape[1])), np.zeros((len(position), force.shape[1]))
+        for k in np.unique(step):
+            here = step == k
+            np.add.at(sides, of[here], on_sides[load[here]] @ body.coupling[k].T)
+            if k == 0:
+                np.add.at(flank, of[here], force[load[here]] @ body.own)
+        parts.append(np.concatenate([flank + sides @ body.interface.T, sides], axis=1))
+    return body.condensed.recover(np.concatenate(parts).T).reshape(-1, 2, sum(len(part) for part in parts))

@@ -83,44 +83,6 @@ class MeshingPair:
         return np.array([gear * self.centre_distance, 0.0])
 
 
-@dataclass(frozen=True)
-class Window:
-    """A piece of one tooth's contact surface that may touch the mate.
-
-    Attributes
-    ----------
-    gear
-        0 pinion, 1 wheel.
-    tooth
-        Tooth number; the compliance depends on differences of it only.
-    first_edge, edges
-        Range of edges of the tooth's contact surface.
-    first_node
-        Where its nodes start among those of the position.
-    """
-
-    gear: int
-    tooth: int
-    first_edge: int
-    edges: int
-    first_node: int
-
-    @property
-    def nodes(self) -> slice:
-        """Its nodes among those of the position."""
-        return slice(self.first_node, self.first_node + 2 * self.edges + 1)
-
-    @property
-    def unknowns(self) -> slice:
-        """Its unknowns among those of the position."""
-        return slice(2 * self.first_node, 2 * (self.first_node + 2 * self.edges + 1))
-
-    @property
-    def flank_unknowns(self) -> slice:
-        """Its unknowns within the tooth's contact surface."""
-        return slice(4 * self.first_edge, 4 * (self.first_edge + self.edges) + 2)
-
-
 def turn(angle: float) -> Array:
     """Rotation matrix of `angle` (rad)."""
     c, s = np.cos(angle), np.sin(angle)

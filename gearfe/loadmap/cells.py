@@ -1,91 +1,131 @@
-"""Pieces of computing a load map: predicting a cell, the order of the torques, bringing a level to its torque."""
+"""What a load map tells of a cell beforehand: its twist, and its share of finite strain."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..stiffness.positions import Solved
+from ..contact.finite_strain import finite_strain_shares, interpolated_shares
+from ..contact.position import Positions
+from ..contact.scene import MeshingPair
 
 Array = NDArray[Any]
 IntArray = NDArray[Any]
 
 #: p: the share of finite strain of a single pair of teeth grows about like this power of its load.
 SHARE_POWER = 0.75
+#: Angles on which the share of finite strain is evaluated at a torque, and the error of it that is left.
+SHARE_ANGLES, SHARE_ERROR = 24, 5e-5
 
 
-def spent_share(pair_torques: Array) -> float:
-    """T^p sum s^(1 + p) of the torques that the pairs carry (N m)."""
-    carried = np.maximum(pair_torques, 0.0)
-    return float((carried ** (1 + SHARE_POWER)).sum() / carried.sum())
+def spent(found: Positions) -> Array:
+    """T^p sum s^(1 + p) of the torques that the pairs of positions carry, shape (n,); 0 without contact."""
+    position, torque = found.contacts.position, np.maximum(found.contacts.torque_wheel, 0.0)
+    power, whole = (np.bincount(position, values, len(found)) for values in (torque ** (1 + SHARE_POWER), torque))
+    return np.divide(power, whole, out=np.zeros(len(found)), where=whole > 0)
 
 
-def log_twist(x: float, known: Array, y: Array, slope: Array) -> float:
-    """Cubic Hermite between the two nearest known levels round x; beyond the last, a parabola through its slopes."""
-    order = np.argsort(known)
-    known, y, slope = known[order], y[order], slope[order]
-    k = int(np.searchsorted(known, x))
-    if 0 < k < len(known):
-        h = known[k] - known[k - 1]
-        t = (x - known[k - 1]) / h
-        low, high, rise = h * slope[k - 1], h * slope[k], y[k] - y[k - 1]
-        return float(y[k - 1] + t * (low + t * (3 * rise - 2 * low - high + t * (low + high - 2 * rise))))
-    end, other = (0, 1) if k == 0 else (len(known) - 1, len(known) - 2)
-    bend = 0.0
-    if len(known) > 1:
-        bend = (slope[end] - slope[other]) / (known[end] - known[other])
-    step = x - known[end]
-    steepest = np.clip(slope[end] + 0.5 * bend * step, 0.3, 1.2)
-    return float(y[end] + steepest * step)
+def hermite(t: Array, value: Array, slope: Array) -> Array:
+    """Cubic through two values with their slopes, both of shape (2, ...), the slopes times the interval; 0 <= t <= 1."""
+    low, high, rise = slope[0], slope[1], value[1] - value[0]
+    return np.asarray(value[0] + t * (low + t * (3 * rise - 2 * low - high + t * (low + high - 2 * rise))))
 
 
-def outward(count: int) -> list[int]:
-    """Numbers 0 .. count - 1: every other one outward from the middle, then the ones between these."""
-    middle = count // 2
-    even = [*range(middle, count, 2), *range(middle - 2, -1, -2)]
-    ends = [i for i in (0, count - 1) if i not in even]
-    return [*even, *ends, *(i for i in range(count) if i not in {*even, *ends})]
+def between(known: Array, goals: Array) -> tuple[IntArray, Array]:
+    """Of rising torques the ones on either side of others, shape (2, m), and where these lie between in ln T, (m, 1)."""
+    high = np.clip(np.searchsorted(known, goals), 1, len(known) - 1)
+    pair = np.stack([high - 1, high])
+    x = np.log(known[pair])
+    return pair, ((np.log(goals) - x[0]) / (x[1] - x[0]))[:, None]
 
 
-def one_cell(made: Solved, k: int) -> Solved:
-    """Cell k of some that were solved together."""
-    part = slice(k, k + 1)
-    numbers = {name: values[part] for name, values in made.numbers.items()}
-    return Solved(made.twist[part], numbers, [made.pairs[k]], made.iterations[part], [made.status[k]])
+def predicted(known: Positions, goals: Array, touching: Array, others: Array) -> tuple[Array, Array]:
+    """Twists (rad) at which cells carry their torque, and what is `spent` in them.
 
+    Parameters
+    ----------
+    known
+        Cells at the torques `goals`, shape (m,), and n angles, torque by torque.
+    touching
+        Twists, shape (n,), at which the rigid flanks touch (rad).
+    others : ndarray, shape (k,)
+        Torques of the other cells between them (N m).
 
-def closed_level(cells: list[Solved], goal: float, share: Array, touching: Array, tally: IntArray) -> Solved:
-    """The level at its torque: the last small step, then the share of finite strain.
-
-    The step follows the tangent of ln delta over ln T, delta the twist beyond `touching`, shape (n,) (rad).
+    Returns
+    -------
+    ndarray, ndarray, shape (k n,)
+        Not-a-number beside a cell without a solution.
     """
-    twist = np.concatenate([c.twist for c in cells])
-    numbers = {name: np.concatenate([c.numbers[name] for c in cells]) for name in cells[0].numbers}
-    status = [c.status[0] for c in cells]
-    good = np.array(status) == "converged"
+    shape = len(goals), len(touching)
+    pair, t = between(goals, others)
+    delta = known.twist.reshape(shape) - touching
     with np.errstate(invalid="ignore", divide="ignore"):
-        torque, tangent = numbers["torque_wheel"], numbers["tangent"]
-        delta = twist - touching
-        step = (goal / (1 + share) / torque) ** (torque / (delta * tangent))
-        twist = np.where(good, touching + delta * step, twist)
-        factor = np.where(good, goal / torque, 1.0)  # the step and the share together
-        root = np.where(good, np.sqrt(goal / (1 + share) / torque), 1.0)
-    moved = dict(numbers)
-    for name in ("torque_wheel", "torque_pinion", "torque_wheel_reaction"):
-        moved[name] = numbers[name] * factor
-    moved["torque_wheel"] = np.where(good, goal, moved["torque_wheel"])
-    moved["tangent"] = tangent * (1 + 2 * share)
-    for name in ("peak_pressure", "edge_pressure"):
-        moved[name] = numbers[name] * root
-    pairs = [(c.pairs[0][0], c.pairs[0][1] * f) for c, f in zip(cells, factor, strict=True)]
-    return replace(
-        cells[0],
-        twist=twist,
-        numbers=moved,
-        pairs=pairs,
-        iterations=tally,
-        status=status,
-    )
+        steep = (known.torque_wheel / known.tangent).reshape(shape) / delta
+        interval = np.log(goals[pair[1]] / goals[pair[0]])[:, None]
+        twist = touching + np.exp(hermite(t, np.log(delta)[pair], steep[pair] * interval))
+    each = spent(known).reshape(shape) / goals[:, None] ** SHARE_POWER
+    carried = ((1 - t) * each[pair[0]] + t * each[pair[1]]) * others[:, None] ** SHARE_POWER
+    return twist.ravel(), carried.ravel()
+
+
+class StrainShares:
+    """Shares of finite strain c = kappa spent of the cells of a map; each learns its kappa when it is first asked for.
+
+    Parameters
+    ----------
+    elastic
+        The gears.
+    angles, goals
+        Pinion angles (rad) and rising torques (N m) of the map.
+    known
+        Numbers of the torques that are asked for before all others.
+    """
+
+    def __init__(self, elastic: MeshingPair, angles: Array, goals: Array, known: IntArray) -> None:
+        self._elastic, self._angles, self._goals, self._known = elastic, angles, goals, known
+        self._kappa = np.full((len(goals), len(angles)), np.nan)
+        self._pairs = np.zeros(self._kappa.shape, dtype=np.int64)
+
+    def expected(self, rows: IntArray, carried: Array) -> Array:
+        """Before cells of the torques `rows` are solved, from what is `spent` in them."""
+        return np.nan_to_num(self._between(rows)[0].ravel() * carried)
+
+    def at(self, rows: IntArray, found: Positions) -> Array:
+        """Of all solved cells of the torques `rows`, shape (cells,)."""
+        carried = spent(found)
+        if np.isnan(self._kappa[rows]).any():
+            count = np.bincount(found.contacts.position, minlength=len(found))
+            self._pairs[rows] = count.reshape(len(rows), -1)
+            learn = self._first if rows is self._known else self._other
+            self._kappa[rows] = np.nan_to_num(learn(rows, found, carried))
+        return self._kappa[rows].ravel() * carried
+
+    def _direct(self, found: Positions, carried: Array, cells: IntArray) -> Array:
+        shares = finite_strain_shares(self._elastic, found.take(cells))
+        return np.divide(shares, carried[cells], out=np.full(len(cells), np.nan), where=carried[cells] > 0)
+
+    def _first(self, rows: IntArray, found: Positions, carried: Array) -> Array:
+        """At some angles of each torque, linear between them."""
+        angles, cycle = self._angles, self._elastic.pitch_angle
+        order = np.argsort(np.mod(angles, cycle), kind="stable")
+        places = np.unique(np.linspace(0, len(order) - 1, min(SHARE_ANGLES, len(order))).round().astype(np.int64))
+        at = order[places]
+        kappa = self._direct(found, carried, (np.arange(len(rows))[:, None] * len(angles) + at).ravel())
+        return np.stack([interpolated_shares(angles, angles[at], k, cycle) for k in kappa.reshape(len(rows), -1)])
+
+    def _between(self, rows: IntArray) -> tuple[Array, Array, IntArray]:
+        """From the known torques on either side: kappa, its change from one to the other, and their loaded pairs."""
+        pair, t = between(self._goals[self._known], self._goals[rows])
+        low, high = self._kappa[self._known][pair]
+        return (1 - t) * low + t * high, high - low, self._pairs[self._known][pair]
+
+    def _other(self, rows: IntArray, found: Positions, carried: Array) -> Array:
+        """Between the known torques, directly where that may be off."""
+        kappa, change, pairs = self._between(rows)
+        differ = (pairs != self._pairs[rows]).any(axis=0)
+        doubt = np.flatnonzero(differ.ravel() | (0.5 * np.abs(change).ravel() * carried > SHARE_ERROR))
+        made = kappa.ravel()
+        made[doubt] = self._direct(found, carried, doubt)
+        return made.reshape(kappa.shape)

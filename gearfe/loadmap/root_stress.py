@@ -29,8 +29,7 @@ from numpy.typing import NDArray
 
 from ..contact.compliance import GearBody, gear_body
 from ..contact.flank import Flank, edge_nodes, edge_shapes
-from ..contact.position import Position
-from ..contact.recovery import position_forces
+from ..contact.position import FlankLoads, Positions
 from ..contact.scene import MeshingPair
 from ..gear.pair import Gear, GearPair
 from ..meshing.recipe import sector_recipes
@@ -70,29 +69,27 @@ class RootMesh:
     rows: dict[int, Array]
     size: float
 
-    def largest(self, tooth: int, loads: dict[int, Array], teeth: int) -> tuple[float, float]:
-        """Largest tension (Pa) along the fillet of a tooth, and its radius (m)."""
-        stress = np.zeros(len(self.place))
-        for number, force in loads.items():
-            step = (tooth - number + teeth // 2) % teeth - teeth // 2
-            if step in self.rows:
-                stress += self.rows[step] @ force
-        return peak(self.place, stress, self.radius)
+    def largest(self, loads: FlankLoads, position: IntArray, tooth: IntArray, teeth: int) -> tuple[Array, Array]:
+        """Largest tensions (Pa) along the fillets of c teeth at positions, both of shape (c,), and their radii (m)."""
+        stress = np.zeros((len(tooth), len(self.place)))
+        of, load, step = loads.felt(position, tooth, teeth)
+        for k in np.intersect1d(step, list(self.rows)):
+            here = step == k
+            np.add.at(stress, of[here], loads.force[load[here]] @ self.rows[k].T)
+        return peaks(self.place, stress, self.radius)
 
 
-def peak(place: Array, values: Array, other: Array) -> tuple[float, float]:
-    """Largest value of a curve through samples, by a parabola round the largest one, and `other` at that place."""
-    k = int(np.clip(np.argmax(values), 1, len(values) - 2))
-    x, y = place[k - 1 : k + 2], values[k - 1 : k + 2]
+def peaks(place: Array, values: Array, other: Array) -> tuple[Array, Array]:
+    """Largest values of c curves through samples, shape (c, q), by parabolas round the largest ones, and `other` there."""
+    row, top = np.arange(len(values)), np.argmax(values, axis=1)
+    k = np.clip(top, 1, len(place) - 2)
+    x, y = place[k + [[-1], [0], [1]]], values[row, k + [[-1], [0], [1]]]
     left, right = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
     bend = (right - left) / (x[2] - x[0])
-    if bend < 0:
-        at = 0.5 * (x[0] + x[1]) - 0.5 * left / bend
-        if x[0] <= at <= x[2]:
-            value = y[0] + left * (at - x[0]) + bend * (at - x[0]) * (at - x[1])
-            return float(value), float(np.interp(at, place, other))
-    k = int(np.argmax(values))
-    return float(values[k]), float(other[k])
+    at = 0.5 * (x[0] + x[1]) - 0.5 * left / np.where(bend < 0, bend, -1.0)
+    inside = (bend < 0) & (x[0] <= at) & (at <= x[2])
+    value = y[0] + left * (at - x[0]) + bend * (at - x[0]) * (at - x[1])
+    return np.where(inside, value, values[row, top]), np.where(inside, np.interp(at, place, other), other[top])
 
 
 def fillet_radius(gear: Gear) -> float:
@@ -172,17 +169,27 @@ def spread_of(chain: Flank, points: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class ToothRoot:
-    """Root stress of one loaded tooth: value (Pa), where (diameter, m), estimated relative error (-)."""
+class ToothRoots:
+    """Root stresses of c loaded tooth pairs; the second axis is the gear (pinion, wheel).
 
-    stress: float
-    diameter: float
-    error: float
+    Attributes
+    ----------
+    position, pair : ndarray, shape (c,)
+        Number of the position, and of the tooth pair.
+    stress, diameter, error : ndarray, shape (c, 2)
+        Largest tension (Pa), where it acts (m), and its estimated relative error (-).
+    """
+
+    position: IntArray
+    pair: IntArray
+    stress: Array
+    diameter: Array
+    error: Array
 
 
 @dataclass(frozen=True)
 class PairRoots:
-    """Root stresses of both gears of a pair, from the forces of any solved position.
+    """Root stresses of both gears of a pair, from the loads of any solved positions.
 
     Attributes
     ----------
@@ -195,19 +202,17 @@ class PairRoots:
     pair: MeshingPair
     meshes: tuple[tuple[RootMesh, RootMesh], tuple[RootMesh, RootMesh]]
 
-    def at(self, position: Position) -> dict[int, tuple[ToothRoot, ToothRoot]]:
-        """Pair number -> root of its pinion tooth and of its wheel tooth, for the pairs that carry load."""
-        loads = [position_forces(body, g, position) for g, body in enumerate(self.pair.bodies)]
-        found = {}
-        for number, torque in zip(position.pair_numbers, position.pair_torques, strict=True):
-            if torque > 0:
-                found[number] = (self._tooth(0, number, loads[0]), self._tooth(1, -1 - number, loads[1]))
-        return found
-
-    def _tooth(self, gear: int, tooth: int, loads: dict[int, Array]) -> ToothRoot:
-        teeth = self.pair.bodies[gear].teeth
-        coarse, fine = (mesh.largest(tooth % teeth, loads, teeth) for mesh in self.meshes[gear])
-        return ToothRoot(fine[0], 2 * fine[1], abs(fine[0] - coarse[0]) / abs(fine[0]))
+    def at(self, found: Positions) -> ToothRoots:
+        """Of the tooth pairs that carry load."""
+        contacts = found.contacts
+        carry = contacts.torque_wheel > 0
+        position, pair = contacts.position[carry], contacts.pair[carry]
+        stress, radius, error = np.zeros((3, len(pair), 2))
+        for g, tooth in enumerate((pair, -1 - pair)):
+            of_gear = found.loads[g], position, tooth, self.pair.bodies[g].teeth
+            (coarse, _), (stress[:, g], radius[:, g]) = (mesh.largest(*of_gear) for mesh in self.meshes[g])
+            error[:, g] = np.abs(stress[:, g] - coarse) / np.abs(stress[:, g])
+        return ToothRoots(position, pair, stress, 2 * radius, error)
 
 
 def pair_roots(gears: GearPair, pair: MeshingPair, *, coarsen: float = 1.0) -> PairRoots:
@@ -229,44 +234,25 @@ def pair_roots(gears: GearPair, pair: MeshingPair, *, coarsen: float = 1.0) -> P
     return PairRoots(pair, (made[0], made[1]))
 
 
-class RootRecorder:
-    """Collects the root stresses of a load map's cells while they are solved.
+def root_map(roots: ToothRoots, shape: tuple[int, int], source: IntArray) -> RootMap:
+    """The roots of the cells of a map with m torques and n angles, row by row, at all angles.
 
     Parameters
     ----------
-    roots
-        Root stresses of the pair.
+    shape
+        (m, n).
+    source : ndarray
+        Number of the solved angle behind each angle of the map.
     """
-
-    def __init__(self, roots: PairRoots) -> None:
-        self._roots = roots
-        self._cells: dict[tuple[int, int], tuple[float, dict[int, tuple[ToothRoot, ToothRoot]]]] = {}
-
-    def record(self, level: int, number: int, position: Position) -> None:
-        """Take a cell's solution; a later one of the same cell replaces it."""
-        self._cells[level, number] = (position.torque_wheel, self._roots.at(position))
-
-    def gathered(self, torques: Array, source: IntArray, failed: Array) -> RootMap:
-        """The map, at the torques, shape (m,) (N m), that the cells stand for.
-
-        Parameters
-        ----------
-        source : ndarray, shape (n,)
-            Number of the solved angle behind each angle of the map.
-        failed : ndarray of bool, shape (m, n)
-        """
-        most = max((max(c) - min(c) + 1 for _, c in self._cells.values() if c), default=1)
-        shape = (len(torques), len(source), 2)
-        stress = np.full((*shape, most), np.nan)
-        diameter, error = np.full(shape, np.nan), np.full(shape, np.nan)
-        for level, goal in enumerate(torques):
-            for j, number in enumerate(source):
-                torque, pairs = self._cells.get((level, int(number)), (1.0, {}))
-                if failed[level, j] or not pairs:
-                    continue
-                for g in range(2):
-                    for k, roots in pairs.items():
-                        stress[level, j, g, max(pairs) - k] = roots[g].stress * goal / torque
-                    worst = max((roots[g] for roots in pairs.values()), key=lambda root: root.stress)
-                    diameter[level, j, g], error[level, j, g] = worst.diameter, worst.error
-        return RootMap(stress, diameter, error)
+    cells = shape[0] * shape[1]
+    leading = np.full(cells, -np.inf)
+    np.maximum.at(leading, roots.position, roots.pair)
+    behind = leading[roots.position].astype(np.int64) - roots.pair
+    stress = np.full((cells, 2, int(behind.max(initial=0)) + 1), np.nan)
+    diameter, error = np.full((2, cells, 2), np.nan)
+    for g in range(2):
+        stress[roots.position, g, behind] = roots.stress[:, g]
+        order = np.argsort(roots.stress[:, g], kind="stable")  # the largest of a cell comes last and stays
+        diameter[roots.position[order], g] = roots.diameter[order, g]
+        error[roots.position[order], g] = roots.error[order, g]
+    return RootMap(*(values.reshape(*shape, *values.shape[1:])[:, source] for values in (stress, diameter, error)))

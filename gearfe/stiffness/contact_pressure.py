@@ -21,13 +21,12 @@ compare designs with, which neither the mesh nor a contact of some micrometres d
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.position import Position
+from ..contact.position import Positions
 from ..contact.scene import MeshingPair
 from ..gear.touching import Face, Flanks, Touching
 
@@ -45,9 +44,7 @@ BLUNTING = 0.01
 QUANTITIES = ("peak_pressure", "peak_pressure_error", "edge_pressure", "edge")
 
 
-def contact_pressures(
-    elastic: MeshingPair, flanks: Flanks, touching: Sequence[Touching], positions: Sequence[Position]
-) -> dict[str, Array]:
+def contact_pressures(elastic: MeshingPair, flanks: Flanks, touching: Touching, found: Positions) -> dict[str, Array]:
     """The `QUANTITIES` of n positions, each of shape (n,).
 
     Parameters
@@ -55,36 +52,26 @@ def contact_pressures(
     touching
         Of each position the tooth pairs whose rigid flanks can meet.
     """
-    lines = [_Line(face) for face in flanks.faces]
-    modulus = 1.0 / sum(elastic.contact_compliances)
-    blunting = BLUNTING * flanks.pair.pinion.module
-    made = {name: np.full(len(positions), np.nan) for name in QUANTITIES[:3]}
-    edge = np.zeros(len(positions), dtype=np.int64)
-    for n, (position, met) in enumerate(zip(positions, touching, strict=True)):
-        if position.status == "no_contact":
-            made["peak_pressure"][n] = made["peak_pressure_error"][n] = 0.0
-        if position.status != "converged":
-            continue
-        for number, torque, width in zip(
-            position.pair_numbers, position.pair_torques, position.pair_widths, strict=True
-        ):
-            here = np.flatnonzero(met.pair == number)
-            if torque <= 0 or len(here) == 0:
-                continue
-            k = int(here[0])
-            force = torque / (met.arm[k, 1] * elastic.width)
-            bears = max(line.bears(float(u), width) for line, u in zip(lines, met.place[k], strict=True))
-            if not math.isfinite(met.curvature[k]):  # it touches at the corner itself, however narrow the contact
-                bears = _SINGULAR
-            if bears:
-                edge[n] = max(edge[n], bears)
-                blunted = 2 * force / (math.pi * math.hypot(width, blunting))
-                made["edge_pressure"][n] = np.fmax(made["edge_pressure"][n], blunted)
-                continue
-            hertz = math.sqrt(force * modulus * met.curvature[k] / math.pi)
-            if not hertz <= made["peak_pressure"][n]:
-                made["peak_pressure"][n] = hertz
-                made["peak_pressure_error"][n] = abs(width * math.pi * hertz / (2 * force) - 1)
+    contacts, lines = found.contacts, [_Line(face) for face in flanks.faces]
+    met, pairs = ((np.stack([one.position, one.pair], axis=1) @ [1 << 32, 1]) for one in (touching, contacts))
+    k = np.minimum(np.searchsorted(met, pairs), len(met) - 1)
+    known = np.flatnonzero((contacts.torque_wheel > 0) & (met[k] == pairs))
+    k, position, width = k[known], contacts.position[known], contacts.half_width[known]
+    force = contacts.torque_wheel[known] / (touching.arm[k, 1] * elastic.width)
+    curvature, flat = touching.curvature[k], np.isfinite(touching.curvature[k])
+    bears = np.maximum(*(line.bears(touching.place[k, g], width) for g, line in enumerate(lines)))
+    bears[~flat] = _SINGULAR  # it touches at the corner itself, however narrow the contact
+    hertz = np.sqrt(force / sum(elastic.contact_compliances) * np.where(flat, curvature, 0.0) / math.pi)
+    blunted = 2 * force / (math.pi * np.hypot(width, BLUNTING * flanks.pair.pinion.module))
+    off = np.abs(width * math.pi * hertz / (2 * force) - 1)
+    made = {name: np.where(found.status == "no_contact", 0.0, np.nan) for name in QUANTITIES[:2]}
+    made["edge_pressure"], edge = np.full(len(found), np.nan), np.zeros(len(found), dtype=np.int64)
+    np.maximum.at(edge, position, bears)
+    np.fmax.at(made["edge_pressure"], position[bears > 0], blunted[bears > 0])
+    smooth = np.flatnonzero(bears == 0)
+    smooth = smooth[np.argsort(hertz[smooth], kind="stable")]  # the largest of a position comes last and stays
+    made["peak_pressure"][position[smooth]] = hertz[smooth]
+    made["peak_pressure_error"][position[smooth]] = off[smooth]
     return {**made, "edge": edge}
 
 
@@ -122,9 +109,8 @@ class _Line:
         """Arc length (m) at parameters u."""
         return np.interp(u, self.u, self.arc)
 
-    def bears(self, u: float, half: float) -> int:
-        """Place in `EDGES` of what a contact of the half width `half` (m) about u reaches."""
-        s = float(self.at(u))
-        if (np.abs(self.sharp - s) <= half).any():
-            return _SINGULAR
-        return _ROUNDED if s + half > self.round else 0
+    def bears(self, u: Array, half: Array) -> NDArray[np.int64]:
+        """Places in `EDGES` of what contacts of the half widths `half` (m) about u reach."""
+        s = self.at(u)
+        sharp = (np.abs(self.sharp - s[:, None]) <= half[:, None]).any(axis=1)
+        return np.where(sharp, _SINGULAR, np.where(s + half > self.round, _ROUNDED, 0))

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.compliance import GearBody
-from ..contact.position import Position
-from ..contact.recovery import position_forces, sector_displacements
+from ..contact.position import Positions
+from ..contact.recovery import sector_displacements
 from ..contact.scene import MeshingPair, turn
 from ..elasticity import physical_gradients, principal_stresses, triangle_shapes, von_mises
 from ..meshing.whole_gear import WholeGear, whole_gear
@@ -109,7 +109,7 @@ def _stress_rows(body: GearBody) -> Any:
     return csr_array((rows.ravel(), (row.ravel(), column.ravel())), shape=(3 * size, 2 * size))
 
 
-def gear_field(recovery: GearRecovery, pair: MeshingPair, position: Position, angle: float, gear: int) -> GearField:
+def gear_field(recovery: GearRecovery, pair: MeshingPair, position: Positions, angle: float, gear: int) -> GearField:
     """Fields of one gear.
 
     Parameters
@@ -122,9 +122,9 @@ def gear_field(recovery: GearRecovery, pair: MeshingPair, position: Position, an
         0 pinion, 1 wheel.
     """
     body, whole = recovery.body, recovery.whole
-    loads = position_forces(body, gear, position)
-    local = sector_displacements(body, [(loads, tooth) for tooth in range(body.teeth)])  # (s, 2, z)
     teeth = body.teeth
+    every = np.arange(teeth)
+    local = sector_displacements(body, position.loads[gear], np.zeros_like(every), every)  # (s, 2, z)
     turns = angle + 2 * np.pi * np.arange(teeth) / teeth
     c, s = np.cos(turns), np.sin(turns)
     x, y = local[:, 0], local[:, 1]
@@ -159,7 +159,7 @@ class PairRecovery:
     pair: MeshingPair
     gears: tuple[GearRecovery, GearRecovery]
 
-    def at(self, position: Position, pinion_angle: float, twist: float) -> tuple[GearField, GearField]:
+    def at(self, position: Positions, pinion_angle: float, twist: float) -> tuple[GearField, GearField]:
         """Fields of pinion and wheel.
 
         Parameters

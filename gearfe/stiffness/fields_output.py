@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.position import Position
+from ..contact.position import Positions
 from ..contact.scene import MeshingPair
 from ..errors import InputError
 from ..gear.drawing import zone
@@ -147,13 +147,13 @@ def _place(curve: StiffnessCurve, number: int) -> tuple[float, float]:
     return float(curve.pinion_angle[number]), float(curve.twist[number] + curve.lost_motion)
 
 
-def _solved(solver: PositionSolver, curve: StiffnessCurve, chosen: NDArray[np.int64]) -> Iterator[tuple[int, Position]]:
+def _solved(solver: PositionSolver, curve: StiffnessCurve, chosen: NDArray[np.int64]) -> Iterator[tuple[int, Positions]]:
     """Positions of the curve solved again, a few side by side; one that does not converge again is left out."""
     for first in range(0, len(chosen), SIDE_BY_SIDE):
         part = chosen[first : first + SIDE_BY_SIDE]
-        made = solver.solve(curve.pinion_angle[part], curve.twist[part] + curve.lost_motion, kept=range(len(part)))
+        made = solver.solve(curve.pinion_angle[part], curve.twist[part] + curve.lost_motion, kept=np.arange(len(part)))
         for number, position in zip(part.tolist(), made, strict=True):
-            if position.forces is not None:
+            if position.status == "converged":
                 yield number, position
 
 
@@ -247,7 +247,7 @@ def frames_of(
             part = slice(first, first + SIDE_BY_SIDE)
             made = solver.solve(angles[part], twists[part], kept=range(len(angles[part])))
             for angle, twist, position in zip(angles[part], twists[part], made, strict=True):
-                if position.forces is not None:
+                if position.status == "converged":
                     fields = recovery.at(position, float(angle), float(twist))
                     parts = [
                         cut_out(1e3 * (f.points + f.displacement), f.triangles, 1e-6 * f.von_mises, place)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..contact.flank import Flank, edge_nodes, edge_shapes
 from ..contact.half_plane_result import PairContacts
-from ..contact.position import Position
+from ..contact.position import Positions
 from ..contact.scene import MeshingPair
 
 Array = NDArray[Any]
@@ -46,30 +46,18 @@ class FlankPressure:
         return np.asarray(np.interp(0.5 * np.arange(count), self.place, self.pressure, left=0.0, right=0.0))
 
 
-def flank_pressures(pair: MeshingPair, position: Position) -> list[FlankPressure]:
-    """Pressure on each piece of flank of a solved position.
-
-    On a gear whose flank carries no contact points of its own (one-sided laws) it is what the mate's points press on
-    it, at their closest places.
-    """
-    if position.contacts is not None:
-        return _of_panels(pair, position.contacts)
-    made: list[FlankPressure] = []
+def flank_pressures(pair: MeshingPair, position: Positions) -> list[FlankPressure]:
+    """Pressure on each piece of flank of one solved position, from `Positions.points` or the half-plane law's panels."""
     points = position.points
     if points is None:
-        return made
-    for i, w in enumerate(position.windows):
-        flank = pair.bodies[w.gear].flank
-        mine = np.flatnonzero(points.owner == i)
-        if len(mine):
-            place = w.first_edge + _own_places(flank, w.edges, len(mine))
-        else:
-            mine = np.flatnonzero(points.facing == i)
-            mine = mine[np.argsort(points.place[mine], kind="stable")]
-            place = w.first_edge + points.place[mine]
-        radius = np.linalg.norm(_points(flank, place), axis=1)
-        number = w.tooth if w.gear == 0 else -1 - w.tooth
-        made.append(FlankPressure(w.gear, number, w.tooth, place, radius, points.pressure[mine]))
+        assert isinstance(position.contacts, PairContacts)
+        return _of_panels(pair, position.contacts)
+    made: list[FlankPressure] = []
+    for gear, number in dict.fromkeys(zip(points.gear.tolist(), points.pair.tolist(), strict=True)):
+        mine = (points.gear == gear) & (points.pair == number)
+        radius = np.linalg.norm(_points(pair.bodies[gear].flank, points.place[mine]), axis=1)
+        tooth = number if gear == 0 else -1 - number
+        made.append(FlankPressure(gear, number, tooth, points.place[mine], radius, points.pressure[mine]))
     return made
 
 
@@ -85,13 +73,6 @@ def _of_panels(pair: MeshingPair, contacts: PairContacts) -> list[FlankPressure]
             place = 0.5 * np.interp(radius, nodes, np.arange(len(nodes)))
             made.append(FlankPressure(g, number, tooth, place, radius, pressure))
     return made
-
-
-def _own_places(flank: Flank, edges: int, count: int) -> Array:
-    """Edge plus position in it of the contact points of a piece of flank."""
-    xi = flank.shapes @ np.array([0.0, 0.5, 1.0])  # the shape functions reproduce the coordinate itself
-    assert count == edges * len(xi)
-    return np.asarray((np.arange(edges)[:, None] + xi).ravel())
 
 
 def _points(flank: Flank, place: Array) -> Array:

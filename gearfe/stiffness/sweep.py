@@ -31,12 +31,13 @@ from ..stopwatch import Stopwatch
 from ..tables.laws import DEFAULT_LAW
 from ..tables.stiffness import check_flank_coarsen
 from ..threads import one_thread
-from .contact_pressure import EDGES
+from ..contact.position import Positions
+from .contact_pressure import EDGES, contact_pressures
 from .curve import SOLVED, ErrorEstimate, StiffnessCurve
 from .curve_error import COARSENING, error_estimate, solved_twice, unseen_error
 from .periodic import fold
 from .position_solver import PositionSolver, position_solver
-from .positions import Progress, Solved, at_torque, at_twists, check_torque, honest, load_shares
+from .positions import Progress, at_torque, at_twists, check_torque, honest, load_shares
 from .torque_control import ANGLE_ROUNDING
 
 __all__ = ["ErrorEstimate", "StiffnessCurve", "elastic_pair", "sweep_stiffness"]
@@ -208,9 +209,9 @@ def sweep_stiffness(
             common = {"plane": elastic.pinion.plane, "law": elastic.law, **points}
             coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
             both = solver, position_solver(pair, coarse, resolved_only=False)
-            error = _estimate(both, solved_angles, solved, finite=finite, coarsen=coarsen * max(1.0, flank_coarsen))
+            error = _estimate(both, solved, finite=finite, coarsen=coarsen * max(1.0, flank_coarsen))
     searched = torque is not None
-    curve = assembled_curve(pair, elastic.law, asked, solved_angles, source, solved, touching, searched=searched)
+    curve = assembled_curve(solver, asked, source, solved, touching, searched=searched)
     return replace(curve, timings=dict(watch.seconds), error=error)
 
 
@@ -245,65 +246,73 @@ def distinct_angles(angles: Array, cycle: float) -> tuple[Array, IntArray]:
 
 
 def _estimate(
-    solvers: tuple[PositionSolver, PositionSolver], angles: Array, solved: Solved, *, finite: bool, coarsen: float
+    solvers: tuple[PositionSolver, PositionSolver], solved: Positions, *, finite: bool, coarsen: float
 ) -> ErrorEstimate:
     """Error of positions solved by the first solver, from the second's on a coarser mesh, resolved there or not."""
     own, coarse = solvers
-    chosen = solved_twice(np.array(solved.status) == "converged")
-    again = at_twists(coarse, angles[chosen], solved.twist[chosen], None, finite=finite)
-    other = np.where(np.array(again.status, dtype=object) == "converged", again.numbers["torque_wheel"], np.nan)
-    torque, tangent = solved.numbers["torque_wheel"][chosen], solved.numbers["tangent"][chosen]
-    unseen = unseen_error(own.elastic.law, solved.numbers["edge"][chosen])
+    chosen = solved.take(solved_twice(solved.status == "converged"))
+    again = at_twists(coarse, chosen.pinion_angle, chosen.twist, None, finite=finite)
+    other = np.where(again.status == "converged", again.torque_wheel, np.nan)
+    unseen = unseen_error(own.elastic.law, _pressures(own, chosen)["edge"])
     # a twist of some bits of the gears' angles is not what the gears are turned by
-    unseen += ANGLE_ROUNDING * np.abs(tangent / torque)
-    return error_estimate(angles[chosen], torque, other, coarsen=coarsen, unseen=unseen)
+    unseen += ANGLE_ROUNDING * np.abs(chosen.tangent / chosen.torque_wheel)
+    return error_estimate(chosen.pinion_angle, chosen.torque_wheel, other, coarsen=coarsen, unseen=unseen)
+
+
+def _pressures(solver: PositionSolver, solved: Positions) -> dict[str, Array]:
+    return contact_pressures(solver.elastic, solver.flanks, solver.touching(solved.pinion_angle), solved)
 
 
 def assembled_curve(
-    pair: GearPair,
-    law: ContactLaw,
-    asked: Array,
-    angles: Array,
-    source: IntArray,
-    solved: Solved,
-    touching: Array,
-    *,
-    searched: bool,
+    solver: PositionSolver, asked: Array, source: IntArray, solved: Positions, touching: Array, *, searched: bool
 ) -> StiffnessCurve:
-    """The curve at all asked angles; `searched` says that the twist is a result, not given."""
+    """The curve at all asked angles.
+
+    Parameters
+    ----------
+    source
+        Number of the position among those solved for each of the angles.
+    touching
+        Twists (rad), shape (n,), at which the rigid flanks of these touch.
+    searched
+        Whether the twist is a result, not given.
+    """
+    pair, law = solver.pair, solver.elastic.law
     radius, lost = pair.wheel.base_radius, pair.contact_twist
     failed = ~np.isin(solved.status, SOLVED)
     total = np.where(failed & searched, np.nan, solved.twist)
-    twist = total - lost
-    torque = solved.numbers["torque_wheel"]
+    twist, torque = total - lost, solved.torque_wheel
     stiffness = np.divide(torque, twist, out=np.zeros_like(torque), where=torque != 0.0)  # not-a-number stays
-    cycles = np.round((asked - angles[source]) / pair.mesh_cycle).astype(np.int64)
-    leading, shares = load_shares(solved.pairs, torque)
+    cycles = np.round((asked - solved.pinion_angle[source]) / pair.mesh_cycle).astype(np.int64)
+    leading, shares = load_shares(solved)
+    pressures = _pressures(solver, solved)
+    edge = np.where(failed, 0, pressures.pop("edge"))
+    of_solved = {
+        "twist": twist,
+        "torque_wheel": torque,
+        "torque_pinion": solved.torque_pinion,
+        "torque_wheel_reaction": solved.torque_wheel_reaction,
+        "k_torsional": stiffness,
+        "k_mesh": stiffness / radius**2,
+        "k_tangent": solved.tangent / radius**2,
+        "transmission_error": twist * radius,
+        "transmission_error_unloaded": (touching - lost) * radius,
+        "load_share": shares,
+        "teeth_in_contact": np.where(failed, -1, (shares > 0).sum(axis=1)),
+        "edge": np.array(EDGES)[edge],
+        "iterations": solved.iterations,
+        "status": solved.status,
+        "beyond_validity": np.where(np.isnan(twist), -1, overlaps(pair, twist) > MOST_OVERLAP),
+        **pressures,
+    }
     return StiffnessCurve(
         pinion_angle=asked,
         wheel_angle=pair.wheel_angle_at(asked, total[source]),  # type: ignore[arg-type]
-        twist=twist[source],
-        torque_wheel=torque[source],
-        torque_pinion=solved.numbers["torque_pinion"][source],
-        torque_wheel_reaction=solved.numbers["torque_wheel_reaction"][source],
-        k_torsional=stiffness[source],
-        k_mesh=(stiffness / radius**2)[source],
-        k_tangent=(solved.numbers["tangent"] / radius**2)[source],
-        transmission_error=(twist * radius)[source],
-        transmission_error_unloaded=((touching - lost) * radius)[source],
         leading_pair=leading[source] - cycles,
-        load_share=shares[source],
-        teeth_in_contact=np.where(failed, -1, (shares > 0).sum(axis=1))[source],
-        peak_pressure=solved.numbers["peak_pressure"][source],
-        peak_pressure_error=solved.numbers["peak_pressure_error"][source],
-        edge_pressure=solved.numbers["edge_pressure"][source],
-        edge=np.array(EDGES)[solved.numbers["edge"].astype(np.int64)][source],
-        iterations=solved.iterations[source],
-        status=np.array(solved.status)[source],
-        beyond_validity=np.where(np.isnan(twist), -1, overlaps(pair, twist) > MOST_OVERLAP)[source],
         law=np.full(len(source), law.name),
         contact_law=law_text(law),
         mesh_cycle=pair.mesh_cycle,
         base_radius=radius,
         lost_motion=lost,
+        **{name: values[source] for name, values in of_solved.items()},
     )
