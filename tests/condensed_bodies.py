@@ -16,7 +16,7 @@ from gearfe.contact.element_batch import FirstContacts
 from gearfe.contact.elements import solve_elements
 from gearfe.contact.flank import flank_of, normal_stress_rows
 from gearfe.contact.laws import ContactLaw
-from gearfe.contact.position import Position
+from gearfe.contact.position import Positions
 from gearfe.contact.scene import MeshingPair, turn
 from gearfe.verification.bodies import Bodies, ElasticBody
 
@@ -84,7 +84,7 @@ def pressed_pair(lower: GearBody, upper: GearBody, law: ContactLaw, overlap: flo
     return MeshingPair(pinion, wheel, CENTRES * size, lower.thickness, law)
 
 
-def pressed(pair: MeshingPair, low: float, high: float, pressure: Callable[[Array], Array]) -> Position:
+def pressed(pair: MeshingPair, low: float, high: float, pressure: Callable[[Array], Array]) -> Positions:
     """The pair solved from a guessed pressure (Pa) as a function of x between `low` and `high` (m)."""
     ends = np.linspace(low, high, 201)
     x = 0.5 * (ends[1:] + ends[:-1])
@@ -100,5 +100,4 @@ def pressed(pair: MeshingPair, low: float, high: float, pressure: Callable[[Arra
     first = FirstContacts(
         none, none, np.array([1j]), np.array([arcs]), pressure(x)[None], np.diff(ends)[None]
     )  # fmt: skip
-    (found,) = solve_elements(pair, np.zeros(1), np.zeros(1), first)
-    return found
+    return solve_elements(pair, np.zeros(1), np.zeros(1), first)[0]

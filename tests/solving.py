@@ -5,31 +5,32 @@ from __future__ import annotations
 import numpy as np
 
 from gearfe import GearPair
-from gearfe.contact.position import Position
+from gearfe.contact.position import Positions
 from gearfe.contact.scene import MeshingPair
 from gearfe.stiffness.position_solver import position_solver
 
 
-def solve_positions(gears: GearPair, elastic: MeshingPair, angles, twists) -> list[Position]:
+def solve_positions(gears: GearPair, elastic: MeshingPair, angles, twists) -> Positions:
     """At pinion angles and twists (rad), with what fields need."""
     angles = np.atleast_1d(np.asarray(angles, dtype=float))
     solver = position_solver(gears, elastic, resolved_only=False)
-    return solver.solve(angles, np.broadcast_to(twists, angles.shape), kept=range(len(angles)))
+    return solver.solve(angles, np.broadcast_to(twists, angles.shape), kept=np.arange(len(angles)))
 
 
-def solve_position(gears: GearPair, elastic: MeshingPair, angle: float, twist: float) -> Position:
+def solve_position(gears: GearPair, elastic: MeshingPair, angle: float, twist: float) -> Positions:
     """At one."""
     return solve_positions(gears, elastic, [angle], twist)[0]
 
 
-def nodal(elastic: MeshingPair, position: Position, angle: float, twist: float):
-    """Window, undeformed nodes (m) and forces (N) of each piece of flank, as complex numbers in global axes."""
-    for w in position.windows:
-        turn = np.exp(1j * elastic.tooth_angle(w.gear, w.tooth, angle, twist))
-        points = elastic.bodies[w.gear].flank.points[flank_nodes(w)] @ [1, 1j]
-        yield w, turn * points + w.gear * elastic.centre_distance, turn * position.forces[w.unknowns].view(complex)
+def nodal(elastic: MeshingPair, position: Positions, angle: float, twist: float):
+    """Gear, tooth, undeformed nodes (m) and forces (N) of each loaded flank, as complex numbers in global axes."""
+    for gear, loads in enumerate(position.loads):
+        for tooth, force in zip(loads.tooth.tolist(), loads.force, strict=True):
+            turn = np.exp(1j * elastic.tooth_angle(gear, tooth, angle, twist))
+            points = elastic.bodies[gear].flank.points @ [1, 1j]
+            yield gear, tooth, turn * points + gear * elastic.centre_distance, turn * force.view(complex)
 
 
-def flank_nodes(window) -> slice:
-    """Nodes of a piece of flank within the tooth's contact surface."""
-    return slice(window.flank_unknowns.start // 2, window.flank_unknowns.stop // 2)
+def peak_pressure(position: Positions) -> float:
+    """Largest pressure (Pa) at the contact points, or on the panels."""
+    return float((position.contacts if position.points is None else position.points).pressure.max())

@@ -15,7 +15,6 @@ import pytest
 from gearfe import StiffnessCurve
 from gearfe.cli import main
 from gearfe.contact.elements import solve_elements
-from gearfe.contact.position import unsolved
 
 ROOT = Path(__file__).parents[1]
 JOB = ROOT / "geometry" / "gear_train.toml"
@@ -151,8 +150,7 @@ for step in range(2):
 def test_a_failed_position_is_told_and_in_the_table(tmp_path, capsys, monkeypatch):
     def weak(pair, angles, twists, first):
         made = solve_elements(pair, angles, twists, first)
-        bad = unsolved("not_converged", 40)
-        return [bad if abs(a - math.radians(4)) < 1e-9 else p for a, p in zip(angles, made, strict=True)]
+        return made.stated(np.where(np.abs(angles - math.radians(4)) < 1e-9, "not_converged", made.status))
 
     monkeypatch.setattr("gearfe.stiffness.position_solver.solve_elements", weak)
     code = main(["stiffness", str(JOB), "--out", str(tmp_path), "--twist-deg", "0.3", *QUICK, "--law", "nitsche"])
@@ -338,7 +336,7 @@ def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
     def one_fails(pair, angles, twists, first):
         made = solve_elements(pair, angles, twists, first)
         bad = np.isclose(np.degrees(angles), 6.0)
-        return [unsolved("not_converged", 40) if b else p for p, b in zip(made, bad, strict=True)]
+        return made.stated(np.where(bad, "not_converged", made.status))
 
     monkeypatch.setattr("gearfe.stiffness.position_solver.solve_elements", one_fails)
     options = ("--twist-deg", "0.3", "--angles", "3", "3", "9", "--fields", "9", "6", "3", "--no-picture")

@@ -15,28 +15,28 @@ import pytest
 from gearfe import Material, sweep_stiffness
 from gearfe.contact.half_width import half_widths
 from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
-from gearfe.contact.position import Position
+from gearfe.contact.position import Positions
 from gearfe.gear.spur_gear import TipRelief
 from gearfe.stiffness.sweep import elastic_pair
 
 from .condensed_bodies import condensed_body, pressed, pressed_pair
 from .gears import pair
+from .solving import peak_pressure
 from .structured import block, mapped_grid
 
 SOFT, HARD = Material(70e9, 0.30), Material(210e9, 0.25)
 
 
-def solved(lower, upper, law: ContactLaw, overlap: float, low: float, high: float, guess) -> Position:
+def solved(lower, upper, law: ContactLaw, overlap: float, low: float, high: float, guess) -> Positions:
     """From a guessed pressure (Pa) as a function of x between `low` and `high` (m)."""
     found = pressed(pressed_pair(lower, upper, law, overlap), low, high, guess)
     assert found.status == "converged"
     return found
 
 
-def normal_force(found: Position) -> float:
+def normal_force(found: Positions) -> float:
     """Of the upper body on the lower one (N per m of thickness)."""
-    (lower,) = (w for w in found.windows if w.gear == 0)
-    return -float(found.forces[lower.unknowns][1::2].sum())
+    return -float(found.loads[0].force[0, 1::2].sum())
 
 
 # ---- patch test ------------------------------------------------------------------------------------------------------
@@ -109,7 +109,7 @@ def hertz_errors(n: int, law: ContactLaw) -> tuple[float, float]:
     force = normal_force(found)
     b = math.sqrt(4 * force * RADIUS / (math.pi * MODULUS))  # Johnson, eq. 4.43
     assert 0.5 < b < FINE
-    return abs(found.pair_widths[0] / b - 1), abs(found.peak_pressure / (2 * force / (math.pi * b)) - 1)
+    return abs(found.contacts.half_width[0] / b - 1), abs(peak_pressure(found) / (2 * force / (math.pi * b)) - 1)
 
 
 @pytest.mark.parametrize("n", [1, 2])

@@ -12,8 +12,8 @@ import pytest
 from gearfe.contact import finite_strain
 from gearfe.contact.compliance import gear_body
 from gearfe.contact.laws import Nitsche
-from gearfe.contact.position import Position
-from gearfe.contact.recovery import position_forces, sector_displacements
+from gearfe.contact.position import Positions
+from gearfe.contact.recovery import sector_displacements
 from gearfe.contact.scene import MeshingPair
 from gearfe.elasticity import Material, physical_gradients, triangle_shapes
 from gearfe.gear.pair import Gear, GearPair
@@ -38,12 +38,12 @@ def meshing_pair(coarsen: float) -> tuple[GearPair, MeshingPair]:
     return pair, MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, 10e-3, Nitsche())
 
 
-def extra_energy(pair: MeshingPair, position: Position) -> float:
+def extra_energy(pair: MeshingPair, position: Positions) -> float:
     """Integral of W_SVK - W_linear over both gears (J), from full tensors, all sectors."""
     total = 0.0
     for gear, body in enumerate(pair.bodies):
-        loads = position_forces(body, gear, position)
-        fields = sector_displacements(body, [(loads, tooth) for tooth in range(body.teeth)])
+        every = np.arange(body.teeth)
+        fields = sector_displacements(body, position.loads[gear], np.zeros_like(every), every)
         r, s = np.array([1, 4, 1]) / 6, np.array([1, 1, 4]) / 6
         triangles = body.mesh.triangles
         gradients, det = physical_gradients(body.mesh.points[triangles], triangle_shapes(r, s)[1])
@@ -67,18 +67,18 @@ def test_share_is_the_rate_of_the_extra_energy(angle_deg: float, monkeypatch: py
     angle, twist = math.radians(angle_deg), math.radians(0.05)
     step = 0.02 * twist
     energies = [extra_energy(pair, solve_position(gears, pair, angle, twist + sign * step)) for sign in (-1, 1)]
-    position = solve_position(gears, pair, angle, twist)
-    share = finite_strain.finite_strain_shares(pair, [position])[0]
-    assert share * position.torque_wheel == pytest.approx((energies[1] - energies[0]) / (2 * step), rel=3e-3)
+    found = solve_positions(gears, pair, [angle], twist)
+    share = finite_strain.finite_strain_shares(pair, found)
+    assert share * found.torque_wheel == pytest.approx((energies[1] - energies[0]) / (2 * step), rel=3e-3)
 
 
 def test_few_neighbours_suffice(monkeypatch: pytest.MonkeyPatch) -> None:
     """The effect is cubic in the strain: the loaded teeth and their neighbours carry all but a few parts in 1e5."""
     gears, pair = meshing_pair(coarsen=2.0)
-    position = solve_position(gears, pair, math.radians(13), math.radians(0.05))
-    near = finite_strain.finite_strain_shares(pair, [position])[0]
+    found = solve_positions(gears, pair, [math.radians(13)], math.radians(0.05))
+    near = finite_strain.finite_strain_shares(pair, found)
     monkeypatch.setattr(finite_strain, "NEIGHBOURS", 15)
-    assert near == pytest.approx(finite_strain.finite_strain_shares(pair, [position])[0], abs=5e-5)
+    assert near == pytest.approx(finite_strain.finite_strain_shares(pair, found), abs=5e-5)
 
 
 def test_sampled_shares_follow_the_curve() -> None:

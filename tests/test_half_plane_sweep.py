@@ -13,7 +13,6 @@ from gearfe import InputError
 from gearfe.cli import main
 from gearfe.contact.finite_strain import finite_strain_shares
 from gearfe.contact.laws import HalfPlane
-from gearfe.contact.recovery import position_forces
 from gearfe.contact.scene import MeshingPair
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.stiffness.curve import StiffnessCurve
@@ -54,7 +53,7 @@ def test_share_of_finite_strain() -> None:
     """From the forces and their rates on a coarse flank as from Nitsche's on a fine one."""
     twist = math.radians(0.4)
     solver = position_solver(PAIR, elastic_of("half_plane"))
-    found = finite_strain_shares(solver.elastic, solver.solve(ANGLES, np.full(5, twist), range(5)))
+    found = finite_strain_shares(solver.elastic, solver.solve(ANGLES, np.full(5, twist), np.arange(5)))
     fine = elastic_of("nitsche")
     expected = finite_strain_shares(fine, solve_positions(PAIR, fine, ANGLES, twist))
     assert found == pytest.approx(expected, rel=0.03)
@@ -63,10 +62,10 @@ def test_share_of_finite_strain() -> None:
 def test_nodal_loads_have_the_moments_of_the_contacts() -> None:
     """What fields are recovered from: forces on both gears cancel and make the reactions at the wheel's bore."""
     solver = position_solver(PAIR, elastic_of("half_plane"))
-    for position, angle in zip(solver.solve(ANGLES, np.full(5, 2e-3), range(5)), ANGLES, strict=True):
+    for position, angle in zip(solver.solve(ANGLES, np.full(5, 2e-3), np.arange(5)), ANGLES, strict=True):
         total, wheel = 0j, 0.0
         for gear, body in enumerate(solver.elastic.bodies):
-            for tooth, load in position_forces(body, gear, position).items():
+            for tooth, load in zip(position.loads[gear].tooth, position.loads[gear].force, strict=True):
                 turn = np.exp(1j * solver.elastic.tooth_angle(gear, tooth, angle, 2e-3))
                 forces, places = load.view(complex) * turn, body.flank.points @ np.array([1, 1j]) * turn
                 total += forces.sum()
@@ -79,7 +78,7 @@ def test_nodal_loads_have_the_moments_of_the_contacts() -> None:
 def test_rates_are_those_of_differences() -> None:
     solver = position_solver(PAIR, elastic_of("half_plane"))
     twist, step = 3e-3, 1e-5
-    low, middle, high = (solver.solve(ANGLES, np.full(5, twist + k * step), range(5)) for k in (-1, 0, 1))
+    low, middle, high = (solver.solve(ANGLES, np.full(5, twist + k * step), np.arange(5)) for k in (-1, 0, 1))
     for one, two, three in zip(low, middle, high, strict=True):
         rate = (three.contacts.force - one.contacts.force) / (2 * step)
         assert two.contacts.force_rate == pytest.approx(rate, rel=1e-2)

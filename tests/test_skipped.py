@@ -91,8 +91,8 @@ def test_neighbour_teeth_only(gears, elastic):
     for angle in np.radians([0.0, 4.0, 12.0]):
         position = solve_position(gears, elastic, float(angle), TWIST)
         assert position.status == "converged"
-        assert len(position.pair_numbers) <= 4 < gears.pinion.teeth
-        assert position.pair_torques.sum() == pytest.approx(position.torque_wheel, rel=1e-9)
+        assert len(position.contacts.pair) <= 4 < gears.pinion.teeth
+        assert position.contacts.torque_wheel.sum() == pytest.approx(position.torque_wheel, rel=1e-9)
 
 
 def test_fields_only_where_asked(tmp_path):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from gearfe import InputError, Material, sweep_stiffness
-from gearfe.contact.position import unsolved
 from gearfe.gear.spur_gear import TipRelief
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.stiffness.position_solver import HalfPlaneSolver
@@ -81,7 +80,7 @@ def test_the_hub_torques_are_in_equilibrium(gears):
     on_elements = elastic_pair(gears, law="nitsche", coarsen=COARSE)
     for angle in (0.05, 0.2):
         p = solve_position(gears, on_elements, angle, TWIST)
-        forces = [(w.gear, f.sum()) for w, _, f in nodal(on_elements, p, angle, TWIST)]
+        forces = [(gear, f.sum()) for gear, _, _, f in nodal(on_elements, p, angle, TWIST)]
         on_pinion, on_wheel = (sum(f for of, f in forces if of == gear) for gear in (0, 1))
         assert abs(on_wheel + on_pinion) < 1e-10 * abs(on_wheel)
         # hub moments balance the contact: wheel - T_wheel about c, pinion - T_pinion about the origin
@@ -254,7 +253,7 @@ def test_a_torque_beyond_reach_is_flagged(gears, elastic, monkeypatch):
 
     def weak(self, angles, twists, kept=()):
         made = solve(self, angles, twists, kept)
-        return [unsolved("not_converged", 40) if p.torque_wheel > 60 else p for p in made]
+        return made.stated(np.where(made.torque_wheel > 60, "not_converged", made.status))
 
     monkeypatch.setattr(HalfPlaneSolver, "solve", weak)
     fine = at(gears, [0.1], elastic, twist=None, torque=50.0)

@@ -20,7 +20,7 @@ from .flank import edge_shapes
 from .flank_compliance import FlankCompliance
 from .half_plane_result import PairContacts
 from .half_width import half_widths
-from .position import TORQUES, Contacts, FlankLoads, PointPressures, Positions
+from .position import Contacts, FlankLoads, PointPressures, Positions, no_contact
 from .records import of_positions
 from .scene import MeshingPair
 
@@ -55,7 +55,7 @@ def solve_elements(elastic: MeshingPair, angles: Array, twists: Array, first: Fi
     first
         Contacts to start from; positions without one have ``no_contact``.
     """
-    made = _clear(elastic, angles, twists)
+    made = no_contact(angles, twists, [len(body.own) for body in elastic.bodies])
     open_ = np.unique(first.position)
     for reach in REACHES:
         outgrown: list[int] = []
@@ -70,22 +70,6 @@ def solve_elements(elastic: MeshingPair, angles: Array, twists: Array, first: Fi
             outgrown += chosen[rims].tolist()
         open_ = np.array(outgrown, dtype=np.int64)
     return made
-
-
-def _clear(elastic: MeshingPair, angles: Array, twists: Array) -> Positions:
-    """Positions without contact."""
-    none, count = np.zeros(0, dtype=np.int64), len(angles)
-    empty = [np.zeros((0, len(body.own))) for body in elastic.bodies]
-    return Positions(
-        pinion_angle=angles,
-        twist=twists,
-        status=np.full(count, "no_contact", dtype="<U18"),
-        iterations=np.zeros(count, dtype=np.int64),
-        contacts=Contacts(none, none, np.zeros(0), np.zeros(0)),
-        loads=(FlankLoads(none, none, empty[0], empty[0]), FlankLoads(none, none, empty[1], empty[1])),
-        points=PointPressures(none, none, none, np.zeros(0), np.zeros(0)),
-        **{name: np.zeros(count) for name in TORQUES},
-    )
 
 
 def _batches(
@@ -205,9 +189,7 @@ def _points(batch: Batch, state: State) -> PointPressures:
     return PointPressures(batch.position[window], batch.gear[window], number, place[order], pressure)
 
 
-def _torques(
-    batch: Batch, state: State, forces: ComplexArray, turn: ComplexArray
-) -> tuple[dict[str, Array], Array]:
+def _torques(batch: Batch, state: State, forces: ComplexArray, turn: ComplexArray) -> tuple[dict[str, Array], Array]:
     """Moments that the hubs need (N m): shape (B,), and of each window about its own hub, shape (W,)."""
     hub = (batch.gear * batch.elastic.centre_distance)[batch.window]
     force, wheel = turn[batch.window] * forces, batch.gear[batch.window] == 1

@@ -1,4 +1,4 @@
-"""Solved positions of a gear pair: what the hubs feel, the contacts, and the nodal loads that fields are recovered from.
+"""Solved positions of a gear pair: what the hubs feel, the contacts, and the nodal loads that make fields.
 
 Arrays have one entry a position. What belongs to the contacts, teeth and points of the positions stands in records of
 its own, sorted by the number of the position that they are of.
@@ -6,7 +6,7 @@ its own, sorted by the number of the position that they are of.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -135,6 +135,9 @@ class Positions:
     def __getitem__(self, i: int) -> Positions:
         return self._of(np.arange(len(self))[[i]], i)
 
+    def __iter__(self) -> Iterator[Positions]:
+        return (self[i] for i in range(len(self)))
+
     def take(self, chosen: IntArray | slice) -> Positions:
         """The positions `chosen`."""
         return self._of(np.arange(len(self))[chosen], chosen)
@@ -161,7 +164,7 @@ class Positions:
         """These with another status: what has not converged has no contacts, loads and numbers."""
         good = status == "converged"
         none = np.where(status == "no_contact", 0.0, np.nan)
-        numbers = {name: np.where(good, getattr(self, name), none) for name in TORQUES}
+        numbers: dict[str, Any] = {name: np.where(good, getattr(self, name), none) for name in TORQUES}
         return replace(self.told(good), status=status, contacts=_among(self.contacts, good), **numbers)
 
     def told(self, kept: NDArray[np.bool_]) -> Positions:
@@ -198,3 +201,19 @@ def together(parts: Sequence[Positions]) -> Positions:
         else:
             made[field.name] = None if values[0] is None else moved(values)
     return Positions(**made)
+
+
+def no_contact(angles: Array, twists: Array, sizes: Sequence[int]) -> Positions:
+    """Positions of a law on the mesh without contact; `sizes` are the unknowns of the flanks of pinion and wheel."""
+    none, count = np.zeros(0, dtype=np.int64), len(angles)
+    pinion, wheel = (FlankLoads(none, none, np.zeros((0, f)), np.zeros((0, f))) for f in sizes)
+    return Positions(
+        pinion_angle=angles,
+        twist=twists,
+        status=np.full(count, "no_contact", dtype="<U18"),
+        iterations=np.zeros(count, dtype=np.int64),
+        contacts=Contacts(none, none, np.zeros(0), np.zeros(0)),
+        loads=(pinion, wheel),
+        points=PointPressures(none, none, none, np.zeros(0), np.zeros(0)),
+        **{name: np.zeros(count) for name in TORQUES},
+    )

@@ -42,7 +42,7 @@ def of_positions(record: Record, chosen: IntArray) -> Record:
     position: IntArray = record.position  # type: ignore[attr-defined]
     first, end = (np.searchsorted(position, chosen, side=side) for side in ("left", "right"))
     made: Any = taken(record, ranges(first, end - first))
-    return replace(made, position=np.repeat(np.arange(len(chosen)), end - first))  # type: ignore[no-any-return]
+    return replace(made, position=np.repeat(np.arange(len(chosen)), end - first))
 
 
 def ranges(starts: IntArray, lengths: IntArray) -> IntArray:

@@ -28,13 +28,13 @@ def spent(found: Positions) -> Array:
 
 
 def hermite(t: Array, value: Array, slope: Array) -> Array:
-    """Cubic through two values with their slopes, both of shape (2, ...), the slopes times the interval; 0 <= t <= 1."""
+    """Cubic at 0 <= t <= 1 through two values with their slopes times the interval, both of shape (2, ...)."""
     low, high, rise = slope[0], slope[1], value[1] - value[0]
     return np.asarray(value[0] + t * (low + t * (3 * rise - 2 * low - high + t * (low + high - 2 * rise))))
 
 
 def between(known: Array, goals: Array) -> tuple[IntArray, Array]:
-    """Of rising torques the ones on either side of others, shape (2, m), and where these lie between in ln T, (m, 1)."""
+    """Of rising torques the ones on either side of others, shape (2, m), and where these lie in ln T, shape (m, 1)."""
     high = np.clip(np.searchsorted(known, goals), 1, len(known) - 1)
     pair = np.stack([high - 1, high])
     x = np.log(known[pair])

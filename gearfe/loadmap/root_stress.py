@@ -80,10 +80,10 @@ class RootMesh:
 
 
 def peaks(place: Array, values: Array, other: Array) -> tuple[Array, Array]:
-    """Largest values of c curves through samples, shape (c, q), by parabolas round the largest ones, and `other` there."""
+    """Largest values of curves through samples, shape (c, q), by parabolas round the largest, and `other` there."""
     row, top = np.arange(len(values)), np.argmax(values, axis=1)
-    k = np.clip(top, 1, len(place) - 2)
-    x, y = place[k + [[-1], [0], [1]]], values[row, k + [[-1], [0], [1]]]
+    three = np.clip(top, 1, len(place) - 2) + np.array([[-1], [0], [1]])
+    x, y = place[three], values[row, three]
     left, right = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
     bend = (right - left) / (x[2] - x[0])
     at = 0.5 * (x[0] + x[1]) - 0.5 * left / np.where(bend < 0, bend, -1.0)

@@ -158,7 +158,9 @@ def _cells(
     groups = [known, *np.array_split(rest, max(1, math.ceil(len(rest) * n / TOGETHER)))]
     strain = StrainShares(solver.elastic, angles, goals, known) if finite else None
     usual = touch + torque / usual_stiffness(solver)
-    parts, at_roots, order = [], [], []
+    parts: list[Positions] = []
+    at_roots: list[ToothRoots] = []
+    order: list[IntArray] = []
     for rows in groups if len(rest) else [known]:
         cells = (rows[:, None] * n + np.arange(n)).ravel()
         ahead: dict[str, Any] = {}

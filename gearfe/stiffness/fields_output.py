@@ -147,7 +147,9 @@ def _place(curve: StiffnessCurve, number: int) -> tuple[float, float]:
     return float(curve.pinion_angle[number]), float(curve.twist[number] + curve.lost_motion)
 
 
-def _solved(solver: PositionSolver, curve: StiffnessCurve, chosen: NDArray[np.int64]) -> Iterator[tuple[int, Positions]]:
+def _solved(
+    solver: PositionSolver, curve: StiffnessCurve, chosen: NDArray[np.int64]
+) -> Iterator[tuple[int, Positions]]:
     """Positions of the curve solved again, a few side by side; one that does not converge again is left out."""
     for first in range(0, len(chosen), SIDE_BY_SIDE):
         part = chosen[first : first + SIDE_BY_SIDE]
@@ -245,7 +247,7 @@ def frames_of(
     with one_thread():
         for first in range(0, count, SIDE_BY_SIDE):
             part = slice(first, first + SIDE_BY_SIDE)
-            made = solver.solve(angles[part], twists[part], kept=range(len(angles[part])))
+            made = solver.solve(angles[part], twists[part], kept=np.arange(len(angles[part])))
             for angle, twist, position in zip(angles[part], twists[part], made, strict=True):
                 if position.status == "converged":
                     fields = recovery.at(position, float(angle), float(twist))

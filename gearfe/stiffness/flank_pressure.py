@@ -47,7 +47,7 @@ class FlankPressure:
 
 
 def flank_pressures(pair: MeshingPair, position: Positions) -> list[FlankPressure]:
-    """Pressure on each piece of flank of one solved position, from `Positions.points` or the half-plane law's panels."""
+    """Pressure on each loaded flank of one solved position, from its points or the half-plane law's panels."""
     points = position.points
     if points is None:
         assert isinstance(position.contacts, PairContacts)

@@ -128,8 +128,9 @@ class ElementSolver:
         loaded = expected.status == "converged"
         thin = loaded & self.resolved_only & (self.elements_per_contact(expected) < 1.0)
         contacts = expected.contacts
-        contacts = taken(contacts, ~thin[contacts.position])
-        found = solve_elements(self.elastic, angles, expected.twist, first_contacts(self.half_plane.law.sides, contacts))
+        assert isinstance(contacts, PairContacts)
+        first = first_contacts(self.half_plane.law.sides, taken(contacts, ~thin[contacts.position]))
+        found = solve_elements(self.elastic, expected.pinion_angle, expected.twist, first)
         status = np.where(thin, "under_resolved", np.where(loaded, found.status, expected.status))
         iterations = np.where(loaded & ~thin, found.iterations, expected.iterations)
         return replace(found.stated(status), iterations=iterations).told(np.isin(np.arange(len(found)), kept))

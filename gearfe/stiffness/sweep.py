@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..contact.compliance import gear_body
 from ..contact.laws import ContactLaw, HalfPlane, law_named, law_text
+from ..contact.position import Positions
 from ..contact.scene import MeshingPair
 from ..elasticity import Material, Plane
 from ..errors import InputError
@@ -31,7 +32,6 @@ from ..stopwatch import Stopwatch
 from ..tables.laws import DEFAULT_LAW
 from ..tables.stiffness import check_flank_coarsen
 from ..threads import one_thread
-from ..contact.position import Positions
 from .contact_pressure import EDGES, contact_pressures
 from .curve import SOLVED, ErrorEstimate, StiffnessCurve
 from .curve_error import COARSENING, error_estimate, solved_twice, unseen_error
@@ -287,7 +287,7 @@ def assembled_curve(
     leading, shares = load_shares(solved)
     pressures = _pressures(solver, solved)
     edge = np.where(failed, 0, pressures.pop("edge"))
-    of_solved = {
+    of_solved: dict[str, Any] = {
         "twist": twist,
         "torque_wheel": torque,
         "torque_pinion": solved.torque_pinion,

@@ -98,7 +98,7 @@ def fields(quick: bool) -> tuple[float, float, str]:
     elastic = elastic_pair(pair, coarsen=5.0 if quick else 1.0)
     at = pair.mesh_cycle * np.arange(1 if quick else 8) / 8
     short = _cpu(lambda: sweep_stiffness(pair, twist=TWIST, angles=at, elastic=elastic))
-    solved = position_solver(pair, elastic).solve(at, np.full(len(at), TWIST), range(len(at)))
+    solved = position_solver(pair, elastic).solve(at, np.full(len(at), TWIST), np.arange(len(at)))
 
     def recovered() -> None:
         recovery = pair_recovery(elastic)

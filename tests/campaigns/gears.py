@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.contact.position import Position
+from gearfe.contact.position import Positions
 from gearfe.contact.scene import MeshingPair
 from gearfe.gear.pair import GearPair
 from gearfe.gear.validity import MOST_OVERLAP
@@ -91,13 +91,13 @@ def run(case: Case, folder: Path) -> Finding:
     total = np.where(np.isfinite(curve.twist), curve.twist, 0.0) + curve.lost_motion
     loaded = np.flatnonzero(curve.status == "converged")
     checks: list[Check] = []
-    found: list[Position] = []
+    found: Positions | None = None
     measures: dict[str, Any] = {"positions": len(curve.status), "converged": len(loaded), "law": job.table.law}
     measures["iterations"] = int(curve.iterations.max(initial=0))
     if len(loaded):
         checks.append(Check("tangent", float((~(curve.k_tangent[loaded] > 0)).sum()), 0.5))
         solver = position_solver(job.pair, elastic)
-        found = solver.solve(curve.pinion_angle[loaded], total[loaded], range(len(loaded)))
+        found = solver.solve(curve.pinion_angle[loaded], total[loaded], np.arange(len(loaded)))
         places = zip(found, curve.pinion_angle[loaded].tolist(), total[loaded].tolist(), strict=True)
         balances = [c for c in (balance(elastic, *place) for place in places) if c is not None]
         checks += [max(balances, key=lambda c: c.share)] if balances else []
@@ -109,53 +109,52 @@ def run(case: Case, folder: Path) -> Finding:
     return Finding("stopped" if bad else "done", told, checks, measures)
 
 
-def period_checks(curve: Any, found: list[Position]) -> list[Check]:
+def period_checks(curve: Any, found: Positions | None) -> list[Check]:
     """Whether the last position, one cycle after the first, repeats it, up to the rounding of angles."""
     if not math.isclose(curve.pinion_angle[-1] - curve.pinion_angle[0], curve.mesh_cycle, rel_tol=1e-9):
         return []
     if curve.status[0] != curve.status[-1]:
         return [Check("period", math.inf, PERIOD)]
-    if curve.status[0] != "converged":
+    if curve.status[0] != "converged" or found is None:
         return []
     apart = abs(float(curve.torque_wheel[-1] / curve.torque_wheel[0]) - 1)
     return [Check("period", apart, max(PERIOD, _rounding(found[0])))]
 
 
-def _rounding(found: Position) -> float:
+def _rounding(found: Positions) -> float:
     """Relative change of the torque by the rounding of two angles."""
-    return 2 * ANGLE_ROUNDING * found.tangent / found.torque_wheel
+    return float(2 * ANGLE_ROUNDING * found.tangent / found.torque_wheel)
 
 
-def balance(elastic: MeshingPair, found: Position, angle: float, twist: float) -> Check | None:
+def balance(elastic: MeshingPair, found: Positions, angle: float, twist: float) -> Check | None:
     """Resultants of the contact forces on both gears; the half-plane law has one force for both."""
-    if found.forces is None or found.contacts is not None:
+    if found.points is None:
         return None
     resultant, on_wheel, moment = 0.0 + 0.0j, 0.0 + 0.0j, 0.0
-    for w in found.windows:
-        turn = np.exp(1j * elastic.tooth_angle(w.gear, w.tooth, angle, twist))
-        force = turn * found.forces[w.unknowns].view(complex)
+    for gear, loads in enumerate(found.loads):
+        turn = np.exp(1j * elastic.tooth_angle(gear, loads.tooth, angle, twist))[:, None]
+        force = turn * loads.force.view(complex)
         resultant += force.sum()
-        if w.gear == 1:
-            nodes = slice(w.flank_unknowns.start // 2, w.flank_unknowns.stop // 2)
-            arm = turn * (elastic.wheel.flank.points[nodes] @ [1, 1j])
+        if gear == 1:
+            arm = turn * (elastic.wheel.flank.points @ [1, 1j])
             on_wheel += force.sum()
             moment -= float((arm.conj() * force).imag.sum())
     wrong = found.torque_wheel + found.torque_pinion - elastic.centre_distance * on_wheel.imag
     reaction = found.torque_wheel_reaction - moment
-    rest = float(abs(resultant) / abs(on_wheel))
-    return Check("balance", max(rest, *(abs(m / found.torque_wheel) for m in (wrong, reaction))), BALANCE)
+    off = float(np.abs([wrong, reaction]).max() / found.torque_wheel)
+    return Check("balance", max(abs(resultant) / abs(on_wheel), off), BALANCE)
 
 
-def on_path(pair: GearPair, angle: float, twist: float, found: Position) -> bool:
+def on_path(pair: GearPair, angle: float, twist: float, found: Positions) -> bool:
     """Whether all loaded pairs touch well within the involutes, clear of tips, rounds, reliefs and form points."""
     start, end = pair.path_limits(relieved=True)
     margin = 0.08 * pair.base_pitch + 3.0 * abs(twist) * pair.wheel.base_radius
-    loaded = np.asarray(found.pair_numbers)[np.asarray(found.pair_torques) > 1e-9 * found.torque_wheel]
+    loaded = found.contacts.pair[found.contacts.torque_wheel > 1e-9 * found.torque_wheel]
     rolls = [pair.pinion_roll_at(angle + int(k) * pair.mesh_cycle) for k in loaded]
     return all(start + margin < s < end - margin for s in rolls)
 
 
-def ratio_checks(solver: PositionSolver, angles: Any, twists: Any, found: list[Position]) -> list[Check]:
+def ratio_checks(solver: PositionSolver, angles: Any, twists: Any, found: Positions) -> list[Check]:
     """The torque ratio on the path, where it is worst against its limit."""
     pair, known = solver.pair, getattr(solver, "half_plane", None)
     checks = []
@@ -165,15 +164,15 @@ def ratio_checks(solver: PositionSolver, angles: Any, twists: Any, found: list[P
         ratio = p.torque_wheel / p.torque_pinion
         expected = pair.wheel.teeth / pair.pinion.teeth
         if known is not None:
-            (same,) = known.solve(np.array([angle]), np.array([twist]))
+            same = known.solve(np.array([angle]), np.array([twist]))[0]
             expected = same.torque_wheel / same.torque_pinion
         overlap = abs(twist - pair.contact_twist) * pair.wheel.base_radius / pair.pinion.module
         bent = BENT * overlap if known is None else RATIO_BENT * overlap**2
-        checks.append(Check("ratio", abs(ratio / expected - 1), RATIO + bent))
+        checks.append(Check("ratio", float(abs(ratio / expected - 1)), RATIO + bent))
     return [max(checks, key=lambda c: c.share)] if checks else []
 
 
-def swap_checks(here: PositionSolver, angles: Any, twists: Any, found: list[Position]) -> list[Check]:
+def swap_checks(here: PositionSolver, angles: Any, twists: Any, found: Positions) -> list[Check]:
     """The same place seen from the other gear: turned by half a turn, the wheel is the pinion.
 
     Its tooth 0 then stands at the wheel's angle + pi/z2, and the twist of the other gear is twist z2/z1.
@@ -188,7 +187,7 @@ def swap_checks(here: PositionSolver, angles: Any, twists: Any, found: list[Posi
     checks = []
     for p, q in zip(found, position_solver(mirrored, other).solve(turned, turns), strict=True):
         if p.status == q.status == "converged":
-            apart = max(abs(q.torque_pinion / p.torque_wheel - 1), abs(q.torque_wheel / p.torque_pinion - 1))
+            apart = float(max(abs(q.torque_pinion / p.torque_wheel - 1), abs(q.torque_wheel / p.torque_pinion - 1)))
             checks.append(Check("swap", apart, max(SWAP, _rounding(p))))
     return [max(checks, key=lambda c: c.share)] if checks else []
 

@@ -141,8 +141,8 @@ def run(case: Case, folder: Path) -> Finding:
 def _torques(job: StiffnessJob, elastic: MeshingPair, angles: Any, twist: float) -> tuple[Any, Any, Counter]:
     """Torques (N m), iterations and statuses, also where the elements do not resolve the contact."""
     found = position_solver(job.pair, elastic, resolved_only=False).solve(angles, np.full(len(angles), twist))
-    torque = np.array([p.torque_wheel if p.status == "converged" else np.nan for p in found])
-    return torque, np.array([p.iterations for p in found]), Counter(p.status for p in found)
+    torque = np.where(found.status == "converged", found.torque_wheel, np.nan)
+    return torque, found.iterations, Counter(found.status.tolist())
 
 
 def _noise(case: Case, job: StiffnessJob, elastic: MeshingPair, twist: float) -> Finding:
