@@ -108,7 +108,7 @@ def test_the_motion_does_not_depend_on_the_units(make, method, tolerance):
         assert run.status == 0
         assert run.statistics["steps"] == made.statistics["steps"]
         np.testing.assert_allclose(run.q[-1] / other.units, made.q[-1] / system.units, atol=1e-2 * tolerance)
-        force = mass * length / time**2 * np.where(other.planar.holds_points, 1.0, length)
+        force = mass * length / time**2 * np.where(other.planar.assembly.row_holds_length, 1.0, length)
         np.testing.assert_allclose(
             run.multipliers[-1] / force, made.multipliers[-1], rtol=10 * tolerance, atol=10 * tolerance
         )

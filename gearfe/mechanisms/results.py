@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..progress import stage
-from ..rigid import Moment, PointForce, Prescribed, Spring, Trajectory
+from ..rigid import CoordinateSpring, Moment, PointForce, Prescribed, Spring, Trajectory
 from ..rigid.contract import Array
-from ..rigid.planar import CoordinateSpring
 from .expressions import compute, quantities
 from .model import Mechanism
 
@@ -140,7 +139,7 @@ def reactions(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
     assert planar is not None
     scene = mechanism.scene
     names = list(mechanism.file.joints)
-    rows = planar.assembly.tables.rows
+    bodies = planar.assembly.tables.forms.bodies
     owner = np.array(planar.assembly.row_joint)
     out = {f"{n}_{c}": np.zeros(len(trajectory.time)) for n in names for c in ("x_N", "y_N", "moment_N_m")}
     q = trajectory.q
@@ -151,7 +150,7 @@ def reactions(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
             body = scene.body_index[table.body]
             wrench = np.zeros(3)
             for r in np.flatnonzero(owner == j):
-                side = 0 if rows.ints[r, 0] == body else 1
+                side = 0 if bodies[r, 0] == body else 1
                 wrench -= multipliers[r] * G[r, side]
             joint = scene.joints[j]
             at = getattr(joint, "point_a", getattr(joint, "point", (0.0, 0.0)))

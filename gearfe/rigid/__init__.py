@@ -4,22 +4,11 @@ Nothing here knows which mechanism it runs. The component contract is in `gearfe
 """
 
 from .contract import Element, LinearJoint, LocalForce, ModalBlocks, SeriesLaw
+from .forces import CoordinateSpring, Gravity, Moment, PointForce, Spring
+from .forms import GROUND
 from .integrate import integrate
-from .planar import (
-    GROUND,
-    Body,
-    CoordinateSpring,
-    Fixed,
-    Gravity,
-    Hinge,
-    Moment,
-    PointForce,
-    Prescribed,
-    Prismatic,
-    Scene,
-    Slot,
-    Spring,
-)
+from .joints import Fixed, Hinge, Prescribed, Prismatic, Slot
+from .planar import Body, Scene
 from .scene import PlanarScene
 from .start import Forced, Freedoms, Start, consistent_start, count_freedoms
 from .system import System

@@ -48,53 +48,53 @@ def project(tb, t, forward, q, v, base, length, w):
 
     Returns the first position change relative to `length` (and 1 rad), and the least pivot ratio.
     """
-    rows, plan, mass = tb.rows, tb.plan, tb.mass
+    forms, vectors, plan, mass = tb.forms, tb.vectors, tb.plan, tb.mass
     time_series(tb.times, t, forward, 3, w.TF)
     first = 0.0
     for sweep in range(8):
         trigonometry(q, w.c, w.s)
-        gradients(rows, q, w.c, w.s, w.G)
-        least, _ = factorise(rows, plan, mass, w.G, base, w.val, w.diag, 0.0)
-        residuals(rows, q, w.c, w.s, w.TF[:, 0], w.mu)
-        change = least_norm(rows, plan, mass, w.G, w.val, base, length, w.mu, w.F, q)
+        gradients(forms, vectors, q, w.c, w.s, w.G)
+        least, _ = factorise(plan, mass, w.G, base, w.val, w.diag, 0.0)
+        residuals(forms, vectors, q, w.c, w.s, w.TF[:, 0], w.mu)
+        change = least_norm(forms, plan, mass, w.G, w.val, base, length, w.mu, w.F, q)
         if sweep == 0:
             first = change
         if change < 1e-9 or not np.isfinite(change):  # the next change would be its square
             break
     if first > 0.0:
         trigonometry(q, w.c, w.s)
-        gradients(rows, q, w.c, w.s, w.G)
-        least, _ = factorise(rows, plan, mass, w.G, base, w.val, w.diag, 0.0)
+        gradients(forms, vectors, q, w.c, w.s, w.G)
+        least, _ = factorise(plan, mass, w.G, base, w.val, w.diag, 0.0)
     for _ in range(2):
-        times_gradients(rows, w.G, v, w.mu)
+        times_gradients(forms, w.G, v, w.mu)
         for r in range(w.mu.shape[0]):
-            if rows.ints[r, 3] >= 0:
-                w.mu[r] -= w.TF[rows.ints[r, 3], 1]
-        least_norm(rows, plan, mass, w.G, w.val, base, length, w.mu, w.F, v)
+            if forms.motion[r] >= 0:
+                w.mu[r] -= w.TF[forms.motion[r], 1]
+        least_norm(forms, plan, mass, w.G, w.val, base, length, w.mu, w.F, v)
     if change >= 1e-9 or not np.isfinite(change):
         first = np.inf
     return first, least
 
 
-def regular_parts(rows, plan, mass, G, row, skip, val, work, z):
+def regular_parts(forms, plan, mass, G, row, skip, val, work, z):
     """z := S^-1 S e_row over the rows that are not skipped: how they make up the gradient of `row`."""
     fill(work, 0.0)
     for side in range(2):
-        b = 3 * rows.ints[row, side]
+        b = 3 * forms.bodies[row, side]
         for k in range(3):
             work[b + k] += G[row, side, k] * mass[b + k]
-    times_gradients(rows, G, work, z)
+    times_gradients(forms, G, work, z)
     for r in range(z.shape[0]):
         if skip[r] != 0:
             z[r] = 0.0
     solve(plan, val, z)
 
 
-def row_square(rows, mass, G, r):
+def row_square(forms, mass, G, r):
     """Square of the gradient of row r in the norm of the inverse masses."""
     total = 0.0
     for side in range(2):
-        b = 3 * rows.ints[r, side]
+        b = 3 * forms.bodies[r, side]
         for k in range(3):
             total += G[r, side, k] * G[r, side, k] * mass[b + k]
     return total
@@ -107,8 +107,8 @@ def next_fold(tb, q, v, base, sign, low, high, w):
     B = dG^T/dt z across them moves it: what is left of B without all rows, and the part along p. Were the row's passing
     to remove p, most of that part would be along p.
     """
-    rows, plan, mass, z = tb.rows, tb.plan, tb.mass, w.rhs
-    m = rows.ints.shape[0]
+    forms, vectors, plan, mass, z = tb.forms, tb.vectors, tb.plan, tb.mass, w.rhs
+    m = w.mu.shape[0]
     found = np.inf
     first = -1
     moving = False
@@ -116,7 +116,7 @@ def next_fold(tb, q, v, base, sign, low, high, w):
         if base[row] != 0 or NEAR * w.val[row] * w.diag[row] <= 1.0:
             continue
         if not moving:
-            gradient_rates(rows, q, v, w.c, w.s, w.H)
+            gradient_rates(forms, vectors, q, v, w.c, w.s, w.H)
             moving = True
         fill(w.mu, 0.0)
         w.mu[row] = 1.0
@@ -124,9 +124,9 @@ def next_fold(tb, q, v, base, sign, low, high, w):
         for r in range(m):
             z[r] = w.mu[r] / w.mu[row] if r != row else 1.0
         fill(w.F, 0.0)
-        add_transposed(rows, w.G, z, 1.0, w.F)
+        add_transposed(forms, w.G, z, 1.0, w.F)
         fill(w.u, 0.0)
-        add_transposed(rows, w.H, z, 1.0, w.u)
+        add_transposed(forms, w.H, z, 1.0, w.u)
         pp = 0.0
         pb = 0.0
         for i in range(w.u.shape[0]):
@@ -139,12 +139,12 @@ def next_fold(tb, q, v, base, sign, low, high, w):
             continue
         for i in range(w.u.shape[0]):
             w.F[i] = w.u[i] * mass[i]
-        times_gradients(rows, w.G, w.F, w.mu)
+        times_gradients(forms, w.G, w.F, w.mu)
         for r in range(m):
             if base[r] != 0:  # redundant rows take no part
                 w.mu[r] = 0.0
         solve(plan, w.val, w.mu)
-        add_transposed(rows, w.G, w.mu, -1.0, w.u)
+        add_transposed(forms, w.G, w.mu, -1.0, w.u)
         rest = 0.0
         for i in range(w.u.shape[0]):
             rest += w.u[i] * w.u[i] * mass[i]
@@ -159,12 +159,12 @@ def fold_frame(tb, q, v, bound, w):
 
     Rows with pivots below `bound` join them. Returns their number (0 when the bordered system is singular, too).
     """
-    rows, plan, mass, fold = tb.rows, tb.plan, tb.mass, w.fold
-    m = rows.ints.shape[0]
+    forms, vectors, plan, mass, fold = tb.forms, tb.vectors, tb.plan, tb.mass, w.fold
+    m = w.mu.shape[0]
     trigonometry(q, w.c, w.s)
-    gradients(rows, q, w.c, w.s, w.G)
-    gradient_rates(rows, q, v, w.c, w.s, w.H)
-    factorise(rows, plan, mass, w.G, w.skip, w.val, w.diag, bound)
+    gradients(forms, vectors, q, w.c, w.s, w.G)
+    gradient_rates(forms, vectors, q, v, w.c, w.s, w.H)
+    factorise(plan, mass, w.G, w.skip, w.val, w.diag, bound)
     folds = 0
     for row in range(m):
         if w.skip[row] != 2:
@@ -174,17 +174,17 @@ def fold_frame(tb, q, v, bound, w):
         p = folds
         fold.drop[p] = row
         folds += 1
-        regular_parts(rows, plan, mass, w.G, row, w.skip, w.val, w.F, w.mu)
+        regular_parts(forms, plan, mass, w.G, row, w.skip, w.val, w.F, w.mu)
         for r in range(m):
             fold.Z[p, r] = -w.mu[r]
         fold.Z[p, row] = 1.0
         fill(fold.P[p], 0.0)
-        add_transposed(rows, w.G, fold.Z[p], 1.0, fold.P[p])
+        add_transposed(forms, w.G, fold.Z[p], 1.0, fold.P[p])
         fill(fold.B[p], 0.0)
-        add_transposed(rows, w.H, fold.Z[p], 1.0, fold.B[p])
+        add_transposed(forms, w.H, fold.Z[p], 1.0, fold.B[p])
         for i in range(w.F.shape[0]):
             w.F[i] = fold.B[p, i] * mass[i]
-        times_gradients(rows, w.G, w.F, w.mu)
+        times_gradients(forms, w.G, w.F, w.mu)
         for r in range(m):
             fold.E[p, r] = w.mu[r] if w.skip[r] == 0 else 0.0
             fold.Y[p, r] = fold.E[p, r]
@@ -229,13 +229,13 @@ def border_share(fold, folds, mass):
 def fold_change(tb, folds, length, w, u):
     """u -= the smallest change that lowers [G_reg; B] u by (w.mu, fold.nu); returns its largest entry, in units of
     `length` and 1 rad."""
-    rows, plan, mass, fold = tb.rows, tb.plan, tb.mass, w.fold
+    forms, plan, mass, fold = tb.forms, tb.plan, tb.mass, w.fold
     for r in range(w.mu.shape[0]):
         if w.skip[r] != 0:
             w.mu[r] = 0.0
     fold_solve(plan, w.val, fold, w.mu, folds)
     fill(w.F, 0.0)
-    add_transposed(rows, w.G, w.mu, 1.0, w.F)
+    add_transposed(forms, w.G, w.mu, 1.0, w.F)
     biggest = 0.0
     for i in range(u.shape[0]):
         change = w.F[i]

@@ -1,108 +1,132 @@
 # mypy: ignore-errors
-"""Taylor series of the applied forces: springs along a line, linear springs, loads, moments."""
+"""Taylor series of the applied forces: tensions of springs along vectors, forces along forms, weight."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from .kernel_planes import AS, BS, CS, EF, EI, EL, EX, EY, LINEAR, LOAD, SN, SPRING
+from .kernel_names import (
+    AS,
+    BS,
+    CS,
+    DAMPING,
+    EW,
+    EX,
+    EY,
+    FREE_LENGTH,
+    INVERSE,
+    KC,
+    KS,
+    KT,
+    KX,
+    KY,
+    LENGTH,
+    PULL,
+    SN,
+    STIFFNESS,
+    VX,
+    VY,
+)
 
 
-def spring_orders(forces, QS, bs, es, j):
-    """Order j of the span D, length L and 1/L of every spring."""
-    for k in range(es.shape[2]):
-        a = forces.ints[k, 1]
-        b = forces.ints[k, 2]
-        p = forces.reals[k]
-        es[EX, j, k] = (
-            QS[j, 3 * b]
-            - QS[j, 3 * a]
-            + bs[CS, j, b] * p[2]
-            - bs[SN, j, b] * p[3]
-            - bs[CS, j, a] * p[0]
-            + bs[SN, j, a] * p[1]
-        )
-        es[EY, j, k] = (
-            QS[j, 3 * b + 1] - QS[j, 3 * a + 1] + bs[SN, j, b] * p[2] + bs[CS, j, b] * p[3]
-            - bs[SN, j, a] * p[0] - bs[CS, j, a] * p[1]
-        )  # fmt: skip
+def spring_orders(forces, vs, ss, j):
+    """Order j of the length L and of 1/L of every spring."""
+    for k in range(ss.shape[2]):
         square = 0.0
         for i in range(j + 1):
-            square += es[EX, i, k] * es[EX, j - i, k] + es[EY, i, k] * es[EY, j - i, k]
+            square += vs[VX, i, k] * vs[VX, j - i, k] + vs[VY, i, k] * vs[VY, j - i, k]
         if j == 0:
-            es[EL, 0, k] = np.sqrt(square)
+            ss[LENGTH, 0, k] = np.sqrt(square)
             # with neither free length nor damping the force is linear in the span: the points may coincide
-            linear = p[5] == 0.0 and p[6] == 0.0
-            es[EI, 0, k] = 0.0 if linear else 1.0 / es[EL, 0, k]
+            linear = forces.spring[k, DAMPING] == 0.0 and forces.spring[k, FREE_LENGTH] == 0.0
+            ss[INVERSE, 0, k] = 0.0 if linear else 1.0 / ss[LENGTH, 0, k]
         else:
             for i in range(1, j):
-                square -= es[EL, i, k] * es[EL, j - i, k]
-            es[EL, j, k] = 0.5 * square * es[EI, 0, k]
+                square -= ss[LENGTH, i, k] * ss[LENGTH, j - i, k]
+            ss[LENGTH, j, k] = 0.5 * square * ss[INVERSE, 0, k]
             inverse = 0.0
             for i in range(1, j + 1):
-                inverse += es[EL, i, k] * es[EI, j - i, k]
-            es[EI, j, k] = -inverse * es[EI, 0, k]
+                inverse += ss[LENGTH, i, k] * ss[INVERSE, j - i, k]
+            ss[INVERSE, j, k] = -inverse * ss[INVERSE, 0, k]
 
 
-def force_orders(forces, QS, TF, bs, es, k, at, F):
+def force_orders(tb, w, k, at, F):
     """Order k of all applied forces: F gets what does not turn with a body, A and B (at row `at`) what does."""
+    forms, forces, bs, QS = tb.forms, tb.forces, w.bs, w.QS
     for i in range(F.shape[0]):
         F[i] = forces.weight[i] if k == 0 else 0.0
     for b in range(bs.shape[2]):
         bs[AS, at, b] = 0.0
         bs[BS, at, b] = 0.0
-    for e in range(forces.ints.shape[0]):
-        kind = forces.ints[e, 0]
-        a = forces.ints[e, 1]
-        b = forces.ints[e, 2]
-        first = forces.reals[e, 0]
-        second = forces.reals[e, 1]
-        if kind == SPRING:
-            fx, fy = spring_force(forces, es, k, e)
-            F[3 * a] += fx
-            F[3 * a + 1] += fy
-            F[3 * b] -= fx
-            F[3 * b + 1] -= fy
-            bs[AS, at, a] -= first * fx + second * fy
-            bs[BS, at, a] += first * fy - second * fx
-            bs[AS, at, b] += forces.reals[e, 2] * fx + forces.reals[e, 3] * fy
-            bs[BS, at, b] -= forces.reals[e, 2] * fy - forces.reals[e, 3] * fx
-        elif kind == LINEAR:
-            value = -first * (QS[k, a] - QS[k, b]) - second * (k + 1) * (QS[k + 1, a] - QS[k + 1, b])
-            if k == 0:
-                value += first * forces.reals[e, 2]
-            F[a] += value
-            F[b] -= value
-        elif kind == LOAD:
-            fx = TF[forces.ints[e, 3], k]
-            fy = TF[forces.ints[e, 4], k]
-            F[3 * a] += fx
-            F[3 * a + 1] += fy
-            bs[AS, at, a] -= first * fx + second * fy
-            bs[BS, at, a] += first * fy - second * fx
-        else:
-            value = TF[forces.ints[e, 3], k]
-            F[3 * a + 2] += value
-            F[3 * b + 2] -= value
+    for e in range(forces.spring.shape[0]):
+        fx, fy = spring_force(forces, w.vs, w.ss, k, e)
+        add_force(tb.vectors, bs, at, e, -fx, -fy, F)
+    m = w.mu.shape[0]
+    for e in range(forces.along.shape[0]):
+        r = m + e
+        value = 0.0
+        if forms.motion[r] >= 0:
+            value = w.TF[forms.motion[r], k]
+        if forces.along[e, STIFFNESS] != 0.0:
+            value -= forces.along[e, STIFFNESS] * form_order(forms, QS, bs, r, k)
+        if forces.along[e, DAMPING] != 0.0:
+            value -= forces.along[e, DAMPING] * (k + 1) * form_order(forms, QS, bs, r, k + 1)
+        for side in range(2):
+            b = forms.bodies[r, side]
+            F[3 * b] += forms.factor[r, side, KX] * value
+            F[3 * b + 1] += forms.factor[r, side, KY] * value
+            F[3 * b + 2] += forms.factor[r, side, KT] * value
+            bs[AS, at, b] -= forms.factor[r, side, KC] * value
+            bs[BS, at, b] += forms.factor[r, side, KS] * value
 
 
-def spring_force(forces, es, k, e):
+def form_order(forms, QS, bs, r, j):
+    """Order j of the affine form r."""
+    value = forms.constant[r] if j == 0 else 0.0
+    for side in range(2):
+        b = forms.bodies[r, side]
+        value += forms.factor[r, side, KX] * QS[j, 3 * b] + forms.factor[r, side, KY] * QS[j, 3 * b + 1]
+        value += forms.factor[r, side, KT] * QS[j, 3 * b + 2]
+        value += forms.factor[r, side, KC] * bs[CS, j, b] + forms.factor[r, side, KS] * bs[SN, j, b]
+    return value
+
+
+def add_force(vectors, bs, at, k, fx, fy, F):
+    """The generalised force of (fx, fy) on the vector k: F gets what does not turn with a body, A and B what does."""
+    for side in range(2):
+        b = vectors.bodies[k, side]
+        F[3 * b] += vectors.end[k, side, EW] * fx
+        F[3 * b + 1] += vectors.end[k, side, EW] * fy
+    add_arms(vectors, bs, at, k, fx, fy)
+
+
+def add_arms(vectors, bs, at, k, fx, fy):
+    """The torques of (fx, fy) on the vector k join the sums A and B."""
+    for side in range(2):
+        b = vectors.bodies[k, side]
+        x = vectors.end[k, side, EX]
+        y = vectors.end[k, side, EY]
+        bs[AS, at, b] -= x * fx + y * fy
+        bs[BS, at, b] += x * fy - y * fx
+
+
+def spring_force(forces, vs, ss, k, e):
     """Order k of the force of spring e on its first point: (k_s (L - L0) + c L') / L times the span."""
-    stiffness = forces.reals[e, 4]
-    damping = forces.reals[e, 5]
-    value = -stiffness * forces.reals[e, 6] * es[EI, k, e]
+    stiffness = forces.spring[e, STIFFNESS]
+    damping = forces.spring[e, DAMPING]
+    value = -stiffness * forces.spring[e, FREE_LENGTH] * ss[INVERSE, k, e]
     if k == 0:
         value += stiffness
     if damping != 0.0:
         for i in range(k + 1):
-            value += damping * (i + 1) * es[EL, i + 1, e] * es[EI, k - i, e]
-    es[EF, k, e] = value
+            value += damping * (i + 1) * ss[LENGTH, i + 1, e] * ss[INVERSE, k - i, e]
+    ss[PULL, k, e] = value
     fx = 0.0
     fy = 0.0
     for i in range(k + 1):
-        fx += es[EF, i, e] * es[EX, k - i, e]
-        fy += es[EF, i, e] * es[EY, k - i, e]
+        fx += ss[PULL, i, e] * vs[VX, k - i, e]
+        fy += ss[PULL, i, e] * vs[VY, k - i, e]
     return fx, fy
 
 
-FUNCTIONS = (spring_orders, force_orders, spring_force)
+FUNCTIONS = (spring_orders, force_orders, form_order, add_force, add_arms, spring_force)

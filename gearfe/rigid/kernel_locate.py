@@ -26,17 +26,6 @@ from .kernel_series import small_solve
 SAME = 4e-11
 
 
-def row_unit(rows, r, length):
-    """Size of row r: `length` where it holds points, 1 where it holds an angle."""
-    if rows.ints[r, 2] == 0:
-        held = 0.0
-        for side in range(2):
-            held += abs(rows.reals[r, 5 * side]) + abs(rows.reals[r, 5 * side + 1])
-        if held == 0.0:
-            return 1.0
-    return length
-
-
 def moved_state(QS, order, h, w, q, v):
     """State of the series at h with the corrections w.dq, w.dv."""
     evaluate(QS, order, h, q, v)
@@ -63,7 +52,7 @@ def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, w,
         folds, h = converge(tb, t, forward, QS, order, h, guess, reach, length, w, q, v)
         if folds == 0 or not split_folds(tb, folds, where, w):
             break
-    if folds == 0 or not passes(tb, folds, length, w, q):
+    if folds == 0 or not passes(tb, folds, w, q):
         return 0, h
     return folds, h
 
@@ -96,7 +85,7 @@ def meet(tb, QS, order, guess, reach, base, where, w, q, v):
 
 def converge(tb, t, forward, QS, order, h, guess, reach, length, w, q, v):
     """Newton of `locate_fold` from the time h for the rows with w.skip = 2."""
-    rows, mass, fold = tb.rows, tb.mass, w.fold
+    forms, vectors, mass, fold = tb.forms, tb.vectors, tb.mass, w.fold
     n = q.shape[0]
     fill(w.dq, 0.0)
     fill(w.dv, 0.0)
@@ -110,22 +99,22 @@ def converge(tb, t, forward, QS, order, h, guess, reach, length, w, q, v):
             move += time_to_fold(fold, p, mass) / folds
         # position: g_reg and z^T (G v - df/dt)
         time_series(tb.times, t + h, forward, 3, w.TF)
-        times_gradients(rows, w.G, v, w.mu)
-        add_rates(rows, w.TF, 1, -1.0, w.mu)
+        times_gradients(forms, w.G, v, w.mu)
+        add_rates(forms, w.TF, 1, -1.0, w.mu)
         for p in range(folds):
             fold.nu[p] = fold_combination(fold, p, w.mu)
-        residuals(rows, q, w.c, w.s, w.TF[:, 0], w.mu)
+        residuals(forms, vectors, q, w.c, w.s, w.TF[:, 0], w.mu)
         copy(q, w.work)
         change = fold_change(tb, folds, length, w, q)
         for i in range(n):
             w.dq[i] += q[i] - w.work[i]
         # velocity: G_reg v - df/dt and half of z^T g'' (linear in v along B)
-        times_gradients(rows, w.H, v, w.mu)
-        add_rates(rows, w.TF, 2, -2.0, w.mu)
+        times_gradients(forms, w.H, v, w.mu)
+        add_rates(forms, w.TF, 2, -2.0, w.mu)
         for p in range(folds):
             fold.nu[p] = 0.5 * fold_combination(fold, p, w.mu)
-        times_gradients(rows, w.G, v, w.mu)
-        add_rates(rows, w.TF, 1, -1.0, w.mu)
+        times_gradients(forms, w.G, v, w.mu)
+        add_rates(forms, w.TF, 1, -1.0, w.mu)
         copy(v, w.work)
         fold_change(tb, folds, length, w, v)
         for i in range(n):
@@ -139,21 +128,21 @@ def converge(tb, t, forward, QS, order, h, guess, reach, length, w, q, v):
     return 0, h
 
 
-def add_rates(rows, TF, order, factor, out):
+def add_rates(forms, TF, order, factor, out):
     """out += factor times the coefficient `order` of every row's time function."""
     for r in range(out.shape[0]):
-        if rows.ints[r, 3] >= 0:
-            out[r] += factor * TF[rows.ints[r, 3], order]
+        if forms.motion[r] >= 0:
+            out[r] += factor * TF[forms.motion[r], order]
 
 
 def split_folds(tb, folds, where, w):
     """Whether some rows pass at another moment than the row `where`; then those that pass with it (w.skip = 2) are
     left."""
-    rows, mass, fold = tb.rows, tb.mass, w.fold
+    forms, mass, fold = tb.forms, tb.mass, w.fold
     worst = 0.0
     own = 0.0
     for p in range(folds):
-        size = row_square(rows, mass, w.G, fold.drop[p])
+        size = row_square(forms, mass, w.G, fold.drop[p])
         worst = max(worst, weighted(fold.P[p], fold.P[p], mass) / size)
         fold.nu[p] = time_to_fold(fold, p, mass)
         if fold.drop[p] == where:
@@ -179,17 +168,17 @@ def exchange(tb, base, folds, w, q, v):
     Which row of a dependent set may be left out changes along the motion: without the x-row of one of three parallel
     cranks, what is left loses rank where that crank's end moves along x, though the mechanism is regular there.
     """
-    rows, plan, mass, fold = tb.rows, tb.plan, tb.mass, w.fold
+    forms, plan, mass, fold = tb.forms, tb.plan, tb.mass, w.fold
     for row in range(base.shape[0]):
         if base[row] == 0 or folds == 0:
             continue
-        regular_parts(rows, plan, mass, w.G, row, w.skip, w.val, w.F, w.mu)
+        regular_parts(forms, plan, mass, w.G, row, w.skip, w.val, w.F, w.mu)
         for r in range(w.mu.shape[0]):
             w.mu[r] = -w.mu[r]
         w.mu[row] = 1.0
         fill(w.F, 0.0)
-        add_transposed(rows, w.G, w.mu, 1.0, w.F)
-        if weighted(w.F, w.F, mass) < TOGETHER * row_square(rows, mass, w.G, row):
+        add_transposed(forms, w.G, w.mu, 1.0, w.F)
+        if weighted(w.F, w.F, mass) < TOGETHER * row_square(forms, mass, w.G, row):
             continue
         for p in range(folds):
             fold.nu[p] = weighted(fold.B[p], w.F, mass)
@@ -206,21 +195,20 @@ def exchange(tb, base, folds, w, q, v):
     return folds
 
 
-def passes(tb, folds, length, w, q):
+def passes(tb, folds, w, q):
     """Whether z^T g vanishes, so that two branches cross, for all folds."""
-    rows, fold = tb.rows, w.fold
-    residuals(rows, q, w.c, w.s, w.TF[:, 0], w.mu)
+    forms, vectors, fold = tb.forms, tb.vectors, w.fold
+    residuals(forms, vectors, q, w.c, w.s, w.TF[:, 0], w.mu)
     for p in range(folds):
         scale = 0.0
         for r in range(w.mu.shape[0]):
-            scale = max(scale, abs(fold.Z[p, r]) * row_unit(rows, r, length))
+            scale = max(scale, abs(fold.Z[p, r]) * tb.forms.unit[r])
         if abs(fold_combination(fold, p, w.mu)) > 1e-10 * scale:
             return False
     return True
 
 
 FUNCTIONS = (
-    row_unit,
     moved_state,
     time_to_fold,
     locate_fold,

@@ -12,6 +12,8 @@ import math
 
 import numpy as np
 
+from .kernel_names import EW, EX, EY, KC, KS, KT, KX, KY
+
 
 def fill(x, value):
     """x := value (a loop compiles far faster than a slice assignment, which brings its error messages along)."""
@@ -32,117 +34,128 @@ def trigonometry(q, c, s):
         s[b] = math.sin(q[3 * b + 2])
 
 
-def gradients(rows, q, c, s, G):
-    """G[r, side] = gradient of row r with respect to (x, y, theta) of its body on that side; shape (m, 2, 3)."""
-    for r in range(rows.ints.shape[0]):
-        if rows.ints[r, 2] == 0:
-            for a in range(2):
-                b = rows.ints[r, a]
-                G[r, a, 0] = rows.reals[r, 5 * a]
-                G[r, a, 1] = rows.reals[r, 5 * a + 1]
-                G[r, a, 2] = (
-                    rows.reals[r, 5 * a + 2] - rows.reals[r, 5 * a + 3] * s[b] + rows.reals[r, 5 * a + 4] * c[b]
-                )
-        else:
-            a = rows.ints[r, 0]
-            b = rows.ints[r, 1]
-            nx = c[a] * rows.reals[r, 10] - s[a] * rows.reals[r, 11]
-            ny = s[a] * rows.reals[r, 10] + c[a] * rows.reals[r, 11]
-            rx = c[b] * rows.reals[r, 12] - s[b] * rows.reals[r, 13]
-            ry = s[b] * rows.reals[r, 12] + c[b] * rows.reals[r, 13]
-            dx = q[3 * b] + rx - q[3 * a]
-            dy = q[3 * b + 1] + ry - q[3 * a + 1]
-            G[r, 0, 0] = -nx
-            G[r, 0, 1] = -ny
-            G[r, 0, 2] = nx * dy - ny * dx
-            G[r, 1, 0] = nx
-            G[r, 1, 1] = ny
-            G[r, 1, 2] = ny * rx - nx * ry
+def vector_at(vectors, k, q, c, s):
+    """Components of vector k."""
+    x = 0.0
+    y = 0.0
+    for side in range(2):
+        b = vectors.bodies[k, side]
+        px = vectors.end[k, side, EX]
+        py = vectors.end[k, side, EY]
+        x += vectors.end[k, side, EW] * q[3 * b] + c[b] * px - s[b] * py
+        y += vectors.end[k, side, EW] * q[3 * b + 1] + s[b] * px + c[b] * py
+    return x, y
 
 
-def gradient_rates(rows, q, v, c, s, H):
+def vector_rate(vectors, k, v, c, s):
+    """Components of the rate of vector k."""
+    x = 0.0
+    y = 0.0
+    for side in range(2):
+        b = vectors.bodies[k, side]
+        px = vectors.end[k, side, EX]
+        py = vectors.end[k, side, EY]
+        x += vectors.end[k, side, EW] * v[3 * b] - v[3 * b + 2] * (s[b] * px + c[b] * py)
+        y += vectors.end[k, side, EW] * v[3 * b + 1] + v[3 * b + 2] * (c[b] * px - s[b] * py)
+    return x, y
+
+
+def gradients(forms, vectors, q, c, s, G):
+    """G[r, side] = gradient of constraint r with respect to (x, y, theta) of its body on that side; shape (m, 2, 3)."""
+    for r in range(G.shape[0]):
+        for a in range(2):
+            b = forms.bodies[r, a]
+            G[r, a, 0] = forms.factor[r, a, KX]
+            G[r, a, 1] = forms.factor[r, a, KY]
+            G[r, a, 2] = forms.factor[r, a, KT] - forms.factor[r, a, KC] * s[b] + forms.factor[r, a, KS] * c[b]
+    for p in range(forms.product.shape[0]):
+        for one in range(2):
+            ux, uy = vector_at(vectors, forms.product[p, 2 - one], q, c, s)
+            add_gradient(forms, vectors, p, one, ux, uy, c, s, G)
+
+
+def add_gradient(forms, vectors, p, one, ux, uy, c, s, G):
+    """G gains the gradient of the inner product of (ux, uy) with the vector `one` (0 or 1) of product p."""
+    r = forms.product[p, 0]
+    k = forms.product[p, 1 + one]
+    for a in range(2):
+        b = forms.bodies[r, a]
+        rx = c[b] * vectors.end[k, a, EX] - s[b] * vectors.end[k, a, EY]
+        ry = s[b] * vectors.end[k, a, EX] + c[b] * vectors.end[k, a, EY]
+        G[r, a, 0] += vectors.end[k, a, EW] * ux
+        G[r, a, 1] += vectors.end[k, a, EW] * uy
+        G[r, a, 2] += rx * uy - ry * ux
+
+
+def gradient_rates(forms, vectors, q, v, c, s, H):
     """H = dG/dt along the velocity v, same layout as G."""
-    for r in range(rows.ints.shape[0]):
-        if rows.ints[r, 2] == 0:
-            for a in range(2):
-                b = rows.ints[r, a]
-                w = v[3 * b + 2]
-                H[r, a, 0] = 0.0
-                H[r, a, 1] = 0.0
-                H[r, a, 2] = -w * (rows.reals[r, 5 * a + 3] * c[b] + rows.reals[r, 5 * a + 4] * s[b])
-        else:
-            a = rows.ints[r, 0]
-            b = rows.ints[r, 1]
-            wa = v[3 * a + 2]
-            wb = v[3 * b + 2]
-            nx = c[a] * rows.reals[r, 10] - s[a] * rows.reals[r, 11]
-            ny = s[a] * rows.reals[r, 10] + c[a] * rows.reals[r, 11]
-            rx = c[b] * rows.reals[r, 12] - s[b] * rows.reals[r, 13]
-            ry = s[b] * rows.reals[r, 12] + c[b] * rows.reals[r, 13]
-            dx = q[3 * b] + rx - q[3 * a]
-            dy = q[3 * b + 1] + ry - q[3 * a + 1]
-            ux = v[3 * b] - wb * ry - v[3 * a]
-            uy = v[3 * b + 1] + wb * rx - v[3 * a + 1]
-            H[r, 0, 0] = wa * ny
-            H[r, 0, 1] = -wa * nx
-            H[r, 0, 2] = nx * uy - ny * ux - wa * (ny * dy + nx * dx)
-            H[r, 1, 0] = -wa * ny
-            H[r, 1, 1] = wa * nx
-            H[r, 1, 2] = wa * (nx * rx + ny * ry) - wb * (ny * ry + nx * rx)
+    for r in range(H.shape[0]):
+        for a in range(2):
+            b = forms.bodies[r, a]
+            H[r, a, 0] = 0.0
+            H[r, a, 1] = 0.0
+            H[r, a, 2] = -v[3 * b + 2] * (forms.factor[r, a, KC] * c[b] + forms.factor[r, a, KS] * s[b])
+    for p in range(forms.product.shape[0]):
+        r = forms.product[p, 0]
+        for one in range(2):
+            ux, uy = vector_rate(vectors, forms.product[p, 2 - one], v, c, s)
+            add_gradient(forms, vectors, p, one, ux, uy, c, s, H)
+            ux, uy = vector_at(vectors, forms.product[p, 2 - one], q, c, s)
+            k = forms.product[p, 1 + one]
+            for a in range(2):  # the arm turns
+                b = forms.bodies[r, a]
+                rx = c[b] * vectors.end[k, a, EX] - s[b] * vectors.end[k, a, EY]
+                ry = s[b] * vectors.end[k, a, EX] + c[b] * vectors.end[k, a, EY]
+                H[r, a, 2] -= v[3 * b + 2] * (rx * ux + ry * uy)
 
 
-def residuals(rows, q, c, s, f, g):
-    """Value of every row; f holds the value of every time function."""
-    for r in range(rows.ints.shape[0]):
-        a = rows.ints[r, 0]
-        b = rows.ints[r, 1]
-        value = rows.reals[r, 14]
-        if rows.ints[r, 3] >= 0:
-            value -= f[rows.ints[r, 3]]
-        if rows.ints[r, 2] == 0:
-            for side in range(2):
-                k = rows.ints[r, side]
-                value += rows.reals[r, 5 * side] * q[3 * k] + rows.reals[r, 5 * side + 1] * q[3 * k + 1]
-                value += rows.reals[r, 5 * side + 2] * q[3 * k + 2]
-                value += rows.reals[r, 5 * side + 3] * c[k] + rows.reals[r, 5 * side + 4] * s[k]
-        else:
-            nx = c[a] * rows.reals[r, 10] - s[a] * rows.reals[r, 11]
-            ny = s[a] * rows.reals[r, 10] + c[a] * rows.reals[r, 11]
-            dx = q[3 * b] + c[b] * rows.reals[r, 12] - s[b] * rows.reals[r, 13] - q[3 * a]
-            dy = q[3 * b + 1] + s[b] * rows.reals[r, 12] + c[b] * rows.reals[r, 13] - q[3 * a + 1]
-            value += nx * dx + ny * dy
+def residuals(forms, vectors, q, c, s, f, g):
+    """Value of every constraint; f holds the value of every time function."""
+    for r in range(g.shape[0]):
+        value = forms.constant[r]
+        if forms.motion[r] >= 0:
+            value -= f[forms.motion[r]]
+        for a in range(2):
+            b = forms.bodies[r, a]
+            value += forms.factor[r, a, KX] * q[3 * b] + forms.factor[r, a, KY] * q[3 * b + 1]
+            value += forms.factor[r, a, KT] * q[3 * b + 2]
+            value += forms.factor[r, a, KC] * c[b] + forms.factor[r, a, KS] * s[b]
         g[r] = value
+    for p in range(forms.product.shape[0]):
+        ux, uy = vector_at(vectors, forms.product[p, 1], q, c, s)
+        vx, vy = vector_at(vectors, forms.product[p, 2], q, c, s)
+        g[forms.product[p, 0]] += ux * vx + uy * vy
 
 
-def times_gradients(rows, G, u, out):
+def times_gradients(forms, G, u, out):
     """out = G u, one number per row."""
-    for r in range(rows.ints.shape[0]):
-        a = 3 * rows.ints[r, 0]
-        b = 3 * rows.ints[r, 1]
+    for r in range(out.shape[0]):
+        a = 3 * forms.bodies[r, 0]
+        b = 3 * forms.bodies[r, 1]
         out[r] = (
             G[r, 0, 0] * u[a] + G[r, 0, 1] * u[a + 1] + G[r, 0, 2] * u[a + 2]
             + G[r, 1, 0] * u[b] + G[r, 1, 1] * u[b + 1] + G[r, 1, 2] * u[b + 2]
         )  # fmt: skip
 
 
-def add_transposed(rows, G, mu, factor, out):
+def add_transposed(forms, G, mu, factor, out):
     """out += factor G^T mu."""
-    for r in range(rows.ints.shape[0]):
+    for r in range(mu.shape[0]):
         for side in range(2):
-            b = 3 * rows.ints[r, side]
+            b = 3 * forms.bodies[r, side]
             value = factor * mu[r]
             out[b] += G[r, side, 0] * value
             out[b + 1] += G[r, side, 1] * value
             out[b + 2] += G[r, side, 2] * value
 
 
-def factorise(rows, plan, mass, G, skip, val, diag, bound):
+def factorise(plan, mass, G, skip, val, diag, bound):
     """L D L^T of S in val (m reciprocals of D, then the entries of L); rows with skip != 0 become unit rows.
 
     Rows whose pivot falls below `bound` of their diagonal become unit rows, too, and get skip = 2.
     Returns the smallest pivot relative to its diagonal of S, and its row (-1 when there is none).
     """
-    m = rows.ints.shape[0]
+    m = diag.shape[0]
     fill(val, 0.0)
     for e in range(plan.entry.shape[0]):
         r = plan.entry[e, 1]
@@ -231,7 +244,7 @@ def time_series(times, t, forward, orders, out):
                 scale *= times.sine[i, 1] / (j + 1)
 
 
-def least_norm(rows, plan, mass, G, val, skip, length, rhs, work, u):
+def least_norm(forms, plan, mass, G, val, skip, length, rhs, work, u):
     """u -= M^-1 G^T S^-1 rhs: the smallest change (in the mass norm) that lowers G u by rhs. Returns its
     largest entry, in units of `length` and 1 rad."""
     for r in range(rhs.shape[0]):
@@ -239,7 +252,7 @@ def least_norm(rows, plan, mass, G, val, skip, length, rhs, work, u):
             rhs[r] = 0.0
     solve(plan, val, rhs)
     fill(work, 0.0)
-    add_transposed(rows, G, rhs, 1.0, work)
+    add_transposed(forms, G, rhs, 1.0, work)
     biggest = 0.0
     for i in range(u.shape[0]):
         change = work[i] * mass[i]
@@ -252,7 +265,10 @@ FUNCTIONS = (
     fill,
     copy,
     trigonometry,
+    vector_at,
+    vector_rate,
     gradients,
+    add_gradient,
     gradient_rates,
     residuals,
     times_gradients,

@@ -67,12 +67,11 @@ def fold_behind(tb, t, sign, q, v, order, tolerance, length, base, where, ahead,
 
 def begin(tb, t, sign, q, v, order, tolerance, length, base, none, w, qn, vn):
     """Consistent start beside a fold: (folds, time shift, time to the fold ahead, its row, status); state in q, v."""
-    rows, plan, mass = tb.rows, tb.plan, tb.mass
     forward = sign > 0.0
     while True:
         trigonometry(q, w.c, w.s)
-        gradients(rows, q, w.c, w.s, w.G)
-        least, where = factorise(rows, plan, mass, w.G, base, w.val, w.diag, 0.0)
+        gradients(tb.forms, tb.vectors, q, w.c, w.s, w.G)
+        least, where = factorise(tb.plan, tb.mass, w.G, base, w.val, w.diag, 0.0)
         if least >= 1e-10:
             break
         speed = 1e-300
@@ -119,8 +118,8 @@ def fold_within(tb, sign, h, order, base, low, high, w, q, v):
         place = h * k / looks
         evaluate(w.QS, order, place, q, v)
         trigonometry(q, w.c, w.s)
-        gradients(tb.rows, q, w.c, w.s, w.G)
-        factorise(tb.rows, tb.plan, tb.mass, w.G, base, w.val, w.diag, 0.0)
+        gradients(tb.forms, tb.vectors, q, w.c, w.s, w.G)
+        factorise(tb.plan, tb.mass, w.G, base, w.val, w.diag, 0.0)
         spacing = abs(h) / looks
         tau, row = next_fold(
             tb, q, v, base, sign, max(-spacing, low - sign * place), min(spacing, high - sign * place), w

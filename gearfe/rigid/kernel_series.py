@@ -26,8 +26,8 @@ is solved exactly: (1 - X) q_c = (q_N)_c once per order. No 1/m of a light link 
 
 from __future__ import annotations
 
-from .kernel_forces import force_orders, spring_orders
-from .kernel_planes import AS, BS, CS, DT, DX, DY, FX, FY, NX, NY, SN
+from .kernel_forces import add_arms, add_force, force_orders, spring_orders
+from .kernel_names import AS, BS, CS, DT, EW, EX, EY, KC, KS, SN, VX, VY
 from .kernel_rows import add_transposed, fill, solve, time_series, times_gradients, trigonometry
 
 
@@ -43,93 +43,73 @@ def angle_orders(bs, j, known):
         bs[CS, j, b] = cosine / j
 
 
-def slot_orders(rows, QS, bs, ls, j):
-    """Orders j of the normal n and the distance D of every moving line, from the orders j of q, sine and cosine."""
-    for k in range(rows.lines.shape[0]):
-        r = rows.lines[k]
-        a = rows.ints[r, 0]
-        b = rows.ints[r, 1]
-        ls[NX, j, k] = bs[CS, j, a] * rows.reals[r, 10] - bs[SN, j, a] * rows.reals[r, 11]
-        ls[NY, j, k] = bs[SN, j, a] * rows.reals[r, 10] + bs[CS, j, a] * rows.reals[r, 11]
-        rx = bs[CS, j, b] * rows.reals[r, 12] - bs[SN, j, b] * rows.reals[r, 13]
-        ry = bs[SN, j, b] * rows.reals[r, 12] + bs[CS, j, b] * rows.reals[r, 13]
-        ls[DX, j, k] = QS[j, 3 * b] + rx - QS[j, 3 * a]
-        ls[DY, j, k] = QS[j, 3 * b + 1] + ry - QS[j, 3 * a + 1]
+def vector_orders(vectors, QS, bs, vs, j, first):
+    """Orders j of the vectors from number `first` on, from the orders j of q, sine and cosine."""
+    for k in range(first, vs.shape[2]):
+        x = 0.0
+        y = 0.0
+        for side in range(2):
+            b = vectors.bodies[k, side]
+            px = vectors.end[k, side, EX]
+            py = vectors.end[k, side, EY]
+            x += vectors.end[k, side, EW] * QS[j, 3 * b] + bs[CS, j, b] * px - bs[SN, j, b] * py
+            y += vectors.end[k, side, EW] * QS[j, 3 * b + 1] + bs[SN, j, b] * px + bs[CS, j, b] * py
+        vs[VX, j, k] = x
+        vs[VY, j, k] = y
 
 
-def row_orders(rows, TF, bs, ls, j, out):
-    """Order j >= 2 of every constraint row without the part of q_j."""
-    for r in range(rows.ints.shape[0]):
+def row_orders(forms, TF, bs, vs, j, out):
+    """Order j >= 2 of every constraint without the part of q_j."""
+    for r in range(out.shape[0]):
         value = 0.0
-        if rows.ints[r, 3] >= 0:
-            value = -TF[rows.ints[r, 3], j]
-        if rows.ints[r, 2] == 0:
-            for side in range(2):
-                b = rows.ints[r, side]
-                value += rows.reals[r, 5 * side + 3] * bs[CS, j, b] + rows.reals[r, 5 * side + 4] * bs[SN, j, b]
+        if forms.motion[r] >= 0:
+            value = -TF[forms.motion[r], j]
+        for side in range(2):
+            b = forms.bodies[r, side]
+            value += forms.factor[r, side, KC] * bs[CS, j, b] + forms.factor[r, side, KS] * bs[SN, j, b]
         out[r] = value
-    for k in range(rows.lines.shape[0]):
+    for p in range(forms.product.shape[0]):
+        one = forms.product[p, 1]
+        two = forms.product[p, 2]
         value = 0.0
         for i in range(j + 1):
-            value += ls[NX, i, k] * ls[DX, j - i, k] + ls[NY, i, k] * ls[DY, j - i, k]
-        out[rows.lines[k]] += value
+            value += vs[VX, i, one] * vs[VX, j - i, two] + vs[VY, i, one] * vs[VY, j - i, two]
+        out[forms.product[p, 0]] += value
 
 
-def slot_forces(rows, LM, bs, ls, at, F):
-    """Known part of order `at` of the forces of moving ls, from the multipliers below that order."""
-    for k in range(rows.lines.shape[0]):
-        r = rows.lines[k]
-        fx = 0.0
-        fy = 0.0
-        for i in range(1, at + 1):
-            fx += ls[NX, i, k] * LM[at - i, r]
-            fy += ls[NY, i, k] * LM[at - i, r]
-        ls[FX, at, k] = fx
-        ls[FY, at, k] = fy
-        turn = 0.0
-        for i in range(at + 1):
-            turn += ls[FX, i, k] * ls[DY, at - i, k] - ls[FY, i, k] * ls[DX, at - i, k]
-        a = rows.ints[r, 0]
-        b = rows.ints[r, 1]
-        F[3 * a] += fx
-        F[3 * a + 1] += fy
-        F[3 * a + 2] -= turn
-        F[3 * b] -= fx
-        F[3 * b + 1] -= fy
-        slot_arms(rows, bs, at, r, b, fx, fy)
+def product_forces(forms, vectors, LM, bs, vs, at, F):
+    """Known part of order `at` of the forces of constraints with products, from the multipliers below that order."""
+    for p in range(forms.product.shape[0]):
+        r = forms.product[p, 0]
+        for one in range(2):
+            k = forms.product[p, 2 - one]
+            fx = 0.0
+            fy = 0.0
+            for i in range(1, at + 1):
+                fx += vs[VX, i, k] * LM[at - i, r]
+                fy += vs[VY, i, k] * LM[at - i, r]
+            add_force(vectors, bs, at, forms.product[p, 1 + one], -fx, -fy, F)
 
 
-def slot_arms(rows, bs, at, r, b, fx, fy):
-    """Reaction (fx, fy) of the moving line r on the point of body b, in the sums A and B."""
-    x = rows.reals[r, 12]
-    y = rows.reals[r, 13]
-    bs[AS, at, b] += x * fx + y * fy
-    bs[BS, at, b] -= x * fy - y * fx
-
-
-def add_multipliers(rows, LM, bs, ls, at, values):
-    """Multipliers `values` (one per row) join order `at`: what turns with a body goes into A, B, and into the
-    lines' forces."""
+def add_multipliers(forms, vectors, LM, bs, vs, at, values):
+    """Multipliers `values` (one per constraint) join order `at`: what turns with a body goes into A, B."""
     for r in range(values.shape[0]):
         value = values[r]
         LM[at, r] += value
-        if rows.ints[r, 2] == 0:
-            for side in range(2):
-                b = rows.ints[r, side]
-                bs[AS, at, b] += rows.reals[r, 5 * side + 3] * value
-                bs[BS, at, b] -= rows.reals[r, 5 * side + 4] * value
-    add_line_multipliers(rows, bs, ls, at, 0, values)
+        for side in range(2):
+            b = forms.bodies[r, side]
+            bs[AS, at, b] += forms.factor[r, side, KC] * value
+            bs[BS, at, b] -= forms.factor[r, side, KS] * value
+    add_product_multipliers(forms, vectors, bs, vs, at, 0, values)
 
 
-def add_line_multipliers(rows, bs, ls, at, i, values):
-    """Order `at` of the force of every moving line gains n_i times its multiplier."""
-    for k in range(rows.lines.shape[0]):
-        r = rows.lines[k]
-        fx = ls[NX, i, k] * values[r]
-        fy = ls[NY, i, k] * values[r]
-        ls[FX, at, k] += fx
-        ls[FY, at, k] += fy
-        slot_arms(rows, bs, at, r, rows.ints[r, 1], fx, fy)
+def add_product_multipliers(forms, vectors, bs, vs, at, i, values):
+    """Order `at` of the force of every product gains order i of its vectors times its multiplier."""
+    for p in range(forms.product.shape[0]):
+        value = values[forms.product[p, 0]]
+        for one in range(2):
+            k = forms.product[p, 2 - one]
+            add_arms(vectors, bs, at, forms.product[p, 1 + one], -vs[VX, i, k] * value, -vs[VY, i, k] * value)
 
 
 def torque_orders(bs, at, F):
@@ -141,16 +121,16 @@ def torque_orders(bs, at, F):
         F[3 * b + 2] += torque
 
 
-def finish_order(rows, forces, QS, bs, ls, es, j):
-    """Everything that follows from q_j: sine, cosine, ls, springs."""
-    n = bs.shape[2]
-    for b in range(n):
-        theta = QS[j, 3 * b + 2]
+def finish_order(tb, w, j):
+    """Everything that follows from q_j: sine, cosine, vectors, springs."""
+    bs = w.bs
+    for b in range(bs.shape[2]):
+        theta = w.QS[j, 3 * b + 2]
         bs[DT, j, b] = j * theta
         bs[SN, j, b] += bs[CS, 0, b] * theta
         bs[CS, j, b] -= bs[SN, 0, b] * theta
-    slot_orders(rows, QS, bs, ls, j)
-    spring_orders(forces, QS, bs, es, j)
+    vector_orders(tb.vectors, w.QS, bs, w.vs, j, 0)
+    spring_orders(tb.forces, w.vs, w.ss, j)
 
 
 def expand(tb, t, forward, order, folds, w):
@@ -158,13 +138,14 @@ def expand(tb, t, forward, order, folds, w):
 
     `folds` is the number of singular rows: 0 at a regular position.
     """
-    rows, forces, mass = tb.rows, tb.forces, tb.mass
-    bs, ls, es, fold = w.bs, w.ls, w.es, w.fold
+    forms, vectors, mass = tb.forms, tb.vectors, tb.mass
+    bs, vs, fold = w.bs, w.vs, w.fold
     QS, TF, LM, G, skip = w.QS, w.TF, w.LM, w.G, w.skip
     mu, rhs, F, u = w.mu, w.rhs, w.F, w.u
+    springs = w.ss.shape[2]
     shift = 1 if folds > 0 else 0
     time_series(tb.times, t, forward, order + 2, TF)
-    start_series(rows, forces, order, QS, LM, bs, ls, es)
+    start_series(tb, w, order)
     if tb.light.shape[0] > 0:
         carry_responses(tb, folds, w)
     for k in range(order - 1):
@@ -172,17 +153,17 @@ def expand(tb, t, forward, order, folds, w):
         at = k + shift
         alpha = float(j * (j - 1))
         share = 1.0 / alpha
-        force_orders(forces, QS, TF, bs, es, k, at, F)
-        slot_forces(rows, LM, bs, ls, at, F)
+        force_orders(tb, w, k, at, F)
+        product_forces(forms, vectors, LM, bs, vs, at, F)
         torque_orders(bs, at, F)
         angle_orders(bs, j, j)
-        slot_orders(rows, QS, bs, ls, j)
-        row_orders(rows, TF, bs, ls, j, rhs)
+        vector_orders(vectors, QS, bs, vs, j, springs)
+        row_orders(forms, TF, bs, vs, j, rhs)
         for i in range(F.shape[0]):
             u[i] = F[i] * mass[i] * share
         if folds > 0:
-            fold_rows(rows, QS, TF, bs, ls, fold, mu, u, j, folds)
-        times_gradients(rows, G, u, mu)
+            fold_rows(tb, w, j, folds)
+        times_gradients(forms, G, u, mu)
         for r in range(mu.shape[0]):
             mu[r] = mu[r] + rhs[r] if skip[r] == 0 else 0.0
         constrained(tb, folds, w, mu, u, QS[j])
@@ -190,15 +171,15 @@ def expand(tb, t, forward, order, folds, w):
             add_carried(tb, folds, w, mu, QS[j])
         for r in range(mu.shape[0]):
             mu[r] *= alpha
-        add_multipliers(rows, LM, bs, ls, at, mu)
+        add_multipliers(forms, vectors, LM, bs, vs, at, mu)
         if folds > 0:  # the multipliers Z nu belong one order below the regular ones
             for r in range(mu.shape[0]):
                 mu[r] = 0.0
                 for p in range(folds):
                     mu[r] += alpha * fold.Z[p, r] * fold.nu[p]
-            add_multipliers(rows, LM, bs, ls, at - 1, mu)
-            add_line_multipliers(rows, bs, ls, at, 1, mu)
-        finish_order(rows, forces, QS, bs, ls, es, j)
+            add_multipliers(forms, vectors, LM, bs, vs, at - 1, mu)
+            add_product_multipliers(forms, vectors, bs, vs, at, 1, mu)
+        finish_order(tb, w, j)
 
 
 def constrained(tb, folds, w, mu, u, q):
@@ -210,7 +191,7 @@ def constrained(tb, folds, w, mu, u, q):
     else:
         solve(tb.plan, w.val, mu)
     fill(F, 0.0)
-    add_transposed(tb.rows, w.G, mu, 1.0, F)
+    add_transposed(tb.forms, w.G, mu, 1.0, F)
     for p in range(folds):
         for i in range(F.shape[0]):
             F[i] += fold.B[p, i] * fold.nu[p]
@@ -229,7 +210,7 @@ def carry_responses(tb, folds, w):
         at = light[c]
         fill(u, 0.0)
         u[at] = tb.excess[c] * tb.mass[at]
-        times_gradients(tb.rows, w.G, u, carry.Y[c])
+        times_gradients(tb.forms, w.G, u, carry.Y[c])
         for r in range(carry.Y.shape[1]):
             if w.skip[r] != 0:
                 carry.Y[c, r] = 0.0
@@ -271,30 +252,30 @@ def add_carried(tb, folds, w, mu, q):
             w.fold.nu[p] += carry.W[c, p] * value
 
 
-def start_series(rows, forces, order, QS, LM, bs, ls, es):
+def start_series(tb, w, order):
     """Orders 0 and 1 from position and velocity; all others zero."""
+    QS, bs = w.QS, w.bs
     for j in range(2, order + 2):
         fill(QS[j], 0.0)
     for j in range(order + 2):
-        fill(LM[j], 0.0)
-    fill(ls[FX, 0], 0.0)
-    fill(ls[FY, 0], 0.0)
+        fill(w.LM[j], 0.0)
     trigonometry(QS[0], bs[CS, 0], bs[SN, 0])
     fill(bs[DT, 0], 0.0)
     fill(bs[SN, 1], 0.0)
     fill(bs[CS, 1], 0.0)
     fill(bs[AS, 0], 0.0)
     fill(bs[BS, 0], 0.0)
-    slot_orders(rows, QS, bs, ls, 0)
-    spring_orders(forces, QS, bs, es, 0)
-    finish_order(rows, forces, QS, bs, ls, es, 1)
+    vector_orders(tb.vectors, QS, bs, w.vs, 0, 0)
+    spring_orders(tb.forces, w.vs, w.ss, 0)
+    finish_order(tb, w, 1)
 
 
-def fold_rows(rows, QS, TF, bs, ls, fold, work, u, j, folds):
+def fold_rows(tb, w, j, folds):
     """Order j + 1 of Z^T g with q_j and q_{j+1} left out: fold.nu; the part of q_j is B q_j."""
+    fold, bs, work, u = w.fold, w.bs, w.mu, w.u
     angle_orders(bs, j + 1, j)
-    slot_orders(rows, QS, bs, ls, j + 1)
-    row_orders(rows, TF, bs, ls, j + 1, work)
+    vector_orders(tb.vectors, w.QS, bs, w.vs, j + 1, w.ss.shape[2])
+    row_orders(tb.forms, w.TF, bs, w.vs, j + 1, work)
     for p in range(folds):
         value = 0.0
         for r in range(work.shape[0]):
@@ -348,12 +329,11 @@ def small_solve(matrix, size, x, work):
 
 FUNCTIONS = (
     angle_orders,
-    slot_orders,
+    vector_orders,
     row_orders,
-    slot_forces,
-    slot_arms,
+    product_forces,
     add_multipliers,
-    add_line_multipliers,
+    add_product_multipliers,
     torque_orders,
     finish_order,
     expand,

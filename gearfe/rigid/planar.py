@@ -1,8 +1,7 @@
-"""Planar bodies, joints and forces as plain data: what a mechanism consists of, nothing about how it is solved.
+"""Planar bodies and scenes as plain data: what a mechanism consists of, nothing about how it is solved.
 
-A body carries a frame: points, the mass centre and joint directions are written in that frame (m); the start
-pose is the
-position of the frame's origin and its angle. The ground is the body named ``"ground"`` with its frame at rest.
+A body carries a frame: points, the mass centre and joint directions are written in that frame (m); the start pose is
+the position of the frame's origin and its angle. The ground is the body named ``"ground"`` with its frame at rest.
 """
 
 from __future__ import annotations
@@ -11,13 +10,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from ..errors import InputError
+from ..errors import InputError, shown, unknown_name
+from .forces import Force
+from .forms import GROUND, Frames, Point
+from .joints import Joint
 from .timefunctions import TimeFunction, constant
 
-GROUND = "ground"
 #: Masses and inertias below this, or above its inverse, overflow in products.
 LEAST_MASS = 1e-100
-Point = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -62,150 +62,6 @@ class Body:
 
 
 @dataclass(frozen=True)
-class Hinge:
-    """Point `point_a` of body `a` stays on point `point_b` of body `b`: two constraints."""
-
-    a: str
-    b: str
-    point_a: Point = (0.0, 0.0)
-    point_b: Point = (0.0, 0.0)
-    name: str = ""
-
-
-@dataclass(frozen=True)
-class Slot:
-    """Point `point` of body `body` stays on a line of body `line`: one constraint (nothing of the joint has mass)."""
-
-    body: str
-    line: str
-    point: Point = (0.0, 0.0)
-    origin: Point = (0.0, 0.0)
-    direction: Point = (1.0, 0.0)
-    name: str = ""
-
-
-@dataclass(frozen=True)
-class Prismatic:
-    """Body `body` slides along a line of body `line` without turning against it: two constraints.
-
-    `angle` is the angle of `body` minus that of `line` (rad); ``None`` keeps the one it starts with.
-    """
-
-    body: str
-    line: str
-    point: Point = (0.0, 0.0)
-    origin: Point = (0.0, 0.0)
-    direction: Point = (1.0, 0.0)
-    angle: float | None = None
-    name: str = ""
-
-
-@dataclass(frozen=True)
-class Fixed:
-    """Body `a` stands still in the frame of body `b`, as it starts: three constraints."""
-
-    a: str
-    b: str = GROUND
-    name: str = ""
-
-
-@dataclass(frozen=True)
-class Prescribed:
-    """A motion given as a function of time: one constraint.
-
-    `coordinate` is ``"angle"`` (rad, relative to body `relative_to`), ``"rate"`` (rad/s, likewise; the angle starts
-    from the start pose), or ``"x"`` or ``"y"`` (m, of the point `point`, in the ground's frame).
-    """
-
-    body: str
-    coordinate: str
-    function: TimeFunction
-    relative_to: str = GROUND
-    point: Point = (0.0, 0.0)
-    name: str = ""
-
-    def __post_init__(self) -> None:
-        if self.coordinate not in ("angle", "rate", "x", "y"):
-            where = f"prescribed motion {self.name!r} coordinate"
-            raise InputError(where, self.coordinate, "must be one of angle, rate, x, y", "choose one of these")
-
-
-@dataclass(frozen=True)
-class Gravity:
-    """Uniform field (m/s2) on every body."""
-
-    acceleration: Point = (0.0, -9.81)
-    name: str = "gravity"
-
-
-@dataclass(frozen=True)
-class Spring:
-    """Spring-damper between two points: tension ``k (L - L0) + c L'`` along the line that joins them.
-
-    With neither free length nor damping the force is k times the span, so the points may coincide.
-    """
-
-    a: str
-    b: str
-    point_a: Point = (0.0, 0.0)
-    point_b: Point = (0.0, 0.0)
-    stiffness: float = 0.0
-    damping: float = 0.0
-    free_length: float = 0.0
-    name: str = ""
-
-
-@dataclass(frozen=True)
-class CoordinateSpring:
-    """Spring and damper on one coordinate of a body's mass centre or angle: ``-k (u - u0) - c u'``.
-
-    `coordinate` is ``"x"``, ``"y"`` (m, of the mass centre, against the ground) or ``"angle"`` (rad, against the body
-    `relative_to`: a torsional spring).
-    """
-
-    body: str
-    coordinate: str
-    stiffness: float = 0.0
-    damping: float = 0.0
-    reference: float = 0.0
-    relative_to: str = GROUND
-    name: str = ""
-
-    def __post_init__(self) -> None:
-        if self.coordinate not in ("angle", "x", "y"):
-            where = f"coordinate spring {self.name!r} coordinate"
-            raise InputError(where, self.coordinate, "must be one of angle, x, y", "choose one of these")
-        if self.coordinate != "angle" and self.relative_to != GROUND:
-            where = f"coordinate spring {self.name!r} relative_to"
-            raise InputError(where, self.relative_to, "only an angle can be relative to a body", "use a spring")
-
-
-@dataclass(frozen=True)
-class PointForce:
-    """Force (N) with directions fixed in the ground, acting at a point that moves with the body."""
-
-    body: str
-    point: Point = (0.0, 0.0)
-    x: TimeFunction = field(default_factory=lambda: constant(0.0))
-    y: TimeFunction = field(default_factory=lambda: constant(0.0))
-    name: str = ""
-
-
-@dataclass(frozen=True)
-class Moment:
-    """Moment (N m) on a body, with the opposite one on body `reaction` (the ground by default)."""
-
-    body: str
-    function: TimeFunction
-    reaction: str = GROUND
-    name: str = ""
-
-
-Joint = Hinge | Slot | Prismatic | Fixed | Prescribed
-Force = Gravity | Spring | CoordinateSpring | PointForce | Moment
-
-
-@dataclass(frozen=True)
 class Scene:
     """A planar mechanism: bodies, joints and forces, with every name checked."""
 
@@ -214,9 +70,12 @@ class Scene:
     forces: tuple[Force, ...] = ()
     body_index: Mapping[str, int] = field(init=False, repr=False, compare=False)
 
-    def __post_init__(self) -> None:
-        from ..errors import shown, unknown_name
+    @property
+    def frames(self) -> Frames:
+        """The bodies' frames."""
+        return Frames(self.bodies, self.body_index)
 
+    def __post_init__(self) -> None:
         index: dict[str, int] = {GROUND: len(self.bodies)}
         for i, body in enumerate(self.bodies):
             if body.name in index:
@@ -232,7 +91,7 @@ class Scene:
             ]
             for name in used:
                 if not isinstance(name, str):
-                    order = ", ".join(type(part).__dataclass_fields__)
+                    order = ", ".join(vars(part))
                     raise InputError(label, None, f"{shown(name)} is no name of a body", f"its arguments are {order}")
                 if name not in index:
                     raise unknown_name(label, name, index)

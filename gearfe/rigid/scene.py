@@ -1,15 +1,35 @@
-"""The planar scene as one element of the contract: every planar body, joint and force, evaluated on whole arrays."""
+"""The planar scene as one element of the contract: forms and vectors of all joints and forces, on whole arrays.
+
+With the vectors V = sum w (x, y) + R(theta) p of the tables, a product U . V has the gradient J_U^T V + J_V^T U, and
+the generalised force of g on a vector is J_V^T g, where J_V = dV/dq holds w and the arms R p, a quarter turn ahead.
+"""
 
 from __future__ import annotations
 
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import InputError
 from .contract import Array, Element
-from .planar import Scene, Spring
-from .tables import Assembly, assemble
+from .planar import Scene
+from .tables import Assembly, Ints, assemble
+
+
+class Pose(NamedTuple):
+    """Where all bodies and, last, the ground stand: shapes (n + 1,) and of vectors (v, 2) and (v, 2, 2)."""
+
+    row: Array  # (n + 1, 5) x, y, theta, cos theta, sin theta
+    vector: Array  # (v, 2)
+    arm: Array  # (v, 2, 2) arms of both ends, in the ground's axes
+
+
+class Motion(NamedTuple):
+    """How fast they move."""
+
+    row: Array  # (n + 1, 3)
+    vector: Array  # (v, 2)
+    spin: Array  # (v, 2) angular velocities of both ends
 
 
 class PlanarScene(Element):
@@ -29,11 +49,9 @@ class PlanarScene(Element):
         self.rows = len(self.assembly.row_label)
         self.row_names = self.assembly.row_label
         self.breaks = self.assembly.breaks
-        # springs come first among the forces, in the order of the scene
-        springs = [force for force in scene.forces if isinstance(force, Spring)]
-        self._springs = [f"spring {force.name or number!r}" for number, force in enumerate(springs, start=1)]
-        self._index = self.assembly.tables.rows.ints
-        self._value = self.assembly.tables.rows.reals
+        self._forms = self.assembly.tables.forms
+        self._vectors = self.assembly.tables.vectors
+        self._forces = self.assembly.tables.forces
 
     def mass(self) -> Array:
         """Diagonal of masses and inertias."""
@@ -46,44 +64,69 @@ class PlanarScene(Element):
     def units(self) -> tuple[Array, Array]:
         """The mechanism's length where a coordinate or a row is a length, 1 where it is an angle."""
         length = self.assembly.length
-        return np.tile([length, length, 1.0], self.size // 3), np.where(self.holds_points, length, 1.0)
+        return np.tile([length, length, 1.0], self.size // 3), self._forms.unit
 
-    @cached_property
-    def holds_points(self) -> np.ndarray:
-        """Whether each row holds points (m) rather than an angle (rad)."""
-        return np.asarray(self._value[:, [0, 1, 3, 4, 5, 6, 8, 9, 10, 11]].any(axis=1))
+    def pose(self, q: Array) -> Pose:
+        """Bodies and vectors at the coordinates q."""
+        full = np.append(q, np.zeros(3)).reshape(-1, 3)
+        row = np.column_stack([full, np.cos(full[:, 2]), np.sin(full[:, 2])])
+        ends, at = self._vectors.end, row[self._vectors.bodies]
+        c, s = at[:, :, 3], at[:, :, 4]
+        arm = np.stack([c * ends[:, :, 1] - s * ends[:, :, 2], s * ends[:, :, 1] + c * ends[:, :, 2]], axis=-1)
+        return Pose(row, (ends[:, :, :1] * at[:, :, :2] + arm).sum(axis=1), arm)
+
+    def _motion(self, pose: Pose, v: Array) -> Motion:
+        row = np.append(v, np.zeros(3)).reshape(-1, 3)
+        at = row[self._vectors.bodies]
+        spin = at[:, :, 2]
+        ends = self._vectors.end[:, :, :1] * at[:, :, :2] + spin[:, :, None] * turned(pose.arm)
+        return Motion(row, ends.sum(axis=1), spin)
+
+    def _vector_jacobian(self, pose: Pose) -> Array:
+        """J_V = dV/d(x, y, theta) of both bodies, shape (v, 2 components, 2 bodies, 3)."""
+        J = np.zeros((len(pose.vector), 2, 2, 3))
+        J[:, 0, :, 0] = J[:, 1, :, 1] = self._vectors.end[:, :, 0]
+        J[:, :, :, 2] = np.swapaxes(turned(pose.arm), 1, 2)
+        return J
 
     # constraints ------------------------------------------------------------------------------------------------
-    @cached_property
-    def _columns(self) -> np.ndarray:
-        """Coordinate numbers (rows, 2, 3) of both bodies; the ground's stand one past the end."""
-        return 3 * self._index[:, :2, None] + np.arange(3)
-
-    @cached_property
-    def _functions(self) -> list:
-        """Time functions in the order of the tables, as evaluators."""
-        return [_evaluator(self.assembly.tables.times, k) for k in range(len(self.assembly.tables.times.first) - 1)]
-
     def _times(self, t: float, derivative: int) -> Array:
+        """Motions of the constraints."""
         out = np.zeros(self.rows)
-        for r in np.flatnonzero(self._index[:, 3] >= 0):
-            out[r] = self._functions[self._index[r, 3]](t, derivative)
+        for r in np.flatnonzero(self._forms.motion[: self.rows] >= 0):
+            out[r] = self.assembly.functions[self._forms.motion[r]](t, derivative)
         return out
+
+    def _affine(self, pose: Pose) -> Array:
+        """Values of the affine parts of all forms."""
+        return (self._forms.factor * pose.row[self._forms.bodies]).sum(axis=(1, 2)) + self._forms.constant
+
+    def _affine_gradients(self, pose: Pose) -> Array:
+        """Gradients of the affine parts of all forms, shape (r, 2, 3)."""
+        factor, at = self._forms.factor, pose.row[self._forms.bodies]
+        out = factor[:, :, :3].copy()
+        out[:, :, 2] += factor[:, :, 4] * at[:, :, 3] - factor[:, :, 3] * at[:, :, 4]
+        return out
+
+    def _affine_bend(self, pose: Pose) -> Array:
+        """Second derivatives of all forms by the two angles, their products left out; shape (r, 2)."""
+        factor, at = self._forms.factor, pose.row[self._forms.bodies]
+        return -(factor[:, :, 3] * at[:, :, 3] + factor[:, :, 4] * at[:, :, 4])
 
     def residual(self, t: float, q: Array) -> Array:
         """Values of all rows."""
-        p = _pose(q)
-        x, y, th, c, s = (p[k][self._index[:, :2]] for k in range(5))
-        f = self._value[:, :10].reshape(-1, 2, 5)
-        g = (f[:, :, 0] * x + f[:, :, 1] * y + f[:, :, 2] * th + f[:, :, 3] * c + f[:, :, 4] * s).sum(axis=1)
-        for r in self.assembly.tables.rows.lines:
-            n, d, _ = _line(self._value[r], p, self._index[r])
-            g[r] += n @ d
-        return g + self._value[:, 14] - self._times(t, 0)
+        pose = self.pose(q)
+        g = self._affine(pose)[: self.rows] - self._times(t, 0)
+        row, one, two = self._forms.product.T
+        np.add.at(g, row, (pose.vector[one] * pose.vector[two]).sum(axis=1))
+        return g
 
     def jacobian(self, t: float, q: Array) -> Array:  # noqa: ARG002
         """G of all rows."""
-        return self._spread(self.gradients(q))
+        full = np.zeros((self.rows, self.size + 3))
+        columns = 3 * self._forms.bodies[: self.rows, :, None] + np.arange(3)
+        np.add.at(full, (np.arange(self.rows)[:, None, None], columns), self.gradients(q))
+        return full[:, : self.size]
 
     def rate(self, t: float, q: Array) -> Array:  # noqa: ARG002
         """Minus the rates of the prescribed motions."""
@@ -91,222 +134,165 @@ class PlanarScene(Element):
 
     def velocity_terms(self, t: float, q: Array, v: Array) -> Array:
         """(dG/dt) v minus the second derivatives of the prescribed motions."""
-        p, w = _pose(q), np.append(v, np.zeros(3))[2::3]
-        c, s = p[3][self._index[:, :2]], p[4][self._index[:, :2]]
-        f = self._value[:, :10].reshape(-1, 2, 5)
-        turn = w[self._index[:, :2]] ** 2
-        out = -(turn * (f[:, :, 3] * c + f[:, :, 4] * s)).sum(axis=1)
-        full = np.append(v, np.zeros(3)).reshape(-1, 3)
-        for r in self.assembly.tables.rows.lines:
-            a, b = self._index[r, :2]
-            n, d, arm = _line(self._value[r], p, self._index[r])
-            spin_a, spin_b = w[a], w[b]
-            du = full[b, :2] - full[a, :2] + spin_b * np.array([-arm[1], arm[0]])
-            dn = spin_a * np.array([-n[1], n[0]])
-            out[r] += -(spin_a**2) * (n @ d) + 2 * (dn @ du) - spin_b**2 * (n @ arm)
-        return out - self._times(t, 2)
+        pose = self.pose(q)
+        motion = self._motion(pose, v)
+        spin = motion.row[self._forms.bodies[: self.rows], 2]
+        out = (spin**2 * self._affine_bend(pose)[: self.rows]).sum(axis=1) - self._times(t, 2)
+        row, one, two = self._forms.product.T
+        inward = -(motion.spin[:, :, None] ** 2 * pose.arm).sum(axis=1)  # V'' less what accelerations make of it
+        V, rate = pose.vector, motion.vector
+        bend = (inward[one] * V[two] + 2.0 * rate[one] * rate[two] + V[one] * inward[two]).sum(axis=1)
+        np.add.at(out, row, bend)
+        return out
 
     def gradients(self, q: Array) -> Array:
-        """Gradients (rows, 2, 3) with respect to the poses of both bodies."""
-        p = _pose(q)
-        c, s = p[3][self._index[:, :2]], p[4][self._index[:, :2]]
-        f = self._value[:, :10].reshape(-1, 2, 5)
-        out = f[:, :, :3].copy()
-        out[:, :, 2] += f[:, :, 4] * c - f[:, :, 3] * s
-        for r in self.assembly.tables.rows.lines:
-            n, d, arm = _line(self._value[r], p, self._index[r])
-            out[r, 0] = -n[0], -n[1], n[0] * d[1] - n[1] * d[0]
-            out[r, 1] = n[0], n[1], n[1] * arm[0] - n[0] * arm[1]
+        """Gradients (rows, 2, 3) of all rows with respect to the poses of both bodies."""
+        pose = self.pose(q)
+        out = self._affine_gradients(pose)[: self.rows]
+        row, one, two = self._forms.product.T
+        J, V = self._vector_jacobian(pose), pose.vector
+        np.add.at(out, row, np.einsum("pcbk,pc->pbk", J[one], V[two]) + np.einsum("pcbk,pc->pbk", J[two], V[one]))
         return out
 
     def curvature(self, q: Array, multipliers: Array) -> Array:
         """d(G^T lambda)/dq at fixed lambda: the geometric stiffness of the joints, (size, size)."""
-        p = _pose(q)
-        f = self._value[:, :10].reshape(-1, 2, 5)
-        c, s = p[3][self._index[:, :2]], p[4][self._index[:, :2]]
+        pose = self.pose(q)
         full = np.zeros((self.size + 3, self.size + 3))
-        theta = 3 * self._index[:, :2] + 2
-        np.add.at(full, (theta, theta), -multipliers[:, None] * (f[:, :, 3] * c + f[:, :, 4] * s))
-        for r in self.assembly.tables.rows.lines:
-            a, b = 3 * self._index[r, :2]
-            n, d, arm = _line(self._value[r], p, self._index[r])
-            side = np.array([-n[1], n[0]]) * multipliers[r]
-            full[a : a + 2, a + 2] -= side
-            full[a + 2, a : a + 2] -= side
-            full[b : b + 2, a + 2] += side
-            full[a + 2, b : b + 2] += side
-            cross = side @ np.array([-arm[1], arm[0]])
-            full[a + 2, b + 2] += cross
-            full[b + 2, a + 2] += cross
-            full[a + 2, a + 2] -= multipliers[r] * (n @ d)
-            full[b + 2, b + 2] -= multipliers[r] * (n @ arm)
+        angles = 3 * self._forms.bodies[: self.rows] + 2
+        np.add.at(full, (angles, angles), multipliers[:, None] * self._affine_bend(pose)[: self.rows])
+        row, one, two = self._forms.product.T
+        J = self._vector_jacobian(pose).reshape(-1, 2, 6)
+        both = multipliers[row, None, None] * np.einsum("pci,pcj->pij", J[one], J[two])
+        both += np.swapaxes(both, 1, 2)
+        for k, other in ((one, two), (two, one)):
+            bend = -np.einsum("pbc,pc->pb", pose.arm[k], pose.vector[other]) * multipliers[row, None]
+            both[:, [2, 5], [2, 5]] += bend
+        where = self._places(one)
+        np.add.at(full, (where[:, :, None], where[:, None, :]), both)
         return full[: self.size, : self.size]
 
-    def _spread(self, gradients: Array) -> Array:
-        full = np.zeros((self.rows, self.size + 3))
-        np.add.at(full, (np.arange(self.rows)[:, None, None], self._columns), gradients)
-        return full[:, : self.size]
+    def _places(self, vectors: Ints) -> Ints:
+        """Numbers of the six coordinates that vectors depend on, the ground's past the end."""
+        return (3 * self._vectors.bodies[vectors][:, :, None] + np.arange(3)).reshape(-1, 6)
 
     # forces -----------------------------------------------------------------------------------------------------
     def force(self, t: float, q: Array, v: Array) -> Array:
         """All applied forces on the scene."""
-        return self._forces(t, q, v)[0]
+        pose = self.pose(q)
+        motion = self._motion(pose, v)
+        total = self._forces.weight.copy()
+        springs = self._springs(pose, motion)
+        J = self._vector_jacobian(pose)[: len(springs.length)]
+        places = self._places(np.arange(len(J)))
+        np.add.at(total, places, -np.einsum("scbk,sc->sbk", J, springs.pull[:, None] * springs.span).reshape(-1, 6))
+        along = self._along(t, pose, motion)
+        np.add.at(total, along.places, (along.value + along.given)[:, None] * along.gradient)
+        return total[: self.size]
 
     def force_jacobian(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
-        """Derivatives of the forces: springs in closed form."""
+        """Derivatives of the forces by q and v in closed form."""
         n = self.size
         by_q, by_v = np.zeros((n + 3, n + 3)), np.zeros((n + 3, n + 3))
-        forces = self.assembly.tables.forces
-        p = _pose(q)
-        full = np.append(v, np.zeros(3)).reshape(-1, 3)
-        for number, (index, value) in enumerate(zip(forces.ints, forces.reals, strict=True)):
-            a, b = int(index[1]), int(index[2])
-            if index[0] == 0:
-                arms = _arms(p, index, value)
-                span, length, unit, speed = self._span(p, full, number, arms)
-                k, damping = value[4:6]
-                where = np.r_[3 * a : 3 * a + 3, 3 * b : 3 * b + 3]
-                J = np.zeros((2, 6))  # d(span)/d(poses)
-                J[:, :2], J[:, 3:5] = -np.eye(2), np.eye(2)
-                J[:, 2], J[:, 5] = (arms[0][1], -arms[0][0]), (-arms[1][1], arms[1][0])
-                pull = _pull(value, length, float(unit @ speed))
-                across = np.eye(2) - np.outer(unit, unit)
-                turned = speed @ across / length if damping else np.zeros(2)
-                w = full[[a, b], 2]
-                Jt = np.zeros((2, 6))  # d(span velocity)/d(poses)
-                Jt[:, 2], Jt[:, 5] = w[0] * arms[0], -w[1] * arms[1]
-                dt_q = k * unit @ J + damping * (turned @ J + unit @ Jt)
-                local = -J.T @ (np.outer(unit, dt_q) + pull * across @ J)
-                push = pull * span
-                local[2, 2] -= push @ arms[0]
-                local[5, 5] += push @ arms[1]
-                by_q[np.ix_(where, where)] += local
-                by_v[np.ix_(where, where)] -= damping * np.outer(J.T @ unit, unit @ J)
-            elif index[0] == 1:
-                for matrix, factor in ((by_q, value[0]), (by_v, value[1])):
-                    matrix[a, a] -= factor
-                    matrix[b, b] -= factor
-                    matrix[a, b] += factor
-                    matrix[b, a] += factor
-            elif index[0] == 2:
-                push = np.array([self._functions[index[3]](t, 0), self._functions[index[4]](t, 0)])
-                by_q[3 * a + 2, 3 * a + 2] -= push @ _turned(p, a, value[:2])
+        pose = self.pose(q)
+        motion = self._motion(pose, v)
+        springs = self._springs(pose, motion)
+        J = self._vector_jacobian(pose)[: len(springs.length)].reshape(-1, 2, 6)
+        unit, pull = springs.unit, springs.pull
+        k, damping = self._forces.spring[:, :2].T
+        across = np.eye(2) - unit[:, :, None] * unit[:, None, :]
+        drift = np.zeros_like(J)  # d(rate of the span)/d(poses)
+        drift[:, :, [2, 5]] = -np.swapaxes(motion.spin[: len(J), :, None] * pose.arm[: len(J)], 1, 2)
+        turn = np.einsum("sc,scd->sd", motion.vector[: len(J)], across)
+        turn *= np.where(springs.length > 0.0, damping / np.where(springs.length > 0.0, springs.length, 1.0), 0.0)[
+            :, None
+        ]
+        stretch = np.einsum("sc,sci->si", unit, J)
+        tension = k[:, None] * stretch + np.einsum("sc,sci->si", turn, J)
+        tension += damping[:, None] * np.einsum("sc,sci->si", unit, drift)
+        local = -np.einsum("si,sj->sij", stretch, tension)
+        local -= pull[:, None, None] * np.einsum("sci,scd,sdj->sij", J, across, J)
+        push = pull[:, None] * springs.span
+        local[:, [2, 5], [2, 5]] += np.einsum("sbc,sc->sb", pose.arm[: len(J)], push)
+        where = self._places(np.arange(len(J)))
+        pairs = (where[:, :, None], where[:, None, :])
+        np.add.at(by_q, pairs, local)
+        np.add.at(by_v, pairs, -damping[:, None, None] * np.einsum("si,sj->sij", stretch, stretch))
+        along = self._along(t, pose, motion)
+        stiffness, damping = self._forces.along.T
+        pairs = (along.places[:, :, None], along.places[:, None, :])
+        outer = along.gradient[:, :, None] * along.gradient[:, None, :]
+        np.add.at(by_q, pairs, -stiffness[:, None, None] * outer)
+        np.add.at(by_v, pairs, -damping[:, None, None] * outer)
+        bend = np.zeros_like(along.gradient)
+        bend[:, [2, 5]] = self._affine_bend(pose)[self.rows :]
+        at = (along.places, along.places)
+        np.add.at(by_q, at, (along.value + along.given)[:, None] * bend)
+        swing = bend * motion.row.ravel()[along.places]  # d(gradient)/dt
+        np.add.at(by_q, pairs, -damping[:, None, None] * along.gradient[:, :, None] * swing[:, None, :])
         return by_q[:n, :n], by_v[:n, :n]
 
     def power(self, t: float, q: Array, v: Array) -> float:
         """Power of applied moments and point forces less the loss in dampers (W)."""
-        return self._forces(t, q, v)[1]
+        pose = self.pose(q)
+        motion = self._motion(pose, v)
+        springs, along = self._springs(pose, motion), self._along(t, pose, motion)
+        losses = self._forces.spring[:, 1] @ springs.rate**2 + self._forces.along[:, 1] @ along.rate**2
+        return float(along.given @ along.rate - losses)
 
     def potential(self, q: Array) -> float:
         """Energy of gravity (datum x = y = 0) and of all springs (J)."""
-        forces = self.assembly.tables.forces
-        p = _pose(q)
-        flat = np.append(q, np.zeros(3))
-        energy = -float(forces.weight @ flat)
-        for number, (index, value) in enumerate(zip(forces.ints, forces.reals, strict=True)):
-            if index[0] == 0:
-                _, length, _, _ = self._span(p, None, number, _arms(p, index, value))
-                energy += 0.5 * value[4] * (length - value[6]) ** 2
-            elif index[0] == 1:
-                energy += 0.5 * value[0] * (flat[index[1]] - flat[index[2]] - value[2]) ** 2
-        return energy
+        pose = self.pose(q)
+        count = len(self._forces.spring)
+        stretch = np.hypot(*pose.vector[:count].T) - self._forces.spring[:, 2]
+        moved = self._affine(pose)[self.rows :]
+        elastic = 0.5 * (self._forces.spring[:, 0] @ stretch**2 + self._forces.along[:, 0] @ moved**2)
+        return float(elastic - self._forces.weight[: self.size] @ q)
 
-    def _forces(self, t: float, q: Array, v: Array) -> tuple[Array, float]:
-        forces = self.assembly.tables.forces
-        F = forces.weight.copy()
-        p = _pose(q)
-        flat_q, flat = np.append(q, np.zeros(3)), np.append(v, np.zeros(3))
-        full = flat.reshape(-1, 3)
-        power = 0.0
-        for number, (index, value) in enumerate(zip(forces.ints, forces.reals, strict=True)):
-            a, b = int(index[1]), int(index[2])
-            if index[0] == 0:
-                arms = _arms(p, index, value)
-                span, length, unit, speed = self._span(p, full, number, arms)
-                rate = float(unit @ speed)
-                push = _pull(value, length, rate) * span
-                power -= value[5] * rate * rate
-                for body, sign, arm in ((a, 1.0, arms[0]), (b, -1.0, arms[1])):
-                    F[3 * body : 3 * body + 2] += sign * push
-                    F[3 * body + 2] += sign * (arm[0] * push[1] - arm[1] * push[0])
-            elif index[0] == 1:
-                rate = flat[a] - flat[b]
-                loss = -value[1] * rate
-                push = -value[0] * (flat_q[a] - flat_q[b] - value[2]) + loss
-                power += loss * rate
-                F[a] += push
-                F[b] -= push
-            elif index[0] == 2:
-                push = np.array([self._functions[index[3]](t, 0), self._functions[index[4]](t, 0)])
-                arm = _turned(p, a, value[:2])
-                F[3 * a : 3 * a + 2] += push
-                F[3 * a + 2] += arm[0] * push[1] - arm[1] * push[0]
-                power += float(push @ (full[a, :2] + full[a, 2] * np.array([-arm[1], arm[0]])))
-            else:
-                moment = float(self._functions[index[3]](t, 0))
-                F[3 * a + 2] += moment
-                F[3 * b + 2] -= moment
-                power += moment * (full[a, 2] - full[b, 2])
-        return F[: self.size], power
+    def _along(self, t: float, pose: Pose, motion: Motion) -> _Along:
+        """Forces along forms."""
+        bodies = self._forms.bodies[self.rows :]
+        gradient = self._affine_gradients(pose)[self.rows :].reshape(-1, 6)
+        places = (3 * bodies[:, :, None] + np.arange(3)).reshape(-1, 6)
+        rate = (gradient * motion.row.ravel()[places]).sum(axis=1)
+        stiffness, damping = self._forces.along.T
+        functions = self.assembly.functions
+        given = np.array([0.0 if k < 0 else float(functions[k](t)) for k in self._forms.motion[self.rows :]])
+        value = -stiffness * self._affine(pose)[self.rows :] - damping * rate
+        return _Along(gradient, places, rate, value, given)
 
-    def _span(self, p, full, number, arms):  # type: ignore[no-untyped-def]
-        """Span of a spring from its first to its second point, its length, direction and (with `full`) velocity."""
-        index, value = self.assembly.tables.forces.ints[number], self.assembly.tables.forces.reals[number]
-        a, b = index[1], index[2]
-        span = np.array([p[0][b] - p[0][a], p[1][b] - p[1][a]]) + arms[1] - arms[0]
-        length = float(np.hypot(*span))
-        if length == 0.0 and (value[5] > 0.0 or value[6] > 0.0):
+    def _springs(self, pose: Pose, motion: Motion) -> _Springs:
+        """Spans, lengths, directions, rates of the lengths, and tensions over lengths."""
+        stiffness, damping, free = self._forces.spring.T
+        span, speed = pose.vector[: len(free)], motion.vector[: len(free)]
+        length = np.hypot(*span.T)
+        pointless = (length == 0.0) & ((damping > 0.0) | (free > 0.0))
+        if pointless.any():
             problem = "joins two points that coincide, so its force has no direction"
             cure = "move its points apart, or give it neither a free length nor damping"
-            raise InputError(self._springs[number], None, problem, cure)
-        speed = None
-        if full is not None:
-            turn = [w * np.array([-r[1], r[0]]) for w, r in zip(full[[a, b], 2], arms, strict=True)]
-            speed = full[b, :2] - full[a, :2] + turn[1] - turn[0]
-        return span, length, span / length if length > 0.0 else np.zeros(2), speed
+            raise InputError(self.assembly.spring_label[int(pointless.argmax())], None, problem, cure)
+        over = np.where(length > 0.0, length, 1.0)
+        unit = span / over[:, None]
+        rate = (unit * speed).sum(axis=1)
+        pull = stiffness * (1.0 - np.where(free > 0.0, free / over, 0.0)) + damping * rate / over
+        return _Springs(span, length, unit, rate, pull)
 
 
-def _pull(value: Array, length: float, rate: float) -> float:
-    """Tension of a spring over its length (N/m): the stiffness itself where it has neither free length nor damping."""
-    pull = float(value[4])
-    if value[6] > 0.0:
-        pull -= float(value[4] * value[6]) / length
-    if value[5] > 0.0:
-        pull += float(value[5]) * rate / length
-    return pull
+class _Along(NamedTuple):
+    gradient: Array  # (f, 6)
+    places: Ints  # (f, 6) numbers of the coordinates
+    rate: Array  # (f,)
+    value: Array  # (f,) of springs and dampers
+    given: Array  # (f,) of the functions of time
 
 
-def _evaluator(times, k):  # type: ignore[no-untyped-def]
-    from .timefunctions import TimeFunction
-
-    pieces = slice(times.first[k], times.first[k + 1])
-    sines = slice(times.sine_first[k], times.sine_first[k + 1])
-    return TimeFunction(
-        tuple(times.start[pieces]),
-        tuple(times.origin[pieces]),
-        tuple(tuple(row) for row in times.factor[pieces]),
-        tuple(tuple(row) for row in times.sine[sines]),
-    )
+class _Springs(NamedTuple):
+    span: Array  # (s, 2)
+    length: Array
+    unit: Array  # (s, 2), zero where the points coincide
+    rate: Array  # of the length
+    pull: Array  # tension / length
 
 
-def _pose(q: Array) -> tuple[Array, ...]:
-    """x, y, theta, cos, sin of every body and of the ground."""
-    full = np.append(q, np.zeros(3)).reshape(-1, 3)
-    return full[:, 0], full[:, 1], full[:, 2], np.cos(full[:, 2]), np.sin(full[:, 2])
-
-
-def _turned(p, body, arm):  # type: ignore[no-untyped-def]
-    c, s = p[3][body], p[4][body]
-    return np.array([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])
-
-
-def _line(value, p, index):  # type: ignore[no-untyped-def]
-    """Normal, distance vector and arm of a moving line."""
-    a, b = index[0], index[1]
-    n = _turned(p, a, value[10:12])
-    arm = _turned(p, b, value[12:14])
-    return n, np.array([p[0][b] - p[0][a], p[1][b] - p[1][a]]) + arm, arm
-
-
-def _arms(p, index, value):  # type: ignore[no-untyped-def]
-    return _turned(p, index[1], value[0:2]), _turned(p, index[2], value[2:4])
+def turned(vectors: Array) -> Array:
+    """A quarter turn ahead: the derivatives of turning vectors by the angle."""
+    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)

@@ -284,10 +284,10 @@ def _worst_gap(system: System, time: float, q: Array) -> tuple[str, str]:
     name, much, planar = system.row_names()[worst], float(gap[worst]), system.planar
     if planar is None:
         return name, f"{much:.3g}"
-    if not planar.holds_points[worst]:
+    joint, lengths = planar.assembly.row_joint, planar.assembly.row_holds_length
+    if not lengths[worst]:
         return name, f"{much:.3g} rad"
-    joint = planar.assembly.row_joint
-    same = [r for r in range(len(gap)) if joint[r] == joint[worst] and planar.holds_points[r]]
+    same = [r for r in range(len(gap)) if joint[r] == joint[worst] and lengths[r]]
     much, length = float(np.linalg.norm(gap[same])), planar.assembly.length
     return name, f"{much:.3g} m ({much / length:.2g} of the mechanism's length, {length:.3g} m)"
 

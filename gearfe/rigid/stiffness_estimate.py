@@ -32,4 +32,5 @@ def _has_springs(system: System) -> bool:
     scene = system.planar
     if scene is None:
         return bool(system.forces)
-    return bool((scene.assembly.tables.forces.ints[:, 0] < 2).any())
+    forces = scene.assembly.tables.forces
+    return bool(forces.spring.size or forces.along.any())

@@ -13,22 +13,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..progress import stage
-from . import compiled, kernel_fold, kernel_forces, kernel_locate, kernel_planes, kernel_rows, kernel_run, kernel_series
+from . import compiled, kernel_fold, kernel_forces, kernel_locate, kernel_names, kernel_rows, kernel_run, kernel_series
 from .choice import LEAST_STEPS, STOPPED, Watch
-from .tables import Array, Assembly, Ints, Rows, Tables
+from .tables import Array, Assembly, Ints, Tables
 from .within import within_run
 
 FUNCTIONS = (
     *kernel_rows.FUNCTIONS, *kernel_forces.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_fold.FUNCTIONS,
     *kernel_locate.FUNCTIONS, *kernel_run.FUNCTIONS,
 )  # fmt: skip
-NAMES = {**kernel_rows.GLOBALS, **kernel_planes.NAMES, **kernel_fold.NAMES, **kernel_locate.NAMES, **kernel_run.NAMES}
+NAMES = {**kernel_rows.GLOBALS, **kernel_names.NAMES, **kernel_fold.NAMES, **kernel_locate.NAMES, **kernel_run.NAMES}
 ENTRIES = ("integrate_series", "sample")
 HOT = (
-    "fill", "copy", "trigonometry", "gradients", "residuals", "times_gradients", "add_transposed", "solve",
-    "least_norm",
-    "angle_orders", "slot_orders", "row_orders", "spring_orders", "force_orders", "spring_force", "slot_forces",
-    "slot_arms", "add_multipliers", "add_line_multipliers", "torque_orders", "finish_order", "constrained",
+    "fill", "copy", "trigonometry", "vector_at", "vector_rate", "gradients", "add_gradient", "residuals",
+    "times_gradients", "add_transposed", "solve", "least_norm",
+    "angle_orders", "vector_orders", "row_orders", "spring_orders", "force_orders", "form_order", "spring_force",
+    "add_force", "add_arms", "product_forces", "add_multipliers", "add_product_multipliers", "torque_orders",
+    "finish_order", "constrained",
 )  # fmt: skip
 
 
@@ -62,9 +63,9 @@ class Work(NamedTuple):
     QS: Array  # (K, 3n) series of the coordinates
     LM: Array  # (K, m) multipliers
     TF: Array  # (functions, K)
-    bs: Array  # (5, K, n) series of the bodies, see kernel_planes
-    ls: Array  # (6, K, moving lines)
-    es: Array  # (5, K, springs)
+    bs: Array  # (5, K, n) Taylor coefficients of the bodies, see kernel_names
+    vs: Array  # (2, K, vectors)
+    ss: Array  # (3, K, springs)
     fold: FoldFrame
     carry: Carry
     G: Array  # (m, 2, 3)
@@ -85,7 +86,7 @@ class Work(NamedTuple):
     skip: Ints  # (m,)
 
 
-def most_folds(rows: Rows) -> int:
+def most_folds(tables: Tables) -> int:
     """How many rows can lose their gradients at once: those that close loops, for a tree of joints is never singular.
 
     Rows of one joint follow one another and join the same two bodies.
@@ -97,7 +98,8 @@ def most_folds(rows: Rows) -> int:
             body = root[body]
         return body
 
-    pairs: Counter[tuple[int, int]] = Counter((int(min(a, b)), int(max(a, b))) for a, b in rows.ints[:, :2])
+    ends = tables.forms.bodies[: len(tables.forms.unit)]
+    pairs: Counter[tuple[int, int]] = Counter((int(min(a, b)), int(max(a, b))) for a, b in ends)
     closing = 0
     for (a, b), count in pairs.items():
         if top(a) == top(b):
@@ -110,9 +112,9 @@ def most_folds(rows: Rows) -> int:
 
 def work_space(tables: Tables, order: int) -> Work:
     """Scratch arrays for series up to `order`."""
-    K, n3, m, d = order + 3, tables.mass.size, len(tables.rows.ints), most_folds(tables.rows)
+    K, n3, m, d = order + 3, tables.mass.size, len(tables.forms.unit), most_folds(tables)
     k = tables.light.size
-    n, lines, springs = n3 // 3, tables.rows.lines.size, int((tables.forces.ints[:, 0] == kernel_planes.SPRING).sum())
+    n, vectors, springs = n3 // 3, len(tables.vectors.bodies), len(tables.forces.spring)
 
     def zeros(count: int, *shape: int) -> list[Any]:
         return [np.zeros(shape) for _ in range(count)]
@@ -124,8 +126,8 @@ def work_space(tables: Tables, order: int) -> Work:
         np.zeros((K, m)),
         np.zeros((tables.times.first.size - 1, K)),
         np.zeros((5, K, n)),
-        np.zeros((6, K, lines)),
-        np.zeros((5, K, springs)),
+        np.zeros((2, K, vectors)),
+        np.zeros((3, K, springs)),
         FoldFrame._make(fold),
         Carry(np.zeros((k, n3)), np.zeros((k, m)), np.zeros((k, d)), np.zeros((k, k)), np.zeros(k)),
         *zeros(2, m, 2, 3),

@@ -1,0 +1,143 @@
+"""Planar joints as plain data, each with the forms that it holds at zero.
+
+A new joint is a class here, or in a file of its own, with `rows`; its line in `gearfe.tables.mechanism.JOINTS` makes it
+known to mechanism files. Nothing else changes: every integrator gets the joint from its forms (`gearfe.rigid.forms`).
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ..errors import InputError
+from .forms import GROUND, Form, Frames, Point
+from .timefunctions import TimeFunction
+
+
+class Row(NamedTuple):
+    """One constraint: ``form = motion(t)``, or ``form = 0``."""
+
+    what: str  # it holds, for messages
+    form: Form
+    motion: TimeFunction | None = None
+
+
+class Joint(ABC):
+    """What joins two bodies: a frozen dataclass with a `name` and the names of its bodies.
+
+    A joint MUST provide `rows`. Each of its forms depends on two bodies at most. Fields called ``a``, ``b``, ``body``,
+    ``line``, ``relative_to`` name bodies, others are numbers, points (m, in the frame of a body), functions of time.
+    """
+
+    name: str
+
+    @abstractmethod
+    def rows(self, frames: Frames) -> list[Row]:
+        """Forms that the joint holds."""
+
+
+@dataclass(frozen=True)
+class Hinge(Joint):
+    """Point `point_a` of body `a` stays on point `point_b` of body `b`: two constraints."""
+
+    a: str
+    b: str
+    point_a: Point = (0.0, 0.0)
+    point_b: Point = (0.0, 0.0)
+    name: str = ""
+
+    def rows(self, frames: Frames) -> list[Row]:
+        """P_a - P_b = 0."""
+        gap = frames.point(self.a, self.point_a) - frames.point(self.b, self.point_b)
+        return [Row("x", gap.x), Row("y", gap.y)]
+
+
+@dataclass(frozen=True)
+class Slot(Joint):
+    """Point `point` of body `body` stays on a line of body `line`: one constraint (nothing of the joint has mass)."""
+
+    body: str
+    line: str
+    point: Point = (0.0, 0.0)
+    origin: Point = (0.0, 0.0)
+    direction: Point = (1.0, 0.0)
+    name: str = ""
+
+    def rows(self, frames: Frames) -> list[Row]:
+        """n . (P - X) = n0 . O with the unit vector n across the line, and the line's place O as seen from X."""
+        x, y = -self.direction[1], self.direction[0]
+        at = frames.arm(self.line, self.origin)
+        offset = (x * at[0] + y * at[1]) / math.hypot(x, y)
+        gap = frames.point(self.body, self.point) - frames.centre(self.line)
+        return [Row("across the line", frames.direction(self.line, (x, y)).dot(gap) - offset)]
+
+
+@dataclass(frozen=True)
+class Prismatic(Joint):
+    """Body `body` slides along a line of body `line` without turning against it: two constraints.
+
+    `angle` is the angle of `body` minus that of `line` (rad); ``None`` keeps the one it starts with.
+    """
+
+    body: str
+    line: str
+    point: Point = (0.0, 0.0)
+    origin: Point = (0.0, 0.0)
+    direction: Point = (1.0, 0.0)
+    angle: float | None = None
+    name: str = ""
+
+    def rows(self, frames: Frames) -> list[Row]:
+        """Those of a slot, and the angle."""
+        slot = Slot(self.body, self.line, self.point, self.origin, self.direction)
+        held = frames.start_angle(self.body) - frames.start_angle(self.line) if self.angle is None else self.angle
+        return [*slot.rows(frames), Row("angle", frames.angle(self.body) - frames.angle(self.line) - held)]
+
+
+@dataclass(frozen=True)
+class Fixed(Joint):
+    """Body `a` stands still in the frame of body `b`, as it starts: three constraints."""
+
+    a: str
+    b: str = GROUND
+    name: str = ""
+
+    def rows(self, frames: Frames) -> list[Row]:
+        """Those of a hinge at the origin of `a`, and the angle."""
+        at_b = frames.start_seen_from(self.b, frames.start_place(self.a, (0.0, 0.0)))
+        held = frames.start_angle(self.a) - frames.start_angle(self.b)
+        hinge = Hinge(self.a, self.b, (0.0, 0.0), at_b)
+        return [*hinge.rows(frames), Row("angle", frames.angle(self.a) - frames.angle(self.b) - held)]
+
+
+@dataclass(frozen=True)
+class Prescribed(Joint):
+    """A motion given as a function of time: one constraint.
+
+    `coordinate` is ``"angle"`` (rad, relative to body `relative_to`), ``"rate"`` (rad/s, likewise; the angle starts
+    from the start pose), or ``"x"`` or ``"y"`` (m, of the point `point`, in the ground's frame).
+    """
+
+    body: str
+    coordinate: str
+    function: TimeFunction
+    relative_to: str = GROUND
+    point: Point = (0.0, 0.0)
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if self.coordinate not in ("angle", "rate", "x", "y"):
+            where = f"prescribed motion {self.name!r} coordinate"
+            raise InputError(where, self.coordinate, "must be one of angle, rate, x, y", "choose one of these")
+
+    def rows(self, frames: Frames) -> list[Row]:
+        """The coordinate less its function of time."""
+        if self.coordinate in ("x", "y"):
+            place = frames.point(self.body, self.point)
+            return [Row(self.coordinate, place.x if self.coordinate == "x" else place.y, self.function)]
+        motion = self.function
+        if self.coordinate == "rate":
+            motion = motion.integral(frames.start_angle(self.body) - frames.start_angle(self.relative_to))
+        return [Row("angle", frames.angle(self.body) - frames.angle(self.relative_to), motion)]
