@@ -135,8 +135,7 @@ def summarise(
     error: TrajectoryError | None = None,
 ) -> dict[str, Any]:
     """Content of summary.json."""
-    planar = mechanism.system.planar
-    assert planar is not None
+    planar = mechanism.planar
     trajectory = results.trajectory
     freedoms = start.freedoms
     label = planar.assembly.row_label

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,19 +15,9 @@ from ..errors import InputError, unknown_name
 from ..rigid import (
     GROUND,
     Body,
-    CoordinateSpring,
-    Fixed,
     Forced,
-    Gravity,
-    Hinge,
-    Moment,
     PlanarScene,
-    PointForce,
-    Prescribed,
-    Prismatic,
     Scene,
-    Slot,
-    Spring,
     Start,
     System,
     TimeFunction,
@@ -35,7 +27,17 @@ from ..rigid import (
     sine,
     smoothed_step,
 )
-from ..tables.mechanism import ForceTable, Function, FunctionTable, JointTable, MechanismFile, read_mechanism_file
+from ..tables.mechanism import (
+    FORCES,
+    JOINTS,
+    BodyTable,
+    ForceTable,
+    FunctionTable,
+    JointTable,
+    Kind,
+    MechanismFile,
+    read_mechanism_file,
+)
 from .expressions import OF_POINT, PLAIN, Node, compute, parse, quantities
 
 Point = tuple[float, float]
@@ -61,10 +63,16 @@ class Mechanism:
     path: Path = Path()
 
     @property
+    def planar(self) -> PlanarScene:
+        """The only element of the system."""
+        element = self.system.elements[0]
+        assert isinstance(element, PlanarScene)
+        return element
+
+    @property
     def scene(self) -> Scene:
         """Bodies, joints and forces."""
-        assert self.system.planar is not None
-        return self.system.planar.scene
+        return self.planar.scene
 
     def point(self, where: str, label: str = "point") -> tuple[int, Point]:
         """Body number and coordinates relative to the mass centre of ``body.point``, ``body.centre`` or ``body``."""
@@ -73,9 +81,7 @@ class Mechanism:
         if body not in index:
             raise unknown_name(label, body, index)
         at = (0.0, 0.0) if name in ("", "origin") else None
-        planar = self.system.planar
-        assert planar is not None
-        centre = planar.assembly.centre[index[body]]
+        centre = self.planar.assembly.centre[index[body]]
         if name == "centre":
             return index[body], (0.0, 0.0)
         if at is None:
@@ -141,8 +147,7 @@ class Mechanism:
         positions = [self._forced(text, target, 0) for text, target in self.file.start.positions.items()]
         velocities = [self._forced(text, target, 1) for text, target in self.file.start.velocities.items()]
         made = consistent_start(self.system, time, positions=positions, velocities=velocities)
-        driven = any(isinstance(j, Prescribed) for j in self.scene.joints)
-        if made.freedoms.net <= 0 and not driven:
+        if made.freedoms.net <= 0 and not self.planar.driven:
             count = f"{made.freedoms.coordinates} coordinates, {made.freedoms.constraints} constraints"
             cure = "remove a joint, or prescribe a motion"
             raise InputError("joints", None, f"nothing is free to move ({count})", cure)
@@ -216,8 +221,8 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
     bodies = tuple(_body(name, table) for name, table in file.bodies.items())
     if not bodies:
         raise InputError("bodies", None, "there is none", "add a table [bodies.NAME]")
-    joints = tuple(_joint(file, name, table) for name, table in file.joints.items())
-    forces = tuple(_force(file, name, table) for name, table in file.forces.items())
+    joints = tuple(_part(file, f"joints.{n}", n, table, JOINTS[table.type]) for n, table in file.joints.items())
+    forces = tuple(_part(file, f"forces.{n}", n, table, FORCES[table.type]) for n, table in file.forces.items())
     system = System([PlanarScene(Scene(bodies, joints, forces))])
     outputs: dict[str, Node] = {}
     made = Mechanism(file, system, outputs, path)
@@ -237,7 +242,7 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
     return made
 
 
-def _body(name: str, t) -> Body:  # type: ignore[no-untyped-def]
+def _body(name: str, t: BodyTable) -> Body:
     angle = t.angle_rad if t.angle_rad is not None else math.radians(t.angle_deg or 0.0)
     return Body(name, t.mass_kg, t.inertia_kg_m2, t.centre_m, t.position_m, angle, t.velocity_m_per_s, t.rate_rad_per_s)
 
@@ -255,47 +260,25 @@ def _place(file: MechanismFile, body: str, point: str | Point | None, label: str
     return points[point]
 
 
-def _joint(file: MechanismFile, name: str, t: JointTable):  # type: ignore[no-untyped-def]
-    here = _place(file, t.body, t.point, f"joints.{name}.point")
-    there = _place(file, t.to, t.to_point, f"joints.{name}.to_point")
-    if t.type == "hinge":
-        return Hinge(t.body, t.to, here, there, name)
-    if t.type == "fixed":
-        return Fixed(t.body, t.to, name)
-    if t.type == "prescribed":
-        assert t.motion is not None
-        assert t.coordinate is not None
-        motion = time_function(t.motion)
-        return Prescribed(t.body, t.coordinate, motion, t.to, here, name)
-    assert t.direction is not None
-    if t.type == "slot":
-        return Slot(t.body, t.to, here, there, t.direction, name)
-    angle = None if t.angle_deg is None else math.radians(t.angle_deg)
-    return Prismatic(t.body, t.to, here, there, t.direction, angle, name)
+def _part(file: MechanismFile, label: str, name: str, table: JointTable | ForceTable, kind: Kind) -> Any:
+    """Joint or force from its table: the class of its type, the keys as its fields, what is not given by default."""
+    module, _, cls = kind.reference.partition(":")
+    values: dict[str, Any] = {}
+    for key, field_name in kind.fields.items():
+        value = getattr(table, key)
+        if key in ("point", "to_point"):
+            value = _place(file, str(table.body if key == "point" else table.to), value, f"{label}.{key}")
+        elif isinstance(value, FunctionTable):
+            value = time_function(value)
+        elif key.endswith("_deg") and value is not None:
+            value = math.radians(value)
+        if value is not None:
+            values[field_name] = value
+    return getattr(importlib.import_module(module), cls)(**values, name=name)
 
 
-def _force(file: MechanismFile, name: str, t: ForceTable):  # type: ignore[no-untyped-def]
-    if t.type == "gravity":
-        assert t.acceleration_m_per_s2 is not None
-        return Gravity(t.acceleration_m_per_s2, name)
-    assert t.body is not None
-    here = _place(file, t.body, t.point, f"forces.{name}.point")
-    there = _place(file, t.to, t.to_point, f"forces.{name}.to_point")
-    if t.type == "spring":
-        return Spring(t.body, t.to, here, there, t.stiffness, t.damping, t.free_length_m, name)
-    if t.type == "coordinate_spring":
-        assert t.coordinate is not None
-        return CoordinateSpring(t.body, t.coordinate, t.stiffness, t.damping, t.reference, t.to, name)
-    if t.type == "force":
-        return PointForce(t.body, here, time_function(t.x_N or 0.0), time_function(t.y_N or 0.0), name)
-    assert t.moment_N_m is not None
-    return Moment(t.body, time_function(t.moment_N_m), t.to, name)
-
-
-def time_function(table: Function) -> TimeFunction:
-    """Function of time from a number or a table."""
-    if not isinstance(table, FunctionTable):
-        return constant(float(table))
+def time_function(table: FunctionTable) -> TimeFunction:
+    """Function of time from a table."""
     made = constant(table.constant)
     if table.polynomial:
         made = made + polynomial(table.polynomial, table.origin_s)

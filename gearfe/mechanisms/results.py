@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..progress import stage
-from ..rigid import CoordinateSpring, Moment, PointForce, Prescribed, Spring, Trajectory
+from ..rigid import CoordinateSpring, Moment, PointForce, Spring, Trajectory
 from ..rigid.contract import Array
 from .expressions import compute, quantities
 from .model import Mechanism
@@ -61,8 +61,7 @@ def wrapped(values: Array, period: float) -> Array:
 def energies(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
     """Kinetic, potential, work and total energy (J) at the output times."""
     system = mechanism.system
-    scene = system.planar
-    assert scene is not None
+    scene = mechanism.planar
     q, v = trajectory.q, trajectory.v
     kinetic = 0.5 * (v**2 * np.diagonal(system.mass)).sum(axis=1)
     potential = np.array([scene.potential(state) for state in q])
@@ -93,17 +92,15 @@ def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
                 continue
         if isinstance(force, Moment | PointForce) or (isinstance(force, Spring | CoordinateSpring) and force.damping):
             varying = True
-    driven = any(isinstance(j, Prescribed) for j in scene.joints)
-    if not (varying or driven) or len(time) < 2:
+    planar = mechanism.planar
+    if not (varying or planar.driven) or len(time) < 2:
         return work
-    planar = mechanism.system.planar
-    assert planar is not None
     nodes, weights = np.polynomial.legendre.leggauss(8)
     half = 0.5 * np.diff(time)
     at = (0.5 * (time[1:] + time[:-1])[:, None] + half[:, None] * nodes).ravel()
     states = trajectory.dense(at, 0), trajectory.dense(at, 1)
     power = np.array([planar.power(t, q, v) for t, q, v in zip(at, *states, strict=True)])
-    if driven:
+    if planar.driven:
         multipliers = trajectory.multipliers_at(at)
         rates = np.array([planar.rate(t, q) for t, q in zip(at, states[0], strict=True)])
         power = power + (multipliers * rates).sum(axis=1)
@@ -135,8 +132,7 @@ def reactions(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
     the share of
     the joints is not unique.
     """
-    planar = mechanism.system.planar
-    assert planar is not None
+    planar = mechanism.planar
     scene = mechanism.scene
     names = list(mechanism.file.joints)
     bodies = planar.assembly.tables.forms.bodies

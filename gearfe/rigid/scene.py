@@ -66,6 +66,11 @@ class PlanarScene(Element):
         length = self.assembly.length
         return np.tile([length, length, 1.0], self.size // 3), self._forms.unit
 
+    @property
+    def driven(self) -> bool:
+        """Whether a joint prescribes a motion."""
+        return bool((self._forms.motion[: self.rows] >= 0).any())
+
     def pose(self, q: Array) -> Pose:
         """Bodies and vectors at the coordinates q."""
         full = np.append(q, np.zeros(3)).reshape(-1, 3)

@@ -3,14 +3,80 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import NamedTuple
 
 from ..config import TABLES, build, quantity, read_toml
 from ..errors import InputError, unknown_name
 
 Pair = tuple[float, float]
+
+
+class Kind(NamedTuple):
+    """How a type of joint or force is written."""
+
+    reference: str  # "module:Class"
+    fields: Mapping[str, str]  # key of the table -> field of the class
+    required: tuple[str, ...] = ()
+
+
+#: Types of joints. A new one is a class (`gearfe.rigid.joints` says what it provides), and a line here.
+JOINTS: dict[str, Kind] = {
+    "hinge": Kind(
+        "gearfe.rigid.joints:Hinge", {"body": "a", "to": "b", "point": "point_a", "to_point": "point_b"}
+    ),
+    "slot": Kind(
+        "gearfe.rigid.joints:Slot",
+        {"body": "body", "to": "line", "point": "point", "to_point": "origin", "direction": "direction"},
+        ("direction",),
+    ),
+    "prismatic": Kind(
+        "gearfe.rigid.joints:Prismatic",
+        {
+            "body": "body", "to": "line", "point": "point", "to_point": "origin", "direction": "direction",
+            "angle_deg": "angle",
+        },
+        ("direction",),
+    ),
+    "fixed": Kind("gearfe.rigid.joints:Fixed", {"body": "a", "to": "b"}),
+    "prescribed": Kind(
+        "gearfe.rigid.joints:Prescribed",
+        {"body": "body", "to": "relative_to", "point": "point", "coordinate": "coordinate", "motion": "function"},
+        ("coordinate", "motion"),
+    ),
+}  # fmt: skip
+#: Types of forces, likewise (`gearfe.rigid.forces`).
+FORCES: dict[str, Kind] = {
+    "gravity": Kind(
+        "gearfe.rigid.forces:Gravity", {"acceleration_m_per_s2": "acceleration"}, ("acceleration_m_per_s2",)
+    ),
+    "spring": Kind(
+        "gearfe.rigid.forces:Spring",
+        {
+            "body": "a", "to": "b", "point": "point_a", "to_point": "point_b", "stiffness": "stiffness",
+            "damping": "damping", "free_length_m": "free_length",
+        },
+        ("body",),
+    ),
+    "coordinate_spring": Kind(
+        "gearfe.rigid.forces:CoordinateSpring",
+        {
+            "body": "body", "to": "relative_to", "coordinate": "coordinate", "stiffness": "stiffness",
+            "damping": "damping", "reference": "reference",
+        },
+        ("body", "coordinate"),
+    ),
+    "force": Kind(
+        "gearfe.rigid.forces:PointForce", {"body": "body", "point": "point", "x_N": "x", "y_N": "y"}, ("body",)
+    ),
+    "moment": Kind(
+        "gearfe.rigid.forces:Moment",
+        {"body": "body", "to": "reaction", "moment_N_m": "function"},
+        ("body", "moment_N_m"),
+    ),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -65,9 +131,9 @@ Function = float | FunctionTable
 
 @dataclass(frozen=True)
 class JointTable:
-    """[joints.NAME]; which keys belong to which type is in `KEYS`."""
+    """[joints.NAME]; which keys belong to which type is in `JOINTS`."""
 
-    type: str = quantity(choices=("hinge", "slot", "prismatic", "fixed", "prescribed"), doc="type of joint")
+    type: str = quantity(choices=tuple(JOINTS), doc="type of joint")
     body: str = quantity(doc="body that the joint holds")
     to: str = quantity("ground", doc="the other body, or 'ground'")
     point: str | Pair | None = quantity(None, doc="point of the body: a name or [x, y] in m")
@@ -77,23 +143,9 @@ class JointTable:
     coordinate: str | None = quantity(None, choices=("angle", "rate", "x", "y"), doc="what is prescribed")
     motion: Function | None = quantity(None, doc="rad, rad/s or m: a number or a function of time")
 
-    KEYS = {  # noqa: RUF012 - a plain class attribute, not a field
-        "hinge": {"point", "to_point"},
-        "slot": {"point", "to_point", "direction"},
-        "prismatic": {"point", "to_point", "direction", "angle_deg"},
-        "fixed": set(),
-        "prescribed": {"point", "coordinate", "motion"},
-    }
-
     def check(self, where: str) -> None:
         """Only the keys of this type."""
-        _only(
-            self, where, self.KEYS[self.type], ("point", "to_point", "direction", "angle_deg", "coordinate", "motion")
-        )
-        needs = {"slot": ("direction",), "prismatic": ("direction",), "prescribed": ("coordinate", "motion")}
-        for key in needs.get(self.type, ()):
-            if getattr(self, key) is None:
-                raise InputError(f"{where}.{key}", None, f"is required by a {self.type} joint", "add it")
+        _check_keys(self, where, JOINTS[self.type], f"a {self.type} joint")
         if self.direction is not None and self.direction == (0.0, 0.0):
             raise InputError(f"{where}.direction", [0.0, 0.0], "must not be zero", "give the direction of the line")
         if self.body == self.to:
@@ -102,9 +154,9 @@ class JointTable:
 
 @dataclass(frozen=True)
 class ForceTable:
-    """[forces.NAME]; which keys belong to which type is in `KEYS`."""
+    """[forces.NAME]; which keys belong to which type is in `FORCES`."""
 
-    type: str = quantity(choices=("gravity", "spring", "coordinate_spring", "force", "moment"), doc="type of force")
+    type: str = quantity(choices=tuple(FORCES), doc="type of force")
     body: str | None = quantity(None, doc="body on which it acts")
     to: str = quantity("ground", doc="the other body, or 'ground', that carries the reaction")
     point: str | Pair | None = quantity(None, doc="point of the body: a name or [x, y] in m")
@@ -119,23 +171,9 @@ class ForceTable:
     y_N: Function | None = quantity(None, doc="force in y in N: a number or a function of time")
     moment_N_m: Function | None = quantity(None, doc="moment in N m: a number or a function of time")
 
-    KEYS = {  # noqa: RUF012
-        "gravity": {"acceleration_m_per_s2"},
-        "spring": {"body", "point", "to_point", "stiffness", "damping", "free_length_m"},
-        "coordinate_spring": {"body", "coordinate", "stiffness", "damping", "reference"},
-        "force": {"body", "point", "x_N", "y_N"},
-        "moment": {"body", "moment_N_m"},
-    }
-
     def check(self, where: str) -> None:
         """Only the keys of this type."""
-        every = {key for keys in self.KEYS.values() for key in keys}
-        _only(self, where, self.KEYS[self.type], sorted(every))
-        needs = {"gravity": ("acceleration_m_per_s2",), "moment": ("body", "moment_N_m"), "spring": ("body",)}
-        needs |= {"coordinate_spring": ("body", "coordinate"), "force": ("body",)}
-        for key in needs[self.type]:
-            if getattr(self, key) is None:
-                raise InputError(f"{where}.{key}", None, f"is required by a force of type {self.type}", "add it")
+        _check_keys(self, where, FORCES[self.type], f"a force of type {self.type}")
         if self.body is not None and self.body == self.to:
             raise InputError(f"{where}.to", self.to, "joins a body to itself", "name another body or 'ground'")
 
@@ -258,9 +296,11 @@ def read_mechanism_file(path: str | Path) -> MechanismFile:
     return build(MechanismFile, raw, "")
 
 
-def _only(table: object, where: str, allowed: set[str], checked: tuple[str, ...] | list[str]) -> None:
-    fields = type(table).__dataclass_fields__  # type: ignore[attr-defined]
-    kind = table.type  # type: ignore[attr-defined]
-    for key in checked:
-        if key not in allowed and getattr(table, key) != fields[key].default:
-            raise InputError(f"{where}.{key}", None, f"does not belong to type {kind!r}", "remove it")
+def _check_keys(table: JointTable | ForceTable, where: str, kind: Kind, what: str) -> None:
+    """No keys of other types, and all that this one needs."""
+    for spec in fields(table):
+        if spec.name not in kind.fields and spec.name != "type" and getattr(table, spec.name) != spec.default:
+            raise InputError(f"{where}.{spec.name}", None, f"does not belong to type {table.type!r}", "remove it")
+    for key in kind.required:
+        if getattr(table, key) is None:
+            raise InputError(f"{where}.{key}", None, f"is required by {what}", "add it")
