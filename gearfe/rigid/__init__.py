@@ -4,6 +4,7 @@ Nothing here knows which mechanism it runs. The component contract is in `gearfe
 """
 
 from .contract import Element, LinearJoint, LocalForce, ModalBlocks, SeriesLaw
+from .distance import Distance
 from .forces import CoordinateSpring, Gravity, Moment, PointForce, Spring
 from .forms import GROUND
 from .integrate import integrate
@@ -19,6 +20,7 @@ __all__ = [
     "GROUND",
     "Body",
     "CoordinateSpring",
+    "Distance",
     "Element",
     "Fixed",
     "Forced",

@@ -40,6 +40,10 @@ JOINTS: dict[str, Kind] = {
         },
         ("direction",),
     ),
+    "distance": Kind(
+        "gearfe.rigid.distance:Distance",
+        {"body": "a", "to": "b", "point": "point_a", "to_point": "point_b", "length_m": "length"},
+    ),
     "fixed": Kind("gearfe.rigid.joints:Fixed", {"body": "a", "to": "b"}),
     "prescribed": Kind(
         "gearfe.rigid.joints:Prescribed",
@@ -140,6 +144,9 @@ class JointTable:
     to_point: str | Pair | None = quantity(None, doc="point of the other body: a name or [x, y] in m")
     direction: Pair | None = quantity(None, doc="direction of the line in the other body's frame, [x, y]")
     angle_deg: float | None = quantity(None, doc="angle of body minus 'to' that a prismatic joint keeps, in degrees")
+    length_m: float | None = quantity(
+        None, above=0.0, doc="distance that a distance joint keeps in m (default: at start)"
+    )
     coordinate: str | None = quantity(None, choices=("angle", "rate", "x", "y"), doc="what is prescribed")
     motion: Function | None = quantity(None, doc="rad, rad/s or m: a number or a function of time")
 
