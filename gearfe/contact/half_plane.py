@@ -155,14 +155,14 @@ class _Pairs:
     state: State
 
 
-def _first(law: HalfPlanePair, twists: Array, found: Touching) -> _Open:
-    """Forces to begin with: the overlaps of the rigid gears, taken up by the teeth and usual contacts."""
+def unloaded_state(law: HalfPlanePair, twists: Array, found: Touching) -> State:
+    """Tooth pairs where their rigid flanks touch, at twists (rad) of the positions, without forces."""
     turn = [
         found.angle + found.pair * law.pair.mesh_cycle + found.turn[:, 0],
         law.flanks.wheel_frame(found.angle, found.pair) + twists[found.position] + found.turn[:, 1],
     ]
     nothing = np.zeros(len(found))
-    state = State(
+    return State(
         centre=found.point,
         normal=found.normal,
         turn=np.exp(1j * np.stack(turn, axis=1)),
@@ -175,6 +175,11 @@ def _first(law: HalfPlanePair, twists: Array, found: Touching) -> _Open:
         bearing=np.zeros((len(found), PANELS), dtype=bool),
         reach=np.full(len(found), WINDOW),
     )
+
+
+def _first(law: HalfPlanePair, twists: Array, found: Touching) -> _Open:
+    """Forces to begin with: the overlaps of the rigid gears, taken up by the teeth and usual contacts."""
+    state = unloaded_state(law, twists, found)
     start = _Open(np.unique(found.position), _Pairs(found, state))
     if len(found) == 0:
         return start

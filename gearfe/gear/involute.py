@@ -19,6 +19,9 @@ from .tooth_root import NIL_ANGLE, ToothForm, half_tooth_angle, tip_radius, toot
 
 __all__ = ["Segment", "ToothForm", "ToothProfile", "inv", "inverse_inv", "tooth_profile"]
 
+#: Accuracy of roll lengths (m) that are searched for.
+ROLL = 1e-17
+
 
 @dataclass(frozen=True)
 class ToothProfile:
@@ -218,11 +221,13 @@ def deviated(gear: ToothForm, profile: ToothProfile, deviation: Deviation) -> tu
 
     The flank starts at the same radius and ends on the same tip circle; its round is tangent to both as before.
     """
+    from scipy.optimize import brentq  # only flanks with deviations need it
+
     flank, tip, rho = replace(profile.flank, deviation=deviation), tip_radius(gear), gear.tip_round
 
     def roll_at(radius: float) -> float:
         forward = math.sqrt((radius - flank.base_radius) * (radius + flank.base_radius))
-        return bisect(lambda s: s - float(flank.relief(np.array(s))[0]) - forward, forward - reach, forward + reach)
+        return float(brentq(lambda s: s - flank.relief(s)[0] - forward, forward - reach, forward + reach, xtol=ROLL))
 
     # twice as far as any point moves
     reach = 2 * (deviation.most + flank.amount) + 1e-12
@@ -232,7 +237,8 @@ def deviated(gear: ToothForm, profile: ToothProfile, deviation: Deviation) -> tu
     inner = tip - rho
     slope = float(np.abs(flank.relief(np.linspace(start, flank.end, 65))[1]).max())
     reach += 2 * rho * slope
-    end = bisect(lambda s: math.hypot(*_round_centre(gear, flank, s)) - inner, flank.end - reach, flank.end + reach)
+    low, high = flank.end - reach, flank.end + reach
+    end = float(brentq(lambda s: math.hypot(*_round_centre(gear, flank, s)) - inner, low, high, xtol=ROLL))
     flank = replace(flank, start=start, end=end)
     return flank, _tip_arc(gear, flank, end)[0]
 

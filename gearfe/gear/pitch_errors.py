@@ -1,0 +1,126 @@
+r"""Pitch errors of a gear: lists, a sine of one turn, or drawn at random for a class of ISO 1328-1.
+
+The index deviation :math:`F_j` of tooth j is how far its flank is off its place along the reference circle, > 0: out of
+the material of that flank. It turns the flank by :math:`F_j/r` and moves it along the line of action by
+:math:`F_j \cos\alpha`. The single pitch deviations are :math:`f_j = F_j - F_{j-1}`, the cumulative pitch deviation is
+the range of F.
+
+Tolerances in um (ISO 1328-1:2013, clause 5), for the diameter d and the module m in mm and class A:
+
+.. math::
+    f_{pT} = (0.001\,d + 0.4\,m + 5)\,\sqrt2^{\,A-5}, \quad
+    F_{pT} = (0.002\,d + 0.55\sqrt{d} + 0.7\,m + 12)\,\sqrt2^{\,A-5}, \\
+    f_{H\alpha T} = (0.001\,d + 0.4\,m + 4)\,\sqrt2^{\,A-5}, \quad
+    f_{f\alpha T} = (0.55\,m + 5)\,\sqrt2^{\,A-5} .
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from .spur_gear import Gear
+
+Array = NDArray[np.float64]
+
+#: Classes of the standard.
+CLASSES = (1, 11)
+#: Sum of single pitch deviations (m) that is rounding of a list in um.
+CLOSED = 1e-6
+
+
+@dataclass(frozen=True)
+class PitchTolerances:
+    """Tolerances of a class, not rounded (m): single and cumulative pitch, profile slope and profile form."""
+
+    single: float
+    cumulative: float
+    slope: float
+    form: float
+
+
+def tolerances(gear: Gear, class_: int) -> PitchTolerances:
+    """Tolerances of a gear in a class of ISO 1328-1."""
+    if not CLASSES[0] <= class_ <= CLASSES[1]:
+        raise InputError("class", class_, f"must be {CLASSES[0]} to {CLASSES[1]}", "5 to 8 are usual")
+    d, m, step = 1e3 * gear.pitch_diameter, 1e3 * gear.module, 1e-6 * math.sqrt(2.0) ** (class_ - 5)
+    return PitchTolerances(
+        single=(0.001 * d + 0.4 * m + 5) * step,
+        cumulative=(0.002 * d + 0.55 * math.sqrt(d) + 0.7 * m + 12) * step,
+        slope=(0.001 * d + 0.4 * m + 4) * step,
+        form=(0.55 * m + 5) * step,
+    )
+
+
+def from_single(single: Sequence[float]) -> Array:
+    """Index deviations (m) of single pitch deviations f_j (m), tooth 0 on its place.
+
+    Raises
+    ------
+    InputError
+        When they do not add up to nothing round the gear.
+    """
+    f = np.asarray(single, dtype=float)
+    left = float(f.sum())
+    if abs(left) > CLOSED:
+        problem = f"must add up to 0 round the gear, within {1e6 * CLOSED:g} um: the sum is {1e6 * left:.4g} um"
+        raise InputError("single pitch deviations", len(f), problem, "subtract their mean")
+    f = f - left / len(f)
+    return np.cumsum(f) - f[0]
+
+
+def sine(teeth: int, amplitude: float, phase: float = 0.0) -> Array:
+    """Index deviations (m) of a run-out: amplitude sin(2 pi j/z + phase)."""
+    return amplitude * np.sin(2 * math.pi * np.arange(teeth) / teeth + phase)
+
+
+def drawn(gear: Gear, class_: int, seed: int) -> Array:
+    """Index deviations (m) drawn at random, as large as the class allows.
+
+    A sine of one turn with a range of F_pT and a random phase, and independent errors of the teeth of standard
+    deviation f_pT/4; then all scaled so that neither tolerance is exceeded and one of them is reached. The same seed
+    gives the same gear.
+    """
+    allowed, rng = tolerances(gear, class_), np.random.default_rng(seed)
+    made = sine(gear.teeth, 0.5 * allowed.cumulative, rng.uniform(0, 2 * math.pi))
+    made = made + rng.normal(0.0, 0.25 * allowed.single, gear.teeth)
+    worst = max(np.ptp(made) / allowed.cumulative, np.abs(single_of(made)).max() / allowed.single)
+    return np.asarray(made / worst)
+
+
+def single_of(index: ArrayLike) -> Array:
+    """Single pitch deviations f_j = F_j - F_(j-1) (m)."""
+    F = np.asarray(index, dtype=float)
+    return F - np.roll(F, 1)
+
+
+def turns(gear: Gear, index: Sequence[float] | Array) -> tuple[float, ...]:
+    """Turns (rad) of the flanks with index deviations (m), one a tooth.
+
+    Raises
+    ------
+    InputError
+        For a list of the wrong length, or numbers that are none.
+    """
+    F = np.asarray(index, dtype=float)
+    if F.shape != (gear.teeth,):
+        problem = f"must have one entry for each of the {gear.teeth} teeth"
+        raise InputError("pitch errors", len(F), problem, "give as many as the gear has teeth")
+    if not (np.isfinite(F).all() and np.ptp(F) <= 0.1 * gear.module):
+        problem = f"must be finite and within {1e6 * 0.1 * gear.module:.4g} um, a tenth of the module, of each other"
+        raise InputError("pitch errors", float(np.ptp(F)), problem, "are they in um?")
+    return tuple((F / gear.reference_radius).tolist())
+
+
+def mirrored_teeth(turn: Sequence[float], *, wheel: bool) -> tuple[float, ...]:
+    """What belongs to the teeth, in the order of the mirrored gears: tooth j is then -j, on the wheel -1 - j.
+
+    Right flanks bear where the pair seen from the other side has left ones bear.
+    """
+    values = list(turn)
+    return tuple(values[(-j - wheel) % len(values)] for j in range(len(values)))

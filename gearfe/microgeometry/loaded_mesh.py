@@ -1,0 +1,348 @@
+r"""A loaded pair with its deviations: transmission error, load sharing, pressure and root stress over angle and torque.
+
+The transmission error is the wheel's lag on the line of action, :math:`r_{b2}` (twist - lost motion): unloaded that of
+the rigid flanks, :math:`\min_k t_k(\psi)`, loaded with what the teeth yield. Material out of the driving flanks makes
+the wheel lead, so it counts negative. An order is so many times a turn of the pinion; the mesh has the order
+:math:`z_1`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..contact.half_plane_loads import with_loads
+from ..contact.half_plane_step import HalfPlanePair
+from ..contact.position import Position
+from ..contact.records import taken
+from ..contact.scene import MeshingPair
+from ..errors import InputError
+from ..gear.pair import GearPair
+from ..loadmap.root_stress import PairRoots
+from ..stiffness.contact_pressure import BLUNTING
+from ..stiffness.positions import Progress
+from ..threads import one_thread
+from .cells import Cells, of_positions, solve_cells
+
+Array = NDArray[Any]
+IntArray = NDArray[np.int64]
+
+#: Cells solved at once, and most in all.
+AT_ONCE, MOST_CELLS = 512, 1_000_000
+
+
+@dataclass(frozen=True)
+class PairLoads:
+    """Tooth pairs that carry load, q of them over all cells.
+
+    Attributes
+    ----------
+    torque, angle : ndarray, shape (q,)
+        Numbers of the torque and of the pinion angle.
+    pair : ndarray, shape (q,)
+        Pair number k: pinion tooth k, wheel tooth -1 - k, counted on round the gears.
+    force : ndarray, shape (q,)
+        On the whole width (N).
+    share : ndarray, shape (q,)
+        Share of the wheel's torque (-).
+    roll : ndarray, shape (q, 2)
+        Roll lengths of the middle of the contact on pinion and wheel (m); not-a-number off the involutes.
+    half_width, pressure : ndarray, shape (q,)
+        Half width (m), and peak pressure of the elliptic contact of that force and half width (Pa); where an edge bears
+        (`mark`) the blunted figure of `gearfe.stiffness.contact_pressure`.
+    mark : ndarray of str, shape (q,)
+        Edge that the pressure reaches, see `gearfe.contact.half_plane_result.PairContacts`, or nothing.
+    """
+
+    torque: IntArray
+    angle: IntArray
+    pair: IntArray
+    force: Array
+    share: Array
+    roll: Array
+    half_width: Array
+    pressure: Array
+    mark: NDArray[np.str_]
+
+
+@dataclass(frozen=True)
+class LoadedMesh:
+    """Results over m torques and n pinion angles.
+
+    Attributes
+    ----------
+    torque : ndarray, shape (m,)
+        At the wheel's hub (N m).
+    pinion_angle : ndarray, shape (n,)
+        rad.
+    mesh_cycles
+        Mesh cycles that the angles divide into equal steps; 0 where they do not.
+    twist, torque_pinion, tangent : ndarray, shape (m, n)
+        Twist since unmodified flanks touch (rad), torque at the pinion's hub (N m), d torque/d twist (N m/rad).
+    twist_unloaded : ndarray, shape (n,)
+        Twist at which the rigid flanks touch, from there (rad).
+    status : ndarray of str, shape (m, n)
+        ``converged``, or why there are no numbers.
+    pairs
+        Loaded tooth pairs.
+    root_stress : ndarray, shape (m, n, 2), or None
+        Largest tension at the tooth roots of pinion and wheel (Pa).
+    pair
+        The gears.
+    """
+
+    torque: Array
+    pinion_angle: Array
+    mesh_cycles: int
+    twist: Array
+    torque_pinion: Array
+    tangent: Array
+    twist_unloaded: Array
+    status: NDArray[np.str_]
+    pairs: PairLoads
+    root_stress: Array | None
+    pair: GearPair
+
+    @property
+    def transmission_error(self) -> Array:
+        """Loaded transmission error (m), shape (m, n)."""
+        return self.twist * self.pair.wheel.base_radius
+
+    @property
+    def transmission_error_unloaded(self) -> Array:
+        """Unloaded transmission error (m), shape (n,)."""
+        return self.twist_unloaded * self.pair.wheel.base_radius
+
+    @property
+    def peak_to_peak(self) -> Array:
+        """Peak-to-peak loaded transmission error (m), shape (m,)."""
+        return np.asarray(np.ptp(self.transmission_error, axis=1))
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Cells without numbers, shape (m, n)."""
+        return self.status != "converged"
+
+    @property
+    def statuses(self) -> dict[str, int]:
+        """How many cells have which status."""
+        return dict(Counter(map(str, self.status.ravel())))
+
+    def load_share(self) -> tuple[IntArray, Array]:
+        """Leading pair of each angle, shape (n,), and the shares of it and of the pairs behind it, shape (m, n, p)."""
+        own, shape = self.pairs, self.twist.shape
+        leading = np.full(shape[1], np.iinfo(np.int64).min)
+        np.maximum.at(leading, own.angle, own.pair)
+        slot = leading[own.angle] - own.pair
+        shares = np.zeros((*shape, int(slot.max(initial=0)) + 1))
+        shares[own.torque, own.angle, slot] = own.share
+        shares[self.failed] = np.nan
+        return np.where(leading == np.iinfo(np.int64).min, 0, leading), shares
+
+    def largest_pressure(self) -> tuple[Array, Array]:
+        """Largest pressure (Pa) of smooth contacts and where an edge bears, shape (m, n); not-a-number without one."""
+        own, made = self.pairs, []
+        for edge in (False, True):
+            rows = (own.mark != "") == edge
+            most = np.full(self.twist.shape, -np.inf)
+            np.maximum.at(most, (own.torque[rows], own.angle[rows]), own.pressure[rows])
+            made.append(np.where(np.isfinite(most), most, np.nan))
+        return made[0], made[1]
+
+    def spectrum(self, *, unloaded: bool = False) -> tuple[Array, Array]:
+        """Orders, shape (k,), and one-sided amplitudes (m) of the transmission error, shape (m, k) or (k,).
+
+        Raises
+        ------
+        InputError
+            Where the angles are no equal steps over whole mesh cycles.
+        """
+        if not self.mesh_cycles:
+            raise InputError("angles", None, "are no equal steps over whole mesh cycles", "leave angles out")
+        values = self.transmission_error_unloaded if unloaded else self.transmission_error
+        count = len(self.pinion_angle)
+        made = np.abs(np.fft.rfft(values, axis=-1)) / count
+        made[..., 1 : (count + 1) // 2] *= 2
+        return np.arange(made.shape[-1]) * (self.pair.pinion.teeth / self.mesh_cycles), made
+
+
+def full_period(pair: GearPair) -> int:
+    """Mesh cycles after which every tooth meets the same mate again: the least common multiple of the teeth."""
+    return math.lcm(pair.pinion.teeth, pair.wheel.teeth)
+
+
+def load_mesh(
+    law: HalfPlanePair,
+    torques: ArrayLike,
+    *,
+    positions: int = 20,
+    mesh_cycles: int | None = None,
+    angles: ArrayLike | None = None,
+    roots: PairRoots | None = None,
+    elastic: MeshingPair | None = None,
+    progress: Progress | None = None,
+) -> LoadedMesh:
+    """Solve a pair with its deviations over pinion angle and torque.
+
+    Parameters
+    ----------
+    law
+        From `gearfe.contact.half_plane.half_plane_pair`, or its `deviated`.
+    torques : array_like, shape (m,)
+        At the wheel's hub (N m), > 0.
+    positions
+        Pinion angles in a mesh cycle.
+    mesh_cycles
+        How many cycles; None: one where all teeth of each gear are alike, else the full period.
+    angles : array_like, shape (n,), optional
+        Pinion angles (rad) instead.
+    roots, elastic
+        Root stresses of the pair (`gearfe.loadmap.root_stress.pair_roots`) and its elastic gears, to have these too.
+    progress
+        Called with cells done, cells in all, and a name.
+
+    Raises
+    ------
+    InputError
+        For torques out of range, too many cells, and tooth pairs that carry nothing on their whole path.
+    """
+    goals = np.unique(np.atleast_1d(np.asarray(torques, dtype=float)))
+    if len(goals) == 0 or not (np.isfinite(goals).all() and goals[0] > 0):
+        raise InputError("torques", torques, "must be finite and > 0 N m", "give torques at the wheel's hub")
+    pair = law.pair
+    if angles is None:
+        alike = all(one.alike for one in law.teeth.deviations)
+        cycles = mesh_cycles if mesh_cycles is not None else 1 if alike else full_period(pair)
+        place = np.arange(positions * cycles) * (pair.mesh_cycle / positions)
+    else:
+        cycles, place = 0, np.atleast_1d(np.asarray(angles, dtype=float))
+    n, count = len(place), len(goals) * len(place)
+    if count > MOST_CELLS:
+        problem = f"makes {count} cells with {len(goals)} torques and {n} angles: must be <= {MOST_CELLS}"
+        raise InputError("mesh_cycles", cycles, problem, "state a part of the period, fewer positions or torques")
+    met = law.teeth.touching(place)
+    touch = np.full(n, np.inf)
+    np.minimum.at(touch, met.position, met.twist)
+    stress = None if roots is None else np.full((count, 2), np.nan)
+    cells: list[Cells] = []
+    pairs: list[PairLoads] = []
+    with one_thread():
+        for start in range(0, count, AT_ONCE):
+            numbers = np.arange(start, min(start + AT_ONCE, count))
+            angle, goal = numbers % n, goals[numbers // n]
+            made = solve_cells(law, place[angle], goal, of_positions(met, angle))
+            if stress is not None and roots is not None and elastic is not None:
+                stress[numbers] = _root_stress(law, made, place[angle], goal, roots, elastic)
+            pairs.append(_pair_loads(law, made, numbers, n, goal))
+            cells.append(made)
+            if progress is not None:
+                progress(int(numbers[-1]) + 1, count, "cells")
+    shape, lost = (len(goals), n), pair.contact_twist
+
+    def whole(name: str) -> Array:
+        return np.concatenate([getattr(one, name) for one in cells]).reshape(shape)
+
+    found = LoadedMesh(
+        torque=goals,
+        pinion_angle=place,
+        mesh_cycles=cycles,
+        twist=whole("twist") - lost,
+        torque_pinion=whole("torque_pinion"),
+        tangent=whole("tangent"),
+        twist_unloaded=touch - lost,
+        status=whole("status"),
+        pairs=PairLoads(**{f: np.concatenate([getattr(one, f) for one in pairs]) for f in PairLoads.__annotations__}),
+        root_stress=None if stress is None else stress.reshape(*shape, 2),
+        pair=pair,
+    )
+    _check_contact(found, law, met.pair, met.position, met.twist - lost)
+    return found
+
+
+def _pair_loads(law: HalfPlanePair, made: Cells, numbers: IntArray, n: int, goal: Array) -> PairLoads:
+    own = made.contacts
+    own = taken(own, np.flatnonzero(own.force > 0))
+    cell = numbers[own.position]
+    force, width = own.force, law.width
+    blunted = 2 * force / (math.pi * width * np.hypot(own.half_width, BLUNTING * law.pair.pinion.module))
+    flank = law.teeth.flank(own.pair)
+    roll = np.full((len(own), 2), np.nan)
+    for i, face in enumerate(law.teeth.faces):
+        rows = (flank == i) & (own.parameter >= 0) & (own.parameter <= 1)
+        roll[rows] = face.flank.roll(own.parameter[rows])
+    total = np.bincount(own.position, own.torque_wheel, len(goal))
+    return PairLoads(
+        torque=cell // n,
+        angle=cell % n,
+        pair=own.pair,
+        force=force,
+        share=own.torque_wheel / total[own.position],
+        roll=roll,
+        half_width=own.half_width,
+        pressure=np.where(own.marked, blunted, own.hertz_pressure),
+        mark=own.mark,
+    )
+
+
+def _root_stress(
+    law: HalfPlanePair, made: Cells, angle: Array, goal: Array, roots: PairRoots, elastic: MeshingPair
+) -> Array:
+    """Largest tension (Pa) at the roots of pinion and wheel, shape (c, 2)."""
+    stress = np.full((len(angle), 2), np.nan)
+    own = made.contacts
+    ends = np.searchsorted(own.position, np.arange(len(angle) + 1))
+    for i in np.flatnonzero(made.status == "converged"):
+        contacts = taken(own, slice(int(ends[i]), int(ends[i + 1])))
+        torques = contacts.torque_wheel
+        bare = Position(
+            "converged", float(torques.sum()), 0.0, 0.0, 0.0, tuple(contacts.pair.tolist()), torques, 0.0, 0
+        )
+        loaded = with_loads(bare, law.sides, elastic, contacts, float(angle[i]), float(made.solved_twist[i]))
+        found = roots.at(loaded)
+        scale = goal[i] / bare.torque_wheel
+        for gear in range(2):
+            stress[i, gear] = max((one[gear].stress for one in found.values()), default=math.nan) * scale
+    return stress
+
+
+def _check_contact(made: LoadedMesh, law: HalfPlanePair, pair: IntArray, position: IntArray, twist: Array) -> None:
+    """Raise `InputError` where a tooth pair carries nothing on its whole path: at the least torque, if at any."""
+    cycles, geometry = made.mesh_cycles, made.pair
+    if not cycles:
+        return
+    start, end = (geometry.pinion_angle_at(s) for s in geometry.path_limits(rounded=True))
+    whole = cycles % full_period(geometry) == 0 or all(one.alike for one in law.teeth.deviations)
+    first, last = -end / geometry.mesh_cycle, -start / geometry.mesh_cycle  # k of the pairs on the path at angle 0
+    if whole:
+        expected = set(range(cycles))
+    else:  # those whose path lies within the angles
+        expected = set(range(math.ceil(last) - cycles, math.floor(first) + 1))
+    if not expected or made.failed[0].any():
+        return
+
+    def number(k: IntArray) -> IntArray:
+        return np.asarray(k % cycles if whole else k)
+
+    loaded = set(number(made.pairs.pair[made.pairs.torque == 0]).tolist())
+    lost = sorted(expected - loaded)
+    if not lost:
+        return
+    rows = number(pair) == lost[0]
+    wheel_radius = geometry.wheel.base_radius
+    gap = twist[rows] - made.twist[0, position[rows]]
+    nearest = int(np.argmin(gap))
+    more = made.tangent[0, position[rows][nearest]] * gap[nearest]
+    k = lost[0]
+    problem = (
+        f"{len(lost)} of {len(expected)} tooth pairs carry nothing on their whole path, among them pinion tooth "
+        f"{k % geometry.pinion.teeth} on wheel tooth {(-1 - k) % geometry.wheel.teeth}, whose flanks stay "
+        f"{1e6 * gap[nearest] * wheel_radius:.3g} um apart: must be >= about {made.torque[0] + more:.3g} N m"
+    )
+    raise InputError(
+        "torques", float(made.torque[0]), problem, "give more torque, or smaller errors of pitch or profile"
+    )
