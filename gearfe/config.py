@@ -30,6 +30,8 @@ TABLES: dict[str, str] = {
     "pair": "gearfe.tables.pair:PairTable",
     "stiffness": "gearfe.tables.stiffness:StiffnessTable",
     "loadmap": "gearfe.tables.loadmap:LoadMapTable",
+    "microgeometry": "gearfe.tables.microgeometry:MicrogeometryTable",
+    "relief": "gearfe.tables.microgeometry:ReliefTable",
     "housing": "gearfe.tables.housing:HousingTable",
     "train": "gearfe.tables.train:TrainTable",
 }

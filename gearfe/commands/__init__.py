@@ -8,6 +8,8 @@ some part failed and is marked as such in the output, 2 is kept for bad input). 
 COMMANDS: dict[str, str] = {
     "stiffness": "stiffness",
     "loadmap": "loadmap",
+    "microgeometry": "microgeometry",
+    "relief": "relief",
     "gear": "gear",
     "mesh": "mesh",
     "mechanism": "mechanism",

@@ -57,7 +57,7 @@ def tolerances(gear: Gear, class_: int) -> PitchTolerances:
     )
 
 
-def from_single(single: Sequence[float]) -> Array:
+def from_single(single: ArrayLike) -> Array:
     """Index deviations (m) of single pitch deviations f_j (m), tooth 0 on its place.
 
     Raises
@@ -115,12 +115,3 @@ def turns(gear: Gear, index: Sequence[float] | Array) -> tuple[float, ...]:
         problem = f"must be finite and within {1e6 * 0.1 * gear.module:.4g} um, a tenth of the module, of each other"
         raise InputError("pitch errors", float(np.ptp(F)), problem, "are they in um?")
     return tuple((F / gear.reference_radius).tolist())
-
-
-def mirrored_teeth(turn: Sequence[float], *, wheel: bool) -> tuple[float, ...]:
-    """What belongs to the teeth, in the order of the mirrored gears: tooth j is then -j, on the wheel -1 - j.
-
-    Right flanks bear where the pair seen from the other side has left ones bear.
-    """
-    values = list(turn)
-    return tuple(values[(-j - wheel) % len(values)] for j in range(len(values)))

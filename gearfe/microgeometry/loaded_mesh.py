@@ -218,9 +218,10 @@ def load_mesh(
     if angles is None:
         alike = all(one.alike for one in law.teeth.deviations)
         cycles = mesh_cycles if mesh_cycles is not None else 1 if alike else full_period(pair)
-        place = np.arange(positions * cycles) * (pair.mesh_cycle / positions)
+        given: ArrayLike = np.arange(positions * cycles) * (pair.mesh_cycle / positions)
     else:
-        cycles, place = 0, np.atleast_1d(np.asarray(angles, dtype=float))
+        cycles, given = 0, angles
+    place: NDArray[np.float64] = np.atleast_1d(np.asarray(given, dtype=np.float64))
     n, count = len(place), len(goals) * len(place)
     if count > MOST_CELLS:
         problem = f"makes {count} cells with {len(goals)} torques and {n} angles: must be <= {MOST_CELLS}"
@@ -276,6 +277,7 @@ def _pair_loads(law: HalfPlanePair, made: Cells, numbers: IntArray, n: int, goal
         rows = (flank == i) & (own.parameter >= 0) & (own.parameter <= 1)
         roll[rows] = face.flank.roll(own.parameter[rows])
     total = np.bincount(own.position, own.torque_wheel, len(goal))
+    mark = np.where((own.mark == "") & (own.parameter > 1).any(axis=1), "round", own.mark)  # beyond its start
     return PairLoads(
         torque=cell // n,
         angle=cell % n,
@@ -284,8 +286,8 @@ def _pair_loads(law: HalfPlanePair, made: Cells, numbers: IntArray, n: int, goal
         share=own.torque_wheel / total[own.position],
         roll=roll,
         half_width=own.half_width,
-        pressure=np.where(own.marked, blunted, own.hertz_pressure),
-        mark=own.mark,
+        pressure=np.where(mark != "", blunted, own.hertz_pressure),
+        mark=mark,
     )
 
 

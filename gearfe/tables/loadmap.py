@@ -13,6 +13,8 @@ from ..errors import InputError
 class LoadMapTable:
     """Torques, positions and extras of a load map; model and mesh are those of [stiffness]."""
 
+    NAME = "loadmap"
+
     torques_Nm: tuple[float, ...] | None = quantity(
         None, doc="torques at the wheel's hub (N m), or give torque_start_Nm and torque_stop_Nm", above=0.0
     )
@@ -50,8 +52,10 @@ class LoadMapTable:
             return sorted(set(self.torques_Nm))
         start, stop, last = self.torque_start_Nm, self.torque_stop_Nm, self.torque_count - 1
         if start is None or stop is None:
-            cure = "add torques_Nm = [...] to [loadmap], or torque_start_Nm and torque_stop_Nm, or give --torques-Nm"
-            raise InputError("loadmap.torques_Nm", None, "no torques are given", cure)
+            cure = (
+                f"add torques_Nm = [...] to [{self.NAME}], or torque_start_Nm and torque_stop_Nm, or give --torques-Nm"
+            )
+            raise InputError(f"{self.NAME}.torques_Nm", None, "no torques are given", cure)
         if self.torque_spacing == "log":
             step = math.log(stop / start) / last
             return [start, *(start * math.exp(step * i) for i in range(1, last)), stop]

@@ -1,0 +1,101 @@
+"""``gearfe microgeometry JOB.toml --out DIR``: what deviations of micrometres do to a loaded pair."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+from ..progress import count
+
+HELP = "reliefs, pitch errors, measured flanks: transmission error, orders, load sharing, pressure against torque"
+
+#: Files that a run can leave.
+FILES = ("microgeometry*.csv", "microgeometry*.png", "microgeometry.json")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    help_ = "job file with the tables [pair], [stiffness] and [microgeometry]"
+    parser.add_argument("job", metavar="JOB.toml", help=help_)
+    parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
+    parser.add_argument("--no-picture", action="store_true", help="leave out the pictures")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Solve the pair and write the files; 1 when a position failed."""
+    started = time.perf_counter()
+    from ..config import load_job
+    from ..tables.stiffness import StiffnessTable
+
+    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    tables = load_job(args.job, ("pair", "microgeometry"), ("stiffness",))
+    table = tables["microgeometry"]
+    torques = table.torques()
+
+    from ..gear.pair import GearPair
+
+    pair = GearPair.from_table(tables["pair"])
+
+    from ..contact.half_plane import half_plane_pair
+    from ..loadmap.root_stress import pair_roots
+    from ..microgeometry.job import checked_model, deviations_of
+    from ..microgeometry.loaded_mesh import load_mesh
+    from ..microgeometry.report import (
+        cell_table,
+        figure_arguments,
+        flank_figure_arguments,
+        order_table,
+        pair_table,
+        summary,
+        told,
+        torque_table,
+    )
+    from ..output.files import output_folder, whole_set, write_csv, write_json
+    from ..stiffness.job import StiffnessJob
+    from ..stiffness.sweep import elastic_pair
+    from ..stopwatch import Stopwatch
+    from ..threads import one_thread
+
+    watch = Stopwatch({"program start": time.perf_counter() - started})
+    job = StiffnessJob(tables["pair"], tables.get("stiffness", StiffnessTable()), pair)
+    beside = Path(args.job).parent
+    with watch.stage("deviations"):
+        deviations = deviations_of(table, pair, beside)
+    folder = output_folder(args.out or Path("out") / Path(args.job).stem)
+    elastic = elastic_pair(pair, watch=watch, **checked_model(job))
+    roots = None
+    if table.root_stress:
+        with watch.stage("root meshes"), one_thread():
+            roots = pair_roots(pair, elastic)
+    with watch.stage("positions"):
+        law = half_plane_pair(pair, elastic, deviations=deviations)
+        made = load_mesh(
+            law,
+            torques,
+            positions=table.positions,
+            mesh_cycles=table.mesh_cycles,
+            roots=roots,
+            elastic=elastic,
+            progress=count,
+        )
+    with whole_set(folder, FILES) as place:
+        with watch.stage("tables"):
+            write_csv(place / "microgeometry.csv", cell_table(made))
+            write_csv(place / "microgeometry_torques.csv", torque_table(made))
+            write_csv(place / "microgeometry_pairs.csv", pair_table(made))
+            write_csv(place / "microgeometry_orders.csv", order_table(made))
+        if not args.no_picture:
+            from ..output.microgeometry_figures import flank_figure, microgeometry_figure
+
+            with watch.stage("pictures"):
+                flank_figure(place / "microgeometry_flanks.png", **flank_figure_arguments(table, pair, beside))
+                microgeometry_figure(place / "microgeometry.png", **figure_arguments(job, made))
+        watch.seconds["total"] = time.perf_counter() - started
+        write_json(place / "microgeometry.json", summary(job, table, made, deviations, watch.seconds))
+        names = sorted(path.name for path in place.iterdir())
+    for line in told(made):
+        print(line)
+    print(f"written to {folder}: " + ", ".join(names))
+    print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
+    return 1 if made.failed.any() else 0

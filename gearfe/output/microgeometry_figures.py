@@ -1,0 +1,201 @@
+"""Pictures of microgeometry: K-charts of the flanks, the Harris map with the order spectrum, the map of a search."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .figures import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save, tidy
+
+Array = NDArray[Any]
+
+#: Lines of a panel; of more torques or profiles, so many are drawn.
+MOST_LINES = 24
+
+
+def flank_figure(path: str | Path, *, charts: Sequence[Mapping[str, Any]], band_label: str | None) -> None:
+    """K-charts: deviation over roll length of both flanks of both gears, and their index deviations.
+
+    Parameters
+    ----------
+    charts
+        Of each flank: title, roll (mm), lines (um, one array a profile), band (um, half its width, or None), active
+        (ends of the path of contact, mm), pitch (index deviations, um, or None).
+    band_label
+        What the band is.
+    """
+    pitch = any(chart["pitch"] is not None for chart in charts)
+    figure = new_figure(11.0, 7.6 if pitch else 5.0)
+    grid = figure.subplots(2 if pitch else 1, len(charts), squeeze=False, height_ratios=(2.2, 1) if pitch else None)
+    for column, chart in enumerate(charts):
+        axes = grid[0][column]
+        tidy(axes)
+        lines = chart["lines"]
+        if chart["band"] is not None:
+            middle = np.mean(lines, axis=0)
+            edges = (middle - chart["band"], middle + chart["band"])
+            axes.fill_betweenx(chart["roll"], *edges, color="#e5e7eb", label=band_label)
+        for i in np.unique(np.linspace(0, len(lines) - 1, min(len(lines), MOST_LINES)).round().astype(int)):
+            axes.plot(lines[i], chart["roll"], color=BLUE, linewidth=1.4 if len(lines) == 1 else 0.7)
+        for end in chart["active"]:
+            axes.axhline(end, color=GREY, linewidth=0.9, linestyle=(0, (4, 3)))
+        axes.set_title(chart["title"], loc="left", fontsize=9.5)
+        axes.set_xlabel("deviation (µm), + material", fontsize=9)
+        if column == 0:
+            axes.set_ylabel("roll length (mm)", fontsize=9)
+        if chart["band"] is not None and column == 0:
+            axes.legend(fontsize=7.5, loc="lower left", frameon=False)
+        if pitch:
+            below = grid[1][column]
+            tidy(below)
+            if chart["pitch"] is not None:
+                below.bar(np.arange(len(chart["pitch"])), chart["pitch"], color=ORANGE, width=0.7)
+            below.set_xlabel("tooth", fontsize=9)
+            if column == 0:
+                below.set_ylabel("index deviation (µm)", fontsize=9)
+    figure.suptitle("Deviations of the flanks; dashed: ends of the path of contact", x=0.01, ha="left", fontsize=11)
+    save(figure, path, dpi=110)
+
+
+def microgeometry_figure(
+    path: str | Path,
+    *,
+    title: str,
+    cycles: Array,
+    torque: Array,
+    error: Array,
+    error_unloaded: Array,
+    path_loads: tuple[Array, Array, Array, Array, Array],
+    order: Array,
+    spectrum: Array,
+    spectrum_unloaded: Array,
+    mesh_order: int,
+) -> None:
+    """Harris map, peak-to-peak error, pressure and load share along the path, and the orders of the error.
+
+    Parameters
+    ----------
+    cycles : ndarray, shape (n,)
+        Pinion angle in mesh cycles.
+    torque : ndarray, shape (m,)
+        N m.
+    error, error_unloaded : ndarray, shape (m, n), (n,)
+        Transmission error (um).
+    path_loads
+        Of all loaded tooth pairs: number of the torque, roll length of the pinion (mm), pressure (MPa), whether an edge
+        bears, load share (-).
+    order, spectrum, spectrum_unloaded : ndarray, shape (k,)
+        Orders of the pinion's turn, and amplitudes (um) at the largest torque and unloaded.
+    mesh_order
+        Order of the mesh.
+    """
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    figure = new_figure(12.0, 7.4)
+    (harris, peak, spectrum_axes), (share, pressure, _) = figure.subplots(2, 3, width_ratios=(1.5, 1, 1.3))
+    figure.delaxes(_)
+    norm = Normalize(float(torque[0]), float(torque[-1] if len(torque) > 1 else 1.01 * torque[0]))
+    colors = colormaps["viridis"]
+    shown = np.unique(np.linspace(0, len(torque) - 1, min(len(torque), MOST_LINES)).round().astype(int))
+    number, roll, stress, edge, part = path_loads
+    tidy(harris)
+    marker = "." if len(cycles) < 60 else ""
+    harris.plot(cycles, error_unloaded, color=RED, linewidth=1.2, marker=marker, markersize=3, label="unloaded")
+    for i in shown:
+        color = colors(0.95 * norm(torque[i]))
+        harris.plot(cycles, error[i], color=color, linewidth=1.1, marker=marker, markersize=3)
+        rows = np.flatnonzero(number == i)
+        rows = rows[np.argsort(roll[rows])]
+        share.plot(roll[rows], part[rows], ".", markersize=2.5, color=color)
+        smooth, sharp = rows[~edge[rows]], rows[edge[rows]]
+        pressure.plot(roll[smooth], stress[smooth], ".", markersize=2.5, color=color)
+        pressure.plot(roll[sharp], stress[sharp], "x", markersize=4, color=color)
+    harris.legend(fontsize=8, frameon=False)
+    tidy(peak)
+    peak.plot(torque, np.ptp(error, axis=1), "o-", color=BLUE, markersize=3.5)
+    peak.axhline(np.ptp(error_unloaded), color=RED, linewidth=1, linestyle=(0, (4, 3)))
+    peak.set_ylim(bottom=0)
+    tidy(spectrum_axes)
+    last = min(len(order) - 1, int(np.searchsorted(order, 4.5 * mesh_order)))
+    bars = slice(1, last + 1)
+    spectrum_axes.vlines(order[bars], 0, spectrum_unloaded[bars], color=RED, linewidth=3, alpha=0.35, label="unloaded")
+    label = f"at {torque[-1]:.4g} N m"
+    spectrum_axes.vlines(order[bars], 0, spectrum[bars], color=BLUE, linewidth=1.3, label=label)
+    spectrum_axes.set_xticks(mesh_order * np.arange(5))
+    spectrum_axes.set_ylim(bottom=0)
+    spectrum_axes.legend(fontsize=8, frameon=False)
+    for axes, text, below in (
+        (harris, "transmission error (µm): Harris map", "pinion angle (mesh cycles)"),
+        (peak, "peak to peak (µm); dashed: unloaded", "torque at the wheel (N m)"),
+        (spectrum_axes, "orders of the transmission error (µm)", "order of the pinion's turn; grid: mesh"),
+        (share, "load share of a tooth pair (–)", "roll length of the pinion (mm)"),
+        (pressure, "pressure (MPa); x: beside an edge", "roll length of the pinion (mm)"),
+    ):
+        tidy(axes)
+        axes.set_title(text, loc="left", fontsize=9.5)
+        axes.set_xlabel(below, fontsize=9)
+        axes.tick_params(labelsize=8.5)
+    bar = figure.colorbar(ScalarMappable(norm, colors), ax=(share, pressure), shrink=0.9, aspect=25, pad=0.02)
+    bar.set_label("torque at the wheel (N m)")
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    save(figure, path, dpi=110)
+
+
+def relief_figure(
+    path: str | Path,
+    *,
+    names: Sequence[str],
+    axes_values: Sequence[Array],
+    objective: Array,
+    best: Sequence[float],
+    torque: Array,
+    peak_to_peak: Mapping[str, Array],
+    sensitivity: Mapping[str, tuple[float, float]],
+) -> None:
+    """Map of the objective over one or two variables, error against torque of the best one, and its sensitivity.
+
+    Parameters
+    ----------
+    names
+        Of the variables, with units.
+    axes_values, objective
+        Values of the first one or two variables, and the objective over them.
+    best
+        Values of the best.
+    torque, peak_to_peak
+        Torques (N m), and label -> peak-to-peak error (um) there.
+    sensitivity
+        Variable -> objective at its low and high tolerance.
+    """
+    figure = new_figure(12.0, 4.2)
+    first, second, third = figure.subplots(1, 3, width_ratios=(1.3, 1.1, 1))
+    if len(axes_values) == 2:
+        filled = first.contourf(axes_values[0], axes_values[1], objective.T, levels=20, cmap="viridis")
+        figure.colorbar(filled, ax=first, shrink=0.9)
+        first.plot(best[0], best[1], "o", color="white", markeredgecolor="black")
+        first.set_ylabel(names[1], fontsize=9)
+    else:
+        tidy(first)
+        first.plot(axes_values[0], objective, ".-", color=BLUE)
+        first.axvline(best[0], color=GREY, linewidth=1)
+    first.set_xlabel(names[0], fontsize=9)
+    first.set_title("objective", loc="left", fontsize=9.5)
+    tidy(second)
+    for (label, values), color in zip(peak_to_peak.items(), (GREY, BLUE, GREEN), strict=False):
+        second.plot(torque, values, "o-", markersize=3, color=color, label=label)
+    second.set_ylim(bottom=0)
+    second.legend(fontsize=8, frameon=False)
+    second.set_xlabel("torque at the wheel (N m)", fontsize=9)
+    second.set_title("transmission error, peak to peak (µm)", loc="left", fontsize=9.5)
+    tidy(third)
+    for i, (low, high) in enumerate(sensitivity.values()):
+        third.plot([low, high], [i, i], "|-", color=ORANGE, markersize=10, linewidth=2)
+    third.set_yticks(range(len(sensitivity)), [name.replace(" ", "\n", 1) for name in sensitivity], fontsize=8)
+    third.set_title("objective within tolerances", loc="left", fontsize=9.5)
+    save(figure, path, dpi=110)

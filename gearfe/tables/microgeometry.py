@@ -1,0 +1,173 @@
+"""The [microgeometry] and [relief] tables: deviations of micrometres of both gears, in everyday units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+from ..config import quantity
+from ..errors import InputError
+from .loadmap import LoadMapTable
+
+SHAPES = ("linear", "arc", "parabolic")
+#: Keys of which at most one says where a relief starts.
+STARTS = ("length_mm", "start_mm", "start_diameter_mm")
+
+
+@dataclass(frozen=True)
+class WavinessTable:
+    """A wave on the flanks of all teeth, which goes on from tooth to tooth."""
+
+    amplitude_um: float = quantity(doc="amplitude (um)", low=0.0)
+    waves: int = quantity(doc="whole waves round the gear", low=1, high=100_000)
+    phase_deg: float = quantity(0.0, doc="phase (deg)")
+
+
+@dataclass(frozen=True)
+class FlankTable:
+    """Deviations of the flanks of a gear along their normals, over the roll length; > 0 is more material."""
+
+    tip_relief_um: float | None = quantity(None, doc="tip relief (um), at the tip circle", low=0.0)
+    tip_relief_length_mm: float | None = quantity(None, doc="roll length of it from the tip circle (mm)", above=0.0)
+    tip_relief_start_mm: float | None = quantity(None, doc="or the roll length where it starts (mm)", above=0.0)
+    tip_relief_start_diameter_mm: float | None = quantity(None, doc="or the diameter there (mm)", above=0.0)
+    tip_relief_end_mm: float | None = quantity(
+        None, doc="roll length where it has its amount (mm), if not the tip circle", above=0.0
+    )
+    tip_relief_shape: str = quantity("linear", doc="linear, arc or parabolic", choices=SHAPES)
+    root_relief_um: float | None = quantity(None, doc="root relief (um), at the form circle", low=0.0)
+    root_relief_length_mm: float | None = quantity(None, doc="roll length of it from the form circle (mm)", above=0.0)
+    root_relief_start_mm: float | None = quantity(None, doc="or the roll length where it starts (mm)", above=0.0)
+    root_relief_start_diameter_mm: float | None = quantity(None, doc="or the diameter there (mm)", above=0.0)
+    root_relief_end_mm: float | None = quantity(
+        None, doc="roll length where it has its amount (mm), if not the form circle", low=0.0
+    )
+    root_relief_shape: str = quantity("linear", doc="linear, arc or parabolic", choices=SHAPES)
+    crowning_um: float = quantity(0.0, doc="profile crowning (um), the ends lie that much back")
+    slope_um: float = quantity(0.0, doc="profile slope (um), from form to tip circle, > 0: more material at the tip")
+    waviness: tuple[WavinessTable, ...] = quantity((), doc="waves")
+    points: tuple[tuple[float, float], ...] = quantity(
+        (), doc="K-chart: [roll length (mm), deviation (um)] and straight lines between"
+    )
+    measured_csv: str | None = quantity(
+        None, doc="file with columns roll_length_mm (or diameter_mm), deviation_um, and tooth where teeth differ"
+    )
+    pitch_um: tuple[float, ...] = quantity((), doc="index deviations of all teeth (um), along the reference circle")
+    single_pitch_um: tuple[float, ...] = quantity((), doc="or the single pitch deviations (um), which add up to 0")
+    pitch_csv: str | None = quantity(None, doc="or a file with the columns tooth and pitch_um")
+    run_out_um: float = quantity(0.0, doc="amplitude of a sine of one turn (um) of the index deviations", low=0.0)
+    run_out_phase_deg: float = quantity(0.0, doc="its phase (deg)")
+    pitch_class: int | None = quantity(None, doc="index deviations drawn for a class of ISO 1328-1", low=1, high=11)
+    pitch_seed: int = quantity(1, doc="seed of the draw", low=0, high=2**63 - 1)
+
+    def check(self, where: str) -> None:
+        """Raise `InputError` for keys that contradict each other."""
+        for name in ("tip_relief", "root_relief"):
+            given = [f"{name}_{key}" for key in STARTS if getattr(self, f"{name}_{key}") is not None]
+            if len(given) > 1:
+                value = getattr(self, given[1])
+                raise InputError(f"{where}.{given[1]}", value, f"stands beside {given[0]}", "leave one of them out")
+        pitch = [key for key in ("pitch_um", "single_pitch_um", "pitch_csv", "pitch_class") if getattr(self, key)]
+        if len(pitch) > 1:
+            value = getattr(self, pitch[1])
+            raise InputError(f"{where}.{pitch[1]}", value, f"stands beside {pitch[0]}", "leave one of them out")
+
+
+@dataclass(frozen=True)
+class GearMicrogeometryTable(FlankTable):
+    """Deviations of one gear: of both flanks of its teeth, or of one, which then wins key by key."""
+
+    left: FlankTable | None = quantity(None, doc="of the left (counter-clockwise) flanks")  # noqa: RUF009
+    right: FlankTable | None = quantity(None, doc="of the right flanks")  # noqa: RUF009
+
+    def flank(self, side: str) -> FlankTable:
+        """What holds on the flanks `side` (left or right)."""
+        own, default = getattr(self, side), FlankTable()
+        made = {f.name: getattr(self, f.name) for f in fields(FlankTable)}
+        if own is not None:
+            given = {f.name: getattr(own, f.name) for f in fields(FlankTable)}
+            changed = {name: value for name, value in given.items() if value != getattr(default, name)}
+            for relief in ("tip_relief", "root_relief"):  # another start takes the place of the shared one
+                if any(f"{relief}_{key}" in changed for key in STARTS):
+                    made |= dict.fromkeys((f"{relief}_{key}" for key in STARTS), None)
+            made |= changed
+        return FlankTable(**made)
+
+
+@dataclass(frozen=True)
+class MicrogeometryTable(LoadMapTable):
+    """Deviations of both gears, and torques and angles at which they are looked at; model and mesh as [stiffness]."""
+
+    NAME = "microgeometry"
+
+    flank: str = quantity("left", doc="the driving flanks of both gears: left or right", choices=("left", "right"))
+    mesh_cycles: int | None = quantity(
+        None, doc="mesh cycles; by default 1 where the teeth are alike, else the full period", low=1, high=100_000
+    )
+    tolerance_class: int | None = quantity(
+        None, doc="class of ISO 1328-1 whose profile tolerances the picture of the flanks shows", low=1, high=11
+    )
+    pinion: GearMicrogeometryTable = quantity(GearMicrogeometryTable, doc="the driving gear")  # noqa: RUF009
+    wheel: GearMicrogeometryTable = quantity(GearMicrogeometryTable, doc="the driven gear")  # noqa: RUF009
+
+    def with_flank(self, gear: str, **changes: Any) -> MicrogeometryTable:
+        """The table with other values on the driving flanks of a gear."""
+        own: GearMicrogeometryTable = getattr(self, gear)
+        made = replace(own.flank(self.flank), **changes)
+        return replace(self, **{gear: replace(own, **{self.flank: made})})  # type: ignore[arg-type]
+
+
+#: What can be varied: key -> (quantity of `gearfe.microgeometry.relief.Variable`, factor to SI).
+VARIABLES: dict[str, tuple[str, float]] = {
+    "tip_relief_um": ("tip_relief.amount", 1e-6),
+    "tip_relief_length_mm": ("tip_relief.length", 1e-3),
+    "root_relief_um": ("root_relief.amount", 1e-6),
+    "root_relief_length_mm": ("root_relief.length", 1e-3),
+    "crowning_um": ("crowning", 1e-6),
+    "slope_um": ("slope", 1e-6),
+}
+
+
+@dataclass(frozen=True)
+class VariableTable:
+    """One number that the search varies."""
+
+    key: str = quantity(doc="key of [microgeometry.pinion] or [microgeometry.wheel]", choices=tuple(VARIABLES))
+    gear: str = quantity("both", doc="pinion, wheel or both", choices=("pinion", "wheel", "both"))
+    low: float = quantity(doc="least value, in the key's unit")
+    high: float = quantity(doc="largest value")
+    tolerance: float = quantity(0.0, doc="+- of manufacture, for the sensitivity", low=0.0)
+
+    def check(self, where: str) -> None:
+        """Raise `InputError` for bounds that hold nothing."""
+        if not self.low < self.high:
+            raise InputError(f"{where}.high", self.high, f"must be > low = {self.low:g}", "swap them")
+
+
+@dataclass(frozen=True)
+class ReliefTable:
+    """Search for the relief that is best at some torques, from the deviations of [microgeometry]."""
+
+    variables: tuple[VariableTable, ...] = quantity(doc="what is varied")
+    torques_Nm: tuple[float, ...] = quantity(doc="torques at the wheel's hub (N m)", above=0.0)
+    weights: tuple[float, ...] = quantity((), doc="of these torques, by default all 1", low=0.0)
+    peak_to_peak_weight: float = quantity(1.0, doc="of the peak-to-peak transmission error (um)", low=0.0)
+    pressure_weight: float = quantity(0.0, doc="of the largest pressure (GPa), edges included", low=0.0)
+    root_stress_weight: float = quantity(0.0, doc="of the largest root stress (100 MPa)", low=0.0)
+    positions: int = quantity(20, doc="pinion angles in the mesh cycle", low=4, high=1000)
+    map_points: int = quantity(9, doc="points of the map along each of the first two variables", low=2, high=200)
+    rounds: int = quantity(4, doc="most searches round the best one, each in a smaller region", low=0, high=100)
+    seed: int = quantity(1, doc="seed of the points that more than two variables start from", low=0, high=2**63 - 1)
+
+    def check(self, where: str) -> None:
+        """Raise `InputError` for keys that contradict each other."""
+        if not self.variables:
+            raise InputError(f"{where}.variables", [], "is empty", "give at least one [[relief.variables]]")
+        if not self.torques_Nm:
+            raise InputError(f"{where}.torques_Nm", [], "is empty", "give at least one torque")
+        if self.weights and len(self.weights) != len(self.torques_Nm):
+            problem = f"must have one entry for each of the {len(self.torques_Nm)} torques"
+            raise InputError(f"{where}.weights", list(self.weights), problem, "or leave it out")
+        if not any((self.peak_to_peak_weight, self.pressure_weight, self.root_stress_weight)):
+            problem = "leaves nothing to minimise: all weights are 0"
+            raise InputError(f"{where}.peak_to_peak_weight", self.peak_to_peak_weight, problem, "give one weight > 0")
