@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, fields
 
 from ..config import quantity
 from ..errors import InputError
@@ -110,12 +109,6 @@ class MicrogeometryTable(LoadMapTable):
     pinion: GearMicrogeometryTable = quantity(GearMicrogeometryTable, doc="the driving gear")  # noqa: RUF009
     wheel: GearMicrogeometryTable = quantity(GearMicrogeometryTable, doc="the driven gear")  # noqa: RUF009
 
-    def with_flank(self, gear: str, **changes: Any) -> MicrogeometryTable:
-        """The table with other values on the driving flanks of a gear."""
-        own: GearMicrogeometryTable = getattr(self, gear)
-        made = replace(own.flank(self.flank), **changes)
-        return replace(self, **{gear: replace(own, **{self.flank: made})})  # type: ignore[arg-type]
-
 
 #: What can be varied: key -> (quantity of `gearfe.microgeometry.relief.Variable`, factor to SI).
 VARIABLES: dict[str, tuple[str, float]] = {
@@ -156,8 +149,8 @@ class ReliefTable:
     root_stress_weight: float = quantity(0.0, doc="of the largest root stress (100 MPa)", low=0.0)
     positions: int = quantity(20, doc="pinion angles in the mesh cycle", low=4, high=1000)
     map_points: int = quantity(9, doc="points of the map along each of the first two variables", low=2, high=200)
-    rounds: int = quantity(4, doc="most searches round the best one, each in a smaller region", low=0, high=100)
-    seed: int = quantity(1, doc="seed of the points that more than two variables start from", low=0, high=2**63 - 1)
+    generations: int = quantity(8, doc="most generations of the search (differential evolution)", low=0, high=1000)
+    seed: int = quantity(1, doc="seed of the search", low=0, high=2**63 - 1)
 
     def check(self, where: str) -> None:
         """Raise `InputError` for keys that contradict each other."""

@@ -1,0 +1,100 @@
+"""``gearfe relief JOB.toml --out DIR``: the relief that is best at the job's torques."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+from ..progress import count
+
+HELP = "tip and root relief, crowning, slope: search for the best at some torques, with its tolerances"
+
+#: Files that a run can leave.
+FILES = ("relief*.csv", "relief.png", "relief.json")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    help_ = "job file with the tables [pair], [stiffness], [microgeometry] and [relief]"
+    parser.add_argument("job", metavar="JOB.toml", help=help_)
+    parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes (default 1); no digit changes")
+    parser.add_argument("--no-picture", action="store_true", help="leave out the picture")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Search and write the files."""
+    started = time.perf_counter()
+    from ..config import load_job
+    from ..errors import InputError
+    from ..tables.microgeometry import MicrogeometryTable
+    from ..tables.stiffness import StiffnessTable
+
+    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    tables = load_job(args.job, ("pair", "relief"), ("stiffness", "microgeometry"))
+    table, base = tables["relief"], tables.get("microgeometry", MicrogeometryTable())
+    if not 1 <= args.workers <= 1024:
+        raise InputError("--workers", args.workers, "must be 1 to 1024", "as many as there are processors")
+
+    from ..gear.pair import GearPair
+
+    pair = GearPair.from_table(tables["pair"])
+
+    from ..contact.half_plane import half_plane_pair
+    from ..loadmap.root_stress import pair_roots
+    from ..microgeometry.job import checked_model
+    from ..microgeometry.relief import optimise_relief
+    from ..microgeometry.relief_job import comparison, figure_arguments, map_table, relief_problem, summary, told
+    from ..output.files import output_folder, whole_set, write_csv, write_json
+    from ..stiffness.job import StiffnessJob
+    from ..stiffness.sweep import elastic_pair
+    from ..stopwatch import Stopwatch
+    from ..threads import one_thread
+
+    watch = Stopwatch({"program start": time.perf_counter() - started})
+    job = StiffnessJob(tables["pair"], tables.get("stiffness", StiffnessTable()), pair)
+    folder = output_folder(args.out or Path("out") / Path(args.job).stem)
+    elastic = elastic_pair(pair, watch=watch, **checked_model(job))
+    roots = None
+    if table.root_stress_weight:
+        with watch.stage("root meshes"), one_thread():
+            roots = pair_roots(pair, elastic)
+    law = half_plane_pair(pair, elastic)
+    problem = relief_problem(table, base, pair, Path(args.job).parent, law, elastic, roots)
+    with watch.stage("search"), ExitStack() as stack:
+        executor = None
+        if args.workers > 1:
+            import multiprocessing
+            from concurrent.futures import ProcessPoolExecutor
+
+            # forking would copy the thread that shows the progress
+            context = multiprocessing.get_context("spawn")
+            executor = stack.enter_context(ProcessPoolExecutor(args.workers, mp_context=context))
+        made = optimise_relief(
+            problem,
+            map_points=table.map_points,
+            generations=table.generations,
+            seed=table.seed,
+            executor=executor,
+            progress=count,
+        )
+    with watch.stage("comparison"):
+        compared = comparison(made)
+    with whole_set(folder, FILES) as place:
+        write_csv(place / "relief_map.csv", map_table(table, made))
+        write_csv(place / "relief_torques.csv", compared)
+        if not args.no_picture:
+            from ..output.microgeometry_figures import relief_figure
+
+            with watch.stage("picture"):
+                relief_figure(place / "relief.png", **figure_arguments(table, made, compared))
+        watch.seconds["total"] = time.perf_counter() - started
+        write_json(place / "relief.json", summary(job, base, table, made, watch.seconds))
+        names = sorted(path.name for path in place.iterdir())
+    for line in told(table, made):
+        print(line)
+    print(f"written to {folder}: " + ", ".join(names))
+    print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
+    return 0

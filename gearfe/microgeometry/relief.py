@@ -1,0 +1,366 @@
+r"""The relief that is best for a load: bounds, several torques, one objective, and what tolerances make of it.
+
+Minimised over the variables x within their bounds is
+
+.. math:: f(x) = \sum_i w_i \Big(\frac{W_e\,\Delta e_i}{1\,\mathrm{um}} + \frac{W_p\,p_i}{1\,\mathrm{GPa}} +
+    \frac{W_r\,\sigma_i}{100\,\mathrm{MPa}}\Big)\Big/\sum_i w_i
+
+over the torques i: peak-to-peak loaded transmission error, largest pressure (edges included) and largest root stress.
+The error is a largest less a least value, so f has edges and valleys: differential evolution searches (Storn & Price,
+J. Global Optimization 11, 1997, by scipy) from a map over the first two variables on, and Nelder's and Mead's method
+ends. Evaluations are independent and the same in any process, so that an executor changes no digit.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..contact.half_plane_step import HalfPlanePair
+from ..contact.scene import MeshingPair
+from ..errors import InputError
+from ..gear.modifications import FlankModification, Relief, ends_of, tooth_deviations
+from ..gear.pair import Gear
+from ..loadmap.root_stress import PairRoots
+from .loaded_mesh import LoadedMesh, load_mesh
+
+Array = NDArray[Any]
+
+QUANTITIES = ("tip_relief.amount", "tip_relief.length", "root_relief.amount", "root_relief.length", "crowning", "slope")
+GEARS = ("pinion", "wheel")
+#: Members of the population for each variable; more variables than these have no worst case over all corners.
+POPULATION, CORNERS = 8, 6
+#: Relative size of the steps in which the last search ends, of the bounds and of the objective.
+LAST_STEP, LAST_CHANGE = 1e-4, 1e-5
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A number that is varied.
+
+    Attributes
+    ----------
+    quantity
+        One of `QUANTITIES`; lengths are roll lengths from the tip or form circle.
+    low, high
+        Bounds (m).
+    gear
+        ``pinion``, ``wheel`` or ``both``.
+    tolerance
+        +- of manufacture (m).
+    """
+
+    quantity: str
+    low: float
+    high: float
+    gear: str = "both"
+    tolerance: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.quantity not in QUANTITIES:
+            raise InputError("quantity", self.quantity, "must be one of " + ", ".join(QUANTITIES))
+        if self.gear not in (*GEARS, "both"):
+            raise InputError("gear", self.gear, "must be pinion, wheel or both")
+        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
+            raise InputError("high", self.high, f"must be finite and > low = {self.low:g}", "swap them")
+
+    @property
+    def name(self) -> str:
+        """Quantity and gear."""
+        return f"{self.quantity} ({self.gear})"
+
+    @property
+    def absent(self) -> float:
+        """No amount, whatever length (m)."""
+        return 0.5 * (self.low + self.high) if self.quantity.endswith(".length") else 0.0
+
+    def applied(self, made: FlankModification, gear: Gear, value: float) -> FlankModification:
+        """The modification with another value (m)."""
+        name, _, part = self.quantity.partition(".")
+        if not part:
+            return replace(made, **{name: value})  # type: ignore[arg-type]
+        low, high = ends_of(gear)
+        own: Relief | None = getattr(made, name)
+        if own is None:
+            own = Relief(0.0, 0.5 * (low + high))
+        if part == "amount":
+            return replace(made, **{name: replace(own, amount=value)})  # type: ignore[arg-type]
+        start = high - value if name == "tip_relief" else low + value
+        return replace(made, **{name: replace(own, start=start)})  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One choice of the variables.
+
+    Attributes
+    ----------
+    value
+        Objective; infinite where there is no such gear (`problem`) or a position failed.
+    peak_to_peak, pressure, root_stress : ndarray, shape (m,)
+        Of each torque: m, Pa, Pa; root stress not-a-number where it has no weight.
+    problem
+        Why there is no such gear.
+    """
+
+    value: float
+    peak_to_peak: Array
+    pressure: Array
+    root_stress: Array
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class ReliefProblem:
+    """What is minimised; can be sent to other processes.
+
+    Attributes
+    ----------
+    law
+        The elastic pair, from `gearfe.contact.half_plane.half_plane_pair`; its own deviations do not count.
+    base
+        Modifications of pinion and wheel that the variables change.
+    variables, torques
+        Variables, and torques at the wheel's hub (N m).
+    weights
+        Of the torques; empty: all 1.
+    peak_to_peak_weight, pressure_weight, root_stress_weight
+        W above.
+    turns
+        Pitch errors of pinion and wheel (rad), see `gearfe.gear.pitch_errors`.
+    positions
+        Pinion angles in a mesh cycle.
+    roots, elastic
+        For root stresses, see `gearfe.microgeometry.loaded_mesh.load_mesh`.
+    """
+
+    law: HalfPlanePair
+    base: tuple[FlankModification, FlankModification]
+    variables: tuple[Variable, ...]
+    torques: tuple[float, ...]
+    weights: tuple[float, ...] = ()
+    peak_to_peak_weight: float = 1.0
+    pressure_weight: float = 0.0
+    root_stress_weight: float = 0.0
+    turns: tuple[tuple[float, ...], tuple[float, ...]] = ((0.0,), (0.0,))
+    positions: int = 20
+    roots: PairRoots | None = None
+    elastic: MeshingPair | None = None
+
+    def modifications(self, x: Sequence[float]) -> tuple[FlankModification, FlankModification]:
+        """Of pinion and wheel, with the values x (m) of the variables."""
+        made = list(self.base)
+        gears = (self.law.pair.pinion, self.law.pair.wheel)
+        for variable, value in zip(self.variables, x, strict=True):
+            for g, name in enumerate(GEARS):
+                if variable.gear in (name, "both"):
+                    made[g] = variable.applied(made[g], gears[g], float(value))
+        return made[0], made[1]
+
+    def mesh(self, x: Sequence[float], torques: ArrayLike) -> LoadedMesh:
+        """The pair with the values x at other torques.
+
+        Raises
+        ------
+        InputError
+            Where there is no such gear.
+        """
+        gears = (self.law.pair.pinion, self.law.pair.wheel)
+        pinion, wheel = (
+            tooth_deviations(gear, made, turn)
+            for gear, made, turn in zip(gears, self.modifications(x), self.turns, strict=True)
+        )
+        roots = self.roots if self.root_stress_weight else None
+        law = self.law.deviated((pinion, wheel))
+        return load_mesh(law, torques, positions=self.positions, roots=roots, elastic=self.elastic)
+
+    def evaluate(self, x: Sequence[float]) -> Evaluation:
+        """Objective and what it is made of."""
+        goals = np.array(self.torques)
+        nothing = np.full(len(goals), np.nan)
+        try:
+            made = self.mesh(x, self.torques)
+        except InputError as error:
+            return Evaluation(math.inf, nothing, nothing, nothing, str(error))
+        order = np.searchsorted(made.torque, goals)  # results are sorted
+        both = np.stack(made.largest_pressure())
+        pressure = np.where(np.isfinite(both), both, 0.0).max(axis=(0, 2))[order]
+        root = nothing if made.root_stress is None else np.nanmax(made.root_stress, axis=(1, 2))[order]
+        peaks = made.peak_to_peak[order]
+        sums = self.peak_to_peak_weight * 1e6 * peaks + self.pressure_weight * 1e-9 * pressure
+        if self.root_stress_weight:
+            sums = sums + self.root_stress_weight * 1e-8 * root
+        weights = np.array(self.weights or (1.0,) * len(goals))
+        value = float(weights @ sums / weights.sum())
+        return Evaluation(value if np.isfinite(value) else math.inf, peaks, pressure, root)
+
+    def value(self, x: Sequence[float]) -> float:
+        """Objective alone."""
+        return self.evaluate(x).value
+
+
+@dataclass(frozen=True)
+class ReliefResult:
+    """The best choice, and what is round it.
+
+    Attributes
+    ----------
+    problem
+        What was asked.
+    x : ndarray, shape (n,)
+        Values of the variables (m).
+    best, without
+        Evaluations there, and with the amounts of all variables 0.
+    axes : tuple of ndarray
+        Values of the first one or two variables in the map (m).
+    map : ndarray, shape of the axes
+        Objective there, the other variables at the middle of their bounds.
+    low, high : ndarray, shape (n,)
+        Objective where one variable is at the end of its tolerance.
+    worst
+        Objective at the worst corner of all tolerances.
+    evaluations
+        How many were made.
+    """
+
+    problem: ReliefProblem
+    x: Array
+    best: Evaluation
+    without: Evaluation
+    axes: tuple[Array, ...]
+    map: Array
+    low: Array
+    high: Array
+    worst: float
+    evaluations: int
+
+
+def optimise_relief(
+    problem: ReliefProblem,
+    *,
+    map_points: int = 9,
+    generations: int = 8,
+    seed: int = 1,
+    executor: Executor | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> ReliefResult:
+    """Search for the best choice of the variables.
+
+    Parameters
+    ----------
+    map_points
+        Values of each of the first two variables in the map.
+    generations
+        Most generations of differential evolution.
+    seed
+        Its seed.
+    executor
+        Where evaluations run side by side; None: here, one after the other. The result is the same, bit for bit.
+    progress
+        Called with evaluations done, about how many there are, and a name.
+
+    Raises
+    ------
+    InputError
+        Where the bounds contain no valid gear.
+    """
+    from scipy.optimize import differential_evolution, minimize
+
+    variables = problem.variables
+    low, high = (np.array([getattr(v, end) for v in variables]) for end in ("low", "high"))
+    size = POPULATION * len(variables)
+    total = map_points ** min(2, len(variables)) + size * (generations + 1)
+    done = 0
+
+    def each(points: Iterable[Any], function: Callable[[Any], Any]) -> list[Any]:
+        nonlocal done
+        made = []
+        for one in (map if executor is None else executor.map)(function, points):
+            made.append(one)
+            done += 1
+            if progress is not None:
+                progress(min(done, total), total, "evaluations")
+        return made
+
+    axes = tuple(np.linspace(v.low, v.high, map_points) for v in variables[:2])
+    middle = 0.5 * (low + high)
+    grid = [(*point, *middle[len(axes) :]) for point in itertools.product(*axes)]
+    found = each(grid, problem.evaluate)
+    values = np.array([one.value for one in found])
+    if not np.isfinite(values).any():
+        name = variables[0].name
+        told = f"no gear between the bounds is valid; the first one: {found[0].problem or 'its positions failed'}"
+        raise InputError(name, (variables[0].low, variables[0].high), told, "change the bounds")
+    first = np.array(grid[int(np.argmin(values))])
+    best, value = first, float(values.min())
+    if generations:
+        searched = differential_evolution(
+            problem.value,
+            list(zip(low, high, strict=True)),
+            maxiter=generations,
+            popsize=POPULATION,
+            rng=np.random.default_rng(seed),
+            polish=False,
+            updating="deferred",
+            workers=lambda function, points: each(points, function),
+            x0=first,
+        )
+        if searched.fun < value:
+            best, value = searched.x, float(searched.fun)
+    scale = high - low
+
+    def scaled(u: Array) -> float:
+        nonlocal done
+        done += 1
+        return problem.value(low + u * scale)
+
+    start = (best - low) / scale
+    simplex = np.tile(start, (len(start) + 1, 1))
+    for i in range(len(start)):
+        simplex[i + 1, i] += 0.03 if start[i] < 0.5 else -0.03
+    ended = minimize(
+        scaled,
+        start,
+        method="Nelder-Mead",
+        bounds=[(0.0, 1.0)] * len(start),
+        options={
+            "initial_simplex": simplex,
+            "xatol": LAST_STEP,
+            "fatol": LAST_CHANGE * value,
+            "maxfev": 40 * len(start),
+        },
+    )
+    if ended.fun < value:
+        best = low + ended.x * scale
+    ends = np.array([v.tolerance for v in variables])
+    least = np.array([0.0 if v.quantity.endswith(".amount") else -math.inf for v in variables])
+    beside = [
+        np.maximum(best + sign * np.eye(len(best))[i] * ends, least) for i in range(len(best)) for sign in (-1, 1)
+    ]
+    corners = []
+    if ends.any() and len(best) <= CORNERS:
+        corners = [
+            np.maximum(best + np.array(signs) * ends, least) for signs in itertools.product((-1, 1), repeat=len(best))
+        ]
+    base = tuple(v.absent for v in variables)
+    made = each([best, base, *beside, *corners], problem.evaluate)
+    around = np.array([one.value for one in made[2 : 2 + len(beside)]]).reshape(-1, 2)
+    return ReliefResult(
+        problem=problem,
+        x=best,
+        best=made[0],
+        without=made[1],
+        axes=axes,
+        map=values.reshape([len(axis) for axis in axes]),
+        low=around[:, 0],
+        high=around[:, 1],
+        worst=max((one.value for one in made[2:]), default=made[0].value),
+        evaluations=done,
+    )

@@ -1,0 +1,170 @@
+"""From the [relief] table of a job file to the search, and from its result to tables, lines and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contact.half_plane_step import HalfPlanePair
+from ..contact.scene import MeshingPair
+from ..gear.pair import GearPair
+from ..loadmap.root_stress import PairRoots
+from ..stiffness.job import StiffnessJob
+from ..stiffness.report import versions
+from ..tables.microgeometry import VARIABLES, MicrogeometryTable, ReliefTable
+from .job import GEARS, active_rolls, modification
+from .relief import ReliefProblem, ReliefResult, Variable
+
+Array = NDArray[Any]
+
+#: Torques at which the best is compared with none: shares of the range that the job's torques span, widened.
+COMPARED = 17
+
+
+def relief_problem(
+    table: ReliefTable,
+    base: MicrogeometryTable,
+    pair: GearPair,
+    folder: Path,
+    law: HalfPlanePair,
+    elastic: MeshingPair,
+    roots: PairRoots | None,
+) -> ReliefProblem:
+    """The search that a job file asks for; pitch errors do not take part."""
+    made = [
+        modification(
+            getattr(base, name).flank(base.flank),
+            getattr(pair, name),
+            active_rolls(pair)[g],
+            f"microgeometry.{name}",
+            folder,
+            mirrored=base.flank == "right",
+            wheel=g == 1,
+        )
+        for g, name in enumerate(GEARS)
+    ]
+    variables = []
+    for one in table.variables:
+        quantity, factor = VARIABLES[one.key]
+        low, high, tolerance = (factor * value for value in (one.low, one.high, one.tolerance))
+        variables.append(Variable(quantity, low, high, one.gear, tolerance))
+    return ReliefProblem(
+        law,
+        (made[0], made[1]),
+        tuple(variables),
+        table.torques_Nm,
+        table.weights,
+        table.peak_to_peak_weight,
+        table.pressure_weight,
+        table.root_stress_weight,
+        positions=table.positions,
+        roots=roots,
+        elastic=elastic,
+    )
+
+
+def names_of(table: ReliefTable) -> list[str]:
+    """Names of the variables in the job's keys."""
+    return [f"{one.key} {one.gear}" for one in table.variables]
+
+
+def in_units(table: ReliefTable, x: Any) -> list[float]:
+    """Values in the job's units."""
+    return [float(value / VARIABLES[one.key][1]) for one, value in zip(table.variables, x, strict=True)]
+
+
+def map_table(table: ReliefTable, made: ReliefResult) -> dict[str, Array]:
+    """The map: a row for each point."""
+    grids = np.meshgrid(*made.axes, indexing="ij")
+    columns = {
+        name.replace(" ", "_"): grid.ravel() / VARIABLES[one.key][1]
+        for name, one, grid in zip(names_of(table), table.variables, grids, strict=False)
+    }
+    # what is no gear has no objective
+    return {**columns, "objective": np.where(np.isfinite(made.map), made.map, np.nan).ravel()}
+
+
+def comparison(made: ReliefResult) -> dict[str, Array]:
+    """Peak-to-peak error of the best, and of none, against torque."""
+    problem = made.problem
+    low, high = min(problem.torques), max(problem.torques)
+    torques = np.unique(np.concatenate([np.linspace(0.5 * low, 1.5 * high, COMPARED), problem.torques]))
+    none = [v.absent for v in problem.variables]
+    return {
+        "torque_Nm": torques,
+        "peak_to_peak_best_um": 1e6 * problem.mesh(made.x, torques).peak_to_peak,
+        "peak_to_peak_without_um": 1e6 * problem.mesh(none, torques).peak_to_peak,
+    }
+
+
+def told(table: ReliefTable, made: ReliefResult) -> list[str]:
+    """Lines to print."""
+    values = ", ".join(f"{n} = {v:.4g}" for n, v in zip(names_of(table), in_units(table, made.x), strict=True))
+    lines = [f"best of {made.evaluations} evaluations: {values}"]
+    for i, torque in enumerate(table.torques_Nm):
+        best, without = (1e6 * one.peak_to_peak[i] for one in (made.best, made.without))
+        line = f"at {torque:.4g} N m: transmission error {best:.3g} um peak to peak, without {without:.3g} um"
+        lines.append(line + f", largest pressure {1e-6 * made.best.pressure[i]:.4g} MPa")
+    lines.append(f"objective {made.best.value:.4g}, without {made.without.value:.4g}")
+    for name, low, high in zip(names_of(table), made.low, made.high, strict=True):
+        lines.append(f"  within the tolerance of {name}: {low:.4g} and {high:.4g}")
+    lines.append(f"  at the worst corner of all tolerances: {made.worst:.4g}")
+    bounds = [
+        name
+        for name, v, value in zip(names_of(table), made.problem.variables, made.x, strict=True)
+        if min(value - v.low, v.high - value) < 1e-3 * (v.high - v.low)
+    ]
+    if bounds:
+        lines.append("at a bound: " + ", ".join(bounds) + "; wider bounds may hold a better one")
+    return lines
+
+
+def summary(
+    job: StiffnessJob, base: MicrogeometryTable, table: ReliefTable, made: ReliefResult, timings: Mapping[str, float]
+) -> dict[str, Any]:
+    """Content of relief.json."""
+    return {
+        "job": {
+            "pair": asdict(job.pair_table),
+            "stiffness": asdict(job.table),
+            "microgeometry": asdict(base),
+            "relief": asdict(table),
+        },
+        "versions": versions(),
+        "best": dict(zip(names_of(table), in_units(table, made.x), strict=True)),
+        "objective": made.best.value,
+        "objective_without": made.without.value,
+        "peak_to_peak_um": (1e6 * made.best.peak_to_peak).tolist(),
+        "peak_to_peak_without_um": (1e6 * made.without.peak_to_peak).tolist(),
+        "largest_pressure_MPa": (1e-6 * made.best.pressure).tolist(),
+        "largest_root_stress_MPa": (1e-6 * made.best.root_stress).tolist(),
+        "objective_at_low_tolerance": made.low.tolist(),
+        "objective_at_high_tolerance": made.high.tolist(),
+        "objective_at_worst_corner": made.worst,
+        "evaluations": made.evaluations,
+        "timings_s": dict(timings),
+    }
+
+
+def figure_arguments(table: ReliefTable, made: ReliefResult, compared: Mapping[str, Array]) -> dict[str, Any]:
+    """Arguments of `gearfe.output.microgeometry_figures.relief_figure`."""
+    names = names_of(table)
+    return {
+        "names": names,
+        "axes_values": [axis / VARIABLES[one.key][1] for axis, one in zip(made.axes, table.variables, strict=False)],
+        "objective": np.where(np.isfinite(made.map), made.map, np.nan),
+        "best": in_units(table, made.x),
+        "torque": compared["torque_Nm"],
+        "peak_to_peak": {
+            "without": compared["peak_to_peak_without_um"],
+            "best": compared["peak_to_peak_best_um"],
+        },
+        "sensitivity": {
+            name: (float(low), float(high)) for name, low, high in zip(names, made.low, made.high, strict=True)
+        },
+    }
