@@ -35,6 +35,8 @@ BEYOND = 0.5
 ARC, WAVE = 32, 48
 #: Steepest flank (-) and largest deviation (modules).
 STEEPEST, LARGEST = 0.2, 0.05
+#: Places where they are looked for, beside the breaks.
+CHECKED = 401
 
 
 @dataclass(frozen=True)
@@ -223,12 +225,14 @@ def tooth_deviations(gear: Gear, made: FlankModification, turn: Sequence[float] 
 def _checked(gear: Gear, made: Deviation | None) -> Deviation | None:
     if made is None:
         return None
-    if made.most > LARGEST * gear.module:
-        problem = f"leaves the range of microgeometry: must be <= {1e6 * LARGEST * gear.module:.4g} um, 0.05 module"
-        raise InputError(
-            "deviation", made.most, problem, "larger changes belong into the geometry: tip_relief of [pair]"
-        )
-    if made.steepest > STEEPEST:
+    low, high = ends_of(gear)
+    inside = [s for s in made.breaks if low < s < high]
+    height, rise = (np.abs(one) for one in made.at(np.concatenate([np.linspace(low, high, CHECKED), inside])))
+    if rise.max() > STEEPEST:
         problem = f"is too steep: its slope must be <= {STEEPEST:g}"
-        raise InputError("deviation", round(made.steepest, 4), problem, "use smaller amounts or longer reliefs")
+        raise InputError("deviation", round(float(rise.max()), 4), problem, "use smaller amounts or longer reliefs")
+    if height.max() > LARGEST * gear.module:
+        problem = f"leaves the range of microgeometry: must be <= {1e6 * LARGEST * gear.module:.4g} um, 0.05 module"
+        cure = "larger changes belong into the geometry: tip_relief of [pair]"
+        raise InputError("deviation", float(height.max()), problem, cure)
     return made

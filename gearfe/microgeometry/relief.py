@@ -154,7 +154,7 @@ class ReliefProblem:
     roots: PairRoots | None = None
     elastic: MeshingPair | None = None
 
-    def modifications(self, x: Sequence[float]) -> tuple[FlankModification, FlankModification]:
+    def modifications(self, x: Sequence[float] | Array) -> tuple[FlankModification, FlankModification]:
         """Of pinion and wheel, with the values x (m) of the variables."""
         made = list(self.base)
         gears = (self.law.pair.pinion, self.law.pair.wheel)
@@ -164,7 +164,7 @@ class ReliefProblem:
                     made[g] = variable.applied(made[g], gears[g], float(value))
         return made[0], made[1]
 
-    def mesh(self, x: Sequence[float], torques: ArrayLike) -> LoadedMesh:
+    def mesh(self, x: Sequence[float] | Array, torques: ArrayLike) -> LoadedMesh:
         """The pair with the values x at other torques.
 
         Raises
@@ -181,7 +181,7 @@ class ReliefProblem:
         law = self.law.deviated((pinion, wheel))
         return load_mesh(law, torques, positions=self.positions, roots=roots, elastic=self.elastic)
 
-    def evaluate(self, x: Sequence[float]) -> Evaluation:
+    def evaluate(self, x: Sequence[float] | Array) -> Evaluation:
         """Objective and what it is made of."""
         goals = np.array(self.torques)
         nothing = np.full(len(goals), np.nan)
@@ -201,7 +201,7 @@ class ReliefProblem:
         value = float(weights @ sums / weights.sum())
         return Evaluation(value if np.isfinite(value) else math.inf, peaks, pressure, root)
 
-    def value(self, x: Sequence[float]) -> float:
+    def value(self, x: Sequence[float] | Array) -> float:
         """Objective alone."""
         return self.evaluate(x).value
 

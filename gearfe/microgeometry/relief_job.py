@@ -164,6 +164,7 @@ def figure_arguments(table: ReliefTable, made: ReliefResult, compared: Mapping[s
             "without": compared["peak_to_peak_without_um"],
             "best": compared["peak_to_peak_best_um"],
         },
+        "value": made.best.value,
         "sensitivity": {
             name: (float(low), float(high)) for name, low, high in zip(names, made.low, made.high, strict=True)
         },

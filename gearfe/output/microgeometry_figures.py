@@ -52,8 +52,10 @@ def flank_figure(path: str | Path, *, charts: Sequence[Mapping[str, Any]], band_
         if pitch:
             below = grid[1][column]
             tidy(below)
-            if chart["pitch"] is not None:
-                below.bar(np.arange(len(chart["pitch"])), chart["pitch"], color=ORANGE, width=0.7)
+            if chart["pitch"] is None:
+                below.set_visible(False)
+                continue
+            below.bar(np.arange(len(chart["pitch"])), chart["pitch"], color=ORANGE, width=0.7)
             below.set_xlabel("tooth", fontsize=9)
             if column == 0:
                 below.set_ylabel("index deviation (µm)", fontsize=9)
@@ -98,8 +100,9 @@ def microgeometry_figure(
     from matplotlib.colors import Normalize
 
     figure = new_figure(12.0, 7.4)
-    (harris, peak, spectrum_axes), (share, pressure, _) = figure.subplots(2, 3, width_ratios=(1.5, 1, 1.3))
-    figure.delaxes(_)
+    grid = figure.add_gridspec(2, 3, width_ratios=(1.5, 1, 1.3))
+    places = (grid[0, 0], grid[0, 1], grid[:, 2], grid[1, 0], grid[1, 1])
+    harris, peak, spectrum_axes, share, pressure = (figure.add_subplot(place) for place in places)
     norm = Normalize(float(torque[0]), float(torque[-1] if len(torque) > 1 else 1.01 * torque[0]))
     colors = colormaps["viridis"]
     shown = np.unique(np.linspace(0, len(torque) - 1, min(len(torque), MOST_LINES)).round().astype(int))
@@ -141,7 +144,7 @@ def microgeometry_figure(
         axes.set_title(text, loc="left", fontsize=9.5)
         axes.set_xlabel(below, fontsize=9)
         axes.tick_params(labelsize=8.5)
-    bar = figure.colorbar(ScalarMappable(norm, colors), ax=(share, pressure), shrink=0.9, aspect=25, pad=0.02)
+    bar = figure.colorbar(ScalarMappable(norm, colors), ax=pressure, shrink=0.95, aspect=25, pad=0.02)
     bar.set_label("torque at the wheel (N m)")
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
     save(figure, path, dpi=110)
@@ -156,6 +159,7 @@ def relief_figure(
     best: Sequence[float],
     torque: Array,
     peak_to_peak: Mapping[str, Array],
+    value: float,
     sensitivity: Mapping[str, tuple[float, float]],
 ) -> None:
     """Map of the objective over one or two variables, error against torque of the best one, and its sensitivity.
@@ -170,8 +174,8 @@ def relief_figure(
         Values of the best.
     torque, peak_to_peak
         Torques (N m), and label -> peak-to-peak error (um) there.
-    sensitivity
-        Variable -> objective at its low and high tolerance.
+    value, sensitivity
+        Objective of the best, and variable -> objective at its low and high tolerance.
     """
     figure = new_figure(12.0, 4.2)
     first, second, third = figure.subplots(1, 3, width_ratios=(1.3, 1.1, 1))
@@ -195,7 +199,11 @@ def relief_figure(
     second.set_title("transmission error, peak to peak (µm)", loc="left", fontsize=9.5)
     tidy(third)
     for i, (low, high) in enumerate(sensitivity.values()):
-        third.plot([low, high], [i, i], "|-", color=ORANGE, markersize=10, linewidth=2)
+        third.plot([value, low], [i - 0.06, i - 0.06], "-", color=ORANGE, linewidth=5, label="-" if i == 0 else None)
+        third.plot([value, high], [i + 0.06, i + 0.06], "-", color=BLUE, linewidth=5, label="+" if i == 0 else None)
+    third.axvline(value, color=GREY, linewidth=1)
+    third.set_ylim(-0.6, len(sensitivity) - 0.4)
+    third.legend(fontsize=8, frameon=False)
     third.set_yticks(range(len(sensitivity)), [name.replace(" ", "\n", 1) for name in sensitivity], fontsize=8)
     third.set_title("objective within tolerances", loc="left", fontsize=9.5)
     save(figure, path, dpi=110)
