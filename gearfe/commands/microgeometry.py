@@ -76,7 +76,6 @@ def run(args: argparse.Namespace) -> int:
             positions=table.positions,
             mesh_cycles=table.mesh_cycles,
             roots=roots,
-            elastic=elastic,
             progress=count,
         )
     with whole_set(folder, FILES) as place:

@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
         with watch.stage("root meshes"), one_thread():
             roots = pair_roots(pair, elastic)
     law = half_plane_pair(pair, elastic)
-    problem = relief_problem(table, base, pair, Path(args.job).parent, law, elastic, roots)
+    problem = relief_problem(table, base, pair, Path(args.job).parent, law, roots)
     with watch.stage("search"), ExitStack() as stack:
         executor = None
         if args.workers > 1:

@@ -10,30 +10,32 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..contact.half_plane_loads import with_loads
+from ..contact.half_plane_loads import flank_loads
+from ..contact.half_plane_result import PairContacts
 from ..contact.half_plane_step import HalfPlanePair
-from ..contact.position import Position
-from ..contact.records import taken
-from ..contact.scene import MeshingPair
+from ..contact.position import Positions
+from ..contact.records import of_positions, taken
 from ..errors import InputError
 from ..gear.pair import GearPair
 from ..loadmap.root_stress import PairRoots
 from ..stiffness.contact_pressure import BLUNTING
 from ..stiffness.positions import Progress
 from ..threads import one_thread
-from .cells import Cells, of_positions, solve_cells
+from .cells import solve_cells
 
 Array = NDArray[Any]
 IntArray = NDArray[np.int64]
 
 #: Cells solved at once, and most in all.
 AT_ONCE, MOST_CELLS = 512, 1_000_000
+#: What stays of a cell's position.
+CELL = ("twist", "torque_pinion", "tangent", "status")
 
 
 @dataclass(frozen=True)
@@ -184,7 +186,6 @@ def load_mesh(
     mesh_cycles: int | None = None,
     angles: ArrayLike | None = None,
     roots: PairRoots | None = None,
-    elastic: MeshingPair | None = None,
     progress: Progress | None = None,
 ) -> LoadedMesh:
     """Solve a pair with its deviations over pinion angle and torque.
@@ -201,8 +202,8 @@ def load_mesh(
         How many cycles; None: one where all teeth of each gear are alike, else the full period.
     angles : array_like, shape (n,), optional
         Pinion angles (rad) instead.
-    roots, elastic
-        Root stresses of the pair (`gearfe.loadmap.root_stress.pair_roots`) and its elastic gears, to have these too.
+    roots
+        Of the same elastic gears (`gearfe.loadmap.root_stress.pair_roots`), for root stresses, too.
     progress
         Called with cells done, cells in all, and a name.
 
@@ -230,23 +231,23 @@ def load_mesh(
     touch = np.full(n, np.inf)
     np.minimum.at(touch, met.position, met.twist)
     stress = None if roots is None else np.full((count, 2), np.nan)
-    cells: list[Cells] = []
+    cells: list[dict[str, Array]] = []
     pairs: list[PairLoads] = []
     with one_thread():
         for start in range(0, count, AT_ONCE):
             numbers = np.arange(start, min(start + AT_ONCE, count))
             angle, goal = numbers % n, goals[numbers // n]
             made = solve_cells(law, place[angle], goal, of_positions(met, angle))
-            if stress is not None and roots is not None and elastic is not None:
-                stress[numbers] = _root_stress(law, made, place[angle], goal, roots, elastic)
-            pairs.append(_pair_loads(law, made, numbers, n, goal))
-            cells.append(made)
+            if stress is not None and roots is not None:
+                stress[numbers] = _root_stress(law, made, roots)
+            pairs.append(_pair_loads(law, made, numbers, n))
+            cells.append({name: getattr(made, name) for name in CELL})  # not the panels of the contacts
             if progress is not None:
                 progress(int(numbers[-1]) + 1, count, "cells")
     shape, lost = (len(goals), n), pair.contact_twist
 
     def whole(name: str) -> Array:
-        return np.concatenate([getattr(one, name) for one in cells]).reshape(shape)
+        return np.concatenate([one[name] for one in cells]).reshape(shape)
 
     found = LoadedMesh(
         torque=goals,
@@ -265,8 +266,9 @@ def load_mesh(
     return found
 
 
-def _pair_loads(law: HalfPlanePair, made: Cells, numbers: IntArray, n: int, goal: Array) -> PairLoads:
+def _pair_loads(law: HalfPlanePair, made: Positions, numbers: IntArray, n: int) -> PairLoads:
     own = made.contacts
+    assert isinstance(own, PairContacts)
     own = taken(own, np.flatnonzero(own.force > 0))
     cell = numbers[own.position]
     force, width = own.force, law.width
@@ -276,7 +278,7 @@ def _pair_loads(law: HalfPlanePair, made: Cells, numbers: IntArray, n: int, goal
     for i, face in enumerate(law.teeth.faces):
         rows = (flank == i) & (own.parameter >= 0) & (own.parameter <= 1)
         roll[rows] = face.flank.roll(own.parameter[rows])
-    total = np.bincount(own.position, own.torque_wheel, len(goal))
+    total = np.bincount(own.position, own.torque_wheel, len(numbers))
     mark = np.where((own.mark == "") & (own.parameter > 1).any(axis=1), "round", own.mark)  # beyond its start
     return PairLoads(
         torque=cell // n,
@@ -291,25 +293,15 @@ def _pair_loads(law: HalfPlanePair, made: Cells, numbers: IntArray, n: int, goal
     )
 
 
-def _root_stress(
-    law: HalfPlanePair, made: Cells, angle: Array, goal: Array, roots: PairRoots, elastic: MeshingPair
-) -> Array:
+def _root_stress(law: HalfPlanePair, made: Positions, roots: PairRoots) -> Array:
     """Largest tension (Pa) at the roots of pinion and wheel, shape (c, 2)."""
-    stress = np.full((len(angle), 2), np.nan)
     own = made.contacts
-    ends = np.searchsorted(own.position, np.arange(len(angle) + 1))
-    for i in np.flatnonzero(made.status == "converged"):
-        contacts = taken(own, slice(int(ends[i]), int(ends[i + 1])))
-        torques = contacts.torque_wheel
-        bare = Position(
-            "converged", float(torques.sum()), 0.0, 0.0, 0.0, tuple(contacts.pair.tolist()), torques, 0.0, 0
-        )
-        loaded = with_loads(bare, law.sides, elastic, contacts, float(angle[i]), float(made.solved_twist[i]))
-        found = roots.at(loaded)
-        scale = goal[i] / bare.torque_wheel
-        for gear in range(2):
-            stress[i, gear] = max((one[gear].stress for one in found.values()), default=math.nan) * scale
-    return stress
+    assert isinstance(own, PairContacts)
+    loads = flank_loads(law.sides, roots.pair, own, made.pinion_angle, made.twist)
+    found = roots.at(replace(made, loads=loads))
+    stress = np.full((len(made), 2), -np.inf)
+    np.maximum.at(stress, found.position, found.stress)
+    return np.where(np.isfinite(stress), stress, np.nan)
 
 
 def _check_contact(made: LoadedMesh, law: HalfPlanePair, pair: IntArray, position: IntArray, twist: Array) -> None:

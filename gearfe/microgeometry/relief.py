@@ -24,7 +24,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..contact.half_plane_step import HalfPlanePair
-from ..contact.scene import MeshingPair
 from ..errors import InputError
 from ..gear.modifications import FlankModification, Relief, ends_of, tooth_deviations
 from ..gear.pair import Gear
@@ -137,7 +136,7 @@ class ReliefProblem:
         Pitch errors of pinion and wheel (rad), see `gearfe.gear.pitch_errors`.
     positions
         Pinion angles in a mesh cycle.
-    roots, elastic
+    roots
         For root stresses, see `gearfe.microgeometry.loaded_mesh.load_mesh`.
     """
 
@@ -152,7 +151,6 @@ class ReliefProblem:
     turns: tuple[tuple[float, ...], tuple[float, ...]] = ((0.0,), (0.0,))
     positions: int = 20
     roots: PairRoots | None = None
-    elastic: MeshingPair | None = None
 
     def modifications(self, x: Sequence[float] | Array) -> tuple[FlankModification, FlankModification]:
         """Of pinion and wheel, with the values x (m) of the variables."""
@@ -179,7 +177,7 @@ class ReliefProblem:
         )
         roots = self.roots if self.root_stress_weight else None
         law = self.law.deviated((pinion, wheel))
-        return load_mesh(law, torques, positions=self.positions, roots=roots, elastic=self.elastic)
+        return load_mesh(law, torques, positions=self.positions, roots=roots)
 
     def evaluate(self, x: Sequence[float] | Array) -> Evaluation:
         """Objective and what it is made of."""

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.half_plane_step import HalfPlanePair
-from ..contact.scene import MeshingPair
 from ..gear.pair import GearPair
 from ..loadmap.root_stress import PairRoots
 from ..stiffness.job import StiffnessJob
@@ -32,7 +31,6 @@ def relief_problem(
     pair: GearPair,
     folder: Path,
     law: HalfPlanePair,
-    elastic: MeshingPair,
     roots: PairRoots | None,
 ) -> ReliefProblem:
     """The search that a job file asks for; pitch errors do not take part."""
@@ -64,7 +62,6 @@ def relief_problem(
         table.root_stress_weight,
         positions=table.positions,
         roots=roots,
-        elastic=elastic,
     )
 
 
