@@ -25,7 +25,7 @@ LEAF_ELEMENTS = 40
 
 @dataclass(frozen=True)
 class _Front:
-    """One front: eliminated unknowns `inner`, remaining ones `outer`, K_ii = L L^T and L^-1 K_io."""
+    """One front: eliminated unknowns `inner`, remaining ones `outer`, K_ii = U^T U and U^-T K_io."""
 
     inner: IntArray
     outer: IntArray
@@ -72,7 +72,7 @@ class Condensed:
         full[self.retained] = values
         for front in _leading_to(self.fronts, wanted, self.size):
             right = front.coupling @ full[front.outer]
-            full[front.inner] = -dtrsm(1.0, front.factor, right, lower=1, trans_a=1)
+            full[front.inner] = -dtrsm(1.0, front.factor, right)
         return full
 
     def on_retained(self, rows: Array, unknowns: IntArray) -> Array:
@@ -87,15 +87,19 @@ class Condensed:
         -------
         ndarray, shape (m, r)
         """
-        forms = np.zeros((self.size, len(rows)))
-        np.add.at(forms, (unknowns, np.arange(len(rows))[:, None]), rows)
-        for front in self.fronts:
-            own = forms[front.inner]
+        fronts = _leading_to(self.fronts, unknowns.ravel(), self.size)[::-1]
+        of_fronts = (part for front in fronts for part in (front.inner, front.outer))
+        seen = np.unique(np.concatenate([self.retained, unknowns.ravel(), *of_fronts]))
+        place = np.full(self.size, -1)
+        place[seen] = np.arange(len(seen))
+        forms = np.zeros((len(seen), len(rows)))
+        np.add.at(forms, (place[unknowns], np.arange(len(rows))[:, None]), rows)
+        for front in fronts:
+            own = forms[place[front.inner]]
             met = np.flatnonzero(own.any(axis=0))  # few forms look into a small front
-            if len(met):
-                solved = dtrsm(1.0, front.factor, own[:, met], lower=1)
-                forms[np.ix_(front.outer, met)] -= front.coupling.T @ solved
-        return np.ascontiguousarray(forms[self.retained].T)
+            solved = dtrsm(1.0, front.factor, own[:, met], trans_a=1)
+            forms[np.ix_(place[front.outer], met)] -= front.coupling.T @ solved
+        return np.ascontiguousarray(forms[place[self.retained]].T)
 
 
 def _leading_to(fronts: tuple[_Front, ...], wanted: IntArray | None, size: int) -> list[_Front]:
@@ -132,27 +136,32 @@ def condense(
     fixed : ndarray
         Nodes held at zero.
     """
-    free = np.ones(nodes, dtype=bool)
-    free[fixed] = False
     leaf_of, levels = _bisect(centres)
     owner = _owners(elements, leaf_of, levels, nodes)
     owner[retained] = 0  # above the root, which is 1
-    owner[~free] = -1
+    owner[fixed] = -1
+    # in the order in which they go: a front then eliminates the first of its nodes
+    order = np.argsort(-owner, kind="stable")
+    number = np.empty(nodes, dtype=np.int64)
+    number[order] = np.arange(nodes)
+    elements, free = number[elements], owner[order] >= 0
     fronts: list[_Front] = []
     pending: dict[int, tuple[IntArray, Array]] = {}
     for leaf in range(2**levels):
         pending[2**levels + leaf] = _leaf(elements[leaf_of == leaf], matrices[leaf_of == leaf], free)
-    for number in range(2 ** (levels + 1) - 1, 0, -1):
-        if number >= 2**levels:
-            members, matrix = pending.pop(number)
-        else:
-            members, matrix = _merge(pending.pop(2 * number), pending.pop(2 * number + 1))
-        pending[number] = _eliminate(members, matrix, owner[members] == number, fronts)
+    for front in range(2 ** (levels + 1) - 1, 0, -1):
+        if front < 2**levels:
+            pending[front] = _merge(pending.pop(2 * front), pending.pop(2 * front + 1))
+        members, matrix = pending[front]
+        count = int(np.count_nonzero(owner[order[members]] == front))
+        if count:
+            made, update = _eliminated(_unknowns(order[members]), matrix, 2 * count)
+            fronts.append(made)
+            pending[front] = members[count:], update
     members, matrix = pending[1]
-    place = np.empty(nodes, dtype=np.int64)
-    place[members] = np.arange(len(members))
-    order = _unknowns(place[retained])
-    return Condensed(np.ascontiguousarray(matrix[np.ix_(order, order)]), _unknowns(retained), 2 * nodes, tuple(fronts))
+    place = _unknowns(np.searchsorted(members, number[retained]))
+    whole = matrix + np.tril(matrix, -1).T
+    return Condensed(whole[np.ix_(place, place)], _unknowns(retained), 2 * nodes, tuple(fronts))
 
 
 def _unknowns(node_numbers: IntArray) -> IntArray:
@@ -192,7 +201,9 @@ def _owners(elements: IntArray, leaf_of: IntArray, levels: int, nodes: int) -> I
 
 
 def _leaf(elements: IntArray, matrices: Array, free: NDArray[np.bool_]) -> tuple[IntArray, Array]:
-    """Assemble a leaf densely on its free nodes."""
+    """Assemble a leaf densely on its free nodes: as for all fronts, their numbers rise and the matrix is lower
+    triangular.
+    """
     members, local = np.unique(elements, return_inverse=True)
     local = local.reshape(elements.shape)
     rows = (2 * local[:, :, None] + np.arange(2)).reshape(len(elements), -1)
@@ -203,29 +214,24 @@ def _leaf(elements: IntArray, matrices: Array, free: NDArray[np.bool_]) -> tuple
     if not keep.all():
         index = _unknowns(np.flatnonzero(keep))
         matrix, members = matrix[np.ix_(index, index)], members[keep]
-    return members, matrix
+    return members, np.tril(matrix)
 
 
 def _merge(left: tuple[IntArray, Array], right: tuple[IntArray, Array]) -> tuple[IntArray, Array]:
     members = np.union1d(left[0], right[0])
     matrix = np.zeros((2 * len(members), 2 * len(members)))
-    for nodes, part in (left, right):
-        index = _unknowns(np.searchsorted(members, nodes))
-        matrix[np.ix_(index, index)] += part
+    one, other = (_unknowns(np.searchsorted(members, nodes)) for nodes in (left[0], right[0]))
+    matrix[one[:, None], one] = left[1]
+    matrix[other[:, None], other] += right[1]
     return members, matrix
 
 
-def _eliminate(
-    members: IntArray, matrix: Array, inner: NDArray[np.bool_], fronts: list[_Front]
-) -> tuple[IntArray, Array]:
-    if not inner.any():
-        return members, matrix
-    inside, outside = _unknowns(np.flatnonzero(inner)), _unknowns(np.flatnonzero(~inner))
-    factor, info = dpotrf(matrix[np.ix_(inside, inside)], lower=1, clean=0)
+def _eliminated(unknowns: IntArray, matrix: Array, count: int) -> tuple[_Front, Array]:
+    """Eliminate the first unknowns of a front, so many of them; the lower triangular matrix of the others."""
+    # LAPACK sees rows as columns: of the lower triangular matrix the upper one, without a copy
+    factor, info = dpotrf(matrix[:count, :count].T, clean=0)
     if info != 0:
         raise np.linalg.LinAlgError("the body is not held or an element is inside out")
-    coupling = dtrsm(1.0, factor, matrix[np.ix_(inside, outside)], lower=1)
-    update = dsyrk(-1.0, coupling, beta=1.0, c=matrix[np.ix_(outside, outside)], trans=1, lower=1)
-    update = np.tril(update) + np.tril(update, -1).T
-    fronts.append(_Front(_unknowns(members[inner]), _unknowns(members[~inner]), factor, coupling))
-    return members[~inner], update
+    coupling = dtrsm(1.0, factor, matrix[count:, :count].T, trans_a=1)
+    update = dsyrk(-1.0, coupling, beta=1.0, c=matrix[count:, count:].copy().T, trans=1, overwrite_c=1)
+    return _Front(unknowns[:count], unknowns[count:], factor, coupling), update.T

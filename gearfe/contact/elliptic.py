@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, bisect_right
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ class Chain:
         flank = body.flank
         self.ends = np.concatenate([[0.0], np.cumsum(flank.sizes)])
         self.sizes = flank.sizes
+        self._ends, self._sizes = self.ends.tolist(), self.sizes.tolist()
         self.corners = flank.points[2 * np.arange(flank.edges)[:, None] + np.arange(3)]
         self.radii = np.linalg.norm(flank.points[::2], axis=1)
 
@@ -46,15 +48,16 @@ class Chain:
     def size_in(self, low: float, high: float) -> float:
         """Largest element between two arc lengths (m)."""
         first, last = self._edges(low, high)
-        return float(self.sizes[first : last + 1].max())
+        return max(self._sizes[first : last + 1])
 
     def size_at(self, arc: Array | float) -> Any:
         """Element size (m) at arc lengths, continuous between the middles of the elements."""
         return np.interp(arc, 0.5 * (self.ends[1:] + self.ends[:-1]), self.sizes)
 
     def _edges(self, low: float, high: float) -> tuple[int, int]:
-        first = int(np.clip(np.searchsorted(self.ends, low, side="right") - 1, 0, len(self.sizes) - 1))
-        return first, int(np.clip(np.searchsorted(self.ends, high) - 1, first, len(self.sizes) - 1))
+        most = len(self._sizes) - 1
+        first = min(max(bisect_right(self._ends, low) - 1, 0), most)
+        return first, min(max(bisect_left(self._ends, high) - 1, first), most)
 
     def loads(self, low: float, high: float) -> tuple[slice, Array]:
         """Nodes under an elliptic pressure of unit force between two arc lengths (m), and its shares on them."""
