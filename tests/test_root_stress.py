@@ -106,9 +106,9 @@ def test_a_plain_solution_of_the_whole_gear_has_the_same_root_stress(gears, elas
         chain = body.mesh.boundaries["root_left"]
         nodes = np.append(chain[:, :2].ravel(), chain[-1, 2])[:-3]  # the last ones lack the next sector's elements
         middle, half = 0.5 * (stress[:, 0] + stress[:, 1]), 0.5 * (stress[:, 0] - stress[:, 1])
-        largest = (middle + np.hypot(half, stress[:, 2]))[nodes].max()
+        averaged = (middle + np.hypot(half, stress[:, 2]))[nodes].max()
         mesh = root_mesh(wheel, body, root_recipe(recipe, wheel, 0.5))
-        assert largest(mesh, tooth, {0: force}, 30)[0] == pytest.approx(largest, rel=0.02)
+        assert largest(mesh, tooth, {0: force}, 30)[0] == pytest.approx(averaged, rel=0.02)
 
 
 def test_stress_is_linear_and_loads_add_up(gears, elastic):

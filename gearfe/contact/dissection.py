@@ -54,15 +54,13 @@ class Condensed:
     size: int
     fronts: tuple[_Front, ...]
 
-    def recover(self, values: Array, wanted: IntArray | None = None) -> Array:
+    def recover(self, values: Array) -> Array:
         """Full displacement of a body without loads on its eliminated unknowns.
 
         Parameters
         ----------
         values : ndarray, shape (r, k)
             Displacements of the retained unknowns, k cases (m).
-        wanted : ndarray, optional
-            Unknowns that are needed; fronts that lead to none of them are skipped and their rows stay zero.
 
         Returns
         -------
@@ -70,7 +68,7 @@ class Condensed:
         """
         full = np.zeros((self.size, values.shape[1]))
         full[self.retained] = values
-        for front in _leading_to(self.fronts, wanted, self.size):
+        for front in reversed(self.fronts):
             right = front.coupling @ full[front.outer]
             full[front.inner] = -dtrsm(1.0, front.factor, right)
         return full
@@ -87,12 +85,14 @@ class Condensed:
         -------
         ndarray, shape (m, r)
         """
-        fronts = _leading_to(self.fronts, unknowns.ravel(), self.size)[::-1]
-        of_fronts = (part for front in fronts for part in (front.inner, front.outer))
-        seen = np.unique(np.concatenate([self.retained, unknowns.ravel(), *of_fronts]))
-        place = np.full(self.size, -1)
-        place[seen] = np.arange(len(seen))
-        forms = np.zeros((len(seen), len(rows)))
+        seen = np.zeros(self.size, dtype=bool)
+        seen[unknowns], seen[self.retained], fronts = True, True, []
+        for front in self.fronts:
+            if seen[front.inner].any():
+                seen[front.inner], seen[front.outer] = True, True
+                fronts.append(front)
+        place = np.cumsum(seen) - 1
+        forms = np.zeros((place[-1] + 1, len(rows)))
         np.add.at(forms, (place[unknowns], np.arange(len(rows))[:, None]), rows)
         for front in fronts:
             own = forms[place[front.inner]]
@@ -100,20 +100,6 @@ class Condensed:
             solved = dtrsm(1.0, front.factor, own[:, met], trans_a=1)
             forms[np.ix_(place[front.outer], met)] -= front.coupling.T @ solved
         return np.ascontiguousarray(forms[place[self.retained]].T)
-
-
-def _leading_to(fronts: tuple[_Front, ...], wanted: IntArray | None, size: int) -> list[_Front]:
-    """Fronts to run through backwards so that the `wanted` unknowns come out."""
-    if wanted is None:
-        return list(reversed(fronts))
-    needed = np.zeros(size, dtype=bool)
-    needed[wanted] = True
-    chosen = []
-    for front in fronts:
-        if needed[front.inner].any():
-            needed[front.outer] = True
-            chosen.append(front)
-    return chosen[::-1]
 
 
 def condense(

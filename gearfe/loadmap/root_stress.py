@@ -127,8 +127,7 @@ def root_mesh(gear: Gear, body: GearBody, recipe: SectorRecipe) -> RootMesh:
     stiff = modulus / (1 - nu**2) if body.plane == "strain" else modulus
     stretch = stiff * slopes[None, :, :, None] * along[:, :, None, :] / speed[:, :, None, None] ** 2  # (e, q, a, i)
     unknowns = (2 * edges[:, :, None] + np.arange(2)).reshape(len(edges), 6)
-    recovered = fine.condensed.recover(np.eye(len(fine.condensed.schur)), wanted=unknowns.ravel())
-    stress = np.matmul(stretch.reshape(len(edges), 2, 6), recovered[unknowns]).reshape(2 * len(edges), -1)
+    stress = fine.condensed.on_retained(stretch.reshape(-1, 6), np.repeat(unknowns, 2, axis=0))
     f = len(fine.own)
     held = stress[:, :f] @ fine.own
     free = stress[:, :f] @ fine.interface + stress[:, f:]
