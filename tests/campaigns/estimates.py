@@ -21,13 +21,12 @@ from typing import Any
 import numpy as np
 
 from gearfe.config import load_job
-from gearfe.gear.validity import MOST_OVERLAP
 from gearfe.tables.laws import LAWS
 
 from .campaign import Campaign, Case, Columns
 from .linkages import linkage
 from .outcome import Check, Finding, Outcome
-from .pairs import log_uniform, rounded, running_pair, twist_of_overlap
+from .pairs import LARGEST_OVERLAP, chosen, log_uniform, rounded, running_pair, twist_of_overlap
 from .rows import housing, row
 from .toml_text import toml_text
 
@@ -78,11 +77,10 @@ Found = tuple[float, float, str] | str
 def _draw_curve(random: np.random.Generator, number: int, kind: str) -> Case:
     pair = running_pair(random, most_teeth=80)
     sweep = {
-        "twist_deg": twist_of_overlap(pair, log_uniform(random, 0.02, MOST_OVERLAP)),
+        "twist_deg": twist_of_overlap(pair, log_uniform(random, 0.02, LARGEST_OVERLAP)),
         "twist_from": "contact",
         "law": str(random.choice(sorted(LAWS))),
-        "coarsen": rounded(random.uniform(1.0, 2.0), 2),
-        "kinematics": "small",
+        "coarsen": chosen(random, None, lambda: rounded(random.uniform(1.0, 2.0), 2)),
     }
     tables = {"pair": pair, "stiffness": sweep}
     return Case(number, kind, {"job.toml": toml_text(tables)}, "gearfe stiffness job.toml --out out")
@@ -109,7 +107,7 @@ def _run_curve(case: Case, job_path: Path) -> Found:
 def _draw_trajectory(random: np.random.Generator, number: int, kind: str) -> Case:
     which = str(random.choice(["folding", "loops", "springs", "light", "chain"]))
     tables, _ = linkage(random, which)
-    tables["run"]["tolerance"] = rounded(log_uniform(random, 1e-9, 1e-4), 2)
+    tables["run"]["tolerance"] = chosen(random, 1e-9, lambda: rounded(log_uniform(random, 1e-9, 1e-4), 2))
     return Case(number, kind, {"job.toml": toml_text(tables)}, "gearfe mechanism job.toml --out out", {"which": which})
 
 
@@ -146,7 +144,7 @@ def _run_trajectory(case: Case, job_path: Path) -> Found:
 
 def _draw_response(random: np.random.Generator, number: int, kind: str) -> Case:
     tables, files, _ = row(random, "general")
-    tables["train"]["tolerance"] = rounded(log_uniform(random, 1e-8, 1e-3), 2)
+    tables["train"]["tolerance"] = chosen(random, 1e-6, lambda: rounded(log_uniform(random, 1e-8, 1e-3), 2))
     # the motion is linear in the load, tolerance and error are relative: a light one keeps soft bearings within the
     # displacements that the gears' geometry allows
     for load in tables["train"]["loads"]:

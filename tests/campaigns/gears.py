@@ -24,7 +24,6 @@ import numpy as np
 from gearfe.contact.position import Positions
 from gearfe.contact.scene import MeshingPair
 from gearfe.gear.pair import GearPair
-from gearfe.gear.validity import MOST_OVERLAP
 from gearfe.stiffness.curve import SOLVED
 from gearfe.stiffness.job import read_stiffness_job
 from gearfe.stiffness.position_solver import PositionSolver, position_solver
@@ -34,7 +33,18 @@ from gearfe.tables.laws import DEFAULT_LAW, LAWS
 
 from .campaign import Campaign, Case
 from .outcome import Check, Finding
-from .pairs import log_uniform, random_pair, rounded, running_pair, spoiled, twist_of_overlap
+from .pairs import (
+    LARGEST_OVERLAP,
+    TORQUES,
+    borne_torque,
+    chosen,
+    log_uniform,
+    random_pair,
+    rounded,
+    running_pair,
+    spoiled,
+    twist_of_overlap,
+)
 from .toml_text import toml_text
 
 #: Limits of the checks. These hold to the solvers' residuals, which the softest contacts amplify.
@@ -49,8 +59,8 @@ LIGHTEST, RESOLVED = 1e-6, 0.01
 
 
 def draw(random: np.random.Generator, number: int) -> Case:
-    """A random [pair] and [stiffness]: two of three pairs can run, one in eight jobs has a value without sense."""
-    pair = random_pair(random) if random.random() < 0.35 else running_pair(random)
+    """A random [pair] and [stiffness]: most pairs can run, one in eight jobs has a value without sense."""
+    pair = random_pair(random) if random.random() < 0.15 else running_pair(random)
     cycle = 360.0 / max(8, pair["pinion"]["teeth"])
     start = rounded(random.uniform(0.0, cycle))
     sweep: dict[str, Any] = {
@@ -61,15 +71,16 @@ def draw(random: np.random.Generator, number: int) -> Case:
         "twist_from": str(random.choice(["contact", "contact", "centred"])),
         "law": str(random.choice(sorted(LAWS))),
         "plane": str(random.choice(["strain", "stress"])),
-        "kinematics": str(random.choice(["finite", "small"])),
-        "coarsen": rounded(log_uniform(random, 1.0, 3.0), 2),
-        "points_per_edge": int(random.choice([4, 4, 4, 2, 3, 6])),
+        "kinematics": chosen(random, None, lambda: "small"),
+        "coarsen": chosen(random, None, lambda: rounded(log_uniform(random, 0.7, 3.0), 2)),
+        "flank_coarsen": chosen(random, None, lambda: rounded(log_uniform(random, 0.5, 2.0), 2)),
+        "points_per_edge": chosen(random, None, lambda: int(random.choice([2, 3, 6]))),
     }
-    if random.random() < 0.85:
+    if random.random() < 0.5:
         least = LIGHTEST if sweep["law"] == DEFAULT_LAW else RESOLVED
-        sweep["twist_deg"] = twist_of_overlap(pair, log_uniform(random, least, MOST_OVERLAP))
+        sweep["twist_deg"] = twist_of_overlap(pair, log_uniform(random, least, LARGEST_OVERLAP))
     else:
-        sweep["torque_Nm"] = rounded(log_uniform(random, 1e-3, 1e4))
+        sweep["torque_Nm"] = rounded(log_uniform(random, *TORQUES) * borne_torque(pair))
     tables = {"pair": pair, "stiffness": sweep}
     kind = "drawn"
     if random.random() < 0.125:
@@ -77,7 +88,7 @@ def draw(random: np.random.Generator, number: int) -> Case:
         if random.random() < 0.7:
             tables["pair"] = spoiled(random, pair)
         else:
-            tables["stiffness"] = spoiled(random, sweep)
+            tables["stiffness"] = spoiled(random, {k: v for k, v in sweep.items() if v is not None})
     return Case(number, kind, {"job.toml": toml_text(tables)}, "gearfe stiffness job.toml --out out --no-estimate")
 
 

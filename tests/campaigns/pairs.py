@@ -1,8 +1,13 @@
-"""Random gear pairs as tables of a job file: most of them meant to run, some with one value that cannot be."""
+"""Random gear pairs as users could ask for, as tables of a job file; some with one value that cannot be.
+
+Gears have 10 to 150 teeth, rigid flanks overlap by a tenth of a module at most, torques are 1e-4 to 1 of what the
+material bears, and numerical options are left alone in nine of ten cases (`chosen`).
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,6 +18,18 @@ from gearfe.gear.pair import GearPair
 from gearfe.tables.pair import PairTable
 
 Table = dict[str, Any]
+
+#: Numbers of teeth, and the largest overlap (modules): within what `gearfe.gear.validity` allows.
+TEETH, LARGEST_OVERLAP = (10, 150), 0.1
+#: Torques as shares of what the material bears.
+TORQUES = (1e-4, 1.0)
+#: Strain E/sigma_FE that a tooth root bears, and the factors Y_F Y_S of ISO 6336-3 on the nominal stress F/(b m). A
+#: case-hardened steel has sigma_FE = 1000 N/mm2 (ISO 6336-5, grade MQ), 0.5 % of its modulus.
+BORNE, ROOT_FACTORS = 5e-3, 4.3
+#: Young's modulus of gears without a [material] (GPa), as `gearfe.tables.pair` has it.
+STEEL_GPA = 200.0
+#: One in so many cases has another value than the default of a numerical option.
+SELDOM = 0.1
 
 #: Values that make little sense anywhere.
 ODD = (0, -1, 1e-12, 1e12, float("nan"), float("inf"), True, "twenty", [1.0, 2.0], -0.5, 3.7, 5000)
@@ -28,8 +45,14 @@ def rounded(value: float, digits: int = 4) -> float:
     return float(f"{value:.{digits}g}")
 
 
-def random_pair(random: np.random.Generator, *, most_teeth: int = 150) -> Table:
-    """A [pair] table: 8 to 150 teeth, 14.5 to 30 deg, shifts, reliefs, tip rounds, bores. Some cannot run together."""
+def chosen(random: np.random.Generator, default: Any, make: Callable[[], Any]) -> Any:
+    """A numerical option: its default in nine of ten cases, else what `make` draws."""
+    value = make()  # drawn in any case: what follows does not depend on the choice
+    return value if random.random() < SELDOM else default
+
+
+def random_pair(random: np.random.Generator, *, most_teeth: int = TEETH[1]) -> Table:
+    """A [pair] table: 14.5 to 30 deg, shifts, reliefs, tip rounds, bores. Some cannot run together."""
     alpha = 20.0 if random.random() < 0.3 else rounded(random.uniform(14.5, 30.0))
     module = rounded(log_uniform(random, 0.3, 12.0), 3)
     addendum = 1.0 if random.random() < 0.6 else rounded(random.uniform(0.7, 1.15), 3)
@@ -45,7 +68,7 @@ def random_pair(random: np.random.Generator, *, most_teeth: int = 150) -> Table:
     }
     shifts = []
     for side in ("pinion", "wheel"):
-        teeth = round(log_uniform(random, 8, most_teeth))
+        teeth = round(log_uniform(random, TEETH[0], most_teeth))
         least = dedendum - rack_tip * (1 - math.sin(math.radians(alpha)))
         least -= 0.5 * teeth * math.sin(math.radians(alpha)) ** 2  # no undercut from here on
         low = max(-0.5, least) if random.random() < 0.85 else -0.5
@@ -91,6 +114,13 @@ def twist_of_overlap(table: Table, overlap: float) -> float:
     """Twist (deg) at which the rigid flanks of a pair overlap by so many modules."""
     radius = 0.5 * table["wheel"]["teeth"] * math.cos(math.radians(table["pressure_angle_deg"]))  # of the base circle
     return rounded(math.degrees(overlap / radius))
+
+
+def borne_torque(table: Table) -> float:
+    """Torque (N m) at the wheel that its material bears: sigma_FE b m/(Y_F Y_S) on the pitch circle (ISO 6336-3)."""
+    strength = BORNE * 1e3 * table.get("material", {}).get("youngs_modulus_GPa", STEEL_GPA)  # N/mm2
+    force = strength * table["face_width_mm"] * table["module_mm"] / ROOT_FACTORS
+    return float(force * 0.5e-3 * table["wheel"]["teeth"] * table["module_mm"])
 
 
 def spoiled(random: np.random.Generator, table: Table) -> Table:

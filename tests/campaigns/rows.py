@@ -7,13 +7,26 @@ from typing import Any
 
 import numpy as np
 
-from .pairs import log_uniform, rounded
+from .pairs import TORQUES, borne_torque, chosen, log_uniform, rounded
 
 Table = dict[str, Any]
 Made = tuple[Table, dict[str, str], dict[str, Any]]
 
-#: Kinds that take turns.
-KINDS = ("general", "resonance", "floquet", "symmetric", "order", "stiff")
+#: Kinds that take turns; "order" and "stiff" choose methods and tolerances themselves.
+KINDS = (
+    "general",
+    "resonance",
+    "floquet",
+    "symmetric",
+    "general",
+    "resonance",
+    "floquet",
+    "symmetric",
+    "order",
+    "stiff",
+)
+#: Tolerance of trains, as `gearfe.tables.train` has it.
+DEFAULT = 1e-6
 MODULE, ALPHA = 2.5, 25.0
 #: Length of a run that is to settle, times its damping per mass.
 SETTLED = 50.0
@@ -73,14 +86,15 @@ def row(random: np.random.Generator, kind: str) -> Made:
     speed = float(random.choice([-1.0, 1.0])) * rounded(log_uniform(random, 20.0, 3000.0))
     train: Table = {
         "housing": "rigid", "duration_ms": 5.0, "step_us": 20.0,
-        "tolerance": rounded(log_uniform(random, 1e-8, 1e-4), 2),
+        "tolerance": chosen(random, DEFAULT, lambda: rounded(log_uniform(random, 1e-8, 1e-4), 2)),
         "shafts": shafts, "gears": gears, "meshes": meshes, "rigid_bores": bores,
         "drive": {"shaft": "s0", "attachment": "1", "speed_rad_per_s": speed},
-        "curves": {"load": "stiffness", "interpolation": str(random.choice(["cubic", "linear"]))},
+        "curves": {"load": "stiffness", "interpolation": chosen(random, "cubic", lambda: "linear")},
         "damping": {"ratio": float(random.choice([0.0, rounded(log_uniform(random, 1e-4, 0.5), 3)]))},
     }  # fmt: skip
     last = 2 * len(teeth) + 1
-    load = rounded(log_uniform(random, 1.0, 300.0), 3) * -math.copysign(1.0, speed) * (-1.0) ** len(teeth)
+    borne = borne_torque({**form, "wheel": {"teeth": min(map(min, teeth))}})
+    load = rounded(log_uniform(random, *TORQUES) * borne, 3) * -math.copysign(1.0, speed) * (-1.0) ** len(teeth)
     train["loads"] = [{"shaft": f"s{len(teeth)}", "attachment": str(last), "torque_Nm": load}]
     data: dict[str, Any] = {"smooth": smooth}
     _special(random, kind, train, teeth[0], stiffness, last)
@@ -99,7 +113,7 @@ def _special(
 ) -> None:
     """What a kind asks for beside the common parts."""
     if kind == "stiff" or (kind in ("general", "order") and random.random() < 0.5):
-        size = log_uniform(random, 1e6, 1e10 if kind == "stiff" else 1e9)
+        size = log_uniform(random, 1e6, 1e9)
         held = [[size, size, size, 1e-3 * size, 1e-3 * size][k] * random.uniform(0.5, 2.0) for k in range(5)]
         damp = [1e-5 * float(random.choice([0.0, 1.0])) * x for x in held]
         train["bearings"] = [{"attachment": str(n), "stiffness": held, "damping": damp} for n in range(1, last + 2)]

@@ -23,12 +23,12 @@ from gearfe.rigid.timefunctions import smoothed_step
 from gearfe.train.floquet import multipliers
 
 from ..rigid_cases import folding_angle, folding_links, pendulum
-from .campaign import campaign_named
+from .campaign import Case, campaign_named
 from .linkages import four_bar
 from .toml_text import toml_text
-from .worker import run_case
 
 ROOT = Path(__file__).resolve().parents[2]
+KEPT = Path(__file__).parent / "kept"
 
 
 @pytest.mark.parametrize("method", ["taylor", "explicit", "implicit"])
@@ -161,29 +161,31 @@ def test_a_step_that_takes_no_time_is_refused(centre: float, width: float) -> No
         smoothed_step(centre, width)
 
 
-@pytest.mark.parametrize("number", [131, 140])
-def test_estimates_that_ended_without_a_reason(number: int) -> None:
-    """140: the truth's tolerance left only rounding at a fold of redundant loops; 131: what moved too far is named."""
-    row = run_case(campaign_named("estimates"), 31, number)
-    if number == 140:
-        assert (row.outcome, row.measures["covered"]) == ("done", True)
+@pytest.mark.parametrize(("kind", "job"), [("trajectory", "loops_that_fold"), ("response", "soft_bearings")])
+def test_estimates_that_ended_without_a_reason(kind: str, job: str, tmp_path: Path) -> None:
+    """At a fold of redundant loops the truth's tolerance left only rounding; what moved too far is named."""
+    files = {"job.toml": (KEPT / "estimates" / f"{job}.toml").read_text(encoding="utf-8")}
+    if kind == "response":
+        files |= {path.name: path.read_text(encoding="utf-8") for path in (KEPT / "estimates").glob("*.csv")}
+    found = campaign_named("estimates").run(Case(0, kind, files, ""), tmp_path)
+    if kind == "trajectory":
+        assert (found.outcome, found.measures["covered"]) == ("done", True)
     else:
-        assert row.outcome == "stopped"
-        assert "shaft s1 moves by" in row.reason
+        assert found.outcome == "stopped"
+        assert "shaft s1 moves by" in found.reason
 
 
 @pytest.mark.parametrize("share", [0.0, 1e-13, 3e-12])
 def test_a_link_without_mass_does_not_stop_a_run(share: float, tmp_path: Path) -> None:
-    """Campaign mechanisms, seed 61, case 67: the pivots of so light a coupler looked like a singular position.
+    """The pivots of so light a coupler (1.45e-14 of the other links' mass) looked like a singular position.
 
     What the mass of a coupler does to the motion is proportional to it, so one of 1e-8 on series is near enough.
     """
-    case = campaign_named("mechanisms").case(61, 67)
-    table = case.files["job.toml"]
+    table = (KEPT / "mechanisms" / "coupler_without_mass.toml").read_text(encoding="utf-8")
     made = {}
     for factor in (share, 1e-8):
         light = re.compile(r"(mass_kg|inertia_kg_m2) = (\S*e-1[0-9])")
-        scaled, count = light.subn(partial(_rescaled, factor / case.data["mass_share"]), table)
+        scaled, count = light.subn(partial(_rescaled, factor / 1.45e-14), table)
         assert count == 2
         (tmp_path / "job.toml").write_text(scaled, encoding="utf-8")
         mechanism = load_mechanism(tmp_path / "job.toml")
