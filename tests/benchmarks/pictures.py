@@ -164,7 +164,7 @@ def bars(label: str, value: str, axis: str, title: str) -> Draw:
 
 PICTURES: Mapping[str, Draw] = {
     "sweep_sizes": time_error(("law",), "stiffness, 40 positions at 0.05 deg: element size and law"),
-    "sweep_routes": time_error(("route",), "one position: condensed route and whole gears", time="position_cpu_s"),
+    "sweep_verification": time_error(("model",), "one position: condensed and whole gears", time="position_cpu_s"),
     "sweep_peers": _sweep_peers,
     "sweep_stages": bars("stage", "wall_s", "seconds", "stages of a default sweep of 40 positions"),
     "sweep_positions": over("positions", "cpu_s", ("positions", "processor time (s)"), "distinct positions", fit=True),

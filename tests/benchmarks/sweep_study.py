@@ -1,23 +1,25 @@
-"""Mesh stiffness: time against error of element sizes, laws and routes; stages, positions, twists, kinematics.
+"""Mesh stiffness: time against error of element sizes and laws; the verification route; stages, positions, loads.
 
-Errors are those of k_mesh against a converged run: the same positions on a far finer mesh (``REFERENCE``).
+Errors are those of k_mesh against a converged run: the same positions on a far finer mesh (``REFERENCE``), by Nitsche's
+law. Where its elements do not resolve the contact, the half-plane law on that mesh is what there is.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 
+from gearfe.contact.laws import law_named
 from gearfe.gear.pair import GearPair
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh
 from gearfe.stiffness.curve import StiffnessCurve
-from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
-from gearfe.tables.laws import LAWS
+from gearfe.stiffness.sweep import elastic_pair, flank_factor, sweep_stiffness
+from gearfe.tables.laws import DEFAULT_LAW, LAWS
 
 from .record import Record
 from .subject import off_changes, shipped_pair
@@ -30,7 +32,7 @@ SIZES, QUICK_SIZES = (2.8, 2.0, 1.4, 1.0, 0.7, 0.5), (2.0, 1.4)
 POSITIONS, QUICK_POSITIONS = (18, 40, 400, 4000), (3, 6)
 #: Twists (deg).
 TWISTS, QUICK_TWISTS = (1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5), (0.05, 0.2)
-#: `coarsen` and positions of the route over whole gears; its time is that of so few positions.
+#: `coarsen` and positions of the verification route; its time is that of so few positions.
 WHOLE_SIZES, QUICK_WHOLE_SIZES = (2.8, 2.0), ()
 WHOLE_ANGLES = (4.0,)
 TWIST = math.radians(0.05)
@@ -39,7 +41,7 @@ TWIST = math.radians(0.05)
 def run_sweep(record: Record) -> None:
     """All tables of the sweep."""
     sizes(record)
-    routes(record)
+    verification(record)
     stages(record)
     positions(record)
     twists(record)
@@ -56,13 +58,13 @@ def angles(record: Record) -> np.ndarray:
 
 
 @lru_cache(maxsize=32)
-def converged(quick: bool, twist: float, finite: bool, at: tuple[float, ...]) -> StiffnessCurve:
+def converged(quick: bool, twist: float, finite: bool, at: tuple[float, ...], law: str = "nitsche") -> StiffnessCurve:
     """The converged curve at the pinion angles `at` (rad)."""
     return sweep_stiffness(
         shipped_pair(),
         twist=twist,
         angles=np.array(at),
-        law="nitsche",
+        law=law,
         coarsen=QUICK_REFERENCE if quick else REFERENCE,
         kinematics="finite" if finite else "small",
     )
@@ -89,8 +91,11 @@ def sizes(record: Record) -> None:
     table, pair, at = record.table("sweep_sizes", "law", "coarsen"), shipped_pair(), angles(record)
 
     def make(law: str, coarsen: float) -> Mapping[str, Any]:
+        factor = flank_factor(law_named(law), coarsen)
+        recipes = sector_recipes(pair, coarsen=coarsen, flank_coarsen=factor)
+
         def mesh() -> None:
-            for gear, recipe in zip((pair.pinion, pair.wheel), sector_recipes(pair, coarsen=coarsen), strict=True):
+            for gear, recipe in zip((pair.pinion, pair.wheel), recipes, strict=True):
                 sector_mesh(gear, recipe, cache=False)
 
         def sweep() -> StiffnessCurve:
@@ -99,7 +104,7 @@ def sizes(record: Record) -> None:
         sweep()  # fills the mesh cache
         curve, cost = measured(sweep, runs=1 if record.quick else 3)
         _, mesher = measured(mesh, runs=1 if record.quick else 3)
-        flank = 1e3 * sector_recipes(pair, coarsen=coarsen)[0].flank
+        flank = 1e3 * recipes[0].flank
         found = errors(pair, curve, converged(record.quick, TWIST, True, tuple(at)))
         return {"flank_mm": flank, "positions": len(at), **found, **cost.columns, "meshing_cpu_s": mesher.cpu_s}
 
@@ -108,13 +113,13 @@ def sizes(record: Record) -> None:
             record.row(table, {"law": law, "coarsen": coarsen}, partial(make, law, coarsen))
 
 
-def routes(record: Record) -> None:
-    """The condensed route against whole gears, small strain: one position each, set-up and solution counted apart."""
-    table, pair = record.table("sweep_routes", "route", "coarsen"), shipped_pair()
+def verification(record: Record) -> None:
+    """Condensed gears against the verification route, small strain: a position each, set-up and solution apart."""
+    table, pair = record.table("sweep_verification", "model", "coarsen"), shipped_pair()
     at = tuple(np.radians(WHOLE_ANGLES[:1] if record.quick else WHOLE_ANGLES))
 
-    def condensed(coarsen: float) -> Mapping[str, Any]:
-        elastic, setup = measured(lambda: elastic_pair(pair, law="nitsche", coarsen=coarsen), runs=1)
+    def condensed(law: str, coarsen: float) -> Mapping[str, Any]:
+        elastic, setup = measured(lambda: elastic_pair(pair, law=law, coarsen=coarsen), runs=1)
         curve, cost = measured(
             lambda: sweep_stiffness(pair, twist=TWIST, angles=at, kinematics="small", elastic=elastic), runs=1
         )
@@ -132,9 +137,12 @@ def routes(record: Record) -> None:
         error = float(np.max(np.abs(torque / truth.torque_wheel - 1.0)))
         return {"error": error, "setup_cpu_s": setup.cpu_s, "position_cpu_s": cost.cpu_s / len(at)}
 
+    models: dict[str, Callable[[float], Mapping[str, Any]]] = {
+        f"condensed gears, {law}": partial(condensed, law) for law in ("half_plane", "nitsche")
+    }
     for coarsen in QUICK_WHOLE_SIZES if record.quick else WHOLE_SIZES:
-        for name, make in (("condensed", condensed), ("whole gears", whole)):
-            record.row(table, {"route": name, "coarsen": coarsen}, partial(make, coarsen))
+        for name, make in {**models, "whole gears, nitsche": whole}.items():
+            record.row(table, {"model": name, "coarsen": coarsen}, partial(make, coarsen))
 
 
 def whole_pair(pair: GearPair, coarsen: float) -> Any:
@@ -198,7 +206,9 @@ def twists(record: Record) -> None:
         curve, cost = measured(
             lambda: sweep_stiffness(pair, twist=twist, angles=at, coarsen=coarsen), runs=1 if record.quick else 2
         )
-        found = errors(pair, curve, converged(record.quick, twist, True, tuple(at)))
+        found = errors(pair, curve, converged(record.quick, twist, True, tuple(at), DEFAULT_LAW))
+        elements = np.abs(curve.k_mesh / converged(record.quick, twist, True, tuple(at)).k_mesh - 1.0)
+        found |= {"resolved": int(np.isfinite(elements).sum()), "from_elements": _largest(elements)}
         return {**found, **cost.columns, "iterations": float(np.mean(curve.iterations))}
 
     for twist in QUICK_TWISTS if record.quick else TWISTS:

@@ -107,9 +107,8 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "sweep_sizes",
         "Mesh stiffness: element size and law",
-        "Shipped pair, 40 positions at 0.05 deg, against the converged curve (`coarsen` 0.35). Meshes come from "
-        "the cache; the "
-        "mesher's seconds stand beside.",
+        "Shipped pair, 40 positions at 0.05 deg, against the converged curve (`nitsche` at `coarsen` 0.35). Meshes "
+        "come from the cache; the mesher's seconds stand beside.",
         {
             "law": ("law", PLAIN),
             "coarsen": ("`coarsen`", digits),
@@ -148,12 +147,12 @@ SECTIONS: tuple[Section, ...] = (
         _own_errors,
     ),
     Section(
-        "sweep_routes",
-        "Mesh stiffness: routes",
-        "The condensed route and the verification route on whole gears, small strain, same mesh: same error, "
-        "other cost.",
+        "sweep_verification",
+        "Mesh stiffness: the verification route",
+        "One position at small strain on gears condensed to their flanks, and on whole gears with all unknowns at "
+        "once (`gearfe.verification`), the same elements.",
         {
-            "route": ("route", PLAIN),
+            "model": ("model", PLAIN),
             "coarsen": ("`coarsen`", digits),
             "error": ("error", percent),
             "setup_cpu_s": ("set-up, CPU (s)", digits),
@@ -183,11 +182,14 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "sweep_twists",
         "Mesh stiffness: load",
-        "Default settings, 18 positions, against the converged curve at the same twist.",
+        "Default settings (the half-plane law), 18 positions: error against the same law at `coarsen` 0.35; and how "
+        "far it is from Nitsche's law on that mesh, where its elements resolve the contact.",
         {
             "twist_deg": ("twist (deg)", digits),
             "error_on_path": ("error on the path", percent),
             "error": ("error at worst", percent),
+            "from_elements": ("from finite-element contact", percent),
+            "resolved": ("resolved there", digits),
             "not_converged": ("not converged", digits),
             "iterations": ("iterations", digits),
             "cpu_s": ("CPU min (s)", digits),

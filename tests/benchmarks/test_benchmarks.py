@@ -178,7 +178,7 @@ def test_smoke_of_every_job(tmp_path, job, capsys):
     assert benchmark(job, "--out", str(tmp_path), *QUICK) == 0
     first = capsys.readouterr().out
     assert "FAILED" not in first
-    left_out = {"sweep_peers", "sweep_routes", "housing_peers", "transient_modes"}
+    left_out = {"sweep_peers", "sweep_verification", "housing_peers", "transient_modes"}
     tables = {s.table for s in SECTIONS if s.command == job} - left_out
     assert tables <= {p.stem for p in tmp_path.glob("*.csv")}
     assert list(tmp_path.glob("*.png"))
