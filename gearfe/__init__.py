@@ -27,6 +27,7 @@ _PUBLIC: dict[str, str] = {
     "TrainResponse": "train",
     "TrainScene": "train",
     "build_train": "train",
+    "housing_from_job": "housing.build",
     "simulate": "train",
     "sweep_loads": "loadmap.sweep",
     "sweep_stiffness": "stiffness",

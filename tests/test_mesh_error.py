@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gearfe.housing.attachments import Attachment
-from gearfe.housing.build import inside_faces
+from gearfe.housing.build import housing_from_table, inside_faces
 from gearfe.housing.extruded import assemble as assemble_extruded
 from gearfe.housing.extruded import extruded_body, outer_velocity
 from gearfe.housing.mesh_checks import boundary_faces
@@ -86,7 +86,7 @@ def test_linear_elements_are_known_to_be_far_off() -> None:
     assert coarse[0] / truth[0] > 1.5
     assert estimate[0] > math.sqrt(2.0) - 1.0  # as large as the stiffness: told as unknown
     mesh = HousingMeshTable(size_mm=11.0, bore_edges=6, order=1)
-    body = Housing.from_table(dataclasses.replace(BRACKET, mesh=mesh)).reduce(15)
+    body = housing_from_table(dataclasses.replace(BRACKET, mesh=mesh)).reduce(15)
     told = mesh_error(body, 1000.0)
     assert math.isinf(told.frequency_errors[0])
 
@@ -155,8 +155,8 @@ def test_outer_surface_of_extruded_elements() -> None:
     ends = 2.0 * feet.length_x_mm * feet.height_mm
     # seen along y: both outer faces, and both sides of the feet, whose outer ones are flush with the walls
     assert squares[1] == pytest.approx(1e-6 * 2.0 * (walls + 2.0 * ends), rel=1e-3)
-    nodes = Housing.from_table(BRACKET).nodes
-    tets = Housing.from_table(BRACKET).tets
+    nodes = housing_from_table(BRACKET).nodes
+    tets = housing_from_table(BRACKET).tets
     faces = boundary_faces(tets)
     faces = faces[~inside_faces(BRACKET, nodes[faces[:, :3]].mean(axis=1))]
     other = np.diag(radiation_matrix(nodes, faces, np.tile(np.eye(3), (len(nodes), 1))))
@@ -165,7 +165,7 @@ def test_outer_surface_of_extruded_elements() -> None:
 
 def test_bracket_against_extruded_elements() -> None:
     """Frequencies and responses of the tetrahedra against elements that are thin at the re-entrant edges."""
-    body = Housing.from_table(BRACKET).reduce(modes=15)
+    body = housing_from_table(BRACKET).reduce(modes=15)
     truth = extruded_body(BRACKET, Sizes(5.0, 30.0, 12.0, 40.0))
     true = body.coupled.frequencies_hz[:8] / truth.coupled.frequencies_hz[:8] - 1.0
     told = mesh_error(body, 8000.0)

@@ -1,6 +1,6 @@
 """Elastic housings: description or arrays -> mesh -> full model -> reduced body (`gearfe.ModalBody`).
 
-housing = Housing.from_job("geometry/housing.toml")
+housing = gearfe.housing_from_job("geometry/housing.toml")
 body = housing.reduce()
 body.save("housing.npz")
 """

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 from typing import cast
 
 import numpy as np
 
 from .. import __version__
 from ..cache import cache_folder
+from ..config import load_job
 from ..errors import InputError
 from ..meshing.cache import cache_key
 from ..meshing.housing_mesh import RECIPE, bore_ranges, housing_mesh
@@ -18,6 +20,11 @@ from ..solid import MassRule, SolidMaterial
 from ..tables.housing import HousingDampingTable, HousingReductionTable, HousingTable
 from .attachments import PLACE_TOLERANCE, Bore
 from .model import Housing
+
+
+def housing_from_job(path: str | Path) -> Housing:
+    """Housing of a job file's ``[housing]`` table; gmsh runs unless the mesh is in the cache."""
+    return housing_from_table(load_job(path, ("housing",))["housing"])
 
 
 def housing_from_table(table: HousingTable) -> Housing:

@@ -5,19 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..config import load_job
 from ..errors import InputError
 from ..progress import stage
 from ..reduction.craig_bampton import reduce_model
 from ..reduction.modal_body import ModalBody
 from ..solid import MassRule, SolidMaterial, SolidMatrices, assemble
-from ..tables.housing import HousingTable
 from .attachments import (
     Attachment,
     Bore,
@@ -156,18 +153,6 @@ class Housing:
             original=mesh.original,
             notes=tuple(notes),
         )
-
-    @classmethod
-    def from_table(cls, table: HousingTable) -> Housing:
-        """Housing that a ``[housing]`` table describes; gmsh runs unless the mesh is in the cache."""
-        from .build import housing_from_table
-
-        return housing_from_table(table)
-
-    @classmethod
-    def from_job(cls, path: str | Path) -> Housing:
-        """Housing of a job file's ``[housing]`` table."""
-        return cls.from_table(load_job(path, ("housing",))["housing"])
 
     @cached_property
     def matrices(self) -> SolidMatrices:
