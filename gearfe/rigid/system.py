@@ -216,7 +216,12 @@ def solve_semidefinite(S: Array, right: Array) -> Array:
 
 
 def least_norm_solution(S: Array, right: Array, least: float) -> Array:
-    """Solution of S x = right of least norm in rows of equal size; singular values below the share `least` are zero."""
+    """Solution of S x = right of least norm in rows of equal size; singular values below the share `least` are zero.
+
+    Not-a-number where S or `right` is not finite: the integrators then tell the state, LAPACK would raise.
+    """
+    if not (np.isfinite(S).all() and np.isfinite(right).all()):
+        return np.full(right.shape, np.nan)
     scale = np.sqrt(np.abs(np.diagonal(S)))
     scale[scale == 0.0] = 1.0
     x = np.linalg.lstsq(S / np.outer(scale, scale), (right.T / scale).T, rcond=least)[0]

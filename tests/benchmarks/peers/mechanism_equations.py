@@ -15,11 +15,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from types import FunctionType
 from typing import Any
 
 import numpy as np
-
-from gearfe.rigid import compiled
 
 MASS = np.array([0.04325, 0.00365, 0.02373, 0.00706, 0.07050, 0.00706, 0.05498])
 INERTIA = np.array([2.194e-6, 4.410e-7, 5.255e-6, 5.667e-7, 1.169e-5, 5.667e-7, 1.912e-5])
@@ -263,9 +262,24 @@ def equations(name: str, *, jit: bool = True) -> tuple[np.ndarray, Callable[...,
     constants = {k: v for k, v in globals().items() if k.isupper() or k in ("_DIAGONAL", "_DOT", "_CROSS", "D_")}
     entries = (f"{name}_rhs", f"{name}_residual")
     functions = FUNCTIONS if name == "andrews" else FUNCTIONS[-2:]
-    made = compiled.bind(functions, {"np": np, "math": math, **constants}, compiled=jit, entries=entries)
+    made = _bound(functions, {"np": np, "math": math, **constants}, jit=jit)
     start, rows = (andrews_start(), 6) if name == "andrews" else (slider_crank_start(), 1)
-    return start, getattr(made, entries[0]), getattr(made, entries[1]), rows
+    return start, made[entries[0]], made[entries[1]], rows
+
+
+def _bound(functions: tuple[Any, ...], names: dict[str, Any], *, jit: bool) -> dict[str, Any]:
+    """Functions that see each other and `names`, as they stand or compiled as numba does it by default."""
+    scope: dict[str, Any] = {"__builtins__": __builtins__, **names}
+    for function in functions:
+        made = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
+        scope[function.__name__] = made
+    if jit:
+        import numba
+
+        for function in functions:
+            name = function.__name__
+            scope[name] = numba.njit(scope[name], fastmath={"contract", "reassoc", "nsz"}, error_model="numpy")
+    return scope
 
 
 def angles_of(name: str, states: np.ndarray) -> list[Any]:
