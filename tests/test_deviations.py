@@ -10,7 +10,7 @@ import pytest
 from gearfe import InputError
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.gear.deviation import NOMINAL, Deviation, ToothDeviations, total
-from gearfe.gear.tooth_flanks import ToothFlanks
+from gearfe.gear.tooth_flanks import ToothFlanks, touching_curve
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import pair as gear_pair
@@ -142,3 +142,17 @@ def test_the_full_period_comes_again(law) -> None:
     touch = [bad.teeth.touching(angles + n * PAIR.mesh_cycle) for n in (0, 60, 20)]
     assert touch[0].twist == pytest.approx(touch[1].twist, abs=1e-14)
     assert np.abs(touch[0].twist - touch[2].twist).max() > 9e-6
+
+
+def test_the_curve_of_one_pair() -> None:
+    """On the path flat at the lost motion, shifted by mesh cycles from pair to pair, and by its pitch errors."""
+    cycle = PAIR.mesh_cycle
+    start, end = (PAIR.pinion_angle_at(s) for s in PAIR.path_limits())
+    on = np.linspace(start + 0.01, end - 0.01, 20)
+    assert touching_curve(PAIR, on) == pytest.approx(PAIR.contact_twist, abs=1e-14)
+    angles = np.linspace(start - 0.15, end + 0.15, 41)
+    assert touching_curve(PAIR, angles) == pytest.approx(touching_curve(PAIR, angles + 3 * cycle, number=-3), abs=1e-13)
+    assert np.isinf(touching_curve(PAIR, np.array([math.pi])))
+    turn = tuple(1e-4 * (np.arange(20) == 17))
+    shifted = touching_curve(PAIR, on + 3 * cycle, number=-3, deviations=(ToothDeviations(turn=turn), NOMINAL[1]))
+    assert PAIR.contact_twist - shifted[:-2] == pytest.approx(1e-4 / PAIR.gear_ratio, rel=1e-9)

@@ -93,6 +93,27 @@ class ToothFlanks:
         return replace(made, position=position[row], angle=angle[row], twist=twist, flank=flank[row], turn=turn[row])
 
 
+def touching_curve(
+    pair: MeshGeometry,
+    angles: Array,
+    *,
+    number: int = 0,
+    deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL,
+) -> Array:
+    """Twist of the wheel (rad) at which a tooth pair's rigid flanks touch at pinion angles (rad), shape (n,).
+
+    The tooth pair `number` is pinion tooth k and wheel tooth -1 - k. It counts from where a wheel space faces the
+    pinion tooth (`MeshGeometry.contact_twist` is where unmodified flanks touch) and is infinite where they cannot
+    touch. Without deviations all pairs have one curve, shifted by mesh cycles.
+    """
+    place = np.asarray(angles, dtype=float)
+    numbers = np.full(len(place), number, dtype=np.int64)
+    found = ToothFlanks(pair, deviations).met(np.arange(len(place)), place, numbers)
+    made = np.full(len(place), np.inf)
+    made[found.position] = found.twist
+    return made
+
+
 def _joined(parts: list[Touching]) -> Touching:
     names = Touching.__dataclass_fields__
     return Touching(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
