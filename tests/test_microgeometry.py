@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import json
 import math
-from dataclasses import replace
+import re
+from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,7 +23,14 @@ from gearfe.gear.pair import GearPair, TipRelief
 from gearfe.microgeometry.job import active_rolls, deviations_of
 from gearfe.microgeometry.loaded_mesh import full_period, load_mesh
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
-from gearfe.tables.microgeometry import MicrogeometryTable
+from gearfe.tables.microgeometry import (
+    VARIABLES,
+    GearMicrogeometryTable,
+    MicrogeometryTable,
+    ReliefTable,
+    VariableTable,
+    WavinessTable,
+)
 
 from .gears import pair as gear_pair
 
@@ -394,3 +403,19 @@ def test_the_command_tells_a_mistake_in_one_line(tmp_path, capsys) -> None:
     assert "microgeometry.pinion" in told
     assert told.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+PAGE = (Path(__file__).parents[1] / "docs" / "microgeometry.md").read_text(encoding="utf-8")
+
+
+def test_the_page_names_every_key() -> None:
+    tables = (MicrogeometryTable, GearMicrogeometryTable, WavinessTable, ReliefTable, VariableTable)
+    for name in {*(f.name for table in tables for f in fields(table)), *VARIABLES}:
+        assert f"`{name}`" in PAGE, name
+
+
+def test_the_example_of_the_page_runs() -> None:
+    names: dict = {}
+    exec(compile(re.search(r"```python\n(.*?)```", PAGE, re.S).group(1), "microgeometry.md", "exec"), names)
+    assert len(names["peaks"]) == 2
+    assert names["problem"].value([15.3e-6, 2.73e-3]) < 1.2  # the optimum that the page tells
