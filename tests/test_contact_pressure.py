@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from gearfe import Material, sweep_stiffness
-from gearfe.contact.half_width import half_widths
+from gearfe.contact.elements import half_widths
 from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
 from gearfe.contact.position import Positions
 from gearfe.gear.spur_gear import TipRelief
@@ -134,7 +134,7 @@ def test_half_width_of_an_ellipse_and_of_nothing() -> None:
     """Gauss-Chebyshev points of the second kind integrate an elliptic pressure exactly: b comes back to rounding."""
     t = math.pi * np.arange(1, 30) / 30
     across = np.array([math.cos(0.3), math.sin(0.3)])
-    place = 7e-5 * np.cos(t)[:, None] * across + [3e-3, -2e-3]
+    place = (7e-5 * np.cos(t)[:, None] * across + [3e-3, -2e-3]) @ [1, 1j]
     found = half_widths(np.zeros(29, dtype=np.int64), place, 1e3 * np.sin(t) ** 2, 2)
     assert found[0] == pytest.approx(7e-5, rel=1e-9)
     assert np.isnan(found[1])

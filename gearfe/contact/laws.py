@@ -31,7 +31,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any, Literal, Protocol, get_args
+from typing import Any, ClassVar, Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,17 +65,11 @@ def carrying(law: ContactLaw, to_tip: Array) -> NDArray[np.bool_]:
 
 def law_text(law: ContactLaw) -> str:
     """Name and parameters in one line without commas, for tables and reports."""
-    if isinstance(law, Nitsche):
-        return f"nitsche gamma0={law.gamma0:.12g} sides={law.sides}"
+    told = {field.name: getattr(law, field.name) for field in fields(law)}  # type: ignore[arg-type]
     if isinstance(law, Penalty):
-        stiffness = "300E/h" if law.stiffness is None else f"{law.stiffness * 1e-9:.12g}N/mm3"
-        return f"penalty stiffness={stiffness} sides={law.sides}"
-    made = [law.name, *(f"{field.name}={_short(getattr(law, field.name))}" for field in fields(law))]  # type: ignore[arg-type]
-    return " ".join(made)
-
-
-def _short(value: object) -> str:
-    return f"{value:.12g}" if isinstance(value, float) else str(value).replace(",", "")
+        told["stiffness"] = "300E/h" if law.stiffness is None else f"{law.stiffness * 1e-9:.12g}N/mm3"
+    texts = {name: f"{v:.12g}" if isinstance(v, float) else str(v).replace(",", "") for name, v in told.items()}
+    return " ".join([law.name, *(f"{name}={text}" for name, text in texts.items())])
 
 
 def _check_sides(sides: str, allowed: tuple[str, ...]) -> None:
@@ -106,19 +100,13 @@ class Penalty:
 
     stiffness: float | None = None
     sides: Sides = "tip"
+    name: ClassVar[str] = "penalty"
+    uses_stress: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         _check_sides(self.sides, get_args(Sides))
         if self.stiffness is not None:
             _check_positive("stiffness", self.stiffness, "Pa/m, pressure for each metre of overlap")
-
-    @property
-    def name(self) -> str:
-        return "penalty"
-
-    @property
-    def uses_stress(self) -> bool:
-        return False
 
     def parameter(self, youngs_modulus: float, sizes: Array) -> Array:
         """gamma at each edge (Pa/m)."""
@@ -140,18 +128,12 @@ class Nitsche:
 
     gamma0: float = 1.0
     sides: Sides = "both"
+    name: ClassVar[str] = "nitsche"
+    uses_stress: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         _check_sides(self.sides, ("both", "pinion", "wheel"))
         _check_positive("gamma0", self.gamma0, "gamma h/E")
-
-    @property
-    def name(self) -> str:
-        return "nitsche"
-
-    @property
-    def uses_stress(self) -> bool:
-        return True
 
     def parameter(self, youngs_modulus: float, sizes: Array) -> Array:
         """gamma at each edge (Pa/m)."""
@@ -162,17 +144,9 @@ class Nitsche:
 class HalfPlane:
     """No overlap, no tension, on the panels of `gearfe.contact.half_plane`: half-planes instead of contact elements."""
 
-    @property
-    def name(self) -> str:
-        return "half_plane"
-
-    @property
-    def uses_stress(self) -> bool:
-        return False
-
-    @property
-    def sides(self) -> Sides:
-        return "both"
+    name: ClassVar[str] = "half_plane"
+    uses_stress: ClassVar[bool] = False
+    sides: ClassVar[Sides] = "both"
 
     def parameter(self, youngs_modulus: float, sizes: Array) -> Array:  # noqa: ARG002
         """None: only its own solver knows the law."""

@@ -31,7 +31,7 @@ class Contacts:
     torque_wheel : ndarray, shape (m,)
         Share in the position's `torque_wheel` (N m).
     half_width : ndarray, shape (m,)
-        By the second moment of the pressure (m), see `gearfe.contact.half_width`.
+        By the second moment of the pressure (m), see `gearfe.contact.elements.half_widths`.
     """
 
     position: IntArray

@@ -5,7 +5,7 @@ has Hertz's peak pressure (Johnson, *Contact Mechanics*, 1985, eq. 4.45)
 
 .. math:: p_H = \sqrt{\frac{F E^*}{\pi\rho w}} = \frac{2F}{\pi b_H w} .
 
-The computed pressure has a half width b of its own, by its second moment (`gearfe.contact.half_width`), so
+The computed pressure has a half width b of its own, by its second moment (`gearfe.contact.elements.half_widths`), so
 :math:`|b/b_H - 1|` tells how far from Hertz's the contact is: the discretisation, flanks whose curvature changes along
 the contact, teeth that are no half-planes.
 
@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.position import Positions
-from ..contact.scene import MeshingPair
-from ..gear.touching import Face, Flanks, Touching
+from ..gear.flank_curve import FlankCurve
+from .position_solver import PositionSolver
 
 Array = NDArray[Any]
 
@@ -44,25 +44,19 @@ BLUNTING = 0.01
 QUANTITIES = ("peak_pressure", "peak_pressure_error", "edge_pressure", "edge")
 
 
-def contact_pressures(elastic: MeshingPair, flanks: Flanks, touching: Touching, found: Positions) -> dict[str, Array]:
-    """The `QUANTITIES` of n positions, each of shape (n,).
-
-    Parameters
-    ----------
-    touching
-        Of each position the tooth pairs whose rigid flanks can meet.
-    """
-    contacts, lines = found.contacts, [_Line(face) for face in flanks.faces]
+def contact_pressures(solver: PositionSolver, found: Positions) -> dict[str, Array]:
+    """The `QUANTITIES` of n positions, each of shape (n,)."""
+    elastic, contacts, touching = solver.elastic, found.contacts, solver.touching(found.pinion_angle)
     met, pairs = ((np.stack([one.position, one.pair], axis=1) @ [1 << 32, 1]) for one in (touching, contacts))
     k = np.minimum(np.searchsorted(met, pairs), len(met) - 1)
     known = np.flatnonzero((contacts.torque_wheel > 0) & (met[k] == pairs))
     k, position, width = k[known], contacts.position[known], contacts.half_width[known]
     force = contacts.torque_wheel[known] / (touching.arm[k, 1] * elastic.width)
     curvature, flat = touching.curvature[k], np.isfinite(touching.curvature[k])
-    bears = np.maximum(*(line.bears(touching.place[k, g], width) for g, line in enumerate(lines)))
+    bears = np.maximum(*(_bearing(curve, touching.place[k, g], width) for g, curve in enumerate(solver.curves)))
     bears[~flat] = _SINGULAR  # it touches at the corner itself, however narrow the contact
     hertz = np.sqrt(force / sum(elastic.contact_compliances) * np.where(flat, curvature, 0.0) / math.pi)
-    blunted = 2 * force / (math.pi * np.hypot(width, BLUNTING * flanks.pair.pinion.module))
+    blunted = 2 * force / (math.pi * np.hypot(width, BLUNTING * solver.pair.pinion.module))
     off = np.abs(width * math.pi * hertz / (2 * force) - 1)
     made = {name: np.where(found.status == "no_contact", 0.0, np.nan) for name in QUANTITIES[:2]}
     made["edge_pressure"], edge = np.full(len(found), np.nan), np.zeros(len(found), dtype=np.int64)
@@ -92,25 +86,10 @@ def largest_pressures(curve: Any) -> dict[str, Any]:
     }
 
 
-class _Line:
-    """A face by its arc length, with the places of its edges."""
-
-    def __init__(self, face: Face) -> None:
-        u = np.concatenate([np.linspace(0.0, 1.0, 257), np.linspace(1.0, face.end, 33)[1:] if face.end > 1.0 else []])
-        middle, size = 0.5 * (u[1:] + u[:-1]), np.diff(u)
-        self.u, self.arc = u, np.concatenate([[0.0], np.cumsum(face.speeds(middle) * size)])
-        sharp = [0.0] if face.fall > 0.0 else []
-        sharp += face.kinks.tolist()
-        sharp += [face.end] if face.sharp else []
-        self.sharp = self.at(np.array(sharp))
-        self.round = math.inf if face.sharp else float(self.at(1.0))
-
-    def at(self, u: Any) -> Any:
-        """Arc length (m) at parameters u."""
-        return np.interp(u, self.u, self.arc)
-
-    def bears(self, u: Array, half: Array) -> NDArray[np.int64]:
-        """Places in `EDGES` of what contacts of the half widths `half` (m) about u reach."""
-        s = self.at(u)
-        sharp = (np.abs(self.sharp - s[:, None]) <= half[:, None]).any(axis=1)
-        return np.where(sharp, _SINGULAR, np.where(s + half > self.round, _ROUNDED, 0))
+def _bearing(curve: FlankCurve, u: Array, half: Array) -> NDArray[np.int64]:
+    """Places in `EDGES` of what contacts of the half widths `half` (m) about the parameters u of a flank reach."""
+    face, s = curve.face, curve.arc_at(u)
+    sharp = curve.arc_at([*([0.0] if face.fall > 0.0 else []), *face.kinks, *([face.end] if face.sharp else [])])
+    reached = (np.abs(sharp - s[:, None]) <= half[:, None]).any(axis=1)
+    rounded = ~np.array(face.sharp) & (s + half > curve.arc_at(1.0))
+    return np.where(reached, _SINGULAR, np.where(rounded, _ROUNDED, 0))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,32 +18,14 @@ from ..contact.position import TORQUES, Positions
 from ..contact.records import joined, of_positions, taken
 from ..contact.scene import MeshingPair
 from ..gear.pair import GearPair
-from ..gear.touching import Flanks, Touching
+from ..gear.touching import Touching
 
 Array = NDArray[Any]
 IntArray = NDArray[np.int64]
 NONE: IntArray = np.zeros(0, dtype=np.int64)
 
 
-class PositionSolver(Protocol):
-    """What solves positions of one pair."""
-
-    @property
-    def pair(self) -> GearPair: ...
-    @property
-    def elastic(self) -> MeshingPair: ...
-    @property
-    def flanks(self) -> Flanks: ...
-    @property
-    def torque_tolerance(self) -> float: ...
-    def solve(self, angles: Array, twists: Array, kept: IntArray = NONE) -> Positions: ...
-    def touching_twists(self, angles: Array) -> Array: ...
-    def touching(self, angles: Array) -> Touching: ...
-
-
-def position_solver(
-    pair: GearPair, elastic: MeshingPair, *, resolved_only: bool = True
-) -> HalfPlaneSolver | ElementSolver:
+def position_solver(pair: GearPair, elastic: MeshingPair, *, resolved_only: bool = True) -> PositionSolver:
     """The solver of the elastic pair's law; see `ElementSolver` for `resolved_only`."""
     if isinstance(elastic.law, HalfPlane):
         return HalfPlaneSolver(pair, elastic)
@@ -59,9 +41,9 @@ class HalfPlaneSolver:
     def __init__(self, pair: GearPair, elastic: MeshingPair) -> None:
         self.pair, self.elastic = pair, elastic
         self.law = half_plane_pair(pair, elastic)
-        self.flanks = self.law.flanks
+        self.curves = [side.curve for side in self.law.sides]
         self._angles = np.zeros(0)
-        self._known = self.flanks.touching(self._angles)
+        self._known = self.law.flanks.touching(self._angles)
 
     def solve(self, angles: Array, twists: Array, kept: IntArray = NONE) -> Positions:
         """Positions at pinion angles and twists (rad), both of shape (n,); those numbered `kept` with loads."""
@@ -88,7 +70,7 @@ class HalfPlaneSolver:
         """Tooth pairs whose rigid flanks can meet at pinion angles (rad), by position; searched for once an angle."""
         new = np.setdiff1d(angles, self._angles)
         if len(new):
-            found = self.flanks.touching(new)
+            found = self.law.flanks.touching(new)
             found = replace(found, position=found.position + len(self._angles))
             self._known = joined([self._known, found])
             self._angles = np.concatenate([self._angles, new])
@@ -119,7 +101,7 @@ class ElementSolver:
     def __init__(self, pair: GearPair, elastic: MeshingPair, *, resolved_only: bool = True) -> None:
         self.pair, self.elastic, self.resolved_only = pair, elastic, resolved_only
         self.half_plane = HalfPlaneSolver(pair, elastic)
-        self.flanks = self.half_plane.flanks
+        self.curves = self.half_plane.curves
         self.touching, self.touching_twists = self.half_plane.touching, self.half_plane.touching_twists
 
     def solve(self, angles: Array, twists: Array, kept: IntArray = NONE) -> Positions:
@@ -149,3 +131,6 @@ class ElementSolver:
         weights = contacts.force, contacts.force * sizes / (2 * contacts.half_width)
         force, spread = (np.bincount(contacts.position, weight, len(found)) for weight in weights)
         return np.divide(force, spread, out=np.full(len(found), np.nan), where=spread > 0)
+
+
+PositionSolver = HalfPlaneSolver | ElementSolver

@@ -253,14 +253,10 @@ def _estimate(
     chosen = solved.take(solved_twice(solved.status == "converged"))
     again = at_twists(coarse, chosen.pinion_angle, chosen.twist, None, finite=finite)
     other = np.where(again.status == "converged", again.torque_wheel, np.nan)
-    unseen = unseen_error(own.elastic.law, _pressures(own, chosen)["edge"])
+    unseen = unseen_error(own.elastic.law, contact_pressures(own, chosen)["edge"])
     # a twist of some bits of the gears' angles is not what the gears are turned by
     unseen += ANGLE_ROUNDING * np.abs(chosen.tangent / chosen.torque_wheel)
     return error_estimate(chosen.pinion_angle, chosen.torque_wheel, other, coarsen=coarsen, unseen=unseen)
-
-
-def _pressures(solver: PositionSolver, solved: Positions) -> dict[str, Array]:
-    return contact_pressures(solver.elastic, solver.flanks, solver.touching(solved.pinion_angle), solved)
 
 
 def assembled_curve(
@@ -285,7 +281,7 @@ def assembled_curve(
     stiffness = np.divide(torque, twist, out=np.zeros_like(torque), where=torque != 0.0)  # not-a-number stays
     cycles = np.round((asked - solved.pinion_angle[source]) / pair.mesh_cycle).astype(np.int64)
     leading, shares = load_shares(solved)
-    pressures = _pressures(solver, solved)
+    pressures = contact_pressures(solver, solved)
     edge = np.where(failed, 0, pressures.pop("edge"))
     of_solved: dict[str, Any] = {
         "twist": twist,
