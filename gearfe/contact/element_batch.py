@@ -189,8 +189,7 @@ def windows_of(elastic: MeshingPair, first: FirstContacts, share: float, margin:
     """
     low, count = np.zeros((len(first), 2), dtype=np.int64), np.zeros((len(first), 2), dtype=np.int64)
     for g, body in enumerate(elastic.bodies):
-        ends = np.concatenate([[0.0], np.cumsum(body.flank.sizes)])
-        arc = first.arc[:, g]
+        ends, arc = body.flank.ends, first.arc[:, g]
         least = np.where(first.pressure > 0, arc, np.inf).min(axis=1)
         most = np.where(first.pressure > 0, arc, -np.inf).max(axis=1)
         more = share * (most - least)

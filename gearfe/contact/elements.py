@@ -87,13 +87,12 @@ def _start(batch: Batch, first: FirstContacts) -> State:
     pressure, place = np.zeros(len(batch.owner)), np.zeros(len(batch.owner))
     forces = np.zeros(len(batch.points), dtype=complex)
     flanks = [body.flank for body in batch.elastic.bodies]
-    ends = [np.concatenate([[0.0], np.cumsum(flank.sizes)]) for flank in flanks]
+    ends = [flank.ends for flank in flanks]
     bounds = np.searchsorted(batch.owner, np.arange(len(batch.gear) + 1))
     for w, (m, g) in enumerate(zip(batch.couple.tolist(), batch.gear.tolist(), strict=True)):
         arc, mate, load = first.arc[m, g], first.arc[m, 1 - g], first.pressure[m] * first.width[m]
-        edge = np.clip(np.searchsorted(ends[g], arc, side="right") - 1, 0, flanks[g].edges - 1)
-        on = np.flatnonzero(load > 0)
-        shapes = edge_shapes(np.clip((arc - ends[g][edge]) / flanks[g].sizes[edge], 0.0, 1.0))[0]
+        edge, xi = flanks[g].place(arc)
+        on, shapes = np.flatnonzero(load > 0), edge_shapes(xi)[0]
         nodes = batch.first_node[w] + 2 * (edge[on, None] - batch.first_edge[w]) + np.arange(3)
         along = batch.elastic.width * (2 * g - 1) * first.normal[m] * batch.turn[w].conj()
         np.add.at(forces, nodes, shapes[on] * (along * load[on])[:, None])

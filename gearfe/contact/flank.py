@@ -7,6 +7,7 @@ lies to the right of the chain, so the outward normal is the tangent turned by +
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,34 @@ class Flank:
     def edges(self) -> int:
         """Number of edges."""
         return len(self.sizes)
+
+    @cached_property
+    def ends(self) -> Array:
+        """Arc lengths of the edges' ends, from the root's (m), shape (e + 1,)."""
+        return np.concatenate([[0.0], np.cumsum(self.sizes)])
+
+    def place(self, arc: Array) -> tuple[IntArray, Array]:
+        """Edges and positions in them (0 to 1) at arc lengths (m)."""
+        edge = np.clip(np.searchsorted(self.ends, arc, side="right") - 1, 0, self.edges - 1)
+        return edge, np.clip((arc - self.ends[edge]) / self.sizes[edge], 0.0, 1.0)
+
+    def arc_at(self, radius: float) -> float:
+        """Arc length (m) at a radius (m)."""
+        radii = np.linalg.norm(self.points[::2], axis=1)
+        edge = int(np.clip(np.searchsorted(radii, radius) - 1, 0, self.edges - 1))
+        corners = self.points[2 * edge : 2 * edge + 3]
+        xi = min(1.0, max(0.0, (radius - radii[edge]) / (radii[edge + 1] - radii[edge])))
+        for _ in range(8):
+            value, slope, _ = edge_shapes(np.array(xi))
+            point = value @ corners
+            now = float(np.linalg.norm(point))
+            rate = float(point @ (slope @ corners)) / now
+            step = (radius - now) / rate if rate > 0 else 0.0
+            xi = min(1.0, max(0.0, xi + step))
+            if abs(step) < 1e-12:
+                break
+        at, weight = gauss_rule(10)
+        return float(self.ends[edge] + xi * (weight @ np.linalg.norm(edge_shapes(xi * at)[1] @ corners, axis=-1)))
 
 
 def flank_of(mesh: SectorMesh, points_per_edge: int) -> Flank:

@@ -25,6 +25,7 @@ least 0.2 module, since second derivatives of H magnify the noise of the element
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -36,7 +37,7 @@ from scipy.interpolate import CubicSpline
 from ..gear.flank_curve import FlankCurve, flank_curve
 from ..gear.pair import GearPair
 from .compliance import GearBody
-from .elliptic import Chain
+from .flank import Flank, edge_shapes, gauss_rule
 from .scene import MeshingPair
 from .wedge import ELLIPSE_W, ELLIPSE_X, mean_log, wedge_tensor
 
@@ -159,10 +160,9 @@ def flank_compliance(
     width
         Width of the contact (m).
     """
-    chain = Chain(body)
-    offset = chain.arc_at(float(curve.face.radii[0]))
+    offset = body.flank.arc_at(float(curve.face.radii[0]))
     corner, wedge = corner_of(curve)
-    stations, bumps, nodal = _stations(body, chain, offset + curve.low, module)
+    stations, bumps, nodal = _stations(body.flank, offset + curve.low, module)
     loads = np.kron(nodal, np.eye(2))
     modes = loads @ body.far.flank
     smooth = {step: modes @ (driven @ loads.T) for step, driven in body.far.driven.items()}
@@ -188,29 +188,45 @@ def corner_of(curve: FlankCurve) -> tuple[complex, Array]:
     return point, one * along_middle + two * (np.eye(2) - along_middle)
 
 
-def _stations(body: GearBody, chain: Chain, start: float, module: float) -> tuple[Array, Array, Array]:
-    """Arc lengths of the stations on the chain, half widths of their bumps, and their nodal loads, shape (k, n)."""
-    end = float(chain.ends[-1])
-    places = np.sort(np.concatenate([chain.ends, 0.5 * (chain.ends[1:] + chain.ends[:-1])]))
-    places = places[(places > start - 2 * chain.size_at(start)) & (places < end - 1e-9)]
-    rows: list[Array] = []
-    kept: list[float] = []
-    widths: list[float] = []
+def _stations(flank: Flank, start: float, module: float) -> tuple[Array, Array, Array]:
+    """Arc lengths of the stations on the flank, half widths of their bumps, and their nodal loads, shape (k, n)."""
+    ends, sizes = flank.ends.tolist(), flank.sizes.tolist()
+
+    def largest(low: float, high: float) -> float:
+        """Largest element between two arc lengths (m)."""
+        first = min(max(bisect_right(ends, low) - 1, 0), len(sizes) - 1)
+        return max(sizes[first : max(bisect_left(ends, high), first + 1)])
+
+    end = ends[-1]
+    places = np.sort(np.concatenate([flank.ends, 0.5 * (flank.ends[1:] + flank.ends[:-1])]))
+    before = 2 * float(np.interp(start, 0.5 * (flank.ends[1:] + flank.ends[:-1]), flank.sizes))
+    places = places[(places > start - before) & (places < end - 1e-9)]
+    kept: list[tuple[float, float]] = []
     for s in places.tolist():
-        here = chain.size_in(s, s)
+        here = largest(s, s)
         a = BUMP_ELEMENTS * here
         for _ in range(3):
-            a = 0.5 * (a + BUMP_ELEMENTS * chain.size_in(max(0.0, s - a), min(end, s + a)))
+            a = 0.5 * (a + BUMP_ELEMENTS * largest(max(0.0, s - a), min(end, s + a)))
         a = min(max(a, BUMP_MODULES * module), end - s, s)
-        if a < TOO_NEAR * here or (kept and s - kept[-1] < SPACING * a):
-            continue
-        row = np.zeros(len(body.flank.points))
-        nodes, shares = chain.loads(s - a, s + a)
-        row[nodes] = shares
-        rows.append(row)
-        kept.append(s)
-        widths.append(a)
-    return np.array(kept), np.array(widths), np.array(rows)
+        if a >= TOO_NEAR * here and not (kept and s - kept[-1][0] < SPACING * a):
+            kept.append((s, a))
+    s, a = np.array(kept).T
+    return s, a, _bumps(flank, s[:, None], a[:, None])
+
+
+def _bumps(flank: Flank, s: Array, a: Array) -> Array:
+    """Shares on the nodes of elliptic unit forces of half widths a about arc lengths s (m), both of shape (k, 1)."""
+    # with the place s - a cos t the pressure is smooth in t
+    t0, t1 = (np.arccos(np.clip((s - at) / a, -1.0, 1.0)) for at in (flank.ends[:-1], flank.ends[1:]))
+    xi, weight = gauss_rule(10)
+    t = t0[:, :, None] + (t1 - t0)[:, :, None] * xi
+    load = (t1 - t0)[:, :, None] * weight * np.sin(t) ** 2 * (2.0 / math.pi)
+    place = (s[:, :, None] - a[:, :, None] * np.cos(t) - flank.ends[:-1, None]) / flank.sizes[:, None]
+    parts = np.einsum("keq,keqa->kea", load, edge_shapes(np.clip(place, 0.0, 1.0))[0])
+    nodal = np.zeros((len(s), len(flank.nodes)))
+    for k in range(3):
+        nodal[:, k : len(flank.nodes) - 2 + k : 2] += parts[:, :, k]
+    return nodal
 
 
 def _local(flank: FlankCompliance) -> Array:

@@ -54,15 +54,13 @@ def _nodal(side: FlankCompliance, flank: Flank, contacts: PairContacts, gear: in
     """Of each pair the shares of the force on the nodes of the flank, which add up to 1, and their rates with the twist
     (1/rad) as the pressure moves along the flank and widens, both of shape (m, nodes).
     """
-    sizes, load = flank.sizes, contacts.pressure * contacts.width
-    ends = np.concatenate([[0.0], np.cumsum(sizes)])
-    arc = contacts.panel_arc[:, gear] + side.offset
-    edge = np.clip(np.searchsorted(ends, arc, side="right") - 1, 0, len(sizes) - 1)
-    value, slope, _ = edge_shapes(np.clip((arc - ends[edge]) / sizes[edge], 0.0, 1.0))
+    load = contacts.pressure * contacts.width
+    edge, xi = flank.place(contacts.panel_arc[:, gear] + side.offset)
+    value, slope, _ = edge_shapes(xi)
     share = load / load.sum(axis=1, keepdims=True)
     moves = contacts.arc_rate[:, gear, None] + WAY[gear] * contacts.x * contacts.growth[:, None]
     shape = len(load), len(flank.nodes)
     at = (np.arange(shape[0])[:, None] * shape[1] + 2 * edge)[:, :, None] + np.arange(3)
-    weights = value * share[:, :, None], slope * (moves / sizes[edge] * share)[:, :, None]
+    weights = value * share[:, :, None], slope * (moves / flank.sizes[edge] * share)[:, :, None]
     shares, moved = (np.bincount(at.ravel(), w.ravel(), shape[0] * shape[1]).reshape(shape) for w in weights)
     return shares, moved

@@ -125,9 +125,8 @@ class ElementSolver:
         assert isinstance(contacts, PairContacts)
         sizes = np.zeros(len(contacts))
         for gear, (side, body) in enumerate(zip(self.half_plane.law.sides, self.elastic.bodies, strict=True)):
-            ends = np.cumsum(body.flank.sizes)
-            edge = np.searchsorted(ends, contacts.arc[:, gear] + side.offset)
-            sizes = np.maximum(sizes, body.flank.sizes[np.minimum(edge, len(ends) - 1)])
+            edge, _ = body.flank.place(contacts.arc[:, gear] + side.offset)
+            sizes = np.maximum(sizes, body.flank.sizes[edge])
         weights = contacts.force, contacts.force * sizes / (2 * contacts.half_width)
         force, spread = (np.bincount(contacts.position, weight, len(found)) for weight in weights)
         return np.divide(force, spread, out=np.full(len(found), np.nan), where=spread > 0)
