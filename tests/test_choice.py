@@ -15,10 +15,12 @@ import pytest
 
 from gearfe.progress import shown
 from gearfe.rigid import Body, CoordinateSpring, Gravity, Hinge, ModalBlocks, PlanarScene, Scene, System
-from gearfe.rigid.choice import STOPPED, Choice, Leg, Watch, Way, joined, joined_statistics
+from gearfe.rigid.choice import Choice, Leg, Way, joined, joined_statistics
 from gearfe.rigid.contract import Array
 from gearfe.rigid.integrate import _dropped_rows_hold, integrate, ways_of
 from gearfe.rigid.start import Freedoms, Start, consistent_start
+from gearfe.rigid.status import Status
+from gearfe.rigid.steps import Watch
 from gearfe.train import build_train, simulate
 
 from .rigid_cases import pendulum
@@ -56,7 +58,7 @@ def stub(name: str, clock: Clock, cost: Cost, step: Callable[[float], float], **
         t, ends, status = start.time, [start.time], 0
         while t < times[-1] and len(ends) <= most:
             if watch is not None and not watch(t, len(ends) - 1, lambda t=t: (np.array([t]), np.ones(1))):
-                status = STOPPED
+                status = Status.STOPPED
                 break
             clock.now += cost(t)
             t = min(t + step(t), float(times[-1]))

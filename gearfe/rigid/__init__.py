@@ -12,9 +12,10 @@ from .joints import Fixed, Hinge, Prescribed, Prismatic, Slot
 from .planar import Body, Scene
 from .scene import PlanarScene
 from .start import Forced, Freedoms, Start, consistent_start, count_freedoms
+from .status import Status
 from .system import System
 from .timefunctions import TimeFunction, constant, polynomial, sine, smoothed_step
-from .trajectory import IntegrationError, Status, Trajectory
+from .trajectory import IntegrationError, Trajectory
 
 __all__ = [
     "GROUND",

@@ -16,15 +16,17 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..progress import SILENT, count, say
 from .contract import Array
+from .dense import Dense, Joined
 from .start import Start
-from .trajectory import Dense
+from .status import Status
+from .steps import Watch
 
 #: A trial may cost this part of what the running way has left: with less, one that is lost might have been the best.
 SHARE, EARLY = 0.75, 0.1
@@ -43,14 +45,8 @@ RECENT = 8
 STIFF = 1.5
 #: Statistics that add up.
 SUMS = ("steps", "evaluations", "orders", "newton_iterations", "rejected")
-#: Status of a run that its watch ended.
-STOPPED = -1
-
-#: ``watch(t, steps, state)``: the time reached, the steps done, and a function that gives (q, v) there; False ends the
-#: run. Called once with no steps when all is loaded, then after every few steps.
-Watch = Callable[[float, int, Callable[[], tuple[Array, Array]]], bool]
 #: ``run(start, times, most, watch)`` -> dense output, status, statistics.
-Run = Callable[[Start, Array, int, "Watch | None"], tuple[Dense, int, dict[str, Any]]]
+Run = Callable[[Start, Array, int, Watch | None], tuple[Dense, Status, dict[str, Any]]]
 
 
 @dataclass(frozen=True)
@@ -93,34 +89,10 @@ class Leg:
 
     way: Way
     dense: Dense
-    status: int
+    status: Status
     statistics: Mapping[str, Any]
     predicted: float | None
     seconds: float
-
-
-@dataclass(frozen=True)
-class Joined:
-    """Dense output of several legs."""
-
-    parts: tuple[Dense, ...]
-    times: Array = field(init=False)
-
-    def __post_init__(self) -> None:
-        ends = [self.parts[0].times, *(p.times[1:] for p in self.parts[1:])]
-        object.__setattr__(self, "times", np.concatenate(ends))
-
-    def __call__(self, t: Array, derivative: int = 0) -> Array:
-        """Coordinates (or a derivative of them) at the times t: of the leg that begins last before each."""
-        t = np.atleast_1d(np.asarray(t, dtype=float))
-        sign = 1.0 if self.times[-1] >= self.times[0] else -1.0
-        joints = np.array([sign * p.times[-1] for p in self.parts[:-1]])
-        which = np.searchsorted(joints, sign * t, side="left")
-        made = {k: part(t[which == k], derivative) for k, part in enumerate(self.parts) if (which == k).any()}
-        out = np.empty((len(t), next(iter(made.values())).shape[1]))
-        for k, values in made.items():
-            out[which == k] = values
-        return out
 
 
 class Pace:
@@ -222,7 +194,7 @@ class Choice:
         sign = math.copysign(1.0, self.times[-1] - start.time)
         ahead = self.times if start is self.start else self.times[sign * self.times > sign * start.time]
         dense, status, statistics = way.run(start, ahead, self.most - used, watch)
-        if trial is not None and (lost or status != 0):
+        if trial is not None and (lost or status != Status.DONE):
             return None
         began = pace.told[0][0] if pace.told else self.clock()
         own = Leg(way, dense, status, statistics, predicted, self.clock() - pace.away - began)

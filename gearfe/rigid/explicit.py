@@ -1,10 +1,8 @@
 """Explicit Runge-Kutta of order 8 (Dormand & Prince; Hairer, Norsett & Wanner I, Sec. II.10) with projection.
 
 Constrained systems are integrated in (q, v) with the accelerations of the index-1 form and projected onto position and
-velocity constraints after every step. Systems whose constraints are linear and constant run in minimal
-coordinates, where
-the projection has nothing to do; there, a force with a compiled law is integrated by Taylor series instead
-(`gearfe.rigid.modal`).
+velocity constraints after every step. Systems whose constraints are linear and constant run in modal coordinates
+(`gearfe.rigid.modal`), where the projection has nothing to do.
 """
 
 from __future__ import annotations
@@ -18,14 +16,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .carried import RANK
-from .choice import STOPPED, Watch
 from .contract import Array
-from .elimination import is_linear, minimal
+from .dense import Polynomials, within_run
 from .start import Start
+from .status import Status
+from .steps import StepControl, StepLaw, Watch, first_step
 from .system import System, own_motion
-from .within import within_run
 
 SCHEME = "Runge-Kutta of order 8"
+LAW = StepLaw(exponent=1 / 8, growth=6.0, least_error=1e-12)
 Rhs = Callable[[float, Array], Array]
 
 
@@ -53,65 +52,57 @@ def tableau() -> Tableau:
     return Tableau(A, DOP853.B, C, DOP853.E3, DOP853.E5, DOP853.D)
 
 
-@dataclass(frozen=True)
-class Pieces:
-    """Dense output: on every step the polynomial of order 7; `expand` turns the state into (q, v, a)."""
+class Problem(NamedTuple):
+    """A first-order problem y' = f(t, y) of a system, y = (coordinates, velocities)."""
 
-    times: Array
-    states: Array
-    polynomials: Array  # (steps, 7, 2n)
+    rhs: Rhs
+    project: Rhs  # onto the constraints
+    expand: Callable[[float, Array], tuple[Array, Array, Array]]  # y -> (q, v, a) of the system
+    sizes: Array  # of the components of y that compare
+
+
+@dataclass(frozen=True)
+class States:
+    """Dense output: polynomials of degree 7 of the state, from which (q, v, a) follow at any time."""
+
+    polynomials: Polynomials
     expand: Callable[[float, Array], tuple[Array, Array, Array]]
 
-    def state(self, t: Array) -> Array:
-        """Integrated state at the times t, (times, 2n)."""
-        sign = 1.0 if self.times[-1] >= self.times[0] else -1.0
-        k = np.clip(np.searchsorted(sign * self.times, sign * t, side="right") - 1, 0, len(self.polynomials) - 1)
-        x = ((t - self.times[k]) / (self.times[k + 1] - self.times[k]))[:, None]
-        y = np.zeros((len(t), self.states.shape[1]))
-        for i in range(7):
-            y += self.polynomials[k, 6 - i]
-            y *= x if i % 2 == 0 else 1.0 - x
-        return y + self.states[k]
+    @property
+    def times(self) -> Array:
+        """Ends of the steps (s)."""
+        return self.polynomials.times
 
     def __call__(self, t: Array, derivative: int = 0) -> Array:
         """Coordinates, velocities or accelerations at the times t."""
         t = within_run(self.times, t)
         return np.array([self.expand(ti, yi)[derivative] for ti, yi in zip(t, self.state(t), strict=True)])
 
+    def state(self, t: Array) -> Array:
+        """Integrated state y at the times t, (times, 2n)."""
+        return self.polynomials(t)
 
-def run_explicit(  # type: ignore[no-untyped-def]
-    system: System, start: Start, times: Array, *, tolerance: float, longest: float, most: int, jit: bool = True,
+
+def run_explicit(
+    system: System, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
     watch: Watch | None = None,
-):  # fmt: skip
-    """Integrate; returns (dense output, status, statistics). `jit`: compiled laws run in a compiled loop."""
-    if is_linear(system):
-        from .modal import run_minimal
-
-        options: dict[str, Any] = {"tolerance": tolerance, "longest": longest, "most": most, "jit": jit, "watch": watch}
-        return run_minimal(minimal(system), start, times, **options)
-    n = system.size
-    active = start.active
+) -> tuple[States, Status, dict[str, Any]]:  # fmt: skip
+    """Integrate; returns (dense output, status, statistics)."""
+    n, active, excess = system.size, start.active, start.excess
 
     def rhs(t: float, y: Array) -> Array:
-        return np.concatenate([y[n:], system.acceleration(t, y[:n], y[n:], active, start.excess)[0]])
+        return np.concatenate([y[n:], system.acceleration(t, y[:n], y[n:], active, excess)[0]])
 
     def project(t: float, y: Array) -> Array:
-        return on_constraints(system, t, y[:n], y[n:], active, start.excess)
+        return on_constraints(system, t, y[:n], y[n:], active, excess)
 
     def expand(t: float, y: Array) -> tuple[Array, Array, Array]:
-        return y[:n], y[n:], system.acceleration(t, y[:n], y[n:], active, start.excess)[0]
+        return y[:n], y[n:], system.acceleration(t, y[:n], y[n:], active, excess)[0]
 
+    problem = Problem(rhs, project, expand, np.tile(system.units, 2))
     y0 = np.concatenate([start.q, start.v])
-
-    def told(t: float, steps: int, y: Array) -> bool:
-        return watch is None or watch(t, steps, lambda: (y[:n], y[n:]))
-
-    made = step_through(
-        rhs, project, start.time, y0, times[-1], system.breaks, tolerance, longest, most, told, system.units
-    )
-    ends, states, polynomials, status, evaluations = made
-    statistics: dict[str, Any] = {"scheme": SCHEME, "steps": len(polynomials), "evaluations": evaluations}
-    return Pieces(ends, states, polynomials, expand), status, statistics
+    options: dict[str, Any] = {"breaks": system.breaks, "longest": longest, "most": most, "watch": watch}
+    return run_problem(problem, (start.time, float(times[-1])), y0, tolerance, **options)
 
 
 def on_constraints(
@@ -147,94 +138,82 @@ def on_constraints(
     return np.concatenate([q, v - change(G, G @ v + system.rate(t, q)[active])])
 
 
-def step_through(
-    rhs: Rhs, project: Rhs, t0: float, y0: Array, t1: float, breaks: Array, tolerance: float, longest: float, most: int,
-    watch: Callable[[float, int, Array], bool] | None = None, units: Array | None = None,
-) -> tuple[Array, Array, Array, int, int]:  # fmt: skip
-    """Adaptive steps from t0 to t1: (ends, states, polynomials, status, evaluations).
+def run_problem(
+    problem: Problem, span: tuple[float, float], y0: Array, tolerance: float, **options: Any
+) -> tuple[States, Status, dict[str, Any]]:
+    """Adaptive steps: (dense output, status, statistics); `options` as those of `StepControl`.
 
-    The error is measured against the largest value that each component has had; steps end at `breaks`.
-    ``watch(t, steps, y)`` may end the run. `units` are sizes of the coordinates that compare (ones by default).
+    The error is measured against the largest value that each component has had.
     """
-    tab = tableau()
-    sign = 1.0 if t1 >= t0 else -1.0
-    t, y = t0, np.array(y0, dtype=float)
+    tab, sizes = tableau(), problem.sizes
+    y, n = np.array(y0, dtype=float), len(y0) // 2
+    t = span[0]
     K = np.zeros((16, y.size))
-    K[0] = rhs(t, y)
-    n = y.size // 2
+    K[0] = problem.rhs(t, y)
     scale = np.abs(y)
-    sizes = np.ones(2 * n) if units is None else np.tile(units, 2)
-    h = first_step(y / sizes, K[0] / sizes, abs(t1 - t0))
-    ends, states = [t], [y]
-    polynomials: list[Array] = []
-    status, evaluations = 0, 1
-    corners = sorted((b for b in breaks if sign * (b - t0) > 0 and sign * (t1 - b) > 0), key=lambda b: sign * b)
-    goals = [*corners, t1]
-    fixed = False
-    while sign * (t1 - t) > 0.0:
-        if len(polynomials) >= most:
-            status = 2
-            break
-        if watch is not None and not watch(t, len(polynomials), y):
-            status = STOPPED
-            break
-        while sign * (goals[0] - t) <= 1e-14 * max(abs(t), abs(t1 - t0)):
-            goals.pop(0)
-        step = min(h, longest, abs(goals[0] - t))
-        fixed = step == abs(goals[0] - t)
-        if step < 1e-14 * max(abs(t), abs(t1 - t0)):
-            status = 1
-            break
-        d = sign * step
+    relative = y / sizes, K[0] / sizes
+    first = first_step(relative[0][:n], relative[1][:n], relative[1][n:], abs(span[1] - span[0]))
+    control = StepControl(LAW, span, first, **options)
+    ends, coefficients = [t], []
+    evaluations = 1
+
+    def state() -> tuple[Array, Array]:
+        return problem.expand(t, y)[:2]
+
+    while (d := control.next_step(state)) is not None:
         try:
             with np.errstate(over="ignore", invalid="ignore"):
                 for s in range(1, 12):
-                    K[s] = rhs(t + tab.C[s] * d, finite(y + d * (tab.A[s, :s] @ K[:s])))
+                    K[s] = problem.rhs(t + tab.C[s] * d, finite(y + d * (tab.A[s, :s] @ K[:s])))
                 new = y + d * (tab.B @ K[:12])
-                K[12] = rhs(t + d, finite(new))
+                K[12] = problem.rhs(t + d, finite(new))
         except np.linalg.LinAlgError:  # a stage ran away (a singular position): a shorter step, or a status
-            h = 0.2 * step
-            if step < 1e-12 * max(1e-300, abs(t1 - t0)):
-                status = 4
-                break
+            control.fail(Status.NOT_FINITE)
             continue
         evaluations += 12
-        reach = np.maximum(scale, np.abs(new))
-        limit = np.maximum(reach, step * np.abs(K[12])) * tolerance + 1e-300
-        relative = limit / sizes
-        limit = limit + 1e-6 * sizes * np.repeat([relative[:n].max(), relative[n:].max()], n)
-        five, three = (tab.E5 @ K[:13]) / limit, (tab.E3 @ K[:13]) / limit
-        big, small = float(five @ five), float(three @ three)
-        error = step * big / math.sqrt((big + 0.01 * small) * y.size) if big > 0.0 else 0.0
+        error = _error(tab, K, d, np.maximum(scale, np.abs(new)), sizes, tolerance)
         if not np.isfinite(error):
-            h = 0.2 * step
-            if step < 1e-12 * max(1e-300, abs(t1 - t0)):
-                status = 4
-                break
+            control.fail(Status.NOT_FINITE)
             continue
         if error > 1.0:
-            h = step * max(0.2, 0.9 * error ** (-1 / 8))
+            control.reject(error)
             continue
         for s in range(13, 16):
-            K[s] = rhs(t + tab.C[s] * d, y + d * (tab.A[s, :s] @ K[:s]))
-        evaluations += 3
-        change = new - y
-        F = np.empty((7, y.size))
-        F[0] = change
-        F[1] = d * K[0] - change
-        F[2] = 2 * change - d * (K[12] + K[0])
-        F[3:] = d * (tab.D @ K)
-        t = goals[0] if fixed else t + d
-        polynomials.append(F)
-        y = project(t, new)
+            K[s] = problem.rhs(t + tab.C[s] * d, y + d * (tab.A[s, :s] @ K[:s]))
+        coefficients.append(_polynomial(tab, K, d, y, new))
+        t = control.accept(error)
+        y = problem.project(t, new)
         scale = np.maximum(scale, np.abs(y))
-        K[0] = rhs(t, y)
-        evaluations += 1
+        K[0] = problem.rhs(t, y)
+        evaluations += 4
         ends.append(t)
-        states.append(y)
-        h = step * min(6.0, 0.9 * max(error, 1e-12) ** (-1 / 8)) if not fixed or error > 0.01 else max(h, step)
-    shape = (len(polynomials), 7, y.size)
-    return np.array(ends), np.array(states), np.array(polynomials).reshape(shape), status, evaluations
+    dense = Polynomials(np.array(ends), np.array(coefficients).reshape(len(coefficients), 8, y.size))
+    statistics = {"scheme": SCHEME, "steps": control.accepted, "evaluations": evaluations}
+    return States(dense, problem.expand), control.status, statistics
+
+
+def _error(tab: Tableau, K: Array, d: float, reach: Array, sizes: Array, tolerance: float) -> float:
+    """Error of a step d over the tolerance, by the embedded methods of order 5 and 3."""
+    n = len(reach) // 2
+    limit = np.maximum(reach, abs(d) * np.abs(K[12])) * tolerance + 1e-300
+    relative = limit / sizes
+    limit = limit + 1e-6 * sizes * np.repeat([relative[:n].max(), relative[n:].max()], n)
+    five, three = (tab.E5 @ K[:13]) / limit, (tab.E3 @ K[:13]) / limit
+    big, small = float(five @ five), float(three @ three)
+    return 0.0 if big == 0.0 else abs(d) * big / math.sqrt((big + 0.01 * small) * len(reach))
+
+
+def _polynomial(tab: Tableau, K: Array, d: float, y: Array, new: Array) -> Array:
+    """Coefficients of powers of t - t_k, shape (8, 2n), of y + x (F0 + (1 - x) (F1 + x (...))), x = (t - t_k)/d."""
+    change = new - y
+    F = [change, d * K[0] - change, 2 * change - d * (K[12] + K[0]), *(d * (tab.D @ K))]
+    out = np.zeros((8, y.size))
+    for i, f in enumerate(reversed(F)):
+        out[0] += f
+        moved = np.roll(out, 1, axis=0)  # times x
+        out = moved if i % 2 == 0 else out - moved  # times x, times 1 - x by turns
+    out[0] += y
+    return out / d ** np.arange(8)[:, None]
 
 
 def finite(y: Array) -> Array:
@@ -248,14 +227,3 @@ def finite(y: Array) -> Array:
     if not np.isfinite(y).all():
         raise np.linalg.LinAlgError("the state is not finite")
     return y
-
-
-def first_step(y: Array, dy: Array, span: float) -> float:
-    """A careful first step: a hundredth of the time in which the speeds change by themselves, or the one from rest in
-    which the accelerations move the coordinates by 5e-9 of themselves."""
-    n = y.size // 2
-    far, speed, pull = (float(np.abs(x).max(initial=0.0)) for x in (y[:n], dy[:n], dy[n:]))
-    guess = 1e-3 * span
-    if pull > 0.0:
-        guess = min(guess, max(0.01 * speed / pull, 1e-4 * math.sqrt(far / pull)))
-    return max(guess, 1e-9 * span)

@@ -15,17 +15,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from .choice import STOPPED, Watch
 from .contract import Array, Element, LocalForce, ModalBlocks
+from .dense import Polynomials, hermite
 from .elimination import Minimal, is_linear, minimal
-from .explicit import first_step, on_constraints
+from .explicit import on_constraints
 from .start import Start
+from .status import Status
+from .steps import StepControl, StepLaw, Watch, first_step
 from .system import System
-from .within import within_run
 
 ROOT6 = math.sqrt(6.0)
 C = np.array([(4 - ROOT6) / 10, (4 + ROOT6) / 10, 1.0])
@@ -43,42 +44,29 @@ MU, BASIS = MU[ORDER], BASIS[:, ORDER]
 BACK = np.linalg.inv(BASIS)
 ERROR = np.array([-13 - 7 * ROOT6, -13 + 7 * ROOT6, -1.0]) / 3
 MOST_NEWTON = 10
+LAW = StepLaw(exponent=0.25, growth=5.0, least_error=1e-8, predictive=True)
+#: Share of a step that is tried after Newton did not converge.
+NOT_SOLVED_SHARE = 0.3
 #: Asked tolerance -> that of steps in modal coordinates: accelerations weigh the fast modes more than the state does.
 MODES_SHARE = 0.03
 
 
-@dataclass(frozen=True)
-class Hermite:
-    """Dense output: on every step the polynomial of degree 5 through q, v, a of its ends."""
+class State(NamedTuple):
+    """Where a step begins."""
 
-    times: Array
+    t: float
     q: Array
     v: Array
     a: Array
-
-    def __call__(self, t: Array, derivative: int = 0) -> Array:
-        """Coordinates (or a derivative of them) at the times t."""
-        t = within_run(self.times, t)
-        sign = 1.0 if self.times[-1] >= self.times[0] else -1.0
-        k = np.clip(np.searchsorted(sign * self.times, sign * t, side="right") - 1, 0, max(0, len(self.times) - 2))
-        h = (self.times[k + 1] - self.times[k])[:, None]
-        x = (t - self.times[k])[:, None] / h
-        q0, v0, a0 = self.q[k], h * self.v[k], h * h * self.a[k]
-        q1, v1, a1 = self.q[k + 1], h * self.v[k + 1], h * h * self.a[k + 1]
-        d = q1 - q0 - v0 - a0 / 2
-        e, f = v1 - v0 - a0, a1 - a0
-        coefficients = [q0, v0, a0 / 2, 10 * d - 4 * e + f / 2, -15 * d + 7 * e - f, 6 * d - 3 * e + f / 2]
-        out = np.zeros_like(q0)
-        for j in range(5, derivative - 1, -1):
-            out = out * x + math.perm(j, derivative) * coefficients[j]
-        return out / h**derivative
+    multipliers: Array
 
 
-def run_implicit(  # type: ignore[no-untyped-def]
+def run_implicit(
     system: System, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
     watch: Watch | None = None,
-):  # fmt: skip
+) -> tuple[Polynomials, Status, dict[str, Any]]:  # fmt: skip
     """Integrate; returns (dense output, status, statistics). Linear constant constraints are eliminated before."""
+    options: dict[str, Any] = {"longest": longest, "most": most}
     if system.joints and is_linear(system) and all(isinstance(e, LocalForce) for e, _ in system.forces):
         core = minimal(system)
         inner, begin = in_modes(core, start)
@@ -87,62 +75,42 @@ def run_implicit(  # type: ignore[no-untyped-def]
         def told(t: float, steps: int, state: Callable[[], tuple[Array, Array]]) -> bool:
             return watch is None or watch(t, steps, lambda: (core.origin + core.T @ state()[0], core.T @ state()[1]))
 
-        options: dict[str, Any] = {"tolerance": local, "longest": longest, "most": most, "watch": told}
-        dense, status, statistics = run_implicit(inner, begin, times, **options)
-        q, v, a = core.origin + dense.q @ core.T.T, dense.v @ core.T.T, dense.a @ core.T.T
-        return Hermite(dense.times, q, v, a), status, {**statistics, "free_coordinates": inner.size}
-    t, t1 = start.time, float(times[-1])
-    sign = 1.0 if t1 >= t else -1.0
-    n, active = system.size, start.active
-    q, v = start.q.copy(), start.v.copy()
-    a, multipliers = system.acceleration(t, q, v, active, start.excess)
-    span = abs(t1 - t)
-    reach = np.maximum(np.abs(q), 1e-300)
-    units = system.units
-    pair = [np.concatenate([x, y]) / np.tile(units, 2) for x, y in ((q, v), (v, a))]
-    h = min(longest, first_step(pair[0], pair[1], span))
-    goals = sorted((b for b in system.breaks if sign * (b - t) > 0 and sign * (t1 - b) > 0), key=lambda b: sign * b)
-    goals.append(t1)
-    record = [(t, q, v, a)]
-    status, newton, rejected, before = 0, 0, 0, 0.0
-    while sign * (t1 - t) > 0.0:
-        if len(record) > most:
-            status = 2
-            break
-        if watch is not None and not watch(t, len(record) - 1, lambda: record[-1][1:3]):
-            status = STOPPED
-            break
-        while sign * (goals[0] - t) <= 1e-14 * max(abs(t), span):
-            goals.pop(0)
-        step = min(h, longest, abs(goals[0] - t))
-        fixed = step == abs(goals[0] - t)
-        if step < 1e-13 * max(abs(t), span):
-            status = 1 if rejected < 50 else 5
-            break
+        dense, status, statistics = run_implicit(inner, begin, times, tolerance=local, watch=told, **options)
+        coefficients = dense.coefficients @ core.T.T
+        coefficients[:, 0] += core.origin
+        return Polynomials(dense.times, coefficients), status, {**statistics, "free_coordinates": inner.size}
+    active, units = start.active, system.units
+    pair = system.acceleration(start.time, start.q, start.v, active, start.excess)
+    here = State(start.time, start.q.copy(), start.v.copy(), *pair)
+    span = (start.time, float(times[-1]))
+    first = first_step(here.q / units, here.v / units, here.a / units, abs(span[1] - span[0]))
+    control = StepControl(LAW, span, first, breaks=system.breaks, watch=watch, **options)
+    reach = np.maximum(np.abs(here.q), 1e-300)
+    record = [here]
+    newton = 0
+
+    def state() -> tuple[Array, Array]:
+        return here.q, here.v
+
+    while (h := control.next_step(state)) is not None:
         least = 1e-3 * units * max(float((reach / units).max()), 1e-12)
-        limit = tolerance * np.maximum(np.maximum(reach, step * np.abs(v)), least)
-        made = radau_step(system, t, q, v, a, multipliers, sign * step, limit, active)
+        limit = tolerance * np.maximum(np.maximum(reach, abs(h) * np.abs(here.v)), least)
+        made = radau_step(system, here, h, limit, active)
         newton += made.iterations
         if not made.converged:
-            h, rejected = 0.3 * step, rejected + 1
+            control.fail(Status.NOT_SOLVED, NOT_SOLVED_SHARE)
             continue
         if made.error > 1.0:
-            h, rejected = step * max(0.2, 0.9 * made.error**-0.25), rejected + 1
+            control.reject(made.error)
             continue
-        t = goals[0] if fixed else t + sign * step
-        state = on_constraints(system, t, made.q, made.v, active, start.excess)
-        q, v = state[:n], state[n:]
-        a, multipliers = system.acceleration(t, q, v, active, start.excess)
+        t = control.accept(made.error)
+        q, v = np.split(on_constraints(system, t, made.q, made.v, active, start.excess), 2)
+        here = State(t, q, v, *system.acceleration(t, q, v, active, start.excess))
         reach = np.maximum(reach, np.abs(q))
-        record.append((t, q, v, a))
-        factor = 0.9 * max(made.error, 1e-8) ** -0.25
-        if before > 0.0 and made.error > 0.0:  # predictive control (Gustafsson)
-            factor = min(factor, factor * (before / made.error) ** 0.25 * 1.0)
-        before = made.error
-        h = max(h, step) if fixed and made.error < 0.01 else step * min(5.0, max(0.2, factor))
-    dense = Hermite(*(np.array([r[k] for r in record]) for k in range(4)))
-    counts = {"scheme": "Radau IIA of order 5", "steps": len(record) - 1}
-    return dense, status, {**counts, "newton_iterations": newton, "rejected": rejected}
+        record.append(here)
+    dense = hermite(*(np.array([r[k] for r in record]) for k in range(4)))
+    counts = {"scheme": "Radau IIA of order 5", "steps": control.accepted}
+    return dense, control.status, {**counts, "newton_iterations": newton, "rejected": control.rejected}
 
 
 def in_modes(core: Minimal, start: Start) -> tuple[System, Start]:
@@ -173,18 +141,9 @@ class Step:
     converged: bool
 
 
-def radau_step(
-    system: System,
-    t: float,
-    q: Array,
-    v: Array,
-    a: Array,
-    multipliers: Array,
-    h: float,
-    limit: Array,
-    active: np.ndarray,
-) -> Step:
+def radau_step(system: System, here: State, h: float, limit: Array, active: np.ndarray) -> Step:
     """Simplified Newton on the three stages, and the embedded error estimate against `limit`."""
+    t, q, v, a, multipliers = here
     n, m = system.size, int(active.sum())
     middle, middle_q, middle_v = t + h / 2, q + h / 2 * v + h * h / 8 * a, v + h / 2 * a
     by_q, by_v = system.force_jacobian(middle, middle_q, middle_v)

@@ -12,17 +12,21 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..progress import announce, count, stage
-from . import compiled, kernel_run, taylor
+from . import compiled, taylor
 from .backend import COMPILED_FASTER, compiled_is_ready, loading_seconds, plain_seconds_spent, spend_plain_seconds
 from .carried import loose_link
-from .choice import Choice, Watch, Way, joined, joined_statistics
+from .choice import Choice, Way, joined, joined_statistics
 from .contract import Array
-from .elimination import is_linear
+from .dense import Dense
+from .elimination import is_linear, minimal
 from .start import Start, consistent_start
+from .status import Status
+from .steps import Watch
 from .system import System
 from .tables import carrying
-from .trajectory import IntegrationError, Status, Trajectory
+from .trajectory import IntegrationError, Trajectory
 
+Run = tuple[Dense, Status, dict[str, Any]]
 METHODS = ("auto", "taylor", "explicit", "implicit")
 #: Asked tolerance -> largest last term of a Taylor step. The benchmark mechanisms amplify local errors some
 #: hundred times.
@@ -109,14 +113,14 @@ def integrate(
             dense = joined(legs)
     sign = 1.0 if asked[-1] >= asked[0] else -1.0
     reached = sign * dense.times[-1] + 1e-12 * max(abs(asked[0]), abs(asked[-1]))
-    kept = asked if status == 0 else asked[sign * asked <= reached]
-    if status == 0 and not _dropped_rows_hold(system, start, dense, tolerance):
+    kept = asked if status is Status.DONE else asked[sign * asked <= reached]
+    if status is Status.DONE and not _dropped_rows_hold(system, start, dense, tolerance):
         status = Status.REDUNDANT_NOT_MET
     if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE, Status.NOT_SOLVED) and len(dense.times) > 1:
         last = dense.times[-6:]  # the very last ones may be beyond all numbers
         link = loose_link(system, last, dense(last, 0), dense(last, 1), start)
         statistics = statistics if link is None else {**statistics, "loose_link": link}
-    made = Trajectory(system, start, kept, Status(status), chosen, statistics, dense)
+    made = Trajectory(system, start, kept, status, chosen, statistics, dense)
     if raise_on_failure and made.status is not Status.DONE:
         raise IntegrationError(made, made.message, made.reached, float(asked[-1]))
     return made
@@ -128,7 +132,7 @@ def _counted(begin: float, end: float, t: float, steps: int, state: Any) -> bool
     return True
 
 
-def _dropped_rows_hold(system: System, start: Start, dense: Any, tolerance: float) -> bool:
+def _dropped_rows_hold(system: System, start: Start, dense: Dense, tolerance: float) -> bool:
     """Whether all rows are met along the run, whichever of a redundant set was left out on the way."""
     left_out = ~start.active
     if not left_out.any() or len(dense.times) < 2 or is_linear(system):  # constant rows hold as they did at the start
@@ -182,25 +186,30 @@ def _rate(system: System, start: Start) -> float:
     return known[1]
 
 
-def _explicit(  # type: ignore[no-untyped-def]
+def _explicit(
     system: System, backend: str, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
-):
+) -> Run:
+    if is_linear(system):
+        from .modal import run_minimal
+
+        jit = use_compiled(backend)
+        return run_minimal(minimal(system), start, times, jit=jit, most=most, watch=watch, **options)
     from .explicit import run_explicit
 
-    return run_explicit(system, start, times, jit=use_compiled(backend), most=most, watch=watch, **options)
+    return run_explicit(system, start, times, most=most, watch=watch, **options)
 
 
-def _implicit(  # type: ignore[no-untyped-def]
+def _implicit(
     system: System, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
-):
+) -> Run:
     from .implicit import run_implicit
 
     return run_implicit(system, start, times, most=most, watch=watch, **options)
 
 
-def _taylor(  # type: ignore[no-untyped-def]
+def _taylor(
     system: System, jit: bool, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
-):
+) -> Run:
     scene = system.planar
     if scene is None:
         cure = "use method='explicit' or 'implicit'"
@@ -215,21 +224,19 @@ def _taylor(  # type: ignore[no-untyped-def]
     if key not in cache:
         cache[key] = taylor.work_space(assembly.tables, order)
     redundant = (~start.active).astype(np.int64)
-    pieces = taylor.run(
+    made = taylor.run(
         assembly, start.q, start.v, (start.time, float(times[-1])), tolerance=local, redundant=redundant,
         order=order, longest=options["longest"], most=most, jit=jit, work=cache[key], watch=watch,
     )  # fmt: skip
-    status = 2 if pieces.status == kernel_run.FULL else pieces.status
-    where = np.flatnonzero(pieces.folds)
     statistics = {
         "scheme": "Taylor series",
-        "steps": len(pieces.coefficients),
+        "steps": len(made.folds),
         "order": order,
         "backend": "compiled" if jit else "plain",
-        "compile_seconds": pieces.compiling,
-        "singular_passages": pieces.times[where],
+        "compile_seconds": made.compiling,
+        "singular_passages": made.dense.times[np.flatnonzero(made.folds)],
     }
-    return pieces, status, statistics
+    return made.dense, made.status, statistics
 
 
 def use_compiled(backend: str) -> bool:

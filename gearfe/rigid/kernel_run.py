@@ -16,8 +16,10 @@ from .kernel_fold import evaluate, next_fold, project
 from .kernel_locate import exchange, locate_fold
 from .kernel_rows import copy, factorise, fill, gradients, trigonometry
 from .kernel_series import expand
+from .status import Status
 
-DONE, TOO_SMALL, FULL, SINGULAR, NOT_FINITE, AT_FOLD = 0, 1, 2, 3, 4, 6
+DONE, TOO_SMALL, FULL = int(Status.DONE), int(Status.STEP_TOO_SMALL), int(Status.MOST_STEPS)
+SINGULAR, NOT_FINITE, AT_FOLD = int(Status.NO_BRANCH), int(Status.NOT_FINITE), int(Status.SINGULAR_START)
 #: Angle (rad) that bodies turn against each other between two looks for folds.
 FAR = 0.5
 
@@ -179,7 +181,8 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
     """Integrate from (q, v) to t1, or until the arrays are full; call again with the same arguments to go on.
 
     `state` holds (time, folds, time to the fold ahead, 1 once begun, last step, row of the fold ahead); T (room + 1,)
-    receives step ends, C (room, order + 1, n) coefficients, kind (room,) the number of folds at the start of each.
+    receives step ends, C (room, order + 1, 3n) coefficients without the ground's, kind (room,) the number of folds at
+    the start of each.
 
     Returns status, number of steps. AT_FOLD asks for `begin` (rare, so it stays in Python) before the next call.
     """
@@ -246,7 +249,8 @@ def integrate_series(tb, w, t0, t1, q, v, order, tolerance, length, base, breaks
         if status != DONE:
             break
         for j in range(order + 1):
-            copy(w.QS[j], C[count, j])
+            for i in range(C.shape[2]):
+                C[count, j, i] = w.QS[j, i]
         kind[count] = folds
         if next_folds == 0:
             copy(base, w.skip)

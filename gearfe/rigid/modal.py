@@ -18,23 +18,25 @@ import numpy as np
 
 from ..progress import stage
 from . import compiled, kernel_modal
-from .choice import STOPPED, Watch
 from .contract import Array, LocalForce, SeriesLaw
+from .dense import Dense, within_run
 from .elimination import Minimal
-from .explicit import SCHEME, Pieces, step_through
+from .explicit import Problem, run_problem
 from .start import Start
-from .within import within_run
+from .status import Status
+from .steps import Watch
 
 #: Highest order of the series; 24 to 36 cost the same within a tenth.
 ORDER = 30
 #: Asked tolerance -> that of the plain Runge-Kutta steps: accelerations weigh the fast modes more than the state does.
 PLAIN_SHARE = 0.03
+_FULL = int(Status.MOST_STEPS)
 
 
-def run_minimal(  # type: ignore[no-untyped-def]
+def run_minimal(
     core: Minimal, start: Start, times: Array, *, tolerance: float, longest: float, most: int, jit: bool = True,
     watch: Watch | None = None,
-):  # fmt: skip
+) -> tuple[Dense, Status, dict[str, Any]]:  # fmt: skip
     """Integrate a system in minimal coordinates; returns (dense output, status, statistics)."""
     n = core.T.shape[1]
     y0 = np.concatenate(core.reduce(start.q, start.v))
@@ -57,29 +59,22 @@ def run_minimal(  # type: ignore[no-untyped-def]
 
     series = _series(core) if jit else None
     if series is None:
-        made = step_through(
-            rhs,
-            lambda _, y: y,
-            start.time,
-            y0,
-            times[-1],
-            core.system.breaks,
-            max(PLAIN_SHARE * tolerance, 1e-14),
-            longest,
-            most,
-            told,
-        )
-        ends, states, polynomials, status, evaluations = made
-        statistics: dict[str, Any] = {"steps": len(polynomials), "evaluations": evaluations, "backend": "plain"}
-        statistics["scheme"] = SCHEME
-        return Pieces(ends, states, polynomials, expand), status, {**statistics, "free_coordinates": n}
+        options: dict[str, Any] = {"breaks": core.system.breaks, "longest": longest, "most": most, "watch": watch}
+        problem = Problem(rhs, lambda _, y: y, expand, np.ones(2 * n))
+        local = max(PLAIN_SHARE * tolerance, 1e-14)
+        plain, ended, counts = run_problem(problem, (start.time, float(times[-1])), y0, local, **options)
+        return plain, ended, {**counts, "backend": "plain", "free_coordinates": n}
     run = SeriesRun(core, *series, tolerance, longest, expand)
     compiling = run.load()
     ends, states, found, status, orders = run.steps(start.time, y0, float(times[-1]), times, most, told)
-    dense = SeriesPieces(ends, states, times[: len(found)], found, run)
-    statistics = {"scheme": "Taylor series", "steps": len(ends) - 1, "orders": orders, "backend": "compiled"}
+    statistics: dict[str, Any] = {
+        "scheme": "Taylor series",
+        "steps": len(ends) - 1,
+        "orders": orders,
+        "backend": "compiled",
+    }
     statistics["compile_seconds"] = compiling
-    return dense, status, {**statistics, "free_coordinates": n}
+    return SeriesPieces(ends, states, times[: len(found)], found, run), status, {**statistics, "free_coordinates": n}
 
 
 def _series(core: Minimal) -> tuple[LocalForce, np.ndarray, SeriesLaw] | None:
@@ -128,7 +123,7 @@ class SeriesRun:
     def steps(
         self, t0: float, y0: Array, t1: float, asked: Array, most: int,
         watch: Callable[[float, int, Array], bool] | None = None,
-    ) -> tuple[Array, Array, Array, int, int]:  # fmt: skip
+    ) -> tuple[Array, Array, Array, Status, int]:  # fmt: skip
         """(step ends, states there, states at the asked times passed, status, orders computed)."""
         core, series = self.core, self.series
         n = core.T.shape[1]
@@ -141,12 +136,19 @@ class SeriesRun:
         work = kernel_modal.work_space(n, W.shape[0], ORDER + 1)
         found = np.empty((len(asked), 2 * n))
         rates = np.sqrt(np.abs(core.squares).max(initial=0.0)) + np.abs(diagonal).max(initial=0.0)
-        t, state, h, status, at, orders = t0, y0.copy(), 5.0 / max(rates, 1.0 / max(abs(t1 - t0), 1e-300)), 2, 0, 0
+        t, state, h, status, at, orders = (
+            t0,
+            y0.copy(),
+            5.0 / max(rates, 1.0 / max(abs(t1 - t0), 1e-300)),
+            int(Status.MOST_STEPS),
+            0,
+            0,
+        )
         reach, pull = np.abs(y0[:n]), np.zeros(n)
         ends, states, room = [np.array([t0])], [y0[None, :]], 512
         if watch is not None:
             watch(t, 0, state)
-        while status == 2 and sum(map(len, ends)) - 1 < most:
+        while status == _FULL and sum(map(len, ends)) - 1 < most:
             room = min(room, most + 1 - sum(map(len, ends)))
             T, Y = np.empty(room), np.empty((room, 2 * n))
             status, count, t, h, further, at = kernels.modal_steps(
@@ -157,10 +159,10 @@ class SeriesRun:
             orders += further
             ends.append(T[:count])
             states.append(Y[:count])
-            if watch is not None and status == 2 and not watch(t, sum(map(len, ends)) - 1, state):
-                status = STOPPED
+            if watch is not None and status == _FULL and not watch(t, sum(map(len, ends)) - 1, state):
+                status = Status.STOPPED
             room = min(4 * room, 20_000)
-        return np.concatenate(ends), np.vstack(states), found[:at], status, orders
+        return np.concatenate(ends), np.vstack(states), found[:at], Status(status), orders
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,10 @@ import numpy as np
 
 from ..progress import stage
 from . import compiled, kernel_fold, kernel_forces, kernel_locate, kernel_names, kernel_rows, kernel_run, kernel_series
-from .choice import LEAST_STEPS, STOPPED, Watch
+from .dense import Polynomials
+from .status import Status
+from .steps import Watch
 from .tables import Array, Assembly, Ints, Tables
-from .within import within_run
 
 FUNCTIONS = (
     *kernel_rows.FUNCTIONS, *kernel_forces.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_fold.FUNCTIONS,
@@ -31,6 +32,10 @@ HOT = (
     "add_force", "add_arms", "product_forces", "add_multipliers", "add_product_multipliers", "torque_orders",
     "finish_order", "constrained",
 )  # fmt: skip
+
+
+#: Steps between two looks at the clock at first: plain ones, compiled ones.
+FIRST_STEPS, FIRST_COMPILED = 8, 64
 
 
 class FoldFrame(NamedTuple):
@@ -141,48 +146,25 @@ def work_space(tables: Tables, order: int) -> Work:
 
 
 @dataclass(frozen=True)
-class Pieces:
-    """Result of the loop, and its dense output.
+class TaylorRun:
+    """Result of the loop.
 
     Parameters
     ----------
-    times : ndarray, shape (steps + 1,)
-        Ends of the steps (s).
-    coefficients : ndarray, shape (steps, order + 1, 3n)
-        Taylor series on every step, the ground's coordinates last.
+    status : Status
+        Why it ended.
+    dense : Polynomials
+        Taylor series on every step, without the ground's coordinates.
     folds : ndarray, shape (steps,)
         Number of singular combinations of rows at the start of every step.
-    begin : float
-        Start of the run (s).
     compiling : float
         Seconds that compiling the kernels took, or loading those of an earlier run.
     """
 
-    status: int
-    times: Array
-    coefficients: Array
+    status: Status
+    dense: Polynomials
     folds: Ints
-    jit: bool
-    begin: float
     compiling: float = 0.0
-
-    def __call__(self, t: Array, derivative: int = 0) -> Array:
-        """Coordinates (or a derivative of them) at the times t."""
-        if len(self.coefficients) == 0:
-            raise ValueError("no step was completed, so there is nothing between the times")
-        # a start on a singular position is left by a series about a moment a little later
-        t = np.ascontiguousarray(within_run(np.array([self.begin, self.times[-1]]), t))
-        out = np.empty((t.size, self.coefficients.shape[2]))
-        sign = 1.0 if self.times[-1] >= self.times[0] else -1.0
-        if self.jit:
-            kernels(True).sample(self.times, self.coefficients, sign, t, derivative, out)
-            return out[:, :-3]
-        k = np.clip(np.searchsorted(sign * self.times, sign * t, side="right") - 1, 0, len(self.coefficients) - 1)
-        h = (t - self.times[k])[:, None]
-        out[:] = 0.0
-        for j in range(self.coefficients.shape[1] - 1, derivative - 1, -1):
-            out = out * h + math.perm(j, derivative) * self.coefficients[k, j]
-        return out[:, :-3]
 
 
 _LOADED: list[bool] = []
@@ -210,14 +192,14 @@ def load_kernels(assembly: Assembly, w: Work, order: int, redundant: Ints) -> fl
     state, times, coefficients = (
         np.array([0.0, 0.0, math.inf, 1.0, 0.0, -1.0]),
         np.zeros(2),
-        np.zeros((1, order + 1, n3)),
+        np.zeros((1, order + 1, n3 - 3)),
     )
     with stage("compiling the kernels"):
         kernels(True).integrate_series(
             assembly.tables, w, 0.0, 0.0, np.zeros(n3), np.zeros(n3), order, 1e-9, assembly.length, redundant,
             assembly.breaks, math.inf, state, times, coefficients, np.zeros(1, dtype=np.int64),
         )  # fmt: skip
-        kernels(True).sample(times, coefficients, 1.0, np.zeros(1), 0, np.zeros((1, n3)))
+        kernels(True).sample(times, coefficients, 1.0, np.zeros(1), 0, np.zeros((1, n3 - 3)))
     _LOADED.append(True)
     return time.perf_counter() - began
 
@@ -241,7 +223,7 @@ def run(
     jit: bool = True,
     work: Work | None = None,
     watch: Watch | None = None,
-) -> Pieces:
+) -> TaylorRun:
     """Integrate the scene from the consistent state (q, v) of its moving bodies over `span`."""
     order = order or order_for(tolerance)
     tb = assembly.tables
@@ -254,7 +236,7 @@ def run(
     compiling = load_kernels(assembly, w, order, redundant) if jit else 0.0
     advance = kernels(jit).integrate_series
     parts = []
-    room, done = min(64 if jit else LEAST_STEPS, most), 0
+    room, done = min(FIRST_COMPILED if jit else FIRST_STEPS, most), 0
 
     def moving() -> tuple[Array, Array]:
         return q[:-3], v[:-3]
@@ -262,32 +244,36 @@ def run(
     if watch is not None:
         watch(t0, 0, moving)
     while True:
-        times, coefficients = np.empty(room + 1), np.empty((room, order + 1, q.size))
+        times, coefficients = np.empty(room + 1), np.empty((room, order + 1, q.size - 3))
         folds = np.zeros(room, dtype=np.int64)
         status, count = advance(
             tb, w, t0, t1, q, v, order, float(tolerance), assembly.length, redundant, assembly.breaks,
             float(longest), state, times, coefficients, folds,
         )  # fmt: skip
-        if status == kernel_run.AT_FOLD:
+        if status == Status.SINGULAR_START:
             sign = 1.0 if t1 >= t0 else -1.0
             folds_here, shift, ahead, row, status = kernels(False).begin(
                 tb, t0, sign, q, v, order, float(tolerance), assembly.length, redundant, 0, w, w.qn, w.vn
             )
             state[:4] = t0 + shift, folds_here, ahead, 1.0
             state[5] = row
-            if status == kernel_run.DONE:
+            if status == Status.DONE:
                 continue
             times[0] = t0
         parts.append((times[: count + 1], coefficients[:count], folds[:count]))
         done += count
-        if status != kernel_run.FULL or done >= most:
+        if status != Status.MOST_STEPS or done >= most:
             break
         if watch is not None and state[1] == 0.0 and not watch(float(state[0]), done, moving):  # not on a fold
-            status = STOPPED
+            status = Status.STOPPED
             break
-        room = min(2 * room, max(64, 2_000_000 // coefficients[0].size), most - done)
+        room = min(2 * room, max(FIRST_COMPILED, 2_000_000 // coefficients[0].size), most - done)
     ends = np.concatenate([parts[0][0], *(p[0][1:] for p in parts[1:])])
-    if len(parts) == 1:
-        return Pieces(int(status), ends, parts[0][1], parts[0][2], jit, t0, compiling)
-    coefficients, folds = (np.concatenate([p[k] for p in parts]) for k in (1, 2))
-    return Pieces(int(status), ends, coefficients, folds, jit, t0, compiling)
+    series = np.concatenate([p[1] for p in parts]) if len(parts) > 1 else parts[0][1]
+    dense = Polynomials(ends, series, sampler if jit else None, t0)
+    return TaylorRun(Status(status), dense, np.concatenate([p[2] for p in parts]), compiling)
+
+
+def sampler(times: Array, coefficients: Array, sign: float, t: Array, derivative: int, out: Array) -> None:
+    """Compiled sums of the polynomials, see `Polynomials`."""
+    kernels(True).sample(times, coefficients, sign, t, derivative, out)

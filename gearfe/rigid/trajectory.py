@@ -4,46 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import IntEnum
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from .contract import Array
+from .dense import Dense
 from .start import Start
+from .status import Status
 from .system import System, least_norm_solution
-
-
-class Status(IntEnum):
-    """Why a run ended."""
-
-    DONE = 0
-    STEP_TOO_SMALL = 1
-    MOST_STEPS = 2
-    NO_BRANCH = 3
-    NOT_FINITE = 4
-    NOT_SOLVED = 5
-    REDUNDANT_NOT_MET = 7
-
-    @property
-    def message(self) -> str:
-        """The status in words."""
-        return _MESSAGES[self]
-
-    def __str__(self) -> str:
-        return self.name.lower()
-
-
-_MESSAGES = {
-    Status.DONE: "done",
-    Status.STEP_TOO_SMALL: "the step became too small for the tolerance",
-    Status.MOST_STEPS: "the largest number of steps was reached",
-    Status.NO_BRANCH: "the start is a singular position and its velocity selects no branch",
-    Status.NOT_FINITE: "the state is not finite",
-    Status.NOT_SOLVED: "the equations could not be solved in a step",
-    Status.REDUNDANT_NOT_MET: "constraints that were taken for redundant at the start are not met by the motion",
-}
 
 
 class IntegrationError(RuntimeError):
@@ -60,17 +30,6 @@ class IntegrationError(RuntimeError):
         super().__init__(
             f"the run ended at {reached:.6g} s of {end:.6g} s: {why}; raise_on_failure=False returns what was computed"
         )
-
-
-class Dense(Protocol):
-    """Coordinates at any time within the run."""
-
-    @property
-    def times(self) -> Array:
-        """Ends of the steps (s)."""
-
-    def __call__(self, t: Array, derivative: int = 0) -> Array:
-        """Coordinates (derivative 0), velocities (1), accelerations (2) at the times t; shape (times, size)."""
 
 
 @dataclass(frozen=True)

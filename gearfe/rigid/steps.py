@@ -1,0 +1,153 @@
+"""Where steps begin and end: lengths from errors, breaks of the forces, the end of the run, and why it ended.
+
+An integrator asks for a step, tries it, and tells what came of it:
+
+    while (step := control.next_step(state)) is not None:
+        ...
+        if error <= 1.0: control.accept(error)      # error relative to the tolerance
+        else: control.reject(error)             # or fail(status) where it has no size
+
+An error of order h^(1/e) in the step h gives the next one h 0.9 error^-e (Hairer & Wanner II, Sec. IV.8).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from .contract import Array
+from .status import Status
+
+#: ``watch(t, steps, state)``: the time reached, the steps done, and a function that gives (q, v) there; False ends the
+#: run. Called once with no steps when all is loaded, then after every few steps.
+Watch = Callable[[float, int, Callable[[], tuple[Array, Array]]], bool]
+
+#: Share of the step that the error allows; the least part of a step that is tried after one that was rejected.
+SAFETY, LEAST = 0.9, 0.2
+#: A step that ended at a break or at the end was cut: unless its error was above this share, the next is not shorter.
+CUT = 0.01
+#: Steps below this share of the time, or of the run's length, are rounding; steps below the second whose errors have no
+#: size end the run.
+ROUNDING, NO_SIZE = 1e-14, 1e-12
+
+
+@dataclass(frozen=True)
+class StepLaw:
+    """What distinguishes methods.
+
+    Parameters
+    ----------
+    exponent
+        e in h ~ error^-e.
+    growth
+        Most times that a step may grow.
+    least_error
+        Below it an error is rounding.
+    predictive
+        Gustafsson's rule: the last two errors tell the trend.
+    """
+
+    exponent: float
+    growth: float
+    least_error: float
+    predictive: bool = False
+
+
+class StepControl:
+    """The steps of one run.
+
+    Parameters
+    ----------
+    law
+        Of the method.
+    span : (float, float)
+        Begin and end (s).
+    first
+        First trial step (s), > 0.
+    breaks
+        Times at which forces are not smooth: steps end there.
+    longest, most
+        Longest step (s), largest number of steps.
+    watch
+        See `Watch`.
+    """
+
+    def __init__(
+        self,
+        law: StepLaw,
+        span: tuple[float, float],
+        first: float,
+        *,
+        breaks: Array,
+        longest: float = math.inf,
+        most: int = 1_000_000,
+        watch: Watch | None = None,
+    ) -> None:
+        self.law, self.longest, self.most, self.watch = law, longest, most, watch
+        self.t, self.end = span
+        self.sign = 1.0 if self.end >= self.t else -1.0
+        self.span = abs(self.end - self.t)
+        inside = (float(b) for b in breaks if self.sign * (b - self.t) > 0 and self.sign * (self.end - b) > 0)
+        self.goals = [*sorted(inside, key=lambda b: self.sign * b), self.end]
+        self.trial = first
+        self.status = Status.DONE
+        self.accepted = self.rejected = 0
+        self._step, self._cut, self._before = 0.0, False, 0.0
+
+    def next_step(self, state: Callable[[], tuple[Array, Array]]) -> float | None:
+        """The next step to try, with the sign of time; None when the run has ended, `status` then says why."""
+        if self.status is not Status.DONE or self.sign * (self.end - self.t) <= 0.0:
+            return None
+        if self.accepted >= self.most:
+            self.status = Status.MOST_STEPS
+            return None
+        if self.watch is not None and not self.watch(self.t, self.accepted, state):
+            self.status = Status.STOPPED
+            return None
+        rounding = ROUNDING * max(abs(self.t), self.span)
+        while self.sign * (self.goals[0] - self.t) <= rounding:
+            self.goals.pop(0)
+        left = abs(self.goals[0] - self.t)
+        self._step = min(self.trial, self.longest, left)
+        self._cut = self._step == left
+        if self._step < rounding:
+            self.status = Status.STEP_TOO_SMALL
+            return None
+        return self.sign * self._step
+
+    def accept(self, error: float) -> float:
+        """The step is made; the time reached."""
+        law = self.law
+        self.t = self.goals[0] if self._cut else self.t + self.sign * self._step
+        factor = SAFETY * max(error, law.least_error) ** -law.exponent
+        if law.predictive and self._before > 0.0 and error > 0.0:
+            factor = min(factor, factor * (self._before / error) ** law.exponent)
+        self._before = error
+        grown = self._step * min(law.growth, max(LEAST, factor))
+        self.trial = max(self.trial, self._step) if self._cut and error <= CUT else grown
+        self.accepted += 1
+        return self.t
+
+    def reject(self, error: float) -> None:
+        """The step is not made: its error is above 1."""
+        self.rejected += 1
+        self.trial = self._step * max(LEAST, SAFETY * error**-self.law.exponent)
+
+    def fail(self, status: Status, share: float = LEAST) -> None:
+        """The step is not made, and its error has no size: `share` of it is next, or the run ends with `status`."""
+        self.rejected += 1
+        self.trial = share * self._step
+        if self._step < NO_SIZE * max(1e-300, self.span):
+            self.status = status
+
+
+def first_step(q: Array, v: Array, a: Array, span: float) -> float:
+    """A careful first step from coordinates, velocities, accelerations in units that compare: a hundredth of the time
+    in which the speeds change by themselves, or the one from rest in which the accelerations move the coordinates by
+    5e-9 of themselves."""
+    far, speed, pull = (float(abs(x).max(initial=0.0)) for x in (q, v, a))
+    guess = 1e-3 * span
+    if pull > 0.0:
+        guess = min(guess, max(0.01 * speed / pull, 1e-4 * math.sqrt(far / pull)))
+    return max(guess, 1e-9 * span)
