@@ -151,6 +151,7 @@ def _positions(batch: Batch, outcome: Outcome, places: Positions) -> Positions:
         loads=(_loads(batch, pinion, forces, rate), _loads(batch, wheel, forces, rate)),
         points=_points(batch, here),
         tangent=tangent,
+        energy=0.5 * work,
         **one,
     )
     return made.stated(np.where(solved, "converged", "not_converged"))

@@ -30,6 +30,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,7 +38,6 @@ from numpy.typing import ArrayLike, NDArray
 from ..gear.touching import Touching
 from .half_plane_result import (
     SUMS,
-    HalfPlaneSolution,
     PairContacts,
     contact_rates,
     contacts_of,
@@ -46,9 +46,10 @@ from .half_plane_result import (
 )
 from .half_plane_step import WINDOW, HalfPlanePair, State, Step, half_plane_pair, moved_on, smooth_influence, step
 from .panels import PANELS, Couplings, couplings, forces_of_overlaps
+from .position import STATUS, Positions, together
 from .records import joined, taken
 
-__all__ = ["HalfPlanePair", "HalfPlaneSolution", "PairContacts", "half_plane_pair", "solve_half_plane"]
+__all__ = ["HalfPlanePair", "PairContacts", "half_plane_pair", "solve_half_plane"]
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -80,7 +81,7 @@ BATCH = 128
 
 def solve_half_plane(
     law: HalfPlanePair, pinion_angles: ArrayLike, twists: ArrayLike, *, touching: Touching | None = None
-) -> HalfPlaneSolution:
+) -> Positions:
     """Solve the contact of a gear pair at several positions.
 
     Parameters
@@ -100,10 +101,8 @@ def solve_half_plane(
     for start in range(0, max(1, len(angles)), BATCH):
         part = slice(start, start + BATCH)
         found = met.take(slice(*np.searchsorted(met.position, [start, start + BATCH])))
-        one = _batch(law, angles[part], twist[part], replace(found, position=found.position - start))
-        one.contacts.position[:] += start
-        made.append(one)
-    return joined(made)
+        made.append(_batch(law, angles[part], twist[part], replace(found, position=found.position - start)))
+    return together(made)
 
 
 @dataclass(frozen=True)
@@ -190,10 +189,10 @@ def _first(law: HalfPlanePair, twists: Array, found: Touching) -> _Open:
     return _Open(start.numbers, _Pairs(found, replace(state, force=force)))
 
 
-def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) -> HalfPlaneSolution:
-    status, iterations = np.full(len(angles), "no_contact", dtype="<U13"), np.zeros(len(angles), dtype=np.int64)
+def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) -> Positions:
+    status, iterations = np.full(len(angles), "no_contact", dtype=STATUS), np.zeros(len(angles), dtype=np.int64)
     names = (*SUMS, "tangent")
-    numbers = {name: np.zeros(len(angles)) for name in names}
+    numbers: dict[str, Any] = {name: np.zeros(len(angles)) for name in names}
     contacts = [no_contacts()]
     open_ = _first(law, twists, found)
     number = 0
@@ -233,7 +232,7 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
     found_ = contacts[1] if len(contacts) == 2 else joined(contacts)
     if len(contacts) > 2:
         found_ = taken(found_, np.lexsort((found_.pair, found_.position)))
-    return HalfPlaneSolution(
+    return Positions(
         pinion_angle=angles, twist=twists, status=status, iterations=iterations, contacts=found_, **numbers
     )
 

@@ -89,45 +89,6 @@ class PairContacts:
         return np.asarray(self.mark != "")
 
 
-@dataclass(frozen=True)
-class HalfPlaneSolution:
-    """n positions.
-
-    Attributes
-    ----------
-    pinion_angle, twist : ndarray, shape (n,)
-        rad, the twist from where a wheel space faces the pinion tooth.
-    torque_wheel, torque_pinion : ndarray, shape (n,)
-        Moments that the hubs need (N m).
-    torque_wheel_reaction : ndarray, shape (n,)
-        Moment of the reactions at the wheel's bore: of the forces at undeformed places (N m).
-    tangent : ndarray, shape (n,)
-        d torque_wheel/d twist (N m/rad).
-    energy : ndarray, shape (n,)
-        Elastic energy (J).
-    status : ndarray of str, shape (n,)
-        ``converged``, ``no_contact`` or ``not_converged``; torques are not-a-number in the last case.
-    iterations : ndarray, shape (n,)
-        Steps of the balance.
-    contacts
-        Loaded tooth pairs.
-    """
-
-    pinion_angle: Array
-    twist: Array
-    torque_wheel: Array
-    torque_pinion: Array
-    torque_wheel_reaction: Array
-    tangent: Array
-    energy: Array
-    status: NDArray[np.str_]
-    iterations: IntArray
-    contacts: PairContacts
-
-    def __len__(self) -> int:
-        return len(self.twist)
-
-
 def no_contacts() -> PairContacts:
     """None."""
     shapes: dict[str, tuple[int, ...]] = dict.fromkeys(("arc", "parameter", "arc_rate"), (0, 2))

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .half_plane_result import PairContacts
 from .records import joined, of_positions, ranges, taken
 
 Array = NDArray[Any]
@@ -109,10 +108,12 @@ class Positions:
         d torque_wheel / d twist (N m/rad).
     iterations : ndarray, shape (n,)
         Newton steps.
+    energy : ndarray, shape (n,)
+        Elastic energy (J): the work of the contact forces.
     contacts
-        Loaded tooth pairs.
+        Loaded tooth pairs: `Contacts`, or `gearfe.contact.half_plane_result.PairContacts`.
     loads
-        What fields need, of pinion and wheel, at the positions where it was asked for.
+        What fields need, of pinion and wheel, at the positions where it was asked for; none at all otherwise.
     points
         Pressures at the contact points of a law on the mesh; None for other laws.
     """
@@ -124,9 +125,10 @@ class Positions:
     torque_pinion: Array
     torque_wheel_reaction: Array
     tangent: Array
+    energy: Array
     iterations: IntArray
-    contacts: Contacts | PairContacts
-    loads: tuple[FlankLoads, FlankLoads]
+    contacts: Any
+    loads: tuple[FlankLoads, ...] = ()
     points: PointPressures | None = None
 
     def __len__(self) -> int:
@@ -164,16 +166,18 @@ class Positions:
         """These with another status: what has not converged has no contacts, loads and numbers."""
         good = status == "converged"
         none = np.where(status == "no_contact", 0.0, np.nan)
-        numbers: dict[str, Any] = {name: np.where(good, getattr(self, name), none) for name in TORQUES}
+        names = (*TORQUES, "energy")
+        numbers: dict[str, Any] = {name: np.where(good, getattr(self, name), none) for name in names}
         return replace(self.told(good), status=status, contacts=_among(self.contacts, good), **numbers)
 
     def told(self, kept: NDArray[np.bool_]) -> Positions:
         """These with loads and point pressures of some alone, shape (n,)."""
-        pinion, wheel = (_among(one, kept) for one in self.loads)
         points = None if self.points is None else _among(self.points, kept)
-        return replace(self, loads=(pinion, wheel), points=points)
+        return replace(self, loads=tuple(_among(one, kept) for one in self.loads), points=points)
 
 
+#: Type of the names of statuses.
+STATUS = "<U18"
 #: Numbers of a position that are moments about the hubs, or their rate.
 TORQUES = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "tangent")
 
@@ -210,10 +214,11 @@ def no_contact(angles: Array, twists: Array, sizes: Sequence[int]) -> Positions:
     return Positions(
         pinion_angle=angles,
         twist=twists,
-        status=np.full(count, "no_contact", dtype="<U18"),
+        status=np.full(count, "no_contact", dtype=STATUS),
         iterations=np.zeros(count, dtype=np.int64),
         contacts=Contacts(none, none, np.zeros(0), np.zeros(0)),
         loads=(pinion, wheel),
         points=PointPressures(none, none, none, np.zeros(0), np.zeros(0)),
+        energy=np.zeros(count),
         **{name: np.zeros(count) for name in TORQUES},
     )

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from ..contact.half_plane import (
     HalfPlanePair,
-    HalfPlaneSolution,
     coupling_compliances,
     half_plane_pair,
     solve_half_plane,
 )
 from ..contact.laws import law_named
+from ..contact.position import Positions
 from ..errors import InputError
 from ..gear.pair import GearPair
 from ..gear.touching import Touching
@@ -102,9 +102,7 @@ def mesh_law(pair: HalfPlanePair, force: float) -> MeshLaw:
     )
 
 
-def pair_forces(
-    pair: HalfPlanePair, solved: HalfPlaneSolution, met: Touching, coupling: Sequence[Couple]
-) -> PairForces:
+def pair_forces(pair: HalfPlanePair, solved: Positions, met: Touching, coupling: Sequence[Couple]) -> PairForces:
     """What contact solutions tell of their loaded pairs; forces are torques of the wheel over its base radius."""
     radius = pair.pair.wheel.base_radius
     c = solved.contacts

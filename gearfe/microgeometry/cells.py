@@ -19,7 +19,7 @@ from ..contact.half_plane import solve_half_plane
 from ..contact.half_plane_result import PairContacts
 from ..contact.half_plane_step import HalfPlanePair
 from ..contact.half_plane_twist import expected_twists
-from ..contact.position import TORQUES, FlankLoads, Positions
+from ..contact.position import Positions
 from ..contact.records import of_positions
 from ..gear.touching import Touching
 from ..stiffness.torque_control import newton_twist, twists_for_torque
@@ -48,16 +48,7 @@ def solve_cells(law: HalfPlanePair, angles: Array, torques: Array, touching: Tou
     np.minimum.at(touch, touching.position, touching.twist)
 
     def solve(numbers: IntArray, twists: Array) -> Positions:
-        found = solve_half_plane(law, angles[numbers], twists, touching=of_positions(touching, numbers))
-        return Positions(
-            pinion_angle=found.pinion_angle,
-            twist=found.twist,
-            status=found.status.astype("<U18"),
-            iterations=found.iterations,
-            contacts=found.contacts,
-            loads=(_none(), _none()),
-            **{name: getattr(found, name) for name in TORQUES},
-        )
+        return solve_half_plane(law, angles[numbers], twists, touching=of_positions(touching, numbers))
 
     most = math.pi / law.pair.wheel.teeth
     first = expected_twists(law, torques, touching)
@@ -74,11 +65,6 @@ def solve_cells(law: HalfPlanePair, angles: Array, torques: Array, touching: Tou
         torque_wheel_reaction=found.torque_wheel_reaction * ratio,
         contacts=_moved(contacts, twist - found.twist),
     )
-
-
-def _none() -> FlankLoads:
-    nothing = np.zeros(0, dtype=np.int64)
-    return FlankLoads(nothing, nothing, np.zeros((0, 0)), np.zeros((0, 0)))
 
 
 def _moved(contacts: PairContacts, by: Array) -> PairContacts:

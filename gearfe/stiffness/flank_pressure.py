@@ -50,7 +50,6 @@ def flank_pressures(pair: MeshingPair, position: Positions) -> list[FlankPressur
     """Pressure on each loaded flank of one solved position, from its points or the half-plane law's panels."""
     points = position.points
     if points is None:
-        assert isinstance(position.contacts, PairContacts)
         return _of_panels(pair, position.contacts)
     made: list[FlankPressure] = []
     for gear, number in dict.fromkeys(zip(points.gear.tolist(), points.pair.tolist(), strict=True)):

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from ..contact.elements import first_contacts, solve_elements
 from ..contact.half_plane import half_plane_pair, solve_half_plane
 from ..contact.half_plane_loads import flank_loads
-from ..contact.half_plane_result import PairContacts
 from ..contact.laws import HalfPlane
-from ..contact.position import TORQUES, Positions
+from ..contact.position import Positions
 from ..contact.records import joined, of_positions, taken
 from ..contact.scene import MeshingPair
 from ..gear.pair import GearPair
@@ -49,15 +48,8 @@ class HalfPlaneSolver:
         """Positions at pinion angles and twists (rad), both of shape (n,); those numbered `kept` with loads."""
         found = solve_half_plane(self.law, angles, twists, touching=self.touching(angles))
         wanted = taken(found.contacts, np.isin(found.contacts.position, kept))
-        return Positions(
-            pinion_angle=found.pinion_angle,
-            twist=found.twist,
-            status=found.status.astype("<U18"),
-            iterations=found.iterations,
-            contacts=found.contacts,
-            loads=flank_loads(self.law.sides, self.elastic, wanted, found.pinion_angle, found.twist),
-            **{name: getattr(found, name) for name in TORQUES},
-        )
+        loads = flank_loads(self.law.sides, self.elastic, wanted, found.pinion_angle, found.twist)
+        return replace(found, loads=loads)
 
     def touching_twists(self, angles: Array) -> Array:
         """Twists (rad) at which the rigid gears just touch."""
@@ -110,7 +102,6 @@ class ElementSolver:
         loaded = expected.status == "converged"
         thin = loaded & self.resolved_only & (self.elements_per_contact(expected) < 1.0)
         contacts = expected.contacts
-        assert isinstance(contacts, PairContacts)
         first = first_contacts(self.half_plane.law.sides, taken(contacts, ~thin[contacts.position]))
         found = solve_elements(self.elastic, expected.pinion_angle, expected.twist, first)
         status = np.where(thin, "under_resolved", np.where(loaded, found.status, expected.status))
@@ -122,7 +113,6 @@ class ElementSolver:
         tooth pairs; not-a-number without contact.
         """
         contacts = found.contacts
-        assert isinstance(contacts, PairContacts)
         sizes = np.zeros(len(contacts))
         for gear, (side, body) in enumerate(zip(self.half_plane.law.sides, self.elastic.bodies, strict=True)):
             edge, _ = body.flank.place(contacts.arc[:, gear] + side.offset)
