@@ -41,7 +41,26 @@ BATCH_BYTES = 60e6
 def first_contacts(sides: Sequence[FlankCompliance], contacts: PairContacts) -> FirstContacts:
     """The contacts that the half-plane law has found, as places on the chains of edges."""
     arc = contacts.panel_arc + np.array([side.offset for side in sides])[:, None]
-    return FirstContacts(contacts.position, contacts.pair, contacts.normal, arc, contacts.pressure, contacts.width)
+    # the contacts of one tooth pair become one with all their panels
+    step = (np.diff(contacts.position, prepend=-1) != 0) | (np.diff(contacts.pair, prepend=0) != 0)
+    step[:1] = True
+    whole = np.cumsum(step) - 1
+    place = np.arange(len(whole)) - np.flatnonzero(step)[whole]
+    size = 1 + int(place.max(initial=0))
+    count, n = int(step.sum()), contacts.pressure.shape[1]
+    arcs = np.repeat(arc[step][:, :, -1:], size * n, axis=2).reshape(count, 2, size, n)
+    pressure, width = np.zeros((2, count, size, n))
+    arcs[whole, :, place], pressure[whole, place], width[whole, place] = arc, contacts.pressure, contacts.width
+    normal = np.zeros(count, dtype=complex)
+    np.add.at(normal, whole, contacts.force * contacts.normal)
+    return FirstContacts(
+        position=contacts.position[step],
+        pair=contacts.pair[step],
+        normal=normal / np.abs(normal),
+        arc=arcs.reshape(count, 2, -1),
+        pressure=pressure.reshape(count, -1),
+        width=width.reshape(count, -1),
+    )
 
 
 def solve_elements(elastic: MeshingPair, angles: Array, twists: Array, first: FirstContacts) -> Positions:

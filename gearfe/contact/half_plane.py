@@ -36,6 +36,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..gear.touching import Touching
+from .half_plane_pair import HalfPlanePair, half_plane_pair
 from .half_plane_result import (
     SUMS,
     PairContacts,
@@ -44,16 +45,19 @@ from .half_plane_result import (
     no_contacts,
     pair_sums,
 )
-from .half_plane_step import WINDOW, HalfPlanePair, State, Step, half_plane_pair, moved_on, smooth_influence, step
+from .half_plane_step import WINDOW, State, Step, moved_on, smooth_influence, step, usual_approach
 from .panels import PANELS, Couplings, couplings, forces_of_overlaps
 from .position import STATUS, Positions, together
 from .records import joined, taken
+from .zones import completed
 
 __all__ = ["HalfPlanePair", "PairContacts", "half_plane_pair", "solve_half_plane"]
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+#: How often missing contacts are looked for.
+ROUNDS = 10
 #: Most steps; change of the forces, in units of their sum, from which on windows and bearing panels are held.
 STEPS, NEAR = 30, 2e-5
 #: What moves of contacts by their width count as changes of force: they are of second order there (see above).
@@ -70,9 +74,6 @@ HELD_STEPS, TOLERANCE = 3, 1e-6
 AHEAD, LEAST_AHEAD = 1e-3, 1e-10
 #: Force per width (N/m) below which there is none.
 TINY = 1e-300
-#: Half width (modules) of Hertz's contacts whose approach the first forces are made with: a length, as T in them is
-#: what the logarithms of lengths in metres leave.
-USUAL_WIDTH = 0.01
 #: Rigid clearance (rad) up to which a tooth pair is looked at.
 CLEAR = 1e-7
 #: Positions solved side by side.
@@ -167,6 +168,7 @@ def unloaded_state(law: HalfPlanePair, twists: Array, found: Touching) -> State:
         turn=np.exp(1j * np.stack(turn, axis=1)),
         flank=found.flank,
         arc=law.arc_at(found.flank, found.place),
+        ends=law.tables.of(found.flank).ends,
         force=nothing,
         spread=nothing,
         low=nothing,
@@ -184,8 +186,7 @@ def _first(law: HalfPlanePair, twists: Array, found: Touching) -> _Open:
         return start
     overlap = found.arm[:, 1] * (twists[found.position] - found.twist)
     T = smooth_influence(law, state, start.couples).compliance
-    approach = law.compliance * (0.5 - np.log(0.5 * USUAL_WIDTH * law.pair.pinion.module))
-    force = forces_of_overlaps(overlap, approach, T, start.couples)
+    force = forces_of_overlaps(overlap, usual_approach(law), T, start.couples)
     return _Open(start.numbers, _Pairs(found, replace(state, force=force)))
 
 
@@ -195,17 +196,17 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
     numbers: dict[str, Any] = {name: np.zeros(len(angles)) for name in names}
     contacts = [no_contacts()]
     open_ = _first(law, twists, found)
-    number = 0
-    while len(open_.numbers) and number < STEPS:  # again for those that are not settled in the last steps
+    number, began, rounds = 0, 0, 0
+    while len(open_.numbers) and number - began < STEPS and rounds < ROUNDS:  # again for those that are not settled in the last steps
         done: list[_Open] = []
-        while len(open_.numbers) and number < STEPS:
+        while len(open_.numbers) and number - began < STEPS:
             number += 1
             couples = open_.couples
-            made = step(law, open_.pairs.state, couples, search=number <= SEARCHES)
+            made = step(law, open_.pairs.state, couples, search=number - began <= SEARCHES)
             iterations[open_.numbers] += 1
             unsettled = couples.total(~made.solution.settled | made.outgrown) > 0
             change = open_.change(made)
-            near = (change <= NEAR) & ~unsettled & (number > 1)
+            near = (change <= NEAR) & ~unsettled & (number - began > 1)
             bears = couples.total(made.solution.force) > 0
             open_ = open_.moved_on(law, made, near=(change <= GROWING)[couples.position])
             if (near & bears).any():
@@ -215,16 +216,18 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
         if not done:
             break
         all_ = _joined(done)
-        settled, sums, loaded, all_ = _finished(law, all_, twists)
+        ended = _finished(law, all_, twists)
         iterations[all_.numbers] += HELD_STEPS
         number += HELD_STEPS
-        solved = all_.numbers[settled]
+        solved = all_.numbers[ended.settled]
         status[solved] = "converged"
         for name in names:
-            numbers[name][solved] = sums[name][settled]
-        contacts.append(taken(loaded, status[loaded.position] == "converged"))
-        if not settled.all():
-            open_ = _joined([open_, all_.kept(~settled)])
+            numbers[name][solved] = ended.sums[name][ended.settled]
+        contacts.append(taken(ended.contacts, status[ended.contacts.position] == "converged"))
+        if ended.more:
+            began, rounds = number, rounds + 1
+        if not ended.settled.all():
+            open_ = _joined([open_, ended.now.kept(~ended.settled)])
     failed = open_.numbers
     status[failed] = "not_converged"
     for name in names:
@@ -246,11 +249,33 @@ def _joined(parts: Sequence[_Open]) -> _Open:
     return _Open(np.sort(np.concatenate([part.numbers for part in parts])), taken(pairs, order))
 
 
-def _finished(
-    law: HalfPlanePair, open_: _Open, twists: Array
-) -> tuple[NDArray[np.bool_], dict[str, Array], PairContacts, _Open]:
-    """Last steps of positions that are near their solution, there and at a slightly larger twist: whether they settled,
-    their sums over the pairs, the contacts, and where they are now.
+@dataclass(frozen=True)
+class _Ended:
+    """Positions after their last steps.
+
+    Attributes
+    ----------
+    settled : ndarray of bool, shape (m,)
+        Whether that is their solution.
+    sums : dict of str to ndarray, shape (m,)
+        Sums over their contacts.
+    contacts
+        Their loaded contacts.
+    now
+        Where they go on from.
+    more
+        Whether tooth pairs have more contacts there.
+    """
+
+    settled: NDArray[np.bool_]
+    sums: dict[str, Array]
+    contacts: PairContacts
+    now: _Open
+    more: bool
+
+
+def _finished(law: HalfPlanePair, open_: _Open, twists: Array) -> _Ended:
+    """Last steps of positions that are near their solution, there and at a slightly larger twist.
 
     Windows and bearing panels are held, so that the differences are derivatives.
     """
@@ -277,7 +302,13 @@ def _finished(
     right = couples.total(~one[1].solution.settled) == 0
     settled = right & (change <= TOLERANCE) & (sums["tangent"] > 0)
     known = of_pairs | contact_rates(law, one, two, ahead[couples.position])
-    return settled, sums, contacts_of(law, pairs.found, one, known), now
+    contacts = contacts_of(law, pairs.found, one, known)
+    whole = completed(law, pairs.found, one, couples)
+    if whole is None:
+        return _Ended(settled, sums, contacts, now, False)
+    found, state, changed = whole
+    again = _Open(open_.numbers, _Pairs(found, state))
+    return _Ended(settled & ~changed, sums, contacts, _joined([now.kept(~changed), again.kept(changed)]), True)
 
 
 def coupling_compliances(law: HalfPlanePair, pinion_angles: Array, twists: Array) -> tuple[Array, IntArray, Array]:

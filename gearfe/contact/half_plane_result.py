@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..gear.touching import Touching
-from .half_plane_step import HalfPlanePair, State, Step, cross
+from .half_plane_pair import HalfPlanePair
+from .half_plane_step import State, Step, cross
 from .moved_faces import WAY
 from .panels import PANELS
 from .records import taken

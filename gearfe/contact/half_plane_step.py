@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gear.deviation import NOMINAL, ToothDeviations
-from ..gear.flank_curve import FlankCurve, FlankTables, flank_curve, flank_tables
-from ..gear.pair import GearPair
-from ..gear.tooth_flanks import ToothFlanks
-from ..gear.touching import Flanks
-from .flank_compliance import FlankCompliance, Shapes, corner_of, flank_compliances, shapes_of
+from ..gear.flank_curve import FlankTables
+from . import neighbours
+from .half_plane_pair import HalfPlanePair
 from .moved_faces import WAY, Faces, Windows, windows
 from .panels import MIDDLES, WIDTHS, Couplings, Pressed, first_guess, influence, pressed
-from .scene import MeshingPair
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -28,155 +24,18 @@ ComplexArray = NDArray[np.complex128]
 WINDOW, WIDER = 1.25, 1.6
 #: Force, of all pairs of a position, and half width in modules below which a window is not made smaller.
 LEAST_FORCE, LEAST_WIDTH = 1e-4, 1e-6
+#: Half width (modules) of Hertz's contacts whose approach first forces are made with: a length, as T in them is what
+#: the logarithms of lengths in metres leave.
+USUAL_WIDTH = 0.01
 #: Distance (m) from an edge that is none.
 LEAST_DISTANCE = 1e-9
 #: Directions of the forces of a contact on pinion and wheel along n.
-_SIGN = np.array([-1.0, 1.0])
-
-
-@dataclass(frozen=True)
-class HalfPlanePair:
-    """A gear pair as the half-plane law sees it.
-
-    Attributes
-    ----------
-    pair
-        Geometry.
-    teeth
-        Working flanks of all teeth, where their first touch is searched for.
-    sides
-        Compliance of pinion's and wheel's flank, without deviations.
-    width
-        Width of the contact (m).
-    """
-
-    pair: GearPair
-    teeth: ToothFlanks
-    sides: tuple[FlankCompliance, FlankCompliance]
-    width: float
-
-    @property
-    def flanks(self) -> Flanks:
-        """The first profiles of both gears."""
-        return self.teeth.first
-
-    @cached_property
-    def curves(self) -> tuple[FlankCurve, ...]:
-        """Exact flanks, f of them: the faces of `teeth`."""
-        gears = (self.pair.pinion, self.pair.wheel)
-        return tuple(flank_curve(gears[self.teeth.gear_of(i)], face) for i, face in enumerate(self.teeth.faces))
-
-    @cached_property
-    def tables(self) -> FlankTables:
-        """These in one table."""
-        return flank_tables(self.curves)
-
-    def arc_at(self, flank: IntArray, parameter: Array) -> Array:
-        """Arc lengths (m) of parameters u on the flanks `flank`, both of shape (p, 2)."""
-        made = np.empty(np.shape(parameter))
-        for i in np.unique(flank):
-            made[flank == i] = self.curves[i].arc_at(parameter[flank == i])
-        return made
-
-    def parameter_at(self, flank: IntArray, arc: Array) -> Array:
-        """Parameters u of arc lengths (m) on the flanks `flank`, both of shape (p, 2)."""
-        made = np.empty(np.shape(arc))
-        for i in np.unique(flank):
-            made[flank == i] = self.curves[i].parameter_at(arc[flank == i])
-        return made
-
-    @cached_property
-    def shapes(self) -> Shapes:
-        """Shape functions of the stations."""
-        return shapes_of([side.stations for side in self.sides])
-
-    @cached_property
-    def inverse_modulus(self) -> Array:
-        """1/E' (1/Pa), shape (2,)."""
-        return np.array([side.inverse_modulus for side in self.sides])
-
-    @cached_property
-    def compliance(self) -> float:
-        """2/pi (1/E_1' + 1/E_2') (1/Pa)."""
-        return float(2 / np.pi * self.inverse_modulus.sum())
-
-    @cached_property
-    def hub(self) -> Array:
-        """x of the gears' centres (m), shape (2,)."""
-        return np.array([0.0, self.pair.working_centre_distance])
-
-    @cached_property
-    def corner(self) -> ComplexArray:
-        """Corners of flanks and tip circles (m), shape (f,)."""
-        return np.array([corner_of(curve)[0] for curve in self.curves])
-
-    @cached_property
-    def wedge(self) -> tuple[Array, ComplexArray]:
-        """W of both gears as W v = a v + b conj(v), both of shape (2,) (-)."""
-        W = np.array([side.wedge for side in self.sides])
-        return 0.5 * (W[:, 0, 0] + W[:, 1, 1]), 0.5 * (W[:, 0, 0] - W[:, 1, 1]) + 1j * W[:, 0, 1]
-
-    @cached_property
-    def undercut(self) -> Array:
-        """1 where the working flank starts with the edge of an undercut, shape (2,)."""
-        return np.array([float(side.curve.face.fall > 0.0) for side in self.sides])
-
-    @cached_property
-    def marks(self) -> list[tuple[str, int, float]]:
-        """Name, flank and arc length (m) of the flanks' marks, see `half_plane_result.PairContacts`, by rising rank."""
-        found = []
-        for name in ("undercut", "relief", "round", "tip"):
-            for flank, curve in enumerate(self.curves):
-                face = curve.face
-                places = {
-                    "undercut": [0.0] if face.fall > 0.0 else [],
-                    "relief": face.kinks.tolist(),
-                    "round": [] if face.sharp else [1.0],
-                    "tip": [face.end] if face.sharp else [],
-                }[name]
-                found += [(name, flank, float(curve.arc_at(at))) for at in places]
-        return found
-
-    @cached_property
-    def bump_squares(self) -> Array:
-        """Mean squares a^2/4 of the stations' bumps (m2), shape (2, k)."""
-        made = np.zeros_like(self.shapes.stations)
-        for gear, side in enumerate(self.sides):
-            made[gear, : len(side.bumps)] = 0.25 * side.bumps**2
-        return made
-
-    def influence(self, steps: int) -> Array:
-        """w H between the stations of teeth -steps ... steps apart, shape (2, 2k, (2 steps + 1) 2k) (m2/N)."""
-        if steps not in self._influences:
-            k = self.shapes.stations.shape[1]
-            made = np.zeros((2, k, 2, 2 * steps + 1, k, 2))
-            for gear, side in enumerate(self.sides):
-                n = len(side.stations)
-                for step in range(-steps, steps + 1):
-                    smooth = side.smooth[step if gear == 0 else -step]
-                    made[gear, :n, :, step + steps, :n] = self.width * smooth.T.reshape(n, 2, n, 2)
-            self._influences[steps] = made.reshape(2, 2 * k, -1)
-        return self._influences[steps]
-
-    @cached_property
-    def _influences(self) -> dict[int, Array]:
-        return {}
-
-    def deviated(self, deviations: tuple[ToothDeviations, ToothDeviations]) -> HalfPlanePair:
-        """The same elastic gears with other deviations of micrometres, which are in the flanks' curves alone."""
-        return HalfPlanePair(self.pair, ToothFlanks(self.pair, deviations), self.sides, self.width)
-
-
-def half_plane_pair(
-    pair: GearPair, elastic: MeshingPair, *, deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL
-) -> HalfPlanePair:
-    """Prepare the law for meshed and condensed gears; their flanks may be coarse (a tenth of a module)."""
-    return HalfPlanePair(pair, ToothFlanks(pair, deviations), flank_compliances(pair, elastic), elastic.width)
+SIGN = np.array([-1.0, 1.0])
 
 
 @dataclass(frozen=True)
 class State:
-    """What a step of the balance of p tooth pairs starts from; pinion and wheel in the second axis.
+    """What a step of the balance of p contacts starts from; pinion and wheel in the second axis.
 
     Attributes
     ----------
@@ -188,6 +47,9 @@ class State:
         Numbers of their flanks in `HalfPlanePair.curves`.
     arc : ndarray, shape (p, 2)
         The material at O (m).
+    ends : ndarray, shape (p, 2, 2)
+        First and last arc (m) of both flanks that may belong to the contact: all of the wheel's, and of the pinion's
+        the stretch up to the next contacts of the tooth pair.
     force, spread : ndarray, shape (p,)
         Force per width (N/m) that displaces the faces, and the variance of its pressure (m2).
     low, high : ndarray, shape (p,)
@@ -203,6 +65,7 @@ class State:
     turn: ComplexArray
     flank: IntArray
     arc: Array
+    ends: Array
     force: Array
     spread: Array
     low: Array
@@ -213,7 +76,7 @@ class State:
 
 @dataclass(frozen=True)
 class Smooth:
-    """Influence of the loads of p tooth pairs along n on the smooth displacements of the faces, in c couples.
+    """Influence of the loads of p contacts along n on the smooth displacements of the faces, in c couples.
 
     Attributes
     ----------
@@ -237,7 +100,7 @@ class Smooth:
 
 @dataclass(frozen=True)
 class Step:
-    """One step of the balance of p tooth pairs: the problem that was solved, its solution, and what follows from it.
+    """One step of the balance of p contacts: the problem that was solved, its solution, and what follows from it.
 
     Attributes
     ----------
@@ -246,7 +109,7 @@ class Step:
     low, high : ndarray, shape (p,)
         Ends of the windows (m).
     outgrown : ndarray of bool, shape (p,)
-        Pairs whose pressure reaches an end of its window beyond which both faces go on.
+        Contacts whose pressure reaches an end of its window beyond which both faces go on.
     x, width : ndarray, shape (p, n)
         Panels' middles and widths (m).
     arcs : ndarray, shape (p, 2, n)
@@ -258,7 +121,7 @@ class Step:
     slope : ndarray, shape (p,)
         Mean slope of the deformed faces under the pressure (-).
     energy : ndarray, shape (p,)
-        Elastic energy of each pair per width (J/m).
+        Elastic energy of each contact per width (J/m).
     """
 
     solution: Pressed
@@ -282,22 +145,41 @@ def cross(a: ComplexArray, b: ComplexArray) -> Array:
 
 
 def smooth_influence(law: HalfPlanePair, state: State, couples: Couplings) -> Smooth:
-    """H at the arcs and along the normals of all pairs."""
+    """H at the arcs and along the normals of all contacts."""
     normal = state.normal[:, None] / state.turn
     shapes = law.shapes.at(state.arc)
     values = shapes[:, :, 0]
-    pairs, k = len(normal), values.shape[2]
-    load = (values[..., None] * normal.view(float).reshape(pairs, 2, 1, 2)).reshape(pairs, 2, 2 * k)
-    most = int(np.abs(couples.step).max(initial=0))
-    answer = np.matmul(load.swapaxes(0, 1), law.influence(most)).reshape(2, pairs, 2 * most + 1, k, 2)
-    at_stations = answer[:, couples.second, couples.step + most].swapaxes(0, 1)
-    moved = (shapes.take(couples.first, axis=0) @ at_stations).view(complex)[..., 0]
+    at_stations = answers(law, values, normal, couples)
+    moved = (shapes.take(couples.first, axis=0) @ at_stations.view(float)).view(complex)[..., 0]
     compliance = (moved[:, :, 0] * normal.take(couples.first, axis=0).conj()).real.sum(axis=1)
     return Smooth(normal, values, shapes[:, :, 2], moved, compliance)
 
 
+def answers(law: HalfPlanePair, values: Array, normal: ComplexArray, couples: Couplings) -> ComplexArray:
+    """Smooth displacements at the stations of the first tooth of each couple by a unit force per width along the normal
+    of the second contact, shape (c, 2, k, 1), tooth axes (m2/N).
+
+    Parameters
+    ----------
+    values : ndarray, shape (p, 2, k)
+        Shape functions of the stations at the contacts.
+    normal : ndarray of complex, shape (p, 2)
+        n in the teeth's axes.
+    """
+    count, k = len(normal), values.shape[2]
+    load = (values[..., None] * normal.view(float).reshape(count, 2, 1, 2)).reshape(count, 2, 2 * k)
+    most = int(np.abs(couples.step).max(initial=0))
+    answer = np.matmul(load.swapaxes(0, 1), law.influence(most)).reshape(2, count, 2 * most + 1, k, 2)
+    return answer[:, couples.second, couples.step + most].swapaxes(0, 1).view(complex)
+
+
+def usual_approach(law: HalfPlanePair) -> float:
+    """Approach of both faces by a unit force per width of a usual contact (m2/N)."""
+    return float(law.compliance * (0.5 - np.log(0.5 * USUAL_WIDTH * law.pair.pinion.module)))
+
+
 def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool = True, held: bool = False) -> Step:
-    """Solve the panels of all pairs with the faces displaced by the state's forces.
+    """Solve the panels of all contacts with the faces displaced by the state's forces.
 
     Parameters
     ----------
@@ -312,20 +194,27 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
     shear = shear * normal.conj() ** 2
     tables, corner = law.tables.of(state.flank), law.corner[state.flank]
     y, far = _distances(law, tables, corner, state.arc)
-    load = force[:, None] * _SIGN
-    displaced = np.add.reduceat(smooth.moved * (force.take(couples.second)[:, None] * _SIGN)[..., None], couples.starts)
+    load = force[:, None] * SIGN
+    displaced = np.add.reduceat(smooth.moved * (force.take(couples.second)[:, None] * SIGN)[..., None], couples.starts)
     # the contact's own width, and that of the bumps
     bend = smooth.moved[couples.own, :, 2] * load
-    wider = (state.spread[:, None] - np.einsum("pgk,gk->pg", smooth.values, law.bump_squares)) * bend
+    excess = state.spread[:, None] - np.einsum("pgk,gk->pg", smooth.values, law.bump_squares)
+    wider = excess * bend
     # across n the wedge moves the faces as a whole: n W along the tangent -i n
     edge = law.inverse_modulus * shear.imag * np.log(2 * y) * load * (-1j * normal)
+    beside = couples.neighbours
+    if len(beside):
+        i, j = couples.first[beside], couples.second[beside]
+        np.add.at(edge, i, neighbours.sideways(law, couples, normal, state.arc, y) * load[j])
+        across = neighbours.widths_in_smooth(couples, normal, smooth.moved[:, :, 2], excess)
+        np.add.at(wider, i, across * load[j] * normal[i])
     turn = state.turn / state.normal[:, None]
     offset = (law.hub - state.centre[:, None]) / state.normal[:, None] + turn * (displaced[:, :, 0] + edge + wider)
     faces = Faces(turn, offset, displaced[:, :, 1], state.arc)
 
     low, high, found = state.low, state.high, None
     if search:
-        found = _searched(law, tables, state, faces, couples)
+        found = _searched(law, tables, state, faces, couples, normal)
         low, high = found.low, found.high
     half = 0.5 * (high - low)
     x = np.empty((len(half), len(MIDDLES) + 1))
@@ -339,8 +228,10 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
     along = law.inverse_modulus * (tension + shear.real)
     edges = np.log(y[:, :, :, None] + y[:, :, None, :]) * (-along[:, :, None, None] * width[:, None, None, :])
     K = influence(half, law.compliance) + edges[:, 0] + edges[:, 1]
+    shared = neighbours.panel_influence(law, couples, normal, arcs, width, y)
     bearing = state.bearing if state.bearing.any() else first_guess(gap)
-    solution = pressed(K, gap, width, smooth.compliance, force, couples, bearing, held=held)
+    both = shared[:, 0] + shared[:, 1]
+    solution = pressed(K, both, gap, width, smooth.compliance, force, couples, bearing, held=held)
 
     p, loaded = solution.pressure, solution.force > 0
     shares = p * width / np.where(loaded, solution.force, 1.0)[:, None]
@@ -348,7 +239,9 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
     spread = (shares * ((x - place[:, None]) ** 2 + width**2 / 12)).sum(axis=1)
     between = 0.5 * (p[:, 1:] + p[:, :-1])
     # both deformed faces have the same slope; the one further from its edges changes less with where it is taken
-    deformed = heights - WAY[:, None] * (edges @ p[:, None, :, None])[..., 0]
+    into = (edges @ p[:, None, :, None])[..., 0]
+    np.add.at(into, couples.first[beside], (shared @ p[couples.second[beside], None, :, None])[..., 0])
+    deformed = heights - WAY[:, None] * into
     middle = (far[:, :, None] * deformed).sum(axis=1)
     area = (between * np.diff(x)).sum(axis=1)
     slope = (between * np.diff(middle)).sum(axis=1) / np.where(area > 0, area, 1.0)
@@ -373,13 +266,17 @@ def _distances(law: HalfPlanePair, tables: FlankTables, corner: ComplexArray, ar
     return y, near[:, ::-1] / near.sum(axis=1, keepdims=True)
 
 
-def _searched(law: HalfPlanePair, tables: FlankTables, state: State, faces: Faces, couples: Couplings) -> Windows:
+def _searched(law: HalfPlanePair, tables: FlankTables, state: State, faces: Faces, couples: Couplings, normal: ComplexArray) -> Windows:
     """Windows by the gap beside its least."""
     module = law.pair.pinion.module
     least = LEAST_WIDTH**2 * module / (0.2 * law.compliance)
     floor = np.maximum(state.force, LEAST_FORCE * couples.total(state.force)[couples.position] + least)
     scale = np.sqrt(0.2 * law.compliance * floor * module)
-    return windows(faces, tables, scale, state.reach * law.compliance * floor)
+    depth = state.reach * law.compliance * floor
+    if len(couples.neighbours) == 0:
+        return windows(faces, tables, state.ends, scale, depth)
+    opened = partial(neighbours.opened, law, couples, normal, (state.arc, state.force, state.spread))
+    return windows(faces, tables, state.ends, scale, depth, opened)
 
 
 def moved_on(law: HalfPlanePair, state: State, made: Step, *, near: BoolArray | bool) -> State:
@@ -396,6 +293,7 @@ def moved_on(law: HalfPlanePair, state: State, made: Step, *, near: BoolArray | 
         turn=state.turn,
         flank=state.flank,
         arc=np.minimum(np.maximum(arc, law.tables.low[state.flank, 0]), law.tables.high[state.flank, 0]),
+        ends=state.ends,
         force=found.force,
         spread=made.spread,
         low=made.low - place,

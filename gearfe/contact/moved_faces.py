@@ -13,6 +13,7 @@ their second axis.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +35,7 @@ _WAYS = WAY[:, None]
 
 @dataclass(frozen=True)
 class Faces:
-    """Both faces of p tooth pairs as seen from O along n.
+    """Both faces of p contacts as seen from O along n.
 
     Attributes
     ----------
@@ -54,13 +55,14 @@ class Faces:
     arc: Array
 
     def heights(self, flanks: FlankTables, x: Array) -> tuple[Array, Array, ComplexArray]:
-        """Arcs (m), heights (m) and undeformed points (m, tooth axes) of the faces at places x (m) of shape (p, n).
+        """Arcs (m), heights (m) and undeformed points (m, tooth axes) of the faces at places x (m) of shape (p, n), or
+        (p, 2, n) for places of each.
 
         All have the shape (p, 2, n). Where a face ends before, they are those of its end.
         """
         start, turn = self.arc[:, :, None], self.turn[:, :, None]
         stretch, offset = self.stretch[:, :, None], self.offset[:, :, None]
-        x = x[:, None, :]
+        x = x[:, None, :] if x.ndim == 2 else x
         close = NEAR * np.ptp(x, axis=2, keepdims=True)
         s = np.minimum(np.maximum(start + _WAYS * x, flanks.low), flanks.high)
         for _ in range(NEWTON):
@@ -75,16 +77,16 @@ class Faces:
         point = ((d * t + c) * t + b) * t + a
         return s, ((point + stretch * (s - start)) * turn + offset).real, point
 
-    def range(self, flanks: FlankTables) -> tuple[Array, Array]:
-        """Least and largest x (m) that both faces reach, shape (p,)."""
-        seen = flanks.end_points + self.stretch[:, :, None] * (flanks.ends - self.arc[:, :, None])
+    def range(self, flanks: FlankTables, ends: Array) -> tuple[Array, Array]:
+        """Least and largest x (m) that both faces reach between their arcs `ends` (m), shape (p, 2, 2)."""
+        seen = flanks.at(ends)[0] + self.stretch[:, :, None] * (ends - self.arc[:, :, None])
         x = -(seen * self.turn[:, :, None] + self.offset[:, :, None]).imag
         return np.maximum(x[:, 0, 0], x[:, 1, 1]), np.minimum(x[:, 0, 1], x[:, 1, 0])
 
 
 @dataclass(frozen=True)
 class Windows:
-    """Where the contacts of p pairs can be.
+    """Where p contacts can be.
 
     Attributes
     ----------
@@ -109,21 +111,32 @@ class Windows:
 _LOOK = np.concatenate([-np.geomspace(0.03, 30, 20)[::-1], [0.0], np.geomspace(0.03, 30, 20)])
 
 
-def windows(faces: Faces, flanks: FlankTables, scale: Array, depth: Array) -> Windows:
+def windows(
+    faces: Faces,
+    flanks: FlankTables,
+    ends: Array,
+    scale: Array,
+    depth: Array,
+    beside: Callable[[Array], Array | float] = lambda arcs: 0.0,
+) -> Windows:
     """Windows in which the gap is at most `depth` (m) above its least, linear in its root between places of a search.
 
     Parameters
     ----------
+    ends : ndarray, shape (p, 2, 2)
+        First and last arcs of the faces that may belong to the contacts (m).
     scale, depth : ndarray, shape (p,)
         Expected half width and largest gap of the contacts (m).
+    beside
+        What opens the gap besides, shape (p, n) (m), at arcs of the faces, shape (p, 2, n) (m).
     """
-    low, high = faces.range(flanks)
+    low, high = faces.range(flanks, ends)
     x = np.minimum(np.maximum(scale[:, None] * _LOOK, low[:, None]), high[:, None])
-    h = faces.heights(flanks, x)[1]
-    gap = h[:, 1] - h[:, 0]
+    arcs, h, _ = faces.heights(flanks, x)
+    gap = h[:, 1] - h[:, 0] + beside(arcs)
     row, count, nearest = np.arange(len(x)), x.shape[1], np.argmin(gap, axis=1)
     over = np.sqrt(gap - gap.min(axis=1, keepdims=True)) - np.sqrt(depth)[:, None]
-    ends = []
+    found = []
     for way in (-1, 1):
         beyond = (over > 0) & (way * (np.arange(count) - nearest[:, None]) > 0)
         first = np.argmax(beyond, axis=1) if way > 0 else count - 1 - np.argmax(beyond[:, ::-1], axis=1)
@@ -131,9 +144,9 @@ def windows(faces: Faces, flanks: FlankTables, scale: Array, depth: Array) -> Wi
         inner = np.clip(first - way, 0, count - 1)
         a, b = over[row, inner], over[row, first]
         share = np.where(b > np.maximum(a, 0), -a / np.where(b > a, b - a, 1.0), 1.0)
-        ends.append(x[row, inner] + np.clip(share, 0, 1) * (x[row, first] - x[row, inner]))
+        found.append(x[row, inner] + np.clip(share, 0, 1) * (x[row, first] - x[row, inner]))
     left, right = np.maximum(nearest - 1, 0), np.minimum(nearest + 1, count - 1)
     rise = 0.5 * (h[row, :, right] - h[row, :, left]).sum(axis=1)
     lean = rise / np.maximum(1e-12, x[row, right] - x[row, left])
-    free = np.stack([ends[0] > low, ends[1] < high], axis=1)
-    return Windows(ends[0], np.maximum(ends[1], ends[0] + 2e-4 * scale), x[row, nearest], lean, free)
+    free = np.stack([found[0] > low, found[1] < high], axis=1)
+    return Windows(found[0], np.maximum(found[1], found[0] + 2e-4 * scale), x[row, nearest], lean, free)

@@ -1,14 +1,15 @@
-r"""Unilateral pressure on panels, for all tooth pairs of many positions at once.
+r"""Unilateral pressure on panels, for all contacts of many positions at once.
 
-Each tooth pair has n panels over its window; the pressure p (N/m2) is constant on each. With the gap g that the faces
-would have without their own local deformation, the influence K of the panels on each other, and the compliance T
-between the forces per width :math:`F=\int p` of the pairs of one position,
+Each contact has n panels over its window; the pressure p (N/m2) is constant on each. With the gap g that the faces
+would have without their local deformation, the influence K of the panels on each other, of all contacts of one tooth
+pair, and the compliance T between the forces per width :math:`F=\int p` of the contacts of one position,
 
 .. math::
     p \ge 0, \qquad g + K p + y \ge 0, \qquad p\,(g + K p + y) = 0, \qquad y = T (F - F_0),
 
-where the gap holds the forces F_0 already. On the set of panels that bear, every pair gives F = c - S y with two right
-sides of one matrix, and the few forces of a position follow from a system of their own size.
+where the gap holds the forces F_0 already. On the set of panels that bear, every tooth pair of z contacts gives their
+F = c - S y with 1 + z right sides of one matrix, and the few forces of a position follow from a system of their own
+size.
 """
 
 from __future__ import annotations
@@ -38,18 +39,18 @@ ROUNDING = 1e-11
 
 @dataclass(frozen=True)
 class Couplings:
-    """Which tooth pairs share a position: all ordered couples (i, j) of pairs of one position, with i = j.
+    """Which contacts share a position: all ordered couples (i, j) of contacts of one position, with i = j.
 
     Attributes
     ----------
     position, slot : ndarray, shape (p,)
-        Position of each pair, and its number within the position.
+        Position of each contact, and its number within the position.
     first, second : ndarray, shape (c,)
-        The pairs i and j of each couple.
+        The contacts i and j of each couple.
     step : ndarray, shape (c,)
-        Pair number of i less that of j.
+        Tooth pair's number of i less that of j: 0 for contacts of one tooth pair.
     positions, slots
-        Number of positions, and most pairs of one.
+        Number of positions, and most contacts of one.
     """
 
     position: IntArray
@@ -62,35 +63,56 @@ class Couplings:
 
     @cached_property
     def starts(self) -> IntArray:
-        """Where the couples of each first pair start, shape (p,)."""
+        """Where the couples of each first contact start, shape (p,)."""
         return np.searchsorted(self.first, np.arange(len(self.position)))
 
     @cached_property
     def own(self) -> IntArray:
-        """Couple of each pair with itself, shape (p,)."""
+        """Couple of each contact with itself, shape (p,)."""
         return np.flatnonzero(self.first == self.second)
 
-    def total(self, of_pairs: Array | NDArray[np.bool_]) -> Array:
-        """Sums over the pairs of each position, shape (positions,)."""
-        return np.bincount(self.position, of_pairs, self.positions).astype(float)
+    @cached_property
+    def neighbours(self) -> IntArray:
+        """Couples of different contacts of one tooth pair, shape (q,)."""
+        return np.flatnonzero((self.step == 0) & (self.first != self.second))
+
+    @cached_property
+    def groups(self) -> list[IntArray]:
+        """Contacts of each tooth pair, an array of shape (pairs, z) for every number z of them."""
+        if len(self.neighbours) == 0:
+            return [np.arange(len(self.position))[:, None]]
+        together = self.step == 0
+        first, second = self.first[together], self.second[together]
+        counts = np.bincount(first)
+        leads = second[np.searchsorted(first, np.arange(len(counts)))] == np.arange(len(counts))
+        return [second[(counts == z)[first] & leads[first]].reshape(-1, z) for z in np.unique(counts)]
+
+    def couple(self, first: IntArray, second: IntArray) -> IntArray:
+        """Numbers of couples of contacts."""
+        return np.asarray(self.starts[first] + self.slot[second])
+
+    def total(self, of_contacts: Array | NDArray[np.bool_]) -> Array:
+        """Sums over the contacts of each position, shape (positions,)."""
+        return np.bincount(self.position, of_contacts, self.positions).astype(float)
 
     def times(self, matrix: Array, vector: Array) -> Array:
-        """sum_j matrix_ij vector_j for each pair i; `matrix` has one entry a couple, shape (c,)."""
+        """sum_j matrix_ij vector_j for each contact i; `matrix` has one entry a couple, shape (c,)."""
         return np.bincount(self.first, matrix * vector[self.second], len(self.position)).astype(float)
 
     def solved(self, free: Array, stiffness: Array, matrix: Array) -> Array:
-        """F with F + stiffness * (matrix F) = free, pair by pair within its position, shape (p,)."""
+        """F with F + stiffness (matrix F) = free within each position, shape (p,); both matrices by couple."""
         size = (self.positions, self.slots)
-        system, right = np.zeros((*size, self.slots)), np.zeros(size)
-        at = self.position[self.first]
-        system[at, self.slot[self.first], self.slot[self.second]] = stiffness[self.first] * matrix
+        dense, right = np.zeros((2, *size, self.slots)), np.zeros(size)
+        at = self.position[self.first], self.slot[self.first], self.slot[self.second]
+        dense[0][at], dense[1][at] = stiffness, matrix
         right[self.position, self.slot] = free
-        solution = np.linalg.solve(system + np.eye(self.slots), right[..., None])[..., 0]
+        system = dense[0] @ dense[1] + np.eye(self.slots)
+        solution = np.linalg.solve(system, right[..., None])[..., 0]
         return np.asarray(solution[self.position, self.slot])
 
 
 def couplings(position: IntArray, number: IntArray, positions: int) -> Couplings:
-    """Couples of the tooth pairs `number` at `position`, both of shape (p,), sorted by position."""
+    """Couples of the contacts of tooth pairs `number` at `position`, both of shape (p,), sorted by both."""
     slot = np.arange(len(position)) - np.searchsorted(position, position)
     slots = int(slot.max(initial=0)) + 1
     at = np.full((positions, slots), -1)
@@ -129,8 +151,51 @@ def influence(half: Array, compliance: float) -> Array:
     return np.asarray(compliance * half[:, None, None] * (LOGS - log))
 
 
+@dataclass(frozen=True)
+class _Group:
+    """Tooth pairs with z contacts each: the contacts, shape (P, z), and K of all their panels, shape (P, z n, z n)."""
+
+    contacts: IntArray
+    K: Array
+
+    def of(self, values: Array) -> Array:
+        """Values of all panels of each tooth pair, shape (P, z n), from those of the contacts, shape (p, n)."""
+        return np.asarray(values[self.contacts].reshape(len(self.contacts), -1))
+
+    def responses(self, on: NDArray[np.bool_], gap: Array) -> Array:
+        """Pressures on the panels `on` for the gap and for an even approach in each contact, shape (P, z n, 1 + z)."""
+        z, size = self.contacts.shape[1], gap.shape[1]
+        right = np.zeros((*gap.shape, 1 + z))
+        right[..., 0] = -gap
+        panel = np.arange(size)
+        right[:, panel, 1 + panel // (size // z)] = 1.0
+        if on.all():
+            return np.linalg.solve(self.K, right)
+        system = np.where(on[:, :, None] & on[:, None, :], self.K, 0.0)
+        system[:, panel, panel] = np.where(on, self.K[:, panel, panel], 1.0)
+        return np.linalg.solve(system, np.where(on[:, :, None], right, 0.0))
+
+
+def _groups(K: Array, between: Array, couples: Couplings) -> list[_Group]:
+    if len(couples.neighbours) == 0:
+        return [_Group(couples.groups[0], K)]
+    first, second = couples.first[couples.neighbours], couples.second[couples.neighbours]
+    n, made = K.shape[1], []
+    for contacts in couples.groups:
+        count, z = contacts.shape
+        whole = np.zeros((count, z, n, z, n))
+        row, place = np.full((2, len(K)), -1)
+        row[contacts], place[contacts] = np.arange(count)[:, None], np.arange(z)
+        whole[row[contacts], place[contacts], :, place[contacts]] = K[contacts]
+        mine = row[first] >= 0
+        whole[row[first[mine]], place[first[mine]], :, place[second[mine]]] = between[mine]
+        made.append(_Group(contacts, whole.reshape(count, z * n, z * n)))
+    return made
+
+
 def pressed(
     K: Array,
+    between: Array,
     gap: Array,
     widths: Array,
     T: Array,
@@ -145,11 +210,13 @@ def pressed(
     Parameters
     ----------
     K : ndarray, shape (p, n, n)
-        Approach of the panels' middles for pressures on the panels (m/Pa).
+        Approach of the panels' middles for pressures on the panels of the same contact (m/Pa).
+    between : ndarray, shape (q, n, n)
+        The same between contacts of one tooth pair, in the order of `Couplings.neighbours`.
     gap, widths : ndarray, shape (p, n)
         Gap at the panels' middles and widths of the panels (m).
     T : ndarray, shape (c,)
-        Compliance between the pairs (m2/N), by couple.
+        Compliance between the contacts (m2/N), by couple.
     carried : ndarray, shape (p,)
         F_0, the forces per width (N/m) that the gap holds.
     bearing : ndarray of bool, shape (p, n)
@@ -157,31 +224,32 @@ def pressed(
     held
         Whether that is no guess but what bears.
     """
-    n = gap.shape[1]
-    diagonal = np.arange(n)
+    groups, n = _groups(K, between, couples), gap.shape[1]
     on = bearing
-    right = np.stack([-gap, np.ones_like(gap)], axis=2)
     y0 = -couples.times(T, carried)
+    pressure, approach = np.empty_like(gap), np.empty_like(gap)
     for _ in range(1 if held else CHANGES):
-        if on.all():
-            both = np.linalg.solve(K, right)
-        else:
-            system = np.where(on[:, :, None] & on[:, None, :], K, 0.0)
-            system[:, diagonal, diagonal] = np.where(on, K[:, diagonal, diagonal], 1.0)
-            both = np.linalg.solve(system, np.where(on[:, :, None], right, 0.0))
-        free, stiffness = (widths[:, None, :] @ both)[:, 0].T
-        force = couples.solved(free - stiffness * y0, stiffness, T)
-        y = (couples.times(T, force) + y0)[:, None]
-        p = both[:, :, 0] - both[:, :, 1] * y
-        approach = (K @ p[:, :, None])[:, :, 0]
+        free, stiffness = np.empty(len(gap)), np.zeros(len(T))
+        responses = [group.responses(group.of(on), group.of(gap)) for group in groups]
+        for group, both in zip(groups, responses, strict=True):
+            count, z = group.contacts.shape
+            forces = (widths[group.contacts][:, :, None, :] @ both.reshape(count, z, n, 1 + z))[:, :, 0]
+            free[group.contacts] = forces[:, :, 0]
+            stiffness[couples.couple(group.contacts[:, :, None], group.contacts[:, None])] = forces[:, :, 1:]
+        force = couples.solved(free - couples.times(stiffness, y0), stiffness, T)
+        y = couples.times(T, force) + y0
+        for group, both in zip(groups, responses, strict=True):
+            p = both[:, :, 0] - (both[:, :, 1:] @ y[group.contacts][:, :, None])[:, :, 0]
+            pressure[group.contacts] = p.reshape(*group.contacts.shape, n)
+            approach[group.contacts] = (group.K @ p[:, :, None]).reshape(*group.contacts.shape, n)
         bound = ROUNDING * np.abs(approach).max(axis=1, keepdims=True)
-        now = np.where(on, p > 0, gap + y + approach < -bound)
+        now = np.where(on, pressure > 0, gap + y[:, None] + approach < -bound)
         settled = (now == on).all(axis=1)
         if settled.all():
             break
         on = now
     # without a bearing panel the force is rounding
-    return Pressed(np.where(on.any(axis=1), force, 0.0), np.where(on, p, 0.0), approach, settled)
+    return Pressed(np.where(on.any(axis=1), force, 0.0), np.where(on, pressure, 0.0), approach, settled)
 
 
 def first_guess(gap: Array) -> NDArray[np.bool_]:
@@ -192,11 +260,12 @@ def first_guess(gap: Array) -> NDArray[np.bool_]:
 
 
 def forces_of_overlaps(overlap: Array, compliance: float, T: Array, couples: Couplings) -> Array:
-    """Forces per width (N/m) >= 0 that take up overlaps (m) when every pair yields by `compliance` (m2/N) besides T."""
+    """Forces per width (N/m) >= 0 that take up overlaps (m) when every contact yields by `compliance` (m2/N) beside T."""
     on = overlap > 0
-    force = np.zeros_like(overlap)
+    force, stiffness = np.zeros_like(overlap), np.zeros(len(T))
     for _ in range(couples.slots + 1):
-        force = couples.solved(np.where(on, overlap / compliance, 0.0), np.where(on, 1 / compliance, 0.0), T)
+        stiffness[couples.own] = on / compliance
+        force = couples.solved(np.where(on, overlap / compliance, 0.0), stiffness, T)
         if (force >= 0).all():
             break
         on = on & (force > 0)

@@ -117,11 +117,6 @@ class FlankTables:
         """First and last arc lengths (m), shape (f, 2)."""
         return np.concatenate([self.low, self.high], axis=-1)
 
-    @cached_property
-    def end_points(self) -> ComplexArray:
-        """Points there (m), shape (f, 2)."""
-        return self.at(self.ends)[0]
-
     def of(self, flank: NDArray[np.int64]) -> FlankTables:
         """The same table with other axes of flanks: the flanks `flank`, shape (..., g), for arc lengths (..., g, m)."""
         return replace(

@@ -1,0 +1,199 @@
+"""A gear pair as the half-plane law sees it: its flanks, what loads on them do, and tables of both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..gear.deviation import NOMINAL, ToothDeviations
+from ..gear.flank_curve import FlankCurve, FlankTables, flank_curve, flank_tables
+from ..gear.pair import GearPair
+from ..gear.tooth_flanks import ToothFlanks
+from ..gear.touching import Flanks
+from .flank_compliance import FlankCompliance, Shapes, corner_of, flank_compliances, shapes_of
+from .scene import MeshingPair
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+ComplexArray = NDArray[np.complex128]
+
+
+#: Even places along a flank for `Finely`.
+FINELY = 128
+
+
+@dataclass(frozen=True)
+class Finely:
+    """Flanks of pinion and wheel at m even places.
+
+    Attributes
+    ----------
+    start, per_length : ndarray, shape (2, 1)
+        Arc of the first place (m), places per arc (1/m).
+    values : ndarray, shape (2, k, m)
+        Shape functions of the stations.
+    distance : ndarray, shape (2, m)
+        Distance y from the corner (m).
+    """
+
+    start: Array
+    per_length: Array
+    values: Array
+    distance: Array
+
+    @property
+    def count(self) -> int:
+        """m."""
+        return self.values.shape[2]
+
+
+@dataclass(frozen=True)
+class HalfPlanePair:
+    """A gear pair as the half-plane law sees it.
+
+    Attributes
+    ----------
+    pair
+        Geometry.
+    teeth
+        Working flanks of all teeth, where their first touch is searched for.
+    sides
+        Compliance of pinion's and wheel's flank, without deviations.
+    width
+        Width of the contact (m).
+    """
+
+    pair: GearPair
+    teeth: ToothFlanks
+    sides: tuple[FlankCompliance, FlankCompliance]
+    width: float
+
+    @property
+    def flanks(self) -> Flanks:
+        """The first profiles of both gears."""
+        return self.teeth.first
+
+    @cached_property
+    def curves(self) -> tuple[FlankCurve, ...]:
+        """Exact flanks, f of them: the faces of `teeth`."""
+        gears = (self.pair.pinion, self.pair.wheel)
+        return tuple(flank_curve(gears[self.teeth.gear_of(i)], face) for i, face in enumerate(self.teeth.faces))
+
+    @cached_property
+    def tables(self) -> FlankTables:
+        """These in one table."""
+        return flank_tables(self.curves)
+
+    def arc_at(self, flank: IntArray, parameter: Array) -> Array:
+        """Arc lengths (m) of parameters u on the flanks `flank`, both of shape (p, 2)."""
+        made = np.empty(np.shape(parameter))
+        for i in np.unique(flank):
+            made[flank == i] = self.curves[i].arc_at(parameter[flank == i])
+        return made
+
+    def parameter_at(self, flank: IntArray, arc: Array) -> Array:
+        """Parameters u of arc lengths (m) on the flanks `flank`, both of shape (p, 2)."""
+        made = np.empty(np.shape(arc))
+        for i in np.unique(flank):
+            made[flank == i] = self.curves[i].parameter_at(arc[flank == i])
+        return made
+
+    @cached_property
+    def shapes(self) -> Shapes:
+        """Shape functions of the stations."""
+        return shapes_of([side.stations for side in self.sides])
+
+    @cached_property
+    def inverse_modulus(self) -> Array:
+        """1/E' (1/Pa), shape (2,)."""
+        return np.array([side.inverse_modulus for side in self.sides])
+
+    @cached_property
+    def compliance(self) -> float:
+        """2/pi (1/E_1' + 1/E_2') (1/Pa)."""
+        return float(2 / np.pi * self.inverse_modulus.sum())
+
+    @cached_property
+    def hub(self) -> Array:
+        """x of the gears' centres (m), shape (2,)."""
+        return np.array([0.0, self.pair.working_centre_distance])
+
+    @cached_property
+    def corner(self) -> ComplexArray:
+        """Corners of flanks and tip circles (m), shape (f,)."""
+        return np.array([corner_of(curve)[0] for curve in self.curves])
+
+    @cached_property
+    def wedge(self) -> tuple[Array, ComplexArray]:
+        """W of both gears as W v = a v + b conj(v), both of shape (2,) (-)."""
+        W = np.array([side.wedge for side in self.sides])
+        return 0.5 * (W[:, 0, 0] + W[:, 1, 1]), 0.5 * (W[:, 0, 0] - W[:, 1, 1]) + 1j * W[:, 0, 1]
+
+    @cached_property
+    def undercut(self) -> Array:
+        """1 where the working flank starts with the edge of an undercut, shape (2,)."""
+        return np.array([float(side.curve.face.fall > 0.0) for side in self.sides])
+
+    @cached_property
+    def marks(self) -> list[tuple[str, int, float]]:
+        """Name, flank and arc length (m) of the flanks' marks, see `half_plane_result.PairContacts`, by rising rank."""
+        found = []
+        for name in ("undercut", "relief", "round", "tip"):
+            for flank, curve in enumerate(self.curves):
+                face = curve.face
+                places = {
+                    "undercut": [0.0] if face.fall > 0.0 else [],
+                    "relief": face.kinks.tolist(),
+                    "round": [] if face.sharp else [1.0],
+                    "tip": [face.end] if face.sharp else [],
+                }[name]
+                found += [(name, flank, float(curve.arc_at(at))) for at in places]
+        return found
+
+    @cached_property
+    def finely(self) -> Finely:
+        """Shape functions between the stations."""
+        ends = np.array([[side.curve.low, side.curve.high] for side in self.sides])
+        arcs = ends[:, :1] + np.diff(ends) * np.linspace(0.0, 1.0, FINELY)
+        distance = np.stack([side.distance(at) for side, at in zip(self.sides, arcs, strict=True)])
+        values = self.shapes.at(arcs.T)[:, :, 0].transpose(1, 2, 0)
+        return Finely(ends[:, :1], (FINELY - 1) / np.diff(ends), values, distance)
+
+    @cached_property
+    def bump_squares(self) -> Array:
+        """Mean squares a^2/4 of the stations' bumps (m2), shape (2, k)."""
+        made = np.zeros_like(self.shapes.stations)
+        for gear, side in enumerate(self.sides):
+            made[gear, : len(side.bumps)] = 0.25 * side.bumps**2
+        return made
+
+    def influence(self, steps: int) -> Array:
+        """w H between the stations of teeth -steps ... steps apart, shape (2, 2k, (2 steps + 1) 2k) (m2/N)."""
+        if steps not in self._influences:
+            k = self.shapes.stations.shape[1]
+            made = np.zeros((2, k, 2, 2 * steps + 1, k, 2))
+            for gear, side in enumerate(self.sides):
+                n = len(side.stations)
+                for step in range(-steps, steps + 1):
+                    smooth = side.smooth[step if gear == 0 else -step]
+                    made[gear, :n, :, step + steps, :n] = self.width * smooth.T.reshape(n, 2, n, 2)
+            self._influences[steps] = made.reshape(2, 2 * k, -1)
+        return self._influences[steps]
+
+    @cached_property
+    def _influences(self) -> dict[int, Array]:
+        return {}
+
+    def deviated(self, deviations: tuple[ToothDeviations, ToothDeviations]) -> HalfPlanePair:
+        """The same elastic gears with other deviations of micrometres, which are in the flanks' curves alone."""
+        return HalfPlanePair(self.pair, ToothFlanks(self.pair, deviations), self.sides, self.width)
+
+
+def half_plane_pair(
+    pair: GearPair, elastic: MeshingPair, *, deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL
+) -> HalfPlanePair:
+    """Prepare the law for meshed and condensed gears; their flanks may be coarse (a tenth of a module)."""
+    return HalfPlanePair(pair, ToothFlanks(pair, deviations), flank_compliances(pair, elastic), elastic.width)
