@@ -3,6 +3,9 @@ r"""The flank of a tooth by its arc length: root, involute with its relief, and 
 Between knots on the exact curve, points are cubic in the arc length s with the exact points and unit tangents at both
 ends (Hermite): with :math:`\tau = s - s_i`, :math:`z(s) = z_i + t_i\tau + c_i\tau^2 + d_i\tau^3`. The knots include all
 marks, so kinks stay sharp; the error is :math:`h^4\kappa''/384` of the curvature :math:`\kappa`, nanometres and less.
+
+A flank with a deviation is tabulated by the arc length of the flank without: the same material has the same s, however
+far a waviness lengthens the curve, and the tangents are longer than 1 by half the square of the deviation's slope.
 """
 
 from __future__ import annotations
@@ -69,7 +72,7 @@ class FlankCurve:
         return flank_tables((self,))
 
     def at(self, s: Array) -> tuple[ComplexArray, ComplexArray]:
-        """Points (m) and unit tangents towards the tip at arc lengths s (m) within the curve."""
+        """Points (m) and tangents dz/ds towards the tip at arc lengths s (m) within the curve."""
         made = self._tables.at(np.asarray(s)[None])
         return made[0][0], made[1][0]
 
@@ -131,7 +134,7 @@ class FlankTables:
         return self.cubic.take(i, axis=1), s - self.arc.take(i)
 
     def at(self, s: Array) -> tuple[ComplexArray, ComplexArray]:
-        """Points (m) and unit tangents towards the tips at arc lengths s (m), shape (..., f, m), within the flanks."""
+        """Points (m) and tangents dz/ds towards the tips at arc lengths s (m), shape (..., f, m), within the flanks."""
         (a, b, c, d), t = self.pieces(s)
         return ((d * t + c) * t + b) * t + a, (3 * d * t + 2 * c) * t + b
 
@@ -169,10 +172,11 @@ def flank_curve(gear: Gear, face: Face | None = None) -> FlankCurve:
     face = face or face_of(gear)
     marks = [m for m in face.marks() if 0 < m < face.end]
     u = np.unique(np.concatenate([np.linspace(0, 1, INVOLUTE), np.linspace(1, face.end, ROUND), marks]))
-    points, size = face.points(u), _lengths(face.speeds, u)
+    nominal = face_of(gear)
+    points, size = face.points(u), _lengths(nominal.speeds, u)
     before, after = (
-        -1j * face.normals(np.clip(v, 0.0, face.end)) for v in (u[:-1] + BESIDE, u[1:] - BESIDE)
-    )  # tangents at the start and end of each piece
+        _rates(face, nominal, np.clip(v, 0.0, face.end)) for v in (u[:-1] + BESIDE, u[1:] - BESIDE)
+    )  # at the start and end of each piece
     root = next((s.curve for s in gear.profile.segments if s.name == "trochoid"), None)
     if isinstance(root, Trochoid):
         v = np.linspace(0.5, 1.0, ROOT)
@@ -186,6 +190,12 @@ def flank_curve(gear: Gear, face: Face | None = None) -> FlankCurve:
     h, chord = np.diff(s), np.diff(points)
     cubic = [points[:-1], before, (3 * chord / h - 2 * before - after) / h, (before + after - 2 * chord / h) / h**2]
     return FlankCurve(face, u, s, np.stack(cubic))
+
+
+def _rates(face: Face, nominal: Face, u: Array) -> ComplexArray:
+    """Derivatives of the points by the arc length of the flank without deviation."""
+    speed = nominal.speeds(u)
+    return np.asarray(-1j * face.normals(u) * np.where(speed > 0, face.speeds(u) / np.where(speed > 0, speed, 1), 1))
 
 
 def _lengths(speed: Any, parameter: Array) -> Array:
