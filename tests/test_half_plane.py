@@ -89,7 +89,8 @@ def test_panels_give_hertz() -> None:
     gap = x**2 / (2 * radius) - deep
     alone = couplings(np.array([0]), np.array([0]), 1)
     width = half[:, None] * WIDTHS
-    found = pressed(influence(half, compliance), gap, width, np.zeros(1), np.zeros(1), alone, bearing=first_guess(gap))
+    K, between, T, nothing = influence(half, compliance), np.zeros((0, 1, 1)), np.zeros(1), np.zeros(1)
+    found = pressed(K, between, gap, width, T, nothing, alone, bearing=first_guess(gap))
     assert found.settled.all()
     assert found.force[0] == pytest.approx(force, rel=1e-3)
     inside = np.abs(x[0]) < 0.9 * b

@@ -51,7 +51,7 @@ def first_contacts(sides: Sequence[FlankCompliance], contacts: PairContacts) -> 
     arcs = np.repeat(arc[step][:, :, -1:], size * n, axis=2).reshape(count, 2, size, n)
     pressure, width = np.zeros((2, count, size, n))
     arcs[whole, :, place], pressure[whole, place], width[whole, place] = arc, contacts.pressure, contacts.width
-    normal = np.zeros(count, dtype=complex)
+    normal: NDArray[np.complex128] = np.zeros(count, dtype=np.complex128)
     np.add.at(normal, whole, contacts.force * contacts.normal)
     return FirstContacts(
         position=contacts.position[step],

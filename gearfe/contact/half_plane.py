@@ -4,15 +4,16 @@ Teeth and rims move the faces by the smooth influence H of `.flank_compliance`; 
 half-planes and wedges on panels, which no mesh resolves. (Vijayakar, *Int. J. Numer. Meth. Eng.* 31, 1991, joins a
 finite-element and a half-space solution at a depth below the contact; here they join in the influence function.)
 
-**One position.** Every tooth pair has a centre O with the common normal n, and panels at x along the tangent over the
-window in which the gap may close. With the pressure p, its force per width :math:`F=\int p`, the gap g between the
+**One position.** Every contact has a centre O with the common normal n, and panels at x along the tangent over the
+window in which the gap may close; a tooth pair has as many contacts as it bears on stretches of its flanks (`.zones`;
+`.neighbours` has their mutual terms). With the pressure p, its force per width :math:`F=\int p`, the gap g between the
 faces as moved by the loads :math:`F_0` of the step before (`.moved_faces`),
 
 .. math::
     p \ge 0,\qquad g(x) + \frac{2}{\pi}\Big(\frac1{E_1'}+\frac1{E_2'}\Big)\int -\ln|x-\xi|\,p\,d\xi
     + \sum_i \frac{n W_i n}{E_i'}\int -\ln(y_i+\eta_i)\,p + \sum_l T_l\,(F_l-F_{0,l}) \ge 0,
 
-complementary, :math:`T = w\, n H n` over all tooth pairs l of the position. Then O moves to the mean place of p, n to
+complementary, :math:`T = w\, n H n` over all contacts l of the position. Then O moves to the mean place of p, n to
 the mean normal of the deformed faces under p (of the face that is further from its edges), H is taken at the material
 that is at O now, and so on until F stays.
 
@@ -56,7 +57,7 @@ __all__ = ["HalfPlanePair", "PairContacts", "half_plane_pair", "solve_half_plane
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-#: How often missing contacts are looked for.
+#: How often missing contacts are added.
 ROUNDS = 10
 #: Most steps; change of the forces, in units of their sum, from which on windows and bearing panels are held.
 STEPS, NEAR = 30, 2e-5
@@ -149,7 +150,8 @@ class _Open:
 
 @dataclass(frozen=True)
 class _Pairs:
-    """Where the rigid flanks of p tooth pairs touch, and what their next `half_plane_step.step` starts from."""
+    """p contacts: where the rigid flanks of their tooth pairs first touch, and what the next `half_plane_step.step`
+    starts from."""
 
     found: Touching
     state: State
@@ -197,7 +199,7 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
     contacts = [no_contacts()]
     open_ = _first(law, twists, found)
     number, began, rounds = 0, 0, 0
-    while len(open_.numbers) and number - began < STEPS and rounds < ROUNDS:  # again for those that are not settled in the last steps
+    while len(open_.numbers) and number - began < STEPS and rounds < ROUNDS:  # again for what is not settled
         done: list[_Open] = []
         while len(open_.numbers) and number - began < STEPS:
             number += 1
@@ -234,7 +236,7 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
         numbers[name][failed] = np.nan
     found_ = contacts[1] if len(contacts) == 2 else joined(contacts)
     if len(contacts) > 2:
-        found_ = taken(found_, np.lexsort((found_.pair, found_.position)))
+        found_ = taken(found_, np.lexsort((found_.arc[:, 0], found_.pair, found_.position)))
     return Positions(
         pinion_angle=angles, twist=twists, status=status, iterations=iterations, contacts=found_, **numbers
     )

@@ -1,4 +1,4 @@
-"""Solved positions of the half-plane law: arrays over positions, and arrays over the tooth pairs that carry load."""
+"""Solved positions of the half-plane law: arrays over positions, and arrays over the contacts that carry load."""
 
 from __future__ import annotations
 
@@ -19,13 +19,15 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 ComplexArray = NDArray[np.complex128]
 
-#: Sums over the pairs of a position.
+#: Sums over the contacts of a position.
 SUMS = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "energy")
 
 
 @dataclass(frozen=True)
 class PairContacts:
-    """Loaded tooth pairs, m of them over all positions, by position and pair number.
+    """Loaded contacts, m of them over all positions, by position, pair number and place on the pinion's flank.
+
+    A tooth pair has one where it bears on one stretch of its flanks, else one for each stretch.
 
     Attributes
     ----------
@@ -101,7 +103,7 @@ def no_contacts() -> PairContacts:
 
 
 def pair_sums(law: HalfPlanePair, state: State, made: Step) -> dict[str, Array]:
-    """What each pair adds to the sums over its position (N m, N m, N m, J)."""
+    """What each contact adds to the sums over its position (N m, N m, N m, J)."""
     force, normal = made.solution.force * law.width, state.normal
     centre = _centres(state, made)
     wheel = law.tables.of(state.flank).at(_material(made)[:, :, None])[0][:, 1, 0] * state.turn[:, 1]
@@ -126,7 +128,7 @@ def _material(made: Step) -> Array:
 def contacts_of(
     law: HalfPlanePair, found: Touching, solved: tuple[State, Step], known: dict[str, Array]
 ) -> PairContacts:
-    """The pairs of a step that carry load; `known` are the torques and rates of all."""
+    """The contacts of a step that carry load; `known` are the torques and rates of all."""
     index = np.flatnonzero(solved[1].solution.force > 0)
     state, made = taken(solved[0], index), taken(solved[1], index)
     force, pressure, width = made.solution.force, made.solution.pressure, made.width
@@ -159,7 +161,7 @@ def contacts_of(
 def contact_rates(
     law: HalfPlanePair, here: tuple[State, Step], ahead: tuple[State, Step], by: Array
 ) -> dict[str, Array]:
-    """Rates of `PairContacts` for all pairs, from the same step at twists larger by `by` (rad), shape (p,)."""
+    """Rates of `PairContacts` for all contacts, from the same step at twists larger by `by` (rad), shape (p,)."""
     (state, one), (state_on, two) = here, ahead
     wider = np.divide(two.spread, one.spread, out=np.ones(len(by)), where=one.spread > 0)
     return {

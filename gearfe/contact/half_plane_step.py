@@ -266,16 +266,18 @@ def _distances(law: HalfPlanePair, tables: FlankTables, corner: ComplexArray, ar
     return y, near[:, ::-1] / near.sum(axis=1, keepdims=True)
 
 
-def _searched(law: HalfPlanePair, tables: FlankTables, state: State, faces: Faces, couples: Couplings, normal: ComplexArray) -> Windows:
+def _searched(
+    law: HalfPlanePair, tables: FlankTables, state: State, faces: Faces, couples: Couplings, normal: ComplexArray
+) -> Windows:
     """Windows by the gap beside its least."""
     module = law.pair.pinion.module
     least = LEAST_WIDTH**2 * module / (0.2 * law.compliance)
     floor = np.maximum(state.force, LEAST_FORCE * couples.total(state.force)[couples.position] + least)
     scale = np.sqrt(0.2 * law.compliance * floor * module)
     depth = state.reach * law.compliance * floor
-    if len(couples.neighbours) == 0:
-        return windows(faces, tables, state.ends, scale, depth)
-    opened = partial(neighbours.opened, law, couples, normal, (state.arc, state.force, state.spread))
+    opened = None
+    if len(couples.neighbours):
+        opened = partial(neighbours.opened, law, couples, normal, (state.arc, state.force, state.spread))
     return windows(faces, tables, state.ends, scale, depth, opened)
 
 

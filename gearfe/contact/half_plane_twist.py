@@ -78,11 +78,11 @@ def _batch(law: HalfPlanePair, torques: Array, found: Touching, start: int) -> A
         on = overlap > 0
         for _ in range(couples.slots + 1):
             weight = np.where(on, 1 / c, 0.0)
-            force = couples.solved(weight * overlap, weight, T)
+            force = couples.solved(weight * overlap, couples.diagonal(weight), T)
             if (force >= 0).all():
                 break
             on = on & (force > 0)
-        rate = couples.solved(weight * arm, weight, T)
+        rate = couples.solved(weight * arm, couples.diagonal(weight), T)
         torque, slope = (couples.total(one * arm) * width for one in (force, rate))
         twist = np.maximum(twist + (torques - torque) / np.maximum(slope, 1e-300), touch + 0.1 * (twist - touch))
         force = np.maximum(force, 0.0)

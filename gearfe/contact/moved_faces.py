@@ -117,7 +117,7 @@ def windows(
     ends: Array,
     scale: Array,
     depth: Array,
-    beside: Callable[[Array], Array | float] = lambda arcs: 0.0,
+    beside: Callable[[Array], Array] | None = None,
 ) -> Windows:
     """Windows in which the gap is at most `depth` (m) above its least, linear in its root between places of a search.
 
@@ -133,7 +133,7 @@ def windows(
     low, high = faces.range(flanks, ends)
     x = np.minimum(np.maximum(scale[:, None] * _LOOK, low[:, None]), high[:, None])
     arcs, h, _ = faces.heights(flanks, x)
-    gap = h[:, 1] - h[:, 0] + beside(arcs)
+    gap = h[:, 1] - h[:, 0] + (0.0 if beside is None else beside(arcs))
     row, count, nearest = np.arange(len(x)), x.shape[1], np.argmin(gap, axis=1)
     over = np.sqrt(gap - gap.min(axis=1, keepdims=True)) - np.sqrt(depth)[:, None]
     found = []

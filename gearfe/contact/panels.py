@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +96,10 @@ class Couplings:
         """Sums over the contacts of each position, shape (positions,)."""
         return np.bincount(self.position, of_contacts, self.positions).astype(float)
 
+    def diagonal(self, of_contacts: Array) -> Array:
+        """The diagonal matrix with these entries, by couple, shape (c,)."""
+        return np.asarray(np.where(self.first == self.second, of_contacts[self.first], 0.0), dtype=float)
+
     def times(self, matrix: Array, vector: Array) -> Array:
         """sum_j matrix_ij vector_j for each contact i; `matrix` has one entry a couple, shape (c,)."""
         return np.bincount(self.first, matrix * vector[self.second], len(self.position)).astype(float)
@@ -158,7 +163,7 @@ class _Group:
     contacts: IntArray
     K: Array
 
-    def of(self, values: Array) -> Array:
+    def of(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values of all panels of each tooth pair, shape (P, z n), from those of the contacts, shape (p, n)."""
         return np.asarray(values[self.contacts].reshape(len(self.contacts), -1))
 
@@ -170,10 +175,10 @@ class _Group:
         panel = np.arange(size)
         right[:, panel, 1 + panel // (size // z)] = 1.0
         if on.all():
-            return np.linalg.solve(self.K, right)
+            return np.asarray(np.linalg.solve(self.K, right))
         system = np.where(on[:, :, None] & on[:, None, :], self.K, 0.0)
         system[:, panel, panel] = np.where(on, self.K[:, panel, panel], 1.0)
-        return np.linalg.solve(system, np.where(on[:, :, None], right, 0.0))
+        return np.asarray(np.linalg.solve(system, np.where(on[:, :, None], right, 0.0)))
 
 
 def _groups(K: Array, between: Array, couples: Couplings) -> list[_Group]:
@@ -260,12 +265,11 @@ def first_guess(gap: Array) -> NDArray[np.bool_]:
 
 
 def forces_of_overlaps(overlap: Array, compliance: float, T: Array, couples: Couplings) -> Array:
-    """Forces per width (N/m) >= 0 that take up overlaps (m) when every contact yields by `compliance` (m2/N) beside T."""
+    """Forces per width (N/m) >= 0 that take up overlaps (m) when contacts yield by `compliance` (m2/N) besides T."""
     on = overlap > 0
-    force, stiffness = np.zeros_like(overlap), np.zeros(len(T))
+    force = np.zeros_like(overlap)
     for _ in range(couples.slots + 1):
-        stiffness[couples.own] = on / compliance
-        force = couples.solved(np.where(on, overlap / compliance, 0.0), stiffness, T)
+        force = couples.solved(np.where(on, overlap / compliance, 0.0), couples.diagonal(on / compliance), T)
         if (force >= 0).all():
             break
         on = on & (force > 0)

@@ -21,7 +21,8 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Contacts:
-    """Loaded tooth pairs of laws on the mesh, m of them; the half-plane law says more of its `PairContacts`.
+    """Loaded tooth pairs of laws on the mesh, m of them; the half-plane law says more of its `PairContacts`, in which a
+    tooth pair may have several contacts.
 
     Attributes
     ----------

@@ -203,8 +203,8 @@ def _added(law: HalfPlanePair, state: State, made: Step, i: int, seen: Seen, bou
     """
     own, ends, reach = taken(state, [i]), state.ends[[i]].copy(), state.reach[[i]]
     parts = []
-    for way, beyond in enumerate(_beyond(taken(made, [i]), seen.x[None])[:, 0]):
-        beyond = np.flatnonzero(beyond)
+    for way, side in enumerate(_beyond(taken(made, [i]), seen.x[None])[:, 0]):
+        beyond = np.flatnonzero(side)
         if len(beyond) == 0 or seen.gap[beyond].min() >= bound:
             continue
         k = int(beyond[np.argmin(seen.gap[beyond])])

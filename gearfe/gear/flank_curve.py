@@ -172,7 +172,7 @@ def flank_curve(gear: Gear, face: Face | None = None) -> FlankCurve:
     face = face or face_of(gear)
     marks = [m for m in face.marks() if 0 < m < face.end]
     u = np.unique(np.concatenate([np.linspace(0, 1, INVOLUTE), np.linspace(1, face.end, ROUND), marks]))
-    nominal = face_of(gear)
+    nominal = replace(face, flank=replace(face.flank, deviation=None))
     points, size = face.points(u), _lengths(nominal.speeds, u)
     before, after = (
         _rates(face, nominal, np.clip(v, 0.0, face.end)) for v in (u[:-1] + BESIDE, u[1:] - BESIDE)

@@ -34,8 +34,9 @@ from .spur_gear import Gear
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-#: Points of the first search along a flank and of each closer look, and how often it looks closer.
-COARSE, CLOSER, LOOKS = 97, 17, 16
+#: Points of the first search along a flank and of each closer look, and how often it looks closer; points besides for
+#: each piece of a deviation, whose waves may be short.
+COARSE, CLOSER, LOOKS, PER_PIECE = 97, 17, 16, 2
 #: A place is an end of the range, or a mark, when it is so near to it: places have the rounding of angles and radii.
 AT_AN_END = 1e-9
 #: Moves of a roll length that are rounding, in parts of the longest.
@@ -337,10 +338,12 @@ class Flanks:
 
     def met(self, position: IntArray, angle: Array, number: IntArray) -> Touching:
         """First touch of the tooth pairs `number` at pinion angles (rad), of those of them that meet, shape (n,)."""
-        u = np.broadcast_to(np.linspace(0.0, self.pinion.end, COARSE), (len(angle), COARSE))
+        pieces = [len(face.flank.deviation.pieces) for face in self.faces if face.flank.deviation is not None]
+        coarse = COARSE + PER_PIECE * max(pieces, default=0)
+        u = np.broadcast_to(np.linspace(0.0, self.pinion.end, coarse), (len(angle), coarse))
         rows = np.arange(len(angle))
         best, least = np.zeros(len(angle)), np.full(len(angle), np.inf)
-        step = self.pinion.end / (COARSE - 1)
+        step = self.pinion.end / (coarse - 1)
         for _ in range(LOOKS):
             found = self.twist(angle[:, None], number[:, None], u)
             lowest = np.argmin(found, axis=1)

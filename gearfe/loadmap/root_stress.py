@@ -205,7 +205,7 @@ class PairRoots:
         """Of the tooth pairs that carry load."""
         contacts = found.contacts
         carry = contacts.torque_wheel > 0
-        position, pair = contacts.position[carry], contacts.pair[carry]
+        position, pair = np.unique(np.stack([contacts.position[carry], contacts.pair[carry]]), axis=1)
         stress, radius, error = np.zeros((3, len(pair), 2))
         for g, tooth in enumerate((pair, -1 - pair)):
             of_gear = found.loads[g], position, tooth, self.pair.bodies[g].teeth

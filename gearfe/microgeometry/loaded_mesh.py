@@ -142,7 +142,7 @@ class LoadedMesh:
         np.maximum.at(leading, own.angle, own.pair)
         slot = leading[own.angle] - own.pair
         shares = np.zeros((*shape, int(slot.max(initial=0)) + 1))
-        shares[own.torque, own.angle, slot] = own.share
+        np.add.at(shares, (own.torque, own.angle, slot), own.share)
         shares[self.failed] = np.nan
         return np.where(leading == np.iinfo(np.int64).min, 0, leading), shares
 

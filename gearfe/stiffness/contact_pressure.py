@@ -54,6 +54,8 @@ def contact_pressures(solver: PositionSolver, found: Positions) -> dict[str, Arr
     force = contacts.torque_wheel[known] / (touching.arm[k, 1] * elastic.width)
     curvature, flat = touching.curvature[k], np.isfinite(touching.curvature[k])
     bears = np.maximum(*(_bearing(curve, touching.place[k, g], width) for g, curve in enumerate(solver.curves)))
+    several = np.unique(pairs[known], return_inverse=True, return_counts=True)
+    bears[several[2][several[1]] > 1] = _ROUNDED  # not where the rigid flanks touch first, nor with one ellipse
     bears[~flat] = _SINGULAR  # it touches at the corner itself, however narrow the contact
     hertz = np.sqrt(force / sum(elastic.contact_compliances) * np.where(flat, curvature, 0.0) / math.pi)
     blunted = 2 * force / (math.pi * np.hypot(width, BLUNTING * solver.pair.pinion.module))

@@ -187,7 +187,7 @@ def load_shares(found: Positions) -> tuple[Array, Array]:
     np.maximum.at(leading, position, pair)
     behind = leading[position].astype(np.int64) - pair
     shares = np.zeros((count, int(behind.max(initial=0)) + 1))
-    shares[position, behind] = contacts.torque_wheel[carry] / found.torque_wheel[position]
+    np.add.at(shares, (position, behind), contacts.torque_wheel[carry] / found.torque_wheel[position])
     leading[np.isinf(leading)] = np.nan
     shares[np.isnan(found.torque_wheel)] = np.nan
     return leading, shares

@@ -1,0 +1,136 @@
+"""Several contacts of one tooth pair: waves on a flank, and a tip that runs along a root."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe.contact.elements import first_contacts, solve_elements
+from gearfe.contact.half_plane import HalfPlanePair, half_plane_pair, solve_half_plane
+from gearfe.contact.panels import MIDDLES, PANELS, WIDTHS, couplings, influence, pressed
+from gearfe.contact.position import Positions
+from gearfe.contact.wedge import log_integral
+from gearfe.gear.deviation import ToothDeviations
+from gearfe.stiffness.job import read_stiffness_job
+from gearfe.stiffness.sweep import elastic_pair
+
+from .gears import pair as gear_pair
+from .solving import solve_positions
+from .waves import wave, waved
+
+PAIR = gear_pair(tip_round=1e-4)
+PLAIN = ToothDeviations()
+CASES = Path(__file__).parent / "campaigns" / "kept" / "gears"
+
+
+@lru_cache
+def law_of(waves: float, amplitude: float) -> HalfPlanePair:
+    return half_plane_pair(PAIR, elastic_pair(PAIR), deviations=(wave(PAIR.pinion, waves, amplitude), PLAIN))
+
+
+def most_zones(found: Positions) -> int:
+    """Most contacts of a tooth pair."""
+    pairs = np.stack([found.contacts.position, found.contacts.pair])
+    return int(np.unique(pairs, axis=1, return_counts=True)[1].max())
+
+
+def test_two_windows_side_by_side_are_one() -> None:
+    """Hertz's contact (Johnson, *Contact Mechanics*, 4.2) cut in two in the middle: both press as one does."""
+    radius, modulus, force = 0.02, 1.1e11, 2e5
+    b = math.sqrt(4 * force * radius / (math.pi * modulus))
+    compliance = 2 / (math.pi * modulus)
+    half = np.full(2, 0.6 * b)
+    x = half[:, None] * MIDDLES + np.array([[-0.6 * b], [0.6 * b]])
+    width = half[:, None] * WIDTHS
+    gap = x**2 / (2 * radius) - compliance * force * (0.5 - math.log(b / 2))
+    z = x[:, :, None] - x[::-1, None, :]
+    between = -compliance * (log_integral(z + width[:, None] / 2) - log_integral(z - width[:, None] / 2))
+    pair = couplings(np.zeros(2, dtype=np.int64), np.zeros(2, dtype=np.int64), 1)
+    nothing = np.zeros((2, PANELS), dtype=bool)
+    found = pressed(influence(half, compliance), between, gap, width, np.zeros(4), np.zeros(2), pair, nothing)
+    assert found.settled.all()
+    assert found.force == pytest.approx([force / 2, force / 2], rel=1e-3)
+    inside = np.abs(x) < 0.9 * b
+    ellipse = 2 * force / (math.pi * b) * np.sqrt(1 - (x[inside] / b) ** 2)
+    assert found.pressure[inside] == pytest.approx(ellipse, rel=5e-3)
+
+
+def test_waves_do_not_stretch_the_material() -> None:
+    """A flank with waves has the arc lengths of the involute, so that loads act on the same material: those between
+    the roll lengths s_0 and s are (s^2 - s_0^2)/(2 r_b).
+    """
+    curve = law_of(200, 1e-5).curves[0]
+    face, knots = curve.face, (curve.parameter >= 0) & (curve.parameter <= 1)
+    roll = face.flank.roll(curve.parameter[knots])
+    expected = (roll**2 - face.flank.start**2) / (2 * PAIR.pinion.base_radius)
+    assert curve.arc[knots] == pytest.approx(expected, abs=1e-12)
+    u = np.linspace(0.02, 0.98, 301)
+    point, tangent = curve.at(curve.arc_at(u))
+    # arcs are linear in u between the knots: the points are on the curve, but nanometres further on
+    assert np.abs(((point - face.points(u)) * tangent.conj()).imag).max() < 3e-10
+
+
+@pytest.mark.parametrize(("waves", "amplitude", "degrees", "zones"), [(200, 3e-6, 0.05, 2), (200, 1e-5, 0.2, 3)])
+def test_waves_as_by_nitsches_law(waves: float, amplitude: float, degrees: float, zones: int) -> None:
+    """The same waves on the nodes of a fine flank: another formulation of the contact."""
+    law, angles = law_of(waves, amplitude), np.radians([1.2, 5.7, 10.2, 14.7])
+    found = solve_half_plane(law, angles, math.radians(degrees))
+    assert set(found.status) == {"converged"}
+    assert most_zones(found) >= zones
+    fine = waved(PAIR, elastic_pair(PAIR, law="nitsche", flank_coarsen=0.6), law.teeth.deviations[0])
+    reference = solve_elements(fine, angles, found.twist, first_contacts(law.sides, found.contacts))
+    good = reference.status == "converged"
+    assert good.sum() >= 3
+    assert found.torque_wheel[good] == pytest.approx(reference.torque_wheel[good], rel=2e-3)
+    assert found.torque_pinion[good] == pytest.approx(reference.torque_pinion[good], rel=2e-3)
+
+
+@pytest.mark.parametrize("angle", [2.0, 8.5])
+def test_nothing_jumps_where_contacts_part_or_join(angle: float) -> None:
+    """Over the twist the contacts of a pair come, join and part: the torque has no jump, and is dU/dtwist."""
+    law, twist = law_of(200, 5e-6), np.radians(np.geomspace(0.01, 0.4, 160))
+    found = solve_half_plane(law, np.full(len(twist), math.radians(angle)), twist)
+    assert set(found.status) == {"converged"}
+    counts = np.bincount(found.contacts.position)
+    assert len(set(counts.tolist())) >= 3
+    between = 0.5 * (found.tangent[1:] + found.tangent[:-1]) * np.diff(twist)
+    assert np.diff(found.torque_wheel) == pytest.approx(between, abs=4e-3 * np.abs(between).max(), rel=4e-3)
+    rate = (found.energy[2:] - found.energy[:-2]) / (twist[2:] - twist[:-2])
+    # differences of the energy over steps of 2 x 2.3 % err by the torque's curvature
+    work = (found.torque_wheel[2:] * 1 + 4 * found.torque_wheel[1:-1] + found.torque_wheel[:-2]) / 6
+    assert rate == pytest.approx(work, rel=1.5e-3)
+
+
+def test_light_load_touches_where_the_rigid_flanks_do() -> None:
+    """One contact at the crest that meets first, with Hertz's width for the curvatures there."""
+    law = law_of(200, 1e-5)
+    met = law.teeth.touching(np.radians([3.0]))
+    k = int(np.argmin(met.twist))
+    contacts = solve_half_plane(law, met.angle[k], met.twist[k] + 1e-7).contacts
+    assert len(contacts) == 1
+    arc = law.arc_at(met.flank[[k]], met.place[[k]])[0]
+    assert contacts.arc[0] == pytest.approx(arc, abs=2e-7)
+    face = law.teeth.faces[0]
+    u = met.place[k, 0] + np.array([-1e-4, 0.0, 1e-4])
+    turned = -np.angle(face.normals(u[[2]]) / face.normals(u[[0]]))[0] / float(face.speeds(u[[1]])[0] * 2e-4)
+    curvature = turned + float(law.teeth.faces[1].curvature(met.place[k, 1], math.inf))
+    line = contacts.force[0] / law.width
+    b = math.sqrt(4 * line * 0.5 * math.pi * law.compliance / (math.pi * curvature))
+    assert contacts.half_width[0] == pytest.approx(b, rel=0.01)
+
+
+def test_a_tip_along_a_root() -> None:
+    """Campaign gears, seed 901, case 60: Nitsche's law on a fine flank sees the second place that bears."""
+    job = read_stiffness_job(CASES / "tip_along_a_root.toml")
+    pair, twist = job.pair, job.sweep["twist"] + job.pair.contact_twist
+    angles = math.radians(11.95) + np.arange(8) * pair.mesh_cycle / 8
+    found = solve_half_plane(half_plane_pair(pair, elastic_pair(pair)), angles, twist)
+    assert set(found.status) == {"converged"}
+    reference = solve_positions(pair, elastic_pair(pair, law="nitsche", coarsen=0.7), angles, twist)
+    good = reference.status == "converged"
+    assert good.sum() >= 6
+    assert found.torque_wheel[good] == pytest.approx(reference.torque_wheel[good], rel=2e-3)
