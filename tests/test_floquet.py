@@ -90,7 +90,7 @@ def by_differences(model: TrainModel, at: np.ndarray, period: float) -> np.ndarr
 
     def after(state: np.ndarray) -> np.ndarray:
         start = dataclasses.replace(model.start, q=core.origin + core.T @ state[:n], v=core.T @ state[n:])
-        run = integrate(model.system, [0.0, period], method="explicit", tolerance=1e-12, start=start)
+        run = integrate(model.system, [0.0, period], method="taylor", tolerance=1e-12, start=start)
         return np.concatenate(core.reduce(run.q[-1], run.v[-1]))
 
     step = 3e-4 * float(np.abs(unit * at).max())

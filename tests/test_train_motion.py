@@ -41,7 +41,7 @@ def energies(model, moved) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[no-
 def test_energy_balance_of_the_undamped_train() -> None:
     """Constant stiffness, no damping: what drive and load put in is kinetic and elastic energy."""
     model = build_train(elastic(train(SHIPPED), skew=0.4, uneven=0.2))
-    trajectory = integrate(model.system, uniform(0.006, 6001), method="explicit", tolerance=1e-11, start=model.start)
+    trajectory = integrate(model.system, uniform(0.006, 6001), method="taylor", tolerance=1e-11, start=model.start)
     moved = motion(model, trajectory)
     energy, power = energies(model, moved)
     work = cumulative_simpson(power, x=moved.time, initial=0.0)
@@ -73,14 +73,14 @@ def test_gyroscopic_splitting() -> None:
     times = uniform(0.02, 401)
     tilt = 1e-4
     start = dataclasses.replace(model.start, q=tilt * np.eye(6)[3], v=np.zeros(6))
-    moved = integrate(model.system, times, method="explicit", tolerance=1e-11, start=start)
+    moved = integrate(model.system, times, method="taylor", tolerance=1e-11, start=start)
     # z = theta_1 + i theta_2: Jt z'' - i Jp Omega z' + k z = 0, so z = A e^(i w_f t) + B e^(-i w_b t)
     a = tilt * backward / (forward + backward)
     z = a * np.exp(1j * forward * times) + (tilt - a) * np.exp(-1j * backward * times)
     assert np.abs(moved.q[:, 3] + 1j * moved.q[:, 4] - z).max() < 1e-8 * tilt
     still = build_train(lone_rotor(damping=Damping(gyroscopic=False)))
     plain = integrate(
-        still.system, times, method="explicit", tolerance=1e-11, start=dataclasses.replace(still.start, q=start.q)
+        still.system, times, method="taylor", tolerance=1e-11, start=dataclasses.replace(still.start, q=start.q)
     )
     assert np.abs(plain.q[:, 3] - tilt * np.cos(math.sqrt(k / body.transverse) * times)).max() < 1e-8 * tilt
 
@@ -95,7 +95,7 @@ def test_modal_damping_decays_as_it_should() -> None:
     v[11] = 1e-3
     times = uniform(0.004, 201)
     moved = integrate(
-        model.system, times, method="explicit", tolerance=1e-11, start=dataclasses.replace(model.start, v=v)
+        model.system, times, method="taylor", tolerance=1e-11, start=dataclasses.replace(model.start, v=v)
     )
     damped = omega * math.sqrt(1 - 0.02**2)
     expected = 1e-3 / damped * np.exp(-0.02 * omega * times) * np.sin(damped * times)
@@ -144,7 +144,7 @@ def test_single_pair_against_a_high_precision_solution() -> None:
         # the curve has kinks of its second derivative every 0.45 deg: short steps
         found = solve_ivp(rhs, (begin, end), state, "DOP853", times[part], rtol=1e-13, atol=1e-18, max_step=2e-6)
         y[part] = found.y.T
-    trajectory = integrate(model.system, times, method="explicit", tolerance=1e-12, start=model.start)
+    trajectory = integrate(model.system, times, method="taylor", tolerance=1e-12, start=model.start)
     q = trajectory.q
     mine = np.stack([q[:, 5], q[:, 11], q[:, 6], q[:, 8]], axis=1)
     assert np.abs(mine - y[:, :4]).max(axis=0) == pytest.approx(0.0, abs=1e-9 * np.abs(y[:, :4]).max(axis=0).min())
@@ -158,7 +158,7 @@ def test_phase_follows_the_state_not_the_nominal_angle() -> None:
     scene = changed(pair_scene(), drive=Drive("s0", "a", constant(SPEED), 5e2, 0.3))
     model = build_train(scene)
     times = uniform(4e-3, 81)
-    moved = motion(model, integrate(model.system, times, method="explicit", tolerance=1e-9, start=model.start))
+    moved = motion(model, integrate(model.system, times, method="taylor", tolerance=1e-9, start=model.start))
     line = model.meshes[0]
     lag = moved.q[:, 5]
     assert np.abs(lag).max() > 0.02
@@ -183,7 +183,7 @@ def test_tolerance_one_millionth() -> None:
 def test_explicit_and_implicit_agree() -> None:
     scene = elastic(train([(20, 30)], stiffness=lambda z: curve(z, swing=0.1), damping=Damping(beta=1e-6)))
     model = build_train(scene)
-    one = simulate(model, uniform(1e-3, 21), method="explicit", tolerance=1e-9)
+    one = simulate(model, uniform(1e-3, 21), method="taylor", tolerance=1e-9)
     two = simulate(model, uniform(1e-3, 21), method="implicit", tolerance=1e-6)
     assert np.abs(one.contact_force - two.contact_force).max() < 1e-3 * np.abs(one.contact_force).max()
     assert two.statistics["method"] == "implicit"

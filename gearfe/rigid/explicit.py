@@ -197,7 +197,7 @@ def _error(tab: Tableau, K: Array, d: float, reach: Array, sizes: Array, toleran
     n = len(reach) // 2
     limit = np.maximum(reach, abs(d) * np.abs(K[12])) * tolerance + 1e-300
     relative = limit / sizes
-    limit = limit + 1e-6 * sizes * np.repeat([relative[:n].max(), relative[n:].max()], n)
+    limit = limit + 1e-6 * sizes * np.repeat([relative[:n].max(initial=0.0), relative[n:].max(initial=0.0)], n)
     five, three = (tab.E5 @ K[:13]) / limit, (tab.E3 @ K[:13]) / limit
     big, small = float(five @ five), float(three @ three)
     return 0.0 if big == 0.0 else abs(d) * big / math.sqrt((big + 0.01 * small) * len(reach))

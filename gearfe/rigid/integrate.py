@@ -19,6 +19,7 @@ from .choice import Choice, Way, joined, joined_statistics
 from .contract import Array
 from .dense import Dense
 from .elimination import is_linear, minimal
+from .modal import series_force
 from .start import Start, consistent_start
 from .status import Status
 from .steps import Watch
@@ -61,10 +62,10 @@ def integrate(
     times : array_like
         Times at which results are wanted (s), rising or falling; the first is the start.
     method : {"auto", "taylor", "explicit", "implicit"}
-        "taylor": series of the index-3 equations, planar scenes only, any accuracy. "explicit": any smooth system;
-        Taylor series in modal coordinates where the constraints are linear and the only force has a compiled law
-        (gear trains), else Runge-Kutta of order 8 with projection. "implicit": Radau IIA of order 5, index 3,
-        for stiff ones. "auto" takes the one of "taylor" (planar scenes) or "explicit", and "implicit", that is
+        "taylor": Taylor series, of the index-3 equations for planar scenes, in modal coordinates (compiled) where the
+        constraints are linear and the only force has a law with a series: gear trains. "explicit": any smooth system,
+        Runge-Kutta of order 8, with projection where constraints are not linear. "implicit": Radau IIA of order 5,
+        index 3, for stiff ones. "auto" takes the one of "taylor" (else "explicit") and "implicit" that is
         predicted to take the fewest seconds, and changes over when that proves wrong (`gearfe.rigid.choice`).
     tolerance : float
         Accuracy asked for, relative to 1 rad and to the size of the mechanism; 1e-13 to 0.1.
@@ -158,9 +159,13 @@ def ways_of(
         return [implicit]
     if method == "implicit":
         return [implicit]
-    if method == "explicit" or (auto and not planar):
-        explicit = Way("explicit", "", partial(_explicit, system, backend, options), PLAIN_TRIAL)
-        return [explicit, implicit] if auto else [explicit]
+    if method == "explicit" or not planar:
+        name = method
+        if auto:
+            name = "taylor" if series_force(system) is not None and use_compiled(backend) else "explicit"
+        run = _explicit if name == "explicit" else _modal_taylor
+        way = Way(name, "", partial(run, system, backend, options), PLAIN_TRIAL)
+        return [way, implicit] if auto else [way]
     plain = Way("taylor", "plain", partial(_taylor, system, False, options), PLAIN_TRIAL)
     if not use_compiled(backend):
         return [plain, implicit] if auto else [plain]
@@ -189,14 +194,27 @@ def _rate(system: System, start: Start) -> float:
 def _explicit(
     system: System, backend: str, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
 ) -> Run:
-    if is_linear(system):
-        from .modal import run_minimal
-
-        jit = use_compiled(backend)
-        return run_minimal(minimal(system), start, times, jit=jit, most=most, watch=watch, **options)
     from .explicit import run_explicit
+    from .modal import run_modal_explicit
 
+    if backend == "compiled":
+        use_compiled(backend)  # refused without numba
+    if is_linear(system):
+        return run_modal_explicit(minimal(system), start, times, most=most, watch=watch, **options)
     return run_explicit(system, start, times, most=most, watch=watch, **options)
+
+
+def _modal_taylor(
+    system: System, backend: str, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
+) -> Run:
+    from .modal import run_modal_taylor
+
+    if series_force(system) is None:
+        problem = "needs a planar scene, or linear constraints and one force whose law has a series"
+        raise InputError("method", "taylor", problem, "use method='explicit' or 'implicit'")
+    if not use_compiled(backend):
+        raise InputError("backend", backend, "has no series in modal coordinates", "use method='explicit', or numba")
+    return run_modal_taylor(minimal(system), start, times, most=most, watch=watch, **options)
 
 
 def _implicit(
@@ -211,9 +229,7 @@ def _taylor(
     system: System, jit: bool, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
 ) -> Run:
     scene = system.planar
-    if scene is None:
-        cure = "use method='explicit' or 'implicit'"
-        raise InputError("method", "taylor", "needs a system that is one planar scene", cure)
+    assert scene is not None  # `ways_of` asks before
     local = max(LOCAL_SHARE * options["tolerance"], 5e-16)
     order = taylor.order_for(local)
     if jit and not compiled_is_ready():

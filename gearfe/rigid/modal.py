@@ -1,7 +1,7 @@
-"""Explicit integration in minimal (modal) coordinates: y'' = -omega^2 y - C y' + W^T phi(t, W y, W y').
+"""Integration in modal coordinates: y'' = -omega^2 y - C y' + W^T phi(t, W y, W y').
 
 Where the only force is a `LocalForce` whose law has a series, the motion is a Taylor series of up to `ORDER` terms,
-in a compiled loop; otherwise Runge-Kutta of order 8, each stage of which calls Python.
+in a compiled loop; Runge-Kutta of order 8, each stage of which calls Python, takes any force.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ from ..progress import stage
 from . import compiled, kernel_modal
 from .contract import Array, LocalForce, SeriesLaw
 from .dense import Dense, within_run
-from .elimination import Minimal
+from .elimination import Minimal, is_linear
 from .explicit import Problem, run_problem
 from .start import Start
 from .status import Status
 from .steps import Watch
+from .system import System
 
 #: Highest order of the series; 24 to 36 cost the same within a tenth.
 ORDER = 30
@@ -33,13 +34,9 @@ PLAIN_SHARE = 0.03
 _FULL = int(Status.MOST_STEPS)
 
 
-def run_minimal(
-    core: Minimal, start: Start, times: Array, *, tolerance: float, longest: float, most: int, jit: bool = True,
-    watch: Watch | None = None,
-) -> tuple[Dense, Status, dict[str, Any]]:  # fmt: skip
-    """Integrate a system in minimal coordinates; returns (dense output, status, statistics)."""
+def modal_problem(core: Minimal) -> Problem:
+    """The equations of motion in modal coordinates."""
     n = core.T.shape[1]
-    y0 = np.concatenate(core.reduce(start.q, start.v))
 
     def acceleration(t: float, y: Array) -> Array:
         stiff = core.constant - core.squares * y[:n] - core.damping @ y[n:]
@@ -51,38 +48,53 @@ def run_minimal(
     def expand(t: float, y: Array) -> tuple[Array, Array, Array]:
         return core.origin + core.T @ y[:n], core.T @ y[n:], core.T @ acceleration(t, y)
 
-    def state(y: Array) -> tuple[Array, Array]:
-        return core.origin + core.T @ y[:n], core.T @ y[n:]
+    return Problem(rhs, lambda _, y: y, expand, np.ones(2 * n))
+
+
+def run_modal_explicit(
+    core: Minimal, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
+    watch: Watch | None = None,
+) -> tuple[Dense, Status, dict[str, Any]]:  # fmt: skip
+    """Integrate by Runge-Kutta; returns (dense output, status, statistics)."""
+    y0 = np.concatenate(core.reduce(start.q, start.v))
+    options: dict[str, Any] = {"breaks": core.system.breaks, "longest": longest, "most": most, "watch": watch}
+    local = max(PLAIN_SHARE * tolerance, 1e-14)
+    dense, status, statistics = run_problem(modal_problem(core), (start.time, float(times[-1])), y0, local, **options)
+    return dense, status, {**statistics, "backend": "plain", "free_coordinates": core.T.shape[1]}
+
+
+def run_modal_taylor(
+    core: Minimal, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
+    watch: Watch | None = None,
+) -> tuple[Dense, Status, dict[str, Any]]:  # fmt: skip
+    """Integrate by Taylor series in compiled code; returns (dense output, status, statistics)."""
+    found = series_force(core.system)
+    assert found is not None  # the caller asks before
+    n = core.T.shape[1]
 
     def told(t: float, steps: int, y: Array) -> bool:
-        return watch is None or watch(t, steps, lambda: state(y))
+        return watch is None or watch(t, steps, lambda: (core.origin + core.T @ y[:n], core.T @ y[n:]))
 
-    series = _series(core) if jit else None
-    if series is None:
-        options: dict[str, Any] = {"breaks": core.system.breaks, "longest": longest, "most": most, "watch": watch}
-        problem = Problem(rhs, lambda _, y: y, expand, np.ones(2 * n))
-        local = max(PLAIN_SHARE * tolerance, 1e-14)
-        plain, ended, counts = run_problem(problem, (start.time, float(times[-1])), y0, local, **options)
-        return plain, ended, {**counts, "backend": "plain", "free_coordinates": n}
-    run = SeriesRun(core, *series, tolerance, longest, expand)
+    run = SeriesRun(core, *found, tolerance, longest, modal_problem(core).expand)
     compiling = run.load()
-    ends, states, found, status, orders = run.steps(start.time, y0, float(times[-1]), times, most, told)
-    statistics: dict[str, Any] = {
+    y0 = np.concatenate(core.reduce(start.q, start.v))
+    ends, states, at_times, status, orders = run.steps(start.time, y0, float(times[-1]), times, most, told)
+    statistics = {
         "scheme": "Taylor series",
         "steps": len(ends) - 1,
         "orders": orders,
         "backend": "compiled",
+        "compile_seconds": compiling,
+        "free_coordinates": n,
     }
-    statistics["compile_seconds"] = compiling
-    return SeriesPieces(ends, states, times[: len(found)], found, run), status, {**statistics, "free_coordinates": n}
+    return SeriesPieces(ends, states, times[: len(at_times)], at_times, run), status, statistics
 
 
-def _series(core: Minimal) -> tuple[LocalForce, np.ndarray, SeriesLaw] | None:
-    """The only force of the system, where it acts, and its series, if it has one."""
-    forces = core.system.forces
-    if not compiled.available() or len(forces) != 1:
+def series_force(system: System) -> tuple[LocalForce, np.ndarray, SeriesLaw] | None:
+    """The only force of a system with linear constraints, where it acts, and its series; None where there is none."""
+    if not is_linear(system) or len(system.forces) != 1:
         return None
-    force, index = forces[0]
+    force, index = system.forces[0]
     if not isinstance(force, LocalForce) or force.series is None:
         return None
     return force, index, force.series

@@ -190,7 +190,9 @@ class TrainTable:
     duration_ms: float = quantity(7.0, above=0.0, doc="end of the simulation (ms)")
     step_us: float = quantity(35.0, above=0.0, doc="step of the output (us); spectra end at half its frequency")
     tolerance: float = quantity(1e-6, low=1e-12, high=0.1, doc="relative tolerance of the integration")
-    method: str = quantity("auto", choices=("auto", "explicit", "implicit"), doc="integrator (auto: quickest)")
+    method: str = quantity(
+        "auto", choices=("auto", "taylor", "explicit", "implicit"), doc="integrator (auto: quickest)"
+    )
     shafts: tuple[TrainShaftTable, ...] = quantity(doc="[[train.shafts]]")
     gears: tuple[TrainGearTable, ...] = quantity(doc="[[train.gears]]")
     meshes: tuple[TrainMeshTable, ...] = quantity((), doc="[[train.meshes]]")

@@ -39,7 +39,7 @@ class Motion:
 def motion(model: TrainModel, trajectory: Trajectory) -> Motion:
     """Motion at the trajectory's times."""
     core, t = model.core, trajectory.time
-    if trajectory.method == "explicit":
+    if trajectory.method in ("taylor", "explicit"):
         state = trajectory.dense.state(t)  # type: ignore[attr-defined]
         n = core.T.shape[1]
         y, dy = state[:, :n], state[:, n:]

@@ -59,7 +59,7 @@ def simulate(
     tolerance
         Of the integration, relative to each coordinate's largest value.
     method
-        ``auto``, ``explicit`` or ``implicit``, see `gearfe.rigid.integrate`.
+        ``auto``, ``taylor``, ``explicit`` or ``implicit``, see `gearfe.rigid.integrate`.
     floquet
         Compute the multipliers over the common mesh period.
     estimate

@@ -125,7 +125,7 @@ def _special(
         train["drive"] |= {"stiffness_Nm_per_rad": rounded(log_uniform(random, 1e2, 1e6), 3)}
         train["drive"] |= {"damping_Nm_s_per_rad": rounded(log_uniform(random, 1e-3, 1.0), 3)}
     if kind == "order":
-        train["method"] = str(random.choice(["explicit", "implicit"]))
+        train["method"] = str(random.choice(["taylor", "implicit"]))
         train["tolerance"] = rounded(log_uniform(random, 1e-7, 1e-2), 2)
         train["duration_ms"] = 0.5
         train["step_us"] = 5.0
@@ -133,7 +133,7 @@ def _special(
         # all modes, slow and fast, decay with half of alpha: e-folds enough until the end
         alpha = rounded(log_uniform(random, 200.0, 2000.0), 4)
         train["damping"] = {"rayleigh_alpha_per_s": alpha}
-        train["method"] = str(random.choice(["auto", "explicit", "implicit"]))
+        train["method"] = str(random.choice(["auto", "taylor", "implicit"]))
         least = 1e-5 if train["method"] == "implicit" else 1e-7  # steps of the implicit method are costly
         train["tolerance"] = rounded(log_uniform(random, least, 1e-2), 2)
         train["duration_ms"] = 1e3 * SETTLED / alpha

@@ -53,8 +53,8 @@ def test_only_symmetric_loads_leave_a_symmetric_train_in_its_plane(bore: str, sy
 def test_an_order_that_is_missing_is_seen() -> None:
     model = build_train(train([(20, 30)]))
     times = np.linspace(0.0, 1e-3, 21)
-    truth = simulate(model, times, tolerance=1e-11, method="explicit").contact_force
-    for method in ("explicit", "implicit"):
+    truth = simulate(model, times, tolerance=1e-11, method="taylor").contact_force
+    for method in ("taylor", "implicit"):
         (good,) = _order(model, times, method, truth)
         assert good.value < 0.6
         (bad,) = _order(model, times, method, truth * 1.01)  # an error that no smaller step makes smaller
