@@ -12,6 +12,13 @@ from gearfe.config import TABLES, build, load_job, quantity
 from gearfe.tables.examples import JOBS, job_file
 from gearfe.tables.housing import HousingTable
 from gearfe.tables.mechanism import BodyTable, MechanismFile, RunTable, read_mechanism_file
+from gearfe.tables.microgeometry import (
+    GearMicrogeometryTable,
+    MicrogeometryTable,
+    ReliefTable,
+    VariableTable,
+    WavinessTable,
+)
 from gearfe.tables.pair import PairTable
 from gearfe.tables.stiffness import StiffnessTable
 from gearfe.tables.text import table_text
@@ -60,7 +67,18 @@ def test_every_optional_key_can_be_switched_on(tmp_path, source):
 def test_every_key_of_the_tables_is_named(kind):
     """A key without a default is told as one that is not set."""
     text = job_file(kind)
-    tables = {"mechanism": [RunTable, BodyTable], "stiffness": [PairTable, StiffnessTable]}
+    tables = {
+        "mechanism": [RunTable, BodyTable],
+        "stiffness": [PairTable, StiffnessTable],
+        "microgeometry": [
+            PairTable,
+            MicrogeometryTable,
+            GearMicrogeometryTable,
+            WavinessTable,
+            ReliefTable,
+            VariableTable,
+        ],
+    }
     for table in tables.get(kind, [PairTable, StiffnessTable, TrainTable, TrainShaftTable, HousingTable]):
         for field in fields(table):
             assert re.search(rf"\b{field.name}\b( =| \(not set\):|\]|\.)", text), field.name

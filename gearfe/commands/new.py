@@ -1,18 +1,18 @@
-"""``gearfe new stiffness|vibration|mechanism [FILE]``: write a commented job file to start from."""
+"""``gearfe new stiffness|microgeometry|vibration|mechanism [FILE]``: write a commented job file to start from."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-HELP = "write a commented job file to start from: stiffness, vibration or mechanism"
+HELP = "write a commented job file to start from: stiffness, microgeometry, vibration or mechanism"
 
-KINDS = ("stiffness", "vibration", "mechanism")
+KINDS = ("stiffness", "microgeometry", "vibration", "mechanism")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("kind", metavar="KIND", help="stiffness, vibration or mechanism")
+    parser.add_argument("kind", metavar="KIND", help=", ".join(KINDS))
     parser.add_argument("file", nargs="?", metavar="FILE", help="file to write (default: KIND.toml)")
     parser.add_argument("--force", action="store_true", help="replace the file when it exists")
 

@@ -26,6 +26,20 @@ PAIR: dict[str, Any] = {
 
 STIFFNESS: dict[str, Any] = {"twist_deg": 0.5, "angle_start_deg": 1.0, "angle_step_deg": 1.0, "angle_stop_deg": 40.0}
 
+MICROGEOMETRY: dict[str, Any] = {
+    "torques_Nm": [50.0, 100.0, 150.0],
+    "pinion": {"tip_relief_um": 15.0, "tip_relief_length_mm": 2.7, "run_out_um": 5.0},
+    "wheel": {"tip_relief_um": 15.0, "tip_relief_length_mm": 2.7},
+}
+
+RELIEF: dict[str, Any] = {
+    "torques_Nm": [100.0],
+    "variables": [
+        {"key": "tip_relief_um", "low": 0.0, "high": 30.0, "tolerance": 2.0},
+        {"key": "tip_relief_length_mm", "low": 1.0, "high": 4.5, "tolerance": 0.2},
+    ],
+}
+
 TRAIN: dict[str, Any] = {
     "duration_ms": 7.0,
     "step_us": 35.0,
@@ -92,6 +106,11 @@ JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]]]] = {
         "Mesh stiffness of a gear pair. Run it: gearfe stiffness FILE --out DIR. " + OPTIONAL_KEYS,
         {"pair": PAIR, "stiffness": STIFFNESS},
     ),
+    "microgeometry": (
+        "Deviations of micrometres of a gear pair, and the search for the best relief. Run it: gearfe microgeometry "
+        "FILE --out DIR, gearfe relief FILE --out DIR. " + OPTIONAL_KEYS,
+        {"pair": PAIR, "microgeometry": MICROGEOMETRY, "relief": RELIEF},
+    ),
     "vibration": (
         "A gear train in its housing: two shafts with one gear pair. Run it: gearfe vibration FILE --out DIR. Shafts "
         "run along y; speeds and torques count positive about +y. " + OPTIONAL_KEYS,
@@ -103,7 +122,7 @@ MECHANISM_HEAD = "A planar mechanism. Run it: gearfe mechanism FILE --out DIR. "
 
 
 def job_file(kind: str) -> str:
-    """Text of an example job file: ``stiffness``, ``vibration`` or ``mechanism``."""
+    """Text of an example job file: ``stiffness``, ``microgeometry``, ``vibration`` or ``mechanism``."""
     if kind == "mechanism":
         # this job is one table, the file itself; the title stands above the tables
         cls = importlib.import_module("gearfe.tables.mechanism").MechanismFile
