@@ -9,11 +9,17 @@ from __future__ import annotations
 
 import argparse
 import re
+import typing
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import replace
+from typing import Any, TypeVar
 
 from ..config import check_range
 from ..errors import InputError, nearest, unknown_name
+
+Table = TypeVar("Table")
+#: What a help calls the value of an option.
+METAVARS = {float: "X", int: "N", str: "NAME"}
 
 _NUMBER = re.compile(r"-(\d|\.\d|inf|nan)", re.IGNORECASE)
 
@@ -103,6 +109,47 @@ def check_option(option: str, value: Any, table: type, key: str) -> None:
         check_range(value, option, known)
     elif (choices := known["choices"]) and value not in choices:
         raise InputError(option, value, "must be one of " + ", ".join(choices), nearest(value, choices))
+
+
+def add_keys(parser: Any, table: type, *keys: str, **renamed: str) -> None:
+    """Options that stand for keys of a table: kind, choices and text are those of the key.
+
+    Parameters
+    ----------
+    parser
+        A parser, or a group of one.
+    table
+        Dataclass whose fields are made with `gearfe.config.quantity`.
+    keys
+        Keys whose option has their name, ``a_key`` as ``--a-key``.
+    renamed
+        Option -> key, where the option has a name of its own.
+    """
+    hints = typing.get_type_hints(table)
+    for name, key in ({k: k for k in keys} | renamed).items():
+        known = table.__dataclass_fields__[key].metadata  # type: ignore[attr-defined]
+        options: dict[str, Any] = {"dest": name, "help": known["doc"].removeprefix("true: ").replace("%", "%%")}
+        kinds = [kind for kind in typing.get_args(hints[key]) or (hints[key],) if kind is not type(None)]
+        if kinds == [bool]:
+            options |= {"action": "store_const", "const": True}
+        else:
+            options |= {"type": kinds[0], "metavar": "|".join(known["choices"] or ()) or METAVARS[kinds[0]]}
+        parser.add_argument(_option(name), **options)
+
+
+def with_keys(args: argparse.Namespace, table: Table, *keys: str, **renamed: str) -> Table:
+    """The table with the options of `add_keys` that were given in place of its values, each checked like these."""
+    changes: dict[str, Any] = {}
+    for name, key in ({k: k for k in keys} | renamed).items():
+        value = getattr(args, name)
+        if value is not None:
+            check_option(_option(name), value, type(table), key)
+            changes[key] = value
+    return replace(table, **changes)  # type: ignore[type-var]
+
+
+def _option(name: str) -> str:
+    return "--" + name.replace("_", "-")
 
 
 class _Removed(argparse.Action):

@@ -7,20 +7,18 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..progress import count
 from ..tables.laws import check_law
+from ..tables.loadmap import LoadMapTable
 from ..tables.stiffness import StiffnessTable
-from .arguments import add_removed, check_option
-
-if TYPE_CHECKING:
-    from ..tables.loadmap import LoadMapTable
+from .arguments import add_keys, add_removed, check_option, with_keys
 
 HELP = "stiffness, transmission error, load share, pressure, root stress over pinion angle and torque"
 
-#: Option -> key of the [stiffness] table that it overrides.
-OVERRIDES = {"law": "law", "plane": "plane", "kinematics": "kinematics", "coarsen": "coarsen"}
+#: Keys of [stiffness] that options stand for.
+MODEL = ("law", "plane", "kinematics", "coarsen")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,14 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     load.add_argument(
         "--torque-range", type=float, nargs=3, metavar=("START", "STOP", "COUNT"), help="a range of torques (N m)"
     )
-    parser.add_argument("--spacing", metavar="HOW", help="of that range: even or log")
-    parser.add_argument("--positions", type=int, metavar="N", help="pinion angles in one mesh cycle (default 18)")
-    parser.add_argument("--root-stress", action="store_true", help="also the tension at the tooth roots")
-    parser.add_argument("--law", metavar="LAW", help="contact law, as in the table [stiffness]")
+    add_keys(parser, LoadMapTable, "positions", "root_stress", spacing="torque_spacing")
+    add_keys(parser, StiffnessTable, *MODEL)
     add_removed(parser, StiffnessTable.REMOVED)
-    parser.add_argument("--plane", metavar="STATE", help="plane state: strain or stress")
-    parser.add_argument("--kinematics", metavar="STRAIN", help="small or finite strain")
-    parser.add_argument("--coarsen", type=float, metavar="C", help="factor on all element sizes")
     parser.add_argument("--no-picture", action="store_true", help="leave out the picture")
 
 
@@ -49,7 +42,6 @@ def run(args: argparse.Namespace) -> int:
     """Compute the map and write the files; 1 when a cell failed."""
     started = time.perf_counter()
     from ..config import load_job
-    from ..tables.loadmap import LoadMapTable
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness", "loadmap"))
@@ -106,14 +98,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _overridden_model(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTable:
     """The table with the command's options in place of the file's values, checked like these."""
-    changes: dict[str, Any] = {}
     if args.law is not None:
         check_law("--law", args.law)
-    for name, key in OVERRIDES.items():
-        if getattr(args, name) is not None:
-            check_option("--" + name, getattr(args, name), StiffnessTable, key)
-            changes[key] = getattr(args, name)
-    made = replace(table, **changes)
+    made = with_keys(args, table, *MODEL)
     made.check("stiffness")
     return made
 
@@ -121,7 +108,6 @@ def _overridden_model(table: StiffnessTable, args: argparse.Namespace) -> Stiffn
 def _overridden_loads(table: LoadMapTable, args: argparse.Namespace) -> LoadMapTable:
     """The table with the command's options in place of the file's values, checked like these."""
     from ..errors import InputError
-    from ..tables.loadmap import LoadMapTable
 
     more: dict[str, Any] = {}
     if args.torques_Nm is not None:
@@ -136,12 +122,6 @@ def _overridden_loads(table: LoadMapTable, args: argparse.Namespace) -> LoadMapT
         for key, value in ends.items():
             check_option("--torque-range", value, LoadMapTable, key)
         more |= {"torques_Nm": None, **ends}
-    for name, key in (("spacing", "torque_spacing"), ("positions", "positions")):
-        if getattr(args, name) is not None:
-            check_option("--" + name, getattr(args, name), LoadMapTable, key)
-            more[key] = getattr(args, name)
-    if args.root_stress:
-        more["root_stress"] = True
-    made = replace(table, **more)
+    made = with_keys(args, replace(table, **more), "positions", "root_stress", spacing="torque_spacing")
     made.check("loadmap")
     return made

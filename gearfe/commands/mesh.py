@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ..progress import stage
-from .arguments import check_option
+from ..tables.stiffness import StiffnessTable
+from .arguments import add_keys, with_keys
 
 HELP = "meshes of a gear pair with named boundaries, as .msh, .vtu or .inp"
 
@@ -20,20 +21,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--gear", choices=("both", "pinion", "wheel"), default="both", help="which gear (default: both)"
     )
     parser.add_argument("--sector", action="store_true", help="one tooth of each gear instead of whole gears")
-    parser.add_argument("--coarsen", type=float, metavar="C", help="factor on all element sizes")
+    add_keys(parser, StiffnessTable, "coarsen", "flank_coarsen")
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the file and name its groups."""
     from ..config import load_job
-    from ..tables.stiffness import StiffnessTable, check_flank_coarsen
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness",))
-    table = tables.get("stiffness", StiffnessTable())
-    coarsen, flank = table.coarsen if args.coarsen is None else args.coarsen, table.flank_coarsen
-    check_option("--coarsen", coarsen, StiffnessTable, "coarsen")
-    check_flank_coarsen(coarsen, flank, "stiffness.flank_coarsen")
+    table = with_keys(args, tables.get("stiffness", StiffnessTable()), "coarsen", "flank_coarsen")
+    table.check("stiffness")
 
     from ..gear.pair import GearPair
 
@@ -48,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     format_of(args.out)
     job = StiffnessJob(tables["pair"], table, pair)
     output_folder(Path(args.out).parent)
-    recipes = sector_recipes(job.pair, coarsen=coarsen, flank_coarsen=flank)
+    recipes = sector_recipes(job.pair, coarsen=table.coarsen, flank_coarsen=table.flank_coarsen)
     parts: dict[str, Any] = {}
     for number, name in enumerate(("pinion", "wheel")):
         if args.gear in ("both", name):

@@ -12,36 +12,28 @@ from typing import TYPE_CHECKING, Any
 from ..progress import announce, count
 from ..tables.laws import check_law
 from ..tables.stiffness import StiffnessTable
-from .arguments import add_removed, check_option, number
+from .arguments import add_keys, add_removed, check_option, number, with_keys
 
 if TYPE_CHECKING:
     from ..stiffness.job import StiffnessJob
 
 HELP = "mesh stiffness of a gear pair over its rotation: table, picture, summary, fields"
 
-#: Option -> key of the [stiffness] table that it overrides.
-OVERRIDES = {
-    "twist_deg": "twist_deg",
-    "torque_Nm": "torque_Nm",
-    "law": "law",
-    "nitsche_gamma0": "nitsche_gamma0",
-    "penalty_stiffness_N_per_mm3": "penalty_stiffness_N_per_mm3",
-    "plane": "plane",
-    "kinematics": "kinematics",
-    "twist_from": "twist_from",
-    "coarsen": "coarsen",
-}
+#: Keys of the [stiffness] table that options stand for, beside the load and the angles.
+KEYS = (
+    "law", "nitsche_gamma0", "penalty_stiffness_N_per_mm3", "plane", "kinematics", "twist_from", "points_per_edge",
+    "coarsen", "flank_coarsen", "solve_all", "interpolation",
+)  # fmt: skip
+LOADS = ("twist_deg", "torque_Nm")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("job", metavar="JOB.toml", help="job file with the tables [pair] and [stiffness]")
     parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
-    load = parser.add_mutually_exclusive_group()
-    load.add_argument("--twist-deg", type=float, metavar="X", dest="twist_deg", help="twist of the wheel (deg)")
-    load.add_argument("--torque-Nm", type=float, metavar="X", dest="torque_Nm", help="torque at the wheel's hub (N m)")
+    add_keys(parser.add_mutually_exclusive_group(), StiffnessTable, *LOADS)
     parser.add_argument("--angles", type=float, nargs=3, metavar=("START", "STEP", "STOP"), help="pinion angles (deg)")
-    parser.add_argument("--law", metavar="LAW", help="contact law: half_plane, nitsche, penalty or another package's")
+    add_keys(parser, StiffnessTable, *KEYS)
     parser.add_argument(
         "--law-parameter",
         nargs=2,
@@ -50,19 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="parameter of a law of another package; may stand several times",
     )
     add_removed(parser, StiffnessTable.REMOVED)
-    parser.add_argument("--nitsche-gamma0", type=float, metavar="G", help="parameter gamma h/E of the law nitsche")
-    parser.add_argument(
-        "--penalty-stiffness-N-per-mm3",
-        type=float,
-        metavar="K",
-        dest="penalty_stiffness_N_per_mm3",
-        help="parameter of the law penalty (N/mm3)",
-    )
-    parser.add_argument("--plane", metavar="STATE", help="plane state: strain or stress")
-    parser.add_argument("--kinematics", metavar="STRAIN", help="small or finite strain")
-    parser.add_argument("--twist-from", metavar="ZERO", help="where the twist counts from: contact or centred")
-    parser.add_argument("--coarsen", type=float, metavar="C", help="factor on all element sizes")
-    parser.add_argument("--solve-all", action="store_true", help="solve positions of later mesh cycles too")
     parser.add_argument("--no-estimate", action="store_true", help="leave out the error estimate")
     parser.add_argument("--no-picture", action="store_true", help="leave out the picture")
     parser.add_argument(
@@ -187,29 +166,18 @@ def _field_angles(given: list[str | float]) -> str | list[float]:
 
 def overridden(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTable:
     """The table with the command's options in place of the file's values, checked like these."""
-    changes: dict[str, Any] = {}
-
     if args.law is not None:
         check_law("--law", args.law)
-
-    def put(option: str, key: str, value: Any) -> None:
-        check_option(option, value, StiffnessTable, key)
-        changes[key] = value
-
-    for name, key in OVERRIDES.items():
-        if getattr(args, name) is not None:
-            put("--" + name.replace("_", "-"), key, getattr(args, name))
-    if "twist_deg" in changes:
-        changes["torque_Nm"] = None
-    elif "torque_Nm" in changes:
-        changes["twist_deg"] = None
+    if any(getattr(args, key) is not None for key in LOADS):
+        table = replace(table, twist_deg=None, torque_Nm=None)
+    table = with_keys(args, table, *LOADS, *KEYS)
     if args.angles is not None:
-        for key, value in zip(("angle_start_deg", "angle_step_deg", "angle_stop_deg"), args.angles, strict=True):
-            put("--angles START STEP STOP", key, value)
-    if args.solve_all:
-        changes["solve_all"] = True
+        keys = ("angle_start_deg", "angle_step_deg", "angle_stop_deg")
+        for key, value in zip(keys, args.angles, strict=True):
+            check_option("--angles START STEP STOP", value, StiffnessTable, key)
+        table = replace(table, **dict(zip(keys, args.angles, strict=True)))
     if args.law_parameter is not None:
-        changes["law_parameters"] = {name: number("--law-parameter", text) for name, text in args.law_parameter}
-    made = replace(table, **changes)
-    made.check("--angles" if args.angles is not None else "stiffness")
-    return made
+        given = {name: number("--law-parameter", text) for name, text in args.law_parameter}
+        table = replace(table, law_parameters=given)
+    table.check("--angles" if args.angles is not None else "stiffness")
+    return table

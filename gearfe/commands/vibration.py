@@ -7,12 +7,12 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..progress import count
-from .arguments import check_option
+from ..tables.train import TrainTable
+from .arguments import add_keys, with_keys
 
 if TYPE_CHECKING:
     from ..train.response import TrainResponse
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 #: Tolerance that suffices for errors: forces and accelerations are within a hundredth of it.
 ROUGH = 1e-3
+
+#: Keys of [train] that options stand for.
+KEYS = ("tolerance", "method")
 
 HELP = "gear train in its housing: contact forces, speeds, vibration, spectrum, radiated power"
 
@@ -34,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--curve", nargs="+", metavar="FILE", default=(), help="stiffness curves (CSV): one, or one a mesh"
     )
-    parser.add_argument("--tolerance", type=float, metavar="X", help="of the integration (default: the file's)")
+    add_keys(parser, TrainTable, *KEYS)
     parser.add_argument("--window", metavar="NAME", default="none", help="none, hann, hamming, blackman or flattop")
     parser.add_argument(
         "--spectrum-from-ms", type=float, metavar="T", default=0.0, help="begin of the spectrum's record"
@@ -55,13 +58,11 @@ def run(args: argparse.Namespace) -> int:
     """Compute and write; 1 when the run ended early or a picture could not be drawn."""
     started = time.perf_counter()
     from ..config import check_range
-    from ..tables.train import TrainTable, read_train_tables
+    from ..tables.train import read_train_tables
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
     tables = read_train_tables(args.job, args.variant)
-    if args.tolerance is not None:
-        check_option("--tolerance", args.tolerance, TrainTable, "tolerance")
-        tables["train"] = replace(tables["train"], tolerance=args.tolerance)
+    tables["train"] = with_keys(args, tables["train"], *KEYS)
     check_range(args.spectrum_from_ms, "--spectrum-from-ms", {"low": 0.0, "doc": "begin of the record (ms)"})
     if args.spectrum_ms is not None:
         check_range(args.spectrum_ms, "--spectrum-ms", {"above": 0.0, "doc": "duration of the record (ms)"})

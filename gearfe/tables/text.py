@@ -41,7 +41,7 @@ def table_text(
     hints = typing.get_type_hints(cls)
     own, below = [f"[{name}]"] if name else [], []
     for field in dataclasses.fields(cls):
-        inner, many = _inner(hints[field.name])
+        inner, many = inner_table(hints[field.name])
         full = f"{name.strip('[]')}.{field.name}".lstrip(".")
         doc = field.metadata.get("doc", "")
         if inner is None:
@@ -74,7 +74,7 @@ def _line(field: Any, example: Mapping[str, Any], doc: str, brief: bool) -> str:
     if choices and not all(choice in doc for choice in choices):
         doc += " (" + ", ".join(choices) + ")"
     if field.name in example:
-        code = f"{field.name} = {_value(example[field.name])}"
+        code = f"{field.name} = {toml_value(example[field.name])}"
     elif brief:
         return ""
     else:
@@ -83,16 +83,16 @@ def _line(field: Any, example: Mapping[str, Any], doc: str, brief: bool) -> str:
             default = field.default_factory()
         if default is None:  # TOML has no word for it: the key is named, but nothing stands there to be switched on
             return _wrapped(f"{field.name} (not set): {doc}").rstrip("\n")
-        code = f"# {field.name} = {_value(default)}"
+        code = f"# {field.name} = {toml_value(default)}"
     line = f"{code:<{_COMMENT}} # {doc}" if doc else code
     return line if len(line) <= _WIDTH else _wrapped(doc) + code
 
 
-def _inner(hint: Any) -> tuple[type | None, str]:
+def inner_table(hint: Any) -> tuple[type | None, str]:
     """Dataclass that a field holds, if it does, and whether as a ``list`` or a ``dict``."""
     origin, inside = typing.get_origin(hint), typing.get_args(hint)
     if origin in (typing.Union, types.UnionType):
-        found = [_inner(option) for option in inside if option is not type(None)]
+        found = [inner_table(option) for option in inside if option is not type(None)]
         return (None, "") if any(inner is None for inner, _ in found) else found[0]
     if origin is tuple and len(inside) == 2 and inside[1] is Ellipsis:
         return _table(inside[0]), "list"
@@ -105,19 +105,21 @@ def _table(hint: Any) -> type | None:
     return hint if isinstance(hint, type) and dataclasses.is_dataclass(hint) else None
 
 
-def _value(value: Any) -> str:
+def toml_value(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(_value(item) for item in value) + "]"
+        return "[" + ", ".join(toml_value(item) for item in value) + "]"
     if isinstance(value, Mapping):
         return (
-            "{ " + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + " }" if value else "{}"
+            "{ " + ", ".join(f"{_key(key)} = {toml_value(item)}" for key, item in value.items()) + " }"
+            if value
+            else "{}"
         )
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return _value({f.name: v for f in dataclasses.fields(value) if (v := getattr(value, f.name)) is not None})
+        return toml_value({f.name: v for f in dataclasses.fields(value) if (v := getattr(value, f.name)) is not None})
     return repr(value)
 
 

@@ -1,0 +1,26 @@
+"""The reference page of keys says what the tables say, and names every key."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+from gearfe.config import TABLES, table_class
+from gearfe.tables.reference import reference_page
+
+PAGE = Path(__file__).parents[1] / "docs" / "keys.md"
+
+
+def test_the_page_is_that_of_the_tables() -> None:
+    assert PAGE.read_text(encoding="utf-8") == reference_page(), "run python scripts/write_keys.py"
+
+
+@pytest.mark.parametrize("name", list(TABLES))
+def test_every_key_has_a_row_or_a_section(name: str) -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    begin = text.index(f"## `[{name}]`")
+    section = text[begin : text.find("\n## ", begin)]
+    for field in dataclasses.fields(table_class(name)):
+        assert f"`{field.name}`" in section or f"[{name}.{field.name}" in section
