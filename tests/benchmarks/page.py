@@ -89,12 +89,19 @@ def _section(section: Section, rows: list[Row], folder: Path) -> list[str]:
 
 
 def _outcomes(path: Path) -> list[str]:
-    """Any table of outcomes of the stress campaigns, as it is."""
+    """Any table of outcomes of the campaigns, as it is."""
     rows = read_rows(path)
     if not rows:
         return []
     columns = {name: (name.replace("_", " "), digits) for name in rows[0]}
-    return [f"## Stress: {path.stem.removesuffix('_outcomes')}", "", f"`{path.name}`", "", *markdown(columns, rows), ""]
+    return [
+        f"## Campaign: {path.stem.replace('_outcomes', '').replace('_', ' ')}",
+        "",
+        f"`{path.name}`",
+        "",
+        *markdown(columns, rows),
+        "",
+    ]
 
 
 def summary(tables: dict[str, list[Row]]) -> list[str]:

@@ -193,7 +193,7 @@ def test_smoke_of_every_job(tmp_path, job, capsys):
     files = write_page(tmp_path, tmp_path / "accuracy.md")
     page = files[0].read_text()
     assert "smoke run" in page
-    assert "Stress: pairs" in page
+    assert "Campaign: pairs" in page
     for section in SECTIONS:
         assert (f"## {section.title}\n" in page) == (tmp_path / f"{section.table}.csv").exists()
     assert all(f"accuracy/{f.name}" in page and f.exists() for f in files[1:])
