@@ -270,7 +270,7 @@ def test_a_pair_that_never_bears_is_told(law) -> None:
     assert load_mesh(bad, [4 * least], positions=6, mesh_cycles=40).statuses == {"converged": 240}
 
 
-@pytest.mark.parametrize("torques", [[], [0.0], [-1.0], [math.nan]])
+@pytest.mark.parametrize("torques", [[], [0.0], [-1.0], [math.nan], [50.0, 1e6]])
 def test_torques_out_of_range(law, torques) -> None:
     with pytest.raises(InputError, match="torques"):
         load_mesh(law, torques)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from pathlib import Path
 
@@ -50,6 +51,7 @@ def run(args: argparse.Namespace) -> int:
         summary,
         told,
         torque_table,
+        warnings,
     )
     from ..output.files import output_folder, whole_set, write_csv, write_json
     from ..stiffness.job import StiffnessJob
@@ -97,4 +99,6 @@ def run(args: argparse.Namespace) -> int:
         print(line)
     print(f"written to {folder}: " + ", ".join(names))
     print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
+    for sentence in warnings(pair, made):
+        print(f"gearfe: warning: {sentence}", file=sys.stderr)
     return 1 if made.failed.any() else 0

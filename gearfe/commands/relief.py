@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from contextlib import ExitStack
 from pathlib import Path
@@ -97,4 +98,6 @@ def run(args: argparse.Namespace) -> int:
         print(line)
     print(f"written to {folder}: " + ", ".join(names))
     print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
+    for sentence in pair.warnings:
+        print(f"gearfe: warning: {sentence}", file=sys.stderr)
     return 0

@@ -94,6 +94,11 @@ class Deviation:
         return float(np.abs(self.at(self._dense)[0]).max())
 
     @cached_property
+    def steepest(self) -> float:
+        """Largest size of the slope (-)."""
+        return float(np.abs(self.at(self._dense)[1]).max())
+
+    @cached_property
     def _dense(self) -> Array:
         s = self._arrays[0]
         return np.append((s[:-1, None] + np.diff(s)[:, None] * np.linspace(0, 1, 8, endpoint=False)).ravel(), s[-1])

@@ -235,7 +235,7 @@ def deviated(gear: ToothForm, profile: ToothProfile, deviation: Deviation) -> tu
     if rho == 0.0:
         return replace(flank, start=start, end=roll_at(tip)), None
     inner = tip - rho
-    slope = float(np.abs(flank.relief(np.linspace(start, flank.end, 65))[1]).max())
+    slope = float(np.abs(profile.flank.relief(np.linspace(start, flank.end, 65))[1]).max()) + deviation.steepest
     reach += 2 * rho * slope
     low, high = flank.end - reach, flank.end + reach
     end = float(brentq(lambda s: math.hypot(*_round_centre(gear, flank, s)) - inner, low, high, xtol=ROLL))

@@ -22,7 +22,9 @@ from ..contact.half_plane_step import HalfPlanePair
 from ..contact.position import Positions
 from ..contact.records import of_positions, taken
 from ..errors import InputError
+from ..gear.iso6336 import mesh_stiffness
 from ..gear.pair import GearPair
+from ..gear.validity import MOST_OVERLAP, MOST_YIELD, overlaps
 from ..loadmap.root_stress import PairRoots
 from ..stiffness.contact_pressure import BLUNTING
 from ..stiffness.positions import Progress
@@ -131,6 +133,11 @@ class LoadedMesh:
         return self.status != "converged"
 
     @property
+    def beyond_validity(self) -> IntArray:
+        """1 where flanks overlap by more than the law holds for, -1 where failed, shape (m, n)."""
+        return np.where(self.failed, -1, overlaps(self.pair, self.twist) > MOST_OVERLAP)
+
+    @property
     def statuses(self) -> dict[str, int]:
         """How many cells have which status."""
         return dict(Counter(map(str, self.status.ravel())))
@@ -216,6 +223,11 @@ def load_mesh(
     if len(goals) == 0 or not (np.isfinite(goals).all() and goals[0] > 0):
         raise InputError("torques", torques, "must be finite and > 0 N m", "give torques at the wheel's hub")
     pair = law.pair
+    stiffness = mesh_stiffness(pair, *(1 / law.inverse_modulus)) * law.width
+    most = MOST_YIELD * pair.pinion.module * stiffness * pair.wheel.base_radius
+    if goals[-1] > most:
+        problem = f"must be <= {most:.3g} N m: the teeth would yield by more than {MOST_YIELD:g} modules"
+        raise InputError("torques", float(goals[-1]), problem, "linear elasticity does not reach so far; give less")
     if angles is None:
         alike = all(one.alike for one in law.teeth.deviations)
         cycles = mesh_cycles if mesh_cycles is not None else 1 if alike else full_period(pair)

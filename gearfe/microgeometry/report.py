@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..gear import pitch_errors
 from ..gear.deviation import ToothDeviations
 from ..gear.pair import GearPair
+from ..gear.validity import overlaps, told_overlaps
 from ..stiffness.job import StiffnessJob
 from ..stiffness.report import versions
 from ..tables.microgeometry import MicrogeometryTable
@@ -49,7 +50,7 @@ def cell_table(made: LoadedMesh) -> dict[str, Array]:
     if made.root_stress is not None:
         for g, gear in enumerate(GEARS):
             table[f"root_stress_{gear}_MPa"] = 1e-6 * made.root_stress[:, :, g].ravel()
-    return {**table, "status": made.status.ravel()}
+    return {**table, "beyond_validity": made.beyond_validity.ravel(), "status": made.status.ravel()}
 
 
 def pair_table(made: LoadedMesh) -> dict[str, Array]:
@@ -161,6 +162,17 @@ def told(made: LoadedMesh) -> list[str]:
     if m > 2:
         lines.append(f"least peak-to-peak error: {1e6 * made.peak_to_peak[best]:.3g} um at {made.torque[best]:.4g} N m")
     return lines
+
+
+def warnings(pair: GearPair, made: LoadedMesh) -> list[str]:
+    """Sentences about what deserves a look."""
+    said, beyond = list(pair.warnings), made.beyond_validity
+    said += told_overlaps(beyond, overlaps(pair, made.twist[beyond == 1]).max(initial=0.0))
+    if made.failed.any():
+        told = ", ".join(f"{count} {status}" for status, count in made.statuses.items() if status != "converged")
+        cure = "a flank that touches at several places at once may jump there; smoother flanks, or other torques"
+        said.append(f"{int(made.failed.sum())} positions have no numbers ({told}): {cure}")
+    return said
 
 
 def flank_figure_arguments(table: MicrogeometryTable, pair: GearPair, folder: Path) -> dict[str, Any]:
