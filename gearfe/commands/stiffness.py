@@ -100,9 +100,7 @@ def run(args: argparse.Namespace) -> int:
         from ..stiffness.fields_output import told_size
 
         announce(told_size(elastic, np.degrees(sweep["angles"]), None if isinstance(chosen, str) else chosen))
-    curve = sweep_stiffness(
-        job.pair, elastic=elastic, estimate_error=not args.no_estimate, progress=count, **sweep, **_points(job)
-    )
+    curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=not args.no_estimate, progress=count, **sweep)
     for stage, seconds in curve.timings.items():
         watch.seconds[stage] = watch.seconds.get(stage, 0.0) + seconds
     with whole_set(folder, ("stiffness.png", "fields.vtkhdf", "stress_*deg.png")) as made:
@@ -142,12 +140,6 @@ def _animate(path: Path, job: StiffnessJob, elastic: Any, curve: Any, number: in
     if frames:
         teeth = f"{job.pair.pinion.teeth}/{job.pair.wheel.teeth}"
         stress_animation(path, frames, title=f"Gear pair {teeth}, von Mises stress", zoom=zone, progress=count)
-
-
-def _points(job: StiffnessJob) -> dict[str, Any]:
-    from ..stiffness.job import MESH
-
-    return {name: getattr(job.table, name) for name in MESH}
 
 
 def field_angle(text: str) -> str | float:

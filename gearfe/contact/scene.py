@@ -36,6 +36,8 @@ class MeshingPair:
         Common face width (m).
     law
         Contact law.
+    coarsen, flank_coarsen, points_per_edge
+        What the meshes were asked for, see `gearfe.stiffness.sweep.elastic_pair`; for a coarser one of the same kind.
     """
 
     pinion: GearBody
@@ -43,6 +45,9 @@ class MeshingPair:
     centre_distance: float
     width: float
     law: ContactLaw
+    coarsen: float = 1.0
+    flank_coarsen: float = 1.0
+    points_per_edge: int = 4
 
     def __post_init__(self) -> None:
         widths = [body.width for body in self.bodies]

@@ -291,25 +291,17 @@ class StiffnessCurve:
         if not (np.isfinite(values["mesh_cycle"]) and values["mesh_cycle"] > 0):
             cure = "add a column mesh_cycle_deg (360 deg/pinion teeth), or give mesh_cycle"
             raise InputError("stiffness curve", str(path), "does not tell the mesh cycle", cure)
-        if not np.isfinite(values["lost_motion"]):
-            values["lost_motion"] = 0.0
+        values["lost_motion"] = np.nan_to_num(values["lost_motion"])
+        rows = len(columns["k_mesh_N_per_m"])
         for name, attribute in COLUMNS.items():
             if attribute in WORDS:
+                values[attribute] = np.array([cell.strip() for cell in columns.get(name, [""] * rows)])
                 continue
             found = curve_csv.numbers(columns, name, path)
-            if attribute in WHOLE:
-                values[attribute] = np.where(np.isfinite(found), found, -1).astype(np.int64)
-            else:
-                values[attribute] = found
-        shares = [name for name in columns if name.startswith(SHARE)]
-        values["load_share"] = (
-            np.stack([curve_csv.numbers(columns, name, path) for name in shares], axis=1)
-            if shares
-            else np.zeros((len(values["k_mesh"]), 0))
-        )
+            values[attribute] = np.nan_to_num(found, nan=-1).astype(np.int64) if attribute in WHOLE else found
+        shares = [curve_csv.numbers(columns, name, path) for name in columns if name.startswith(SHARE)]
+        values["load_share"] = np.stack(shares, axis=1) if shares else np.zeros((rows, 0))
         values["contact_law"] = columns.get("contact_law", [""])[0].strip()
-        default = ["converged" if np.isfinite(k) else "missing" for k in values["k_mesh"]]
-        values["status"] = np.array([cell.strip() for cell in columns.get("status", default)])
-        for word in ("law", "edge"):
-            values[word] = np.array([cell.strip() for cell in columns.get(word, [""] * len(default))])
+        if "status" not in columns:
+            values["status"] = np.where(np.isfinite(values["k_mesh"]), "converged", "missing")
         return cls(**values)

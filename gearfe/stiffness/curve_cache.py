@@ -63,13 +63,10 @@ def cached_curve(
         found = None if error is None else replace(found, error=error)
     if found is not None:
         return found
-    from .job import MESH
     from .sweep import elastic_pair, sweep_stiffness
 
     elastic = elastic_pair(pair, watch=watch, **model)
-    points = {name: model[name] for name in MESH if name in model}
-    options = {**sweep, **points, "estimate_error": estimate_error}
-    curve = sweep_stiffness(pair, elastic=elastic, progress=progress, **options)
+    curve = sweep_stiffness(pair, elastic=elastic, progress=progress, estimate_error=estimate_error, **sweep)
     if watch is not None:
         for stage, seconds in curve.timings.items():
             watch.seconds[stage] = watch.seconds.get(stage, 0.0) + seconds

@@ -18,9 +18,6 @@ from ..tables.pair import MaterialTable, PairTable
 from ..tables.stiffness import StiffnessTable
 from .curve_csv import from_text
 
-#: Keys that decide the meshes and their contact points: of `elastic_pair`, and of the sweep's error estimate.
-MESH = ("coarsen", "flank_coarsen", "points_per_edge")
-
 
 @dataclass(frozen=True)
 class StiffnessJob:
@@ -62,7 +59,9 @@ class StiffnessJob:
             "materials": self.materials,
             "plane": t.plane,
             "law": self.law,
-            **{name: getattr(t, name) for name in MESH},
+            "coarsen": t.coarsen,
+            "flank_coarsen": t.flank_coarsen,
+            "points_per_edge": t.points_per_edge,
         }
 
     @property

@@ -89,6 +89,7 @@ def elastic_pair(
         raise InputError("coarsen", coarsen, "must be >= 0.2 and <= 5", "1 is the default mesh, 2 twice its sizes")
     check_flank_coarsen(coarsen, flank_coarsen, "flank_coarsen")
     chosen = law_named(law) if isinstance(law, str) else law
+    asked = coarsen, flank_coarsen, points_per_edge
     flank_coarsen = flank_factor(chosen, coarsen, flank_coarsen)
     both = (materials, materials) if isinstance(materials, Material) else materials
     watch = watch or Stopwatch()
@@ -110,7 +111,7 @@ def elastic_pair(
             )
             for mesh, material, gear in zip(meshes, both, gears, strict=True)
         ]
-    return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen)
+    return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen, *asked)
 
 
 def flank_factor(law: ContactLaw, coarsen: float, flank_coarsen: float = 1.0) -> float:
@@ -163,8 +164,7 @@ def sweep_stiffness(
     estimate_error
         Solve again on a coarser mesh and estimate the discretisation error.
     elastic
-        The pair from `elastic_pair`, when it is there already; of its arguments only coarsen, flank_coarsen and
-        points_per_edge are then looked at, by the error estimate.
+        The pair from `elastic_pair`, when it is there already; its arguments are not looked at then.
     progress
         Called with positions done, positions in all, and the stage's name.
 
@@ -186,10 +186,9 @@ def sweep_stiffness(
     if asked.ndim != 1 or len(asked) == 0 or not np.isfinite(asked).all():
         raise InputError("angles", angles, "must be a list of finite angles (rad)", "give at least one angle")
     watch, finite = Stopwatch(), kinematics == "finite"
-    points = {"points_per_edge": points_per_edge, "flank_coarsen": flank_coarsen}
-    common: dict[str, Any] = {"plane": plane, "law": law, **points}
     if elastic is None:
-        elastic = elastic_pair(pair, materials, coarsen=coarsen, watch=watch, **common)
+        sizes: dict[str, Any] = {"coarsen": coarsen, "flank_coarsen": flank_coarsen, "points_per_edge": points_per_edge}
+        elastic = elastic_pair(pair, materials, plane=plane, law=law, watch=watch, **sizes)
     solved_angles, source = (asked, np.arange(len(asked))) if solve_all else distinct_angles(asked, cycle)
     solver = position_solver(pair, elastic)
     if torque is not None:
@@ -205,13 +204,8 @@ def sweep_stiffness(
     error = None
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
-            given = (elastic.pinion.material, elastic.wheel.material)
-            common = {"plane": elastic.pinion.plane, "law": elastic.law, **points}
-            coarse = elastic_pair(pair, given, coarsen=COARSENING * coarsen, **common)
-            both = solver, position_solver(pair, coarse, resolved_only=False)
-            error = _estimate(both, solved, finite=finite, coarsen=coarsen * max(1.0, flank_coarsen))
-    searched = torque is not None
-    curve = assembled_curve(solver, asked, source, solved, touching, searched=searched)
+            error = _estimate(solver, solved, finite=finite)
+    curve = assembled_curve(solver, asked, source, solved, touching, searched=torque is not None)
     return replace(curve, timings=dict(watch.seconds), error=error)
 
 
@@ -245,15 +239,23 @@ def distinct_angles(angles: Array, cycle: float) -> tuple[Array, IntArray]:
     return folded[order][new], source
 
 
-def _estimate(
-    solvers: tuple[PositionSolver, PositionSolver], solved: Positions, *, finite: bool, coarsen: float
-) -> ErrorEstimate:
-    """Error of positions solved by the first solver, from the second's on a coarser mesh, resolved there or not."""
-    own, coarse = solvers
-    chosen = solved.take(solved_twice(solved.status == "converged"))
-    again = at_twists(coarse, chosen.pinion_angle, chosen.twist, None, finite=finite)
-    other = np.where(again.status == "converged", again.torque_wheel, np.nan)
-    unseen = unseen_error(own.elastic.law, contact_pressures(own, chosen)["edge"])
+def _estimate(solver: PositionSolver, solved: Positions, *, finite: bool) -> ErrorEstimate:
+    """Error of solved positions, from the same ones on a coarser mesh, resolved there or not."""
+    elastic, chosen = solver.elastic, solved.take(solved_twice(solved.status == "converged"))
+    coarse = elastic_pair(
+        solver.pair,
+        (elastic.pinion.material, elastic.wheel.material),
+        plane=elastic.pinion.plane,
+        law=elastic.law,
+        coarsen=COARSENING * elastic.coarsen,
+        flank_coarsen=elastic.flank_coarsen,
+        points_per_edge=elastic.points_per_edge,
+    )
+    again = position_solver(solver.pair, coarse, resolved_only=False)
+    there = at_twists(again, chosen.pinion_angle, chosen.twist, None, finite=finite)
+    other = np.where(there.status == "converged", there.torque_wheel, np.nan)
+    unseen = unseen_error(elastic.law, contact_pressures(solver, chosen)["edge"])
+    coarsen = elastic.coarsen * max(1.0, elastic.flank_coarsen)
     # a twist of some bits of the gears' angles is not what the gears are turned by
     unseen += ANGLE_ROUNDING * np.abs(chosen.tangent / chosen.torque_wheel)
     return error_estimate(chosen.pinion_angle, chosen.torque_wheel, other, coarsen=coarsen, unseen=unseen)
