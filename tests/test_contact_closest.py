@@ -7,7 +7,7 @@ parameter keep it one: there are no kinks between edges, and blended and own nor
 import numpy as np
 import pytest
 
-from gearfe.contact.closest import OFF_END, Projection, chains_of, nearest_places, project
+from gearfe.contact.closest import OFF_END, Projection, nearest_places, project
 from gearfe.contact.flank import edge_nodes, edge_shapes
 
 EDGES = 4
@@ -45,8 +45,13 @@ def scene() -> dict[str, np.ndarray]:
 def _project(scene: dict[str, np.ndarray], nodes: np.ndarray) -> Projection:
     half = len(nodes) // 2
     slave = np.einsum("qa,qai->qi", scene["shapes"], nodes[scene["slave_nodes"]])
-    chains = chains_of(nodes[:half], np.array([EDGES]), np.zeros(len(slave), dtype=np.int64))
-    return project(slave, chains, nearest_places(slave, nodes[:half]))
+    return onto(slave @ [1, 1j], nodes[:half] @ [1, 1j])
+
+
+def onto(points: np.ndarray, nodes: np.ndarray) -> Projection:
+    """Points projected onto one chain, both as complex numbers."""
+    one = np.array([len(nodes) // 2]), np.zeros(len(points), dtype=np.int64)
+    return project(points, nodes, *one, nearest_places(points, nodes))
 
 
 def _moved(scene: dict[str, np.ndarray], step: float) -> Projection:
@@ -63,7 +68,7 @@ def test_closest_point_is_the_foot_of_the_normal(scene: dict[str, np.ndarray]) -
         t = t - f / (1 + 2 * b * (b * t**2 - slave[:, 1] * 1e3) + 4 * b**2 * t**2)
     foot = 1e-3 * np.stack([t, 0.15 * t**2], axis=1)
     np.testing.assert_allclose(np.abs(p.gap), np.linalg.norm(slave - foot, axis=1), rtol=1e-12)
-    np.testing.assert_allclose(slave - p.gap[:, None] * p.normal, foot, rtol=0, atol=1e-16)
+    np.testing.assert_allclose(slave @ [1, 1j] - p.gap * p.normal, foot @ [1, 1j], rtol=0, atol=1e-16)
 
 
 def test_variation_of_the_gap(scene: dict[str, np.ndarray]) -> None:
@@ -71,7 +76,7 @@ def test_variation_of_the_gap(scene: dict[str, np.ndarray]) -> None:
     p, moved = _project(scene, scene["nodes"]), np.einsum("nij,nj->ni", scene["rotation"], scene["u"])
     slave = np.einsum("qa,qai->qi", scene["shapes"], moved[scene["slave_nodes"]])
     master = np.einsum("qa,qai->qi", p.shapes, moved[p.edge[:, None] + np.arange(3)])
-    gap = np.einsum("qi,qi->q", p.normal, slave - master)
+    gap = (p.normal.conj() * ((slave - master) @ [1, 1j])).real
     after, before = _moved(scene, STEP), _moved(scene, -STEP)
     np.testing.assert_allclose(gap, (after.gap - before.gap) / (2 * STEP), rtol=1e-8)
 
@@ -79,13 +84,12 @@ def test_variation_of_the_gap(scene: dict[str, np.ndarray]) -> None:
 def test_gap_is_continuous_past_a_kinked_vertex_and_off_beyond_the_ends() -> None:
     nodes = np.array([[1.0, 0.0], [0.5, 0.0], [0.0, 0.0], [-0.5, -0.1], [-1.0, -0.2]])
     line = np.linspace(-0.6, 0.6, 241)
-    points = np.stack([line, np.full_like(line, 0.05)], axis=1)
-    chains = chains_of(nodes, np.array([2]), np.zeros(len(points), dtype=np.int64))
-    p = project(points, chains, nearest_places(points, nodes))
-    steps = np.linalg.norm(np.diff(points - p.gap[:, None] * p.normal, axis=0), axis=1)
+    points, nodes = line + 0.05j, nodes @ [1, 1j]
+    p = onto(points, nodes)
+    steps = np.abs(np.diff(points - p.gap * p.normal))
     assert np.max(np.abs(np.diff(p.gap))) < 0.3 * np.diff(line)[0]
     assert steps.max() < 3 * np.diff(line)[0]
-    turn = np.linalg.norm(np.diff(p.normal, axis=0), axis=1)
+    turn = np.abs(np.diff(p.normal))
     assert turn.max() < 0.05 * 0.2
-    beyond = project(np.array([[1.2, 0.1], [-1.3, 0.1]]), chains_of(nodes, np.array([2]), np.zeros(2, int)), np.ones(2))
+    beyond = onto(np.array([1.2 + 0.1j, -1.3 + 0.1j]), nodes)
     assert (beyond.gap == OFF_END).all()

@@ -31,14 +31,17 @@ from .flank import edge_shapes
 
 Array = NDArray[Any]
 IntArray = NDArray[Any]
+ComplexArray = NDArray[np.complex128]
 
 #: Gap (m) given to points whose projection runs off the end of the mate's surface: never in contact.
 OFF_END = 1.0
+#: Most steps of Newton's method, and its last step along the chain (edges): what is left after it is of its square.
+STEPS, CLOSE = 15, 1e-7
 
 
 @dataclass(frozen=True)
 class Projection:
-    """Closest points of n slave points.
+    """Closest points of n slave points; vectors are complex numbers x + i y.
 
     Attributes
     ----------
@@ -46,13 +49,13 @@ class Projection:
         Edge number plus xi on the master chain.
     gap : ndarray, shape (n,)
         m, negative where the bodies overlap.
-    normal : ndarray, shape (n, 2)
+    normal : ndarray of complex, shape (n,)
         Outward unit normal of the master there.
     edge : ndarray, shape (n,)
         First node of the master edge.
-    shapes, slopes : ndarray, shape (n, 3)
-        Edge shape functions and their derivatives at the closest point.
-    tangent : ndarray, shape (n, 2)
+    shapes : ndarray, shape (n, 3)
+        Edge shape functions at the closest point.
+    tangent : ndarray of complex, shape (n,)
         a (m).
     curvature : ndarray, shape (n,)
         kappa (m).
@@ -60,162 +63,117 @@ class Projection:
 
     place: Array
     gap: Array
-    normal: Array
+    normal: ComplexArray
     edge: IntArray
     shapes: Array
-    slopes: Array
-    tangent: Array
+    tangent: ComplexArray
     curvature: Array
 
-    def take(self, index: IntArray | slice) -> Projection:
-        """The projections of the points `index`."""
-        return Projection(**{name: getattr(self, name)[index] for name in self.__dataclass_fields__})
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """Whether the mate has a point that is closest: else the projection runs off the end of its surface."""
+        return self.gap < OFF_END
 
 
-@dataclass(frozen=True)
-class Chains:
-    """Master curves: edges of all chains, prepared for projection.
-
-    Attributes
-    ----------
-    first, edges : ndarray, shape (n,)
-        For each slave point the first edge (in the arrays below) and the number of edges of its chain.
-    reach : ndarray, shape (n,)
-        How far beyond the end of its chain a point may be projected, onto the last edge continued (edges).
-    table : ndarray, shape (10, e)
-        Of each edge: start, linear and quadratic coefficient of x_m = start + xi linear + xi^2 quadratic (m), what the
-        blended normal adds to the edge's own at its start, and how much more than that at its end.
-    node : ndarray, shape (e,)
-        First node of each edge.
-    """
-
-    first: IntArray
-    edges: IntArray
-    reach: Array
-    table: Array
-    node: IntArray
-
-
-def chains_of(nodes: Array, counts: IntArray, chain_of: IntArray, reach: Array | None = None) -> Chains:
-    """Prepare chains that follow one another in `nodes`.
-
-    Parameters
-    ----------
-    nodes : ndarray, shape (k, 2)
-        Nodes of all chains (m); a chain of e edges has 2 e + 1 of them.
-    counts : ndarray, shape (c,)
-        Number of edges of each chain.
-    chain_of : ndarray, shape (n,)
-        Chain that each slave point is projected onto.
-    reach : ndarray, shape (n,), optional
-        See `Chains`; nothing beyond the end without it.
-    """
-    first_edge = np.concatenate([[0], np.cumsum(counts)])
-    node = 2 * np.arange(first_edge[-1]) + np.repeat(np.arange(len(counts)), counts)
-    x0, x1, x2 = nodes[node], nodes[node + 1], nodes[node + 2]
-    linear, quadratic = 4 * x1 - 3 * x0 - x2, 2 * (x0 - 2 * x1 + x2)
-    at_start, at_end = _normal(linear), _normal(linear + 2 * quadratic)
-    added = np.zeros((2, len(node), 2))
-    joint = np.ones(len(node), dtype=bool)
-    joint[first_edge[1:] - 1] = False
-    left = np.flatnonzero(joint)
-    mean = at_end[left] + at_start[left + 1]
-    mean /= np.sqrt(mean[:, :1] ** 2 + mean[:, 1:] ** 2)
-    added[1, left], added[0, left + 1] = mean - at_end[left], mean - at_start[left + 1]
-    table = np.concatenate([x0.T, linear.T, quadratic.T, added[0].T, (added[1] - added[0]).T])
-    beyond = np.zeros(len(chain_of)) if reach is None else reach
-    return Chains(first_edge[chain_of], counts[chain_of], beyond, table, node)
-
-
-def _normal(tangent: Array) -> Array:
-    length = np.sqrt(tangent[:, 0] ** 2 + tangent[:, 1] ** 2)
-    return np.stack([-tangent[:, 1] / length, tangent[:, 0] / length], axis=1)
-
-
-def nearest_places(points: Array, chain: Array) -> Array:
+def nearest_places(points: ComplexArray, chain: ComplexArray) -> Array:
     """Starting places on a chain of 2 e + 1 nodes: the nearest node of each point, shape (n,)."""
     nearest = np.empty(len(points))
     for first in range(0, len(points), 256):  # blocks that stay in the cache
         part = slice(first, first + 256)
-        x, y = points[part, 0, None] - chain[:, 0], points[part, 1, None] - chain[:, 1]
-        nearest[part] = 0.5 * np.argmin(x * x + y * y, axis=1)
+        nearest[part] = 0.5 * np.argmin(np.abs(points[part, None] - chain), axis=1)
     return nearest
 
 
-def project(slave: Array, chains: Chains, place: Array, *, iterations: int = 15, tolerance: float = 1e-7) -> Projection:
-    """Closest points by Newton's method along the chain, from the starting places `place`, shape (n,).
+def project(
+    slave: ComplexArray,
+    nodes: ComplexArray,
+    counts: IntArray,
+    chain_of: IntArray,
+    place: Array,
+    reach: Array | float = 0.0,
+) -> Projection:
+    """Closest points by Newton's method along the master's chains.
 
-    Points whose projection runs off either end of the chain get the gap `OFF_END`. `tolerance` is on the last step
-    along the chain (edges); what is left after it is of its square.
+    Parameters
+    ----------
+    slave : ndarray of complex, shape (n,)
+        Points (m).
+    nodes : ndarray of complex, shape (k,)
+        Nodes (m) of all chains, one after the other; a chain of e edges has 2 e + 1 of them.
+    counts : ndarray, shape (c,)
+        Number of edges of each chain.
+    chain_of, place : ndarray, shape (n,)
+        Chain that each slave point is projected onto, and where its search starts.
+    reach : ndarray, shape (n,)
+        How far beyond the end of its chain a point may be projected, onto the last edge continued (edges). Beyond, and
+        before the start, the gap is `OFF_END`.
     """
-    place = place.copy()
-    last = chains.edges + chains.reach
-    x, y = np.ascontiguousarray(slave[:, 0]), np.ascontiguousarray(slave[:, 1])
-    moving: IntArray | None = None  # all of them
-    for _ in range(iterations):
-        now, edges, ends = (
-            (place, chains.edges, last) if moving is None else (place[moving], chains.edges[moving], last[moving])
-        )
-        at = _evaluate(x, y, chains, now) if moving is None else _evaluate(x[moving], y[moving], chains, now, moving)
+    first, node, table = _edges(nodes, counts)
+    first, edges = first[chain_of], counts[chain_of]
+    last, place = edges + reach, place.copy()
+    moving = np.arange(len(slave))
+    for _ in range(STEPS):
+        now = place[moving]
+        at = _evaluate(slave[moving], table, first[moving], edges[moving], now)
         # residual: the part of the distance across the normal; its slope is -|a| as long as the gap is small
-        slope = at.ax * at.ny - at.ay * at.nx - (at.dx * at.ty - at.dy * at.tx)
-        slope = np.maximum(slope, 0.2 * at.length)
+        slope = np.maximum(_cross(at.a, at.n) - _cross(at.d, at.turning), 0.2 * np.abs(at.a))
         low = np.maximum(at.edge - 0.999, 0.0)
-        high = np.where(at.edge + 1 < edges, at.edge + 1.999, ends)
-        moved = np.minimum(np.maximum(now + (at.dx * at.ny - at.dy * at.nx) / slope, low), high)
-        open_ = np.abs(moved - now) > tolerance
-        if moving is None:
-            place, moving = moved, np.flatnonzero(open_)
-        else:
-            place[moving] = moved
-            moving = moving[open_]
+        high = np.where(at.edge + 1 < edges[moving], at.edge + 1.999, last[moving])
+        moved = np.minimum(np.maximum(now + _cross(at.d, at.n) / slope, low), high)
+        place[moving] = moved
+        moving = moving[np.abs(moved - now) > CLOSE]
         if len(moving) == 0:
             break
-    at = _evaluate(x, y, chains, place)
-    gap = at.dx * at.nx + at.dy * at.ny
-    ends = (place <= 0) | (place >= last)
-    sideways = np.abs(at.dx * at.ny - at.dy * at.nx)
-    off = ends & (sideways > 1e-9 * at.length)
-    gap[off] = OFF_END
-    shapes, slopes, _ = edge_shapes(place - at.edge)
-    normal, tangent = np.stack([at.nx, at.ny], axis=1), np.stack([at.ax, at.ay], axis=1)
-    curvature = -(at.ax * at.tx + at.ay * at.ty)
-    return Projection(place, gap, normal, chains.node[at.number], shapes, slopes, tangent, curvature)
+    at = _evaluate(slave, table, first, edges, place)
+    off = ((place <= 0) | (place >= last)) & (np.abs(_cross(at.d, at.n)) > 1e-9 * np.abs(at.a))
+    gap = np.where(off, OFF_END, _dot(at.d, at.n))
+    shapes = edge_shapes(place - at.edge)[0]
+    return Projection(place, gap, at.n, node[first + at.edge], shapes, at.a, -_dot(at.a, at.turning))
+
+
+def _edges(nodes: ComplexArray, counts: IntArray) -> tuple[IntArray, IntArray, ComplexArray]:
+    """First edge of each chain, first node of each edge, and of each edge the table of `_evaluate`, shape (5, e).
+
+    That is start, linear and quadratic coefficient of x_m = start + xi linear + xi^2 quadratic (m), what the blended
+    normal adds to the edge's own at its start, and how much more than that at its end.
+    """
+    first = np.concatenate([[0], np.cumsum(counts)])
+    node = 2 * np.arange(first[-1]) + np.repeat(np.arange(len(counts)), counts)
+    x0, x1, x2 = nodes[node], nodes[node + 1], nodes[node + 2]
+    linear, quadratic = 4 * x1 - 3 * x0 - x2, 2 * (x0 - 2 * x1 + x2)
+    at_start, at_end = (1j * a / np.abs(a) for a in (linear, linear + 2 * quadratic))
+    added = np.zeros((2, len(node)), dtype=complex)
+    left = np.setdiff1d(np.arange(len(node)), first[1:] - 1)
+    mean = at_end[left] + at_start[left + 1]
+    mean /= np.abs(mean)
+    added[1, left], added[0, left + 1] = mean - at_end[left], mean - at_start[left + 1]
+    return first, node, np.stack([x0, linear, quadratic, added[0], added[1] - added[0]])
 
 
 class _Foot(NamedTuple):
-    """Trial foot points: edge, x_s - x_m, a, |a|, blended unit normal and its derivative, edge number in the arrays."""
+    """Trial foot points: edge, x_s - x_m, a, blended unit normal, and the derivative of that before its scaling."""
 
     edge: IntArray
-    dx: Array
-    dy: Array
-    ax: Array
-    ay: Array
-    length: Array
-    nx: Array
-    ny: Array
-    tx: Array
-    ty: Array
-    number: IntArray
+    d: ComplexArray
+    a: ComplexArray
+    n: ComplexArray
+    turning: ComplexArray
 
 
-def _evaluate(x: Array, y: Array, chains: Chains, place: Array, chosen: IntArray | slice = slice(None)) -> _Foot:
-    """Components apart: numpy is several times quicker on contiguous arrays than on columns of two."""
-    edge = np.minimum(place.astype(np.int64), chains.edges[chosen] - 1)
-    number = chains.first[chosen] + edge
+def _evaluate(slave: ComplexArray, table: ComplexArray, first: IntArray, edges: IntArray, place: Array) -> _Foot:
+    edge = np.minimum(place.astype(np.int64), edges - 1)
     s = place - edge
-    x0, y0, lx, ly, qx, qy, sx, sy, bx, by = chains.table.take(number, axis=1)
-    bow_x, bow_y = s * qx, s * qy
-    dx, dy = x - x0 - s * (lx + bow_x), y - y0 - s * (ly + bow_y)
-    ax, ay = lx + 2 * bow_x, ly + 2 * bow_y
-    square = ax * ax + ay * ay
-    length = np.sqrt(square)
-    nx, ny = sx + s * bx - ay / length, sy + s * by + ax / length
-    size = np.sqrt(nx * nx + ny * ny)
-    kappa = 2 * (ax * qy - ay * qx) / (square * length)
-    return _Foot(edge, dx, dy, ax, ay, length, nx / size, ny / size, bx - kappa * ax, by - kappa * ay, number)
+    start, linear, quadratic, added, more = table.take(first + edge, axis=1)
+    a = linear + 2 * s * quadratic
+    length = np.abs(a)
+    n = added + s * more + 1j * a / length
+    kappa = 2 * _cross(a, quadratic) / length**3
+    return _Foot(edge, slave - start - s * (linear + s * quadratic), a, n / np.abs(n), more - kappa * a)
 
 
-def unreached(gap: Array) -> NDArray[np.bool_]:
-    """Points whose projection runs off the end of the mate's surface."""
-    return gap >= OFF_END
+def _cross(a: ComplexArray, b: ComplexArray) -> Array:
+    return a.real * b.imag - a.imag * b.real
+
+
+def _dot(a: ComplexArray, b: ComplexArray) -> Array:
+    return a.real * b.real + a.imag * b.imag

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .closest import Projection, chains_of, project
+from .closest import Projection, project
 from .laws import carrying
 from .records import ranges
 from .scene import MeshingPair
@@ -168,18 +168,13 @@ class Batch:
 
     def project(self, placed: ComplexArray, points: IntArray, start: Array) -> Projection:
         """Closest points of the contact points `points` on their mates, from starting places."""
-        nodes, slaves = parts(placed), parts(self.slaves(placed, points))
-        return project(slaves, chains_of(nodes, self.counts, self.facing[points], self.fade[points]), start)
+        mates = self.counts, self.facing[points]
+        return project(self.slaves(placed, points), placed, *mates, start, self.fade[points])
 
     def areas(self, place: Array, points: IntArray) -> Array:
         """Areas of contact points (m2) as far as they lie before the end of the mate's surface."""
         past = self.counts[self.facing[points]] - place
         return self.weight[points] * np.clip(0.5 + past / (2 * self.fade[points]), 0.0, 1.0)
-
-
-def parts(values: ComplexArray) -> Array:
-    """Components x, y in a second axis."""
-    return np.ascontiguousarray(values).view(float).reshape(-1, 2)
 
 
 def windows_of(elastic: MeshingPair, first: FirstContacts, share: float, margin: int) -> tuple[IntArray, IntArray]:

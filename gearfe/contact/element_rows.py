@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 
-from .closest import unreached
 from .element_batch import Batch
 
 Array = NDArray[Any]
@@ -86,7 +85,7 @@ class Seen:
 def seen(batch: Batch, state: State, turn: ComplexArray, points: IntArray) -> Seen:
     """The contact points `points` in a state, with the windows turned by `turn`, shape (W,)."""
     found = batch.project(batch.placed(state.displacement, turn), points, state.place[points])
-    normal = found.normal[:, 0] + 1j * found.normal[:, 1]
+    normal = found.normal
     own, mate = batch.owner[points], batch.facing[points]
     rows = np.concatenate(
         [
@@ -95,7 +94,7 @@ def seen(batch: Batch, state: State, turn: ComplexArray, points: IntArray) -> Se
         ],
         axis=1,
     )
-    reached = ~unreached(found.gap)
+    reached = found.reached
     asked = np.maximum(-batch.parameter[points] * found.gap - state.stress[points], 0.0)
     return Seen(
         points=points,

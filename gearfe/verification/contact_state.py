@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 from skfem import DiscreteField
 
-from ..contact.closest import Projection, chains_of, nearest_places, project, unreached
+from ..contact.closest import Projection, nearest_places, project
 from . import forms
 from .bodies import edge_points, edge_tangents
 from .problem import ContactProblem, Points
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+PLANE = np.array([1.0, 1.0j])
 
 
 @dataclass(frozen=True)
@@ -103,10 +104,10 @@ def contact_at(
     moved, fade = slave.interpolate(u), problem.fade(points)
     where = (slave.global_coordinates() + moved)[:, :, 0].T
     found = _closest(problem, places[problem.chain_nodes], where, points.mate, fade)
-    reached = ~unreached(found.gap)
+    reached, normal, tangent = found.reached, _plane(found.normal), _plane(found.tangent)
     over = (problem.counts[points.mate] - found.place) / (2 * fade)
     share = np.where(reached, np.clip(0.5 + over, 0.0, 1.0), 0.0)
-    stress, rate = problem.constitution.surface_stress(np.asarray(moved.grad), found.normal.T[:, :, None], **surface)
+    stress, rate = problem.constitution.surface_stress(np.asarray(moved.grad), normal[:, :, None], **surface)
     if law.name == "exact":
         hats, _ = hat_functions(points)
         multipliers = np.zeros(hats.shape[1]) if multipliers is None else multipliers
@@ -123,8 +124,8 @@ def contact_at(
     pairs = own @ edge_points(problem.mesh, mate, mate_xi, points.weight[on])
     at_points = {
         "g": found.gap,
-        "n": found.normal.T,
-        "a": found.tangent.T,
+        "n": normal,
+        "a": tangent,
         "kappa": found.curvature,
         "gamma": points.gamma,
         "p": pressure,
@@ -141,10 +142,15 @@ def contact_at(
 
 def _closest(problem: ContactProblem, nodes: Array, where: Array, mate: IntArray, fade: Array) -> Projection:
     """Closest points of points at `where` on the chains with these nodes."""
-    start = np.empty(len(where))
-    for k, chain in enumerate(np.split(nodes, np.cumsum(2 * problem.counts + 1)[:-1])):
-        start[mate == k] = nearest_places(where[mate == k], chain)
-    return project(where, chains_of(nodes, problem.counts, mate, fade), start)
+    start, slave, master = np.empty(len(where)), where @ PLANE, nodes @ PLANE
+    for k, chain in enumerate(np.split(master, np.cumsum(2 * problem.counts + 1)[:-1])):
+        start[mate == k] = nearest_places(slave[mate == k], chain)
+    return project(slave, master, problem.counts, mate, start, fade)
+
+
+def _plane(vectors: NDArray[np.complex128]) -> Array:
+    """Components, shape (2, q)."""
+    return np.stack([vectors.real, vectors.imag])
 
 
 def hat_functions(points: Points) -> tuple[csr_matrix, Array]:

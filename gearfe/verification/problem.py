@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.closest import chains_of, nearest_places, project
+from ..contact.closest import nearest_places, project
 from ..errors import InputError
 from .bodies import Bodies, Value, edge_lengths, edge_points, edge_tangents
 from .constitution import Kinematics, SaintVenantKirchhoff, SmallStrain, linear_stress_rate
@@ -185,9 +185,9 @@ class ContactProblem:
 
     def node_gaps(self, own: Surface, mate: Surface) -> Array:
         """Gaps (m) of a surface's nodes to its mate, undeformed."""
-        points, nodes = self.mesh.doflocs.T[own.nodes], self.mesh.doflocs.T[mate.nodes]
-        chain = chains_of(nodes, np.array([len(mate.edges)]), np.zeros(len(points), dtype=np.int64))
-        return project(points, chain, nearest_places(points, nodes)).gap
+        points, nodes = ([1, 1j] @ self.mesh.doflocs[:, surface.nodes] for surface in (own, mate))
+        chain = np.array([len(mate.edges)]), np.zeros(len(points), dtype=np.int64)
+        return project(points, nodes, *chain, nearest_places(points, nodes)).gap
 
     def points(self, places: Array) -> Points:
         """Contact points when the nodes are at `places`, shape (n, 2) (m)."""
