@@ -7,7 +7,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ..progress import count
 from ..tables.laws import check_law
@@ -17,6 +17,8 @@ from .arguments import add_keys, add_removed, check_option, with_keys
 
 HELP = "stiffness, transmission error, load share, pressure, root stress over pinion angle and torque"
 
+Loads = TypeVar("Loads", bound=LoadMapTable)
+
 #: Keys of [stiffness] that options stand for.
 MODEL = ("law", "plane", "kinematics", "coarsen")
 
@@ -25,14 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("job", metavar="JOB.toml", help="job file with the tables [pair], [stiffness] and [loadmap]")
     parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
-    load = parser.add_mutually_exclusive_group()
-    load.add_argument(
-        "--torques-Nm", type=float, nargs="+", metavar="T", dest="torques_Nm", help="torques at the wheel's hub (N m)"
-    )
-    load.add_argument(
-        "--torque-range", type=float, nargs=3, metavar=("START", "STOP", "COUNT"), help="a range of torques (N m)"
-    )
-    add_keys(parser, LoadMapTable, "positions", "root_stress", spacing="torque_spacing")
+    add_loads(parser)
     add_keys(parser, StiffnessTable, *MODEL)
     add_removed(parser, StiffnessTable.REMOVED)
     parser.add_argument("--no-picture", action="store_true", help="leave out the picture")
@@ -46,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness", "loadmap"))
     tables["stiffness"] = _overridden_model(tables.get("stiffness", StiffnessTable()), args)
-    table = _overridden_loads(tables.get("loadmap", LoadMapTable()), args)
+    table = with_loads(args, tables.get("loadmap", LoadMapTable()))
     torques = table.torques()
 
     from ..gear.pair import GearPair
@@ -105,8 +100,20 @@ def _overridden_model(table: StiffnessTable, args: argparse.Namespace) -> Stiffn
     return made
 
 
-def _overridden_loads(table: LoadMapTable, args: argparse.Namespace) -> LoadMapTable:
-    """The table with the command's options in place of the file's values, checked like these."""
+def add_loads(parser: argparse.ArgumentParser) -> None:
+    """Options that stand for the torques and positions of a table."""
+    load = parser.add_mutually_exclusive_group()
+    load.add_argument(
+        "--torques-Nm", type=float, nargs="+", metavar="T", dest="torques_Nm", help="torques at the wheel's hub (N m)"
+    )
+    load.add_argument(
+        "--torque-range", type=float, nargs=3, metavar=("START", "STOP", "COUNT"), help="a range of torques (N m)"
+    )
+    add_keys(parser, LoadMapTable, "positions", "root_stress", spacing="torque_spacing")
+
+
+def with_loads(args: argparse.Namespace, table: Loads) -> Loads:
+    """The table with the options of `add_loads` in place of the file's values, checked like these."""
     from ..errors import InputError
 
     more: dict[str, Any] = {}
@@ -123,5 +130,5 @@ def _overridden_loads(table: LoadMapTable, args: argparse.Namespace) -> LoadMapT
             check_option("--torque-range", value, LoadMapTable, key)
         more |= {"torques_Nm": None, **ends}
     made = with_keys(args, replace(table, **more), "positions", "root_stress", spacing="torque_spacing")
-    made.check("loadmap")
+    made.check(table.NAME)
     return made

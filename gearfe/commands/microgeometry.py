@@ -8,6 +8,10 @@ import time
 from pathlib import Path
 
 from ..progress import count
+from ..tables.microgeometry import MicrogeometryTable
+from ..tables.stiffness import StiffnessTable
+from .arguments import add_keys, with_keys
+from .loadmap import add_loads, with_loads
 
 HELP = "reliefs, pitch errors, measured flanks: transmission error, orders, load sharing, pressure against torque"
 
@@ -20,6 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     help_ = "job file with the tables [pair], [stiffness] and [microgeometry]"
     parser.add_argument("job", metavar="JOB.toml", help=help_)
     parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
+    add_loads(parser)
+    add_keys(parser, MicrogeometryTable, "mesh_cycles", "flank")
+    add_keys(parser, StiffnessTable, "coarsen")
     parser.add_argument("--no-picture", action="store_true", help="leave out the pictures")
 
 
@@ -27,11 +34,10 @@ def run(args: argparse.Namespace) -> int:
     """Solve the pair and write the files; 1 when a position failed."""
     started = time.perf_counter()
     from ..config import load_job
-    from ..tables.stiffness import StiffnessTable
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair", "microgeometry"), ("stiffness",))
-    table = tables["microgeometry"]
+    table = with_keys(args, with_loads(args, tables["microgeometry"]), "mesh_cycles", "flank")
     torques = table.torques()
 
     from ..gear.pair import GearPair
@@ -60,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     from ..threads import one_thread
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
-    job = StiffnessJob(tables["pair"], tables.get("stiffness", StiffnessTable()), pair)
+    job = StiffnessJob(tables["pair"], with_keys(args, tables.get("stiffness", StiffnessTable()), "coarsen"), pair)
     beside = Path(args.job).parent
     with watch.stage("deviations"):
         deviations = deviations_of(table, pair, beside)

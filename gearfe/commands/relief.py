@@ -9,6 +9,9 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from ..progress import count
+from ..tables.microgeometry import MicrogeometryTable, ReliefTable
+from ..tables.stiffness import StiffnessTable
+from .arguments import add_keys, with_keys
 
 HELP = "tip and root relief, crowning, slope: search for the best at some torques, with its tolerances"
 
@@ -21,6 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     help_ = "job file with the tables [pair], [stiffness], [microgeometry] and [relief]"
     parser.add_argument("job", metavar="JOB.toml", help=help_)
     parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
+    add_keys(parser, ReliefTable, "positions", "map_points", "generations", "seed")
+    add_keys(parser, StiffnessTable, "coarsen")
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes (default 1); no digit changes")
     parser.add_argument("--no-picture", action="store_true", help="leave out the picture")
 
@@ -30,12 +35,11 @@ def run(args: argparse.Namespace) -> int:
     started = time.perf_counter()
     from ..config import load_job
     from ..errors import InputError
-    from ..tables.microgeometry import MicrogeometryTable
-    from ..tables.stiffness import StiffnessTable
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair", "relief"), ("stiffness", "microgeometry"))
-    table, base = tables["relief"], tables.get("microgeometry", MicrogeometryTable())
+    table = with_keys(args, tables["relief"], "positions", "map_points", "generations", "seed")
+    base = tables.get("microgeometry", MicrogeometryTable())
     if not 1 <= args.workers <= 1024:
         raise InputError("--workers", args.workers, "must be 1 to 1024", "as many as there are processors")
 
@@ -55,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     from ..threads import one_thread
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
-    job = StiffnessJob(tables["pair"], tables.get("stiffness", StiffnessTable()), pair)
+    job = StiffnessJob(tables["pair"], with_keys(args, tables.get("stiffness", StiffnessTable()), "coarsen"), pair)
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
     elastic = elastic_pair(pair, watch=watch, **checked_model(job))
     roots = None
