@@ -57,9 +57,9 @@ def first_contacts(sides: Sequence[FlankCompliance], contacts: PairContacts) -> 
         position=contacts.position[step],
         pair=contacts.pair[step],
         normal=normal / np.abs(normal),
-        arc=arcs.reshape(count, 2, -1),
-        pressure=pressure.reshape(count, -1),
-        width=width.reshape(count, -1),
+        arc=arcs.reshape(count, 2, size * n),
+        pressure=pressure.reshape(count, size * n),
+        width=width.reshape(count, size * n),
     )
 
 
