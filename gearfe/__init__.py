@@ -29,7 +29,7 @@ _PUBLIC: dict[str, str] = {
     "TrainScene": "train",
     "build_train": "train",
     "housing_from_job": "housing.build",
-    "load_mesh": "microgeometry.loaded_mesh",
+    "load_mesh": "microgeometry.solve",
     "optimise_relief": "microgeometry.relief",
     "simulate": "train",
     "sweep_loads": "loadmap.sweep",

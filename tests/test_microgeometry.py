@@ -21,7 +21,8 @@ from gearfe.gear.deviation import NOMINAL, Deviation, ToothDeviations
 from gearfe.gear.modifications import FlankModification, Relief, Waviness, tooth_deviations
 from gearfe.gear.pair import GearPair, TipRelief
 from gearfe.microgeometry.job import active_rolls, deviations_of
-from gearfe.microgeometry.loaded_mesh import full_period, load_mesh
+from gearfe.microgeometry.loaded_mesh import full_period
+from gearfe.microgeometry.solve import load_mesh
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 from gearfe.tables.microgeometry import (
     VARIABLES,

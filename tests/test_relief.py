@@ -15,7 +15,8 @@ from gearfe.cli import main
 from gearfe.config import build
 from gearfe.contact.half_plane import half_plane_pair
 from gearfe.gear.modifications import FlankModification, Relief
-from gearfe.microgeometry.relief import ReliefProblem, Variable, optimise_relief
+from gearfe.microgeometry.relief import optimise_relief
+from gearfe.microgeometry.relief_problem import ReliefProblem, Variable
 from gearfe.stiffness.sweep import elastic_pair
 from gearfe.tables.microgeometry import ReliefTable
 

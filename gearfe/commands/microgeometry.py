@@ -47,7 +47,6 @@ def run(args: argparse.Namespace) -> int:
     from ..contact.half_plane import half_plane_pair
     from ..loadmap.root_stress import pair_roots
     from ..microgeometry.job import checked_model, deviations_of
-    from ..microgeometry.loaded_mesh import load_mesh
     from ..microgeometry.report import (
         cell_table,
         figure_arguments,
@@ -59,6 +58,7 @@ def run(args: argparse.Namespace) -> int:
         torque_table,
         warnings,
     )
+    from ..microgeometry.solve import load_mesh
     from ..output.files import output_folder, whole_set, write_csv, write_json
     from ..stiffness.job import StiffnessJob
     from ..stiffness.sweep import elastic_pair

@@ -10,34 +10,18 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from ..contact.half_plane_loads import flank_loads
-from ..contact.half_plane_result import PairContacts
-from ..contact.half_plane_step import HalfPlanePair
-from ..contact.position import Positions
-from ..contact.records import of_positions, taken
 from ..errors import InputError
-from ..gear.iso6336 import mesh_stiffness
 from ..gear.pair import GearPair
-from ..gear.validity import MOST_OVERLAP, MOST_YIELD, overlaps
-from ..loadmap.root_stress import PairRoots
-from ..stiffness.contact_pressure import BLUNTING
-from ..stiffness.positions import Progress
-from ..threads import one_thread
-from .cells import solve_cells
+from ..gear.validity import MOST_OVERLAP, overlaps
 
 Array = NDArray[Any]
 IntArray = NDArray[np.int64]
-
-#: Cells solved at once, and most in all.
-AT_ONCE, MOST_CELLS = 512, 1_000_000
-#: What stays of a cell's position.
-CELL = ("twist", "torque_pinion", "tangent", "status")
 
 
 @dataclass(frozen=True)
@@ -183,171 +167,3 @@ class LoadedMesh:
 def full_period(pair: GearPair) -> int:
     """Mesh cycles after which every tooth meets the same mate again: the least common multiple of the teeth."""
     return math.lcm(pair.pinion.teeth, pair.wheel.teeth)
-
-
-def load_mesh(
-    law: HalfPlanePair,
-    torques: ArrayLike,
-    *,
-    positions: int = 20,
-    mesh_cycles: int | None = None,
-    angles: ArrayLike | None = None,
-    roots: PairRoots | None = None,
-    progress: Progress | None = None,
-) -> LoadedMesh:
-    """Solve a pair with its deviations over pinion angle and torque.
-
-    Parameters
-    ----------
-    law
-        From `gearfe.contact.half_plane.half_plane_pair`, or its `deviated`.
-    torques : array_like, shape (m,)
-        At the wheel's hub (N m), > 0.
-    positions
-        Pinion angles in a mesh cycle.
-    mesh_cycles
-        How many cycles; None: one where all teeth of each gear are alike, else the full period.
-    angles : array_like, shape (n,), optional
-        Pinion angles (rad) instead.
-    roots
-        Of the same elastic gears (`gearfe.loadmap.root_stress.pair_roots`), for root stresses, too.
-    progress
-        Called with cells done, cells in all, and a name.
-
-    Raises
-    ------
-    InputError
-        For torques out of range, too many cells, and tooth pairs that carry nothing on their whole path.
-    """
-    goals = np.unique(np.atleast_1d(np.asarray(torques, dtype=float)))
-    if len(goals) == 0 or not (np.isfinite(goals).all() and goals[0] > 0):
-        raise InputError("torques", torques, "must be finite and > 0 N m", "give torques at the wheel's hub")
-    pair = law.pair
-    stiffness = mesh_stiffness(pair, *(1 / law.inverse_modulus)) * law.width
-    most = MOST_YIELD * pair.pinion.module * stiffness * pair.wheel.base_radius
-    if goals[-1] > most:
-        problem = f"must be <= {most:.3g} N m: the teeth would yield by more than {MOST_YIELD:g} modules"
-        raise InputError("torques", float(goals[-1]), problem, "linear elasticity does not reach so far; give less")
-    if angles is None:
-        alike = all(one.alike for one in law.teeth.deviations)
-        cycles = mesh_cycles if mesh_cycles is not None else 1 if alike else full_period(pair)
-        given: ArrayLike = np.arange(positions * cycles) * (pair.mesh_cycle / positions)
-    else:
-        cycles, given = 0, angles
-    place: NDArray[np.float64] = np.atleast_1d(np.asarray(given, dtype=np.float64))
-    n, count = len(place), len(goals) * len(place)
-    if count > MOST_CELLS:
-        problem = f"makes {count} cells with {len(goals)} torques and {n} angles: must be <= {MOST_CELLS}"
-        raise InputError("mesh_cycles", cycles, problem, "state a part of the period, fewer positions or torques")
-    met = law.teeth.touching(place)
-    touch = np.full(n, np.inf)
-    np.minimum.at(touch, met.position, met.twist)
-    stress = None if roots is None else np.full((count, 2), np.nan)
-    cells: list[dict[str, Array]] = []
-    pairs: list[PairLoads] = []
-    with one_thread():
-        for start in range(0, count, AT_ONCE):
-            numbers = np.arange(start, min(start + AT_ONCE, count))
-            angle, goal = numbers % n, goals[numbers // n]
-            made = solve_cells(law, place[angle], goal, of_positions(met, angle))
-            if stress is not None and roots is not None:
-                stress[numbers] = _root_stress(law, made, roots)
-            pairs.append(_pair_loads(law, made, numbers, n))
-            cells.append({name: getattr(made, name) for name in CELL})  # not the panels of the contacts
-            if progress is not None:
-                progress(int(numbers[-1]) + 1, count, "cells")
-    shape, lost = (len(goals), n), pair.contact_twist
-
-    def whole(name: str) -> Array:
-        return np.concatenate([one[name] for one in cells]).reshape(shape)
-
-    found = LoadedMesh(
-        torque=goals,
-        pinion_angle=place,
-        mesh_cycles=cycles,
-        twist=whole("twist") - lost,
-        torque_pinion=whole("torque_pinion"),
-        tangent=whole("tangent"),
-        twist_unloaded=touch - lost,
-        status=whole("status"),
-        pairs=PairLoads(**{f: np.concatenate([getattr(one, f) for one in pairs]) for f in PairLoads.__annotations__}),
-        root_stress=None if stress is None else stress.reshape(*shape, 2),
-        pair=pair,
-    )
-    _check_contact(found, law, met.pair, met.position, met.twist - lost)
-    return found
-
-
-def _pair_loads(law: HalfPlanePair, made: Positions, numbers: IntArray, n: int) -> PairLoads:
-    own = made.contacts
-    assert isinstance(own, PairContacts)
-    own = taken(own, np.flatnonzero(own.force > 0))
-    cell = numbers[own.position]
-    force, width = own.force, law.width
-    blunted = 2 * force / (math.pi * width * np.hypot(own.half_width, BLUNTING * law.pair.pinion.module))
-    flank = law.teeth.flank(own.pair)
-    roll = np.full((len(own), 2), np.nan)
-    for i, face in enumerate(law.teeth.faces):
-        rows = (flank == i) & (own.parameter >= 0) & (own.parameter <= 1)
-        roll[rows] = face.flank.roll(own.parameter[rows])
-    total = np.bincount(own.position, own.torque_wheel, len(numbers))
-    mark = np.where((own.mark == "") & (own.parameter > 1).any(axis=1), "round", own.mark)  # beyond its start
-    return PairLoads(
-        torque=cell // n,
-        angle=cell % n,
-        pair=own.pair,
-        force=force,
-        share=own.torque_wheel / total[own.position],
-        roll=roll,
-        half_width=own.half_width,
-        pressure=np.where(mark != "", blunted, own.hertz_pressure),
-        mark=mark,
-    )
-
-
-def _root_stress(law: HalfPlanePair, made: Positions, roots: PairRoots) -> Array:
-    """Largest tension (Pa) at the roots of pinion and wheel, shape (c, 2)."""
-    own = made.contacts
-    assert isinstance(own, PairContacts)
-    loads = flank_loads(law.sides, roots.pair, own, made.pinion_angle, made.twist)
-    found = roots.at(replace(made, loads=loads))
-    stress = np.full((len(made), 2), -np.inf)
-    np.maximum.at(stress, found.position, found.stress)
-    return np.where(np.isfinite(stress), stress, np.nan)
-
-
-def _check_contact(made: LoadedMesh, law: HalfPlanePair, pair: IntArray, position: IntArray, twist: Array) -> None:
-    """Raise `InputError` where a tooth pair carries nothing on its whole path: at the least torque, if at any."""
-    cycles, geometry = made.mesh_cycles, made.pair
-    if not cycles:
-        return
-    start, end = (geometry.pinion_angle_at(s) for s in geometry.path_limits(rounded=True))
-    whole = cycles % full_period(geometry) == 0 or all(one.alike for one in law.teeth.deviations)
-    if whole:
-        expected = set(range(cycles))
-    else:  # tooth pair k passes the path k mesh cycles earlier: those whose path lies within the angles
-        first, last = (angle / geometry.mesh_cycle for angle in (start, end))
-        expected = set(range(math.ceil(last) - cycles, math.floor(first) + 1))
-    if not expected or made.failed[0].any():
-        return
-
-    def number(k: IntArray) -> IntArray:
-        return np.asarray(k % cycles if whole else k)
-
-    loaded = set(number(made.pairs.pair[made.pairs.torque == 0]).tolist())
-    lost = sorted(expected - loaded)
-    if not lost:
-        return
-    rows = number(pair) == lost[0]
-    gap = twist[rows] - made.twist[0, position[rows]]  # of rigid flanks; loaded neighbours move a tooth away, too
-    nearest = int(np.argmin(gap))
-    more = made.tangent[0, position[rows][nearest]] * max(0.0, gap[nearest])
-    k = lost[0]
-    problem = (
-        f"{len(lost)} of {len(expected)} tooth pairs carry nothing on their whole path, among them pinion tooth "
-        f"{k % geometry.pinion.teeth} on wheel tooth {(-1 - k) % geometry.wheel.teeth}: must be > about "
-        f"{made.torque[0] + more:.3g} N m"
-    )
-    raise InputError(
-        "torques", float(made.torque[0]), problem, "give more torque, or smaller errors of pitch or profile"
-    )

@@ -17,7 +17,8 @@ from ..stiffness.job import StiffnessJob
 from ..stiffness.report import versions
 from ..tables.microgeometry import VARIABLES, MicrogeometryTable, ReliefTable
 from .job import GEARS, active_rolls, modification
-from .relief import ReliefProblem, ReliefResult, Variable
+from .relief import ReliefResult
+from .relief_problem import ReliefProblem, Variable
 
 Array = NDArray[Any]
 

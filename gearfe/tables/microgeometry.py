@@ -110,7 +110,7 @@ class MicrogeometryTable(LoadMapTable):
     wheel: GearMicrogeometryTable = quantity(GearMicrogeometryTable, doc="the driven gear")  # noqa: RUF009
 
 
-#: What can be varied: key -> (quantity of `gearfe.microgeometry.relief.Variable`, factor to SI).
+#: What can be varied: key -> (quantity of `gearfe.microgeometry.relief_problem.Variable`, factor to SI).
 VARIABLES: dict[str, tuple[str, float]] = {
     "tip_relief_um": ("tip_relief.amount", 1e-6),
     "tip_relief_length_mm": ("tip_relief.length", 1e-3),
