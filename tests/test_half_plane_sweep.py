@@ -12,6 +12,8 @@ import pytest
 from gearfe import InputError
 from gearfe.cli import main
 from gearfe.contact.finite_strain import finite_strain_shares
+from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
+from gearfe.contact.influence_error import torque_changes
 from gearfe.contact.laws import HalfPlane
 from gearfe.contact.scene import MeshingPair
 from gearfe.loadmap.sweep import sweep_loads
@@ -148,6 +150,17 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     job.write_text(JOB + 'law_sides = "pinion"\n')
     assert main(["stiffness", str(job), "--out", str(tmp_path / "out")]) != 0
     assert "law_sides" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("degrees", "bound"), [(0.01, 0.08), (0.1, 0.3)])
+def test_another_influence_function_by_the_energy(degrees: float, bound: float) -> None:
+    """The change of the torque to first order, from the energy, against positions solved again with that function."""
+    own, other = (half_plane_pair(PAIR, elastic_pair(PAIR, coarsen=c)) for c in (1.0, 2.5))
+    found, again = (solve_half_plane(law, ANGLES, math.radians(degrees)) for law in (own, other))
+    exact = again.torque_wheel / found.torque_wheel - 1
+    assert np.abs(exact).max() > 1e-4
+    assert torque_changes(own, other, found) == pytest.approx(exact, abs=bound * np.abs(exact).max())
+    assert torque_changes(own, own, found) == pytest.approx(np.zeros(len(found)), abs=1e-14)
 
 
 def test_estimate_covers_what_a_finer_mesh_shows() -> None:

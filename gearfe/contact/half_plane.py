@@ -187,7 +187,7 @@ def _first(law: HalfPlanePair, twists: Array, found: Touching) -> _Open:
     if len(found) == 0:
         return start
     overlap = found.arm[:, 1] * (twists[found.position] - found.twist)
-    T = smooth_influence(law, state, start.couples).compliance
+    T = smooth_influence(law, state.seen, state.arc, start.couples).compliance
     force = forces_of_overlaps(overlap, usual_approach(law), T, start.couples)
     return _Open(start.numbers, _Pairs(found, replace(state, force=force)))
 
@@ -327,7 +327,8 @@ def coupling_compliances(law: HalfPlanePair, pinion_angles: Array, twists: Array
     start = _first(law, twists, met)
     couples = start.couples
     arm = met.arm[:, 1] / law.pair.wheel.base_radius
-    found = smooth_influence(law, start.pairs.state, couples).compliance / law.width
+    state = start.pairs.state
+    found = smooth_influence(law, state.seen, state.arc, couples).compliance / law.width
     found = found / (arm[couples.first] * arm[couples.second])
     upper, own = couples.step > 0, met.angle + met.pair * law.pair.mesh_cycle
     return own[couples.second[upper]], couples.step[upper], found[upper]

@@ -73,6 +73,11 @@ class State:
     bearing: BoolArray
     reach: Array
 
+    @property
+    def seen(self) -> ComplexArray:
+        """n in the teeth's axes, shape (p, 2)."""
+        return self.normal[:, None] / self.turn
+
 
 @dataclass(frozen=True)
 class Smooth:
@@ -80,8 +85,6 @@ class Smooth:
 
     Attributes
     ----------
-    normal : ndarray of complex, shape (p, 2)
-        n in the teeth's axes.
     values, bends : ndarray, shape (p, 2, k)
         Shape functions of the stations at the arcs, and their curvatures (1/m2).
     moved : ndarray of complex, shape (c, 2, 3)
@@ -91,7 +94,6 @@ class Smooth:
         T = w n H n (m2/N).
     """
 
-    normal: ComplexArray
     values: Array
     bends: Array
     moved: ComplexArray
@@ -144,15 +146,14 @@ def cross(a: ComplexArray, b: ComplexArray) -> Array:
     return np.asarray((np.conj(a) * b).imag)
 
 
-def smooth_influence(law: HalfPlanePair, state: State, couples: Couplings) -> Smooth:
-    """H at the arcs and along the normals of all contacts."""
-    normal = state.normal[:, None] / state.turn
-    shapes = law.shapes.at(state.arc)
+def smooth_influence(law: HalfPlanePair, normal: ComplexArray, arc: Array, couples: Couplings) -> Smooth:
+    """H at the arcs (m) and along the normals (tooth axes) of all contacts, both of shape (p, 2)."""
+    shapes = law.shapes.at(arc)
     values = shapes[:, :, 0]
     at_stations = answers(law, values, normal, couples)
     moved = (shapes.take(couples.first, axis=0) @ at_stations.view(float)).view(complex)[..., 0]
     compliance = (moved[:, :, 0] * normal.take(couples.first, axis=0).conj()).real.sum(axis=1)
-    return Smooth(normal, values, shapes[:, :, 2], moved, compliance)
+    return Smooth(values, shapes[:, :, 2], moved, compliance)
 
 
 def answers(law: HalfPlanePair, values: Array, normal: ComplexArray, couples: Couplings) -> ComplexArray:
@@ -188,8 +189,8 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
     held
         Whether the bearing panels stay too, so that the step is a smooth function of its state.
     """
-    smooth = smooth_influence(law, state, couples)
-    normal, force = smooth.normal, state.force
+    normal, force = state.seen, state.force
+    smooth = smooth_influence(law, normal, state.arc, couples)
     tension, shear = law.wedge
     shear = shear * normal.conj() ** 2
     tables, corner = law.tables.of(state.flank), law.corner[state.flank]

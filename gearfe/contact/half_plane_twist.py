@@ -56,11 +56,10 @@ def _batch(law: HalfPlanePair, torques: Array, found: Touching, start: int) -> A
         return np.where(np.isfinite(touch), np.nan, touch)
     couples = couplings(position, found.pair, count)
     state = unloaded_state(law, touch, replace(found, position=position))
-    smooth = smooth_influence(law, state, couples)
-    T, arm = smooth.compliance, found.arm[:, 1]
+    T, arm = smooth_influence(law, state.seen, state.arc, couples).compliance, found.arm[:, 1]
     kappa = np.minimum(found.curvature, 1 / (SHARPEST * law.pair.pinion.module))
     tension, shear = law.wedge
-    along = law.inverse_modulus * (tension + (shear * smooth.normal.conj() ** 2).real)
+    along = law.inverse_modulus * (tension + (shear * state.seen.conj() ** 2).real)
     points = law.tables.of(state.flank).at(state.arc[:, :, None])[0][:, :, 0]
     y = np.abs(points - law.corner[state.flank])
     own = T[couples.own]

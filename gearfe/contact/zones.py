@@ -147,7 +147,7 @@ def _gaps(law: HalfPlanePair, state: State, couples: Couplings) -> tuple[Array, 
     moved, y = _smooth(law, state, couples, arcs)
     at = np.maximum(np.abs(tables.at(state.arc[:, :, None])[0] - law.corner[state.flank][:, :, None]), LEAST_DISTANCE)
     i, j = couples.first[couples.step == 0], couples.second[couples.step == 0]
-    load = state.force[:, None] * SIGN * state.normal[:, None] / state.turn
+    load = state.force[:, None] * SIGN * state.seen
     tension, shear = law.wedge
     wedge = tension * load + shear * load.conj()
     half = _half_widths(state)[j, None, None]
@@ -183,8 +183,7 @@ def _smooth(law: HalfPlanePair, state: State, couples: Couplings, arcs: Array) -
     """Smooth displacements of the faces at arcs (m) of shape (p, 2, m), tooth axes (m), and the distances y (m) of the
     arcs from the corners: linear between even places.
     """
-    normal = state.normal[:, None] / state.turn
-    each = answers(law, law.shapes.at(state.arc)[:, :, 0], normal, couples)[..., 0]
+    each = answers(law, law.shapes.at(state.arc)[:, :, 0], state.seen, couples)[..., 0]
     load = state.force[couples.second][:, None] * SIGN
     at_stations = np.add.reduceat(each * load[:, :, None], couples.starts)
     fine = law.finely

@@ -72,12 +72,12 @@ OUTLIER = 2.0
 
 @dataclass(frozen=True)
 class ErrorEstimate:
-    """Discretisation error of a curve, from a second sweep on a coarser mesh: see `gearfe.stiffness.curve_error`.
+    """Discretisation error of a curve, from coarser meshes: see `gearfe.stiffness.curve_error`.
 
     Attributes
     ----------
     pinion_angle : ndarray, shape (m,)
-        Positions that were solved twice (rad).
+        Positions that have an estimate (rad).
     relative : ndarray, shape (m,)
         Estimated relative error of k_mesh there (-): covers the true error at about 19 of 20 positions.
         Not-a-number where nothing converged on the coarser mesh.

@@ -1,8 +1,9 @@
-r"""Discretisation error of a solved curve, from the same positions solved again on a coarser mesh.
+r"""Discretisation error of a solved curve, from a coarser mesh.
 
-With sizes larger by the factor c and errors of order p, one position's error would be :math:`d_i = |T_{c,i}/T_i - 1|
-/(c^p - 1)`. Alone that is not to be trusted: the error swings about as the edge of the contact slides past the nodes,
-so coarse and fine mesh often agree by chance. The swing is alike at all n positions of a sweep, hence
+**Laws on the mesh** solve positions again on it. With sizes larger by the factor c and errors of order p, one
+position's error would be :math:`d_i = |T_{c,i}/T_i - 1|/(c^p - 1)`. Alone that is not to be trusted: the error swings
+about as the edge of the contact slides past the nodes, so coarse and fine mesh often agree by chance. The swing is
+alike at all n positions of a sweep, hence
 
 .. math:: e_i = \max\Big(d_i,\; (1 + 1/n)\,\big(\tfrac1n\sum_j d_j^2\big)^{1/2}\Big) + 5\cdot10^{-5} c_0^p,
 
@@ -10,11 +11,18 @@ with the curve's own factor :math:`c_0` on the default sizes. p is 1, the lowest
 about one element's half width; 1.5 to 2 where the mesh sees the contact well). The last term stands for what both
 meshes share.
 
-The half-plane law is solved twice in the same way, with influence functions from two meshes; what they share (bumps,
-panels, half-planes and wedges) is `HALF_PLANE`, by what bears besides smooth flanks.
+**The half-plane law** needs no second sweep. The influence function of the coarser gears changes the energy, and with
+it the torque, of each position by :math:`\delta T` (`gearfe.contact.influence_error`), so that
+:math:`d_i = |\delta T_i/T_i|/(c^p-1)`, and
+
+.. math:: e_i = \max\Big(d_i,\; 2\,\big(\tfrac1n\sum_j d_j^2\big)^{1/2}\Big),
+
+twice the standard deviation, which covers 95 % of what is normally distributed (JCGM 100:2008, *Guide to the
+expression of uncertainty in measurement*, 6.2.2).
 
 Not in it: the model (plane, no friction, rigid bores, small strain with its first-order correction) and what no
-refinement of one mesh family shows. `scripts/measure_curve_accuracy.py` measures over random pairs how often it covers
+refinement of one mesh family shows: of the half-plane law, the wedge that stands for a sharp tip (0.2 to 0.4 % where
+one bears; docs/contact_laws.md). `scripts/measure_curve_accuracy.py` measures over random pairs how often it covers
 the true error.
 """
 
@@ -25,7 +33,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.laws import ContactLaw, HalfPlane
 from .curve import ErrorEstimate
 
 Array = NDArray[Any]
@@ -33,9 +40,8 @@ Array = NDArray[Any]
 #: Coarsening c, assumed order of convergence p, share of the meshes' common error at the default sizes, and largest
 #: number of positions solved twice.
 COARSENING, ORDER, COMMON, POSITIONS = 1.6, 1.0, 5e-5, 20
-#: Relative error of the half-plane law that no mesh shows: on smooth flanks, at rounded and at sharp edges (as in
-#: `contact_pressure.EDGES`); with it the estimates cover 95 % of random pairs (docs/contact_laws.md).
-HALF_PLANE = (1e-4, 2e-4, 1.5e-3)
+#: Standard deviations that cover 95 %.
+COVERAGE = 2.0
 
 
 def solved_twice(converged: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -46,15 +52,19 @@ def solved_twice(converged: NDArray[np.bool_]) -> NDArray[np.int64]:
     return good[np.unique(np.linspace(0, len(good) - 1, min(len(good), POSITIONS)).round().astype(np.int64))]
 
 
-def unseen_error(law: ContactLaw, edge: Array) -> Array:
-    """Relative error of a law that no refinement of the mesh shows, shape (n,).
+def influence_estimate(angles: Array, changes: Array, *, unseen: Array | float = 0.0) -> ErrorEstimate:
+    """Estimated relative error of positions of the half-plane law.
 
     Parameters
     ----------
-    edge : ndarray, shape (n,)
-        What bears besides smooth flanks: the place in `contact_pressure.EDGES`.
+    angles, changes : ndarray, shape (m,)
+        Pinion angles (rad), and the relative changes of the torque by the influence function of coarser gears.
+    unseen
+        What no mesh shows: the rounding of the gears' angles.
     """
-    return np.array(HALF_PLANE)[edge.astype(np.int64)] if isinstance(law, HalfPlane) else np.zeros(len(edge))
+    single = np.abs(changes) / (COARSENING**ORDER - 1)
+    usual = COVERAGE * float(np.sqrt(np.mean(single**2))) if len(single) else 0.0
+    return ErrorEstimate(angles, np.maximum(single, usual) + unseen, COARSENING, ORDER)
 
 
 def error_estimate(
@@ -72,7 +82,7 @@ def error_estimate(
     coarsen
         The curve's own factor on the default element sizes, that of the flanks where it is larger.
     unseen : ndarray, shape (m,)
-        What no mesh shows: `unseen_error`, and the rounding of the gears' angles.
+        What no mesh shows: the rounding of the gears' angles.
     """
     single = np.abs(coarse / torque - 1) / (COARSENING**ORDER - 1)
     known = np.isfinite(single)

@@ -19,6 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..contact.compliance import gear_body
+from ..contact.half_plane import half_plane_pair
+from ..contact.influence_error import torque_changes
 from ..contact.laws import ContactLaw, HalfPlane, law_named, law_text
 from ..contact.position import Positions
 from ..contact.scene import MeshingPair
@@ -34,9 +36,9 @@ from ..tables.stiffness import check_flank_coarsen
 from ..threads import one_thread
 from .contact_pressure import EDGES, contact_pressures
 from .curve import SOLVED, ErrorEstimate, StiffnessCurve
-from .curve_error import COARSENING, error_estimate, solved_twice, unseen_error
+from .curve_error import COARSENING, error_estimate, influence_estimate, solved_twice
 from .periodic import fold
-from .position_solver import PositionSolver, position_solver
+from .position_solver import ElementSolver, HalfPlaneSolver, PositionSolver, position_solver
 from .positions import Progress, at_torque, at_twists, check_torque, honest, load_shares
 from .torque_control import ANGLE_ROUNDING
 
@@ -162,7 +164,7 @@ def sweep_stiffness(
     solve_all
         Solve every position, also those that differ by whole mesh cycles.
     estimate_error
-        Solve again on a coarser mesh and estimate the discretisation error.
+        Estimate the discretisation error from coarser meshes.
     elastic
         The pair from `elastic_pair`, when it is there already; its arguments are not looked at then.
     progress
@@ -239,9 +241,11 @@ def distinct_angles(angles: Array, cycle: float) -> tuple[Array, IntArray]:
     return folded[order][new], source
 
 
-def _estimate(solver: PositionSolver, solved: Positions, *, finite: bool) -> ErrorEstimate:
-    """Error of solved positions, from the same ones on a coarser mesh, resolved there or not."""
-    elastic, chosen = solver.elastic, solved.take(solved_twice(solved.status == "converged"))
+def _estimate(solver: HalfPlaneSolver | ElementSolver, solved: Positions, *, finite: bool) -> ErrorEstimate:
+    """Error of solved positions from coarser meshes: of all of them by the influence function of these, of some by a
+    law on the mesh, which solves them again, resolved there or not.
+    """
+    elastic, good = solver.elastic, solved.status == "converged"
     coarse = elastic_pair(
         solver.pair,
         (elastic.pinion.material, elastic.wheel.material),
@@ -251,14 +255,17 @@ def _estimate(solver: PositionSolver, solved: Positions, *, finite: bool) -> Err
         flank_coarsen=elastic.flank_coarsen,
         points_per_edge=elastic.points_per_edge,
     )
+    chosen = solved.take(np.flatnonzero(good) if isinstance(solver, HalfPlaneSolver) else solved_twice(good))
+    # a twist of some bits of the gears' angles is not what the gears are turned by
+    rounding = ANGLE_ROUNDING * np.abs(chosen.tangent / chosen.torque_wheel)
+    if isinstance(solver, HalfPlaneSolver):
+        changes = torque_changes(solver.law, half_plane_pair(solver.pair, coarse), chosen)
+        return influence_estimate(chosen.pinion_angle, changes, unseen=rounding)
     again = position_solver(solver.pair, coarse, resolved_only=False)
     there = at_twists(again, chosen.pinion_angle, chosen.twist, None, finite=finite)
     other = np.where(there.status == "converged", there.torque_wheel, np.nan)
-    unseen = unseen_error(elastic.law, contact_pressures(solver, chosen)["edge"])
     coarsen = elastic.coarsen * max(1.0, elastic.flank_coarsen)
-    # a twist of some bits of the gears' angles is not what the gears are turned by
-    unseen += ANGLE_ROUNDING * np.abs(chosen.tangent / chosen.torque_wheel)
-    return error_estimate(chosen.pinion_angle, chosen.torque_wheel, other, coarsen=coarsen, unseen=unseen)
+    return error_estimate(chosen.pinion_angle, chosen.torque_wheel, other, coarsen=coarsen, unseen=rounding)
 
 
 def assembled_curve(
