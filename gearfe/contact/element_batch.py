@@ -52,9 +52,6 @@ class FirstContacts:
     pressure: Array
     width: Array
 
-    def __len__(self) -> int:
-        return len(self.pair)
-
 
 @dataclass(frozen=True)
 class Block:
@@ -182,7 +179,7 @@ def windows_of(elastic: MeshingPair, first: FirstContacts, share: float, margin:
 
     They reach beyond the pressure by `share` of its length and `margin` edges.
     """
-    low, count = np.zeros((len(first), 2), dtype=np.int64), np.zeros((len(first), 2), dtype=np.int64)
+    low, count = np.zeros((2, len(first.pair), 2), dtype=np.int64)
     for g, body in enumerate(elastic.bodies):
         ends, arc = body.flank.ends, first.arc[:, g]
         least = np.where(first.pressure > 0, arc, np.inf).min(axis=1)
@@ -205,35 +202,36 @@ def batch_of(
     reach
         `share` and `margin` of `windows_of`.
     """
-    size, flanks = len(angles), [body.flank for body in elastic.bodies]
-    per_position = np.bincount(first.position, minlength=size)
-    start = np.cumsum(per_position) - per_position
-    rank = np.arange(len(first)) - start[first.position]
-    number = 2 * start[first.position] + rank
-    of = np.stack([number, number + per_position[first.position]], axis=1)  # window of each contact and gear
-    edges = windows_of(elastic, first, *reach)
-
-    def windows(pinion: Any, wheel: Any) -> Array:
-        made = np.empty(2 * len(first), dtype=np.result_type(pinion, wheel))
-        made[of[:, 0]], made[of[:, 1]] = pinion, wheel
-        return made
-
-    here = angles[first.position], twists[first.position]
-    gear, mate = windows(0, 1), windows(of[:, 1], of[:, 0])
-    tooth, position = windows(first.pair, -1 - first.pair), windows(first.position, first.position)
-    couple = windows(np.arange(len(first)), np.arange(len(first)))
-    first_edge, counts = (windows(part[:, 0], part[:, 1]) for part in edges)
-    turned = [elastic.tooth_angle(g, tooth[of[:, g]], *here) for g in (0, 1)]
+    flanks, m = [body.flank for body in elastic.bodies], len(first.pair)
+    low, count = windows_of(elastic, first, *reach)
+    gear, couple = np.repeat([0, 1], m), np.tile(np.arange(m), 2)
+    order = np.lexsort((couple, gear, first.position[couple]))
+    gear, couple, mate = gear[order], couple[order], np.argsort(order)[(order + m) % (2 * m)]
+    position, first_edge, counts = first.position[couple], low[couple, gear], count[couple, gear]
+    tooth = np.where(gear == 0, first.pair[couple], -1 - first.pair[couple])
+    turned = [elastic.tooth_angle(g, tooth, angles[position], twists[position]) for g in (0, 1)]
     nodes = 2 * counts + 1
     first_node = np.concatenate([[0], np.cumsum(nodes)])
-    begin = np.array([0, len(flanks[0].points)])[gear] + 2 * first_edge
-    local = np.concatenate([f.points for f in flanks])[ranges(begin, nodes)]
+    local = np.concatenate([f.points for f in flanks])[
+        ranges(np.array([0, len(flanks[0].points)])[gear] + 2 * first_edge, nodes)
+    ]
+    # contact points: of a window's flank one stretch
     bears = carried_by(elastic, first)[couple, gear]
-    at_points = _contact_points(elastic, gear, first_edge, counts, mate, first_node, bears)
-    owner = at_points["owner"]
+    quadrature = np.array([len(flank.shapes) for flank in flanks])
+    per_window = np.where(bears, quadrature[gear] * counts, 0)
+    owner = np.repeat(np.arange(2 * m), per_window)
+    within, own, facing = ranges(np.zeros_like(per_window), per_window), gear[owner], mate[owner]
+    number = np.array([0, flanks[0].weights.size])[own] + quadrature[own] * first_edge[owner] + within
+    lengths = np.concatenate([f.weights.ravel() for f in flanks])[number]
+    gammas = [
+        np.repeat(elastic.law.parameter(body.surface_modulus, body.flank.sizes), n)
+        for body, n in zip(elastic.bodies, quadrature, strict=True)
+    ]
+    last = np.concatenate([f.sizes for f in flanks])[np.array([0, flanks[0].edges])[gear] + first_edge + counts - 1]
+    shapes = np.concatenate([f.shapes for f in flanks])
     made = Batch(
         elastic=elastic,
-        size=size,
+        size=len(angles),
         position=position,
         gear=gear,
         tooth=tooth,
@@ -241,13 +239,19 @@ def batch_of(
         mate=mate,
         first_edge=first_edge,
         counts=counts,
-        turn=windows(np.exp(1j * turned[0]), np.exp(1j * turned[1])),
+        turn=np.exp(1j * np.where(gear == 0, *turned)),
         first_node=first_node,
-        window=np.repeat(np.arange(len(gear)), nodes),
-        points=np.ascontiguousarray(local).view(complex)[:, 0],
+        window=np.repeat(np.arange(2 * m), nodes),
+        points=local @ np.array([1.0, 1.0j]),
+        owner=owner,
         at=position[owner],
+        facing=facing,
+        slave_nodes=(first_node[owner] + 2 * (within // quadrature[own]))[:, None] + np.arange(3),
+        slave_shapes=shapes[np.array([0, quadrature[0]])[own] + within % quadrature[own]],
+        weight=elastic.width * np.where(bears[owner] & bears[facing], 0.5, 1.0) * lengths,
+        fade=0.5 * lengths / last[facing],
+        parameter=np.concatenate(gammas)[number],
         blocks=[],
-        **at_points,
     )
     return replace(made, blocks=_blocks(made, bears))
 
@@ -256,45 +260,7 @@ def carried_by(elastic: MeshingPair, first: FirstContacts) -> NDArray[np.bool_]:
     """Whether pinion and wheel carry contact points of the law at each contact, shape (m, 2)."""
     load = first.pressure * first.width
     mean = (first.arc * load[:, None, :]).sum(axis=2) / load.sum(axis=1)[:, None]
-    length = np.array([body.flank.sizes.sum() for body in elastic.bodies])
-    return carrying(elastic.law, length - mean)
-
-
-def _contact_points(
-    elastic: MeshingPair,
-    gear: IntArray,
-    first_edge: IntArray,
-    counts: IntArray,
-    mate: IntArray,
-    first_node: IntArray,
-    bears: NDArray[np.bool_],
-) -> dict[str, Any]:
-    law, flanks = elastic.law, [body.flank for body in elastic.bodies]
-    quadrature = np.array([flank.shapes.shape[0] for flank in flanks])
-    per_window = np.where(bears, quadrature[gear] * counts, 0)
-    owner = np.repeat(np.arange(len(gear)), per_window)
-    within = ranges(np.zeros(len(gear), dtype=np.int64), per_window)
-    own, facing = gear[owner], mate[owner]
-    edge = within // quadrature[own]
-    number = np.array([0, flanks[0].weights.size])[own] + quadrature[own] * first_edge[owner] + within
-    lengths = np.concatenate([f.weights.ravel() for f in flanks])[number]
-    gammas = [
-        np.repeat(law.parameter(body.surface_modulus, f.sizes), n)
-        for body, f, n in zip(elastic.bodies, flanks, quadrature, strict=True)
-    ]
-    sizes = np.concatenate([f.sizes for f in flanks])
-    last_size = sizes[np.array([0, flanks[0].edges])[gear] + first_edge + counts - 1]
-    shapes = np.concatenate([f.shapes for f in flanks])
-    share = np.where(bears[owner] & bears[facing], 0.5, 1.0)
-    return {
-        "owner": owner,
-        "facing": facing,
-        "slave_nodes": (first_node[owner] + 2 * edge)[:, None] + np.arange(3),
-        "slave_shapes": shapes[np.array([0, quadrature[0]])[own] + within % quadrature[own]],
-        "weight": elastic.width * share * lengths,
-        "fade": 0.5 * lengths / last_size[facing],
-        "parameter": np.concatenate(gammas)[number],
-    }
+    return carrying(elastic.law, np.array([body.flank.ends[-1] for body in elastic.bodies]) - mean)
 
 
 def _blocks(batch: Batch, bears: NDArray[np.bool_]) -> list[Block]:

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from .element_batch import Batch
 from .element_rows import Equations, Seen, State, equations_of, seen
+from .records import taken
 
 Array = NDArray[Any]
 IntArray = NDArray[Any]
@@ -143,8 +144,8 @@ def solve(batch: Batch, state: State, tolerance: float) -> Outcome:
             if b not in equations or not np.isin(found.points[mine][asks[mine]], equations[b].points).all():
                 beside = np.convolve(asks[mine], np.ones(2 * BESIDE + 1), mode="same") > 0
                 may = mine.start + np.flatnonzero(beside & found.reached[mine])
-                equations[b] = equations_of(batch, b, found.take(may), asks[may])
-        state = step(batch, old, found.take(live[at]), equations)
+                equations[b] = equations_of(batch, b, taken(found, may), asks[may])
+        state = step(batch, old, taken(found, live[at]), equations)
         for b in np.flatnonzero(live).tolist():
             _mix(batch, b, past[b], old, state)
     return Outcome(state, {b: equations[b] for b in sorted(done)}, iterations)

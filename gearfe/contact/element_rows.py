@@ -67,10 +67,6 @@ class Seen:
     reached: NDArray[np.bool_]
     asked: Array
 
-    def take(self, index: Any) -> Seen:
-        """The points `index` of these."""
-        return Seen(**{name: getattr(self, name)[index] for name in self.__dataclass_fields__})
-
     def forces(self, pressure: Array, count: int) -> ComplexArray:
         """G^T W p (N), shape (n,), for pressures (Pa), shape (k,)."""
         loads, nodes = self.normal * (self.area * pressure)[:, None], self.nodes.ravel()
