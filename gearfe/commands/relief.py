@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     from ..loadmap.root_stress import pair_roots
     from ..microgeometry.job import checked_model
     from ..microgeometry.relief import optimise_relief
-    from ..microgeometry.relief_job import comparison, figure_arguments, map_table, relief_problem, summary, told
+    from ..microgeometry.relief_job import comparison, figure_arguments, map_table, named, relief_problem, summary, told
     from ..output.files import output_folder, whole_set, write_csv, write_json
     from ..stiffness.job import StiffnessJob
     from ..stiffness.sweep import elastic_pair
@@ -77,14 +77,17 @@ def run(args: argparse.Namespace) -> int:
             # forking would copy the thread that shows the progress
             context = multiprocessing.get_context("spawn")
             executor = stack.enter_context(ProcessPoolExecutor(args.workers, mp_context=context))
-        made = optimise_relief(
-            problem,
-            map_points=table.map_points,
-            generations=table.generations,
-            seed=table.seed,
-            executor=executor,
-            progress=count,
-        )
+        try:
+            made = optimise_relief(
+                problem,
+                map_points=table.map_points,
+                generations=table.generations,
+                seed=table.seed,
+                executor=executor,
+                progress=count,
+            )
+        except InputError as error:
+            raise named(error, table, problem) from None
     with watch.stage("comparison"):
         compared = comparison(made)
     with whole_set(folder, FILES) as place:

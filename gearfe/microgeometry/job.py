@@ -253,8 +253,8 @@ def _columns(
 def _named(error: InputError, where: str) -> InputError:
     """The same error in the words of the job file."""
     names = {
-        "tip_relief.start": "tip_relief_length_mm",
-        "root_relief.start": "root_relief_length_mm",
+        "tip_relief.start": "tip_relief_start_mm",
+        "root_relief.start": "root_relief_start_mm",
         "tip_relief.end": "tip_relief_end_mm",
         "root_relief.end": "root_relief_end_mm",
     }
@@ -262,7 +262,7 @@ def _named(error: InputError, where: str) -> InputError:
         return error
     value = error.value
     if error.field in names and isinstance(value, float):
-        value = float(f"{1e3 * value:.12g}")
+        value = float(f"{1e3 * value:.6g}")
     elif isinstance(value, float) and error.field in ("deviation", "pitch errors") and abs(value) < 1e-2:
         value = float(f"{1e6 * value:.6g}")
     return InputError(f"{where}.{names.get(error.field, error.field)}", value, error.problem, error.cure)

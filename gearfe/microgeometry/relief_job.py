@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.half_plane_step import HalfPlanePair
+from ..errors import InputError
 from ..gear.pair import GearPair
 from ..loadmap.root_stress import PairRoots
 from ..stiffness.job import StiffnessJob
@@ -64,6 +65,14 @@ def relief_problem(
         positions=table.positions,
         roots=roots,
     )
+
+
+def named(error: InputError, table: ReliefTable, problem: ReliefProblem) -> InputError:
+    """The error of bounds that hold no gear in the words of the job file."""
+    first = table.variables[0]
+    if error.field != problem.variables[0].name:
+        return error
+    return InputError(f"relief.variables, {first.key}", (first.low, first.high), error.problem, error.cure)
 
 
 def names_of(table: ReliefTable) -> list[str]:

@@ -13,9 +13,10 @@ from ..contact.half_plane_loads import flank_loads
 from ..contact.half_plane_result import PairContacts
 from ..contact.half_plane_step import HalfPlanePair
 from ..contact.position import Positions
-from ..contact.records import of_positions, taken
+from ..contact.records import joined, of_positions, taken
 from ..errors import InputError
 from ..gear.iso6336 import mesh_stiffness
+from ..gear.touching import Touching
 from ..gear.validity import MOST_YIELD
 from ..loadmap.root_stress import PairRoots
 from ..stiffness.contact_pressure import BLUNTING
@@ -79,15 +80,16 @@ def load_mesh(
     if angles is None:
         alike = all(one.alike for one in law.teeth.deviations)
         cycles = mesh_cycles if mesh_cycles is not None else 1 if alike else full_period(pair)
-        given: ArrayLike = np.arange(positions * cycles) * (pair.mesh_cycle / positions)
+        n = positions * cycles
     else:
-        cycles, given = 0, angles
-    place: NDArray[np.float64] = np.atleast_1d(np.asarray(given, dtype=np.float64))
-    n, count = len(place), len(goals) * len(place)
+        cycles, n = 0, len(np.atleast_1d(np.asarray(angles)))
+    count = len(goals) * n
     if count > MOST_CELLS:
         problem = f"makes {count} cells with {len(goals)} torques and {n} angles: must be <= {MOST_CELLS}"
         raise InputError("mesh_cycles", cycles, problem, "state a part of the period, fewer positions or torques")
-    met = law.teeth.touching(place)
+    given = np.arange(n) * (pair.mesh_cycle / positions) if angles is None else angles
+    place: NDArray[np.float64] = np.atleast_1d(np.asarray(given, dtype=np.float64))
+    met = _touching(law, place)
     touch = np.full(n, np.inf)
     np.minimum.at(touch, met.position, met.twist)
     stress = None if roots is None else np.full((count, 2), np.nan)
@@ -124,6 +126,15 @@ def load_mesh(
     )
     _check_contact(found, law, met.pair, met.position, met.twist - lost)
     return found
+
+
+def _touching(law: HalfPlanePair, angles: NDArray[np.float64]) -> Touching:
+    """What `law.teeth.touching` says, in pieces: its search takes kilobytes for each angle."""
+    parts = []
+    for start in range(0, len(angles), AT_ONCE):
+        found = law.teeth.touching(angles[start : start + AT_ONCE])
+        parts.append(replace(found, position=found.position + start))
+    return joined(parts)
 
 
 def _pair_loads(law: HalfPlanePair, made: Positions, numbers: IntArray, n: int) -> PairLoads:
