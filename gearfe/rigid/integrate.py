@@ -236,21 +236,20 @@ def _taylor(
         announce(COMPILING)
     assembly = carrying(scene.assembly, start.excess)
     key = (order, jit, assembly.tables.light.size)
-    cache = scene.__dict__.setdefault("_work", {})
-    if key not in cache:
-        cache[key] = taylor.work_space(assembly.tables, order)
-    redundant = (~start.active).astype(np.int64)
-    made = taylor.run(
-        assembly, start.q, start.v, (start.time, float(times[-1])), tolerance=local, redundant=redundant,
-        order=order, longest=options["longest"], most=most, jit=jit, work=cache[key], watch=watch,
+    known = scene.__dict__.setdefault("_work", {})
+    if key not in known:
+        known[key] = taylor.work_space(assembly.tables, order)
+    made = taylor.integrate_scene(
+        assembly, start, float(times[-1]), tolerance=local, order=order, longest=options["longest"], most=most, jit=jit,
+        work=known[key], watch=watch,
     )  # fmt: skip
     statistics = {
         "scheme": "Taylor series",
-        "steps": len(made.folds),
+        "steps": len(made.singular),
         "order": order,
         "backend": "compiled" if jit else "plain",
         "compile_seconds": made.compiling,
-        "singular_passages": made.dense.times[np.flatnonzero(made.folds)],
+        "singular_passages": made.dense.times[np.flatnonzero(made.singular)],
     }
     return made.dense, made.status, statistics
 

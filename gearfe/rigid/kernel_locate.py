@@ -1,81 +1,81 @@
 # mypy: ignore-errors
-"""Finding a passing singular position: the rows that pass together, its moment, the state there.
+"""Finding a passing singular position: the rows that pass together, its moment, the state there (in w.qn, w.vn).
 
-The conditions are in `kernel_fold`. All rows that pass at the same moment take part, however many loops fold at once.
+The conditions are in `kernel_singular`. All rows that pass at the same moment take part, however many loops fold.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from .kernel_fold import (
-    TOGETHER,
-    evaluate,
-    fold_change,
-    fold_combination,
-    fold_frame,
-    regular_parts,
-    row_square,
-    weighted,
-)
 from .kernel_rows import add_transposed, copy, fill, residuals, time_series, times_gradients
 from .kernel_series import small_solve
+from .kernel_singular import (
+    TOGETHER,
+    border_change,
+    combination,
+    evaluate,
+    regular_parts,
+    row_square,
+    singular_frame,
+    weighted,
+)
 
-#: Pivot of another row at the fold of one row below which it passes with it (eps^(2/3): at the distance d between two
-#: folds, rounding leaves eps / d^2 of the velocities, more than taking both for one does).
+#: Pivot of another row at the singular position of one row below which it passes with it (eps^(2/3): at the distance d
+#: between two, rounding leaves eps / d^2 of the velocities, more than taking both for one does).
 SAME = 4e-11
 
 
-def moved_state(QS, order, h, w, q, v):
+def moved_state(w, run, h):
     """State of the series at h with the corrections w.dq, w.dv."""
-    evaluate(QS, order, h, q, v)
-    for i in range(q.shape[0]):
-        q[i] += w.dq[i]
-        v[i] += w.dv[i]
+    evaluate(w.QS, run.order, h, w.qn, w.vn)
+    for i in range(w.qn.shape[0]):
+        w.qn[i] += w.dq[i]
+        w.vn[i] += w.dv[i]
 
 
-def time_to_fold(fold, p, mass):
+def time_to_singular(border, p, mass):
     """Time from here to the moment at which P_p vanishes along B_p."""
-    return -weighted(fold.P[p], fold.B[p], mass) / fold.border[p, p]
+    return -weighted(border.P[p], border.B[p], mass) / border.schur[p, p]
 
 
-def locate_fold(tb, t, forward, QS, order, guess, reach, base, where, length, w, q, v):
-    """Time (from the point of expansion) and state of the fold near `guess`; folds = 0 when there is none.
+def locate(tb, w, run, t, guess, reach, where):
+    """Time (from the point of expansion) of the singular position near `guess`; count = 0 when there is none.
 
     Newton on: regular rows of g = 0, z^T G v = 0, and time such that B . G^T z = 0. It is a true crossing when z^T g
     vanishes there too; a near miss (rod a little longer than the crank) leaves a residual and is integrated as usual.
-    All rows that pass at the same moment take part: those with pivots below `TOGETHER` near the fold of the first one,
-    less those that keep a gradient where the others have none.
+    All rows that pass at the same moment take part: those with pivots below `TOGETHER` near the singular position of
+    the first one, less those that keep a gradient where the others have none.
     """
-    folds, h = meet(tb, QS, order, guess, reach, base, where, w, q, v)
-    for _ in range(folds):
-        folds, h = converge(tb, t, forward, QS, order, h, guess, reach, length, w, q, v)
-        if folds == 0 or not split_folds(tb, folds, where, w):
+    count, h = meet(tb, w, run, guess, reach, where)
+    for _ in range(count):
+        count, h = converge(tb, w, run, t, h, guess, reach)
+        if count == 0 or not split(tb, w, count, where):
             break
-    if folds == 0 or not passes(tb, folds, w, q):
+    if count == 0 or not passes(tb, w, count):
         return 0, h
-    return folds, h
+    return count, h
 
 
-def meet(tb, QS, order, guess, reach, base, where, w, q, v):
+def meet(tb, w, run, guess, reach, where):
     """Number of rows (w.skip = 2) that pass about when the row `where` does, and its time along the series."""
     h = guess
     for _ in range(30):
-        copy(base, w.skip)
+        copy(w.base, w.skip)
         w.skip[where] = 2
-        evaluate(QS, order, h, q, v)
-        folds = fold_frame(tb, q, v, TOGETHER, w)
+        evaluate(w.QS, run.order, h, w.qn, w.vn)
+        count = singular_frame(tb, w, w.qn, w.vn, TOGETHER)
         move = np.inf
-        for p in range(folds):
-            if w.fold.drop[p] == where:
-                move = time_to_fold(w.fold, p, tb.mass)
+        for p in range(count):
+            if w.border.drop[p] == where:
+                move = time_to_singular(w.border, p, tb.mass)
         if not abs(h + move - guess) <= reach:
             return 0, h
         if abs(move) < 1e-4 * reach:
             left = 0
-            for p in range(folds):
-                if abs(time_to_fold(w.fold, p, tb.mass) - move) > 0.5 * reach:
-                    w.skip[w.fold.drop[p]] = 0
+            for p in range(count):
+                if abs(time_to_singular(w.border, p, tb.mass) - move) > 0.5 * reach:
+                    w.skip[w.border.drop[p]] = 0
                 else:
                     left += 1
             return left, h + move
@@ -83,48 +83,48 @@ def meet(tb, QS, order, guess, reach, base, where, w, q, v):
     return 0, h
 
 
-def converge(tb, t, forward, QS, order, h, guess, reach, length, w, q, v):
-    """Newton of `locate_fold` from the time h for the rows with w.skip = 2."""
-    forms, vectors, mass, fold = tb.forms, tb.vectors, tb.mass, w.fold
+def converge(tb, w, run, t, h, guess, reach):
+    """Newton of `locate` from the time h for the rows with w.skip = 2."""
+    forms, vectors, mass, border, q, v = tb.forms, tb.vectors, tb.mass, w.border, w.qn, w.vn
     n = q.shape[0]
     fill(w.dq, 0.0)
     fill(w.dv, 0.0)
     for _ in range(30):
-        moved_state(QS, order, h, w, q, v)
-        folds = fold_frame(tb, q, v, 0.0, w)
-        if folds == 0:
+        moved_state(w, run, h)
+        count = singular_frame(tb, w, q, v, 0.0)
+        if count == 0:
             return 0, h
         move = 0.0
-        for p in range(folds):
-            move += time_to_fold(fold, p, mass) / folds
+        for p in range(count):
+            move += time_to_singular(border, p, mass) / count
         # position: g_reg and z^T (G v - df/dt)
-        time_series(tb.times, t + h, forward, 3, w.TF)
+        time_series(tb.times, t + h, run.sign > 0.0, 3, w.TF)
         times_gradients(forms, w.G, v, w.mu)
         add_rates(forms, w.TF, 1, -1.0, w.mu)
-        for p in range(folds):
-            fold.nu[p] = fold_combination(fold, p, w.mu)
+        for p in range(count):
+            border.nu[p] = combination(border, p, w.mu)
         residuals(forms, vectors, q, w.c, w.s, w.TF[:, 0], w.mu)
         copy(q, w.work)
-        change = fold_change(tb, folds, length, w, q)
+        change = border_change(tb, w, run, count, q)
         for i in range(n):
             w.dq[i] += q[i] - w.work[i]
         # velocity: G_reg v - df/dt and half of z^T g'' (linear in v along B)
         times_gradients(forms, w.H, v, w.mu)
         add_rates(forms, w.TF, 2, -2.0, w.mu)
-        for p in range(folds):
-            fold.nu[p] = 0.5 * fold_combination(fold, p, w.mu)
+        for p in range(count):
+            border.nu[p] = 0.5 * combination(border, p, w.mu)
         times_gradients(forms, w.G, v, w.mu)
         add_rates(forms, w.TF, 1, -1.0, w.mu)
         copy(v, w.work)
-        fold_change(tb, folds, length, w, v)
+        border_change(tb, w, run, count, v)
         for i in range(n):
             w.dv[i] += v[i] - w.work[i]
         h += move
         if abs(h - guess) > reach or not np.isfinite(h) or not np.isfinite(change):
             return 0, h
         if abs(move) < 1e-10 * reach and change < 1e-10:  # the next change would be its square
-            moved_state(QS, order, h, w, q, v)
-            return fold_frame(tb, q, v, 0.0, w), h
+            moved_state(w, run, h)
+            return singular_frame(tb, w, q, v, 0.0), h
     return 0, h
 
 
@@ -135,44 +135,44 @@ def add_rates(forms, TF, order, factor, out):
             out[r] += factor * TF[forms.motion[r], order]
 
 
-def split_folds(tb, folds, where, w):
+def split(tb, w, count, where):
     """Whether some rows pass at another moment than the row `where`; then those that pass with it (w.skip = 2) are
     left."""
-    forms, mass, fold = tb.forms, tb.mass, w.fold
+    forms, mass, border = tb.forms, tb.mass, w.border
     worst = 0.0
     own = 0.0
-    for p in range(folds):
-        size = row_square(forms, mass, w.G, fold.drop[p])
-        worst = max(worst, weighted(fold.P[p], fold.P[p], mass) / size)
-        fold.nu[p] = time_to_fold(fold, p, mass)
-        if fold.drop[p] == where:
-            own = fold.nu[p]
+    for p in range(count):
+        size = row_square(forms, mass, w.G, border.drop[p])
+        worst = max(worst, weighted(border.P[p], border.P[p], mass) / size)
+        border.nu[p] = time_to_singular(border, p, mass)
+        if border.drop[p] == where:
+            own = border.nu[p]
     if worst < SAME:
         return False
     far = 0.0
-    for p in range(folds):
-        far = max(far, abs(fold.nu[p] - own))
+    for p in range(count):
+        far = max(far, abs(border.nu[p] - own))
     kept = 0
-    for p in range(folds):
-        if abs(fold.nu[p] - own) > 0.5 * far:
-            w.skip[fold.drop[p]] = 0
+    for p in range(count):
+        if abs(border.nu[p] - own) > 0.5 * far:
+            w.skip[border.drop[p]] = 0
         else:
             kept += 1
-    return kept < folds
+    return kept < count
 
 
-def exchange(tb, base, folds, w, q, v):
-    """Number of folds that are left when every redundant row that has a gradient of its own here takes the place of a
-    row that lost its.
+def exchange(tb, w, count):
+    """Number of singular rows that are left when every redundant row that has a gradient of its own here takes the
+    place of a row that lost its.
 
     Which row of a dependent set may be left out changes along the motion: without the x-row of one of three parallel
     cranks, what is left loses rank where that crank's end moves along x, though the mechanism is regular there.
     """
-    forms, plan, mass, fold = tb.forms, tb.plan, tb.mass, w.fold
-    for row in range(base.shape[0]):
-        if base[row] == 0 or folds == 0:
+    forms, mass, border = tb.forms, tb.mass, w.border
+    for row in range(w.base.shape[0]):
+        if w.base[row] == 0 or count == 0:
             continue
-        regular_parts(forms, plan, mass, w.G, row, w.skip, w.val, w.F, w.mu)
+        regular_parts(tb, w, row)
         for r in range(w.mu.shape[0]):
             w.mu[r] = -w.mu[r]
         w.mu[row] = 1.0
@@ -180,43 +180,33 @@ def exchange(tb, base, folds, w, q, v):
         add_transposed(forms, w.G, w.mu, 1.0, w.F)
         if weighted(w.F, w.F, mass) < TOGETHER * row_square(forms, mass, w.G, row):
             continue
-        for p in range(folds):
-            fold.nu[p] = weighted(fold.B[p], w.F, mass)
-        small_solve(fold.border, folds, fold.nu, fold.small)
+        for p in range(count):
+            border.nu[p] = weighted(border.B[p], w.F, mass)
+        small_solve(border.schur, count, border.nu, border.small)
         most = 0
-        for p in range(1, folds):
-            if fold.nu[p] ** 2 * fold.border[p, p] > fold.nu[most] ** 2 * fold.border[most, most]:
+        for p in range(1, count):
+            if border.nu[p] ** 2 * border.schur[p, p] > border.nu[most] ** 2 * border.schur[most, most]:
                 most = p
-        base[row] = 0
-        base[fold.drop[most]] = 1
+        w.base[row] = 0
+        w.base[border.drop[most]] = 1
         w.skip[row] = 0
-        w.skip[fold.drop[most]] = 1
-        folds = fold_frame(tb, q, v, 0.0, w)
-    return folds
+        w.skip[border.drop[most]] = 1
+        count = singular_frame(tb, w, w.qn, w.vn, 0.0)
+    return count
 
 
-def passes(tb, folds, w, q):
-    """Whether z^T g vanishes, so that two branches cross, for all folds."""
-    forms, vectors, fold = tb.forms, tb.vectors, w.fold
-    residuals(forms, vectors, q, w.c, w.s, w.TF[:, 0], w.mu)
-    for p in range(folds):
+def passes(tb, w, count):
+    """Whether z^T g vanishes, so that two branches cross, for all singular rows."""
+    forms, border = tb.forms, w.border
+    residuals(forms, tb.vectors, w.qn, w.c, w.s, w.TF[:, 0], w.mu)
+    for p in range(count):
         scale = 0.0
         for r in range(w.mu.shape[0]):
-            scale = max(scale, abs(fold.Z[p, r]) * tb.forms.unit[r])
-        if abs(fold_combination(fold, p, w.mu)) > 1e-10 * scale:
+            scale = max(scale, abs(border.Z[p, r]) * forms.unit[r])
+        if abs(combination(border, p, w.mu)) > 1e-10 * scale:
             return False
     return True
 
 
-FUNCTIONS = (
-    moved_state,
-    time_to_fold,
-    locate_fold,
-    meet,
-    converge,
-    add_rates,
-    split_folds,
-    exchange,
-    passes,
-)
+FUNCTIONS = (moved_state, time_to_singular, locate, meet, converge, add_rates, split, exchange, passes)
 NAMES = {"SAME": SAME}

@@ -14,6 +14,9 @@ DT, SN, CS, AS, BS = range(5)
 VX, VY = range(2)
 #: Taylor coefficients of the springs: length, 1 / length, tension / length.
 LENGTH, INVERSE, PULL = range(3)
+#: State of a run: time, singular rows there, time to the next singular position, 1 once begun, last step, row of the
+#: next singular position (-1 for none).
+TIME, SINGULAR, AHEAD, BEGUN, LAST_STEP, ROW = range(6)
 
 NAMES = {
     "KX": KX, "KY": KY, "KT": KT, "KC": KC, "KS": KS,
@@ -22,4 +25,5 @@ NAMES = {
     "DT": DT, "SN": SN, "CS": CS, "AS": AS, "BS": BS,
     "VX": VX, "VY": VY,
     "LENGTH": LENGTH, "INVERSE": INVERSE, "PULL": PULL,
+    "TIME": TIME, "SINGULAR": SINGULAR, "AHEAD": AHEAD, "BEGUN": BEGUN, "LAST_STEP": LAST_STEP, "ROW": ROW,
 }  # fmt: skip

@@ -47,6 +47,14 @@ def vector_at(vectors, k, q, c, s):
     return x, y
 
 
+def arm_at(vectors, k, a, c, s):
+    """Arm of vector k at its end a, in the ground's axes."""
+    b = vectors.bodies[k, a]
+    px = vectors.end[k, a, EX]
+    py = vectors.end[k, a, EY]
+    return c[b] * px - s[b] * py, s[b] * px + c[b] * py
+
+
 def vector_rate(vectors, k, v, c, s):
     """Components of the rate of vector k."""
     x = 0.0
@@ -69,22 +77,15 @@ def gradients(forms, vectors, q, c, s, G):
             G[r, a, 1] = forms.factor[r, a, KY]
             G[r, a, 2] = forms.factor[r, a, KT] - forms.factor[r, a, KC] * s[b] + forms.factor[r, a, KS] * c[b]
     for p in range(forms.product.shape[0]):
+        r = forms.product[p, 0]
         for one in range(2):
+            k = forms.product[p, 1 + one]
             ux, uy = vector_at(vectors, forms.product[p, 2 - one], q, c, s)
-            add_gradient(forms, vectors, p, one, ux, uy, c, s, G)
-
-
-def add_gradient(forms, vectors, p, one, ux, uy, c, s, G):
-    """G gains the gradient of the inner product of (ux, uy) with the vector `one` (0 or 1) of product p."""
-    r = forms.product[p, 0]
-    k = forms.product[p, 1 + one]
-    for a in range(2):
-        b = forms.bodies[r, a]
-        rx = c[b] * vectors.end[k, a, EX] - s[b] * vectors.end[k, a, EY]
-        ry = s[b] * vectors.end[k, a, EX] + c[b] * vectors.end[k, a, EY]
-        G[r, a, 0] += vectors.end[k, a, EW] * ux
-        G[r, a, 1] += vectors.end[k, a, EW] * uy
-        G[r, a, 2] += rx * uy - ry * ux
+            for a in range(2):
+                rx, ry = arm_at(vectors, k, a, c, s)
+                G[r, a, 0] += vectors.end[k, a, EW] * ux
+                G[r, a, 1] += vectors.end[k, a, EW] * uy
+                G[r, a, 2] += rx * uy - ry * ux
 
 
 def gradient_rates(forms, vectors, q, v, c, s, H):
@@ -98,15 +99,15 @@ def gradient_rates(forms, vectors, q, v, c, s, H):
     for p in range(forms.product.shape[0]):
         r = forms.product[p, 0]
         for one in range(2):
-            ux, uy = vector_rate(vectors, forms.product[p, 2 - one], v, c, s)
-            add_gradient(forms, vectors, p, one, ux, uy, c, s, H)
-            ux, uy = vector_at(vectors, forms.product[p, 2 - one], q, c, s)
             k = forms.product[p, 1 + one]
-            for a in range(2):  # the arm turns
-                b = forms.bodies[r, a]
-                rx = c[b] * vectors.end[k, a, EX] - s[b] * vectors.end[k, a, EY]
-                ry = s[b] * vectors.end[k, a, EX] + c[b] * vectors.end[k, a, EY]
-                H[r, a, 2] -= v[3 * b + 2] * (rx * ux + ry * uy)
+            ux, uy = vector_at(vectors, forms.product[p, 2 - one], q, c, s)
+            dx, dy = vector_rate(vectors, forms.product[p, 2 - one], v, c, s)
+            for a in range(2):
+                spin = v[3 * forms.bodies[r, a] + 2]
+                rx, ry = arm_at(vectors, k, a, c, s)
+                H[r, a, 0] += vectors.end[k, a, EW] * dx
+                H[r, a, 1] += vectors.end[k, a, EW] * dy
+                H[r, a, 2] += rx * dy - ry * dx - spin * (rx * ux + ry * uy)
 
 
 def residuals(forms, vectors, q, c, s, f, g):
@@ -244,31 +245,14 @@ def time_series(times, t, forward, orders, out):
                 scale *= times.sine[i, 1] / (j + 1)
 
 
-def least_norm(forms, plan, mass, G, val, skip, length, rhs, work, u):
-    """u -= M^-1 G^T S^-1 rhs: the smallest change (in the mass norm) that lowers G u by rhs. Returns its
-    largest entry, in units of `length` and 1 rad."""
-    for r in range(rhs.shape[0]):
-        if skip[r] != 0:
-            rhs[r] = 0.0
-    solve(plan, val, rhs)
-    fill(work, 0.0)
-    add_transposed(forms, G, rhs, 1.0, work)
-    biggest = 0.0
-    for i in range(u.shape[0]):
-        change = work[i] * mass[i]
-        u[i] -= change
-        biggest = max(biggest, abs(change) / (1.0 if i % 3 == 2 else length))
-    return biggest
-
-
 FUNCTIONS = (
     fill,
     copy,
     trigonometry,
     vector_at,
+    arm_at,
     vector_rate,
     gradients,
-    add_gradient,
     gradient_rates,
     residuals,
     times_gradients,
@@ -276,6 +260,5 @@ FUNCTIONS = (
     factorise,
     solve,
     time_series,
-    least_norm,
 )
 GLOBALS = {"math": math, "np": np}

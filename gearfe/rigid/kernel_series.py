@@ -11,7 +11,7 @@ orders. Sines and
 cosines follow from s' = c theta', c' = -s theta' (Barrio, Appl. Math. Comput. 163 (2005) 525); every force that acts at
 a point of a body enters through two sums A, B with the torque s A + c B, so the price does not depend on the joints.
 
-At a passing singular position (fold) some rows Z^T G_0 vanish while B = Z^T dG/dt does not. There order k + 3 of Z^T g
+At a passing singular position some rows Z^T G_0 vanish while B = Z^T dG/dt does not. There order k + 3 of Z^T g
 fixes q_{k+2} along B, and the multipliers have a simple pole: lambda = (Z nu_0)/t + ... . Both conditions
 together give the
 bordered system with the rows B; multipliers are then stored one order up ("shift").
@@ -133,21 +133,22 @@ def finish_order(tb, w, j):
     spring_orders(tb.forces, w.vs, w.ss, j)
 
 
-def expand(tb, t, forward, order, folds, w):
-    """Fill w.QS[2..order] from w.QS[0], w.QS[1]; w.G, w.val hold gradients and factor there, w.fold the fold's rows.
+def expand(tb, w, run, t, singular):
+    """Fill w.QS[2..order] from w.QS[0], w.QS[1]; w.G, w.val hold gradients and factor there, w.border singular rows.
 
-    `folds` is the number of singular rows: 0 at a regular position.
+    `singular` is their number: 0 at a regular position.
     """
+    order = run.order
     forms, vectors, mass = tb.forms, tb.vectors, tb.mass
-    bs, vs, fold = w.bs, w.vs, w.fold
+    bs, vs, border = w.bs, w.vs, w.border
     QS, TF, LM, G, skip = w.QS, w.TF, w.LM, w.G, w.skip
     mu, rhs, F, u = w.mu, w.rhs, w.F, w.u
     springs = w.ss.shape[2]
-    shift = 1 if folds > 0 else 0
-    time_series(tb.times, t, forward, order + 2, TF)
+    shift = 1 if singular > 0 else 0
+    time_series(tb.times, t, run.sign > 0.0, order + 2, TF)
     start_series(tb, w, order)
     if tb.light.shape[0] > 0:
-        carry_responses(tb, folds, w)
+        carry_responses(tb, singular, w)
     for k in range(order - 1):
         j = k + 2
         at = k + shift
@@ -161,50 +162,50 @@ def expand(tb, t, forward, order, folds, w):
         row_orders(forms, TF, bs, vs, j, rhs)
         for i in range(F.shape[0]):
             u[i] = F[i] * mass[i] * share
-        if folds > 0:
-            fold_rows(tb, w, j, folds)
+        if singular > 0:
+            border_rows(tb, w, j, singular)
         times_gradients(forms, G, u, mu)
         for r in range(mu.shape[0]):
             mu[r] = mu[r] + rhs[r] if skip[r] == 0 else 0.0
-        constrained(tb, folds, w, mu, u, QS[j])
+        constrained(tb, singular, w, mu, u, QS[j])
         if tb.light.shape[0] > 0:
-            add_carried(tb, folds, w, mu, QS[j])
+            add_carried(tb, singular, w, mu, QS[j])
         for r in range(mu.shape[0]):
             mu[r] *= alpha
         add_multipliers(forms, vectors, LM, bs, vs, at, mu)
-        if folds > 0:  # the multipliers Z nu belong one order below the regular ones
+        if singular > 0:  # the multipliers Z nu belong one order below the regular ones
             for r in range(mu.shape[0]):
                 mu[r] = 0.0
-                for p in range(folds):
-                    mu[r] += alpha * fold.Z[p, r] * fold.nu[p]
+                for p in range(singular):
+                    mu[r] += alpha * border.Z[p, r] * border.nu[p]
             add_multipliers(forms, vectors, LM, bs, vs, at - 1, mu)
             add_product_multipliers(forms, vectors, bs, vs, at, 1, mu)
         finish_order(tb, w, j)
 
 
-def constrained(tb, folds, w, mu, u, q):
-    """q := the motion that a free motion u becomes under the constraints; mu (and fold.nu): gaps in, multipliers
+def constrained(tb, singular, w, mu, u, q):
+    """q := the motion that a free motion u becomes under the constraints; mu (and border.nu): gaps in, multipliers
     out."""
-    fold, F = w.fold, w.F
-    if folds > 0:
-        fold_solve(tb.plan, w.val, fold, mu, folds)
+    border, F = w.border, w.F
+    if singular > 0:
+        border_solve(tb.plan, w.val, border, mu, singular)
     else:
         solve(tb.plan, w.val, mu)
     fill(F, 0.0)
     add_transposed(tb.forms, w.G, mu, 1.0, F)
-    for p in range(folds):
+    for p in range(singular):
         for i in range(F.shape[0]):
-            F[i] += fold.B[p, i] * fold.nu[p]
+            F[i] += border.B[p, i] * border.nu[p]
     for i in range(F.shape[0]):
         q[i] = u[i] - F[i] * tb.mass[i]
 
 
-def carry_responses(tb, folds, w):
+def carry_responses(tb, singular, w):
     """w.carry: what a unit of every light coordinate adds to coordinates (X) and multipliers (Y, W); 1 - X = L U.
 
     D (1 - X) is symmetric and positive definite, so it needs no pivots.
     """
-    carry, light, fold, u = w.carry, tb.light, w.fold, w.u
+    carry, light, border, u = w.carry, tb.light, w.border, w.u
     k = light.shape[0]
     for c in range(k):
         at = light[c]
@@ -214,11 +215,11 @@ def carry_responses(tb, folds, w):
         for r in range(carry.Y.shape[1]):
             if w.skip[r] != 0:
                 carry.Y[c, r] = 0.0
-        for p in range(folds):
-            fold.nu[p] = fold.B[p, at] * u[at]
-        constrained(tb, folds, w, carry.Y[c], u, carry.X[c])
-        for p in range(folds):
-            carry.W[c, p] = fold.nu[p]
+        for p in range(singular):
+            border.nu[p] = border.B[p, at] * u[at]
+        constrained(tb, singular, w, carry.Y[c], u, carry.X[c])
+        for p in range(singular):
+            carry.W[c, p] = border.nu[p]
     lu = carry.lu
     for e in range(k):
         for c in range(k):
@@ -229,8 +230,8 @@ def carry_responses(tb, folds, w):
                 lu[e, c] /= lu[c, c]
 
 
-def add_carried(tb, folds, w, mu, q):
-    """Motion q and multipliers mu (and fold.nu) of the masses N become those of the masses M."""
+def add_carried(tb, singular, w, mu, q):
+    """Motion q and multipliers mu (and border.nu) of the masses N become those of the masses M."""
     carry, light = w.carry, tb.light
     lu, own = carry.lu, carry.own
     k = light.shape[0]
@@ -248,8 +249,8 @@ def add_carried(tb, folds, w, mu, q):
             q[i] += carry.X[c, i] * value
         for r in range(mu.shape[0]):
             mu[r] += carry.Y[c, r] * value
-        for p in range(folds):
-            w.fold.nu[p] += carry.W[c, p] * value
+        for p in range(singular):
+            w.border.nu[p] += carry.W[c, p] * value
 
 
 def start_series(tb, w, order):
@@ -270,32 +271,32 @@ def start_series(tb, w, order):
     finish_order(tb, w, 1)
 
 
-def fold_rows(tb, w, j, folds):
-    """Order j + 1 of Z^T g with q_j and q_{j+1} left out: fold.nu; the part of q_j is B q_j."""
-    fold, bs, work, u = w.fold, w.bs, w.mu, w.u
+def border_rows(tb, w, j, singular):
+    """Order j + 1 of Z^T g with q_j and q_{j+1} left out: border.nu; the part of q_j is B q_j."""
+    border, bs, work, u = w.border, w.bs, w.mu, w.u
     angle_orders(bs, j + 1, j)
     vector_orders(tb.vectors, w.QS, bs, w.vs, j + 1, w.ss.shape[2])
     row_orders(tb.forms, w.TF, bs, w.vs, j + 1, work)
-    for p in range(folds):
+    for p in range(singular):
         value = 0.0
         for r in range(work.shape[0]):
-            value += fold.Z[p, r] * work[r]
+            value += border.Z[p, r] * work[r]
         for i in range(u.shape[0]):
-            value += fold.B[p, i] * u[i]
-        fold.nu[p] = value
+            value += border.B[p, i] * u[i]
+        border.nu[p] = value
 
 
-def fold_solve(plan, val, fold, mu, folds):
+def border_solve(plan, val, border, mu, singular):
     """Bordered solve: in come the regular right-hand side in mu and the one of the rows B in nu; out the
     multipliers."""
-    for p in range(folds):
+    for p in range(singular):
         for r in range(mu.shape[0]):
-            fold.nu[p] -= fold.Y[p, r] * mu[r]
-    small_solve(fold.border, folds, fold.nu, fold.small)
+            border.nu[p] -= border.Y[p, r] * mu[r]
+    small_solve(border.schur, singular, border.nu, border.small)
     solve(plan, val, mu)
-    for p in range(folds):
+    for p in range(singular):
         for r in range(mu.shape[0]):
-            mu[r] -= fold.Y[p, r] * fold.nu[p]
+            mu[r] -= border.Y[p, r] * border.nu[p]
 
 
 def small_solve(matrix, size, x, work):
@@ -341,7 +342,7 @@ FUNCTIONS = (
     carry_responses,
     add_carried,
     start_series,
-    fold_rows,
-    fold_solve,
+    border_rows,
+    border_solve,
     small_solve,
 )

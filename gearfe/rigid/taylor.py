@@ -13,21 +13,37 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..progress import stage
-from . import compiled, kernel_fold, kernel_forces, kernel_locate, kernel_names, kernel_rows, kernel_run, kernel_series
+from . import (
+    compiled,
+    kernel_forces,
+    kernel_locate,
+    kernel_names,
+    kernel_rows,
+    kernel_run,
+    kernel_series,
+    kernel_singular,
+)
 from .dense import Polynomials
+from .start import Start
 from .status import Status
 from .steps import Watch
 from .tables import Array, Assembly, Ints, Tables
 
 FUNCTIONS = (
-    *kernel_rows.FUNCTIONS, *kernel_forces.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_fold.FUNCTIONS,
+    *kernel_rows.FUNCTIONS, *kernel_forces.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_singular.FUNCTIONS,
     *kernel_locate.FUNCTIONS, *kernel_run.FUNCTIONS,
 )  # fmt: skip
-NAMES = {**kernel_rows.GLOBALS, **kernel_names.NAMES, **kernel_fold.NAMES, **kernel_locate.NAMES, **kernel_run.NAMES}
+NAMES = {
+    **kernel_rows.GLOBALS,
+    **kernel_names.NAMES,
+    **kernel_singular.NAMES,
+    **kernel_locate.NAMES,
+    **kernel_run.NAMES,
+}
 ENTRIES = ("integrate_series", "sample")
 HOT = (
-    "fill", "copy", "trigonometry", "vector_at", "vector_rate", "gradients", "add_gradient", "residuals",
-    "times_gradients", "add_transposed", "solve", "least_norm",
+    "fill", "copy", "trigonometry", "vector_at", "arm_at", "vector_rate", "gradients", "residuals",
+    "times_gradients", "add_transposed", "solve", "least_change",
     "angle_orders", "vector_orders", "row_orders", "spring_orders", "force_orders", "form_order", "spring_force",
     "add_force", "add_arms", "product_forces", "add_multipliers", "add_product_multipliers", "torque_orders",
     "finish_order", "constrained",
@@ -38,7 +54,20 @@ HOT = (
 FIRST_STEPS, FIRST_COMPILED = 8, 64
 
 
-class FoldFrame(NamedTuple):
+class Run(NamedTuple):
+    """What holds for a whole run."""
+
+    begin: float  # (s)
+    end: float
+    sign: float  # of time
+    order: int
+    tolerance: float  # of the last terms
+    length: float  # of the mechanism (m)
+    longest: float  # step (s)
+    breaks: Array  # times at which steps end (s)
+
+
+class Border(NamedTuple):
     """Rows of a passing singular position; d is the most that may pass at once."""
 
     Z: Array  # (d, m) combinations whose gradient vanishes
@@ -46,7 +75,7 @@ class FoldFrame(NamedTuple):
     E: Array  # (d, m) G_reg M^-1 B^T
     P: Array  # (d, 3n) G^T Z
     B: Array  # (d, 3n) dG^T/dt Z
-    border: Array  # (d, d) Schur complement of the rows B
+    schur: Array  # (d, d) Schur complement of the rows B
     small: Array  # (d, d)
     nu: Array  # (d,)
     drop: Ints  # (d,) rows left out
@@ -57,7 +86,7 @@ class Carry(NamedTuple):
 
     X: Array  # (k, 3n) coordinates
     Y: Array  # (k, m) multipliers
-    W: Array  # (k, d) multipliers of the fold
+    W: Array  # (k, d) multipliers of the singular rows
     lu: Array  # (k, k)
     own: Array  # (k,)
 
@@ -71,7 +100,7 @@ class Work(NamedTuple):
     bs: Array  # (5, K, n) Taylor coefficients of the bodies, see kernel_names
     vs: Array  # (2, K, vectors)
     ss: Array  # (3, K, springs)
-    fold: FoldFrame
+    border: Border
     carry: Carry
     G: Array  # (m, 2, 3)
     H: Array  # (m, 2, 3) dG/dt
@@ -84,14 +113,17 @@ class Work(NamedTuple):
     work: Array
     dq: Array
     dv: Array
+    q: Array  # (3n,) state reached
+    v: Array
     qn: Array  # (3n,) state at the end of a step
     vn: Array
     c: Array  # (n,)
     s: Array
-    skip: Ints  # (m,)
+    skip: Ints  # (m,) rows left out here
+    base: Ints  # (m,) redundant rows: which ones are left out changes along the motion
 
 
-def most_folds(tables: Tables) -> int:
+def most_singular(tables: Tables) -> int:
     """How many rows can lose their gradients at once: those that close loops, for a tree of joints is never singular.
 
     Rows of one joint follow one another and join the same two bodies.
@@ -117,7 +149,7 @@ def most_folds(tables: Tables) -> int:
 
 def work_space(tables: Tables, order: int) -> Work:
     """Scratch arrays for series up to `order`."""
-    K, n3, m, d = order + 3, tables.mass.size, len(tables.forms.unit), most_folds(tables)
+    K, n3, m, d = order + 3, tables.mass.size, len(tables.forms.unit), most_singular(tables)
     k = tables.light.size
     n, vectors, springs = n3 // 3, len(tables.vectors.bodies), len(tables.forces.spring)
 
@@ -125,7 +157,7 @@ def work_space(tables: Tables, order: int) -> Work:
         return [np.zeros(shape) for _ in range(count)]
 
     drop: Any = np.zeros(d, dtype=np.int64)
-    fold = [*zeros(3, d, m), *zeros(2, d, n3), *zeros(2, d, d), np.zeros(d), drop]
+    border = [*zeros(3, d, m), *zeros(2, d, n3), *zeros(2, d, d), np.zeros(d), drop]
     arrays: list[Any] = [
         np.zeros((K, n3)),
         np.zeros((K, m)),
@@ -133,13 +165,14 @@ def work_space(tables: Tables, order: int) -> Work:
         np.zeros((5, K, n)),
         np.zeros((2, K, vectors)),
         np.zeros((3, K, springs)),
-        FoldFrame._make(fold),
+        Border._make(border),
         Carry(np.zeros((k, n3)), np.zeros((k, m)), np.zeros((k, d)), np.zeros((k, k)), np.zeros(k)),
         *zeros(2, m, 2, 3),
         np.zeros(m + tables.plan.row.size),
         *zeros(3, m),
-        *zeros(7, n3),
+        *zeros(9, n3),
         *zeros(2, n),
+        np.zeros(m, dtype=np.int64),
         np.zeros(m, dtype=np.int64),
     ]
     return Work._make(arrays)
@@ -155,7 +188,7 @@ class TaylorRun:
         Why it ended.
     dense : Polynomials
         Taylor series on every step, without the ground's coordinates.
-    folds : ndarray, shape (steps,)
+    singular : ndarray, shape (steps,)
         Number of singular combinations of rows at the start of every step.
     compiling : float
         Seconds that compiling the kernels took, or loading those of an earlier run.
@@ -163,7 +196,7 @@ class TaylorRun:
 
     status: Status
     dense: Polynomials
-    folds: Ints
+    singular: Ints
     compiling: float = 0.0
 
 
@@ -183,25 +216,24 @@ def kernels(jit: bool) -> SimpleNamespace:
     return compiled.bind((*FUNCTIONS, *kernel_run.STARTERS), NAMES, compiled=False)
 
 
-def load_kernels(assembly: Assembly, w: Work, order: int, redundant: Ints) -> float:
+def load_kernels(tables: Tables, w: Work, run: Run) -> float:
     """Compile the kernels, or load them, by a run of no length; seconds that this took."""
     if _LOADED:
         return 0.0
     began = time.perf_counter()
-    n3 = assembly.tables.mass.size
-    state, times, coefficients = (
-        np.array([0.0, 0.0, math.inf, 1.0, 0.0, -1.0]),
-        np.zeros(2),
-        np.zeros((1, order + 1, n3 - 3)),
-    )
+    times, coefficients = np.zeros(2), np.zeros((1, run.order + 1, w.q.size - 3))
+    state = first_state(run.end)
+    state[kernel_names.BEGUN] = 1.0
     with stage("compiling the kernels"):
-        kernels(True).integrate_series(
-            assembly.tables, w, 0.0, 0.0, np.zeros(n3), np.zeros(n3), order, 1e-9, assembly.length, redundant,
-            assembly.breaks, math.inf, state, times, coefficients, np.zeros(1, dtype=np.int64),
-        )  # fmt: skip
-        kernels(True).sample(times, coefficients, 1.0, np.zeros(1), 0, np.zeros((1, n3 - 3)))
+        kernels(True).integrate_series(tables, w, run, state, times, coefficients, np.zeros(1, dtype=np.int64))
+        kernels(True).sample(times, coefficients, 1.0, np.zeros(1), 0, np.zeros((1, w.q.size - 3)))
     _LOADED.append(True)
     return time.perf_counter() - began
+
+
+def first_state(begin: float) -> Array:
+    """State of a run that has not begun, see `kernel_names`."""
+    return np.array([begin, 0.0, math.inf, 0.0, 0.0, -1.0])
 
 
 def order_for(tolerance: float) -> int:
@@ -209,14 +241,12 @@ def order_for(tolerance: float) -> int:
     return int(min(26, max(8, math.ceil(-0.62 * math.log(tolerance)) + 7)))
 
 
-def run(
+def integrate_scene(
     assembly: Assembly,
-    q: Array,
-    v: Array,
-    span: tuple[float, float],
+    start: Start,
+    end: float,
     *,
     tolerance: float,
-    redundant: Ints,
     order: int | None = None,
     longest: float = math.inf,
     most: int = 1_000_000,
@@ -224,47 +254,40 @@ def run(
     work: Work | None = None,
     watch: Watch | None = None,
 ) -> TaylorRun:
-    """Integrate the scene from the consistent state (q, v) of its moving bodies over `span`."""
+    """Integrate the scene from its consistent start to the time `end`; `tolerance` is that of the last terms."""
     order = order or order_for(tolerance)
-    tb = assembly.tables
-    w = work or work_space(tb, order)
-    q = np.concatenate([q, np.zeros(3)])
-    v = np.concatenate([v, np.zeros(3)])
-    t0, t1 = float(span[0]), float(span[1])
-    redundant = redundant.copy()  # which rows are left out changes along the motion
-    state = np.array([t0, 0.0, math.inf, 0.0, 0.0, -1.0])
-    compiling = load_kernels(assembly, w, order, redundant) if jit else 0.0
+    tables, t0 = assembly.tables, start.time
+    w = work or work_space(tables, order)
+    w.q[:-3], w.v[:-3], w.base[:] = start.q, start.v, ~start.active
+    sign = 1.0 if end >= t0 else -1.0
+    run = Run(t0, end, sign, order, float(tolerance), assembly.length, float(longest), assembly.breaks)
+    state = first_state(t0)
+    compiling = load_kernels(tables, w, run) if jit else 0.0
     advance = kernels(jit).integrate_series
     parts = []
     room, done = min(FIRST_COMPILED if jit else FIRST_STEPS, most), 0
 
     def moving() -> tuple[Array, Array]:
-        return q[:-3], v[:-3]
+        return w.q[:-3], w.v[:-3]
 
     if watch is not None:
         watch(t0, 0, moving)
     while True:
-        times, coefficients = np.empty(room + 1), np.empty((room, order + 1, q.size - 3))
-        folds = np.zeros(room, dtype=np.int64)
-        status, count = advance(
-            tb, w, t0, t1, q, v, order, float(tolerance), assembly.length, redundant, assembly.breaks,
-            float(longest), state, times, coefficients, folds,
-        )  # fmt: skip
+        times, coefficients = np.empty(room + 1), np.empty((room, order + 1, w.q.size - 3))
+        singular = np.zeros(room, dtype=np.int64)
+        status, count = advance(tables, w, run, state, times, coefficients, singular)
         if status == Status.SINGULAR_START:
-            sign = 1.0 if t1 >= t0 else -1.0
-            folds_here, shift, ahead, row, status = kernels(False).begin(
-                tb, t0, sign, q, v, order, float(tolerance), assembly.length, redundant, 0, w, w.qn, w.vn
-            )
-            state[:4] = t0 + shift, folds_here, ahead, 1.0
-            state[5] = row
+            rows, shift, ahead, row, status = kernels(False).begin(tables, w, run, t0)
+            state[:] = t0 + shift, rows, ahead, 1.0, 0.0, row
             if status == Status.DONE:
                 continue
             times[0] = t0
-        parts.append((times[: count + 1], coefficients[:count], folds[:count]))
+        parts.append((times[: count + 1], coefficients[:count], singular[:count]))
         done += count
         if status != Status.MOST_STEPS or done >= most:
             break
-        if watch is not None and state[1] == 0.0 and not watch(float(state[0]), done, moving):  # not on a fold
+        regular = state[kernel_names.SINGULAR] == 0.0
+        if watch is not None and regular and not watch(float(state[kernel_names.TIME]), done, moving):
             status = Status.STOPPED
             break
         room = min(2 * room, max(FIRST_COMPILED, 2_000_000 // coefficients[0].size), most - done)

@@ -1,8 +1,7 @@
 # mypy: ignore-errors
 """Projection onto the constraints, and passing singular positions: where they are, and the state on them.
 
-At a passing singular position (fold) a combination z^T g of the constraints loses its gradient, G^T z = 0,
-while the motion
+At a passing singular position a combination z^T g of the constraints loses its gradient, G^T z = 0, while the motion
 carries it through zero: B = d(G^T z)/dt != 0. Two branches cross there. The motion continues on the one its velocity
 selects: z^T G v = 0 holds the position to it, z^T g'' = 0 its velocity, and both are linear in the direction B.
 """
@@ -17,18 +16,18 @@ from .kernel_rows import (
     fill,
     gradient_rates,
     gradients,
-    least_norm,
     residuals,
     solve,
     time_series,
     times_gradients,
     trigonometry,
 )
-from .kernel_series import fold_solve
+from .kernel_series import border_solve
 
-#: Pivot of S relative to its diagonal below which a fold is looked for.
+#: Pivot of S relative to its diagonal below which a singular position is looked for.
 NEAR = 0.3
-#: Pivot (square of a distance in rad) of other rows at the fold of one row below which they are tried together with it.
+#: Pivot (square of a distance in rad) of other rows at the singular position of one row below which they are tried
+#: together with it.
 TOGETHER = 1e-6
 
 
@@ -43,51 +42,71 @@ def evaluate(QS, order, h, q, v):
             q[i] = q[i] * h + QS[j, i]
 
 
-def project(tb, t, forward, q, v, base, length, w):
+def factor_at(tb, w, q):
+    """w.G, w.val, w.diag at the coordinates q; the least pivot ratio and its row."""
+    trigonometry(q, w.c, w.s)
+    gradients(tb.forms, tb.vectors, q, w.c, w.s, w.G)
+    return factorise(tb.plan, tb.mass, w.G, w.base, w.val, w.diag, 0.0)
+
+
+def project(tb, w, run, t, q, v):
     """Onto g = 0 and G v = df/dt by the smallest change in the mass norm; w.G, w.val, w.diag belong to the new point.
 
-    Returns the first position change relative to `length` (and 1 rad), and the least pivot ratio.
+    Returns the first position change relative to the length (and 1 rad), and the least pivot ratio.
     """
-    forms, vectors, plan, mass = tb.forms, tb.vectors, tb.plan, tb.mass
-    time_series(tb.times, t, forward, 3, w.TF)
+    forms = tb.forms
+    time_series(tb.times, t, run.sign > 0.0, 3, w.TF)
     first = 0.0
     for sweep in range(8):
-        trigonometry(q, w.c, w.s)
-        gradients(forms, vectors, q, w.c, w.s, w.G)
-        least, _ = factorise(plan, mass, w.G, base, w.val, w.diag, 0.0)
-        residuals(forms, vectors, q, w.c, w.s, w.TF[:, 0], w.mu)
-        change = least_norm(forms, plan, mass, w.G, w.val, base, length, w.mu, w.F, q)
+        least, _ = factor_at(tb, w, q)
+        residuals(forms, tb.vectors, q, w.c, w.s, w.TF[:, 0], w.mu)
+        change = least_change(tb, w, run, q)
         if sweep == 0:
             first = change
         if change < 1e-9 or not np.isfinite(change):  # the next change would be its square
             break
     if first > 0.0:
-        trigonometry(q, w.c, w.s)
-        gradients(forms, vectors, q, w.c, w.s, w.G)
-        least, _ = factorise(plan, mass, w.G, base, w.val, w.diag, 0.0)
+        least, _ = factor_at(tb, w, q)
     for _ in range(2):
         times_gradients(forms, w.G, v, w.mu)
         for r in range(w.mu.shape[0]):
             if forms.motion[r] >= 0:
                 w.mu[r] -= w.TF[forms.motion[r], 1]
-        least_norm(forms, plan, mass, w.G, w.val, base, length, w.mu, w.F, v)
+        least_change(tb, w, run, v)
     if change >= 1e-9 or not np.isfinite(change):
         first = np.inf
     return first, least
 
 
-def regular_parts(forms, plan, mass, G, row, skip, val, work, z):
-    """z := S^-1 S e_row over the rows that are not skipped: how they make up the gradient of `row`."""
-    fill(work, 0.0)
+def least_change(tb, w, run, u):
+    """u -= M^-1 G^T S^-1 w.mu: the smallest change (in the mass norm) that lowers G u by w.mu. Returns its largest
+    entry, in units of the length and 1 rad."""
+    for r in range(w.mu.shape[0]):
+        if w.base[r] != 0:
+            w.mu[r] = 0.0
+    solve(tb.plan, w.val, w.mu)
+    fill(w.F, 0.0)
+    add_transposed(tb.forms, w.G, w.mu, 1.0, w.F)
+    biggest = 0.0
+    for i in range(u.shape[0]):
+        change = w.F[i] * tb.mass[i]
+        u[i] -= change
+        biggest = max(biggest, abs(change) / (1.0 if i % 3 == 2 else run.length))
+    return biggest
+
+
+def regular_parts(tb, w, row):
+    """w.mu := S^-1 S e_row over the rows that are not skipped: how they make up the gradient of `row`."""
+    fill(w.F, 0.0)
     for side in range(2):
-        b = 3 * forms.bodies[row, side]
+        b = 3 * tb.forms.bodies[row, side]
         for k in range(3):
-            work[b + k] += G[row, side, k] * mass[b + k]
-    times_gradients(forms, G, work, z)
-    for r in range(z.shape[0]):
-        if skip[r] != 0:
-            z[r] = 0.0
-    solve(plan, val, z)
+            w.F[b + k] += w.G[row, side, k] * tb.mass[b + k]
+    times_gradients(tb.forms, w.G, w.F, w.mu)
+    for r in range(w.mu.shape[0]):
+        if w.skip[r] != 0:
+            w.mu[r] = 0.0
+    solve(tb.plan, w.val, w.mu)
 
 
 def row_square(forms, mass, G, r):
@@ -100,20 +119,22 @@ def row_square(forms, mass, G, r):
     return total
 
 
-def next_fold(tb, q, v, base, sign, low, high, w):
-    """First fold from here within low < sign tau < high, judged from all small pivots: (tau, row), row -1 for none.
+def next_singular(tb, w, run, q, v, low, high):
+    """First singular position from here within low < sign tau < high, judged from all small pivots: (tau, row).
+
+    The row is -1 where there is none.
 
     For each such row z = S^-1 e_row, p = G^T z. It stands on the gradients of all other rows, so only the part of
     B = dG^T/dt z across them moves it: what is left of B without all rows, and the part along p. Were the row's passing
     to remove p, most of that part would be along p.
     """
-    forms, vectors, plan, mass, z = tb.forms, tb.vectors, tb.plan, tb.mass, w.rhs
+    forms, vectors, plan, mass, z, sign = tb.forms, tb.vectors, tb.plan, tb.mass, w.rhs, run.sign
     m = w.mu.shape[0]
     found = np.inf
     first = -1
     moving = False
     for row in range(m):
-        if base[row] != 0 or NEAR * w.val[row] * w.diag[row] <= 1.0:
+        if w.base[row] != 0 or NEAR * w.val[row] * w.diag[row] <= 1.0:
             continue
         if not moving:
             gradient_rates(forms, vectors, q, v, w.c, w.s, w.H)
@@ -141,7 +162,7 @@ def next_fold(tb, q, v, base, sign, low, high, w):
             w.F[i] = w.u[i] * mass[i]
         times_gradients(forms, w.G, w.F, w.mu)
         for r in range(m):
-            if base[r] != 0:  # redundant rows take no part
+            if w.base[r] != 0:  # redundant rows take no part
                 w.mu[r] = 0.0
         solve(plan, w.val, w.mu)
         add_transposed(forms, w.G, w.mu, -1.0, w.u)
@@ -154,49 +175,49 @@ def next_fold(tb, q, v, base, sign, low, high, w):
     return found, first
 
 
-def fold_frame(tb, q, v, bound, w):
-    """Z, B, the bordered system and p = G^T Z (in fold.P) of the rows with w.skip = 2, which are left out.
+def singular_frame(tb, w, q, v, bound):
+    """Z, B, the bordered system and p = G^T Z (in border.P) of the rows with w.skip = 2, which are left out.
 
     Rows with pivots below `bound` join them. Returns their number (0 when the bordered system is singular, too).
     """
-    forms, vectors, plan, mass, fold = tb.forms, tb.vectors, tb.plan, tb.mass, w.fold
+    forms, vectors, plan, mass, border = tb.forms, tb.vectors, tb.plan, tb.mass, w.border
     m = w.mu.shape[0]
     trigonometry(q, w.c, w.s)
     gradients(forms, vectors, q, w.c, w.s, w.G)
     gradient_rates(forms, vectors, q, v, w.c, w.s, w.H)
     factorise(plan, mass, w.G, w.skip, w.val, w.diag, bound)
-    folds = 0
+    count = 0
     for row in range(m):
         if w.skip[row] != 2:
             continue
-        if folds == fold.drop.shape[0]:
+        if count == border.drop.shape[0]:
             return 0
-        p = folds
-        fold.drop[p] = row
-        folds += 1
-        regular_parts(forms, plan, mass, w.G, row, w.skip, w.val, w.F, w.mu)
+        p = count
+        border.drop[p] = row
+        count += 1
+        regular_parts(tb, w, row)
         for r in range(m):
-            fold.Z[p, r] = -w.mu[r]
-        fold.Z[p, row] = 1.0
-        fill(fold.P[p], 0.0)
-        add_transposed(forms, w.G, fold.Z[p], 1.0, fold.P[p])
-        fill(fold.B[p], 0.0)
-        add_transposed(forms, w.H, fold.Z[p], 1.0, fold.B[p])
+            border.Z[p, r] = -w.mu[r]
+        border.Z[p, row] = 1.0
+        fill(border.P[p], 0.0)
+        add_transposed(forms, w.G, border.Z[p], 1.0, border.P[p])
+        fill(border.B[p], 0.0)
+        add_transposed(forms, w.H, border.Z[p], 1.0, border.B[p])
         for i in range(w.F.shape[0]):
-            w.F[i] = fold.B[p, i] * mass[i]
+            w.F[i] = border.B[p, i] * mass[i]
         times_gradients(forms, w.G, w.F, w.mu)
         for r in range(m):
-            fold.E[p, r] = w.mu[r] if w.skip[r] == 0 else 0.0
-            fold.Y[p, r] = fold.E[p, r]
-        solve(plan, w.val, fold.Y[p])
-    for p in range(folds):
+            border.E[p, r] = w.mu[r] if w.skip[r] == 0 else 0.0
+            border.Y[p, r] = border.E[p, r]
+        solve(plan, w.val, border.Y[p])
+    for p in range(count):
         for k in range(p + 1):
-            value = weighted(fold.B[p], fold.B[k], mass)
+            value = weighted(border.B[p], border.B[k], mass)
             for r in range(m):
-                value -= fold.Y[p, r] * fold.E[k, r]
-            fold.border[p, k] = value
-            fold.border[k, p] = value
-    return folds if border_share(fold, folds, mass) > 1e-8 else 0
+                value -= border.Y[p, r] * border.E[k, r]
+            border.schur[p, k] = value
+            border.schur[k, p] = value
+    return count if border_share(border, count, mass) > 1e-8 else 0
 
 
 def weighted(a, b, mass):
@@ -207,18 +228,18 @@ def weighted(a, b, mass):
     return total
 
 
-def border_share(fold, folds, mass):
+def border_share(border, count, mass):
     """Least share of a direction B that neither the regular rows nor the other directions hold (pivots of L D L^T)."""
-    L = fold.small
+    L = border.small
     least = 1.0
-    for p in range(folds):
+    for p in range(count):
         for k in range(p + 1):
-            L[p, k] = fold.border[p, k]
+            L[p, k] = border.schur[p, k]
             for i in range(k):
                 L[p, k] -= L[p, i] * L[k, i] * L[i, i]
             if k < p:
                 L[p, k] /= L[k, k]
-        plain = weighted(fold.B[p], fold.B[p], mass)
+        plain = weighted(border.B[p], border.B[p], mass)
         share = L[p, p] / plain if plain > 0.0 else 0.0
         if not share > 1e-30:
             return 0.0
@@ -226,45 +247,47 @@ def border_share(fold, folds, mass):
     return least
 
 
-def fold_change(tb, folds, length, w, u):
-    """u -= the smallest change that lowers [G_reg; B] u by (w.mu, fold.nu); returns its largest entry, in units of
-    `length` and 1 rad."""
-    forms, plan, mass, fold = tb.forms, tb.plan, tb.mass, w.fold
+def border_change(tb, w, run, count, u):
+    """u -= the smallest change that lowers [G_reg; B] u by (w.mu, border.nu); returns its largest entry, in units of
+    the length and 1 rad."""
+    forms, plan, mass, border = tb.forms, tb.plan, tb.mass, w.border
     for r in range(w.mu.shape[0]):
         if w.skip[r] != 0:
             w.mu[r] = 0.0
-    fold_solve(plan, w.val, fold, w.mu, folds)
+    border_solve(plan, w.val, border, w.mu, count)
     fill(w.F, 0.0)
     add_transposed(forms, w.G, w.mu, 1.0, w.F)
     biggest = 0.0
     for i in range(u.shape[0]):
         change = w.F[i]
-        for p in range(folds):
-            change += fold.B[p, i] * fold.nu[p]
+        for p in range(count):
+            change += border.B[p, i] * border.nu[p]
         change *= mass[i]
         u[i] -= change
-        biggest = max(biggest, abs(change) / (1.0 if i % 3 == 2 else length))
+        biggest = max(biggest, abs(change) / (1.0 if i % 3 == 2 else run.length))
     return biggest
 
 
-def fold_combination(fold, p, values):
+def combination(border, p, values):
     """z_p . values."""
     total = 0.0
     for r in range(values.shape[0]):
-        total += fold.Z[p, r] * values[r]
+        total += border.Z[p, r] * values[r]
     return total
 
 
 FUNCTIONS = (
     evaluate,
+    factor_at,
     project,
+    least_change,
     regular_parts,
     row_square,
-    next_fold,
-    fold_frame,
+    next_singular,
+    singular_frame,
     weighted,
     border_share,
-    fold_change,
-    fold_combination,
+    border_change,
+    combination,
 )
 NAMES = {"NEAR": NEAR, "TOGETHER": TOGETHER}
