@@ -1,8 +1,8 @@
 """From the contacts of the half-plane law to nodal loads on the mesh: for fields, root stress and finite strain.
 
 The loads are the consistent ones of the pressures on the panels, at their places on the deformed flanks and along the
-common normal. Fields recovered from them are those of the teeth away from the contact; nearer than an element or two
-they show what the coarse flank makes of the pressure.
+common normal. Displacements recovered from them are those of the teeth; nearer to a contact than an element or two they
+show what the coarse flank makes of the pressure. Stresses there: `gearfe.stiffness.contact_stress`.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@ r"""Displacement and stress on whole gears, recovered from a solved position.
 
 The displacements of each sector come from `gearfe.contact.recovery`. Stresses are those of the elements at
 their nodes, averaged over the elements that meet there; they are linear in the displacements, one sparse matrix a gear.
+Beside contacts of the half-plane law that are narrower than its elements, they are those of `.contact_stress`.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from ..contact.recovery import sector_displacements
 from ..contact.scene import MeshingPair, turn
 from ..elasticity import physical_gradients, principal_stresses, triangle_shapes, von_mises
 from ..meshing.whole_gear import WholeGear, whole_gear
+from .contact_stress import bumped
 from .flank_pressure import flank_pressures
 
 Array = NDArray[Any]
@@ -130,7 +132,13 @@ def gear_field(recovery: GearRecovery, pair: MeshingPair, position: Positions, a
     x, y = local[:, 0], local[:, 1]
     displacement = np.empty((len(whole.points), 2))
     displacement[whole.numbers.T] = np.stack([c * x - s * y, s * x + c * y], axis=-1)
+    loads, beside = bumped(body, position, gear)
+    if beside:
+        local = sector_displacements(body, loads, np.zeros_like(every), every)
     sums = (recovery.stress_rows @ local.reshape(-1, teeth)).reshape(-1, 3, teeth)
+    counts = recovery.elements[whole.numbers]
+    for tooth, stress in beside:
+        sums[:, :, tooth % teeth] += counts[tooth % teeth][:, None] * stress.T
     xx, yy, xy = sums[:, 0], sums[:, 1], sums[:, 2]
     turned = np.stack(
         [
