@@ -124,7 +124,7 @@ def mesh_like_law(t, u, du, parameters, out):  # type: ignore[no-untyped-def]
     out[1] = 0.0
 
 
-def mesh_like_begin(t, sign, u, parameters, pieces):  # type: ignore[no-untyped-def]
+def mesh_like_begin(t, sign, u, du, memory, pieces):  # type: ignore[no-untyped-def]
     """No pieces."""
 
 

@@ -1,15 +1,17 @@
-"""The series of a train's forces: the law again, order by order, and the corners between its cubics."""
+"""The series of a train's forces: the same law at many times, order by order, and the corners between its cells."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 
+from gearfe.meshlaw.fit import Couple, PairForces, TouchCurve, fit_law
 from gearfe.rigid import TimeFunction, compiled, constant, kernel_modal, smoothed_step
 from gearfe.stiffness.periodic import periodic_interpolant
 from gearfe.train import build_train, simulate
-from gearfe.train.law import angle_block, gyro_block, joined, mesh_block, torque_block, train_law
-from gearfe.train.series import train_begin, train_corner, train_order, train_series
+from gearfe.train.forces import CurveFlank, Gyro, LawFlank, TrainForces
+from gearfe.train.series import train_corner, train_order, train_series
 
 from .trains import SHIPPED, curve, train
 
@@ -17,35 +19,58 @@ SPEED = 600.0
 NODES = np.array([0.0, 0.1, 0.25, 0.4, 0.5])
 
 
-def mesh(sense=1.0, method="linear", direction=0, spin=1):
-    """A mesh whose curve has nodes at 0, 0.1, 0.25, 0.4, 0.5 rad and the period 0.6 rad."""
+def flank(sense=1.0, method="linear", direction=0, spin=1, parts=False, gap=0.0):
+    """A flank whose curve has nodes at 0, 0.1, 0.25, 0.4, 0.5 rad and the period 0.6 rad."""
     values = np.array([1e8, 1.1e8, 0.9e8, 1e8, 1.05e8])
     shape = periodic_interpolant(NODES, values, 0.6, widest_gap=0.3, method=method)
-    return mesh_block(direction, spin, 1.0, sense, 0.0, 1e8, shape)
+    return CurveFlank(direction, spin, 1.0, sense, 0.0, 1e8, gap, shape, parts)
 
 
-def began(t, sign, u, parameters, meshes=1):
-    """Pieces at a start, and memory for the series."""
-    law = train_series(parameters, meshes)
-    pieces = np.zeros(law.pieces, dtype=np.int64)
-    train_begin(t, sign, u, parameters, pieces)
-    return np.zeros((law.rows, u.shape[1])), pieces
+def hertzian_law(cycle=0.3):
+    """A law whose pairs yield as Hertz's contacts on springs that vary with the angle, through exact data."""
+    cells = 12
+    angle = -0.28 + cycle * np.arange(2 * cells + 1) / cells
+    touch = TouchCurve(angle, 2e-3 * np.maximum(np.abs(angle) - 0.16, 0.0) ** 2, 0.0 * angle)
+    slope = 4e-3 * np.maximum(np.abs(angle) - 0.16, 0.0) * np.sign(angle)
+    psi, force = np.meshgrid(np.linspace(angle[0], angle[-1], 90), np.geomspace(2.0, 8e3, 9), indexing="ij")
+    made = force * (1.3e-8 + 2e-9 * np.cos(9 * psi) - 2.9e-10 * np.log(force / 1e3))
+    found = PairForces(psi.ravel(), force.ravel(), np.ones(psi.size), made.ravel())
+    couple = Couple(np.linspace(-0.3, 0.1, 9), 5.4e-9 + 2e-10 * np.linspace(-1, 1, 9) ** 2)
+    return fit_law(
+        found, dataclasses.replace(touch, slope=slope), [couple], cells=cells, hertz=2.9e-10, base_radii=(0.02, 0.03),
+        backlash=0.0, reach=6e-5,
+    )  # fmt: skip
 
 
-@pytest.mark.parametrize("method", ["linear", "cubic"])
-@pytest.mark.parametrize("s", [2e-5, -2e-5])
-def test_the_series_sums_up_to_the_law(method, s):
+def began(forces, t, sign, u, s):
+    """Series law, memory and whole numbers at a start."""
+    law = train_series(forces)
+    memory, pieces = np.zeros((law.rows, u.shape[1])), np.zeros(law.pieces, dtype=np.int64)
+    law.begin(t, sign, u[:, 0], u[:, 1] / s, memory, pieces)
+    return law.parameters, memory, pieces
+
+
+@pytest.mark.parametrize("kind", ["linear", "cubic", "law"])
+@pytest.mark.parametrize("s", [4e-6, -4e-6])
+def test_the_series_sums_up_to_the_law(kind, s):
     """Meshes, gyroscopic moments, torques of both kinds along a motion that is a polynomial of time."""
     speed = constant(SPEED) + TimeFunction(sines=((20.0, 4e4, 0.3),))
     torque = smoothed_step(0.5e-3, 1e-3, -100.0) + TimeFunction(sines=((7.0, 3e4, 1.0),))
-    blocks = [angle_block(speed.integral(0.0, 0.0)), gyro_block(0, 1.5, 2e-4), mesh(1.0, method, 3, 2)]
-    parameters = joined([*blocks, mesh(-1.0, method, 4, 2), torque_block(5, torque)])
+    if kind == "law":
+        law = hertzian_law()
+        flanks = (
+            LawFlank(3, 2, 1.0, 1.0, 0.006, 1e8, 0.0, law, 0.2),
+            LawFlank(4, 5, 1.0, -1.0, 0.0585, 0.0, -2e-6, law, 0.0),
+        )
+    else:
+        flanks = (flank(1.0, kind, 3, 2), flank(-1.0, kind, 4, 2, parts=True, gap=-2e-6))
+    angle = speed.integral(0.0, 0.0)
+    forces = TrainForces(6, angle, (Gyro(0, 1.5, 2e-4),), flanks, ((5, torque),))
     random, t, most = np.random.default_rng(4), 0.21e-3, 30
     u = np.zeros((6, most + 1))
-    u[:, :5] = random.normal(size=(6, 5)) * [1e-5, 1e-5, 1e-6, 1e-6, 1e-6]
-    rates = u.copy()
-    rates[:, 1] /= s
-    memory, pieces = began(t, math.copysign(1.0, s), rates, parameters, 2)
+    u[:, :5] = random.normal(size=(6, 5)) * [1e-6, 2e-7, 1e-7, 1e-7, 1e-7]
+    u[3:5, 0] = 3.1e-5, 1.7e-5  # no pair leaves its cell of the force
+    parameters, memory, pieces = began(forces, t, math.copysign(1.0, s), u, s)
     out, orders = np.zeros(6), np.zeros((most, 6))
     for j in range(most):
         train_order(j, t, s, u, parameters, memory, pieces, out)
@@ -53,8 +78,8 @@ def test_the_series_sums_up_to_the_law(method, s):
     powers = np.arange(most + 1)
     for x in (0.0, 0.3, 0.9):
         now, rate = u @ x**powers, (u[:, 1:] * powers[1:]) @ x ** powers[:-1] / s
-        train_law(t + s * x, now, rate, parameters, out)
-        assert x ** powers[:-1] @ orders == pytest.approx(out, rel=1e-11, abs=1e-11 * np.abs(out).max())
+        true = forces(np.array([t + s * x]), now[None], rate[None])[0]
+        assert x ** powers[:-1] @ orders == pytest.approx(true, rel=1e-11, abs=1e-11 * np.abs(true).max())
 
 
 @pytest.mark.parametrize(
@@ -70,10 +95,11 @@ def test_the_series_sums_up_to_the_law(method, s):
     ],
 )
 def test_the_way_to_the_next_corner(t, spin, sense, sign, way):
-    parameters, s = joined([angle_block(constant(SPEED).integral(0.0, 0.0)), mesh(sense)]), sign * 0.3 / SPEED
+    forces = TrainForces(2, constant(SPEED).integral(0.0, 0.0), (), (flank(sense),), ())
+    s = sign * 0.3 / SPEED
     u, out = np.zeros((2, 11)), np.zeros(2)
     u[1, 0] = spin
-    memory, pieces = began(t, sign, u, parameters)
+    parameters, memory, pieces = began(forces, t, sign, u, s)
     for j in range(10):
         train_order(j, t, s, u, parameters, memory, pieces, out)
     before = pieces.copy()
@@ -82,19 +108,33 @@ def test_the_way_to_the_next_corner(t, spin, sense, sign, way):
     assert train_corner(9, 0.9 * way / 0.3, parameters, memory, pieces, False) == 2.0
     assert (pieces == before).all()
     assert train_corner(9, 1.0, parameters, memory, pieces, False) * 0.3 == pytest.approx(way, rel=1e-9)
-    assert pieces[0] - before[0] == sense * sign
+    assert 5 * (pieces[0] - before[0]) + pieces[1] - before[1] == sense * sign
+
+
+@pytest.mark.parametrize("ends", [(0.4, 0.7), (0.51, 0.515)])
+def test_a_flank_parts_where_its_approach_ends(ends):
+    """u = 1e-6 (x - a) (x - b): it parts at a; a dip between two looks is seen, too."""
+    forces = TrainForces(2, constant(1.0).integral(0.0, 0.0), (), (flank(1.0, "linear", 0, 1, True),), ())
+    s, out, u = 1e-6, np.zeros(2), np.zeros((2, 11))
+    u[0, :3] = 1e-6 * np.array([ends[0] * ends[1], -sum(ends), 1.0])
+    parameters, memory, pieces = began(forces, 0.05, 1.0, u, s)
+    for j in range(10):
+        train_order(j, 0.05, s, u, parameters, memory, pieces, out)
+    assert train_corner(9, 1.0, parameters, memory, pieces, False) == pytest.approx(ends[0], rel=1e-9)
+    assert pieces[2] == -1
+    for j in range(10):  # open: no force but the mean stiffness's
+        train_order(j, 0.05, s, u, parameters, memory, pieces, out)
+        assert out[0] == pytest.approx(1e8 * u[0, j], rel=1e-12)
 
 
 def test_a_constant_stiffness_has_no_corner():
-    parameters = joined([angle_block(constant(SPEED))])
-    assert train_corner(9, 1.0, parameters, np.zeros((3, 11)), np.zeros(0, dtype=np.int64), False) == 2.0
+    forces = TrainForces(1, constant(SPEED), (), (), ())
+    parameters, memory, pieces = began(forces, 0.0, 1.0, np.zeros((1, 11)), 1.0)
+    assert train_corner(9, 1.0, parameters, memory, pieces, False) == 2.0
 
 
 def oscillators(tolerance):
     """Two free oscillators and a rigid mode by the plain kernel: (states, at 1/4 s ... 4 s)."""
-
-    def begin(t, sign, u, parameters, pieces):
-        """Nothing to set."""
 
     def order(j, t, s, u, parameters, memory, pieces, out):
         out[0] = 0.0
@@ -103,14 +143,14 @@ def oscillators(tolerance):
         return 2.0
 
     names = {"np": np, "math": math, "LEAST": kernel_modal.LEAST}
-    alias = {"begin": "law_begin", "order": "law_order", "corner": "law_corner"}
-    kernels = compiled.bind((*kernel_modal.FUNCTIONS, begin, order, corner), names, compiled=False, alias=alias)
+    alias = {"order": "law_order", "corner": "law_corner"}
+    kernels = compiled.bind((*kernel_modal.FUNCTIONS, order, corner), names, compiled=False, alias=alias)
     squares, diagonal = np.array([0.0, 4.0, 900.0]), np.array([0.0, 0.0, 1.2])
     state, asked = np.array([0.1, 1.0, 1e-3, 0.5, 0.0, 1.0]), np.linspace(0.25, 4.0, 16)
     found, T, Y = np.zeros((16, 6)), np.zeros(999), np.zeros((999, 6))
     made = kernels.modal_steps(
         squares, np.diag(diagonal), diagonal, False, np.zeros(3), np.zeros((1, 3)), np.zeros(1), np.zeros(1),
-        np.zeros((1, 21)), np.zeros(1, dtype=np.int64), True, 0.0, 4.0, state, 0.1, np.abs(state[:3]), np.zeros(3),
+        np.zeros((1, 21)), np.zeros(1, dtype=np.int64), 0.0, 4.0, state, 0.1, np.abs(state[:3]), np.zeros(3),
         np.array([0.7]), tolerance, np.inf, asked, 0, found, T, Y, kernel_modal.work_space(3, 1, 21),
     )  # fmt: skip
     status, steps, _, _, _, passed = made

@@ -27,8 +27,9 @@ Array = NDArray[np.float64]
 SMOOTH_PHASE, SMOOTH_FORCE, LEVEL_FORCE = 0.01, 0.05, 0.02
 #: Pairs with less than this share of the mesh force count less: what they yield is divided by their force.
 SHARE = 0.5
-#: Cells of the pair force end at these parts of the largest: a cubic errs by 3e-5 of the approach in a cell of ratio 2.
-PARTS = (0.0, 0.001, 0.004, 0.016, 0.0625, 0.125, 0.25, 0.5, 1.0)
+#: Cells of the pair force end at these parts of the largest: Lambda's cubics err by 1e-4 of it in a cell of ratio 2.2,
+#: and by 1e-3 in those of small forces.
+PARTS = (0.0, 0.002, 0.01, 0.05, 0.2, 0.45, 1.0)
 #: Nodes of b over ln F.
 FORCE_NODES = 7
 NANO = 1e-9

@@ -32,6 +32,7 @@ cubic, with continuous slope), so the law has Taylor series.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -114,6 +115,11 @@ class MeshLaw:
     def slots(self) -> int:
         """Most tooth pairs that are looked at."""
         return len(self.touch)
+
+    @cached_property
+    def largest_force(self) -> float:
+        """Mesh force (N) up to which the law is known at every phase."""
+        return float(self(self.nodes, self.touching(self.nodes) + self.reach).force.min())
 
     def place(self, angles: Array) -> tuple[IntArray, IntArray, Array]:
         """Mesh cycle, cell and angle beyond its first node (rad)."""

@@ -27,14 +27,16 @@ from ..meshing.cache import cached_arrays
 from ..progress import stage
 from ..stiffness.curve_cache import curve_key
 from ..stiffness.sweep import elastic_pair
-from .fit import Couple, PairForces, TouchCurve, fit_law
+from .fit import Couple, PairForces, TouchCurve, fit_law, touch_cubics
 from .law import NEVER, MeshLaw
 from .store import law_arrays, law_of_arrays
 
 Array = NDArray[np.float64]
 
-#: Cells of the phase and pinion angles in a mesh cycle.
-CELLS, ANGLES = 36, 72
+#: Cells of the phase in a mesh cycle, at least, and pinion angles in each at which contacts are solved.
+CELLS, SAMPLES = 24, 3
+#: Error (m) of the touching curve's cubics from which on a cell is halved, and how often.
+CLOSE, HALVINGS = 2e-9, 3
 #: Approaches beyond the first touch, in parts of the largest: light ones tell how a pair comes into contact.
 DEPTHS = (0.0025, 0.008, 0.025, 0.06, 0.12, 0.2, 0.32, 0.5, 0.75, 1.0)
 #: The law's tables go on to where pairs touch at this many times its reach, so that no pair bears at their ends.
@@ -80,11 +82,12 @@ def mesh_law(pair: HalfPlanePair, force: float) -> MeshLaw:
         For forces that contact solutions do not reach.
     """
     geometry = pair.pair
-    cycle, radius = geometry.mesh_cycle, geometry.wheel.base_radius
+    radius = geometry.wheel.base_radius
     reach = _reach(pair, force)
     nodes, slots = _nodes(pair, reach)
-    phases = np.concatenate([nodes[:-1] + k * cycle for k in range(slots)] + [[nodes[-1] + (slots - 1) * cycle]])
-    angles = nodes[0] + cycle * (np.arange(ANGLES) + 0.5) / ANGLES
+    phases = _phases(nodes, slots)
+    places = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    angles = (nodes[:-1, None] + np.diff(nodes)[:, None] * places).ravel()
     met, first = _touching(pair, angles)
     deep = reach * np.array(DEPTHS)
     twists = first[:, None] + deep / radius
@@ -185,8 +188,8 @@ def _nodes(pair: HalfPlanePair, reach: float) -> tuple[Array, int]:
     """Nodes of one mesh cycle (rad), and how many mesh cycles a pair's contact takes."""
     geometry = pair.pair
     cycle = geometry.mesh_cycle
-    step = cycle / (4 * ANGLES)
-    wide = step * np.arange(-3.0 * 4 * ANGLES, 3 * 4 * ANGLES + 1)
+    step = 0.1 * cycle / CELLS
+    wide = step * np.arange(-30.0 * CELLS, 30 * CELLS + 1)
     bears = np.flatnonzero(touch_curve(pair, wide).value < BEYOND * reach)
     low, high = wide[bears[0]] - step, wide[bears[-1]] + step
     slots = math.ceil((high - low) / cycle)
@@ -198,4 +201,29 @@ def _nodes(pair: HalfPlanePair, reach: float) -> tuple[Array, int]:
     corners = corners[(corners > SAME * width) & (corners < cycle - SAME * width)]
     even = width * np.arange(1, CELLS)
     even = even[np.abs(even[:, None] - corners).min(axis=1, initial=np.inf) > NEAR * width]
-    return begin + np.sort(np.concatenate([[0.0, cycle], corners, even])), slots
+    nodes = begin + np.sort(np.concatenate([[0.0, cycle], corners, even]))
+    for _ in range(HALVINGS):
+        off = _midway(pair, nodes, slots, BEYOND * reach)
+        coarse = np.flatnonzero(off > CLOSE)
+        if not len(coarse):
+            break
+        nodes = np.sort(np.append(nodes, 0.5 * (nodes[coarse] + nodes[coarse + 1])))
+    return nodes, slots
+
+
+def _midway(pair: HalfPlanePair, nodes: Array, slots: int, reach: float) -> Array:
+    """Error of the cubics of t in the middle of each cell of the phase (m), the largest over the slots."""
+    ends = _phases(nodes, slots)
+    middle = 0.5 * (ends[1:] + ends[:-1])
+    true = touch_curve(pair, middle).value
+    c = touch_cubics(touch_curve(pair, ends))
+    z = middle - ends[:-1]
+    off = np.abs(c[:, 0] + z * (c[:, 1] + z * (c[:, 2] + z * c[:, 3])) - true)
+    found: Array = np.where(true < reach, off, 0.0).reshape(slots, -1).max(axis=0)
+    return found
+
+
+def _phases(nodes: Array, slots: int) -> Array:
+    """The nodes of so many mesh cycles."""
+    cycle = nodes[-1] - nodes[0]
+    return np.append((nodes[:-1] + cycle * np.arange(slots)[:, None]).ravel(), nodes[-1] + (slots - 1) * cycle)

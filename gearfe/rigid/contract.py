@@ -44,8 +44,9 @@ An element has no state of its own that changes during a run: integrators call i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,8 +159,8 @@ class SeriesLaw:
     Parameters
     ----------
     begin
-        ``begin(t, sign, u, parameters, pieces)``: sets the pieces at the start, where ``u[k, 0], u[k, 1]`` are value
-        and rate; sign tells where time runs.
+        ``begin(t, sign, u, du, memory, pieces)``: sets the pieces at the start, and what the memory holds from one step
+        to the next; u, du are values and rates, sign tells where time runs. Called from Python.
     order
         ``order(j, t, s, u, parameters, memory, pieces, out)``: order j of the forces into ``out[k]``, from orders up to
         j of u and up to j + 1 for u'.
@@ -169,19 +170,22 @@ class SeriesLaw:
         place, for the length of the step; pieces stay.
     helpers
         Functions that they call by name.
-    parameters : ndarray
-        What they get.
+    parameters
+        What they get: an array, or named tuples of arrays.
     rows, pieces
         Number of series in the memory, and of whole numbers.
+    names
+        Constants that the functions use.
     """
 
     begin: Callable[..., None]
     order: Callable[..., None]
     corner: Callable[..., float]
     helpers: tuple[Callable[..., object], ...]
-    parameters: Array
+    parameters: Any
     rows: int
     pieces: int
+    names: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ With y = sum_j y_j x^j, x = (t - t0) / s running from 0 to 1 over the trial step
     (j + 2)(j + 1) y_{j+2} = s^2 (c_j - w^2 y_j + W^T phi_j) - s (j + 1) D y_{j+1}
 
 (Hairer, Norsett & Wanner I, Sec. I.8). phi_j comes from the law's own recurrences (`gearfe.rigid.contract.SeriesLaw`),
-bound by the names `law_begin`, `law_order`, `law_corner`. One order costs two small products with W, half a stage of
+bound by the names `law_order`, `law_corner`. One order costs two small products with W, half a stage of
 a Runge-Kutta method of order 8, and takes the fastest mode further. A step ends where its law has a corner; the number
 of orders follows from the terms.
 """
@@ -125,7 +125,7 @@ def set_weights(squares, reach, pull, tolerance, weight):
 
 
 def modal_steps(
-    squares, damping, diagonal, full, constant, W, offset, parameters, memory, pieces, first, t, t1, state, h, reach,
+    squares, damping, diagonal, full, constant, W, offset, parameters, memory, pieces, t, t1, state, h, reach,
     pull, breaks, tolerance, longest, asked, at, found, T, Y, work,
 ):  # fmt: skip
     """Steps from t to t1, or until T is full; states at the `asked` times go to `found`, step ends to T, Y.
@@ -143,15 +143,6 @@ def modal_steps(
     orders = 0
     status = 0
     still = 0
-    if first:
-        for i in range(n):
-            y[0, i] = state[i]
-            y[1, i] = state[n + i]
-        project(W, y, 0, u)
-        project(W, y, 1, u)
-        for p in range(W.shape[0]):
-            u[p, 0] += offset[p]
-        law_begin(t, sign, u, parameters, pieces)  # noqa: F821
     while sign * (t1 - t) > 0.0:
         if count >= T.shape[0]:
             status = 2

@@ -101,10 +101,10 @@ def series_force(system: System) -> tuple[LocalForce, np.ndarray, SeriesLaw] | N
 
 
 @lru_cache(maxsize=8)
-def _kernels(begin: Any, order: Any, corner: Any, helpers: tuple[Any, ...]) -> SimpleNamespace:
-    functions = (*kernel_modal.FUNCTIONS, *helpers, begin, order, corner)
-    names = {"np": np, "math": math, "LEAST": kernel_modal.LEAST, **order.__globals__}
-    alias = {begin.__name__: "law_begin", order.__name__: "law_order", corner.__name__: "law_corner"}
+def _kernels(order: Any, corner: Any, helpers: tuple[Any, ...], constants: tuple[Any, ...]) -> SimpleNamespace:
+    functions = (*kernel_modal.FUNCTIONS, *helpers, order, corner)
+    names = {"np": np, "math": math, "LEAST": kernel_modal.LEAST, **dict(constants)}
+    alias = {order.__name__: "law_order", corner.__name__: "law_corner"}
     return compiled.bind(functions, names, compiled=True, entries=("modal_steps",), alias=alias)
 
 
@@ -120,10 +120,14 @@ class SeriesRun:
     longest: float
     expand: Callable[[float, Array], tuple[Array, Array, Array]]
 
+    @property
+    def _bound(self) -> SimpleNamespace:
+        series = self.series
+        return _kernels(series.order, series.corner, series.helpers, tuple(sorted(series.names.items())))
+
     def load(self) -> float:
         """Compile the kernels, or load them, by a run of no length; seconds that this took."""
-        series = self.series
-        kernels = _kernels(series.begin, series.order, series.corner, series.helpers)
+        kernels = self._bound
         if "loaded" in vars(kernels):
             return 0.0
         began = time.perf_counter()
@@ -143,7 +147,7 @@ class SeriesRun:
         offset = np.atleast_1d(core.origin[self.index] @ self.force.W)
         diagonal = np.diagonal(core.damping).copy()
         full = not np.array_equal(core.damping, np.diag(diagonal))
-        kernels = _kernels(series.begin, series.order, series.corner, series.helpers)
+        kernels = self._bound
         memory, pieces = np.zeros((series.rows, ORDER + 1)), np.zeros(series.pieces, dtype=np.int64)
         work = kernel_modal.work_space(n, W.shape[0], ORDER + 1)
         found = np.empty((len(asked), 2 * n))
@@ -158,6 +162,7 @@ class SeriesRun:
         )
         reach, pull = np.abs(y0[:n]), np.zeros(n)
         ends, states, room = [np.array([t0])], [y0[None, :]], 512
+        series.begin(t0, 1.0 if t1 >= t0 else -1.0, W @ y0[:n] + offset, W @ y0[n:], memory, pieces)
         if watch is not None:
             watch(t, 0, state)
         while status == _FULL and sum(map(len, ends)) - 1 < most:
@@ -165,7 +170,7 @@ class SeriesRun:
             T, Y = np.empty(room), np.empty((room, 2 * n))
             status, count, t, h, further, at = kernels.modal_steps(
                 core.squares, core.damping, diagonal, full, core.constant, W, offset, series.parameters, memory, pieces,
-                len(ends) == 1, t, t1, state, h, reach, pull, core.system.breaks, self.tolerance, self.longest, asked,
+                t, t1, state, h, reach, pull, core.system.breaks, self.tolerance, self.longest, asked,
                 at, found, T, Y, work,
             )  # fmt: skip
             orders += further

@@ -150,7 +150,7 @@ def assemble(scene: Scene) -> Assembly:
         _floats([(t.stiffness, t.damping, t.free_length) for _, t in tensions], 3),
         _floats([(a.stiffness, a.damping) for a in along], 2),
     )
-    tables = Tables(inverse, *_NONE, forms, vectors, plan.factor, forces, _time_arrays(functions))
+    tables = Tables(inverse, *_NONE, forms, vectors, plan.factor, forces, time_arrays(functions))
     return Assembly(
         tables,
         row_joint=tuple(r.joint for r in rows),
@@ -234,7 +234,8 @@ def _holds_length(form: Form) -> bool:
     return any(weights) or any(terms[k] for terms in form.terms.values() for k in (0, 1, 3, 4))
 
 
-def _time_arrays(functions: list[TimeFunction]) -> Times:
+def time_arrays(functions: list[TimeFunction]) -> Times:
+    """Arrays of functions of time, for the kernels."""
     used = functions or [constant(0.0)]
     width = max(len(row) for f in used for row in f.coefficients)
     return Times(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,13 +41,15 @@ class TimeFunction:
     def __call__(self, t: ArrayLike, derivative: int = 0) -> NDArray[np.float64]:
         """Value (or derivative of that order) at the times `t` (s)."""
         time = np.asarray(t, dtype=float)
-        piece = np.searchsorted(np.asarray(self.starts), time, side="right") - 1
-        out = np.zeros_like(time)
-        for i, (origin, row) in enumerate(zip(self.origins, self.coefficients, strict=True)):
-            here = piece == i
-            if here.any():
-                poly = np.polynomial.Polynomial(row)
-                out = np.where(here, (poly.deriv(derivative) if derivative else poly)(time - origin), out)
+        starts, origins, rows = _tables(self.starts, self.origins, self.coefficients, derivative)
+        if len(starts) == 1:
+            x, rows = time - origins[0], rows[0]
+        else:
+            piece = np.searchsorted(starts, time, side="right") - 1
+            x, rows = time - origins[piece], rows[piece]
+        out = rows[..., -1] + 0.0 * x
+        for j in range(rows.shape[-1] - 2, -1, -1):
+            out = out * x + rows[..., j]
         for amplitude, omega, phase in self.sines:
             out = out + amplitude * omega**derivative * np.sin(omega * time + phase + derivative * math.pi / 2)
         return out
@@ -93,6 +96,19 @@ class TimeFunction:
     def _piece(self, start: float) -> tuple[float, tuple[float, ...]]:
         i = max(k for k, s in enumerate(self.starts) if s <= start)
         return self.origins[i], self.coefficients[i]
+
+
+@lru_cache(maxsize=256)
+def _tables(
+    starts: tuple[float, ...], origins: tuple[float, ...], coefficients: tuple[tuple[float, ...], ...], derivative: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Starts, origins and the coefficients of a derivative, (pieces, width), as arrays."""
+    rows = np.zeros((len(coefficients), max(len(row) for row in coefficients)))
+    for i, row in enumerate(coefficients):
+        rows[i, : len(row)] = row
+    for _ in range(derivative):
+        rows = (rows * np.arange(rows.shape[1]))[:, 1:] if rows.shape[1] > 1 else 0.0 * rows
+    return np.array(starts), np.array(origins), rows
 
 
 def constant(value: float) -> TimeFunction:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError, unknown_name
 from ..gear.pair import GearPair
+from ..meshlaw.law import MeshLaw
 from ..stiffness.curve import StiffnessCurve
 from ..stiffness.periodic import PeriodicInterpolant
 from .flanks import check_flanks
@@ -169,18 +170,34 @@ def _check_mesh(scene: TrainScene, mesh: GearMesh) -> None:
 def check_curve(mesh: GearMesh, teeth: int) -> None:
     """The curve of a mesh covers one cycle of its driver, with positive values."""
     label, curve = f"mesh {mesh.name!r} stiffness", mesh.stiffness
+    if mesh.backlash is not None and not (math.isfinite(mesh.backlash) and mesh.backlash >= 0.0):
+        problem = "must be finite and >= 0 m: less is a wedged mesh, whose flanks all bear without a load"
+        raise InputError(
+            f"mesh {mesh.name!r} backlash", mesh.backlash, problem, "thin the teeth, or move the shafts apart"
+        )
     if curve is None:
+        if mesh.backlash is not None:
+            problem = "stands beside a rigid mesh, whose teeth never part"
+            raise InputError(f"mesh {mesh.name!r} backlash", mesh.backlash, problem, "leave one out")
         return
     if isinstance(curve, (int, float)):
         if not (math.isfinite(curve) and curve > 0.0):
             raise InputError(label, curve, "must be finite and > 0 N/m", "or None for a rigid mesh")
         return
-    period = curve.mesh_cycle if isinstance(curve, StiffnessCurve) else curve.period
+    period = (
+        curve.period
+        if isinstance(curve, PeriodicInterpolant)
+        else curve.cycle
+        if isinstance(curve, MeshLaw)
+        else curve.mesh_cycle
+    )
     wanted = 2.0 * math.pi / teeth
     if abs(period - wanted) > SAME * wanted:
         needs = f"the driver of {teeth} teeth needs {math.degrees(wanted):.9g} deg"
         problem = f"has a period of {math.degrees(period):.9g} deg, {needs}"
         raise InputError(label, None, problem, "take the curve of these gears, the driver as pinion")
+    if isinstance(curve, MeshLaw):
+        return
     table = interpolant(mesh)
     gaps = np.diff(table.nodes)
     widest = float(gaps.max()) / table.period
@@ -204,6 +221,7 @@ def interpolant(mesh: GearMesh) -> PeriodicInterpolant:
             return curve.interpolant("k_mesh", method=mesh.interpolation)
         except InputError as error:
             raise InputError(f"mesh {mesh.name!r} stiffness", error.value, error.problem, error.cure) from None
+    assert not isinstance(curve, MeshLaw)
     flat = 0.0 if curve is None else float(curve)
     nothing = np.zeros(0)
     return PeriodicInterpolant(

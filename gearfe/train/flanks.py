@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..meshlaw.law import MeshLaw
 from .inertia import rotor
 from .kinematics import balanced_forces, drive_sense, driving_senses, load_torques, rolling
 from .scene import TrainScene
@@ -39,11 +40,19 @@ def check_flanks(scene: TrainScene) -> None:
     loads = balanced_forces(scene, senses, load_torques(scene, times))
     whole = loads + balanced_forces(scene, senses, _inertia(scene, times))
     least = -NONE * float(np.abs(loads).max())
-    wrong = (loads < least) & (whole < least)
+    wrong = (loads < least) & (whole < least) & one_sided(scene)[:, None]
     if wrong.any():
         at = int(np.argmin(np.where(wrong, loads, np.inf).min(axis=0)))
         mesh = int(np.argmin(np.where(wrong[:, at], loads[:, at], np.inf)))
         raise _told(scene, mesh, float(times[at]), senses)
+
+
+def one_sided(scene: TrainScene) -> NDArray[np.bool_]:
+    """For each mesh, whether nothing is known of its back flanks."""
+    own = [isinstance(mesh.stiffness, MeshLaw) and mesh.stiffness.backlash > 0.0 for mesh in scene.meshes]
+    return np.array(
+        [mesh.backlash is None and not has for mesh, has in zip(scene.meshes, own, strict=True)], dtype=bool
+    )
 
 
 def _times(scene: TrainScene) -> Array:

@@ -41,22 +41,33 @@ SAME = 1e-9
 @stage("stability of the steady motion")
 def train_multipliers(model: TrainModel) -> tuple[Complex | None, str]:
     """Multipliers of a train at its steady speed over the common period of its meshes, or the reason for none."""
-    speed, scene = model.steady_speed, model.scene
-    assert scene.drive is not None
-    if scene.drive.speed.sines or speed == 0.0:
-        return None, "the drive has no steady speed"
-    if any(load.torque.sines for load in scene.loads):
-        return None, "a load oscillates: no motion repeats with the meshes"
-    if model.rolling.common_turns is None:
-        return None, model.rolling.note
-    if not len(model.core.squares):
-        return None, "nothing can vibrate: rigid meshes in a rigid housing follow the drive"
+    speed, note = model.steady_speed, why_not(model)
+    if note:
+        return None, note
+    assert model.rolling.common_turns is not None
     period = float(model.rolling.common_turns) * 2 * math.pi / abs(speed)
     with one_thread():
         made = settled(Linearised(model, speed, period).matrix)
     if made is not None:
         return made, ""
     return None, f"no motion was found that repeats with the common mesh period of {1e3 * period:.4g} ms"
+
+
+def why_not(model: TrainModel) -> str:
+    """Why a train has no multipliers, or nothing."""
+    drive = model.scene.drive
+    assert drive is not None
+    reasons = (
+        (bool(drive.speed.sines) or model.steady_speed == 0.0, "the drive has no steady speed"),
+        (any(load.torque.sines for load in model.scene.loads), "a load oscillates: no motion repeats with the meshes"),
+        (model.rolling.common_turns is None, model.rolling.note),
+        (not len(model.core.squares), "nothing can vibrate: rigid meshes in a rigid housing follow the drive"),
+        (
+            any(not (line.rigid or line.pulls) for line in model.meshes),
+            "the teeth may part: multipliers are those of springs that act both ways",
+        ),
+    )
+    return next((note for there, note in reasons if there), "")
 
 
 @dataclass(eq=False)

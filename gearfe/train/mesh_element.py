@@ -12,8 +12,11 @@ presses. The phase :math:`\varphi` follows the driver's actual rotation in its d
 no force. P lies in the middle of the face that both gears share. A rigid mesh is the constraint :math:`\delta = 0`, F
 its multiplier.
 
-What joins later stands apart: a transmission error is a second curve over the phase taken off delta, backlash with
-loss of contact a function of delta in place of the product k delta, friction a force along a direction of its own.
+A mesh law (`gearfe.meshlaw`) takes the place of :math:`k\,\delta`. Its phase is the driver's rotation relative to the
+line of centres, whose turn is :math:`t\cdot(u_2 - u_1)/a` with the displacements of the gears' centres, and its moment
+M acts on that: on the driver, and across the line of centres. The back flanks, where a backlash j is known, have the
+line of action :math:`n_b = -\cos\alpha_w\,t + \sin\alpha_w\,c` and bear behind j. Damping of such a mesh grows with
+its force, :math:`d\,\dot\delta\,F/F_0`, and never pulls; :math:`F_0` is the force in steady running.
 """
 
 from __future__ import annotations
@@ -26,14 +29,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..gear.pair import GearPair
+from ..meshlaw.law import MeshLaw
 from ..rigid import Element, LinearJoint
 from ..stiffness.periodic import PeriodicInterpolant
 from .checks import interpolant
 from .elements import LinearForce, RigidShaft
-from .law import mesh_block
+from .forces import CurveFlank, Flank, LawFlank
 from .scene import GearMesh, TrainScene
 
 Array = NDArray[np.float64]
+
+
+#: Least force F0 of a mesh's damping, in parts of the largest that its law is known for.
+LEAST_REFERENCE = 0.01
+#: Phases at which the mean stiffness of a law is taken.
+PHASES = 72
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,14 +54,22 @@ class MeshLine:
     ----------
     name
         ``driver-driven``.
-    row : (system size,)
-        Approach delta for unit coordinates of the system.
+    row, back : (system size,)
+        Approach of the driving and of the back flanks for unit coordinates of the system.
+    turn : (system size,)
+        Rotation of the driver that the phase follows.
     direction, point : (3,)
         n and P (m).
     curve
-        Stiffness over the driver's rotation; None for a rigid mesh.
+        Stiffness over the driver's rotation; None for a rigid mesh, and for one with a law.
+    law
+        Mesh law, or None.
+    backlash
+        j (m); None: without back flanks, a curve then acts both ways.
     mean, damping
         Mean of k (N/m), infinite for a rigid mesh; d (N s/m), the Rayleigh part included.
+    reference
+        F0 (N) of a law.
     driver
         Number of the driver's shaft.
     ratio, sense, phase
@@ -62,16 +80,31 @@ class MeshLine:
 
     name: str
     row: Array
+    back: Array
+    turn: Array
     direction: Array
     point: Array
     curve: PeriodicInterpolant | None
+    law: MeshLaw | None
+    backlash: float | None
     mean: float
     damping: float
+    reference: float
     driver: int
     ratio: float
     sense: float
     phase: float
     module: float
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the mesh is a constraint."""
+        return self.curve is None and self.law is None
+
+    @property
+    def pulls(self) -> bool:
+        """Whether its spring acts both ways."""
+        return self.curve is not None and self.backlash is None
 
     def stiffness(self, angle: Array, rest: Array | float = 0.0) -> Array:
         """k (N/m) at rotations `angle` (rad) of the drive, the driver's rotation beside rolling being `rest` (rad)."""
@@ -80,22 +113,32 @@ class MeshLine:
 
     def element(self, bodies: Sequence[Element]) -> Element:
         """The constant part for the core: mean spring and damper, or the constraint."""
-        if self.curve is None:
+        if self.rigid:
             return LinearJoint(tuple(bodies), self.row[None, :], np.zeros(1), name=f"mesh {self.name}")
         square = np.outer(self.row, self.row)
-        return LinearForce(tuple(bodies), self.damping * square, self.mean * square, f"mesh {self.name}")
+        damping = 0.0 if self.law is not None else self.damping
+        return LinearForce(tuple(bodies), damping * square, self.mean * square, f"mesh {self.name}")
 
-    def block(self, direction: int, driver: int) -> Array:
-        """The changing part of the spring for the law, along `direction`; `driver` is that of the driver's rotation."""
-        assert self.curve is not None
-        return mesh_block(direction, driver, self.ratio, self.sense, self.phase, self.mean, self.curve)
+    def flanks(self, directions: Sequence[int], turn: int) -> tuple[Flank, ...]:
+        """Driving and back flanks along the directions of their approaches; `turn` is that of the driver's rotation."""
+        ends = [(1.0, self.mean, 0.0)] + ([] if self.backlash is None else [(-1.0, 0.0, self.backlash)])
+        made: list[Flank] = []
+        for direction, (side, mean, gap) in zip(directions, ends, strict=True):
+            place = (direction, turn, self.ratio, side * self.sense, side * self.phase, mean, gap)
+            if self.law is not None:
+                made.append(LawFlank(*place, self.law, self.damping / self.reference))
+            elif self.curve is not None:
+                made.append(CurveFlank(*place, self.curve, not self.pulls))
+        return tuple(made)
 
 
 def mesh_line(
     scene: TrainScene, mesh: GearMesh, shafts: Sequence[RigidShaft], first: NDArray[np.int64], ratios: Sequence[float],
-    size: int, sense: float, phase: float,
+    size: int, sense: float, phase: float, force: float,
 ) -> MeshLine:  # fmt: skip
-    """Line of action of a mesh in a train whose shafts' coordinates begin at `first` of `size`."""
+    """Line of action of a mesh in a train whose shafts' coordinates begin at `first` of `size`; `force` (N) is that of
+    steady running.
+    """
     names = [s.name for s in scene.shafts]
     one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
     i, j = names.index(one.shaft), names.index(two.shaft)
@@ -105,20 +148,47 @@ def mesh_line(
     base = np.array(scene.shaft(one.shaft).point)
     arm = np.array(scene.shaft(two.shaft).point) - base
     arm = arm - (arm @ a) * a
-    across = arm / np.linalg.norm(arm)
-    line = math.cos(alpha) * sense * np.cross(a, across) + math.sin(alpha) * across
+    distance = float(np.linalg.norm(arm))
+    across = arm / distance
+    along = np.cross(a, across)
     low = max(g.along - 0.5 * g.gear.face_width for g in (one, two))
     high = min(g.along + 0.5 * g.gear.face_width for g in (one, two))
-    point = base + (0.5 * (low + high) - float(base @ a)) * a + pair.pinion_working_radius * across
-    row = np.zeros(size)
-    row[first[i] : first[i] + 6] += line @ shafts[i].point_rows(point, scene.frame)
-    row[first[j] : first[j] + 6] -= line @ shafts[j].point_rows(point, scene.frame)
-    curve, mean, damping = None, math.inf, 0.0
-    if mesh.stiffness is not None:
+    centre = base + (0.5 * (low + high) - float(base @ a)) * a
+    point = centre + pair.pinion_working_radius * across
+
+    def relative(line: Array, on_one: Array, on_two: Array) -> Array:
+        row = np.zeros(size)
+        row[first[i] : first[i] + 6] += line @ shafts[i].point_rows(on_one, scene.frame)
+        row[first[j] : first[j] + 6] -= line @ shafts[j].point_rows(on_two, scene.frame)
+        return row
+
+    line = math.cos(alpha) * sense * along + math.sin(alpha) * across
+    back = -math.cos(alpha) * sense * along + math.sin(alpha) * across
+    turn = np.zeros(size)
+    curve, law, backlash, mean, damping, reference = None, None, mesh.backlash, math.inf, 0.0, 1.0
+    if isinstance(mesh.stiffness, MeshLaw):
+        law = mesh.stiffness
+        turn = relative(along / distance, centre, centre + arm)
+        reference = min(max(abs(force), LEAST_REFERENCE * law.largest_force), law.largest_force)
+        mean = mean_tangent(law, reference)
+        if backlash is None and law.backlash > 0.0:
+            backlash = law.backlash
+    elif mesh.stiffness is not None:
         curve = interpolant(mesh)
         mean = mean_value(curve)
+    turn[first[i] + 5] += 1.0
+    if mesh.stiffness is not None:
         damping = mesh.damping + scene.damping.beta * mean
-    return MeshLine(mesh.name, row, line, point, curve, mean, damping, i, ratios[i], sense, phase, one.gear.module)
+    return MeshLine(
+        mesh.name, relative(line, point, point), relative(back, point, point), turn, line, point, curve, law, backlash,
+        mean, damping, reference, i, ratios[i], sense, phase, one.gear.module,
+    )  # fmt: skip
+
+
+def mean_tangent(law: MeshLaw, force: float) -> float:
+    """Mean over a mesh cycle of the law's dF/d approach (N/m) under a constant force (N)."""
+    angles = law.nodes[0] + law.cycle * (np.arange(PHASES) + 0.5) / PHASES
+    return float(law(angles, law.approach(angles, force)).tangent.mean())
 
 
 def mean_value(curve: PeriodicInterpolant) -> float:

@@ -20,16 +20,9 @@ from ..rigid import Element, LinearJoint, LocalForce, ModalBlocks, Start, System
 from ..rigid.elimination import Minimal, minimal
 from .checks import check_scene
 from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge
+from .forces import Flank, Gyro, TrainForces, derivative
 from .inertia import rotor
-from .kinematics import Rolling, driving_senses, load_end, rolling
-from .law import (
-    angle_block,
-    derivative,
-    gyro_block,
-    joined,
-    python_law,
-    torque_block,
-)
+from .kinematics import Rolling, driving_senses, load_end, rolling, steady_forces
 from .mesh_element import MeshLine, mesh_line
 from .phases import tooth_places
 from .scene import Drive, TrainScene
@@ -56,6 +49,8 @@ class TrainModel:
         Lines of action.
     torques
         Pairs (direction in the system, torque over time): loads, and the shafts' inertia under a changing drive.
+    forces, directions
+        All that is not constant, and its directions, (system size, directions).
     first : (shafts,)
         Number of each shaft's first coordinate in the system.
     spin_reference : (shafts, system size)
@@ -76,6 +71,8 @@ class TrainModel:
     housing: ModalBlocks | None
     meshes: tuple[MeshLine, ...]
     torques: tuple[tuple[Array, TimeFunction], ...]
+    forces: TrainForces
+    directions: Array
     first: NDArray[np.int64]
     spin_reference: Array
     axial: Array
@@ -144,12 +141,16 @@ def build_train(scene: TrainScene) -> TrainModel:
     senses = driving_senses(scene)
     phases = tooth_places(scene, senses).phases
     lines = tuple(
-        mesh_line(scene, mesh, shafts, first, ratios, size, sense, phase)
-        for mesh, sense, phase in zip(scene.meshes, senses, phases, strict=True)
+        mesh_line(scene, mesh, shafts, first, ratios, size, sense, phase, float(force))
+        for mesh, sense, phase, force in zip(scene.meshes, senses, phases, steady_forces(scene), strict=True)
     )
     torques = _torques(scene, shafts, first, ratios, angle, size)
-    forces = _forces(scene, bodies, lines, torques, angle, first, ratios, shafts)
-    elements = [*bodies, *_supports(scene, shafts, housing), *(line.element(bodies) for line in lines), forces]
+    forces, directions = _forces(scene, lines, torques, angle, first, ratios, shafts, size)
+    series = train_series(forces)
+    changing = LocalForce(
+        tuple(bodies), directions, forces.at_one_time, series, forces.breaks, name="forces of the train"
+    )
+    elements = [*bodies, *_supports(scene, shafts, housing), *(line.element(bodies) for line in lines), changing]
     system, core = _damped(scene, elements, bodies)
     return TrainModel(
         scene=scene,
@@ -162,6 +163,8 @@ def build_train(scene: TrainScene) -> TrainModel:
         housing=housing,
         meshes=lines,
         torques=torques,
+        forces=forces,
+        directions=directions,
         first=first,
         spin_reference=_spin_reference(scene, size, first),
         axial=_axial(scene, size),
@@ -192,32 +195,31 @@ def _torques(
 
 
 def _forces(
-    scene: TrainScene, bodies: list[Element], lines: tuple[MeshLine, ...],
-    torques: tuple[tuple[Array, TimeFunction], ...], angle: TimeFunction, first: NDArray[np.int64], ratios: list[float],
-    shafts: tuple[RigidShaft, ...],
-) -> LocalForce:  # fmt: skip
-    """All that is not constant, as one force: three directions a shaft (tilts, spin), one a mesh, one a torque."""
-    size = sum(b.size for b in bodies)
+    scene: TrainScene, lines: tuple[MeshLine, ...], torques: tuple[tuple[Array, TimeFunction], ...],
+    angle: TimeFunction, first: NDArray[np.int64], ratios: list[float], shafts: tuple[RigidShaft, ...], size: int,
+) -> tuple[TrainForces, Array]:  # fmt: skip
+    """All that is not constant: three directions a shaft (tilts, spin), up to three a mesh, one a torque."""
     unit = np.eye(size)
-    columns = [unit[:, i + 3 : i + 6] for i in first]
-    blocks = [angle_block(angle)]
+    columns = [column for i in first for column in unit[i + 3 : i + 6]]
+    gyros: tuple[Gyro, ...] = ()
     if scene.damping.gyroscopic:
-        blocks += [gyro_block(3 * i, g, s.rotor.polar) for i, (g, s) in enumerate(zip(ratios, shafts, strict=True))]
-    at = 3 * len(shafts)
+        gyros = tuple(Gyro(3 * i, g, s.rotor.polar) for i, (g, s) in enumerate(zip(ratios, shafts, strict=True)))
+    flanks: list[Flank] = []
     for line in lines:
-        if line.curve is not None:
-            columns.append(line.row[:, None])
-            blocks.append(line.block(at, 3 * line.driver + 2))
-            at += 1
-    for direction, function in torques:
-        columns.append(direction[:, None])
-        blocks.append(torque_block(at, function))
-        at += 1
-    parameters = joined(blocks)
-    breaks = tuple(sorted({*angle.breaks, *(b for _, function in torques for b in function.breaks)}))
-    law = python_law(parameters, at)
-    series = train_series(parameters, sum(line.curve is not None for line in lines))
-    return LocalForce(tuple(bodies), np.hstack(columns), law, series, breaks, name="forces of the train")
+        if line.rigid:
+            continue
+        at = len(columns)
+        columns += [line.row] + ([] if line.backlash is None else [line.back])
+        directions, turn = range(at, len(columns)), 3 * line.driver + 2
+        if line.law is not None:
+            turn = len(columns)
+            columns.append(line.turn)
+        flanks += line.flanks(directions, turn)
+    at = len(columns)
+    columns += [direction for direction, _ in torques]
+    numbered = tuple((at + i, function) for i, (_, function) in enumerate(torques))
+    made = TrainForces(len(columns), angle, gyros, tuple(flanks), numbered)
+    return made, np.array(columns).T
 
 
 def bore_selector(scene: TrainScene, bore: str) -> Array:

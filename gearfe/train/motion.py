@@ -61,31 +61,25 @@ def motion(model: TrainModel, trajectory: Trajectory) -> Motion:
 
 def forces(model: TrainModel, t: Array, q: Array, v: Array) -> Array:
     """All forces but the constant blocks on the system's coordinates, shape (n, size)."""
-    total = np.zeros_like(q)
-    for line in model.meshes:
-        if line.curve is not None:
-            k = line.stiffness(model.angle(t), q[:, model.first[line.driver] + 5])
-            total -= ((k - line.mean) * (q @ line.row))[:, None] * line.row
-    speed = model.angle(t, 1)
-    if model.scene.damping.gyroscopic:
-        for body, first, ratio in zip(model.shafts, model.first, model.ratios, strict=True):
-            momentum = body.rotor.polar * (ratio * speed + v[:, first + 5])
-            total[:, first + 3] -= momentum * v[:, first + 4]
-            total[:, first + 4] += momentum * v[:, first + 3]
-    for direction, function in model.torques:
-        total += function(t)[:, None] * direction
-    return total
+    W = model.directions
+    made: Array = model.forces(t, q @ W, v @ W) @ W.T
+    return made
 
 
 def contact_forces(model: TrainModel, t: Array, q: Array, v: Array, multipliers: dict[str, Array]) -> Array:
-    """F of each mesh (N): spring and damper, or the multiplier of a rigid mesh."""
+    """F of each mesh (N): spring and damper, or the multiplier of a rigid mesh; of back flanks negative."""
     out = np.zeros((len(t), len(model.meshes)))
+    u, du = q @ model.directions, v @ model.directions
+    flanks = iter(model.forces.flanks)
     for i, line in enumerate(model.meshes):
-        if line.curve is None:
+        if line.rigid:
             out[:, i] = multipliers[f"mesh {line.name}"][:, 0]
-        else:
-            k = line.stiffness(model.angle(t), q[:, model.first[line.driver] + 5])
-            out[:, i] = k * (q @ line.row) + line.damping * (v @ line.row)
+            continue
+        out[:, i] = model.forces.of_flank(next(flanks), t, u, du)
+        if line.backlash is not None:
+            out[:, i] -= model.forces.of_flank(next(flanks), t, u, du)
+        if line.law is None:
+            out[:, i] += line.damping * (v @ line.row)
     return out
 
 

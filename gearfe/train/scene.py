@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..gear.pair import Gear
+from ..meshlaw.law import MeshLaw
 from ..reduction.modal_body import ModalBody
 from ..rigid.timefunctions import TimeFunction
 from ..stiffness.curve import StiffnessCurve
@@ -85,27 +86,31 @@ class GearMesh:
     driver, driven
         Names of gears.
     stiffness
-        Curve over the driver's rotation, its interpolant (N/m over rad), a constant (N/m), or None for the ideal rigid
-        mesh: a constraint whose multiplier is the contact force.
+        A mesh law, a curve over the driver's rotation, its interpolant (N/m over rad), a constant (N/m), or None for
+        the ideal rigid mesh: a constraint whose multiplier is the contact force.
     phase
         Angle of the driver (rad), counted in its driving sense, at which it starts; 0: a driver's tooth stands on the
         line of centres. None: from the teeth of the gears that hang together, the first of whose meshes has 0; see
         `gearfe.train.phases`.
     damping
-        N s/m along the line of action.
+        N s/m along the line of action; with a law at the force of steady running.
     interpolation
         ``cubic`` (monotone) or ``linear``, for a curve.
     centre_distance
         Working centre distance of the gears (m); None: the one without backlash.
+    backlash
+        Normal backlash (m), along the line of action. None: with a law that of the gears, or no back flanks where they
+        have none; with a curve or a constant a spring that acts both ways.
     """
 
     driver: str
     driven: str
-    stiffness: StiffnessCurve | PeriodicInterpolant | float | None
+    stiffness: MeshLaw | StiffnessCurve | PeriodicInterpolant | float | None
     phase: float | None = None
     damping: float = 0.0
     interpolation: str = "cubic"
     centre_distance: float | None = None
+    backlash: float | None = None
 
     @property
     def name(self) -> str:

@@ -1,194 +1,387 @@
 # mypy: ignore-errors
-r"""The forces of a train by the orders of their Taylor series: what `gearfe.train.law` gives at a time, as recurrences.
+r"""The forces of a train by the orders of their Taylor series: those of `gearfe.train.forces`, as recurrences.
 
-Over x, time :math:`t + s x`, the phase of a mesh counts from the node at which its cubic begins: with
-:math:`z = \sum_j z_j x^j`, the products :math:`z^2, z^3` and :math:`(k(z) - k_0)\,u_d` follow order by order from
-Cauchy's rule, as do momentum times tilt rate of the gyroscopic moments. Parameters and blocks are those of the law.
+Over x, time :math:`t + s x`, all forces follow order by order from Cauchy's rule for products
+(`gearfe.train.program`). A step ends where a phase or a pair force leaves its cell, where flanks meet or part, and
+where a damper would begin to pull.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..rigid import SeriesLaw
-from .law import time_function
+from ..rigid.kernel_rows import time_series
+from . import program as tables
+from .forces import TrainForces
+from .program import (
+    BEFORE,
+    CELL,
+    DELTA,
+    ENERGIES,
+    FULL,
+    GAP,
+    H1,
+    H2,
+    H3,
+    JACOBIAN,
+    NUMBERS,
+    ORIGIN,
+    PAIR,
+    PER_COUPLE,
+    PER_FLANK,
+    PER_SLOT,
+    PHASE,
+    SLOTS,
+    TOUCH,
+    TOUCHES,
+    F,
+    train_program,
+)
 
-#: Part of a cubic's width by which a corner is passed in its prediction, so that the step contains it.
+#: Part of a cell's width by which a corner is passed in its prediction, so that the step contains it.
 PAST = 2e-3
-#: Part of a cubic's width that counts as none.
-SAME = 1e-9
+#: Part of a cell's width that counts as none, and approach (m) whose part `SAME` counts as none.
+SAME, SMALL = 1e-9, 1e-7
+#: Parts of a step in which a series is looked at for leaving its cell.
+LOOKS = 6
+#: Most Newton steps for order 0 of the pair forces, and their relative change in the last one.
+NEWTON, CHANGED = 50, 1e-9
 
 
-def train_begin(t, sign, u, parameters, pieces):  # type: ignore[no-untyped-def]
-    """Number of the cubic that each mesh is on, counted through all periods; at a node the one that lies ahead."""
-    angle = 0.0
-    rate = 0.0
-    mesh = 0
-    for block in range(int(parameters[0])):
-        o = int(parameters[1 + block])
-        if parameters[o] == 0.0:
-            angle, rate = time_function(t, parameters, o + 1)
-        elif parameters[o] == 1.0:
-            r = int(parameters[o + 2])
-            phase = parameters[o + 4] * (parameters[o + 3] * angle + u[r, 0]) + parameters[o + 5]
-            speed = sign * parameters[o + 4] * (parameters[o + 3] * rate + u[r, 1])
-            n = int(parameters[o + 7])
-            first = o + 8
-            period = parameters[first + n] - parameters[first]
-            turn = math.floor((phase - parameters[first]) / period)
-            place = phase - turn * period
-            low = 0
-            while low < n - 1 and parameters[first + low + 1] <= place:
-                low += 1
-            width = parameters[first + low + 1] - parameters[first + low]
-            if speed > 0.0 and parameters[first + low + 1] - place < SAME * width:
-                low += 1
-            elif speed < 0.0 and place - parameters[first + low] < SAME * width:
-                low -= 1
-            pieces[mesh] = turn * n + low
-            mesh += 1
-
-
-def train_order(j, t, s, u, parameters, memory, pieces, out):  # type: ignore[no-untyped-def]
-    """Order j of the forces over x, time t + s x, from the orders up to j + 1 of u; see the module's docstring.
-
-    Rows of the memory, three to a block: a function of time; or phase from the cubic's node on, its square, the
-    changing part of the stiffness; or momentum and the rates of both tilts.
-    """
+def train_order(j, t, s, u, p, memory, pieces, out):
+    """Order j of the forces over x, time t + s x, from the orders up to j + 1 of u; see the module's docstring."""
+    if j == 0:
+        step_begins(t, s, p, memory, pieces)
+    for i in range(p.inputs.reals.shape[0]):
+        row = p.inputs.ints[i, 0]
+        d = p.inputs.ints[i, 1]
+        k = j + p.inputs.ints[i, 2]
+        value = p.inputs.reals[i, 0] * memory[0, k] + p.inputs.reals[i, 1] * u[d, k]
+        if k > j:
+            value *= (j + 1) / s
+        if j == 0:
+            value += p.inputs.reals[i, 2]
+            if p.inputs.ints[i, 3] >= 0:
+                value -= memory[p.inputs.ints[i, 3], ORIGIN]
+        memory[row, j] = value
+    slots = p.laws.touch.shape[1]
+    flanks = p.flanks.row.shape[0]
+    row = 0
+    at = 0
+    for k in range(flanks + 1):  # the last ones: what follows when all pair forces are known
+        contact = k < flanks and p.flanks.curves[k] < 0
+        if contact:
+            row = p.flanks.row[k]
+            at = p.flanks.piece[k] + PER_FLANK
+        settled = j > 0 or not contact
+        for _ in range(NEWTON):  # for order 0 alone, whose forces then are those that make the gaps vanish
+            if contact:
+                for slot in range(slots):
+                    own = row + SLOTS + PER_SLOT * slot
+                    memory[own + GAP, j] = memory[row + DELTA, j]
+                    memory[own + F, j] = memory[own + FULL, 0] - memory[own + TOUCHES, ORIGIN] if j == 0 else 0.0
+                    if j > 0:
+                        memory[own + FULL, j] = 0.0
+            operate(j, p.operations, p.flanks.first[k], p.flanks.first[k + 1], memory, pieces)
+            if contact and not (settled and j == 0):
+                change = pair_forces(j, slots, memory, row, pieces, at)
+                settled = settled or change <= CHANGED
+                if j > 0:
+                    break
+            else:
+                break
     for i in range(out.shape[0]):
         out[i] = 0.0
-    mesh = 0
-    for block in range(int(parameters[0])):
-        o = int(parameters[1 + block])
-        kind = parameters[o]
-        row = 3 * block
-        if kind == 1.0:
-            d = int(parameters[o + 1])
-            first = o + 8
-            n = int(parameters[o + 7])
-            turn = pieces[mesh] // n
-            low = pieces[mesh] - turn * n
-            mesh += 1
-            value = parameters[o + 4] * (parameters[o + 3] * memory[0, j] + u[int(parameters[o + 2]), j])
-            c = first + n + 1 + 4 * low
-            stiffness = 0.0
-            if j == 0:
-                value += parameters[o + 5] - parameters[first + low]
-                value -= turn * (parameters[first + n] - parameters[first])
-                stiffness = parameters[c] - parameters[o + 6]
-            memory[row, j] = value
-            stiffness += parameters[c + 1] * value
-            if parameters[c + 2] != 0.0 or parameters[c + 3] != 0.0:
-                square = product(memory, row, memory, row, j)
-                memory[row + 1, j] = square
-                stiffness += parameters[c + 2] * square + parameters[c + 3] * product(memory, row + 1, memory, row, j)
-            memory[row + 2, j] = stiffness
-            out[d] -= product(memory, row + 2, u, d, j)
-        elif kind == 2.0:
-            d = int(parameters[o + 1])
-            rate = (j + 1) / s
-            memory[row, j] = parameters[o + 3] * rate * (parameters[o + 2] * memory[0, j + 1] + u[d + 2, j + 1])
-            memory[row + 1, j] = rate * u[d, j + 1]
-            memory[row + 2, j] = rate * u[d + 1, j + 1]
-            out[d] -= product(memory, row, memory, row + 2, j)
-            out[d + 1] += product(memory, row, memory, row + 1, j)
-        else:
-            if j == 0:
-                time_orders(t, s, parameters, o + 1 if kind == 0.0 else o + 2, memory, row)
-            if kind == 3.0:
-                out[int(parameters[o + 1])] += memory[row, j]
+    for i in range(p.outputs.reals.shape[0]):
+        d = p.outputs.ints[i, 0]
+        row = p.outputs.ints[i, 1]
+        out[d] += p.outputs.reals[i, 0] * (memory[row, j] if row >= 0 else u[d, j])
 
 
-def product(a, row, b, other, j):  # type: ignore[no-untyped-def]
-    """Order j of the product of two series (Cauchy)."""
-    total = 0.0
-    for i in range(j + 1):
-        total += a[row, i] * b[other, j - i]
-    return total
+def step_begins(t, s, p, memory, pieces):
+    """Functions of time, and the numbers of the cells that the flanks are on, for a step."""
+    time_series(p.times, t, s > 0.0, memory.shape[1], memory)
+    for k in range(p.times.first.shape[0] - 1):
+        scale = 1.0
+        for i in range(memory.shape[1]):
+            memory[k, i] *= scale
+            scale *= s
+    slots = p.laws.touch.shape[1]
+    for k in range(p.flanks.row.shape[0]):
+        row = p.flanks.row[k]
+        at = p.flanks.piece[k]
+        cell = pieces[at + 1]
+        if p.flanks.curves[k] >= 0:
+            first = p.curves.first[p.flanks.curves[k]]
+            last = p.curves.first[p.flanks.curves[k] + 1] - 1
+            cycle = p.curves.nodes[last] - p.curves.nodes[first]
+            memory[row + CELL, ORIGIN] = p.curves.nodes[first + cell] + pieces[at] * cycle
+            for a in range(4):
+                memory[row + CELL, a] = p.curves.cubics[first + cell, a]
+            continue
+        law = p.flanks.laws[k]
+        cycle = p.laws.nodes[law, p.laws.cells[law]] - p.laws.nodes[law, 0]
+        memory[row + CELL, ORIGIN] = p.laws.nodes[law, cell] + pieces[at] * cycle
+        couple = row + SLOTS + PER_SLOT * slots + NUMBERS
+        for slot in range(slots):
+            own = row + SLOTS + PER_SLOT * slot
+            part = pieces[at + PER_FLANK + slot]
+            memory[own + FULL, 0] = memory[row + BEFORE, slot] if part >= 0 else 0.0
+            memory[own + TOUCHES, ORIGIN] = p.laws.forces[law, part] if part >= 0 else 0.0
+            for a in range(4):
+                memory[own + TOUCHES, a] = p.laws.touch[law, slot, cell, a]
+            for power in range(5):
+                for a in range(4):
+                    if part >= 0:
+                        memory[own + ENERGIES, 4 * power + a] = p.laws.energies[law, slot, cell, part, power, a]
+            for up in range(slot + 1, slots):
+                for a in range(4):
+                    memory[couple, a] = p.laws.coupling[law, slot * slots + up, cell, a]
+                couple += PER_COUPLE
 
 
-def time_orders(t, s, parameters, at, memory, row):  # type: ignore[no-untyped-def]
-    """All orders over x of the function of time whose numbers begin at `at`, on the piece that lies ahead."""
-    pieces = int(parameters[at])
-    width = int(parameters[at + 1])
-    sines = int(parameters[at + 2])
-    at += 3
-    i = pieces - 1
-    while i > 0 and parameters[at + i] > t + 0.5 * s:
-        i -= 1
-    x = t - parameters[at + pieces + i]
-    first = at + 2 * pieces + i * width
-    orders = memory.shape[1]
-    for j in range(orders):
-        memory[row, j] = 0.0
-    for k in range(width - 1, -1, -1):  # Horner with (x + s z): the polynomial about t
-        for j in range(min(width - 1, orders - 1), 0, -1):
-            memory[row, j] = memory[row, j] * x + memory[row, j - 1] * s
-        memory[row, 0] = memory[row, 0] * x + parameters[first + k]
-    first = at + 2 * pieces + pieces * width
-    for k in range(sines):
-        turn = parameters[first + 3 * k + 1]
-        size = parameters[first + 3 * k]
-        for j in range(orders):
-            memory[row, j] += size * math.sin(turn * t + parameters[first + 3 * k + 2] + 0.5 * math.pi * j)
-            size *= turn * s / (j + 1)
+def operate(j, operations, first, end, memory, pieces):
+    """Order j of the rows that the operations change."""
+    for i in range(first, end):
+        one = operations.ints[i, 7]
+        two = operations.ints[i, 8]
+        if (one >= 0 and pieces[one] < 0) or (two >= 0 and pieces[two] < 0):
+            continue
+        row = operations.ints[i, 0]
+        a = operations.ints[i, 1]
+        b = operations.ints[i, 2]
+        kind = operations.ints[i, 3]
+        value = 0.0
+        if kind > 0:
+            z = operations.ints[i, 4]
+            n = operations.ints[i, 5]
+            c = operations.ints[i, 6]
+            if kind == 1:
+                value = memory[n, c + 1] * memory[z, j] + memory[n, c + 2] * memory[z + 1, j]
+                value += memory[n, c + 3] * memory[z + 2, j]
+                if j == 0:
+                    value += memory[n, c]
+            else:
+                value = 2.0 * memory[n, c + 2] * memory[z, j] + 3.0 * memory[n, c + 3] * memory[z + 1, j]
+                if j == 0:
+                    value += memory[n, c + 1]
+            value *= operations.reals[i, 0]
+        if a >= 0:
+            for k in range(j + 1):  # Cauchy
+                value += memory[a, k] * memory[b, j - k]
+        memory[row, j] = operations.reals[i, 2] * memory[row, j] + operations.reals[i, 1] * value
 
 
-def train_corner(last, limit, parameters, memory, pieces, ahead):  # type: ignore[no-untyped-def]
-    """Where x, up to `limit`, first takes a mesh's phase off its cubic; 2 when nothing does.
+def pair_forces(j, slots, memory, row, pieces, at):
+    """Order j of the pair forces from what their gaps lack, J f = gap; for j = 0 a step of Newton's method.
 
-    `ahead`: a little past the place to which the phase goes at its present rate; pieces stay. Otherwise meshes that
-    are off their cubic there go on to the next.
+    Returns the largest change, relative to the largest force.
+    """
+    column = max(j, 1)  # column 0 is the state at which J is taken
+    J = row + JACOBIAN
+    couple = row + SLOTS + PER_SLOT * slots
+    for low in range(slots):
+        own = row + SLOTS + PER_SLOT * low
+        bears = pieces[at + low] >= 0
+        f = memory[own + F, 0]
+        slope = memory[own + H1, 0] + f * (memory[own + H2, 0] + f * memory[own + H3, 0])
+        memory[J, low * slots + low] = slope if bears else 1.0
+        memory[own + F, column] = memory[own + GAP, j] if bears else 0.0
+        for up in range(low + 1, slots):
+            both = bears and pieces[at + up] >= 0
+            memory[J, low * slots + up] = memory[couple, 0] if both else 0.0
+            memory[J, up * slots + low] = memory[J, low * slots + up]
+            couple += PER_COUPLE
+    for a in range(slots):
+        for b in range(a + 1, slots):
+            factor = memory[J, b * slots + a] / memory[J, a * slots + a]
+            for c in range(a, slots):
+                memory[J, b * slots + c] -= factor * memory[J, a * slots + c]
+            one = row + SLOTS + PER_SLOT * a + F
+            memory[one + PER_SLOT * (b - a), column] -= factor * memory[one, column]
+    change = 0.0
+    largest = 1e-300
+    for a in range(slots - 1, -1, -1):
+        own = row + SLOTS + PER_SLOT * a
+        for c in range(a + 1, slots):
+            memory[own + F, column] -= memory[J, a * slots + c] * memory[own + PER_SLOT * (c - a) + F, column]
+        memory[own + F, column] /= memory[J, a * slots + a]
+        f = memory[own + F, column]
+        memory[own + FULL, j] += f
+        change = max(change, abs(f))
+        largest = max(largest, abs(memory[own + FULL, 0]))
+    if j == 0:
+        return change / largest
+    couple = row + SLOTS + PER_SLOT * slots
+    for low in range(slots):  # what hangs on the forces
+        own = row + SLOTS + PER_SLOT * low
+        f = memory[own + F, j]
+        bend = f * memory[own + H3, 0]
+        memory[own + H2, j] += bend
+        memory[own + H1, j] += f * memory[own + H2, 0] + memory[own + F, 0] * bend
+        for up in range(low + 1, slots):
+            other = row + SLOTS + PER_SLOT * up
+            memory[own + GAP, j] -= memory[couple, 0] * memory[other + F, j]
+            memory[other + GAP, j] -= memory[couple, 0] * f
+            couple += PER_COUPLE
+    return 0.0
+
+
+def train_corner(last, limit, p, memory, pieces, ahead):
+    """Where x, up to `limit`, first takes something off its cell; 2 when nothing does.
+
+    `ahead`: a little past the place to which the phases go at their present rate; pieces stay. Otherwise what is off
+    its cell there goes on to the next.
     """
     nearest = 2.0
-    for turn in range(1 if ahead else 2):  # find the place; go on from there
-        mesh = 0
-        for block in range(int(parameters[0])):
-            o = int(parameters[1 + block])
-            if parameters[o] != 1.0:
-                continue
-            row = 3 * block
-            n = int(parameters[o + 7])
-            low = pieces[mesh] % n
-            width = parameters[o + 9 + low] - parameters[o + 8 + low]
-            x = min(limit, nearest)
-            place, slope = polynomial(memory, row, last, x)
-            if ahead:
-                slope = memory[row, 1]
-                if slope != 0.0:
-                    way = (1.0 + PAST) * width - memory[row, 0] if slope > 0.0 else memory[row, 0] + PAST * width
-                    nearest = min(nearest, max(0.0, way) / abs(slope))
-            elif turn == 1:
-                if nearest <= limit and slope > 0.0 and place >= (1.0 - SAME) * width:
-                    pieces[mesh] += 1
-                elif nearest <= limit and slope < 0.0 and place <= SAME * width:
-                    pieces[mesh] -= 1
-            elif place > (1.0 + SAME) * width or place < -SAME * width:
-                goal = width if place > 0.0 else 0.0
-                begin = 0.0
-                beyond = x
-                side = 1.0 if place > goal else -1.0
-                for _ in range(60):
-                    step = (place - goal) / slope if slope != 0.0 else 1e300
-                    x = x - step
-                    if not (begin < x < beyond):
-                        x = 0.5 * (begin + beyond)
-                    place, slope = polynomial(memory, row, last, x)
-                    if side * (place - goal) > 0.0:
-                        beyond = x
-                    else:
-                        begin = x
-                    if abs(place - goal) <= 1e-3 * SAME * width:
-                        break
-                nearest = min(nearest, x)
-            mesh += 1
+    for w in range(p.watches.shape[0]):
+        low, high, slack = bounds(w, p, pieces)
+        row = watched(w, p, pieces)
+        if not ahead:
+            nearest = min(nearest, leaves(memory, row, last, low, high, slack, min(limit, nearest)))
+        elif p.watches[w, 0] == PHASE and memory[row, 1] != 0.0:
+            way = (1.0 + PAST) * high - memory[row, 0] if memory[row, 1] > 0.0 else memory[row, 0] + PAST * high
+            nearest = min(nearest, max(0.0, way) / abs(memory[row, 1]))
+    if not ahead:
+        for w in range(p.watches.shape[0]):
+            go_on(w, last, min(limit, nearest), nearest <= limit, p, memory, pieces)
     return nearest
 
 
-def polynomial(memory, row, last, x):  # type: ignore[no-untyped-def]
+def watched(w, p, pieces):
+    """Row of what is watched: of a pair its force, or its gap."""
+    k = p.watches[w, 1]
+    row = p.watches[w, 2]
+    if p.watches[w, 0] == PAIR:
+        bears = pieces[p.flanks.piece[k] + PER_FLANK + p.watches[w, 3]] >= 0
+        return row + F if bears else row + GAP
+    return row
+
+
+def bounds(w, p, pieces):
+    """Cell of what is watched, and how much beyond it counts as none."""
+    kind = p.watches[w, 0]
+    k = p.watches[w, 1]
+    at = p.flanks.piece[k]
+    law = p.flanks.laws[k]
+    if kind == PHASE:
+        if p.flanks.curves[k] >= 0:
+            node = p.curves.first[p.flanks.curves[k]] + pieces[at + 1]
+            width = p.curves.nodes[node + 1] - p.curves.nodes[node]
+        else:
+            width = p.laws.nodes[law, pieces[at + 1] + 1] - p.laws.nodes[law, pieces[at + 1]]
+        return 0.0, width, SAME * width
+    if kind == PAIR:
+        part = pieces[at + PER_FLANK + p.watches[w, 3]]
+        if part >= 0:
+            width = p.laws.forces[law, part + 1] - p.laws.forces[law, part]
+            return 0.0, (width if part < p.laws.parts[law] - 1 else 1e300), SAME * width
+        return -1e300, 0.0, SAME * SMALL
+    slack = SAME * SMALL if kind == TOUCH else SAME
+    return (0.0, 1e300, slack) if pieces[at + 2] >= 0 else (-1e300, 0.0, slack)
+
+
+def go_on(w, last, x, corner, p, memory, pieces):
+    """Keep the pair forces at x for the next step; where x is a corner, go on to the cell beyond it."""
+    kind = p.watches[w, 0]
+    k = p.watches[w, 1]
+    at = p.flanks.piece[k]
+    row = p.flanks.row[k]
+    slot = p.watches[w, 3]
+    low, high, slack = bounds(w, p, pieces)
+    value, slope = polynomial(memory, watched(w, p, pieces), last, x)
+    up = corner and slope > 0.0 and value >= high - slack
+    down = corner and slope < 0.0 and value <= low + slack
+    if kind == PAIR:
+        part = pieces[at + PER_FLANK + slot]
+        law = p.flanks.laws[k]
+        memory[row + BEFORE, slot] = p.laws.forces[law, part] + value if part >= 0 else 0.0
+        if up or (down and part >= 0):
+            pieces[at + PER_FLANK + slot] = part + 1 if up else part - 1
+    elif kind != PHASE:
+        if up or down:
+            pieces[at + 2] = 0 if up else -1
+    elif up or down:
+        cells = p.laws.cells[p.flanks.laws[k]] if p.flanks.curves[k] < 0 else 0
+        if p.flanks.curves[k] >= 0:
+            cells = p.curves.first[p.flanks.curves[k] + 1] - 1 - p.curves.first[p.flanks.curves[k]]
+        pieces[at + 1] += 1 if up else -1
+        if 0 <= pieces[at + 1] < cells:
+            return
+        pieces[at + 1] = 0 if up else cells - 1
+        pieces[at] += 1 if up else -1
+        if p.flanks.curves[k] < 0:  # each pair goes on to the next slot
+            slots = p.laws.touch.shape[1]
+            for i in range(slots):
+                to = slots - 1 - i if up else i
+                come = to - 1 if up else to + 1
+                inside = 0 <= come < slots
+                pieces[at + PER_FLANK + to] = pieces[at + PER_FLANK + come] if inside else -1
+                memory[row + BEFORE, to] = memory[row + BEFORE, come] if inside else 0.0
+
+
+def leaves(memory, row, last, low, high, slack, limit):
+    """Where x, up to `limit`, first takes the series in a row of the memory out of [low, high]; 2 when it stays.
+
+    It is looked at in a few places; between two of them at its turning point, where tangents allow it to pass there.
+    """
+    before = 0.0
+    value = memory[row, 0]
+    slope = memory[row, 1]
+    for i in range(LOOKS):
+        end = limit * (i + 1) / LOOKS
+        there, rate = polynomial(memory, row, last, end)
+        x = end
+        found = there
+        one = value + slope * (end - before)
+        two = there - rate * (end - before)
+        above = slope > 0.0 and rate < 0.0 and there <= high + slack and min(one, two) > high + slack
+        below = slope < 0.0 and rate > 0.0 and there >= low - slack and max(one, two) < low - slack
+        if above or below:
+            x, found = turning(memory, row, last, before, end, above)
+        if found > high + slack or found < low - slack:
+            over = found > high + slack
+            return crossing(memory, row, last, before, x, high if over else low, over, 1e-3 * slack)
+        before = end
+        value = there
+        slope = rate
+    return 2.0
+
+
+def turning(memory, row, last, begin, end, rises):
+    """Place and value where the slope of a series changes its sign."""
+    x = 0.5 * (begin + end)
+    value = 0.0
+    for _ in range(40):
+        x = 0.5 * (begin + end)
+        value, slope = polynomial(memory, row, last, x)
+        if (slope > 0.0) == rises:
+            begin = x
+        else:
+            end = x
+    return x, value
+
+
+def crossing(memory, row, last, begin, end, goal, rises, close):
+    """Where a series passes `goal` between two places: Newton's method, kept between them by halving."""
+    x = end
+    for _ in range(80):
+        value, slope = polynomial(memory, row, last, x)
+        if (value > goal) == rises:
+            end = x
+        else:
+            begin = x
+        if abs(value - goal) <= close or end - begin <= 1e-16:
+            break
+        x = x - (value - goal) / slope if slope != 0.0 else 2.0
+        if not (begin < x < end):
+            x = 0.5 * (begin + end)
+    return x
+
+
+def polynomial(memory, row, last, x):
     """Value and slope at x of the series in a row of the memory."""
     value = 0.0
     slope = 0.0
@@ -198,7 +391,59 @@ def polynomial(memory, row, last, x):  # type: ignore[no-untyped-def]
     return value, slope
 
 
-def train_series(parameters: NDArray[np.float64], meshes: int) -> SeriesLaw:
-    """The law with these parameters, whose blocks hold so many meshes of changing stiffness."""
-    helpers = (time_function, product, time_orders, polynomial)
-    return SeriesLaw(train_begin, train_order, train_corner, helpers, parameters, 3 * int(parameters[0]), meshes)
+def train_begin(t, sign, u, du, p, forces, memory, pieces):
+    """Cells of all flanks at a start, at a node the one that lies ahead, and the pair forces there; not compiled."""
+    angle, rate = float(forces.angle(t)), float(forces.angle(t, 1))
+    slots = p.laws.touch.shape[1]
+    for k, flank in enumerate((*forces.curves, *forces.contacts)):
+        at, row = p.flanks.piece[k], p.flanks.row[k]
+        phase, approach = (float(x[0]) for x in flank.place(np.array([angle]), u[None]))
+        speed = sign * flank.sense * (flank.ratio * rate + du[flank.turn])
+        if k < len(forces.curves):
+            pieces[at : at + 2] = ahead_of(flank.curve.nodes, phase, speed)
+            bears = approach > 0.0 or (approach == 0.0 and sign * du[flank.direction] > 0.0)
+            pieces[at + 2] = 0 if bears or not flank.parts else -1
+            continue
+        turn, cell = ahead_of(flank.law.nodes, phase, speed)
+        pieces[at : at + 3] = turn, cell, 0 if 1.0 + flank.damping * du[flank.direction] > 0.0 else -1
+        force = np.zeros(slots)
+        made = flank.law([phase], [approach]).pair_forces[0]
+        shift = turn - int(flank.law.place(np.array([phase]))[0][0])  # a node at which a cycle ends lies behind
+        for slot in range(flank.law.slots):
+            if 0 <= slot + shift < slots:
+                force[slot + shift] = made[slot]
+        part = np.minimum(np.searchsorted(flank.law.forces, force, side="right") - 1, len(flank.law.forces) - 2)
+        pieces[at + PER_FLANK : at + PER_FLANK + slots] = np.where(force > 0.0, part, -1)
+        memory[row + BEFORE, :slots] = force
+
+
+def ahead_of(nodes, phase, speed):
+    """Cycle and cell that a phase is in, at a node those that lie ahead."""
+    cells, period = len(nodes) - 1, nodes[-1] - nodes[0]
+    turn = int(np.floor((phase - nodes[0]) / period))
+    place = phase - turn * period
+    cell = min(max(int(np.searchsorted(nodes, place, side="right")) - 1, 0), cells - 1)
+    width = nodes[cell + 1] - nodes[cell]
+    if speed > 0.0 and nodes[cell + 1] - place < SAME * width:
+        cell += 1
+    elif speed < 0.0 and place - nodes[cell] < SAME * width:
+        cell -= 1
+    return turn + cell // cells, cell % cells
+
+
+def train_series(forces: TrainForces) -> SeriesLaw:
+    """The series of a train's forces."""
+    program, rows, pieces = train_program(forces)
+
+    def begin(
+        t: float, sign: float, u: NDArray[np.float64], du: NDArray[np.float64], memory: NDArray[np.float64],
+        numbers: NDArray[np.int64],
+    ) -> None:  # fmt: skip
+        train_begin(t, sign, u, du, program, forces, memory, numbers)
+
+    constants = {"PAST": PAST, "SAME": SAME, "SMALL": SMALL, "LOOKS": LOOKS, "NEWTON": NEWTON, "CHANGED": CHANGED}
+    constants |= {name: value for name, value in vars(tables).items() if name.isupper() and isinstance(value, int)}
+    own = (step_begins, operate, pair_forces, watched, bounds, go_on, leaves, turning, crossing, polynomial)
+    return SeriesLaw(
+        begin, train_order, train_corner, (*own, time_series), program, rows, pieces, constants,
+    )  # fmt: skip

@@ -213,7 +213,7 @@ class _SoFar:
             f"mesh {line.name} pulls: {force:.5g} N at {1e3 * at:.5g} ms; the spring acts both ways, real teeth would "
             "part there"
             for line, force, at, most in zip(model.meshes, self.least, self.least_at, self.most, strict=True)
-            if force < -1e-6 * most
+            if line.pulls and force < -1e-6 * most
         ]
 
 

@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..meshlaw.law import MeshLaw
 from ..spectrum import OrderLine, nearest_line, order_lines, peaks
 from ..stiffness.curve import StiffnessCurve
+from ..train.kinematics import steady_forces
+from ..train.mesh_element import LEAST_REFERENCE, PHASES
 from ..train.response import TrainResponse
 from ..train.scene import TrainScene
 from .follow import Followed, RunningMean
@@ -142,12 +145,19 @@ def train_summary(followed: Followed, timings: Mapping[str, float], **further: A
 
 
 def stiffness_ranges(scene: TrainScene) -> dict[str, tuple[float | None, float | None]]:
-    """Mesh -> smallest and largest stiffness (N/m); None for a rigid mesh."""
+    """Mesh -> smallest and largest stiffness (N/m), of a mesh law its tangent under the steady force; None for a rigid
+    mesh.
+    """
     found: dict[str, tuple[float | None, float | None]] = {}
-    for mesh in scene.meshes:
+    for mesh, steady in zip(scene.meshes, steady_forces(scene), strict=True):
         given = mesh.stiffness
         if given is None or isinstance(given, float | int):
             found[mesh.name] = (given, given)
+        elif isinstance(given, MeshLaw):
+            force = max(abs(float(steady)), LEAST_REFERENCE * given.largest_force)
+            angles = given.nodes[0] + given.cycle * np.linspace(0.0, 1.0, PHASES)
+            tangent = given(angles, given.approach(angles, force)).tangent
+            found[mesh.name] = (float(tangent.min()), float(tangent.max()))
         else:
             values = given.k_mesh if isinstance(given, StiffnessCurve) else given.values
             found[mesh.name] = (float(np.nanmin(values)), float(np.nanmax(values)))

@@ -16,7 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.train.law import time_function, train_law
+from gearfe.rigid.kernel_rows import time_series
+from gearfe.rigid.tables import time_arrays
+from gearfe.train.arrays import curve_arrays
 
 from ..subject import train_model, train_times
 from ..timing import measured
@@ -31,7 +33,7 @@ def answer(task: dict[str, Any]) -> dict[str, Any]:
     model, times = train_model(task["variant"], quick=task["quick"]), train_times(task["quick"])
     core = model.core
     start = np.concatenate(core.reduce(model.start.q, model.start.v))
-    rhs = plain_rhs(core) if task["quick"] else compiled_rhs(core)
+    rhs = plain_rhs(core) if task["quick"] else compiled_rhs(core, model.forces)
     rhs(0.0, start, np.empty_like(start))
     runs = {"sundials": _sundials, "scipy_ivp": _scipy, "exudyn": _exudyn}
     (at, states), cost = measured(lambda: runs[task["peer"]](task, core, rhs, start, times), runs=3, most_s=30.0)
@@ -49,13 +51,13 @@ def plain_rhs(core: Any) -> Rhs:
     return rhs
 
 
-def compiled_rhs(core: Any) -> Rhs:
-    """The same in compiled code."""
+def compiled_rhs(core: Any, forces: Any) -> Rhs:
+    """The same in compiled code; `forces` are those of a train whose meshes have stiffness curves."""
     from gearfe.rigid import compiled
 
     [(force, index)] = core.system.forces
     names = {"np": np, "math": math}
-    functions = (modal_rhs, time_function, train_law)
+    functions = (modal_rhs, time_series, train_law)
     kernels = compiled.bind(functions, names, compiled=True, entries=("modal_rhs",))
     W = np.ascontiguousarray((core.T[index].T @ force.W).T)
     offset = np.atleast_1d(core.origin[index] @ force.W)
@@ -63,12 +65,56 @@ def compiled_rhs(core: Any) -> Rhs:
     if not np.array_equal(core.damping, np.diag(diagonal)):
         raise PeerError("the damping of the shipped train is modal")
     u, du, out = (np.zeros(len(W)) for _ in range(3))
-    fixed = (core.squares, diagonal, core.constant, W, offset, force.series.parameters)
+    fixed = (core.squares, diagonal, core.constant, W, offset, law_parameters(forces))
 
     def rhs(t: float, y: Any, dy: Any) -> None:
         kernels.modal_rhs(*fixed, t, np.asarray(y), np.asarray(dy), u, du, out)
 
     return rhs
+
+
+def law_parameters(forces: Any) -> tuple[Any, ...]:
+    """Functions of time with the directions of the torques, flanks and their curves, gyroscopic moments."""
+    if len(forces.curves) < len(forces.flanks):
+        raise PeerError("peers know stiffness curves only")
+    names = ("direction", "turn", "ratio", "sense", "phase", "mean")
+    flanks = np.array([[getattr(flank, name) for name in names] for flank in forces.curves])
+    gyros = np.array([[g.direction, g.ratio, g.polar] for g in forces.gyros]).reshape(-1, 3)
+    functions = [forces.angle, *(torque for _, torque in forces.torques)]
+    torques = np.array([direction for direction, _ in forces.torques], dtype=np.int64)
+    curves = curve_arrays([flank.curve for flank in forces.curves])
+    return time_arrays(functions), np.zeros((len(functions), 2)), torques, flanks, curves, gyros
+
+
+def train_law(t, u, du, parameters, out):  # type: ignore[no-untyped-def]
+    """Forces along all directions into `out`: the equations of `gearfe.train.forces`, written out for one time."""
+    times, now, torques, flanks, curves, gyros = parameters
+    time_series(times, t, True, 2, now)
+    for i in range(out.shape[0]):
+        out[i] = 0.0
+    for k in range(torques.shape[0]):
+        out[torques[k]] += now[k + 1, 0]
+    for k in range(flanks.shape[0]):
+        d = int(flanks[k, 0])
+        phase = flanks[k, 3] * (flanks[k, 2] * now[0, 0] + u[int(flanks[k, 1])]) + flanks[k, 4]
+        low = curves.first[k]
+        high = curves.first[k + 1] - 1
+        period = curves.nodes[high] - curves.nodes[low]
+        place = phase - math.floor((phase - curves.nodes[low]) / period) * period
+        while high - low > 1:
+            middle = (low + high) // 2
+            if curves.nodes[middle] <= place:
+                low = middle
+            else:
+                high = middle
+        x = place - curves.nodes[low]
+        c0, c1, c2, c3 = curves.cubics[low, 0], curves.cubics[low, 1], curves.cubics[low, 2], curves.cubics[low, 3]
+        out[d] -= (c0 + x * (c1 + x * (c2 + x * c3)) - flanks[k, 5]) * u[d]
+    for k in range(gyros.shape[0]):
+        d = int(gyros[k, 0])
+        momentum = gyros[k, 2] * (gyros[k, 1] * now[0, 1] + du[d + 2])
+        out[d] -= momentum * du[d + 1]
+        out[d + 1] += momentum * du[d]
 
 
 def modal_rhs(squares, diagonal, constant, W, offset, parameters, t, y, dy, u, du, out):  # type: ignore[no-untyped-def]

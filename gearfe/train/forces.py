@@ -1,0 +1,184 @@
+r"""All forces of a train that are not constant matrices, along few directions: one formulation for many times at once.
+
+The motion is split into rolling and a small rest: the rotation of a shaft is :math:`g\,\psi(t) + u`, psi the drive's
+angle, g the shaft's ratio to it, u a coordinate. With u, u' along the directions, the forces are
+
+- of a *flank with a stiffness curve*: along the approach d, :math:`-(k(\varphi)\,(u_d - j) - k_0 u_d)` with
+  :math:`\varphi = s\,(g\psi + u_r) + \varphi_0` and r the driver's rotation. The part with the mean :math:`k_0` stands
+  in the system's stiffness. A flank that may part bears where :math:`u_d > j`;
+- of a *flank with a mesh law* (`gearfe.meshlaw.law`): :math:`-(F\,\langle 1 + \chi u_d'\rangle - k_0 u_d)` along d, and
+  :math:`-s M` along r, the driver's rotation relative to the line of centres;
+- *gyroscopic*: :math:`-J_p\Omega\,(u_{d+1}', -u_d')`, :math:`\Omega = g\psi' + u_{d+2}'`, on the tilts d, d + 1 of a
+  shaft with the spin d + 2;
+- *torques*: functions of time along a direction.
+
+A mesh has one flank, or two: the back flank has an approach of its own, along the other line of action, and its law is
+the driving one's at the mirrored phase, behind the backlash j.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..meshlaw.law import MeshLaw
+from ..rigid.timefunctions import TimeFunction
+from ..stiffness.periodic import PeriodicInterpolant
+from .arrays import cubics
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Flank:
+    """One side of a mesh.
+
+    Attributes
+    ----------
+    direction, turn
+        Numbers of the approach and of the driver's rotation among the directions.
+    ratio, sense, phase
+        The phase is ``sense (ratio psi + u[turn]) + phase`` (rad).
+    mean
+        Stiffness (N/m) that the system's constant part has along the approach already.
+    gap
+        Approach (m) at which unmodified flanks touch.
+    """
+
+    direction: int
+    turn: int
+    ratio: float
+    sense: float
+    phase: float
+    mean: float
+    gap: float
+
+    def place(self, angle: Array, u: Array) -> tuple[Array, Array]:
+        """Phase (rad) and approach beyond the gap (m), u of shape (n, directions)."""
+        return self.sense * (self.ratio * angle + u[:, self.turn]) + self.phase, u[:, self.direction] - self.gap
+
+
+@dataclass(frozen=True, eq=False)
+class CurveFlank(Flank):
+    """Force k(phase) times approach; where `parts`, none before the touch."""
+
+    curve: PeriodicInterpolant
+    parts: bool
+
+    def forces(self, angle: Array, u: Array, du: Array) -> tuple[Array, None]:  # noqa: ARG002
+        """Force along the approach (N), shape (n,), and no moment on the phase."""
+        phase, approach = self.place(angle, u)
+        nodes, table = self.curve.nodes, self._cubics
+        place = phase - np.floor((phase - nodes[0]) / self.curve.period) * self.curve.period
+        cell = np.minimum(np.searchsorted(nodes[1:], place, side="right"), len(nodes) - 2)
+        c, x = table[cell].T, place - nodes[cell]
+        force = (c[0] + x * (c[1] + x * (c[2] + x * c[3]))) * approach
+        return (np.maximum(force, 0.0) if self.parts else force), None
+
+    @cached_property
+    def _cubics(self) -> Array:
+        return cubics(self.curve)
+
+
+@dataclass(frozen=True, eq=False)
+class LawFlank(Flank):
+    """A mesh law; `damping` is chi (s/m)."""
+
+    law: MeshLaw
+    damping: float
+
+    def forces(self, angle: Array, u: Array, du: Array) -> tuple[Array, Array]:
+        """Force along the approach, damping included (N), and moment on the phase (N m), shape (n,)."""
+        made = self.law(*self.place(angle, u))
+        return made.force * np.maximum(1.0 + self.damping * du[:, self.direction], 0.0), made.moment
+
+
+@dataclass(frozen=True)
+class Gyro:
+    """Gyroscopic moments on the tilts `direction` and the one after it; `polar` in kg m2."""
+
+    direction: int
+    ratio: float
+    polar: float
+
+
+@dataclass(frozen=True, eq=False)
+class TrainForces:
+    """The forces along `size` directions.
+
+    Attributes
+    ----------
+    angle
+        psi, rotation of the drive (rad).
+    gyros, flanks
+        What depends on the motion.
+    torques
+        Pairs (direction, torque over time in N m).
+    """
+
+    size: int
+    angle: TimeFunction
+    gyros: tuple[Gyro, ...]
+    flanks: tuple[Flank, ...]
+    torques: tuple[tuple[int, TimeFunction], ...]
+
+    @cached_property
+    def curves(self) -> tuple[CurveFlank, ...]:
+        """Flanks with stiffness curves."""
+        return tuple(f for f in self.flanks if isinstance(f, CurveFlank))
+
+    @cached_property
+    def contacts(self) -> tuple[LawFlank, ...]:
+        """Flanks with mesh laws."""
+        return tuple(f for f in self.flanks if isinstance(f, LawFlank))
+
+    def of_flank(self, flank: Flank, t: Array, u: Array, du: Array) -> Array:
+        """Force of a flank (N) at the times t (n,), u and du of shape (n, directions)."""
+        assert isinstance(flank, CurveFlank | LawFlank)
+        return flank.forces(self.angle(t), u, du)[0]
+
+    def __call__(self, t: Array, u: Array, du: Array) -> Array:
+        """Forces at the times t (n,), u and du of shape (n, directions); shape (n, directions)."""
+        out = np.zeros_like(u)
+        angle, rate = self.angle(t), self.angle(t, 1)
+        for flank in self.flanks:
+            assert isinstance(flank, CurveFlank | LawFlank)
+            force, moment = flank.forces(angle, u, du)
+            out[:, flank.direction] += flank.mean * u[:, flank.direction] - force
+            if moment is not None:
+                out[:, flank.turn] -= flank.sense * moment
+        for gyro in self.gyros:
+            d = gyro.direction
+            momentum = gyro.polar * (gyro.ratio * rate + du[:, d + 2])
+            out[:, d] -= momentum * du[:, d + 1]
+            out[:, d + 1] += momentum * du[:, d]
+        for direction, torque in self.torques:
+            out[:, direction] += torque(t)
+        return out
+
+    @property
+    def at_one_time(self) -> Callable[[float, Array, Array], Array]:
+        """The same as a function ``(t, u, du) -> (size,)``."""
+
+        def law(t: float, u: Array, du: Array) -> Array:
+            made: Array = self(np.array([t]), u[None], du[None])[0]
+            return made
+
+        return law
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Times at which a function of time is not smooth."""
+        return tuple(sorted({*self.angle.breaks, *(b for _, torque in self.torques for b in torque.breaks)}))
+
+
+def derivative(function: TimeFunction) -> TimeFunction:
+    """d/dt of a function of time, away from its breaks."""
+    rows = tuple(tuple(j * c for j, c in enumerate(row))[1:] or (0.0,) for row in function.coefficients)
+    sines = tuple((a * w, w, p + math.pi / 2) for a, w, p in function.sines)
+    return TimeFunction(function.starts, function.origins, rows, sines)
