@@ -1,18 +1,17 @@
 """The series of a train's forces: the same law at many times, order by order, and the corners between its cells."""
 
-import dataclasses
 import math
 
 import numpy as np
 import pytest
 
-from gearfe.meshlaw.fit import Couple, PairForces, TouchCurve, fit_law
 from gearfe.rigid import TimeFunction, compiled, constant, kernel_modal, smoothed_step
 from gearfe.stiffness.periodic import periodic_interpolant
 from gearfe.train import build_train, simulate
 from gearfe.train.forces import CurveFlank, Gyro, LawFlank, TrainForces
 from gearfe.train.series import train_corner, train_order, train_series
 
+from .mesh_laws import hertzian_law
 from .trains import SHIPPED, curve, train
 
 SPEED = 600.0
@@ -24,22 +23,6 @@ def flank(sense=1.0, method="linear", direction=0, spin=1, parts=False, gap=0.0)
     values = np.array([1e8, 1.1e8, 0.9e8, 1e8, 1.05e8])
     shape = periodic_interpolant(NODES, values, 0.6, widest_gap=0.3, method=method)
     return CurveFlank(direction, spin, 1.0, sense, 0.0, 1e8, gap, shape, parts)
-
-
-def hertzian_law(cycle=0.3):
-    """A law whose pairs yield as Hertz's contacts on springs that vary with the angle, through exact data."""
-    cells = 12
-    angle = -0.28 + cycle * np.arange(2 * cells + 1) / cells
-    touch = TouchCurve(angle, 2e-3 * np.maximum(np.abs(angle) - 0.16, 0.0) ** 2, 0.0 * angle)
-    slope = 4e-3 * np.maximum(np.abs(angle) - 0.16, 0.0) * np.sign(angle)
-    psi, force = np.meshgrid(np.linspace(angle[0], angle[-1], 90), np.geomspace(2.0, 8e3, 9), indexing="ij")
-    made = force * (1.3e-8 + 2e-9 * np.cos(9 * psi) - 2.9e-10 * np.log(force / 1e3))
-    found = PairForces(psi.ravel(), force.ravel(), np.ones(psi.size), made.ravel())
-    couple = Couple(np.linspace(-0.3, 0.1, 9), 5.4e-9 + 2e-10 * np.linspace(-1, 1, 9) ** 2)
-    return fit_law(
-        found, dataclasses.replace(touch, slope=slope), [couple], cells=cells, hertz=2.9e-10, base_radii=(0.02, 0.03),
-        backlash=0.0, reach=6e-5,
-    )  # fmt: skip
 
 
 def began(forces, t, sign, u, s):
@@ -57,7 +40,7 @@ def test_the_series_sums_up_to_the_law(kind, s):
     speed = constant(SPEED) + TimeFunction(sines=((20.0, 4e4, 0.3),))
     torque = smoothed_step(0.5e-3, 1e-3, -100.0) + TimeFunction(sines=((7.0, 3e4, 1.0),))
     if kind == "law":
-        law = hertzian_law()
+        law = hertzian_law(0.3)
         flanks = (
             LawFlank(3, 2, 1.0, 1.0, 0.006, 1e8, 0.0, law, 0.2),
             LawFlank(4, 5, 1.0, -1.0, 0.0585, 0.0, -2e-6, law, 0.0),

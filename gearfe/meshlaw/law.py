@@ -119,7 +119,8 @@ class MeshLaw:
     @cached_property
     def largest_force(self) -> float:
         """Mesh force (N) up to which the law is known at every phase."""
-        return float(self(self.nodes, self.touching(self.nodes) + self.reach).force.min())
+        angles = self.nodes[0] + self.cycle * np.linspace(0.0, 1.0, 10 * len(self.nodes))
+        return 0.999 * float(self(angles, self.touching(angles) + self.reach).force.min())
 
     def place(self, angles: Array) -> tuple[IntArray, IntArray, Array]:
         """Mesh cycle, cell and angle beyond its first node (rad)."""

@@ -24,6 +24,8 @@ class Motion:
         Coordinates, rates, second rates.
     contact_force : (n, meshes)
         N.
+    approach : (n, meshes)
+        Along the lines of action (m).
     drive_torque : (n,)
         Torque of the drive on its shaft (N m).
     """
@@ -33,6 +35,7 @@ class Motion:
     v: Array
     a: Array
     contact_force: Array
+    approach: Array
     drive_torque: Array
 
 
@@ -56,7 +59,8 @@ def motion(model: TrainModel, trajectory: Trajectory) -> Motion:
     else:
         row = model.spin_reference[[s.name for s in model.scene.shafts].index(drive.shaft)]
         push = -drive.stiffness * (q @ row) - drive.damping * (v @ row)
-    return Motion(t, q, v, a, contact_forces(model, t, q, v, multipliers), push)
+    rows = np.array([line.row for line in model.meshes]).reshape(-1, q.shape[1])
+    return Motion(t, q, v, a, contact_forces(model, t, q, v, multipliers), q @ rows.T, push)
 
 
 def forces(model: TrainModel, t: Array, q: Array, v: Array) -> Array:

@@ -16,6 +16,7 @@ SAMPLED = (
     "time",
     "drive_angle",
     "contact_force",
+    "transmission_error",
     "drive_torque",
     "speed",
     "speed_absolute",
@@ -44,7 +45,11 @@ class TrainResponse:
     drive_torque : (n,)
         Torque of the drive on its shaft (N m), about the axis.
     contact_force : (n, m)
-        Force of each mesh along its line of action (N); positive presses the flanks together.
+        Force of each mesh along its line of action (N); positive presses the driving flanks together, negative the back
+        flanks (or it pulls, where a spring acts both ways).
+    transmission_error : (n, m)
+        Approach of both gears along the line of action (m), by turns, tilts and displacements: the dynamic transmission
+        error. 0 where unmodified driving flanks touch.
     shaft_names : tuple of s names
     speed, speed_absolute : (n, s)
         Spin of each shaft about the axis (rad/s): relative to its first bore, as a hinge measures it, and absolute.
@@ -82,7 +87,9 @@ class TrainResponse:
     statistics, estimates : mapping
         ``steps``, ``method``, ``scheme``, ``seconds``, ``compile_seconds``, ``choice``, ``free_coordinates``,
         ``redundant_constraints`` (names),
-        ``smallest_contact_force_N``; error estimates asked for (``integration``, ``reduction``).
+        ``smallest_contact_force_N``; for each mesh ``contacts_lost``, ``contacts_regained``, ``share_without_contact``
+        and ``longest_without_contact_s`` (None for meshes that do not part); error estimates asked for
+        (``integration``, ``reduction``).
     warnings : tuple of str
     """
 
@@ -90,6 +97,7 @@ class TrainResponse:
     drive_angle: Array
     mesh_names: tuple[str, ...]
     contact_force: Array
+    transmission_error: Array
     drive_torque: Array
     shaft_names: tuple[str, ...]
     speed: Array

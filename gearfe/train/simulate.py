@@ -18,6 +18,7 @@ from ..rigid import IntegrationError, Start, Status, Trajectory, integrate
 from .floquet import train_multipliers
 from .model import TrainModel
 from .motion import Motion, motion
+from .parting import Parting, beyond_law, parted
 from .response import TrainResponse, joined
 
 Array = NDArray[np.float64]
@@ -177,9 +178,10 @@ class _SoFar:
     least: Array = field(default_factory=lambda: np.zeros(0))
     least_at: Array = field(default_factory=lambda: np.zeros(0))
     most: Array = field(default_factory=lambda: np.zeros(0))
+    parting: list[Parting] = field(default_factory=list)
 
     def add(self, trajectory: Trajectory, moved: Motion, seconds: float) -> None:
-        """Count steps and seconds, keep each mesh's least force, its time, and the largest size."""
+        """Count steps and seconds, keep each mesh's least force, its time, the largest size, and when teeth part."""
         self.seconds += seconds - float(trajectory.statistics.get("compile_seconds", 0.0))
         for name in COUNTED:
             if name in trajectory.statistics:
@@ -188,6 +190,9 @@ class _SoFar:
         if not len(self.least):
             self.least, self.most = np.full(force.shape[1], np.inf), np.zeros(force.shape[1])
             self.least_at = np.zeros(force.shape[1])
+            self.parting = [Parting() for _ in range(force.shape[1])]
+        for one, values in zip(self.parting, force.T, strict=True):
+            one.add(moved.time, values == 0.0)
         if len(force):
             self.reached = float(moved.time[-1])
             low = force.min(axis=0)
@@ -205,6 +210,7 @@ class _SoFar:
             "free_coordinates": model.core.T.shape[1],
             "redundant_constraints": redundant_names(model),
             "smallest_contact_force_N": self.least.tolist(),
+            **parted(self.parting, [line.rigid or line.pulls for line in model.meshes]),
         }
 
     def pulls(self, model: TrainModel) -> list[str]:
@@ -288,17 +294,16 @@ def _whole(
 def _ended(model: TrainModel, trajectory: Trajectory, moved: Motion) -> tuple[str, int, str]:
     """Status, the number of output times up to which the results hold, and what moved too far."""
     limit = DIVERGED * min((line.module for line in model.meshes), default=1e-3)
-    reach = (
-        np.abs(moved.q @ np.array([line.row for line in model.meshes]).T)
-        if model.meshes
-        else np.zeros((len(moved.q), 1))
-    )
+    reach = np.abs(moved.approach) if model.meshes else np.zeros((len(moved.q), 1))
     shafts = np.abs(moved.q[:, [i + j for i in model.first for j in range(3)]])
     worst = np.maximum(reach.max(axis=1), shafts.max(axis=1))
     bad = ~np.isfinite(moved.q).all(axis=1) | ~(worst <= limit)
     if bad.any():
         at = int(np.argmax(bad))
         return "diverged", at, _too_far(model, reach[at], shafts[at], limit)
+    beyond = beyond_law(model, moved)
+    if beyond is not None:
+        return "beyond the mesh law", *beyond
     return ("diverged" if trajectory.status is Status.NOT_FINITE else trajectory.message), len(moved.time), ""
 
 
@@ -317,7 +322,7 @@ def _too_far(model: TrainModel, reach: Array, shafts: Array, limit: float) -> st
 
 
 def _cut(moved: Motion, first: int, keep: int) -> Motion:
-    names = ("time", "q", "v", "a", "contact_force", "drive_torque")
+    names = ("time", "q", "v", "a", "contact_force", "approach", "drive_torque")
     return Motion(*(getattr(moved, name)[first:keep] for name in names))
 
 
@@ -336,6 +341,7 @@ def _response(
         drive_angle=model.angle(t),
         mesh_names=tuple(line.name for line in model.meshes),
         contact_force=moved.contact_force,
+        transmission_error=moved.approach,
         drive_torque=moved.drive_torque,
         shaft_names=tuple(s.name for s in scene.shafts),
         speed=rate + moved.v @ model.spin_reference.T,

@@ -1,0 +1,166 @@
+"""Trains whose teeth part and meet: energy, separation, back flanks, transmission error, known oscillators."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from gearfe.errors import InputError
+from gearfe.rigid import TimeFunction, constant, integrate, smoothed_step
+from gearfe.rigid.compiled import available
+from gearfe.train import Damping, Drive, Load, build_train, simulate
+from gearfe.train.motion import motion
+
+from .mesh_laws import hertzian_law
+from .trains import base_radius, curve, elastic, train
+
+R1, R2 = base_radius(20), base_radius(30)
+needs_numba = pytest.mark.skipif(not available(), reason="numba is not installed")
+
+
+def pair(law, *, speed=600.0, torque=None, backlash=None, **changes):  # type: ignore[no-untyped-def]
+    """One stage with a law; `torque` brakes the driven shaft."""
+    scene = train([(20, 30)], **changes)
+    mesh = dataclasses.replace(scene.meshes[0], stiffness=law, backlash=backlash)
+    scene = dataclasses.replace(scene, meshes=(mesh,), drive=dataclasses.replace(scene.drive, speed=constant(speed)))
+    if torque is not None:
+        scene = dataclasses.replace(scene, loads=(Load("s1", None, torque),))
+    return scene
+
+
+def free_pair(law, force):  # type: ignore[no-untyped-def]
+    """Both shafts free but for balanced torques, the drive a spring of no consequence."""
+    scene = pair(law)
+    drive = Drive("s0", "s0+", constant(600.0), stiffness=1e-9)
+    loads = (Load("s0", None, constant(force * R1)), Load("s1", None, constant(force * R2)))
+    return build_train(dataclasses.replace(scene, drive=drive, loads=loads))
+
+
+def free_energy(model, law, times, tolerance):  # type: ignore[no-untyped-def]
+    """Kinetic and elastic energy less the work of the torques (J), and the elastic part."""
+    run = integrate(model.system, times, method="explicit", tolerance=tolerance, start=model.start)
+    moved = motion(model, run)
+    line = model.meshes[0]
+    spins = moved.q[:, [int(i) + 5 for i in model.first]]
+    rates = moved.v[:, [int(i) + 5 for i in model.first]] + model.angle(moved.time, 1)[:, None] * model.ratios
+    turned = spins + model.angle(moved.time)[:, None] * model.ratios
+    kinetic = 0.5 * rates**2 @ np.array([s.rotor.polar for s in model.shafts])
+    phase = line.sense * (line.ratio * model.angle(moved.time) + spins[:, 0]) + line.phase
+    elastic_part = law(phase, moved.q @ line.row).energy
+    work = sum(float(f(0.0)) * (turned @ np.array([d[int(i) + 5] for i in model.first])) for d, f in model.torques)
+    return kinetic + elastic_part - work, elastic_part, moved
+
+
+@needs_numba
+@pytest.mark.parametrize("cycles", [20, pytest.param(1000, marks=pytest.mark.slow)])
+def test_a_free_pair_keeps_its_energy(cycles):
+    """Undamped, with one and two pairs in contact in turns and teeth that part: 1e-9 of the elastic energy."""
+    law = hertzian_law(relief=3e-6)
+    model = free_pair(law, 800.0)
+    times = np.linspace(0.0, cycles * 2 * math.pi / 20 / 600.0, 40 * min(cycles, 100))
+    energy, elastic_part, moved = free_energy(model, law, times, 1e-10)
+    assert (moved.contact_force == 0).any()  # they part
+    assert np.abs(energy - energy[0]).max() < 1e-9 * energy.max()
+    assert np.abs(energy - energy[0]).max() < 1e-6 * elastic_part.max()
+
+
+@needs_numba
+def test_slow_running_is_the_static_transmission_error():
+    law = hertzian_law(relief=5e-6)
+    torque, period = smoothed_step(0.01, 0.02, 60.0), 2 * math.pi / 20 / 0.3
+    scene = pair(law, speed=0.3, torque=torque, damping=Damping(ratio=0.05))
+    model = build_train(scene)
+    made = simulate(model, np.linspace(0.0, period + 0.05, 401), tolerance=1e-6)
+    late = made.time > 0.05
+    line = model.meshes[0]
+    run = made.transmission_error[late, 0]
+    static = law.approach(line.sense * line.ratio * model.angle(made.time[late]) + line.phase, 60.0 / R2)
+    assert np.abs(run - static).max() < 1e-3 * np.ptp(static)
+
+
+@needs_numba
+def test_a_load_that_drives_bears_on_the_back_flanks():
+    """Behind the backlash j, the mirrored law: the approach is -(j + that of the mirrored phase)."""
+    law, j = hertzian_law(relief=5e-6), 20e-6
+    scene = pair(law, speed=1.0, torque=smoothed_step(0.01, 0.02, -60.0), backlash=j, damping=Damping(ratio=0.02))
+    with pytest.raises(InputError, match="back flanks"):
+        build_train(pair(law, speed=1.0, torque=constant(-60.0)))
+    model = build_train(scene)
+    made = simulate(model, np.linspace(0.0, 0.2, 201), tolerance=1e-6)
+    late = made.time > 0.1
+    phase = model.meshes[0].sense * model.angle(made.time[late]) + model.meshes[0].phase
+    static = -j - law.approach(-phase, 60.0 / R2)
+    assert made.contact_force[late, 0] == pytest.approx(np.full(late.sum(), -60.0 / R2), rel=1e-3)
+    assert np.abs(made.transmission_error[late, 0] - static).max() < 1e-3 * 5e-6
+
+
+@needs_numba
+def test_the_mirrored_train_moves_alike():
+    """Drive and load reversed: the other flanks of the same teeth bear, and all forces are the same."""
+    law = hertzian_law(relief=2e-6)
+    made = [
+        simulate(
+            build_train(pair(law, speed=s * 600.0, torque=s * smoothed_step(0.2e-3, 0.4e-3, 40.0), backlash=10e-6)),
+            np.linspace(0.0, 2e-3, 101),
+            tolerance=1e-9,
+        ).contact_force
+        for s in (1.0, -1.0)
+    ]
+    assert (made[0] == 0).any()
+    assert made[1] == pytest.approx(made[0], abs=1e-4 * np.abs(made[0]).max())
+
+
+@needs_numba
+@pytest.mark.parametrize("damping", [0.0, 400.0])
+def test_an_oscillator_with_backlash_against_events_by_scipy(damping):
+    """One degree of freedom, k = k0 (1 + e cos), a damper that always acts, flanks that part behind a backlash.
+
+    scipy's DOP853 at 1e-12 with each stretch between touches integrated by itself.
+    """
+    j, swing, torque = 3e-6, 0.25, constant(2.0) + TimeFunction(sines=((30.0, 9e3, 0.2),))
+    shape = curve(20, mean=1e8, swing=swing, method="cubic", count=40)
+    scene = pair(shape, torque=torque, backlash=j)
+    mesh = dataclasses.replace(scene.meshes[0], damping=damping)
+    model = build_train(dataclasses.replace(scene, meshes=(mesh,)))
+    times = np.linspace(0.0, 2e-3, 101)
+    made = simulate(model, times, tolerance=1e-9)
+    inertia = model.shafts[1].rotor.polar
+    line = model.meshes[0]
+
+    def force(t, x):  # type: ignore[no-untyped-def]
+        phase = 600.0 * t + line.phase
+        if x > 0.0:
+            return float(shape(phase).value) * x
+        return float(shape(-phase).value) * (x + j) if x < -j else 0.0
+
+    def rhs(t, y):  # type: ignore[no-untyped-def]
+        return [y[1], R2 * (float(torque(t)) - R2 * (force(t, y[0]) + damping * y[1])) / inertia]
+
+    fine = np.unique(np.concatenate([times, np.linspace(0, 2e-3, 2001)]))
+    true = solve_ivp(rhs, (0, 2e-3), [0.0, 0.0], "DOP853", t_eval=fine, rtol=1e-12, atol=1e-18, max_step=5e-7).y
+    x = np.interp(times, fine, true[0])
+    assert (x < -j).any()
+    assert ((x > -j) & (x < 0.0)).any()
+    assert np.abs(made.transmission_error[:, 0] - x).max() < 1e-3 * np.abs(x).max()
+
+
+def test_mistakes():
+    law = hertzian_law()
+    with pytest.raises(InputError, match="wedged"):
+        build_train(pair(law, backlash=-1e-6))
+    with pytest.raises(InputError, match="has a period of"):
+        build_train(pair(hertzian_law(0.3)))
+
+
+@needs_numba
+def test_a_law_that_does_not_reach_says_what_to_ask_for():
+    law = hertzian_law()
+    scene = pair(law, torque=smoothed_step(0.5e-3, 1e-3, 3.0 * law.largest_force * R2))
+    made = simulate(build_train(scene), np.linspace(0.0, 2e-3, 101), raise_on_failure=False)
+    assert made.status == "beyond the mesh law"
+    assert made.time_reached < 1.2e-3
+    assert any("N m" in warning and "law_torque_Nm" in warning for warning in made.warnings)
