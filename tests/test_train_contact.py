@@ -16,7 +16,7 @@ from gearfe.train import Damping, Drive, Load, build_train, simulate
 from gearfe.train.motion import motion
 
 from .mesh_laws import hertzian_law
-from .trains import base_radius, curve, elastic, train
+from .trains import base_radius, curve, train
 
 R1, R2 = base_radius(20), base_radius(30)
 needs_numba = pytest.mark.skipif(not available(), reason="numba is not installed")

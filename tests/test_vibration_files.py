@@ -154,7 +154,7 @@ def test_a_run_that_ended_early_is_written(tmp_path, scene):
     }
     short |= {
         name: getattr(made_up(), name)[:40]
-        for name in ("acceleration_absolute", "attachment_acceleration", "gear_pose")
+        for name in ("acceleration_absolute", "attachment_acceleration", "gear_pose", "transmission_error")
     }
     response = made_up(**short, status="diverged", time_reached=39 * STEP)
     choice = OutputChoice(spectrum_start=5e-3)  # beyond what was reached

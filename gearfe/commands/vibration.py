@@ -228,6 +228,15 @@ def told(response: TrainResponse, scene: TrainScene, written: Written, choice: O
             else f", mean contact force {mean[i]:.1f}{off('mean_contact_forces_N', i)} N"
         )
         lines.append(f"mesh {i + 1} ({name}): {frequency:.1f} Hz, {k}{force}")
+    contact = summary.get("contact", {})
+    for i, share in enumerate(contact.get("share_without_contact", ())):
+        if share is not None:
+            lost, factor = contact["contacts_lost"][i], contact["dynamic_factors"][i]
+            parts = (
+                f"no contact in {100 * share:.3g} % of the time, contacts lost: {lost}" if lost else "always in contact"
+            )
+            most = "" if factor is None else f"; largest force {factor:.3g} times the steady one"
+            lines.append(f"mesh {i + 1}: {contact['flanks'][i]}; {parts}{most}")
     if response.common_period_s:
         count = summary.get("mean_over_common_periods", 0)
         lines.append(

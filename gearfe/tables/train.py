@@ -73,7 +73,7 @@ class TrainGearTable(ToothFormTable):
 
 @dataclass(frozen=True)
 class TrainMeshTable:
-    """Two gears in mesh. Its stiffness is computed with [stiffness] unless one of the keys below gives it."""
+    """Two gears in mesh. What it is made of is computed with [stiffness] unless one of the keys below gives it."""
 
     driver: str = quantity(doc="name of the driving gear")
     driven: str = quantity(doc="name of the driven gear")
@@ -85,6 +85,22 @@ class TrainMeshTable:
     damping_N_s_per_m: float = quantity(0.0, low=0.0, doc="damping along the line of action (N s/m)")
     centre_distance_mm: float | None = quantity(
         None, above=0.0, doc="working centre distance (mm); left out: no backlash"
+    )
+    law: str | None = quantity(
+        None,
+        choices=("map", "curve", "linear"),
+        doc="map: mesh law with transmission error and separation; curve: k(phi) delta; linear: mean of that curve; "
+        "left out: that of [train.curves]",
+    )
+    law_torque_Nm: float | None = quantity(
+        None,
+        above=0.0,
+        doc="largest torque at the driven gear that the mesh law is made for; left out: 5 times the steady one",
+    )
+    backlash_um: float | None = quantity(
+        None,
+        doc="normal backlash (um); left out: with a map that of the gears, or no back flanks where they have none; "
+        "with a curve or a constant a spring that acts both ways",
     )
     curve: str | None = quantity(None, doc="CSV file with pinion_angle_deg and k_mesh_N_per_m, beside the job file")
     load_map: str | None = quantity(
@@ -102,6 +118,17 @@ class TrainMeshTable:
             raise InputError(
                 f"{where}.{given[1]}", getattr(self, given[1]), f"stands beside {given[0]}", "leave one out"
             )
+        if given and self.law == "map":
+            cure = f'write law = "curve", or leave {given[0]} out: a map is made of contact solutions'
+            raise InputError(f"{where}.law", self.law, f"contradicts {given[0]}", cure)
+        if self.backlash_um is not None and self.backlash_um < 0.0:
+            problem = "must be >= 0 um: less is a wedged mesh, whose flanks all bear without a load"
+            raise InputError(
+                f"{where}.backlash_um", self.backlash_um, problem, "thin the teeth, or move the shafts apart"
+            )
+        if self.backlash_um is not None and self.rigid:
+            problem = "stands beside rigid = true: rigid teeth never part"
+            raise InputError(f"{where}.backlash_um", self.backlash_um, problem, "leave one out")
 
 
 @dataclass(frozen=True)
@@ -159,6 +186,11 @@ class TrainCurvesTable:
         doc="load and angles of [stiffness], or the torque that each mesh carries",
     )
     positions: int = quantity(36, low=8, high=10_000, doc='positions in one mesh cycle, for load = "torque"')
+    law: str = quantity(
+        "curve",
+        choices=("map", "curve", "linear"),
+        doc="of meshes whose stiffness is computed: map, curve or linear, see [[train.meshes]]",
+    )
     interpolation: str = quantity(
         "cubic", choices=("cubic", "linear"), doc="between the positions: cubic (monotone) or linear"
     )

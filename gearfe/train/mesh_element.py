@@ -106,6 +106,17 @@ class MeshLine:
         """Whether its spring acts both ways."""
         return self.curve is not None and self.backlash is None
 
+    @property
+    def told(self) -> str:
+        """Which flanks bear, in words."""
+        if self.rigid:
+            return "rigid"
+        if self.pulls:
+            return "a spring that acts both ways"
+        if self.backlash is None:
+            return "driving flanks only: the gears have no backlash, and backlash_um is not given"
+        return f"both flanks, {1e6 * self.backlash:.6g} um of normal backlash"
+
     def stiffness(self, angle: Array, rest: Array | float = 0.0) -> Array:
         """k (N/m) at rotations `angle` (rad) of the drive, the driver's rotation beside rolling being `rest` (rad)."""
         assert self.curve is not None

@@ -16,6 +16,7 @@ from ..progress import count, stage
 from ..record_spectrum import FASTEST, SPARE
 from ..rigid import IntegrationError, Start, Status, Trajectory, integrate
 from .floquet import train_multipliers
+from .kinematics import steady_forces
 from .model import TrainModel
 from .motion import Motion, motion
 from .parting import Parting, beyond_law, parted
@@ -210,6 +211,8 @@ class _SoFar:
             "free_coordinates": model.core.T.shape[1],
             "redundant_constraints": redundant_names(model),
             "smallest_contact_force_N": self.least.tolist(),
+            "steady_forces_N": steady_forces(model.scene).tolist(),
+            "flanks": [line.told for line in model.meshes],
             **parted(self.parting, [line.rigid or line.pulls for line in model.meshes]),
         }
 

@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..meshlaw.law import MeshLaw
 from ..reduction.modal_body import ModalBody
 from ..stiffness.curve import StiffnessCurve
 from ..train import build_train
@@ -208,7 +209,10 @@ def _stiffer(scene: TrainScene) -> TrainScene | None:
     meshes, changed = [], False
     for mesh in scene.meshes:
         curve = mesh.stiffness
-        if isinstance(curve, StiffnessCurve) and curve.error is not None:
+        if isinstance(curve, MeshLaw) and math.isfinite(curve.error):
+            meshes.append(replace(mesh, stiffness=curve.stiffer(curve.error)))
+            changed = True
+        elif isinstance(curve, StiffnessCurve) and curve.error is not None:
             worst = curve.error.worst
             meshes.append(replace(mesh, stiffness=replace(curve, k_mesh=(1.0 + worst) * curve.k_mesh)))
             changed = True

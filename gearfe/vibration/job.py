@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..gear.pair import Gear, GearPair
+from ..meshlaw.law import MeshLaw
 from ..progress import stage
 from ..rigid import TimeFunction, constant, smoothed_step
 from ..stiffness.curve import StiffnessCurve
@@ -26,12 +27,18 @@ from ..tables.pair import DEFAULTS, PairTable
 from ..tables.stiffness import StiffnessTable
 from ..tables.train import TrainGearTable, TrainMeshTable, TrainTable, read_train_tables
 from ..train.kinematics import steady_forces
+from ..train.mesh_element import mean_value
 from ..train.scene import Bearing, Damping, Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
 
 if TYPE_CHECKING:
     from ..reduction.modal_body import ModalBody
 
-Stiffness = StiffnessCurve | float | None
+Stiffness = MeshLaw | StiffnessCurve | float | None
+
+#: A mesh law is made for so many times the torque in steady running: vibration has room.
+ROOM = 5.0
+#: Positions at which the error of a law's stiffness is estimated.
+ESTIMATED = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +133,12 @@ def train_curves(
             found.append(_read_curve(job.path.parent / mesh.curve, teeth))
         elif mesh.load_map is not None:
             found.append(_mapped_curve(job.path.parent / mesh.load_map, scene, number))
+        elif (mesh.law or job.table.curves.law) == "map":
+            found.append(_computed_law(job, scene, number, estimate))
         else:
-            found.append(_computed_curve(job, scene, number, watch, progress, estimate))
+            curve = _computed_curve(job, scene, number, watch, progress, estimate)
+            linear = (mesh.law or job.table.curves.law) == "linear"
+            found.append(mean_value(curve.interpolant("k_mesh", method="cubic")) if linear else curve)
     return tuple(found)
 
 
@@ -252,6 +263,7 @@ def _mesh(job: TrainJob, table: TrainMeshTable, stiffness: Stiffness) -> GearMes
         table.damping_N_s_per_m,
         job.table.curves.interpolation,
         None if distance is None else 1e-3 * distance,
+        None if table.backlash_um is None else 1e-6 * table.backlash_um,
     )
 
 
@@ -352,6 +364,41 @@ def _computed_curve(
     }
     with stage(mesh.name):
         return cached_curve(pair, model, sweep, watch=watch, progress=progress, estimate_error=estimate)
+
+
+def _computed_law(job: TrainJob, scene: TrainScene, number: int, estimate: bool) -> MeshLaw:
+    """Mesh law of a mesh with the driver as pinion; meshes of the same gears share the one for the largest torque."""
+    from ..contact.laws import law_named
+    from ..meshlaw.make import cached_law
+    from ..stiffness.curve_cache import cached_curve
+    from ..stiffness.job import StiffnessJob
+
+    def gears(mesh: GearMesh) -> tuple[Any, ...]:
+        materials = None if job.pair is None else _materials(job, mesh)
+        return scene.gear(mesh.driver).gear, scene.gear(mesh.driven).gear, mesh.centre_distance, materials
+
+    mesh, table = scene.meshes[number], job.table.meshes[number]
+    if job.pair is None:
+        problem = "has no mesh law: there is no table [pair] to compute it with"
+        raise InputError(f"mesh {mesh.name!r}", None, problem, "add curve, stiffness_N_per_m or rigid to it, or [pair]")
+    alike = [i for i, other in enumerate(scene.meshes) if gears(other) == gears(mesh)]
+    steady = max(_carried_torque(scene, i) for i in alike)
+    most = table.law_torque_Nm or ROOM * steady
+    if not most > 0.0:
+        problem = "carries no torque in steady running, so nothing tells for which torques to make its law"
+        raise InputError(f"mesh {mesh.name!r} law_torque_Nm", None, problem, "give law_torque_Nm")
+    one, two, distance, materials = gears(mesh)
+    pair = GearPair(one, two, distance)
+    tables = StiffnessJob(job.pair, job.stiffness, pair)
+    model = {**tables.model, "materials": materials, "law": law_named("half_plane")}
+    with stage(mesh.name):
+        law = cached_law(pair, model, most / pair.wheel.base_radius)
+        if not estimate:
+            return law
+        angles = pair.mesh_cycle * np.arange(ESTIMATED) / ESTIMATED
+        sweep = {"torque": most / ROOM, "angles": angles, "kinematics": "small"}
+        curve = cached_curve(pair, model, sweep, estimate_error=True)
+    return law if curve.error is None else replace(law, error=curve.error.worst)
 
 
 def _materials(job: TrainJob, mesh: GearMesh) -> Any:

@@ -114,6 +114,7 @@ def train_summary(followed: Followed, timings: Mapping[str, float], **further: A
         }
         if len(force) and force[0] != 0.0:
             summary["contact_force_ratios_to_first"] = force / force[0]
+        summary["contact"] = contact_summary(followed)
     if made is not None:
         spectrum = made.spectrum
         summary["spectrum"] = {
@@ -142,6 +143,17 @@ def train_summary(followed: Followed, timings: Mapping[str, float], **further: A
         "timings_s": dict(timings),
     }
     return summary
+
+
+def contact_summary(followed: Followed) -> dict[str, Any]:
+    """For each mesh which flanks bear, when they part, and the largest force over the steady one (K_v)."""
+    statistics = followed.response.statistics
+    steady = np.abs(np.asarray(statistics.get("steady_forces_N", np.zeros(len(followed.largest_force))), dtype=float))
+    largest = np.maximum(np.abs(followed.largest_force), np.abs(followed.least_force))
+    factors = [float(most / one) if one > 0.0 else None for most, one in zip(largest, steady, strict=True)]
+    names = ("flanks", "contacts_lost", "contacts_regained", "share_without_contact", "longest_without_contact_s")
+    told = {name: statistics[name] for name in names if name in statistics}
+    return {**told, "dynamic_factors": factors}
 
 
 def stiffness_ranges(scene: TrainScene) -> dict[str, tuple[float | None, float | None]]:
