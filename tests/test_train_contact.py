@@ -42,7 +42,7 @@ def free_pair(law, force):  # type: ignore[no-untyped-def]
 
 def free_energy(model, law, times, tolerance):  # type: ignore[no-untyped-def]
     """Kinetic and elastic energy less the work of the torques (J), and the elastic part."""
-    run = integrate(model.system, times, method="explicit", tolerance=tolerance, start=model.start)
+    run = integrate(model.system, times, method="taylor", tolerance=tolerance, start=model.start)
     moved = motion(model, run)
     line = model.meshes[0]
     spins = moved.q[:, [int(i) + 5 for i in model.first]]
