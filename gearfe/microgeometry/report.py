@@ -170,7 +170,7 @@ def warnings(pair: GearPair, made: LoadedMesh) -> list[str]:
     said += told_overlaps(beyond, overlaps(pair, made.twist[beyond == 1]).max(initial=0.0))
     if made.failed.any():
         told = ", ".join(f"{count} {status}" for status, count in made.statuses.items() if status != "converged")
-        cure = "a flank that touches at several places at once may jump there; smoother flanks, or other torques"
+        cure = "rough flanks may not settle; take smoother ones, or other torques"
         said.append(f"{int(made.failed.sum())} positions have no numbers ({told}): {cure}")
     return said
 
