@@ -4,100 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
-from gearfe.contact.half_plane import NEAR, HalfPlanePair, _first, half_plane_pair, solve_half_plane
+from gearfe.contact.half_plane import NEAR, _first, half_plane_pair, solve_half_plane
 from gearfe.contact.half_plane_step import step
-from gearfe.contact.panels import MIDDLES, WIDTHS, couplings, first_guess, influence, pressed
-from gearfe.contact.wedge import ELLIPSE_W, ELLIPSE_X, mean_log, wedge_tensor
 from gearfe.elasticity import Material
-from gearfe.gear.deviation import Deviation, ToothDeviations
-from gearfe.gear.flank_curve import flank_curve
-from gearfe.gear.pair import GearPair, TipRelief
-from gearfe.gear.touching import face_of
+from gearfe.gear.pair import GearPair
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import gear
 from .gears import pair as gear_pair
+from .half_plane_pairs import PAIRS, angles_of, law_of
 from .solving import solve_positions
-
-PAIRS = {
-    "rounded": gear_pair(tip_round=1e-4),
-    "sharp": gear_pair(),
-    "shifted": gear_pair(
-        19, 48, pressure_angle=20.0, tip_round=5e-5, pinion={"profile_shift": 0.4}, wheel={"profile_shift": -0.2}
-    ),
-    "relieved": gear_pair(25, 25, pressure_angle=20.0, tip_relief=TipRelief(20e-6, 1.5e-3, 2.0), tip_round=5e-5),
-}
-
-
-@lru_cache
-def law_of(name: str, flank_coarsen: float = 4.0) -> HalfPlanePair:
-    return half_plane_pair(PAIRS[name], elastic_pair(PAIRS[name], law="penalty", flank_coarsen=flank_coarsen))
-
-
-def angles_of(pair: GearPair, count: int) -> np.ndarray:
-    return (np.arange(count) + 0.37) * pair.mesh_cycle / count
-
-
-# ---- parts ---------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", PAIRS)
-def test_curve_is_the_exact_flank(name: str) -> None:
-    """Points of the table lie on the exact curve, and arc lengths are its own."""
-    for one in (PAIRS[name].pinion, PAIRS[name].wheel):
-        curve = flank_curve(one)
-        u = np.sort(np.random.default_rng(1).uniform(0, curve.face.end, 200))
-        exact = np.array(
-            [quad(lambda v, c=curve: float(c.face.speeds(np.array(v))), 0, x, points=[1.0])[0] for x in u[:20]]
-        )
-        s = np.interp(u, curve.parameter, curve.arc)
-        for _ in range(3):  # the table is linear in u between its knots, the points are not
-            point, tangent = curve.at(s)
-            s = s + ((curve.face.points(u) - point) * tangent.conj()).real
-        assert np.abs(curve.at(s)[0] - curve.face.points(u)).max() < 2e-12
-        assert np.abs(np.abs(curve.at(s)[1]) - 1).max() < 1e-6
-        assert s[:20] == pytest.approx(exact, abs=1e-11)
-
-
-def test_a_half_plane_is_a_wedge_of_two_right_angles() -> None:
-    assert wedge_tensor(math.pi / 2) == pytest.approx([0, 0], abs=1e-15)
-
-
-@pytest.mark.parametrize("x", [0.0, 0.3, -0.9, 1.0, 2.5])
-def test_mean_of_a_logarithm_under_an_ellipse(x: float) -> None:
-    a = 1.7
-    density = lambda s: 2 / (math.pi * a) * math.sqrt(1 - (s / a) ** 2)  # noqa: E731
-    exact = quad(lambda s: density(s) * math.log(abs(a * x - s)), -a, a, points=[np.clip(a * x, -a, a)], limit=200)[0]
-    assert mean_log(np.array(a * x), np.array(a)) == pytest.approx(exact, abs=1e-7)
-    assert pytest.approx(1 / 8, rel=1e-12) == ELLIPSE_W @ ELLIPSE_X**4
-
-
-def test_panels_give_hertz() -> None:
-    """Parabolic gap x^2/(2 R): b^2 = 4 F R/(pi E*), p = 2 F/(pi b) (Johnson, *Contact Mechanics*, 4.2)."""
-    radius, modulus, force = 0.02, 1.1e11, 2e5
-    b = math.sqrt(4 * force * radius / (math.pi * modulus))
-    half = np.array([1.2 * b])
-    compliance = 2 / (math.pi * modulus)
-    x = half[:, None] * MIDDLES
-    deep = compliance * force * (0.5 - math.log(b / 2))  # approach of the centre, which makes the force F
-    gap = x**2 / (2 * radius) - deep
-    alone = couplings(np.array([0]), np.array([0]), 1)
-    width = half[:, None] * WIDTHS
-    K, between, T, nothing = influence(half, compliance), np.zeros((0, 1, 1)), np.zeros(1), np.zeros(1)
-    found = pressed(K, between, gap, width, T, nothing, alone, bearing=first_guess(gap))
-    assert found.settled.all()
-    assert found.force[0] == pytest.approx(force, rel=1e-3)
-    inside = np.abs(x[0]) < 0.9 * b
-    ellipse = 2 * force / (math.pi * b) * np.sqrt(1 - (x[0][inside] / b) ** 2)
-    assert found.pressure[0][inside] == pytest.approx(ellipse, rel=5e-3)
-    assert 2 * math.sqrt((found.pressure * width * x**2).sum() / force) == pytest.approx(b, rel=3e-3)
-
 
 # ---- identities ----------------------------------------------------------------------------------------------------
 
@@ -352,53 +272,3 @@ def test_gears_of_another_size(factor: float) -> None:
     angles, twist = angles_of(one, 8), math.radians(0.3)
     small, large = (solve_half_plane(half_plane_pair(p, elastic_pair(p)), angles, twist) for p in (one, other))
     assert large.torque_wheel == pytest.approx(factor**2 * small.torque_wheel, rel=2e-5)
-
-
-# ---- deviations ----------------------------------------------------------------------------------------------------
-
-
-def test_relief_as_a_deviation() -> None:
-    """Parabolic tip relief of 10 um over 1.2 mm of roll, in the geometry and its mesh, or in the curves alone."""
-    relief = TipRelief(10e-6, 1.2e-3, 2.0)
-    for form in ({}, {"tip_round": 5e-5}):
-        plain, relieved = gear_pair(**form), gear_pair(tip_relief=relief, **form)
-        deviations = []
-        for one in (relieved.pinion, relieved.wheel):
-            flank = face_of(one).flank
-            roll = np.linspace(flank.start, flank.end, 400)
-            deviations.append(ToothDeviations((Deviation.sampled(flank.relief, roll).scaled(-1.0),)))
-        elastic = elastic_pair(plain, law="half_plane")
-        found = half_plane_pair(plain, elastic, deviations=(deviations[0], deviations[1]))
-        without = half_plane_pair(plain, elastic)
-        expected = half_plane_pair(relieved, elastic_pair(relieved, law="half_plane"))
-        angles = angles_of(plain, 16)
-        touch = [law.flanks.touching(angles).twist for law in (found, expected)]
-        assert touch[0] == pytest.approx(touch[1], abs=2e-8 if form else 1e-9)
-        for degrees in (0.02, 0.2):
-            one, two, three = (
-                solve_half_plane(law, angles, math.radians(degrees)) for law in (found, expected, without)
-            )
-            assert set(one.status) == {"converged"}
-            assert np.abs(one.torque_wheel / two.torque_wheel - 1).max() < 3e-4
-            assert np.abs(three.torque_wheel / two.torque_wheel - 1).max() > 0.03
-
-
-def test_an_even_deviation_turns_the_wheel() -> None:
-    """A layer h on an involute is the involute turned by h/r_b: on the path the pair touches h/r_b2 earlier."""
-    pair, height = PAIRS["rounded"], 5e-6
-    flank = face_of(pair.pinion).flank
-    layer = ToothDeviations((Deviation.straight([flank.start, flank.end], [height, height]),))
-    plain = law_of("rounded")
-    elastic = elastic_pair(pair, law="half_plane")
-    law = half_plane_pair(pair, elastic, deviations=(layer, ToothDeviations()))
-    angles = angles_of(pair, 7)
-    found, expected = law.flanks.touching(angles), plain.flanks.touching(angles)
-    on_path = ((expected.place > 0.05) & (expected.place < 0.95)).all(axis=1)
-    assert on_path.sum() >= 7
-    earlier = height / pair.wheel.base_radius
-    assert (expected.twist - found.twist)[on_path] == pytest.approx(earlier, rel=1e-6)
-    # and so it carries there what the plain pair does at a larger twist
-    twist = math.radians(0.05)
-    one = solve_half_plane(law, angles, twist)
-    two = solve_half_plane(half_plane_pair(pair, elastic), angles, twist + earlier)
-    assert one.torque_wheel == pytest.approx(two.torque_wheel, rel=2e-3)

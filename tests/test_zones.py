@@ -127,10 +127,11 @@ def test_a_tip_along_a_root() -> None:
     """Campaign gears, seed 901, case 60: Nitsche's law on a fine flank sees the second place that bears."""
     job = read_stiffness_job(CASES / "tip_along_a_root.toml")
     pair, twist = job.pair, job.sweep["twist"] + job.pair.contact_twist
-    angles = math.radians(11.95) + np.arange(8) * pair.mesh_cycle / 8
+    angles = np.radians([3.09, 6.18, 9.27, 15.4])
     found = solve_half_plane(half_plane_pair(pair, elastic_pair(pair)), angles, twist)
     assert set(found.status) == {"converged"}
     reference = solve_positions(pair, elastic_pair(pair, law="nitsche", coarsen=0.7), angles, twist)
-    good = reference.status == "converged"
-    assert good.sum() >= 6
-    assert found.torque_wheel[good] == pytest.approx(reference.torque_wheel[good], rel=2e-3)
+    assert set(reference.status) == {"converged"}
+    assert found.torque_wheel == pytest.approx(reference.torque_wheel, rel=1e-3)
+    pairs = found.contacts.pair[found.contacts.position == 1]
+    assert len(set(pairs.tolist())) < len(pairs)  # one contact for the pair was 0.4 % low here

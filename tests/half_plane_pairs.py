@@ -1,0 +1,31 @@
+"""Pairs that tests of the half-plane law use, and their laws."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from gearfe.contact.half_plane import HalfPlanePair, half_plane_pair
+from gearfe.gear.pair import GearPair, TipRelief
+from gearfe.stiffness.sweep import elastic_pair
+
+from .gears import pair as gear_pair
+
+PAIRS = {
+    "rounded": gear_pair(tip_round=1e-4),
+    "sharp": gear_pair(),
+    "shifted": gear_pair(
+        19, 48, pressure_angle=20.0, tip_round=5e-5, pinion={"profile_shift": 0.4}, wheel={"profile_shift": -0.2}
+    ),
+    "relieved": gear_pair(25, 25, pressure_angle=20.0, tip_relief=TipRelief(20e-6, 1.5e-3, 2.0), tip_round=5e-5),
+}
+
+
+@lru_cache
+def law_of(name: str, flank_coarsen: float = 4.0) -> HalfPlanePair:
+    return half_plane_pair(PAIRS[name], elastic_pair(PAIRS[name], law="penalty", flank_coarsen=flank_coarsen))
+
+
+def angles_of(pair: GearPair, count: int) -> np.ndarray:
+    return (np.arange(count) + 0.37) * pair.mesh_cycle / count

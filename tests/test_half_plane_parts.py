@@ -1,0 +1,67 @@
+"""Parts of the half-plane law: exact flanks, logarithms, panels."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from gearfe.contact.panels import MIDDLES, WIDTHS, couplings, first_guess, influence, pressed
+from gearfe.contact.wedge import ELLIPSE_W, ELLIPSE_X, mean_log, wedge_tensor
+from gearfe.gear.flank_curve import flank_curve
+
+from .half_plane_pairs import PAIRS
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_curve_is_the_exact_flank(name: str) -> None:
+    """Points of the table lie on the exact curve, and arc lengths are its own."""
+    for one in (PAIRS[name].pinion, PAIRS[name].wheel):
+        curve = flank_curve(one)
+        u = np.sort(np.random.default_rng(1).uniform(0, curve.face.end, 200))
+        exact = np.array(
+            [quad(lambda v, c=curve: float(c.face.speeds(np.array(v))), 0, x, points=[1.0])[0] for x in u[:20]]
+        )
+        s = np.interp(u, curve.parameter, curve.arc)
+        for _ in range(3):  # the table is linear in u between its knots, the points are not
+            point, tangent = curve.at(s)
+            s = s + ((curve.face.points(u) - point) * tangent.conj()).real
+        assert np.abs(curve.at(s)[0] - curve.face.points(u)).max() < 2e-12
+        assert np.abs(np.abs(curve.at(s)[1]) - 1).max() < 1e-6
+        assert s[:20] == pytest.approx(exact, abs=1e-11)
+
+
+def test_a_half_plane_is_a_wedge_of_two_right_angles() -> None:
+    assert wedge_tensor(math.pi / 2) == pytest.approx([0, 0], abs=1e-15)
+
+
+@pytest.mark.parametrize("x", [0.0, 0.3, -0.9, 1.0, 2.5])
+def test_mean_of_a_logarithm_under_an_ellipse(x: float) -> None:
+    a = 1.7
+    density = lambda s: 2 / (math.pi * a) * math.sqrt(1 - (s / a) ** 2)  # noqa: E731
+    exact = quad(lambda s: density(s) * math.log(abs(a * x - s)), -a, a, points=[np.clip(a * x, -a, a)], limit=200)[0]
+    assert mean_log(np.array(a * x), np.array(a)) == pytest.approx(exact, abs=1e-7)
+    assert pytest.approx(1 / 8, rel=1e-12) == ELLIPSE_W @ ELLIPSE_X**4
+
+
+def test_panels_give_hertz() -> None:
+    """Parabolic gap x^2/(2 R): b^2 = 4 F R/(pi E*), p = 2 F/(pi b) (Johnson, *Contact Mechanics*, 4.2)."""
+    radius, modulus, force = 0.02, 1.1e11, 2e5
+    b = math.sqrt(4 * force * radius / (math.pi * modulus))
+    half = np.array([1.2 * b])
+    compliance = 2 / (math.pi * modulus)
+    x = half[:, None] * MIDDLES
+    deep = compliance * force * (0.5 - math.log(b / 2))  # approach of the centre, which makes the force F
+    gap = x**2 / (2 * radius) - deep
+    alone = couplings(np.array([0]), np.array([0]), 1)
+    width = half[:, None] * WIDTHS
+    K, between, T, nothing = influence(half, compliance), np.zeros((0, 1, 1)), np.zeros(1), np.zeros(1)
+    found = pressed(K, between, gap, width, T, nothing, alone, bearing=first_guess(gap))
+    assert found.settled.all()
+    assert found.force[0] == pytest.approx(force, rel=1e-3)
+    inside = np.abs(x[0]) < 0.9 * b
+    ellipse = 2 * force / (math.pi * b) * np.sqrt(1 - (x[0][inside] / b) ** 2)
+    assert found.pressure[0][inside] == pytest.approx(ellipse, rel=5e-3)
+    assert 2 * math.sqrt((found.pressure * width * x**2).sum() / force) == pytest.approx(b, rel=3e-3)
