@@ -8,8 +8,9 @@ import pytest
 from gearfe.rigid import TimeFunction, compiled, constant, kernel_modal, smoothed_step
 from gearfe.stiffness.periodic import periodic_interpolant
 from gearfe.train import build_train, simulate
+from gearfe.train.corners import train_corner
 from gearfe.train.forces import CurveFlank, Gyro, LawFlank, TrainForces
-from gearfe.train.series import train_corner, train_order, train_series
+from gearfe.train.series import train_order, train_series
 
 from .mesh_laws import hertzian_law
 from .trains import SHIPPED, curve, train
