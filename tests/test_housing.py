@@ -14,8 +14,9 @@ import pytest
 from gearfe.config import build, load_job
 from gearfe.errors import InputError
 from gearfe.housing.build import bores, housing_from_table, inside_faces, reduced_housing
+from gearfe.housing.meshes import Prisms
 from gearfe.housing.surface import surface_area
-from gearfe.solid import curved_elements, jacobian_determinants
+from gearfe.prisms import volume_ratios
 from gearfe.tables.housing import HousingTable
 
 SHIPPED = Path(__file__).parent.parent / "geometry" / "housing.toml"
@@ -30,7 +31,7 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 def coarse(changes: dict[str, Any] | None = None) -> HousingTable:
     """The shipped housing on a coarse mesh, with changes."""
-    return build(HousingTable, {"mesh": {"size_mm": 16.0, "graded": False}} | (changes or {}), "housing")
+    return build(HousingTable, {"mesh": {"size_mm": 16.0}} | (changes or {}), "housing")
 
 
 def volume_mm3(t: HousingTable) -> float:
@@ -58,23 +59,25 @@ def test_shipped_geometry() -> None:
     low, high = 1e3 * housing.nodes.min(axis=0), 1e3 * housing.nodes.max(axis=0)
     np.testing.assert_allclose(low, [-75.0, -39.5, -90.0], atol=1e-6)
     np.testing.assert_allclose(high, [210.0, 41.0, 25.0], atol=1e-6)
-    # curved second-order faces miss the volume of a circle by parts in ten thousand
-    assert housing.mass_kg == pytest.approx(volume_mm3(coarse()) * 7850e-9, rel=3e-4)
+    # arcs of order 3 miss the volume of a circle by parts in a hundred thousand
+    assert housing.mass_kg == pytest.approx(volume_mm3(coarse()) * 7850e-9, rel=2e-5)
     assert len(housing.attachments) == 6
     for number, attachment in enumerate(housing.attachments):
         y = 33.0 if number % 2 == 0 else -32.25  # middle of wall and boss: 25..41 and -39.5..-25
         np.testing.assert_allclose(1e3 * attachment.point, [62.5 * (number // 2), y, 0.0], atol=1e-9)
         np.testing.assert_array_equal(attachment.axis, [0, 1, 0])
         radius = np.linalg.norm(1e3 * (housing.nodes[attachment.nodes] - attachment.point)[:, [0, 2]], axis=1)
-        np.testing.assert_allclose(radius, 10.0, atol=1e-6)  # midside nodes too: curved bores
+        np.testing.assert_allclose(radius, 10.0, atol=1e-6)  # nodes between the corners too: curved bores
     feet = housing.nodes[housing.fixed]
     np.testing.assert_allclose(feet[:, 2], -0.09, atol=1e-9)
     assert np.all((feet[:, 0] < -0.045 + 1e-9) | (feet[:, 0] > 0.18 - 1e-9))
     # the held faces end where the feet end: their nodes lie on the lines x = -45 and 180 too
     for x in (-0.045, 0.18):
         assert np.sum(np.abs(feet[:, 0] - x) < 1e-9) >= 6
-    assert curved_elements(housing.nodes, housing.tets).any()
-    assert jacobian_determinants(housing.nodes, housing.tets).min() > 0.0
+    assert isinstance(housing.mesh, Prisms)
+    plane = housing.mesh.extrusion
+    ratios = volume_ratios(plane.points, plane.triangles)
+    assert 0.0 < ratios.min() < 0.999  # curved, none folded
 
 
 @pytest.mark.parametrize(
@@ -96,7 +99,7 @@ def test_shipped_geometry() -> None:
 def test_other_geometries(changes: dict[str, Any]) -> None:
     table = coarse(changes)
     housing = housing_from_table(table)
-    assert housing.mass_kg == pytest.approx(volume_mm3(table) * 7850e-9, rel=6e-4)
+    assert housing.mass_kg == pytest.approx(volume_mm3(table) * 7850e-9, rel=5e-5)
     assert len(housing.attachments) == sum(2 if s.walls == "both" else 1 for s in table.shafts)
     assert len(housing.fixed) > 0
 
@@ -104,7 +107,7 @@ def test_other_geometries(changes: dict[str, Any]) -> None:
 def test_outer_surface_leaves_out_bores_feet_and_the_inner_space() -> None:
     table = coarse()
     housing = housing_from_table(table)
-    area = 1e6 * surface_area(housing.nodes, housing.faces)
+    area = 1e6 * surface_area(housing.nodes, housing.surface.faces)
     (x0, x1), (z0, z1) = table.wall_x_mm, table.wall_z_mm
     length, height, depth = x1 - x0, z1 - z0, 60.5
     walls = 2 * length * height + 2 * 10.5 * height + 10.5 * length  # outer faces, ends, tops
@@ -114,16 +117,6 @@ def test_outer_surface_leaves_out_bores_feet_and_the_inner_space() -> None:
     assert area == pytest.approx(walls + base + feet + bosses, rel=1e-3)
     centres = np.array([[0.05, 0.025, 0.0], [0.05, 0.0, -0.072], [0.05, 0.031, 0.0], [0.05, 0.028, 0.025]])
     np.testing.assert_array_equal(inside_faces(table, centres), [True, True, False, False])
-
-
-def test_linear_elements_are_far_too_stiff_and_say_so() -> None:
-    second, first = (
-        housing_from_table(coarse({"mesh": {"size_mm": 16.0, "graded": False, "order": n}})) for n in (2, 1)
-    )
-    assert any("too stiff" in note for note in first.notes)
-    assert not second.notes
-    ratio = first.reduce(20).coupled.frequencies_hz[:5] / second.reduce(20).coupled.frequencies_hz[:5]
-    assert np.all(ratio > 1.15)
 
 
 def test_cached_body_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -175,13 +168,13 @@ def test_free_housing() -> None:
         ({"wall_x_mm": [180.0, -45.0]}, "swap"),
         ({"end_wall_thickness_mm": [150.0, 100.0]}, "end walls"),
         ({"wall_thicknes_mm": [6.0, 4.5]}, "did you mean 'wall_thickness_mm'"),
-        ({"mesh": {"order": 3}}, "order"),
+        ({"mesh": {"order": 2}}, "order"),
         ({"mesh": {"size": 3}}, "size_mm"),
         ({"material": {"poisson_ratio": 0.5}}, "poisson_ratio"),
-        ({"mesh": {"size_mm": 1e-3}}, "more than 2000000 elements"),
-        ({"feet": {"length_x_mm": 3e10}}, r"more than 2000000 elements.*feet \(3e\+10 mm long\)"),
-        ({"wall_x_mm": [-45.0, 1e9]}, "more than 2000000 elements"),
-        ({"shafts": [{"x_mm": 0.0, "bore_radius_mm": 1e-8}]}, "bore_radius_mm = 1e-08.*of a bore 16 mm deep"),
+        ({"mesh": {"size_mm": 1e-3}}, "more than 100000 elements"),
+        ({"feet": {"length_x_mm": 3e10}}, r"more than 100000 elements.*feet \(3e\+10 mm long\)"),
+        ({"wall_x_mm": [-45.0, 1e9]}, "more than 100000 elements"),
+        ({"shafts": [{"x_mm": 0.0, "bore_radius_mm": 1e-8}]}, "bore_radius_mm = 1e-08"),
         ({"reduction": {"modes": 100000}}, "modes"),
         ({"damping": {"ratio": -0.01}}, "ratio"),
         ({"reduction": {"solver": "mumps"}, "mesh": {"size_mm": 30.0}}, "solver"),

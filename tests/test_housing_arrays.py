@@ -106,7 +106,7 @@ def test_meshes_of_gmsh_and_of_linear_elements() -> None:
     gmsh_order = tets.copy()
     gmsh_order[:, [8, 9]] = tets[:, [9, 8]]
     first, second = Housing.from_arrays(nodes, tets), Housing.from_arrays(nodes, gmsh_order)
-    np.testing.assert_array_equal(first.tets, second.tets)
+    np.testing.assert_array_equal(first.mesh.cells, second.mesh.cells)
     extra = np.concatenate([np.full((5, 3), 9.9), nodes])
     shifted = Housing.from_arrays(extra, tets + 5, [AXIS], np.array([5 + int(tets.max()), 2]))
     assert any("5 nodes belong to no element" in note for note in shifted.notes)
@@ -238,7 +238,7 @@ def test_bad_attachments_and_supports_are_named() -> None:
 def test_folded_curved_elements_are_straightened_and_named() -> None:
     housing = Housing.from_arrays(*broken("folded"))
     assert any("folded" in note for note in housing.notes)
-    assert not curved_elements(housing.nodes, housing.tets).any()
+    assert not curved_elements(housing.nodes, housing.mesh.cells).any()
 
 
 def test_any_number_of_attachments() -> None:

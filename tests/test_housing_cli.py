@@ -19,7 +19,6 @@ JOB = """
 [housing]
 [housing.mesh]
 size_mm = 16.0
-graded = false
 [housing.reduction]
 modes = 10
 """

@@ -9,7 +9,8 @@ from scipy.sparse.linalg import spsolve
 
 from gearfe.errors import InputError
 from gearfe.housing.mesh_checks import boundary_faces
-from gearfe.housing.surface import nodal_normals, radiation_matrix, surface_area, surface_quadrature
+from gearfe.housing.meshes import Tetrahedra
+from gearfe.housing.surface import nodal_normals, surface_area, surface_quadrature
 from gearfe.reduction.lanczos import lowest_modes
 from gearfe.reduction.sparse_solver import factorize
 from gearfe.solid import (
@@ -208,7 +209,7 @@ def test_outer_surface_of_a_box() -> None:
     # v = (x, 0, 0): v.n = 1 on the face x = 1 of area 1; v = (0, 0, 1): both faces of area 2; v = y e_x: y^2 on x = 1
     motions = np.zeros((len(nodes), 3, 3))
     motions[:, 0, 0], motions[:, 2, 1], motions[:, 0, 2] = nodes[:, 0], 1.0, nodes[:, 1]
-    matrix = radiation_matrix(nodes, faces, motions.reshape(-1, 3))
+    matrix = Tetrahedra(nodes, tets).surface([]).radiation(motions.reshape(-1, 3))
     np.testing.assert_allclose(np.diag(matrix), [1.0, 4.0, 2 * 0.5 * 8 / 3], rtol=1e-12)
 
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.housing.mesh_checks import boundary_faces
-from gearfe.housing.surface import radiation_matrix
+from gearfe.housing.meshes import Tetrahedra
 from gearfe.vibration.radiation import instantaneous_power, power_level, radiated_power
 
 from .housing_meshes import box
@@ -17,12 +16,11 @@ SIZE = (0.3, 0.2, 0.05)
 STEP = 1e-4
 
 
-def surface(shapes, *, order=2, keep=lambda centres: centres[:, 0] < np.inf, cells=(3, 2, 1)):
+def surface(shapes, *, order=2, keep=None, cells=(3, 2, 1)):
     """Surface matrix of a box for nodal fields that are functions of the place, (n, 3) each."""
     nodes, tets = box(cells, SIZE, order=order)
-    faces = boundary_faces(tets)
-    faces = faces[keep(nodes[faces[:, :3]].mean(axis=1))]
-    return radiation_matrix(nodes, faces, np.column_stack([shape(nodes).ravel() for shape in shapes]))
+    found = Tetrahedra(nodes, tets).surface([], keep)
+    return found.radiation(np.column_stack([shape(nodes).ravel() for shape in shapes]))
 
 
 def vector(axis, value=1.0):

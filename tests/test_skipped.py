@@ -176,7 +176,7 @@ from dataclasses import replace
 from tests.benchmarks.subject import shipped_housing
 from gearfe.housing.build import reduced_housing
 table = shipped_housing()
-small = replace(table, mesh=replace(table.mesh, order=1, size_mm=40.0), reduction=replace(table.reduction, modes=5))
+small = replace(table, mesh=replace(table.mesh, size_mm=40.0), reduction=replace(table.reduction, modes=5))
 print(repr(reduced_housing(small).coupled.frequencies_hz[:8].tolist()))
 """
     first, made = loaded_after(table, GEARFE_CACHE=str(tmp_path))

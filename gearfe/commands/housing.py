@@ -84,7 +84,7 @@ def _report(body: ModalBody, errors: dict[str, Any], mesh: MeshError, left_out: 
     for note in body.notes:
         print(f"note: {note}")
     print(f"mass            {body.rigid_mass[0, 0]:.4f} kg")
-    print(f"mesh            {len(body.elements)} tetrahedra, {body.nodes.size} unknowns")
+    print(f"mesh            {len(body.nodes)} nodes, {body.nodes.size} unknowns")
     kept = f"{body.modes} modes to {body.internal_hz[body.modes - 1]:.0f} Hz" if body.modes else "no modes"
     extra = len(body.internal_hz) - body.modes
     print(f"reduced to      {body.size} coordinates: {6 * len(body.attachment_names)} of attachments, {kept},")
@@ -126,9 +126,8 @@ def _write(
     columns["mesh_error_estimate_percent"] = 100.0 * errors["mesh"]
     columns["reduction_error_bound_percent"] = 100.0 * errors["reduction"]
     write_csv(folder / "modes.csv", columns)
-    cells = {"tetra" if body.elements.shape[1] == 4 else "tetra10": body.elements}
     names = [f"mode_{k + 1:02d}_{body.coupled.frequencies_hz[k]:.1f}_Hz" for k in range(shown)]
-    write_vtkhdf(folder / "modes.vtkhdf", body.nodes, cells, point_data=dict(zip(names, fields, strict=True)))
+    write_vtkhdf(folder / "modes.vtkhdf", body.nodes, body.cells, point_data=dict(zip(names, fields, strict=True)))
     summary = {
         "mass_kg": body.rigid_mass[0, 0],
         "unknowns": body.nodes.size,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
@@ -16,9 +15,10 @@ from ..meshing.cache import cache_key
 from ..meshing.housing_mesh import RECIPE, bore_ranges, housing_mesh
 from ..progress import stage
 from ..reduction.modal_body import FORMAT, ModalBody
-from ..solid import MassRule, SolidMaterial
+from ..solid import SolidMaterial
 from ..tables.housing import HousingDampingTable, HousingReductionTable, HousingTable
 from .attachments import PLACE_TOLERANCE, Bore
+from .meshes import Prisms
 from .model import Housing
 
 
@@ -33,14 +33,12 @@ def housing_from_table(table: HousingTable) -> Housing:
     Bores are numbered shaft by shaft, the +y wall before the -y wall.
     """
     table.check("housing")
-    mesh = housing_mesh(table)
-    return Housing.from_arrays(
-        mesh.nodes,
-        mesh.tets,
+    mesh = Prisms(housing_mesh(table))
+    return Housing.of_mesh(
+        mesh,
         bores(table),
-        foot_nodes(table, mesh.nodes) if table.feet.fixed else None,
+        np.flatnonzero(foot_nodes(table, mesh.nodes) & table.feet.fixed),
         material=material(table),
-        mass=cast(MassRule, table.mesh.mass),
         outer=lambda centres: ~inside_faces(table, centres),
     )
 

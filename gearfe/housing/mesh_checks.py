@@ -73,11 +73,29 @@ def checked_mesh(nodes: object, tets: object) -> CheckedMesh:
     return CheckedMesh(points, cells, original, tuple(notes))
 
 
-def boundary_faces(tets: Ints) -> Ints:
-    """(f, 3) or (f, 6) faces that belong to one element only, anticlockwise seen from outside."""
-    per = 3 if tets.shape[1] == 4 else 6
-    faces = tets[:, FACES[:, :per]].reshape(-1, per)
-    _, first, count = np.unique(np.sort(faces[:, :3], axis=1), axis=0, return_index=True, return_counts=True)
+def boundary_faces(cells: Ints) -> Ints:
+    """(f, 3) or (f, 6) faces that belong to one cell only, anticlockwise seen from outside.
+
+    Cells are tetrahedra of four or ten nodes, or wedges of six, whose quadrilateral faces become two triangles each.
+    """
+    if cells.shape[1] == 6:
+        a, b, c, d = _only_once(cells[:, WEDGE_SIDES].reshape(-1, 4)).T
+        ends = _only_once(cells[:, WEDGE_ENDS].reshape(-1, 3))
+        return np.concatenate([ends, np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    per = 3 if cells.shape[1] == 4 else 6
+    return _only_once(cells[:, FACES[:, :per]].reshape(-1, per))
+
+
+#: Faces of a wedge, its first three nodes clockwise seen from the other three.
+WEDGE_ENDS, WEDGE_SIDES = np.array([[0, 1, 2], [3, 5, 4]]), np.array([[1, 0, 3, 4], [2, 1, 4, 5], [0, 2, 5, 3]])
+
+
+def _only_once(faces: Ints) -> Ints:
+    """Faces that no other has the first three nodes (of a quadrilateral: all but the largest number) in common with."""
+    known = np.sort(faces[:, : 4 if faces.shape[1] == 4 else 3], axis=1)[:, :3]
+    n = int(faces.max(initial=0)) + 1
+    key = (known[:, 0] * n + known[:, 1]) * n + known[:, 2]
+    _, first, count = np.unique(key, return_index=True, return_counts=True)
     return faces[np.sort(first[count == 1])]
 
 

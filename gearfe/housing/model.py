@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..progress import stage
 from ..reduction.craig_bampton import reduce_model
 from ..reduction.modal_body import ModalBody
-from ..solid import MassRule, SolidMaterial, SolidMatrices, assemble
+from ..solid import MassRule, SolidMaterial, SolidMatrices
 from .attachments import (
     Attachment,
     Bore,
@@ -25,9 +25,9 @@ from .attachments import (
     plane_nodes,
 )
 from .full import FullModel, full_model
-from .mesh_checks import boundary_faces, checked_mesh
-from .mesh_error import energy_lost
-from .surface import nodal_normals, radiation_matrix
+from .mesh_checks import checked_mesh
+from .meshes import Outer, Prisms, Tetrahedra
+from .surface import Surface, nodal_normals
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -50,33 +50,27 @@ class Housing:
 
     Attributes
     ----------
-    nodes : (n, 3)
-        Coordinates (m).
-    tets : (m, 4) or (m, 10)
-        Elements, midside nodes in the order of `gearfe.solid.EDGES`.
+    mesh
+        Nodes and elements.
     attachments
         Rigid attachments; their order is that of the coordinates of the reduced body.
     fixed : (k,)
         Numbers of the held nodes; none for a free body.
     material
         Of the whole body.
-    mass_rule
-        Integration of the mass.
-    faces : (f, 3) or (f, 6)
-        Outer surface: what radiates sound and is shown.
+    surface
+        Outer surface: what radiates sound.
     original : (n,)
         Number that each node had in the arrays that were given.
     notes
         What the user should know.
     """
 
-    nodes: Floats
-    tets: Ints
+    mesh: Tetrahedra | Prisms
     attachments: tuple[Attachment, ...]
     fixed: Ints
     material: SolidMaterial
-    mass_rule: MassRule
-    faces: Ints
+    surface: Surface
     original: Ints
     notes: tuple[str, ...] = ()
 
@@ -91,7 +85,7 @@ class Housing:
         material: SolidMaterial = STEEL,
         attachments: Sequence[Attachment] = (),
         mass: MassRule = "exact",
-        outer: Callable[[Floats], NDArray[np.bool_]] | None = None,
+        outer: Outer | None = None,
     ) -> Housing:
         """Housing from a mesh of any origin (gmsh, meshio, arrays).
 
@@ -126,39 +120,63 @@ class Housing:
         mesh = checked_mesh(nodes, tets)
         new_number = np.full(len(np.asarray(nodes)), -1)
         new_number[mesh.original] = np.arange(len(mesh.original))
-        notes = list(mesh.notes)
-        made = []
+        made = [
+            replace(given, nodes=_renumbered(f"attachment {given.name!r}", given.nodes, new_number))
+            for given in attachments
+        ]
+        notes = [*mesh.notes, *([LINEAR_NOTE] if mesh.tets.shape[1] == 4 else [])]
+        return cls.of_mesh(
+            Tetrahedra(mesh.nodes, mesh.tets, mass),
+            bores,
+            _fixed_nodes(fixed, mesh.nodes, new_number),
+            material=material,
+            attachments=made,
+            outer=outer,
+            original=mesh.original,
+            notes=notes,
+        )
+
+    @classmethod
+    def of_mesh(
+        cls,
+        mesh: Tetrahedra | Prisms,
+        bores: Sequence[Bore | Sequence[Any]],
+        fixed: Ints,
+        *,
+        material: SolidMaterial = STEEL,
+        attachments: Sequence[Attachment] = (),
+        outer: Outer | None = None,
+        original: Ints | None = None,
+        notes: Sequence[str] = (),
+    ) -> Housing:
+        """Housing from a mesh that is in order; see `from_arrays`. `fixed` are numbers of nodes."""
+        made, notes = [], list(notes)
         for number, bore in enumerate(bores, start=1):
             attachment, remarks = bore_attachment(bore, number, mesh.nodes)
             made.append(attachment)
             notes += remarks
-        for given in attachments:
-            made.append(replace(given, nodes=_renumbered(f"attachment {given.name!r}", given.nodes, new_number)))
-        held = _fixed_nodes(fixed, mesh.nodes, new_number)
-        check_attachments(made, held, mesh.nodes)
-        notes += [LINEAR_NOTE] if mesh.tets.shape[1] == 4 else []
-        notes += [FREE_NOTE] if len(held) == 0 else []
-        faces = boundary_faces(mesh.tets)
-        faces = _without(faces, [held, *(a.nodes for a in made)], len(mesh.nodes))
-        if outer is not None:
-            faces = faces[np.asarray(outer(mesh.nodes[faces[:, :3]].mean(axis=1)), dtype=bool)]
+        made += attachments
+        check_attachments(made, fixed, mesh.nodes)
         return cls(
-            nodes=mesh.nodes,
-            tets=mesh.tets,
+            mesh=mesh,
             attachments=tuple(made),
-            fixed=held,
+            fixed=fixed,
             material=material,
-            mass_rule=mass,
-            faces=faces,
-            original=mesh.original,
-            notes=tuple(notes),
+            surface=mesh.surface([fixed, *(a.nodes for a in made)], outer),
+            original=np.arange(len(mesh.nodes)) if original is None else original,
+            notes=(*notes, *([FREE_NOTE] if len(fixed) == 0 else [])),
         )
+
+    @property
+    def nodes(self) -> Floats:
+        """(n, 3) coordinates (m)."""
+        return self.mesh.nodes
 
     @cached_property
     def matrices(self) -> SolidMatrices:
         """Nodal stiffness and mass, assembled on first use."""
         with stage("assembling"):
-            return assemble(self.nodes, self.tets, self.material, mass_rule=self.mass_rule)
+            return self.mesh.assemble(self.material)
 
     @cached_property
     def internal(self) -> Ints:
@@ -233,11 +251,11 @@ class Housing:
             internal_hz=np.sqrt(np.maximum(found.eigenvalues, 0.0)) / (2.0 * np.pi),
             modes=found.modes,
             nodes=self.nodes,
-            elements=self.tets,
+            elements=self.mesh.cells,
             shapes=found.shapes,
-            faces=self.faces,
-            normals=nodal_normals(self.nodes, self.faces),
-            radiation=radiation_matrix(self.nodes, self.faces, found.shapes),
+            faces=self.surface.faces,
+            normals=nodal_normals(self.nodes, self.surface.faces),
+            radiation=self.surface.radiation(found.shapes),
             momentum=np.asarray((mass @ motions).T @ found.shapes),
             rigid_mass=motions.T @ (mass @ motions),
             tail=found.tail,
@@ -263,7 +281,7 @@ class Housing:
         squares = np.concatenate([np.zeros(static.shape[1]), squares])
         rigid = [self.fixed, *(attachment.nodes for attachment in self.attachments)]
         with stage("estimating the mesh's error"):
-            lost = energy_lost(self.nodes, self.tets, self.material, body.shapes @ fields, squares, rigid)
+            lost = self.mesh.energy_lost(self.material, body.shapes @ fields, squares, rigid)
         # weights of the fields in any motion, orthogonal in energy to the rest; a free body's energy needs some mass
         highest = (2.0 * np.pi * body.highest_hz) ** 2
         slow = np.min(squares[squares > ROUNDING * highest], initial=highest)  # rigid motions are round-off
@@ -319,13 +337,3 @@ def _renumbered(field: str, chosen: Any, new_number: Ints) -> Ints:
     if not len(found):
         raise InputError(field, None, "names no node that belongs to an element", "give nodes, or None for none")
     return np.asarray(found)
-
-
-def _without(faces: Ints, sets: list[Ints], n: int) -> Ints:
-    """Faces that do not lie wholly within one of the node sets."""
-    keep = np.ones(len(faces), dtype=bool)
-    for chosen in sets:
-        flags = np.zeros(n, dtype=bool)
-        flags[chosen] = True
-        keep &= ~flags[faces].all(axis=1)
-    return faces[keep]

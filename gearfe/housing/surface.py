@@ -1,4 +1,4 @@
-r"""Outer surface of a tetrahedral body: faces, normals, and the integral of the squared normal velocity.
+r"""Outer surface of a body: faces, normals, and the integral of the squared normal velocity.
 
 ``integral of (v . n)^2 dA`` over faces with six nodes: with the shape functions N_a on a face this is
 ``v^T G^T G v``, one row of G for each quadrature point, ``sqrt(w dA) N_a n_k`` in the column of node a, axis k.
@@ -56,17 +56,26 @@ def nodal_normals(nodes: Floats, faces: Ints) -> Floats:
     return np.divide(total, length, out=np.zeros_like(total), where=length > 0.0)
 
 
-def radiation_matrix(nodes: Floats, faces: Ints, shapes: Floats) -> Floats:
-    """(N, N) matrix R with ``qdot^T R qdot`` the integral of the squared normal velocity over the faces (m4/s2)."""
-    if len(faces) == 0:
-        return np.zeros((shapes.shape[1], shapes.shape[1]))
-    quadrature = surface_quadrature(nodes, faces)
+def normal_velocity(quadrature: SurfaceQuadrature, faces: Ints, n: int) -> sparse.csr_array:
+    """(f p, 3 n) matrix G with ``|G v|^2`` the integral of the squared normal velocity over the faces (m4/s2)."""
     size = np.linalg.norm(quadrature.areas, axis=2)
     scaled = quadrature.areas / np.sqrt(np.maximum(size, 1e-300))[..., None]
     entries = np.einsum("pa,fpk->fpak", quadrature.values, scaled)
     f, p, a, _ = entries.shape
     columns = np.broadcast_to(3 * faces[:, None, :, None] + np.arange(3), entries.shape)
     starts = np.arange(0, f * p * a * 3 + 1, a * 3)
-    g = sparse.csr_array((entries.ravel(), columns.ravel(), starts), shape=(f * p, 3 * len(nodes)))
-    rows = g @ shapes
-    return np.asarray(rows.T @ rows)
+    return sparse.csr_array((entries.ravel(), columns.ravel(), starts), shape=(f * p, 3 * n))
+
+
+class Surface(NamedTuple):
+    """Outer surface of a mesh."""
+
+    #: (f, 3) or (f, 6) triangles, anticlockwise seen from outside
+    faces: Ints
+    #: (rows, 3 n) G with ``|G v|^2`` the integral of the squared normal velocity, v the nodal velocities
+    normal_velocity: sparse.csr_array
+
+    def radiation(self, shapes: Floats) -> Floats:
+        """(N, N) matrix R with ``qdot^T R qdot`` that integral for the field ``shapes @ qdot`` (m4/s2)."""
+        rows = self.normal_velocity @ shapes
+        return np.asarray(rows.T @ rows)

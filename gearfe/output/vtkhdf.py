@@ -25,6 +25,7 @@ CELL_TYPES: dict[str, tuple[int, int]] = {
     "triangle": (5, 3),
     "quad": (9, 4),
     "tetra": (10, 4),
+    "wedge": (13, 6),
     "triangle6": (22, 6),
     "tetra10": (24, 10),
 }

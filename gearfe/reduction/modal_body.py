@@ -53,8 +53,8 @@ class ModalBody:
         How many of the internal coordinates are modes.
     nodes : (n, 3)
         Mesh nodes (m).
-    elements : (m, 4) or (m, 10)
-        Tetrahedra.
+    elements : (m, 4), (m, 10) or (m, 6)
+        Cells to show: tetrahedra, or linear wedges between the nodes of extruded elements.
     shapes : (3 n, N)
         Nodal displacement for unit coordinates, rows ``3 node + axis``.
     faces : (f, 3) or (f, 6)
@@ -109,6 +109,11 @@ class ModalBody:
     def size(self) -> int:
         """Number of coordinates N."""
         return len(self.mass)
+
+    @property
+    def cells(self) -> dict[str, Ints]:
+        """The elements by their name in `gearfe.output.vtkhdf`."""
+        return {{4: "tetra", 6: "wedge", 10: "tetra10"}[self.elements.shape[1]]: self.elements}
 
     @property
     def highest_hz(self) -> float:

@@ -146,7 +146,6 @@ def write_housing(
 ) -> None:
     """VTKHDF series of the housing: displacement (m), acceleration along the outward normal (m/s2)."""
     position, acceleration = _coordinates(response)
-    cells = {"tetra" if body.elements.shape[1] == 4 else "tetra10": body.elements}
     chosen = np.asarray(steps, dtype=np.int64)
     with VtkHdfSeries(path) as series:
         for first in range(0, len(chosen), _AT_ONCE):
@@ -157,7 +156,10 @@ def write_housing(
                 start = first + i == 0
                 data = {"displacement_m": displacement[i], "normal_acceleration_m_per_s2": normal[i]}
                 series.add(
-                    float(response.time[step]), body.nodes if start else None, cells if start else None, point_data=data
+                    float(response.time[step]),
+                    body.nodes if start else None,
+                    body.cells if start else None,
+                    point_data=data,
                 )
             if progress is not None:
                 progress(first + len(some), len(chosen), "fields")

@@ -1,13 +1,12 @@
 """Elastic housing: mesh, reduction, size and sparse solver against error and time; other programs on the same mesh.
 
-Frequencies are those with rigid bores that are free to move. Errors of the mesh are taken against other elements, of
-order 3 and thin across the re-entrant edges: finer tetrahedra of the same grading would share the slow error that these
-edges make. Errors of the reduction are taken against the full model under a ramp on bore 5.
+Frequencies are those with rigid bores that are free to move. Errors of the mesh are taken against elements that are
+much thinner across the re-entrant edges, where the slow error is made. Errors of the reduction are taken against the
+full model under a ramp on bore 5.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from functools import lru_cache, partial
 from typing import Any
@@ -21,14 +20,11 @@ from gearfe.reduction.transient import newmark, smooth_ramp
 
 from .peers.process import missing, run_python
 from .record import Record
-from .subject import DATA, given_file, housing_of, shipped_housing
+from .subject import DATA, given_file, housing_of
 from .timing import measured
 
-#: Element sizes (mm), coarse to fine.
-SIZES, QUICK_SIZES = (20.0, 14.0, 11.0, 9.0, 7.0, 6.0, 4.6, 4.0), (40.0, 24.0)
-LINEAR_SIZES = (11.0, 7.0, 4.6)
-#: Sizes of the extruded elements across re-entrant edges (mm); the last one is the truth of all others.
-ACROSS, QUICK_ACROSS = (4.0, 3.0, 1.5), (8.0,)
+#: Thicknesses of the elements at inner edges (mm), coarse to fine; the last one is the truth of all others.
+SIZES, QUICK_SIZES = (20.0, 12.0, 9.0, 6.0, 4.5, 3.0, 2.0, 1.2), (40.0, 24.0)
 #: (modes, correction levels) of the reduction.
 REDUCTIONS = (
     (10, 0),
@@ -72,38 +68,24 @@ def reduced(housing: Housing, modes: int = 40, levels: int = 1, solver: str = "a
 
 def sizes(record: Record) -> None:
     """Mesh to reduced model (40 modes, one level): seconds against unknowns, frequencies and their estimated errors."""
-    from gearfe.housing.extruded import extruded_body
-    from gearfe.meshing.extruded_housing import Sizes
     from gearfe.reduction.error import mesh_error
 
-    table = record.table("housing_sizes", "order", "size_mm")
+    table = record.table("housing_sizes", "size_mm")
 
-    def make(size: float, order: int) -> Mapping[str, Any]:
-        housing = housing_of(size, order)
+    def make(size: float) -> Mapping[str, Any]:
+        housing = housing_of(size)
         body, cost = measured(lambda: reduced(housing), runs=1 if record.quick else 2, most_s=12.0)
-        told = mesh_error(housing.with_estimate(body), 1.0).frequency_errors[:FREQUENCIES]
-        largest = float(told.max()) if np.isfinite(told).all() else math.nan  # linear elements have no estimate
-        return {"unknowns": housing.unknowns, **cost.columns, "told": largest, **named(body)}
+        told = float(mesh_error(housing.with_estimate(body), 1.0).frequency_errors[:FREQUENCIES].max())
+        found = {f"f{k + 1}_Hz": float(f) for k, f in enumerate(body.coupled.frequencies_hz[:FREQUENCIES])}
+        return {"unknowns": housing.unknowns, **cost.columns, "told": told, "solver": body.solver, **found}
 
-    def truth(across: float) -> Mapping[str, Any]:
-        sizes = Sizes(across, far=20.0 * across) if record.quick else Sizes(across)
-        body, cost = measured(lambda: extruded_body(shipped_housing(), sizes, modes=40), runs=1)
-        return {"unknowns": body.nodes.size, **cost.columns, "told": math.nan, **named(body)}
-
-    def named(body: Any) -> dict[str, Any]:
-        found = body.coupled.frequencies_hz[:FREQUENCIES]
-        return {"solver": body.solver} | {f"f{k + 1}_Hz": float(f) for k, f in enumerate(found)}
-
-    for order, sizes_mm in ((1, QUICK_SIZES),) if record.quick else ((2, SIZES), (1, LINEAR_SIZES)):
-        for size in sizes_mm:
-            record.row(table, {"order": order, "size_mm": size}, partial(make, size, order))
-    for across in QUICK_ACROSS if record.quick else ACROSS:
-        record.row(table, {"order": 3, "size_mm": across}, partial(truth, across))
+    for size in QUICK_SIZES if record.quick else SIZES:
+        record.row(table, {"size_mm": size}, partial(make, size))
 
 
 def frequency_errors(rows: list[dict[str, Any]]) -> list[float]:
-    """Largest relative error of the frequencies of each row against the finest elements of the highest order."""
-    finest = max(rows, key=lambda r: (r["order"], r["unknowns"]))
+    """Largest relative error of the frequencies of each row against the finest elements."""
+    finest = max(rows, key=lambda r: r["unknowns"])
     names = [f"f{k + 1}_Hz" for k in range(FREQUENCIES)]
     return [max(abs(r[n] / finest[n] - 1.0) for n in names) for r in rows]
 
@@ -111,12 +93,12 @@ def frequency_errors(rows: list[dict[str, Any]]) -> list[float]:
 def reductions(record: Record) -> None:
     """Modes and correction levels against the response of the full model, below 5 kHz, at bore 5 along the shaft."""
     table = record.table("housing_reductions", "modes", "levels")
-    size = QUICK_SIZES[0] if record.quick else 11.0
+    size = QUICK_SIZES[0] if record.quick else 9.0
     step, steps = 10e-6, 100 if record.quick else 700
 
     @lru_cache(maxsize=1)
     def truth() -> tuple[Housing, Any]:
-        housing = housing_of(size, 1 if record.quick else 2)
+        housing = housing_of(size)
         full = housing.full_model()
         return housing, newmark(
             full.mass, BETA * full.stiffness, full.stiffness, load, step=step, steps=steps, watch=range(36)
@@ -151,13 +133,13 @@ def below(signal: np.ndarray, step: float, limit_hz: float) -> np.ndarray:
 def solvers(record: Record) -> None:
     """Every sparse solver that is there, reduction to 40 modes; the slowest one is spared the large meshes."""
     table = record.table("housing_solvers", "solver", "size_mm")
-    for size in QUICK_SIZES[-1:] if record.quick else (9.0, 7.0, 6.0):
+    for size in QUICK_SIZES[-1:] if record.quick else (12.0, 6.0, 4.5):
         for solver in installed_solvers():
-            if solver == "superlu" and size < 9.0:
+            if solver == "superlu" and size < 12.0:
                 continue
 
             def make(solver: str = solver, size: float = size) -> Mapping[str, Any]:
-                housing = housing_of(size, 1 if record.quick else 2)
+                housing = housing_of(size)
                 _ = housing.matrices
                 _, cost = measured(lambda: reduced_from(housing, solver), runs=1 if record.quick else 2, most_s=10.0)
                 return {"unknowns": housing.unknowns, **cost.columns}
@@ -246,8 +228,11 @@ def reference_or_small(record: Record, mass: str) -> Housing:
 
 
 def small_housing() -> Housing:
-    """A coarse mesh of the shipped housing."""
-    return housing_of(QUICK_SIZES[0], order=1)
+    """The reference's own elements without their midside nodes, for a smoke run."""
+    whole = reference_housing()
+    return Housing.from_arrays(
+        whole.nodes, whole.mesh.cells[:, :4], attachments=whole.attachments, fixed=whole.fixed, material=whole.material
+    )
 
 
 def _body(housing: Housing, modes: int) -> Any:

@@ -117,7 +117,7 @@ def summary(tables: dict[str, list[Row]]) -> list[str]:
         ("chain: exponent of a step in bodies", "mechanism_chains", "bodies", "us_a_step", "<= 1.2"),
         ("housing: exponent of time in unknowns", "housing_sizes", "unknowns", "cpu_s", "<= 1.4"),
     ):
-        own = [r for r in tables.get(table, []) if r.get("order", 2) == 2]
+        own = tables.get(table, [])
         if len(own) > 1:
             rows.append((title, f"{exponent(own, x, y):.2f}", goal))
     if not rows:

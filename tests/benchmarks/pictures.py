@@ -128,21 +128,15 @@ def _sweep_peers(figure: Any, rows: list[Row]) -> None:
     _finish(axes)
 
 
-#: Elements of the size study by their order.
-KINDS_OF_ORDER = {1: "linear", 2: "second order", 3: "extruded, third order"}
-
-
 def _housing_sizes(figure: Any, rows: list[Row]) -> None:
     from .housing_study import frequency_errors
 
     left, right = figure.subplots(1, 2)
     own = [{**r, "error": e} for r, e in zip(rows, frequency_errors(rows), strict=True)]
-    own = [{**r, "kind": KINDS_OF_ORDER[r["order"]]} for r in own]
-    curves(left, groups(own, "kind"), "error", "cpu_s")
+    curves(left, {"": own}, "error", "cpu_s")
     left.set(xlabel="largest error of 20 frequencies", ylabel="processor time (s)", title="housing: mesh")
-    for label, part in groups(own, "kind").items():
-        text = f"{label} (exponent {exponent(part, 'unknowns', 'cpu_s'):.2f})" if len(part) > 1 else label
-        curves(right, {text: part}, "unknowns", "cpu_s")
+    text = f"exponent {exponent(own, 'unknowns', 'cpu_s'):.2f}" if len(own) > 1 else ""
+    curves(right, {text: own}, "unknowns", "cpu_s")
     right.set(xlabel="unknowns", ylabel="processor time (s)", title="mesh to reduced body, 40 modes")
     for axes in (left, right):
         _finish(axes)

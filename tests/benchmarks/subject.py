@@ -69,12 +69,12 @@ def shipped_housing() -> HousingTable:
     return table
 
 
-def housing_of(size_mm: float, order: int = 2) -> Housing:
-    """The shipped housing with elements of `size_mm` in its walls."""
+def housing_of(size_mm: float) -> Housing:
+    """The shipped housing with elements `size_mm` thick at inner edges."""
     from gearfe.housing.build import housing_from_table
 
     table = shipped_housing()
-    return housing_from_table(replace(table, mesh=replace(table.mesh, order=order, size_mm=size_mm)))
+    return housing_from_table(replace(table, mesh=replace(table.mesh, size_mm=size_mm)))
 
 
 def train_model(variant: str, *, quick: bool = False, modes: int | None = None) -> Any:

@@ -277,11 +277,9 @@ SECTIONS: tuple[Section, ...] = (
         "Housing: mesh",
         "Mesh to reduced body (40 modes, one level of corrections, assembly included); largest error of the "
         "first 20 frequencies "
-        "against extruded elements of order 3 that are 1.5 mm thin across the re-entrant edges (last row; by its own "
-        "rate its first six are another 0.1 to 0.2 % too high, single ones of the 20 up to 0.5 %), and largest error "
-        "that the estimate tells. Times are without the estimate, which takes a quarter to a third of them more.",
+        "against the thinnest elements (last row), and largest error that the estimate tells. "
+        "Times are without mesher and estimate.",
         {
-            "order": ("order", digits),
             "size_mm": ("size (mm)", digits),
             "unknowns": ("unknowns", digits),
             "error": ("error", percent),

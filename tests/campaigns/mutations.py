@@ -68,7 +68,7 @@ def base_jobs() -> dict[str, BaseJob]:
         for name, x, y in (("1", 0.0, 33.0), ("2", 0.0, -33.0), ("3", 62.5, 33.0), ("4", 62.5, -33.0))
     ]
     train["curves"] = {"load": "stiffness"}
-    housing = {**HOUSING, "mesh": {"size_mm": 20.0, "order": 1}, "reduction": {"modes": 5}}
+    housing = {**HOUSING, "mesh": {"size_mm": 20.0}, "reduction": {"modes": 5}}
     plain = ("--no-pictures", "--no-floquet", "--no-estimate")
     return {
         "mechanism": BaseJob(toml_text(mechanism), ("mechanism", "--no-figures", "--reactions", "--no-estimate"), 0.45),

@@ -187,7 +187,7 @@ def housing(random: np.random.Generator, distance: float) -> Table:
         "base_thickness_mm": rounded(random.uniform(8.0, 20.0), 3),
         "shafts": [{"x_mm": 0.0, "bore_radius_mm": 10.0}, {"x_mm": distance, "bore_radius_mm": 10.0}],
         "feet": {"length_x_mm": 20.0, "width_y_mm": 15.0, "fixed": True},
-        "mesh": {"size_mm": rounded(random.uniform(9.0, 13.0), 2), "order": 2},
+        "mesh": {"size_mm": rounded(random.uniform(4.0, 13.0), 2)},
         "reduction": {"modes_below_Hz": 8000.0, "least_modes": 20, "band_Hz": 4000.0},
         "damping": {"ratio": float(random.choice([0.0, 0.01, 0.03]))},
     }

@@ -103,7 +103,8 @@ def clamped_modes(housing: Housing, count: int) -> tuple[np.ndarray, Spent]:
         folder = Path(name)
         lines = ["*NODE, NSET=NALL"]
         lines += [f"{i + 1}, {x:.12e}, {y:.12e}, {z:.12e}" for i, (x, y, z) in enumerate(housing.nodes)]
-        tets = housing.tets if housing.tets.shape[1] == 4 else _as_vtk(housing.tets)  # CalculiX has VTK's order
+        tets = housing.mesh.cells
+        tets = tets if tets.shape[1] == 4 else _as_vtk(tets)  # CalculiX has VTK's order
         lines.append(f"*ELEMENT, TYPE=C3D{tets.shape[1]}, ELSET=ALL")
         lines += [f"{e + 1}, " + ", ".join(map(str, nodes + 1)) for e, nodes in enumerate(tets)]
         lines += ["*NSET, NSET=HELD", *(f"{n + 1}," for n in held)]

@@ -1,0 +1,187 @@
+r"""The two kinds of meshes that a housing may have: tetrahedra that anyone brought, extruded elements of a job's own.
+
+Each tells the same of itself: nodes, cells to show, matrices, outer surface, and how much too stiff it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..meshing.housing_mesh import REVERSED, Extrusion
+from ..prisms import ORDER, assemble_prisms, lagrange, triangle_rule
+from ..solid import MassRule, SolidMaterial, SolidMatrices, assemble
+from .mesh_checks import boundary_faces
+from .mesh_error import energy_lost
+from .prism_error import prism_energy_lost
+from .surface import Surface, SurfaceQuadrature, normal_velocity, surface_quadrature
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+#: Which faces are outside, told by their centres (f, 3) in m.
+Outer = Callable[[Floats], NDArray[np.bool_]]
+
+#: Triangles between the ten nodes of one, in its own sense.
+_SPLIT = np.array([[0, 3, 8], [3, 4, 9], [4, 1, 5], [8, 9, 7], [9, 5, 6], [7, 6, 2], [3, 9, 8], [4, 5, 9], [9, 6, 7]])
+
+
+@dataclass(frozen=True, eq=False)
+class Tetrahedra:
+    """Tetrahedra of first or second order.
+
+    Attributes
+    ----------
+    nodes : (n, 3)
+        Coordinates (m).
+    cells : (m, 4) or (m, 10)
+        Elements, midside nodes in the order of `gearfe.solid.EDGES`.
+    mass_rule
+        Integration of the mass.
+    """
+
+    nodes: Floats
+    cells: Ints
+    mass_rule: MassRule = "exact"
+
+    def assemble(self, material: SolidMaterial) -> SolidMatrices:
+        """Stiffness and mass."""
+        return assemble(self.nodes, self.cells, material, mass_rule=self.mass_rule)
+
+    def surface(self, without: list[Ints], outer: Outer | None = None) -> Surface:
+        """Surface but for faces that lie wholly within one of the sets of nodes, or are not `outer`."""
+        faces = boundary_faces(self.cells)
+        faces = faces[_chosen(self.nodes, faces, faces[:, :3], without, outer)]
+        return Surface(faces, normal_velocity(surface_quadrature(self.nodes, faces), faces, len(self.nodes)))
+
+    def energy_lost(self, material: SolidMaterial, fields: Floats, squares: Floats, rigid: list[Ints]) -> Floats:
+        """See `gearfe.housing.mesh_error.energy_lost`."""
+        return energy_lost(self.nodes, self.cells, material, fields, squares, rigid)
+
+
+@dataclass(frozen=True, eq=False)
+class Prisms:
+    """Extruded elements of order 3, 40 nodes each; see `gearfe.prisms`."""
+
+    extrusion: Extrusion
+
+    @cached_property
+    def used(self) -> Ints:
+        """(n,) number ``point * levels + level`` of each node."""
+        return np.unique(self._numbers)
+
+    @cached_property
+    def nodes(self) -> Floats:
+        """(n, 3) coordinates (m)."""
+        return self._places(self.used)
+
+    @cached_property
+    def cells(self) -> Ints:
+        """(m, 6) linear wedges between the nodes, 27 an element: what is shown."""
+        low, high = self._numbers[:, _SPLIT, :-1], self._numbers[:, _SPLIT, 1:]
+        wedges = np.concatenate([low, high], axis=2)  # (elements, 9, 6, 3 layers)
+        return self._renumbered(wedges.transpose(0, 1, 3, 2).reshape(-1, 6))
+
+    def assemble(self, material: SolidMaterial) -> SolidMatrices:
+        """Stiffness and mass."""
+        return assemble_prisms(*self.extrusion, material).matrices
+
+    def surface(self, without: list[Ints], outer: Outer | None = None) -> Surface:
+        """Surface but for faces that lie wholly within one of the sets of nodes, or are not `outer`."""
+        mesh, levels, ends, sides = self.extrusion, len(self.extrusion.levels), [], []
+        none = np.zeros_like(mesh.solid[:1])
+        tops = mesh.solid & ~np.concatenate([mesh.solid[1:], none])
+        bottoms = mesh.solid & ~np.concatenate([none, mesh.solid[:-1]])
+        for layer, (solid, top, bottom) in enumerate(zip(mesh.solid, tops, bottoms, strict=True)):
+            own = ORDER * layer + np.arange(ORDER + 1)
+            # anticlockwise in (x, z) is clockwise seen from +y
+            ends += [mesh.triangles[top][:, REVERSED] * levels + own[-1], mesh.triangles[bottom] * levels + own[0]]
+            edges = _outline(mesh.triangles[solid])
+            sides.append((edges[..., None] * levels + own).reshape(len(edges), -1))
+        triangles, velocities = [], []
+        for numbers, split, quadrature in (
+            (np.concatenate(ends), _SPLIT, _end_quadrature),
+            (np.concatenate(sides), _side_split(), _side_quadrature),
+        ):
+            faces = self._renumbered(numbers)
+            faces = faces[_chosen(self.nodes, faces, faces, without, outer)]
+            triangles.append(faces[:, split].reshape(-1, 3))
+            velocities.append(normal_velocity(quadrature(self.nodes[faces]), faces, len(self.nodes)))
+        return Surface(np.concatenate(triangles), sparse.csr_array(sparse.vstack(velocities)))
+
+    def energy_lost(self, material: SolidMaterial, fields: Floats, squares: Floats, rigid: list[Ints]) -> Floats:
+        """See `gearfe.housing.prism_error.prism_energy_lost`."""
+        return prism_energy_lost(self.extrusion, self.used, material, fields, squares, rigid)
+
+    @cached_property
+    def _numbers(self) -> Ints:
+        """(elements, 10, 4) numbers of their nodes."""
+        mesh = self.extrusion
+        layer, triangle = np.nonzero(mesh.solid)
+        level = ORDER * layer[:, None, None] + np.arange(ORDER + 1)
+        return np.asarray(mesh.triangles[triangle][:, :, None] * len(mesh.levels) + level)
+
+    def _renumbered(self, numbers: Ints) -> Ints:
+        return np.searchsorted(self.used, numbers)
+
+    def _places(self, numbers: Ints) -> Floats:
+        mesh, levels = self.extrusion, len(self.extrusion.levels)
+        x, z = mesh.points[numbers // levels].T
+        return np.column_stack([x, mesh.levels[numbers % levels], z])
+
+
+def _chosen(nodes: Floats, faces: Ints, corners: Ints, without: list[Ints], outer: Outer | None) -> NDArray[np.bool_]:
+    """(f,) whether faces lie within none of the sets of nodes and are outer ones by the mean of their `corners`."""
+    keep = np.ones(len(faces), dtype=bool) if outer is None else outer(nodes[corners].mean(axis=1))
+    keep = np.asarray(keep, dtype=bool)
+    for chosen in without:
+        flags = np.zeros(len(nodes), dtype=bool)
+        flags[chosen] = True
+        keep &= ~flags[faces].all(axis=1)
+    return keep
+
+
+def _outline(triangles: Ints) -> Ints:
+    """(e, 4) edges of only one of the triangles, in its sense: ends, then the nodes between."""
+    edges = np.concatenate([triangles[:, [0, 1, 3, 4]], triangles[:, [1, 2, 5, 6]], triangles[:, [2, 0, 7, 8]]])
+    _, first, times = np.unique(np.sort(edges[:, :2], axis=1), axis=0, return_index=True, return_counts=True)
+    return np.asarray(edges[first[times == 1]])
+
+
+def _side_split() -> Ints:
+    """(18, 3) triangles between the sixteen nodes of a side: an edge's four (ends first) times four levels."""
+    along = np.array([0, 2, 3, 1])
+    made = []
+    for i in range(ORDER):
+        for j in range(ORDER):
+            a, b = along[i] * (ORDER + 1) + j, along[i + 1] * (ORDER + 1) + j
+            made += [[a, a + 1, b + 1], [a, b + 1, b]]
+    return np.array(made)
+
+
+def _end_quadrature(place: Floats) -> SurfaceQuadrature:
+    """Functions and area vectors of plane triangles with nodes at `place` (f, 10, 3)."""
+    rule = triangle_rule()
+    one, two = (np.einsum("fak,ap->fpk", place, rule.slopes[..., axis]) for axis in range(2))
+    return SurfaceQuadrature(rule.values.T, np.cross(one, two) * rule.weights[:, None])
+
+
+def _side_quadrature(place: Floats) -> SurfaceQuadrature:
+    """The same of faces (f, 16, 3) over an edge, its four nodes ends first, times four levels."""
+    x, w = np.polynomial.legendre.leggauss(ORDER + 1)
+    line = lagrange()
+    edge = [line[k] for k in (0, ORDER, 1, 2)]
+    along, level = np.array([[one(x) for one in functions] for functions in (edge, line)])
+    d_along, d_level = np.array([[one.deriv()(x) for one in functions] for functions in (edge, line)])
+
+    def product(one: Floats, two: Floats) -> Floats:
+        return np.einsum("as,bt->abst", one, two).reshape(len(one) * len(two), -1)
+
+    one, two = (
+        np.einsum("fak,ap->fpk", place, slopes) for slopes in (product(d_along, level), product(along, d_level))
+    )
+    return SurfaceQuadrature(product(along, level).T, np.cross(two, one) * np.outer(w, w).reshape(-1, 1))
