@@ -63,11 +63,8 @@ def prism_energy_lost(
     lost = np.zeros((count, count))
     # residuals and stiffnesses of functions at the level between two layers: (plane functions, 3, k), (.., 3, 3)
     below = (np.zeros((len(numbers.new.node), 3, count)), np.zeros((len(numbers.new.node), 3, 3)))
-    for layer in range(len(mesh.solid) + 1):
-        if layer == len(mesh.solid):
-            lost += _taken(*below, _acting(numbers.new, ORDER * layer, levels, still))
-            break
-        chosen = np.flatnonzero(mesh.solid[layer])
+    for layer, solid in enumerate(mesh.solid):
+        chosen = np.flatnonzero(solid)
         half = 0.5 * (mesh.levels[ORDER * layer + ORDER] - mesh.levels[ORDER * layer])
         own = mesh.triangles[chosen][:, :, None] * levels + ORDER * layer + np.arange(ORDER + 1)
         values = field[np.searchsorted(used, own)].reshape(len(chosen), 10, ORDER + 1, 3, count)
@@ -89,6 +86,7 @@ def prism_energy_lost(
                     below = (residual[:, j], stiffness[:, j])
                 else:
                     lost += _taken(residual[:, j], stiffness[:, j], inside)
+    lost += _taken(*below, _acting(numbers.new, levels - 1, levels, still))
     return np.asarray(FACTOR * lost)
 
 
