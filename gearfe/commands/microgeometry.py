@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..contact.half_plane import half_plane_pair
     from ..loadmap.root_stress import pair_roots
-    from ..microgeometry.job import checked_model, deviations_of
+    from ..microgeometry.job import checked_model, deviations_of, law_remarks
     from ..microgeometry.report import (
         cell_table,
         figure_arguments,
@@ -101,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "microgeometry.json", summary(job, table, made, deviations, watch.seconds))
         names = sorted(path.name for path in place.iterdir())
-    for line in told(made):
+    for line in [*told(made), *law_remarks(job)]:
         print(line)
     print(f"written to {folder}: " + ", ".join(names))
     print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))

@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..contact.half_plane import half_plane_pair
     from ..loadmap.root_stress import pair_roots
-    from ..microgeometry.job import checked_model
+    from ..microgeometry.job import checked_model, law_remarks
     from ..microgeometry.relief import optimise_relief
     from ..microgeometry.relief_job import comparison, figure_arguments, map_table, named, relief_problem, summary, told
     from ..output.files import output_folder, whole_set, write_csv, write_json
@@ -101,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "relief.json", summary(job, base, table, made, watch.seconds))
         names = sorted(path.name for path in place.iterdir())
-    for line in told(table, made):
+    for line in [*told(table, made), *law_remarks(job)]:
         print(line)
     print(f"written to {folder}: " + ", ".join(names))
     print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))

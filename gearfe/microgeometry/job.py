@@ -35,6 +35,14 @@ def checked_model(job: StiffnessJob) -> dict[str, Any]:
     return {**job.model, "law": HalfPlane()}
 
 
+def law_remarks(job: StiffnessJob) -> list[str]:
+    """A line to print where [stiffness] names another law than the one that solves here."""
+    name = job.model["law"].name
+    if name == HalfPlane.name:
+        return []
+    return [f"contact law: half_plane, as deviations need it; law = {name!r} of [stiffness] is for its curve alone"]
+
+
 def deviations_of(
     table: MicrogeometryTable, pair: GearPair, folder: str | Path = "."
 ) -> tuple[ToothDeviations, ToothDeviations]:
