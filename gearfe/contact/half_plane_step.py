@@ -241,7 +241,8 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
     between = 0.5 * (p[:, 1:] + p[:, :-1])
     # both deformed faces have the same slope; the one further from its edges changes less with where it is taken
     into = (edges @ p[:, None, :, None])[..., 0]
-    np.add.at(into, couples.first[beside], (shared @ p[couples.second[beside], None, :, None])[..., 0])
+    if len(beside):
+        np.add.at(into, couples.first[beside], (shared @ p[couples.second[beside], None, :, None])[..., 0])
     deformed = heights - WAY[:, None] * into
     middle = (far[:, :, None] * deformed).sum(axis=1)
     area = (between * np.diff(x)).sum(axis=1)

@@ -64,6 +64,8 @@ def panel_influence(
         Of the panels (m).
     """
     i, j = couples.first[couples.neighbours], couples.second[couples.neighbours]
+    if len(i) == 0:
+        return np.zeros((0, 2, arcs.shape[2], arcs.shape[2]))
     tension, shear = law.wedge
     turned = normal[i] * normal[j].conj()
     half = 0.5 * widths[j][:, None, None, :]

@@ -230,12 +230,12 @@ def pressed(
         Whether that is no guess but what bears.
     """
     groups, n = _groups(K, between, couples), gap.shape[1]
-    on = bearing
+    gaps, on = [group.of(gap) for group in groups], bearing
     y0 = -couples.times(T, carried)
     pressure, approach = np.empty_like(gap), np.empty_like(gap)
     for _ in range(1 if held else CHANGES):
         free, stiffness = np.empty(len(gap)), np.zeros(len(T))
-        responses = [group.responses(group.of(on), group.of(gap)) for group in groups]
+        responses = [group.responses(group.of(on), own) for group, own in zip(groups, gaps, strict=True)]
         for group, both in zip(groups, responses, strict=True):
             count, z = group.contacts.shape
             forces = (widths[group.contacts][:, :, None, :] @ both.reshape(count, z, n, 1 + z))[:, :, 0]
