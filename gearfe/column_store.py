@@ -6,9 +6,8 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from .typing import Array
 
 #: Bytes up to which the table stays in memory.
 IN_MEMORY = 32 << 20
@@ -22,13 +21,13 @@ class ColumnStore:
         self._blocks: list[int] = []
         self._file = tempfile.SpooledTemporaryFile(max_size=IN_MEMORY, dir=None if folder is None else str(folder))  # noqa: SIM115 (lives as long as the table)
 
-    def append(self, rows: Floats) -> None:
+    def append(self, rows: Array) -> None:
         """Add a block of rows, (n, columns)."""
         if len(rows):
             self._blocks.append(len(rows))
             self._file.write(np.ascontiguousarray(rows.T).tobytes())
 
-    def column(self, number: int) -> Floats:
+    def column(self, number: int) -> Array:
         """(rows,) a whole column."""
         parts, begin = [], 0
         for count in self._blocks:

@@ -13,10 +13,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
-IntArray = NDArray[Any]
+from .typing import Array
+
 Plane = Literal["strain", "stress"]
 
 

@@ -24,13 +24,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .column_store import ColumnStore
 from .errors import InputError
 from .spectrum import Spectrum, window_at
-
-Floats = NDArray[np.float64]
+from .typing import Array, ComplexArray
 
 #: Sampling frequency of the motion, in parts of twice the highest natural frequency, at least: with 2 the leakage of a
 #: fast mode through the ends of a record is within 1e-3 of the largest line; on lines of the record it would need 1.
@@ -52,7 +50,7 @@ def samples_per_step(step: float, highest: float) -> int:
     return 1 if needed <= 1.0 else 2 * math.ceil(0.5 * needed)
 
 
-def finer(times: Floats, highest: float) -> tuple[Floats, int]:
+def finer(times: Array, highest: float) -> tuple[Array, int]:
     """Times (s) at which to sample a motion with modes up to `highest` (Hz), and how many of them make an output step.
 
     Parameters
@@ -65,7 +63,7 @@ def finer(times: Floats, highest: float) -> tuple[Floats, int]:
     return subdivided(times, every), every
 
 
-def subdivided(times: Floats, every: int) -> Floats:
+def subdivided(times: Array, every: int) -> Array:
     """Equally spaced times (n,) with `every` steps in place of each one."""
     count = len(times) - 1
     made = times[0] + float(times[-1] - times[0]) / (every * count) * np.arange(every * count + 1)
@@ -115,7 +113,7 @@ class RecordSpectrum:
         """Whether all samples have arrived."""
         return self._next == self._last + 1
 
-    def add(self, first: int, samples: Floats) -> None:
+    def add(self, first: int, samples: Array) -> None:
         """Take the samples (n, signals) whose first is number `first` of the record; those beside it are left out."""
         begin, end = max(0, first), min(self._last + 1, first + len(samples))
         if end <= begin:
@@ -141,7 +139,7 @@ class RecordSpectrum:
         if self.complete:
             self._kept.append(self._overlap)
 
-    def _filtered(self, x: Floats) -> None:
+    def _filtered(self, x: Array) -> None:
         """Store the rows that the samples x, a multiple of those kept, complete; row i lies at i keep - half of x."""
         half = len(self._filter) // 2
         before, after = (np.zeros((n, self.signals)) for n in (2 * half, max(0, 2 * half - self._keep + 1)))
@@ -154,12 +152,12 @@ class RecordSpectrum:
             self._kept.append(made[:done])
 
     @cached_property
-    def frequency(self) -> Floats:
+    def frequency(self) -> Array:
         """(lines,) frequencies (Hz) up to half the output's sampling frequency, 0 first."""
         return np.arange(self.steps // 2 + 1) / (self.steps * self.step)
 
     @cached_property
-    def _scale(self) -> Floats:
+    def _scale(self) -> Array:
         """(lines,) from sums of kept samples to amplitudes; the filter's response is divided out."""
         half = len(self._filter) // 2
         turn = 2.0 * np.pi * np.arange(self.steps // 2 + 1) / self._last
@@ -173,7 +171,7 @@ class RecordSpectrum:
         return np.asarray(scale)
 
     @cached_property
-    def _ramp(self) -> NDArray[np.complex128]:
+    def _ramp(self) -> ComplexArray:
         """(lines,) amplitudes of a ramp from 0 to 1: those of the integral less those of the trapezoidal sum."""
         half = np.pi * np.arange(1, self.steps // 2 + 1) / self._last  # half the angle between samples
         missing = 1j * (1.0 / half - 1.0 / np.tan(half)) / (self._last * self._gain)
@@ -181,7 +179,7 @@ class RecordSpectrum:
             missing[-1] = 0.0  # no phase is known there
         return np.concatenate([[0.0], missing])
 
-    def column(self, signal: int) -> NDArray[np.complex128]:
+    def column(self, signal: int) -> ComplexArray:
         """(lines,) complex amplitudes of a signal."""
         if not self.complete:
             problem = f"{self._next} of {self._last + 1} samples have arrived"
@@ -199,7 +197,7 @@ class RecordSpectrum:
         return Spectrum(self.frequency, value, self._last, self.window, self._square / self._gain**2)
 
 
-def low_pass(keep: int) -> Floats:
+def low_pass(keep: int) -> Array:
     """(2 REACH keep + 1,) weights, of sum 1: half of the response at the frequency of half the kept samples' rate.
 
     Passes up to half of that frequency, stops from one and a half on; with every sample kept there is nothing to stop.

@@ -24,9 +24,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from .errors import InputError
+from .typing import Array, BoolArray, IntArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 MassRule = Literal["exact", "4-point"]
 
 #: Corner pairs of the edges in the order of the midside nodes (VTK, Abaqus, CalculiX; scikit-fem's too).
@@ -99,7 +98,7 @@ def expand_nodal(nodal: sparse.csr_array) -> sparse.csr_array:
     return sparse.kron(nodal, sparse.eye_array(3), format="csr")
 
 
-def assemble(nodes: Floats, tets: Ints, material: SolidMaterial, *, mass_rule: MassRule = "exact") -> SolidMatrices:
+def assemble(nodes: Array, tets: IntArray, material: SolidMaterial, *, mass_rule: MassRule = "exact") -> SolidMatrices:
     """Stiffness and consistent mass of a tetrahedral mesh.
 
     Parameters
@@ -119,7 +118,7 @@ def assemble(nodes: Floats, tets: Ints, material: SolidMaterial, *, mass_rule: M
     parts = [_by_blocks(nodes, part, material, mass_rule) for part in (straight, bent) if len(part)]
     pattern = _pattern(tets, len(nodes))
 
-    def summed(local: list[Floats]) -> Floats:
+    def summed(local: list[Array]) -> Array:
         weights = np.concatenate([entries.ravel() for entries in local])
         return np.asarray(np.bincount(pattern.place, weights=weights, minlength=len(pattern.columns)), dtype=float)
 
@@ -137,13 +136,13 @@ class ElementMatrices(NamedTuple):
     """Element matrices of ``m`` elements with ``a`` nodes each."""
 
     #: (m, a, 3, a, 3) stiffness (N/m)
-    stiffness: Floats
+    stiffness: Array
     #: (m, a, a) mass of one axis (kg)
-    mass: Floats
+    mass: Array
 
 
 def general_element_matrices(
-    nodes: Floats, tets: Ints, material: SolidMaterial, *, mass_rule: MassRule = "exact"
+    nodes: Array, tets: IntArray, material: SolidMaterial, *, mass_rule: MassRule = "exact"
 ) -> ElementMatrices:
     """Element matrices of any tetrahedra, curved or not, by scikit-fem's weak forms and isoparametric maps.
 
@@ -171,7 +170,7 @@ def general_element_matrices(
     return ElementMatrices(k.reshape(len(tets), a, 3, a, 3), m)
 
 
-def skfem_mesh(nodes: Floats, tets: Ints) -> Any:
+def skfem_mesh(nodes: Array, tets: IntArray) -> Any:
     """scikit-fem mesh of the elements, geometry of the same order as the elements (``MeshTet1`` or ``MeshTet2``).
 
     scikit-fem numbers vertices first and midside nodes by its own edges, so node numbers change; element order and the
@@ -192,7 +191,7 @@ def skfem_mesh(nodes: Floats, tets: Ints) -> Any:
     return MeshTet2(locations, linear.t, validate=False)
 
 
-def curved_elements(nodes: Floats, tets: Ints) -> NDArray[np.bool_]:
+def curved_elements(nodes: Array, tets: IntArray) -> BoolArray:
     """(m,) whether a midside node lies off the middle of its edge."""
     if tets.shape[1] == 4:
         return np.zeros(len(tets), dtype=bool)
@@ -201,7 +200,7 @@ def curved_elements(nodes: Floats, tets: Ints) -> NDArray[np.bool_]:
     return np.asarray(np.any(offset > STRAIGHT * np.linalg.norm(second - first, axis=2), axis=1))
 
 
-def jacobian_determinants(nodes: Floats, tets: Ints, *, inside: bool = False) -> Floats:
+def jacobian_determinants(nodes: Array, tets: IntArray, *, inside: bool = False) -> Array:
     """(m, points) volume ratio against the reference element: six times the volume where edges are straight.
 
     At all nodes of the element, or `inside` at the quadrature points. One value for each linear element. A value that
@@ -217,11 +216,11 @@ def jacobian_determinants(nodes: Floats, tets: Ints, *, inside: bool = False) ->
 class Unfolded(NamedTuple):
     """Nodes after `unfolded`, and how many elements were changed."""
 
-    nodes: Floats
+    nodes: Array
     changed: int
 
 
-def unfolded(nodes: Floats, tets: Ints, *, least: float = 0.0) -> Unfolded:
+def unfolded(nodes: Array, tets: IntArray, *, least: float = 0.0) -> Unfolded:
     """Straighten the edges of second-order elements that their curved edges fold.
 
     An element counts as folded when its volume ratio at a quadrature point is not above `least` times its mean. Meshers
@@ -250,10 +249,10 @@ class _Pattern(NamedTuple):
 
     starts: NDArray[np.int32]
     columns: NDArray[np.int32]
-    place: Ints
+    place: IntArray
 
 
-def _pattern(tets: Ints, n: int) -> _Pattern:
+def _pattern(tets: IntArray, n: int) -> _Pattern:
     a = tets.shape[1]
     keys = (np.repeat(tets, a, axis=1).astype(np.int64) * n + np.tile(tets, (1, a))).ravel()
     found, place = np.unique(keys, return_inverse=True)
@@ -262,7 +261,7 @@ def _pattern(tets: Ints, n: int) -> _Pattern:
 
 
 @cache
-def shape_functions(a: int, order: int) -> tuple[Floats, Floats, Floats]:
+def shape_functions(a: int, order: int) -> tuple[Array, Array, Array]:
     """Shape functions (a, p), their gradients (a, 3, p) and weights (p,) at quadrature points of the given degree."""
     from skfem import ElementTetP1, ElementTetP2
     from skfem.quadrature import get_quadrature_tet
@@ -276,7 +275,7 @@ def shape_functions(a: int, order: int) -> tuple[Floats, Floats, Floats]:
 
 
 @cache
-def node_gradients(a: int) -> Floats:
+def node_gradients(a: int) -> Array:
     """(points, a, 3) gradients of the shape functions at the nodes (at the first corner for linear elements)."""
     from skfem import ElementTetP1, ElementTetP2
 
@@ -291,23 +290,23 @@ class _Blocks:
     """Element matrices of ``m`` elements as (coefficients of each element) @ (integrals over the reference element)."""
 
     #: (m, 3, 3, 9 p) coefficients of the stiffness blocks; p quadrature points (straight: one set for all)
-    coefficients: Floats
+    coefficients: Array
     #: (9 p, a a) of d phi_a / d xi_m  d phi_b / d xi_n
-    gradients: Floats
+    gradients: Array
     #: (m, q) density times volume ratio, and (q, a a) of phi_a phi_b
-    density: Floats
-    products: Floats
+    density: Array
+    products: Array
 
-    def stiffness(self, i: int, j: int) -> Floats:
+    def stiffness(self, i: int, j: int) -> Array:
         """(m, a a) block that couples axes i and j."""
         return np.asarray(self.coefficients[:, i, j] @ self.gradients)
 
-    def mass(self) -> Floats:
+    def mass(self) -> Array:
         """(m, a a) mass of one axis."""
         return np.asarray(self.density @ self.products)
 
 
-def _by_blocks(nodes: Floats, tets: Ints, material: SolidMaterial, mass_rule: MassRule) -> _Blocks:
+def _by_blocks(nodes: Array, tets: IntArray, material: SolidMaterial, mass_rule: MassRule) -> _Blocks:
     """Factors of the element matrices of elements that are all straight or all curved.
 
     With J the gradient of the inverse map, ``d phi_a/d x_i = J[m, i] d phi_a/d xi_m``, block (i, j) of the element
@@ -340,7 +339,7 @@ def _by_blocks(nodes: Floats, tets: Ints, material: SolidMaterial, mass_rule: Ma
     return _Blocks(c.reshape(len(tets), 3, 3, -1), products, material.density * det, phi_phi)
 
 
-def maps(nodes: Floats, tets: Ints, gradients: Floats) -> tuple[Floats, Floats]:
+def maps(nodes: Array, tets: IntArray, gradients: Array) -> tuple[Array, Array]:
     """(m, p) volume ratio and (m, p, 3, 3) gradient of the inverse map [xi axis, x axis] where `gradients` are."""
     forward = np.einsum("eak,amp->epkm", nodes[tets], gradients, optimize=True)
     det = np.asarray(np.linalg.det(forward))

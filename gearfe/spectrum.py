@@ -20,11 +20,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .errors import InputError
-
-Floats = NDArray[np.float64]
+from .typing import Array, ComplexArray
 
 #: Window -> coefficients a_j of ``w_n = sum_j (-1)^j a_j cos(2 pi j n/N)``; periodic (no repeated end sample).
 #: Hann, Hamming, Blackman: Harris 1978, Table I; flat top: ISO 18431-2:2004.
@@ -57,14 +56,14 @@ class Spectrum:
         B, bins (1 without a window).
     """
 
-    frequency: Floats
-    value: NDArray[np.complex128]
+    frequency: Array
+    value: ComplexArray
     samples: int
     window: str
     noise_bandwidth: float
 
     @property
-    def amplitude(self) -> Floats:
+    def amplitude(self) -> Array:
         """Amplitudes, shape of `value`, in the signal's unit."""
         return np.abs(self.value)
 
@@ -79,7 +78,7 @@ class Spectrum:
         return 0.5 * self.samples * self.resolution
 
     @property
-    def weight(self) -> Floats:
+    def weight(self) -> Array:
         """(m,) share of the squared amplitude in the mean square: 1/2, but 1 for the constant and at Nyquist."""
         weight = np.full(len(self.frequency), 0.5)
         weight[0] = 1.0
@@ -110,9 +109,9 @@ class OrderLine:
 class Waterfall:
     """Spectra of overlapping pieces: middle times (k,) in s, frequencies (m,) in Hz, amplitudes (k, m)."""
 
-    time: Floats
-    frequency: Floats
-    amplitude: Floats
+    time: Array
+    frequency: Array
+    amplitude: Array
 
 
 def uniform_step(time: ArrayLike) -> float:
@@ -132,12 +131,12 @@ def uniform_step(time: ArrayLike) -> float:
     return step
 
 
-def window_values(name: str, length: int) -> Floats:
+def window_values(name: str, length: int) -> Array:
     """(length,) values of a window; see `WINDOWS`."""
     return window_at(name, np.arange(length) / length)
 
 
-def window_at(name: str, place: Floats) -> Floats:
+def window_at(name: str, place: Array) -> Array:
     """Values of a window at places of the record, 0 at its beginning and 1 at its end."""
     if name not in WINDOWS:
         raise InputError("window", name, "must be one of " + ", ".join(WINDOWS), "")
@@ -256,7 +255,7 @@ def nearest_line(frequency: float, lines: Iterable[OrderLine], within: float) ->
     return min(near, key=lambda line: (round(abs(line.frequency - frequency), 6), line.order), default=None)
 
 
-def line_amplitudes(values: ArrayLike, step: float, frequencies: ArrayLike) -> NDArray[np.complex128]:
+def line_amplitudes(values: ArrayLike, step: float, frequencies: ArrayLike) -> ComplexArray:
     """Complex amplitudes at given frequencies that need not lie on bins, by least squares with a constant.
 
     Parameters

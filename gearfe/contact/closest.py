@@ -22,16 +22,12 @@ the normal's turning from the point's own edge).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .flank import edge_shapes
-
-Array = NDArray[Any]
-IntArray = NDArray[Any]
-ComplexArray = NDArray[np.complex128]
 
 #: Gap (m) given to points whose projection runs off the end of the mate's surface: never in contact.
 OFF_END = 1.0
@@ -70,7 +66,7 @@ class Projection:
     curvature: Array
 
     @property
-    def reached(self) -> NDArray[np.bool_]:
+    def reached(self) -> BoolArray:
         """Whether the mate has a point that is closest: else the projection runs off the end of its surface."""
         return self.gap < OFF_END
 

@@ -14,18 +14,15 @@ Everything is expressed in the frame of the tooth that it belongs to.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 
 from ..elasticity import Material, Plane, element_stiffness
 from ..meshing.tooth_sector import SectorMesh
+from ..typing import Array
 from .dissection import Condensed, condense
 from .flank import Flank, flank_of, normal_stress_rows
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

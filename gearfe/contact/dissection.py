@@ -9,15 +9,12 @@ for recovering the eliminated ones.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.blas import dsyrk, dtrsm
 from scipy.linalg.lapack import dpotrf
 
-Array = NDArray[Any]
-IntArray = NDArray[Any]
+from ..typing import Array, BoolArray, IntArray
 
 #: Elements in a leaf: below, Python's overhead per front rules; above, the dense work does.
 LEAF_ELEMENTS = 40
@@ -186,7 +183,7 @@ def _owners(elements: IntArray, leaf_of: IntArray, levels: int, nodes: int) -> I
     return high
 
 
-def _leaf(elements: IntArray, matrices: Array, free: NDArray[np.bool_]) -> tuple[IntArray, Array]:
+def _leaf(elements: IntArray, matrices: Array, free: BoolArray) -> tuple[IntArray, Array]:
     """Assemble a leaf densely on its free nodes: as for all fronts, their numbers rise and the matrix is lower
     triangular.
     """

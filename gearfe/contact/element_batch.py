@@ -14,19 +14,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .closest import Projection, project
 from .laws import carrying
 from .records import ranges
 from .scene import MeshingPair
-
-Array = NDArray[Any]
-IntArray = NDArray[Any]
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -256,14 +251,14 @@ def batch_of(
     return replace(made, blocks=_blocks(made, bears))
 
 
-def carried_by(elastic: MeshingPair, first: FirstContacts) -> NDArray[np.bool_]:
+def carried_by(elastic: MeshingPair, first: FirstContacts) -> BoolArray:
     """Whether pinion and wheel carry contact points of the law at each contact, shape (m, 2)."""
     load = first.pressure * first.width
     mean = (first.arc * load[:, None, :]).sum(axis=2) / load.sum(axis=1)[:, None]
     return carrying(elastic.law, np.array([body.flank.ends[-1] for body in elastic.bodies]) - mean)
 
 
-def _blocks(batch: Batch, bears: NDArray[np.bool_]) -> list[Block]:
+def _blocks(batch: Batch, bears: BoolArray) -> list[Block]:
     """The response of pinion and wheel in each position."""
     made = []
     edges = np.searchsorted(2 * batch.position + batch.gear, np.arange(2 * batch.size + 1)).tolist()
@@ -274,7 +269,7 @@ def _blocks(batch: Batch, bears: NDArray[np.bool_]) -> list[Block]:
     return made
 
 
-def _response(batch: Batch, windows: range, bears: NDArray[np.bool_]) -> Array:
+def _response(batch: Batch, windows: range, bears: BoolArray) -> Array:
     """Displacements and stresses of one gear's windows for forces on them, see `Block`."""
     body, stressed = batch.elastic.bodies[batch.gear[windows[0]]], batch.elastic.law.uses_stress
     q, tooth = body.flank.shapes.shape[0], batch.tooth.tolist()

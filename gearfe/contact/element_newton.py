@@ -17,18 +17,13 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, ComplexArray, IntArray
 from .element_batch import Batch
 from .element_rows import Equations, Seen, State, equations_of, seen
 from .records import taken
-
-Array = NDArray[Any]
-IntArray = NDArray[Any]
-ComplexArray = NDArray[np.complex128]
 
 #: Steps after which a position has not converged.
 STEPS = 40

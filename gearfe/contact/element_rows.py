@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 
+from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .element_batch import Batch
-
-Array = NDArray[Any]
-IntArray = NDArray[Any]
-ComplexArray = NDArray[np.complex128]
 
 #: Exchanges of the points that bear, and how often more may be wrong than before.
 EXCHANGES, CHANCES = 60, 3
@@ -64,7 +59,7 @@ class Seen:
     place: Array
     gap: Array
     area: Array
-    reached: NDArray[np.bool_]
+    reached: BoolArray
     asked: Array
 
     def forces(self, pressure: Array, count: int) -> ComplexArray:
@@ -122,10 +117,10 @@ class Equations:
 
     points: IntArray
     matrix: Array
-    bears: NDArray[np.bool_]
+    bears: BoolArray
     factor: tuple[Array, IntArray] | None = None
 
-    def solve(self, right: Array, reached: NDArray[np.bool_], *, held: bool = False) -> Array:
+    def solve(self, right: Array, reached: BoolArray, *, held: bool = False) -> Array:
         """Pressures p >= 0 (Pa) with M p >= q, complementary, for q = `right`, all of shape (c,).
 
         The points that bear are exchanged all at once as long as fewer and fewer are wrong, else one by one, which ends
@@ -162,7 +157,7 @@ class Equations:
         return np.maximum(pressure, 0.0)
 
 
-def equations_of(batch: Batch, b: int, rows: Seen, asks: NDArray[np.bool_]) -> Equations:
+def equations_of(batch: Batch, b: int, rows: Seen, asks: BoolArray) -> Equations:
     """Those of position b on the points `rows`, of which those that ask for pressure bear at first."""
     points, count = rows.points, len(rows.points)
     nodes, column = np.unique(rows.nodes, return_inverse=True)

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .element_batch import Batch, FirstContacts, batch_of, windows_of
 from .element_newton import Outcome, solve, turned
 from .element_rows import State, seen
@@ -22,10 +21,6 @@ from .half_plane_result import PairContacts
 from .position import Contacts, FlankLoads, PointPressures, Positions, no_contact
 from .records import of_positions
 from .scene import MeshingPair
-
-Array = NDArray[Any]
-IntArray = NDArray[Any]
-ComplexArray = NDArray[np.complex128]
 
 #: Relative error of pressures and forces at which a position counts as converged.
 TOLERANCE = 1e-9
@@ -51,7 +46,7 @@ def first_contacts(sides: Sequence[FlankCompliance], contacts: PairContacts) -> 
     arcs = np.repeat(arc[step][:, :, -1:], size * n, axis=2).reshape(count, 2, size, n)
     pressure, width = np.zeros((2, count, size, n))
     arcs[whole, :, place], pressure[whole, place], width[whole, place] = arc, contacts.pressure, contacts.width
-    normal: NDArray[np.complex128] = np.zeros(count, dtype=np.complex128)
+    normal: ComplexArray = np.zeros(count, dtype=np.complex128)
     np.add.at(normal, whole, contacts.force * contacts.normal)
     return FirstContacts(
         position=contacts.position[step],
@@ -131,7 +126,7 @@ def _start(batch: Batch, first: FirstContacts) -> State:
     return State(pressure, stress, place, forces, displacement)
 
 
-def _at_rims(batch: Batch, state: State) -> NDArray[np.bool_]:
+def _at_rims(batch: Batch, state: State) -> BoolArray:
     """Whether a contact has come to the rim of a window that could be longer, shape (B,)."""
     edges = np.array([body.flank.edges for body in batch.elastic.bodies])[batch.gear]
     low, high = batch.first_edge > 0, batch.first_edge + batch.counts < edges
@@ -238,7 +233,7 @@ def _torques(batch: Batch, state: State, forces: ComplexArray, turn: ComplexArra
     placed, still = (batch.placed(u, turn) - hub for u in (state.displacement, np.zeros_like(forces)))
     moment, reaction = (-(arm.conj() * force).imag for arm in (placed, still))
 
-    def total(values: Array, chosen: NDArray[np.bool_]) -> Array:
+    def total(values: Array, chosen: BoolArray) -> Array:
         return np.bincount(batch.node_position, np.where(chosen, values, 0.0), batch.size)
 
     torques = {

@@ -15,18 +15,15 @@ linear one. The equilibrium minimises the whole energy, so by the envelope theor
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..elasticity import physical_gradients, triangle_shapes
+from ..typing import Array, IntArray
 from .compliance import GearBody
 from .position import TORQUES, Positions
 from .recovery import sector_displacements
 from .scene import MeshingPair
-
-Array = NDArray[Any]
 
 #: Sectors on either side of a loaded tooth that take part: the effect is cubic in the strain and dies out fast.
 NEIGHBOURS = 1
@@ -37,7 +34,7 @@ BLOCK = 40_000
 SAMPLES = 9
 
 
-def sample_numbers(angles: Array, cycle: float) -> NDArray[np.int64]:
+def sample_numbers(angles: Array, cycle: float) -> IntArray:
     """At most `SAMPLES` of the positions at `angles` (rad), spread evenly over the mesh cycle (rad): their numbers."""
     order = np.argsort(np.mod(angles, cycle), kind="stable")
     return order[np.unique(np.linspace(0, len(order) - 1, min(SAMPLES, len(order))).round().astype(np.int64))]

@@ -8,16 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..elasticity import Material, Plane, physical_gradients, triangle_shapes
 from ..meshing.tooth_sector import SectorMesh
-
-Array = NDArray[Any]
-IntArray = NDArray[Any]
+from ..typing import Array, BoolArray, IntArray
 
 
 def edge_shapes(xi: Array) -> tuple[Array, Array, Array]:
@@ -147,7 +143,7 @@ def normal_stress_rows(
     return unknowns.reshape(len(chain), 12), rows.reshape(*shape, 12)
 
 
-def _triangles_behind(triangles: IntArray, chain: IntArray) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:
+def _triangles_behind(triangles: IntArray, chain: IntArray) -> tuple[IntArray, IntArray, BoolArray]:
     """Triangle that owns each edge, which of its sides it is, and whether both run the same way."""
     slot = {int(node): k for k, node in enumerate(chain[:, 1])}
     found_triangle, found_side = np.zeros(len(chain), dtype=np.int64), np.zeros(len(chain), dtype=np.int64)

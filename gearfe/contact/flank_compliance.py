@@ -28,20 +28,17 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from ..gear.flank_curve import FlankCurve, flank_curve
 from ..gear.pair import GearPair
+from ..typing import Array
 from .compliance import GearBody
 from .flank import Flank, edge_shapes, gauss_rule
 from .scene import MeshingPair
 from .wedge import ELLIPSE_W, ELLIPSE_X, mean_log, wedge_tensor
-
-Array = NDArray[Any]
 
 #: Half width of a bump, in elements and at least in modules; distance of two stations in half widths.
 BUMP_ELEMENTS, BUMP_MODULES, SPACING = 2.0, 0.2, 0.8

@@ -34,9 +34,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..gear.touching import Touching
+from ..typing import Array, BoolArray, IntArray
 from .half_plane_pair import HalfPlanePair, half_plane_pair
 from .half_plane_result import (
     SUMS,
@@ -54,8 +55,6 @@ from .zones import completed
 
 __all__ = ["HalfPlanePair", "PairContacts", "half_plane_pair", "solve_half_plane"]
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 #: How often missing contacts are added.
 ROUNDS = 10
@@ -128,7 +127,7 @@ class _Open:
         found = self.pairs.found
         return couplings(np.searchsorted(self.numbers, found.position), found.pair, len(self.numbers))
 
-    def kept(self, positions: NDArray[np.bool_]) -> _Open:
+    def kept(self, positions: BoolArray) -> _Open:
         """Only some of the positions, shape (m,)."""
         return _Open(self.numbers[positions], taken(self.pairs, np.flatnonzero(positions[self.couples.position])))
 
@@ -142,7 +141,7 @@ class _Open:
         all_ = np.abs(new - old.force) + MOVED * new * moved
         return self.couples.total(all_) / np.maximum(self.couples.total(new), TINY)
 
-    def moved_on(self, law: HalfPlanePair, made: Step, *, near: NDArray[np.bool_] | bool = False) -> _Open:
+    def moved_on(self, law: HalfPlanePair, made: Step, *, near: BoolArray | bool = False) -> _Open:
         """What the next step starts from."""
         state = moved_on(law, self.pairs.state, made, near=near)
         return _Open(self.numbers, _Pairs(self.pairs.found, state))
@@ -269,7 +268,7 @@ class _Ended:
         Whether tooth pairs have more contacts there.
     """
 
-    settled: NDArray[np.bool_]
+    settled: BoolArray
     sums: dict[str, Array]
     contacts: PairContacts
     now: _Open

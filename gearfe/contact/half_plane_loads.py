@@ -8,19 +8,16 @@ show what the coarse flank makes of the pressure. Stresses there: `gearfe.stiffn
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array
 from .flank import Flank, edge_shapes
 from .flank_compliance import FlankCompliance
 from .half_plane_result import PairContacts
 from .moved_faces import WAY
 from .position import FlankLoads
 from .scene import MeshingPair
-
-Array = NDArray[Any]
 
 
 def flank_loads(

@@ -6,20 +6,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..gear.deviation import NOMINAL, ToothDeviations
 from ..gear.flank_curve import FlankCurve, FlankTables, flank_curve, flank_tables
 from ..gear.pair import GearPair
 from ..gear.tooth_flanks import ToothFlanks
 from ..gear.touching import Flanks
+from ..typing import Array, ComplexArray, IntArray
 from .flank_compliance import FlankCompliance, Shapes, corner_of, flank_compliances, shapes_of
 from .scene import MeshingPair
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-ComplexArray = NDArray[np.complex128]
-
 
 #: Even places along a flank for `Finely`.
 FINELY = 128

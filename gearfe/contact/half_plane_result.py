@@ -9,15 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..gear.touching import Touching
+from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .half_plane_pair import HalfPlanePair
 from .half_plane_step import State, Step, cross
 from .moved_faces import WAY
 from .panels import PANELS
 from .records import taken
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-ComplexArray = NDArray[np.complex128]
 
 #: Sums over the contacts of a position.
 SUMS = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "energy")
@@ -87,7 +84,7 @@ class PairContacts:
         return len(self.pair)
 
     @property
-    def marked(self) -> NDArray[np.bool_]:
+    def marked(self) -> BoolArray:
         """Whether the pressure reaches a mark, beside which it is not elliptic, shape (m,)."""
         return np.asarray(self.mark != "")
 

@@ -6,18 +6,13 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..gear.flank_curve import FlankTables
+from ..typing import Array, BoolArray, ComplexArray, IntArray
 from . import neighbours
 from .half_plane_pair import HalfPlanePair
 from .moved_faces import WAY, Faces, Windows, windows
 from .panels import MIDDLES, WIDTHS, Couplings, Pressed, first_guess, influence, pressed
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
-ComplexArray = NDArray[np.complex128]
 
 #: Gap at the window's ends in units of that at the ends of Hertz's contact of the same force, and what it grows by
 #: where the pressure reaches an end: beside edges contacts are wider.

@@ -16,14 +16,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..gear.touching import Touching
+from ..typing import Array
 from .half_plane import BATCH, unloaded_state
 from .half_plane_step import HalfPlanePair, smooth_influence
 from .panels import couplings
-
-Array = NDArray[np.float64]
 
 #: Steps; sharpest edge (modules) that the curvature of a contact knows.
 STEPS, SHARPEST = 10, 0.02

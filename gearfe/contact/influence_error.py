@@ -15,16 +15,13 @@ and cancel.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, ComplexArray
 from .half_plane_pair import HalfPlanePair
 from .half_plane_result import PairContacts
 from .half_plane_step import SIGN, smooth_influence
 from .panels import Couplings, couplings
 from .position import Positions
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 #: Way ahead in twist for the derivative, as a share of the way in which the forces double.
 AHEAD = 1e-4

@@ -34,12 +34,11 @@ from dataclasses import dataclass, fields
 from typing import Any, ClassVar, Literal, Protocol, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..tables.laws import law_class
+from ..typing import Array, BoolArray
 
-Array = NDArray[Any]
 Sides = Literal["both", "pinion", "wheel", "tip"]
 
 
@@ -55,7 +54,7 @@ class ContactLaw(Protocol):
     def parameter(self, youngs_modulus: float, sizes: Array) -> Array: ...
 
 
-def carrying(law: ContactLaw, to_tip: Array) -> NDArray[np.bool_]:
+def carrying(law: ContactLaw, to_tip: Array) -> BoolArray:
     """Which gears carry contact points at contacts that lie `to_tip` (m) from their tips, shape (m, 2)."""
     if law.sides == "both":
         return np.ones(to_tip.shape, dtype=bool)

@@ -17,13 +17,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..gear.flank_curve import FlankTables
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-ComplexArray = NDArray[np.complex128]
+from ..typing import Array, BoolArray, ComplexArray
 
 #: Most steps of Newton's method for the arc at a place along the tangent, its last move in windows, and least cosine
 #: between tangent and face.
@@ -104,7 +100,7 @@ class Windows:
     high: Array
     nearest: Array
     lean: Array
-    free: NDArray[np.bool_]
+    free: BoolArray
 
 
 #: Places at which a window is searched for, in units of the contact's expected half width.

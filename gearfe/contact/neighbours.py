@@ -18,14 +18,11 @@ Arrays are over the q couples of `.panels.Couplings.neighbours`, then over pinio
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, ComplexArray
 from .half_plane_pair import HalfPlanePair
 from .panels import Couplings
 from .wedge import log_integral, mean_log
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 #: Distance (m) of two contacts that is none.
 LEAST_DISTANCE = 1e-9

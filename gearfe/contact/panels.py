@@ -17,15 +17,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, BoolArray, IntArray
 from .wedge import log_integral
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 #: Panels of a window, and changes of the set of panels that bear before a solution is given up.
 PANELS, CHANGES = 28, 40
@@ -92,7 +88,7 @@ class Couplings:
         """Numbers of couples of contacts."""
         return np.asarray(self.starts[first] + self.slot[second])
 
-    def total(self, of_contacts: Array | NDArray[np.bool_]) -> Array:
+    def total(self, of_contacts: Array | BoolArray) -> Array:
         """Sums over the contacts of each position, shape (positions,)."""
         return np.bincount(self.position, of_contacts, self.positions).astype(float)
 
@@ -147,7 +143,7 @@ class Pressed:
     force: Array
     pressure: Array
     approach: Array
-    settled: NDArray[np.bool_]
+    settled: BoolArray
 
 
 def influence(half: Array, compliance: float) -> Array:
@@ -163,11 +159,11 @@ class _Group:
     contacts: IntArray
     K: Array
 
-    def of(self, values: NDArray[Any]) -> NDArray[Any]:
+    def of(self, values: Array) -> Array:
         """Values of all panels of each tooth pair, shape (P, z n), from those of the contacts, shape (p, n)."""
         return np.asarray(values[self.contacts].reshape(len(self.contacts), -1))
 
-    def responses(self, on: NDArray[np.bool_], gap: Array) -> Array:
+    def responses(self, on: BoolArray, gap: Array) -> Array:
         """Pressures on the panels `on` for the gap and for an even approach in each contact, shape (P, z n, 1 + z)."""
         z, size = self.contacts.shape[1], gap.shape[1]
         right = np.zeros((*gap.shape, 1 + z))
@@ -206,7 +202,7 @@ def pressed(
     T: Array,
     carried: Array,
     couples: Couplings,
-    bearing: NDArray[np.bool_],
+    bearing: BoolArray,
     *,
     held: bool = False,
 ) -> Pressed:
@@ -257,7 +253,7 @@ def pressed(
     return Pressed(np.where(on.any(axis=1), force, 0.0), np.where(on, pressure, 0.0), approach, settled)
 
 
-def first_guess(gap: Array) -> NDArray[np.bool_]:
+def first_guess(gap: Array) -> BoolArray:
     """Panels that bear, where the ends of the window lie a quarter beyond Hertz's contact."""
     least = gap.min(axis=1, keepdims=True)
     end = gap[:, [0, -1]].min(axis=1, keepdims=True)

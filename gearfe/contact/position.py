@@ -13,10 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..typing import Array, BoolArray, IntArray
 from .records import joined, of_positions, ranges, taken
-
-Array = NDArray[Any]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -171,7 +169,7 @@ class Positions:
         numbers: dict[str, Any] = {name: np.where(good, getattr(self, name), none) for name in names}
         return replace(self.told(good), status=status, contacts=_among(self.contacts, good), **numbers)
 
-    def told(self, kept: NDArray[np.bool_]) -> Positions:
+    def told(self, kept: BoolArray) -> Positions:
         """These with loads and point pressures of some alone, shape (n,)."""
         points = None if self.points is None else _among(self.points, kept)
         return replace(self, loads=tuple(_among(one, kept) for one in self.loads), points=points)
@@ -183,7 +181,7 @@ STATUS = "<U18"
 TORQUES = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "tangent")
 
 
-def _among(record: Any, kept: NDArray[np.bool_]) -> Any:
+def _among(record: Any, kept: BoolArray) -> Any:
     """The entries of the positions that are kept, shape (n,)."""
     return taken(record, kept[record.position])
 

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, IntArray
 from .compliance import GearBody
 from .position import FlankLoads
-
-Array = NDArray[Any]
-IntArray = NDArray[np.int64]
 
 
 def sector_displacements(

@@ -13,13 +13,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..typing import Array
 from .compliance import GearBody
 from .laws import ContactLaw
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

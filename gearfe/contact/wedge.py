@@ -21,12 +21,10 @@ sharp tips by at most 0.006 %: left out.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from ..typing import Array
 
 #: Rule that averages over an elliptic pressure on |x| < 1: Gauss-Chebyshev of the second kind, exact for polynomials of
 #: degree 2 n - 1.

@@ -24,20 +24,15 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..gear.touching import Touching
+from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .half_plane_pair import HalfPlanePair
 from .half_plane_step import SIGN, WIDER, WINDOW, State, Step, answers, usual_approach
 from .moved_faces import WAY, Faces
 from .panels import EDGES, Couplings
 from .records import joined, taken
 from .wedge import log_integral, mean_log
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-ComplexArray = NDArray[np.complex128]
-BoolArray = NDArray[np.bool_]
 
 #: Places at which both faces are compared where they have no deviations, and besides for each piece of a deviation.
 PLACES, PER_PIECE = 32, 2

@@ -17,13 +17,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any
 
 import numpy as np
 
+from ..typing import Array
 from .deviation import Deviation
 
-Array = np.ndarray[Any, Any]
 Point = tuple[float, float]
 
 _PANELS = 24

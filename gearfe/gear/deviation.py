@@ -12,12 +12,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from ..typing import Array, IntArray
 
 #: Jump of the slope (-) from which on a break is a kink.
 KINK = 1e-9

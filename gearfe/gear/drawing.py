@@ -6,12 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array
 from .pair import GearPair
 from .spur_gear import Gear
-
-Array = NDArray[np.float64]
 
 
 def gear_outline(gear: Gear, angle: float, centre: tuple[float, float], *, per_segment: int = 24) -> Array:

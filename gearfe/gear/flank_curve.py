@@ -17,14 +17,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, ComplexArray, IntArray
 from .curves import Trochoid
 from .spur_gear import Gear
 from .touching import Face, face_of
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 #: Knots on the involute, on the tip round and on the upper half of the root.
 INVOLUTE, ROUND, ROOT = 513, 65, 129
@@ -108,8 +105,8 @@ class FlankTables:
     low: Array
     high: Array
     cells: Array
-    start: NDArray[np.int64]
-    piece: NDArray[np.int64]
+    start: IntArray
+    piece: IntArray
     arc: Array
     beyond: Array
     cubic: ComplexArray
@@ -120,7 +117,7 @@ class FlankTables:
         """First and last arc lengths (m), shape (f, 2)."""
         return np.concatenate([self.low, self.high], axis=-1)
 
-    def of(self, flank: NDArray[np.int64]) -> FlankTables:
+    def of(self, flank: IntArray) -> FlankTables:
         """The same table with other axes of flanks: the flanks `flank`, shape (..., g), for arc lengths (..., g, m)."""
         return replace(
             self, low=self.low[flank], high=self.high[flank], cells=self.cells[flank], start=self.start[flank]

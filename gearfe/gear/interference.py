@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from .curves import Array
+from ..typing import Array
 from .spur_gear import Gear
 
 #: Penetrations below this many modules are taken for the discretisation of the outlines.

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import InputError
-from .curves import Arc, Array, Flank, Point, Segment, Trochoid, bisect, inv, inverse_inv
+from ..typing import Array
+from .curves import Arc, Flank, Point, Segment, Trochoid, bisect, inv, inverse_inv
 from .deviation import Deviation
 from .tooth_root import NIL_ANGLE, ToothForm, half_tooth_angle, tip_radius, tooth_root
 

@@ -19,13 +19,12 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..typing import Array
 from .deviation import Deviation, ToothDeviations, total
 from .spur_gear import Gear
 
-Array = NDArray[np.float64]
 Shape = Literal["linear", "arc", "parabolic"]
 SHAPES: tuple[Shape, ...] = ("linear", "arc", "parabolic")
 

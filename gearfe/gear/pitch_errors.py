@@ -21,12 +21,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..typing import Array
 from .spur_gear import Gear
-
-Array = NDArray[np.float64]
 
 #: Classes of the standard.
 CLASSES = (1, 11)

@@ -6,14 +6,11 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, IntArray
 from .deviation import NOMINAL, ToothDeviations
 from .mesh_geometry import MeshGeometry
 from .touching import Face, Flanks, Touching, candidates, face_of
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 class ToothFlanks:

@@ -23,16 +23,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .curves import Arc, Flank
 from .deviation import Deviation
 from .involute import deviated
 from .mesh_geometry import MeshGeometry
 from .spur_gear import Gear
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 #: Points of the first search along a flank and of each closer look, and how often it looks closer; points besides for
 #: each piece of a deviation, whose waves may be short.
@@ -75,7 +72,7 @@ class Face:
         """Whether the flank ends in a corner."""
         return self.round_ is None
 
-    def points(self, u: Array) -> NDArray[np.complex128]:
+    def points(self, u: Array) -> ComplexArray:
         """Points (m) as complex numbers."""
         flank = self.flank
         s = flank.roll(np.minimum(np.maximum(u, 0.0), 1.0))
@@ -83,7 +80,7 @@ class Face:
         made = np.exp(1j * (flank.base_angle - s / flank.base_radius)) * (flank.base_radius + 1j * beside)
         return made if self.round_ is None else np.where(u > 1.0, _complex(self.round_.point(u - 1.0)), made)
 
-    def normals(self, u: Array) -> NDArray[np.complex128]:
+    def normals(self, u: Array) -> ComplexArray:
         """Outward unit normals as complex numbers."""
         made = _complex(self.flank.normal(np.clip(u, 0.0, 1.0)))
         return made if self.round_ is None else np.where(u > 1.0, _complex(self.round_.normal(u - 1.0)), made)
@@ -158,7 +155,7 @@ class Face:
                 made += 0.5 * (b - a) * float(_GAUSS_W @ self.speeds(a + 0.5 * (b - a) * (_GAUSS_X + 1)))
         return sign * made
 
-    def corners(self, u: Array) -> NDArray[np.bool_]:
+    def corners(self, u: Array) -> BoolArray:
         """Whether the face has a corner at u: a sharp tip, an undercut's edge, a kink (where a linear relief starts).
 
         Its normal may be any of a fan there, and without friction the force takes that of the smooth mate.
@@ -206,7 +203,7 @@ class Face:
         return sorted({*found, *self.kinks.tolist()})
 
 
-def _complex(points: Any) -> NDArray[np.complex128]:
+def _complex(points: Any) -> ComplexArray:
     return np.asarray(points[..., 0] + 1j * points[..., 1])
 
 
@@ -263,8 +260,8 @@ class Touching:
     twist: Array
     place: Array
     radius: Array
-    point: NDArray[np.complex128]
-    normal: NDArray[np.complex128]
+    point: ComplexArray
+    normal: ComplexArray
     arm: Array
     curvature: Array
     flank: IntArray
@@ -292,7 +289,7 @@ class Flanks:
         pair = self.pair
         return -angle / pair.gear_ratio + math.pi - (2 * number + 1) * math.pi / pair.wheel.teeth
 
-    def placed(self, angle: Array, number: IntArray, u: Array) -> NDArray[np.complex128]:
+    def placed(self, angle: Array, number: IntArray, u: Array) -> ComplexArray:
         """Points of the pinion's flank seen from the wheel's centre, global axes (m)."""
         turn = np.exp(1j * (angle + number * self.pair.mesh_cycle))
         return self.pinion.points(u) * turn - self.pair.working_centre_distance
@@ -386,5 +383,5 @@ def candidates(pair: MeshGeometry, angles: Array) -> tuple[IntArray, Array, IntA
     return position, angles[position], number[position, tooth]
 
 
-def _cross(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> Array:
+def _cross(a: ComplexArray, b: ComplexArray) -> Array:
     return np.asarray((np.conj(a) * b).imag)

@@ -15,9 +15,10 @@ from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..typing import Array, IntArray
 
 if TYPE_CHECKING:
     from .pair import GearPair
@@ -60,12 +61,12 @@ def check_rim(gear: Any) -> None:
         raise InputError("bore_diameter", gear.bore_diameter, problem, "use a smaller bore")
 
 
-def overlaps(pair: GearPair, twist: ArrayLike) -> NDArray[np.float64]:
+def overlaps(pair: GearPair, twist: ArrayLike) -> Array:
     """Overlaps (modules) of the rigid flanks at twists (rad) from where they touch."""
     return np.asarray(twist, dtype=float) * pair.wheel.base_radius / pair.pinion.module
 
 
-def told_overlaps(beyond: NDArray[np.int64], largest: float) -> list[str]:
+def told_overlaps(beyond: IntArray, largest: float) -> list[str]:
     """What is said of the positions flagged as beyond validity, `largest` (modules) the largest of their overlaps."""
     count = int(np.count_nonzero(beyond == 1))
     if not count:

@@ -12,13 +12,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import InputError
+from ..typing import Array, IntArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Vector = tuple[float, float, float]
 
 #: Nodes up to this part of the radius outside a bore still belong to it (meshes written with few digits).
@@ -77,12 +75,12 @@ class Attachment:
     """
 
     name: str
-    point: Floats
-    axis: Floats
-    nodes: Ints
+    point: Array
+    axis: Array
+    nodes: IntArray
 
 
-def bore_attachment(bore: Bore | Sequence[Any], number: int, nodes: Floats) -> tuple[Attachment, tuple[str, ...]]:
+def bore_attachment(bore: Bore | Sequence[Any], number: int, nodes: Array) -> tuple[Attachment, tuple[str, ...]]:
     """Attachment of a bore: all nodes at or inside its radius, within its range. Also notes for the user.
 
     The reference point is the point of the axis in the middle of the range.
@@ -139,7 +137,7 @@ def bore_attachment(bore: Bore | Sequence[Any], number: int, nodes: Floats) -> t
     return Attachment(name, reference, axis, chosen), notes
 
 
-def plane_nodes(plane: Plane, nodes: Floats) -> Ints:
+def plane_nodes(plane: Plane, nodes: Array) -> IntArray:
     """Numbers of the nodes that lie on a plane."""
     normal = _vector("fixed.normal", plane.normal)
     length = float(np.linalg.norm(normal))
@@ -153,7 +151,7 @@ def plane_nodes(plane: Plane, nodes: Floats) -> Ints:
     return found
 
 
-def check_attachments(attachments: Sequence[Attachment], fixed: Ints, nodes: Floats) -> None:
+def check_attachments(attachments: Sequence[Attachment], fixed: IntArray, nodes: Array) -> None:
     """Names differ, nodes exist, none is claimed twice, none lies on a line.
 
     Raises
@@ -185,7 +183,7 @@ def check_attachments(attachments: Sequence[Attachment], fixed: Ints, nodes: Flo
         owner[chosen] = number
 
 
-def interface_matrix(attachments: Sequence[Attachment], nodes: Floats) -> sparse.csc_array:
+def interface_matrix(attachments: Sequence[Attachment], nodes: Array) -> sparse.csc_array:
     """(3 n, 6 a) displacement of all nodes for unit attachment coordinates; rows of other nodes are empty."""
     rows, columns, values = [], [], []
     for number, attachment in enumerate(attachments):
@@ -215,7 +213,7 @@ def _bore(given: Sequence[Any], number: int) -> Bore:
     return Bore(*given)
 
 
-def _vector(field: str, value: Any) -> Floats:
+def _vector(field: str, value: Any) -> Array:
     vector = np.asarray(value, dtype=float)
     if vector.shape != (3,) or not np.all(np.isfinite(vector)):
         raise InputError(field, value, "must be three finite numbers", "x, y, z")

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import InputError
@@ -15,9 +14,7 @@ from ..reduction.craig_bampton import rigid_shift
 from ..reduction.lanczos import lowest_modes
 from ..reduction.sparse_solver import factorize
 from ..threads import one_thread
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from ..typing import Array, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +43,7 @@ class FullModel:
     solver: str = "auto"
 
     @one_thread()
-    def static(self, loads: Floats) -> Floats:
+    def static(self, loads: Array) -> Array:
         """Displacement (N,) or (N, k) under loads on the attachments (6 a,) or (6 a, k), with one refinement step."""
         if not self.held:
             raise InputError("fixed", None, "a free housing has no static response", "hold a part of it")
@@ -58,7 +55,7 @@ class FullModel:
         return found + factor.solve(force - self.stiffness @ found)
 
     @one_thread()
-    def frequencies_hz(self, count: int = 20) -> Floats:
+    def frequencies_hz(self, count: int = 20) -> Array:
         """Lowest natural frequencies (Hz) with the attachments free to move, rigid-body modes (zero) included."""
         shift = 0.0 if self.held else rigid_shift(self.stiffness, self.mass)
         factor = factorize(self.stiffness + shift * self.mass if shift else self.stiffness, solver=self.solver)
@@ -67,12 +64,12 @@ class FullModel:
             values = np.where(np.abs(values) < 1e-3 * shift, 0.0, values)
         return np.asarray(np.sqrt(np.maximum(values, 0.0)) / (2.0 * math.pi))
 
-    def reconstruct(self, q: Floats) -> Floats:
+    def reconstruct(self, q: Array) -> Array:
         """Nodal field (n, 3) of unknowns (N,)."""
         return np.asarray((self.transform @ q).reshape(-1, 3))
 
 
-def full_model(stiffness: Any, mass: Any, interface: Any, internal: Ints, *, held: bool, solver: str) -> FullModel:
+def full_model(stiffness: Any, mass: Any, interface: Any, internal: IntArray, *, held: bool, solver: str) -> FullModel:
     """Model of a body from nodal matrices, interface rows and internal rows (`gearfe.reduction.craig_bampton`)."""
     count = len(internal)
     unit = sparse.csc_array((np.ones(count), (internal, np.arange(count))), shape=(stiffness.shape[0], count))

@@ -29,10 +29,10 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from ..solid import EDGES, SolidMaterial, curved_elements, maps, shape_functions
+from ..typing import Array, BoolArray, IntArray
 
 #: Error over what the next order's functions take one by one: 1.7 by theory, at most 2.5 measured.
 FACTOR = 3.0
@@ -46,13 +46,10 @@ _DEGREE = 5
 #: Elements at a time, for the memory that takes.
 _CHUNK = 1000
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 
 def energy_lost(
-    nodes: Floats, tets: Ints, material: SolidMaterial, fields: Floats, squares: Floats, rigid: list[Ints]
-) -> Floats:
+    nodes: Array, tets: IntArray, material: SolidMaterial, fields: Array, squares: Array, rigid: list[IntArray]
+) -> Array:
     """Estimated energy that the mesh keeps fields from giving up, a quadratic form over them: (k, k), N m.
 
     Parameters
@@ -100,13 +97,13 @@ class _Functions(NamedTuple):
     """Functions that the next order adds (s of them) and the elements' own (a), at p quadrature points."""
 
     #: (s, p), (s, 3, p)
-    added: Floats
-    added_slopes: Floats
+    added: Array
+    added_slopes: Array
     #: (a, p), (a, 3, p)
-    values: Floats
-    slopes: Floats
+    values: Array
+    slopes: Array
     #: (p,)
-    weights: Floats
+    weights: Array
 
 
 @cache
@@ -134,7 +131,7 @@ def _functions(a: int) -> _Functions:
 
 
 @cache
-def _linear() -> Floats:
+def _linear() -> Array:
     """(4, 3, 1) slopes of the corners' functions: the map of straight elements."""
     return np.asarray(shape_functions(4, 1)[1])
 
@@ -143,15 +140,15 @@ class _Numbers(NamedTuple):
     """Numbers of the added functions in the mesh."""
 
     #: (m, s)
-    place: Ints
+    place: IntArray
     #: (m, s) sign that makes a function the same in all its elements
-    signs: Floats
+    signs: Array
     #: (count,) whether it may act
-    acting: NDArray[np.bool_]
+    acting: BoolArray
     total: int
 
 
-def _number(nodes: Floats, tets: Ints, rigid: list[Ints]) -> _Numbers:
+def _number(nodes: Array, tets: IntArray, rigid: list[IntArray]) -> _Numbers:
     a, n = tets.shape[1], len(nodes)
     ends = np.sort(tets[:, EDGES], axis=2)
     edges, edge = np.unique(ends[..., 0] * n + ends[..., 1], return_inverse=True)
@@ -175,8 +172,8 @@ def _number(nodes: Floats, tets: Ints, rigid: list[Ints]) -> _Numbers:
 
 
 def _straight_residual(
-    made: _Functions, material: SolidMaterial, det: Floats, inverse: Floats, field: Floats, squares: Floats
-) -> tuple[Floats, Floats]:
+    made: _Functions, material: SolidMaterial, det: Array, inverse: Array, field: Array, squares: Array
+) -> tuple[Array, Array]:
     """(m, s, 3, k) residuals and (m, s, 3, 3) stiffnesses of straight elements, one map each."""
     weight, inverse = det[:, 0], inverse[:, 0]
     m, k, s, a = len(det), field.shape[-1], len(made.added), field.shape[1]
@@ -193,8 +190,8 @@ def _straight_residual(
 
 
 def _residual(
-    made: _Functions, material: SolidMaterial, det: Floats, inverse: Floats, field: Floats, squares: Floats
-) -> tuple[Floats, Floats]:
+    made: _Functions, material: SolidMaterial, det: Array, inverse: Array, field: Array, squares: Array
+) -> tuple[Array, Array]:
     """The same of curved elements, point by point."""
     lam, mu = material.lame_lambda, material.shear_modulus
     volume = det * made.weights
@@ -213,7 +210,7 @@ def _residual(
     return residual, stiffness.transpose(0, 3, 1, 2)
 
 
-def _stiffness(material: SolidMaterial, gradients: Floats) -> Floats:
+def _stiffness(material: SolidMaterial, gradients: Array) -> Array:
     """(m, 3, 3, ...) blocks of the stiffness from the integrals of d/dx_i of one function times d/dx_j of the other."""
     blocks = material.lame_lambda * gradients + material.shear_modulus * gradients.swapaxes(1, 2)
     total = material.shear_modulus * np.trace(gradients, axis1=1, axis2=2)

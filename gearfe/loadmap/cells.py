@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.finite_strain import finite_strain_shares, interpolated_shares
 from ..contact.position import Positions
 from ..contact.scene import MeshingPair
-
-Array = NDArray[Any]
-IntArray = NDArray[Any]
+from ..typing import Array, IntArray
 
 #: p: the share of finite strain of a single pair of teeth grows about like this power of its load.
 SHARE_POWER = 0.75

@@ -25,9 +25,8 @@ from ..errors import InputError
 from ..output.files import write_csv
 from ..stiffness import curve_csv
 from ..stiffness.curve import COLUMNS, WHOLE, StiffnessCurve
+from ..typing import Array, BoolArray
 from .root_map import RootMap, root_columns, root_of
-
-Array = NDArray[np.float64]
 
 #: Column of the torque that a row belongs to.
 TORQUE = "torque_Nm"
@@ -73,7 +72,7 @@ class LoadMap:
         return self.quantity("status")
 
     @property
-    def failed(self) -> NDArray[np.bool_]:
+    def failed(self) -> BoolArray:
         """Cells without a solution, shape (m, n)."""
         return np.stack([curve.failed for curve in self.curves])
 
@@ -154,7 +153,7 @@ class LoadMap:
         twist = touching + _twist_between(torque, self.torque[pair], *self._delta(pair, touching))
         bad = self.failed[pair]
         status = np.where(bad[1], self.status[after], self.status[after - 1])
-        lost: NDArray[np.bool_] = np.any(bad, axis=0)
+        lost: BoolArray = np.any(bad, axis=0)
         twist = np.where(lost, np.nan, twist)
         x = np.log(self.torque)
 

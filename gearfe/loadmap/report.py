@@ -8,7 +8,6 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..gear.derived import derived_geometry
 from ..gear.validity import overlaps, told_overlaps
@@ -16,10 +15,9 @@ from ..stiffness.contact_pressure import largest_pressures
 from ..stiffness.job import StiffnessJob
 from ..stiffness.report import cure_of, pressure_lines, versions
 from ..tables.loadmap import LoadMapTable
+from ..typing import Array
 from .load_map import LoadMap
 from .root_map import GEARS
-
-Array = NDArray[np.float64]
 
 
 def torque_table(made: LoadMap) -> dict[str, list[float]]:

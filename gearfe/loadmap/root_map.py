@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..stiffness import curve_csv
-
-Array = NDArray[np.float64]
+from ..typing import Array
 
 GEARS = ("pinion", "wheel")
 

@@ -22,10 +22,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.compliance import GearBody, gear_body
 from ..contact.flank import Flank, edge_nodes, edge_shapes
@@ -34,10 +32,8 @@ from ..contact.scene import MeshingPair
 from ..gear.pair import Gear, GearPair
 from ..meshing.recipe import sector_recipes
 from ..meshing.tooth_sector import SectorRecipe, sector_mesh
+from ..typing import Array, IntArray
 from .root_map import RootMap
-
-Array = NDArray[Any]
-IntArray = NDArray[Any]
 
 #: Element size of the coarser mesh: times the smallest radius of curvature of the fillet, and at most times the module.
 SIZE_OF_RADIUS, SIZE_OF_MODULE = 0.25, 0.06

@@ -24,7 +24,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..contact.finite_strain import with_shares
 from ..contact.laws import ContactLaw
@@ -40,14 +40,13 @@ from ..stiffness.sweep import STEEL, assembled_curve, distinct_angles, elastic_p
 from ..stopwatch import Stopwatch
 from ..tables.laws import DEFAULT_LAW
 from ..threads import one_thread
+from ..typing import Array, IntArray
 from .cells import StrainShares, predicted
 from .load_map import LoadMap
 
 if TYPE_CHECKING:
     from .root_stress import PairRoots, ToothRoots
 
-Array = NDArray[Any]
-IntArray = NDArray[Any]
 
 #: Relative miss of the torque at which a cell is accepted.
 ACCEPTED = 3e-4

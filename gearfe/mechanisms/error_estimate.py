@@ -20,7 +20,7 @@ import numpy as np
 from ..errors import InputError
 from ..progress import stage
 from ..rigid import Start, Trajectory, integrate
-from ..rigid.contract import Array
+from ..typing import Array
 from .model import Mechanism
 from .results import Results, evaluate
 

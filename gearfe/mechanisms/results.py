@@ -8,7 +8,7 @@ import numpy as np
 
 from ..progress import stage
 from ..rigid import CoordinateSpring, Moment, PointForce, Spring, Trajectory
-from ..rigid.contract import Array
+from ..typing import Array
 from .expressions import compute, quantities
 from .model import Mechanism
 

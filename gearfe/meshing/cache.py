@@ -17,13 +17,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..cache import cache_folder
 from ..output.files import whole_file
+from ..typing import Array
 from .session import gmsh_version
 
-Arrays = dict[str, NDArray[Any]]
+Arrays = dict[str, Array]
 
 
 def cache_key(kind: str, recipe: object) -> str:

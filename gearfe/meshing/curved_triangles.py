@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
-IntArray = NDArray[Any]
+from ..typing import Array, IntArray
 
 #: Places in a triangle at which its Jacobian is looked at (area coordinates): det is quadratic there.
 _EACH = 6
 _PLACES = np.array([(i, j, _EACH - i - j) for i in range(_EACH + 1) for j in range(_EACH + 1 - i)]) / _EACH
 
 
-def least_jacobian(points: Array, triangles: IntArray) -> Array:
+def least_jacobian(points: Array, triangles: Array) -> Array:
     r"""Smallest :math:`\det \partial x/\partial \xi` of each triangle, in twice its straight area (-).
 
     It is looked at on a lattice with seven places along each edge. Where it is not positive, the element is inside out

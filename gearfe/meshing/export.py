@@ -18,13 +18,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError, MissingLibraryError
 from ..output.files import whole_file
-
-Array = NDArray[Any]
-IntArray = NDArray[Any]
+from ..typing import Array, IntArray
 
 #: File suffix -> meshio's format. Version 2.2 of .msh keeps groups without CAD entities; newer ones do not.
 FORMATS = {".msh": "gmsh22", ".vtu": "vtu", ".inp": "abaqus"}

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +16,10 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..gear.involute import tooth_profile
 from ..gear.pair import Gear
+from ..typing import Array, IntArray
 from .cache import cached_arrays
 from .curved_triangles import least_jacobian, second_order
 from .session import gmsh_session
-
-Array = NDArray[Any]
-IntArray = NDArray[Any]
 
 #: Raised whenever the recipe's meaning changes, so that stored meshes are not mistaken for new ones.
 RECIPE_NUMBER = 3

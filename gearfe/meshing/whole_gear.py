@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, IntArray
 from .tooth_sector import SectorMesh
-
-Array = NDArray[Any]
-IntArray = NDArray[Any]
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import BSpline, PchipInterpolator
 from scipy.sparse.linalg import spsolve
 
+from ..typing import Array
 from .law import NEVER, MeshLaw
-
-Array = NDArray[np.float64]
 
 #: Weights of the second difference of b over the phase, and of the second and first over ln F (in nm/N): they decide
 #: where no pair force was found, such as below the smallest share.

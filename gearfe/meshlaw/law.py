@@ -36,12 +36,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from ..typing import Array, IntArray
 
 #: Approach (m) at which flanks touch that do not meet at all.
 NEVER = 1.0

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.half_plane import (
     HalfPlanePair,
@@ -27,11 +26,10 @@ from ..meshing.cache import cached_arrays
 from ..progress import stage
 from ..stiffness.curve_cache import curve_key
 from ..stiffness.sweep import elastic_pair
+from ..typing import Array, IntArray
 from .fit import Couple, PairForces, TouchCurve, fit_law, touch_cubics
 from .law import NEVER, MeshLaw
 from .store import law_arrays, law_of_arrays
-
-Array = NDArray[np.float64]
 
 #: Cells of the phase in a mesh cycle, at least, and pinion angles in each at which contacts are solved.
 CELLS, SAMPLES = 24, 3
@@ -159,7 +157,7 @@ def _touching(pair: HalfPlanePair, angles: Array) -> tuple[Touching, Array]:
     return met, first
 
 
-def _of_pairs(met: Touching, angle: Array, number: NDArray[np.int64]) -> Array:
+def _of_pairs(met: Touching, angle: Array, number: IntArray) -> Array:
     """Twists (rad) at which pairs touch, by pinion angle and pair number."""
     known = {(a, k): t for a, k, t in zip(met.angle.tolist(), met.pair.tolist(), met.twist.tolist(), strict=True)}
     return np.array([known[a, k] for a, k in zip(angle.tolist(), number.tolist(), strict=True)])

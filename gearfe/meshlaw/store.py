@@ -7,24 +7,24 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..output.arrays import load_arrays, save_arrays
 from ..output.files import write_csv
+from ..typing import Array
 from .law import NEVER, MeshLaw
 
 #: Fields that are arrays, with the number of their axes.
 ARRAYS = {"nodes": 1, "forces": 1, "touch": 3, "energies": 5, "coupling": 4}
 
 
-def law_arrays(law: MeshLaw) -> dict[str, NDArray[np.float64]]:
+def law_arrays(law: MeshLaw) -> dict[str, Array]:
     """A law as named arrays."""
     numbers = np.array([*law.base_radii, law.backlash, law.reach])
     return {**{name: getattr(law, name) for name in ARRAYS}, "numbers": numbers}
 
 
-def law_of_arrays(arrays: Mapping[str, NDArray[np.float64]]) -> MeshLaw:
+def law_of_arrays(arrays: Mapping[str, Array]) -> MeshLaw:
     """The law of `law_arrays`."""
     pinion, wheel, backlash, reach = arrays["numbers"].tolist()
     nodes, forces, touch, energies, coupling = (np.ascontiguousarray(arrays[name], dtype=float) for name in ARRAYS)

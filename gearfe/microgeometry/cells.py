@@ -10,10 +10,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.half_plane import solve_half_plane
 from ..contact.half_plane_result import PairContacts
@@ -23,9 +21,7 @@ from ..contact.position import Positions
 from ..contact.records import of_positions
 from ..gear.touching import Touching
 from ..stiffness.torque_control import newton_twist, twists_for_torque
-
-Array = NDArray[Any]
-IntArray = NDArray[np.int64]
+from ..typing import Array, IntArray
 
 #: Relative miss of the torque from which one step leads to it.
 ACCEPTED = 1e-3

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.laws import HalfPlane
 from ..errors import InputError, unknown_name
@@ -21,8 +20,7 @@ from ..gear.pair import Gear, GearPair
 from ..stiffness.job import StiffnessJob
 from ..tables.microgeometry import STARTS, FlankTable, MicrogeometryTable
 from ..textfile import read_text
-
-Array = NDArray[np.float64]
+from ..typing import Array, IntArray
 
 GEARS = ("pinion", "wheel")
 
@@ -225,7 +223,7 @@ def _covering(
     return made
 
 
-def _teeth(numbers: Array, gear: Gear, field: str, name: str) -> NDArray[np.int64]:
+def _teeth(numbers: Array, gear: Gear, field: str, name: str) -> IntArray:
     """Order that sorts the teeth, each of which must be there once."""
     order = np.argsort(numbers, kind="stable")
     if len(numbers) != gear.teeth or not np.array_equal(numbers[order], np.arange(gear.teeth)):

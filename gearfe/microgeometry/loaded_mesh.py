@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +18,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..gear.pair import GearPair
 from ..gear.validity import MOST_OVERLAP, overlaps
-
-Array = NDArray[Any]
-IntArray = NDArray[np.int64]
+from ..typing import Array, BoolArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -112,7 +109,7 @@ class LoadedMesh:
         return np.asarray(np.ptp(self.transmission_error, axis=1))
 
     @property
-    def failed(self) -> NDArray[np.bool_]:
+    def failed(self) -> BoolArray:
         """Cells without numbers, shape (m, n)."""
         return self.status != "converged"
 

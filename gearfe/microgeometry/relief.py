@@ -21,12 +21,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..typing import Array
 from .relief_problem import Evaluation, ReliefProblem
-
-Array = NDArray[Any]
 
 #: Members of the population for each variable; more variables than these have no worst case over all corners.
 POPULATION, CORNERS = 8, 6

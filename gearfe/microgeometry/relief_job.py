@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.half_plane_step import HalfPlanePair
 from ..errors import InputError
@@ -17,11 +16,10 @@ from ..loadmap.root_stress import PairRoots
 from ..stiffness.job import StiffnessJob
 from ..stiffness.report import versions
 from ..tables.microgeometry import VARIABLES, MicrogeometryTable, ReliefTable
+from ..typing import Array
 from .job import GEARS, active_rolls, modification
 from .relief import ReliefResult
 from .relief_problem import ReliefProblem, Variable
-
-Array = NDArray[Any]
 
 #: Torques at which the best is compared with none: shares of the range that the job's torques span, widened.
 COMPARED = 17

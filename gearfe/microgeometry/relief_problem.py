@@ -5,20 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..contact.half_plane_step import HalfPlanePair
 from ..errors import InputError
 from ..gear.modifications import FlankModification, Relief, ends_of, tooth_deviations
 from ..gear.pair import Gear
 from ..loadmap.root_stress import PairRoots
+from ..typing import Array
 from .loaded_mesh import LoadedMesh
 from .solve import load_mesh
-
-Array = NDArray[Any]
 
 QUANTITIES = ("tip_relief.amount", "tip_relief.length", "root_relief.amount", "root_relief.length", "crowning", "slope")
 GEARS = ("pinion", "wheel")

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..gear import pitch_errors
 from ..gear.deviation import ToothDeviations
@@ -17,10 +16,9 @@ from ..gear.validity import overlaps, told_overlaps
 from ..stiffness.job import StiffnessJob
 from ..stiffness.report import versions
 from ..tables.microgeometry import MicrogeometryTable
+from ..typing import Array
 from .job import GEARS, active_rolls, flank_deviations
 from .loaded_mesh import LoadedMesh
-
-Array = NDArray[Any]
 
 #: Harmonics of the mesh order in the table by torque.
 HARMONICS = 5

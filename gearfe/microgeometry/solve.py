@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..contact.half_plane_loads import flank_loads
 from ..contact.half_plane_result import PairContacts
@@ -22,11 +21,9 @@ from ..loadmap.root_stress import PairRoots
 from ..stiffness.contact_pressure import BLUNTING
 from ..stiffness.positions import Progress
 from ..threads import one_thread
+from ..typing import Array, IntArray
 from .cells import solve_cells
 from .loaded_mesh import LoadedMesh, PairLoads, full_period
-
-Array = NDArray[Any]
-IntArray = NDArray[np.int64]
 
 #: Cells solved at once, and most in all.
 AT_ONCE, MOST_CELLS = 512, 1_000_000
@@ -88,7 +85,7 @@ def load_mesh(
         problem = f"makes {count} cells with {len(goals)} torques and {n} angles: must be <= {MOST_CELLS}"
         raise InputError("mesh_cycles", cycles, problem, "state a part of the period, fewer positions or torques")
     given = np.arange(n) * (pair.mesh_cycle / positions) if angles is None else angles
-    place: NDArray[np.float64] = np.atleast_1d(np.asarray(given, dtype=np.float64))
+    place: Array = np.atleast_1d(np.asarray(given, dtype=np.float64))
     met = _touching(law, place)
     touch = np.full(n, np.inf)
     np.minimum.at(touch, met.position, met.twist)
@@ -128,7 +125,7 @@ def load_mesh(
     return found
 
 
-def _touching(law: HalfPlanePair, angles: NDArray[np.float64]) -> Touching:
+def _touching(law: HalfPlanePair, angles: Array) -> Touching:
     """What `law.teeth.touching` says, in pieces: its search takes kilobytes for each angle."""
     parts = []
     for start in range(0, len(angles), AT_ONCE):

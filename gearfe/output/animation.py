@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, IntArray
 from .figures import color_limit, draw_zone, new_figure
 from .files import whole_file
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Part = tuple[Array, IntArray, Array]
 
 

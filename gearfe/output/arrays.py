@@ -10,23 +10,23 @@ from typing import Any
 
 import numpy as np
 from numpy.lib import format as npy
-from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..typing import Array
 from .files import whole_file
 
 #: Arrays of more bytes than this are mapped.
 LARGE = 1 << 20
 
 
-def save_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+def save_arrays(path: str | Path, arrays: Mapping[str, Array]) -> None:
     """Write arrays (no object arrays) to one uncompressed ``.npz`` file."""
     target = Path(path)
     with whole_file(target) as temporary, temporary.open("wb") as stream:
         np.savez(stream, allow_pickle=False, **arrays)
 
 
-def load_arrays(path: str | Path, *, verify: bool = False) -> dict[str, NDArray[Any]]:
+def load_arrays(path: str | Path, *, verify: bool = False) -> dict[str, Array]:
     """Read a file of `save_arrays`; arrays above `LARGE` bytes are read-only views of the file.
 
     Checksums of the large ones are verified on request only.
@@ -57,7 +57,7 @@ def load_arrays(path: str | Path, *, verify: bool = False) -> dict[str, NDArray[
         raise InputError("file", str(path), f"cannot be read ({error})", "make it anew") from error
 
 
-def _mapped(path: Path, stream: Any, member: zipfile.ZipInfo, size: int) -> NDArray[Any]:
+def _mapped(path: Path, stream: Any, member: zipfile.ZipInfo, size: int) -> Array:
     """Array of an uncompressed member, mapped from its place in the file."""
     stream.seek(member.header_offset)
     header = stream.read(30)

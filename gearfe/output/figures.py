@@ -11,11 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, IntArray
 from .files import whole_file
-
-Array = NDArray[np.float64]
 
 BLUE, ORANGE, GREEN, RED, GREY = "#1f5a99", "#d9730d", "#3a8c5c", "#b3261e", "#6b7280"
 PINION_FILL, WHEEL_FILL = "#dbe7f3", "#f3e6d8"
@@ -207,7 +205,7 @@ def stress_figure(
     path: str | Path,
     *,
     title: str,
-    parts: Sequence[tuple[Array, NDArray[np.int64], Array]],
+    parts: Sequence[tuple[Array, IntArray, Array]],
     zoom: tuple[float, float, float],
 ) -> None:
     """Von Mises stress in the meshing zone on the deformed gears.
@@ -241,7 +239,7 @@ def stress_figure(
 
 
 def draw_zone(
-    axes: Any, parts: Sequence[tuple[Array, NDArray[np.int64], Array]], zoom: tuple[float, float, float], top: float
+    axes: Any, parts: Sequence[tuple[Array, IntArray, Array]], zoom: tuple[float, float, float], top: float
 ) -> Any:
     """Draw the stress of both gears in the meshing zone, colours from 0 to `top`; the answer is for a colour bar.
 
@@ -266,7 +264,7 @@ def draw_zone(
     return drawn
 
 
-def color_limit(parts: Sequence[tuple[Array, NDArray[np.int64], Array]], *, share: float = 0.004) -> float:
+def color_limit(parts: Sequence[tuple[Array, IntArray, Array]], *, share: float = 0.004) -> float:
     """Stress that a `share` of the area exceeds: colours up to it show the roots too, not the contact's peak alone.
 
     Parameters
@@ -284,7 +282,7 @@ def color_limit(parts: Sequence[tuple[Array, NDArray[np.int64], Array]], *, shar
     return float(level[order[min(int(np.searchsorted(beyond, share)), len(order) - 1)]])
 
 
-def draw_rim(axes: Any, points: Array, triangles: NDArray[np.int64]) -> None:
+def draw_rim(axes: Any, points: Array, triangles: IntArray) -> None:
     """Draw the edges that belong to one triangle only, as one line with gaps (thousands of lines take seconds)."""
     edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     _, first, count = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_index=True, return_counts=True)

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, IntArray
 from .arrays import load_arrays
 from .files import whole_file
 from .offscreen import draw_apart
@@ -26,12 +26,12 @@ _SECONDS = 120.0
 
 def draw_modes(
     path: str | Path,
-    points: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    fields: NDArray[np.float64],
+    points: Array,
+    faces: IntArray,
+    fields: Array,
     titles: Sequence[str],
     *,
-    marked: NDArray[np.int64] | None = None,
+    marked: IntArray | None = None,
 ) -> str:
     """Draw deformed surfaces side by side into one picture.
 

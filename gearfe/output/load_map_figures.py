@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array
 from .figures import BLUE, ORANGE, new_figure, save, tidy
-
-Array = NDArray[np.float64]
 
 #: Lines of a panel; of more torques, so many are drawn.
 MOST_LINES = 24

@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array
 from .figures import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save, tidy
-
-Array = NDArray[Any]
 
 #: Lines of a panel; of more torques or profiles, so many are drawn.
 MOST_LINES = 24

@@ -12,14 +12,12 @@ import sys
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from numpy.typing import NDArray
-
+from ..typing import Array
 from .arrays import save_arrays
 
 
-def draw_apart(module: str, path: str | Path, arrays: Mapping[str, NDArray[Any]], *, seconds: float) -> str:
+def draw_apart(module: str, path: str | Path, arrays: Mapping[str, Array], *, seconds: float) -> str:
     """Run ``python -m module JOB PATH`` on stored arrays; return an empty text, or why nothing was drawn.
 
     Parameters

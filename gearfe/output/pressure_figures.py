@@ -6,12 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..typing import Array
 from .figures import new_figure, save, tidy
-
-Array = NDArray[np.float64]
 
 
 def pressure_figure(path: str | Path, *, title: str, lines: Sequence[Sequence[tuple[float, Array, Array]]]) -> None:

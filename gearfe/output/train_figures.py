@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array
 from .figures import BLUE, GREEN, GREY, ORANGE, RED, new_figure
 from .files import whole_file
-
-Array = NDArray[np.float64]
 
 COLOURS = (BLUE, ORANGE, GREEN, RED, "#6d4c9f", "#0f766e", "#8a5a2b")
 _DPI = 130

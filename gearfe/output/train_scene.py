@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..typing import Array, IntArray
 from .arrays import load_arrays
 from .files import whole_file
 from .offscreen import draw_apart
@@ -25,7 +26,7 @@ _FRAME = 80
 _STILL, _FILM = (2000, 1440), (720, 520)
 
 
-def draw_scene(path: str | Path, arrays: Mapping[str, NDArray[Any]], title: str) -> str:
+def draw_scene(path: str | Path, arrays: Mapping[str, Array], title: str) -> str:
     """Draw what `gearfe.vibration.fields.frames` gives: one step into a ``.png``, several into an animated ``.gif``.
 
     Returns
@@ -83,14 +84,14 @@ def _draw(job: Path, target: Path) -> None:
     _write(target, pictures)
 
 
-def _aim(plotter: Any, points: NDArray[np.float64]) -> None:
+def _aim(plotter: Any, points: Array) -> None:
     """Look from the front, above and left; the body in the upper part of the window."""
     centre, size = 0.5 * (points.min(axis=0) + points.max(axis=0)), float(np.ptp(points, axis=0).max())
     focus = centre - size * np.array([0.0, 0.0, 0.1])
     plotter.camera_position = [focus + size * np.array([-0.8, -1.25, 1.25]), focus, (0.0, 0.0, 1.0)]
 
 
-def sharp_edges(points: NDArray[Any], triangles: NDArray[np.int64], angle_deg: float = 35.0) -> NDArray[np.int64]:
+def sharp_edges(points: Array, triangles: IntArray, angle_deg: float = 35.0) -> IntArray:
     """(k, 2) edges at which two triangles meet at more than an angle, and edges of one triangle only."""
     a, b, c = (points[triangles[:, i]].astype(float) for i in range(3))
     normal = np.cross(b - a, c - a)
@@ -128,7 +129,7 @@ def _write(target: Path, pictures: list[NDArray[np.uint8]]) -> None:
         made[0].save(temporary, save_all=True, append_images=made[1:], duration=_FRAME, loop=0, optimize=False)
 
 
-def _flat(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def _flat(faces: IntArray) -> IntArray:
     """Corner triangles; a face with six nodes becomes four."""
     if faces.shape[1] == 3:
         return faces
@@ -136,7 +137,7 @@ def _flat(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.concatenate([np.column_stack(t) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
 
 
-def _cells(table: NDArray[np.int64]) -> NDArray[np.int64]:
+def _cells(table: IntArray) -> IntArray:
     return np.column_stack([np.full(len(table), table.shape[1]), table]).ravel()
 
 

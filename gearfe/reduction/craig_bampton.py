@@ -34,17 +34,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import InputError
 from ..progress import stage
 from ..threads import one_thread
+from ..typing import Array, IntArray
 from .lanczos import lowest_modes
 from .sparse_solver import Factorization, factorize
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Part of its own size below which a correction vector counts as contained in the others.
 DEPENDENT = 1e-6
@@ -77,12 +74,12 @@ class Reduction:
         Right-hand sides solved for.
     """
 
-    mass: Floats
-    stiffness: Floats
-    shapes: Floats
-    eigenvalues: Floats
+    mass: Array
+    stiffness: Array
+    shapes: Array
+    eigenvalues: Array
     modes: int
-    tail: Floats
+    tail: Array
     levels: int
     next_eigenvalue: float
     solver: str
@@ -94,7 +91,7 @@ def reduce_model(
     stiffness: Any,
     mass: Any,
     interface: Any,
-    internal: Ints,
+    internal: IntArray,
     *,
     count: int | None = None,
     below_hz: float = math.inf,
@@ -183,8 +180,8 @@ def reduce_model(
 
 
 def _corrections(
-    factor: Factorization, m_ii: Any, modes: Floats, coupling: Floats, wanted: int
-) -> tuple[Floats, Floats, int]:
+    factor: Factorization, m_ii: Any, modes: Array, coupling: Array, wanted: int
+) -> tuple[Array, Array, int]:
     """M-orthonormal correction vectors, ``V^T M K^-1 M V`` of the last level's, and the number of right-hand sides.
 
     ``X_1 = K^-1 b``, ``X_l = K^-1 M X_{l-1}``: all freed of the modes. Without corrections ``X_1^T b`` comes second.
@@ -192,7 +189,7 @@ def _corrections(
     m_modes = np.asarray(m_ii @ modes)
     found = [modes]
 
-    def solved(load: Floats) -> Floats:
+    def solved(load: Array) -> Array:
         x = factor.solve(load)
         return np.asarray(x - modes @ (m_modes.T @ x))
 
@@ -220,7 +217,7 @@ def _corrections(
     return np.concatenate([np.zeros((len(modes), 0)), *found[1:]], axis=1), left, columns
 
 
-def _symmetric(matrix: Floats) -> Floats:
+def _symmetric(matrix: Array) -> Array:
     return np.asarray(0.5 * (matrix + matrix.T))
 
 

@@ -21,12 +21,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..typing import Array, ComplexArray
 from .modal_body import ModalBody
-
-Floats = NDArray[np.float64]
 
 #: The response is bounded to first order: on random housings the bare figure was 0.97 to 1.15 times the true error.
 SAFETY = 1.5
@@ -54,8 +52,8 @@ class ReductionError:
 
     band_hz: float
     response: float
-    frequencies_hz: Floats
-    frequency_errors: Floats
+    frequencies_hz: Array
+    frequency_errors: Array
 
 
 def reduction_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, points: int = 200) -> ReductionError:
@@ -118,7 +116,7 @@ class MeshError:
 
     band_hz: float
     response: float
-    frequency_errors: Floats
+    frequency_errors: Array
 
 
 def mesh_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, points: int = 200) -> MeshError:
@@ -140,7 +138,7 @@ def mesh_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, points: 
     return MeshError(band_hz, response, errors)
 
 
-def accelerances(body: ModalBody, band_hz: float, *, ratio: float = 0.01, points: int = 200) -> NDArray[np.complex128]:
+def accelerances(body: ModalBody, band_hz: float, *, ratio: float = 0.01, points: int = 200) -> ComplexArray:
     """Accelerations of all attachments' points for forces on them, (points, 3 a, 3 a) over a band (1/kg)."""
     m = 6 * len(body.attachment_names)
     coupled = body.coupled
@@ -151,7 +149,7 @@ def accelerances(body: ModalBody, band_hz: float, *, ratio: float = 0.01, points
     return np.asarray((shapes * gains[:, None, :]) @ shapes.T)
 
 
-def lost_stiffness(body: ModalBody, omega: float) -> Floats:
+def lost_stiffness(body: ModalBody, omega: float) -> Array:
     """E of the bound ``dD <= E`` at a circular frequency (rad/s), over the attachments' coordinates, (6 a, 6 a)."""
     m = 6 * len(body.attachment_names)
     if math.isinf(body.next_hz):

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from ..typing import Array
 
 #: Residual of a mode, relative to theta, at which it counts as found; its frequency is then right to about its square.
 TOLERANCE = 1e-5
@@ -41,14 +40,14 @@ class Modes:
         Number of right-hand sides that were solved for.
     """
 
-    eigenvalues: Floats
-    vectors: Floats
+    eigenvalues: Array
+    vectors: Array
     next_eigenvalue: float
     columns: int
 
 
 def lowest_modes(
-    solve: Callable[[Floats], Floats],
+    solve: Callable[[Array], Array],
     mass: Any,
     *,
     count: int | None = None,
@@ -128,14 +127,14 @@ class _Basis:
         self.size = 0
 
     @property
-    def vectors(self) -> Floats:
+    def vectors(self) -> Array:
         return self._q[:, : self.size]
 
-    def mass_times(self, first: int, last: int) -> Floats:
+    def mass_times(self, first: int, last: int) -> Array:
         """M times the columns ``first:last``."""
         return self._mq[:, first:last]
 
-    def append(self, new: Floats) -> tuple[Floats, Floats]:
+    def append(self, new: Array) -> tuple[Array, Array]:
         """Add the part of `new` that is orthogonal to the basis.
 
         In exact arithmetic only the last two blocks matter: they are taken out first, then all are, against rounding.

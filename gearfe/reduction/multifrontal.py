@@ -19,14 +19,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg.blas import dsyrk, dtrsm
 from scipy.linalg.lapack import dpotrf
 from scipy.sparse.csgraph import minimum_spanning_tree
 
-Floats = NDArray[np.float64]
-Ints = NDArray[Any]
+from ..typing import Array, IntArray
 
 #: Nodes in a subtree that becomes one front: with fewer, calls of small kernels rule; with more, stored zeros do.
 LEAF_NODES = 32
@@ -44,9 +42,9 @@ class _Front:
 
     begin: int
     end: int
-    outer: Ints
-    pivot: Floats
-    coupling: Floats
+    outer: IntArray
+    pivot: Array
+    coupling: Array
 
 
 @dataclass(frozen=True)
@@ -61,10 +59,10 @@ class MultifrontalFactor:
         In the order of elimination.
     """
 
-    order: Ints
+    order: IntArray
     fronts: tuple[_Front, ...]
 
-    def solve(self, b: Floats) -> Floats:
+    def solve(self, b: Array) -> Array:
         """(n,) or (n, p) right-hand sides to solutions of the same shape; several at a time are much cheaper."""
         x = np.ascontiguousarray(np.reshape(b, (len(self.order), -1))[self.order], dtype=float)
         # rows of x are contiguous: x[a:b].T is in Fortran order, and BLAS changes it in place
@@ -97,13 +95,13 @@ class _Tree:
         Of each front.
     """
 
-    order: Ints
-    ends: Ints
-    outer: list[Ints]
+    order: IntArray
+    ends: IntArray
+    outer: list[IntArray]
     children: list[list[int]]
 
 
-def multifrontal(matrix: Any, graph: Any, order: Ints) -> MultifrontalFactor:
+def multifrontal(matrix: Any, graph: Any, order: IntArray) -> MultifrontalFactor:
     """Factorise a symmetric positive definite matrix.
 
     Parameters
@@ -129,7 +127,7 @@ def multifrontal(matrix: Any, graph: Any, order: Ints) -> MultifrontalFactor:
     kept = np.flatnonzero(columns >= rows)  # the upper triangle, by rows, with the place of its blocks as values
     upper = sparse.csr_array((kept, (rows[kept], columns[kept])), shape=graph.shape)
     place = np.empty(nodes, dtype=np.int64)
-    updates: dict[int, tuple[Ints, Floats]] = {}
+    updates: dict[int, tuple[IntArray, Array]] = {}
     fronts = []
     begin = 0
     for here, (end, outer) in enumerate(zip(tree.ends.tolist(), tree.outer, strict=True)):
@@ -160,11 +158,11 @@ def multifrontal(matrix: Any, graph: Any, order: Ints) -> MultifrontalFactor:
     return MultifrontalFactor(_unknowns(tree.order, width), tuple(fronts))
 
 
-def _unknowns(nodes: Ints, width: int) -> Ints:
+def _unknowns(nodes: IntArray, width: int) -> IntArray:
     return np.asarray((width * nodes[:, None] + np.arange(width)).ravel())
 
 
-def _add(target: Floats, rows: Ints, columns: Ints, values: Floats) -> None:
+def _add(target: Array, rows: IntArray, columns: IntArray, values: Array) -> None:
     """``target[rows][:, columns] += values``, upper triangle; `rows` are the first of the ascending `columns`.
 
     A strip is spread over whole rows first, which are then added in one piece: five times faster than indexing twice.
@@ -178,7 +176,7 @@ def _add(target: Floats, rows: Ints, columns: Ints, values: Floats) -> None:
         target[rows[first:last]] += part
 
 
-def _fronts(graph: Any, order: Ints) -> _Tree:
+def _fronts(graph: Any, order: IntArray) -> _Tree:
     """Elimination tree, its postorder, and its runs: subtrees of `LEAF_NODES`, and chains without larger branches."""
     parent = _elimination_tree(graph[order][:, order])
     nodes = len(parent)
@@ -200,7 +198,7 @@ def _fronts(graph: Any, order: Ints) -> _Tree:
     order = order[run]
     graph = sparse.csr_array(graph[order][:, order])
     front_of = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
-    outer: list[Ints] = []
+    outer: list[IntArray] = []
     children: list[list[int]] = [[] for _ in ends]
     begin = 0
     for here, end in enumerate(ends.tolist()):

@@ -36,12 +36,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import InputError, MissingLibraryError
-
-Floats = NDArray[np.float64]
+from ..typing import Array, IntArray
 
 #: Names of the solvers, best first; each needs the package on the right (``None``: scipy alone).
 PACKAGES: dict[str, str | None] = {
@@ -73,7 +71,7 @@ class Factorization:
 
     solver: str
     unknowns: int
-    solve: Callable[[Floats], Floats]
+    solve: Callable[[Array], Array]
 
 
 def installed_solvers() -> tuple[str, ...]:
@@ -133,7 +131,7 @@ def factorize(matrix: Any, *, solver: str = "auto", block: int = 3) -> Factoriza
     return Factorization(name, matrix.shape[0], solve)
 
 
-def _multifrontal(matrix: Any, block: int) -> Callable[[Floats], Floats]:
+def _multifrontal(matrix: Any, block: int) -> Callable[[Array], Array]:
     from .multifrontal import NotPositiveDefinite, multifrontal
 
     graph = node_graph(matrix, block if matrix.shape[0] % block == 0 else 1)
@@ -155,7 +153,7 @@ def node_graph(matrix: Any, block: int) -> Any:
     return sparse.csr_array((ones, (rows[off], blocks.indices[off])), shape=(nodes, nodes))
 
 
-def metis_order(graph: Any) -> NDArray[np.int64]:
+def metis_order(graph: Any) -> IntArray:
     """Order of the nodes of a graph with little fill, by nested dissection (METIS through pymetis)."""
     pymetis: Any = importlib.import_module("pymetis")
 
@@ -168,7 +166,7 @@ def metis_order(graph: Any) -> NDArray[np.int64]:
     return np.asarray(order, dtype=np.int64)
 
 
-def _superlu(matrix: Any) -> Callable[[Floats], Floats]:
+def _superlu(matrix: Any) -> Callable[[Array], Array]:
     from scipy.sparse.linalg import splu
 
     options = {"SymmetricMode": True}
@@ -179,7 +177,7 @@ def _superlu(matrix: Any) -> Callable[[Floats], Floats]:
     return lambda b: np.asarray(lu.solve(np.asfortranarray(b, dtype=float)))
 
 
-def _pardiso(matrix: Any) -> Callable[[Floats], Floats]:
+def _pardiso(matrix: Any) -> Callable[[Array], Array]:
     pypardiso: Any = importlib.import_module("pypardiso")
 
     upper = sparse.csr_matrix(sparse.triu(matrix, format="csr"))
@@ -192,7 +190,7 @@ def _pardiso(matrix: Any) -> Callable[[Floats], Floats]:
     except Exception as error:
         raise _not_definite() from error
 
-    def solve(b: Floats) -> Floats:
+    def solve(b: Array) -> Array:
         solver.set_phase(33)
         x = solver._call_pardiso(upper, np.asfortranarray(b, dtype=float))
         return np.asarray(x).reshape(b.shape, order="F")
@@ -200,7 +198,7 @@ def _pardiso(matrix: Any) -> Callable[[Floats], Floats]:
     return solve
 
 
-def _cholmod(matrix: Any) -> Callable[[Floats], Floats]:
+def _cholmod(matrix: Any) -> Callable[[Array], Array]:
     kvxopt: Any = importlib.import_module("kvxopt")
     cholmod: Any = importlib.import_module("kvxopt.cholmod")
 
@@ -224,7 +222,7 @@ def _cholmod(matrix: Any) -> Callable[[Floats], Floats]:
         else:
             cholmod.options["supernodal"] = before
 
-    def solve(b: Floats) -> Floats:
+    def solve(b: Array) -> Array:
         x = kvxopt.matrix(np.asarray(b, dtype=float).reshape(len(b), -1))
         cholmod.solve(factor, x)
         return np.array(x).reshape(b.shape)
@@ -232,7 +230,7 @@ def _cholmod(matrix: Any) -> Callable[[Floats], Floats]:
     return solve
 
 
-def _check_definite(matrix: Any, solve: Callable[[Floats], Floats]) -> None:
+def _check_definite(matrix: Any, solve: Callable[[Array], Array]) -> None:
     """One solve with a random right-hand side: an answer without bound, or against the load, tells a free part."""
     b = np.random.default_rng(0).standard_normal(matrix.shape[0])
     try:

@@ -15,14 +15,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import InputError
 from ..threads import one_thread
+from ..typing import Array
 from .sparse_solver import factorize
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +35,10 @@ class Transient:
         Of the watched unknowns (SI).
     """
 
-    time: Floats
-    displacement: Floats
-    velocity: Floats
-    acceleration: Floats
+    time: Array
+    displacement: Array
+    velocity: Array
+    acceleration: Array
 
 
 @one_thread()
@@ -48,7 +46,7 @@ def newmark(
     mass: Any,
     damping: Any,
     stiffness: Any,
-    load: Callable[[float], Floats],
+    load: Callable[[float], Array],
     *,
     step: float,
     steps: int,
@@ -99,13 +97,13 @@ def smooth_ramp(time: float, duration: float) -> float:
     return 1.0 if time >= duration else 0.5 * (1.0 - float(np.cos(np.pi * time / duration)))
 
 
-def _padded(force: Floats, n: int) -> Floats:
+def _padded(force: Array, n: int) -> Array:
     full = np.zeros(n)
     full[: len(force)] = force
     return full
 
 
-def _solver(matrix: Any, solver: str) -> Callable[[Floats], Floats]:
+def _solver(matrix: Any, solver: str) -> Callable[[Array], Array]:
     if sparse.issparse(matrix):
         return factorize(matrix, solver=solver).solve
     from scipy.linalg import cho_factor, cho_solve

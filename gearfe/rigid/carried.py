@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
-from .contract import Array
+from ..typing import Array
 from .scene import PlanarScene
 from .system import System
 

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..progress import SILENT, count, say
-from .contract import Array
+from ..typing import Array
 from .dense import Dense, Joined
 from .start import Start
 from .status import Status

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from .contract import Array
+from ..typing import Array
 
 #: Times may lie outside of the run by so much of its length: rounding of output times.
 SLACK = 1e-9

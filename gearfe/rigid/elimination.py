@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .contract import Array
+from ..typing import Array
 from .system import System
 
 

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..typing import Array
 from .carried import RANK
-from .contract import Array
 from .dense import Polynomials, within_run
 from .start import Start
 from .status import Status

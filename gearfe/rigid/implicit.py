@@ -19,7 +19,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .contract import Array, Element, LocalForce, ModalBlocks
+from ..typing import Array
+from .contract import Element, LocalForce, ModalBlocks
 from .dense import Polynomials, hermite
 from .elimination import Minimal, is_linear, minimal
 from .explicit import on_constraints

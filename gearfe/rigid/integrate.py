@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..progress import announce, count, stage
+from ..typing import Array
 from . import compiled, taylor
 from .backend import COMPILED_FASTER, compiled_is_ready, loading_seconds, plain_seconds_spent, spend_plain_seconds
 from .carried import loose_link
 from .choice import Choice, Way, joined, joined_statistics
-from .contract import Array
 from .dense import Dense
 from .elimination import is_linear, minimal
 from .modal import series_force

@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 
 from ..progress import stage
+from ..typing import Array
 from . import compiled, kernel_modal
-from .contract import Array, LocalForce, SeriesLaw
+from .contract import LocalForce, SeriesLaw
 from .dense import Dense, within_run
 from .elimination import Minimal, is_linear
 from .explicit import Problem, run_problem

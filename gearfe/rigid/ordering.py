@@ -14,18 +14,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Ints = NDArray[np.int64]
+from ..typing import IntArray
 
 
 class Factor(NamedTuple):
     """Every index that the numeric factorisation needs, for m rows."""
 
-    start: Ints  # (m + 1,) columns of the factor L
+    start: IntArray  # (m + 1,) columns of the factor L
     row: NDArray[np.uint64]  # (nnz,) row number of each entry
     column: NDArray[np.uint64]  # (nnz,) and its column (unsigned: compiled code need not ask for negative numbers)
-    entry: Ints  # (e, 6) target, row, side, row, side, body: products that make G M^-1 G^T
-    update_start: Ints  # (m + 1,)
-    update: Ints  # (u, 3) target, entry, entry of L
+    entry: IntArray  # (e, 6) target, row, side, row, side, body: products that make G M^-1 G^T
+    update_start: IntArray  # (m + 1,)
+    update: IntArray  # (u, 3) target, entry, entry of L
 
 
 class Plan(NamedTuple):

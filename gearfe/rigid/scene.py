@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from .contract import Array, Element
+from ..typing import Array, IntArray
+from .contract import Element
 from .planar import Scene
-from .tables import Assembly, Ints, assemble
+from .tables import Assembly, assemble
 
 
 class Pose(NamedTuple):
@@ -176,7 +177,7 @@ class PlanarScene(Element):
         np.add.at(full, (where[:, :, None], where[:, None, :]), both)
         return full[: self.size, : self.size]
 
-    def _places(self, vectors: Ints) -> Ints:
+    def _places(self, vectors: IntArray) -> IntArray:
         """Numbers of the six coordinates that vectors depend on, the ground's past the end."""
         return (3 * self._vectors.bodies[vectors][:, :, None] + np.arange(3)).reshape(-1, 6)
 
@@ -284,7 +285,7 @@ class PlanarScene(Element):
 
 class _Along(NamedTuple):
     gradient: Array  # (f, 6)
-    places: Ints  # (f, 6) numbers of the coordinates
+    places: IntArray  # (f, 6) numbers of the coordinates
     rate: Array  # (f,)
     value: Array  # (f,) of springs and dampers
     given: Array  # (f,) of the functions of time

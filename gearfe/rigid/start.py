@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import InputError
+from ..typing import Array
 from .carried import RANK, free_motions, mass_excess
-from .contract import Array
 from .system import System
 
 #: A row is dependent on earlier ones when this share of its gradient is left (noise of redundant rows: up to 3e-9).

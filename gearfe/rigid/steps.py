@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from .contract import Array
+from ..typing import Array
 from .status import Status
 
 #: ``watch(t, steps, state)``: the time reached, the steps done, and a function that gives (q, v) there; False ends the

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from .contract import Array, Element
+from ..typing import Array
+from .contract import Element
 from .scene import PlanarScene
 
 

@@ -14,34 +14,31 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..typing import Array, BoolArray, IntArray
 from .forces import Along, Tension, Weight
 from .forms import End, Form, Frames, Terms, Vector
 from .ordering import Factor, elimination_plan
 from .planar import Body, Scene
 from .timefunctions import TimeFunction, constant
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 
 class Forms(NamedTuple):
     """Scalars of the coordinates: m constraints, then those along which forces act; r in all."""
 
-    bodies: Ints  # (r, 2)
-    motion: Ints  # (r,) time function: the motion of a constraint, the load of a force; -1 for none
+    bodies: IntArray  # (r, 2)
+    motion: IntArray  # (r,) time function: the motion of a constraint, the load of a force; -1 for none
     factor: Array  # (r, 2, 5) of x, y, theta, cos theta, sin theta of both bodies
     constant: Array  # (r,)
     unit: Array  # (m,) the mechanism's length where a constraint holds lengths, 1 where it holds angles
-    product: Ints  # (p, 3) form and two vectors whose inner product it contains, their ends on the form's bodies
+    product: IntArray  # (p, 3) form and two vectors whose inner product it contains, their ends on the form's bodies
 
 
 class Vectors(NamedTuple):
     """Vectors that move with two bodies; the first ones are the spans of the springs."""
 
-    bodies: Ints  # (v, 2)
+    bodies: IntArray  # (v, 2)
     end: Array  # (v, 2, 3) of each body: weight of the mass centre, components of the arm in its frame
 
 
@@ -56,11 +53,11 @@ class Forces(NamedTuple):
 class Times(NamedTuple):
     """Time functions: polynomial pieces and sines."""
 
-    first: Ints  # (functions + 1,) pieces of each time function
+    first: IntArray  # (functions + 1,) pieces of each time function
     start: Array  # (pieces,)
     origin: Array  # (pieces,)
     factor: Array  # (pieces, width)
-    sine_first: Ints  # (functions + 1,)
+    sine_first: IntArray  # (functions + 1,)
     sine: Array  # (sines, 3)
 
 
@@ -68,7 +65,7 @@ class Tables(NamedTuple):
     """Everything the planar kernels need, for n bodies and m constraints."""
 
     mass: Array  # (3 (n + 1),) inverse of m, m, I of each body (with the excess of light ones), zero for the ground
-    light: Ints  # (k,) coordinates that are eliminated with more than their own mass, see `gearfe.rigid.carried`
+    light: IntArray  # (k,) coordinates that are eliminated with more than their own mass, see `gearfe.rigid.carried`
     excess: Array  # (k,) by how much
     forms: Forms
     vectors: Vectors
@@ -83,7 +80,7 @@ class Assembly(NamedTuple):
     tables: Tables
     row_joint: tuple[int, ...]  # joint number of each constraint
     row_label: tuple[str, ...]  # what the constraint holds, for messages
-    row_holds_length: NDArray[np.bool_]  # (m,) whether it holds lengths, not angles and directions alone
+    row_holds_length: BoolArray  # (m,) whether it holds lengths, not angles and directions alone
     spring_label: tuple[str, ...]
     functions: tuple[TimeFunction, ...]  # in the order of the tables
     start_q: Array  # (3n,) start coordinates of the mass centres
@@ -259,7 +256,7 @@ def _length(rows: list[_Row], tensions: list[Tension], q0: Array, ground: int) -
     return float(size) or 1.0
 
 
-def _ints(values: Sequence[Sequence[int]], width: int) -> Ints:
+def _ints(values: Sequence[Sequence[int]], width: int) -> IntArray:
     return np.array(values, dtype=np.int64).reshape(-1, width)
 
 

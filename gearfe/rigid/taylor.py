@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..progress import stage
+from ..typing import Array, IntArray
 from . import (
     compiled,
     kernel_forces,
@@ -27,7 +28,7 @@ from .dense import Polynomials
 from .start import Start
 from .status import Status
 from .steps import Watch
-from .tables import Array, Assembly, Ints, Tables
+from .tables import Assembly, Tables
 
 FUNCTIONS = (
     *kernel_rows.FUNCTIONS, *kernel_forces.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_singular.FUNCTIONS,
@@ -78,7 +79,7 @@ class Border(NamedTuple):
     schur: Array  # (d, d) Schur complement of the rows B
     small: Array  # (d, d)
     nu: Array  # (d,)
-    drop: Ints  # (d,) rows left out
+    drop: IntArray  # (d,) rows left out
 
 
 class Carry(NamedTuple):
@@ -119,8 +120,8 @@ class Work(NamedTuple):
     vn: Array
     c: Array  # (n,)
     s: Array
-    skip: Ints  # (m,) rows left out here
-    base: Ints  # (m,) redundant rows: which ones are left out changes along the motion
+    skip: IntArray  # (m,) rows left out here
+    base: IntArray  # (m,) redundant rows: which ones are left out changes along the motion
 
 
 def most_singular(tables: Tables) -> int:
@@ -196,7 +197,7 @@ class TaylorRun:
 
     status: Status
     dense: Polynomials
-    singular: Ints
+    singular: IntArray
     compiling: float = 0.0
 
 

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..typing import Array
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class TimeFunction:
     coefficients: tuple[tuple[float, ...], ...] = ((0.0,),)
     sines: tuple[tuple[float, float, float], ...] = ()
 
-    def __call__(self, t: ArrayLike, derivative: int = 0) -> NDArray[np.float64]:
+    def __call__(self, t: ArrayLike, derivative: int = 0) -> Array:
         """Value (or derivative of that order) at the times `t` (s)."""
         time = np.asarray(t, dtype=float)
         starts, origins, rows = _tables(self.starts, self.origins, self.coefficients, derivative)
@@ -101,7 +102,7 @@ class TimeFunction:
 @lru_cache(maxsize=256)
 def _tables(
     starts: tuple[float, ...], origins: tuple[float, ...], coefficients: tuple[tuple[float, ...], ...], derivative: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array, Array]:
     """Starts, origins and the coefficients of a derivative, (pieces, width), as arrays."""
     rows = np.zeros((len(coefficients), max(len(row) for row in coefficients)))
     for i, row in enumerate(coefficients):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .contract import Array
+from ..typing import Array
 from .dense import Dense
 from .start import Start
 from .status import Status

@@ -24,13 +24,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.position import Positions
 from ..gear.flank_curve import FlankCurve
+from ..typing import Array, IntArray
 from .position_solver import PositionSolver
-
-Array = NDArray[Any]
 
 #: What bears besides smooth flanks, by number: nothing; a rounded tip edge; a sharp edge, under which the pressure of
 #: linear elasticity is singular.
@@ -88,7 +86,7 @@ def largest_pressures(curve: Any) -> dict[str, Any]:
     }
 
 
-def _bearing(curve: FlankCurve, u: Array, half: Array) -> NDArray[np.int64]:
+def _bearing(curve: FlankCurve, u: Array, half: Array) -> IntArray:
     """Places in `EDGES` of what contacts of the half widths `half` (m) about the parameters u of a flank reach."""
     face, s = curve.face, curve.arc_at(u)
     sharp = curve.arc_at([*([0.0] if face.fall > 0.0 else []), *face.kinks, *([face.end] if face.sharp else [])])

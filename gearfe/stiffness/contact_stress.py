@@ -23,18 +23,15 @@ changed.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.compliance import GearBody
 from ..contact.flank import Flank, edge_nodes, edge_shapes
 from ..contact.half_plane_result import PairContacts
 from ..contact.panels import EDGES
 from ..contact.position import FlankLoads, Positions
-
-Array = NDArray[Any]
+from ..typing import Array
 
 #: Half width of a bump in elements.
 BUMP_ELEMENTS = 2.0

@@ -20,11 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, unknown_name
 from ..output.files import write_csv
+from ..typing import Array, BoolArray, IntArray
 from . import curve_csv
 from .periodic import PeriodicInterpolant, ValueAndSlope, periodic_interpolant
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 #: Statuses that stand for a result; every other one marks a failed position, whose numbers are not-a-number.
 SOLVED = ("converged", "no_contact")
@@ -200,7 +198,7 @@ class StiffnessCurve:
         return len(self.pinion_angle)
 
     @property
-    def failed(self) -> NDArray[np.bool_]:
+    def failed(self) -> BoolArray:
         """Positions without a solution."""
         return ~np.isin(self.status, SOLVED)
 

@@ -13,10 +13,10 @@ from decimal import Context, Decimal
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError, shown
 from ..textfile import read_text
+from ..typing import Array
 
 #: Far more digits than any double needs, so that a product is rounded once.
 _EXACT = Context(prec=50)
@@ -89,7 +89,7 @@ def read_columns(path: str | Path) -> dict[str, list[str]]:
     return {name: [row[i] for row in rows[1:]] for i, name in enumerate(names)}
 
 
-def numbers(columns: Mapping[str, Sequence[str]], name: str, path: str | Path) -> NDArray[np.float64]:
+def numbers(columns: Mapping[str, Sequence[str]], name: str, path: str | Path) -> Array:
     """Column `name` in SI; all not-a-number where the file has no such column."""
     if name not in columns:
         return np.full(len(next(iter(columns.values()))), np.nan)

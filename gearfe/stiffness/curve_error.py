@@ -28,14 +28,10 @@ the true error.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, BoolArray, IntArray
 from .curve import ErrorEstimate
-
-Array = NDArray[Any]
 
 #: Coarsening c, assumed order of convergence p, share of the meshes' common error at the default sizes, and largest
 #: number of positions solved twice.
@@ -44,7 +40,7 @@ COARSENING, ORDER, COMMON, POSITIONS = 1.6, 1.0, 5e-5, 20
 COVERAGE = 2.0
 
 
-def solved_twice(converged: NDArray[np.bool_]) -> NDArray[np.int64]:
+def solved_twice(converged: BoolArray) -> IntArray:
     """Positions to solve again, evenly among those that converged: their numbers."""
     good = np.flatnonzero(converged)
     if len(good) == 0:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.compliance import GearBody
 from ..contact.position import Positions
@@ -19,11 +18,9 @@ from ..contact.recovery import sector_displacements
 from ..contact.scene import MeshingPair, turn
 from ..elasticity import physical_gradients, principal_stresses, triangle_shapes, von_mises
 from ..meshing.whole_gear import WholeGear, whole_gear
+from ..typing import Array, IntArray
 from .contact_stress import bumped
 from .flank_pressure import flank_pressures
-
-Array = NDArray[Any]
-IntArray = NDArray[Any]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.position import Positions
 from ..contact.scene import MeshingPair
@@ -21,12 +20,12 @@ from ..output.files import write_csv
 from ..output.pressure_figures import pressure_figure
 from ..output.vtkhdf import VtkHdfSeries
 from ..threads import one_thread
+from ..typing import Array, IntArray
 from .curve import StiffnessCurve
 from .fields import GearField, pair_recovery, straight_triangles
 from .flank_pressure import FlankPressure, flank_pressures
 from .position_solver import PositionSolver, position_solver
 
-Array = NDArray[Any]
 Progress = Callable[[int, int, str], None]
 
 GEARS = ("pinion", "wheel")
@@ -34,7 +33,7 @@ GEARS = ("pinion", "wheel")
 SIDE_BY_SIDE, MOST_LINES = 8, 12
 
 
-def chosen_positions(curve: StiffnessCurve, angles_deg: Sequence[float] | None) -> NDArray[np.int64]:
+def chosen_positions(curve: StiffnessCurve, angles_deg: Sequence[float] | None) -> IntArray:
     """Numbers of the positions of a curve at given pinion angles (deg), all without them, in the order of the angles.
 
     Positions without a solution are left out.
@@ -47,7 +46,7 @@ def chosen_positions(curve: StiffnessCurve, angles_deg: Sequence[float] | None) 
     return found[np.argsort(curve.pinion_angle[found], kind="stable")]
 
 
-def angle_numbers(known_deg: Array, angles_deg: Sequence[float]) -> NDArray[np.int64]:
+def angle_numbers(known_deg: Array, angles_deg: Sequence[float]) -> IntArray:
     """Numbers of given angles among the sweep's angles (deg).
 
     Raises
@@ -147,9 +146,7 @@ def _place(curve: StiffnessCurve, number: int) -> tuple[float, float]:
     return float(curve.pinion_angle[number]), float(curve.twist[number] + curve.lost_motion)
 
 
-def _solved(
-    solver: PositionSolver, curve: StiffnessCurve, chosen: NDArray[np.int64]
-) -> Iterator[tuple[int, Positions]]:
+def _solved(solver: PositionSolver, curve: StiffnessCurve, chosen: IntArray) -> Iterator[tuple[int, Positions]]:
     """Positions of the curve solved again, a few side by side; one that does not converge again is left out."""
     for first in range(0, len(chosen), SIDE_BY_SIDE):
         part = chosen[first : first + SIDE_BY_SIDE]
@@ -206,7 +203,7 @@ def pressure_table(pair: GearPair, pressures: Sequence[tuple[float, list[FlankPr
     return columns
 
 
-def _shown(one: FlankPressure) -> NDArray[np.int64]:
+def _shown(one: FlankPressure) -> IntArray:
     """Contact points with pressure and one neighbour on either side."""
     carries = one.pressure > 0
     near = carries.copy()

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.flank import Flank, edge_nodes, edge_shapes
 from ..contact.half_plane_result import PairContacts
 from ..contact.position import Positions
 from ..contact.scene import MeshingPair
-
-Array = NDArray[Any]
+from ..typing import Array
 
 
 @dataclass(frozen=True)

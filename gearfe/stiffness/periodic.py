@@ -15,11 +15,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
-
-Array = NDArray[np.float64]
+from ..typing import Array
 
 #: Names of the methods of interpolation.
 METHODS = ("cubic", "linear")

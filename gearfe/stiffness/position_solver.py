@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.elements import first_contacts, solve_elements
 from ..contact.half_plane import half_plane_pair, solve_half_plane
@@ -18,9 +16,8 @@ from ..contact.records import joined, of_positions, taken
 from ..contact.scene import MeshingPair
 from ..gear.pair import GearPair
 from ..gear.touching import Touching
+from ..typing import Array, IntArray
 
-Array = NDArray[Any]
-IntArray = NDArray[np.int64]
 NONE: IntArray = np.zeros(0, dtype=np.int64)
 
 

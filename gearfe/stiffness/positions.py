@@ -5,21 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.finite_strain import finite_strain_shares, interpolated_shares, sample_numbers, with_shares
 from ..contact.position import TORQUES, Positions, together
 from ..errors import InputError
 from ..gear.iso6336 import mesh_stiffness
 from ..gear.validity import MOST_YIELD
+from ..typing import Array, IntArray
 from .position_solver import NONE, ElementSolver, PositionSolver
 from .torque_control import ANGLE_ROUNDING, newton_twist, twists_for_torque
 
-Array = NDArray[Any]
-IntArray = NDArray[Any]
 Progress = Callable[[int, int, str], None]
 
 #: Positions handed to the solver at once: enough to work side by side, few enough to stay small in memory.

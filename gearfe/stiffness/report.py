@@ -18,12 +18,11 @@ from ..errors import InputError
 from ..gear.derived import derived_geometry, iso_values
 from ..gear.drawing import single_pair_stretches
 from ..gear.validity import overlaps, told_overlaps
+from ..typing import Array, IntArray
 from .contact_pressure import largest_pressures
 from .curve import StiffnessCurve
 from .job import StiffnessJob
 from .periodic import fold
-
-Array = NDArray[np.float64]
 
 #: Allowable contact stress of case-hardened steel for unlimited life (Pa): ISO 6336-5, material quality MQ.
 USUAL_STEEL = 1500e6
@@ -244,7 +243,7 @@ def figure_arguments(job: StiffnessJob, curve: StiffnessCurve) -> dict[str, Any]
     }
 
 
-def _shares(curve: StiffnessCurve, angles: Array, pick: NDArray[np.int64]) -> list[tuple[Array, Array]]:
+def _shares(curve: StiffnessCurve, angles: Array, pick: IntArray) -> list[tuple[Array, Array]]:
     """For each tooth pair its share of the load against the pinion angle (deg), along its whole way through contact."""
     moved = np.round((angles - curve.pinion_angle[pick]) / curve.mesh_cycle)
     leading = curve.leading_pair[pick] - moved

@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..contact.compliance import gear_body
 from ..contact.half_plane import half_plane_pair
@@ -34,6 +34,7 @@ from ..stopwatch import Stopwatch
 from ..tables.laws import DEFAULT_LAW
 from ..tables.stiffness import check_flank_coarsen
 from ..threads import one_thread
+from ..typing import Array, IntArray
 from .contact_pressure import EDGES, contact_pressures
 from .curve import SOLVED, ErrorEstimate, StiffnessCurve
 from .curve_error import COARSENING, error_estimate, influence_estimate, solved_twice
@@ -44,8 +45,6 @@ from .torque_control import ANGLE_ROUNDING
 
 __all__ = ["ErrorEstimate", "StiffnessCurve", "elastic_pair", "sweep_stiffness"]
 
-Array = NDArray[Any]
-IntArray = NDArray[Any]
 
 #: Flank elements of the half-plane law, which need not resolve contacts: times those of the laws on the mesh, and at
 #: most so many times the default ones.

@@ -15,12 +15,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.position import Positions
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from ..typing import Array, IntArray
 
 #: Rounding of the gears' angles (rad) below which no twist can be told apart.
 ANGLE_ROUNDING = 2e-15

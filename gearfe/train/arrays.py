@@ -6,19 +6,16 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..meshlaw.law import NEVER, MeshLaw
 from ..stiffness.periodic import PeriodicInterpolant
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from ..typing import Array, IntArray
 
 
 class Curves(NamedTuple):
     """Stiffness curves, one after the other."""
 
-    first: Ints  # (c + 1,) first node of each
+    first: IntArray  # (c + 1,) first node of each
     nodes: Array  # (all nodes,) rising phases; the last of each is its first plus the period
     cubics: Array  # (all nodes, 4) stiffness over the phase from each node but the last
 
@@ -26,8 +23,8 @@ class Curves(NamedTuple):
 class Laws(NamedTuple):
     """l mesh laws, filled up to the largest: see `gearfe.meshlaw.law.MeshLaw`."""
 
-    cells: Ints  # (l,) cells of the phase
-    parts: Ints  # (l,) cells of the pair force
+    cells: IntArray  # (l,) cells of the phase
+    parts: IntArray  # (l,) cells of the pair force
     nodes: Array  # (l, n + 1)
     forces: Array  # (l, m + 1)
     touch: Array  # (l, s, n, 4)

@@ -10,12 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..rigid import Element, LinearJoint, ModalBlocks
+from ..typing import Array
 from .inertia import Rotor
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

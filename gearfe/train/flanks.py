@@ -10,15 +10,13 @@ import itertools
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..meshlaw.law import MeshLaw
+from ..typing import Array, BoolArray
 from .inertia import rotor
 from .kinematics import balanced_forces, drive_sense, driving_senses, load_torques, rolling
 from .scene import TrainScene
-
-Array = NDArray[np.float64]
 
 #: Times looked at in each piece of the loads and of the drive.
 LOOKS = 64
@@ -47,7 +45,7 @@ def check_flanks(scene: TrainScene) -> None:
         raise _told(scene, mesh, float(times[at]), senses)
 
 
-def one_sided(scene: TrainScene) -> NDArray[np.bool_]:
+def one_sided(scene: TrainScene) -> BoolArray:
     """For each mesh, whether nothing is known of its back flanks."""
     own = [isinstance(mesh.stiffness, MeshLaw) and mesh.stiffness.backlash > 0.0 for mesh in scene.meshes]
     return np.array(

@@ -19,16 +19,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..progress import stage
 from ..threads import one_thread
+from ..typing import Array, ComplexArray
 from .model import TrainModel
-from .monodromy import Complex, Flow, flow, kick_times, monodromy, multipliers, settled, walk
+from .monodromy import Flow, flow, kick_times, monodromy, multipliers, settled, walk
 
 __all__ = ["Linearised", "multipliers", "train_multipliers"]
 
-Array = NDArray[np.float64]
 
 #: Newton steps to the orbit, and what may be left of the way round it, relative to the state.
 MOST_TRIES, CLOSED = 12, 1e-9
@@ -39,7 +38,7 @@ SAME = 1e-9
 
 
 @stage("stability of the steady motion")
-def train_multipliers(model: TrainModel) -> tuple[Complex | None, str]:
+def train_multipliers(model: TrainModel) -> tuple[ComplexArray | None, str]:
     """Multipliers of a train at its steady speed over the common period of its meshes, or the reason for none."""
     speed, note = model.steady_speed, why_not(model)
     if note:
@@ -168,7 +167,7 @@ class Linearised:
         senses, phases, means = (np.array([getattr(x, k) for x in self.lines]) for k in ("sense", "phase", "mean"))
         meshes, shafts = np.arange(m), np.arange(s)
 
-        def kick(step: int, stage: int, length: float, x: Complex) -> None:
+        def kick(step: int, stage: int, length: float, x: ComplexArray) -> None:
             read = base + (rows @ x[:, 0]).real
             delta, turned = read[:m], read[m : 2 * m]
             found = [

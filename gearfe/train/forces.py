@@ -24,14 +24,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..meshlaw.law import MeshLaw
 from ..rigid.timefunctions import TimeFunction
 from ..stiffness.periodic import PeriodicInterpolant
+from ..typing import Array
 from .arrays import cubics
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

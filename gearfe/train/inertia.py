@@ -13,14 +13,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..gear.drawing import gear_outline
 from ..gear.pair import Gear
+from ..typing import Array
 from .scene import Shaft, ShaftGear
-
-Array = NDArray[np.float64]
 
 #: Points on each piece of a tooth's outline: area good to 1e-7.
 POINTS = 200

@@ -13,13 +13,11 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..rigid.timefunctions import TimeFunction
+from ..typing import Array
 from .scene import TrainScene
-
-Array = NDArray[np.float64]
 
 #: A common period of more cycles of the fastest mesh than this is of no practical use.
 MOST_CYCLES = 200

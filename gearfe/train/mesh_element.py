@@ -26,19 +26,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..gear.pair import GearPair
 from ..meshlaw.law import MeshLaw
 from ..rigid import Element, LinearJoint
 from ..stiffness.periodic import PeriodicInterpolant
+from ..typing import Array, IntArray
 from .checks import interpolant
 from .elements import LinearForce, RigidShaft
 from .forces import CurveFlank, Flank, LawFlank
 from .scene import GearMesh, TrainScene
-
-Array = NDArray[np.float64]
-
 
 #: Least force F0 of a mesh's damping, in parts of the largest that its law is known for.
 LEAST_REFERENCE = 0.01
@@ -144,7 +141,7 @@ class MeshLine:
 
 
 def mesh_line(
-    scene: TrainScene, mesh: GearMesh, shafts: Sequence[RigidShaft], first: NDArray[np.int64], ratios: Sequence[float],
+    scene: TrainScene, mesh: GearMesh, shafts: Sequence[RigidShaft], first: IntArray, ratios: Sequence[float],
     size: int, sense: float, phase: float, force: float,
 ) -> MeshLine:  # fmt: skip
     """Line of action of a mesh in a train whose shafts' coordinates begin at `first` of `size`; `force` (N) is that of

@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..rigid import Element, LinearJoint, LocalForce, ModalBlocks, Start, System, TimeFunction, consistent_start
 from ..rigid.elimination import Minimal, minimal
+from ..typing import Array, IntArray
 from .checks import check_scene
 from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge
 from .forces import Flank, Gyro, TrainForces, derivative
@@ -27,8 +27,6 @@ from .mesh_element import MeshLine, mesh_line
 from .phases import tooth_places
 from .scene import Drive, TrainScene
 from .series import train_series
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +71,7 @@ class TrainModel:
     torques: tuple[tuple[Array, TimeFunction], ...]
     forces: TrainForces
     directions: Array
-    first: NDArray[np.int64]
+    first: IntArray
     spin_reference: Array
     axial: Array
     bores: tuple[str, ...]
@@ -173,7 +171,7 @@ def build_train(scene: TrainScene) -> TrainModel:
 
 
 def _torques(
-    scene: TrainScene, shafts: tuple[RigidShaft, ...], first: NDArray[np.int64], ratios: list[float],
+    scene: TrainScene, shafts: tuple[RigidShaft, ...], first: IntArray, ratios: list[float],
     angle: TimeFunction, size: int,
 ) -> tuple[tuple[Array, TimeFunction], ...]:  # fmt: skip
     """Directions in the system with torques over time: loads, and the shafts' inertia when the drive changes speed."""
@@ -196,7 +194,7 @@ def _torques(
 
 def _forces(
     scene: TrainScene, lines: tuple[MeshLine, ...], torques: tuple[tuple[Array, TimeFunction], ...],
-    angle: TimeFunction, first: NDArray[np.int64], ratios: list[float], shafts: tuple[RigidShaft, ...], size: int,
+    angle: TimeFunction, first: IntArray, ratios: list[float], shafts: tuple[RigidShaft, ...], size: int,
 ) -> tuple[TrainForces, Array]:  # fmt: skip
     """All that is not constant: three directions a shaft (tilts, spin), up to three a mesh, one a torque."""
     unit = np.eye(size)
@@ -293,7 +291,7 @@ def _damped(scene: TrainScene, elements: list[Element], bodies: list[Element]) -
     return damped, made
 
 
-def _start(scene: TrainScene, system: System, shafts: tuple[RigidShaft, ...], first: NDArray[np.int64]) -> Start:
+def _start(scene: TrainScene, system: System, shafts: tuple[RigidShaft, ...], first: IntArray) -> Start:
     """At rest beside rolling but for the asked speeds, which the constraints must allow."""
     start = consistent_start(system, 0.0)
     open_rows = {system.row_names()[i] for i in start.freedoms.redundant}
@@ -324,7 +322,7 @@ def _measured_against(scene: TrainScene, name: str) -> str:
     return next((bore for shaft, bore in ends if shaft == name and bore is not None), scene.shaft(name).bores[0])
 
 
-def _spin_reference(scene: TrainScene, size: int, first: NDArray[np.int64]) -> Array:
+def _spin_reference(scene: TrainScene, size: int, first: IntArray) -> Array:
     rows = np.zeros((len(scene.shafts), size))
     for i, shaft in enumerate(scene.shafts):
         rows[i, first[i] + 5] = 1.0

@@ -14,15 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..threads import one_thread
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from ..typing import Array, ComplexArray
 
 _B = (0.0829844064174052, 0.396309801498368, -0.0390563049223486)
 _A = (0.245298957184271, 0.604872665711080)
@@ -54,12 +50,12 @@ class Flow:
     """
 
     scale: Array
-    values: Complex | None
+    values: ComplexArray | None
     matrix: Array
-    into: Complex
-    out: Complex
+    into: ComplexArray
+    out: ComplexArray
 
-    def over(self, length: float) -> Callable[[Complex], Complex]:
+    def over(self, length: float) -> Callable[[ComplexArray], ComplexArray]:
         """The flow over a time (s)."""
         if self.values is not None:
             factors = np.exp(length * self.values)[:, None]
@@ -85,7 +81,7 @@ def flow(squares: Array, damping: Array, period: float) -> Flow:
 
 
 def walk(
-    constant: Flow, edges: Array, state: Array, kick: Callable[[int, int, float, Complex], None]
+    constant: Flow, edges: Array, state: Array, kick: Callable[[int, int, float, ComplexArray], None]
 ) -> Array:  # fmt: skip
     """State (2n, columns) at the last of the step ends `edges` from the state at the first.
 
@@ -93,7 +89,7 @@ def walk(
     """
     x = constant.into @ state
     lengths = np.diff(edges)
-    flows: list[Callable[[Complex], Complex]] = []
+    flows: list[Callable[[ComplexArray], ComplexArray]] = []
     before = None
     for step, h in enumerate(lengths):
         if before is None or abs(h - before) > 1e-12 * h:
@@ -129,7 +125,7 @@ def monodromy(constant: Flow, edges: Array, directions: Array, reads: Array, str
     into = constant.into @ np.vstack([np.zeros_like(directions), directions])
     rows = (reads.T / np.concatenate([constant.scale, np.ones(n)])) @ constant.out
 
-    def kick(step: int, stage: int, length: float, x: Complex) -> None:
+    def kick(step: int, stage: int, length: float, x: ComplexArray) -> None:
         x += into @ (length * (strengths[step, stage] @ (rows @ x).real))
 
     return walk(constant, edges, np.eye(2 * n), kick)
@@ -138,7 +134,7 @@ def monodromy(constant: Flow, edges: Array, directions: Array, reads: Array, str
 def multipliers(
     squares: Array, damping: Array, directions: Array, gains: Callable[[Array], Array], period: float, *,
     tolerance: float = 1e-6, first: int = 64,
-) -> Complex | None:  # fmt: skip
+) -> ComplexArray | None:  # fmt: skip
     """Floquet multipliers, largest modulus first; None when numbers overflow even with the shortest steps.
 
     Parameters
@@ -172,7 +168,7 @@ def multipliers(
         return settled(found, tolerance=tolerance, first=first)
 
 
-def settled(found: Callable[[int], Array | None], *, tolerance: float = 1e-6, first: int = 64) -> Complex | None:
+def settled(found: Callable[[int], Array | None], *, tolerance: float = 1e-6, first: int = 64) -> ComplexArray | None:
     """Eigenvalues of the monodromy matrices `found` with more and more steps, until their moduli stand still.
 
     Parameters
@@ -185,13 +181,13 @@ def settled(found: Callable[[int], Array | None], *, tolerance: float = 1e-6, fi
         Fewest steps.
     """
 
-    def sorted_values(steps: int) -> Complex | None:
+    def sorted_values(steps: int) -> ComplexArray | None:
         # the splitting also steps back: heavy damping then grows, and overflows where steps are long
         with np.errstate(over="ignore", invalid="ignore"):
             X = found(steps)
         if X is None or not np.isfinite(X).all():
             return None
-        values: NDArray[Any] = np.linalg.eigvals(X)
+        values: Array = np.linalg.eigvals(X)
         return np.asarray(values[np.argsort(-np.abs(values), kind="stable")], dtype=complex)
 
     steps = first

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..rigid import Trajectory
+from ..typing import Array
 from .model import TrainModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,13 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array, BoolArray
 from .forces import LawFlank
 from .model import TrainModel
 from .motion import Motion
-
-Array = NDArray[np.float64]
 
 
 @dataclass
@@ -28,7 +26,7 @@ class Parting:
     before: tuple[float, bool] | None = None
     touched: bool = False
 
-    def add(self, time: Array, apart: NDArray[np.bool_]) -> None:
+    def add(self, time: Array, apart: BoolArray) -> None:
         """Further samples; before the first contact nothing is lost."""
         for t, open_ in zip(time.tolist(), apart.tolist(), strict=True):
             last, was = self.before if self.before is not None else (t, open_)

@@ -16,14 +16,12 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..rigid.tables import Times, time_arrays
+from ..typing import Array, IntArray
 from .arrays import Curves, Laws, curve_arrays, law_arrays
 from .forces import CurveFlank, Flank, LawFlank, TrainForces
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Row = tuple[tuple[int, ...], tuple[float, ...]]
 
 #: Rows of a flank: phase from the cell's node with its square and cube, approach, numbers of the cell (four
@@ -51,34 +49,33 @@ PER_FLANK = 3
 class Inputs(NamedTuple):
     """Rows ``alpha psi + beta u`` of a direction, or the rates of both, plus a constant."""
 
-    ints: (
-        Ints  # (n, 4): row, direction, order of the derivative, row of the cell whose node the phase counts from or -1
-    )
+    # (n, 4): row, direction, order of the derivative, row of the cell whose node the phase counts from or -1
+    ints: IntArray
     reals: Array  # (n, 3): alpha, beta, constant
 
 
 class Operations(NamedTuple):
     """See the module's docstring."""
 
-    ints: Ints  # (n, 9): row, A, B (-1: none), kind, row of z, row and column of the coefficients, two pieces >= 0
+    ints: IntArray  # (n, 9): row, A, B (-1: none), kind, row of z, row and column of the coefficients, two pieces >= 0
     reals: Array  # (n, 3): factor, sign, keep
 
 
 class Outputs(NamedTuple):
     """Forces: a factor times a row, or (row -1) times the motion along the direction."""
 
-    ints: Ints  # (n, 2): direction, row
+    ints: IntArray  # (n, 2): direction, row
     reals: Array  # (n, 1)
 
 
 class Flanks(NamedTuple):
     """All flanks, those with curves before those with mesh laws."""
 
-    curves: Ints  # (f,) number of the curve, -1 for one with a mesh law
-    laws: Ints  # (f,) number of the mesh law
-    row: Ints  # (f,) first row
-    piece: Ints  # (f,) first whole number
-    first: Ints  # (f + 2,) first operation before the solution of each flank, first and end of those after them
+    curves: IntArray  # (f,) number of the curve, -1 for one with a mesh law
+    laws: IntArray  # (f,) number of the mesh law
+    row: IntArray  # (f,) first row
+    piece: IntArray  # (f,) first whole number
+    first: IntArray  # (f + 2,) first operation before the solution of each flank, first and end of those after them
 
 
 class Program(NamedTuple):
@@ -89,7 +86,7 @@ class Program(NamedTuple):
     operations: Operations
     outputs: Outputs
     flanks: Flanks
-    watches: Ints  # (w, 4): what, flank, row, slot
+    watches: IntArray  # (w, 4): what, flank, row, slot
     curves: Curves
     laws: Laws
 
@@ -261,9 +258,9 @@ def _pair(made: Tables, row: int, own: int, need: tuple[int, int]) -> None:
         below = own + H1 + power - 2
 
 
-def _two(rows: list[Row], ints: int, reals: int) -> tuple[Ints, Array]:
+def _two(rows: list[Row], ints: int, reals: int) -> tuple[IntArray, Array]:
     return _ints([row[0] for row in rows]).reshape(-1, ints), np.array([r[1] for r in rows], float).reshape(-1, reals)
 
 
-def _ints(values: object) -> Ints:
+def _ints(values: object) -> IntArray:
     return np.array(values, dtype=np.int64)

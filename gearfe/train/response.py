@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..typing import Array, ComplexArray, IntArray
 
 #: What has a row for each output time.
 SAMPLED = (
@@ -116,7 +115,7 @@ class TrainResponse:
     shaft_frequencies_Hz: Array
     common_period_s: float | None
     coupled_frequencies_Hz: Array
-    floquet: NDArray[np.complex128] | None
+    floquet: ComplexArray | None
     floquet_note: str
     status: str
     time_reached: float
@@ -129,7 +128,7 @@ class TrainResponse:
         """The response at each `count`-th of its times from number `first` on."""
         return self._at(slice(first, None, count))
 
-    def at(self, rows: Sequence[int] | NDArray[np.int64]) -> TrainResponse:
+    def at(self, rows: Sequence[int] | IntArray) -> TrainResponse:
         """The response at some of its times."""
         return self._at(np.asarray(rows, dtype=np.int64))
 

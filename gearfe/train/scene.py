@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..gear.pair import Gear
 from ..meshlaw.law import MeshLaw
@@ -16,8 +15,8 @@ from ..reduction.modal_body import ModalBody
 from ..rigid.timefunctions import TimeFunction
 from ..stiffness.curve import StiffnessCurve
 from ..stiffness.periodic import PeriodicInterpolant
+from ..typing import Array
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 

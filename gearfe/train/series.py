@@ -9,10 +9,10 @@ where a damper would begin to pull.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..rigid import SeriesLaw
 from ..rigid.kernel_rows import time_series
+from ..typing import Array, IntArray
 from . import corners
 from . import program as tables
 from .corners import SAME, train_corner
@@ -267,8 +267,8 @@ def train_series(forces: TrainForces) -> SeriesLaw:
     program, rows, pieces = train_program(forces)
 
     def begin(
-        t: float, sign: float, u: NDArray[np.float64], du: NDArray[np.float64], memory: NDArray[np.float64],
-        numbers: NDArray[np.int64],
+        t: float, sign: float, u: Array, du: Array, memory: Array,
+        numbers: IntArray,
     ) -> None:  # fmt: skip
         train_begin(t, sign, u, du, program, forces, memory, numbers)
 

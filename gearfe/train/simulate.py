@@ -9,20 +9,19 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..progress import count, stage
 from ..record_spectrum import FASTEST, SPARE
 from ..rigid import IntegrationError, Start, Status, Trajectory, integrate
+from ..typing import Array
 from .floquet import train_multipliers
 from .kinematics import steady_forces
 from .model import TrainModel
 from .motion import Motion, motion
 from .parting import Parting, beyond_law, parted
 from .response import TrainResponse, joined
-
-Array = NDArray[np.float64]
 
 #: The finer run shares a little of the error; with this factor the estimate covers it.
 SAFETY = 1.5

@@ -9,15 +9,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from skfem import CellBasis, ElementTriP2, ElementVector, MeshTri2
 
 from ..contact.flank import edge_shapes, gauss_rule
 from ..elasticity import Material, Plane, stiffness_form, triangle_rule
 from ..errors import InputError, unknown_name
+from ..typing import Array, IntArray
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 #: A prescribed displacement (m) or traction (Pa): a number, or a function of places, shape (n, 2), with values (n,).
 Value = float | Callable[[Array], Array]
 

@@ -24,13 +24,12 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from skfem import BilinearForm, LinearForm
 from skfem.helpers import ddot, dot, eye, grad, mul, prod, trace, transpose
 
+from ..typing import Array
 from .bodies import Bodies
 
-Array = NDArray[np.float64]
 Kinematics = Literal["small", "finite"]
 
 

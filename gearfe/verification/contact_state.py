@@ -7,17 +7,15 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 from skfem import DiscreteField
 
 from ..contact.closest import Projection, nearest_places, project
+from ..typing import Array, ComplexArray, IntArray
 from . import forms
 from .bodies import edge_points, edge_tangents
 from .problem import ContactProblem, Points
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 PLANE = np.array([1.0, 1.0j])
 
 
@@ -148,7 +146,7 @@ def _closest(problem: ContactProblem, nodes: Array, where: Array, mate: IntArray
     return project(slave, master, problem.counts, mate, start, fade)
 
 
-def _plane(vectors: NDArray[np.complex128]) -> Array:
+def _plane(vectors: ComplexArray) -> Array:
     """Components, shape (2, q)."""
     return np.stack([vectors.real, vectors.imag])
 

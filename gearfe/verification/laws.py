@@ -24,14 +24,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..typing import Array
 
-Array = NDArray[Any]
 #: Surfaces that carry the contact points: the first of each couple (``pinion``), the second (``wheel``), both with half
 #: of the pressure each, or the one whose end, a tooth's tip, is nearer to the contact.
 Sides = Literal["both", "pinion", "wheel", "tip"]

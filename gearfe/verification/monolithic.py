@@ -10,15 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array
 from .contact_state import contact_at
 from .laws import ContactLaw
 from .newton import TOLERANCE, ContactSolution, solve_contact
 from .problem import ContactProblem
 from .whole_pair import WholePair
-
-Array = NDArray[np.float64]
 
 #: Smallest step of the twist, as a share of it, when it is raised in steps.
 SMALLEST_STEP = 0.02

@@ -15,16 +15,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
+from ..typing import Array, IntArray
 from .contact_state import ContactState, contact_at, hat_functions
 from .forms import gap_change, unit_pressure_work
 from .problem import ContactProblem
-
-Array = NDArray[np.float64]
-IntArray = NDArray[Any]
 
 #: Out-of-balance forces relative to the contact forces at which a position counts as converged.
 TOLERANCE = 1e-10

@@ -8,18 +8,15 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.closest import nearest_places, project
 from ..errors import InputError
+from ..typing import Array, IntArray
 from .bodies import Bodies, Value, edge_lengths, edge_points, edge_tangents
 from .constitution import Kinematics, SaintVenantKirchhoff, SmallStrain, linear_stress_rate
 from .forms import stress_term
 from .laws import ContactLaw, side_share
 from .segments import Quadrature, segments, whole_edges
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -15,15 +15,13 @@ the quadrature error, and Newton's method keeps converging fast.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.flank import gauss_rule
+from ..typing import Array, IntArray
 
-Array = NDArray[Any]
-IntArray = NDArray[Any]
 Quadrature = Literal["points", "segments"]
 
 #: Segments shorter than this part of an edge are left out.

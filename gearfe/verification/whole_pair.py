@@ -6,21 +6,18 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.spatial import KDTree
 
 from ..elasticity import Material, Plane
 from ..meshing.tooth_sector import SectorMesh
 from ..meshing.whole_gear import WholeGear, whole_gear
+from ..typing import Array
 from .bodies import Bodies, ElasticBody
 from .constitution import Kinematics
 from .laws import ContactLaw
 from .problem import ContactProblem, Surface
 from .segments import Quadrature
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -25,16 +25,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..meshlaw.law import MeshLaw
 from ..reduction.modal_body import ModalBody
 from ..stiffness.curve import StiffnessCurve
 from ..train import build_train
 from ..train.scene import TrainScene
+from ..typing import Array
 from .spectra import TrainSpectra
-
-Array = NDArray[np.float64]
 
 #: How often the modes are parted into halves: two runs each.
 PAIRS = 2

@@ -9,20 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..output.files import whole_set, write_csv, write_json
 from ..stopwatch import Stopwatch
 from ..train.response import TrainResponse
 from ..train.scene import TrainScene
+from ..typing import Array, IntArray
 from .errors import Run, with_errors
 from .follow import Followed, follow
 from .report import train_summary
 from .spectra import TrainRecord, TrainSpectra, record
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Frames of the animation, and steps of the field files at most.
 FRAMES, FIELD_STEPS = 50, 101
@@ -208,13 +205,13 @@ def _timed(pieces: Iterable[TrainResponse], watch: Stopwatch) -> Iterator[TrainR
         watch.seconds["transient"] = watch.seconds.get("transient", 0.0) - spent
 
 
-def field_steps(times: Array, choice: OutputChoice) -> Ints:
+def field_steps(times: Array, choice: OutputChoice) -> IntArray:
     """Numbers of the output times that the files and pictures of the fields show, rising."""
     series, still, film = _shown(times, choice)
     return np.unique(np.concatenate([series, [still], film]))
 
 
-def _shown(times: Array, choice: OutputChoice) -> tuple[Ints, int, Ints]:
+def _shown(times: Array, choice: OutputChoice) -> tuple[IntArray, int, IntArray]:
     """Output times of the series, of the picture, and of the animation."""
     last = len(times) - 1
     series = np.arange(0, last + 1, max(1, -(-last // (FIELD_STEPS - 1))))

@@ -8,15 +8,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..output.files import csv_table
 from ..train.response import TrainResponse, joined
+from ..typing import Array, IntArray
 from .spectra import TrainRecord, TrainSpectra, response_columns
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Parts of the curves in a picture: more than it has columns of pixels.
 DRAWN = 4000
@@ -70,7 +67,7 @@ def follow(
     table: Path | None = None,
     radiation: Array | None = None,
     record: TrainRecord | None = None,
-    keep: Ints | None = None,
+    keep: IntArray | None = None,
 ) -> Followed:
     """Follow a run to its end; each piece is dropped when the next one comes.
 

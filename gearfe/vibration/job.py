@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..gear.pair import Gear, GearPair
@@ -29,6 +28,7 @@ from ..tables.train import TrainGearTable, TrainMeshTable, TrainTable, read_trai
 from ..train.kinematics import steady_forces
 from ..train.mesh_element import mean_value
 from ..train.scene import Bearing, Damping, Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
+from ..typing import Array
 
 if TYPE_CHECKING:
     from ..reduction.modal_body import ModalBody
@@ -62,7 +62,7 @@ class TrainJob:
     housing: HousingTable | None
 
     @property
-    def times(self) -> NDArray[np.float64]:
+    def times(self) -> Array:
         """Output times (s), from 0 to the end, the end included where the steps meet it."""
         step = 1e-6 * self.table.step_us
         count = int(1e-3 * self.table.duration_ms / step * (1 + 1e-12) + 1e-9)

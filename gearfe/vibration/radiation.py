@@ -19,12 +19,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..spectrum import Spectrum, amplitude_spectrum
-
-Floats = NDArray[np.float64]
+from ..typing import Array
 
 #: Density (kg/m3) and speed of sound (m/s) of air at 20 degrees Celsius, 101325 Pa.
 AIR_DENSITY, AIR_SPEED = 1.2041, 343.21
@@ -46,12 +45,12 @@ class RadiatedPower:
         Mean of the power over the samples (W).
     """
 
-    frequency: Floats
-    power: Floats
+    frequency: Array
+    power: Array
     mean: float
 
     @property
-    def level(self) -> Floats:
+    def level(self) -> Array:
         """(m,) levels of the lines (dB re 1e-12 W); minus infinity where nothing is radiated."""
         return power_level(self.power)
 
@@ -61,22 +60,22 @@ class RadiatedPower:
         return float(power_level(self.mean))
 
 
-def power_level(power: ArrayLike) -> Floats:
+def power_level(power: ArrayLike) -> Array:
     """Level (dB re 1e-12 W) of a power (W)."""
     with np.errstate(divide="ignore"):
         return np.asarray(10.0 * np.log10(np.asarray(power, dtype=float) / REFERENCE_POWER))
 
 
 def instantaneous_power(
-    radiation: Floats, velocity: ArrayLike, *, density: float = AIR_DENSITY, speed: float = AIR_SPEED
-) -> Floats:
+    radiation: Array, velocity: ArrayLike, *, density: float = AIR_DENSITY, speed: float = AIR_SPEED
+) -> Array:
     """Power (W) at each time: () or (n,); see `radiated_power` for the arguments."""
     matrix, v = _checked(radiation, velocity, density, speed)
     return np.asarray(density * speed * np.einsum("...i,...i->...", v @ matrix, v))
 
 
 def radiated_power(
-    radiation: Floats,
+    radiation: Array,
     velocity: ArrayLike,
     step: float,
     *,
@@ -107,15 +106,15 @@ def radiated_power(
 
 
 def power_of_lines(
-    radiation: Floats, spectrum: Spectrum, *, density: float = AIR_DENSITY, speed: float = AIR_SPEED
-) -> Floats:
+    radiation: Array, spectrum: Spectrum, *, density: float = AIR_DENSITY, speed: float = AIR_SPEED
+) -> Array:
     """(m,) power (W) of the lines of a velocity spectrum of all N coordinates."""
     v = spectrum.value
     square = np.einsum("ki,ki->k", v.conj(), v @ radiation).real
     return np.asarray(density * speed * spectrum.weight * np.maximum(square, 0.0))
 
 
-def _checked(radiation: Floats, velocity: ArrayLike, density: float, speed: float) -> tuple[Floats, Floats]:
+def _checked(radiation: Array, velocity: ArrayLike, density: float, speed: float) -> tuple[Array, Array]:
     matrix, v = np.asarray(radiation, dtype=float), np.asarray(velocity, dtype=float)
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
         raise InputError("radiation", matrix.shape, "must be a square matrix", "take ModalBody.radiation")

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..meshlaw.law import MeshLaw
 from ..spectrum import OrderLine, nearest_line, order_lines, peaks
@@ -15,10 +14,9 @@ from ..train.kinematics import steady_forces
 from ..train.mesh_element import LEAST_REFERENCE, PHASES
 from ..train.response import TrainResponse
 from ..train.scene import TrainScene
+from ..typing import Array
 from .follow import Followed, RunningMean
 from .spectra import TrainSpectra
-
-Array = NDArray[np.float64]
 
 #: Lines that the summary names for each signal.
 NAMED = 5

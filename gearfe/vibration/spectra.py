@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..record_spectrum import FASTEST, RecordSpectrum
 from ..spectrum import Spectrum, uniform_step
 from ..train.response import TrainResponse
+from ..typing import Array, ComplexArray
 from .radiation import AIR_DENSITY, AIR_SPEED, RadiatedPower, instantaneous_power
-
-Array = NDArray[np.float64]
 
 #: Columns of response.csv that are no signals of the spectrum.
 NO_SIGNALS = ("time_s", "drive_angle_deg", "instantaneous_radiated_power_W", "band_limited")
@@ -47,7 +45,7 @@ class TrainSpectra:
         """(m,) amplitudes of a signal."""
         return np.abs(self.value(name))
 
-    def value(self, name: str) -> NDArray[np.complex128]:
+    def value(self, name: str) -> ComplexArray:
         """(m,) complex amplitudes of a signal."""
         return self.spectrum.value[:, self.names.index(name)]
 

@@ -14,19 +14,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gearfe.reduction.modal_body import ModalBody
+from gearfe.typing import Array
 
 from .pairs import log_uniform
-
-Floats = NDArray[np.float64]
 
 #: Internal coordinates, and the lever (m) between a random body's translations and rotations.
 INTERNAL, LEVER = 4, 0.05
 
 
-def mirror(points: Floats, internal: Floats) -> Floats:
+def mirror(points: Array, internal: Array) -> Array:
     """Matrix P of the reflection at y = 0: attachments at `points` (a, 3), then internal coordinates of given signs."""
     a = len(points)
     made = np.zeros((6 * a + len(internal), 6 * a + len(internal)))
@@ -37,7 +35,7 @@ def mirror(points: Floats, internal: Floats) -> Floats:
     return made
 
 
-def symmetric_frame(random: np.random.Generator, names: tuple[str, ...], points: Floats) -> tuple[ModalBody, Floats]:
+def symmetric_frame(random: np.random.Generator, names: tuple[str, ...], points: Array) -> tuple[ModalBody, Array]:
     """A held body with these attachments that is its own mirror image, every coordinate coupled; and its mirror P."""
     a = len(points)
     m, n = 6 * a, 6 * a + INTERNAL
@@ -64,7 +62,7 @@ def symmetric_frame(random: np.random.Generator, names: tuple[str, ...], points:
     return body.with_damping(ratio=float(random.choice([0.0, 0.01, 0.05]))), reflect
 
 
-def _positive(random: np.random.Generator, size: Floats) -> Floats:
+def _positive(random: np.random.Generator, size: Array) -> Array:
     """A full positive definite matrix whose rows and columns are scaled by `size`; eigenvalues before that 0.3 to 4."""
     g = random.normal(size=(len(size), len(size)))
     return np.asarray((g @ g.T / len(size) + 0.3 * np.eye(len(size))) * np.outer(size, size))

@@ -7,17 +7,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gearfe.gear.pair import Gear, GearPair
 from gearfe.meshing.export import MeshPart
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import SectorMesh, SectorRecipe, sector_mesh
+from gearfe.typing import Array
 
-Array = NDArray[Any]
 #: Teeth on either side of the line of centres that are fine.
 REACH = 1
 #: Flank elements of the coarse teeth (modules): nothing touches them.
