@@ -183,7 +183,14 @@ def test_the_power_of_a_fast_motion():
     rates = np.column_stack([tone(14 / T, 0.02)(time), tone(700 / T, 0.05)(time)])
     long = {
         name: np.repeat(getattr(made_up(), name)[:1], len(time), axis=0)
-        for name in ("contact_force", "speed", "speed_absolute", "acceleration", "acceleration_absolute")
+        for name in (
+            "contact_force",
+            "transmission_error",
+            "speed",
+            "speed_absolute",
+            "acceleration",
+            "acceleration_absolute",
+        )
     }
     long |= {"attachment_acceleration": np.zeros((len(time), 6)), "drive_angle": 600.0 * time}
     response = made_up(time=time, modal=rates, modal_velocity=rates, modal_acceleration=rates, **long)
