@@ -11,7 +11,8 @@ import sys
 from gearfe.output.files import output_folder, write_csv
 from gearfe.record_spectrum import finer
 from gearfe.train import build_train, simulate
-from gearfe.vibration.job import job_scene, read_train_job, train_body, train_curves
+from gearfe.vibration.job import job_scene, read_train_job, train_body
+from gearfe.vibration.mesh_stiffness import train_curves
 from gearfe.vibration.report import mean_over_periods
 from gearfe.vibration.spectra import response_columns, spectra
 

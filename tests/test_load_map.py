@@ -14,7 +14,8 @@ from gearfe.cli import main
 from gearfe.errors import InputError
 from gearfe.loadmap.root_map import RootMap
 from gearfe.stiffness.sweep import elastic_pair
-from gearfe.vibration.job import read_train_job, train_curves
+from gearfe.vibration.job import read_train_job
+from gearfe.vibration.mesh_stiffness import train_curves
 
 from .gears import pair
 from .test_train_job import BORES, SMALL

@@ -100,17 +100,6 @@ def test_rigid_motions_and_exact_fields_have_no_error() -> None:
     assert energy_lost(nodes, tets, STEEL, field, np.zeros(1), [surface])[0, 0] > 1e-6 * scale
 
 
-def volume_mm3(table: HousingTable) -> float:
-    """Volume of the bracket by hand."""
-    (x0, x1), (z0, z1) = table.wall_x_mm, table.wall_z_mm
-    depth, shaft, feet = table.inner_gap_mm + sum(table.wall_thickness_mm), table.shafts[0], table.feet
-    made = (x1 - x0) * (z1 - z0) * sum(table.wall_thickness_mm) + (x1 - x0) * depth * table.base_thickness_mm
-    made += 4.0 * feet.length_x_mm * feet.width_y_mm * feet.height_mm
-    ring = math.pi * (shaft.boss_radius_mm**2 - shaft.bore_radius_mm**2)
-    made += 2.0 * ring * shaft.boss_height_mm - math.pi * shaft.bore_radius_mm**2 * sum(table.wall_thickness_mm)
-    return made
-
-
 def test_tetrahedra_against_extruded_elements() -> None:
     """The stored housing, tetrahedra of CalculiX's, and extruded elements: two meshes, two elements, two assemblies."""
     body = reference_housing().reduce(modes=15)

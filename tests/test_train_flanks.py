@@ -13,7 +13,8 @@ from gearfe.errors import InputError
 from gearfe.rigid import TimeFunction, constant, smoothed_step
 from gearfe.train import Drive, GearMesh, Load, build_train, simulate
 from gearfe.train.kinematics import steady_forces
-from gearfe.vibration.job import job_scene, read_train_job, train_curves
+from gearfe.vibration.job import job_scene, read_train_job
+from gearfe.vibration.mesh_stiffness import train_curves
 
 from .test_train_job import BORES, SMALL, written
 from .trains import SHIPPED, base_radius, braking, changed, train

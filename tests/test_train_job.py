@@ -14,7 +14,8 @@ from gearfe.errors import InputError
 from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.train import build_train, simulate
 from gearfe.train.kinematics import steady_forces
-from gearfe.vibration.job import bore_places, job_scene, read_train_job, train_curves
+from gearfe.vibration.job import bore_places, job_scene, read_train_job
+from gearfe.vibration.mesh_stiffness import train_curves
 
 SHIPPED = Path(__file__).parent.parent / "geometry" / "gear_train.toml"
 

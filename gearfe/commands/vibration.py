@@ -123,7 +123,8 @@ def simulated(
     from ..record_spectrum import finer
     from ..train import build_train
     from ..train.simulate import simulate_in_pieces
-    from ..vibration.job import job_scene, train_body, train_curves
+    from ..vibration.job import job_scene, train_body
+    from ..vibration.mesh_stiffness import train_curves
 
     with watch.stage("curves"):
         stiffness = train_curves(job, curves, progress=progress, estimate=estimate)

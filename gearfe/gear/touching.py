@@ -188,13 +188,6 @@ class Face:
         turned = np.abs(np.angle(self.normals(after) / self.normals(before)))
         return np.where(self.corners(u), math.inf, turned / np.abs(self.points(after) - self.points(before)))
 
-    def tip_angle(self) -> float:
-        """Angle (rad) of the material between the flank's end and the tip circle."""
-        at = np.array(self.end)
-        point = complex(self.points(at))
-        across = (complex(self.normals(at)) * point.conjugate()).real / abs(point)
-        return math.pi - math.acos(max(-1.0, min(1.0, across)))
-
     def marks(self) -> list[float]:
         """Parameters where the curvature jumps or the flank ends sharply."""
         found = [0.0, 1.0] if self.fall > 0.0 else [1.0]

@@ -88,7 +88,8 @@ def train_model(variant: str, *, quick: bool = False, modes: int | None = None) 
         Of the housing with held bores, in place of the job's choice by frequency.
     """
     from gearfe.train import build_train
-    from gearfe.vibration.job import job_scene, read_train_job, train_body, train_curves
+    from gearfe.vibration.job import job_scene, read_train_job, train_body
+    from gearfe.vibration.mesh_stiffness import train_curves
 
     job = read_train_job(given_file(GEOMETRY / "gear_train.toml"), variant)
     if quick:

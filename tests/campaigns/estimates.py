@@ -156,7 +156,8 @@ def _draw_response(random: np.random.Generator, number: int, kind: str) -> Case:
 def _run_response(case: Case, job_path: Path) -> Found:
     """Worst error of a contact force over the run, relative to its largest value."""
     from gearfe.train import build_train, simulate
-    from gearfe.vibration.job import job_scene, read_train_job, train_curves
+    from gearfe.vibration.job import job_scene, read_train_job
+    from gearfe.vibration.mesh_stiffness import train_curves
 
     del case
     job = read_train_job(job_path)

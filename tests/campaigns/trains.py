@@ -28,7 +28,8 @@ from gearfe.train import TrainModel, TrainResponse, build_train, simulate
 from gearfe.train.floquet import train_multipliers
 from gearfe.train.kinematics import steady_forces
 from gearfe.train.motion import motion
-from gearfe.vibration.job import job_scene, read_train_job, train_body, train_curves
+from gearfe.vibration.job import job_scene, read_train_job, train_body
+from gearfe.vibration.mesh_stiffness import train_curves
 
 from .campaign import Campaign, Case
 from .frames import symmetric_frame

@@ -1,0 +1,189 @@
+"""Stiffness of the meshes of a train job: from files, from load maps at the carried torque, or computed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..gear.pair import GearPair
+from ..meshlaw.law import MeshLaw
+from ..progress import stage
+from ..stiffness.curve import StiffnessCurve
+from ..train.kinematics import steady_forces
+from ..train.mesh_element import mean_value
+from ..train.scene import GearMesh, TrainScene
+from .job import Stiffness, TrainJob, job_scene
+
+#: A mesh law is made for so many times the torque in steady running: vibration has room.
+ROOM = 5.0
+#: Positions at which the error of a law's stiffness is estimated.
+ESTIMATED = 8
+
+
+def train_curves(
+    job: TrainJob,
+    files: Sequence[str | Path] = (),
+    *,
+    watch: Any = None,
+    progress: Any = None,
+    estimate: bool = False,
+) -> tuple[Stiffness, ...]:
+    """Stiffness of each mesh: from `files`, from the file or number its table names, or computed (and cached).
+
+    Parameters
+    ----------
+    files
+        CSV files, one for all meshes or one a mesh; they win over the job's.
+    watch, progress
+        See `gearfe.stiffness.sweep.sweep_stiffness`.
+    estimate
+        Whether computed curves carry an estimate of their error.
+    """
+    meshes = job.table.meshes
+    if files and len(files) not in (1, len(meshes)):
+        problem = f"{len(files)} files for {len(meshes)} meshes"
+        raise InputError("curve", [str(f) for f in files], problem, "give one for all, or one a mesh")
+    scene = job_scene(job, [1e8] * len(meshes), None, geometry_only=True)
+    found: list[Stiffness] = []
+    for number, (mesh, made) in enumerate(zip(meshes, scene.meshes, strict=True)):
+        teeth = scene.gear(made.driver).gear.teeth
+        if files:
+            found.append(_read_curve(Path(files[number if len(files) > 1 else 0]), teeth))
+        elif mesh.rigid:
+            found.append(None)
+        elif mesh.stiffness_N_per_m is not None:
+            found.append(mesh.stiffness_N_per_m)
+        elif mesh.curve is not None:
+            found.append(_read_curve(job.path.parent / mesh.curve, teeth))
+        elif mesh.load_map is not None:
+            found.append(_mapped_curve(job.path.parent / mesh.load_map, scene, number))
+        elif (mesh.law or job.table.curves.law) == "map":
+            found.append(_computed_law(job, scene, number, estimate))
+        else:
+            curve = _computed_curve(job, scene, number, watch, progress, estimate)
+            linear = (mesh.law or job.table.curves.law) == "linear"
+            found.append(mean_value(curve.interpolant("k_mesh", method="cubic")) if linear else curve)
+    return tuple(found)
+
+
+def _read_curve(path: Path, teeth: int) -> StiffnessCurve:
+    """A curve from a CSV file; where the file does not tell its period it is that of the driver."""
+    try:
+        return StiffnessCurve.from_csv(path)
+    except InputError as error:
+        if "mesh cycle" not in error.problem:
+            raise
+    return StiffnessCurve.from_csv(path, mesh_cycle=2.0 * math.pi / teeth)
+
+
+def _carried_torque(scene: TrainScene, number: int) -> float:
+    """Torque (N m) at the driven gear of a mesh in steady running, without sign."""
+    driven = scene.gear(scene.meshes[number].driven).gear
+    return abs(float(steady_forces(scene)[number])) * driven.base_radius
+
+
+def _mapped_curve(path: Path, scene: TrainScene, number: int) -> StiffnessCurve:
+    """The curve of a load map at the torque that a mesh carries; the map's pinion is the driver."""
+    from ..loadmap.load_map import LoadMap
+
+    mesh = scene.meshes[number]
+    made, torque = LoadMap.from_csv(path), _carried_torque(scene, number)
+    driver, driven = scene.gear(mesh.driver).gear, scene.gear(mesh.driven).gear
+    cycle, radius = 2.0 * math.pi / driver.teeth, driven.base_radius
+    fits = math.isclose(made.mesh_cycle, cycle, rel_tol=1e-9)
+    if not (fits and math.isclose(made.curves[0].base_radius, radius, rel_tol=1e-9)):
+        problem = (
+            f"is of other gears: mesh cycle {math.degrees(made.mesh_cycle):.6g} deg and base radius of the wheel "
+            f"{1e3 * made.curves[0].base_radius:.6g} mm, but {math.degrees(cycle):.6g} deg and {1e3 * radius:.6g} mm "
+            f"in mesh {mesh.name!r}"
+        )
+        raise InputError("load_map", str(path), problem, "make a map of this pair, the driver as its pinion")
+    if not torque > 0.0:
+        problem = "carries no torque, so its load map has no load to be read at"
+        raise InputError(f"mesh {mesh.name!r}", None, problem, "add a load, or give another stiffness")
+    return made.curve_at(torque)
+
+
+def _computed_curve(
+    job: TrainJob, scene: TrainScene, number: int, watch: Any, progress: Any, estimate: bool
+) -> StiffnessCurve:
+    """Curve of a mesh with the driver as pinion, by [stiffness] or at the torque that the mesh carries."""
+    from ..stiffness.curve_cache import cached_curve
+    from ..stiffness.job import StiffnessJob
+
+    mesh = scene.meshes[number]
+    one, two = scene.gear(mesh.driver).gear, scene.gear(mesh.driven).gear
+    pair = GearPair(one, two, mesh.centre_distance)
+    if job.pair is None:
+        problem = "has no stiffness: there is no table [pair] to compute it with"
+        raise InputError(f"mesh {mesh.name!r}", None, problem, "add curve, stiffness_N_per_m or rigid to it, or [pair]")
+    tables = StiffnessJob(job.pair, job.stiffness, pair)
+    model = {**tables.model, "materials": _materials(job, mesh)}
+    if job.table.curves.load == "stiffness":
+        with stage(mesh.name):
+            return cached_curve(pair, model, tables.sweep, watch=watch, progress=progress, estimate_error=estimate)
+    torque = _carried_torque(scene, number)
+    if not torque > 0.0:
+        problem = 'carries no torque, so train.curves.load = "torque" has no load to compute its curve with'
+        raise InputError(f"mesh {mesh.name!r}", None, problem, 'add a load, or write load = "stiffness"')
+    count = job.table.curves.positions
+    sweep = {
+        "torque": torque,
+        "angles": pair.mesh_cycle * np.arange(count) / count,
+        "kinematics": job.stiffness.kinematics,
+    }
+    with stage(mesh.name):
+        return cached_curve(pair, model, sweep, watch=watch, progress=progress, estimate_error=estimate)
+
+
+def _computed_law(job: TrainJob, scene: TrainScene, number: int, estimate: bool) -> MeshLaw:
+    """Mesh law of a mesh with the driver as pinion; meshes of the same gears share the one for the largest torque."""
+    from ..contact.laws import law_named
+    from ..meshlaw.make import cached_law
+    from ..stiffness.curve_cache import cached_curve
+    from ..stiffness.job import StiffnessJob
+
+    def gears(mesh: GearMesh) -> tuple[Any, ...]:
+        materials = None if job.pair is None else _materials(job, mesh)
+        return scene.gear(mesh.driver).gear, scene.gear(mesh.driven).gear, mesh.centre_distance, materials
+
+    mesh, table = scene.meshes[number], job.table.meshes[number]
+    if job.pair is None:
+        problem = "has no mesh law: there is no table [pair] to compute it with"
+        raise InputError(f"mesh {mesh.name!r}", None, problem, "add curve, stiffness_N_per_m or rigid to it, or [pair]")
+    alike = [i for i, other in enumerate(scene.meshes) if gears(other) == gears(mesh)]
+    steady = max(_carried_torque(scene, i) for i in alike)
+    most = table.law_torque_Nm or ROOM * steady
+    if not most > 0.0:
+        problem = "carries no torque in steady running, so nothing tells for which torques to make its law"
+        raise InputError(f"mesh {mesh.name!r} law_torque_Nm", None, problem, "give law_torque_Nm")
+    one, two, distance, materials = gears(mesh)
+    pair = GearPair(one, two, distance)
+    tables = StiffnessJob(job.pair, job.stiffness, pair)
+    model = {**tables.model, "materials": materials, "law": law_named("half_plane")}
+    with stage(mesh.name):
+        law = cached_law(pair, model, most / pair.wheel.base_radius)
+        if not estimate:
+            return law
+        angles = pair.mesh_cycle * np.arange(ESTIMATED) / ESTIMATED
+        sweep = {"torque": most / ROOM, "angles": angles, "kinematics": "small"}
+        curve = cached_curve(pair, model, sweep, estimate_error=True)
+    return law if curve.error is None else replace(law, error=curve.error.worst)
+
+
+def _materials(job: TrainJob, mesh: GearMesh) -> Any:
+    from ..elasticity import Material
+
+    assert job.pair is not None
+    sides = {g.name: g.gear for g in job.table.gears}
+    made = []
+    for name in (mesh.driver, mesh.driven):
+        table = job.pair.material_of(sides[name]) if sides[name] else job.pair.material
+        made.append(Material(table.youngs_modulus_GPa * 1e9, table.poisson_ratio, density=table.density_kg_per_m3))
+    return tuple(made)
