@@ -21,7 +21,7 @@ from gearfe.stiffness.sweep import elastic_pair
 from gearfe.tables.microgeometry import ReliefTable
 
 from .gears import pair as gear_pair
-from .test_microgeometry import JOB
+from .test_deviation_job import JOB
 
 AMOUNT = Variable("tip_relief.amount", 0.0, 30e-6, tolerance=2e-6)
 LENGTH = Variable("tip_relief.length", 1e-3, 4.5e-3, tolerance=0.2e-3)

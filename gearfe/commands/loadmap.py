@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     from ..config import load_job
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
-    tables = load_job(args.job, ("pair",), ("stiffness", "loadmap"))
+    tables = load_job(args.job, ("pair",), ("stiffness", "loadmap", "microgeometry"))
     tables["stiffness"] = _overridden_model(tables.get("stiffness", StiffnessTable()), args)
     table = with_loads(args, tables.get("loadmap", LoadMapTable()))
     torques = table.torques()
@@ -54,11 +54,14 @@ def run(args: argparse.Namespace) -> int:
     from ..loadmap.sweep import sweep_loads
     from ..output.files import output_folder, whole_set, write_csv, write_json
     from ..stiffness.job import StiffnessJob
+    from ..stiffness.report import deviation_lines
     from ..stopwatch import Stopwatch
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("geometry"):
-        job = StiffnessJob(tables["pair"], tables["stiffness"], pair)
+        beside = Path(args.job).parent
+        job = StiffnessJob(tables["pair"], tables["stiffness"], pair, tables.get("microgeometry"), beside)
+        model = job.model
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
     made_map = sweep_loads(
         job.pair,
@@ -67,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
         root_stress=table.root_stress,
         kinematics=job.table.kinematics,  # type: ignore[arg-type]
         progress=count,
-        **job.model,
+        **model,
     )
     watch.seconds.update(made_map.timings)
     with whole_set(folder) as made:
@@ -82,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(made / "loadmap.json", summary(job, table, made_map, watch.seconds))
         names = sorted(path.name for path in made.iterdir())
-    for line in told(made_map):
+    for line in [*told(made_map), *deviation_lines(job)]:
         print(line)
     print(f"written to {folder}: " + ", ".join(names))
     print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))

@@ -45,8 +45,9 @@ def run(args: argparse.Namespace) -> int:
     pair = GearPair.from_table(tables["pair"])
 
     from ..contact.half_plane import half_plane_pair
+    from ..gear.deviation_job import deviations_of
     from ..loadmap.root_stress import pair_roots
-    from ..microgeometry.job import checked_model, deviations_of, law_remarks
+    from ..microgeometry.job import checked_model, law_remarks
     from ..microgeometry.report import (
         cell_table,
         figure_arguments,

@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     from ..errors import InputError
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
-    tables = load_job(args.job, ("pair",), ("stiffness",))
+    tables = load_job(args.job, ("pair",), ("stiffness", "microgeometry"))
     tables["stiffness"] = overridden(tables.get("stiffness", StiffnessTable()), args)
     chosen = None if args.fields is None else _field_angles(args.fields)
     if args.animate is not None and not 2 <= args.animate <= 1000:
@@ -88,14 +88,16 @@ def run(args: argparse.Namespace) -> int:
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("geometry"):
-        job = StiffnessJob(tables["pair"], tables["stiffness"], pair)
-        sweep = job.sweep
+        job = StiffnessJob(
+            tables["pair"], tables["stiffness"], pair, tables.get("microgeometry"), Path(args.job).parent
+        )
+        sweep, model = job.sweep, job.model
         if isinstance(chosen, list):
             from ..stiffness.fields_output import angle_numbers
 
             angle_numbers(np.degrees(sweep["angles"]), chosen)
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
-    elastic = elastic_pair(job.pair, watch=watch, **job.model)
+    elastic = elastic_pair(job.pair, watch=watch, **model)
     if chosen is not None:
         from ..stiffness.fields_output import told_size
 

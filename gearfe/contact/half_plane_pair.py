@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..gear.deviation import NOMINAL, ToothDeviations
+from ..gear.deviation import ToothDeviations
 from ..gear.flank_curve import FlankCurve, FlankTables, flank_curve, flank_tables
 from ..gear.pair import GearPair
 from ..gear.tooth_flanks import ToothFlanks
@@ -188,7 +188,11 @@ class HalfPlanePair:
 
 
 def half_plane_pair(
-    pair: GearPair, elastic: MeshingPair, *, deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL
+    pair: GearPair, elastic: MeshingPair, *, deviations: tuple[ToothDeviations, ToothDeviations] | None = None
 ) -> HalfPlanePair:
-    """Prepare the law for meshed and condensed gears; their flanks may be coarse (a tenth of a module)."""
-    return HalfPlanePair(pair, ToothFlanks(pair, deviations), flank_compliances(pair, elastic), elastic.width)
+    """Prepare the law for meshed and condensed gears; their flanks may be coarse (a tenth of a module).
+
+    `deviations` None: those of `elastic`.
+    """
+    teeth = ToothFlanks(pair, elastic.deviations if deviations is None else deviations)
+    return HalfPlanePair(pair, teeth, flank_compliances(pair, elastic), elastic.width)

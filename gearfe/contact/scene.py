@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..gear.deviation import NOMINAL, ToothDeviations
 from ..typing import Array
 from .compliance import GearBody
-from .laws import ContactLaw
+from .laws import ContactLaw, HalfPlane
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ class MeshingPair:
         Contact law.
     coarsen, flank_coarsen, points_per_edge
         What the meshes were asked for, see `gearfe.stiffness.sweep.elastic_pair`; for a coarser one of the same kind.
+    deviations
+        Of micrometres, which no mesh has.
     """
 
     pinion: GearBody
@@ -46,8 +49,10 @@ class MeshingPair:
     coarsen: float = 1.0
     flank_coarsen: float = 1.0
     points_per_edge: int = 4
+    deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL
 
     def __post_init__(self) -> None:
+        check_deviations(self.deviations, self.law)
         widths = [body.width for body in self.bodies]
         if self.law.uses_stress and widths != [self.width, self.width]:
             problem = f"the gears' surface stresses are made for contacts {widths} m wide"
@@ -84,6 +89,22 @@ class MeshingPair:
     def centre(self, gear: int) -> Array:
         """Centre of the pinion (0) or wheel (1), shape (2,) (m)."""
         return np.array([gear * self.centre_distance, 0.0])
+
+
+def check_deviations(deviations: tuple[ToothDeviations, ToothDeviations], law: ContactLaw) -> None:
+    """Raise `InputError` for deviations that a law, or the one mesh cycle of a curve or map, cannot have."""
+    for name, own in zip(("pinion (driver)", "wheel (driven)"), deviations, strict=True):
+        if not own.alike:
+            what = "stand unevenly" if len(set(own.turn)) > 1 else "have different flanks"
+            problem = f"its teeth {what}: curves, load maps and mesh laws are of one mesh cycle that repeats"
+            cure = (
+                "leave out pitch errors, measured teeth that differ, and waves that are no multiple of the teeth; "
+                "gearfe microgeometry takes them"
+            )
+            raise InputError(f"deviations of the {name}", None, problem, cure)
+    if deviations != NOMINAL and not isinstance(law, HalfPlane):
+        problem = "takes flanks from meshes, which have no deviations of micrometres"
+        raise InputError("law", law.name, problem, 'write law = "half_plane", or leave [microgeometry] out')
 
 
 def turn(angle: float) -> Array:

@@ -46,7 +46,7 @@ def summary(job: StiffnessJob, table: LoadMapTable, made: LoadMap, timings: Mapp
     """Content of loadmap.json."""
     missed = made.interpolation_error()
     return {
-        "job": {"pair": asdict(job.pair_table), "stiffness": asdict(job.table), "loadmap": asdict(table)},
+        "job": {**job.tables, "loadmap": asdict(table)},
         "versions": versions(),
         "derived_geometry": derived_geometry(job.pair),
         "warnings": list(job.pair.warnings),

@@ -33,6 +33,7 @@ from ..contact.records import joined
 from ..contact.scene import MeshingPair
 from ..elasticity import Material, Plane
 from ..errors import InputError
+from ..gear.deviation import NOMINAL, ToothDeviations
 from ..gear.pair import GearPair
 from ..stiffness.position_solver import PositionSolver, position_solver
 from ..stiffness.positions import Progress, at_torques, closed, honest, usual_stiffness
@@ -71,6 +72,7 @@ def sweep_loads(
     coarsen: float = 1.0,
     flank_coarsen: float = 1.0,
     points_per_edge: int = 4,
+    deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL,
     elastic: MeshingPair | None = None,
     progress: Progress | None = None,
 ) -> LoadMap:
@@ -85,7 +87,7 @@ def sweep_loads(
         solved once.
     root_stress
         Also the tension at the tooth roots, on refined meshes of its own, see `gearfe.loadmap.root_stress`.
-    materials, plane, law, kinematics, coarsen, flank_coarsen, points_per_edge, elastic, progress
+    materials, plane, law, kinematics, coarsen, flank_coarsen, points_per_edge, deviations, elastic, progress
         See `gearfe.stiffness.sweep.sweep_stiffness`.
 
     Returns
@@ -110,7 +112,7 @@ def sweep_loads(
     watch = Stopwatch()
     if elastic is None:
         sizes: dict[str, Any] = {"coarsen": coarsen, "flank_coarsen": flank_coarsen, "points_per_edge": points_per_edge}
-        elastic = elastic_pair(pair, materials, plane=plane, law=law, watch=watch, **sizes)
+        elastic = elastic_pair(pair, materials, plane=plane, law=law, deviations=deviations, watch=watch, **sizes)
     solved_angles, source = distinct_angles(asked, cycle)
     if len(goals) * len(solved_angles) > MOST_CELLS:
         problem = f"makes more than {MOST_CELLS} cells with {len(solved_angles)} angles"

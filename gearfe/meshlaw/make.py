@@ -193,7 +193,7 @@ def _nodes(pair: HalfPlanePair, reach: float) -> tuple[Array, int]:
     slots = math.ceil((high - low) / cycle)
     begin = 0.5 * (low + high - slots * cycle)
     width = cycle / CELLS
-    limits = {s for relieved in (False, True) for s in geometry.path_limits(relieved=relieved)}
+    limits = {s for relieved in (False, True) for s in geometry.path_limits(relieved=relieved)} | _kinks(pair)
     corners = np.sort([(geometry.pinion_angle_at(s) - begin) % cycle for s in limits])
     corners = corners[np.diff(corners, prepend=-np.inf) > SAME * width]
     corners = corners[(corners > SAME * width) & (corners < cycle - SAME * width)]
@@ -207,6 +207,16 @@ def _nodes(pair: HalfPlanePair, reach: float) -> tuple[Array, int]:
             break
         nodes = np.sort(np.append(nodes, 0.5 * (nodes[coarse] + nodes[coarse + 1])))
     return nodes, slots
+
+
+def _kinks(pair: HalfPlanePair) -> set[float]:
+    """Roll lengths of the pinion (m) on the path of contact at which a deviation of either gear has a kink."""
+    geometry, made = pair.pair, set()
+    start, end = geometry.path_limits()
+    for g, own in enumerate(pair.teeth.deviations):
+        for kink in (s for one in own.profiles if one is not None for s in one.kinks):
+            made.add(kink if g == 0 else geometry.tangent_length - kink)
+    return {s for s in made if start < s < end}
 
 
 def _midway(pair: HalfPlanePair, nodes: Array, slots: int, reach: float) -> Array:

@@ -11,13 +11,13 @@ import numpy as np
 
 from ..contact.half_plane_step import HalfPlanePair
 from ..errors import InputError
+from ..gear.deviation_job import GEARS, active_rolls, modification
 from ..gear.pair import GearPair
 from ..loadmap.root_stress import PairRoots
 from ..stiffness.job import StiffnessJob
 from ..stiffness.report import versions
 from ..tables.microgeometry import VARIABLES, MicrogeometryTable, ReliefTable
 from ..typing import Array
-from .job import GEARS, active_rolls, modification
 from .relief import ReliefResult
 from .relief_problem import ReliefProblem, Variable
 

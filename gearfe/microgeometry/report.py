@@ -11,13 +11,13 @@ import numpy as np
 
 from ..gear import pitch_errors
 from ..gear.deviation import ToothDeviations
+from ..gear.deviation_job import GEARS, active_rolls, flank_deviations
 from ..gear.pair import GearPair
 from ..gear.validity import overlaps, told_overlaps
 from ..stiffness.job import StiffnessJob
 from ..stiffness.report import versions
 from ..tables.microgeometry import MicrogeometryTable
 from ..typing import Array
-from .job import GEARS, active_rolls, flank_deviations
 from .loaded_mesh import LoadedMesh
 
 #: Harmonics of the mesh order in the table by torque.

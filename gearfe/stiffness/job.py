@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,13 @@ import numpy as np
 
 from ..config import load_job
 from ..contact.laws import ContactLaw, law_named
+from ..contact.scene import check_deviations
 from ..elasticity import Material
 from ..errors import InputError
+from ..gear.deviation import NOMINAL, ToothDeviations
+from ..gear.deviation_job import deviations_of
 from ..gear.pair import GearPair
+from ..tables.microgeometry import MicrogeometryTable
 from ..tables.pair import MaterialTable, PairTable
 from ..tables.stiffness import StiffnessTable
 from .curve_csv import from_text
@@ -29,11 +33,17 @@ class StiffnessJob:
         The tables as read, with any overrides.
     pair
         The gears.
+    microgeometry
+        Their deviations, or None.
+    folder
+        Where the files that these name are looked for.
     """
 
     pair_table: PairTable
     table: StiffnessTable
     pair: GearPair
+    microgeometry: MicrogeometryTable | None = None
+    folder: Path = Path()
 
     @property
     def materials(self) -> tuple[Material, Material]:
@@ -52,9 +62,27 @@ class StiffnessJob:
         return law_named(t.law, **parameters)
 
     @property
+    def deviations(self) -> tuple[ToothDeviations, ToothDeviations]:
+        """Deviations of the driving flanks of pinion and wheel."""
+        return NOMINAL if self.microgeometry is None else deviations_of(self.microgeometry, self.pair, self.folder)
+
+    @property
+    def tables(self) -> dict[str, Any]:
+        """The tables as plain data, for summaries."""
+        made = {"pair": asdict(self.pair_table), "stiffness": asdict(self.table)}
+        return made if self.microgeometry is None else {**made, "microgeometry": asdict(self.microgeometry)}
+
+    @property
     def model(self) -> dict[str, Any]:
-        """Keyword arguments of `gearfe.stiffness.sweep.elastic_pair`."""
-        t = self.table
+        """Keyword arguments of `gearfe.stiffness.sweep.elastic_pair`.
+
+        Raises
+        ------
+        InputError
+            For deviations that a curve or the law cannot have.
+        """
+        t, deviations = self.table, self.deviations
+        check_deviations(deviations, self.law)
         return {
             "materials": self.materials,
             "plane": t.plane,
@@ -62,6 +90,7 @@ class StiffnessJob:
             "coarsen": t.coarsen,
             "flank_coarsen": t.flank_coarsen,
             "points_per_edge": t.points_per_edge,
+            "deviations": deviations,
         }
 
     @property
@@ -110,6 +139,7 @@ def read_stiffness_job(path: str | Path) -> StiffnessJob:
     InputError
         For every mistake in the file, and for gears that cannot run together.
     """
-    tables = load_job(path, ("pair",), ("stiffness",))
+    tables = load_job(path, ("pair",), ("stiffness", "microgeometry"))
     table = tables.get("stiffness", StiffnessTable())
-    return StiffnessJob(tables["pair"], table, GearPair.from_table(tables["pair"]))
+    pair = GearPair.from_table(tables["pair"])
+    return StiffnessJob(tables["pair"], table, pair, tables.get("microgeometry"), Path(path).parent)

@@ -37,9 +37,9 @@ class HalfPlaneSolver:
     def __init__(self, pair: GearPair, elastic: MeshingPair) -> None:
         self.pair, self.elastic = pair, elastic
         self.law = half_plane_pair(pair, elastic)
-        self.curves = [side.curve for side in self.law.sides]
+        self.curves = [self.law.curves[flank] for flank in self.law.teeth.flank(np.zeros(1, dtype=np.int64))[0]]
         self._angles = np.zeros(0)
-        self._known = self.law.flanks.touching(self._angles)
+        self._known = self.law.teeth.touching(self._angles)
 
     def solve(self, angles: Array, twists: Array, kept: IntArray = NONE) -> Positions:
         """Positions at pinion angles and twists (rad), both of shape (n,); those numbered `kept` with loads."""
@@ -59,7 +59,7 @@ class HalfPlaneSolver:
         """Tooth pairs whose rigid flanks can meet at pinion angles (rad), by position; searched for once an angle."""
         new = np.setdiff1d(angles, self._angles)
         if len(new):
-            found = self.law.flanks.touching(new)
+            found = self.law.teeth.touching(new)
             found = replace(found, position=found.position + len(self._angles))
             self._known = joined([self._known, found])
             self._angles = np.concatenate([self._angles, new])

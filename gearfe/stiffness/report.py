@@ -6,7 +6,6 @@ import math
 import platform
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict
 from importlib import metadata
 from typing import Any
 
@@ -16,7 +15,9 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..errors import InputError
 from ..gear.derived import derived_geometry, iso_values
+from ..gear.deviation_job import GEARS
 from ..gear.drawing import single_pair_stretches
+from ..gear.modifications import CHECKED, ends_of
 from ..gear.validity import overlaps, told_overlaps
 from ..typing import Array, IntArray
 from .contact_pressure import largest_pressures
@@ -75,7 +76,7 @@ def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, floa
     error = curve.error
     failed = np.degrees(curve.pinion_angle[curve.failed])
     return {
-        "job": {"pair": asdict(job.pair_table), "stiffness": asdict(job.table)},
+        "job": job.tables,
         "versions": versions(),
         "derived_geometry": derived_geometry(job.pair),
         "warnings": list(job.pair.warnings),
@@ -101,6 +102,18 @@ def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, floa
     }
 
 
+def deviation_lines(job: StiffnessJob) -> list[str]:
+    """A line about the deviations of the flanks, where there are any."""
+    most = []
+    for gear, own in zip((job.pair.pinion, job.pair.wheel), job.deviations, strict=True):
+        roll = np.linspace(*ends_of(gear), CHECKED)
+        most.append(max(0.0 if one is None else float(np.abs(one.at(roll)[0]).max()) for one in own.profiles))
+    if not any(most):
+        return []
+    both = " and ".join(f"{1e6 * size:.3g} um ({name})" for size, name in zip(most, GEARS, strict=True))
+    return [f"flanks with the deviations of [microgeometry], up to {both}"]
+
+
 def told(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
     """Lines to print."""
     moduli = [material.youngs_modulus for material in job.materials]
@@ -109,6 +122,7 @@ def told(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
     lines = [f"{len(curve)} positions: " + ", ".join(f"{n} {status}" for status, n in count.items())]
     if curve.contact_law:
         lines.append(f"contact law: {curve.contact_law}")
+    lines += deviation_lines(job)
     lines += _load_lines(load_statistics(job, curve))
     level = cycle_statistics(curve, job.table.interpolation)
     if level is not None:

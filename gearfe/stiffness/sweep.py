@@ -26,6 +26,7 @@ from ..contact.position import Positions
 from ..contact.scene import MeshingPair
 from ..elasticity import Material, Plane
 from ..errors import InputError
+from ..gear.deviation import NOMINAL, ToothDeviations
 from ..gear.pair import GearPair
 from ..gear.validity import MOST_OVERLAP, overlaps
 from ..meshing.recipe import sector_recipes
@@ -63,6 +64,7 @@ def elastic_pair(
     coarsen: float = 1.0,
     flank_coarsen: float = 1.0,
     points_per_edge: int = 4,
+    deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL,
     watch: Stopwatch | None = None,
 ) -> MeshingPair:
     """Mesh both gears (or read their meshes from the cache) and condense them to their flanks.
@@ -80,6 +82,8 @@ def elastic_pair(
         by `HALF_PLANE_FLANK`, as far as `HALF_PLANE_COARSEST` allows.
     points_per_edge
         Contact points on each edge of a flank.
+    deviations
+        Of the driving flanks of pinion and wheel, all teeth alike; the half-plane law alone takes them.
     watch
         Takes the time of the stages.
     """
@@ -112,7 +116,7 @@ def elastic_pair(
             )
             for mesh, material, gear in zip(meshes, both, gears, strict=True)
         ]
-    return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen, *asked)
+    return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen, *asked, deviations)
 
 
 def flank_factor(law: ContactLaw, coarsen: float, flank_coarsen: float = 1.0) -> float:
@@ -137,6 +141,7 @@ def sweep_stiffness(
     coarsen: float = 1.0,
     flank_coarsen: float = 1.0,
     points_per_edge: int = 4,
+    deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL,
     estimate_error: bool = False,
     elastic: MeshingPair | None = None,
     progress: Progress | None = None,
@@ -152,7 +157,7 @@ def sweep_stiffness(
     angles : array_like, shape (n,), optional
         Pinion angles (rad); without them, 20 over one mesh cycle. Positions that differ by whole mesh cycles are
         solved once.
-    materials, plane, law, coarsen, flank_coarsen, points_per_edge
+    materials, plane, law, coarsen, flank_coarsen, points_per_edge, deviations
         See `elastic_pair`.
     kinematics
         ``small``: small strain in each hub's frame; ``finite`` (default) adds the first-order effect of finite strain
@@ -189,7 +194,7 @@ def sweep_stiffness(
     watch, finite = Stopwatch(), kinematics == "finite"
     if elastic is None:
         sizes: dict[str, Any] = {"coarsen": coarsen, "flank_coarsen": flank_coarsen, "points_per_edge": points_per_edge}
-        elastic = elastic_pair(pair, materials, plane=plane, law=law, watch=watch, **sizes)
+        elastic = elastic_pair(pair, materials, plane=plane, law=law, deviations=deviations, watch=watch, **sizes)
     solved_angles, source = (asked, np.arange(len(asked))) if solve_all else distinct_angles(asked, cycle)
     solver = position_solver(pair, elastic)
     if torque is not None:
@@ -253,6 +258,7 @@ def _estimate(solver: HalfPlaneSolver | ElementSolver, solved: Positions, *, fin
         coarsen=COARSENING * elastic.coarsen,
         flank_coarsen=elastic.flank_coarsen,
         points_per_edge=elastic.points_per_edge,
+        deviations=elastic.deviations,
     )
     chosen = solved.take(np.flatnonzero(good) if isinstance(solver, HalfPlaneSolver) else solved_twice(good))
     # a twist of some bits of the gears' angles is not what the gears are turned by

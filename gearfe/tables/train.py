@@ -282,7 +282,7 @@ def read_train_tables(path: str | Path, variant: str | None = None) -> dict[str,
     InputError
         For every mistake in the tables, and an unknown variant.
     """
-    tables = load_job(path, ("train",), ("pair", "stiffness", "housing"))
+    tables = load_job(path, ("train",), ("pair", "stiffness", "microgeometry", "housing"))
     table: TrainTable = tables["train"]
     table = table.chosen(table.variant if variant is None else variant)
     if table.housing == "elastic" and "housing" not in tables:

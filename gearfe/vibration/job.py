@@ -21,6 +21,7 @@ from ..meshlaw.law import MeshLaw
 from ..rigid import TimeFunction, constant, smoothed_step
 from ..stiffness.curve import StiffnessCurve
 from ..tables.housing import HousingTable
+from ..tables.microgeometry import MicrogeometryTable
 from ..tables.pair import DEFAULTS, PairTable
 from ..tables.stiffness import StiffnessTable
 from ..tables.train import TrainGearTable, TrainMeshTable, TrainTable, read_train_tables
@@ -43,7 +44,7 @@ class TrainJob:
         The job file; curves that it names lie beside it.
     table
         [train], with the chosen variant's curves and damping.
-    pair, stiffness, housing
+    pair, stiffness, housing, microgeometry
         The other tables, None where the file has none.
     """
 
@@ -52,6 +53,7 @@ class TrainJob:
     pair: PairTable | None
     stiffness: StiffnessTable
     housing: HousingTable | None
+    microgeometry: MicrogeometryTable | None = None
 
     @property
     def times(self) -> Array:
@@ -75,7 +77,9 @@ def read_train_job(path: str | Path, variant: str | None = None) -> TrainJob:
 def train_job(path: str | Path, tables: Mapping[str, Any]) -> TrainJob:
     """The job of tables that are read; curves that they name lie beside `path`."""
     stiffness = tables.get("stiffness", StiffnessTable())
-    return TrainJob(Path(path), tables["train"], tables.get("pair"), stiffness, tables.get("housing"))
+    return TrainJob(
+        Path(path), tables["train"], tables.get("pair"), stiffness, tables.get("housing"), tables.get("microgeometry")
+    )
 
 
 def train_body(job: TrainJob) -> ModalBody | None:

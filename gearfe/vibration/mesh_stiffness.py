@@ -10,12 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from ..contact.laws import ContactLaw
+from ..contact.scene import check_deviations
 from ..errors import InputError
+from ..gear.deviation import NOMINAL, ToothDeviations
+from ..gear.deviation_job import deviations_of
 from ..gear.pair import GearPair
 from ..meshlaw.law import MeshLaw
 from ..progress import stage
 from ..stiffness.curve import StiffnessCurve
-from ..train.kinematics import steady_forces
+from ..train.kinematics import driving_senses, steady_forces
 from ..train.mesh_element import mean_value
 from ..train.scene import GearMesh, TrainScene
 from .job import Stiffness, TrainJob, job_scene
@@ -125,6 +129,7 @@ def _computed_curve(
         raise InputError(f"mesh {mesh.name!r}", None, problem, "add curve, stiffness_N_per_m or rigid to it, or [pair]")
     tables = StiffnessJob(job.pair, job.stiffness, pair)
     model = {**tables.model, "materials": _materials(job, mesh)}
+    model["deviations"] = _deviations(job, scene, number, pair, model["law"])
     if job.table.curves.load == "stiffness":
         with stage(mesh.name):
             return cached_curve(pair, model, tables.sweep, watch=watch, progress=progress, estimate_error=estimate)
@@ -167,6 +172,7 @@ def _computed_law(job: TrainJob, scene: TrainScene, number: int, estimate: bool)
     pair = GearPair(one, two, distance)
     tables = StiffnessJob(job.pair, job.stiffness, pair)
     model = {**tables.model, "materials": materials, "law": law_named("half_plane")}
+    model["deviations"] = _deviations(job, scene, number, pair, model["law"])
     with stage(mesh.name):
         law = cached_law(pair, model, most / pair.wheel.base_radius)
         if not estimate:
@@ -175,6 +181,32 @@ def _computed_law(job: TrainJob, scene: TrainScene, number: int, estimate: bool)
         sweep = {"torque": most / ROOM, "angles": angles, "kinematics": "small"}
         curve = cached_curve(pair, model, sweep, estimate_error=True)
     return law if curve.error is None else replace(law, error=curve.error.worst)
+
+
+def _deviations(
+    job: TrainJob, scene: TrainScene, number: int, pair: GearPair, law: ContactLaw
+) -> tuple[ToothDeviations, ToothDeviations]:
+    """Deviations of the flanks that drive a mesh: the left ones where the driver turns about the axis of the shafts.
+
+    Raises
+    ------
+    InputError
+        For deviations that the law or one mesh cycle cannot have, and where the back flanks may bear and are others.
+    """
+    if job.microgeometry is None:
+        return NOMINAL
+    mesh, sides = scene.meshes[number], {g.name: g.gear for g in job.table.gears}
+    gears = (sides[mesh.driver], sides[mesh.driven])
+    flanks = ("left", "right") if driving_senses(scene)[number] > 0.0 else ("right", "left")
+    driving, back = (
+        deviations_of(job.microgeometry, pair, job.path.parent, flank=flank, gears=gears) for flank in flanks
+    )
+    check_deviations(driving, law)
+    mapped = (job.table.meshes[number].law or job.table.curves.law) == "map"
+    if (mesh.backlash is not None or (mapped and pair.normal_backlash > 0.0)) and back != driving:
+        problem = f"left and right flanks differ, but mesh {mesh.name!r} takes its back flanks as its driving ones"
+        raise InputError("microgeometry", None, problem, "give both the same, or the mesh no backlash")
+    return driving
 
 
 def _materials(job: TrainJob, mesh: GearMesh) -> Any:

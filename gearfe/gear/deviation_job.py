@@ -1,0 +1,271 @@
+"""From the [microgeometry] table of a job file, and the files it names, to the deviations of both gears' flanks."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, unknown_name
+from ..tables.microgeometry import STARTS, FlankTable, MicrogeometryTable
+from ..textfile import read_text
+from ..typing import Array, IntArray
+from . import pitch_errors
+from .deviation import Deviation, ToothDeviations
+from .modifications import FlankModification, Relief, Waviness, tooth_deviations
+from .pair import Gear, GearPair
+
+GEARS = ("pinion", "wheel")
+
+
+def deviations_of(
+    table: MicrogeometryTable,
+    pair: GearPair,
+    folder: str | Path = ".",
+    *,
+    flank: str | None = None,
+    gears: Sequence[str] = GEARS,
+) -> tuple[ToothDeviations, ToothDeviations]:
+    """Deviations of the driving flanks of a pair's driver and driven gear; files are looked for in `folder`.
+
+    Where the right flanks drive, those of the pair seen from the other side, whose left ones they are.
+
+    Parameters
+    ----------
+    flank
+        ``left`` or ``right``; None: what the table says.
+    gears
+        Table of the driver and of the driven gear: ``pinion``, ``wheel``, or an empty text for a gear without one.
+
+    Raises
+    ------
+    InputError
+        For every mistake, in the table's own keys.
+    """
+    side = flank or table.flank
+    driver, driven = (
+        flank_deviations(
+            getattr(table, name).flank(side),
+            gear,
+            active,
+            f"microgeometry.{name}",
+            Path(folder),
+            mirrored=side == "right",
+            wheel=g == 1,
+        )
+        if name
+        else ToothDeviations()
+        for g, (name, gear, active) in enumerate(zip(gears, (pair.pinion, pair.wheel), active_rolls(pair), strict=True))
+    )
+    return driver, driven
+
+
+def active_rolls(pair: GearPair) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Roll lengths (m) between which pinion and wheel touch on the path of contact."""
+    start, end = pair.path_limits(rounded=True)
+    return (start, end), (pair.tangent_length - end, pair.tangent_length - start)
+
+
+def flank_deviations(
+    table: FlankTable,
+    gear: Gear,
+    active: tuple[float, float],
+    where: str,
+    folder: Path,
+    *,
+    mirrored: bool = False,
+    wheel: bool = False,
+) -> ToothDeviations:
+    """Deviations of one side of a gear's teeth."""
+    made = modification(table, gear, active, where, folder, mirrored=mirrored, wheel=wheel)
+    try:
+        index = _index_deviations(table, gear, where, folder)
+        turn = pitch_errors.turns(gear, index) if index.any() else (0.0,)
+        if mirrored and len(turn) > 1:
+            turn = _mirrored(turn, wheel)
+        return tooth_deviations(gear, made, turn)
+    except InputError as error:
+        raise _named(error, where) from None
+
+
+def _mirrored(values: Sequence[Any], wheel: bool) -> tuple[Any, ...]:
+    """What belongs to teeth, in the order that the pair has seen from the other side: j is -j, on the wheel -1 - j."""
+    return tuple(values[(-j - wheel) % len(values)] for j in range(len(values)))
+
+
+def modification(
+    table: FlankTable,
+    gear: Gear,
+    active: tuple[float, float],
+    where: str,
+    folder: Path,
+    *,
+    mirrored: bool = False,
+    wheel: bool = False,
+) -> FlankModification:
+    """Modifications of one side of a gear's teeth, in SI."""
+    extra: list[Deviation] = []
+    measured: tuple[Deviation, ...] = ()
+    if table.points:
+        s, h = np.array(table.points).T
+        extra.append(_covering(1e-3 * s, 1e-6 * h, active, f"{where}.points", straight=True))
+    if table.measured_csv is not None:
+        found = _measured(table.measured_csv, gear, active, f"{where}.measured_csv", folder)
+        if len(found) == 1:
+            extra += found
+        else:
+            measured = _mirrored(found, wheel) if mirrored else tuple(found)
+    return FlankModification(
+        tip_relief=_relief(table, gear, where, "tip"),
+        root_relief=_relief(table, gear, where, "root"),
+        crowning=1e-6 * table.crowning_um,
+        slope=1e-6 * table.slope_um,
+        waviness=tuple(Waviness(1e-6 * w.amplitude_um, w.waves, math.radians(w.phase_deg)) for w in table.waviness),
+        extra=tuple(extra),
+        measured=measured,
+    )
+
+
+def _relief(table: FlankTable, gear: Gear, where: str, end: str) -> Relief | None:
+    name = f"{end}_relief"
+    amount = getattr(table, f"{name}_um")
+    length, start, diameter = (getattr(table, f"{name}_{key}") for key in STARTS)
+    given = next((f"{name}_{key}" for key in STARTS if getattr(table, f"{name}_{key}") is not None), None)
+    if amount is None:
+        if given is not None:
+            raise InputError(f"{where}.{name}_um", None, f"is required beside {given}", "add the amount")
+        return None
+    if given is None:
+        cure = f"add {name}_length_mm, {name}_start_mm or {name}_start_diameter_mm"
+        raise InputError(f"{where}.{name}_length_mm", None, "is required with a relief", cure)
+    if length is not None:
+        roll = gear.profile.tip_roll - 1e-3 * length if end == "tip" else gear.form_roll + 1e-3 * length
+    elif start is not None:
+        roll = 1e-3 * start
+    else:
+        roll = gear.roll_length(0.5e-3 * diameter)
+    ends = (gear.form_roll, min(gear.profile.round_roll, gear.profile.tip_roll))
+    if not ends[0] < roll < ends[1]:
+        problem = (
+            f"starts at {1e3 * roll:.5g} mm of roll length: must be > {1e3 * ends[0]:.5g} and < {1e3 * ends[1]:.5g} "
+            "mm, on the active flank"
+        )
+        value = next(one for one in (length, start, diameter) if one is not None)
+        raise InputError(f"{where}.{given}", value, problem, "start it between form point and tip round")
+    last = getattr(table, f"{name}_end_mm")
+    return Relief(1e-6 * amount, roll, getattr(table, f"{name}_shape"), None if last is None else 1e-3 * last)
+
+
+def _index_deviations(table: FlankTable, gear: Gear, where: str, folder: Path) -> Array:
+    """Index deviations (m) of all teeth."""
+    made = pitch_errors.sine(gear.teeth, 1e-6 * table.run_out_um, math.radians(table.run_out_phase_deg))
+    given: Array | None = None
+    if table.pitch_um:
+        given = 1e-6 * np.array(table.pitch_um)
+    elif table.single_pitch_um:
+        given = pitch_errors.from_single(1e-6 * np.array(table.single_pitch_um))
+    elif table.pitch_csv is not None:
+        field = f"{where}.pitch_csv"
+        columns = _columns(table.pitch_csv, folder, field, ("tooth", "pitch_um"))
+        order = _teeth(columns["tooth"], gear, field, table.pitch_csv)
+        given = 1e-6 * columns["pitch_um"][order]
+    elif table.pitch_class is not None:
+        given = pitch_errors.drawn(gear, table.pitch_class, table.pitch_seed)
+    if given is None:
+        return made
+    if len(given) != gear.teeth:
+        key = "pitch_um" if table.pitch_um else "single_pitch_um"
+        problem = f"must have one entry for each of the {gear.teeth} teeth"
+        raise InputError(f"{where}.{key}", len(given), problem, "give as many as the gear has teeth")
+    return made + given
+
+
+def _measured(name: str, gear: Gear, active: tuple[float, float], field: str, folder: Path) -> list[Deviation]:
+    """One deviation, or one a tooth."""
+    columns = _columns(name, folder, field, ("deviation_um",), ("roll_length_mm", "diameter_mm", "tooth"))
+    if "roll_length_mm" in columns:
+        roll = 1e-3 * columns["roll_length_mm"]
+    elif "diameter_mm" in columns:
+        roll = np.array([gear.roll_length(0.5e-3 * d) for d in columns["diameter_mm"]])
+    else:
+        raise InputError(field, name, "has neither of the columns roll_length_mm and diameter_mm", "add one")
+    height = 1e-6 * columns["deviation_um"]
+    if "tooth" not in columns:
+        return [_covering(roll, height, active, field)]
+    teeth = columns["tooth"]
+    _teeth(np.unique(teeth), gear, field, name)
+    return [_covering(roll[teeth == t], height[teeth == t], active, f"{field}, tooth {t}") for t in range(gear.teeth)]
+
+
+def _covering(
+    roll: Array, height: Array, active: tuple[float, float], field: str, *, straight: bool = False
+) -> Deviation:
+    order = np.argsort(roll, kind="stable")
+    try:
+        made = (Deviation.straight if straight else Deviation.through)(roll[order], height[order])
+    except InputError as error:
+        raise InputError(field, None, error.problem, error.cure) from None
+    low, high = made.breaks[0], made.breaks[-1]
+    if low > active[0] + 1e-9 or high < active[1] - 1e-9:
+        problem = (
+            f"covers {1e3 * low:.5g} to {1e3 * high:.5g} mm of roll length: must cover {1e3 * active[0]:.5g} to "
+            f"{1e3 * active[1]:.5g} mm, the path of contact"
+        )
+        raise InputError(field, None, problem, "give more points; nothing is extrapolated")
+    return made
+
+
+def _teeth(numbers: Array, gear: Gear, field: str, name: str) -> IntArray:
+    """Order that sorts the teeth, each of which must be there once."""
+    order = np.argsort(numbers, kind="stable")
+    if len(numbers) != gear.teeth or not np.array_equal(numbers[order], np.arange(gear.teeth)):
+        problem = f"must have the teeth 0 to {gear.teeth - 1}, each once: it has {len(numbers)}"
+        raise InputError(field, name, problem, "list all teeth; tooth 0 stands on the line of centres at angle 0")
+    return order
+
+
+def _columns(
+    name: str, folder: Path, field: str, needed: Sequence[str], optional: Sequence[str] = ()
+) -> dict[str, Array]:
+    """Columns of numbers of a CSV file."""
+    rows = list(csv.reader(io.StringIO(read_text(folder / name, field))))
+    header = [one.strip() for one in rows[0]] if rows else []
+    for one in header:
+        if one not in (*needed, *optional):
+            raise unknown_name(f"{field} {name}, column", one, (*needed, *optional))
+    for one in needed:
+        if one not in header:
+            raise InputError(field, name, f"has no column {one}", "its first line names the columns")
+    body = [row for row in rows[1:] if any(cell.strip() for cell in row)]
+    made = np.empty((len(body), len(header)))
+    for i, row in enumerate(body):
+        try:
+            made[i] = [float(cell) for cell in row]
+        except ValueError:
+            raise InputError(field, name, f"row {i + 1} must have {len(header)} numbers", "mend that row") from None
+    if not np.isfinite(made).all():
+        raise InputError(field, name, "holds numbers that are none", "mend it")
+    return dict(zip(header, made.T, strict=True))
+
+
+def _named(error: InputError, where: str) -> InputError:
+    """The same error in the words of the job file."""
+    names = {
+        "tip_relief.start": "tip_relief_start_mm",
+        "root_relief.start": "root_relief_start_mm",
+        "tip_relief.end": "tip_relief_end_mm",
+        "root_relief.end": "root_relief_end_mm",
+    }
+    if error.field.startswith(where):
+        return error
+    value = error.value
+    if error.field in names and isinstance(value, float):
+        value = float(f"{1e3 * value:.6g}")
+    elif isinstance(value, float) and error.field in ("deviation", "pitch errors") and abs(value) < 1e-2:
+        value = float(f"{1e6 * value:.6g}")
+    return InputError(f"{where}.{names.get(error.field, error.field)}", value, error.problem, error.cure)

@@ -1,0 +1,177 @@
+"""One [microgeometry] table for every command: curves, maps, trains take the same deviations."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe import InputError
+from gearfe.cli import main
+from gearfe.contact.half_plane import half_plane_pair
+from gearfe.gear.deviation import NOMINAL
+from gearfe.gear.modifications import FlankModification, Relief, tooth_deviations
+from gearfe.loadmap.sweep import sweep_loads
+from gearfe.meshlaw.make import mesh_law
+from gearfe.microgeometry.solve import load_mesh
+from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
+from gearfe.vibration.job import read_train_job
+from gearfe.vibration.mesh_stiffness import train_curves
+
+from .gears import pair as gear_pair
+from .test_train_job import BORES, SMALL
+
+PAIR = gear_pair(tip_round=1e-4)
+
+JOB = """
+[pair]
+pressure_angle_deg = 25.0
+face_width_mm = 10.0
+tip_round_mm = 0.1
+pinion = { teeth = 20, pitch_diameter_mm = 50.0, bore_diameter_mm = 10.0 }
+wheel = { teeth = 30, pitch_diameter_mm = 75.0, bore_diameter_mm = 15.0 }
+[stiffness]
+torque_Nm = 80.0
+angle_step_deg = 3.0
+kinematics = "small"
+coarsen = 2.0
+[loadmap]
+torques_Nm = [80.0]
+positions = 6
+[microgeometry]
+torques_Nm = [80.0]
+positions = 6
+[microgeometry.pinion]
+tip_relief_um = 12.0
+tip_relief_length_mm = 3.0
+slope_um = 4.0
+waviness = [{ amplitude_um = 1.0, waves = 40 }]
+[microgeometry.wheel]
+crowning_um = 5.0
+root_relief_um = 6.0
+root_relief_length_mm = 2.0
+root_relief_shape = "parabolic"
+"""
+
+
+def columns(path: Path) -> dict[str, np.ndarray]:
+    with path.open() as stream:
+        rows = list(csv.DictReader(stream))
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+def test_every_command_takes_the_same_deviations(tmp_path, capsys) -> None:
+    """Twist, its unloaded part and load shares of curve and map are those of gearfe microgeometry."""
+    job = tmp_path / "job.toml"
+    job.write_text(JOB)
+    for command in ("stiffness", "loadmap", "microgeometry"):
+        assert main([command, str(job), "--out", str(tmp_path / command), "--no-picture"]) == 0
+    # -12 + 2 um at the pinion's tip, a wave of 1 um besides; -5 - 6 um at the wheel's form circle
+    told = re.findall(r"up to ([0-9.]+) um \(pinion\) and ([0-9.]+) um \(wheel\)", capsys.readouterr().out)
+    assert len(told) == 2
+    assert float(told[0][0]) == pytest.approx(10, abs=1)
+    assert float(told[0][1]) == pytest.approx(11)
+    one, other, own = (columns(tmp_path / c / f"{c}.csv") for c in ("stiffness", "loadmap", "microgeometry"))
+    for name in ("twist_deg", "transmission_error_unloaded_um", "load_share_1"):
+        expected = own[name].astype(float)
+        close = 3e-4 if name == "load_share_1" else 1e-5  # shares are of a torque that a map accepts within 3e-4
+        assert one[name].astype(float) == pytest.approx(expected, rel=close, abs=1e-9), name
+        assert other[name].astype(float) == pytest.approx(expected, rel=close, abs=1e-9), name
+    assert np.ptp(own["transmission_error_unloaded_um"].astype(float)) > 1.0
+
+
+def test_a_mesh_law_has_the_transmission_error_of_its_flanks() -> None:
+    """Approach under a force against contact solutions at that torque; a kink is a corner of the law."""
+    start = PAIR.pinion.profile.tip_roll - 2.5e-3
+    relieved = tooth_deviations(PAIR.pinion, FlankModification(tip_relief=Relief(15e-6, start)))
+    law = half_plane_pair(PAIR, elastic_pair(PAIR, deviations=(relieved, NOMINAL[1]), coarsen=2.0))
+    made = mesh_law(law, 2000.0)
+    torque, radius = 60.0, PAIR.wheel.base_radius
+    found = load_mesh(law, [torque], positions=40)
+    expected = found.transmission_error[0]
+    assert np.ptp(expected) > 2e-6
+    approach = made.approach(found.pinion_angle, np.full(40, torque / radius))
+    assert approach == pytest.approx(expected, abs=0.02e-6)
+    kink = PAIR.pinion_angle_at(start)
+    away = np.mod(made.nodes - kink + 0.5 * made.cycle, made.cycle) - 0.5 * made.cycle
+    assert np.abs(away).min() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ("run_out_um = 3.0", "pinion.*stand unevenly.*gearfe microgeometry takes them"),
+        ("waviness = [{ amplitude_um = 1.0, waves = 11 }]", "pinion.*different flanks"),
+    ],
+)
+@pytest.mark.parametrize("command", ["stiffness", "loadmap"])
+def test_teeth_that_differ_have_no_curve(keys, told, command, tmp_path, capsys) -> None:
+    job = tmp_path / "job.toml"
+    text = JOB.replace("waviness = [{ amplitude_um = 1.0, waves = 40 }]", keys)
+    job.write_text(text)
+    assert main([command, str(job), "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert re.search(told, error)
+    assert not (tmp_path / "out").exists()
+
+
+def test_laws_on_meshes_have_no_deviations(tmp_path) -> None:
+    relieved = tooth_deviations(PAIR.pinion, FlankModification(crowning=5e-6))
+    with pytest.raises(InputError, match='law = "half_plane"'):
+        sweep_stiffness(PAIR, torque=50.0, law="nitsche", deviations=(relieved, NOMINAL[1]), coarsen=3.0)
+    with pytest.raises(InputError, match='law = "half_plane"'):
+        sweep_loads(PAIR, [50.0], law="penalty", deviations=(relieved, NOMINAL[1]), coarsen=3.0)
+
+
+def train_text(more: str, **curves: str) -> str:
+    pair = JOB.split("[stiffness]", maxsplit=1)[0]
+    text = SMALL.replace("stiffness_N_per_m = 2e8", "")
+    for name, gear, rest in (("a", "pinion", 18), ("b", "wheel", 27)):
+        form = f"teeth = {rest}\nmodule_mm = 2.0\npressure_angle_deg = 20.0\nface_width_mm = 12.0\n"
+        text = text.replace(form, f'gear = "{gear}"\n', 1)
+        assert name in text
+    text = text.replace("x_mm = 45.0", "x_mm = 62.5")
+    table = "[train.curves]\n" + "".join(f"{key} = {value}\n" for key, value in curves.items())
+    stiffness = '[stiffness]\nkinematics = "small"\ncoarsen = 2.0\n'
+    return pair + stiffness + text + BORES.replace("45.0", "62.5") + table + more
+
+
+def test_a_train_takes_the_flanks_that_drive(tmp_path) -> None:
+    """The drive turns against the axis, so the right flanks bear: relief on the left ones changes nothing."""
+    relief = "[microgeometry.pinion.{}]\ntip_relief_um = 20.0\ntip_relief_length_mm = 3.0\n"
+    curves = {"law": '"curve"', "load": '"torque"', "positions": "8"}
+    found = {}
+    for side in ("none", "left", "right"):
+        job = tmp_path / f"{side}.toml"
+        job.write_text(train_text("" if side == "none" else relief.format(side), **curves))
+        found[side] = train_curves(read_train_job(job))[0]
+    assert found["left"].twist == pytest.approx(found["none"].twist, rel=1e-12)
+    torque = float(found["right"].torque_wheel[0])
+    gear = PAIR.pinion
+    own = tooth_deviations(gear, FlankModification(tip_relief=Relief(20e-6, gear.profile.tip_roll - 3e-3)))
+    law = half_plane_pair(PAIR, elastic_pair(PAIR, coarsen=2.0)).deviated((own, NOMINAL[1]))
+    expected = load_mesh(law, [torque], positions=8)
+    assert found["right"].twist == pytest.approx(expected.twist[0], rel=1e-5)
+    assert np.abs(found["right"].twist / found["none"].twist - 1).max() > 0.1
+    assert math.isclose(found["right"].mesh_cycle, PAIR.mesh_cycle)
+
+
+@pytest.mark.parametrize(
+    ("more", "law", "told"),
+    [
+        ("[microgeometry.pinion]\npitch_class = 7\n", "map", "stand unevenly"),
+        ("[microgeometry.pinion.left]\ncrowning_um = 5.0\n", "map", "left and right flanks differ"),
+    ],
+)
+def test_what_a_train_refuses(more, law, told, tmp_path) -> None:
+    job = tmp_path / "job.toml"
+    text = train_text(more, law=f'"{law}"').replace(
+        "tip_round_mm = 0.1", "tip_round_mm = 0.1\ntooth_thinning_um = 50.0"
+    )
+    job.write_text(text)
+    with pytest.raises(InputError, match=told):
+        train_curves(read_train_job(job))
