@@ -8,14 +8,17 @@ import numpy as np
 import pytest
 
 from gearfe import InputError
+from gearfe.config import build
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.gear import pitch_errors
 from gearfe.gear.deviation import NOMINAL, ToothDeviations
+from gearfe.gear.deviation_job import deviations_of
 from gearfe.gear.modifications import FlankModification, Relief, Waviness, tooth_deviations
 from gearfe.gear.pair import GearPair, TipRelief
 from gearfe.microgeometry.loaded_mesh import full_period
 from gearfe.microgeometry.solve import load_mesh
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
+from gearfe.tables.microgeometry import MicrogeometryTable
 
 from .gears import pair as gear_pair
 
@@ -150,3 +153,37 @@ def test_a_pair_that_never_bears_is_told(law) -> None:
 def test_torques_out_of_range(law, torques) -> None:
     with pytest.raises(InputError, match="torques"):
         load_mesh(law, torques)
+
+
+@pytest.mark.parametrize("flank", ["left", "right"])
+def test_the_room_behind_the_teeth(flank) -> None:
+    """Unloaded, the clearance of a whole set of rigid teeth is the backlash plus what both flanks lack where they
+    touch; a tooth that stands bodily off its place leaves it as it is where it touches on both sides.
+    """
+    pair = gear_pair(tip_round=1e-4, tooth_thinning=40e-6)
+    backlash, cosine = pair.normal_backlash, math.cos(pair.pinion.pressure_angle)
+    assert backlash > 60e-6
+    law = half_plane_pair(pair, elastic_pair(pair, coarsen=3.0))
+
+    def room(left: dict, right: dict, angles) -> tuple[np.ndarray, np.ndarray]:
+        table = build(MicrogeometryTable, {"flank": flank, "pinion": {"left": left, "right": right}}, "microgeometry")
+        other = {"left": "right", "right": "left"}[flank]
+        own, back = (deviations_of(table, pair, flank=side) for side in (flank, other))
+        made = load_mesh(law.deviated(own), [30.0], angles=angles, back=back)
+        unloaded = backlash + pair.wheel.base_radius * (made.twist_unloaded + made.twist_unloaded_back)
+        yields = made.transmission_error[0] - made.transmission_error_unloaded
+        assert made.back_clearance[0] == pytest.approx(unloaded + yields)
+        return unloaded, made.pinion_angle
+
+    angles = (np.arange(6) + 0.3) * pair.mesh_cycle / 6
+    assert room({}, {}, angles)[0] == pytest.approx(np.full(6, backlash), rel=1e-9)
+    # the same index deviation of all teeth is a thicker tooth
+    assert room({"pitch_um": [5.0] * 20}, {"pitch_um": [3.0] * 20}, angles)[0] == pytest.approx(
+        np.full(6, backlash - 8e-6 * cosine), rel=1e-9
+    )
+    index = 4.0 * np.sin(2 * np.pi * np.arange(20) / 20)
+    middle = 2 * np.pi * np.arange(0, 20, 3) / 20 * (1 if flank == "right" else -1)  # a tooth between the centres
+    bodily = room({"pitch_um": index.tolist()}, {"pitch_um": (-index).tolist()}, middle)[0]
+    assert np.abs(bodily - backlash).max() < 8e-6 * math.sin(2 * np.pi / 20) + 1e-9
+    thick = room({"pitch_um": index.tolist()}, {"pitch_um": index.tolist()}, middle)[0]
+    assert np.ptp(thick) > 10e-6

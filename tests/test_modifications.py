@@ -12,6 +12,7 @@ from gearfe import InputError
 from gearfe.gear import pitch_errors
 from gearfe.gear.deviation import Deviation
 from gearfe.gear.modifications import FlankModification, Relief, Waviness, tooth_deviations
+from gearfe.gear.pair import Gear
 
 from .gears import pair as gear_pair
 
@@ -102,6 +103,32 @@ def test_tolerances_of_the_standard() -> None:
     assert 1e6 * five.slope == pytest.approx(5.05)
     assert 1e6 * five.form == pytest.approx(6.375)
     assert seven.cumulative == pytest.approx(2 * five.cumulative)
+    assert five.total == pytest.approx(math.hypot(five.slope, five.form))
+
+
+def test_tolerances_against_published_values() -> None:
+    """d = 120 mm, m = 3 mm in class 6, as calculators of ISO 1328-1:2013 publish it: 8.94 and 28.80 um, rounded 9.0
+    and 29 um, profile 12 um.
+    """
+    gear = Gear(40, 3e-3, math.radians(20), 30e-3, 20e-3)
+    made = pitch_errors.tolerances(gear, 6)
+    assert 1e6 * made.single == pytest.approx(8.94, abs=0.005)
+    assert 1e6 * made.cumulative == pytest.approx(28.80, abs=0.005)
+    told = made.rounded_um
+    assert (told["f_pT"], told["F_pT"], told["F_alphaT"]) == (9.0, 29.0, 12.0)
+
+
+@pytest.mark.parametrize(
+    ("value", "told"), [(10.4, 10), (10.5, 11), (9.74, 9.5), (9.75, 10), (5.0, 5.0), (4.96, 5.0), (4.94, 4.9)]
+)
+def test_rounding_of_tolerances(value, told) -> None:
+    """5.2.3: to 1 um above 10, to 0.5 um from 5 on, to 0.1 um below."""
+    assert pitch_errors.rounded(value) == told
+
+
+def test_gears_that_the_standard_does_not_have() -> None:
+    with pytest.raises(InputError, match=r"module_mm = 0\.4.*0\.5 to 70"):
+        pitch_errors.tolerances(Gear(40, 0.4e-3, math.radians(20), 5e-3, 4e-3), 6)
 
 
 def test_drawn_gears_are_as_bad_as_the_class_and_come_again() -> None:

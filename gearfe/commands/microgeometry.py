@@ -71,6 +71,8 @@ def run(args: argparse.Namespace) -> int:
     beside = Path(args.job).parent
     with watch.stage("deviations"):
         deviations = deviations_of(table, pair, beside)
+        other = {"left": "right", "right": "left"}[table.flank]
+        back = deviations_of(table, pair, beside, flank=other)
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
     elastic = elastic_pair(pair, watch=watch, **checked_model(job))
     roots = None
@@ -85,6 +87,7 @@ def run(args: argparse.Namespace) -> int:
             positions=table.positions,
             mesh_cycles=table.mesh_cycles,
             roots=roots,
+            back=back,
             progress=count,
         )
     with whole_set(folder, FILES) as place:

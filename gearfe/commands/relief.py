@@ -51,7 +51,16 @@ def run(args: argparse.Namespace) -> int:
     from ..loadmap.root_stress import pair_roots
     from ..microgeometry.job import checked_model, law_remarks
     from ..microgeometry.relief import optimise_relief
-    from ..microgeometry.relief_job import comparison, figure_arguments, map_table, named, relief_problem, summary, told
+    from ..microgeometry.relief_job import (
+        comparison,
+        figure_arguments,
+        map_table,
+        named,
+        relief_problem,
+        summary,
+        told,
+        with_pitch_errors,
+    )
     from ..output.files import output_folder, whole_set, write_csv, write_json
     from ..stiffness.job import StiffnessJob
     from ..stiffness.sweep import elastic_pair
@@ -90,6 +99,7 @@ def run(args: argparse.Namespace) -> int:
             raise named(error, table, problem) from None
     with watch.stage("comparison"):
         compared = comparison(made)
+        errors = with_pitch_errors(made, base, pair, Path(args.job).parent)
     with whole_set(folder, FILES) as place:
         write_csv(place / "relief_map.csv", map_table(table, made))
         write_csv(place / "relief_torques.csv", compared)
@@ -99,9 +109,9 @@ def run(args: argparse.Namespace) -> int:
             with watch.stage("picture"):
                 relief_figure(place / "relief.png", **figure_arguments(table, made, compared))
         watch.seconds["total"] = time.perf_counter() - started
-        write_json(place / "relief.json", summary(job, base, table, made, watch.seconds))
+        write_json(place / "relief.json", summary(job, base, table, made, errors, watch.seconds))
         names = sorted(path.name for path in place.iterdir())
-    for line in [*told(table, made), *law_remarks(job)]:
+    for line in [*told(table, made, errors), *law_remarks(job)]:
         print(line)
     print(f"written to {folder}: " + ", ".join(names))
     print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))

@@ -71,6 +71,8 @@ class LoadedMesh:
         Twist since unmodified flanks touch (rad), torque at the pinion's hub (N m), d torque/d twist (N m/rad).
     twist_unloaded : ndarray, shape (n,)
         Twist at which the rigid flanks touch, from there (rad).
+    twist_unloaded_back : ndarray, shape (n,), or None
+        The same of the back flanks, > 0 where they lie behind those without deviations.
     status : ndarray of str, shape (m, n)
         ``converged``, or why there are no numbers.
     pairs
@@ -88,6 +90,7 @@ class LoadedMesh:
     torque_pinion: Array
     tangent: Array
     twist_unloaded: Array
+    twist_unloaded_back: Array | None
     status: NDArray[np.str_]
     pairs: PairLoads
     root_stress: Array | None
@@ -102,6 +105,13 @@ class LoadedMesh:
     def transmission_error_unloaded(self) -> Array:
         """Unloaded transmission error (m), shape (n,)."""
         return self.twist_unloaded * self.pair.wheel.base_radius
+
+    @property
+    def back_clearance(self) -> Array | None:
+        """Normal clearance (m) of the back flanks, unloaded themselves, shape (m, n); < 0 where they would bear."""
+        if self.twist_unloaded_back is None:
+            return None
+        return self.pair.normal_backlash + self.pair.wheel.base_radius * (self.twist_unloaded_back + self.twist)
 
     @property
     def peak_to_peak(self) -> Array:

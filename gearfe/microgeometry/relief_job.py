@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..contact.half_plane_step import HalfPlanePair
 from ..errors import InputError
-from ..gear.deviation_job import GEARS, active_rolls, modification
+from ..gear.deviation_job import GEARS, active_rolls, deviations_of, modification
 from ..gear.pair import GearPair
 from ..loadmap.root_stress import PairRoots
 from ..stiffness.job import StiffnessJob
@@ -19,10 +19,17 @@ from ..stiffness.report import versions
 from ..tables.microgeometry import VARIABLES, MicrogeometryTable, ReliefTable
 from ..typing import Array
 from .relief import ReliefResult
-from .relief_problem import ReliefProblem, Variable
+from .relief_problem import Evaluation, ReliefProblem, Variable
 
 #: Torques at which the best is compared with none: shares of the range that the job's torques span, widened.
 COMPARED = 17
+
+
+class PitchErrors(NamedTuple):
+    """The best relief, and none, on gears with pitch errors."""
+
+    best: Evaluation
+    without: Evaluation
 
 
 def relief_problem(
@@ -33,7 +40,7 @@ def relief_problem(
     law: HalfPlanePair,
     roots: PairRoots | None,
 ) -> ReliefProblem:
-    """The search that a job file asks for; pitch errors do not take part."""
+    """The search that a job file asks for, of gears without pitch errors."""
     made = [
         modification(
             getattr(base, name).flank(base.flank),
@@ -63,6 +70,16 @@ def relief_problem(
         positions=table.positions,
         roots=roots,
     )
+
+
+def with_pitch_errors(made: ReliefResult, base: MicrogeometryTable, pair: GearPair, folder: Path) -> PitchErrors | None:
+    """The best relief, and none, on gears with the pitch errors of [microgeometry]; None where there are none."""
+    pinion, wheel = (one.turn for one in deviations_of(base, pair, folder))
+    if not any((*pinion, *wheel)):
+        return None
+    problem = replace(made.problem, turns=(pinion, wheel), mesh_cycles=base.mesh_cycles)
+    best, without = problem.evaluate(made.x), problem.evaluate([v.absent for v in problem.variables])
+    return PitchErrors(best, without)
 
 
 def named(error: InputError, table: ReliefTable, problem: ReliefProblem) -> InputError:
@@ -107,7 +124,7 @@ def comparison(made: ReliefResult) -> dict[str, Array]:
     }
 
 
-def told(table: ReliefTable, made: ReliefResult) -> list[str]:
+def told(table: ReliefTable, made: ReliefResult, errors: PitchErrors | None) -> list[str]:
     """Lines to print."""
     values = ", ".join(f"{n} = {v:.4g}" for n, v in zip(names_of(table), in_units(table, made.x), strict=True))
     lines = [f"best of {made.evaluations} evaluations: {values}"]
@@ -119,6 +136,11 @@ def told(table: ReliefTable, made: ReliefResult) -> list[str]:
     for name, low, high in zip(names_of(table), made.low, made.high, strict=True):
         lines.append(f"  within the tolerance of {name}: {low:.4g} and {high:.4g}")
     lines.append(f"  at the worst corner of all tolerances: {made.worst:.4g}")
+    if errors is not None:
+        line = (
+            f"  with the pitch errors of [microgeometry]: {errors.best.value:.4g}, without {errors.without.value:.4g}"
+        )
+        lines.append(line + (f" ({errors.best.problem})" if errors.best.problem else ""))
     bounds = [
         name
         for name, v, value in zip(names_of(table), made.problem.variables, made.x, strict=True)
@@ -130,7 +152,12 @@ def told(table: ReliefTable, made: ReliefResult) -> list[str]:
 
 
 def summary(
-    job: StiffnessJob, base: MicrogeometryTable, table: ReliefTable, made: ReliefResult, timings: Mapping[str, float]
+    job: StiffnessJob,
+    base: MicrogeometryTable,
+    table: ReliefTable,
+    made: ReliefResult,
+    errors: PitchErrors | None,
+    timings: Mapping[str, float],
 ) -> dict[str, Any]:
     """Content of relief.json."""
     return {
@@ -151,6 +178,12 @@ def summary(
         "objective_at_low_tolerance": made.low.tolist(),
         "objective_at_high_tolerance": made.high.tolist(),
         "objective_at_worst_corner": made.worst,
+        "with_pitch_errors": None
+        if errors is None
+        else {
+            name: {"objective": one.value, "peak_to_peak_um": (1e6 * one.peak_to_peak).tolist(), "problem": one.problem}
+            for name, one in errors._asdict().items()
+        },
         "evaluations": made.evaluations,
         "timings_s": dict(timings),
     }

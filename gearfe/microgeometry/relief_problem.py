@@ -116,8 +116,8 @@ class ReliefProblem:
         W above.
     turns
         Pitch errors of pinion and wheel (rad), see `gearfe.gear.pitch_errors`.
-    positions
-        Pinion angles in a mesh cycle.
+    positions, mesh_cycles
+        Pinion angles in a mesh cycle, and how many; see `gearfe.microgeometry.solve.load_mesh`.
     roots
         For root stresses, see `gearfe.microgeometry.solve.load_mesh`.
     """
@@ -132,6 +132,7 @@ class ReliefProblem:
     root_stress_weight: float = 0.0
     turns: tuple[tuple[float, ...], tuple[float, ...]] = ((0.0,), (0.0,))
     positions: int = 20
+    mesh_cycles: int | None = None
     roots: PairRoots | None = None
 
     def modifications(self, x: Sequence[float] | Array) -> tuple[FlankModification, FlankModification]:
@@ -159,7 +160,7 @@ class ReliefProblem:
         )
         roots = self.roots if self.root_stress_weight else None
         law = self.law.deviated((pinion, wheel))
-        return load_mesh(law, torques, positions=self.positions, roots=roots)
+        return load_mesh(law, torques, positions=self.positions, mesh_cycles=self.mesh_cycles, roots=roots)
 
     def evaluate(self, x: Sequence[float] | Array) -> Evaluation:
         """Objective and what it is made of."""

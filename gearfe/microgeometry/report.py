@@ -45,6 +45,9 @@ def cell_table(made: LoadedMesh) -> dict[str, Array]:
     for j in range(shares.shape[2]):
         table[f"load_share_{j + 1}"] = shares[:, :, j].ravel()
     table |= {"peak_pressure_MPa": 1e-6 * pressure.ravel(), "edge_pressure_MPa": 1e-6 * edge.ravel()}
+    if made.twist_unloaded_back is not None and made.back_clearance is not None:
+        table["transmission_error_unloaded_back_um"] = np.tile(1e6 * radius * made.twist_unloaded_back, m)
+        table["back_clearance_um"] = 1e6 * made.back_clearance.ravel()
     if made.root_stress is not None:
         for g, gear in enumerate(GEARS):
             table[f"root_stress_{gear}_MPa"] = 1e-6 * made.root_stress[:, :, g].ravel()
@@ -121,6 +124,11 @@ def summary(
         "transmission_error_unloaded_peak_to_peak_um": 1e6 * float(np.ptp(made.transmission_error_unloaded)),
         "by_torque": {name: values.tolist() for name, values in torque_table(made).items()},
         "pitch": {name: _pitch(one, getattr(job.pair, name)) for name, one in zip(GEARS, deviations, strict=True)},
+        "tolerances_um": None
+        if table.tolerance_class is None
+        else {
+            name: pitch_errors.tolerances(getattr(job.pair, name), table.tolerance_class).rounded_um for name in GEARS
+        },
         "statuses": made.statuses,
         "timings_s": dict(timings),
     }
@@ -166,6 +174,14 @@ def warnings(pair: GearPair, made: LoadedMesh) -> list[str]:
     """Sentences about what deserves a look."""
     said, beyond = list(pair.warnings), made.beyond_validity
     said += told_overlaps(beyond, overlaps(pair, made.twist[beyond == 1]).max(initial=0.0))
+    room = made.back_clearance
+    if room is not None and (least := float(np.nanmin(room))) < 0.0:
+        i, j = np.unravel_index(int(np.nanargmin(room)), room.shape)
+        where = f"{made.torque[i]:.4g} N m and {np.degrees(made.pinion_angle[j]):.4g} deg"
+        said.append(
+            f"the back flanks, which do not bear here, overlap by up to {-1e6 * least:.3g} um (at {where}): more material "
+            f"stands out than {1e6 * pair.normal_backlash:.3g} um of backlash have room for; thin the teeth, or take it off"
+        )
     if made.failed.any():
         told = ", ".join(f"{count} {status}" for status, count in made.statuses.items() if status != "converged")
         cure = "rough flanks may not settle; take smoother ones, or other torques"

@@ -14,7 +14,9 @@ from ..contact.half_plane_step import HalfPlanePair
 from ..contact.position import Positions
 from ..contact.records import joined, of_positions, taken
 from ..errors import InputError
+from ..gear.deviation import ToothDeviations
 from ..gear.iso6336 import mesh_stiffness
+from ..gear.tooth_flanks import ToothFlanks
 from ..gear.touching import Touching
 from ..gear.validity import MOST_YIELD
 from ..loadmap.root_stress import PairRoots
@@ -39,6 +41,7 @@ def load_mesh(
     mesh_cycles: int | None = None,
     angles: ArrayLike | None = None,
     roots: PairRoots | None = None,
+    back: tuple[ToothDeviations, ToothDeviations] | None = None,
     progress: Progress | None = None,
 ) -> LoadedMesh:
     """Solve a pair with its deviations over pinion angle and torque.
@@ -57,6 +60,9 @@ def load_mesh(
         Pinion angles (rad) instead.
     roots
         Of the same elastic gears (`gearfe.loadmap.root_stress.pair_roots`), for root stresses, too.
+    back
+        Deviations of the back flanks of pinion and wheel, of the pair seen from the other side as
+        `gearfe.gear.deviation_job.deviations_of` gives them, to know the room behind the teeth.
     progress
         Called with cells done, cells in all, and a name.
 
@@ -86,9 +92,13 @@ def load_mesh(
         raise InputError("mesh_cycles", cycles, problem, "state a part of the period, fewer positions or torques")
     given = np.arange(n) * (pair.mesh_cycle / positions) if angles is None else angles
     place: Array = np.atleast_1d(np.asarray(given, dtype=np.float64))
-    met = _touching(law, place)
+    met = _touching(law.teeth, place)
     touch = np.full(n, np.inf)
     np.minimum.at(touch, met.position, met.twist)
+    behind = None if back is None else np.full(n, np.inf)
+    if back is not None and behind is not None:  # seen from the other side the pinion turns the other way
+        other = _touching(ToothFlanks(pair, back), -place)
+        np.minimum.at(behind, other.position, other.twist)
     stress = None if roots is None else np.full((count, 2), np.nan)
     cells: list[dict[str, Array]] = []
     pairs: list[PairLoads] = []
@@ -116,6 +126,7 @@ def load_mesh(
         torque_pinion=whole("torque_pinion"),
         tangent=whole("tangent"),
         twist_unloaded=touch - lost,
+        twist_unloaded_back=None if behind is None else behind - lost,
         status=whole("status"),
         pairs=PairLoads(**{f: np.concatenate([getattr(one, f) for one in pairs]) for f in PairLoads.__annotations__}),
         root_stress=None if stress is None else stress.reshape(*shape, 2),
@@ -125,11 +136,11 @@ def load_mesh(
     return found
 
 
-def _touching(law: HalfPlanePair, angles: Array) -> Touching:
-    """What `law.teeth.touching` says, in pieces: its search takes kilobytes for each angle."""
+def _touching(teeth: ToothFlanks, angles: Array) -> Touching:
+    """What `teeth.touching` says, in pieces: its search takes kilobytes for each angle."""
     parts = []
     for start in range(0, len(angles), AT_ONCE):
-        found = law.teeth.touching(angles[start : start + AT_ONCE])
+        found = teeth.touching(angles[start : start + AT_ONCE])
         parts.append(replace(found, position=found.position + start))
     return joined(parts)
 
