@@ -179,8 +179,8 @@ def warnings(pair: GearPair, made: LoadedMesh) -> list[str]:
         i, j = np.unravel_index(int(np.nanargmin(room)), room.shape)
         where = f"{made.torque[i]:.4g} N m and {np.degrees(made.pinion_angle[j]):.4g} deg"
         said.append(
-            f"the back flanks, which do not bear here, overlap by up to {-1e6 * least:.3g} um (at {where}): more material "
-            f"stands out than {1e6 * pair.normal_backlash:.3g} um of backlash have room for; thin the teeth, or take it off"
+            f"the back flanks, which do not bear here, overlap by up to {-1e6 * least:.3g} um (at {where}): more "
+            f"material stands out than {1e6 * pair.normal_backlash:.3g} um of backlash leave room for; thin the teeth"
         )
     if made.failed.any():
         told = ", ".join(f"{count} {status}" for status, count in made.statuses.items() if status != "converged")
