@@ -167,7 +167,7 @@ def flank_curve(gear: Gear, face: Face | None = None) -> FlankCurve:
     (if any) to the end at the tip.
     """
     face = face or face_of(gear)
-    marks = [m for m in face.marks() if 0 < m < face.end]
+    marks = [m for m in face.marks if 0 < m < face.end]
     u = np.unique(np.concatenate([np.linspace(0, 1, INVOLUTE), np.linspace(1, face.end, ROUND), marks]))
     nominal = replace(face, flank=replace(face.flank, deviation=None))
     points, size = face.points(u), _lengths(nominal.speeds, u)

@@ -6,10 +6,9 @@ twist, :math:`\varphi_2(r(u))`, that point of the pinion's flank is met at the t
 
 .. math:: D(u) = \varphi_1(u) - \varphi_2(r(u)),
 
-the pair touches at :math:`\varphi_k = \min_u D`. The gap beside the point of contact is taken along the common normal
-(`Flanks.gap`); :math:`a_k (D - \varphi_k)`, with the lever :math:`a_k` of that normal about the wheel's centre, is its
-first order on smooth flanks only. The minimum is smooth on the path of contact and on rounds and reliefs, an end of the
-range where a sharp tip bears before or after the path.
+the pair touches at :math:`\varphi_k = \min_u D`. The minimum is smooth on the path of contact and on rounds and
+reliefs, where parabolas close in on it, a kink of D at the kink of a relief, and an end of the range where a sharp tip
+bears before or after the path.
 
 The working flank is the involute with its relief, then the tip round. Roots take no part, but where one is undercut the
 involute starts with an edge, which can bear as a sharp tip does.
@@ -31,17 +30,17 @@ from .involute import deviated
 from .mesh_geometry import MeshGeometry
 from .spur_gear import Gear
 
-#: Points of the first search along a flank and of each closer look, and how often it looks closer; points besides for
-#: each piece of a deviation, whose waves may be short.
-COARSE, CLOSER, LOOKS, PER_PIECE = 97, 17, 16, 2
+#: Points of the first search along a flank and of each closer look, and how often it looks closer at most; points
+#: besides for each piece of a deviation, whose waves may be short.
+COARSE, CLOSER, LOOKS, PER_PIECE = 97, 65, 13, 2
+#: Change of the least twist (rad) from one look to the next that is rounding.
+ROUNDING = 2e-15
 #: A place is an end of the range, or a mark, when it is so near to it: places have the rounding of angles and radii.
 AT_AN_END = 1e-9
 #: Moves of a roll length that are rounding, in parts of the longest.
 ROLL_ROUNDING = 1e-15
-#: Steps of the search along a normal, and least cosine between it and the wheel's face that they reckon with.
-NEWTON, STEEPEST = 10, 0.05
-
-_GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(12)
+#: Parameters on either side of a point between which a face's turning is taken.
+BESIDE = 1e-5
 
 
 @dataclass(frozen=True)
@@ -78,12 +77,26 @@ class Face:
         s = flank.roll(np.minimum(np.maximum(u, 0.0), 1.0))
         beside = s - flank.relief(s)[0] if flank.modified else s
         made = np.exp(1j * (flank.base_angle - s / flank.base_radius)) * (flank.base_radius + 1j * beside)
-        return made if self.round_ is None else np.where(u > 1.0, _complex(self.round_.point(u - 1.0)), made)
+        if self.round_ is None:
+            return made
+        return np.where(u > 1.0, complex(*self.round_.centre) + self.round_.radius * self._round_normals(u), made)
 
     def normals(self, u: Array) -> ComplexArray:
         """Outward unit normals as complex numbers."""
-        made = _complex(self.flank.normal(np.clip(u, 0.0, 1.0)))
-        return made if self.round_ is None else np.where(u > 1.0, _complex(self.round_.normal(u - 1.0)), made)
+        flank = self.flank
+        s = flank.roll(np.minimum(np.maximum(u, 0.0), 1.0))
+        made = 1j * np.exp(1j * (flank.base_angle - s / flank.base_radius))
+        if flank.modified:
+            depth, slope = flank.relief(s)
+            forward = (s - depth) / flank.base_radius
+            size = np.hypot(forward, slope)
+            made = made * np.where(size > 0.0, (forward - 1j * slope) / np.where(size > 0.0, size, 1.0), 1.0)
+        return made if self.round_ is None else np.where(u > 1.0, self._round_normals(u), made)
+
+    def _round_normals(self, u: Array) -> ComplexArray:
+        assert self.round_ is not None
+        start, end = self.round_.start_angle, self.round_.end_angle
+        return np.asarray(np.exp(1j * (start + (u - 1.0) * (end - start))))
 
     def speeds(self, u: Array) -> Array:
         """Arc length per unit of u (m)."""
@@ -129,32 +142,6 @@ class Face:
         along = np.clip((angle - arc.start_angle) / (arc.end_angle - arc.start_angle), 0.0, 1.0)
         return np.where(radius > self.radii[1], 1.0 + along, u)
 
-    def moved(self, u: float, x: Array) -> Array:
-        """Parameters at the arc lengths x (m) beyond u, outside of the range where the face ends."""
-        grid = np.unique(np.concatenate([np.linspace(0.0, self.end, 401), [u]]))
-        half = 0.5 * np.diff(grid)
-        speed = self.speeds(0.5 * (grid[1:] + grid[:-1])) * 2 * half
-        arc = np.concatenate([[0.0], np.cumsum(speed)])
-        here = float(arc[np.searchsorted(grid, u)])
-        made = np.interp(here + x, arc, grid, left=-1.0, right=math.inf)
-        near = np.abs(x) < 1e-4 * arc[-1]
-        speed_here = float(self.speeds(np.array(u)))
-        made[near] = u + x[near] / speed_here
-        if self.round_ is not None:  # the parameter's speed jumps where the round starts
-            start = (1.0 - u) * speed_here
-            across = near & ((x > start) if u <= 1.0 else (x < start))
-            made[across] = 1.0 + (x[across] - start) / float(self.speeds(np.array(1.0 if u > 1.0 else 1.0 + 1e-9)))
-        return made
-
-    def distance(self, u: float, mark: float) -> float:
-        """Signed arc length (m) from u to `mark`."""
-        made, sign = 0.0, math.copysign(1.0, mark - u)
-        low, high = min(u, mark), max(u, mark)
-        for a, b in ((low, min(high, 1.0)), (max(low, 1.0), high)):
-            if b > a:
-                made += 0.5 * (b - a) * float(_GAUSS_W @ self.speeds(a + 0.5 * (b - a) * (_GAUSS_X + 1)))
-        return sign * made
-
     def corners(self, u: Array) -> BoolArray:
         """Whether the face has a corner at u: a sharp tip, an undercut's edge, a kink (where a linear relief starts).
 
@@ -169,14 +156,15 @@ class Face:
 
     def curvature(self, u: Any, most: float) -> Any:
         """Curvature (1/m) at u (a number or an array), at most `most`, which a corner has."""
-        step, at = 1e-5, np.clip(u, 0.0, 1.0)
-        before, after = np.maximum(at - step, 0.0), np.minimum(at + step, 1.0)
-        for mark in self.marks():  # not across it, beside which it is another
+        at = np.clip(u, 0.0, 1.0)
+        before, after = np.maximum(at - BESIDE, 0.0), np.minimum(at + BESIDE, 1.0)
+        for mark in self.marks:  # not across it, beside which it is another
             if 0.0 < mark < 1.0:
                 below = at <= mark
                 before = np.where(below, before, np.maximum(before, mark))
                 after = np.where(below, np.minimum(after, mark), after)
-        turned = -np.angle(self.normals(after) / self.normals(before)) / (self.speeds(at) * (after - before))
+        normals = self.normals(np.stack([before, after]))
+        turned = -np.angle(normals[1] / normals[0]) / (self.speeds(at) * (after - before))
         made = np.where(self.corners(np.asarray(u)), most, np.maximum(0.0, turned))
         if self.round_ is not None:
             made = np.where(u > 1.0, 1.0 / self.round_.radius, made)
@@ -184,10 +172,12 @@ class Face:
 
     def bend(self, u: Array) -> Array:
         """How much the normal turns around u, per length (1/m): across marks too, infinite at corners."""
-        before, after = np.clip(u - 1e-5, 0.0, self.end), np.clip(u + 1e-5, 0.0, self.end)
-        turned = np.abs(np.angle(self.normals(after) / self.normals(before)))
-        return np.where(self.corners(u), math.inf, turned / np.abs(self.points(after) - self.points(before)))
+        beside = np.clip(np.stack([u - BESIDE, u + BESIDE]), 0.0, self.end)
+        normals, points = self.normals(beside), self.points(beside)
+        turned = np.abs(np.angle(normals[1] / normals[0]))
+        return np.where(self.corners(u), math.inf, turned / np.abs(points[1] - points[0]))
 
+    @cached_property
     def marks(self) -> list[float]:
         """Parameters where the curvature jumps or the flank ends sharply."""
         found = [0.0, 1.0] if self.fall > 0.0 else [1.0]
@@ -296,32 +286,6 @@ class Flanks:
         apart = np.angle(seen * np.exp(-1j * self.wheel_frame(angle, number)) / mate)
         return np.where(inside, apart, np.inf)
 
-    def turns(self, found: Touching, k: int) -> tuple[float, float]:
-        """Angles (rad) of the teeth of pinion and wheel where the pair number k of `found` touches."""
-        pinion = found.angle[k] + found.pair[k] * self.pair.mesh_cycle
-        return float(pinion), float(self.wheel_frame(found.angle[k], found.pair[k]) + found.twist[k])
-
-    def gap(self, found: Touching, k: int, u: Array) -> Array:
-        """Gap (m) between points of the pinion's flank and the wheel's where the pair number k of `found` touches.
-
-        Along the common normal, which meets the wheel's flank where both have the same place along the tangent
-        (Newton's method for the wheel's arc length); infinite where it does not.
-        """
-        normal, start = found.normal[k], float(found.place[k, 1])
-        turn = np.exp(1j * self.turns(found, k)[1]) / normal  # then n is 1 and x is -i
-        touch = self.wheel.points(np.array(start))
-        from_touch = self.placed(found.angle[k], found.pair[k], u) / normal - touch * turn
-        arc, close = from_touch.imag, 1e-9 * np.abs(from_touch) + 1e-14 * self.pair.working_centre_distance
-        for _ in range(NEWTON):
-            place = self.wheel.moved(start, arc)
-            on, at = (place >= 0.0) & (place <= self.wheel.end), np.clip(place, 0.0, self.wheel.end)
-            apart = (self.wheel.points(at) - touch) * turn - from_touch
-            met = on & (np.abs(apart.imag) <= close)
-            if (met | ~on).all():
-                break
-            arc = arc - apart.imag / np.maximum(STEEPEST, (-self.wheel.normals(at) * turn).real)
-        return np.where(met, apart.real, np.inf)
-
     def touching(self, angles: Array) -> Touching:
         """First touch of every pair that can meet at the given pinion angles (rad), shape (p,)."""
         return self.met(*candidates(self.pair, angles))
@@ -331,18 +295,20 @@ class Flanks:
         pieces = [len(face.flank.deviation.pieces) for face in self.faces if face.flank.deviation is not None]
         coarse = COARSE + PER_PIECE * max(pieces, default=0)
         u = np.broadcast_to(np.linspace(0.0, self.pinion.end, coarse), (len(angle), coarse))
-        rows = np.arange(len(angle))
         best, least = np.zeros(len(angle)), np.full(len(angle), np.inf)
-        step = self.pinion.end / (coarse - 1)
+        open_, step = np.arange(len(angle)), self.pinion.end / (coarse - 1)
         for _ in range(LOOKS):
-            found = self.twist(angle[:, None], number[:, None], u)
-            lowest = np.argmin(found, axis=1)
-            better = found[rows, lowest] < least
-            best = np.where(better, u[rows, lowest], best)
-            least = np.where(better, found[rows, lowest], least)
-            # not a difference of u: near an end of the face several of them are the end
-            u = np.clip(best[:, None] + step * np.linspace(-1.0, 1.0, CLOSER), 0.0, self.pinion.end)
-            step *= 2.0 / (CLOSER - 1)
+            found = self.twist(angle[open_, None], number[open_, None], u)
+            place, value, known = _lowest(u, found, step)
+            with np.errstate(invalid="ignore"):
+                goes_on = np.isfinite(value) & ~(known & (np.abs(value - least[open_]) <= ROUNDING))
+            open_, place, reach = open_[goes_on], place[goes_on], 1.5 * step
+            best[open_], least[open_] = place, value[goes_on]
+            if len(open_) == 0:
+                break
+            middle = np.clip(place, reach, self.pinion.end - reach)[:, None]
+            u = np.clip(middle + reach * np.linspace(-1.0, 1.0, CLOSER), 0.0, self.pinion.end)
+            step = 2.0 * reach / (CLOSER - 1)
         best = np.where(best < AT_AN_END, 0.0, best)
         meets = np.isfinite(least)
         return self._described(position[meets], angle[meets], number[meets], best[meets], least[meets])
@@ -363,6 +329,23 @@ class Flanks:
         bent = self.pinion.curvature(u, math.inf) + self.wheel.curvature(mate, math.inf)
         flank, turn = np.tile(np.array([0, 1]), (len(angle), 1)), np.zeros((len(angle), 2))
         return Touching(position, number, angle, twist, place, radii, point, normal, arm, bent, flank, turn)
+
+
+def _lowest(u: Array, values: Array, step: float) -> tuple[Array, Array, BoolArray]:
+    """Place and value of the lowest point of the parabola through the lowest value of each row and those beside it,
+    `step` apart; and whether these are finite, so that no end of the mate's flank lies between them.
+    """
+    rows, last = np.arange(len(u)), u.shape[1] - 1
+    k = np.argmin(values, axis=1)
+    lowest, middle = values[rows, k], np.minimum(np.maximum(k, 1), last - 1)
+    before, here, after = (values[rows, middle + j] for j in (-1, 0, 1))
+    known = np.isfinite(before + here + after)
+    before, after = (np.subtract(one, here, out=np.zeros(len(u)), where=known) for one in (before, after))
+    bend = np.where(known & (before + after > 0), before + after, np.inf)
+    shift = np.minimum(np.maximum(0.5 * (before - after) / bend, -1.0), 1.0)
+    value = here + shift * (0.5 * (after - before) + 0.5 * shift * (before + after))
+    better = known & (value < lowest)
+    return np.where(better, u[rows, middle] + step * shift, u[rows, k]), np.where(better, value, lowest), known
 
 
 def candidates(pair: MeshGeometry, angles: Array) -> tuple[IntArray, Array, IntArray]:
