@@ -47,8 +47,9 @@ from .half_plane_result import (
     no_contacts,
     pair_sums,
 )
-from .half_plane_step import WINDOW, State, Step, moved_on, smooth_influence, step, usual_approach
-from .panels import PANELS, Couplings, couplings, forces_of_overlaps
+from .half_plane_start import BATCH, first_state, unloaded_state
+from .half_plane_step import State, Step, moved_on, smooth_influence, step
+from .panels import Couplings, couplings
 from .position import STATUS, Positions, together
 from .records import joined, taken
 from .zones import completed
@@ -76,8 +77,6 @@ AHEAD, LEAST_AHEAD = 1e-3, 1e-10
 TINY = 1e-300
 #: Rigid clearance (rad) up to which a tooth pair is looked at.
 CLEAR = 1e-7
-#: Positions solved side by side.
-BATCH = 128
 
 
 def solve_half_plane(
@@ -129,6 +128,8 @@ class _Open:
 
     def kept(self, positions: BoolArray) -> _Open:
         """Only some of the positions, shape (m,)."""
+        if positions.all():
+            return self
         return _Open(self.numbers[positions], taken(self.pairs, np.flatnonzero(positions[self.couples.position])))
 
     def change(self, made: Step) -> Array:
@@ -156,46 +157,17 @@ class _Pairs:
     state: State
 
 
-def unloaded_state(law: HalfPlanePair, twists: Array, found: Touching) -> State:
-    """Tooth pairs where their rigid flanks touch, at twists (rad) of the positions, without forces."""
-    turn = [
-        found.angle + found.pair * law.pair.mesh_cycle + found.turn[:, 0],
-        law.flanks.wheel_frame(found.angle, found.pair) + twists[found.position] + found.turn[:, 1],
-    ]
-    nothing = np.zeros(len(found))
-    return State(
-        centre=found.point,
-        normal=found.normal,
-        turn=np.exp(1j * np.stack(turn, axis=1)),
-        flank=found.flank,
-        arc=law.arc_at(found.flank, found.place),
-        ends=law.tables.of(found.flank).ends,
-        force=nothing,
-        spread=nothing,
-        low=nothing,
-        high=nothing,
-        bearing=np.zeros((len(found), PANELS), dtype=bool),
-        reach=np.full(len(found), WINDOW),
-    )
-
-
 def _first(law: HalfPlanePair, twists: Array, found: Touching) -> _Open:
-    """Forces to begin with: the overlaps of the rigid gears, taken up by the teeth and usual contacts."""
-    state = unloaded_state(law, twists, found)
-    start = _Open(np.unique(found.position), _Pairs(found, state))
-    if len(found) == 0:
-        return start
-    overlap = found.arm[:, 1] * (twists[found.position] - found.twist)
-    T = smooth_influence(law, state.seen, state.arc, start.couples).compliance
-    force = forces_of_overlaps(overlap, usual_approach(law), T, start.couples)
-    return _Open(start.numbers, _Pairs(found, replace(state, force=force)))
+    numbers = np.unique(found.position)
+    couples = couplings(np.searchsorted(numbers, found.position), found.pair, len(numbers))
+    return _Open(numbers, _Pairs(found, first_state(law, twists, found, couples)[0]))
 
 
 def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) -> Positions:
     status, iterations = np.full(len(angles), "no_contact", dtype=STATUS), np.zeros(len(angles), dtype=np.int64)
     names = (*SUMS, "tangent")
     numbers: dict[str, Any] = {name: np.zeros(len(angles)) for name in names}
-    contacts = [no_contacts()]
+    contacts: list[PairContacts] = []
     open_ = _first(law, twists, found)
     number, began, rounds = 0, 0, 0
     while len(open_.numbers) and number - began < STEPS and rounds < ROUNDS:  # again for what is not settled
@@ -224,7 +196,9 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
         status[solved] = "converged"
         for name in names:
             numbers[name][solved] = ended.sums[name][ended.settled]
-        contacts.append(taken(ended.contacts, status[ended.contacts.position] == "converged"))
+        contacts.append(ended.contacts)
+        if not ended.settled.all():
+            contacts[-1] = taken(ended.contacts, status[ended.contacts.position] == "converged")
         if ended.more:
             began, rounds = number, rounds + 1
         if not ended.settled.all():
@@ -233,8 +207,8 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
     status[failed] = "not_converged"
     for name in names:
         numbers[name][failed] = np.nan
-    found_ = contacts[1] if len(contacts) == 2 else joined(contacts)
-    if len(contacts) > 2:
+    found_ = joined(contacts) if contacts else no_contacts()
+    if len(contacts) > 1:
         found_ = taken(found_, np.lexsort((found_.arc[:, 0], found_.pair, found_.position)))
     return Positions(
         pinion_angle=angles, twist=twists, status=status, iterations=iterations, contacts=found_, **numbers
@@ -297,9 +271,10 @@ def _finished(law: HalfPlanePair, open_: _Open, twists: Array) -> _Ended:
     change, state = both.change(made)[:count], both.pairs.state
     now = _Open(open_.numbers, _Pairs(pairs.found, taken(moved_on(law, state, made, near=False), here)))
     one, two = (taken(state, here), taken(made, here)), (taken(state, on), taken(made, on))
-    of_pairs, ahead_of_pairs = pair_sums(law, *one), pair_sums(law, *two)
+    of_both = pair_sums(law, state, made)
+    of_pairs = {name: values[here] for name, values in of_both.items()}
     sums = {name: couples.total(of_pairs[name]) for name in SUMS}
-    sums["tangent"] = couples.total(ahead_of_pairs["torque_wheel"] - of_pairs["torque_wheel"]) / ahead
+    sums["tangent"] = couples.total(of_both["torque_wheel"][on] - of_pairs["torque_wheel"]) / ahead
     right = couples.total(~one[1].solution.settled) == 0
     settled = right & (change <= TOLERANCE) & (sums["tangent"] > 0)
     known = of_pairs | contact_rates(law, one, two, ahead[couples.position])
@@ -323,10 +298,9 @@ def coupling_compliances(law: HalfPlanePair, pinion_angles: Array, twists: Array
     """
     met = law.teeth.touching(pinion_angles)
     met = met.take(np.flatnonzero(met.twist < twists[met.position]))
-    start = _first(law, twists, met)
-    couples = start.couples
+    couples = couplings(met.position, met.pair, len(twists))
+    state = unloaded_state(law, twists, met)
     arm = met.arm[:, 1] / law.pair.wheel.base_radius
-    state = start.pairs.state
     found = smooth_influence(law, state.seen, state.arc, couples).compliance / law.width
     found = found / (arm[couples.first] * arm[couples.second])
     upper, own = couples.step > 0, met.angle + met.pair * law.pair.mesh_cycle

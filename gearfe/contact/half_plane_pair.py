@@ -16,8 +16,9 @@ from ..typing import Array, ComplexArray, IntArray
 from .flank_compliance import FlankCompliance, Shapes, corner_of, flank_compliances, shapes_of
 from .scene import MeshingPair
 
-#: Even places along a flank for `Finely`.
-FINELY = 128
+#: Even places along a flank for `Finely`; places at which both faces of a contact are compared where they have no
+#: deviations, and besides for each piece of a deviation.
+FINELY, PLACES, PER_PIECE = 128, 32, 2
 
 
 @dataclass(frozen=True)
@@ -156,6 +157,13 @@ class HalfPlanePair:
         distance = np.stack([side.distance(at) for side, at in zip(self.sides, arcs, strict=True)])
         values = self.shapes.at(arcs.T)[:, :, 0].transpose(1, 2, 0)
         return Finely(ends[:, :1], (FINELY - 1) / np.diff(ends), values, distance)
+
+    @cached_property
+    def looked_at(self) -> Array:
+        """Places at which both faces of a contact are compared, in parts of the length that they share."""
+        deviations = [face.flank.deviation for face in self.teeth.faces]
+        pieces = max((len(one.pieces) for one in deviations if one is not None), default=0)
+        return np.linspace(0.0, 1.0, PLACES + PER_PIECE * pieces)
 
     @cached_property
     def bump_squares(self) -> Array:

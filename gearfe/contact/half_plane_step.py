@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -11,8 +10,8 @@ from ..gear.flank_curve import FlankTables
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from . import neighbours
 from .half_plane_pair import HalfPlanePair
-from .moved_faces import WAY, Faces, Windows, windows
-from .panels import MIDDLES, WIDTHS, Couplings, Pressed, first_guess, influence, pressed
+from .moved_faces import LOOK, WAY, Faces, windows
+from .panels import MIDDLES, PANELS, WIDTHS, Couplings, Pressed, first_guess, influence, pressed
 
 #: Gap at the window's ends in units of that at the ends of Hertz's contact of the same force, and what it grows by
 #: where the pressure reaches an end: beside edges contacts are wider.
@@ -26,6 +25,8 @@ USUAL_WIDTH = 0.01
 LEAST_DISTANCE = 1e-9
 #: Directions of the forces of a contact on pinion and wheel along n.
 SIGN = np.array([-1.0, 1.0])
+#: Distances of the panels' middles in a window of half width 1.
+_BETWEEN = np.diff(MIDDLES)
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class State:
     force, spread : ndarray, shape (p,)
         Force per width (N/m) that displaces the faces, and the variance of its pressure (m2).
     low, high : ndarray, shape (p,)
-        Ends of the windows of the step before along the tangent from O (m).
+        Ends of the windows along the tangent from O (m).
     bearing : ndarray of bool, shape (p, n)
         Panels that bore then; none at first.
     reach : ndarray, shape (p,)
@@ -174,6 +175,16 @@ def usual_approach(law: HalfPlanePair) -> float:
     return float(law.compliance * (0.5 - np.log(0.5 * USUAL_WIDTH * law.pair.pinion.module)))
 
 
+def least_force(law: HalfPlanePair) -> float:
+    """Force per width (N/m) below which windows are not made smaller."""
+    return float(LEAST_WIDTH**2 * law.pair.pinion.module / (0.2 * law.compliance))
+
+
+def usual_width(law: HalfPlanePair, force: Array) -> Array:
+    """Half width (m) of a usual contact that carries forces per width (N/m)."""
+    return np.asarray(np.sqrt(0.2 * law.compliance * law.pair.pinion.module * force))
+
+
 def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool = True, held: bool = False) -> Step:
     """Solve the panels of all contacts with the faces displaced by the state's forces.
 
@@ -182,7 +193,7 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
     search
         Whether windows are searched for; else they stay.
     held
-        Whether the bearing panels stay too, so that the step is a smooth function of its state.
+        Whether the bearing panels stay, so that the step is a smooth function of its state.
     """
     normal, force = state.seen, state.force
     smooth = smooth_influence(law, normal, state.arc, couples)
@@ -210,17 +221,23 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
 
     low, high, found = state.low, state.high, None
     if search:
-        found = _searched(law, tables, state, faces, couples, normal)
-        low, high = found.low, found.high
+        floor = np.maximum(force, LEAST_FORCE * couples.total(force)[couples.position] + least_force(law))
+        scale, reach = usual_width(law, floor), faces.range(tables, state.ends)
+        look = np.minimum(np.maximum(scale[:, None] * LOOK, reach[0][:, None]), reach[1][:, None])
+        arcs, heights, _ = faces.heights(tables, look)
+        gap = heights[:, 1] - heights[:, 0]
+        if len(beside):
+            gap += neighbours.opened(law, couples, normal, (state.arc, force, state.spread), arcs)
+        found = windows(look, heights, gap, state.reach * law.compliance * floor)
+        low, high = found.low, np.maximum(found.high, found.low + 2e-4 * scale)
     half = 0.5 * (high - low)
-    x = np.empty((len(half), len(MIDDLES) + 1))
-    np.add(0.5 * (high + low)[:, None], half[:, None] * MIDDLES, out=x[:, :-1])
-    x[:, -1] = 0.0  # O itself
+    x = np.zeros((len(half), PANELS + 1))  # at last O itself
+    np.add(0.5 * (high + low)[:, None], half[:, None] * MIDDLES, out=x[:, :PANELS])
     arcs, heights, points = faces.heights(tables, x)
-    arc, height = arcs[:, :, -1], 0.5 * (heights[:, 0, -1] + heights[:, 1, -1])
-    x, width, arcs, heights = x[:, :-1], half[:, None] * WIDTHS, arcs[:, :, :-1], heights[:, :, :-1]
+    arc, height = arcs[:, :, PANELS], 0.5 * (heights[:, 0, PANELS] + heights[:, 1, PANELS])
+    x, width, arcs, heights = x[:, :PANELS], half[:, None] * WIDTHS, arcs[:, :, :PANELS], heights[:, :, :PANELS]
     gap = heights[:, 1] - heights[:, 0]
-    y = np.maximum(np.abs(points[:, :, :-1] - corner[:, :, None]), LEAST_DISTANCE)
+    y = np.maximum(np.abs(points[:, :, :PANELS] - corner[:, :, None]), LEAST_DISTANCE)
     along = law.inverse_modulus * (tension + shear.real)
     edges = np.log(y[:, :, :, None] + y[:, :, None, :]) * (-along[:, :, None, None] * width[:, None, None, :])
     K = influence(half, law.compliance) + edges[:, 0] + edges[:, 1]
@@ -240,12 +257,12 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
         np.add.at(into, couples.first[beside], (shared @ p[couples.second[beside], None, :, None])[..., 0])
     deformed = heights - WAY[:, None] * into
     middle = (far[:, :, None] * deformed).sum(axis=1)
-    area = (between * np.diff(x)).sum(axis=1)
-    slope = (between * np.diff(middle)).sum(axis=1) / np.where(area > 0, area, 1.0)
+    area = between @ _BETWEEN
+    slope = (between * (middle[:, 1:] - middle[:, :-1])).sum(axis=1) / np.where(area > 0, half * area, 1.0)
     outgrown: BoolArray = np.zeros(len(p), dtype=bool)
     if found is not None:
         place, slope = np.where(loaded, place, found.nearest), np.where(loaded, slope, found.lean)
-        outgrown = np.asarray(((p[:, [0, -1]] > 0) & found.free).any(axis=1))
+        outgrown = ((p[:, 0] > 0) & (low > reach[0])) | ((p[:, -1] > 0) & (high < reach[1]))
     energy = 0.5 * (
         (p * width * solution.approach).sum(axis=1)
         + solution.force * couples.times(smooth.compliance, solution.force)
@@ -263,27 +280,12 @@ def _distances(law: HalfPlanePair, tables: FlankTables, corner: ComplexArray, ar
     return y, near[:, ::-1] / near.sum(axis=1, keepdims=True)
 
 
-def _searched(
-    law: HalfPlanePair, tables: FlankTables, state: State, faces: Faces, couples: Couplings, normal: ComplexArray
-) -> Windows:
-    """Windows by the gap beside its least."""
-    module = law.pair.pinion.module
-    least = LEAST_WIDTH**2 * module / (0.2 * law.compliance)
-    floor = np.maximum(state.force, LEAST_FORCE * couples.total(state.force)[couples.position] + least)
-    scale = np.sqrt(0.2 * law.compliance * floor * module)
-    depth = state.reach * law.compliance * floor
-    opened = None
-    if len(couples.neighbours):
-        opened = partial(neighbours.opened, law, couples, normal, (state.arc, state.force, state.spread))
-    return windows(faces, tables, state.ends, scale, depth, opened)
-
-
 def moved_on(law: HalfPlanePair, state: State, made: Step, *, near: BoolArray | bool) -> State:
     """What the next step starts from: frames at the mean place of the pressure, along the mean normal under it.
 
     Windows grow only `near` the solution, so that they do not depend on the way to it.
     """
-    found, place = made.solution, made.place
+    solution, place = made.solution, made.place
     arc = made.arc + place[:, None] * WAY
     turned = 1 + 1j * made.slope
     return State(
@@ -293,10 +295,10 @@ def moved_on(law: HalfPlanePair, state: State, made: Step, *, near: BoolArray | 
         flank=state.flank,
         arc=np.minimum(np.maximum(arc, law.tables.low[state.flank, 0]), law.tables.high[state.flank, 0]),
         ends=state.ends,
-        force=found.force,
+        force=solution.force,
         spread=made.spread,
         low=made.low - place,
         high=made.high - place,
-        bearing=found.pressure > 0,
+        bearing=solution.pressure > 0,
         reach=np.where(made.outgrown & near, WIDER * state.reach, state.reach),
     )

@@ -13,13 +13,12 @@ their second axis.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..gear.flank_curve import FlankTables
-from ..typing import Array, BoolArray, ComplexArray
+from ..typing import Array, ComplexArray
 
 #: Most steps of Newton's method for the arc at a place along the tangent, its last move in windows, and least cosine
 #: between tangent and face.
@@ -59,7 +58,7 @@ class Faces:
         start, turn = self.arc[:, :, None], self.turn[:, :, None]
         stretch, offset = self.stretch[:, :, None], self.offset[:, :, None]
         x = x[:, None, :] if x.ndim == 2 else x
-        close = NEAR * np.ptp(x, axis=2, keepdims=True)
+        close = NEAR * (x.max(axis=2, keepdims=True) - x.min(axis=2, keepdims=True))
         s = np.minimum(np.maximum(start + _WAYS * x, flanks.low), flanks.high)
         for _ in range(NEWTON):
             (a, b, c, d), t = flanks.pieces(s)
@@ -92,57 +91,39 @@ class Windows:
         x where the faces are nearest to each other (m).
     lean : ndarray, shape (p,)
         Slope of the mean of both faces there (-).
-    free : ndarray of bool, shape (p, 2)
-        Whether both faces go on beyond the window's ends.
     """
 
     low: Array
     high: Array
     nearest: Array
     lean: Array
-    free: BoolArray
 
 
 #: Places at which a window is searched for, in units of the contact's expected half width.
-_LOOK = np.concatenate([-np.geomspace(0.03, 30, 20)[::-1], [0.0], np.geomspace(0.03, 30, 20)])
+LOOK = np.concatenate([-np.geomspace(0.03, 30, 20)[::-1], [0.0], np.geomspace(0.03, 30, 20)])
 
 
-def windows(
-    faces: Faces,
-    flanks: FlankTables,
-    ends: Array,
-    scale: Array,
-    depth: Array,
-    beside: Callable[[Array], Array] | None = None,
-) -> Windows:
-    """Windows in which the gap is at most `depth` (m) above its least, linear in its root between places of a search.
+def windows(x: Array, h: Array, gap: Array, depth: Array) -> Windows:
+    """Windows in which the gap is at most `depth` (m) above its least, linear in its root between places.
 
     Parameters
     ----------
-    ends : ndarray, shape (p, 2, 2)
-        First and last arcs of the faces that may belong to the contacts (m).
-    scale, depth : ndarray, shape (p,)
-        Expected half width and largest gap of the contacts (m).
-    beside
-        What opens the gap besides, shape (p, n) (m), at arcs of the faces, shape (p, 2, n) (m).
+    x, h : ndarray, shape (p, m), (p, 2, m)
+        Rising places along the tangent (m), and heights of the faces there (m).
+    gap, depth : ndarray, shape (p, m), (p,)
+        m.
     """
-    low, high = faces.range(flanks, ends)
-    x = np.minimum(np.maximum(scale[:, None] * _LOOK, low[:, None]), high[:, None])
-    arcs, h, _ = faces.heights(flanks, x)
-    gap = h[:, 1] - h[:, 0] + (0.0 if beside is None else beside(arcs))
-    row, count, nearest = np.arange(len(x)), x.shape[1], np.argmin(gap, axis=1)
-    over = np.sqrt(gap - gap.min(axis=1, keepdims=True)) - np.sqrt(depth)[:, None]
-    found = []
-    for way in (-1, 1):
-        beyond = (over > 0) & (way * (np.arange(count) - nearest[:, None]) > 0)
-        first = np.argmax(beyond, axis=1) if way > 0 else count - 1 - np.argmax(beyond[:, ::-1], axis=1)
-        first = np.where(beyond.any(axis=1), first, count - 1 if way > 0 else 0)
-        inner = np.clip(first - way, 0, count - 1)
-        a, b = over[row, inner], over[row, first]
-        share = np.where(b > np.maximum(a, 0), -a / np.where(b > a, b - a, 1.0), 1.0)
-        found.append(x[row, inner] + np.clip(share, 0, 1) * (x[row, first] - x[row, inner]))
-    left, right = np.maximum(nearest - 1, 0), np.minimum(nearest + 1, count - 1)
+    row, last, nearest = np.arange(len(x)), x.shape[1] - 1, np.argmin(gap, axis=1)
+    over = np.sqrt(gap - gap[row, nearest, None]) - np.sqrt(depth)[:, None]
+    # both ways at once: to the left everything reversed
+    over, places = np.stack([over[:, ::-1], over]), np.stack([x[:, ::-1], x])
+    beyond = (over > 0) & (np.arange(last + 1) > np.stack([last - nearest, nearest])[:, :, None])
+    first = np.argmax(beyond, axis=2)
+    first = np.where(first > 0, first, last)
+    inner, way = np.maximum(first - 1, 0), np.array([[0], [1]])
+    a, b, start = over[way, row, inner], over[way, row, first], places[way, row, inner]
+    share = np.where(b > np.maximum(a, 0), -a / np.where(b > a, b - a, 1.0), 1.0)
+    found = start + np.minimum(np.maximum(share, 0), 1) * (places[way, row, first] - start)
+    left, right = np.maximum(nearest - 1, 0), np.minimum(nearest + 1, last)
     rise = 0.5 * (h[row, :, right] - h[row, :, left]).sum(axis=1)
-    lean = rise / np.maximum(1e-12, x[row, right] - x[row, left])
-    free = np.stack([found[0] > low, found[1] < high], axis=1)
-    return Windows(found[0], np.maximum(found[1], found[0] + 2e-4 * scale), x[row, nearest], lean, free)
+    return Windows(found[0], found[1], x[row, nearest], rise / np.maximum(1e-12, x[row, right] - x[row, left]))

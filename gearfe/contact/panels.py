@@ -102,14 +102,22 @@ class Couplings:
 
     def solved(self, free: Array, stiffness: Array, matrix: Array) -> Array:
         """F with F + stiffness (matrix F) = free within each position, shape (p,); both matrices by couple."""
-        size = (self.positions, self.slots)
-        dense, right = np.zeros((2, *size, self.slots)), np.zeros(size)
-        at = self.position[self.first], self.slot[self.first], self.slot[self.second]
-        dense[0][at], dense[1][at] = stiffness, matrix
-        right[self.position, self.slot] = free
-        system = dense[0] @ dense[1] + np.eye(self.slots)
-        solution = np.linalg.solve(system, right[..., None])[..., 0]
-        return np.asarray(solution[self.position, self.slot])
+        if self.slots == 1:
+            return np.asarray(free / (1.0 + stiffness * matrix))
+        row, entry, size = *self._places, self.slots
+        dense = np.zeros((2, self.positions * size * size))
+        dense[0, entry], dense[1, entry] = stiffness, matrix
+        right = np.zeros(self.positions * size)
+        right[row] = free
+        system = np.matmul(*dense.reshape(2, -1, size, size))
+        system[:, range(size), range(size)] += 1.0
+        return np.asarray(np.linalg.solve(system, right.reshape(-1, size, 1)).ravel()[row])
+
+    @cached_property
+    def _places(self) -> tuple[IntArray, IntArray]:
+        """Place of each contact, (p,), and of each couple, (c,), in arrays of all slots of all positions."""
+        row = self.position * self.slots + self.slot
+        return row, row[self.first] * self.slots + self.slot[self.second]
 
 
 def couplings(position: IntArray, number: IntArray, positions: int) -> Couplings:
@@ -168,13 +176,10 @@ class _Group:
         z, size = self.contacts.shape[1], gap.shape[1]
         right = np.zeros((*gap.shape, 1 + z))
         right[..., 0] = -gap
-        panel = np.arange(size)
-        right[:, panel, 1 + panel // (size // z)] = 1.0
-        if on.all():
-            return np.asarray(np.linalg.solve(self.K, right))
-        system = np.where(on[:, :, None] & on[:, None, :], self.K, 0.0)
-        system[:, panel, panel] = np.where(on, self.K[:, panel, panel], 1.0)
-        return np.asarray(np.linalg.solve(system, np.where(on[:, :, None], right, 0.0)))
+        for k in range(z):
+            right[:, k * (size // z) : (k + 1) * (size // z), 1 + k] = 1.0
+        system = np.where(on[:, :, None] & on[:, None, :], self.K, np.eye(size))
+        return np.asarray(np.linalg.solve(system, right * on[:, :, None]))
 
 
 def _groups(K: Array, between: Array, couples: Couplings) -> list[_Group]:
@@ -260,7 +265,7 @@ def first_guess(gap: Array) -> BoolArray:
     return np.asarray(gap < least + 0.75 * (end - least))
 
 
-def forces_of_overlaps(overlap: Array, compliance: float, T: Array, couples: Couplings) -> Array:
+def forces_of_overlaps(overlap: Array, compliance: Array, T: Array, couples: Couplings) -> Array:
     """Forces per width (N/m) >= 0 that take up overlaps (m) when contacts yield by `compliance` (m2/N) besides T."""
     on = overlap > 0
     force = np.zeros_like(overlap)

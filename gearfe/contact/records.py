@@ -27,6 +27,8 @@ def taken(record: Record, index: Any) -> Record:
 
 def joined(parts: Sequence[Record]) -> Record:
     """Records of one kind put one after the other."""
+    if len(parts) == 1:
+        return parts[0]
     made: dict[str, Any] = {}
     for field in fields(parts[0]):  # type: ignore[arg-type]
         values = [getattr(part, field.name) for part in parts]

@@ -34,8 +34,6 @@ from .panels import EDGES, Couplings
 from .records import joined, taken
 from .wedge import log_integral, mean_log
 
-#: Places at which both faces are compared where they have no deviations, and besides for each piece of a deviation.
-PLACES, PER_PIECE = 32, 2
 #: Force, in units of that of the position, up to which a missing contact is none.
 MISSED = 1e-5
 #: Rim of a window that counts as its own, in units of its width.
@@ -137,8 +135,9 @@ def _gaps(law: HalfPlanePair, state: State, couples: Couplings) -> tuple[Array, 
     rigid = (law.hub - state.centre[:, None]) / state.normal[:, None]
     faces = Faces(turn, rigid, np.zeros_like(turn), state.arc)
     low, high = faces.range(tables, state.ends)
-    x = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, _places(law))
-    arcs = np.clip(state.arc[:, :, None] + WAY[:, None] * x[:, None], tables.low, tables.high)  # nearly
+    x = low[:, None] + (high - low)[:, None] * law.looked_at
+    arcs = state.arc[:, :, None] + WAY[:, None] * x[:, None]  # nearly
+    arcs = np.minimum(np.maximum(arcs, tables.low), tables.high)
     moved, y = _smooth(law, state, couples, arcs)
     at = np.maximum(np.abs(tables.at(state.arc[:, :, None])[0] - law.corner[state.flank][:, :, None]), LEAST_DISTANCE)
     i, j = couples.first[couples.step == 0], couples.second[couples.step == 0]
@@ -169,11 +168,6 @@ def _beside_ellipse(law: HalfPlanePair, state: State, made: Step, i: int, x: Arr
     return np.asarray(law.compliance * (state.force[i] * mean_log(x, _half_widths(state)[i]) - logs))
 
 
-def _places(law: HalfPlanePair) -> int:
-    deviations = [face.flank.deviation for face in law.teeth.faces]
-    return PLACES + PER_PIECE * max((len(one.pieces) for one in deviations if one is not None), default=0)
-
-
 def _smooth(law: HalfPlanePair, state: State, couples: Couplings, arcs: Array) -> tuple[ComplexArray, Array]:
     """Smooth displacements of the faces at arcs (m) of shape (p, 2, m), tooth axes (m), and the distances y (m) of the
     arcs from the corners: linear between even places.
@@ -182,11 +176,11 @@ def _smooth(law: HalfPlanePair, state: State, couples: Couplings, arcs: Array) -
     load = state.force[couples.second][:, None] * SIGN
     at_stations = np.add.reduceat(each * load[:, :, None], couples.starts)
     fine = law.finely
-    t = np.clip((arcs - fine.start) * fine.per_length, 0.0, fine.count - 1.0)
+    t = np.minimum(np.maximum((arcs - fine.start) * fine.per_length, 0.0), fine.count - 1.0)
     moved = np.matmul(at_stations.swapaxes(0, 1), fine.values).swapaxes(0, 1)
     left = np.minimum(t.astype(np.int64), fine.count - 2)
-    part, gear = t - left, np.arange(2)[:, None]
-    lower, upper = (np.take_along_axis(moved, one, axis=2) for one in (left, left + 1))
+    part, gear, contact = t - left, np.arange(2)[:, None], np.arange(len(arcs))[:, None, None]
+    lower, upper = moved[contact, gear, left], moved[contact, gear, left + 1]
     near, far = fine.distance[gear, left], fine.distance[gear, left + 1]
     return lower + part * (upper - lower), near + part * (far - near)
 

@@ -1,6 +1,6 @@
 r"""Positions of a pair with deviations at given torques: all cells of pinion angles and torques, side by side.
 
-The twist of each cell is expected (`gearfe.contact.half_plane_twist`) and searched for until the torque is off by no
+The twist of each cell is expected (`gearfe.contact.half_plane_start`) and searched for until the torque is off by no
 more than `ACCEPTED`. The last step is Newton's of the search (`gearfe.stiffness.torque_control`), whose error is of the
 order of that squared; forces and widths move with their own rates. Small strain: finite strain, which the stiffness
 curve adds, changes approaches by 0.1 to 0.2 per cent.
@@ -15,8 +15,8 @@ import numpy as np
 
 from ..contact.half_plane import solve_half_plane
 from ..contact.half_plane_result import PairContacts
+from ..contact.half_plane_start import expected_twists
 from ..contact.half_plane_step import HalfPlanePair
-from ..contact.half_plane_twist import expected_twists
 from ..contact.position import Positions
 from ..contact.records import of_positions
 from ..gear.touching import Touching
