@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from gearfe.contact.compliance import REACH, FarField, GearBody
+from gearfe.contact.compliance import REACH, FarField, GearBody, MeshingPair, turn
 from gearfe.contact.element_batch import FirstContacts
 from gearfe.contact.elements import solve_elements
 from gearfe.contact.flank import flank_of, normal_stress_rows
 from gearfe.contact.laws import ContactLaw
 from gearfe.contact.position import Positions
-from gearfe.contact.scene import MeshingPair, turn
 from gearfe.verification.bodies import Bodies, ElasticBody
 
 Array = NDArray[Any]

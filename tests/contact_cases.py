@@ -6,9 +6,8 @@ import math
 from dataclasses import asdict
 from functools import cache
 
-from gearfe.contact.compliance import GearBody, gear_body
+from gearfe.contact.compliance import GearBody, MeshingPair, gear_body
 from gearfe.contact.laws import ContactLaw
-from gearfe.contact.scene import MeshingPair
 from gearfe.elasticity import Material, Plane
 from gearfe.gear.pair import Gear, GearPair, TipRelief
 from gearfe.meshing.recipe import sector_recipes

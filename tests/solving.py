@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from gearfe import GearPair
+from gearfe.contact.compliance import MeshingPair
 from gearfe.contact.position import Positions
-from gearfe.contact.scene import MeshingPair
-from gearfe.stiffness.position_solver import position_solver
+from gearfe.stiffness.positions import position_solver
 
 
 def solve_positions(gears: GearPair, elastic: MeshingPair, angles, twists) -> Positions:

@@ -152,7 +152,7 @@ def test_a_failed_position_is_told_and_in_the_table(tmp_path, capsys, monkeypatc
         made = solve_elements(pair, angles, twists, first)
         return made.stated(np.where(np.abs(angles - math.radians(4)) < 1e-9, "not_converged", made.status))
 
-    monkeypatch.setattr("gearfe.stiffness.position_solver.solve_elements", weak)
+    monkeypatch.setattr("gearfe.stiffness.positions.solve_elements", weak)
     code = main(["stiffness", str(JOB), "--out", str(tmp_path), "--twist-deg", "0.3", *QUICK, "--law", "nitsche"])
     assert code == 1
     said = capsys.readouterr()
@@ -338,7 +338,7 @@ def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
         bad = np.isclose(np.degrees(angles), 6.0)
         return made.stated(np.where(bad, "not_converged", made.status))
 
-    monkeypatch.setattr("gearfe.stiffness.position_solver.solve_elements", one_fails)
+    monkeypatch.setattr("gearfe.stiffness.positions.solve_elements", one_fails)
     options = ("--twist-deg", "0.3", "--angles", "3", "3", "9", "--fields", "9", "6", "3", "--no-picture")
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, "--law", "nitsche", *options]) == 1
     assert [r["status"] for r in rows(tmp_path)] == ["converged", "not_converged", "converged"]

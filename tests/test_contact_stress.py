@@ -10,8 +10,7 @@ from scipy.interpolate import LinearNDInterpolator
 
 from gearfe.contact.half_plane_result import PairContacts
 from gearfe.contact.panels import EDGES, MIDDLES
-from gearfe.stiffness.contact_stress import bumped, half_plane_stress
-from gearfe.stiffness.fields import pair_recovery
+from gearfe.stiffness.fields import bumped, half_plane_stress, pair_recovery
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import pair as gear_pair

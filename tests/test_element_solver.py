@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from gearfe.cli import main
-from gearfe.contact.scene import MeshingPair
+from gearfe.contact.compliance import MeshingPair
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.meshing.recipe import sector_recipes
-from gearfe.stiffness.position_solver import ElementSolver, HalfPlaneSolver
+from gearfe.stiffness.positions import ElementSolver, HalfPlaneSolver
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 
 from .gears import pair as gear_pair

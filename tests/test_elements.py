@@ -8,13 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearfe.contact.compliance import gear_body
+from gearfe.contact.compliance import MeshingPair, gear_body
 from gearfe.contact.elements import first_contacts, solve_elements
 from gearfe.contact.finite_strain import finite_strain_shares
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
 from gearfe.contact.position import Positions
-from gearfe.contact.scene import MeshingPair
 
 from .contact_cases import IRON, STEEL, WIDTH, condensed, gears, meshes
 from .solving import nodal, peak_pressure, solve_positions

@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 
 from gearfe.contact import finite_strain
-from gearfe.contact.compliance import gear_body
+from gearfe.contact.compliance import MeshingPair, gear_body, sector_displacements
 from gearfe.contact.laws import Nitsche
 from gearfe.contact.position import Positions
-from gearfe.contact.recovery import sector_displacements
-from gearfe.contact.scene import MeshingPair
 from gearfe.elasticity import Material, physical_gradients, triangle_shapes
 from gearfe.gear.pair import Gear, GearPair
 from gearfe.meshing.recipe import sector_recipes

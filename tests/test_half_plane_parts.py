@@ -8,8 +8,18 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from gearfe.contact.panels import MIDDLES, WIDTHS, couplings, first_guess, influence, pressed
-from gearfe.contact.wedge import ELLIPSE_W, ELLIPSE_X, mean_log, wedge_tensor
+from gearfe.contact.panels import (
+    ELLIPSE_W,
+    ELLIPSE_X,
+    MIDDLES,
+    WIDTHS,
+    couplings,
+    first_guess,
+    influence,
+    mean_log,
+    pressed,
+    wedge_tensor,
+)
 from gearfe.gear.flank_curve import flank_curve
 
 from .half_plane_pairs import PAIRS

@@ -11,14 +11,14 @@ import pytest
 
 from gearfe import InputError
 from gearfe.cli import main
+from gearfe.contact.compliance import MeshingPair
 from gearfe.contact.finite_strain import finite_strain_shares
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
-from gearfe.contact.influence_error import torque_changes
 from gearfe.contact.laws import HalfPlane
-from gearfe.contact.scene import MeshingPair
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.stiffness.curve import StiffnessCurve
-from gearfe.stiffness.position_solver import HalfPlaneSolver, position_solver
+from gearfe.stiffness.curve_error import torque_changes
+from gearfe.stiffness.positions import HalfPlaneSolver, position_solver
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 
 from .gears import pair as gear_pair

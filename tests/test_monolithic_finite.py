@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from gearfe.contact import finite_strain, laws
-from gearfe.contact.compliance import gear_body
+from gearfe.contact.compliance import MeshingPair, gear_body
 from gearfe.contact.finite_strain import finite_strain_shares
-from gearfe.contact.scene import MeshingPair
 from gearfe.elasticity import Material
 from gearfe.gear.pair import Gear, GearPair
 from gearfe.meshing.recipe import sector_recipes

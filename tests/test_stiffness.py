@@ -8,7 +8,7 @@ import pytest
 from gearfe import InputError, Material, sweep_stiffness
 from gearfe.gear.spur_gear import TipRelief
 from gearfe.loadmap.sweep import sweep_loads
-from gearfe.stiffness.position_solver import HalfPlaneSolver
+from gearfe.stiffness.positions import HalfPlaneSolver
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import pair

@@ -11,9 +11,8 @@ import pytest
 
 from gearfe.contact.elements import first_contacts, solve_elements
 from gearfe.contact.half_plane import HalfPlanePair, half_plane_pair, solve_half_plane
-from gearfe.contact.panels import MIDDLES, PANELS, WIDTHS, couplings, influence, pressed
+from gearfe.contact.panels import MIDDLES, PANELS, WIDTHS, couplings, influence, log_integral, pressed
 from gearfe.contact.position import Positions
-from gearfe.contact.wedge import log_integral
 from gearfe.gear.deviation import ToothDeviations
 from gearfe.stiffness.job import read_stiffness_job
 from gearfe.stiffness.sweep import elastic_pair

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearfe.contact.scene import MeshingPair
+from gearfe.contact.compliance import MeshingPair
 from gearfe.gear.deviation import Deviation, ToothDeviations
 from gearfe.gear.pair import GearPair
 from gearfe.gear.spur_gear import Gear

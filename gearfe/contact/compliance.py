@@ -9,20 +9,31 @@ Fourier transform over the teeth splits into one small system per harmonic (Thom
 .. math:: C_{ji} = \delta_{ij} A + P\,X_{j-i}\,P^T .
 
 Everything is expressed in the frame of the tooth that it belongs to.
+
+**In mesh.** The pinion's centre is the origin, the wheel's centre lies at (a, 0). At pinion angle 0 the pinion tooth 0
+is centred on the line of centres and a wheel space faces it; angles are counter-clockwise. Pair k joins the left
+flanks of the pinion tooth k and of the wheel tooth -1 - k (tooth 0 of the wheel is the one below the line of centres
+then). Places are global; displacements and forces refer to the axes of the tooth they belong to, in which compliances
+are the same at every position.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 
 from ..elasticity import Material, Plane, element_stiffness
+from ..errors import InputError
+from ..gear.deviation import NOMINAL, ToothDeviations
 from ..meshing.tooth_sector import SectorMesh
-from ..typing import Array
+from ..typing import Array, IntArray
 from .dissection import Condensed, condense
 from .flank import Flank, flank_of, normal_stress_rows
+from .laws import ContactLaw, HalfPlane
+from .position import FlankLoads
 
 
 @dataclass(frozen=True)
@@ -198,3 +209,125 @@ def _cyclic_compliance(stiffness: Array, teeth: int) -> Array:
     adjoint = tie.conj().transpose(0, 2, 1)
     per_harmonic = tie @ np.linalg.solve(adjoint @ (stiffness @ tie), adjoint)
     return np.fft.irfft(per_harmonic, n=teeth, axis=0)
+
+
+@dataclass(frozen=True)
+class MeshingPair:
+    """Two elastic gears in mesh.
+
+    Parameters
+    ----------
+    pinion, wheel
+        Elastic gears.
+    centre_distance
+        a (m).
+    width
+        Common face width (m).
+    law
+        Contact law.
+    coarsen, flank_coarsen, points_per_edge
+        What the meshes were asked for, see `gearfe.stiffness.sweep.elastic_pair`; for a coarser one of the same kind.
+    deviations
+        Of micrometres, which no mesh has.
+    """
+
+    pinion: GearBody
+    wheel: GearBody
+    centre_distance: float
+    width: float
+    law: ContactLaw
+    coarsen: float = 1.0
+    flank_coarsen: float = 1.0
+    points_per_edge: int = 4
+    deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL
+
+    def __post_init__(self) -> None:
+        check_deviations(self.deviations, self.law)
+        widths = [body.width for body in self.bodies]
+        if self.law.uses_stress and widths != [self.width, self.width]:
+            problem = f"the gears' surface stresses are made for contacts {widths} m wide"
+            raise InputError("width", self.width, problem, "make the gears with it: gear_body(..., width=...)")
+
+    @property
+    def bodies(self) -> tuple[GearBody, GearBody]:
+        """Pinion and wheel."""
+        return self.pinion, self.wheel
+
+    @property
+    def contact_compliances(self) -> tuple[float, float]:
+        """1/E' of both gears (1/Pa); a plane body of its own face width w_i carries the load of the common width and
+        counts with w/w_i.
+        """
+        one, two = (b.material.contact_compliance(b.plane) * self.width / b.thickness for b in self.bodies)
+        return one, two
+
+    @property
+    def pitch_angle(self) -> float:
+        """Mesh cycle in terms of the pinion's rotation (rad)."""
+        return 2 * np.pi / self.pinion.teeth
+
+    def wheel_angle(self, pinion_angle: Any, twist: Any) -> Any:
+        """Wheel rotation (rad): -pinion angle z1/z2 + twist."""
+        return -pinion_angle * self.pinion.teeth / self.wheel.teeth + twist
+
+    def tooth_angle(self, gear: int, tooth: Any, pinion_angle: Any, twist: Any) -> Any:
+        """Angle (rad) of the frame of a tooth of the pinion (gear 0) or wheel (gear 1); numbers or arrays."""
+        if gear == 0:
+            return pinion_angle + 2 * np.pi * tooth / self.pinion.teeth
+        return self.wheel_angle(pinion_angle, twist) + np.pi + (2 * tooth + 1) * np.pi / self.wheel.teeth
+
+    def centre(self, gear: int) -> Array:
+        """Centre of the pinion (0) or wheel (1), shape (2,) (m)."""
+        return np.array([gear * self.centre_distance, 0.0])
+
+
+def check_deviations(deviations: tuple[ToothDeviations, ToothDeviations], law: ContactLaw) -> None:
+    """Raise `InputError` for deviations that a law, or the one mesh cycle of a curve or map, cannot have."""
+    for name, own in zip(("pinion (driver)", "wheel (driven)"), deviations, strict=True):
+        if not own.alike:
+            what = "stand unevenly" if len(set(own.turn)) > 1 else "have different flanks"
+            problem = f"its teeth {what}: curves, load maps and mesh laws are of one mesh cycle that repeats"
+            cure = (
+                "leave out pitch errors, measured teeth that differ, and waves that are no multiple of the teeth; "
+                "gearfe microgeometry takes them"
+            )
+            raise InputError(f"deviations of the {name}", None, problem, cure)
+    if deviations != NOMINAL and not isinstance(law, HalfPlane):
+        problem = "takes flanks from meshes, which have no deviations of micrometres"
+        raise InputError("law", law.name, problem, 'write law = "half_plane", or leave [microgeometry] out')
+
+
+def turn(angle: float) -> Array:
+    """Rotation matrix of `angle` (rad)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]])
+
+
+def sector_displacements(
+    body: GearBody, loads: FlankLoads, position: IntArray, tooth: IntArray, *, rates: bool = False
+) -> Array:
+    """Nodal displacements of c sectors, by their teeth, in the axes of each (m).
+
+    Parameters
+    ----------
+    position, tooth : ndarray, shape (c,)
+        Number of the position, and of the tooth.
+    rates
+        Whether their derivatives with respect to the twist (m/rad) follow, another c.
+
+    Returns
+    -------
+    ndarray, shape (nodes, 2, c or 2 c)
+    """
+    of, load, step = loads.felt(position, tooth, body.teeth)
+    parts = []
+    for force in (loads.force, loads.rate) if rates else (loads.force,):
+        on_sides = force @ body.interface
+        sides, flank = np.zeros((len(position), body.interface.shape[1])), np.zeros((len(position), force.shape[1]))
+        for k in np.unique(step):
+            here = step == k
+            np.add.at(sides, of[here], on_sides[load[here]] @ body.coupling[k].T)
+            if k == 0:
+                np.add.at(flank, of[here], force[load[here]] @ body.own)
+        parts.append(np.concatenate([flank + sides @ body.interface.T, sides], axis=1))
+    return body.condensed.recover(np.concatenate(parts).T).reshape(-1, 2, sum(len(part) for part in parts))

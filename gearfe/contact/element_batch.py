@@ -19,9 +19,9 @@ import numpy as np
 
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .closest import Projection, project
+from .compliance import MeshingPair
 from .laws import carrying
-from .records import ranges
-from .scene import MeshingPair
+from .position import ranges
 
 
 @dataclass(frozen=True)

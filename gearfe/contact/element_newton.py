@@ -23,7 +23,7 @@ import numpy as np
 from ..typing import Array, ComplexArray, IntArray
 from .element_batch import Batch
 from .element_rows import Equations, Seen, State, equations_of, seen
-from .records import taken
+from .position import taken
 
 #: Steps after which a position has not converged.
 STEPS = 40

@@ -12,15 +12,14 @@ from dataclasses import replace
 import numpy as np
 
 from ..typing import Array, BoolArray, ComplexArray, IntArray
+from .compliance import MeshingPair
 from .element_batch import Batch, FirstContacts, batch_of, windows_of
 from .element_newton import Outcome, solve, turned
 from .element_rows import State, seen
 from .flank import edge_shapes
 from .flank_compliance import FlankCompliance
 from .half_plane_result import PairContacts
-from .position import Contacts, FlankLoads, PointPressures, Positions, no_contact
-from .records import of_positions
-from .scene import MeshingPair
+from .position import Contacts, FlankLoads, PointPressures, Positions, no_contact, of_positions
 
 #: Relative error of pressures and forces at which a position counts as converged.
 TOLERANCE = 1e-9

@@ -20,10 +20,8 @@ import numpy as np
 
 from ..elasticity import physical_gradients, triangle_shapes
 from ..typing import Array, IntArray
-from .compliance import GearBody
+from .compliance import GearBody, MeshingPair, sector_displacements
 from .position import TORQUES, Positions
-from .recovery import sector_displacements
-from .scene import MeshingPair
 
 #: Sectors on either side of a loaded tooth that take part: the effect is cubic in the strain and dies out fast.
 NEIGHBOURS = 1

@@ -5,7 +5,7 @@ A line load f per width at the arc t of a tooth moves the flank of the tooth k s
 .. math::
     u(s) = w\,H_k(s,t)\,f - \delta_{k0}\,\tfrac{1}{E'}\Big(\tfrac2\pi\ln|s-t|\,I + W\ln(y(s)+y(t))\Big) f
 
-with the width w and the surface of a half-plane and of a wedge (`.wedge`), y the distance from the corner in which
+with the width w and the surface of a half-plane and of a wedge (`.panels`), y the distance from the corner in which
 flank and tip circle meet, virtual under a tip round. What is left, H, is smooth: no load is near it any more. It is
 known from the finite-element answers to elliptic bumps of pressure at some fifteen stations, less the bracket under the
 same bumps,
@@ -35,10 +35,9 @@ from scipy.interpolate import CubicSpline
 from ..gear.flank_curve import FlankCurve, flank_curve
 from ..gear.pair import GearPair
 from ..typing import Array
-from .compliance import GearBody
+from .compliance import GearBody, MeshingPair
 from .flank import Flank, edge_shapes, gauss_rule
-from .scene import MeshingPair
-from .wedge import ELLIPSE_W, ELLIPSE_X, mean_log, wedge_tensor
+from .panels import ELLIPSE_W, ELLIPSE_X, mean_log, wedge_tensor
 
 #: Half width of a bump, in elements and at least in modules; distance of two stations in half widths.
 BUMP_ELEMENTS, BUMP_MODULES, SPACING = 2.0, 0.2, 0.8

@@ -6,8 +6,8 @@ finite-element and a half-space solution at a depth below the contact; here they
 
 **One position.** Every contact has a centre O with the common normal n, and panels at x along the tangent over the
 window in which the gap may close; a tooth pair has as many contacts as it bears on stretches of its flanks (`.zones`;
-`.neighbours` has their mutual terms). With the pressure p, its force per width :math:`F=\int p`, the gap g between the
-faces as moved by the loads :math:`F_0` of the step before (`.moved_faces`),
+`.half_plane_pair` has their mutual terms). With the pressure p, its force per width :math:`F=\int p`, the gap g
+between the faces as moved by the loads :math:`F_0` of the step before (`.moved_faces`),
 
 .. math::
     p \ge 0,\qquad g(x) + \frac{2}{\pi}\Big(\frac1{E_1'}+\frac1{E_2'}\Big)\int -\ln|x-\xi|\,p\,d\xi
@@ -50,8 +50,7 @@ from .half_plane_result import (
 from .half_plane_start import BATCH, first_state, unloaded_state
 from .half_plane_step import State, Step, moved_on, smooth_influence, step
 from .panels import Couplings, couplings
-from .position import STATUS, Positions, together
-from .records import joined, taken
+from .position import STATUS, Positions, joined, taken, together
 from .zones import completed
 
 __all__ = ["HalfPlanePair", "PairContacts", "half_plane_pair", "solve_half_plane"]

@@ -8,8 +8,7 @@ import numpy as np
 
 from ..gear.flank_curve import FlankTables
 from ..typing import Array, BoolArray, ComplexArray, IntArray
-from . import neighbours
-from .half_plane_pair import HalfPlanePair
+from .half_plane_pair import HalfPlanePair, opened, panel_influence, sideways, widths_in_smooth
 from .moved_faces import LOOK, WAY, Faces, windows
 from .panels import MIDDLES, PANELS, WIDTHS, Couplings, Pressed, first_guess, influence, pressed
 
@@ -212,8 +211,8 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
     beside = couples.neighbours
     if len(beside):
         i, j = couples.first[beside], couples.second[beside]
-        np.add.at(edge, i, neighbours.sideways(law, couples, normal, state.arc, y) * load[j])
-        across = neighbours.widths_in_smooth(couples, normal, smooth.moved[:, :, 2], excess)
+        np.add.at(edge, i, sideways(law, couples, normal, state.arc, y) * load[j])
+        across = widths_in_smooth(couples, normal, smooth.moved[:, :, 2], excess)
         np.add.at(wider, i, across * load[j] * normal[i])
     turn = state.turn / state.normal[:, None]
     offset = (law.hub - state.centre[:, None]) / state.normal[:, None] + turn * (displaced[:, :, 0] + edge + wider)
@@ -227,7 +226,7 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
         arcs, heights, _ = faces.heights(tables, look)
         gap = heights[:, 1] - heights[:, 0]
         if len(beside):
-            gap += neighbours.opened(law, couples, normal, (state.arc, force, state.spread), arcs)
+            gap += opened(law, couples, normal, (state.arc, force, state.spread), arcs)
         found = windows(look, heights, gap, state.reach * law.compliance * floor)
         low, high = found.low, np.maximum(found.high, found.low + 2e-4 * scale)
     half = 0.5 * (high - low)
@@ -241,7 +240,7 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
     along = law.inverse_modulus * (tension + shear.real)
     edges = np.log(y[:, :, :, None] + y[:, :, None, :]) * (-along[:, :, None, None] * width[:, None, None, :])
     K = influence(half, law.compliance) + edges[:, 0] + edges[:, 1]
-    shared = neighbours.panel_influence(law, couples, normal, arcs, width, y)
+    shared = panel_influence(law, couples, normal, arcs, width, y)
     bearing = state.bearing if state.bearing.any() else first_guess(gap)
     both = shared[:, 0] + shared[:, 1]
     solution = pressed(K, both, gap, width, smooth.compliance, force, couples, bearing, held=held)

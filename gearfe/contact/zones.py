@@ -9,8 +9,8 @@ a contact of its own, with its own centre, normal and window:
   they are not, a window that ends there is made wider, or, where the faces are clear in between, a contact is added and
   the flank cut where they are furthest apart.
 
-Contacts of one pair act on each other exactly as the panels of one window do (`.neighbours`), so one contact more or
-less is another discretisation of the same pressure, and no other answer.
+Contacts of one pair act on each other exactly as the panels of one window do (`.half_plane_pair`), so one contact more
+or less is another discretisation of the same pressure, and no other answer.
 
 **The gap of the deformed faces** over all of their length, seen from a contact's centre along its normal n, is that of
 the rigid faces (`.moved_faces`) and :math:`n\cdot(u_2-u_1)`: u by the smooth influence of all pairs of the position, by
@@ -30,9 +30,8 @@ from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .half_plane_pair import HalfPlanePair
 from .half_plane_step import SIGN, WIDER, WINDOW, State, Step, answers, usual_approach
 from .moved_faces import WAY, Faces
-from .panels import EDGES, Couplings
-from .records import joined, taken
-from .wedge import log_integral, mean_log
+from .panels import EDGES, Couplings, log_integral, mean_log
+from .position import joined, taken
 
 #: Force, in units of that of the position, up to which a missing contact is none.
 MISSED = 1e-5

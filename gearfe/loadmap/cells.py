@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..contact.compliance import MeshingPair
 from ..contact.finite_strain import finite_strain_shares, interpolated_shares
 from ..contact.position import Positions
-from ..contact.scene import MeshingPair
 from ..typing import Array, IntArray
 
 #: p: the share of finite strain of a single pair of teeth grows about like this power of its load.

@@ -25,10 +25,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..contact.compliance import GearBody, gear_body
+from ..contact.compliance import GearBody, MeshingPair, gear_body
 from ..contact.flank import Flank, edge_nodes, edge_shapes
 from ..contact.position import FlankLoads, Positions
-from ..contact.scene import MeshingPair
 from ..gear.pair import Gear, GearPair
 from ..meshing.recipe import sector_recipes
 from ..meshing.tooth_sector import SectorRecipe, sector_mesh

@@ -26,17 +26,15 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..contact.compliance import MeshingPair
 from ..contact.finite_strain import with_shares
 from ..contact.laws import ContactLaw
-from ..contact.position import Positions, together
-from ..contact.records import joined
-from ..contact.scene import MeshingPair
+from ..contact.position import Positions, joined, together
 from ..elasticity import Material, Plane
 from ..errors import InputError
 from ..gear.deviation import NOMINAL, ToothDeviations
 from ..gear.pair import GearPair
-from ..stiffness.position_solver import PositionSolver, position_solver
-from ..stiffness.positions import Progress, at_torques, closed, honest, usual_stiffness
+from ..stiffness.positions import PositionSolver, Progress, at_torques, closed, honest, position_solver, usual_stiffness
 from ..stiffness.sweep import STEEL, assembled_curve, distinct_angles, elastic_pair
 from ..stopwatch import Stopwatch
 from ..tables.laws import DEFAULT_LAW

@@ -17,8 +17,7 @@ from ..contact.half_plane import solve_half_plane
 from ..contact.half_plane_result import PairContacts
 from ..contact.half_plane_start import expected_twists
 from ..contact.half_plane_step import HalfPlanePair
-from ..contact.position import Positions
-from ..contact.records import of_positions
+from ..contact.position import Positions, of_positions
 from ..gear.touching import Touching
 from ..stiffness.torque_control import newton_twist, twists_for_torque
 from ..typing import Array, IntArray

@@ -8,11 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..contact.half_plane_loads import flank_loads
-from ..contact.half_plane_result import PairContacts
+from ..contact.half_plane_result import PairContacts, flank_loads
 from ..contact.half_plane_step import HalfPlanePair
-from ..contact.position import Positions
-from ..contact.records import joined, of_positions, taken
+from ..contact.position import Positions, joined, of_positions, taken
 from ..errors import InputError
 from ..gear.deviation import ToothDeviations
 from ..gear.iso6336 import mesh_stiffness

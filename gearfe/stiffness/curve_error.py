@@ -11,9 +11,15 @@ with the curve's own factor :math:`c_0` on the default sizes. p is 1, the lowest
 about one element's half width; 1.5 to 2 where the mesh sees the contact well). The last term stands for what both
 meshes share.
 
-**The half-plane law** needs no second sweep. The influence function of the coarser gears changes the energy, and with
-it the torque, of each position by :math:`\delta T` (`gearfe.contact.influence_error`), so that
-:math:`d_i = |\delta T_i/T_i|/(c^p-1)`, and
+**The half-plane law** needs no second sweep. At a given twist the energy of a position is
+:math:`U = \max_F\,(g\cdot F - \tfrac12 F\,C\,F)` over the forces, and stationary with their places and normals. The
+influence function of the coarser gears (other elements, stations and bumps; wedge and half-plane cancel) changes the
+compliance between the contacts by :math:`\delta C`, and with the forces, places, normals and widths moving on at the
+rates that each solution has, the torque by
+
+.. math:: \delta T = -\frac{d}{d\varphi}\,\tfrac12\,F(\varphi)\,\delta C(\varphi)\,F(\varphi) .
+
+Then :math:`d_i = |\delta T_i/T_i|/(c^p-1)`, and
 
 .. math:: e_i = \max\Big(d_i,\; 2\,\big(\tfrac1n\sum_j d_j^2\big)^{1/2}\Big),
 
@@ -30,14 +36,42 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..typing import Array, BoolArray, IntArray
+from ..contact.compliance import MeshingPair
+from ..contact.half_plane_pair import HalfPlanePair, half_plane_pair
+from ..contact.half_plane_result import PairContacts
+from ..contact.half_plane_step import SIGN, smooth_influence
+from ..contact.panels import Couplings, couplings
+from ..contact.position import Positions
+from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .curve import ErrorEstimate
+from .positions import HalfPlaneSolver, PositionSolver, at_twists, position_solver
+from .torque_control import ANGLE_ROUNDING
 
 #: Coarsening c, assumed order of convergence p, share of the meshes' common error at the default sizes, and largest
 #: number of positions solved twice.
 COARSENING, ORDER, COMMON, POSITIONS = 1.6, 1.0, 5e-5, 20
 #: Standard deviations that cover 95 %.
 COVERAGE = 2.0
+#: Way ahead in twist for the derivative of the energy, as a share of the way in which the forces double.
+AHEAD = 1e-4
+
+
+def curve_error(solver: PositionSolver, coarse: MeshingPair, solved: Positions, *, finite: bool) -> ErrorEstimate:
+    """Error of solved positions from the coarser gears `coarse`: of all of them by the influence function of these, of
+    some by a law on the mesh, which solves them again, resolved there or not.
+    """
+    elastic, good = solver.elastic, solved.status == "converged"
+    chosen = solved.take(np.flatnonzero(good) if isinstance(solver, HalfPlaneSolver) else solved_twice(good))
+    # a twist of some bits of the gears' angles is not what the gears are turned by
+    rounding = ANGLE_ROUNDING * np.abs(chosen.tangent / chosen.torque_wheel)
+    if isinstance(solver, HalfPlaneSolver):
+        changes = torque_changes(solver.law, half_plane_pair(solver.pair, coarse), chosen)
+        return influence_estimate(chosen.pinion_angle, changes, unseen=rounding)
+    again = position_solver(solver.pair, coarse, resolved_only=False)
+    there = at_twists(again, chosen.pinion_angle, chosen.twist, None, finite=finite)
+    other = np.where(there.status == "converged", there.torque_wheel, np.nan)
+    coarsen = elastic.coarsen * max(1.0, elastic.flank_coarsen)
+    return error_estimate(chosen.pinion_angle, chosen.torque_wheel, other, coarsen=coarsen, unseen=rounding)
 
 
 def solved_twice(converged: BoolArray) -> IntArray:
@@ -89,3 +123,44 @@ def error_estimate(
         relative = np.where(known, np.maximum(single, usual), max(usual, float(single[known].max())))
         relative = relative + COMMON * coarsen**ORDER + unseen
     return ErrorEstimate(angles, relative, COARSENING, ORDER)
+
+
+def torque_changes(law: HalfPlanePair, other: HalfPlanePair, found: Positions) -> Array:
+    """Relative changes of the wheel's torque when the influence function of `law` is that of `other`, shape (n,).
+
+    Parameters
+    ----------
+    found
+        Positions solved with `law`; not-a-number where there is no contact.
+    """
+    c = found.contacts
+    assert isinstance(c, PairContacts)
+    angle, twist = found.pinion_angle[c.position], found.twist[c.position]
+    frames = angle + c.pair * law.pair.mesh_cycle, law.flanks.wheel_frame(angle, c.pair) + twist
+    normal = c.normal[:, None] * np.exp(-1j * (np.stack(frames, axis=1) + law.teeth.turn(c.pair)))
+    couples = couplings(c.position, c.pair, len(found))
+    here = c.force, c.arc, normal, 0.25 * c.half_width**2
+    total = couples.total(c.force)
+    rate = couples.total(np.abs(c.force_rate))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        by = AHEAD * np.where(rate > 0, total / rate, np.nan)
+        b = by[c.position]
+        there = (
+            c.force + c.force_rate * b,
+            c.arc + c.arc_rate * b[:, None],
+            normal * np.exp(1j * (c.normal_rate[:, None] - np.array([0.0, 1.0])) * b[:, None]),
+            here[3] * np.exp(2 * c.growth * b),
+        )
+        energies = [_energy(other, couples, *at) - _energy(law, couples, *at) for at in (here, there)]
+        return np.asarray((energies[0] - energies[1]) / (by * couples.total(c.torque_wheel)))
+
+
+def _energy(
+    law: HalfPlanePair, couples: Couplings, force: Array, arc: Array, normal: ComplexArray, spread: Array
+) -> Array:
+    """Energy (J) of the smooth displacements of each position, shape (n,), for forces (N)."""
+    smooth = smooth_influence(law, normal, arc, couples)
+    own = smooth.moved[couples.own, :, 2] * SIGN * force[:, None]
+    excess = spread[:, None] - np.einsum("pgk,gk->pg", smooth.values, law.bump_squares)
+    wider = ((own * normal.conj()).real * SIGN * excess).sum(axis=1)
+    return couples.total(0.5 * force * (couples.times(smooth.compliance, force) + wider)) / law.width

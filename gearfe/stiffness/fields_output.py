@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ..contact.compliance import MeshingPair
 from ..contact.position import Positions
-from ..contact.scene import MeshingPair
 from ..errors import InputError
 from ..gear.drawing import zone
 from ..gear.pair import GearPair
@@ -21,10 +21,10 @@ from ..output.pressure_figures import pressure_figure
 from ..output.vtkhdf import VtkHdfSeries
 from ..threads import one_thread
 from ..typing import Array, IntArray
+from .contact_pressure import FlankPressure, flank_pressures
 from .curve import StiffnessCurve
 from .fields import GearField, pair_recovery, straight_triangles
-from .flank_pressure import FlankPressure, flank_pressures
-from .position_solver import PositionSolver, position_solver
+from .positions import PositionSolver, position_solver
 
 Progress = Callable[[int, int, str], None]
 

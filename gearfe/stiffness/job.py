@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..config import load_job
+from ..contact.compliance import check_deviations
 from ..contact.laws import ContactLaw, law_named
-from ..contact.scene import check_deviations
 from ..elasticity import Material
 from ..errors import InputError
 from ..gear.deviation import NOMINAL, ToothDeviations

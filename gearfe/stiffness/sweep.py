@@ -18,12 +18,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..contact.compliance import gear_body
-from ..contact.half_plane import half_plane_pair
-from ..contact.influence_error import torque_changes
+from ..contact.compliance import MeshingPair, gear_body
 from ..contact.laws import ContactLaw, HalfPlane, law_named, law_text
 from ..contact.position import Positions
-from ..contact.scene import MeshingPair
 from ..elasticity import Material, Plane
 from ..errors import InputError
 from ..gear.deviation import NOMINAL, ToothDeviations
@@ -38,11 +35,18 @@ from ..threads import one_thread
 from ..typing import Array, IntArray
 from .contact_pressure import EDGES, contact_pressures
 from .curve import SOLVED, ErrorEstimate, StiffnessCurve
-from .curve_error import COARSENING, error_estimate, influence_estimate, solved_twice
+from .curve_error import COARSENING, curve_error
 from .periodic import fold
-from .position_solver import ElementSolver, HalfPlaneSolver, PositionSolver, position_solver
-from .positions import Progress, at_torque, at_twists, check_torque, honest, load_shares
-from .torque_control import ANGLE_ROUNDING
+from .positions import (
+    PositionSolver,
+    Progress,
+    at_torque,
+    at_twists,
+    check_torque,
+    honest,
+    load_shares,
+    position_solver,
+)
 
 __all__ = ["ErrorEstimate", "StiffnessCurve", "elastic_pair", "sweep_stiffness"]
 
@@ -117,6 +121,20 @@ def elastic_pair(
             for mesh, material, gear in zip(meshes, both, gears, strict=True)
         ]
     return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen, *asked, deviations)
+
+
+def coarser(pair: GearPair, elastic: MeshingPair) -> MeshingPair:
+    """The same gears on meshes `COARSENING` times coarser."""
+    return elastic_pair(
+        pair,
+        (elastic.pinion.material, elastic.wheel.material),
+        plane=elastic.pinion.plane,
+        law=elastic.law,
+        coarsen=COARSENING * elastic.coarsen,
+        flank_coarsen=elastic.flank_coarsen,
+        points_per_edge=elastic.points_per_edge,
+        deviations=elastic.deviations,
+    )
 
 
 def flank_factor(law: ContactLaw, coarsen: float, flank_coarsen: float = 1.0) -> float:
@@ -210,7 +228,7 @@ def sweep_stiffness(
     error = None
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
-            error = _estimate(solver, solved, finite=finite)
+            error = curve_error(solver, coarser(pair, elastic), solved, finite=finite)
     curve = assembled_curve(solver, asked, source, solved, touching, searched=torque is not None)
     return replace(curve, timings=dict(watch.seconds), error=error)
 
@@ -243,34 +261,6 @@ def distinct_angles(angles: Array, cycle: float) -> tuple[Array, IntArray]:
     source = np.empty(len(angles), dtype=np.int64)
     source[order] = np.cumsum(new) - 1
     return folded[order][new], source
-
-
-def _estimate(solver: HalfPlaneSolver | ElementSolver, solved: Positions, *, finite: bool) -> ErrorEstimate:
-    """Error of solved positions from coarser meshes: of all of them by the influence function of these, of some by a
-    law on the mesh, which solves them again, resolved there or not.
-    """
-    elastic, good = solver.elastic, solved.status == "converged"
-    coarse = elastic_pair(
-        solver.pair,
-        (elastic.pinion.material, elastic.wheel.material),
-        plane=elastic.pinion.plane,
-        law=elastic.law,
-        coarsen=COARSENING * elastic.coarsen,
-        flank_coarsen=elastic.flank_coarsen,
-        points_per_edge=elastic.points_per_edge,
-        deviations=elastic.deviations,
-    )
-    chosen = solved.take(np.flatnonzero(good) if isinstance(solver, HalfPlaneSolver) else solved_twice(good))
-    # a twist of some bits of the gears' angles is not what the gears are turned by
-    rounding = ANGLE_ROUNDING * np.abs(chosen.tangent / chosen.torque_wheel)
-    if isinstance(solver, HalfPlaneSolver):
-        changes = torque_changes(solver.law, half_plane_pair(solver.pair, coarse), chosen)
-        return influence_estimate(chosen.pinion_angle, changes, unseen=rounding)
-    again = position_solver(solver.pair, coarse, resolved_only=False)
-    there = at_twists(again, chosen.pinion_angle, chosen.twist, None, finite=finite)
-    other = np.where(there.status == "converged", there.torque_wheel, np.nan)
-    coarsen = elastic.coarsen * max(1.0, elastic.flank_coarsen)
-    return error_estimate(chosen.pinion_angle, chosen.torque_wheel, other, coarsen=coarsen, unseen=rounding)
 
 
 def assembled_curve(

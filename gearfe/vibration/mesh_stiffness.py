@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from ..contact.compliance import check_deviations
 from ..contact.laws import ContactLaw
-from ..contact.scene import check_deviations
 from ..errors import InputError
 from ..gear.deviation import NOMINAL, ToothDeviations
 from ..gear.deviation_job import deviations_of

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.stiffness.position_solver import position_solver
+from gearfe.stiffness.positions import position_solver
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 
 from .record import Record

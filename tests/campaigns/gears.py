@@ -21,12 +21,12 @@ from typing import Any
 
 import numpy as np
 
+from gearfe.contact.compliance import MeshingPair
 from gearfe.contact.position import Positions
-from gearfe.contact.scene import MeshingPair
 from gearfe.gear.pair import GearPair
 from gearfe.stiffness.curve import SOLVED
 from gearfe.stiffness.job import read_stiffness_job
-from gearfe.stiffness.position_solver import PositionSolver, position_solver
+from gearfe.stiffness.positions import PositionSolver, position_solver
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 from gearfe.stiffness.torque_control import ANGLE_ROUNDING
 from gearfe.tables.laws import DEFAULT_LAW, LAWS

@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from gearfe.contact.compliance import MeshingPair
 from gearfe.contact.laws import HalfPlane, Nitsche
-from gearfe.contact.scene import MeshingPair
 from gearfe.stiffness.job import StiffnessJob, read_stiffness_job
-from gearfe.stiffness.position_solver import position_solver
+from gearfe.stiffness.positions import position_solver
 from gearfe.stiffness.sweep import elastic_pair
 
 from .campaign import Campaign, Case, Columns
