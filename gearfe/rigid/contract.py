@@ -37,7 +37,11 @@ eliminated at
     Absent: the force is called as it is; the integration in modal coordinates then calls Python in every stage.
 11. ``units()``: sizes of the own coordinates and of the rows that count as much as 1 rad, so that bounds do not depend
     on the unit of length. Absent: ones.
-12. ``breaks``: times at which a force or joint is not smooth. Steps of all integrators end there. Absent: none.
+12. ``shared_mass()``: constant mass on the local coordinates (k, k), for what gives mass to the coordinates of
+    others: a beam whose nodes are bodies of a scene. Absent: none.
+13. ``stiff = True``: its fast motions leave steps of series or Runge-Kutta next to no length; ``method="auto"`` then is
+    the implicit method. Absent: not stiff.
+14. ``breaks``: times at which a force or joint is not smooth. Steps of all integrators end there. Absent: none.
 
 An element has no state of its own that changes during a run: integrators call it at trial points in any order.
 """
@@ -61,6 +65,7 @@ class Element:
     name: str = ""
     touches: tuple[Element, ...] = ()
     constant_jacobian: bool = False
+    stiff: bool = False
 
     def mass(self) -> Array:
         """Mass matrix of the own coordinates."""
@@ -72,6 +77,10 @@ class Element:
 
     def blocks(self) -> tuple[Array, Array] | None:
         """Constant damping and stiffness on the local coordinates."""
+        return None
+
+    def shared_mass(self) -> Array | None:
+        """Constant mass on the local coordinates."""
         return None
 
     def rate(self, t: float, q: Array) -> Array:  # noqa: ARG002

@@ -44,6 +44,11 @@ ORDER = np.argsort(np.abs(MU.imag))  # the real one first, then a conjugate pair
 MU, BASIS = MU[ORDER], BASIS[:, ORDER]
 BACK = np.linalg.inv(BASIS)
 ERROR = np.array([-13 - 7 * ROOT6, -13 + 7 * ROOT6, -1.0]) / 3
+#: Cubic through values at 0, C: its powers of x - 1, lowest first.
+CUBIC = np.linalg.inv(np.vander(np.append(0.0, C) - 1.0, increasing=True))
+#: Coefficients of powers of x from (q, q') at 0, q at the first two stages, (q, q') at 1.
+_P = np.arange(6.0)
+QUINTIC = np.linalg.inv(np.array([_P == 0, _P == 1, C[0] ** _P, C[1] ** _P, np.ones(6), _P], dtype=float))
 MOST_NEWTON = 10
 LAW = StepLaw(exponent=0.25, growth=5.0, least_error=1e-8, predictive=True)
 #: Share of a step that is tried after Newton did not converge.
@@ -87,8 +92,9 @@ def run_implicit(
     first = first_step(here.q / units, here.v / units, here.a / units, abs(span[1] - span[0]))
     control = StepControl(LAW, span, first, breaks=system.breaks, watch=watch, **options)
     reach = np.maximum(np.abs(here.q), 1e-300)
-    record = [here]
+    record, stages = [here], []
     newton = 0
+    last: Array | None = None
 
     def state() -> tuple[Array, Array]:
         return here.q, here.v
@@ -96,7 +102,7 @@ def run_implicit(
     while (h := control.next_step(state)) is not None:
         least = 1e-3 * units * max(float((reach / units).max()), 1e-12)
         limit = tolerance * np.maximum(np.maximum(reach, abs(h) * np.abs(here.v)), least)
-        made = radau_step(system, here, h, limit, active)
+        made = radau_step(system, here, h, limit, active, last)
         newton += made.iterations
         if not made.converged:
             control.fail(Status.NOT_SOLVED, NOT_SOLVED_SHARE)
@@ -107,11 +113,25 @@ def run_implicit(
         t = control.accept(made.error)
         q, v = np.split(on_constraints(system, t, made.q, made.v, active, start.excess), 2)
         here = State(t, q, v, *system.acceleration(t, q, v, active, start.excess))
-        reach = np.maximum(reach, np.abs(q))
+        reach, last = np.maximum(reach, np.abs(q)), made.speeds
         record.append(here)
-    dense = hermite(*(np.array([r[k] for r in record]) for k in range(4)))
+        stages.append(made.stages)
+    # accelerations of stiff links at the steps' ends are the rounding of their strains; those of others are exact
+    if system.stressed and stages:
+        dense = collocated(record, np.array(stages))
+    else:
+        dense = hermite(*(np.array([r[k] for r in record]) for k in range(4)))
     counts = {"scheme": "Radau IIA of order 5", "steps": control.accepted}
     return dense, control.status, {**counts, "newton_iterations": newton, "rejected": control.rejected}
+
+
+def collocated(record: list[State], stages: Array) -> Polynomials:
+    """Polynomials of degree 5 through the stages of every step and the coordinates and velocities of its ends."""
+    times, q, v = (np.array([r[k] for r in record]) for k in range(3))
+    h = np.diff(times)[:, None]
+    known = np.stack([q[:-1], h * v[:-1], stages[:, 0], stages[:, 1], q[1:], h * v[1:]])
+    scaled = np.einsum("jk,ksn->sjn", QUINTIC, known)
+    return Polynomials(times, scaled / h[:, :, None] ** np.arange(6)[:, None])
 
 
 def in_modes(core: Minimal, start: Start) -> tuple[System, Start]:
@@ -140,14 +160,35 @@ class Step:
     error: float
     iterations: int
     converged: bool
+    stages: Array | None = None  # (2, n) coordinates of the first two
+    speeds: Array | None = None  # (4, n) coefficients of powers of the time (s) since the step's end, lowest first
 
 
-def radau_step(system: System, here: State, h: float, limit: Array, active: np.ndarray) -> Step:
-    """Simplified Newton on the three stages, and the embedded error estimate against `limit`."""
+def radau_step(
+    system: System, here: State, h: float, limit: Array, active: np.ndarray, last: Array | None = None
+) -> Step:
+    """Simplified Newton on the three stages, and the embedded error estimate against `limit`.
+
+    `last`: the speeds of the step before, whose continuation is the first guess (Hairer & Wanner II, Sec. IV.8).
+    """
     t, q, v, a, multipliers = here
     n, m = system.size, int(active.sum())
-    middle, middle_q, middle_v = t + h / 2, q + h / 2 * v + h * h / 8 * a, v + h / 2 * a
-    by_q, by_v = system.force_jacobian(middle, middle_q, middle_v)
+    at = np.append(C, 0.5) * h
+    if last is None:
+        ahead, speed = 0.5 * at[:, None] ** 2 * a, v + h / 2 * a
+    else:
+        powers = at[:, None] ** np.arange(1, 4)
+        ahead, speed = (at[:, None] * powers / np.arange(2, 5)) @ last[1:], v + powers[3] @ last[1:]
+    middle, middle_q, middle_v = t + h / 2, q + h / 2 * v + ahead[3], speed
+    by_q, by_v = system.force_jacobian(middle, middle_q, middle_v, stressed=False)
+    stresses, tangents = [], []
+    for element, index in system.stressed:
+        stress = element.stress(q[index], v[index])
+        tangent = element.tangent(middle_q[index], middle_v[index], stress)
+        by_q[np.ix_(index, index)] += tangent.by_q
+        by_v[np.ix_(index, index)] += tangent.by_v
+        tangents.append(tangent)
+        stresses.append([stress, stress, stress])
     curvature = joint_stiffness(system, middle, middle_q, multipliers)
     G = system.jacobian(middle, middle_q)[active]
     M = system.mass
@@ -156,7 +197,7 @@ def radau_step(system: System, here: State, h: float, limit: Array, active: np.n
         factor = mu.real if abs(mu.imag) < 1e-12 else mu
         top = factor**2 / h**2 * M - factor / h * by_v - by_q + curvature
         solves.append(saddle_solver(top, G, system.units, system.row_units[active]))
-    Z = 0.5 * (C * h)[:, None] ** 2 * a
+    Z = ahead[:3]
     L = np.tile(multipliers[active], (3, 1))
     moved = math.inf
     converged = False
@@ -170,7 +211,12 @@ def radau_step(system: System, here: State, h: float, limit: Array, active: np.n
             Q = q + C[i] * h * v + Z[i]
             ti = t + C[i] * h
             Gi = system.jacobian(ti, Q)[active]
-            rest[i] = M @ acceleration[i] - system.force(ti, Q, V[i]) + Gi.T @ L[i]
+            force = system.force(ti, Q, V[i], stressed=False)
+            for k, (_, index) in enumerate(system.stressed):
+                pull, lacks = tangents[k].force(Q[index], V[i][index], stresses[k][i])
+                force[index] += pull
+                stresses[k][i] = stresses[k][i] + lacks
+            rest[i] = M @ acceleration[i] - force + Gi.T @ L[i]
             gaps[i] = system.residual(ti, Q)[active]
         r, g = BACK @ rest, BACK @ gaps
         dz0, dl0 = solves[0](-r[0].real, -g[0].real)
@@ -178,6 +224,10 @@ def radau_step(system: System, here: State, h: float, limit: Array, active: np.n
         dZ = np.real(np.outer(BASIS[:, 0], dz0)) + 2 * np.real(np.outer(BASIS[:, 1], dz1))
         dL = np.real(np.outer(BASIS[:, 0], dl0)) + 2 * np.real(np.outer(BASIS[:, 1], dl1))
         Z, L = Z + dZ, L + dL
+        dV = INVERSE @ dZ / h
+        for k, (_, index) in enumerate(system.stressed):
+            for i in range(3):
+                stresses[k][i] = stresses[k][i] + tangents[k].change(dZ[i][index], dV[i][index])
         size = float(np.abs(dZ / limit).max())
         if not math.isfinite(size):
             break
@@ -194,7 +244,11 @@ def radau_step(system: System, here: State, h: float, limit: Array, active: np.n
     second = M @ (a + ERROR @ (INVERSE @ Z) / h**2)
     mu = MU[0].real
     off, _ = solves[0](second + (mu / h * M - by_v) @ first, np.zeros(m))
-    return Step(new_q, new_v, float(np.sqrt(np.mean((off.real / limit) ** 2))), iterations, True)
+    speeds = np.vstack([v, v + INVERSE @ Z / h])
+    return Step(
+        new_q, new_v, float(np.sqrt(np.mean((off.real / limit) ** 2))), iterations, True,
+        q + (C * h)[:2, None] * v + Z[:2], (CUBIC @ speeds) / h ** np.arange(4)[:, None],
+    )  # fmt: skip
 
 
 def joint_stiffness(system: System, t: float, q: Array, multipliers: Array) -> Array:

@@ -155,7 +155,7 @@ def ways_of(
     rate = partial(_rate, system) if planar else None  # it does not see singular positions
     implicit = Way("implicit", "", partial(_implicit, system, options), trial, rate=rate)
     auto = method == "auto"
-    if auto and _hopeless(system, start, times):
+    if auto and (any(e.stiff for e in system.elements) or _hopeless(system, start, times)):
         return [implicit]
     if method == "implicit":
         return [implicit]

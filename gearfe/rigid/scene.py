@@ -53,6 +53,8 @@ class PlanarScene(Element):
         self._forms = self.assembly.tables.forms
         self._vectors = self.assembly.tables.vectors
         self._forces = self.assembly.tables.forces
+        self._loaded = bool(len(self._forces.spring) or len(self._forces.along))
+        self._known: tuple[Array, Pose] | None = None
 
     def mass(self) -> Array:
         """Diagonal of masses and inertias."""
@@ -73,7 +75,12 @@ class PlanarScene(Element):
         return bool((self._forms.motion[: self.rows] >= 0).any())
 
     def pose(self, q: Array) -> Pose:
-        """Bodies and vectors at the coordinates q."""
+        """Bodies and vectors at the coordinates q; those of the last ones are remembered."""
+        if self._known is None or not np.array_equal(self._known[0], q):
+            self._known = q.copy(), self._pose(q)
+        return self._known[1]
+
+    def _pose(self, q: Array) -> Pose:
         full = np.append(q, np.zeros(3)).reshape(-1, 3)
         row = np.column_stack([full, np.cos(full[:, 2]), np.sin(full[:, 2])])
         ends, at = self._vectors.end, row[self._vectors.bodies]
@@ -105,7 +112,7 @@ class PlanarScene(Element):
 
     def _affine(self, pose: Pose) -> Array:
         """Values of the affine parts of all forms."""
-        return (self._forms.factor * pose.row[self._forms.bodies]).sum(axis=(1, 2)) + self._forms.constant
+        return np.einsum("rbk,rbk->r", self._forms.factor, pose.row[self._forms.bodies]) + self._forms.constant
 
     def _affine_gradients(self, pose: Pose) -> Array:
         """Gradients of the affine parts of all forms, shape (r, 2, 3)."""
@@ -124,7 +131,8 @@ class PlanarScene(Element):
         pose = self.pose(q)
         g = self._affine(pose)[: self.rows] - self._times(t, 0)
         row, one, two = self._forms.product.T
-        np.add.at(g, row, (pose.vector[one] * pose.vector[two]).sum(axis=1))
+        if len(row):
+            np.add.at(g, row, (pose.vector[one] * pose.vector[two]).sum(axis=1))
         return g
 
     def jacobian(self, t: float, q: Array) -> Array:  # noqa: ARG002
@@ -145,6 +153,8 @@ class PlanarScene(Element):
         spin = motion.row[self._forms.bodies[: self.rows], 2]
         out = (spin**2 * self._affine_bend(pose)[: self.rows]).sum(axis=1) - self._times(t, 2)
         row, one, two = self._forms.product.T
+        if not len(row):
+            return out
         inward = -(motion.spin[:, :, None] ** 2 * pose.arm).sum(axis=1)  # V'' less what accelerations make of it
         V, rate = pose.vector, motion.vector
         bend = (inward[one] * V[two] + 2.0 * rate[one] * rate[two] + V[one] * inward[two]).sum(axis=1)
@@ -156,8 +166,9 @@ class PlanarScene(Element):
         pose = self.pose(q)
         out = self._affine_gradients(pose)[: self.rows]
         row, one, two = self._forms.product.T
-        J, V = self._vector_jacobian(pose), pose.vector
-        np.add.at(out, row, np.einsum("pcbk,pc->pbk", J[one], V[two]) + np.einsum("pcbk,pc->pbk", J[two], V[one]))
+        if len(row):
+            J, V = self._vector_jacobian(pose), pose.vector
+            np.add.at(out, row, np.einsum("pcbk,pc->pbk", J[one], V[two]) + np.einsum("pcbk,pc->pbk", J[two], V[one]))
         return out
 
     def curvature(self, q: Array, multipliers: Array) -> Array:
@@ -167,6 +178,8 @@ class PlanarScene(Element):
         angles = 3 * self._forms.bodies[: self.rows] + 2
         np.add.at(full, (angles, angles), multipliers[:, None] * self._affine_bend(pose)[: self.rows])
         row, one, two = self._forms.product.T
+        if not len(row):
+            return full[: self.size, : self.size]
         J = self._vector_jacobian(pose).reshape(-1, 2, 6)
         both = multipliers[row, None, None] * np.einsum("pci,pcj->pij", J[one], J[two])
         both += np.swapaxes(both, 1, 2)
@@ -184,6 +197,8 @@ class PlanarScene(Element):
     # forces -----------------------------------------------------------------------------------------------------
     def force(self, t: float, q: Array, v: Array) -> Array:
         """All applied forces on the scene."""
+        if not self._loaded:
+            return self._forces.weight[: self.size].copy()
         pose = self.pose(q)
         motion = self._motion(pose, v)
         total = self._forces.weight.copy()
@@ -199,6 +214,8 @@ class PlanarScene(Element):
         """Derivatives of the forces by q and v in closed form."""
         n = self.size
         by_q, by_v = np.zeros((n + 3, n + 3)), np.zeros((n + 3, n + 3))
+        if not self._loaded:
+            return by_q[:n, :n], by_v[:n, :n]
         pose = self.pose(q)
         motion = self._motion(pose, v)
         springs = self._springs(pose, motion)

@@ -43,6 +43,9 @@ class System:
                     raise InputError(f"element {name!r}", None, "touches an element that is not in the system", cure)
             self.index.append(np.concatenate([place[id(e)] for e in (element, *element.touches)]).astype(int))
         self.forces = [(e, i) for e, i in zip(self.elements, self.index, strict=True) if hasattr(e, "force")]
+        #: Forces whose stresses the implicit method takes as unknowns.
+        self.stressed: list[tuple[Any, np.ndarray]] = [(e, i) for e, i in self.forces if hasattr(e, "tangent")]
+        self._others = [(e, i) for e, i in self.forces if not hasattr(e, "tangent")]
         self.joints = [(e, i) for e, i in zip(self.elements, self.index, strict=True) if e.rows]
         self.rows = sum(e.rows for e, _ in self.joints)
         self.mass = np.zeros((total, total))
@@ -52,6 +55,9 @@ class System:
             own = place[id(element)]
             if element.size:
                 self.mass[np.ix_(own, own)] += element.mass()
+            shared = element.shared_mass()
+            if shared is not None:
+                self.mass[np.ix_(index, index)] += shared
             blocks = element.blocks()
             if blocks is not None:
                 self.damping[np.ix_(index, index)] += blocks[0]
@@ -105,17 +111,17 @@ class System:
         """Numbers of the coordinates that `element` owns."""
         return self.index[self.elements.index(element)][: element.size]
 
-    def force(self, t: float, q: Array, v: Array) -> Array:
-        """All applied forces, the linear parts included; shape (size,)."""
+    def force(self, t: float, q: Array, v: Array, *, stressed: bool = True) -> Array:
+        """All applied forces, the linear parts included, with those of `stressed` elements or without; (size,)."""
         total = -(self.damping @ v + self.stiffness @ q) if self.linear else np.zeros(self.size)
-        for element, index in self.forces:
+        for element, index in self.forces if stressed else self._others:
             np.add.at(total, index, element.force(t, q[index], v[index]))
         return total
 
-    def force_jacobian(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
+    def force_jacobian(self, t: float, q: Array, v: Array, *, stressed: bool = True) -> tuple[Array, Array]:
         """(df/dq, df/dv); finite differences for elements that do not provide theirs."""
-        by_q, by_v = -self.stiffness, -self.damping
-        for element, index in self.forces:
+        by_q, by_v = -self.stiffness, -self.damping  # new arrays
+        for element, index in self.forces if stressed else self._others:
             local = element_jacobian(element, t, q[index], v[index])
             by_q, by_v = by_q.copy(), by_v.copy()
             np.add.at(by_q, np.ix_(index, index), local[0])

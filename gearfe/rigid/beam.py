@@ -1,0 +1,387 @@
+"""Flexible links: geometrically exact (Reissner) planar beams whose nodes are bodies of the planar scene.
+
+A section at the arc length s of the straight, unloaded axis has the place r(s) = (x, y) and the angle theta(s). With
+t = (cos theta, sin theta) and n a quarter turn ahead, the strains of axis, shear and bending, and the energy, are
+
+    Gamma = r' . t - 1,   gamma = r' . n,   kappa = theta',
+    U = 1/2 int EA Gamma^2 + GA_s gamma^2 + EI kappa^2 ds
+
+for displacements and rotations of any size (Reissner, ZAMP 23 (1972) 795-804; Simo & Vu-Quoc, J. Appl. Mech. 53 (1986)
+849-863). x, y and theta are interpolated by cubics, so the mass matrix is constant, and integrated at three Gauss
+points an element, which leaves thin beams free of locking. Damping is Kelvin's and Voigt's: every strain e counts as
+e + tau e'.
+
+Every node is a body without mass of its own; what mass it has is in the mass matrix of the beam. Joints and forces of
+the scene so hold at any node. At a Gauss point z = (x', y', theta, theta') = P q is linear in the coordinates: forces
+are -P^T s(P q, P q'), tangents P^T k P, with the law of one point in closed form.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..typing import Array, IntArray
+from .contract import Element
+from .forces import Weight
+from .forms import Point
+from .planar import Body
+from .scene import PlanarScene
+
+#: Nodes of an element on -1..1 (Gauss-Lobatto), and its Gauss points with their weights.
+NODES = np.array([-1.0, -math.sqrt(0.2), math.sqrt(0.2), 1.0])
+GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(3)
+#: Points closer than this share of the length share a node.
+TOGETHER = 1e-9
+
+
+@dataclass(frozen=True)
+class Section:
+    """Cross-section of a beam.
+
+    Parameters
+    ----------
+    area : float
+        Area A (m2).
+    second_moment : float
+        Second moment of area I about the axis of bending (m4).
+    edge : float, optional
+        Distance of the outer fibre from the axis (m), for stresses.
+    shear_factor : float
+        Part of the area that carries shear.
+    """
+
+    area: float
+    second_moment: float
+    edge: float | None = None
+    shear_factor: float = 5.0 / 6.0
+
+    @classmethod
+    def rectangle(cls, width: float, height: float) -> Section:
+        """Rectangle; `height` lies in the plane of motion (m)."""
+        return cls(width * height, width * height**3 / 12.0, height / 2.0)
+
+    @classmethod
+    def tube(cls, outer: float, inner: float = 0.0) -> Section:
+        """Circle or ring of these diameters (m)."""
+        area, second = math.pi / 4 * (outer**2 - inner**2), math.pi / 64 * (outer**4 - inner**4)
+        return cls(area, second, outer / 2.0, 0.9 if inner == 0.0 else 0.5)
+
+
+@dataclass(frozen=True)
+class BeamLink:
+    """A straight flexible link as plain data; its frame has the origin at the start of the axis, which is its x axis.
+
+    Parameters
+    ----------
+    name : str
+        Name of the link, and of the body at its start.
+    length : float
+        Length of the axis (m).
+    section : Section
+        Its cross-section.
+    young_modulus, density : float
+        Pa, kg/m3.
+    poisson_ratio : float
+        For the shear modulus E / (2 (1 + nu)).
+    damping : float
+        Kelvin and Voigt's time tau (s).
+    elements : int
+        Least number of cubic elements; there is at least one between two of the `points`.
+    points : tuple of float
+        Arc lengths at which there must be nodes (m); both ends have some.
+    position, angle, velocity, rate
+        Start of the frame, as of a `Body`.
+    """
+
+    name: str
+    length: float
+    section: Section
+    young_modulus: float
+    density: float
+    poisson_ratio: float = 0.3
+    damping: float = 0.0
+    elements: int = 4
+    points: tuple[float, ...] = ()
+    position: Point = (0.0, 0.0)
+    angle: float = 0.0
+    velocity: Point = (0.0, 0.0)
+    rate: float = 0.0
+
+    def __post_init__(self) -> None:
+        label = f"flexible link {self.name!r}"
+        positive = {
+            "length": (self.length, "m"),
+            "section area": (self.section.area, "m2"),
+            "section second_moment": (self.section.second_moment, "m4"),
+            "section shear_factor": (self.section.shear_factor, "one"),
+            "young_modulus": (self.young_modulus, "Pa"),
+            "density": (self.density, "kg/m3"),
+        }
+        for key, (value, unit) in positive.items():
+            if not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"{label} {key}", value, "must be finite and > 0", f"give it in {unit}")
+        if not (math.isfinite(self.damping) and self.damping >= 0.0):
+            raise InputError(f"{label} damping", self.damping, "must be finite and >= 0", "give a time in s")
+        if not -1.0 < self.poisson_ratio <= 0.5:
+            raise InputError(f"{label} poisson_ratio", self.poisson_ratio, "must be > -1 and <= 0.5", "0.3 is steel's")
+        if self.elements < 1:
+            raise InputError(f"{label} elements", self.elements, "must be >= 1", "4 suit most links")
+        for s in self.points:
+            if not -TOGETHER * self.length <= s <= (1.0 + TOGETHER) * self.length:
+                problem = f"lies outside of the link's axis, which goes from 0 to {self.length:g} m"
+                raise InputError(f"{label} point x", s, problem, "move it onto the axis, or make the link longer")
+
+    @cached_property
+    def ends(self) -> Array:
+        """Arc lengths of the elements' ends, shape (elements + 1,)."""
+        at = [0.0]
+        for s in sorted(self.points):
+            if s - at[-1] > TOGETHER * self.length and self.length - s > TOGETHER * self.length:
+                at.append(s)
+        at.append(self.length)
+        parts = [np.zeros(1)]
+        for a, b in itertools.pairwise(at):
+            count = max(1, round(self.elements * (b - a) / self.length))
+            parts.append(a + (b - a) * np.arange(1, count + 1) / count)
+        return np.concatenate(parts)
+
+    @cached_property
+    def stations(self) -> Array:
+        """Arc lengths of the nodes (m), shape (3 elements + 1,)."""
+        ends = self.ends
+        inner = 0.5 * (ends[:-1, None] + ends[1:, None]) + 0.5 * np.diff(ends)[:, None] * NODES[:3]
+        inner[:, 0] = ends[:-1]
+        return np.append(inner.ravel(), self.length)
+
+    def node(self, s: float) -> int:
+        """Number of the node at the arc length s, which must be one of the `points` or an end."""
+        number = int(np.abs(self.stations - s).argmin())
+        if abs(self.stations[number] - s) > 2.0 * TOGETHER * self.length:
+            raise InputError(f"flexible link {self.name!r} point x", s, "has no node", "name it among the points")
+        return number
+
+    @property
+    def node_names(self) -> tuple[str, ...]:
+        """Names of the bodies that are its nodes: that of the link, then with ``.1``, ``.2`` ..."""
+        return (self.name, *(f"{self.name}.{k}" for k in range(1, len(self.stations))))
+
+    def nodes(self) -> tuple[Body, ...]:
+        """Bodies for the scene, which start as those of a straight rigid link."""
+        c, s = math.cos(self.angle), math.sin(self.angle)
+        (x, y), (vx, vy), w = self.position, self.velocity, self.rate
+        return tuple(
+            Body(
+                name, 0.0, 0.0, (0.0, 0.0), (x + c * at, y + s * at), self.angle, (vx - w * s * at, vy + w * c * at), w
+            )
+            for name, at in zip(self.node_names, self.stations, strict=True)
+        )
+
+    def rigid(self) -> Body:
+        """The rigid link of the same mass and inertia."""
+        mass = self.density * self.section.area * self.length
+        inertia = mass * self.length**2 / 12.0 + self.density * self.section.second_moment * self.length
+        centre = (self.length / 2.0, 0.0)
+        return Body(self.name, mass, inertia, centre, self.position, self.angle, self.velocity, self.rate)
+
+
+class Strains(NamedTuple):
+    """Strains at points of the axis and what belongs to them, in the order axial, shear, bending."""
+
+    value: Array  # (points, 3)
+    slope: Array  # (points, 3, 4) by z = (x', y', theta, theta')
+    bend: Array  # (points, 3, 4, 4) second derivatives
+
+
+class Beam(Element):
+    """Mass, elasticity, damping and weight of a flexible link on the bodies of a scene that are its nodes.
+
+    Parameters
+    ----------
+    scene : PlanarScene
+        Has the link's `BeamLink.nodes` among its bodies.
+    link : BeamLink
+        What it is.
+    """
+
+    stiff = True
+
+    def __init__(self, scene: PlanarScene, link: BeamLink) -> None:
+        self.link, self.name, self.touches = link, f"flexible link {link.name!r}", (scene,)
+        self.places: IntArray = np.array([3 * scene.scene.body_index[n] + k for n in link.node_names for k in range(3)])
+        self._size = scene.size
+        shear = link.young_modulus / (2.0 * (1.0 + link.poisson_ratio)) * link.section.shear_factor
+        area, second = link.section.area, link.section.second_moment
+        self.stiffness = np.array([link.young_modulus * area, shear * area, link.young_modulus * second])
+        half = 0.5 * np.diff(link.ends)
+        #: Arc lengths of the Gauss points (m).
+        self.points = (0.5 * (link.ends[:-1] + link.ends[1:])[:, None] + half[:, None] * GAUSS).ravel()
+        self.weights = (half[:, None] * WEIGHTS).ravel()
+        N, D = self.shapes(self.points)
+        self._to_points = _gather(N, D)  # P, shape (points, 4, 3 nodes)
+        own = self._own_mass()
+        self._mass = np.zeros((self._size, self._size))
+        self._mass[np.ix_(self.places, self.places)] = own
+        frames = scene.scene.frames
+        parts = [part for force in scene.scene.forces for part in force.parts(frames) if isinstance(part, Weight)]
+        field = np.sum([part.acceleration for part in parts], axis=0) if parts else np.zeros(2)
+        self._weight = own @ np.tile([*field, 0.0], len(link.stations))
+
+    def shapes(self, s: Array) -> tuple[Array, Array]:
+        """Shape functions and their derivatives by the arc length at the places s; shapes (places, nodes)."""
+        ends = self.link.ends
+        element = np.clip(np.searchsorted(ends, s, side="right") - 1, 0, len(ends) - 2)
+        half = 0.5 * np.diff(ends)[element]
+        local = (s - 0.5 * (ends[element] + ends[element + 1])) / half
+        N, D = np.zeros((2, len(s), len(self.link.stations)))
+        for j, polynomial in enumerate(_LAGRANGE):
+            N[np.arange(len(s)), 3 * element + j] = polynomial(local)
+            D[np.arange(len(s)), 3 * element + j] = polynomial.deriv()(local) / half
+        return N, D
+
+    def _own_mass(self) -> Array:
+        """rho A int N N^T for x and y, rho I for theta: the integrals of sixth degree are exact."""
+        points, weights = np.polynomial.legendre.leggauss(4)
+        half = 0.5 * np.diff(self.link.ends)
+        at = (0.5 * (self.link.ends[:-1] + self.link.ends[1:])[:, None] + half[:, None] * points).ravel()
+        N = self.shapes(at)[0]
+        shared = self.link.density * (N.T * (half[:, None] * weights).ravel()) @ N
+        section = self.link.section
+        return np.kron(shared, np.diag([section.area, section.area, section.second_moment]))
+
+    def shared_mass(self) -> Array:
+        """Mass on the coordinates of the scene, constant."""
+        return self._mass
+
+    def strains(self, z: Array) -> Strains:
+        """Strains at points with z = (x', y', theta, theta'), shape (points, 4)."""
+        dx, dy, c, s = z[:, 0], z[:, 1], np.cos(z[:, 2]), np.sin(z[:, 2])
+        stretch, shear = c * dx + s * dy, c * dy - s * dx
+        slope, bend = np.zeros((len(z), 3, 4)), np.zeros((len(z), 3, 4, 4))
+        slope[:, 0, 0] = slope[:, 1, 1] = c
+        slope[:, 0, 1], slope[:, 1, 0] = s, -s
+        slope[:, 0, 2], slope[:, 1, 2], slope[:, 2, 3] = shear, -stretch, 1.0
+        bend[:, 0, 0, 2], bend[:, 0, 1, 2], bend[:, 0, 2, 2] = -s, c, -stretch
+        bend[:, 1, 0, 2], bend[:, 1, 1, 2], bend[:, 1, 2, 2] = -c, -s, -shear
+        bend[:, :2, 2, :2] = bend[:, :2, :2, 2]
+        return Strains(np.stack([stretch - 1.0, shear, z[:, 3]], axis=1), slope, bend)
+
+    def force(self, t: float, q: Array, v: Array) -> Array:  # noqa: ARG002
+        """Forces of the strains and their rates, and the weight."""
+        z, dz = self._at_points(q), self._at_points(v)
+        e = self.strains(z)
+        stress = self._stress(e, dz)
+        return self._force(np.einsum("pi,pij->pj", stress, e.slope))
+
+    def force_jacobian(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:  # noqa: ARG002
+        """Its derivatives by q and v."""
+        made = self.tangent(q, v, self.stress(q, v))
+        return made.by_q, made.by_v
+
+    def tangent(self, q: Array, v: Array, stress: Array) -> Tangent:
+        """Derivatives of the forces about a state, for stresses of their own, shape (points, 3)."""
+        z, dz = self._at_points(q), self._at_points(v)
+        e, tau = self.strains(z), self.link.damping
+        law = self.stiffness[:, None] * e.slope
+        weighted = self.weights[:, None, None] * e.slope.transpose(0, 2, 1)
+        by_q = weighted @ (law + tau * self.stiffness[:, None] * np.einsum("pijk,pk->pij", e.bend, dz))
+        by_q += np.einsum("pi,pijk->pjk", stress * self.weights[:, None], e.bend)
+        return Tangent(self, law, self._spread(-by_q), self._spread(-tau * (weighted @ law)))
+
+    def stress(self, q: Array, v: Array) -> Array:
+        """Axial force (N), shear force (N) and bending moment (N m) at the Gauss points, shape (points, 3)."""
+        z, dz = self._at_points(q), self._at_points(v)
+        return self._stress(self.strains(z), dz)
+
+    def potential(self, q: Array) -> float:
+        """Elastic energy and that of the weight (J)."""
+        return self.elastic_energy(q) - float(self._weight @ q[self.places])
+
+    def elastic_energy(self, q: Array) -> float:
+        """1/2 int EA Gamma^2 + GA gamma^2 + EI kappa^2 ds (J)."""
+        e = self.strains(self._at_points(q)).value
+        return 0.5 * float(self.weights @ (e**2 @ self.stiffness))
+
+    def loss(self, q: Array, v: Array) -> float:
+        """Power that damping takes (W)."""
+        rates = np.einsum("pij,pj->pi", self.strains(self._at_points(q)).slope, self._at_points(v))
+        return self.link.damping * float(self.weights @ (rates**2 @ self.stiffness))
+
+    def _stress(self, e: Strains, dz: Array) -> Array:
+        rates = np.einsum("pij,pj->pi", e.slope, dz) if self.link.damping else 0.0
+        return (e.value + self.link.damping * rates) * self.stiffness
+
+    def _force(self, pull: Array) -> Array:
+        """Weight less P^T of the pull (points, 4) of the stresses."""
+        out = np.zeros(self._size)
+        weighted = (pull * self.weights[:, None]).ravel()
+        out[self.places] = self._weight - weighted @ self._to_points.reshape(-1, len(self.places))
+        return out
+
+    def _at_points(self, q: Array) -> Array:
+        return (self._to_points.reshape(-1, len(self.places)) @ q[self.places]).reshape(-1, 4)
+
+    def _spread(self, blocks: Array) -> Array:
+        """P^T blocks P on the coordinates of the scene."""
+        P = self._to_points
+        n = len(self.places)
+        out = np.zeros((self._size, self._size))
+        out[np.ix_(self.places, self.places)] = P.reshape(-1, n).T @ (blocks @ P).reshape(-1, n)
+        return out
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """Forces of a beam whose stresses S are unknowns of their own, for Newton's method with one matrix.
+
+    S and the coordinates are found together from f = -B(q)^T S and C e(q) - S = 0, linearised as f' and C B about one
+    state. With B from one state and not S but the stress of a wrong strain, the matrix would be useful only as far as
+    turns leave no axial strain: thousandths of a degree in a thin link. (Mixed integration points: Magisano, Leonetti
+    & Garcea, Int. J. Numer. Meth. Engng 109 (2017) 1237-1262.)
+    """
+
+    beam: Beam
+    law: Array  # C B, shape (points, 3, 4)
+    by_q: Array
+    by_v: Array
+
+    def force(self, q: Array, v: Array, stress: Array) -> tuple[Array, Array]:
+        """The force that Newton's method sees, and what the stress lacks, C e(q) - S."""
+        beam = self.beam
+        dz = beam._at_points(v)
+        e = beam.strains(beam._at_points(q))
+        gap = beam._stress(e, dz) - stress
+        pull = np.einsum("pi,pij->pj", stress, e.slope) + np.einsum("pi,pij->pj", gap / beam.stiffness, self.law)
+        return beam._force(pull), gap
+
+    def change(self, q: Array, v: Array) -> Array:
+        """Change of the stress with changes of coordinates and velocities."""
+        beam = self.beam
+        moved = beam._at_points(q + beam.link.damping * v)
+        return np.einsum("pij,pj->pi", self.law, moved)
+
+
+def _gather(N: Array, D: Array) -> Array:
+    """P: from (x, y, theta) of the nodes to (x', y', theta, theta') at the points, shape (points, 4, 3 nodes)."""
+    P = np.zeros((len(N), 4, N.shape[1], 3))
+    P[:, 0, :, 0] = P[:, 1, :, 1] = P[:, 3, :, 2] = D
+    P[:, 2, :, 2] = N
+    return P.reshape(len(N), 4, -1)
+
+
+def _lagrange(nodes: Array) -> list[np.polynomial.Polynomial]:
+    """Polynomials that are 1 at one node and 0 at the others."""
+    made = []
+    for j, own in enumerate(nodes):
+        others = np.delete(nodes, j)
+        made.append(np.polynomial.Polynomial.fromroots(others) / float(np.prod(own - others)))
+    return made
+
+
+_LAGRANGE = _lagrange(NODES)
