@@ -32,6 +32,10 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
 #: Quantities of a body or joint, and of a point.
 OF_BODY = ("angle", "rate", "angular_acceleration")
 OF_POINT = ("x", "y", "vx", "vy", "ax", "ay")
+#: Quantities of a point of a flexible link, and of a flexible link.
+OF_SECTION = ("deflection", "stretch", "axial_force", "shear_force", "bending_moment", "edge_stress")
+OF_LINK = ("elastic_energy", "largest_edge_stress")
+NAMED = (*OF_BODY, *OF_POINT, *OF_SECTION, *OF_LINK)
 #: Quantities of the whole mechanism.
 PLAIN = ("time", "kinetic", "potential", "work", "total")
 _TOKEN = re.compile(
@@ -163,16 +167,17 @@ class _Reader:
         if self._next() != ("operator", "("):
             return self._plain(value)
         self.at += 1
-        if value in OF_BODY or value in OF_POINT:
+        if value in NAMED:
             kind, what = self._next()
             if kind != "name":
-                example = "a body or joint" if value in OF_BODY else "a point such as rod.B"
+                one = {OF_BODY: "a body or joint", OF_LINK: "a flexible link"}
+                example = next((text for names, text in one.items() if value in names), "a point such as rod.B")
                 raise _wrong(self.label, self.text, f"{value}(...) needs the name of {example}")
             self.at += 1
             self._take(")")
             return Node("quantity", (value, what))
         if value not in FUNCTIONS:
-            raise unknown_name(f"{self.label} = {self.text!r}", value, [*FUNCTIONS, *OF_BODY, *OF_POINT])
+            raise unknown_name(f"{self.label} = {self.text!r}", value, [*FUNCTIONS, *NAMED])
         parts = [self.sum(depth + 1)]
         while self._next() == ("operator", ","):
             self.at += 1
@@ -186,7 +191,7 @@ class _Reader:
         if name == "pi":
             return Node("number", float(np.pi))
         if name not in PLAIN:
-            known = [*PLAIN, "pi", *(f"{q}(...)" for q in (*OF_BODY, *OF_POINT))]
+            known = [*PLAIN, "pi", *(f"{q}(...)" for q in NAMED)]
             raise unknown_name(f"{self.label} = {self.text!r}", name, known)
         return Node("quantity", (name, None))
 

@@ -19,7 +19,9 @@ from .model import Mechanism
 from .results import Results, evaluate, reactions
 
 #: Files that depend on the options: what is left of them from an earlier run is removed.
-MAY_WRITE = ("reactions.csv", "curves.png", "picture.png", "animation.gif")
+MAY_WRITE = (
+    "reactions.csv", "curves.png", "picture.png", "animation.gif", "links.csv", "links.vtkhdf", "links.png"
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,8 @@ def run_mechanism(
     read = clock.perf_counter()
     times = output_times(end, run.step_s)
     method = run.method if method is None else method
-    tolerance = run.tolerance if tolerance is None else tolerance
+    if tolerance is None:
+        tolerance = mechanism.tolerance
     options: dict[str, Any] = {"method": method, "tolerance": tolerance, "raise_on_failure": False}
     trajectory = integrate(mechanism.system, times, start=start, **options)
     integrated = clock.perf_counter()
@@ -79,6 +82,10 @@ def run_mechanism(
     estimated = clock.perf_counter()
     with whole_set(folder, MAY_WRITE) as made:
         warnings = tuple(write_tables(made, mechanism, results, reactions or run.reactions))
+        if mechanism.links:
+            from ..output.link_files import write_links
+
+            write_links(made, mechanism, trajectory)
         written = clock.perf_counter()
         if figures:
             from ..output.mechanism_figures import draw_figures
@@ -164,7 +171,7 @@ def summarise(
         "tolerance": tolerance,
         **statistics,
         "freedoms": {
-            "bodies": len(mechanism.scene.bodies),
+            "bodies": len(mechanism.file.bodies),
             "coordinates": freedoms.coordinates,
             "constraints": freedoms.constraints,
             "redundant": len(freedoms.redundant),
@@ -172,6 +179,7 @@ def summarise(
             "redundant_constraints": [label[r] for r in freedoms.redundant],
             "singular_at_start": [label[r] for r in freedoms.passing],
         },
+        "flexible_links": [_flexible(mechanism, results, name) for name in mechanism.links],
         "joints": joints,
         "singular_passages": {"count": len(inside), "first_times_s": inside[:100]},
         "constraint_residual": float(np.abs(residual).max(initial=0.0)),
@@ -187,11 +195,33 @@ def summarise(
     }
 
 
+def _flexible(mechanism: Mechanism, results: Results, name: str) -> dict[str, Any]:
+    """What the summary says of a flexible link: its mesh, its largest deflection and stress at the output times."""
+    link = mechanism.links[name]
+    data = link.beam.link
+    made: dict[str, Any] = {
+        "name": name,
+        "elements": len(data.ends) - 1,
+        "largest_deflection_m": float(np.abs(link.offsets(results.trajectory.q)[:, :, 1]).max()),
+        "largest_axial_force_N": float(np.abs(results.sections[name][:, :, 0]).max()),
+        "largest_bending_moment_N_m": float(np.abs(results.sections[name][:, :, 2]).max()),
+    }
+    if data.section.edge is not None:
+        made["largest_edge_stress_Pa"] = float(link.edge_stress(results.sections[name], name).max())
+    return made
+
+
 def _told_error(error: dict[str, Any]) -> str:
     largest = error["coordinates_m_or_rad"]
     if not math.isfinite(largest):
         return "error estimate: none, a finer run did not reach as far"
     return f"error estimate from finer runs: {largest:.2g} (m or rad) at worst"
+
+
+def _told_link(link: dict[str, Any]) -> str:
+    stress = link.get("largest_edge_stress_Pa")
+    told = f"flexible link {link['name']}: deflection up to {link['largest_deflection_m']:.3g} m"
+    return told if stress is None else told + f", edge stress up to {1e-6 * stress:.3g} MPa"
 
 
 def _text(summary: dict[str, Any], folder: Path) -> str:
@@ -200,6 +230,7 @@ def _text(summary: dict[str, Any], folder: Path) -> str:
         f"{f['bodies']} bodies, {f['coordinates']} coordinates - {f['constraints']} constraints"
         f" + {f['redundant']} redundant = {f['net']} free",
         *(f"redundant: {name}" for name in f["redundant_constraints"]),
+        *(_told_link(link) for link in summary["flexible_links"]),
         f"{summary['method']}: {summary['status']} at {summary['reached_s']:g} s in {summary['steps']} steps,"
         f" {summary['timings']['integrate_s']:.3f} s; singular passages: {summary['singular_passages']['count']}",
         *([_told_error(summary["error_estimate"])] if summary["error_estimate"] else []),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,10 +27,12 @@ from ..rigid import (
     sine,
     smoothed_step,
 )
+from ..rigid.beam import BeamLink
 from ..tables.mechanism import (
     FORCES,
     JOINTS,
     BodyTable,
+    FigureTable,
     ForceTable,
     FunctionTable,
     JointTable,
@@ -38,7 +40,8 @@ from ..tables.mechanism import (
     MechanismFile,
     read_mechanism_file,
 )
-from .expressions import OF_POINT, PLAIN, Node, compute, parse, quantities
+from .expressions import OF_LINK, OF_POINT, OF_SECTION, PLAIN, Node, compute, parse, quantities
+from .links import FlexibleLink, bent_start, flexible_links, link_of
 
 Point = tuple[float, float]
 
@@ -52,22 +55,32 @@ class Mechanism:
     file : MechanismFile
         The tables as read.
     system : System
-        One planar scene.
+        One planar scene, and a beam for each flexible link.
     outputs : dict
         Column name -> parsed expression.
+    links : dict
+        Flexible links by name.
     """
 
     file: MechanismFile
     system: System
     outputs: Mapping[str, Node] = field(repr=False)
     path: Path = Path()
+    links: Mapping[str, FlexibleLink] = field(default_factory=dict, repr=False)
+    unbent: bool = False  # made for the start of one with flexible links: nothing in it need be free to move
 
     @property
     def planar(self) -> PlanarScene:
-        """The only element of the system."""
+        """Bodies, joints and forces: the first element of the system."""
         element = self.system.elements[0]
         assert isinstance(element, PlanarScene)
         return element
+
+    @property
+    def tolerance(self) -> float:
+        """Tolerance of the run: asked for, or 1e-9, with flexible links 1e-5."""
+        asked = self.file.run.tolerance
+        return asked if asked is not None else (1e-5 if self.links else 1e-9)
 
     @property
     def scene(self) -> Scene:
@@ -78,8 +91,12 @@ class Mechanism:
         """Body number and coordinates relative to the mass centre of ``body.point``, ``body.centre`` or ``body``."""
         body, _, name = where.partition(".")
         index = self.scene.body_index
-        if body not in index:
-            raise unknown_name(label, body, index)
+        if body not in self.file.bodies and body != GROUND:
+            raise unknown_name(label, body, [*self.file.bodies, GROUND])
+        if body in self.links:
+            link = self.links[body]
+            node = link.node(name, label)
+            return index[link.beam.link.node_names[node]], (0.0, link.points[name][1] if name in link.points else 0.0)
         at = (0.0, 0.0) if name in ("", "origin") else None
         centre = self.planar.assembly.centre[index[body]]
         if name == "centre":
@@ -91,14 +108,19 @@ class Mechanism:
             at = points[name]
         return index[body], (at[0] - centre[0], at[1] - centre[1])
 
-    def values(self, wanted: set[tuple[str, str | None]], q, v=None, a=None):  # type: ignore[no-untyped-def]
-        """Quantities of bodies, joints and points for states of shape (n, size)."""
+    def values(self, wanted: set[tuple[str, str | None]], q, v=None, a=None, sections=None):  # type: ignore[no-untyped-def]
+        """Quantities of bodies, joints and points for states of shape (n, size).
+
+        `sections`: link -> forces at its nodes, shape (n, nodes, 3); from the states where not given.
+        """
         found = {}
         for kind, what in wanted:
             if kind in PLAIN:
                 continue
             assert what is not None
-            if kind in OF_POINT:
+            if kind in OF_SECTION or kind in OF_LINK:
+                found[kind, what] = self._of_link(kind, what, q, v, sections)
+            elif kind in OF_POINT:
                 x, y = self._point_values(kind, what, q, v, a)
                 found[kind, what] = x if kind.endswith("x") else y
             else:
@@ -113,12 +135,35 @@ class Mechanism:
             i = index[body]
             return np.zeros(len(source)) if body == GROUND else source[:, 3 * i + 2]
 
-        if what in index:
+        if what in self.file.bodies or what == GROUND:
             return of(what)
+        if "." in what:
+            body = self.point(what, "expression")[0]
+            return np.zeros(len(source)) if body == index[GROUND] else source[:, 3 * body + 2]
         if what in self.file.joints:
             joint = self.file.joints[what]
-            return of(joint.body) - of(joint.to)
-        raise unknown_name("expression", what, [*index, *self.file.joints])
+            return self._angle(joint.body, source) - self._angle(joint.to, source)
+        raise unknown_name("expression", what, [*self.file.bodies, GROUND, *self.file.joints])
+
+    def _of_link(self, kind: str, what: str, q, v, sections):  # type: ignore[no-untyped-def]
+        name, _, point = what.partition(".")
+        if name not in self.links:
+            raise unknown_name(f"expression {kind}({what}): flexible links", name, self.links)
+        link = self.links[name]
+        if kind == "elastic_energy":
+            return np.array([link.beam.elastic_energy(state) for state in q])
+        node = link.node(point, "expression")
+        if kind in ("stretch", "deflection"):
+            return link.offsets(q)[:, node, ("stretch", "deflection").index(kind)]
+        if sections is None:
+            stress = np.array([link.beam.stress(*state) for state in zip(q, v, strict=True)])
+            sections = {name: link.beam.at_nodes(stress)}
+        if kind == "largest_edge_stress":
+            return link.edge_stress(sections[name], f"expression {kind}({what})").max(axis=1)
+        forces = sections[name][:, node]
+        if kind == "edge_stress":
+            return link.edge_stress(forces, f"expression {kind}({what})")
+        return forces[:, ("axial_force", "shear_force", "bending_moment").index(kind)]
 
     def _point_values(self, kind: str, where: str, q, v, a):  # type: ignore[no-untyped-def]
         body, (lx, ly) = self.point(where, "expression")
@@ -144,14 +189,28 @@ class Mechanism:
         InputError
             When a loop cannot close, forced values contradict the joints, or nothing is free to move.
         """
+        if self.links:
+            return self._bent_start(time)
         positions = [self._forced(text, target, 0) for text, target in self.file.start.positions.items()]
         velocities = [self._forced(text, target, 1) for text, target in self.file.start.velocities.items()]
         made = consistent_start(self.system, time, positions=positions, velocities=velocities)
+        if self.unbent:
+            return made
         if made.freedoms.net <= 0 and not self.planar.driven:
             count = f"{made.freedoms.coordinates} coordinates, {made.freedoms.constraints} constraints"
             cure = "remove a joint, or prescribe a motion"
             raise InputError("joints", None, f"nothing is free to move ({count})", cure)
         return made
+
+    def _bent_start(self, time: float) -> Start:
+        """Flexible links start straight, with the velocities of the same mechanism with rigid ones."""
+        bodies = {n: replace(b, flexible=False) if b.beam is not None else b for n, b in self.file.bodies.items()}
+        rigid = replace(
+            make_mechanism(replace(self.file, bodies=bodies, forces={}, outputs=(), figure=FigureTable())), unbent=True
+        )
+        known = rigid.start(time)
+        q, v = bent_start(dict(self.links), self.planar, rigid.planar, np.stack([known.q, known.v]))
+        return consistent_start(self.system, time, q=q, v=v)
 
     def _forced(self, text: str, target: float, level: int) -> Forced:
         label = f"start.{('positions', 'velocities')[level]} {text!r}"
@@ -218,14 +277,17 @@ def load_mechanism(path: str | Path) -> Mechanism:
 
 def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
     """Mechanism from its tables."""
-    bodies = tuple(_body(name, table) for name, table in file.bodies.items())
+    links = {name: link_of(file, name, table) for name, table in file.bodies.items() if table.bends}
+    bodies = [b for n, t in file.bodies.items() for b in (links[n].nodes() if n in links else (_body(file, n, t),))]
     if not bodies:
         raise InputError("bodies", None, "there is none", "add a table [bodies.NAME]")
-    joints = tuple(_part(file, f"joints.{n}", n, table, JOINTS[table.type]) for n, table in file.joints.items())
-    forces = tuple(_part(file, f"forces.{n}", n, table, FORCES[table.type]) for n, table in file.forces.items())
-    system = System([PlanarScene(Scene(bodies, joints, forces))])
+    joints = tuple(_part(file, links, f"joints.{n}", n, table, JOINTS[table.type]) for n, table in file.joints.items())
+    forces = tuple(_part(file, links, f"forces.{n}", n, table, FORCES[table.type]) for n, table in file.forces.items())
+    planar = PlanarScene(Scene(tuple(bodies), joints, forces))
+    flexible = flexible_links(file, planar, links)
+    system = System([planar, *(link.beam for link in flexible.values())])
     outputs: dict[str, Node] = {}
-    made = Mechanism(file, system, outputs, path)
+    made = Mechanism(file, system, outputs, path, flexible)
     zero = np.zeros((1, system.size))
     for i, output in enumerate(file.outputs):
         if output.name in outputs or output.name == "time_s":
@@ -242,33 +304,61 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
     return made
 
 
-def _body(name: str, t: BodyTable) -> Body:
+def _body(file: MechanismFile, name: str, t: BodyTable) -> Body:
+    if t.beam is not None:
+        return link_of(file, name, t).rigid()
+    assert t.mass_kg is not None  # the table was checked
+    assert t.inertia_kg_m2 is not None
     angle = t.angle_rad if t.angle_rad is not None else math.radians(t.angle_deg or 0.0)
     return Body(name, t.mass_kg, t.inertia_kg_m2, t.centre_m, t.position_m, angle, t.velocity_m_per_s, t.rate_rad_per_s)
 
 
-def _place(file: MechanismFile, body: str, point: str | Point | None, label: str) -> Point:
-    if point is None:
-        return (0.0, 0.0)
-    if not isinstance(point, str):
-        return point
-    points = file.ground.points_m if body == GROUND else file.bodies[body].points_m
-    if point == "centre" and body != GROUND:
-        return file.bodies[body].centre_m
-    if point not in points:
-        raise unknown_name(f"{label}: points of {body}", point, points)
-    return points[point]
+def _place(
+    file: MechanismFile, links: Mapping[str, BeamLink], where: str, point: str | Point | None, label: str
+) -> tuple[str, Point]:
+    """Body of the scene, and the place in its frame, of a point of `where`: a body, or a point of a flexible link."""
+    body, _, at = where.partition(".")
+    place = (0.0, 0.0)
+    if at:
+        place = file.bodies[body].points_m[at]
+    elif isinstance(point, str):
+        points = file.ground.points_m if body == GROUND else file.bodies[body].points_m
+        if point == "centre" and body != GROUND and file.bodies[body].beam is None:
+            place = file.bodies[body].centre_m
+        elif point not in points:
+            raise unknown_name(f"{label}: points of {body}", point, points)
+        else:
+            place = points[point]
+    elif point is not None:
+        place = point
+    if body not in links:
+        return body, place
+    link = links[body]
+    return link.node_names[link.node(place[0])], (0.0, place[1])
 
 
-def _part(file: MechanismFile, label: str, name: str, table: JointTable | ForceTable, kind: Kind) -> Any:
+def _part(
+    file: MechanismFile,
+    links: Mapping[str, BeamLink],
+    label: str,
+    name: str,
+    table: JointTable | ForceTable,
+    kind: Kind,
+) -> Any:
     """Joint or force from its table: the class of its type, the keys as its fields, what is not given by default."""
     module, _, cls = kind.reference.partition(":")
     values: dict[str, Any] = {}
+    for body, point in (("body", "point"), ("to", "to_point")):
+        if body in kind.fields and getattr(table, body) is not None:
+            made = _place(file, links, getattr(table, body), getattr(table, point), f"{label}.{point}")
+            values[kind.fields[body]] = made[0]
+            if point in kind.fields:
+                values[kind.fields[point]] = made[1]
     for key, field_name in kind.fields.items():
         value = getattr(table, key)
-        if key in ("point", "to_point"):
-            value = _place(file, str(table.body if key == "point" else table.to), value, f"{label}.{key}")
-        elif isinstance(value, FunctionTable):
+        if key in ("body", "to", "point", "to_point"):
+            continue
+        if isinstance(value, FunctionTable):
             value = time_function(value)
         elif key.endswith("_deg") and value is not None:
             value = math.radians(value)

@@ -9,7 +9,7 @@ import numpy as np
 from ..progress import stage
 from ..rigid import CoordinateSpring, Moment, PointForce, Spring, Trajectory
 from ..typing import Array
-from .expressions import compute, quantities
+from .expressions import PLAIN, compute, quantities
 from .model import Mechanism
 
 
@@ -25,12 +25,16 @@ class Results:
         Named outputs of the file.
     energy : dict
         kinetic_J, potential_J (gravity with datum y = 0, springs), work_J (of moments, point forces, dampers and
-        prescribed motions, from the start), total_J = kinetic + potential - work.
+        prescribed motions, from the start), total_J = kinetic + potential - work; elastic_J of flexible links, a part
+        of the potential energy.
+    sections : dict
+        Flexible link -> axial force (N), shear force (N), bending moment (N m) at its nodes, shape (n, nodes, 3).
     """
 
     trajectory: Trajectory
     outputs: dict[str, Array] = field(repr=False)
     energy: dict[str, Array] = field(repr=False)
+    sections: dict[str, Array] = field(default_factory=dict, repr=False)
 
 
 @stage("outputs")
@@ -39,9 +43,13 @@ def evaluate(mechanism: Mechanism, trajectory: Trajectory) -> Results:
     energy = energies(mechanism, trajectory)
     wanted = set().union(*(quantities(node) for node in mechanism.outputs.values())) if mechanism.outputs else set()
     needs = {kind for kind, _ in wanted}
-    v = trajectory.v if needs & {"rate", "vx", "vy", "angular_acceleration", "ax", "ay"} else None
+    v = trajectory.v if needs - {"angle", "x", "y", *PLAIN} else None
     a = trajectory.a if needs & {"angular_acceleration", "ax", "ay"} else None
-    values = mechanism.values(wanted, trajectory.q, v, a)
+    sections = {
+        name: link.beam.at_nodes(trajectory.stress_at(link.beam, trajectory.time))
+        for name, link in mechanism.links.items()
+    }
+    values = mechanism.values(wanted, trajectory.q, v, a, sections)
     values["time", None] = trajectory.time
     for name in ("kinetic", "potential", "work", "total"):
         values[name, None] = energy[f"{name}_J"]
@@ -49,7 +57,7 @@ def evaluate(mechanism: Mechanism, trajectory: Trajectory) -> Results:
     for table in mechanism.file.outputs:
         column = np.broadcast_to(compute(mechanism.outputs[table.name], values), trajectory.time.shape).astype(float)
         outputs[table.name] = column if table.wrap is None else wrapped(column, table.wrap)
-    return Results(trajectory, outputs, energy)
+    return Results(trajectory, outputs, energy, sections)
 
 
 def wrapped(values: Array, period: float) -> Array:
@@ -61,12 +69,14 @@ def wrapped(values: Array, period: float) -> Array:
 def energies(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
     """Kinetic, potential, work and total energy (J) at the output times."""
     system = mechanism.system
-    scene = mechanism.planar
     q, v = trajectory.q, trajectory.v
-    kinetic = 0.5 * (v**2 * np.diagonal(system.mass)).sum(axis=1)
-    potential = np.array([scene.potential(state) for state in q])
+    kinetic = 0.5 * ((v @ system.mass) * v).sum(axis=1)
+    potential = np.array([system.energy(*state)[1] for state in zip(q, v, strict=True)])
     work = _work(mechanism, trajectory)
+    beams = [link.beam for link in mechanism.links.values()]
+    elastic = {"elastic_J": np.array([sum(b.elastic_energy(state) for b in beams) for state in q])} if beams else {}
     return {
+        **elastic,
         "kinetic_J": kinetic,
         "potential_J": potential,
         "work_J": work,
@@ -93,13 +103,16 @@ def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
         if isinstance(force, Moment | PointForce) or (isinstance(force, Spring | CoordinateSpring) and force.damping):
             varying = True
     planar = mechanism.planar
-    if not (varying or planar.driven) or len(time) < 2:
+    damped = [link.beam for link in mechanism.links.values() if link.beam.link.damping]
+    if not (varying or damped or planar.driven) or len(time) < 2:
         return work
     nodes, weights = np.polynomial.legendre.leggauss(8)
     half = 0.5 * np.diff(time)
     at = (0.5 * (time[1:] + time[:-1])[:, None] + half[:, None] * nodes).ravel()
     states = trajectory.dense(at, 0), trajectory.dense(at, 1)
     power = np.array([planar.power(t, q, v) for t, q, v in zip(at, *states, strict=True)])
+    for beam in damped:
+        power = power - np.array([beam.loss(q, v) for q, v in zip(*states, strict=True)])
     if planar.driven:
         multipliers = trajectory.multipliers_at(at)
         rates = np.array([planar.rate(t, q) for t, q in zip(at, states[0], strict=True)])
@@ -142,13 +155,12 @@ def reactions(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
     for i, multipliers in enumerate(trajectory.multipliers):
         G = planar.gradients(q[i])
         for j, name in enumerate(names):
-            table = mechanism.file.joints[name]
-            body = scene.body_index[table.body]
+            joint = scene.joints[j]
+            body = scene.body_index[getattr(joint, "a", "") or getattr(joint, "body", "")]
             wrench = np.zeros(3)
             for r in np.flatnonzero(owner == j):
                 side = 0 if bodies[r, 0] == body else 1
                 wrench -= multipliers[r] * G[r, side]
-            joint = scene.joints[j]
             at = getattr(joint, "point_a", getattr(joint, "point", (0.0, 0.0)))
             centre = planar.assembly.centre[body]
             angle = q[i, 3 * body + 2] if body < len(scene.bodies) else 0.0

@@ -29,6 +29,10 @@ def draw_figures(folder: Path, mechanism: Any, results: Any) -> None:
     _frame(axes, mechanism, trajectory.q)
     axes.set_title(f"{mechanism.file.title or 'mechanism'} at {time:g} s")
     _save(plt, figure, folder / "picture.png")
+    if mechanism.links:
+        from .link_files import draw_links
+
+        draw_links(plt, folder / "links.png", mechanism, results)
 
 
 @stage("animation")
@@ -105,6 +109,7 @@ def _points(mechanism: Any) -> list[tuple[int, list[tuple[float, float]]]]:
     return [
         (mechanism.scene.body_index[name], [mechanism.point(f"{name}.{p}")[1] for p in table.points_m])
         for name, table in mechanism.file.bodies.items()
+        if name not in mechanism.links
     ]
 
 
@@ -121,7 +126,7 @@ def _paths(axes: Any, mechanism: Any, q: np.ndarray) -> None:
             continue
         if isinstance(path.point, str):
             label = f"{path.body}.{path.point}"
-            point = mechanism.point(label)[1]
+            body, point = mechanism.point(label)
         else:
             label = f"{path.body} {path.point}"
             centre = mechanism.file.bodies[path.body].centre_m
@@ -139,6 +144,14 @@ def _draw(axes: Any, mechanism: Any, q: np.ndarray) -> None:
         loop = ends if len(ends) < 3 else np.vstack([ends, ends[:1]])
         (line,) = axes.plot(loop[:, 0], loop[:, 1], "-o", lw=2, ms=3.5)
         axes.plot(*centre, "+", color=line.get_color(), ms=8)
+    magnification = mechanism.file.figure.magnification
+    for link in mechanism.links.values():
+        shape = link.exaggerated(q, link.smooth, magnification)[0]
+        nodes = link.exaggerated(q, link.beam.link.ends, magnification)[0]
+        (line,) = axes.plot(*shape.T, lw=2)
+        axes.plot(*nodes.T, "o", ms=3, color=line.get_color())
+    if mechanism.links and magnification != 1.0:
+        axes.text(0.01, 0.01, f"deflections x {magnification:g}", transform=axes.transAxes, fontsize=8)
     for x, y in mechanism.file.ground.points_m.values():
         axes.plot(x, y, "k^", ms=6, mfc="none")
 
@@ -150,6 +163,10 @@ def _frame(axes: Any, mechanism: Any, q: np.ndarray) -> None:
             a, b = _place(q, body, point)
             x += [a.min(), a.max()]
             y += [b.min(), b.max()]
+    for link in mechanism.links.values():
+        shapes = link.exaggerated(q, link.beam.link.ends, mechanism.file.figure.magnification)
+        x += [shapes[:, :, 0].min(), shapes[:, :, 0].max()]
+        y += [shapes[:, :, 1].min(), shapes[:, :, 1].max()]
     for a, b in mechanism.file.ground.points_m.values():
         x.append(a)
         y.append(b)

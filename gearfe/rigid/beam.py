@@ -299,6 +299,25 @@ class Beam(Element):
         z, dz = self._at_points(q), self._at_points(v)
         return self._stress(self.strains(z), dz)
 
+    @cached_property
+    def _to_nodes(self) -> Array:
+        """Values at the nodes of the parabolas through those at the Gauss points; means where elements meet."""
+        count, n = len(self.link.ends) - 1, len(self.link.stations)
+        inside = np.array([[p(x) for p in _lagrange(GAUSS)] for x in NODES])
+        out, shares = np.zeros((n, 3 * count)), np.zeros(n)
+        for e in range(count):
+            out[3 * e : 3 * e + 4, 3 * e : 3 * e + 3] += inside
+            shares[3 * e : 3 * e + 4] += 1.0
+        return out / shares[:, None]
+
+    def at_nodes(self, stress: Array) -> Array:
+        """Axial force (N), shear force (N), bending moment (N m) at the nodes from those at the Gauss points.
+
+        Shapes (times, nodes, 3) and (times, points, 3). Where two elements meet the mean of both: the axial force of a
+        point that carries a load lies between those of its sides.
+        """
+        return np.einsum("np,tpk->tnk", self._to_nodes, stress)
+
     def potential(self, q: Array) -> float:
         """Elastic energy and that of the weight (J)."""
         return self.elastic_energy(q) - float(self._weight @ q[self.places])

@@ -80,7 +80,8 @@ def equilibrium(system: System, start: Start) -> Equilibrium:
         before = far
     left = _left(system, t, q, active)
     if far < ROUNDING:
-        problem, cure = "is not stable where the start rests", "disturb the start position, or add what holds it"
+        problem = "is not stable where the start rests: something moves there without force"
+        cure = "disturb the start position, or add what holds it"
     else:
         problem = f"was not found in {step} steps: a force of {left:.3g} N is left"
         cure = "look for loads that nothing carries, or give a start that is nearer"

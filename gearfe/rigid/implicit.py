@@ -48,6 +48,7 @@ ERROR = np.array([-13 - 7 * ROOT6, -13 + 7 * ROOT6, -1.0]) / 3
 CUBIC = np.linalg.inv(np.vander(np.append(0.0, C) - 1.0, increasing=True))
 #: Coefficients of powers of x from (q, q') at 0, q at the first two stages, (q, q') at 1.
 _P = np.arange(6.0)
+PARABOLA = np.linalg.inv(np.vander(C, increasing=True))
 QUINTIC = np.linalg.inv(np.array([_P == 0, _P == 1, C[0] ** _P, C[1] ** _P, np.ones(6), _P], dtype=float))
 MOST_NEWTON = 10
 LAW = StepLaw(exponent=0.25, growth=5.0, least_error=1e-8, predictive=True)
@@ -81,10 +82,10 @@ def run_implicit(
         def told(t: float, steps: int, state: Callable[[], tuple[Array, Array]]) -> bool:
             return watch is None or watch(t, steps, lambda: (core.origin + core.T @ state()[0], core.T @ state()[1]))
 
-        dense, status, statistics = run_implicit(inner, begin, times, tolerance=local, watch=told, **options)
-        coefficients = dense.coefficients @ core.T.T
+        within, status, statistics = run_implicit(inner, begin, times, tolerance=local, watch=told, **options)
+        coefficients = within.coefficients @ core.T.T
         coefficients[:, 0] += core.origin
-        return Polynomials(dense.times, coefficients), status, {**statistics, "free_coordinates": inner.size}
+        return Polynomials(within.times, coefficients), status, {**statistics, "free_coordinates": inner.size}
     active, units = start.active, system.units
     pair = system.acceleration(start.time, start.q, start.v, active, start.excess)
     here = State(start.time, start.q.copy(), start.v.copy(), *pair)
@@ -92,7 +93,8 @@ def run_implicit(
     first = first_step(here.q / units, here.v / units, here.a / units, abs(span[1] - span[0]))
     control = StepControl(LAW, span, first, breaks=system.breaks, watch=watch, **options)
     reach = np.maximum(np.abs(here.q), 1e-300)
-    record, stages = [here], []
+    record: list[State] = [here]
+    stages, forces = [], []
     newton = 0
     last: Array | None = None
 
@@ -116,22 +118,37 @@ def run_implicit(
         reach, last = np.maximum(reach, np.abs(q)), made.speeds
         record.append(here)
         stages.append(made.stages)
+        forces.append(made.forces)
     # accelerations of stiff links at the steps' ends are the rounding of their strains; those of others are exact
+    dense: Polynomials
     if system.stressed and stages:
-        dense = collocated(record, np.array(stages))
+        dense = collocated(record, np.array(stages), np.array(forces))
     else:
         dense = hermite(*(np.array([r[k] for r in record]) for k in range(4)))
     counts = {"scheme": "Radau IIA of order 5", "steps": control.accepted}
     return dense, control.status, {**counts, "newton_iterations": newton, "rejected": control.rejected}
 
 
-def collocated(record: list[State], stages: Array) -> Polynomials:
+@dataclass(frozen=True)
+class Collocated(Polynomials):
+    """Dense output through the stages; `forces`: multipliers of all rows, then stresses of the elements that have some.
+
+    Both are unknowns of the stages. From the coordinates between them they would be as far off as the stiffness times
+    the error of a strain, which is that of the coordinates.
+    """
+
+    forces: Polynomials | None = None
+
+
+def collocated(record: list[State], stages: Array, forces: Array) -> Collocated:
     """Polynomials of degree 5 through the stages of every step and the coordinates and velocities of its ends."""
     times, q, v = (np.array([r[k] for r in record]) for k in range(3))
     h = np.diff(times)[:, None]
     known = np.stack([q[:-1], h * v[:-1], stages[:, 0], stages[:, 1], q[1:], h * v[1:]])
     scaled = np.einsum("jk,ksn->sjn", QUINTIC, known)
-    return Polynomials(times, scaled / h[:, :, None] ** np.arange(6)[:, None])
+    parabolas = np.einsum("jk,skn->sjn", PARABOLA, forces) / h[:, :, None] ** np.arange(3)[:, None]
+    coefficients = scaled / h[:, :, None] ** np.arange(6)[:, None]
+    return Collocated(times, coefficients, forces=Polynomials(times, parabolas))
 
 
 def in_modes(core: Minimal, start: Start) -> tuple[System, Start]:
@@ -161,6 +178,7 @@ class Step:
     iterations: int
     converged: bool
     stages: Array | None = None  # (2, n) coordinates of the first two
+    forces: Array | None = None  # (3, all rows and stresses) at the stages
     speeds: Array | None = None  # (4, n) coefficients of powers of the time (s) since the step's end, lowest first
 
 
@@ -244,11 +262,19 @@ def radau_step(
     second = M @ (a + ERROR @ (INVERSE @ Z) / h**2)
     mu = MU[0].real
     off, _ = solves[0](second + (mu / h * M - by_v) @ first, np.zeros(m))
+    pulls = np.zeros((3, system.rows))
+    pulls[:, active] = L
     speeds = np.vstack([v, v + INVERSE @ Z / h])
     return Step(
-        new_q, new_v, float(np.sqrt(np.mean((off.real / limit) ** 2))), iterations, True,
-        q + (C * h)[:2, None] * v + Z[:2], (CUBIC @ speeds) / h ** np.arange(4)[:, None],
-    )  # fmt: skip
+        new_q,
+        new_v,
+        float(np.sqrt(np.mean((off.real / limit) ** 2))),
+        iterations,
+        True,
+        stages=q + (C * h)[:2, None] * v + Z[:2],
+        forces=np.hstack([pulls, *(np.reshape(stress, (3, -1)) for stress in stresses)]),
+        speeds=(CUBIC @ speeds) / h ** np.arange(4)[:, None],
+    )
 
 
 def joint_stiffness(system: System, t: float, q: Array, multipliers: Array) -> Array:

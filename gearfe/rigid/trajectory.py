@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..typing import Array
+from .contract import Element
 from .dense import Dense
 from .start import Start
 from .status import Status
@@ -100,13 +101,34 @@ class Trajectory:
         ]  # not a single step was made
         return np.tile(state, (len(self.time), 1))
 
+    def stress_at(self, element: Element, times: Array) -> Array:
+        """Stresses of a flexible link at the given times, shape (times, points, 3): of the integrator's stages."""
+        before = self.system.rows
+        stages = getattr(self.dense, "forces", None)
+        for one, index in self.system.stressed:
+            here = np.asarray(one.stress(self.start.q[index], self.start.v[index]), dtype=float)
+            if one is not element:
+                before += here.size
+            elif stages is None:  # not a single step was made
+                return np.tile(here, (len(times), 1, 1))
+            else:
+                flat: Array = stages(times)[:, before : before + here.size]
+                return flat.reshape(len(times), *here.shape)
+        raise KeyError(element.name)
+
     @cached_property
     def multipliers(self) -> Array:
         """Constraint forces (generalised), shape (n, rows); zero for redundant rows, not unique where there are any."""
         return self.multipliers_at(self.time)
 
     def multipliers_at(self, times: Array) -> Array:
-        """Multipliers from M a = f - G^T lambda at the given times; not-a-number where they are beyond all numbers."""
+        """Multipliers from M a = f - G^T lambda at the given times; not-a-number where they are beyond all numbers.
+
+        Of the integrator's stages where it has them, with flexible links.
+        """
+        stages = getattr(self.dense, "forces", None)
+        if stages is not None:
+            return np.asarray(stages(times)[:, : self.system.rows], dtype=float)
         excess = self.start.excess
         inverse, light = self.system.inverse_of(excess), np.flatnonzero(excess)
         states = [self.dense(times, k) for k in range(3)]

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from ..config import TABLES, build, quantity, read_toml
 from ..errors import InputError, unknown_name
+from .beam import BeamTable, check_on_axis
 
 Pair = tuple[float, float]
 
@@ -87,8 +88,12 @@ FORCES: dict[str, Kind] = {
 class BodyTable:
     """[bodies.NAME]"""
 
-    mass_kg: float = quantity(low=0.0, doc="mass in kg, >= 0; 0 where the joints hold the body to others with mass")
-    inertia_kg_m2: float = quantity(low=0.0, doc="moment of inertia about the mass centre in kg m2, >= 0, likewise")
+    mass_kg: float | None = quantity(
+        None, low=0.0, doc="mass in kg, >= 0; 0 where the joints hold the body to others with mass"
+    )
+    inertia_kg_m2: float | None = quantity(
+        None, low=0.0, doc="moment of inertia about the mass centre in kg m2, >= 0, likewise"
+    )
     centre_m: Pair = quantity((0.0, 0.0), doc="mass centre in the body's frame, [x, y] in m")
     position_m: Pair = quantity((0.0, 0.0), doc="start position of the frame's origin, [x, y] in m")
     angle_deg: float | None = quantity(None, doc="start angle in degrees (or give angle_rad)")
@@ -96,9 +101,30 @@ class BodyTable:
     velocity_m_per_s: Pair = quantity((0.0, 0.0), doc="start velocity of the frame's origin, [x, y] in m/s")
     rate_rad_per_s: float = quantity(0.0, doc="start angular velocity in rad/s")
     points_m: dict[str, Pair] = quantity(dict, doc="named points in the body's frame, [x, y] in m")
+    flexible: bool | None = quantity(None, doc="false takes a link with a beam as rigid (default: flexible)")
+    beam: BeamTable | None = quantity(None, doc="beam of a flexible link, in place of mass, inertia and centre")
+
+    @property
+    def bends(self) -> bool:
+        """Whether it is a flexible link."""
+        return self.beam is not None and self.flexible is not False
 
     def check(self, where: str) -> None:
-        """At most one of the two angles."""
+        """Mass or beam, at most one of the two angles, points of a beam beside its axis."""
+        if self.beam is None:
+            for key, unit in (("mass_kg", "kg"), ("inertia_kg_m2", "kg m2")):
+                if getattr(self, key) is None:
+                    raise InputError(f"{where}.{key}", None, "is required", f"give it in {unit}, or give a beam")
+            if self.flexible:
+                cure = f"add a table [{where}.beam] with length_m, section, youngs_modulus_GPa, density_kg_per_m3"
+                raise InputError(f"{where}.flexible", True, "needs a beam", cure)
+        else:
+            for key in ("mass_kg", "inertia_kg_m2", "centre_m"):
+                if getattr(self, key) not in (None, (0.0, 0.0)):
+                    problem = "follows from the beam's length, section and density"
+                    raise InputError(f"{where}.{key}", getattr(self, key), problem, "remove it, or the beam")
+            for name, (x, _) in self.points_m.items():
+                check_on_axis(self.beam, x, f"{where}.points_m.{name}")
         if self.angle_deg is not None and self.angle_rad is not None:
             raise InputError(where, None, "has angle_deg and angle_rad", "keep one of them")
 
@@ -221,7 +247,12 @@ class RunTable:
 
     end_s: float = quantity(above=0.0, doc="end of the run in s, > 0")
     step_s: float = quantity(above=0.0, doc="distance of the output times in s, > 0")
-    tolerance: float = quantity(1e-9, low=1e-13, high=0.1, doc="accuracy relative to 1 rad and the mechanism's size")
+    tolerance: float | None = quantity(
+        None,
+        low=1e-13,
+        high=0.1,
+        doc="accuracy relative to 1 rad and the mechanism's size (default: 1e-9, with flexible links 1e-5)",
+    )
     method: str = quantity(
         "auto", choices=("auto", "taylor", "explicit", "implicit"), doc="integrator (auto: quickest)"
     )
@@ -243,6 +274,7 @@ class FigureTable:
     reference: str | None = quantity(None, doc="CSV file with a column t and reference columns, beside the job file")
     reference_columns: dict[str, str] = quantity(dict, doc="output name = column of the reference file")
     every: int = quantity(10, low=1, doc="draw each so manyth reference point")
+    magnification: float = quantity(1.0, low=0.0, doc="factor of the deflections of flexible links in pictures")
 
 
 @dataclass(frozen=True)
@@ -273,6 +305,7 @@ class MechanismFile:
                 if not name.isidentifier():
                     problem = "must be a word of letters, digits and _ (it is used in expressions and columns)"
                     raise InputError(kind, name, problem, "rename it")
+        known |= {f"{name}.{point}" for name, body in self.bodies.items() if body.beam for point in body.points_m}
         for name in self.joints:
             if name in known:
                 raise InputError("joints", name, "is the name of a body, too", "rename the joint")
@@ -282,9 +315,22 @@ class MechanismFile:
                     value = getattr(part, key)
                     if value is not None and value not in known:
                         raise unknown_name(f"{kind}.{name}.{key}", value, known)
+                for key, body, point in (("point", part.body, part.point), ("to_point", part.to, part.to_point)):
+                    if body is None or point is None:
+                        continue
+                    label = f"{kind}.{name}.{key}"
+                    if "." in body:
+                        raise InputError(label, point, f"has a point already: {body!r}", "give the point once")
+                    link = self.bodies.get(body)
+                    if link is not None and link.beam is not None and isinstance(point, tuple):
+                        check_on_axis(link.beam, point[0], label)
         for i, path in enumerate(self.paths):
             if path.body not in known:
                 raise unknown_name(f"paths[{i}].body", path.body, known)
+            link = self.bodies.get(path.body)
+            if isinstance(path.point, tuple) and link is not None and link.bends:
+                cure = "give it a name in points_m"
+                raise InputError(f"paths[{i}].point", path.point, "is no named point of the flexible link", cure)
 
 
 def read_mechanism_file(path: str | Path) -> MechanismFile:

@@ -1,0 +1,160 @@
+"""Flexible links of a mechanism: from their tables to beams, from names to nodes, and what is asked of them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..errors import InputError, unknown_name
+from ..rigid.beam import Beam, BeamLink, Section
+from ..rigid.scene import PlanarScene
+from ..tables.beam import BeamTable
+from ..tables.mechanism import BodyTable, ForceTable, JointTable, MechanismFile
+from ..typing import Array
+
+Point = tuple[float, float]
+
+
+def section_of(table: BeamTable) -> Section:
+    """Cross-section from its keys."""
+    if table.width_m is not None and table.height_m is not None:
+        return Section.rectangle(table.width_m, table.height_m)
+    if table.diameter_m is not None:
+        return Section.tube(table.diameter_m, table.inner_diameter_m)
+    assert table.area_m2 is not None  # the table was checked
+    assert table.second_moment_m4 is not None
+    return Section(table.area_m2, table.second_moment_m4, table.edge_m)
+
+
+def link_of(file: MechanismFile, name: str, table: BodyTable) -> BeamLink:
+    """Flexible link from its tables, with nodes wherever points, joints or forces are."""
+    beam = table.beam
+    assert beam is not None
+    points = {x for x, _ in table.points_m.values()}
+    parts: list[JointTable | ForceTable] = [*file.joints.values(), *file.forces.values()]
+    for part in parts:
+        for body, point in ((part.body, part.point), (part.to, part.to_point)):
+            if body == name and isinstance(point, tuple):
+                points.add(point[0])
+    angle = table.angle_rad if table.angle_rad is not None else math.radians(table.angle_deg or 0.0)
+    return BeamLink(
+        name,
+        beam.length_m,
+        section_of(beam),
+        1e9 * beam.youngs_modulus_GPa,
+        beam.density_kg_per_m3,
+        poisson_ratio=beam.poisson_ratio,
+        damping=beam.damping_s,
+        elements=beam.elements,
+        points=tuple(sorted(points)),
+        position=table.position_m,
+        angle=angle,
+        velocity=table.velocity_m_per_s,
+        rate=table.rate_rad_per_s,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class FlexibleLink:
+    """A link of a mechanism with its beam.
+
+    Parameters
+    ----------
+    beam
+        Element of the system.
+    points
+        Named points in the link's frame (m).
+    clamped
+        Deflections are against the frame of the start's section, not against the chord through both ends.
+    """
+
+    beam: Beam
+    points: dict[str, Point]
+    clamped: bool
+
+    def node(self, point: str, label: str) -> int:
+        """Number of the node of a named point."""
+        if point in ("", "origin"):
+            return 0
+        if point not in self.points:
+            raise unknown_name(f"{label}: points of {self.beam.link.name}", point, [*self.points, "origin"])
+        return self.beam.link.node(self.points[point][0])
+
+    def places(self, q: Array, stations: Array | None = None) -> Array:
+        """x, y, theta of the nodes, or at other stations (m) of the axis, for states (times, size): (times, n, 3)."""
+        nodes = q[:, self.beam.places].reshape(len(q), -1, 3)
+        return nodes if stations is None else np.einsum("sn,tnk->tsk", self.beam.shapes(stations)[0], nodes)
+
+    def offsets(self, q: Array, stations: Array | None = None) -> Array:
+        """Displacements along and across in the link's own frame (m), shape (times, n, 2)."""
+        at = self.places(q, stations)
+        ends = self.places(q)
+        s = self.beam.link.stations if stations is None else stations
+        if self.clamped:
+            angle = ends[:, 0, 2]
+        else:
+            angle = np.arctan2(ends[:, -1, 1] - ends[:, 0, 1], ends[:, -1, 0] - ends[:, 0, 0])
+        c, sn = np.cos(angle)[:, None], np.sin(angle)[:, None]
+        x, y = at[:, :, 0] - ends[:, :1, 0], at[:, :, 1] - ends[:, :1, 1]
+        return np.stack([c * x + sn * y - s, c * y - sn * x], axis=-1)
+
+    def exaggerated(self, q: Array, stations: Array, factor: float) -> Array:
+        """Places with displacements in the link's own frame times a factor, shape (times, n, 2)."""
+        at, offset = self.places(q, stations), self.offsets(q, stations)
+        ends = self.places(q)
+        if self.clamped:
+            c, s = np.cos(ends[:, :1, 2]), np.sin(ends[:, :1, 2])
+        else:
+            chord = ends[:, -1, :2] - ends[:, 0, :2]
+            c, s = (chord / np.hypot(*chord.T)[:, None]).T[:, :, None]
+        more = (factor - 1.0) * offset
+        moved = np.stack([c * more[..., 0] - s * more[..., 1], s * more[..., 0] + c * more[..., 1]], axis=-1)
+        return np.asarray(at[:, :, :2] + moved, dtype=float)
+
+    def edge_stress(self, resultants: Array, label: str) -> Array:
+        """Largest normal stress |N|/A + |M| e/I over the section (Pa)."""
+        section = self.beam.link.section
+        if section.edge is None:
+            raise InputError(label, None, f"link {self.beam.link.name!r} has no edge_m", "give the outer fibre's place")
+        bending = np.abs(resultants[..., 2]) * section.edge / section.second_moment
+        return np.asarray(np.abs(resultants[..., 0]) / section.area + bending, dtype=float)
+
+    @cached_property
+    def smooth(self) -> Array:
+        """Stations for pictures (m)."""
+        ends = self.beam.link.ends
+        return np.unique(np.concatenate([np.linspace(a, b, 9) for a, b in itertools.pairwise(ends)]))
+
+
+def flexible_links(file: MechanismFile, planar: PlanarScene, links: dict[str, BeamLink]) -> dict[str, FlexibleLink]:
+    """Links with their beams, which are elements of the system beside the scene."""
+    made = {}
+    for name, link in links.items():
+        table = file.bodies[name]
+        assert table.beam is not None
+        made[name] = FlexibleLink(Beam(planar, link), dict(table.points_m), table.beam.frame == "start")
+    return made
+
+
+def bent_start(links: dict[str, FlexibleLink], planar: PlanarScene, rigid: PlanarScene, state: Array) -> Array:
+    """Coordinates (of all bodies, shape (2, size): q and v) in which the links move as rigid ones do."""
+    out = np.zeros((2, planar.size))
+    index, other = planar.scene.body_index, rigid.scene.body_index
+    for body in rigid.scene.bodies:
+        k = 3 * other[body.name]
+        (x, y, angle), (vx, vy, w) = state[:, k : k + 3]
+        if body.name not in links:
+            at = 3 * index[body.name]
+            out[:, at : at + 3] = state[:, k : k + 3]
+            continue
+        beam = links[body.name].beam
+        arm = beam.link.stations - beam.link.length / 2.0
+        c, s = math.cos(angle), math.sin(angle)
+        turn = np.full(len(arm), 1.0)
+        out[0, beam.places] = np.stack([x + c * arm, y + s * arm, angle * turn], axis=1).ravel()
+        out[1, beam.places] = np.stack([vx - w * s * arm, vy + w * c * arm, w * turn], axis=1).ravel()
+    return out

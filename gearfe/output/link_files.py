@@ -1,0 +1,105 @@
+"""Flexible links of a mechanism: links.csv, links.vtkhdf with stress, and links.png with forces along them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..progress import stage
+from ..typing import Array
+from .files import csv_table, whole_file
+from .vtkhdf import VtkHdfSeries
+
+#: Names of the forces at the nodes, in their order.
+FORCES = ("axial_force_N", "shear_force_N", "bending_moment_N_m")
+
+
+@stage("flexible links")
+def write_links(folder: Path, mechanism: Any, trajectory: Any) -> None:
+    """links.csv and links.vtkhdf: shape, forces and edge stress of every node at the times of the frames."""
+    times = _times(mechanism, trajectory)
+    q = trajectory.dense(times)
+    forces = {n: link.beam.at_nodes(trajectory.stress_at(link.beam, times)) for n, link in mechanism.links.items()}
+    with csv_table(folder / "links.csv") as table:
+        for i, time in enumerate(times):
+            for name, link in mechanism.links.items():
+                count = len(link.beam.link.stations)
+                columns: dict[str, Any] = {
+                    "time_s": np.full(count, time),
+                    "link": [name] * count,
+                    "s_m": link.beam.link.stations,
+                }
+                at, offset = link.places(q[i : i + 1])[0], link.offsets(q[i : i + 1])[0]
+                columns |= {"x_m": at[:, 0], "y_m": at[:, 1], "angle_rad": at[:, 2]}
+                columns |= {"stretch_m": offset[:, 0], "deflection_m": offset[:, 1]}
+                columns |= {key: forces[name][i, :, k] for k, key in enumerate(FORCES)}
+                if link.beam.link.section.edge is not None:
+                    columns["edge_stress_Pa"] = link.edge_stress(forces[name][i], name)
+                else:
+                    columns["edge_stress_Pa"] = np.full(count, np.nan)
+                table.write(columns)
+    with VtkHdfSeries(folder / "links.vtkhdf") as series:
+        for i, time in enumerate(times):
+            points, cells, data = [], [], []
+            start = 0
+            for name, link in mechanism.links.items():
+                sides, values = _strip(link, q[i : i + 1], forces[name][i])
+                n = len(sides) // 2
+                one = start + np.arange(n - 1)
+                cells.append(np.stack([one, one + 1, one + 1 + n, one + n], axis=1))
+                points.append(sides)
+                data.append(values)
+                start += len(sides)
+            joined = np.concatenate(data)
+            fields = {
+                "stress_Pa": joined[:, 0],
+                "axial_force_N": joined[:, 1],
+                "bending_moment_N_m": joined[:, 2],
+                "deflection_m": joined[:, 3],
+            }
+            grid = {"quad": np.concatenate(cells)} if i == 0 else None
+            series.add(float(time), np.concatenate(points), grid, point_data=fields)
+
+
+def _times(mechanism: Any, trajectory: Any) -> Array:
+    return np.linspace(trajectory.time[0], trajectory.time[-1], mechanism.file.run.frames)
+
+
+def _strip(link: Any, q: Array, forces: Array) -> tuple[Array, Array]:
+    """Both edges of a link (2 nodes, 2), and at them stress along the axis, axial force, moment and deflection."""
+    section, at = link.beam.link.section, link.places(q)[0]
+    edge = section.edge if section.edge is not None else float(np.sqrt(3.0 * section.second_moment / section.area))
+    across = edge * np.stack([-np.sin(at[:, 2]), np.cos(at[:, 2])], axis=1)
+    deflection = link.offsets(q)[0, :, 1]
+    sides, values = [], []
+    for sign in (-1.0, 1.0):
+        stress = forces[:, 0] / section.area - sign * forces[:, 2] * edge / section.second_moment
+        sides.append(at[:, :2] + sign * across)
+        values.append(np.stack([stress, forces[:, 0], forces[:, 2], deflection], axis=1))
+    return np.concatenate(sides), np.concatenate(values)
+
+
+def draw_links(plt: Any, path: Path, mechanism: Any, results: Any) -> None:
+    """links.png: axial force and bending moment along every link, the range over the run and the last time."""
+    count = len(mechanism.links)
+    figure, rows = plt.subplots(count, 3, figsize=(11, 1.0 + 2.2 * count), squeeze=False)
+    for axes, (name, link) in zip(rows, mechanism.links.items(), strict=True):
+        s = link.beam.link.stations
+        values = [1e3 * link.offsets(results.trajectory.q)[:, :, 1]]
+        values += [results.sections[name][:, :, k] for k in (0, 2)]
+        for ax, value, label in zip(
+            axes, values, ("deflection in mm", "axial force in N", "bending moment in N m"), strict=True
+        ):
+            ax.fill_between(s, value.min(axis=0), value.max(axis=0), alpha=0.25, label="over the run")
+            ax.plot(s, value[-1], lw=1.4, label=f"at {results.trajectory.time[-1]:.4g} s")
+            ax.set_title(f"{name}: {label}", fontsize=9)
+            ax.grid(alpha=0.3)
+        axes[0].legend(fontsize=7)
+    for ax in rows[-1]:
+        ax.set_xlabel("s in m")
+    figure.tight_layout()
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, dpi=130)
+    plt.close(figure)
