@@ -69,7 +69,7 @@ def run(case: Case, folder: Path) -> Finding:
 
 
 def _checks(case: Case, mechanism: Mechanism, start: Start, made: Trajectory) -> list[Check]:
-    tolerance = mechanism.file.run.tolerance
+    tolerance = mechanism.tolerance
     allowed = max((AMPLIFIED if made.method == "taylor" else IMPLICIT) * tolerance, FLOOR)
     turns = float(case.data.get("amplification", 1.0))
     energy = evaluate(mechanism, made).energy
@@ -94,7 +94,7 @@ def _checks(case: Case, mechanism: Mechanism, start: Start, made: Trajectory) ->
 
 def _estimate(mechanism: Mechanism, start: Start, made: Trajectory, floor: float) -> list[Check]:
     """The error that the command would state, against a run far finer than the one it is made from."""
-    tolerance = mechanism.file.run.tolerance
+    tolerance = mechanism.tolerance
     if tolerance < 1e-9 or made.method != "taylor":
         return []  # no run is far finer than that
     stated = trajectory_error(mechanism, start, evaluate(mechanism, made), tolerance).coordinates
@@ -111,13 +111,13 @@ def _backwards(case: Case, mechanism: Mechanism, start: Start, made: Trajectory)
     """Run back to the start; chains are chaotic, so errors grow with a rate that the case states."""
     end = consistent_start(mechanism.system, made.reached, q=made.q[-1], v=made.v[-1])
     backend = "compiled" if compiled_is_ready() else "plain"
-    options: dict[str, Any] = {"method": made.method, "tolerance": mechanism.file.run.tolerance, "start": end}
+    options: dict[str, Any] = {"method": made.method, "tolerance": mechanism.tolerance, "start": end}
     back = integrate(mechanism.system, [made.reached, 0.0], backend=backend, raise_on_failure=False, **options)
     if back.status != 0:
         return []
     growth = math.exp(min(12.0, float(case.data["growth_per_s"]) * made.reached))
     off = float(np.abs(back.q[-1] - start.q).max())
-    return [Check("back", off, growth * max(AMPLIFIED * mechanism.file.run.tolerance, FLOOR))]
+    return [Check("back", off, growth * max(AMPLIFIED * mechanism.tolerance, FLOOR))]
 
 
 def folding_angle(theta: float, omega: float, times: np.ndarray) -> np.ndarray:
