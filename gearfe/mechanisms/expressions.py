@@ -28,6 +28,11 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
     "atan2": (2, np.arctan2),
     "hypot": (2, np.hypot),
     "abs": (1, np.abs),
+    "exp": (1, np.exp),
+    "log": (1, np.log),
+    "tanh": (1, np.tanh),
+    "min": (2, np.minimum),
+    "max": (2, np.maximum),
 }
 #: Quantities of a body or joint, and of a point.
 OF_BODY = ("angle", "rate", "angular_acceleration")
@@ -42,19 +47,21 @@ _TOKEN = re.compile(
     r"\s*(?:(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*(?:\.\w+)?)|(\*\*|[-+*/(),]))"
 )
 _DEEPEST = 60
+#: A function of numbers, not-a-number where it has no value.
+Table = Callable[[Any], Any]
 
 
 @dataclass(frozen=True)
 class Node:
-    """A piece of an expression: kind is "number", "quantity", "call" or an operator."""
+    """A piece of an expression: kind is "number", "quantity", "call", "table" or an operator."""
 
     kind: str
     value: Any = None
     parts: tuple[Node, ...] = ()
 
 
-def parse(text: str, label: str) -> Node:
-    """Syntax tree of `text`; `label` names it in messages.
+def parse(text: str, label: str, tables: Mapping[str, Table] | None = None) -> Node:
+    """Syntax tree of `text`; `label` names it in messages, `tables` are functions of one number by name.
 
     Raises
     ------
@@ -74,7 +81,7 @@ def parse(text: str, label: str) -> Node:
         number, name, operator = match.groups()
         tokens.append(("number", number) if number else ("name", name) if name else ("operator", operator))
         at = match.end()
-    reader = _Reader(tokens, text, label)
+    reader = _Reader(tokens, text, label, tables or {})
     node = reader.sum(0)
     if reader.at != len(tokens):
         raise _wrong(label, text, f"did not expect {tokens[reader.at][1]!r}")
@@ -95,6 +102,8 @@ def compute(node: Node, values: Mapping[tuple[str, str | None], Any]) -> Any:
         return node.value
     if node.kind == "quantity":
         return values[node.value]
+    if node.kind == "table":
+        return node.value[1](compute(node.parts[0], values))
     parts = [compute(p, values) for p in node.parts]
     with np.errstate(all="ignore"):
         if node.kind == "call":
@@ -108,8 +117,9 @@ def compute(node: Node, values: Mapping[tuple[str, str | None], Any]) -> Any:
 class _Reader:
     """Recursive descent over the tokens."""
 
-    def __init__(self, tokens: list[tuple[str, str]], text: str, label: str) -> None:
+    def __init__(self, tokens: list[tuple[str, str]], text: str, label: str, tables: Mapping[str, Table]) -> None:
         self.tokens, self.text, self.label, self.at = tokens, text, label, 0
+        self.tables = tables
 
     def _next(self) -> tuple[str, str]:
         return self.tokens[self.at] if self.at < len(self.tokens) else ("end", "")
@@ -176,15 +186,18 @@ class _Reader:
             self.at += 1
             self._take(")")
             return Node("quantity", (value, what))
-        if value not in FUNCTIONS:
-            raise unknown_name(f"{self.label} = {self.text!r}", value, [*FUNCTIONS, *NAMED])
+        if value not in FUNCTIONS and value not in self.tables:
+            raise unknown_name(f"{self.label} = {self.text!r}", value, [*FUNCTIONS, *self.tables, *NAMED])
         parts = [self.sum(depth + 1)]
         while self._next() == ("operator", ","):
             self.at += 1
             parts.append(self.sum(depth + 1))
         self._take(")")
-        if len(parts) != FUNCTIONS[value][0]:
-            raise _wrong(self.label, self.text, f"{value} takes {FUNCTIONS[value][0]} argument(s), not {len(parts)}")
+        wanted = 1 if value in self.tables else FUNCTIONS[value][0]
+        if len(parts) != wanted:
+            raise _wrong(self.label, self.text, f"{value} takes {wanted} argument(s), not {len(parts)}")
+        if value in self.tables:
+            return Node("table", (value, self.tables[value]), tuple(parts))
         return Node("call", value, tuple(parts))
 
     def _plain(self, name: str) -> Node:

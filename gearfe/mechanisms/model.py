@@ -40,10 +40,14 @@ from ..tables.mechanism import (
     MechanismFile,
     read_mechanism_file,
 )
-from .expressions import OF_LINK, OF_POINT, OF_SECTION, PLAIN, Node, compute, parse, quantities
+from .expressions import FUNCTIONS, NAMED, OF_LINK, OF_POINT, OF_SECTION, PLAIN, Node, compute, parse, quantities
 from .links import FlexibleLink, bent_start, flexible_links, link_of
+from .loads import ExpressionLoad
+from .tables import ValueTable, read_table
 
 Point = tuple[float, float]
+#: Keys that may be expressions of the state.
+LOADS = ("x_N", "y_N", "moment_N_m")
 
 
 @dataclass(frozen=True)
@@ -129,21 +133,23 @@ class Mechanism:
         return found
 
     def _angle(self, what: str, source):  # type: ignore[no-untyped-def]
-        index = self.scene.body_index
+        total = np.zeros(len(source))
+        for body, sign in self.angle_of(what, "expression"):
+            total = total + sign * source[:, 3 * body + 2]
+        return total
 
-        def of(body: str):  # type: ignore[no-untyped-def]
-            i = index[body]
-            return np.zeros(len(source)) if body == GROUND else source[:, 3 * i + 2]
-
-        if what in self.file.bodies or what == GROUND:
-            return of(what)
-        if "." in what:
-            body = self.point(what, "expression")[0]
-            return np.zeros(len(source)) if body == index[GROUND] else source[:, 3 * body + 2]
+    def angle_of(self, what: str, label: str) -> list[tuple[int, float]]:
+        """Moving bodies, with signs, whose angles add up to that of a body, a point's section, or a joint."""
+        ground = len(self.scene.bodies)
         if what in self.file.joints:
             joint = self.file.joints[what]
-            return self._angle(joint.body, source) - self._angle(joint.to, source)
-        raise unknown_name("expression", what, [*self.file.bodies, GROUND, *self.file.joints])
+            pair = [(joint.body, 1.0), (joint.to, -1.0)]
+        elif what.partition(".")[0] in (*self.file.bodies, GROUND):
+            pair = [(what, 1.0)]
+        else:
+            raise unknown_name(label, what, [*self.file.bodies, GROUND, *self.file.joints])
+        bodies = [(self.point(body, label)[0], sign) for body, sign in pair]
+        return [(body, sign) for body, sign in bodies if body != ground]
 
     def _of_link(self, kind: str, what: str, q, v, sections):  # type: ignore[no-untyped-def]
         name, _, point = what.partition(".")
@@ -196,6 +202,7 @@ class Mechanism:
         made = consistent_start(self.system, time, positions=positions, velocities=velocities)
         if self.unbent:
             return made
+        self._check_loads(made)
         if made.freedoms.net <= 0 and not self.planar.driven:
             count = f"{made.freedoms.coordinates} coordinates, {made.freedoms.constraints} constraints"
             cure = "remove a joint, or prescribe a motion"
@@ -210,7 +217,14 @@ class Mechanism:
         )
         known = rigid.start(time)
         q, v = bent_start(dict(self.links), self.planar, rigid.planar, np.stack([known.q, known.v]))
-        return consistent_start(self.system, time, q=q, v=v)
+        made = consistent_start(self.system, time, q=q, v=v)
+        self._check_loads(made)
+        return made
+
+    def _check_loads(self, start: Start) -> None:
+        for _, load in self.planar.assembly.state_loads:
+            if not math.isfinite(load.value(start.time, start.q, start.v)):
+                raise InputError("forces", None, f"have no value at the start: {load.complaint}", "mend the expression")
 
     def _forced(self, text: str, target: float, level: int) -> Forced:
         label = f"start.{('positions', 'velocities')[level]} {text!r}"
@@ -277,22 +291,33 @@ def load_mechanism(path: str | Path) -> Mechanism:
 
 def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
     """Mechanism from its tables."""
+    tables = {name: read_table(name, table, path.parent) for name, table in file.tables.items()}
+    for name in tables:
+        if name in FUNCTIONS or name in (*NAMED, *PLAIN, "pi"):
+            raise InputError("tables", name, "is the name of a function or a quantity", "rename the table")
     links = {name: link_of(file, name, table) for name, table in file.bodies.items() if table.bends}
     bodies = [b for n, t in file.bodies.items() for b in (links[n].nodes() if n in links else (_body(file, n, t),))]
     if not bodies:
         raise InputError("bodies", None, "there is none", "add a table [bodies.NAME]")
-    joints = tuple(_part(file, links, f"joints.{n}", n, table, JOINTS[table.type]) for n, table in file.joints.items())
-    forces = tuple(_part(file, links, f"forces.{n}", n, table, FORCES[table.type]) for n, table in file.forces.items())
+    joints = tuple(
+        _part(file, links, tables, f"joints.{n}", n, table, JOINTS[table.type]) for n, table in file.joints.items()
+    )
+    forces = tuple(
+        _part(file, links, tables, f"forces.{n}", n, table, FORCES[table.type]) for n, table in file.forces.items()
+    )
     planar = PlanarScene(Scene(tuple(bodies), joints, forces))
     flexible = flexible_links(file, planar, links)
     system = System([planar, *(link.beam for link in flexible.values())])
     outputs: dict[str, Node] = {}
     made = Mechanism(file, system, outputs, path, flexible)
+    for _, load in planar.assembly.state_loads:
+        assert isinstance(load, ExpressionLoad)
+        load.bind(made)
     zero = np.zeros((1, system.size))
     for i, output in enumerate(file.outputs):
         if output.name in outputs or output.name == "time_s":
             raise InputError(f"outputs[{i}].name", output.name, "is used twice", "rename the column")
-        node = parse(output.value, f"outputs[{i}].value")
+        node = parse(output.value, f"outputs[{i}].value", tables)
         made.values(quantities(node), zero, zero, zero)  # names exist
         outputs[output.name] = node
     for path_table in file.paths:
@@ -340,6 +365,7 @@ def _place(
 def _part(
     file: MechanismFile,
     links: Mapping[str, BeamLink],
+    tables: Mapping[str, ValueTable],
     label: str,
     name: str,
     table: JointTable | ForceTable,
@@ -360,6 +386,9 @@ def _part(
             continue
         if isinstance(value, FunctionTable):
             value = time_function(value)
+        elif isinstance(value, str) and key in LOADS:
+            node = parse(value, f"{label}.{key}", tables)
+            value = ExpressionLoad(value, f"{label}.{key}", node)
         elif key.endswith("_deg") and value is not None:
             value = math.radians(value)
         if value is not None:

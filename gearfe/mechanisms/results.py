@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TypeGuard
 
 import numpy as np
 
 from ..progress import stage
-from ..rigid import CoordinateSpring, Moment, PointForce, Spring, Trajectory
+from ..rigid import CoordinateSpring, Moment, PointForce, Spring, StateFunction, TimeFunction, Trajectory
 from ..typing import Array
 from .expressions import PLAIN, compute, quantities
 from .model import Mechanism
@@ -92,7 +93,7 @@ def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
     index = scene.body_index
     varying = False
     for force in scene.forces:
-        if isinstance(force, Moment) and not force.function.breaks and not force.function.sines:
+        if isinstance(force, Moment) and _is_polynomial(force.function):
             row = force.function.coefficients[0]
             if len(row) == 1:
                 for body, sign in ((force.body, 1.0), (force.reaction, -1.0)):
@@ -123,13 +124,17 @@ def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
     return work
 
 
+def _is_polynomial(load: TimeFunction | StateFunction) -> TypeGuard[TimeFunction]:
+    return isinstance(load, TimeFunction) and not load.breaks and not load.sines
+
+
 def _steady_power(mechanism: Mechanism, v: Array) -> Array:
     """Power of the constant moments, which have a closed form."""
     scene = mechanism.scene
     index = scene.body_index
     power = np.zeros(len(v))
     for force in scene.forces:
-        if isinstance(force, Moment) and not force.function.breaks and not force.function.sines:
+        if isinstance(force, Moment) and _is_polynomial(force.function):
             row = force.function.coefficients[0]
             if len(row) == 1:
                 for body, sign in ((force.body, 1.0), (force.reaction, -1.0)):

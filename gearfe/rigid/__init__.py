@@ -12,6 +12,7 @@ from .joints import Fixed, Hinge, Prescribed, Prismatic, Slot
 from .planar import Body, Scene
 from .scene import PlanarScene
 from .start import Forced, Freedoms, Start, consistent_start, count_freedoms
+from .statefunctions import StateFunction
 from .status import Status
 from .system import System
 from .timefunctions import TimeFunction, constant, polynomial, sine, smoothed_step
@@ -42,6 +43,7 @@ __all__ = [
     "Slot",
     "Spring",
     "Start",
+    "StateFunction",
     "Status",
     "System",
     "TimeFunction",

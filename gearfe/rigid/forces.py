@@ -12,16 +12,17 @@ from typing import NamedTuple
 
 from ..errors import InputError
 from .forms import GROUND, Form, Frames, Point, Vector
+from .statefunctions import StateFunction
 from .timefunctions import TimeFunction, constant
 
 
 class Along(NamedTuple):
-    """Generalised force ``load(t) - stiffness u - damping u'`` along an affine form u."""
+    """Generalised force ``load - stiffness u - damping u'`` along an affine form u."""
 
     form: Form
     stiffness: float = 0.0
     damping: float = 0.0
-    load: TimeFunction | None = None
+    load: TimeFunction | StateFunction | None = None
 
 
 class Tension(NamedTuple):
@@ -128,8 +129,8 @@ class PointForce(Force):
 
     body: str
     point: Point = (0.0, 0.0)
-    x: TimeFunction = field(default_factory=lambda: constant(0.0))
-    y: TimeFunction = field(default_factory=lambda: constant(0.0))
+    x: TimeFunction | StateFunction = field(default_factory=lambda: constant(0.0))
+    y: TimeFunction | StateFunction = field(default_factory=lambda: constant(0.0))
     name: str = ""
 
     def parts(self, frames: Frames) -> list[Along | Tension | Weight]:
@@ -143,7 +144,7 @@ class Moment(Force):
     """Moment (N m) on a body, with the opposite one on body `reaction` (the ground by default)."""
 
     body: str
-    function: TimeFunction
+    function: TimeFunction | StateFunction
     reaction: str = GROUND
     name: str = ""
 

@@ -20,6 +20,7 @@ from .choice import Choice, Way, joined, joined_statistics
 from .dense import Dense
 from .elimination import is_linear, minimal
 from .modal import series_force
+from .scene import PlanarScene
 from .start import Start, consistent_start
 from .status import Status
 from .steps import Watch
@@ -121,10 +122,18 @@ def integrate(
         last = dense.times[-6:]  # the very last ones may be beyond all numbers
         link = loose_link(system, last, dense(last, 0), dense(last, 1), start)
         statistics = statistics if link is None else {**statistics, "loose_link": link}
+    if status is not Status.DONE and (why := _complaint(system)):
+        statistics = {**statistics, "complaint": why}
     made = Trajectory(system, start, kept, status, chosen, statistics, dense)
     if raise_on_failure and made.status is not Status.DONE:
         raise IntegrationError(made, made.message, made.reached, float(asked[-1]))
     return made
+
+
+def _complaint(system: System) -> str:
+    """What the first load without a value says."""
+    scenes = [e for e in system.elements if isinstance(e, PlanarScene)]
+    return next((f.complaint for s in scenes for _, f in s.assembly.state_loads if f.complaint), "")
 
 
 def _counted(begin: float, end: float, t: float, steps: int, state: Any) -> bool:  # noqa: ARG001 - a `choice.Watch`

@@ -14,6 +14,7 @@ from ..errors import InputError, shown, unknown_name
 from .forces import Force
 from .forms import GROUND, Frames, Point
 from .joints import Joint
+from .statefunctions import StateFunction
 from .timefunctions import TimeFunction, constant
 
 #: Masses and inertias below this, or above its inverse, overflow in products.
@@ -99,7 +100,7 @@ class Scene:
                 values = value if isinstance(value, tuple) else (value,)
                 if any(isinstance(x, float) and not math.isfinite(x) for x in values):
                     raise InputError(f"{label} {key}", value, "must be finite", "give a number")
-                if key in ("function", "x", "y") and not isinstance(value, TimeFunction):
+                if key in ("function", "x", "y") and not isinstance(value, TimeFunction | StateFunction):
                     if not isinstance(value, int | float):
                         cure = "use constant, polynomial, sine or smoothed_step"
                         raise InputError(f"{label} {key}", None, "must be a function of time", cure)

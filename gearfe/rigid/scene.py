@@ -70,6 +70,11 @@ class PlanarScene(Element):
         return np.tile([length, length, 1.0], self.size // 3), self._forms.unit
 
     @property
+    def has_series(self) -> bool:
+        """Whether the Taylor kernels can run it: no load depends on the state."""
+        return not self.assembly.state_loads
+
+    @property
     def driven(self) -> bool:
         """Whether a joint prescribes a motion."""
         return bool((self._forms.motion[: self.rows] >= 0).any())
@@ -252,6 +257,10 @@ class PlanarScene(Element):
         np.add.at(by_q, at, (along.value + along.given)[:, None] * bend)
         swing = bend * motion.row.ravel()[along.places]  # d(gradient)/dt
         np.add.at(by_q, pairs, -damping[:, None, None] * along.gradient[:, :, None] * swing[:, None, :])
+        for k, load in self.assembly.state_loads:
+            slopes = load.slopes(t, q, v)
+            for total, slope in zip((by_q, by_v), slopes, strict=True):
+                np.add.at(total[:, :n], along.places[k], np.outer(along.gradient[k], slope))
         return by_q[:n, :n], by_v[:n, :n]
 
     def power(self, t: float, q: Array, v: Array) -> float:
@@ -280,6 +289,8 @@ class PlanarScene(Element):
         stiffness, damping = self._forces.along.T
         functions = self.assembly.functions
         given = np.array([0.0 if k < 0 else float(functions[k](t)) for k in self._forms.motion[self.rows :]])
+        for k, load in self.assembly.state_loads:
+            given[k] = load.value(t, pose.row[:-1, :3].ravel(), motion.row[:-1].ravel())
         value = -stiffness * self._affine(pose)[self.rows :] - damping * rate
         return _Along(gradient, places, rate, value, given)
 
@@ -305,7 +316,7 @@ class _Along(NamedTuple):
     places: IntArray  # (f, 6) numbers of the coordinates
     rate: Array  # (f,)
     value: Array  # (f,) of springs and dampers
-    given: Array  # (f,) of the functions of time
+    given: Array  # (f,) of the loads
 
 
 class _Springs(NamedTuple):

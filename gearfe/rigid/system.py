@@ -105,7 +105,7 @@ class System:
     def planar(self) -> PlanarScene | None:
         """The planar scene when the system is nothing else: the Taylor kernels can run it."""
         one = self.elements[0] if len(self.elements) == 1 else None
-        return one if isinstance(one, PlanarScene) else None
+        return one if isinstance(one, PlanarScene) and one.has_series else None
 
     def coordinates(self, element: Element) -> np.ndarray:
         """Numbers of the coordinates that `element` owns."""

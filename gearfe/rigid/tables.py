@@ -21,6 +21,7 @@ from .forces import Along, Tension, Weight
 from .forms import End, Form, Frames, Terms, Vector
 from .ordering import Factor, elimination_plan
 from .planar import Body, Scene
+from .statefunctions import StateFunction
 from .timefunctions import TimeFunction, constant
 
 
@@ -83,6 +84,7 @@ class Assembly(NamedTuple):
     row_holds_length: BoolArray  # (m,) whether it holds lengths, not angles and directions alone
     spring_label: tuple[str, ...]
     functions: tuple[TimeFunction, ...]  # in the order of the tables
+    state_loads: tuple[tuple[int, StateFunction], ...]  # number among the forces along forms, and the load
     start_q: Array  # (3n,) start coordinates of the mass centres
     start_v: Array  # (3n,)
     breaks: Array  # times at which a time function changes its piece
@@ -106,8 +108,8 @@ def assemble(scene: Scene) -> Assembly:
     frames = scene.frames
     functions: list[TimeFunction] = []
 
-    def numbered(function: TimeFunction | None) -> int:
-        if function is None:
+    def numbered(function: TimeFunction | StateFunction | None) -> int:
+        if function is None or isinstance(function, StateFunction):
             return -1
         functions.append(function)
         return len(functions) - 1
@@ -155,6 +157,7 @@ def assemble(scene: Scene) -> Assembly:
         row_holds_length=lengths,
         spring_label=tuple(label for label, _ in tensions),
         functions=tuple(functions),
+        state_loads=tuple((k, a.load) for k, a in enumerate(along) if isinstance(a.load, StateFunction)),
         start_q=q0,
         start_v=v0,
         breaks=np.unique([t for f in functions for t in f.breaks if math.isfinite(t)]).astype(float),

@@ -65,7 +65,9 @@ class Trajectory:
     @property
     def message(self) -> str:
         """The status in words, with the link that is to blame where one is known."""
-        link = self.statistics.get("loose_link")
+        link, complaint = self.statistics.get("loose_link"), self.statistics.get("complaint")
+        if complaint is not None:
+            return f"{self.status.message}: {complaint}"
         if link is None:
             return self.status.message
         return (

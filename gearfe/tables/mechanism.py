@@ -157,6 +157,18 @@ class FunctionTable:
 
 
 Function = float | FunctionTable
+#: A load may be an expression, too.
+Load = float | FunctionTable | str
+
+
+@dataclass(frozen=True)
+class ValueTableTable:
+    """[tables.NAME]: a function for expressions, from two columns of a CSV file."""
+
+    file: str = quantity(doc="CSV file with a header, beside the mechanism file")
+    x: str = quantity(doc="column of the argument, rising")
+    y: str = quantity(doc="column of the value")
+    interpolation: str = quantity("cubic", choices=("cubic", "linear"), doc="monotone cubics, or straight lines")
 
 
 @dataclass(frozen=True)
@@ -200,9 +212,9 @@ class ForceTable:
     free_length_m: float = quantity(0.0, low=0.0, doc="length of the spring without force in m, >= 0")
     coordinate: str | None = quantity(None, choices=("angle", "x", "y"), doc="coordinate that the spring acts on")
     reference: float = quantity(0.0, doc="coordinate at which the spring is free, in m or rad")
-    x_N: Function | None = quantity(None, doc="force in x in N: a number or a function of time")
-    y_N: Function | None = quantity(None, doc="force in y in N: a number or a function of time")
-    moment_N_m: Function | None = quantity(None, doc="moment in N m: a number or a function of time")
+    x_N: Load | None = quantity(None, doc="force in x in N: a number, a function of time, or an expression")
+    y_N: Load | None = quantity(None, doc="force in y in N: a number, a function of time, or an expression")
+    moment_N_m: Load | None = quantity(None, doc="moment in N m: a number, a function of time, or an expression")
 
     def check(self, where: str) -> None:
         """Only the keys of this type."""
@@ -287,6 +299,7 @@ class MechanismFile:
     joints: dict[str, JointTable] = quantity(dict, doc="joints by name")
     forces: dict[str, ForceTable] = quantity(dict, doc="forces by name")
     start: StartTable = quantity(StartTable, doc="start values that must hold")
+    tables: dict[str, ValueTableTable] = quantity(dict, doc="functions for expressions by name")
     outputs: tuple[OutputTable, ...] = quantity((), doc="columns of trajectory.csv")
     paths: tuple[PathTable, ...] = quantity((), doc="points whose paths are drawn")
     figure: FigureTable = quantity(FigureTable, doc="figure over time")
@@ -297,7 +310,12 @@ class MechanismFile:
         known = {*self.bodies, "ground"}
         if "ground" in self.bodies:
             raise InputError("bodies.ground", None, "is the name of the ground", "rename the body")
-        named: dict[str, Iterable[str]] = {"bodies": self.bodies, "joints": self.joints, "forces": self.forces}
+        named: dict[str, Iterable[str]] = {
+            "bodies": self.bodies,
+            "joints": self.joints,
+            "forces": self.forces,
+            "tables": self.tables,
+        }
         named["ground.points_m"] = self.ground.points_m
         named |= {f"bodies.{name}.points_m": body.points_m for name, body in self.bodies.items()}
         for kind, names in named.items():

@@ -1,0 +1,93 @@
+"""Values from CSV tables: straight lines or monotone cubics between the points, nothing beyond them."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..tables.mechanism import ValueTableTable
+from ..textfile import read_text
+from ..typing import Array
+
+
+@dataclass(frozen=True, eq=False)
+class ValueTable:
+    """y over x.
+
+    Parameters
+    ----------
+    x, y : ndarray, shape (n,)
+        Points, x rising.
+    cubic
+        Monotone cubics (Fritsch & Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304) instead of straight lines.
+    """
+
+    x: Array
+    y: Array
+    cubic: bool = True
+
+    @cached_property
+    def _pieces(self) -> Array:
+        """Coefficients of powers of x - x_k, highest first, shape (4, n - 1)."""
+        if self.cubic and len(self.x) > 2:
+            from scipy.interpolate import PchipInterpolator
+
+            return np.asarray(PchipInterpolator(self.x, self.y).c, dtype=float)
+        slopes = np.diff(self.y) / np.diff(self.x)
+        zero = np.zeros_like(slopes)
+        return np.stack([zero, zero, slopes, self.y[:-1]])
+
+    def _at(self, x: float) -> tuple[float, Array]:
+        k = min(max(int(np.searchsorted(self.x, x, side="right")) - 1, 0), len(self.x) - 2)
+        return x - float(self.x[k]), self._pieces[:, k]
+
+    def __call__(self, x: Array) -> Array:
+        """y at many x, not-a-number beyond the table."""
+        inside = (x >= self.x[0]) & (x <= self.x[-1])
+        flat = [self.value(float(a)) if ok else np.nan for a, ok in zip(np.ravel(x), np.ravel(inside), strict=True)]
+        return np.reshape(flat, np.shape(x))
+
+    def value(self, x: float) -> float:
+        """y at x."""
+        h, c = self._at(x)
+        return float(((c[0] * h + c[1]) * h + c[2]) * h + c[3])
+
+    def slope(self, x: float) -> float:
+        """dy/dx at x."""
+        h, c = self._at(x)
+        return float((3.0 * c[0] * h + 2.0 * c[1]) * h + c[2])
+
+
+def read_table(name: str, table: ValueTableTable, folder: Path) -> ValueTable:
+    """Columns of a CSV file as a table.
+
+    Raises
+    ------
+    InputError
+        When a column is missing, holds no numbers, or does not rise.
+    """
+    label, source = f"tables.{name}", folder / table.file
+    lines = [line for line in read_text(source, f"{label}.file").splitlines() if line.strip() and line[:1] != "#"]
+    rows = list(csv.DictReader(lines))
+    columns = []
+    for key in ("x", "y"):
+        column = getattr(table, key)
+        if not rows or column not in rows[0]:
+            known = ", ".join(rows[0]) if rows else "none"
+            raise InputError(f"{label}.{key}", column, f"is no column of {source.name} (it has {known})", "name one")
+        try:
+            columns.append(np.array([float(row[column]) for row in rows]))
+        except (TypeError, ValueError) as error:
+            problem = f"is no column of numbers in {source.name} ({error})"
+            raise InputError(f"{label}.{key}", column, problem, "mend the file") from None
+    x, y = columns
+    if len(x) < 2 or not np.isfinite([x, y]).all():
+        raise InputError(f"{label}.file", str(source), "needs two rows or more, all finite", "mend the file")
+    if not (np.diff(x) > 0.0).all():
+        raise InputError(f"{label}.x", table.x, "must rise from row to row", "sort the rows and drop doubles")
+    return ValueTable(x, y, table.interpolation == "cubic")

@@ -1,0 +1,161 @@
+"""Loads by expression and table: against closed forms and the forces that they repeat; slopes; what wrong ones get."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe.errors import InputError
+from gearfe.mechanisms import evaluate, load_mechanism
+from gearfe.mechanisms.loads import ExpressionLoad
+from gearfe.rigid import IntegrationError, integrate
+
+ROD = """
+[run]
+end_s = 1.0
+step_s = 0.01
+[ground.points_m]
+O = [0.0, 0.0]
+[bodies.rod]
+mass_kg = 2.0
+inertia_kg_m2 = 0.5
+points_m = { tip = [0.7, 0.2] }
+angle_deg = 30.0
+rate_rad_per_s = 1.0
+[joints.O]
+type = "hinge"
+body = "rod"
+to_point = "O"
+"""
+MOMENT = '[forces.drive]\ntype = "moment"\nbody = "rod"\nmoment_N_m = "{}"\n'
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "mechanism.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def ran(folder: Path, text: str, end: float = 1.0, **options):  # type: ignore[no-untyped-def]
+    mechanism = load_mechanism(write(folder, text))
+    times = np.linspace(0.0, end, 21)
+    return mechanism, integrate(mechanism.system, times, start=mechanism.start(), **options)
+
+
+def test_a_controller_is_the_damped_oscillator(tmp_path: Path) -> None:
+    """I a'' = -k (a - a0) - c a': decay and frequency in closed form."""
+    _, run = ran(tmp_path, ROD + MOMENT.format("-(20*(angle(O) - 0.2) + 0.5*rate(rod))"), tolerance=1e-10)
+    k, c, inertia = 20.0, 0.5, 0.5
+    decay, u0 = c / (2 * inertia), math.radians(30.0) - 0.2
+    omega = math.sqrt(k / inertia - decay**2)
+    t = run.time
+    u = np.exp(-decay * t) * (u0 * np.cos(omega * t) + (1.0 + decay * u0) / omega * np.sin(omega * t))
+    np.testing.assert_allclose(run.q[:, 2], 0.2 + u, atol=1e-9)
+
+
+@pytest.mark.parametrize(("method", "allowed"), [("explicit", 1e-8), ("implicit", 1e-6)])
+def test_an_expression_of_places_is_the_spring_that_it_says(tmp_path: Path, method: str, allowed: float) -> None:
+    spring = '[forces.s]\ntype = "spring"\nbody = "rod"\npoint = "tip"\nstiffness = 30.0\ndamping = 2.0\n'
+    force = '[forces.s]\ntype = "force"\nbody = "rod"\npoint = "tip"\n'
+    force += 'x_N = "-30*x(rod.tip) - 2*vx(rod.tip)"\ny_N = "-30*y(rod.tip) - 2*vy(rod.tip)"\n'
+    # a spring damps along its line only: of a hinged tip about O nothing; so the damping is left out there
+    spring = spring.replace("damping = 2.0", "damping = 0.0").replace(
+        'point = "tip"', 'point = "tip"\nto_point = [0.3, 0.1]'
+    )
+    force = force.replace(" - 2*vx(rod.tip)", "").replace(" - 2*vy(rod.tip)", "")
+    force = force.replace("-30*x(rod.tip)", "-30*(x(rod.tip) - 0.3)").replace(
+        "-30*y(rod.tip)", "-30*(y(rod.tip) - 0.1)"
+    )
+    _, one = ran(tmp_path, ROD + spring, tolerance=1e-11, backend="plain")
+    _, two = ran(tmp_path, ROD + force, tolerance=1e-10 if method == "explicit" else 1e-8, method=method)
+    assert one.method == "taylor"
+    assert two.method == method
+    np.testing.assert_allclose(two.q, one.q, atol=allowed)
+
+
+def test_work_of_an_expression_balances_the_energy(tmp_path: Path) -> None:
+    mechanism, run = ran(tmp_path, ROD + MOMENT.format("3*sin(5*time) - 0.3*tanh(rate(rod)/0.1)"), tolerance=1e-10)
+    energy = evaluate(mechanism, run).energy
+    assert np.ptp(energy["total_J"]) < 1e-8
+    assert abs(energy["work_J"]).max() > 0.1
+
+
+def test_slopes_are_those_of_the_value(tmp_path: Path) -> None:
+    text = "min(10, 2*(1 - angle(rod))) * hypot(x(rod.tip), 1 + vy(rod.tip)**2) / (2 + cos(rate(O))) + exp(-y(rod.tip))"
+    mechanism = load_mechanism(
+        write(tmp_path, ROD + MOMENT.format(text + " + atan2(vx(rod.tip), 3)**3 + log(2 + time)"))
+    )
+    ((_, load),) = mechanism.planar.assembly.state_loads
+    assert isinstance(load, ExpressionLoad)
+    rng = np.random.default_rng(0)
+    q, v = rng.standard_normal((2, 3))
+    for part, slope in enumerate(load.slopes(0.3, q, v)):
+        for j in range(3):
+            step = np.zeros((2, 3))
+            step[part, j] = 1e-6
+            ends = [load.value(0.3, q + s * step[0], v + s * step[1]) for s in (1.0, -1.0)]
+            assert slope[j] == pytest.approx((ends[0] - ends[1]) / 2e-6, abs=1e-7)
+
+
+def test_a_table_holds_its_points_and_is_monotone(tmp_path: Path) -> None:
+    (tmp_path / "motor.csv").write_text("speed,torque\n0,10\n1,9\n2,9\n4,0\n", encoding="utf-8")
+    table = '[tables.motor]\nfile = "motor.csv"\nx = "speed"\ny = "torque"\n'
+    output = '[[outputs]]\nname = "torque_N_m"\nvalue = "motor(rate(rod))"\n'
+    mechanism, run = ran(tmp_path, ROD + MOMENT.format("motor(rate(rod))") + table + output, 0.3)
+    torque = evaluate(mechanism, run).outputs["torque_N_m"]
+    assert torque[0] == pytest.approx(9.0)
+    assert (np.diff(torque) <= 1e-9).all()
+    np.testing.assert_allclose(run.a[:, 2] * 0.5, torque, atol=1e-6)
+    linear = load_mechanism(write(tmp_path, ROD + MOMENT.format("motor(3)") + table + 'interpolation = "linear"\n'))
+    assert linear.planar.assembly.state_loads[0][1].value(0.0, np.zeros(3), np.zeros(3)) == pytest.approx(4.5)
+
+
+def test_a_run_out_of_the_table_tells_where(tmp_path: Path) -> None:
+    (tmp_path / "motor.csv").write_text("speed,torque\n0,10\n1.5,9\n", encoding="utf-8")
+    table = '[tables.motor]\nfile = "motor.csv"\nx = "speed"\ny = "torque"\n'
+    with pytest.raises(IntegrationError, match=r"table 'motor' goes from 0 to 1\.5 and is asked at 1\.5") as caught:
+        ran(tmp_path, ROD + MOMENT.format("motor(rate(rod))") + table)
+    # I a'' = 10 - (rate - 0)/1.5: 1.5 rad/s is reached soon after 0.025 s
+    assert 0.02 < caught.value.result.reached < 0.03
+
+
+@pytest.mark.parametrize(
+    ("expression", "text"),
+    [
+        ("2*angle(crank)", "crank"),
+        ("speed(rod)", "speed"),
+        ("kinetic", "uses kinetic"),
+        ("1 + ", "is not an expression"),
+        ("1/(rate(rod) - 1)", "has no value at the start|have no value at the start"),
+        ("sqrt(-angle(rod))", "have no value at the start"),
+        ("(-1 - angle(rod))**0.5", "have no value at the start"),
+        ("__import__('os')", "cannot read"),
+    ],
+)
+def test_wrong_expressions(tmp_path: Path, expression: str, text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        load_mechanism(write(tmp_path, ROD + MOMENT.format(expression))).start()
+
+
+@pytest.mark.parametrize(
+    ("content", "text"),
+    [
+        ("speed,torque\n0,1\n", "two rows"),
+        ("speed,torque\n0,1\n0,2\n", "must rise"),
+        ("speed,moment\n0,1\n1,2\n", "no column"),
+        ("speed,torque\n0,1\nx,2\n", "no column of numbers"),
+    ],
+)
+def test_wrong_tables(tmp_path: Path, content: str, text: str) -> None:
+    (tmp_path / "motor.csv").write_text(content, encoding="utf-8")
+    table = '[tables.motor]\nfile = "motor.csv"\nx = "speed"\ny = "torque"\n'
+    with pytest.raises(InputError, match=text):
+        load_mechanism(write(tmp_path, ROD + MOMENT.format("motor(1)") + table))
+
+
+def test_a_division_by_zero_on_the_way_tells_time_and_values(tmp_path: Path) -> None:
+    with pytest.raises(IntegrationError, match=r"forces.drive.moment_N_m = .* at 0\.5.* s"):
+        ran(tmp_path, ROD + MOMENT.format("sqrt(0.5 - time)"))
