@@ -1,0 +1,108 @@
+"""A train as an oscillator of few freedoms: approaches of its flanks, and the rotations that their phases follow."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from ..errors import InputError
+from ..train.forces import CurveFlank, LawFlank
+from ..train.model import TrainModel
+from ..typing import Array
+from .balance import Oscillator
+from .linear import Linear
+from .mesh_forces import MeshForces
+
+
+@dataclass(frozen=True, eq=False)
+class CondensedTrain:
+    """A train in steady running.
+
+    Attributes
+    ----------
+    model
+        What it was made of.
+    system
+        Its freedoms, forces and linear part.
+    forces
+        Those of the flanks.
+    flanks_of_mesh
+        For each mesh the numbers of its driving flank and, where it has one, of its back flank.
+    steady
+        Force of each mesh by statics (N).
+    """
+
+    model: TrainModel
+    system: Oscillator
+    forces: MeshForces
+    flanks_of_mesh: tuple[tuple[int, ...], ...]
+    steady: Array
+
+
+def condense(model: TrainModel) -> CondensedTrain:
+    """The few freedoms of a train's meshes, at the loads that it has in the end.
+
+    Raises
+    ------
+    InputError
+        For meshes that share no common period within the bound of `gearfe.train.kinematics`, rigid meshes, loads that
+        oscillate, and parts that nothing holds.
+    """
+    from ..train.kinematics import drive_sense, steady_forces
+
+    _check(model)
+    core, turns = model.core, model.rolling.common_turns
+    assert turns is not None
+    assert model.scene.drive is not None
+    flanks = [f for f in model.forces.flanks if isinstance(f, CurveFlank | LawFlank)]
+    used = sorted({x for f in flanks for x in (f.direction, f.turn)})
+    freedoms = np.array([[used.index(f.direction), used.index(f.turn)] for f in flanks])
+    to_modes = core.T.T @ model.directions
+    push = core.constant + core.T.T @ sum(
+        (d * float(f(model.torque_end)) for d, f in model.torques), start=np.zeros(len(core.T))
+    )
+    gyros = model.forces.gyros
+    tilts = [column for g in gyros for column in (g.direction, g.direction + 1)]
+    linear = Linear(
+        core.squares, core.damping, to_modes[:, used], push, to_modes[:, tilts],
+        np.array([g.polar * g.ratio for g in gyros]),
+    )  # fmt: skip
+    sense = drive_sense(model.scene.drive.speed) or 1.0
+    forces = MeshForces(flanks, freedoms, sense * float(turns))
+    steady = steady_forces(model.scene)
+    orders = tuple(int(Fraction(c) * turns) for c in model.rolling.cycles)
+    system = Oscillator(linear, forces, float(turns), _scale(model, linear, freedoms, flanks), orders)
+    numbers, of_mesh = iter(range(len(flanks))), []
+    for line in model.meshes:
+        of_mesh.append(tuple(next(numbers) for _ in range(1 if line.backlash is None else 2)))
+    return CondensedTrain(model, system, forces, tuple(of_mesh), steady)
+
+
+def _check(model: TrainModel) -> None:
+    if not model.meshes:
+        raise InputError("train.meshes", None, "is empty: nothing excites the train", "add a mesh")
+    for line in model.meshes:
+        if line.rigid:
+            problem = "is a constraint without a stiffness, which excites nothing"
+            raise InputError(f"mesh {line.name!r} rigid", True, problem, "give it a stiffness, a curve or a law")
+    if model.rolling.common_turns is None:
+        problem = "have no common period to repeat with: " + model.rolling.note
+        raise InputError("train.meshes", None, problem, "look at it with gearfe vibration")
+    for load in model.scene.loads:
+        if load.torque.sines:
+            problem = "oscillates: no motion repeats with the meshes"
+            raise InputError(f"load on {load.shaft!r}", None, problem, "look at it with gearfe vibration")
+
+
+def _scale(model: TrainModel, linear: Linear, freedoms: Array, flanks: list[CurveFlank | LawFlank]) -> Array:
+    """Approach of each mesh under its steady force; rotations that move a base circle so far."""
+    size = max(float(np.abs(linear.rest[np.unique(freedoms[:, 0])]).max()), 1e-9)
+    scale = np.full(linear.size, size)
+    for flank, (d, r) in zip(flanks, freedoms, strict=True):
+        if flank.mean > 0.0:
+            scale[d] = max(abs(float(linear.rest[d])), 0.1 * size)
+        scale[r] = size / (0.5 * model.meshes[0].module * 2.0 * math.pi)
+    return scale

@@ -1,0 +1,327 @@
+r"""Along the periodic motions of an oscillator over the speed, round turning points (pseudo-arclength).
+
+With the unknown harmonics x in parts of their scale and :math:`\sigma = \Omega/\Omega_u`, the curve of solutions of
+:math:`r(x, \sigma) = 0` has the tangent t of :math:`[r_x\; r_\sigma]\,t = 0`; a step s along it ends on
+
+.. math:: t_x\cdot(x - x_0) + t_\sigma(\sigma - \sigma_0) = s
+
+(Keller 1977; Nayfeh & Balachandran, Applied Nonlinear Dynamics, Sec. 6.1). Where the curve goes on smoothly from one
+asked speed to the next, extrapolation and Newton's method at that speed do; the two agree or the short steps decide.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import lu_factor, lu_solve
+
+from ..typing import Array, ComplexArray, IntArray
+from .balance import (
+    FOUND,
+    Evaluated,
+    Newton,
+    Orbit,
+    Oscillator,
+    evaluate,
+    jacobian,
+    packed,
+    samples_of,
+    settled,
+    size_of,
+    solve,
+    unknown_waves,
+    unpacked,
+)
+
+#: Newton steps of a corrector; a step is kept where the correction is smaller than this part of it.
+CORRECTIONS, CLOSE = 20, 0.35
+#: An extrapolation this near to what is found (in parts of the scale) is on the same curve.
+NEAR = 0.1
+#: Steps along the curve, in parts of the scale: first, least, largest; growth from one to the next.
+FIRST, LEAST, LARGEST, GROWTH = 0.05, 1e-5, 0.4, 1.6
+#: Steps along the curve between two asked speeds, at most.
+MOST = 400
+#: Extrapolation takes so many speeds before.
+BACK = 4
+#: Change of the speed, relative, for a derivative.
+NUDGE = 1e-6
+
+
+class Turn(NamedTuple):
+    """A turning point."""
+
+    speed: float  # rad/s
+    after: int  # number of the orbit before it
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Orbits along one curve of solutions.
+
+    Attributes
+    ----------
+    orbits
+        At asked speeds, in the order in which the curve passes them.
+    branch
+        Number of each orbit's branch: it grows at each turning point.
+    turns
+        Turning points.
+    note
+        Why the curve was left, or nothing.
+    """
+
+    orbits: tuple[Orbit, ...]
+    branch: tuple[int, ...]
+    turns: tuple[Turn, ...]
+    note: str
+
+
+class _Place(NamedTuple):
+    """A point of the curve with its tangent."""
+
+    orbit: Orbit
+    waves: IntArray
+    along: Array  # t_x, packed over the waves
+    rising: float  # t_sigma
+
+
+def follow(
+    system: Oscillator, speeds: Sequence[float], start: Orbit, *, tolerance: float, highest: float,
+    progress: Callable[[int, int], None] | None = None,
+) -> Curve:  # fmt: skip
+    """Along the curve of solutions from an orbit at the first of the speeds, until it passes the first or the last one.
+
+    Parameters
+    ----------
+    speeds
+        Asked speeds (rad/s), rising or falling in size.
+    tolerance
+        Of the error estimate of each orbit.
+    highest
+        Angular frequency (rad/s) that the harmonics reach at least.
+    """
+    walk = _Walk(system, np.asarray(speeds, dtype=float), tolerance, highest)
+    return walk.run(start, progress)
+
+
+@dataclass(eq=False)
+class _Walk:
+    system: Oscillator
+    speeds: Array
+    tolerance: float
+    highest: float
+
+    def __post_init__(self) -> None:
+        self.unit = max(abs(float(self.speeds[-1] - self.speeds[0])), 1e-3 * abs(float(self.speeds[0]))) / 20.0
+        self.orbits: list[Orbit] = []
+        self.branch: list[int] = []
+        self.turns: list[Turn] = []
+        self.before: Newton | None = None
+        self.number = 0  # of the asked speed that was reached
+        self.heading = 1
+
+    def run(self, start: Orbit, progress: Callable[[int, int], None] | None) -> Curve:
+        orbit, note = self._kept(start), ""
+        while 0 <= self.number + self.heading < len(self.speeds):
+            if progress is not None:
+                progress(self.number, len(self.speeds) - 1)
+            target = float(self.speeds[self.number + self.heading])
+            made = self._extrapolated(target) if self.heading > 0 else None
+            if made is not None:
+                self.number += 1
+                orbit = self._kept(made)
+                continue
+            found = self._stepwise(orbit)
+            if isinstance(found, str):
+                note = found
+                break
+            orbit = found
+        return Curve(tuple(self.orbits), tuple(self.branch), tuple(self.turns), note)
+
+    def _kept(self, orbit: Orbit) -> Orbit:
+        self.orbits.append(orbit)
+        self.branch.append(len(self.turns))
+        return orbit
+
+    def _count(self, speed: float, orbit: Orbit) -> int:
+        """Harmonics at a speed: what is asked for, and more where the orbit before needed them."""
+        least = self.system.harmonics(speed, self.highest)
+        return least if orbit.error < 0.05 * self.tolerance else max(least, orbit.harmonics)
+
+    def _extrapolated(self, speed: float) -> Orbit | None:
+        """Orbit at a speed from those before on this branch, where both agree."""
+        back = [o for o, b in zip(self.orbits, self.branch, strict=True) if b == len(self.turns)][-BACK:]
+        if len(back) < 2:
+            return None
+        count = self._count(speed, back[-1])
+        known = np.array([o.with_harmonics(count) for o in back])
+        places = _lagrange(np.array([o.speed for o in back]), known, speed)
+        orbit, newton = solve(self.system, speed, places, self.before, steps=6)
+        if not orbit.found:
+            return None
+        step = size_of(places - known[-1], self.system.scale)
+        if size_of(orbit.places - places, self.system.scale) > max(CLOSE * step, NEAR):
+            return None
+        orbit, self.before = settled(self.system, orbit, newton, self.tolerance)
+        return orbit if orbit.found else None
+
+    def _stepwise(self, orbit: Orbit) -> Orbit | str:
+        """Short steps along the curve until it passes the next asked speed, up or down."""
+        sign = 1.0 if self.speeds[-1] >= self.speeds[0] else -1.0
+        place = self._tangent(orbit, None, sign * self.heading)
+        if place is None:
+            return f"no direction of the curve at {orbit.speed:.6g} rad/s"
+        place = self._toward(orbit, place)
+        step, speeds = FIRST, self.speeds
+        for _ in range(MOST):
+            new, quick = self._corrected(place, step)
+            if new is None:
+                step *= 0.5
+                if step < LEAST:
+                    return f"no motion was found beyond {place.orbit.speed:.6g} rad/s on this branch"
+                continue
+            if new.rising * place.rising < 0.0:
+                self.turns.append(Turn(_turning(place, new, step, self.unit), len(self.orbits) - 1))
+                self.heading = -self.heading
+            asked = [k for k in (self.number - 1, self.number, self.number + 1) if 0 <= k < len(speeds)]
+            a, b = place.orbit.speed, new.orbit.speed
+            passed = [k for k in asked if (a - speeds[k]) * (b - speeds[k]) <= 0.0 and a != speeds[k]]
+            off = self._left(b)
+            if passed:
+                landed = self._landed(place, new, float(speeds[passed[0]]))
+                if landed is None:
+                    return f"no motion was found at {speeds[passed[0]]:.6g} rad/s on this branch"
+                self.number = passed[0]
+                self.last = new
+                return self._kept(landed)
+            if off:
+                self.number = -1 if self.heading < 0 else len(speeds)
+                return off
+            place = new
+            step = min(step * (GROWTH if quick else 1.0), LARGEST)
+        return f"more than {MOST} steps along the curve at {place.orbit.speed:.6g} rad/s"
+
+    def _left(self, speed: float) -> str:
+        low, high = sorted((float(self.speeds[0]), float(self.speeds[-1])))
+        return "" if low - self.unit < speed < high + self.unit else f"the curve leaves the range at {speed:.6g} rad/s"
+
+    last: _Place | None = None
+
+    def _toward(self, orbit: Orbit, place: _Place) -> _Place:
+        """The tangent in the direction in which the curve was followed."""
+        last = self.last
+        if last is None or abs(last.orbit.speed - orbit.speed) > self.unit:
+            return place
+        made = self._tangent(orbit, last, 1.0)
+        return place if made is None else made
+
+    def _equations(self, orbit: Orbit) -> tuple[Evaluated, ComplexArray]:
+        H = self.system.flexibility(orbit.speed, orbit.harmonics)
+        return evaluate(self.system, orbit.speed, orbit.places, samples_of(orbit.harmonics), H), H
+
+    def _tangent(self, orbit: Orbit, last: _Place | None, sign: float) -> _Place | None:
+        at, H = self._equations(orbit)
+        waves = unknown_waves(self.system, orbit.places, at.pushes, H)
+        M = self._bordered(orbit, waves, at, H)
+        if last is None:
+            M[-1, -1] = sign
+        else:
+            M[-1, :-1], M[-1, -1] = _moved(last, waves, self.system.linear.size), last.rising
+        right = np.zeros(len(M))
+        right[-1] = 1.0
+        try:
+            t = np.linalg.solve(M, right)
+        except np.linalg.LinAlgError:
+            return None
+        t /= np.linalg.norm(t)
+        return _Place(orbit, waves, t[:-1], float(t[-1]))
+
+    def _bordered(self, orbit: Orbit, waves: IntArray, at: Evaluated, H: ComplexArray) -> Array:
+        """[r_x r_sigma] with an empty last row."""
+        J = jacobian(self.system, orbit.speed, waves, at.pushes, H)
+        M = np.zeros((len(J) + 1, len(J) + 1))
+        M[:-1, :-1] = J
+        other = replace(orbit, speed=orbit.speed * (1.0 + NUDGE))
+        change = (self._equations(other)[0].residual - at.residual)[waves] / (NUDGE * orbit.speed / self.unit)
+        M[:-1, -1] = packed(change, self.system.scale)
+        return M
+
+    def _corrected(self, place: _Place, step: float) -> tuple[_Place | None, bool]:
+        """Next point of the curve, and whether it was found easily."""
+        system, waves = self.system, place.waves
+        speed = place.orbit.speed + step * place.rising * self.unit
+        guess = place.orbit.with_harmonics(max(self._count(speed, place.orbit), int(waves[-1])))
+        guess[waves] += unpacked(step * place.along, system.scale)
+        made = self._newton(Orbit(speed, guess, math.nan, False, 0), place, step)
+        if made is None or made.steps > CORRECTIONS:
+            return None, False
+        new = self._tangent(made, place, 1.0)
+        if new is None or _moved(place, new.waves, system.linear.size) @ new.along + new.rising * place.rising < 0.5:
+            return None, False
+        return new, made.steps <= 8
+
+    def _newton(self, orbit: Orbit, place: _Place, step: float) -> Orbit | None:
+        system, waves, scale = self.system, place.waves, self.system.scale
+        begin = packed(place.orbit.places[waves], scale)
+        factors = None
+        size = math.inf
+        for taken in range(1, CORRECTIONS + 1):
+            at, H = self._equations(orbit)
+            last = (
+                place.along @ (packed(orbit.places[waves], scale) - begin)
+                + place.rising * (orbit.speed - place.orbit.speed) / self.unit
+                - step
+            )
+            found = math.hypot(size_of(at.residual, scale), last)
+            if found < FOUND:
+                return replace(orbit, found=True, steps=taken)
+            if not math.isfinite(found) or found > 10.0 * size:
+                return None
+            if factors is None or found > 0.2 * size:
+                M = self._bordered(orbit, waves, at, H)
+                M[-1, :-1], M[-1, -1] = place.along, place.rising
+                factors = lu_factor(M, check_finite=False)
+            size = found
+            change = lu_solve(factors, np.append(packed(at.residual[waves], scale), last), check_finite=False)
+            places = orbit.places - at.residual
+            places[waves] = orbit.places[waves] - unpacked(change[:-1], scale)
+            orbit = replace(orbit, speed=orbit.speed - change[-1] * self.unit, places=places)
+        return None
+
+    def _landed(self, one: _Place, two: _Place, speed: float) -> Orbit | None:
+        """Orbit at a speed between two points of the curve."""
+        a, b = one.orbit, two.orbit
+        part = (speed - a.speed) / (b.speed - a.speed)
+        count = max(a.harmonics, b.harmonics)
+        guess = (1.0 - part) * a.with_harmonics(count) + part * b.with_harmonics(count)
+        orbit, newton = solve(self.system, speed, guess)
+        if not orbit.found:
+            return None
+        orbit, self.before = settled(self.system, orbit, newton, self.tolerance)
+        return orbit if orbit.found else None
+
+
+def _moved(place: _Place, waves: IntArray, m: int) -> Array:
+    """A tangent over other waves, 0 where it had none."""
+    k = len(place.waves)
+    real, imaginary = np.zeros((int(max(waves.max(), place.waves.max())) + 1, m)), None
+    imaginary = np.zeros_like(real)
+    real[place.waves] = place.along[: k * m].reshape(k, m)
+    imaginary[place.waves[1:]] = place.along[k * m :].reshape(k - 1, m)
+    return np.concatenate([real[waves].ravel(), imaginary[waves[1:]].ravel()])
+
+
+def _lagrange(x: Array, values: ComplexArray, at: float) -> ComplexArray:
+    """Polynomial through values at x, at another place."""
+    weights = [np.prod([(at - b) / (a - b) for b in x if b != a]) for a in x]
+    return np.asarray(np.tensordot(np.array(weights), values, axes=1))
+
+
+def _turning(a: _Place, b: _Place, step: float, unit: float) -> float:
+    """Speed (rad/s) where the tangent's rise vanishes, which it does linearly from one point to the next."""
+    part = step * a.rising / (a.rising - b.rising)
+    return a.orbit.speed + 0.5 * a.rising * part * unit

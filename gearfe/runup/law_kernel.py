@@ -1,0 +1,207 @@
+# mypy: ignore-errors
+r"""A mesh law with the derivatives that Newton's method needs, sample by sample; compiled where numba is installed.
+
+With :math:`g_k = t'(\psi_k) + \Lambda_\psi(\psi_k, F_k) + \sum_l C'_{kl}F_l` and J as in `gearfe.meshlaw.law`,
+
+.. math::
+    \frac{dF_k}{d\delta} = (J^{-1}1)_k,\quad \frac{dF_k}{d\varphi} = -(J^{-1}g)_k,\quad
+    \frac{\partial M}{\partial\delta} = \frac{\partial F}{\partial\varphi},\quad
+    \frac{\partial M}{\partial\varphi} = -\sum_k\Big[F_k t'' + \Phi_{\psi\psi} + g_k\frac{dF_k}{d\varphi}\Big]
+    - \sum_{k<l} C''F_kF_l .
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+from ..rigid import compiled
+
+#: Newton steps for the pair forces, their relative change in the last one.
+MOST, SETTLED = 60, 1e-11
+#: Columns of the results: F, M, dF/d approach, dF/d phase = dM/d approach, dM/d phase, 1 where beyond the reach.
+FORCE, MOMENT, TANGENT, CROSS, BEND, BEYOND, RESULTS = range(7)
+#: Rows of the work space, before those of the matrix: gap, t', t'', Lambda and its derivative with the force, those of Phi with the
+#: angle and of Lambda with it, whether a pair bears, two right sides that become solutions, g.
+GAPS, TOUCH1, TOUCH2, LAMBDA, GIVES, TURN, TURN2, SHIFT, BEARS, RIGHT1, RIGHT2, BEFORE, ROWS = range(13)
+
+
+def law_jets(nodes, forces, touch, energies, coupling, reach, phase, approach, pairs, work, out):
+    """Results (n, RESULTS) at phases and approaches (n,); `pairs` (n, s) are pair forces to begin with, then found."""
+    slots = touch.shape[0]
+    cells = nodes.shape[0] - 1
+    cycle = nodes[cells] - nodes[0]
+    for i in range(phase.shape[0]):
+        x = phase[i] - math.floor((phase[i] - nodes[0]) / cycle) * cycle
+        cell = 0
+        top = cells
+        while top - cell > 1:
+            middle = (cell + top) // 2
+            if nodes[middle] <= x:
+                cell = middle
+            else:
+                top = middle
+        z = x - nodes[cell]
+        least = 1e300
+        for k in range(slots):
+            c = touch[k, cell]
+            t = c[0] + z * (c[1] + z * (c[2] + z * c[3]))
+            least = min(least, t)
+            work[GAPS, k] = approach[i] - t
+            work[TOUCH1, k] = c[1] + z * (2.0 * c[2] + 3.0 * z * c[3])
+            work[TOUCH2, k] = 2.0 * c[2] + 6.0 * z * c[3]
+        out[i, BEYOND] = 1.0 if approach[i] - least > reach else 0.0
+        settled = False
+        for _ in range(MOST):
+            pair_laws(forces, energies, cell, z, pairs[i], work)
+            for k in range(slots):
+                off = work[LAMBDA, k] - work[GAPS, k]
+                for j in range(slots):
+                    if j != k:
+                        off += coupled(coupling, k, j, slots, cell, z, 0) * pairs[i, j]
+                work[BEARS, k] = 1.0 if pairs[i, k] > 0.0 or off < 0.0 else 0.0
+                work[RIGHT1, k] = -off
+            matrix(coupling, slots, cell, z, work)
+            for k in range(slots):
+                if work[BEARS, k] == 0.0:
+                    work[RIGHT1, k] = -pairs[i, k]
+                work[RIGHT2, k] = 0.0
+            solved(slots, work)
+            change = 0.0
+            largest = 0.0
+            for k in range(slots):
+                new = max(pairs[i, k] + work[RIGHT1, k], 0.0)
+                change = max(change, abs(new - pairs[i, k]))
+                largest = max(largest, new)
+                pairs[i, k] = new
+            if change <= SETTLED * largest or largest == 0.0 and change == 0.0:
+                settled = True
+                break
+        if not settled:
+            for k in range(slots):
+                pairs[i, k] = 0.0
+            for k in range(RESULTS):
+                out[i, k] = math.nan
+            continue
+        pair_laws(forces, energies, cell, z, pairs[i], work)
+        force = 0.0
+        moment = 0.0
+        bend = 0.0
+        for k in range(slots):
+            F = pairs[i, k]
+            work[BEARS, k] = 1.0 if F > 0.0 else 0.0
+            force += F
+            shift = work[TOUCH1, k] + work[SHIFT, k]
+            moment -= F * work[TOUCH1, k] + work[TURN, k]
+            bend -= F * work[TOUCH2, k] + work[TURN2, k]
+            for j in range(slots):
+                if j != k:
+                    once = coupled(coupling, k, j, slots, cell, z, 1) * pairs[i, j]
+                    shift += once
+                    moment -= 0.5 * once * F
+                    bend -= 0.5 * coupled(coupling, k, j, slots, cell, z, 2) * pairs[i, j] * F
+            work[BEFORE, k] = shift
+            work[RIGHT1, k] = 1.0 if F > 0.0 else 0.0
+            work[RIGHT2, k] = -shift if F > 0.0 else 0.0
+        matrix(coupling, slots, cell, z, work)
+        solved(slots, work)
+        tangent = 0.0
+        cross = 0.0
+        for k in range(slots):
+            tangent += work[RIGHT1, k]
+            cross += work[RIGHT2, k]
+            bend -= work[BEFORE, k] * work[RIGHT2, k]
+        out[i, FORCE] = force
+        out[i, MOMENT] = moment
+        out[i, TANGENT] = tangent
+        out[i, CROSS] = cross
+        out[i, BEND] = bend
+
+
+def pair_laws(forces, energies, cell, z, pairs, work):
+    """Lambda with its derivatives with force and angle, Phi's first and second derivative with the angle."""
+    parts = forces.shape[0] - 1
+    for k in range(pairs.shape[0]):
+        part = 0
+        while part < parts - 1 and pairs[k] >= forces[part + 1]:
+            part += 1
+        f = pairs[k] - forces[part]
+        e = energies[k, cell, part]
+        value = 0.0
+        slope = 0.0
+        gives = 0.0
+        turn = 0.0
+        turn2 = 0.0
+        shift = 0.0
+        for b in range(4, -1, -1):
+            c = e[b]
+            here = c[0] + z * (c[1] + z * (c[2] + z * c[3]))
+            one = c[1] + z * (2.0 * c[2] + 3.0 * z * c[3])
+            # Horner with derivatives over f: value' and value'' of the energy, its angle's slope with its own slope
+            gives = gives * f + 2.0 * slope
+            slope = slope * f + value
+            value = value * f + here
+            shift = shift * f + turn
+            turn = turn * f + one
+            turn2 = turn2 * f + 2.0 * c[2] + 6.0 * z * c[3]
+        work[LAMBDA, k] = slope
+        work[GIVES, k] = gives
+        work[TURN, k] = turn
+        work[SHIFT, k] = shift
+        work[TURN2, k] = turn2
+
+
+def coupled(coupling, k, j, slots, cell, z, order):
+    """C between two slots, its slope or its second derivative with the angle."""
+    c = coupling[min(k, j) * slots + max(k, j), cell]
+    if order == 0:
+        return c[0] + z * (c[1] + z * (c[2] + z * c[3]))
+    if order == 1:
+        return c[1] + z * (2.0 * c[2] + 3.0 * z * c[3])
+    return 2.0 * c[2] + 6.0 * z * c[3]
+
+
+def matrix(coupling, slots, cell, z, work):
+    """J of the pairs that bear; ones on the diagonal for the others."""
+    for k in range(slots):
+        for j in range(slots):
+            both = work[BEARS, k] > 0.0 and work[BEARS, j] > 0.0
+            if j == k:
+                work[ROWS + k, j] = work[GIVES, k] if both else 1.0
+            else:
+                work[ROWS + k, j] = coupled(coupling, k, j, slots, cell, z, 0) if both else 0.0
+
+
+def solved(slots, work):
+    """Both right sides over the matrix, by elimination in place: it is positive definite."""
+    for k in range(slots):
+        for i in range(k + 1, slots):
+            factor = work[ROWS + i, k] / work[ROWS + k, k]
+            if factor != 0.0:
+                for j in range(k + 1, slots):
+                    work[ROWS + i, j] -= factor * work[ROWS + k, j]
+                work[RIGHT1, i] -= factor * work[RIGHT1, k]
+                work[RIGHT2, i] -= factor * work[RIGHT2, k]
+    for k in range(slots - 1, -1, -1):
+        for j in range(k + 1, slots):
+            work[RIGHT1, k] -= work[ROWS + k, j] * work[RIGHT1, j]
+            work[RIGHT2, k] -= work[ROWS + k, j] * work[RIGHT2, j]
+        work[RIGHT1, k] /= work[ROWS + k, k]
+        work[RIGHT2, k] /= work[ROWS + k, k]
+
+
+FUNCTIONS = (law_jets, pair_laws, coupled, matrix, solved)
+NAMES = {
+    "math": math, "MOST": MOST, "SETTLED": SETTLED,
+    "FORCE": FORCE, "MOMENT": MOMENT, "TANGENT": TANGENT, "CROSS": CROSS, "BEND": BEND, "BEYOND": BEYOND,
+    "RESULTS": RESULTS, "GAPS": GAPS, "TOUCH1": TOUCH1, "TOUCH2": TOUCH2, "LAMBDA": LAMBDA, "GIVES": GIVES,
+    "TURN": TURN, "TURN2": TURN2, "SHIFT": SHIFT, "BEARS": BEARS, "RIGHT1": RIGHT1, "RIGHT2": RIGHT2,
+    "BEFORE": BEFORE, "ROWS": ROWS,
+}  # fmt: skip
+
+
+@lru_cache(maxsize=1)
+def jets():
+    """`law_jets`, compiled where numba is installed."""
+    made = compiled.bind(FUNCTIONS, NAMES, compiled=compiled.available(), entries=("law_jets",))
+    return made.law_jets

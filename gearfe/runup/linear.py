@@ -1,0 +1,162 @@
+r"""What is linear in a train: modal coordinates behind a few freedoms, as a dynamic flexibility.
+
+.. math::
+    \ddot y + D\dot y + \Lambda y = c + P f + \Omega\,G\dot y, \qquad u = P^T y,
+    \qquad \hat u = H(i\omega)\,\hat f
+
+G are the gyroscopic moments of steady spins: skew, along two tilts of each shaft. The poles of the rest are found once
+for all speeds and frequencies; gyroscopic moments are forces that react on the tilts, of few freedoms, so they cost a
+small solution a frequency (Woodbury's identity).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..typing import Array, ComplexArray
+
+#: Squares of frequencies below this part of the largest are round-off: such a mode moves freely.
+ROUND_OFF = 1e-12
+
+
+class Poles(NamedTuple):
+    """Partial fractions of the flexibility without gyroscopic moments."""
+
+    values: ComplexArray  # (2n,) 1/s
+    out: ComplexArray  # (n, 2n) eigenvectors, modal coordinates
+    into: ComplexArray  # (2n, p) of unit forces along all p freedoms, tilts last
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """Modal coordinates of unit mass and what acts on them linearly.
+
+    Parameters
+    ----------
+    squares : (n,)
+        Squares of the natural frequencies (rad2/s2), all > 0.
+    damping : (n, n)
+        D (1/s).
+    places : (n, m)
+        P: modal coordinates to the freedoms along which other forces act.
+    constant : (n,)
+        c: constant modal force.
+    tilts : (n, 2 s)
+        Both tilts of each shaft, shaft by shaft.
+    momenta : (s,)
+        Angular momentum of each shaft for unit speed (kg m2).
+    """
+
+    squares: Array
+    damping: Array
+    places: Array
+    constant: Array
+    tilts: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    momenta: Array = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        n = len(self.squares)
+        if not self.tilts.size:
+            object.__setattr__(self, "tilts", np.zeros((n, 0)))
+        if (self.squares <= ROUND_OFF * self.squares.max(initial=0.0)).any():
+            problem = "moves freely, so its place in steady running is open"
+            cure = "hold the housing at its feet, and each shaft along its axis"
+            raise InputError("train", None, f"a part of it {problem}", cure)
+
+    @property
+    def size(self) -> int:
+        """Freedoms m."""
+        return self.places.shape[1]
+
+    @cached_property
+    def poles(self) -> Poles:
+        """Eigenvalues and vectors of the first-order form, scaled so that without damping it is a rotation."""
+        n = len(self.squares)
+        rates = np.sqrt(self.squares)
+        A = np.block([[np.zeros((n, n)), np.diag(rates)], [-np.diag(rates), -self.damping]])
+        values, vectors = np.linalg.eig(A)
+        every = np.hstack([self.places, self.tilts])
+        forces = np.vstack([np.zeros_like(every), every])
+        into = np.linalg.solve(vectors, forces.astype(complex))
+        return Poles(values.astype(complex), vectors[:n] / rates[:, None], into)
+
+    @cached_property
+    def _pairs(self) -> tuple[Array, Array, Array]:
+        """Poles in pairs, conjugate or both real: sum and product (n, 2), and real residues (n, 2, entries).
+
+        A pair gives :math:`(a s + b)/(s^2 - (\\lambda_1 + \\lambda_2) s + \\lambda_1\\lambda_2)`. The flexibility is
+        symmetric: entries are those of its upper half.
+        """
+        poles, every = self.poles, np.hstack([self.places, self.tilts])
+        up = np.triu_indices(every.shape[1])
+        residues = np.einsum("aj,jb->jab", every.T @ poles.out, poles.into)[:, up[0], up[1]]
+        plane = np.flatnonzero(poles.values.imag > 0.0)
+        conjugate = [int(np.argmin(np.abs(poles.values - poles.values[j].conj()))) for j in plane]
+        line = np.flatnonzero(poles.values.imag == 0.0)
+        one, two = np.concatenate([plane, line[::2]]), np.concatenate([np.array(conjugate, int), line[1::2]])
+        first, second = poles.values[one, None], poles.values[two, None]
+        a, b = residues[one] + residues[two], -(residues[one] * second + residues[two] * first)
+        sums = np.hstack([(first + second).real, (first * second).real])
+        return sums, np.ascontiguousarray(a.real), np.ascontiguousarray(b.real)
+
+    def _own(self, omega: Array) -> ComplexArray:
+        """Flexibility of all freedoms without gyroscopic moments, (k, p, p)."""
+        sums, a, b = self._pairs
+        s = 1j * omega[:, None]
+        inverse = 1.0 / ((sums[:, 1] - (omega**2)[:, None]) - s * sums[:, 0])
+        split = np.vstack([inverse.real, inverse.imag])
+        entries = [(split @ x) for x in (a, b)]
+        k, p = len(omega), self.size + self.tilts.shape[1]
+        values = s * (entries[0][:k] + 1j * entries[0][k:]) + entries[1][:k] + 1j * entries[1][k:]
+        made = np.empty((k, p, p), dtype=complex)
+        up = np.triu_indices(p)
+        made[:, up[0], up[1]] = values
+        made[:, up[1], up[0]] = values
+        return made
+
+    @cached_property
+    def _swap(self) -> Array:
+        """(2 s, 2 s) gyroscopic moments for unit rates of the tilts and unit speed."""
+        return np.kron(np.diag(self.momenta), np.array([[0.0, -1.0], [1.0, 0.0]]))
+
+    @cached_property
+    def _statics(self) -> Array:
+        return np.asarray(self.places.T @ (self.places / self.squares[:, None]))
+
+    @cached_property
+    def rest(self) -> Array:
+        """(m,) freedoms under the constant force alone."""
+        return np.asarray(self.places.T @ (self.constant / self.squares))
+
+    def _turning(self, omega: Array, speed: float) -> tuple[ComplexArray, ComplexArray]:
+        """Flexibility at the freedoms, (k, m, m), and gyroscopic moments for unit forces, (k, 2 s, m)."""
+        m, count = self.size, len(omega)
+        p = m + self.tilts.shape[1]
+        whole = self._own(omega)
+        own = whole[:, :m, :m]
+        if p == m:
+            return own, np.zeros((count, 0, m), dtype=complex)
+        react = 1j * speed * omega[:, None, None] * self._swap
+        left = np.eye(p - m) - react @ whole[:, m:, m:]
+        moments = np.linalg.solve(left, react @ whole[:, m:, :m])
+        return own + whole[:, :m, m:] @ moments, moments
+
+    def flexibility(self, omega: Array, speed: float) -> ComplexArray:
+        """H (k, m, m) at the angular frequencies (k,); `speed` turns the shafts."""
+        made = self._turning(omega, speed)[0]
+        made[omega == 0.0] = self._statics
+        return made
+
+    def modal(self, omega: Array, speed: float, forces: ComplexArray) -> ComplexArray:
+        """Modal coordinates (k, n) under forces (k, m) at the freedoms, the constant force included at omega = 0."""
+        _, moments = self._turning(omega, speed)
+        every = np.concatenate([forces, (moments @ forces[..., None])[..., 0]], axis=1)
+        made = ((every @ self.poles.into.T) / (1j * omega[:, None] - self.poles.values)) @ self.poles.out.T
+        still = omega == 0.0
+        made[still] = (forces[still] @ self.places.T + self.constant) / self.squares
+        return np.asarray(made)
