@@ -34,6 +34,7 @@ TABLES: dict[str, str] = {
     "relief": "gearfe.tables.microgeometry:ReliefTable",
     "housing": "gearfe.tables.housing:HousingTable",
     "train": "gearfe.tables.train:TrainTable",
+    "runup": "gearfe.tables.runup:RunUpTable",
 }
 
 

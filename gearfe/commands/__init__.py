@@ -15,5 +15,6 @@ COMMANDS: dict[str, str] = {
     "mechanism": "mechanism",
     "housing": "housing",
     "vibration": "vibration",
+    "runup": "runup",
     "new": "new",
 }

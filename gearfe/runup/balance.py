@@ -32,6 +32,9 @@ from .linear import Linear
 STEPS, HALVINGS = 60, 8
 #: A motion is found where what is left of the equations is smaller than this, in parts of the scale.
 FOUND = 1e-7
+#: Where Newton's method goes to and fro over a touch of flanks that falls on a sample, this many steps without halving
+#: what is left end it; less than this is left to the error estimate to judge, which asks for more samples.
+IDLE, LEFT = 8, 1e-4
 #: A step that leaves more than this of the residual asks for a new Jacobian.
 SLOW = 0.2
 #: Harmonics are unknowns of Newton's method where a change of them comes back larger than this through the forces, and
@@ -273,9 +276,10 @@ def solve(
     places[0] = places[0].real
     at = evaluate(system, speed, places, samples, H)
     size, fresh, taken = size_of(at.residual, scale), False, 0
+    best, idle = (size, places), 0
     if before is not None and before.waves[-1] > count:
         before = None
-    while size >= FOUND and taken < steps and math.isfinite(size):
+    while size >= FOUND and taken < steps and idle < IDLE and math.isfinite(size):
         if before is None:
             waves = unknown_waves(system, places, at.pushes, H)
             before, fresh = newton(system, speed, waves, at.pushes, H), True
@@ -296,7 +300,10 @@ def solve(
         if found > SLOW * size:
             before = None
         places, at, size, fresh = places + part * step, new, found, False
-    return Orbit(speed, places, math.nan, bool(size < FOUND), taken), before
+        idle = 0 if size < 0.5 * best[0] else idle + 1
+        if size < best[0]:
+            best = size, places
+    return Orbit(speed, best[1], math.nan, bool(best[0] < (FOUND if idle < IDLE else LEFT)), taken), before
 
 
 def error_of(system: Oscillator, orbit: Orbit, before: Newton | None) -> tuple[float, ComplexArray]:
@@ -316,9 +323,7 @@ def error_of(system: Oscillator, orbit: Orbit, before: Newton | None) -> tuple[f
     return SAFETY * size_of(step, system.scale), places + step
 
 
-def settled(
-    system: Oscillator, orbit: Orbit, before: Newton | None, tolerance: float
-) -> tuple[Orbit, Newton | None]:
+def settled(system: Oscillator, orbit: Orbit, before: Newton | None, tolerance: float) -> tuple[Orbit, Newton | None]:
     """An orbit with as many harmonics as its error estimate needs to meet a tolerance."""
     while orbit.found:
         error, guess = error_of(system, orbit, before)

@@ -184,19 +184,26 @@ class _Walk:
                 if step < LEAST:
                     return f"no motion was found beyond {place.orbit.speed:.6g} rad/s on this branch"
                 continue
-            if new.rising * place.rising < 0.0:
-                self.turns.append(Turn(_turning(place, new, step, self.unit), len(self.orbits) - 1))
-                self.heading = -self.heading
+            turned = new.rising * place.rising < 0.0
             asked = [k for k in (self.number - 1, self.number, self.number + 1) if 0 <= k < len(speeds)]
             a, b = place.orbit.speed, new.orbit.speed
             passed = [k for k in asked if (a - speeds[k]) * (b - speeds[k]) <= 0.0 and a != speeds[k]]
+            if turned and passed and step > 2.0 * LEAST:  # in which order: shorter steps tell
+                step *= 0.5
+                continue
+            if turned:
+                self.turns.append(Turn(_turning(place, new, step, self.unit), len(self.orbits) - 1))
+                self.heading = -self.heading
             off = self._left(b)
             if passed:
                 landed = self._landed(place, new, float(speeds[passed[0]]))
+                if landed is None and step > 4.0 * LEAST:  # from nearer
+                    step *= 0.25
+                    continue
                 if landed is None:
                     return f"no motion was found at {speeds[passed[0]]:.6g} rad/s on this branch"
                 self.number = passed[0]
-                self.last = new
+                self.last = new if turned else place
                 return self._kept(landed)
             if off:
                 self.number = -1 if self.heading < 0 else len(speeds)
@@ -265,7 +272,7 @@ class _Walk:
         return new, made.steps <= 8
 
     def _newton(self, orbit: Orbit, place: _Place, step: float) -> Orbit | None:
-        system, waves, scale = self.system, place.waves, self.system.scale
+        waves, scale = place.waves, self.system.scale
         begin = packed(place.orbit.places[waves], scale)
         factors = None
         size = math.inf

@@ -21,8 +21,8 @@ from ..rigid import compiled
 MOST, SETTLED = 60, 1e-11
 #: Columns of the results: F, M, dF/d approach, dF/d phase = dM/d approach, dM/d phase, 1 where beyond the reach.
 FORCE, MOMENT, TANGENT, CROSS, BEND, BEYOND, RESULTS = range(7)
-#: Rows of the work space, before those of the matrix: gap, t', t'', Lambda and its derivative with the force, those of Phi with the
-#: angle and of Lambda with it, whether a pair bears, two right sides that become solutions, g.
+#: Rows of the work space, before those of the matrix: gap, t', t'', Lambda and its derivative with the force, two of
+#: Phi and one of Lambda with the angle, whether a pair bears, two right sides that become solutions, g.
 GAPS, TOUCH1, TOUCH2, LAMBDA, GIVES, TURN, TURN2, SHIFT, BEARS, RIGHT1, RIGHT2, BEFORE, ROWS = range(13)
 
 
@@ -74,7 +74,7 @@ def law_jets(nodes, forces, touch, energies, coupling, reach, phase, approach, p
                 change = max(change, abs(new - pairs[i, k]))
                 largest = max(largest, new)
                 pairs[i, k] = new
-            if change <= SETTLED * largest or largest == 0.0 and change == 0.0:
+            if change <= SETTLED * largest or largest == 0.0:
                 settled = True
                 break
         if not settled:

@@ -83,7 +83,7 @@ class Linear:
         every = np.hstack([self.places, self.tilts])
         forces = np.vstack([np.zeros_like(every), every])
         into = np.linalg.solve(vectors, forces.astype(complex))
-        return Poles(values.astype(complex), vectors[:n] / rates[:, None], into)
+        return Poles(values.astype(complex), np.asarray(vectors[:n] / rates[:, None], dtype=complex), into)
 
     @cached_property
     def _pairs(self) -> tuple[Array, Array, Array]:
@@ -108,9 +108,10 @@ class Linear:
         """Flexibility of all freedoms without gyroscopic moments, (k, p, p)."""
         sums, a, b = self._pairs
         s = 1j * omega[:, None]
-        inverse = 1.0 / ((sums[:, 1] - (omega**2)[:, None]) - s * sums[:, 0])
-        split = np.vstack([inverse.real, inverse.imag])
-        entries = [(split @ x) for x in (a, b)]
+        with np.errstate(divide="ignore", invalid="ignore"):  # infinite at the resonance of an undamped mode
+            inverse = 1.0 / ((sums[:, 1] - (omega**2)[:, None]) - s * sums[:, 0])
+            split = np.vstack([inverse.real, inverse.imag])
+            entries = [split @ x for x in (a, b)]
         k, p = len(omega), self.size + self.tilts.shape[1]
         values = s * (entries[0][:k] + 1j * entries[0][k:]) + entries[1][:k] + 1j * entries[1][k:]
         made = np.empty((k, p, p), dtype=complex)
@@ -143,8 +144,8 @@ class Linear:
             return own, np.zeros((count, 0, m), dtype=complex)
         react = 1j * speed * omega[:, None, None] * self._swap
         left = np.eye(p - m) - react @ whole[:, m:, m:]
-        moments = np.linalg.solve(left, react @ whole[:, m:, :m])
-        return own + whole[:, :m, m:] @ moments, moments
+        moments = np.asarray(np.linalg.solve(left, react @ whole[:, m:, :m]), dtype=complex)
+        return np.asarray(own + whole[:, :m, m:] @ moments), moments
 
     def flexibility(self, omega: Array, speed: float) -> ComplexArray:
         """H (k, m, m) at the angular frequencies (k,); `speed` turns the shafts."""

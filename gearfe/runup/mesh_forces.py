@@ -85,15 +85,16 @@ class MeshForces:
         if pairs is None:
             pairs = self._pairs[number, count] = np.zeros((count, slots))
         out = np.zeros((count, RESULTS))
-        jets()(*tables, flank.law.reach, phase, np.ascontiguousarray(approach), pairs, np.zeros((ROWS + slots, slots)), out)
+        work = np.zeros((ROWS + slots, slots))
+        jets()(*tables, flank.law.reach, phase, np.ascontiguousarray(approach), pairs, work, out)
         push = 1.0 + flank.damping * rate
         acts = push > 0.0
         push = np.where(acts, push, 0.0)
         F = out[:, FORCE]
         per_rate = np.where(acts, flank.damping * F, 0.0) if flank.damping > 0.0 else None
         return FlankForces(
-            F * push, out[:, TANGENT] * push, out[:, CROSS] * push, per_rate, out[:, MOMENT], out[:, CROSS], out[:, BEND],
-            F <= 0.0, out[:, BEYOND] > 0.0,
+            F * push, out[:, TANGENT] * push, out[:, CROSS] * push, per_rate, out[:, MOMENT], out[:, CROSS],
+            out[:, BEND], F <= 0.0, out[:, BEYOND] > 0.0,
         )  # fmt: skip
 
     @cached_property
@@ -120,7 +121,7 @@ class MeshForces:
             if at.per_rate is not None:
                 by_rate = np.zeros_like(by_place) if by_rate is None else by_rate
                 by_rate[:, d, d] -= at.per_rate
-            if at.moment is not None:
+            if at.moment is not None and at.moment_by_approach is not None:
                 value[:, r] -= flank.sense * at.moment
                 by_place[:, r, d] -= flank.sense * at.moment_by_approach
                 by_place[:, r, r] -= at.bend

@@ -1,0 +1,138 @@
+"""``gearfe runup JOB.toml --out DIR``: steady states of a gear train over its speed."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from ..progress import count, stage
+from ..tables.runup import RunUpTable
+from .arguments import add_keys, with_keys
+
+#: Keys of [runup] that options stand for.
+KEYS = ("speed_start_rad_per_s", "speed_stop_rad_per_s", "speeds", "tolerance", "band_Hz", "multiples")
+
+HELP = "gear train over its speed: steady states on all branches, waterfall, orders, critical speeds"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("job", metavar="JOB.toml", help="job file with the tables [train] and [runup]")
+    parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
+    parser.add_argument("--variant", metavar="NAME", help="a variant that the job file describes")
+    parser.add_argument(
+        "--curve", nargs="+", metavar="FILE", default=(), help="stiffness curves (CSV): one, or one a mesh"
+    )
+    add_keys(parser, RunUpTable, *KEYS)
+    parser.add_argument("--attachment", metavar="NAME", help="attachment in the pictures (default: that of the load)")
+    parser.add_argument("--no-pictures", action="store_true", help="tables and summary only")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compute and write; 1 when the range was not covered."""
+    started = time.perf_counter()
+    from ..errors import unknown_name
+    from ..tables.train import read_train_tables
+
+    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    tables = read_train_tables(args.job, args.variant)
+    table = with_keys(args, _own_table(args.job), *KEYS)
+    table.check("runup")
+
+    import numpy as np
+
+    from ..output.files import output_folder
+    from ..rigid import constant
+    from ..runup.files import write_runup
+    from ..runup.run_up import run_up
+    from ..stopwatch import Stopwatch
+    from ..train import build_train
+    from ..vibration.job import job_scene, train_body, train_job
+    from ..vibration.mesh_stiffness import train_curves
+
+    watch = Stopwatch({"program start": time.perf_counter() - started})
+    with watch.stage("reading"):
+        job = train_job(args.job, tables)
+        bores = [str(a) for s in job.table.shafts for a in s.attachments]
+        if args.attachment is not None and args.attachment not in bores:
+            raise unknown_name("--attachment", args.attachment, bores)
+        folder = output_folder(args.out or Path("out") / Path(args.job).stem)
+    with watch.stage("curves"):
+        stiffness = train_curves(job, args.curve, progress=count)
+    with watch.stage("housing"):
+        body = train_body(job)
+    with watch.stage("model"):
+        scene = job_scene(job, stiffness, body)
+        assert scene.drive is not None
+        speeds = np.linspace(table.speed_start_rad_per_s, table.speed_stop_rad_per_s, table.speeds)
+        model = build_train(replace(scene, drive=replace(scene.drive, speed=constant(float(speeds[0])))))
+    band = table.band_Hz or (5000.0 if job.housing is None else job.housing.reduction.band_Hz)
+    with watch.stage("steady states"), stage("steady states"):
+        made = run_up(model, speeds, tolerance=table.tolerance, band_hz=band, progress=_counted)
+    if not made.states:
+        problem = "has no periodic motion that was found at any of the speeds"
+        raise _nothing(table, problem)
+    further = {"variant": job.table.variant, "job": {"runup": asdict(table), "train": asdict(job.table)}}
+    parts = [f"{len(model.shafts)} shafts, {len(model.meshes)} gear meshes"]
+    parts += [f"load {x.torque_Nm:g} N m on {x.shaft}".replace("-", "−", 1) for x in job.table.loads[:1]]
+    parts += [f"variant {job.table.variant}"] if job.table.variant else []
+    summary, names = write_runup(
+        folder, made, multiples=table.multiples, title=", ".join(parts), attachment=args.attachment,
+        draw=not args.no_pictures, watch=watch, further=further,
+    )  # fmt: skip
+    for line in _told(summary):
+        print(line)
+    print(f"written to {folder}: " + ", ".join(names))
+    print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
+    for sentence in summary["warnings"]:
+        print(f"gearfe: warning: {sentence}", file=sys.stderr)
+    return 0 if summary["speeds_reached"] == summary["speeds"] else 1
+
+
+def _own_table(job: str) -> RunUpTable:
+    from ..config import load_job
+
+    found: RunUpTable = load_job(job, ("runup",))["runup"]
+    return found
+
+
+def _counted(number: int, of: int) -> None:
+    count(number, of, "speeds")
+
+
+def _nothing(table: RunUpTable, problem: str) -> Exception:
+    from ..errors import InputError
+
+    value = [table.speed_start_rad_per_s, table.speed_stop_rad_per_s]
+    return InputError("runup", value, problem, "add damping, or look at a transient: gearfe vibration")
+
+
+def _told(summary: dict[str, Any]) -> list[str]:
+    """Lines for the terminal."""
+    lines = [
+        f"{summary['speeds_reached']} of {summary['speeds']} speeds, {summary['steady_states']} steady states; largest "
+        f"error estimate {summary['largest_error_estimate']:.2g} of the approach under the steady force"
+    ]
+    if summary["turning_speeds_rad_per_s"]:
+        turns = ", ".join(f"{speed:.6g}" for speed in summary["turning_speeds_rad_per_s"])
+        lines.append(f"turning points (jumps of a run-up or run-down) at {turns} rad/s")
+    for name, factor, open_ in zip(
+        summary["mesh_names"], summary["largest_dynamic_factor"], summary["largest_share_without_contact"], strict=True
+    ):
+        parts = []
+        if factor is not None:
+            parts.append(f"dynamic factor up to {factor['value']:.3g} at {factor['speed_rad_per_s']:.6g} rad/s")
+        if open_ is not None and open_["value"] > 0.0:
+            share = 100.0 * open_["value"]
+            parts.append(f"apart up to {share:.3g} % of the time at {open_['speed_rad_per_s']:.6g} rad/s")
+        lines.append(f"mesh {name}: " + ", ".join(parts or ["no steady force"]))
+    for peak in summary["peaks"][:6]:
+        lines.append(
+            f"critical speed {peak['speed_rad_per_s']:.6g} rad/s: {peak['order']} at {peak['frequency_Hz']:.0f} Hz "
+            f"meets {peak['mode']}, {peak['mode_frequency_Hz']:.0f} Hz; dynamic factor {peak['dynamic_factor']:.3g}"
+        )
+    return lines

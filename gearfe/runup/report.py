@@ -1,0 +1,282 @@
+"""Tables and summary of a run-up."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..typing import Array
+from ..vibration.radiation import power_level
+from .modes import CoupledModes, Crossing
+from .results import SteadyState
+from .run_up import RunUp
+
+#: Peaks of the dynamic factor that rise by this part of it over the valleys beside them are critical speeds.
+RISE = 0.03
+RPM = 30.0 / math.pi
+
+
+def runup_columns(run: RunUp) -> dict[str, Any]:
+    """Columns of runup.csv: a row for each steady state, along the curve."""
+    states, model = run.states, run.train.model
+    made: dict[str, Any] = {
+        "speed_rad_per_s": np.array([s.speed for s in states]),
+        "speed_rpm": RPM * np.array([s.speed for s in states]),
+        "branch": np.array([s.branch for s in states], dtype=int),
+        "error_estimate": np.array([s.error for s in states]),
+        "beyond_mesh_law": np.array([s.beyond for s in states], dtype=int),
+    }
+    for i in range(len(model.meshes)):
+        force = [s.force[:, i] for s in states]
+        error = np.array([np.ptp(s.transmission_error[:, i]) for s in states])
+        made |= {
+            f"mean_force_{i + 1}_N": np.array([f.mean() for f in force]),
+            f"peak_to_peak_force_{i + 1}_N": np.array([np.ptp(f) for f in force]),
+            f"least_force_{i + 1}_N": np.array([f.min() for f in force]),
+            f"dynamic_factor_{i + 1}": dynamic_factors(run, i),
+            f"share_without_contact_{i + 1}": np.array([s.apart[i] for s in states]),
+            f"peak_to_peak_transmission_error_{i + 1}_um": 1e6 * error,
+        }
+    rms = np.array([s.rms(run.band_hz) for s in states]).reshape(len(states), -1)
+    for j, name in enumerate(model.bores):
+        made[f"acceleration_rms_{name}_m_per_s2"] = rms[:, j]
+    if model.scene.housing is not None:
+        made["radiated_power_level_dB"] = np.array([power_level(power_in_band(s, run.band_hz)) for s in states])
+    return made
+
+
+def dynamic_factors(run: RunUp, mesh: int) -> Array:
+    """Largest size of a mesh's force over the steady one, of all states."""
+    steady = abs(float(run.train.steady[mesh]))
+    largest = np.array([np.abs(s.force[:, mesh]).max() for s in run.states])
+    return np.asarray(largest / steady) if steady > 0.0 else np.full(len(largest), np.nan)
+
+
+def power_in_band(state: SteadyState, band_hz: float) -> float:
+    """Equivalent radiated power up to a frequency (W)."""
+    assert state.power is not None
+    return float(state.power[(state.frequency > 0.0) & (state.frequency <= band_hz)].sum())
+
+
+def orders(run: RunUp, multiples: int) -> dict[int, list[str]]:
+    """Harmonics of the period that are multiples of mesh frequencies -> what they are called."""
+    found: dict[int, list[str]] = {}
+    for multiple in range(1, multiples + 1):
+        for mesh, order in enumerate(run.train.system.orders):
+            found.setdefault(multiple * order, []).append(f"{multiple} x mesh {mesh + 1}")
+    return dict(sorted(found.items()))
+
+
+def order_columns(run: RunUp, multiples: int) -> dict[str, Any]:
+    """Columns of orders.csv: each order of each steady state with the amplitudes of all signals."""
+    states, model = run.states, run.train.model
+    cut = orders(run, multiples)
+    rows = [(s, k) for k in cut for s in states if k < len(s.frequency)]
+    made: dict[str, Any] = {
+        "order": np.array([s.order[k] for s, k in rows]),
+        "meets": [" = ".join(cut[k]) for _, k in rows],
+        "speed_rad_per_s": np.array([s.speed for s, _ in rows]),
+        "branch": np.array([s.branch for s, _ in rows], dtype=int),
+        "frequency_Hz": np.array([s.frequency[k] for s, k in rows]),
+    }
+    forces = np.abs([s.at_harmonic(s.force, k) for s, k in rows])
+    errors = np.abs([s.at_harmonic(s.transmission_error, k) for s, k in rows])
+    moved = np.abs([s.acceleration[k] for s, k in rows])
+    made |= {f"contact_force_{i + 1}_N": forces[:, i] for i in range(len(model.meshes))}
+    made |= {f"transmission_error_{i + 1}_um": 1e6 * errors[:, i] for i in range(len(model.meshes))}
+    made |= {f"acceleration_{name}_m_per_s2": moved[:, j] for j, name in enumerate(model.bores)}
+    if model.scene.housing is not None:
+        made["radiated_power_W"] = np.array([s.power[k] for s, k in rows if s.power is not None])
+    return made
+
+
+def waterfall(run: RunUp) -> dict[str, Array]:
+    """Arrays of waterfall.npz: lines of all steady states up to the band; not-a-number beyond it.
+
+    ``speed_rad_per_s`` and ``branch`` (states,), ``frequency_Hz`` (states, lines), ``order`` (lines,),
+    ``acceleration_m_per_s2`` (states, lines, attachments).
+    """
+    states = run.states
+    lines = max((int((s.frequency <= run.band_hz).sum()) for s in states), default=0)
+    bores = len(run.train.model.bores)
+    frequency = np.full((len(states), lines), np.nan)
+    moved = np.full((len(states), lines, bores), np.nan)
+    for row, s in enumerate(states):
+        count = int((s.frequency <= run.band_hz).sum())
+        frequency[row, :count], moved[row, :count] = s.frequency[:count], np.abs(s.acceleration[:count])
+    return {
+        "speed_rad_per_s": np.array([s.speed for s in states]),
+        "branch": np.array([s.branch for s in states], dtype=np.int64),
+        "order": np.arange(lines) / run.train.system.turns,
+        "frequency_Hz": frequency,
+        "acceleration_m_per_s2": moved,
+    }
+
+
+def waterfall_columns(run: RunUp) -> dict[str, Any]:
+    """The same as rows of waterfall.csv."""
+    made = waterfall(run)
+    state, line = np.nonzero(np.isfinite(made["frequency_Hz"]))
+    columns = {
+        "speed_rad_per_s": made["speed_rad_per_s"][state],
+        "branch": made["branch"][state],
+        "frequency_Hz": made["frequency_Hz"][state, line],
+        "order": made["order"][line],
+    }
+    for j, name in enumerate(run.train.model.bores):
+        columns[f"acceleration_{name}_m_per_s2"] = made["acceleration_m_per_s2"][state, line, j]
+    return columns
+
+
+def mode_columns(modes: CoupledModes) -> dict[str, Any]:
+    """Columns of modes.csv: each mode at each speed."""
+    count, speeds = modes.frequency.shape[1], len(modes.speeds)
+    number = np.repeat(np.arange(count), speeds)
+    columns: dict[str, Any] = {
+        "mode": number + 1,
+        "speed_rad_per_s": np.tile(modes.speeds, count),
+        "frequency_Hz": modes.frequency.T.ravel(),
+        "damping_ratio": modes.damping_ratio.T.ravel(),
+    }
+    for j, part in enumerate(modes.strain_in):
+        columns[f"strain_share_{part.replace(' ', '_')}"] = modes.strain[number, j]
+    for j, part in enumerate(("shafts", "housing")):
+        columns[f"kinetic_share_{part}"] = modes.kinetic[number, j]
+    return columns
+
+
+def critical_columns(modes: CoupledModes, met: list[Crossing]) -> dict[str, Any]:
+    """Columns of critical_speeds.csv: where a mesh order meets a mode, with the mode's shares of energy."""
+    mode = np.array([c.mode for c in met], dtype=int)
+    columns: dict[str, Any] = {
+        "speed_rad_per_s": np.array([c.speed for c in met]),
+        "speed_rpm": RPM * np.array([c.speed for c in met]),
+        "frequency_Hz": np.array([c.frequency for c in met]),
+        "mode": mode + 1,
+        "mesh": np.array([c.mesh for c in met], dtype=int) + 1,
+        "multiple": np.array([c.multiple for c in met], dtype=int),
+        "damping_ratio": modes.damping_ratio[0][mode],
+    }
+    for j, part in enumerate(modes.strain_in):
+        columns[f"strain_share_{part.replace(' ', '_')}"] = modes.strain[mode, j]
+    for j, part in enumerate(("shafts", "housing")):
+        columns[f"kinetic_share_{part}"] = modes.kinetic[mode, j]
+    columns["name"] = [modes.names[c.mode] for c in met]
+    return columns
+
+
+def peaks_of(run: RunUp, modes: CoupledModes, multiples: int) -> list[dict[str, Any]]:
+    """Peaks of the dynamic factors over the speed, highest first, each with the order and mode that meet there."""
+    swept = run.sweep()
+    cut = orders(run, multiples)
+    found = []
+    for mesh, line in enumerate(run.train.model.meshes):
+        steady = abs(float(run.train.steady[mesh]))
+        values = np.array([np.abs(s.force[:, mesh]).max() for s in swept]) / max(steady, 1e-300)
+        for at in _tops(values):
+            state = swept[at]
+            lines = {k: float(np.abs(state.at_harmonic(state.force[:, mesh], k))) for k in cut if k < len(state.order)}
+            order = max(lines, key=lambda k: lines[k])
+            frequency = float(state.frequency[order])
+            row = int(np.argmin(np.abs(modes.speeds - state.speed)))
+            mode = _answering(modes, row, frequency, modes.strain_in.index(line.name))
+            found.append(
+                {
+                    "speed_rad_per_s": state.speed,
+                    "mesh": line.name,
+                    "dynamic_factor": float(values[at]),
+                    "order": " = ".join(cut[order]),
+                    "frequency_Hz": frequency,
+                    "mode": modes.names[mode],
+                    "mode_frequency_Hz": float(modes.frequency[row, mode]),
+                    "damping_ratio": float(modes.damping_ratio[row, mode]),
+                }
+            )
+    return sorted(found, key=lambda x: -float(x["dynamic_factor"]))
+
+
+def _answering(modes: CoupledModes, row: int, frequency: float, part: int) -> int:
+    """Mode that answers most to a force in a mesh at a frequency: its share of strain there, times its resonance."""
+    ratio = frequency / modes.frequency[row]
+    resonance = np.abs(1.0 / (1.0 - ratio**2 + 2j * modes.damping_ratio[row] * ratio))
+    return int(np.nanargmax(modes.strain[:, part] * resonance))
+
+
+def _tops(values: Array) -> list[int]:
+    """Places of local maxima that rise over both valleys beside them."""
+    found = []
+    for at in range(1, len(values) - 1):
+        if not values[at - 1] <= values[at] > values[at + 1]:
+            continue
+        sides = []
+        for part in (values[:at][::-1], values[at + 1 :]):
+            higher = np.flatnonzero(part > values[at])
+            sides.append(float(part[: higher[0] if len(higher) else len(part)].min()))
+        if values[at] - max(sides) > RISE * values[at]:
+            found.append(at)
+    return found
+
+
+def summary(run: RunUp, modes: CoupledModes, multiples: int) -> dict[str, Any]:
+    """What summary.json says of the run-up."""
+    states, model = run.states, run.train.model
+    reached = {s.speed for s in states}
+    factors = [dynamic_factors(run, i) for i in range(len(model.meshes))]
+    open_ = [np.array([s.apart[i] for s in states]) for i in range(len(model.meshes))]
+
+    def most(values: Array) -> dict[str, float] | None:
+        if not len(values) or not np.isfinite(values).any():
+            return None
+        at = int(np.nanargmax(values))
+        return {"value": float(values[at]), "speed_rad_per_s": states[at].speed}
+
+    return {
+        "speeds": len(run.speeds),
+        "speeds_reached": len(reached),
+        "steady_states": len(states),
+        "turning_speeds_rad_per_s": run.turning_speeds.tolist(),
+        "largest_error_estimate": max((s.error for s in states), default=None),
+        "tolerance": run.tolerance,
+        "band_Hz": run.band_hz,
+        "mesh_names": [line.name for line in model.meshes],
+        "flanks": [line.told for line in model.meshes],
+        "steady_forces_N": run.train.steady.tolist(),
+        "largest_dynamic_factor": [most(f) for f in factors],
+        "largest_share_without_contact": [most(x) for x in open_],
+        "peaks": peaks_of(run, modes, multiples),
+        "modes": [
+            {"name": n, "frequency_Hz": float(f), "damping_ratio": float(z)}
+            for n, f, z in zip(modes.names, modes.frequency[0], modes.damping_ratio[0], strict=True)
+        ],
+        "notes": list(run.notes),
+    }
+
+
+def warnings(run: RunUp) -> list[str]:
+    """Sentences about what a reader must know."""
+    found = list(run.notes)
+    for i, line in enumerate(run.train.model.meshes):
+        if line.pulls:
+            low = [(float(s.force[:, i].min()), s.speed) for s in run.states]
+            least, speed = min(low, default=(0.0, 0.0))
+            if least < 0.0:
+                found.append(
+                    f"mesh {line.name} pulls: {least:.5g} N at {speed:.6g} rad/s; the spring acts both ways, real "
+                    'teeth would part there: write law = "map" or backlash_um'
+                )
+    beyond = [s.speed for s in run.states if s.beyond]
+    if beyond:
+        found.append(
+            f"at {len(beyond)} of {len(run.states)} states, the first at {beyond[0]:.6g} rad/s, a mesh goes beyond "
+            "what its law is known for: write a larger law_torque_Nm in [[train.meshes]]"
+        )
+    late = [s for s in run.states if not s.error <= run.tolerance]
+    if late:
+        worst = max(late, key=lambda s: s.error)
+        found.append(
+            f"{len(late)} of {len(run.states)} states miss the tolerance, the worst with {worst.error:.2g} at "
+            f"{worst.speed:.6g} rad/s: their motion has more harmonics than the program takes"
+        )
+    return found

@@ -1,0 +1,113 @@
+"""Oscillators of one degree of freedom, and periodic motions by shooting: an integration of its own, events located.
+
+Nothing here comes from `gearfe.runup`'s solution; its oscillators are made for it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import fsolve
+
+from gearfe.runup.balance import Oscillator, Pushes
+from gearfe.runup.linear import Linear
+
+
+@dataclass(frozen=True)
+class Single:
+    """``x'' + 2 z x' + force(theta, x) = load + swing cos(theta)``, natural frequency 1 where the force is x."""
+
+    damping: float
+    load: float
+    swing: float
+    force: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    slope: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    phase: float = 0.0
+
+    def __call__(self, theta, speed, u, du):  # type: ignore[no-untyped-def]
+        x = u[:, 0]
+        push = self.swing * np.cos(theta + self.phase) + x - self.force(theta + self.phase, x)
+        return Pushes(push[:, None], (1.0 - self.slope(theta + self.phase, x))[:, None, None], None)
+
+    @property
+    def oscillator(self) -> Oscillator:
+        one = np.ones((1, 1))
+        linear = Linear(np.ones(1), 2.0 * self.damping * one, one, self.load * np.ones(1))
+        return Oscillator(linear, self, 1.0, np.ones(1))
+
+    def rhs(self, speed):  # type: ignore[no-untyped-def]
+        def made(t, y):  # type: ignore[no-untyped-def]
+            push = self.load + self.swing * math.cos(speed * t + self.phase)
+            return [y[1], push - 2.0 * self.damping * y[1] - float(self.force(speed * t + self.phase, np.array(y[0])))]
+
+        return made
+
+
+def duffing(cubic: float, damping: float, swing: float) -> Single:
+    return Single(
+        damping, 0.0, swing, lambda th, x: x + cubic * x**3, lambda th, x: 1.0 + 3.0 * cubic * x**2 + 0.0 * th
+    )  # fmt: skip
+
+
+def meshing(ripple: float, damping: float, load: float, gap: float = math.inf) -> Single:
+    """A spring ``1 + ripple cos`` that parts below 0 and bears on its back side behind a gap."""
+
+    def side(th, x):  # type: ignore[no-untyped-def]
+        return np.where(x > 0.0, x, np.where(x < -gap, x + gap, 0.0))
+
+    def slope(th, x):  # type: ignore[no-untyped-def]
+        return (1.0 + ripple * np.cos(th)) * ((x > 0.0) | (x < -gap))
+
+    return Single(damping, load, 0.0, lambda th, x: (1.0 + ripple * np.cos(th)) * side(th, x), slope)
+
+
+def around(system: Single, speed: float, state: np.ndarray, *, parts: bool = False) -> np.ndarray:
+    """State after a period; with `parts` each touch (x = 0) ends a stretch of the integration."""
+    t, end, y = 0.0, 2.0 * math.pi / speed, np.array(state)
+
+    def touch(t, y):  # type: ignore[no-untyped-def]
+        return y[0]
+
+    touch.terminal = True  # type: ignore[attr-defined]
+    while True:
+        events = [touch] if parts else None
+        run = solve_ivp(system.rhs(speed), (t, end), y, "DOP853", events=events, rtol=1e-10, atol=1e-12)
+        t, y = run.t[-1], run.y[:, -1]
+        if run.status == 0:
+            return y
+        y = np.array([math.copysign(1e-14, y[1]), y[1]])
+
+
+def monodromy(system: Single, speed: float, state: np.ndarray, **options: bool) -> np.ndarray:
+    h = 1e-5
+    columns = [
+        (around(system, speed, state + h * e, **options) - around(system, speed, state - h * e, **options)) / (2 * h)
+        for e in np.eye(2)
+    ]
+    return np.array(columns).T
+
+
+def shooting(system: Single, speed: float, state: np.ndarray, **options: bool) -> np.ndarray:
+    """Start of a periodic motion."""
+    for _ in range(12):
+        gap = around(system, speed, state, **options) - state
+        if np.abs(gap).max() < 1e-8:
+            return state
+        state = state - np.linalg.solve(monodromy(system, speed, state, **options) - np.eye(2), gap)
+    raise AssertionError("no periodic motion by shooting")
+
+
+def turning_speed(system: Single, speed: float, state: np.ndarray, **options: bool) -> float:
+    """Speed near a guess at which a periodic motion has a multiplier 1."""
+
+    def equations(x):  # type: ignore[no-untyped-def]
+        gap = around(system, x[2], x[:2], **options) - x[:2]
+        return [*gap, np.linalg.det(monodromy(system, x[2], x[:2], **options) - np.eye(2))]
+
+    found, _, status, message = fsolve(equations, [*state, speed], full_output=True, xtol=1e-7)
+    assert status == 1, message
+    return float(found[2])

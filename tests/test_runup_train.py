@@ -1,0 +1,249 @@
+"""Steady states of trains: against their own long transients, energy, modes, mistakes, the command."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+
+from gearfe.cli import main
+from gearfe.errors import InputError
+from gearfe.rigid import constant
+from gearfe.rigid.compiled import available
+from gearfe.runup.balance import analysis, rates, synthesis
+from gearfe.runup.condensed import condense
+from gearfe.runup.law_kernel import BEND, CROSS, FORCE, MOMENT, TANGENT
+from gearfe.runup.modes import coupled_modes, crossings
+from gearfe.runup.run_up import run_up, steady_state
+from gearfe.train import Damping, Load, build_train, simulate
+from gearfe.train.arrays import law_arrays
+
+from .mesh_laws import hertzian_law
+from .test_cli_vibration import SMALL
+from .trains import curve, elastic, train
+
+needs_numba = pytest.mark.skipif(not available(), reason="numba is not installed")
+
+
+def loaded(stages, stiffness, *, speed=600.0, torque=60.0, ratio=0.05, backlash=None, flexible=True, **options):  # type: ignore[no-untyped-def]
+    """A train with a constant load from the begin on, all modes damped."""
+    scene = train(stages, stiffness=stiffness, damping=Damping(ratio=ratio), **options)
+    last = f"s{len(stages)}"
+    load = Load(last, f"{last}+", constant(-torque * (-1) ** len(stages) * math.copysign(1.0, speed)))
+    scene = dataclasses.replace(
+        scene, loads=(load,), drive=dataclasses.replace(scene.drive, speed=constant(speed)),
+        meshes=tuple(dataclasses.replace(m, backlash=backlash) for m in scene.meshes),
+    )  # fmt: skip
+    return elastic(scene, uneven=0.2, skew=0.5) if flexible else scene
+
+
+def settled_transient(model, state, periods, samples=256, tolerance=1e-7):  # type: ignore[no-untyped-def]
+    """Forces, approaches and accelerations over the last of many periods, from the same place as the state."""
+    times = np.arange(periods * samples + 1) * state.period / samples
+    made = simulate(model, times, tolerance=tolerance)
+    last = slice(-samples - 1, -1)
+    return made.contact_force[last], made.transmission_error[last], made.attachment_acceleration[last]
+
+
+def smooth(teeth):  # type: ignore[no-untyped-def]
+    return curve(teeth, mean=1e8, swing=0.15)
+
+
+@pytest.mark.parametrize(
+    ("stages", "stiffness", "speed", "backlash"),
+    [
+        ([(20, 30)], smooth, 600.0, None),
+        ([(20, 30), (20, 30)], smooth, -500.0, None),
+        pytest.param([(20, 30)], lambda teeth: hertzian_law(relief=4e-6), 700.0, 30e-6, marks=needs_numba),
+    ],
+)
+def test_steady_running_is_what_a_transient_comes_to(stages, stiffness, speed, backlash):
+    """Elastic housing, gyroscopic moments, rotation that feeds back on the phase: all are in both."""
+    model = build_train(loaded(stages, stiffness, speed=speed, backlash=backlash))
+    state = steady_state(model, speed, tolerance=1e-4)
+    force, error, acceleration = settled_transient(model, state, 60)
+    samples = len(force)
+    mine = synthesis(analysis(state.force)[: samples // 2], samples)
+    assert np.abs(mine - force).max() < 2e-3 * np.abs(force).max()
+    assert state.force.mean(axis=0) == pytest.approx(force.mean(axis=0), rel=1e-4)
+    assert np.ptp(state.transmission_error, axis=0) == pytest.approx(np.ptp(error, axis=0), rel=1e-3)
+    shared = slice(1, min(40, len(state.frequency)))
+    lines = analysis(acceleration)[shared]
+    assert np.abs(state.acceleration[shared] - lines).max() < 2e-3 * np.abs(lines).max()
+    assert state.error <= 1e-4
+
+
+@needs_numba
+def test_teeth_that_part_as_in_a_transient():
+    law = hertzian_law(relief=6e-6)
+    model = build_train(loaded([(20, 30)], lambda teeth: law, speed=1500.0, torque=15.0, ratio=0.02, flexible=False))
+    peak = max(run_up(model, np.linspace(1100.0, 2200.0, 60), tolerance=1e-2).states, key=lambda s: s.apart[0])
+    assert peak.apart[0] > 0.05
+    state = steady_state(model, peak.speed, peak, tolerance=1e-3)
+    scene = dataclasses.replace(model.scene, drive=dataclasses.replace(model.scene.drive, speed=constant(peak.speed)))
+    force, error, _ = settled_transient(build_train(scene), state, 160)
+    assert (force == 0.0).mean() == pytest.approx(state.apart[0], abs=0.01)
+    assert np.ptp(state.transmission_error) == pytest.approx(np.ptp(error), rel=5e-3)
+    assert state.force.max() == pytest.approx(force.max(), rel=5e-3)
+
+
+def test_all_speeds_of_a_range_in_order_and_from_both_ends():
+    model = build_train(loaded([(20, 30)], smooth))
+    speeds = np.linspace(300.0, 900.0, 25)
+    up, down = run_up(model, speeds), run_up(model, speeds[::-1])
+    assert [s.speed for s in up.states] == speeds.tolist()
+    assert not up.notes
+    for one, two in zip(up.sweep(), down.sweep(up=False), strict=True):
+        assert one.force.max() == pytest.approx(two.force.max(), rel=1e-3)
+
+
+def test_the_work_of_the_mesh_goes_into_damping():
+    """Power that the periodic forces put into the modes, against what their dampers take."""
+    train_ = condense(build_train(loaded([(20, 30)], smooth)))
+    system = train_.system
+    state = steady_state(train_.model, 600.0, tolerance=1e-6)
+    places, omega0 = state.orbit.places, system.omega0(600.0)
+    count = state.orbit.harmonics
+    samples = 16 * count
+    u, du = synthesis(places, samples), synthesis(rates(places, omega0), samples)
+    forces = system.forces(2 * math.pi * np.arange(samples) / samples, 600.0, u, du).value
+    omega = omega0 * np.arange(count + 1)
+    modal = system.linear.modal(omega, 600.0, analysis(forces)[: count + 1])
+    rate = 1j * omega[:, None] * modal
+    taken = 0.5 * np.einsum("ki,ij,kj->", rate[1:].conj(), system.linear.damping, rate[1:]).real
+    assert (forces * du).sum(axis=1).mean() == pytest.approx(taken, rel=1e-4)
+
+
+@needs_numba
+def test_the_jets_of_a_law_are_its_derivatives():
+    from gearfe.runup.law_kernel import RESULTS, ROWS, jets
+
+    law = hertzian_law(relief=3e-6)
+    tables = law_arrays([law])
+    rng = np.random.default_rng(5)
+    phase, approach = rng.uniform(-2.0, 2.0, 300), rng.uniform(-2e-6, 5e-5, 300)
+
+    def made(phase):  # type: ignore[no-untyped-def]
+        out = np.zeros((300, RESULTS))
+        work, pairs = np.zeros((ROWS + law.slots, law.slots)), np.zeros((300, law.slots))
+        arrays = (tables.nodes[0], tables.forces[0], tables.touch[0], tables.energies[0], tables.coupling[0])
+        jets()(*arrays, law.reach, phase, approach, pairs, work, out)
+        return out
+
+    out, true, h = made(phase), law(phase, approach), 1e-8
+    assert np.allclose(out[:, FORCE], true.force, rtol=1e-8, atol=1e-8)
+    assert np.allclose(out[:, MOMENT], true.moment, rtol=1e-8, atol=1e-10)
+    assert np.allclose(out[:, TANGENT], true.tangent, rtol=1e-7, atol=1.0)
+    above, below = made(phase + h), made(phase - h)
+    for value, slope in ((FORCE, CROSS), (MOMENT, BEND)):
+        off = np.abs((above[:, value] - below[:, value]) / (2 * h) - out[:, slope])
+        assert np.median(off) < 1e-6 * np.abs(out[:, slope]).max()
+        assert (off < 1e-4 * np.abs(out[:, slope]).max()).mean() > 0.98  # beside the places where pairs come and go
+
+
+def test_campbell_frequencies_are_those_of_the_whole_train():
+    """Against the eigenvalues of the train with its gyroscopic matrix, written down body by body."""
+    model = build_train(loaded([(20, 30)], smooth))
+    modes = coupled_modes(condense(model), np.array([200.0, 5000.0]), 6000.0)
+    core = model.core
+    n = len(core.squares)
+    for speed, frequency in zip((200.0, 5000.0), modes.frequency, strict=True):
+        gyro = np.zeros((len(core.T), len(core.T)))
+        for first, ratio, shaft in zip(model.first, model.ratios, model.shafts, strict=True):
+            gyro[first + 3, first + 4] = shaft.rotor.polar * ratio * speed
+            gyro[first + 4, first + 3] = -shaft.rotor.polar * ratio * speed
+        A = np.block(
+            [[np.zeros((n, n)), np.eye(n)], [-np.diag(core.squares), -core.damping - core.T.T @ gyro @ core.T]]
+        )
+        exact = np.sort(np.abs(np.linalg.eigvals(A))[::1]) / (2 * math.pi)
+        assert frequency == pytest.approx(exact[::2][: len(frequency)], rel=1e-6)
+    assert np.abs(modes.frequency[0] - modes.frequency[1]).max() > 0.01
+    assert modes.strain.sum(axis=1) == pytest.approx(1.0)
+
+
+def test_critical_speeds_lie_where_orders_meet_modes():
+    model = build_train(loaded([(20, 30)], smooth))
+    made = condense(model)
+    modes = coupled_modes(made, np.linspace(200.0, 1500.0, 5), 4000.0)
+    met = crossings(made, modes, 3)
+    assert met
+    for c in met:
+        assert c.frequency == pytest.approx(c.multiple * 20 * c.speed / (2 * math.pi))
+        assert c.frequency == pytest.approx(np.interp(c.speed, modes.speeds, modes.frequency[:, c.mode]), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("stages", "changes", "speeds", "words"),
+    [
+        ([(20, 30)], {}, [0.0, 100.0], "contain zero"),
+        ([(20, 30)], {}, [-100.0, 100.0], "change sign"),
+        ([(20, 30)], {}, [300.0, 200.0, 250.0], "do not rise or fall"),
+        ([(20, 30)], {}, [-300.0], "turns against the drive"),
+        ([(20, 30)], {"stiffness": None}, [300.0], "without a stiffness"),
+        ([(23, 31), (29, 37), (41, 43)], {}, [300.0], "no common period"),
+    ],
+)
+def test_what_has_no_steady_state_is_told(stages, changes, speeds, words):
+    model = build_train(train(stages, **changes))
+    with pytest.raises(InputError, match=words):
+        run_up(model, speeds)
+
+
+RUNUP = """
+[runup]
+speed_start_rad_per_s = 500.0
+speed_stop_rad_per_s = 700.0
+speeds = 6
+"""
+
+
+@pytest.fixture
+def job(tmp_path):  # type: ignore[no-untyped-def]
+    rows = "\n".join(f"{18.0 * i / 12},{1e8 * (1 + 0.1 * math.cos(2 * math.pi * i / 12))}" for i in range(12))
+    (tmp_path / "k.csv").write_text("pinion_angle_deg,k_mesh_N_per_m\n" + rows + "\n")
+    text = SMALL.replace("stiffness_N_per_m = 1e8", 'curve = "k.csv"')
+
+    def write(extra):  # type: ignore[no-untyped-def]
+        path = tmp_path / "job.toml"
+        path.write_text(text + extra)
+        return path
+
+    return write
+
+
+def test_the_command_writes_tables_and_pictures(job, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["runup", str(job(RUNUP)), "--out", str(out)]) == 0
+    names = sorted(path.name for path in out.iterdir())
+    assert names == [
+        "campbell.png", "critical_speeds.csv", "meshes.png", "modes.csv", "orders.csv", "orders.png", "runup.csv",
+        "summary.json", "waterfall.csv", "waterfall.npz", "waterfall.png",
+    ]  # fmt: skip
+    table = np.genfromtxt(out / "runup.csv", delimiter=",", names=True)
+    assert table["speed_rad_per_s"].tolist() == np.linspace(500.0, 700.0, 6).tolist()
+    assert table["mean_force_1_N"] == pytest.approx(75.0 / (37.5e-3 * math.cos(math.radians(25.0))), rel=1e-3)
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["speeds_reached"] == 6
+    assert summary["largest_error_estimate"] <= 1e-3
+    arrays = np.load(out / "waterfall.npz")
+    assert arrays["acceleration_m_per_s2"].shape == (6, len(arrays["order"]), 4)
+    assert "6 of 6 speeds" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("extra", "words"),
+    [
+        ("", "[runup]: is missing"),
+        (RUNUP.replace("500.0", "-500.0"), "contains zero or changes sign"),
+        (RUNUP.replace("500.0", "0.0"), "contains zero or changes sign"),
+        (RUNUP.replace("500.0", "700.0"), "is the first speed, too"),
+        (RUNUP + "tolerance = 0.5\n", "runup.tolerance"),
+        (RUNUP + "harmonics = 5\n", "harmonics"),
+    ],
+)
+def test_mistakes_in_a_job_are_told(job, capsys, extra, words):
+    assert main(["runup", str(job(extra))]) == 2
+    assert words in capsys.readouterr().err
