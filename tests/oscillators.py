@@ -101,13 +101,22 @@ def shooting(system: Single, speed: float, state: np.ndarray, **options: bool) -
     raise AssertionError("no periodic motion by shooting")
 
 
-def turning_speed(system: Single, speed: float, state: np.ndarray, **options: bool) -> float:
-    """Speed near a guess at which a periodic motion has a multiplier 1."""
+def turning_speed(system: Single, speed: float, one: np.ndarray, two: np.ndarray, **options: bool) -> float:
+    """Speed at which the curve of periodic motions turns between two of them at the same speed.
 
-    def equations(x):  # type: ignore[no-untyped-def]
-        gap = around(system, x[2], x[:2], **options) - x[:2]
-        return [*gap, np.linalg.det(monodromy(system, x[2], x[:2], **options) - np.eye(2))]
+    The curve is followed over the way from the one to the other: the distance from it and the speed by shooting.
+    """
+    part, across = np.linspace(0.0, 1.0, 5), np.array([-(two - one)[1], (two - one)[0]])
+    found, guess = [], np.array([0.0, speed])
+    for s in part:
 
-    found, _, status, message = fsolve(equations, [*state, speed], full_output=True, xtol=1e-7)
-    assert status == 1, message
-    return float(found[2])
+        def gap(x, s=s):  # type: ignore[no-untyped-def]
+            state = one + s * (two - one) + x[0] * across
+            return around(system, x[1], state, **options) - state
+
+        guess, _, status, message = fsolve(gap, guess, full_output=True, xtol=1e-8)
+        assert status == 1, message
+        found.append(guess[1])
+    fit = np.polynomial.Polynomial.fit(part, found, 4)
+    roots = [r.real for r in fit.deriv().roots() if abs(r.imag) < 1e-9 and 0.0 < r.real < 1.0]
+    return float(fit(roots[0]))

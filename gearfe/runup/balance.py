@@ -30,8 +30,8 @@ from .linear import Linear
 
 #: Newton steps, and halvings of one of them.
 STEPS, HALVINGS = 60, 8
-#: A motion is found where what is left of the equations is smaller than this, in parts of the scale.
-FOUND = 1e-7
+#: A motion is found where what is left of the equations is smaller than this part of the tolerance.
+FOUND = 1e-2
 #: Where Newton's method goes to and fro over a touch of flanks that falls on a sample, this many steps without halving
 #: what is left end it; less than this is left to the error estimate to judge, which asks for more samples.
 IDLE, LEFT = 8, 1e-4
@@ -39,7 +39,7 @@ IDLE, LEFT = 8, 1e-4
 SLOW = 0.2
 #: Harmonics are unknowns of Newton's method where a change of them comes back larger than this through the forces, and
 #: they are larger than this part of the scale.
-COMES_BACK, PRESENT = 0.02, 1e-7
+COMES_BACK, PRESENT = 0.05, 1e-7
 #: Samples of the period for each harmonic of the highest.
 SAMPLES = 4
 #: The error estimate is multiplied by this.
@@ -259,7 +259,13 @@ def size_of(amplitudes: ComplexArray, scale: Array) -> float:
 
 
 def solve(
-    system: Oscillator, speed: float, guess: ComplexArray, before: Newton | None = None, *, steps: int = STEPS
+    system: Oscillator,
+    speed: float,
+    guess: ComplexArray,
+    tolerance: float,
+    before: Newton | None = None,
+    *,
+    steps: int = STEPS,
 ) -> tuple[Orbit, Newton | None]:
     """Periodic motion at a speed, from a guess; without an error estimate.
 
@@ -267,6 +273,8 @@ def solve(
     ----------
     guess : (K + 1, m)
         Amplitudes to begin with.
+    tolerance
+        Of the error in the end, in parts of the scale.
     before
         A Jacobian to begin with, such as that of a neighbouring speed; a new one is made where it is too slow.
     """
@@ -279,7 +287,8 @@ def solve(
     best, idle = (size, places), 0
     if before is not None and before.waves[-1] > count:
         before = None
-    while size >= FOUND and taken < steps and idle < IDLE and math.isfinite(size):
+    enough = FOUND * tolerance
+    while size >= enough and taken < steps and idle < IDLE and math.isfinite(size):
         if before is None:
             waves = unknown_waves(system, places, at.pushes, H)
             before, fresh = newton(system, speed, waves, at.pushes, H), True
@@ -303,7 +312,9 @@ def solve(
         idle = 0 if size < 0.5 * best[0] else idle + 1
         if size < best[0]:
             best = size, places
-    return Orbit(speed, best[1], math.nan, bool(best[0] < (FOUND if idle < IDLE else LEFT)), taken), before
+    return Orbit(
+        speed, best[1], math.nan, bool(best[0] < (enough if idle < IDLE else max(enough, LEFT))), taken
+    ), before
 
 
 def error_of(system: Oscillator, orbit: Orbit, before: Newton | None) -> tuple[float, ComplexArray]:
@@ -331,6 +342,6 @@ def settled(system: Oscillator, orbit: Orbit, before: Newton | None, tolerance: 
         if error <= tolerance or len(guess) > MOST_HARMONICS:
             break
         steps = orbit.steps
-        orbit, before = solve(system, orbit.speed, guess, before)
+        orbit, before = solve(system, orbit.speed, guess, tolerance, before)
         orbit = replace(orbit, steps=steps + orbit.steps)
     return orbit, before

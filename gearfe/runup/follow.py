@@ -45,8 +45,9 @@ NEAR = 0.1
 FIRST, LEAST, LARGEST, GROWTH = 0.05, 1e-5, 0.4, 1.6
 #: Steps along the curve between two asked speeds, at most.
 MOST = 400
-#: Extrapolation takes so many speeds before.
-BACK = 4
+#: Extrapolation takes so many speeds before, Newton's method then so many steps; else the speeds between are halved so
+#: many times.
+BACK, STEPS, HALVINGS = 4, 10, 3
 #: Change of the speed, relative, for a derivative.
 NUDGE = 1e-6
 
@@ -120,6 +121,7 @@ class _Walk:
         self.orbits: list[Orbit] = []
         self.branch: list[int] = []
         self.turns: list[Turn] = []
+        self.back: list[Orbit] = []  # on this branch, to extrapolate from
         self.before: Newton | None = None
         self.number = 0  # of the asked speed that was reached
         self.heading = 1
@@ -130,8 +132,10 @@ class _Walk:
             if progress is not None:
                 progress(self.number, len(self.speeds) - 1)
             target = float(self.speeds[self.number + self.heading])
-            made = self._extrapolated(target) if self.heading > 0 else None
+            made = self._onward(target) if self.heading > 0 else None
             if made is not None:
+                made, self.before = settled(self.system, made, self.before, self.tolerance)
+            if made is not None and made.found:
                 self.number += 1
                 orbit = self._kept(made)
                 continue
@@ -143,6 +147,11 @@ class _Walk:
         return Curve(tuple(self.orbits), tuple(self.branch), tuple(self.turns), note)
 
     def _kept(self, orbit: Orbit) -> Orbit:
+        if self.branch and self.branch[-1] != len(self.turns):
+            self.back = []
+        if self.back and self.back[-1].speed == orbit.speed:
+            self.back.pop()
+        self.back.append(orbit)
         self.orbits.append(orbit)
         self.branch.append(len(self.turns))
         return orbit
@@ -152,22 +161,31 @@ class _Walk:
         least = self.system.harmonics(speed, self.highest)
         return least if orbit.error < 0.05 * self.tolerance else max(least, orbit.harmonics)
 
+    def _onward(self, speed: float, halvings: int = HALVINGS) -> Orbit | None:
+        """Orbit at a speed by extrapolation, where needed over speeds between."""
+        if len(self.back) < 2:
+            return None
+        made = self._extrapolated(speed)
+        if made is not None or not halvings:
+            return made
+        if self._onward(0.5 * (speed + self.back[-1].speed), halvings - 1) is None:
+            return None
+        return self._onward(speed, halvings - 1)
+
     def _extrapolated(self, speed: float) -> Orbit | None:
         """Orbit at a speed from those before on this branch, where both agree."""
-        back = [o for o, b in zip(self.orbits, self.branch, strict=True) if b == len(self.turns)][-BACK:]
-        if len(back) < 2:
-            return None
+        back, system = self.back[-BACK:], self.system
         count = self._count(speed, back[-1])
         known = np.array([o.with_harmonics(count) for o in back])
         places = _lagrange(np.array([o.speed for o in back]), known, speed)
-        orbit, newton = solve(self.system, speed, places, self.before, steps=6)
+        orbit, self.before = solve(system, speed, places, self.tolerance, self.before, steps=STEPS)
         if not orbit.found:
             return None
-        step = size_of(places - known[-1], self.system.scale)
-        if size_of(orbit.places - places, self.system.scale) > max(CLOSE * step, NEAR):
+        step, off = size_of(places - known[-1], system.scale), size_of(orbit.places - places, system.scale)
+        if off > max(CLOSE * step, NEAR):
             return None
-        orbit, self.before = settled(self.system, orbit, newton, self.tolerance)
-        return orbit if orbit.found else None
+        self.back.append(orbit)
+        return orbit
 
     def _stepwise(self, orbit: Orbit) -> Orbit | str:
         """Short steps along the curve until it passes the next asked speed, up or down."""
@@ -284,7 +302,7 @@ class _Walk:
                 - step
             )
             found = math.hypot(size_of(at.residual, scale), last)
-            if found < FOUND:
+            if found < FOUND * self.tolerance:
                 return replace(orbit, found=True, steps=taken)
             if not math.isfinite(found) or found > 10.0 * size:
                 return None
@@ -305,7 +323,7 @@ class _Walk:
         part = (speed - a.speed) / (b.speed - a.speed)
         count = max(a.harmonics, b.harmonics)
         guess = (1.0 - part) * a.with_harmonics(count) + part * b.with_harmonics(count)
-        orbit, newton = solve(self.system, speed, guess)
+        orbit, newton = solve(self.system, speed, guess, self.tolerance)
         if not orbit.found:
             return None
         orbit, self.before = settled(self.system, orbit, newton, self.tolerance)

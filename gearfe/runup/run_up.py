@@ -160,7 +160,7 @@ def _first(train: CondensedTrain, speed: float, guess: Orbit | None, tolerance: 
         else:
             places = np.zeros((count + 1, system.linear.size), dtype=complex)
             places[0] = system.linear.rest
-        orbit, newton = solve(system, away, places)
+        orbit, newton = solve(system, away, places, tolerance)
         orbit, _ = settled(system, orbit, newton, tolerance)
         if not orbit.found:
             continue
