@@ -66,7 +66,7 @@ MOVED = 0.1
 GROWING = 5e-3
 #: Steps in which windows are searched for: where the pressure moves by what one panel makes of its end, a window that
 #: follows it might do so for ever.
-SEARCHES = 8
+SEARCHES = 12
 #: Steps with windows and bearing panels held, after which derivatives err by 1e-3, and the change in the last of them
 #: with which a position is solved.
 HELD_STEPS, TOLERANCE = 3, 1e-6
