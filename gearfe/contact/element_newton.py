@@ -128,7 +128,10 @@ def solve(batch: Batch, state: State, tolerance: float) -> Outcome:
             converged = live & (_error(batch, state, found) < np.maximum(tolerance, _rounding(batch, found)))
             done |= set(np.flatnonzero(converged).tolist())
             live &= ~converged
-        at, asks = batch.at[found.points], (found.asked if number else state.pressure[found.points]) > 0
+        at, bears = batch.at[found.points], state.pressure[found.points] > 0
+        asks = found.asked > 0 if number else bears
+        # mixing may open all gaps by the overlap of a stiff law: then the points that bear are where to go on
+        asks = asks | (bears & (np.bincount(at[asks], minlength=batch.size) == 0)[at])
         live &= np.bincount(at[asks], minlength=batch.size) > 0
         if number == STEPS or not live.any():
             break
