@@ -86,16 +86,19 @@ def build(cls: type[T], table: Any, where: str) -> T:
 
     Understands ``int``, ``float``, ``bool``, ``str``, ``X | None``, ``tuple[X, ...]``, fixed tuples, ``dict[str, X]``,
     and nested dataclasses. A dataclass may define ``check(self, where)`` for rules that join several fields, and
-    ``REMOVED``: key that was -> what became of it, and what to write instead.
+    ``REMOVED``: key that was -> what became of it, and what to write instead; and ``SHORT``: the key that a text in
+    place of the table stands for.
 
     Raises
     ------
     InputError
         Unknown key (with the nearest known one), missing key, wrong type, value out of range.
     """
+    fields = {f.name: f for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    if isinstance(table, str) and hasattr(cls, "SHORT"):
+        table = {cls.SHORT: table}  # type: ignore[attr-defined]
     if not isinstance(table, dict):
         raise InputError(where, table, "must be a table of keys and values", f"write [{where}] and its keys below it")
-    fields = {f.name: f for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
     hints = typing.get_type_hints(cls)
     # what chooses among kinds first: a wrong kind brings keys of its own
     for name, spec in fields.items():

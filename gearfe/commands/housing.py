@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
 
     folder = output_folder(args.out)
     started = time.perf_counter()
-    body = reduced_housing(table)
+    body = reduced_housing(table, Path(args.job).parent)
     seconds = time.perf_counter() - started
     shown = min(args.modes, body.size)
     with stage("error estimates"):
@@ -81,6 +81,8 @@ def _frequency_errors(body: ModalBody, shown: int, mesh: MeshError) -> dict[str,
 
 
 def _report(body: ModalBody, errors: dict[str, Any], mesh: MeshError, left_out: ReductionError, seconds: float) -> None:
+    import numpy as np
+
     for note in body.notes:
         print(f"note: {note}")
     print(f"mass            {body.rigid_mass[0, 0]:.4f} kg")
@@ -90,7 +92,7 @@ def _report(body: ModalBody, errors: dict[str, Any], mesh: MeshError, left_out: 
     print(f"reduced to      {body.size} coordinates: {6 * len(body.attachment_names)} of attachments, {kept},")
     print(f"                {extra} quasi-static corrections; sparse solver {body.solver}; {seconds:.2f} s")
     for name, point in zip(body.attachment_names, body.attachment_points, strict=True):
-        x, y, z = 1e3 * point
+        x, y, z = np.round(1e3 * point, 6) + 0.0
         print(f"bore {name:<10} reference point x {x:8.3f}  y {y:8.3f}  z {z:8.3f} mm")
     print("frequencies, bores rigid and free to move; estimated error (mesh and reduction, all towards too high):")
     for number, estimate in enumerate(errors["all"]):

@@ -20,19 +20,25 @@ from ..tables.housing import HousingDampingTable, HousingReductionTable, Housing
 from .attachments import PLACE_TOLERANCE, Bore
 from .meshes import Prisms
 from .model import Housing
+from .own_mesh import fingerprint, own_housing
 
 
 def housing_from_job(path: str | Path) -> Housing:
     """Housing of a job file's ``[housing]`` table; gmsh runs unless the mesh is in the cache."""
-    return housing_from_table(load_job(path, ("housing",))["housing"])
+    return housing_from_table(load_job(path, ("housing",))["housing"], Path(path).parent)
 
 
-def housing_from_table(table: HousingTable) -> Housing:
+def housing_from_table(table: HousingTable, folder: str | Path = ".") -> Housing:
     """Mesh (from the cache when it is there) with the bores as attachments 1, 2, ... and the feet held.
 
-    Bores are numbered shaft by shaft, the +y wall before the -y wall.
+    Bores are numbered shaft by shaft, the +y wall before the -y wall; those of a mesh file, which is looked for in
+    `folder`, as they are listed.
     """
     table.check("housing")
+    if table.body is not None:
+        raise InputError("housing.body", table.body, "is reduced: it has no mesh any more", "read it: ModalBody.load")
+    if table.mesh.file is not None:
+        return own_housing(table, Path(folder), material(table))
     mesh = Prisms(housing_mesh(table))
     return Housing.of_mesh(
         mesh,
@@ -80,17 +86,19 @@ def inside_faces(table: HousingTable, centres: np.ndarray) -> np.ndarray:
     return np.asarray(np.all((place >= low) & (place <= high), axis=1))
 
 
-def reduced_housing(table: HousingTable) -> ModalBody:
+def reduced_housing(table: HousingTable, folder: str | Path = ".") -> ModalBody:
     """Reduced body of a ``[housing]`` table with its damping: from the cache when it was made before.
 
-    A second run then starts neither gmsh nor the finite elements.
+    A second run then starts neither gmsh nor the finite elements. Files that it names are looked for in `folder`.
     """
     table.check("housing")
-    recipe = dataclasses.replace(table, damping=HousingDampingTable())
-    folder = cache_folder()
-    path = (
-        None if folder is None else folder / f"body-{cache_key('body', [recipe, RECIPE, FORMAT, __version__])[:32]}.npz"
-    )
+    if table.body is not None:
+        return damped(_loaded(Path(folder) / table.body), table)
+    recipe: list[object] = [dataclasses.replace(table, damping=HousingDampingTable()), RECIPE, FORMAT, __version__]
+    if table.mesh.file is not None:
+        recipe.append(fingerprint(Path(folder) / table.mesh.file, "housing.mesh"))
+    cache = cache_folder()
+    path = None if cache is None else cache / f"body-{cache_key('body', recipe)[:32]}.npz"
     body = None
     if path is not None and path.exists():
         try:
@@ -98,7 +106,7 @@ def reduced_housing(table: HousingTable) -> ModalBody:
         except InputError:
             body = None
     if body is None:
-        body = reduced(housing_from_table(table), table.reduction)
+        body = reduced(housing_from_table(table, folder), table.reduction)
         if path is not None:
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)
@@ -106,6 +114,14 @@ def reduced_housing(table: HousingTable) -> ModalBody:
             except OSError:
                 pass
     return damped(body, table)
+
+
+def _loaded(path: Path) -> ModalBody:
+    try:
+        return ModalBody.load(path, verify=True)
+    except InputError as error:
+        cure = "give housing.npz of gearfe housing, beside the job file"
+        raise InputError("housing.body", str(path), error.problem, cure) from None
 
 
 def reduced(housing: Housing, table: HousingReductionTable) -> ModalBody:
@@ -125,3 +141,13 @@ def damped(body: ModalBody, table: HousingTable) -> ModalBody:
     given = table.damping
     ratio = given.ratio if isinstance(given.ratio, float) else np.array(given.ratio or (0.0,))
     return body.with_damping(ratio=ratio, alpha=given.rayleigh_alpha_per_s, beta=given.rayleigh_beta_s)
+
+
+def bore_points(table: HousingTable, folder: str | Path) -> dict[str, tuple[float, float, float]]:
+    """Name -> reference point (m) of the attachments of a mesh file or a reduced body."""
+    if table.body is not None:
+        body = reduced_housing(table, folder)
+        rows = zip(body.attachment_names, body.attachment_points, strict=True)
+        return {name: (float(x), float(y), float(z)) for name, (x, y, z) in rows}
+    made = housing_from_table(table, folder).attachments
+    return {a.name: (float(a.point[0]), float(a.point[1]), float(a.point[2])) for a in made}

@@ -21,6 +21,8 @@ from .offscreen import draw_apart
 
 #: Largest displacement in a picture of a mode, in parts of the body's size.
 EXAGGERATION = 0.06
+#: How much nearer the camera is than where the sphere round the body fits.
+ZOOM = 1.15
 _SECONDS = 120.0
 
 
@@ -103,6 +105,8 @@ def _draw(job: Path, target: Path) -> None:
         plotter.add_text(str(title), font_size=9, color="black")
         centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
         plotter.camera_position = [centre + size * np.array([0.75, 1.25, 0.75]), centre, (0.0, 0.0, 1.0)]
+        plotter.reset_camera()  # the whole body, long or compact
+        plotter.camera.zoom(ZOOM)
     with whole_file(target) as temporary:
         plotter.screenshot(str(temporary))
     plotter.close()

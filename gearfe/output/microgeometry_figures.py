@@ -36,7 +36,7 @@ def flank_figure(path: str | Path, *, charts: Sequence[Mapping[str, Any]], band_
         if chart["band"] is not None:
             middle = np.mean(lines, axis=0)
             edges = (middle - chart["band"], middle + chart["band"])
-            axes.fill_betweenx(chart["roll"], *edges, color="#e5e7eb", label=band_label)
+            axes.fill_betweenx(chart["roll"], *edges, color="#e5e7eb")
         for i in np.unique(np.linspace(0, len(lines) - 1, min(len(lines), MOST_LINES)).round().astype(int)):
             axes.plot(lines[i], chart["roll"], color=BLUE, linewidth=1.4 if len(lines) == 1 else 0.7)
         for end in chart["active"]:
@@ -45,8 +45,6 @@ def flank_figure(path: str | Path, *, charts: Sequence[Mapping[str, Any]], band_
         axes.set_xlabel("deviation (µm), + material", fontsize=9)
         if column == 0:
             axes.set_ylabel("roll length (mm)", fontsize=9)
-        if chart["band"] is not None and column == 0:
-            axes.legend(fontsize=7.5, loc="lower left", frameon=False)
         if pitch:
             below = grid[1][column]
             tidy(below)
@@ -57,7 +55,9 @@ def flank_figure(path: str | Path, *, charts: Sequence[Mapping[str, Any]], band_
             below.set_xlabel("tooth", fontsize=9)
             if column == 0:
                 below.set_ylabel("index deviation (µm)", fontsize=9)
-    figure.suptitle("Deviations of the flanks; dashed: ends of the path of contact", x=0.01, ha="left", fontsize=11)
+    grey = "" if band_label is None else f"; grey: {band_label}"
+    title = "Deviations of the flanks; dashed: ends of the path of contact" + grey
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
     save(figure, path, dpi=110)
 
 

@@ -1,4 +1,5 @@
-"""Table ``[housing]``: a gearbox housing of two bored walls on a base plate with four feet, and what is made of it.
+"""Table ``[housing]``: a gearbox housing of two bored walls on a base plate with four feet, or a mesh of the user's own
+or a reduced body in its place, and what is made of it.
 
 All lengths in millimetres, in one frame: shafts run along y, z points up, the gap between the walls is centred on
 y = 0.
@@ -6,9 +7,11 @@ y = 0.
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 from ..config import quantity
 from ..errors import InputError
@@ -56,11 +59,75 @@ class HousingMaterialTable:
 
 @dataclass(frozen=True)
 class HousingMeshTable:
-    """Size of the elements."""
+    """Size of the elements, or a mesh of the user's own."""
+
+    #: ``mesh = "box.msh"`` is ``mesh = { file = "box.msh" }``.
+    SHORT: ClassVar[str] = "file"
 
     size_mm: float = quantity(
-        4.5, above=0.0, doc="thickness of the elements at inner edges, where it decides the error; others follow (mm)"
+        4.5,
+        above=0.0,
+        doc="thickness of the elements at inner edges, where it decides the error; others follow (mm); of a CAD file "
+        "the largest edge",
     )
+    file: str | None = quantity(
+        None, doc="mesh of the user's own: .msh, .vtu, .inp, .bdf, .med, ... (or .step), beside the job file"
+    )
+    unit: str = quantity("mm", choices=("mm", "cm", "m", "in"), doc="unit of the coordinates in that file")
+    inner_box_mm: tuple[tuple[float, float, float], tuple[float, float, float]] | None = quantity(
+        None, doc="lowest and highest corner of a box (mm) in which faces bound the inside: they radiate no sound"
+    )
+
+
+#: Lengths in m.
+UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 25.4e-3}
+
+
+@dataclass(frozen=True)
+class MeshBoreTable:
+    """A bore of a mesh of the user's own: a cylinder, or a group."""
+
+    name: str | None = quantity(None, doc="of the attachment, by default its number from 1 on")
+    group: str | None = quantity(None, doc="named group of its nodes or faces in the mesh, or point_mm and radius_mm")
+    point_mm: tuple[float, float, float] | None = quantity(
+        None, doc="a point on the axis (mm); beside a group its reference point, which may then be no cylinder"
+    )
+    direction: tuple[float, float, float] = quantity((0.0, 1.0, 0.0), doc="along the axis, of any length")
+    radius_mm: float | None = quantity(None, above=0.0, doc="radius (mm)")
+    range_mm: tuple[float, float] | None = quantity(
+        None, doc="begin and end along the axis, from point_mm on (mm); left out: all that the mesh has"
+    )
+
+    def check(self, where: str) -> None:
+        """Raise `InputError` for a bore that is told by nothing, or twice."""
+        if self.group is None and (self.point_mm is None or self.radius_mm is None):
+            key = "point_mm" if self.point_mm is None else "radius_mm"
+            raise InputError(
+                f"{where}.{key}", None, "is required without a group", "give point_mm and radius_mm, or group"
+            )
+        for key in ("radius_mm", "range_mm"):
+            if self.group is not None and getattr(self, key) is not None:
+                problem = "stands beside group, whose nodes tell it"
+                raise InputError(f"{where}.{key}", getattr(self, key), problem, "leave one of them out")
+        if not any(self.direction):
+            raise InputError(f"{where}.direction", list(self.direction), "must not be zero", "give the axis")
+
+
+@dataclass(frozen=True)
+class HeldTable:
+    """Nodes of a mesh of the user's own that are held: a group, or those on a plane."""
+
+    group: str | None = quantity(None, doc="named group of nodes or faces in the mesh, or point_mm")
+    point_mm: tuple[float, float, float] | None = quantity(None, doc="a point on the plane (mm)")
+    normal: tuple[float, float, float] = quantity((0.0, 0.0, 1.0), doc="normal of the plane, of any length")
+
+    def check(self, where: str) -> None:
+        """Raise `InputError` unless exactly one of both is given."""
+        if (self.group is None) == (self.point_mm is None):
+            problem = "must be given, or point_mm" if self.group is None else "stands beside point_mm"
+            raise InputError(f"{where}.group", self.group, problem, "give one of them")
+        if not any(self.normal):
+            raise InputError(f"{where}.normal", list(self.normal), "must not be zero", "give the normal of the plane")
 
 
 #: Elements beyond which a mesh is taken for a mistake.
@@ -111,9 +178,19 @@ class HousingTable:
     mesh: HousingMeshTable = quantity(HousingMeshTable, doc="[housing.mesh]")  # noqa: RUF009
     reduction: HousingReductionTable = quantity(HousingReductionTable, doc="[housing.reduction]")  # noqa: RUF009
     damping: HousingDampingTable = quantity(HousingDampingTable, doc="[housing.damping]")  # noqa: RUF009
+    bores: tuple[MeshBoreTable, ...] = quantity((), doc="[[housing.bores]]: bores of a mesh of the user's own")
+    held: tuple[HeldTable, ...] = quantity((), doc="[[housing.held]]: held faces of such a mesh; none: a free body")
+    body: str | None = quantity(None, doc="reduced body (housing.npz of gearfe housing) in place of all this")
 
     def check(self, where: str) -> None:
         """Rules that join several dimensions: everything lies where it can be joined to the rest."""
+        if self.body is not None or self.mesh.file is not None:
+            self._check_own(where)
+            return
+        for key in ("bores", "held"):
+            if getattr(self, key):
+                cure = 'add mesh = "FILE", or take shafts and feet of the parametric housing'
+                raise InputError(f"{where}.{key}", None, "belongs to a mesh of the user's own", cure)
         for name, (low, high) in (("wall_x_mm", self.wall_x_mm), ("wall_z_mm", self.wall_z_mm)):
             if low >= high:
                 raise InputError(f"{where}.{name}", [low, high], "must be [low, high] with low < high", "swap them")
@@ -128,6 +205,23 @@ class HousingTable:
         for first, second in itertools.combinations(self.shafts, 2):
             _check_apart(first, second, where)
         self._check_size(f"{where}.mesh")
+
+    def _check_own(self, where: str) -> None:
+        """What has no meaning beside a mesh of the user's own, or a reduced body."""
+        taken = {"mesh", "bores", "held", "material", "reduction", "damping"}
+        source = "mesh"
+        if self.body is not None:
+            taken, source = {"body", "reduction", "damping"}, "body"
+            if dataclasses.replace(self.reduction, band_Hz=0.0) != HousingReductionTable(band_Hz=0.0):
+                problem = "a reduced body has its modes"
+                raise InputError(f"{where}.reduction", None, problem, "leave all but band_Hz out, or reduce the mesh")
+        for field in dataclasses.fields(self):
+            default = field.default_factory() if callable(field.default_factory) else field.default
+            if field.name not in taken and getattr(self, field.name) != default:
+                problem = f"stands beside {source}, which has it"
+                raise InputError(f"{where}.{field.name}", None, problem, "leave one of them out")
+        if self.body is None and not self.bores:
+            raise InputError(f"{where}.bores", None, "is required with a mesh", "add [[housing.bores]]")
 
     def _check_size(self, where: str) -> None:
         """A size that makes more elements than any machine here holds is a slip of the unit."""

@@ -89,7 +89,7 @@ def train_body(job: TrainJob) -> ModalBody | None:
     from ..housing.build import reduced_housing
 
     assert job.housing is not None
-    return reduced_housing(job.housing)
+    return reduced_housing(job.housing, job.path.parent)
 
 
 def job_scene(
@@ -229,11 +229,18 @@ def _rigid_bores(job: TrainJob) -> dict[str, tuple[float, float, float]]:
     if job.housing is None:
         problem = "are not given: neither [[train.rigid_bores]] nor [housing] tells where the bores are"
         raise InputError("train.rigid_bores", None, problem, "add one entry for each attachment")
-    return bore_places(job.housing)
+    return bore_places(job.housing, job.path.parent)
 
 
-def bore_places(table: HousingTable) -> dict[str, tuple[float, float, float]]:
-    """Name -> reference point (m) of the bores of a [housing] table: their middles, numbered as attachments."""
+def bore_places(table: HousingTable, folder: Path = Path()) -> dict[str, tuple[float, float, float]]:
+    """Name -> reference point (m) of the bores of a [housing] table: their middles, numbered as attachments.
+
+    Files that the table names are looked for in `folder`.
+    """
+    if table.body is not None or table.mesh.file is not None:
+        from ..housing.build import bore_points
+
+        return bore_points(table, folder)
     places, number = {}, 0
     for shaft in table.shafts:
         for side, sign in (("plus", 1.0), ("minus", -1.0)):

@@ -1,0 +1,158 @@
+r"""A housing from a mesh file of the user's own: bores by axis, radius and range or by groups, held faces likewise.
+
+A group that is a bore is a cylinder: its axis and radius are those that minimise :math:`\sum_i (d_i - r)^2` over the
+distances d of its nodes from the axis, and it must be one within a thousandth of the radius. The reference point is the
+point of the axis in the middle of the nodes' range.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..meshing.mesh_file import MeshFile, read_mesh_file
+from ..solid import SolidMaterial
+from ..tables.housing import UNITS, HeldTable, HousingTable, MeshBoreTable
+from ..typing import Array, BoolArray, IntArray
+from .attachments import RADIUS_TOLERANCE, Attachment, Bore, Plane, bore_attachment, plane_nodes
+from .model import Housing
+
+
+def own_housing(table: HousingTable, folder: Path, material: SolidMaterial) -> Housing:
+    """Housing of the mesh file that a [housing] table names; files are looked for in `folder`.
+
+    Raises
+    ------
+    InputError
+        For every mistake in file, bores and held faces, in the table's keys.
+    """
+    assert table.mesh.file is not None
+    field = "housing.mesh"
+    found = read_mesh_file(folder / table.mesh.file, field, table.mesh.size_mm)
+    mesh = found._replace(nodes=UNITS[table.mesh.unit] * found.nodes)
+    used = np.unique(mesh.tets)
+    notes = [told_size(mesh.nodes[used])]
+    attachments = []
+    for i, bore in enumerate(table.bores):
+        made, remarks = _attachment(bore, i, mesh, used)
+        attachments.append(made)
+        notes += remarks
+    held = [_held(one, f"housing.held[{i}]", mesh, used) for i, one in enumerate(table.held)]
+    box = None if table.mesh.inner_box_mm is None else 1e-3 * np.array(table.mesh.inner_box_mm)
+
+    def outer(centres: Array) -> BoolArray:
+        return np.ones(len(centres), bool) if box is None else ~((centres >= box[0]) & (centres <= box[1])).all(axis=1)
+
+    try:
+        housing = Housing.from_arrays(
+            mesh.nodes,
+            mesh.tets,
+            fixed=np.unique(np.concatenate(held)) if held else None,
+            material=material,
+            attachments=attachments,
+            outer=outer,
+        )
+    except InputError as error:
+        raise InputError(f"{field} {table.mesh.file}, {error.field}", error.value, error.problem, error.cure) from None
+    return dataclasses.replace(housing, notes=(*notes, *housing.notes))
+
+
+def told_size(nodes: Array) -> str:
+    """How large a mesh is: a unit that is wrong shows there."""
+    x, y, z = 1e3 * np.ptp(nodes, axis=0)
+    return f"the mesh is {x:.4g} x {y:.4g} x {z:.4g} mm"
+
+
+def fingerprint(path: Path, field: str) -> str:
+    """Hash of a file's content."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        reason = error.strerror or str(error)
+        cure = "check the path; it is looked for beside the job file"
+        raise InputError(field, str(path), f"cannot be read ({reason})", cure) from None
+
+
+def fitted_cylinder(points: Array) -> tuple[Array, Array, float, float]:
+    """Cylinder nearest to points (n, 3): a point of its axis, unit vector along it, radius, largest distance off it."""
+    from scipy.optimize import least_squares
+
+    middle = points.mean(axis=0)
+    size = float(np.abs(points - middle).max())
+    at = (points - middle) / size
+    starts = [*np.eye(3), *np.linalg.svd(at, full_matrices=False)[2]]
+
+    def parts(x: Array, frame: Array) -> tuple[Array, Array, Array]:
+        axis = np.array([x[0], x[1], 1.0]) @ frame
+        axis = axis / np.linalg.norm(axis)
+        foot = x[2] * frame[0] + x[3] * frame[1]
+        offset = at - foot
+        return foot, axis, np.linalg.norm(offset - np.outer(offset @ axis, axis), axis=1)
+
+    best = None
+    for start in starts:
+        frame = np.linalg.svd(np.outer(start, start))[0].T[[1, 2, 0]]
+        # a circle through the points seen along the start (Kasa's equations)
+        plane = np.column_stack([at @ frame[0], at @ frame[1]])
+        matrix = np.column_stack([2 * plane, np.ones(len(at))])
+        x, y, _ = np.linalg.lstsq(matrix, (plane**2).sum(axis=1), rcond=None)[0]
+
+        def off(x: Array, frame: Array = frame) -> Array:
+            distance = parts(x, frame)[2]
+            return np.asarray(distance - distance.mean())
+
+        found = least_squares(off, [0.0, 0.0, x, y], xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60)
+        if best is None or found.cost < best[0].cost:
+            best = found, frame
+    assert best is not None
+    foot, axis, distance = parts(best[0].x, best[1])
+    axis = axis * np.sign(axis[np.argmax(np.abs(axis))])
+    radius = float(distance.mean())
+    return middle + size * foot, axis, size * radius, size * float(np.abs(distance - radius).max())
+
+
+def _attachment(bore: MeshBoreTable, i: int, mesh: MeshFile, used: IntArray) -> tuple[Attachment, tuple[str, ...]]:
+    field, name = f"housing.bores[{i}]", bore.name or str(i + 1)
+    point = None if bore.point_mm is None else 1e-3 * np.array(bore.point_mm)
+    if bore.group is None:
+        assert point is not None
+        assert bore.radius_mm is not None
+        along = None if bore.range_mm is None else (1e-3 * bore.range_mm[0], 1e-3 * bore.range_mm[1])
+        x, y, z = (float(one) for one in point)
+        given = Bore((x, y, z), bore.direction, 1e-3 * bore.radius_mm, along, name)
+        try:
+            made, notes = bore_attachment(given, i + 1, mesh.nodes[used])
+        except InputError as error:
+            cure = "check point_mm, direction, radius_mm and range_mm, and the unit of the mesh"
+            raise InputError(field, name, error.problem, cure) from None
+        return dataclasses.replace(made, nodes=used[made.nodes]), notes
+    nodes = mesh.group(bore.group, f"{field}.group")
+    if point is not None:
+        axis = np.array(bore.direction, dtype=float)
+        return Attachment(name, point, axis / np.linalg.norm(axis), nodes), ()
+    at = mesh.nodes[nodes]
+    foot, axis, radius, off = fitted_cylinder(at) if len(at) >= 6 else (at[0], at[0], 0.0, np.inf)
+    if not (off <= RADIUS_TOLERANCE * radius and radius <= np.linalg.norm(np.ptp(at, axis=0))):  # else a flat patch
+        problem = f"its {len(nodes)} nodes are no cylinder: they are up to {1e3 * off:.3g} mm off the nearest one"
+        cure = "give point_mm, the point that the attachment is referred to, beside the group"
+        raise InputError(f"{field}.group", bore.group, problem, cure)
+    height = (at - foot) @ axis
+    reference = foot + 0.5 * (height.min() + height.max()) * axis
+    note = f"bore {name}: group {bore.group} is a cylinder of radius {1e3 * radius:.6g} mm"
+    return Attachment(name, reference, axis, nodes), (note,)
+
+
+def _held(held: HeldTable, field: str, mesh: MeshFile, used: IntArray) -> IntArray:
+    if held.group is not None:
+        return mesh.group(held.group, f"{field}.group")
+    assert held.point_mm is not None
+    x, y, z = (1e-3 * one for one in held.point_mm)
+    try:
+        return used[plane_nodes(Plane((x, y, z), held.normal), mesh.nodes[used])]
+    except InputError as error:
+        cure = "check point_mm and normal, and the unit of the mesh"
+        raise InputError(field, list(held.point_mm), error.problem, cure) from None
