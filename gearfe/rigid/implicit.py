@@ -210,6 +210,8 @@ def radau_step(
     curvature = joint_stiffness(system, middle, middle_q, multipliers)
     G = system.jacobian(middle, middle_q)[active]
     M = system.mass
+    if not all(np.isfinite(x).all() for x in (middle_q, by_q, by_v, curvature, G)):
+        return Step(q, v, math.inf, 0, False)
     solves = []
     for mu in MU[:2]:
         factor = mu.real if abs(mu.imag) < 1e-12 else mu
