@@ -10,7 +10,7 @@ from ..tables.mechanism import RunTable, read_mechanism_file
 from .arguments import add_keys, with_keys
 
 #: Keys of [run] that options stand for, beside the end of the run.
-KEYS = ("tolerance", "method", "reactions")
+KEYS = ("analysis", "tolerance", "method", "reactions", "modes")
 
 HELP = "trajectories, energies and reactions of a planar mechanism"
 
@@ -35,8 +35,15 @@ def run(args: argparse.Namespace) -> int:
     from ..mechanisms.job import run_mechanism
     from ..mechanisms.model import make_mechanism
 
+    mechanism = make_mechanism(file, Path(args.file))
+    if file.run.analysis in ("equilibrium", "modes"):
+        from ..mechanisms.rest import run_rest
+
+        outcome = run_rest(mechanism, args.out, figures=not args.no_figures)
+        print(outcome.text)
+        return 0 if outcome.complete else 1
     outcome = run_mechanism(
-        make_mechanism(file, Path(args.file)),
+        mechanism,
         args.out,
         figures=not args.no_figures,
         animation=args.animation,

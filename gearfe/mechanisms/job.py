@@ -14,13 +14,15 @@ from ..errors import InputError
 from ..output.files import output_folder, whole_set, write_csv, write_json
 from ..progress import stage
 from ..rigid import Start, integrate
+from ..rigid.inverse import prescribed_motion
 from .error_estimate import TrajectoryError, trajectory_error
 from .model import Mechanism
 from .results import Results, evaluate, reactions
 
 #: Files that depend on the options: what is left of them from an earlier run is removed.
 MAY_WRITE = (
-    "reactions.csv", "curves.png", "picture.png", "animation.gif", "links.csv", "links.vtkhdf", "links.png"
+    "trajectory.csv", "energy.csv", "equilibrium.csv", "bodies.csv", "modes.csv", "shapes.csv", "modes.png",
+    "reactions.csv", "curves.png", "picture.png", "animation.gif", "links.csv", "links.vtkhdf", "links.png",
 )  # fmt: skip
 
 
@@ -68,8 +70,11 @@ def run_mechanism(
     method = run.method if method is None else method
     if tolerance is None:
         tolerance = mechanism.tolerance
-    options: dict[str, Any] = {"method": method, "tolerance": tolerance, "raise_on_failure": False}
-    trajectory = integrate(mechanism.system, times, start=start, **options)
+    if run.analysis == "inverse":
+        trajectory, estimate = prescribed_motion(mechanism.system, start, times), False
+    else:
+        options: dict[str, Any] = {"method": method, "tolerance": tolerance, "raise_on_failure": False}
+        trajectory = integrate(mechanism.system, times, start=start, **options)
     integrated = clock.perf_counter()
     compiling = float(trajectory.statistics.get("compile_seconds", 0.0))
     if len(trajectory.dense.times) < 2:

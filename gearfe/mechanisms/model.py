@@ -311,8 +311,8 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
     outputs: dict[str, Node] = {}
     made = Mechanism(file, system, outputs, path, flexible)
     for _, load in planar.assembly.state_loads:
-        assert isinstance(load, ExpressionLoad)
-        load.bind(made)
+        if isinstance(load, ExpressionLoad):
+            load.bind(made)
     zero = np.zeros((1, system.size))
     for i, output in enumerate(file.outputs):
         if output.name in outputs or output.name == "time_s":

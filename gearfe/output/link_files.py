@@ -64,6 +64,8 @@ def write_links(folder: Path, mechanism: Any, trajectory: Any) -> None:
 
 
 def _times(mechanism: Any, trajectory: Any) -> Array:
+    if len(trajectory.time) == 1:
+        return np.asarray(trajectory.time, dtype=float)
     return np.linspace(trajectory.time[0], trajectory.time[-1], mechanism.file.run.frames)
 
 

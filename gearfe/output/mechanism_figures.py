@@ -18,8 +18,9 @@ from .files import whole_file
 def draw_figures(folder: Path, mechanism: Any, results: Any) -> None:
     """curves.png (outputs over time, with reference markers where the file names a table) and picture.png."""
     plt = _pyplot()
-    _curves(plt, folder / "curves.png", mechanism, results)
     trajectory = results.trajectory
+    if len(trajectory.time) > 1:
+        _curves(plt, folder / "curves.png", mechanism, results)
     asked = mechanism.file.run.picture_s
     time = trajectory.time[-1] if asked is None else min(asked, trajectory.time[-1])
     figure, axes = plt.subplots(figsize=(7, 6))
@@ -33,6 +34,28 @@ def draw_figures(folder: Path, mechanism: Any, results: Any) -> None:
         from .link_files import draw_links
 
         draw_links(plt, folder / "links.png", mechanism, results)
+
+
+def draw_modes(folder: Path, mechanism: Any, q: np.ndarray, modes: Any) -> None:
+    """modes.png: the first six shapes, 15 % of the mechanism's length at the largest, over the state of rest."""
+    plt = _pyplot()
+    count = min(6, len(modes.rates))
+    columns = min(3, count)
+    figure, axes = plt.subplots(-(-count // columns), columns, figsize=(4 * columns, 3.4 * -(-count // columns)))
+    size = 0.15 * mechanism.planar.assembly.length / mechanism.system.units
+    for k, ax in enumerate(np.ravel(axes)):
+        if k >= count:
+            ax.axis("off")
+            continue
+        shape = modes.shapes[k].real / np.abs(modes.shapes[k].real / mechanism.system.units).max()
+        moved = q + size * shape
+        _draw(ax, mechanism, q[None, :], alpha=0.25)
+        ax.set_prop_cycle(None)
+        _draw(ax, mechanism, moved[None, :])
+        _frame(ax, mechanism, np.stack([q, moved, q - size * shape]))
+        ax.set_aspect("equal", adjustable="datalim")
+        ax.set_title(f"{k + 1}: {modes.frequencies[k]:.4g} Hz", fontsize=9)
+    _save(plt, figure, folder / "modes.png")
 
 
 @stage("animation")
@@ -134,7 +157,7 @@ def _paths(axes: Any, mechanism: Any, q: np.ndarray) -> None:
         axes.plot(*_place(q, body, point), lw=0.7, alpha=0.6, label=label)
 
 
-def _draw(axes: Any, mechanism: Any, q: np.ndarray) -> None:
+def _draw(axes: Any, mechanism: Any, q: np.ndarray, alpha: float = 1.0) -> None:
     """Bodies as outlines of their points, mass centres, points at rest."""
     for body, points in _points(mechanism):
         ends = np.array([[float(a[0]) for a in _place(q, body, p)] for p in points]).reshape(-1, 2)
@@ -142,14 +165,14 @@ def _draw(axes: Any, mechanism: Any, q: np.ndarray) -> None:
         if len(ends) == 1:
             ends = np.vstack([ends, centre])
         loop = ends if len(ends) < 3 else np.vstack([ends, ends[:1]])
-        (line,) = axes.plot(loop[:, 0], loop[:, 1], "-o", lw=2, ms=3.5)
-        axes.plot(*centre, "+", color=line.get_color(), ms=8)
+        (line,) = axes.plot(loop[:, 0], loop[:, 1], "-o", lw=2, ms=3.5, alpha=alpha)
+        axes.plot(*centre, "+", color=line.get_color(), ms=8, alpha=alpha)
     magnification = mechanism.file.figure.magnification
     for link in mechanism.links.values():
         shape = link.exaggerated(q, link.smooth, magnification)[0]
         nodes = link.exaggerated(q, link.beam.link.ends, magnification)[0]
-        (line,) = axes.plot(*shape.T, lw=2)
-        axes.plot(*nodes.T, "o", ms=3, color=line.get_color())
+        (line,) = axes.plot(*shape.T, lw=2, alpha=alpha)
+        axes.plot(*nodes.T, "o", ms=3, color=line.get_color(), alpha=alpha)
     if mechanism.links and magnification != 1.0:
         axes.text(0.01, 0.01, f"deflections x {magnification:g}", transform=axes.transAxes, fontsize=8)
     for x, y in mechanism.file.ground.points_m.values():

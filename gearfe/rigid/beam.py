@@ -33,6 +33,7 @@ from .forces import Weight
 from .forms import Point
 from .planar import Body
 from .scene import PlanarScene
+from .turning import TurningFrame
 
 #: Nodes of an element on -1..1 (Gauss-Lobatto), and its Gauss points with their weights.
 NODES = np.array([-1.0, -math.sqrt(0.2), math.sqrt(0.2), 1.0])
@@ -232,6 +233,11 @@ class Beam(Element):
         parts = [part for force in scene.scene.forces for part in force.parts(frames) if isinstance(part, Weight)]
         field = np.sum([part.acceleration for part in parts], axis=0) if parts else np.zeros(2)
         self._weight = own @ np.tile([*field, 0.0], len(link.stations))
+        rate = sum(f.rate for f in scene.scene.forces if isinstance(f, TurningFrame))
+        places = own * np.tile([1.0, 1.0, 0.0], len(link.stations))
+        quarter = np.kron(np.eye(len(link.stations)), np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
+        #: Centrifugal and Coriolis forces by coordinates and velocities.
+        self._turning = (rate**2 * places, 2.0 * rate * own @ quarter) if rate else None
 
     def shapes(self, s: Array) -> tuple[Array, Array]:
         """Shape functions and their derivatives by the arc length at the places s; shapes (places, nodes)."""
@@ -277,7 +283,7 @@ class Beam(Element):
         z, dz = self._at_points(q), self._at_points(v)
         e = self.strains(z)
         stress = self._stress(e, dz)
-        return self._force(np.einsum("pi,pij->pj", stress, e.slope))
+        return self._force(np.einsum("pi,pij->pj", stress, e.slope), q, v)
 
     def force_jacobian(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:  # noqa: ARG002
         """Its derivatives by q and v."""
@@ -292,7 +298,11 @@ class Beam(Element):
         weighted = self.weights[:, None, None] * e.slope.transpose(0, 2, 1)
         by_q = weighted @ (law + tau * self.stiffness[:, None] * np.einsum("pijk,pk->pij", e.bend, dz))
         by_q += np.einsum("pi,pijk->pjk", stress * self.weights[:, None], e.bend)
-        return Tangent(self, law, self._spread(-by_q), self._spread(-tau * (weighted @ law)))
+        whole = self._spread(-by_q), self._spread(-tau * (weighted @ law))
+        if self._turning is not None:
+            for total, part in zip(whole, self._turning, strict=True):
+                total[np.ix_(self.places, self.places)] += part
+        return Tangent(self, law, *whole)
 
     def stress(self, q: Array, v: Array) -> Array:
         """Axial force (N), shear force (N) and bending moment (N m) at the Gauss points, shape (points, 3)."""
@@ -320,7 +330,9 @@ class Beam(Element):
 
     def potential(self, q: Array) -> float:
         """Elastic energy and that of the weight (J)."""
-        return self.elastic_energy(q) - float(self._weight @ q[self.places])
+        x = q[self.places]
+        turning = 0.0 if self._turning is None else 0.5 * float(x @ self._turning[0] @ x)
+        return self.elastic_energy(q) - float(self._weight @ x) - turning
 
     def elastic_energy(self, q: Array) -> float:
         """1/2 int EA Gamma^2 + GA gamma^2 + EI kappa^2 ds (J)."""
@@ -336,11 +348,13 @@ class Beam(Element):
         rates = np.einsum("pij,pj->pi", e.slope, dz) if self.link.damping else 0.0
         return (e.value + self.link.damping * rates) * self.stiffness
 
-    def _force(self, pull: Array) -> Array:
-        """Weight less P^T of the pull (points, 4) of the stresses."""
+    def _force(self, pull: Array, q: Array, v: Array) -> Array:
+        """Weight, and forces of a turning frame, less P^T of the pull (points, 4) of the stresses."""
         out = np.zeros(self._size)
         weighted = (pull * self.weights[:, None]).ravel()
         out[self.places] = self._weight - weighted @ self._to_points.reshape(-1, len(self.places))
+        if self._turning is not None:
+            out[self.places] += self._turning[0] @ q[self.places] + self._turning[1] @ v[self.places]
         return out
 
     def _at_points(self, q: Array) -> Array:
@@ -377,7 +391,7 @@ class Tangent:
         e = beam.strains(beam._at_points(q))
         gap = beam._stress(e, dz) - stress
         pull = np.einsum("pi,pij->pj", stress, e.slope) + np.einsum("pi,pij->pj", gap / beam.stiffness, self.law)
-        return beam._force(pull), gap
+        return beam._force(pull, q, v), gap
 
     def change(self, q: Array, v: Array) -> Array:
         """Change of the stress with changes of coordinates and velocities."""

@@ -81,6 +81,7 @@ FORCES: dict[str, Kind] = {
         {"body": "body", "to": "reaction", "moment_N_m": "function"},
         ("body", "moment_N_m"),
     ),
+    "turning_frame": Kind("gearfe.rigid.turning:TurningFrame", {"rate_rad_per_s": "rate"}, ("rate_rad_per_s",)),
 }  # fmt: skip
 
 
@@ -212,6 +213,7 @@ class ForceTable:
     free_length_m: float = quantity(0.0, low=0.0, doc="length of the spring without force in m, >= 0")
     coordinate: str | None = quantity(None, choices=("angle", "x", "y"), doc="coordinate that the spring acts on")
     reference: float = quantity(0.0, doc="coordinate at which the spring is free, in m or rad")
+    rate_rad_per_s: float | None = quantity(None, doc="rate of a turning frame about the ground's origin in rad/s")
     x_N: Load | None = quantity(None, doc="force in x in N: a number, a function of time, or an expression")
     y_N: Load | None = quantity(None, doc="force in y in N: a number, a function of time, or an expression")
     moment_N_m: Load | None = quantity(None, doc="moment in N m: a number, a function of time, or an expression")
@@ -268,6 +270,12 @@ class RunTable:
     method: str = quantity(
         "auto", choices=("auto", "taylor", "explicit", "implicit"), doc="integrator (auto: quickest)"
     )
+    analysis: str = quantity(
+        "transient",
+        choices=("transient", "equilibrium", "modes", "inverse"),
+        doc="motion, state of rest, vibrations about it, or forces of a prescribed motion",
+    )
+    modes: int = quantity(10, low=1, high=1000, doc="number of modes")
     reactions: bool = quantity(False, doc="write reactions.csv")
     picture_s: float | None = quantity(None, low=0.0, doc="time of the picture in s (default: the end)")
     frames: int = quantity(100, low=2, high=10000, doc="frames of the animation")

@@ -1,0 +1,124 @@
+"""``gearfe mechanism --analysis equilibrium | modes``: the state of rest, and small vibrations about it."""
+
+from __future__ import annotations
+
+import time as clock
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..output.files import output_folder, whole_set, write_csv, write_json
+from ..progress import stage
+from ..rigid import Start, Status, Trajectory
+from ..rigid.dense import Polynomials
+from ..rigid.equilibrium import Equilibrium, equilibrium
+from ..rigid.modes import Modes, modes
+from ..typing import Array
+from .job import MAY_WRITE, Outcome
+from .model import Mechanism
+from .results import Results, evaluate, reactions
+
+
+def run_rest(mechanism: Mechanism, out: str | Path, *, figures: bool = True) -> Outcome:
+    """Find the equilibrium downhill from the start, and modes where the file asks for them; all files, or none.
+
+    ``equilibrium.csv`` has the outputs, ``bodies.csv`` the poses, ``reactions.csv`` the forces of the joints,
+    ``modes.csv`` frequencies and damping, ``shapes.csv`` the motions.
+    """
+    began = clock.perf_counter()
+    folder = output_folder(out)
+    start = mechanism.start()
+    with stage("equilibrium"):
+        rest = equilibrium(mechanism.system, start)
+    results = evaluate(mechanism, at_rest(mechanism, start, rest))
+    asked = mechanism.file.run.analysis == "modes"
+    found = modes(mechanism.system, start, rest, mechanism.file.run.modes) if asked else None
+    with whole_set(folder, MAY_WRITE) as made:
+        told = write_csv(made / "equilibrium.csv", dict(results.outputs), gaps=False) if results.outputs else []
+        write_csv(made / "bodies.csv", _poses(mechanism, rest.q))
+        write_csv(made / "reactions.csv", dict(reactions(mechanism, results.trajectory)))
+        if found is not None:
+            _write_modes(made, mechanism, found)
+        if mechanism.links:
+            from ..output.link_files import write_links
+
+            write_links(made, mechanism, results.trajectory)
+        if figures:
+            from ..output.mechanism_figures import draw_figures, draw_modes
+
+            draw_figures(made, mechanism, results)
+            if found is not None:
+                draw_modes(made, mechanism, rest.q, found)
+        summary = _summary(mechanism, start, rest, results, found)
+        summary["timings"] = {"whole_s": clock.perf_counter() - began}
+        summary["warnings"] = list(told)
+        write_json(made / "summary.json", summary)
+    return Outcome(not told, _text(summary, folder), summary, tuple(told))
+
+
+def at_rest(mechanism: Mechanism, start: Start, rest: Equilibrium) -> Trajectory:
+    """The state of rest as a trajectory of one time."""
+    still = replace(start, q=rest.q, v=np.zeros_like(rest.q))
+    dense = Polynomials(np.array([start.time, start.time + 1.0]), rest.q[None, None, :])
+    statistics = {"scheme": "Newton's method", "steps": rest.steps}
+    return Trajectory(mechanism.system, still, np.array([start.time]), Status.DONE, "equilibrium", statistics, dense)
+
+
+def _poses(mechanism: Mechanism, q: Array) -> dict[str, Any]:
+    """Place of the frame's origin and angle of every body, of flexible links at their starts."""
+    names = list(mechanism.file.bodies)
+    x, y, angle = [], [], []
+    for name in names:
+        values = mechanism.values({("x", name), ("y", name), ("angle", name)}, q[None, :])
+        x.append(float(values["x", name][0]))
+        y.append(float(values["y", name][0]))
+        angle.append(float(values["angle", name][0]))
+    return {"body": names, "x_m": np.array(x), "y_m": np.array(y), "angle_rad": np.array(angle)}
+
+
+def _write_modes(folder: Path, mechanism: Mechanism, found: Modes) -> None:
+    count = len(found.rates)
+    number = np.arange(1, count + 1)
+    columns: dict[str, Any] = {
+        "mode": number,
+        "frequency_Hz": found.frequencies,
+        "damping_ratio": found.damping_ratios,
+        "damped_frequency_Hz": found.rates.imag / (2 * np.pi),
+        "decay_per_s": -found.rates.real,
+    }
+    write_csv(folder / "modes.csv", columns)
+    bodies = [body.name for body in mechanism.scene.bodies]
+    shapes = found.shapes.reshape(count, -1, 3)
+    rows: dict[str, Any] = {"mode": np.repeat(number, len(bodies)), "body": bodies * count}
+    for k, name in enumerate(("x_m", "y_m", "angle_rad")):
+        rows[name] = shapes[:, :, k].real.ravel()
+        rows[f"{name}_a_quarter_later"] = shapes[:, :, k].imag.ravel()
+    write_csv(folder / "shapes.csv", rows)
+
+
+def _summary(
+    mechanism: Mechanism, start: Start, rest: Equilibrium, results: Results, found: Modes | None
+) -> dict[str, Any]:
+    made: dict[str, Any] = {
+        "title": mechanism.file.title,
+        "analysis": mechanism.file.run.analysis,
+        "steps": rest.steps,
+        "residual_N": rest.residual,
+        "net_freedoms": start.freedoms.net,
+        "potential_J": float(results.energy["potential_J"][0]),
+        "outputs": {name: float(column[0]) for name, column in results.outputs.items()},
+    }
+    if found is not None:
+        made["frequencies_Hz"] = found.frequencies
+        made["damping_ratios"] = found.damping_ratios
+    return made
+
+
+def _text(summary: dict[str, Any], folder: Path) -> str:
+    lines = [f"equilibrium in {summary['steps']} steps, {summary['residual_N']:.2g} N left"]
+    lines += [f"{name} = {value:.9g}" for name, value in summary["outputs"].items()]
+    for k, (f, d) in enumerate(zip(summary.get("frequencies_Hz", ()), summary.get("damping_ratios", ()), strict=True)):
+        lines.append(f"mode {k + 1}: {f:.6g} Hz, damping {100 * d:.3g} %")
+    return "\n".join([*lines, f"results in {folder}"])

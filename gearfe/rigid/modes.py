@@ -1,0 +1,86 @@
+"""Small vibrations about a state of rest.
+
+With a state at rest, a basis T of the motions that the joints leave free (G T = 0), M, C = -df/dv and
+K = -df/dq + d(G^T lambda)/dq, small motions T u exp(l t) obey
+
+    (l^2 M_r + l C_r + K_r) u = 0,        M_r = T^T M T, ...
+
+It is solved for m = 1/l, of which those of slow motions are the largest and the most exact; links may be without mass,
+and C and K need not be symmetric (Tisseur & Meerbergen, SIAM Review 43 (2001) 235-286).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import InputError
+from ..typing import Array
+from .carried import free_motions
+from .equilibrium import Equilibrium, stiffness_at
+from .start import Start
+from .system import System
+
+#: Motions that decay or vibrate faster than this many times the slowest are rounding, or without mass.
+FASTEST = 1e9
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Vibrations, then decays without vibration, the slowest first.
+
+    Attributes
+    ----------
+    rates : ndarray of complex, shape (n,)
+        l (1/s): decay and angular frequency; with a positive imaginary part, or real.
+    shapes : ndarray of complex, shape (n, size)
+        Coordinates, the largest in units of the coordinates 1.
+    """
+
+    rates: np.ndarray
+    shapes: np.ndarray = field(repr=False)
+
+    @property
+    def frequencies(self) -> Array:
+        """|l| / (2 pi) (Hz): of the vibration without damping."""
+        return np.asarray(np.abs(self.rates) / (2 * np.pi))
+
+    @property
+    def damping_ratios(self) -> Array:
+        """-Re l / |l|; 1 for a decay without vibration."""
+        return np.asarray(-self.rates.real / np.abs(self.rates))
+
+
+def modes(system: System, start: Start, rest: Equilibrium, count: int) -> Modes:
+    """The `count` slowest small motions about the equilibrium `rest`.
+
+    Raises
+    ------
+    InputError
+        When joints prescribe a motion: the state does not rest.
+    """
+    t, active, units = start.time, start.active, system.units
+    moving = np.abs(system.rate(t, rest.q) / system.row_units)
+    if system.rows and moving.max(initial=0.0) > 0.0:
+        name = system.row_names()[int(moving.argmax())]
+        problem = "moves: modes are those of a state of rest"
+        raise InputError(name, None, problem, "prescribe a constant, or describe the mechanism in a turning frame")
+    zero = np.zeros(system.size)
+    G = system.jacobian(t, rest.q)[active] * units / system.row_units[active, None]
+    T = units[:, None] * free_motions(G)
+    M, C = T.T @ system.mass @ T, -T.T @ system.force_jacobian(t, rest.q, zero)[1] @ T
+    K = T.T @ stiffness_at(system, t, rest.q, rest.multipliers) @ T
+    n = len(K)
+    companion = np.zeros((2 * n, 2 * n))  # of (m u, u) in powers of m: m^2 K + m C + M = 0, scaled by the slowest rate
+    soft = np.linalg.solve(K, np.hstack([C, M]))
+    scale = float(np.sqrt(np.abs(np.linalg.eigvals(soft[:, n:])).max())) or 1.0
+    companion[:n] = -np.hstack([soft[:, :n] / scale, soft[:, n:] / scale**2])
+    companion[n:, :n] = np.eye(n)
+    m, vectors = np.linalg.eig(companion)
+    kept = np.flatnonzero((np.abs(m) > np.abs(m).max() / FASTEST) & (m.imag <= 0.0))  # l = 1/m turns the sign
+    kept = kept[np.lexsort((-np.abs(m[kept]), m[kept].imag == 0.0))][:count]
+    shapes = (T @ vectors[n:, kept]).T
+    largest = np.abs(shapes / units).argmax(axis=1)
+    shapes = shapes / (shapes / units)[np.arange(len(kept)), largest][:, None]
+    return Modes(1.0 / (scale * m[kept]), shapes)

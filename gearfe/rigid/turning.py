@@ -1,0 +1,53 @@
+"""A mechanism described in a frame that turns at a constant rate about the ground's origin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..typing import Array
+from .forces import Along, Force, Tension, Weight
+from .forms import Frames
+from .statefunctions import StateFunction
+
+
+@dataclass(frozen=True)
+class TurningFrame(Force):
+    """Centrifugal and Coriolis forces of a frame with the angular velocity `rate` w (rad/s), on all masses:
+
+        m (w^2 x + 2 w y'),    m (w^2 y - 2 w x').
+
+    The flexible links of the scene take theirs from here, too. An equilibrium is a steady rotation then, and modes are
+    the vibrations about it. Energies are those of the frame; the potential has the centrifugal forces in it.
+    """
+
+    rate: float
+    name: str = "turning frame"
+
+    def parts(self, frames: Frames) -> list[Along | Tension | Weight]:
+        """Springs of negative stiffness, and loads that depend on the velocities."""
+        made: list[Along | Tension | Weight] = []
+        for i, body in enumerate(frames.bodies):
+            if body.mass > 0.0:
+                centre, pull = frames.centre(body.name), body.mass * self.rate
+                made.append(Along(centre.x, -pull * self.rate, load=Coriolis(3 * i + 1, 2.0 * pull)))
+                made.append(Along(centre.y, -pull * self.rate, load=Coriolis(3 * i, -2.0 * pull)))
+        return made
+
+
+class Coriolis(StateFunction):
+    """A load in proportion to one velocity."""
+
+    def __init__(self, place: int, factor: float) -> None:
+        self.place, self.factor = place, factor
+
+    def value(self, t: float, q: Array, v: Array) -> float:  # noqa: ARG002
+        """Factor times velocity."""
+        return self.factor * float(v[self.place])
+
+    def slopes(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:  # noqa: ARG002
+        """The factor."""
+        by_v = np.zeros(len(v))
+        by_v[self.place] = self.factor
+        return np.zeros(len(q)), by_v
