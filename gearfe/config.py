@@ -8,6 +8,7 @@ unknown keys only (``gearfe.tables`` says which tables exist), so a misspelt key
 from __future__ import annotations
 
 import dataclasses
+import functools
 import importlib
 import math
 import tomllib
@@ -35,6 +36,7 @@ TABLES: dict[str, str] = {
     "housing": "gearfe.tables.housing:HousingTable",
     "train": "gearfe.tables.train:TrainTable",
     "runup": "gearfe.tables.runup:RunUpTable",
+    "study": "gearfe.tables.study:StudyTable",
 }
 
 
@@ -81,6 +83,12 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         raise InputError("job file", str(path), problem, "write it as 1e300") from None
 
 
+@functools.cache
+def type_hints(cls: Any) -> dict[str, Any]:
+    """Types of a table's fields (evaluated once: that takes longer than reading a table)."""
+    return typing.get_type_hints(cls)
+
+
 def build(cls: type[T], table: Any, where: str) -> T:
     """Frozen dataclass `cls` from a parsed TOML table; `where` is the table's name for messages.
 
@@ -99,7 +107,7 @@ def build(cls: type[T], table: Any, where: str) -> T:
         table = {cls.SHORT: table}  # type: ignore[attr-defined]
     if not isinstance(table, dict):
         raise InputError(where, table, "must be a table of keys and values", f"write [{where}] and its keys below it")
-    hints = typing.get_type_hints(cls)
+    hints = type_hints(typing.cast(Any, cls))
     # what chooses among kinds first: a wrong kind brings keys of its own
     for name, spec in fields.items():
         if spec.metadata.get("choices") and name in table:
@@ -135,7 +143,13 @@ def load_job(path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...
     dict
         Table name -> dataclass instance.
     """
-    raw = read_toml(path)
+    return job_tables(read_toml(path), path, needed, optional)
+
+
+def job_tables(
+    raw: dict[str, Any], path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...] = ()
+) -> dict[str, Any]:
+    """The same of tables that are parsed; `path` is named in messages."""
     for name in raw:
         if name not in TABLES:
             if {"run", "bodies"} <= raw.keys():

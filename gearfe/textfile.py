@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import codecs
+import csv
+import io
 from pathlib import Path
 
 from .errors import InputError
@@ -56,3 +58,22 @@ def _told(raw: bytes, at: int) -> tuple[str, str]:
     name, codec = ("Windows-1252", "cp1252") if any(0x80 <= byte < 0xA0 for byte in raw) else ("Latin-1", "latin-1")
     letter = raw[at : at + 1].decode(codec, "replace")
     return f"is not UTF-8 but, it seems, {name}: line {line} has {letter!r} as byte {raw[at]:#x}", "save it as UTF-8"
+
+
+def read_csv(path: str | Path, field: str) -> dict[str, list[str]]:
+    """Columns of a CSV file as text, by name; `field` names the file in messages.
+
+    Raises
+    ------
+    InputError
+        When the file is missing, unreadable or not a rectangular table with a header.
+    """
+    rows = [row for row in csv.reader(io.StringIO(read_text(path, field))) if row]
+    if len(rows) < 2:
+        raise InputError(field, str(path), "has no rows", "give a CSV file with a header line and rows")
+    names = [name.strip() for name in rows[0]]
+    for number, row in enumerate(rows[1:], start=2):
+        if len(row) != len(names):
+            problem = f"line {number} has {len(row)} cells, the header {len(names)}"
+            raise InputError(field, str(path), problem, "mend that line")
+    return {name: [row[i] for row in rows[1:]] for i, name in enumerate(names)}

@@ -16,5 +16,6 @@ COMMANDS: dict[str, str] = {
     "housing": "housing",
     "vibration": "vibration",
     "runup": "runup",
+    "study": "study",
     "new": "new",
 }

@@ -5,8 +5,6 @@ Numbers are scaled in decimal arithmetic, so 17 significant digits in the file's
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from decimal import Context, Decimal
@@ -15,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, shown
-from ..textfile import read_text
+from ..textfile import read_csv
 from ..typing import Array
 
 #: Far more digits than any double needs, so that a product is rounded once.
@@ -77,16 +75,7 @@ def read_columns(path: str | Path) -> dict[str, list[str]]:
     InputError
         When the file is missing, unreadable or not a rectangular table with a header.
     """
-    content = read_text(path, "stiffness curve")
-    rows = [row for row in csv.reader(io.StringIO(content)) if row]
-    if len(rows) < 2:
-        raise InputError("stiffness curve", str(path), "has no rows", "give a CSV file with a header line and rows")
-    names = [name.strip() for name in rows[0]]
-    for number, row in enumerate(rows[1:], start=2):
-        if len(row) != len(names):
-            problem = f"line {number} has {len(row)} cells, the header {len(names)}"
-            raise InputError("stiffness curve", str(path), problem, "mend that line")
-    return {name: [row[i] for row in rows[1:]] for i, name in enumerate(names)}
+    return read_csv(path, "stiffness curve")
 
 
 def numbers(columns: Mapping[str, Sequence[str]], name: str, path: str | Path) -> Array:

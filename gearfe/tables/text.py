@@ -130,3 +130,17 @@ def _key(name: str) -> str:
 
 def _wrapped(text: str) -> str:
     return textwrap.fill(text, _WIDTH, initial_indent="# ", subsequent_indent="# ") + "\n"
+
+
+def toml_document(tables: Mapping[str, Any], name: str = "") -> str:
+    """TOML of parsed tables: plain keys first, then tables and lists of tables below their names."""
+    plain, below = [], []
+    for key, value in tables.items():
+        full = f"{name}.{_key(key)}".lstrip(".")
+        if isinstance(value, Mapping):
+            below.append(f"[{full}]\n{toml_document(value, full)}")
+        elif isinstance(value, list) and value and all(isinstance(item, Mapping) for item in value):
+            below += [f"[[{full}]]\n{toml_document(item, full)}" for item in value]
+        else:
+            plain.append(f"{_key(key)} = {toml_value(value)}")
+    return "\n".join([*("\n".join([*plain, ""]) for _ in plain[:1]), *below])

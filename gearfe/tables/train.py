@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..config import load_job, quantity
+from ..config import job_tables, quantity, read_toml
 from ..errors import InputError, unknown_name
 from .pair import ToothFormTable
 
@@ -282,7 +282,12 @@ def read_train_tables(path: str | Path, variant: str | None = None) -> dict[str,
     InputError
         For every mistake in the tables, and an unknown variant.
     """
-    tables = load_job(path, ("train",), ("pair", "stiffness", "microgeometry", "housing"))
+    return train_tables(read_toml(path), path, variant)
+
+
+def train_tables(raw: dict[str, Any], path: str | Path, variant: str | None = None) -> dict[str, Any]:
+    """The same of tables that are parsed; `path` is named in messages."""
+    tables = job_tables(raw, path, ("train",), ("pair", "stiffness", "microgeometry", "housing"))
     table: TrainTable = tables["train"]
     table = table.chosen(table.variant if variant is None else variant)
     if table.housing == "elastic" and "housing" not in tables:

@@ -1,0 +1,112 @@
+"""``gearfe study STUDY.toml --out DIR``: one job in many cases, with nothing lost."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from ..progress import count
+
+HELP = "one job in many cases: parameters, designs, statistics, sensitivities; goes on where it was interrupted"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("study", metavar="STUDY.toml", help="file with a table [study], and the job or its name in it")
+    parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the study's name)")
+    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one a processor); 1: none beside")
+    parser.add_argument("--dask", metavar="ADDRESS", help="run the cases on the Dask cluster with this scheduler")
+    parser.add_argument("--restart", action="store_true", help="begin anew, whatever the folder holds")
+    parser.add_argument("--row", type=int, metavar="CASE", help="write the job file of a case to --write, and stop")
+    parser.add_argument(
+        "--write", metavar="FILE", help="where --row writes; files that the job names stay where they are"
+    )
+    parser.add_argument("--no-picture", action="store_true", help="leave out the pictures")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Solve the cases that are missing and write the files; 1 when a case has no answer."""
+    started = time.perf_counter()
+    from ..errors import InputError
+    from ..study.job import read_study, run_study
+
+    if args.jobs is not None and args.jobs < 1:
+        raise InputError("--jobs", args.jobs, "must be >= 1", "the number of processors is the default")
+    if (args.row is None) != (args.write is None):
+        raise InputError("--row", args.row, "goes with --write", "give both: --row 17 --write best.toml")
+    study = read_study(args.study)
+    if args.row is not None:
+        return _write_case(study, args.row, Path(args.write))
+
+    from ..output.files import output_folder, whole_set, write_json
+    from ..stopwatch import Stopwatch
+    from ..study.report import told
+
+    watch = Stopwatch({"program start": time.perf_counter() - started})
+    folder = output_folder(args.out or Path("out") / Path(args.study).stem)
+    with ExitStack() as stack, watch.stage("cases"):
+        where: dict[str, Any] = {"jobs": args.jobs}
+        if args.dask is not None:
+            where = _cluster(args.dask, stack)
+        made = run_study(study, folder, restart=args.restart, progress=count, **where)
+    with watch.stage("statistics"):
+        summary = made.summary()
+    with whole_set(folder, ("study*.png",)) as place:
+        if not args.no_picture:
+            from ..study.pictures import write_figures
+
+            with watch.stage("pictures"):
+                title = f"{Path(args.study).stem}: {len(made.done)} cases of a {study.table.job} job"
+                write_figures(place, made, summary, title)
+        watch.seconds["total"] = time.perf_counter() - started
+        write_json(place / "summary.json", {**summary, "timings_s": dict(watch.seconds)})
+        names = sorted(["study.csv", "study.json", *(path.name for path in place.iterdir())])
+    for line in told(summary):
+        print(line)
+    print(f"written to {folder}: " + ", ".join(names))
+    print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
+    bad = int((~made.done).sum())
+    if bad:
+        first = next(i for i, good in enumerate(made.done) if not good)
+        told_first = f"case {made.columns['case'][first]}: {made.columns['message'][first]}"
+        print(f"gearfe: warning: {bad} of {len(made.done)} cases are not solved wholly; {told_first}", file=sys.stderr)
+    return 1 if bad else 0
+
+
+def _cluster(address: str, stack: ExitStack) -> dict[str, Any]:
+    """Where cases run on a Dask cluster."""
+    from ..errors import InputError, MissingLibraryError
+
+    try:
+        from dask.distributed import Client
+    except ImportError:
+        raise MissingLibraryError("--dask needs dask.distributed: pip install gearfe[cluster]") from None
+    try:
+        client = stack.enter_context(Client(address, timeout=20))
+    except (OSError, ValueError, TimeoutError) as error:
+        problem = f"does not answer ({type(error).__name__})"
+        raise InputError("--dask", address, problem, "is the scheduler running there?") from None
+    workers = sum(client.nthreads().values())
+    if not workers:
+        raise InputError("--dask", address, "has no workers", "start some: dask worker ADDRESS")
+    return {"executor": client.get_executor(pure=False), "workers": workers}
+
+
+def _write_case(study: Any, number: int, path: Path) -> int:
+    from ..errors import InputError
+    from ..output.files import whole_file
+    from ..tables.text import toml_document
+
+    if not 0 <= number < len(study.cases):
+        raise InputError("--row", number, f"must be >= 0 and <= {len(study.cases) - 1}", "see the column case")
+    values = dict(zip(study.task.names, study.cases[number], strict=True))
+    head = f"# Case {number} of the study {study.path.name}: " + ", ".join(f"{k} = {v!r}" for k, v in values.items())
+    with whole_file(path) as temporary:
+        temporary.write_text(f"{head}\n\n{toml_document(study.task.tables(study.cases[number]))}", encoding="utf-8")
+    print(f"written: {path}")
+    print(f"run it:  gearfe {study.table.job} {path} --out out/{path.stem}")
+    return 0

@@ -1,0 +1,164 @@
+"""Pictures of a study: outputs against parameters, all cases as lines, changes over the parameters, the Pareto set."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ..typing import Array, BoolArray, IntArray
+from .figures import BLUE, GREY, ORANGE, RED, new_figure, save, tidy
+
+#: Parameters and outputs that a picture shows at most, and cases of which every one is drawn.
+MOST, DRAWN = 6, 4000
+
+
+def scatter_figure(
+    path: str | Path,
+    *,
+    title: str,
+    parameters: Mapping[str, Array],
+    outputs: Mapping[str, Array],
+    limits: Mapping[str, tuple[float | None, float | None]],
+) -> None:
+    """Every output against every parameter, a point for each case.
+
+    Parameters
+    ----------
+    parameters, outputs
+        Name -> values of the cases, (n,).
+    limits
+        Output -> lower and upper end of good values.
+    """
+    names, rows = list(parameters)[:MOST], list(outputs)[:MOST]
+    figure = new_figure(1.2 + 2.6 * len(names), 0.9 + 2.1 * len(rows))
+    axes = figure.subplots(len(rows), len(names), squeeze=False, sharex="col", sharey="row")
+    some = slice(None, None, -(-len(next(iter(outputs.values()))) // DRAWN) or 1)
+    for i, row in enumerate(rows):
+        for j, name in enumerate(names):
+            part = axes[i, j]
+            tidy(part)
+            part.plot(parameters[name][some], outputs[row][some], ".", color=BLUE, markersize=6, alpha=0.6, mew=0)
+            for end in limits.get(row, ()):
+                if end is not None:
+                    part.axhline(end, color=RED, linewidth=1.0, dashes=(5, 3))
+            if i == len(rows) - 1:
+                part.set_xlabel(_short(name), fontsize=8.5)
+        axes[i, 0].set_ylabel(row, fontsize=8.5)
+    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
+    save(figure, path)
+
+
+def parallel_figure(path: str | Path, *, title: str, columns: Mapping[str, Array], colour: str) -> None:
+    """Every case as a line over its parameters and outputs, each scaled to its range.
+
+    Parameters
+    ----------
+    columns
+        Name -> values of the cases, (n,).
+    colour
+        Column that colours the lines.
+    """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import Normalize
+
+    values = np.stack(list(columns.values()), axis=1)
+    values = values[np.isfinite(values).all(axis=1)]
+    values = values[:: -(-len(values) // DRAWN) or 1]
+    figure = new_figure(max(6.0, 1.6 * values.shape[1]), 4.6)
+    axes = figure.add_subplot()
+    if len(values):
+        low, high = values.min(axis=0), values.max(axis=0)
+        span = np.where(high > low, high - low, 1.0)
+        scaled = np.where(high > low, (values - low) / span, 0.5)
+        of = values[:, list(columns).index(colour)]
+        norm = Normalize(float(of.min()), float(of.max()) if np.ptp(of) > 0.0 else float(of.min()) + 1.0)
+        places = np.arange(values.shape[1])
+        lines = np.stack([np.broadcast_to(places, scaled.shape), scaled], axis=2)
+        axes.add_collection(LineCollection(list(lines), array=of, cmap="viridis", norm=norm, linewidth=0.9, alpha=0.6))
+        for place, (a, b) in enumerate(zip(low, high, strict=True)):
+            axes.axvline(place, color=GREY, linewidth=0.8)
+            axes.text(place, 1.03, f"{b:.4g}", ha="center", fontsize=8)
+            axes.text(place, -0.03, f"{a:.4g}", ha="center", va="top", fontsize=8)
+        figure.colorbar(ScalarMappable(norm, "viridis"), ax=axes, label=colour, shrink=0.9)
+    axes.set_xticks(range(values.shape[1]), [_short(name) for name in columns], fontsize=8.5)
+    axes.tick_params(axis="x", length=0, pad=16)
+    axes.set_yticks([])
+    axes.spines[:].set_visible(False)
+    axes.set_xlim(-0.4, values.shape[1] - 0.6)
+    axes.set_ylim(-0.1, 1.1)
+    axes.set_title(title, fontsize=11, loc="left", pad=14)
+    save(figure, path)
+
+
+def tornado_figure(
+    path: str | Path, *, title: str, effects: Mapping[str, Mapping[str, float]], notes: Mapping[str, str]
+) -> None:
+    """How much each parameter changes each output, the largest on top.
+
+    Parameters
+    ----------
+    effects
+        Output -> parameter -> change of the output, or Sobol's total index.
+    notes
+        Output -> label of its axis.
+    """
+    rows = {name: found for name, found in effects.items() if found}
+    rows = dict(list(rows.items())[:MOST])
+    figure = new_figure(8.0, 0.8 + sum(0.75 + 0.28 * min(len(found), 10) for found in rows.values()))
+    parts = figure.subplots(max(1, len(rows)), 1, squeeze=False)[:, 0]
+    for part, (name, found) in zip(parts, rows.items(), strict=False):
+        tidy(part)
+        largest = sorted(found.items(), key=lambda item: abs(item[1]))[-10:]
+        sizes = [value for _, value in largest]
+        part.barh([_short(n, " ") for n, _ in largest], sizes, color=[BLUE if v >= 0 else ORANGE for v in sizes])
+        part.axvline(0.0, color="#374151", linewidth=0.9)
+        part.set_xlabel(notes.get(name, name), fontsize=8.5)
+        part.tick_params(labelsize=8.5)
+    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
+    save(figure, path)
+
+
+def pareto_figure(
+    path: str | Path,
+    *,
+    title: str,
+    first: tuple[str, Array],
+    second: tuple[str, Array],
+    best: IntArray,
+    good: BoolArray,
+) -> None:
+    """Two outputs of all cases, and the cases that no other one beats.
+
+    Parameters
+    ----------
+    first, second
+        Name and values of the cases, (n,).
+    best
+        Cases of the Pareto set.
+    good
+        (n,) cases that keep all limits.
+    """
+    figure = new_figure(6.4, 5.0)
+    axes = figure.add_subplot()
+    tidy(axes)
+    (one, x), (two, y) = first, second
+    axes.plot(x[~good], y[~good], ".", color=GREY, alpha=0.5, mew=0, label="beyond a limit" if (~good).any() else None)
+    axes.plot(x[good], y[good], ".", color=BLUE, alpha=0.7, mew=0, label="cases")
+    order = best[np.argsort(x[best])]
+    axes.plot(x[order], y[order], "o-", color=RED, markersize=5, linewidth=1.0, label="Pareto set")
+    for number in order[:: -(-len(order) // 8) or 1]:
+        axes.annotate(str(number), (x[number], y[number]), (5, 4), textcoords="offset points", fontsize=8, color=RED)
+    axes.set_xlabel(one)
+    axes.set_ylabel(two)
+    axes.set_title(title, fontsize=11, loc="left")
+    axes.legend(fontsize=8.5, frameon=False)
+    save(figure, path)
+
+
+def _short(name: str, between: str = "\n") -> str:
+    """The key on one line and its table on the other."""
+    table, _, key = name.rpartition(".")
+    return f"{key}{between}{table}" if table else key

@@ -1,0 +1,105 @@
+"""One case of a study: its values put into the base job, the job solved, its outputs evaluated."""
+
+from __future__ import annotations
+
+import ast
+import copy
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..threads import one_thread
+from .answer import Answer
+from .expressions import parse, value_of
+from .kinds import Shared, solve
+from .parameters import set_key
+
+#: Of a row: solved; solved in part, the message says what failed; refused, as the job's command would; an error of
+#: the program itself; the process died of it.
+DONE, PARTLY, INVALID, ERROR, DIED = "done", "partly", "invalid", "error", "died"
+
+
+@dataclass(frozen=True)
+class Task:
+    """What every case of a study has in common; light, for it travels with each group of cases.
+
+    Attributes
+    ----------
+    kind, path, raw, variant, estimate
+        Of the base job, see `gearfe.study.kinds.solve`.
+    names
+        Dotted names of the parameters.
+    outputs
+        Name -> expression.
+    """
+
+    kind: str
+    path: Path
+    raw: Mapping[str, Any]
+    variant: str
+    estimate: bool
+    names: tuple[str, ...]
+    outputs: Mapping[str, str]
+
+    def tables(self, values: Sequence[Any]) -> dict[str, Any]:
+        """Tables of the job with these values."""
+        made = copy.deepcopy(dict(self.raw))
+        for name, value in zip(self.names, values, strict=True):
+            set_key(made, name, value)
+        return made
+
+    def expressions(self) -> dict[str, ast.expr]:
+        """Outputs, parsed."""
+        return {name: parse(text, f"study.outputs.{name}") for name, text in self.outputs.items()}
+
+
+@dataclass(frozen=True)
+class Row:
+    """Result of a case: outputs are not-a-number where it has none."""
+
+    case: int
+    outputs: tuple[float, ...]
+    status: str
+    message: str
+    seconds: float
+
+
+def evaluate(task: Task, values: Sequence[Any], shared: Shared | None = None) -> tuple[dict[str, float], Answer]:
+    """Outputs of a case, and the job's answer.
+
+    Raises
+    ------
+    InputError
+        What the job's command would refuse, and outputs that the job does not give.
+    """
+    options: dict[str, Any] = {"estimate": task.estimate, "variant": task.variant}
+    answer = solve(task.kind, task.tables(values), task.path, shared or Shared(), **options)
+    return {name: value_of(tree, answer, f"study.outputs.{name}") for name, tree in task.expressions().items()}, answer
+
+
+def solve_case(task: Task, number: int, values: Sequence[Any], shared: Shared) -> Row:
+    """Row of a case; what goes wrong in it is told in the row."""
+    began = time.perf_counter()
+    nothing = (float("nan"),) * len(task.outputs)
+    try:
+        outputs, answer = evaluate(task, values, shared)
+        status, found = (PARTLY if answer.problem else DONE), tuple(outputs.values())
+        message = answer.problem
+    except InputError as error:
+        status, found, message = INVALID, nothing, str(error)
+    except Exception as error:  # a study of thousands goes on
+        status, found, message = ERROR, nothing, f"{type(error).__name__}: {error}"
+    return Row(number, found, status, " ".join(message.split()), time.perf_counter() - began)
+
+
+#: What the cases of this process share, whatever groups they come in.
+_SHARED = Shared()
+
+
+def solve_group(task: Task, group: Sequence[tuple[int, tuple[Any, ...]]]) -> list[Row]:
+    """Rows of some cases, (number, values) each."""
+    with one_thread():  # a number of threads changes digits
+        return [solve_case(task, number, values, _SHARED) for number, values in group]

@@ -1,0 +1,98 @@
+"""Which cases a study has: the values of its parameters, case by case, the same for a seed wherever it runs."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..tables.study import StudyTable
+from ..textfile import read_csv
+from ..typing import Array
+from .parameters import Parameter, key_hint, read_parameters
+
+#: Cases of one study at most.
+MOST = 10_000_000
+
+#: Case by case the values of the parameters.
+Cases = Sequence[tuple[Any, ...]]
+
+
+def study_cases(table: StudyTable, folder: Path) -> tuple[tuple[Parameter, ...], Cases]:
+    """Parameters and cases of a study; files that it names lie in `folder`.
+
+    Raises
+    ------
+    InputError
+        For names that do not exist, values that are no distribution, and designs of too many cases.
+    """
+    if table.design == "rows":
+        return _rows(table, folder)
+    parameters = read_parameters(table.parameters, table.job)
+    if table.design == "factorial":
+        levels = [one.levels() for one in parameters]
+        count = math.prod(map(len, levels))
+        if count > MOST:
+            problem = f"make {count} combinations, more than {MOST}"
+            raise InputError("study.parameters", None, problem, "take fewer levels, or another design")
+        return parameters, list(itertools.product(*levels))
+    shares = _shares(table, len(parameters))
+    return parameters, list(zip(*(one.at(s) for one, s in zip(parameters, shares.T, strict=True)), strict=True))
+
+
+def _shares(table: StudyTable, d: int) -> Array:
+    """(n, d) points of the unit cube."""
+    from scipy.stats import qmc
+
+    n, seed = table.cases, table.seed
+    if table.design == "latin_hypercube":
+        return np.asarray(qmc.LatinHypercube(d, rng=np.random.default_rng(seed)).random(n))
+    power = max(0, math.ceil(math.log2(n)))
+    if table.design == "sobol":
+        return np.asarray(qmc.Sobol(d, rng=np.random.default_rng(seed)).random_base2(power)[:n])
+    if n != 1 << power:
+        raise InputError("study.cases", n, 'must be a power of 2 with design = "saltelli"', f"take {1 << power}")
+    if n * (d + 2) > MOST:
+        raise InputError("study.cases", n, f"makes {n * (d + 2)} cases, more than {MOST}", "take fewer")
+    return saltelli(np.asarray(qmc.Sobol(2 * d, rng=np.random.default_rng(seed)).random_base2(power)))
+
+
+def saltelli(points: Array) -> Array:
+    """Points for Sobol's indices, (n (d + 2), d), from (n, 2 d) points: A, B, and A with one column of B.
+
+    Saltelli et al., Comput. Phys. Commun. 181 (2010) 259, table 2.
+    """
+    n, d = len(points), points.shape[1] // 2
+    first, second = points[:, :d], points[:, d:]
+    mixed = np.repeat(first[None], d, axis=0)
+    for i in range(d):
+        mixed[i, :, i] = second[:, i]
+    return np.concatenate([first, second, mixed.reshape(n * d, d)])
+
+
+def _rows(table: StudyTable, folder: Path) -> tuple[tuple[Parameter, ...], Cases]:
+    assert table.rows_csv is not None
+    columns = read_csv(folder / table.rows_csv, "study.rows_csv")
+    columns.pop("case", None)
+    hints = {name: key_hint(table.job, name) for name in columns}
+    parameters = tuple(read_parameters({name: [0.0] for name in hints}, table.job))
+    made = [
+        [_cell(text, one, table.rows_csv, i) for i, text in enumerate(columns[one.name], start=1)] for one in parameters
+    ]
+    return parameters, list(zip(*made, strict=True))
+
+
+def _cell(text: str, one: Parameter, path: str, row: int) -> Any:
+    """A number where it is one, else the text."""
+    try:
+        number = float(text)
+    except ValueError:
+        return text
+    if not math.isfinite(number):
+        raise InputError(f"{path}, row {row}, {one.name}", text, "must be finite", "mend it")
+    return int(number) if one.whole and number.is_integer() else number

@@ -1,0 +1,144 @@
+"""Outputs of a study: arithmetic over the columns and the summary of a job, parsed here and never run as code.
+
+The syntax is Python's: names of columns of the job's main table, ``table.column`` for the others, ``summary.key.key``,
+numbers, ``+ - * / **``, comparisons, ``&`` and ``|`` between them, ``[...]`` with a number, a text or a comparison, and
+the functions of `FUNCTIONS`.
+"""
+
+from __future__ import annotations
+
+import ast
+import operator
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, unknown_name
+from .answer import Answer
+
+#: Functions of numbers and columns; gaps of a column (not-a-number) are left out.
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "mean": lambda x: np.mean(_there(x)),
+    "min": lambda x: np.min(_there(x)),
+    "max": lambda x: np.max(_there(x)),
+    "sum": lambda x: np.sum(_there(x)),
+    "ptp": lambda x: np.ptp(_there(x)),
+    "rms": lambda x: np.sqrt(np.mean(np.square(_there(x)))),
+    "abs": np.abs,
+    "sqrt": np.sqrt,
+    "sin": np.sin,
+    "cos": np.cos,
+    "log10": np.log10,
+    "interp": np.interp,
+    "count": np.count_nonzero,
+}
+_OPERATORS: dict[type, Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.BitAnd: operator.and_,
+    ast.BitOr: operator.or_,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.USub: lambda x, _: -x,
+    ast.UAdd: lambda x, _: x,
+}
+_LONGEST = 2000
+
+
+def parse(text: str, label: str) -> ast.expr:
+    """Syntax tree of an output.
+
+    Raises
+    ------
+    InputError
+        When it is no expression.
+    """
+    if len(text) > _LONGEST:
+        raise InputError(label, None, f"is longer than {_LONGEST} characters", "split it into several outputs")
+    try:
+        return ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise InputError(label, text, f"cannot be read ({type(error).__name__})", "write it as in Python") from None
+
+
+def value_of(tree: ast.expr, answer: Answer, label: str) -> float:
+    """The output's value, one number.
+
+    Raises
+    ------
+    InputError
+        Names that the job does not give, with the near match; what is not one number.
+    """
+    try:
+        with np.errstate(all="ignore"):
+            found = _value(tree, answer, label)
+            made = np.asarray(np.nan if found is None else found, dtype=float)
+    except (TypeError, ValueError, IndexError, KeyError, ZeroDivisionError, OverflowError, RecursionError) as error:
+        raise InputError(label, None, f"has no value ({error})", "look at the job's own tables") from None
+    if made.size != 1:
+        cure = "take mean(), min(), max(), ptp() of it, or choose one: [torque_Nm == 100]"
+        raise InputError(label, None, f"gives {made.size} values: must be one number", cure)
+    return float(made.reshape(()) if made.ndim == 0 else made.ravel()[0])
+
+
+def _value(node: ast.expr, answer: Answer, label: str) -> Any:  # noqa: PLR0911 (a value for each kind of node)
+    if isinstance(node, ast.Constant) and isinstance(node.value, (int, float, str)):
+        return float(node.value) if isinstance(node.value, int) else node.value
+    if isinstance(node, ast.Name):
+        return _named(answer.names(), node.id, label)
+    if isinstance(node, ast.Attribute):
+        within = _value(node.value, answer, label)
+        if not isinstance(within, Mapping):
+            raise InputError(label, None, f"{ast.unparse(node.value)} has nothing below it", "leave .NAME out")
+        return _named(within, node.attr, label)
+    if isinstance(node, ast.Subscript):
+        within, index = _value(node.value, answer, label), _value(node.slice, answer, label)
+        if isinstance(within, Mapping):
+            return _named(within, str(index), label)
+        where = int(index) if isinstance(index, float) else np.asarray(index, dtype=bool)
+        return _column(within)[where]
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
+        function = _named(FUNCTIONS, node.func.id, label)
+        return function(*(_value(part, answer, label) for part in node.args))
+    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
+        return _OPERATORS[type(node.op)](_value(node.left, answer, label), _value(node.right, answer, label))
+    if isinstance(node, ast.UnaryOp) and type(node.op) in _OPERATORS:
+        return _OPERATORS[type(node.op)](_value(node.operand, answer, label), None)
+    if isinstance(node, ast.Compare) and len(node.ops) == 1 and type(node.ops[0]) in _OPERATORS:
+        left, right = _value(node.left, answer, label), _value(node.comparators[0], answer, label)
+        return _OPERATORS[type(node.ops[0])](left, right)
+    cure = "use names, numbers, + - * / **, comparisons, [...] and " + ", ".join(f"{name}()" for name in FUNCTIONS)
+    raise InputError(label, None, f"does not know {ast.unparse(node)[:40]!r}", cure)
+
+
+def _there(values: Any) -> Any:
+    """Values of a column without its gaps; a column of gaps alone stays one gap."""
+    made = np.asarray(values, dtype=float)
+    found = made[np.isfinite(made)]
+    return found if found.size else np.array([np.nan])
+
+
+def _named(known: Mapping[str, Any], name: str, label: str) -> Any:
+    if name not in known:
+        raise unknown_name(label, name, known)
+    value = known[name]
+    return _column(value) if isinstance(value, (list, tuple)) else value
+
+
+def _column(values: Any) -> Any:
+    """Numbers where all of them are, else texts."""
+    made = np.asarray(values)
+    if made.dtype.kind in "US":
+        try:
+            return made.astype(float)
+        except ValueError:
+            return made
+    return made

@@ -1,0 +1,177 @@
+"""A study from its file to its table: read, checked on the base job, run, resumed, summed up."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ..config import build, read_toml
+from ..errors import InputError
+from ..tables.study import StudyTable
+from ..threads import one_thread
+from .case import DIED, ERROR, INVALID, Row, Task, evaluate
+from .design import Cases, study_cases
+from .journal import HEAD, TABLE, Journal
+from .parameters import Parameter
+from .run import serially, side_by_side
+from .statistics import StudyResult
+
+#: A study whose first cases, so many, all have no answer is stopped.
+HOPELESS = 50
+#: Tables of a job that cases share much work in: those that agree in them run one after the other.
+COSTLY = ("pair", "stiffness", "housing")
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study as read.
+
+    Attributes
+    ----------
+    path
+        The file.
+    table
+        [study].
+    parameters
+        What is varied.
+    cases
+        Case by case the values of the parameters.
+    task
+        The base job and the outputs.
+    """
+
+    path: Path
+    table: StudyTable
+    parameters: tuple[Parameter, ...]
+    cases: Cases
+    task: Task
+
+    @property
+    def head(self) -> dict[str, Any]:
+        """What decides the rows."""
+        head = {"study": asdict(self.table), "base": dict(self.task.raw)}
+        return head if self.table.design != "rows" else {**head, "rows": [list(row) for row in self.cases]}
+
+    def evaluate(self, values: Mapping[str, Any]) -> dict[str, float]:
+        """Outputs with some parameters at these values, the others as the base job has them.
+
+        Raises
+        ------
+        InputError
+            What the job's command would refuse.
+        """
+        names = tuple(values)
+        task = Task(**{**vars(self.task), "names": names})
+        with one_thread():
+            return evaluate(task, list(values.values()))[0]
+
+
+def read_study(path: str | Path) -> Study:
+    """Read a study and its base job; every parameter's key exists, every output can be read.
+
+    Raises
+    ------
+    InputError
+        For every mistake in the file that shows without solving a case.
+    """
+    path = Path(path)
+    raw = read_toml(path)
+    if "study" not in raw:
+        raise InputError("[study]", None, f"is missing in {path.name}", "add a table [study]")
+    table: StudyTable = build(StudyTable, raw["study"], "study")
+    base = path if table.base is None else path.parent / table.base
+    tables = {name: one for name, one in (raw if table.base is None else read_toml(base)).items() if name != "study"}
+    parameters, cases = study_cases(table, path.parent)
+    names = tuple(one.name for one in parameters)
+    task = Task(table.job, base, tables, table.variant, table.estimate, names, table.outputs)
+    task.expressions()
+    task.tables(cases[0])
+    return Study(path, table, parameters, cases, task)
+
+
+def check_outputs(study: Study) -> dict[str, float]:
+    """Outputs of the base job as it stands: its names are known before the cases run.
+
+    Raises
+    ------
+    InputError
+        What the job's command would refuse, and outputs that the job does not give.
+    """
+    with one_thread():
+        return evaluate(Task(**{**vars(study.task), "names": ()}), ())[0]
+
+
+def run_study(
+    study: Study,
+    folder: str | Path,
+    *,
+    jobs: int | None = None,
+    executor: Executor | None = None,
+    workers: int | None = None,
+    restart: bool = False,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> StudyResult:
+    """Solve the cases that are missing in the folder's table; the result does not depend on where they run.
+
+    Parameters
+    ----------
+    folder
+        Of ``study.csv`` and ``study.json``: a study that was interrupted goes on.
+    jobs
+        Processes; None: as many as there are processors; 1: in this process.
+    executor
+        Where cases run instead: any of `concurrent.futures`, or a cluster's.
+    workers
+        How many cases the executor runs side by side; None: as many as it tells, else 4.
+    restart
+        Begin anew, whatever the folder holds.
+    progress
+        Called with cases done, all cases, and a name.
+
+    Raises
+    ------
+    InputError
+        Outputs that the job does not give, a folder with another study, a study whose first cases all have no answer.
+    """
+    from ..stiffness.report import versions
+
+    folder = Path(folder)
+    base = check_outputs(study)
+    if restart:
+        for name in (TABLE, HEAD):
+            (folder / name).unlink(missing_ok=True)
+    journal = Journal(folder, study.head, versions(), study.task.names, tuple(study.table.outputs))
+    bad, first = 0, ""
+    missing = [n for n in _order(study) if n not in journal.done]
+    cases = ((n, study.cases[n]) for n in missing)
+    rows: Iterator[list[Row]]
+    if executor is not None:
+        many = workers or getattr(executor, "_max_workers", None) or 4
+        rows = side_by_side(study.task, cases, many, executor)
+    else:
+        many = min(jobs or os.cpu_count() or 1, max(1, len(missing)))
+        rows = serially(study.task, cases) if many == 1 else side_by_side(study.task, cases, many)
+    for group in rows:
+        journal.append(group, study.cases)
+        if progress is not None:
+            progress(len(journal.done), len(study.cases), "cases")
+        for row in group:
+            hopeless = row.status in (INVALID, ERROR, DIED)
+            first = first or (row.message if hopeless else "")
+            bad = bad + 1 if hopeless and bad >= 0 else -1
+        if bad >= HOPELESS:
+            problem = f"the first {bad} cases have no answer; one of them: {first}"
+            raise InputError("study", None, problem, "change the base job or the parameters; their rows are kept")
+    return StudyResult(study.table, journal.finish(), base)
+
+
+def _order(study: Study) -> Sequence[int]:
+    """Numbers of the cases, those that share work one after the other."""
+    costly = [i for i, name in enumerate(study.task.names) if name.split(".")[0] in COSTLY]
+    if not costly:
+        return range(len(study.cases))
+    return sorted(range(len(study.cases)), key=lambda n: [repr(study.cases[n][i]) for i in costly])

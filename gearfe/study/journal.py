@@ -1,0 +1,131 @@
+"""The table of a study on disk: a row is appended whole as soon as its case is done, and found again after a kill.
+
+``study.json`` says what the study is; ``study.csv`` has a row for each finished case. While cases are missing, rows
+stand as they came; `finish` sorts them.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..output.files import whole_file, write_json
+from .case import Row
+
+TABLE, HEAD = "study.csv", "study.json"
+#: Columns beside parameters and outputs.
+FIRST, LAST = ("case",), ("status", "message", "seconds")
+
+
+class Journal:
+    """Rows of a study in a folder; the only writer.
+
+    Parameters
+    ----------
+    folder
+        Where the files are.
+    head
+        What decides the rows: a study with another one does not go on here.
+    versions
+        Of program and libraries.
+    parameters, outputs
+        Names of the columns.
+
+    Raises
+    ------
+    InputError
+        When the folder holds another study.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        head: Mapping[str, Any],
+        versions: Mapping[str, str],
+        parameters: Sequence[str],
+        outputs: Sequence[str],
+    ) -> None:
+        self.path = folder / TABLE
+        self.columns = (*FIRST, *parameters, *outputs, *LAST)
+        self.done: set[int] = set()
+        plain = json.loads(json.dumps(head, default=str))
+        if self.path.exists():
+            self._same(folder / HEAD, plain)
+            self._recover()
+        else:
+            write_json(folder / HEAD, {"study": plain, "versions": dict(versions)})
+            with whole_file(self.path) as temporary:
+                temporary.write_text(_line(self.columns), encoding="utf-8")
+
+    def _same(self, path: Path, head: dict[str, Any]) -> None:
+        cure = "choose another --out, or give --restart to begin anew"
+        try:
+            there = json.loads(path.read_text(encoding="utf-8"))["study"]
+        except (OSError, ValueError, KeyError, TypeError):
+            problem = f"holds a {TABLE} without its {HEAD}"
+            raise InputError("--out", str(path.parent), problem, cure) from None
+        key = _difference(there, head)
+        if key:
+            raise InputError("--out", str(path.parent), f"holds the rows of another study: {key} differs", cure)
+
+    def _recover(self) -> None:
+        """Numbers of the rows that are there; what a kill left of a last row goes."""
+        raw = self.path.read_bytes()
+        whole = raw[: raw.rfind(b"\n") + 1]
+        if len(whole) < len(raw):
+            os.truncate(self.path, len(whole))
+        rows = csv.reader(io.StringIO(whole.decode("utf-8")))
+        header = next(rows, [])
+        if tuple(header) != self.columns:
+            problem = f"{TABLE} has other columns than the study"
+            raise InputError("--out", str(self.path.parent), problem, "give --restart to begin anew")
+        self.done = {int(row[0]) for row in rows if row}
+
+    def append(self, rows: Iterable[Row], values: Sequence[Sequence[Any]]) -> None:
+        """Add finished cases, once each; `values` of all cases."""
+        fresh = [row for row in rows if row.case not in self.done]
+        text = "".join(
+            _line((row.case, *values[row.case], *row.outputs, row.status, row.message, float(f"{row.seconds:.4g}")))
+            for row in fresh
+        )
+        with self.path.open("ab", buffering=0) as stream:  # one write: no half rows beside other programs' reading
+            stream.write(text.encode("utf-8"))
+        self.done.update(row.case for row in fresh)
+
+    def finish(self) -> dict[str, list[str]]:
+        """Sort the table by case, and return its columns as text."""
+        with self.path.open(encoding="utf-8", newline="") as stream:
+            rows = list(csv.reader(stream))
+        header, body = rows[0], sorted((row for row in rows[1:] if row), key=lambda row: int(row[0]))
+        with whole_file(self.path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
+            csv.writer(stream, lineterminator="\n").writerows([header, *body])
+        return {name: [row[i] for row in body] for i, name in enumerate(header)}
+
+
+def _line(cells: Sequence[Any]) -> str:
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerow([_text(cell) for cell in cells])
+    return stream.getvalue()
+
+
+def _text(cell: Any) -> str:
+    if isinstance(cell, float):
+        return repr(cell)
+    return json.dumps(cell) if isinstance(cell, (list, dict)) else str(cell)
+
+
+def _difference(there: Any, here: Any, name: str = "") -> str:
+    """First key in which two headers differ; empty where they are the same."""
+    if isinstance(there, dict) and isinstance(here, dict):
+        for key in [*here, *(k for k in there if k not in here)]:
+            found = _difference(there.get(key), here.get(key), f"{name}.{key}".lstrip("."))
+            if found:
+                return found
+        return ""
+    return "" if there == here else name or "the study"

@@ -1,0 +1,182 @@
+"""One case of each kind of job, in this process and without files: tables of a job in, tables and summary out.
+
+What cases share is made once: a `Shared` keeps the condensed gears and the root meshes of the last pair, so that cases
+which differ in load or microgeometry alone cost positions only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..config import build, job_tables
+from ..tables.loadmap import LoadMapTable
+from ..tables.stiffness import StiffnessTable
+from .answer import Answer
+
+#: Tables of a job as parsed from TOML.
+Raw = dict[str, Any]
+
+
+class Shared:
+    """What the last case made and the next may use: pure functions of the key."""
+
+    def __init__(self) -> None:
+        self._key = ""
+        self._made: dict[str, Any] = {}
+
+    def get(self, key: str, name: str, make: Callable[[], Any]) -> Any:
+        """What `make` makes, kept under `name` until another key comes."""
+        if key != self._key:
+            self._key, self._made = key, {}
+        if name not in self._made:
+            self._made[name] = make()
+        return self._made[name]
+
+
+def solve(kind: str, raw: Raw, path: Path, shared: Shared, *, estimate: bool = False, variant: str = "") -> Answer:
+    """Tables and summary of one case.
+
+    Parameters
+    ----------
+    kind
+        Of the job.
+    raw
+        Its tables.
+    path
+        The job file, for messages; files that the tables name lie beside it.
+    shared
+        What cases share.
+    estimate
+        With the error estimates of the job.
+    variant
+        Of a vibration job.
+
+    Raises
+    ------
+    InputError
+        What the job's command would refuse.
+    """
+    return _KINDS[kind](raw, path, shared, estimate, variant)
+
+
+def _stiffness(raw: Raw, path: Path, shared: Shared, estimate: bool, _variant: str) -> Answer:
+    from ..stiffness.report import summary
+    from ..stiffness.sweep import sweep_stiffness
+
+    job = _pair_job(job_tables(raw, path, ("pair",), ("stiffness", "microgeometry")), path)
+    sweep = job.sweep
+    elastic = _elastic(job, job.model, shared)
+    curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=estimate, **sweep)
+    return Answer({"stiffness": curve.table()}, summary(job, curve, {}), _positions(curve.failed))
+
+
+def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool, _variant: str) -> Answer:
+    from ..loadmap.report import summary, torque_table
+    from ..loadmap.sweep import sweep_loads
+
+    tables = job_tables(raw, path, ("pair",), ("stiffness", "microgeometry", "loadmap"))
+    table = tables.get("loadmap", LoadMapTable())
+    torques = table.torques()
+    job = _pair_job(tables, path)
+    model = job.model
+    made = sweep_loads(
+        job.pair,
+        torques,
+        angles=np.arange(table.positions) * job.pair.mesh_cycle / table.positions,
+        root_stress=table.root_stress,
+        kinematics=job.table.kinematics,
+        elastic=_elastic(job, model, shared),
+    )
+    rows: dict[str, Any] = {"loadmap": made.table(), "torques": torque_table(made)}
+    return Answer(rows, summary(job, table, made, {}), _positions(made.failed))
+
+
+def _microgeometry(raw: Raw, path: Path, shared: Shared, _estimate: bool, _variant: str) -> Answer:
+    from ..contact.half_plane import half_plane_pair
+    from ..gear.deviation_job import deviations_of
+    from ..loadmap.root_stress import pair_roots
+    from ..microgeometry.job import checked_model
+    from ..microgeometry.report import cell_table, order_table, pair_table, summary, torque_table
+    from ..microgeometry.solve import load_mesh
+
+    tables = job_tables(raw, path, ("pair", "microgeometry"), ("stiffness",))
+    table, job = tables["microgeometry"], _pair_job({**tables, "microgeometry": None}, path)
+    torques = table.torques()
+    deviations = deviations_of(table, job.pair, path.parent)
+    model = checked_model(job)
+    elastic = _elastic(job, model, shared)
+    roots = None
+    if table.root_stress:
+        roots = shared.get(_key(job, model), "roots", lambda: pair_roots(job.pair, elastic))
+    law = half_plane_pair(job.pair, elastic, deviations=deviations)
+    made = load_mesh(law, torques, positions=table.positions, mesh_cycles=table.mesh_cycles, roots=roots)
+    rows: dict[str, Any] = {
+        "microgeometry": cell_table(made),
+        "torques": torque_table(made),
+        "pairs": pair_table(made),
+        "orders": order_table(made),
+    }
+    return Answer(rows, summary(job, table, made, deviations, {}), _positions(made.failed))
+
+
+def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool, _variant: str) -> Answer:
+    from ..mechanisms.error_estimate import trajectory_error
+    from ..mechanisms.job import output_times, summarise
+    from ..mechanisms.model import make_mechanism
+    from ..mechanisms.results import evaluate
+    from ..rigid import integrate
+    from ..tables.mechanism import MechanismFile
+
+    mechanism = make_mechanism(build(MechanismFile, raw, ""), path)
+    run, start = mechanism.file.run, mechanism.start()
+    # auto chooses by the clock, and a case must have the same digits wherever it runs
+    options: dict[str, Any] = {"method": "taylor" if run.method == "auto" else run.method, "tolerance": run.tolerance}
+    times = output_times(run.end_s, run.step_s)
+    trajectory = integrate(mechanism.system, times, start=start, raise_on_failure=False, **options)
+    results = evaluate(mechanism, trajectory)
+    error = trajectory_error(mechanism, start, results, run.tolerance) if estimate else None
+    time = {"time_s": trajectory.time}
+    rows = {"trajectory": {**time, **results.outputs}, "energy": {**time, **results.energy}}
+    problem = "" if trajectory.status == 0 else trajectory.message
+    return Answer(rows, summarise(mechanism, start, results, run.tolerance, {}, error), problem)
+
+
+def _pair_job(tables: dict[str, Any], path: Path) -> Any:
+    from ..gear.pair import GearPair
+    from ..stiffness.job import StiffnessJob
+
+    pair = GearPair.from_table(tables["pair"])
+    table = tables.get("stiffness", StiffnessTable())
+    return StiffnessJob(tables["pair"], table, pair, tables.get("microgeometry"), path.parent)
+
+
+def _elastic(job: Any, model: dict[str, Any], shared: Shared) -> Any:
+    """Condensed gears with the deviations of the job: these cost nothing, so the gears are shared without them."""
+    from ..stiffness.sweep import elastic_pair
+
+    smooth = {name: value for name, value in model.items() if name != "deviations"}
+    made = shared.get(_key(job, model), "elastic", lambda: elastic_pair(job.pair, **smooth))
+    return replace(made, deviations=model["deviations"]) if "deviations" in model else made
+
+
+def _key(job: Any, model: dict[str, Any]) -> str:
+    """What decides the condensed gears."""
+    return repr((job.pair_table, sorted((name, value) for name, value in model.items() if name != "deviations")))
+
+
+def _positions(failed: Any) -> str:
+    count = int(np.count_nonzero(failed))
+    return f"{count} of {np.size(failed)} positions failed" if count else ""
+
+
+_KINDS: dict[str, Callable[[Raw, Path, Shared, bool, str], Answer]] = {
+    "stiffness": _stiffness,
+    "loadmap": _loadmap,
+    "microgeometry": _microgeometry,
+    "mechanism": _mechanism,
+}

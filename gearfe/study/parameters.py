@@ -1,0 +1,217 @@
+"""Parameters of a study: keys of the job by dotted names, and the values that they take."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import types
+import typing
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..config import TABLES, build, table_class, type_hints
+from ..errors import InputError, unknown_name
+from ..tables.study import DistributionTable
+from ..typing import Array
+
+_KEYS = {field.name for field in dataclasses.fields(DistributionTable)}
+WHERE = "study.parameters"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A key of the job and its distribution.
+
+    Attributes
+    ----------
+    name
+        Dotted name of the key.
+    whole
+        Whether it takes whole numbers only.
+    values
+        The values it takes, each as likely; empty with a distribution.
+    distribution
+        In the unit of the key; None with values.
+    """
+
+    name: str
+    whole: bool
+    values: tuple[Any, ...] = ()
+    distribution: DistributionTable | None = None
+
+    @property
+    def path(self) -> list[str]:
+        """Names from the job's table down to the key; numbers count entries of lists."""
+        return self.name.split(".")
+
+    def at(self, share: Array) -> list[Any]:
+        """Values below which the distribution has these shares: its inverse cumulative distribution, (n,) in [0, 1)."""
+        d = self.distribution
+        if d is None:
+            return [self.values[i] for i in _steps(share, len(self.values))]
+        if d.mean is None:
+            assert d.low is not None
+            assert d.high is not None
+            if self.whole:
+                first = math.ceil(d.low)
+                return [first + int(i) for i in _steps(share, math.floor(d.high) - first + 1)]
+            return (d.low + (d.high - d.low) * share).tolist()
+        from scipy.special import ndtr, ndtri
+
+        assert d.deviation is not None
+        low, high = (None if end is None else (end - d.mean) / d.deviation for end in (d.low, d.high))
+        below, upto = 0.0 if low is None else ndtr(low), 1.0 if high is None else ndtr(high)
+        # a share of 0 has no value in a tail without an end
+        inside = np.clip(below + (upto - below) * share, np.finfo(float).tiny, 1.0 - np.finfo(float).epsneg)
+        values = d.mean + d.deviation * ndtri(inside)
+        made = np.clip(values, d.low, d.high) if low is not None or high is not None else values
+        return [round(v) for v in made.tolist()] if self.whole else made.tolist()
+
+    def levels(self) -> Sequence[Any]:
+        """Values for a factorial design."""
+        d = self.distribution
+        if d is None:
+            return self.values
+        if d.mean is None and d.low is not None and d.high is not None:
+            if d.count is not None and not self.whole:
+                return np.linspace(d.low, d.high, d.count).tolist()
+            if self.whole and d.count is None:
+                return range(math.ceil(d.low), math.floor(d.high) + 1)
+        cure = "give a list of values, or low, high and count (whole numbers: low and high)"
+        raise InputError(f"{WHERE}.{self.name}", None, "has no levels for a factorial design", cure)
+
+
+def _steps(share: Array, count: int) -> Array:
+    return np.minimum((np.asarray(share) * count).astype(int), count - 1)
+
+
+def read_parameters(given: Mapping[str, Any], kind: str) -> tuple[Parameter, ...]:
+    """Parameters of a job of this kind.
+
+    Raises
+    ------
+    InputError
+        Names of keys that do not exist, with the near match; values that are no distribution.
+    """
+    made = []
+    for name, spec in _flat(given, "").items():
+        hint, label = key_hint(kind, name), f"{WHERE}.{name}"
+        whole = int in _options(hint) and float not in _options(hint)
+        if isinstance(spec, list):
+            if not spec:
+                raise InputError(label, [], "is empty", "give at least one value")
+            made.append(Parameter(name, whole, tuple(spec)))
+            continue
+        found = build(DistributionTable, spec, label)
+        if not {int, float} & set(_options(hint)):
+            raise InputError(label, None, "is no number: low, high, mean do not apply", "give a list of values")
+        if whole and found.low is not None and found.high is not None and math.ceil(found.low) > found.high:
+            raise InputError(label, (found.low, found.high), "holds no whole number", "widen it")
+        made.append(Parameter(name, whole, distribution=found))
+    return tuple(made)
+
+
+def _flat(given: Mapping[str, Any], above: str) -> dict[str, Any]:
+    """Dotted name -> list or distribution; names may be quoted or be tables within tables."""
+    found: dict[str, Any] = {}
+    for key, value in given.items():
+        name = f"{above}{key}"
+        if isinstance(value, list) or (isinstance(value, dict) and value and set(value) <= _KEYS):
+            found[name] = value
+        elif isinstance(value, dict) and value:
+            near = [k for k in value if k in _KEYS and not isinstance(value[k], (dict, list))]
+            if near:
+                wrong = next(k for k in value if k not in _KEYS)
+                raise unknown_name(f"{WHERE}.{name}", wrong, _KEYS)
+            found |= _flat(value, f"{name}.")
+        else:
+            cure = "write [a, b, c], { low = a, high = b } or { mean = a, deviation = b }"
+            raise InputError(f"{WHERE}.{name}", value, "must be a list of values or a distribution", cure)
+    return found
+
+
+def key_hint(kind: str, name: str) -> Any:
+    """Type of the key with this dotted name in a job of this kind.
+
+    Raises
+    ------
+    InputError
+        When there is no such key, with the nearest that exists.
+    """
+    parts = name.split(".")
+    where, rest = WHERE, parts
+    hint: Any
+    if kind == "mechanism":
+        from ..tables.mechanism import MechanismFile
+
+        hint = MechanismFile
+    else:
+        known = [table for table in TABLES if table != "study"]
+        if parts[0] not in known:
+            raise unknown_name(where, parts[0], known)
+        hint, where, rest = table_class(parts[0]), f"{where}.{parts[0]}", parts[1:]
+        if not rest:
+            raise InputError(where, None, "is a table, not a key", "name a key in it")
+    for part in rest:
+        hint = _below(hint, part, where)
+        where = f"{where}.{part}"
+    if any(dataclasses.is_dataclass(option) for option in _options(hint)):
+        raise InputError(where, None, "is a table, not a key", "name a key in it")
+    return hint
+
+
+def _below(hint: Any, part: str, where: str) -> Any:
+    """Type of what is named `part` in something of type `hint`."""
+    for option in _options(hint):
+        origin, inside = typing.get_origin(option), typing.get_args(option)
+        if dataclasses.is_dataclass(option):
+            hints = type_hints(typing.cast(Any, option))
+            names = [field.name for field in dataclasses.fields(option)]
+            if part not in names:
+                raise unknown_name(where, part, names)
+            return hints[part]
+        if origin is dict:
+            return inside[1]
+        if origin is tuple:
+            if not part.isdigit():
+                raise InputError(where, part, "is a list: an entry has a number, from 0 on", f"write {where}.0")
+            if inside[1:] == (Ellipsis,):
+                return inside[0]
+            if int(part) < len(inside):
+                return inside[int(part)]
+            raise InputError(where, part, f"has {len(inside)} entries, 0 to {len(inside) - 1}", "choose one")
+        if option is Any:
+            return Any
+    raise InputError(where, part, "has nothing below it", "name the key itself")
+
+
+def _options(hint: Any) -> tuple[Any, ...]:
+    """Types that a key may have, without None."""
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        return tuple(option for option in typing.get_args(hint) if option is not type(None))
+    return (hint,)
+
+
+def set_key(tables: dict[str, Any], name: str, value: Any) -> None:
+    """Put a value under a dotted name into the tables of a job, as a TOML file would have it."""
+    parts = name.split(".")
+    place: Any = tables
+    for i, part in enumerate(parts):
+        last = i == len(parts) - 1
+        if isinstance(place, list):
+            if not (part.isdigit() and int(part) < len(place)):
+                above = ".".join(parts[:i])
+                raise InputError(f"{WHERE}.{name}", None, f"{above} has {len(place)} entries in the job", "choose one")
+            if last:
+                place[int(part)] = value
+            else:
+                place = place[int(part)]
+        elif last:
+            place[part] = value
+        else:
+            place = place.setdefault(part, {})
+        if not last and not isinstance(place, (dict, list)):
+            raise InputError(f"{WHERE}.{name}", None, f"{part} is a value in the job, not a table", "name that key")

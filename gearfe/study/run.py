@@ -1,0 +1,111 @@
+"""The cases of a study, one after the other, on processes, or on any executor; each finished one is told at once.
+
+Cases go in groups of about `GROUP_SECONDS`, so that handing over costs little. The cases of groups that never come
+back run again one by one, with nothing beside them, so that it is known whose fault a death is, `AGAIN` times at most.
+Where a case runs changes no digit of its row.
+"""
+
+from __future__ import annotations
+
+import itertools
+import signal
+from collections import Counter, deque
+from collections.abc import Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from multiprocessing import get_context
+from typing import Any
+
+from ..threads import one_thread
+from .case import DIED, Row, Task, solve_case, solve_group
+from .kinds import Shared
+
+#: Seconds of a group of cases, and groups that wait for each worker.
+GROUP_SECONDS, WAITING = 0.5, 2
+#: How often cases run again after the worker that had them died.
+AGAIN = 2
+#: Cases of a group at most.
+LARGEST = 1000
+
+#: (number, values)
+Case = tuple[int, tuple[Any, ...]]
+
+
+def serially(task: Task, cases: Iterable[Case]) -> Iterator[list[Row]]:
+    """Rows, one case after the other in this process."""
+    shared = Shared()
+    with one_thread():
+        for number, values in cases:
+            yield [solve_case(task, number, values, shared)]
+
+
+def side_by_side(
+    task: Task, cases: Iterable[Case], workers: int, executor: Executor | None = None
+) -> Iterator[list[Row]]:
+    """Rows in the order in which they come.
+
+    Parameters
+    ----------
+    workers
+        How many processes there are.
+    executor
+        Where the cases run; it stays open. None: on processes of our own, and one that dies is replaced.
+    """
+    pool = executor or _processes(workers)
+    ahead = iter(cases)
+    running: dict[Future[list[Row]], list[Case]] = {}
+    suspects: deque[Case] = deque()
+    deaths: Counter[int] = Counter()
+    size = 1
+    try:
+        while True:
+            alone = bool(suspects)
+            lost: list[tuple[list[Case], str]] = []
+            while len(running) < (1 if alone else workers * WAITING):
+                group = [suspects.popleft()] if alone else list(itertools.islice(ahead, size))
+                if not group:
+                    break
+                try:
+                    running[pool.submit(solve_group, task, group)] = group
+                except BrokenExecutor as error:
+                    lost.append((group, str(error)))
+                    break
+            if not (running or lost):
+                return
+            for future in wait(running, return_when=FIRST_COMPLETED).done if running else ():
+                group = running.pop(future)
+                try:
+                    rows = future.result()
+                except Exception as error:  # cases tell theirs in their rows: this one is the executor's
+                    lost.append((group, f"{type(error).__name__}: {error}"))
+                    continue
+                spent = sum(row.seconds for row in rows) / len(rows)
+                size = max(1, min(LARGEST, 2 * size, int(GROUP_SECONDS / max(spent, 1e-9))))
+                yield rows
+            if lost and executor is None:
+                lost += [(group, lost[0][1]) for group in running.values()]
+                running.clear()
+                pool.shutdown(wait=False, cancel_futures=True)
+                pool = _processes(workers)
+            for group, reason in lost:
+                for case in group:
+                    deaths[case[0]] += alone
+                    if deaths[case[0]] < AGAIN:
+                        suspects.append(case)
+                    else:
+                        yield [Row(case[0], (float("nan"),) * len(task.outputs), DIED, reason, 0.0)]
+    finally:
+        if executor is None:
+            _end(pool)
+
+
+def _processes(workers: int) -> Executor:
+    """Fresh processes, whatever this one has loaded; workers leave Ctrl-C to the program that started them."""
+    return ProcessPoolExecutor(workers, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_IGN))
+
+
+def _end(pool: Any) -> None:
+    """End a pool without waiting for what still runs."""
+    processes = list((getattr(pool, "_processes", None) or {}).values())
+    pool.shutdown(wait=False, cancel_futures=True)
+    for process in processes:
+        process.terminate()

@@ -1,0 +1,228 @@
+"""What many cases say: quantiles, yield, sensitivities, Sobol's indices, the Pareto set."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..tables.study import LimitTable, StudyTable
+from ..typing import Array, BoolArray, IntArray
+from .case import DONE
+
+#: Quantiles that are told, and the confidence of all intervals.
+QUANTILES, CONFIDENCE = (0.05, 0.25, 0.5, 0.75, 0.95), 0.95
+
+
+@dataclass(frozen=True)
+class StudyResult:
+    """Rows of a study, sorted by case.
+
+    Attributes
+    ----------
+    table
+        [study].
+    columns
+        Column -> its cells as text, as in ``study.csv``.
+    base
+        Outputs of the base job.
+    """
+
+    table: StudyTable
+    columns: Mapping[str, Sequence[str]]
+    base: Mapping[str, float]
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Dotted names of the parameters."""
+        return tuple(self.columns)[1 : -3 - len(self.table.outputs)]
+
+    @property
+    def done(self) -> BoolArray:
+        """(n,) cases that were solved wholly."""
+        return np.array([status == DONE for status in self.columns["status"]])
+
+    def output(self, name: str) -> Array:
+        """(n,) values of an output, not-a-number where a case has none."""
+        return np.array([float(cell) for cell in self.columns[name]])
+
+    def numbers(self) -> dict[str, Array]:
+        """(n,) values of the parameters that are numbers and vary."""
+        made = {}
+        for name in self.parameters:
+            try:
+                values = np.array([float(cell) for cell in self.columns[name]])
+            except ValueError:
+                continue
+            if len(values) and np.ptp(values) > 0.0:
+                made[name] = values
+        return made
+
+    @property
+    def good(self) -> BoolArray:
+        """(n,) cases that were solved wholly and keep all limits."""
+        kept = self.done.copy()
+        for name, limit in self.table.limits.items():
+            kept &= within(self.output(name), limit)
+        return kept
+
+    def pareto(self) -> IntArray:
+        """Cases that no other one beats in all of minimise and maximise; none where there are no such outputs."""
+        t = self.table
+        aims = [self.output(n) for n in t.minimise] + [-self.output(n) for n in t.maximise]
+        if not aims:
+            return np.zeros(0, dtype=np.int64)
+        values = np.stack(aims, axis=1)
+        return pareto_set(np.where(self.done[:, None] & np.isfinite(values).all(axis=1)[:, None], values, np.inf))
+
+    def summary(self) -> dict[str, Any]:
+        """Content of summary.json."""
+        done = self.done
+        outputs: dict[str, Any] = {}
+        for name in self.table.outputs:
+            values = self.output(name)[done]
+            values = values[np.isfinite(values)]
+            outputs[name] = {"base": self.base[name], **spread(values)}
+            if name in self.table.limits:
+                outputs[name]["yield"] = share_within(values, self.table.limits[name], int(done.sum()))
+            outputs[name]["effects"] = self.effects(name)
+            if self.table.design == "saltelli":
+                outputs[name]["sobol"] = self.sobol(name)
+        made: dict[str, Any] = {
+            "cases": len(done),
+            "statuses": dict(Counter(self.columns["status"])),
+            "outputs": outputs,
+            "seconds_of_all_cases": float(sum(float(cell) for cell in self.columns["seconds"])),
+        }
+        if self.table.limits:
+            made["yield"] = proportion(int(self.good.sum()), int(done.sum()))
+        if self.table.minimise or self.table.maximise:
+            made["pareto_cases"] = self.pareto().tolist()
+        return made
+
+    def effects(self, name: str) -> dict[str, Any]:
+        """How an output follows the parameters over their ranges, from a linear model of the solved cases.
+
+        ``change``: parameter -> change of the output from the 5 to the 95 % quantile of the parameter; ``explained``:
+        share R^2 of the variance that the linear model explains; ``rank_correlation``: Spearman's.
+        """
+        from scipy.stats import spearmanr
+
+        numbers, values = self.numbers(), self.output(name)
+        use = self.done & np.isfinite(values)
+        y = values[use]
+        if not numbers or len(y) < len(numbers) + 2 or not np.ptp(y) > 0.0:
+            return {"change": {}, "explained": math.nan, "rank_correlation": {}}
+        x = np.stack([one[use] for one in numbers.values()], axis=1)
+        middle, scale = x.mean(axis=0), x.std(axis=0)
+        scale[scale == 0.0] = 1.0
+        model = np.column_stack([(x - middle) / scale, np.ones(len(y))])
+        slope = np.linalg.lstsq(model, y, rcond=None)[0]
+        left = y - model @ slope
+        low, high = np.quantile(x, [0.05, 0.95], axis=0)
+        change = slope[:-1] * (high - low) / scale
+        ranks = [float(spearmanr(column, y).statistic) if np.ptp(column) > 0.0 else math.nan for column in x.T]
+        return {
+            "change": dict(zip(numbers, change.tolist(), strict=True)),
+            "explained": 1.0 - float(left @ left) / float(((y - y.mean()) ** 2).sum()),
+            "rank_correlation": dict(zip(numbers, ranks, strict=True)),
+        }
+
+    def sobol(self, name: str) -> dict[str, Any] | None:
+        """Sobol's indices of first order and in total, with their intervals; None where a case has no answer.
+
+        Saltelli et al., Comput. Phys. Commun. 181 (2010) 259, by `scipy.stats.sobol_indices`.
+        """
+        from scipy.stats import sobol_indices
+
+        d = len(self.parameters)
+        values = self.output(name)
+        if not (self.done & np.isfinite(values)).all():
+            return None
+        n = len(values) // (d + 2)
+        parts = {"f_A": values[None, :n], "f_B": values[None, n : 2 * n], "f_AB": values[2 * n :].reshape(d, 1, n)}
+        found = sobol_indices(func=parts, n=n)
+        told: dict[str, Any] = {
+            "first_order": dict(zip(self.parameters, found.first_order.ravel().tolist(), strict=True)),
+            "total_order": dict(zip(self.parameters, found.total_order.ravel().tolist(), strict=True)),
+        }
+        boot = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=200)
+        for key in ("first_order", "total_order"):
+            ends = getattr(boot, key).confidence_interval
+            low, high = np.ravel(ends.low).tolist(), np.ravel(ends.high).tolist()
+            told[f"{key}_interval"] = dict(zip(self.parameters, map(list, zip(low, high, strict=True)), strict=True))
+        return told
+
+
+def spread(values: Array) -> dict[str, Any]:
+    """Mean, deviation, ends and quantiles of a sample with the intervals that hold the true ones.
+
+    The interval of a quantile lies between two order statistics: how many of n values lie below it is binomial (David &
+    Nagaraja, Order Statistics, 3rd ed., section 7.1), whatever the distribution. It is null where n is too small.
+    """
+    from scipy.stats import binom
+
+    n = len(values)
+    if not n:
+        return {"solved": 0}
+    ordered = np.sort(values)
+    quantiles = {}
+    for share in QUANTILES:
+        low = int(binom.ppf(0.5 * (1.0 - CONFIDENCE), n, share))
+        high = int(binom.ppf(0.5 * (1.0 + CONFIDENCE), n, share)) + 1
+        quantiles[f"{100 * share:g} %"] = {
+            "value": float(np.quantile(values, share)),
+            "interval": [
+                float(ordered[low - 1]) if low >= 1 else None,
+                float(ordered[high - 1]) if high <= n else None,
+            ],
+        }
+    return {
+        "solved": n,
+        "mean": float(values.mean()),
+        "deviation": float(values.std(ddof=1)) if n > 1 else None,
+        "least": float(ordered[0]),
+        "largest": float(ordered[-1]),
+        "quantiles": quantiles,
+    }
+
+
+def within(values: Array, limit: LimitTable) -> BoolArray:
+    """Which values are good."""
+    low = -math.inf if limit.low is None else limit.low
+    high = math.inf if limit.high is None else limit.high
+    return (low <= values) & (values <= high)
+
+
+def share_within(values: Array, limit: LimitTable, cases: int) -> dict[str, Any]:
+    """Share of solved cases that are good."""
+    return proportion(int(within(values, limit).sum()), cases)
+
+
+def proportion(good: int, cases: int) -> dict[str, Any]:
+    """A share with its interval (Clopper & Pearson, Biometrika 26 (1934) 404)."""
+    from scipy.stats import binomtest
+
+    if not cases:
+        return {"good": 0, "cases": 0, "share": None, "interval": None}
+    ends = binomtest(good, cases).proportion_ci(CONFIDENCE, method="exact")
+    return {"good": good, "cases": cases, "share": good / cases, "interval": [float(ends.low), float(ends.high)]}
+
+
+def pareto_set(values: Array) -> IntArray:
+    """Rows of (n, k) that no other row beats: none is as small in all columns and smaller in one; rising.
+
+    Rows that are infinite take no part.
+    """
+    finite = np.flatnonzero(np.isfinite(values).all(axis=1))
+    order = finite[np.lexsort(values[finite].T[::-1])]
+    kept: list[int] = []
+    for row in order:  # who beats a row stands before it
+        others = values[kept]
+        if not kept or not ((others <= values[row]).all(axis=1) & (others < values[row]).any(axis=1)).any():
+            kept.append(int(row))
+    return np.array(sorted(kept), dtype=np.int64)

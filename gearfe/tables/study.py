@@ -1,0 +1,109 @@
+"""The [study] table: a base job, what is varied in it, and what is kept of each case."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ..config import quantity
+from ..errors import InputError, unknown_name
+
+#: Kinds of job that a study can vary.
+KINDS = ("stiffness", "loadmap", "microgeometry", "vibration", "mechanism")
+DESIGNS = ("factorial", "latin_hypercube", "sobol", "saltelli", "rows")
+
+
+@dataclass(frozen=True)
+class DistributionTable:
+    """One parameter: even between two ends, or normal, and then cut off where ends are given."""
+
+    low: float | None = quantity(None, doc="lower end, in the unit of the key")
+    high: float | None = quantity(None, doc="upper end")
+    mean: float | None = quantity(None, doc="mean of a normal distribution")
+    deviation: float | None = quantity(None, above=0.0, doc="its standard deviation")
+    count: int | None = quantity(None, low=2, high=100_000, doc="even steps from low to high for a factorial design")
+
+    def check(self, where: str) -> None:
+        """Ends or mean and deviation, not half of them."""
+        for one, other in (("mean", "deviation"), ("deviation", "mean")):
+            if getattr(self, one) is not None and getattr(self, other) is None:
+                raise InputError(f"{where}.{other}", None, f"is required beside {one}", "add it")
+        if self.mean is None:
+            for name in ("low", "high"):
+                if getattr(self, name) is None:
+                    cure = "give low and high, mean and deviation, or a list of values"
+                    raise InputError(f"{where}.{name}", None, "is required", cure)
+        elif self.count is not None:
+            raise InputError(f"{where}.count", self.count, "stands beside mean", "steps are even between low and high")
+        if self.low is not None and self.high is not None and not self.low < self.high:
+            raise InputError(f"{where}.high", self.high, f"must be > low = {self.low:g}", "swap them")
+
+
+@dataclass(frozen=True)
+class LimitTable:
+    """Between which values an output is good."""
+
+    low: float | None = quantity(None, doc="least good value")
+    high: float | None = quantity(None, doc="largest good value")
+
+    def check(self, where: str) -> None:
+        """At least one end."""
+        if self.low is None and self.high is None:
+            raise InputError(f"{where}.high", None, "is required", "give low, high or both")
+
+
+@dataclass(frozen=True)
+class StudyTable:
+    """Many cases of one job."""
+
+    job: str = quantity(choices=KINDS, doc="kind of job, the name of its command")
+    base: str | None = quantity(
+        None, doc="job file that is varied, beside this one; left out: this file, whose other tables are the job"
+    )
+    variant: str = quantity("", doc="variant of a vibration job; left out: that which the job names")
+    design: str = quantity(
+        "latin_hypercube",
+        choices=DESIGNS,
+        doc="factorial: all combinations; latin_hypercube, sobol: that many random cases; saltelli: those that Sobol's "
+        "indices need; rows: a CSV file",
+    )
+    cases: int = quantity(64, low=1, high=10_000_000, doc="number of random cases; saltelli: of base points")
+    seed: int = quantity(1, low=0, doc="seed of the random cases")
+    rows_csv: str | None = quantity(None, doc="CSV file whose columns are named as the keys, for design = rows")
+    parameters: dict[str, Any] = quantity(  # noqa: RUF009
+        dict, doc="dotted name of a key of the job -> list of values, or low and high, or mean and deviation"
+    )
+    outputs: dict[str, str] = quantity(  # noqa: RUF009
+        doc="name -> expression of the job's columns and of summary, as `ptp(transmission_error_um)`"
+    )
+    limits: dict[str, LimitTable] = quantity(dict, doc="output -> low and high of good cases, for the yield")  # noqa: RUF009
+    minimise: tuple[str, ...] = quantity((), doc="outputs of which less is better, for the Pareto set")
+    maximise: tuple[str, ...] = quantity((), doc="outputs of which more is better, for the Pareto set")
+    estimate: bool = quantity(False, doc="true: with the error estimates of the job, where it has some")
+
+    def check(self, where: str) -> None:
+        """Rules that join several keys."""
+        if not self.outputs:
+            raise InputError(f"{where}.outputs", None, "is empty", "name at least one output")
+        for name in self.outputs:
+            if not name.isidentifier():
+                problem = "must be a word of letters, digits and _ (it becomes a column)"
+                raise InputError(f"{where}.outputs", name, problem, "rename it")
+        for key in ("limits", "minimise", "maximise"):
+            for name in getattr(self, key):
+                if name not in self.outputs:
+                    raise unknown_name(f"{where}.{key}", name, self.outputs)
+        for name in self.minimise:
+            if name in self.maximise:
+                raise InputError(f"{where}.maximise", name, "stands in minimise, too", "leave one of them out")
+        rows = self.design == "rows"
+        if rows and self.rows_csv is None:
+            raise InputError(f"{where}.rows_csv", None, 'is required with design = "rows"', "name the CSV file")
+        if rows and self.parameters:
+            problem = 'stands beside design = "rows"'
+            raise InputError(f"{where}.parameters", None, problem, "the CSV file's columns are the parameters")
+        if not rows and self.rows_csv is not None:
+            problem = f"stands beside design = {self.design!r}"
+            raise InputError(f"{where}.rows_csv", self.rows_csv, problem, 'use design = "rows"')
+        if not rows and not self.parameters:
+            raise InputError(f"{where}.parameters", None, "is empty", "vary at least one key of the job")
