@@ -1,13 +1,13 @@
-"""``gearfe new stiffness|microgeometry|vibration|mechanism [FILE]``: write a commented job file to start from."""
+"""``gearfe new stiffness|microgeometry|study|vibration|mechanism [FILE]``: write a commented job file to start from."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-HELP = "write a commented job file to start from: stiffness, microgeometry, vibration or mechanism"
+HELP = "write a commented job file to start from: stiffness, microgeometry, study, vibration or mechanism"
 
-KINDS = ("stiffness", "microgeometry", "vibration", "mechanism")
+KINDS = ("stiffness", "microgeometry", "study", "vibration", "mechanism")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

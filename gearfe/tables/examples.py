@@ -32,12 +32,36 @@ MICROGEOMETRY: dict[str, Any] = {
     "wheel": {"tip_relief_um": 15.0, "tip_relief_length_mm": 2.7},
 }
 
+MICROGEOMETRY_OF_STUDY: dict[str, Any] = {
+    "torques_Nm": [100.0],
+    "pinion": {"tip_relief_um": 15.0, "tip_relief_length_mm": 2.7},
+    "wheel": {"tip_relief_um": 15.0, "tip_relief_length_mm": 2.7},
+}
+
 RELIEF: dict[str, Any] = {
     "torques_Nm": [100.0],
     "variables": [
         {"key": "tip_relief_um", "low": 0.0, "high": 30.0, "tolerance": 2.0},
         {"key": "tip_relief_length_mm", "low": 1.0, "high": 4.5, "tolerance": 0.2},
     ],
+}
+
+STUDY: dict[str, Any] = {
+    "job": "microgeometry",
+    "design": "sobol",
+    "cases": 128,
+    "parameters": {
+        "microgeometry.pinion.tip_relief_um": {"low": 0.0, "high": 30.0},
+        "microgeometry.pinion.tip_relief_length_mm": {"low": 1.0, "high": 4.0},
+        "microgeometry.pinion.slope_um": {"mean": 0.0, "deviation": 3.0},
+        "microgeometry.wheel.tip_relief_um": {"low": 0.0, "high": 30.0},
+    },
+    "outputs": {
+        "peak_to_peak_um": "torques.transmission_error_peak_to_peak_um[0]",
+        "pressure_MPa": "max(peak_pressure_MPa)",
+    },
+    "limits": {"peak_to_peak_um": {"high": 3.0}},
+    "minimise": ["peak_to_peak_um", "pressure_MPa"],
 }
 
 TRAIN: dict[str, Any] = {
@@ -111,6 +135,10 @@ JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]]]] = {
         "FILE --out DIR, gearfe relief FILE --out DIR. " + OPTIONAL_KEYS,
         {"pair": PAIR, "microgeometry": MICROGEOMETRY, "relief": RELIEF},
     ),
+    "study": (
+        "Many microgeometries of a gear pair. Run it: gearfe study FILE --out DIR. " + OPTIONAL_KEYS,
+        {"pair": PAIR, "microgeometry": MICROGEOMETRY_OF_STUDY, "study": STUDY},
+    ),
     "vibration": (
         "A gear train in its housing: two shafts with one gear pair. Run it: gearfe vibration FILE --out DIR. Shafts "
         "run along y; speeds and torques count positive about +y. " + OPTIONAL_KEYS,
@@ -122,7 +150,7 @@ MECHANISM_HEAD = "A planar mechanism. Run it: gearfe mechanism FILE --out DIR. "
 
 
 def job_file(kind: str) -> str:
-    """Text of an example job file: ``stiffness``, ``microgeometry``, ``vibration`` or ``mechanism``."""
+    """Text of an example job file: ``stiffness``, ``microgeometry``, ``study``, ``vibration`` or ``mechanism``."""
     if kind == "mechanism":
         # this job is one table, the file itself; the title stands above the tables
         cls = importlib.import_module("gearfe.tables.mechanism").MechanismFile

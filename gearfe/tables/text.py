@@ -44,7 +44,11 @@ def table_text(
         inner, many = inner_table(hints[field.name])
         full = f"{name.strip('[]')}.{field.name}".lstrip(".")
         doc = field.metadata.get("doc", "")
-        if inner is None:
+        given = example.get(field.name)
+        if inner is None and isinstance(given, Mapping):
+            lines = [f"{_key(key)} = {toml_value(value)}" for key, value in given.items()]
+            below.append("\n".join([f"[{full}] # {doc}", *lines, ""]))
+        elif inner is None:
             line = _line(field, example, doc, brief)
             if line:
                 own.append(line)
