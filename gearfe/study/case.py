@@ -22,6 +22,10 @@ from .parameters import set_key
 DONE, PARTLY, INVALID, ERROR, DIED = "done", "partly", "invalid", "error", "died"
 
 
+#: What the cases of this process share, whatever groups they come in.
+HERE = Shared()
+
+
 @dataclass(frozen=True)
 class Task:
     """What every case of a study has in common; light, for it travels with each group of cases.
@@ -67,7 +71,7 @@ class Row:
     seconds: float
 
 
-def evaluate(task: Task, values: Sequence[Any], shared: Shared | None = None) -> tuple[dict[str, float], Answer]:
+def evaluate(task: Task, values: Sequence[Any], shared: Shared) -> tuple[dict[str, float], Answer]:
     """Outputs of a case, and the job's answer.
 
     Raises
@@ -76,7 +80,7 @@ def evaluate(task: Task, values: Sequence[Any], shared: Shared | None = None) ->
         What the job's command would refuse, and outputs that the job does not give.
     """
     options: dict[str, Any] = {"estimate": task.estimate, "variant": task.variant}
-    answer = solve(task.kind, task.tables(values), task.path, shared or Shared(), **options)
+    answer = solve(task.kind, task.tables(values), task.path, shared, **options)
     return {name: value_of(tree, answer, f"study.outputs.{name}") for name, tree in task.expressions().items()}, answer
 
 
@@ -95,11 +99,7 @@ def solve_case(task: Task, number: int, values: Sequence[Any], shared: Shared) -
     return Row(number, found, status, " ".join(message.split()), time.perf_counter() - began)
 
 
-#: What the cases of this process share, whatever groups they come in.
-_SHARED = Shared()
-
-
 def solve_group(task: Task, group: Sequence[tuple[int, tuple[Any, ...]]]) -> list[Row]:
     """Rows of some cases, (number, values) each."""
     with one_thread():  # a number of threads changes digits
-        return [solve_case(task, number, values, _SHARED) for number, values in group]
+        return [solve_case(task, number, values, HERE) for number, values in group]

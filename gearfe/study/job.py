@@ -13,7 +13,7 @@ from ..config import build, read_toml
 from ..errors import InputError
 from ..tables.study import StudyTable
 from ..threads import one_thread
-from .case import DIED, ERROR, INVALID, Row, Task, evaluate
+from .case import DIED, ERROR, HERE, INVALID, Row, Task, evaluate
 from .design import Cases, study_cases
 from .journal import HEAD, TABLE, Journal
 from .parameters import Parameter
@@ -67,7 +67,7 @@ class Study:
         names = tuple(values)
         task = Task(**{**vars(self.task), "names": names})
         with one_thread():
-            return evaluate(task, list(values.values()))[0]
+            return evaluate(task, list(values.values()), HERE)[0]
 
 
 def read_study(path: str | Path) -> Study:
@@ -102,7 +102,7 @@ def check_outputs(study: Study) -> dict[str, float]:
         What the job's command would refuse, and outputs that the job does not give.
     """
     with one_thread():
-        return evaluate(Task(**{**vars(study.task), "names": ()}), ())[0]
+        return evaluate(Task(**{**vars(study.task), "names": ()}), (), HERE)[0]
 
 
 def run_study(

@@ -16,8 +16,7 @@ from multiprocessing import get_context
 from typing import Any
 
 from ..threads import one_thread
-from .case import DIED, Row, Task, solve_case, solve_group
-from .kinds import Shared
+from .case import DIED, HERE, Row, Task, solve_case, solve_group
 
 #: Seconds of a group of cases, and groups that wait for each worker.
 GROUP_SECONDS, WAITING = 0.5, 2
@@ -32,10 +31,9 @@ Case = tuple[int, tuple[Any, ...]]
 
 def serially(task: Task, cases: Iterable[Case]) -> Iterator[list[Row]]:
     """Rows, one case after the other in this process."""
-    shared = Shared()
     with one_thread():
         for number, values in cases:
-            yield [solve_case(task, number, values, shared)]
+            yield [solve_case(task, number, values, HERE)]
 
 
 def side_by_side(
