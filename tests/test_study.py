@@ -40,7 +40,7 @@ BASE = """
 [run]
 end_s = 1e-3
 step_s = 1e-3
-method = "taylor"
+method = "explicit"
 [bodies.a]
 mass_kg = 1.0
 inertia_kg_m2 = 1.0
@@ -490,7 +490,7 @@ def test_command_names_mistakes(tmp_path, capsys, arguments, told):
         ({"rows_csv": "a.csv"}, "stands beside design"),
         ({"parameters": {}}, "is empty"),
         ({"design": "saltelli", "cases": 12}, "power of 2"),
-        ({"job": "vibrations"}, "did you mean 'vibration'"),
+        ({"job": "stifness"}, "did you mean 'stiffness'"),
     ],
 )
 def test_wrong_tables_are_named(keys, told, tmp_path):

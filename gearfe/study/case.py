@@ -32,7 +32,7 @@ class Task:
 
     Attributes
     ----------
-    kind, path, raw, variant, estimate
+    kind, path, raw, estimate
         Of the base job, see `gearfe.study.kinds.solve`.
     names
         Dotted names of the parameters.
@@ -43,7 +43,6 @@ class Task:
     kind: str
     path: Path
     raw: Mapping[str, Any]
-    variant: str
     estimate: bool
     names: tuple[str, ...]
     outputs: Mapping[str, str]
@@ -79,8 +78,7 @@ def evaluate(task: Task, values: Sequence[Any], shared: Shared) -> tuple[dict[st
     InputError
         What the job's command would refuse, and outputs that the job does not give.
     """
-    options: dict[str, Any] = {"estimate": task.estimate, "variant": task.variant}
-    answer = solve(task.kind, task.tables(values), task.path, shared, **options)
+    answer = solve(task.kind, task.tables(values), task.path, shared, estimate=task.estimate)
     return {name: value_of(tree, answer, f"study.outputs.{name}") for name, tree in task.expressions().items()}, answer
 
 

@@ -87,7 +87,7 @@ def read_study(path: str | Path) -> Study:
     tables = {name: one for name, one in (raw if table.base is None else read_toml(base)).items() if name != "study"}
     parameters, cases = study_cases(table, path.parent)
     names = tuple(one.name for one in parameters)
-    task = Task(table.job, base, tables, table.variant, table.estimate, names, table.outputs)
+    task = Task(table.job, base, tables, table.estimate, names, table.outputs)
     task.expressions()
     task.tables(cases[0])
     return Study(path, table, parameters, cases, task)

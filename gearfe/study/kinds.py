@@ -38,7 +38,7 @@ class Shared:
         return self._made[name]
 
 
-def solve(kind: str, raw: Raw, path: Path, shared: Shared, *, estimate: bool = False, variant: str = "") -> Answer:
+def solve(kind: str, raw: Raw, path: Path, shared: Shared, *, estimate: bool = False) -> Answer:
     """Tables and summary of one case.
 
     Parameters
@@ -53,18 +53,16 @@ def solve(kind: str, raw: Raw, path: Path, shared: Shared, *, estimate: bool = F
         What cases share.
     estimate
         With the error estimates of the job.
-    variant
-        Of a vibration job.
 
     Raises
     ------
     InputError
         What the job's command would refuse.
     """
-    return _KINDS[kind](raw, path, shared, estimate, variant)
+    return _KINDS[kind](raw, path, shared, estimate)
 
 
-def _stiffness(raw: Raw, path: Path, shared: Shared, estimate: bool, _variant: str) -> Answer:
+def _stiffness(raw: Raw, path: Path, shared: Shared, estimate: bool) -> Answer:
     from ..stiffness.report import summary
     from ..stiffness.sweep import sweep_stiffness
 
@@ -75,7 +73,7 @@ def _stiffness(raw: Raw, path: Path, shared: Shared, estimate: bool, _variant: s
     return Answer({"stiffness": curve.table()}, summary(job, curve, {}), _positions(curve.failed))
 
 
-def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool, _variant: str) -> Answer:
+def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
     from ..loadmap.report import summary, torque_table
     from ..loadmap.sweep import sweep_loads
 
@@ -96,7 +94,7 @@ def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool, _variant: st
     return Answer(rows, summary(job, table, made, {}), _positions(made.failed))
 
 
-def _microgeometry(raw: Raw, path: Path, shared: Shared, _estimate: bool, _variant: str) -> Answer:
+def _microgeometry(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
     from ..contact.half_plane import half_plane_pair
     from ..gear.deviation_job import deviations_of
     from ..loadmap.root_stress import pair_roots
@@ -124,26 +122,30 @@ def _microgeometry(raw: Raw, path: Path, shared: Shared, _estimate: bool, _varia
     return Answer(rows, summary(job, table, made, deviations, {}), _positions(made.failed))
 
 
-def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool, _variant: str) -> Answer:
+def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
     from ..mechanisms.error_estimate import trajectory_error
     from ..mechanisms.job import output_times, summarise
     from ..mechanisms.model import make_mechanism
     from ..mechanisms.results import evaluate
     from ..rigid import integrate
+    from ..rigid.integrate import use_compiled
     from ..tables.mechanism import MechanismFile
 
     mechanism = make_mechanism(build(MechanismFile, raw, ""), path)
     run, start = mechanism.file.run, mechanism.start()
     # auto chooses by the clock, and a case must have the same digits wherever it runs
-    options: dict[str, Any] = {"method": "taylor" if run.method == "auto" else run.method, "tolerance": run.tolerance}
-    times = output_times(run.end_s, run.step_s)
-    trajectory = integrate(mechanism.system, times, start=start, raise_on_failure=False, **options)
+    stiff = any(element.stiff for element in mechanism.system.elements)
+    method = ("implicit" if stiff else "taylor") if run.method == "auto" else run.method
+    options: dict[str, Any] = {"method": method, "backend": "compiled" if use_compiled("auto") else "plain"}
+    times, tolerance = output_times(run.end_s, run.step_s), mechanism.tolerance
+    system = mechanism.system
+    trajectory = integrate(system, times, start=start, tolerance=tolerance, raise_on_failure=False, **options)
     results = evaluate(mechanism, trajectory)
-    error = trajectory_error(mechanism, start, results, run.tolerance) if estimate else None
+    error = trajectory_error(mechanism, start, results, tolerance) if estimate else None
     time = {"time_s": trajectory.time}
     rows = {"trajectory": {**time, **results.outputs}, "energy": {**time, **results.energy}}
     problem = "" if trajectory.status == 0 else trajectory.message
-    return Answer(rows, summarise(mechanism, start, results, run.tolerance, {}, error), problem)
+    return Answer(rows, summarise(mechanism, start, results, tolerance, {}, error), problem)
 
 
 def _pair_job(tables: dict[str, Any], path: Path) -> Any:
@@ -174,7 +176,7 @@ def _positions(failed: Any) -> str:
     return f"{count} of {np.size(failed)} positions failed" if count else ""
 
 
-_KINDS: dict[str, Callable[[Raw, Path, Shared, bool, str], Answer]] = {
+_KINDS: dict[str, Callable[[Raw, Path, Shared, bool], Answer]] = {
     "stiffness": _stiffness,
     "loadmap": _loadmap,
     "microgeometry": _microgeometry,

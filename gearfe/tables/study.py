@@ -9,7 +9,7 @@ from ..config import quantity
 from ..errors import InputError, unknown_name
 
 #: Kinds of job that a study can vary.
-KINDS = ("stiffness", "loadmap", "microgeometry", "vibration", "mechanism")
+KINDS = ("stiffness", "loadmap", "microgeometry", "mechanism")
 DESIGNS = ("factorial", "latin_hypercube", "sobol", "saltelli", "rows")
 
 
@@ -60,7 +60,6 @@ class StudyTable:
     base: str | None = quantity(
         None, doc="job file that is varied, beside this one; left out: this file, whose other tables are the job"
     )
-    variant: str = quantity("", doc="variant of a vibration job; left out: that which the job names")
     design: str = quantity(
         "latin_hypercube",
         choices=DESIGNS,
