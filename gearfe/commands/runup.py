@@ -29,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_keys(parser, RunUpTable, *KEYS)
     parser.add_argument("--attachment", metavar="NAME", help="attachment in the pictures (default: that of the load)")
+    parser.add_argument("--no-stability", action="store_true", help="leave out the Floquet multipliers")
     parser.add_argument("--no-pictures", action="store_true", help="tables and summary only")
 
 
@@ -42,6 +43,8 @@ def run(args: argparse.Namespace) -> int:
     tables = read_train_tables(args.job, args.variant)
     table = with_keys(args, _own_table(args.job), *KEYS)
     table.check("runup")
+    if args.no_stability:
+        table = replace(table, stability=False)
 
     import numpy as np
 
@@ -72,7 +75,8 @@ def run(args: argparse.Namespace) -> int:
         model = build_train(replace(scene, drive=replace(scene.drive, speed=constant(float(speeds[0])))))
     band = table.band_Hz or (5000.0 if job.housing is None else job.housing.reduction.band_Hz)
     with watch.stage("steady states"), stage("steady states"):
-        made = run_up(model, speeds, tolerance=table.tolerance, band_hz=band, progress=_counted)
+        options = {"tolerance": table.tolerance, "band_hz": band, "stability": table.stability}
+        made = run_up(model, speeds, progress=_counted, **options)  # type: ignore[arg-type]
     if not made.states:
         problem = "has no periodic motion that was found at any of the speeds"
         raise _nothing(table, problem)
@@ -117,9 +121,10 @@ def _told(summary: dict[str, Any]) -> list[str]:
         f"{summary['speeds_reached']} of {summary['speeds']} speeds, {summary['steady_states']} steady states; largest "
         f"error estimate {summary['largest_error_estimate']:.2g} of the approach under the steady force"
     ]
-    if summary["turning_speeds_rad_per_s"]:
-        turns = ", ".join(f"{speed:.6g}" for speed in summary["turning_speeds_rad_per_s"])
-        lines.append(f"turning points (jumps of a run-up or run-down) at {turns} rad/s")
+    changes: dict[str, list[str]] = {}
+    for change in summary["bifurcations"]:
+        changes.setdefault(change["kind"], []).append(f"{change['speed_rad_per_s']:.6g}")
+    lines += [f"{kind} at {', '.join(speeds)} rad/s" for kind, speeds in changes.items()]
     for name, factor, open_ in zip(
         summary["mesh_names"], summary["largest_dynamic_factor"], summary["largest_share_without_contact"], strict=True
     ):

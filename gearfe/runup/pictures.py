@@ -117,4 +117,5 @@ def _line(state: SteadyState, harmonic: int, bore: int) -> float:
 def _pieces(run: RunUp, values: Sequence[float] | Array) -> Pieces:
     speed = np.array([s.speed for s in run.states])
     branch = np.array([s.branch for s in run.states], dtype=np.int64)
-    return Pieces(speed, np.asarray(values, dtype=float), branch, branch % 2 == 0)
+    stable = np.array([s.branch % 2 == 0 if s.stable is None else s.stable for s in run.states])
+    return Pieces(speed, np.asarray(values, dtype=float), branch, stable)

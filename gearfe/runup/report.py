@@ -25,6 +25,7 @@ def runup_columns(run: RunUp) -> dict[str, Any]:
         "speed_rad_per_s": np.array([s.speed for s in states]),
         "speed_rpm": RPM * np.array([s.speed for s in states]),
         "branch": np.array([s.branch for s in states], dtype=int),
+        **stability_columns(run),
         "error_estimate": np.array([s.error for s in states]),
         "beyond_mesh_law": np.array([s.beyond for s in states], dtype=int),
     }
@@ -45,6 +46,18 @@ def runup_columns(run: RunUp) -> dict[str, Any]:
     if model.scene.housing is not None:
         made["radiated_power_level_dB"] = np.array([power_level(power_in_band(s, run.band_hz)) for s in states])
     return made
+
+
+def stability_columns(run: RunUp) -> dict[str, Array]:
+    """Columns of the largest multiplier; none where they were not asked for."""
+    if any(s.multipliers is None for s in run.states):
+        return {}
+    largest = np.array([s.multipliers[0] for s in run.states if s.multipliers is not None])
+    return {
+        "stable": np.array([bool(s.stable) for s in run.states], dtype=int),
+        "largest_multiplier": np.abs(largest),
+        "largest_multiplier_angle_deg": np.degrees(np.abs(np.angle(largest))),
+    }
 
 
 def dynamic_factors(run: RunUp, mesh: int) -> Array:
@@ -237,6 +250,7 @@ def summary(run: RunUp, modes: CoupledModes, multiples: int) -> dict[str, Any]:
         "speeds_reached": len(reached),
         "steady_states": len(states),
         "turning_speeds_rad_per_s": run.turning_speeds.tolist(),
+        "bifurcations": [{"speed_rad_per_s": b.speed, "kind": b.kind, "branch": b.branch} for b in run.bifurcations],
         "largest_error_estimate": max((s.error for s in states), default=None),
         "tolerance": run.tolerance,
         "band_Hz": run.band_hz,
@@ -271,6 +285,12 @@ def warnings(run: RunUp) -> list[str]:
         found.append(
             f"at {len(beyond)} of {len(run.states)} states, the first at {beyond[0]:.6g} rad/s, a mesh goes beyond "
             "what its law is known for: write a larger law_torque_Nm in [[train.meshes]]"
+        )
+    lost = sorted({s.speed for s in run.states} - {s.speed for s in run.states if s.stable is not False}, key=abs)
+    if lost:
+        found.append(
+            f"at {len(lost)} speeds, {lost[0]:.6g} to {lost[-1]:.6g} rad/s, no motion with the period of the meshes is "
+            "stable: what runs there repeats after several periods or not at all; look at a transient"
         )
     late = [s for s in run.states if not s.error <= run.tolerance]
     if late:

@@ -16,6 +16,7 @@ from ..vibration.radiation import AIR_DENSITY, AIR_SPEED
 from .balance import Orbit, analysis, evaluate, rates, samples_of, synthesis
 from .condensed import CondensedTrain
 from .mesh_forces import sampled
+from .stability import STABLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +49,8 @@ class SteadyState:
         Complex amplitudes along the shafts at the attachments (m/s2).
     power : (K + 1,) or None
         Equivalent radiated power of each line (W); None for a rigid housing.
+    multipliers : (2 modes,) or None
+        Floquet multipliers of the motion, largest modulus first; None where they were not asked for.
     """
 
     speed: float
@@ -62,6 +65,12 @@ class SteadyState:
     beyond: bool
     acceleration: ComplexArray
     power: Array | None
+    multipliers: ComplexArray | None = None
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether small disturbances die out; None where multipliers were not asked for."""
+        return None if self.multipliers is None else bool(abs(self.multipliers[0]) <= STABLE)
 
     @property
     def error(self) -> float:
@@ -78,7 +87,9 @@ class SteadyState:
         return np.asarray(analysis(values)[harmonic])
 
 
-def steady_result(train: CondensedTrain, orbit: Orbit, branch: int) -> SteadyState:
+def steady_result(
+    train: CondensedTrain, orbit: Orbit, branch: int, multipliers: ComplexArray | None = None
+) -> SteadyState:
     """Evaluate an orbit."""
     system, model = train.system, train.model
     omega0, count = system.omega0(orbit.speed), orbit.harmonics
@@ -111,5 +122,5 @@ def steady_result(train: CondensedTrain, orbit: Orbit, branch: int) -> SteadySta
     frequency = omega / (2.0 * math.pi)
     return SteadyState(
         orbit.speed, branch, orbit, 2.0 * math.pi / omega0, frequency, np.arange(count + 1) / system.turns, force,
-        approach, apart, beyond, acceleration, power,
+        approach, apart, beyond, acceleration, power, multipliers,
     )  # fmt: skip

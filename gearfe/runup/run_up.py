@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,11 +16,12 @@ from ..errors import InputError
 from ..threads import one_thread
 from ..train.kinematics import drive_sense
 from ..train.model import TrainModel
-from ..typing import Array
+from ..typing import Array, ComplexArray
 from .balance import Orbit, settled, solve
 from .condensed import CondensedTrain, condense
 from .follow import Curve, follow
 from .results import SteadyState, steady_result
+from .stability import Bifurcation, kind_of, multipliers
 
 #: Where no motion is found at the first speed, others are tried so many times as far away, each a part of it farther.
 TRIES, AWAY = 12, 0.01
@@ -38,6 +42,9 @@ class RunUp:
         turning point on branch 1 back, after the next one on branch 2 upwards again.
     turning_speeds : (turns,)
         Speeds of the turning points (rad/s), between branch 0 and 1, 1 and 2, ...
+    bifurcations
+        Where motions change their stability: turning points, period doubling, Neimark-Sacker; only turning points where
+        no multipliers were asked for.
     notes
         What could not be followed, and why.
     tolerance, band_hz
@@ -48,6 +55,7 @@ class RunUp:
     speeds: Array
     states: tuple[SteadyState, ...]
     turning_speeds: Array
+    bifurcations: tuple[Bifurcation, ...]
     notes: tuple[str, ...]
     tolerance: float
     band_hz: float
@@ -55,19 +63,22 @@ class RunUp:
     def sweep(self, *, up: bool = True) -> tuple[SteadyState, ...]:
         """One state at each speed that was reached: what a slow run-up, or a slow run-down, meets there.
 
-        At a turning point the motion jumps to the branch that is left.
+        Where a branch ends, or is stable no longer, the motion jumps to the stable one that is left; where none is
+        known the first of all is taken, whose `stable` says so.
         """
-        found: dict[float, SteadyState] = {}
+        found: dict[float, list[SteadyState]] = {}
         for state in self.states:
-            before = found.get(state.speed)
-            if state.branch % 2 == 0 and (before is None or (state.branch > before.branch) is not up):
-                found[state.speed] = state
-        return tuple(found[speed] for speed in sorted(found, key=abs))
+            found.setdefault(state.speed, []).append(state)
+        made = []
+        for speed in sorted(found, key=abs):
+            left = [s for s in found[speed] if s.stable or (s.stable is None and s.branch % 2 == 0)] or found[speed]
+            made.append(min(left, key=lambda s: s.branch if up else -s.branch))
+        return tuple(made)
 
 
 def steady_state(
     model: TrainModel, speed: float, guess: SteadyState | None = None, *, tolerance: float = 1e-3,
-    band_hz: float = 5000.0,
+    band_hz: float = 5000.0, stability: bool = True,
 ) -> SteadyState:  # fmt: skip
     """Steady running of a train at a speed of its drive, by harmonic balance.
 
@@ -83,6 +94,8 @@ def steady_state(
         Of the meshes' approaches, in parts of those under the steady force.
     band_hz
         Harmonics reach this frequency at least (Hz).
+    stability
+        Compute Floquet multipliers.
 
     Raises
     ------
@@ -97,12 +110,14 @@ def steady_state(
         problem = "has no periodic motion that was found"
         cure = "give a guess from a neighbouring speed (run_up finds them), more damping, or look at a transient"
         raise InputError("speed", float(speed), problem, cure)
-    return steady_result(train, made, 0)
+    with one_thread():
+        found = multipliers(train.system, made) if stability else None
+    return steady_result(train, made, 0, found)
 
 
 def run_up(
-    model: TrainModel, speeds: ArrayLike, *, tolerance: float = 1e-3, band_hz: float = 5000.0,
-    progress: Callable[[int, int], None] | None = None,
+    model: TrainModel, speeds: ArrayLike, *, tolerance: float = 1e-3, band_hz: float = 5000.0, stability: bool = True,
+    executor: Executor | None = None, progress: Callable[[int, int], None] | None = None,
 ) -> RunUp:  # fmt: skip
     """Steady states of a train along a range of speeds, round the turning points of their curve.
 
@@ -110,8 +125,10 @@ def run_up(
     ----------
     speeds : array_like, shape (n,)
         Speeds of the drive (rad/s), all of one sign, rising or falling in size.
-    tolerance, band_hz
+    tolerance, band_hz, stability
         See `steady_state`.
+    executor
+        Computes multipliers beside each other; None: one after the other.
     progress
         Called with the number of the speed reached and of the last.
 
@@ -122,7 +139,7 @@ def run_up(
     """
     asked = _checked(model, speeds)
     train, notes = condense(model), []
-    states: list[SteadyState] = []
+    orbits: list[tuple[Orbit, int]] = []
     turns: list[float] = []
     left = asked
     with one_thread():
@@ -135,18 +152,40 @@ def run_up(
             options = {"tolerance": tolerance, "highest": 2.0 * math.pi * band_hz, "progress": progress}
             curve = follow(train.system, left, start, **options)  # type: ignore[arg-type]
             first = len(turns)
-            states += _results(train, curve, 2 * math.ceil(first / 2))
+            orbits += _numbered(curve, orbits, first)
             turns += [turn.speed for turn in curve.turns]
             if not curve.note:
                 break
             notes.append(curve.note)
             reached = max(range(len(left)), key=lambda k: any(o.speed == left[k] for o in curve.orbits) * (k + 1))
             left = left[reached + 1 :]
-    return RunUp(train, asked, tuple(states), np.array(turns), tuple(notes), tolerance, band_hz)
+        found: list[ComplexArray | None] = [None] * len(orbits)
+        if stability:
+            ways = map if executor is None else executor.map
+            found = list(ways(partial(multipliers, train.system), [orbit for orbit, _ in orbits]))
+    states = tuple(steady_result(train, *orbit, each) for orbit, each in zip(orbits, found, strict=True))
+    changes = _bifurcations(states, turns)
+    return RunUp(train, asked, states, np.array(turns), changes, tuple(notes), tolerance, band_hz)
 
 
-def _results(train: CondensedTrain, curve: Curve, first: int) -> list[SteadyState]:
-    return [steady_result(train, o, first + b) for o, b in zip(curve.orbits, curve.branch, strict=True)]
+def _numbered(curve: Curve, before: Sequence[tuple[Orbit, int]], turns: int) -> list[tuple[Orbit, int]]:
+    """Orbits with the numbers of their branches, going on from a curve before; a gap is no turning point."""
+    first = turns + turns % 2 if before else 0
+    return [(orbit, first + branch) for orbit, branch in zip(curve.orbits, curve.branch, strict=True)]
+
+
+def _bifurcations(states: Sequence[SteadyState], turns: Sequence[float]) -> tuple[Bifurcation, ...]:
+    """Turning points, and where a branch's largest multiplier passes the unit circle."""
+    found = [Bifurcation(speed, "turning point", branch) for branch, speed in enumerate(turns)]
+    for one, two in itertools.pairwise(states):
+        if one.branch != two.branch or one.stable == two.stable:
+            continue
+        assert one.multipliers is not None
+        assert two.multipliers is not None
+        a, b = abs(one.multipliers[0]) - 1.0, abs(two.multipliers[0]) - 1.0
+        speed = one.speed + (two.speed - one.speed) * a / (a - b)
+        found.append(Bifurcation(float(speed), kind_of(one.multipliers, two.multipliers), one.branch))
+    return tuple(sorted(found, key=lambda b: b.branch))
 
 
 def _first(train: CondensedTrain, speed: float, guess: Orbit | None, tolerance: float, band_hz: float) -> Orbit | None:

@@ -25,6 +25,8 @@ class RunUpTable:
     )
     multiples: int = quantity(5, low=1, high=50, doc="multiples of each mesh frequency that are cut out as orders")
 
+    stability: bool = quantity(True, doc="false: leave out the Floquet multipliers")
+
     def check(self, where: str) -> None:
         """Rules that join several keys."""
         start, stop = self.speed_start_rad_per_s, self.speed_stop_rad_per_s

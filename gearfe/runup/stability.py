@@ -1,0 +1,100 @@
+r"""Stability of a periodic motion: Floquet multipliers of the motion itself.
+
+Small motions beside the orbit feel the forces' derivatives along it,
+
+.. math:: \ddot y + D\dot y + \Lambda y = P\,[A(t)\,P^T y + B(t)\,P^T\dot y] + \Omega\,G\dot y ,
+
+so the orbit is stable where all eigenvalues of the map of (y, y') over a period, the multipliers, have a modulus below
+1 (Nayfeh & Balachandran, Applied Nonlinear Dynamics, Sec. 3.2). The map is integrated by `gearfe.train.monodromy`. Modes
+that the forces reach little are not in it: they yield as they do at rest, and their own multipliers are those of free
+decay. A mode counts where its share in the forces' change, beside its damping, is more than `REACHED`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..train.monodromy import flow, kick_times, monodromy
+from ..typing import Array, ComplexArray
+from .balance import Orbit, Oscillator, rates
+
+#: Least strength of the forces on a mode, in parts of its damping.
+REACHED = 0.01
+#: Steps of the period, of six kicks each: first, most. Where the forces' derivatives jump they are doubled until the
+#: largest modulus stands still to this part.
+STEPS, MOST, SETTLED = 64, 256, 3e-3
+#: Change of a derivative from one kick to the next, in parts of the largest, that is a jump.
+JUMP = 0.7
+#: Imaginary part of a multiplier, in parts of its modulus, that is none.
+REAL = 1e-6
+#: A multiplier beyond this is an instability, not round-off.
+STABLE = 1.0 + 1e-6
+
+
+class Bifurcation(NamedTuple):
+    """Where a branch changes its stability."""
+
+    speed: float  # rad/s
+    kind: str  # turning point, period doubling, Neimark-Sacker
+    branch: int  # before it
+
+
+def multipliers(system: Oscillator, orbit: Orbit, *, reached: float = REACHED, steps: int = STEPS) -> ComplexArray:
+    """Floquet multipliers of an orbit, largest modulus first, (2 n,)."""
+    made, jumps = _multipliers(system, orbit, reached, steps)
+    while jumps and steps < MOST:
+        steps *= 2
+        before = abs(made[0])
+        made, _ = _multipliers(system, orbit, reached, steps)
+        if abs(abs(made[0]) - before) <= SETTLED * abs(made[0]):
+            break
+    return made
+
+
+def _multipliers(system: Oscillator, orbit: Orbit, reached: float, steps: int) -> tuple[ComplexArray, bool]:
+    """Multipliers with so many steps, and whether derivatives jump."""
+    linear, omega0 = system.linear, system.omega0(orbit.speed)
+    m, period = linear.size, 2.0 * math.pi / omega0
+    edges = np.linspace(0.0, period, steps + 1)
+    times = kick_times(edges)
+    theta = omega0 * times.ravel()
+    turns = np.exp(1j * theta[:, None] * np.arange(orbit.harmonics + 1))
+    u, du = ((turns @ x).real for x in (orbit.places, rates(orbit.places, omega0)))
+    A, B = system.forces(theta, orbit.speed, u, du)[1:]
+    size = np.abs(A).max(axis=0)
+    order = np.argsort(theta, kind="stable")  # kicks step back, too
+    jumps = bool((np.abs(np.diff(A[order], axis=0)) > JUMP * size).any())
+    strength = np.einsum("ni,ij,nj->n", np.abs(linear.places), size, np.abs(linear.places)) / linear.squares
+    kept = strength > reached * np.diag(linear.damping) / np.sqrt(linear.squares)
+    places, tilts = linear.places[kept], linear.tilts[kept]
+    swap = np.kron(np.diag(linear.momenta), np.array([[0.0, -1.0], [1.0, 0.0]])) * orbit.speed
+    D = linear.damping[np.ix_(kept, kept)] - tilts @ swap @ tilts.T
+    # what the other modes yield at once: u = P y + R f, f = A u
+    rest = linear.places[~kept].T @ (linear.places[~kept] / linear.squares[~kept, None])
+    A = A @ np.linalg.inv(np.eye(m) - rest @ A)
+    strengths = np.concatenate([A, np.zeros_like(A) if B is None else B], axis=2).reshape(*times.shape, m, 2 * m)
+    none = np.zeros_like(places)
+    with np.errstate(over="ignore", invalid="ignore"):
+        constant = flow(linear.squares[kept], D, period)
+        X = monodromy(constant, edges, places, np.block([[places, none], [none, places]]), strengths)
+    made = np.linalg.eigvals(X) if np.isfinite(X).all() else np.array([np.inf])
+    decay = _free(linear.squares[~kept], np.diag(linear.damping)[~kept], period)
+    both = np.concatenate([made, decay]).astype(complex)
+    return np.asarray(both[np.argsort(-np.abs(both), kind="stable")]), jumps
+
+
+def kind_of(one: ComplexArray, two: ComplexArray) -> str:
+    """What happens between orbits of which one is stable, by the multiplier that leaves the unit circle."""
+    leaving = next((x for x in (one[0], two[0]) if abs(x) > STABLE), one[0])
+    if abs(leaving.imag) > REAL * abs(leaving):
+        return "Neimark-Sacker"
+    return "period doubling" if leaving.real < 0.0 else "turning point"
+
+
+def _free(squares: Array, damping: Array, period: float) -> ComplexArray:
+    """Multipliers of modes by themselves."""
+    root = np.sqrt((0.25 * damping**2 - squares).astype(complex))
+    return np.asarray(np.exp(period * np.concatenate([-0.5 * damping + root, -0.5 * damping - root])))

@@ -1,0 +1,107 @@
+"""Floquet multipliers of periodic motions: Mathieu's borders, direct integration, the trains' own multipliers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from scipy.special import mathieu_a, mathieu_b
+
+from gearfe.runup.balance import Oscillator, Pushes, settled, solve
+from gearfe.runup.condensed import condense
+from gearfe.runup.linear import Linear
+from gearfe.runup.run_up import run_up, steady_state
+from gearfe.runup.stability import STABLE, kind_of, multipliers
+from gearfe.train import build_train
+from gearfe.train.floquet import train_multipliers
+
+from .oscillators import duffing, meshing, monodromy
+from .test_runup_balance import curve, found, start_of
+from .test_runup_train import loaded, smooth
+
+
+@pytest.mark.parametrize("border", [mathieu_a, mathieu_b])
+def test_the_borders_of_mathieus_equation(border):
+    """``x'' + (1 + e cos wt) x``: a = 4/w^2, q = 2e/w^2; the first tongue lies between a_1 and b_1."""
+    e = 0.3
+    edge = brentq(lambda w: border(1, 2 * e / w**2) - 4 / w**2, 1.5, 2.5)
+    system = meshing(e, 0.0, 1.0, gap=0.0).oscillator
+    sides = [multipliers(system, found(system, edge * (1 + s * 2e-4), 1e-8)) for s in (-1, 1)]
+    stable, unstable = sorted(sides, key=lambda x: abs(x[0]))
+    assert abs(stable[0]) == pytest.approx(1.0, abs=1e-5)
+    assert abs(unstable[0]) > 1.003
+    assert kind_of(stable, unstable) == "period doubling"
+
+
+def test_multipliers_of_oscillators_by_direct_integration():
+    for system, speeds, parts in (
+        (duffing(0.05, 0.03, 0.2), np.arange(0.8, 1.3, 0.05), False),
+        (meshing(0.1, 0.03, 1.0), np.arange(0.85, 1.0, 0.03), True),
+    ):
+        made = curve(system.oscillator, speeds, 1e-4 if parts else 1e-7, highest=20.0)
+        for orbit in made.orbits[::3]:
+            exact = np.linalg.eigvals(monodromy(system, orbit.speed, start_of(orbit), parts=parts))
+            mine = multipliers(system.oscillator, orbit)
+            assert np.sort(np.abs(mine)) == pytest.approx(np.sort(np.abs(exact)), rel=1e-2 if parts else 1e-4)
+
+
+def test_branches_between_turning_points_are_unstable():
+    system = duffing(0.05, 0.03, 0.2)
+    made = curve(system.oscillator, np.arange(0.8, 1.4, 0.02))
+    stable = [abs(multipliers(system.oscillator, o)[0]) <= STABLE for o in made.orbits]
+    assert stable == [b != 1 for b in made.branch]
+
+
+def test_a_sum_resonance_of_two_modes():
+    """Two modes that a periodic stiffness joins at the sum of their frequencies: complex multipliers grow."""
+    squares, places, e = np.array([1.0, 2.3**2]), np.array([[1.0], [1.5]]), 0.5
+    damping = np.diag([0.01, 0.02])
+
+    def forces(theta, speed, u, du):  # type: ignore[no-untyped-def]
+        k = e * np.cos(theta)
+        return Pushes(-k[:, None] * u, -k[:, None, None], None)
+
+    system = Oscillator(Linear(squares, damping, places, np.zeros(2)), forces, 1.0, np.ones(1))
+    speed = 3.3
+    orbit, _ = settled(system, *solve(system, speed, np.zeros((9, 1), dtype=complex), 1e-6), 1e-6)
+
+    def rhs(t, y):  # type: ignore[no-untyped-def]
+        push = -e * math.cos(speed * t) * (places[:, 0] @ y[:2])
+        return [*y[2:], *(places[:, 0] * push - squares * y[:2] - damping @ y[2:])]
+
+    period = 2 * math.pi / speed
+    columns = [solve_ivp(rhs, (0, period), x, "DOP853", rtol=1e-11, atol=1e-13).y[:, -1] for x in np.eye(4)]
+    exact = np.linalg.eigvals(np.array(columns).T)
+    mine = multipliers(system, orbit)
+    assert abs(mine[0]) > 1.01
+    assert np.sort(np.abs(mine)) == pytest.approx(np.sort(np.abs(exact)), rel=1e-5)
+    assert kind_of(mine, mine) == "Neimark-Sacker"
+
+
+def test_a_train_has_the_multipliers_of_its_own_transient():
+    """All modes, against those that `gearfe.train` finds by Newton's method on its way round."""
+    model = build_train(loaded([(20, 30)], smooth, ratio=0.02))
+    state = steady_state(model, 600.0, tolerance=1e-5)
+    own, note = train_multipliers(model)
+    assert note == ""
+    mine = multipliers(condense(model).system, state.orbit, reached=0.0)
+    assert np.abs(mine[:10]) == pytest.approx(np.abs(own[:10]), rel=1e-5)
+    assert state.stable
+    # those of modes that the mesh reaches little, left to themselves
+    assert np.abs(state.multipliers[:10]) == pytest.approx(np.abs(own[:10]), rel=1e-3)
+
+
+def test_an_undamped_train_is_unstable_at_twice_its_frequency():
+    """Parametric resonance of a pair in a rigid housing: mesh frequency twice the natural frequency."""
+    model = build_train(loaded([(20, 30)], smooth, ratio=1e-3, flexible=False))
+    natural = 2 * math.pi * model.coupled_frequencies_hz[-1]
+    twice = 2.0 * natural / 20.0
+    run = run_up(model, twice * np.linspace(0.9, 1.1, 9))
+    middle = next(s for s in run.states if s.speed == pytest.approx(twice))
+    assert not middle.stable
+    assert run.states[0].stable
+    kinds = {b.kind for b in run.bifurcations}
+    assert kinds == {"period doubling"}
