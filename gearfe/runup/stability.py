@@ -4,7 +4,7 @@ Small motions beside the orbit feel the forces' derivatives along it,
 
 .. math:: \ddot y + D\dot y + \Lambda y = P\,[A(t)\,P^T y + B(t)\,P^T\dot y] + \Omega\,G\dot y ,
 
-so the orbit is stable where all multipliers, the eigenvalues of the map of (y, y') over a period, have a modulus below 1
+so the orbit is stable where all multipliers, eigenvalues of the map of (y, y') over a period, have a modulus below 1
 (Nayfeh & Balachandran, Applied Nonlinear Dynamics, Sec. 3.2). `gearfe.train.monodromy` integrates the map. Modes that
 the forces reach little are not in it: they yield as they do at rest, and have the multipliers of free decay. A mode
 counts where its share in the forces' change, beside its damping, is more than `REACHED`.
