@@ -185,7 +185,8 @@ def _far_field(interface: Array, stress: Array | None, coupling: Array) -> FarFi
     _, values, modes = np.linalg.svd(triangular, full_matrices=False)
     basis = modes[values > 1e-13 * values[0]].T
     flank, teeth = interface @ basis, len(coupling)
-    driven = {k: (basis.T @ coupling[k % teeth] @ basis) @ flank.T for k in range(-REACH, REACH + 1)}
+    steps = range(-REACH, REACH + 1)
+    driven = dict(zip(steps, basis.T @ coupling[[k % teeth for k in steps]] @ basis @ flank.T, strict=True))
     return FarField(flank, None if stress is None else stress @ basis, driven)
 
 
@@ -197,18 +198,18 @@ def _cyclic_compliance(stiffness: Array, teeth: int) -> Array:
     """X_k for k = 0 .. z - 1 from the side stiffness of one sector (right side first, then left).
 
     With v_j the displacement of the right side of sector j in frame j, the sides of sector j move by
-    (v_j, R v_{j+1}), R the rotation by the pitch angle. A harmonic n has v_j = v exp(i n j 2 pi / z).
+    (v_j, R v_{j+1}), R the rotation by the pitch angle. A harmonic n has v_j = v exp(i n j 2 pi / z), so that the
+    stiffness against it is A + B exp(i n 2 pi / z) + its adjoint, and the factor shifts answers by a tooth.
     """
     half = len(stiffness) // 2
     angle = 2 * np.pi / teeth
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    rotation = np.kron(np.eye(half // 2), turn)
-    harmonics = np.arange(teeth // 2 + 1)
-    phase = np.exp(1j * angle * harmonics)
-    tie = np.concatenate([np.broadcast_to(np.eye(half), (len(phase), half, half)), phase[:, None, None] * rotation], 1)
-    adjoint = tie.conj().transpose(0, 2, 1)
-    per_harmonic = tie @ np.linalg.solve(adjoint @ (stiffness @ tie), adjoint)
-    return np.fft.irfft(per_harmonic, n=teeth, axis=0)
+    rotation = np.kron(np.eye(half // 2), turn(angle))
+    phase = np.exp(1j * angle * np.arange(teeth // 2 + 1))[:, None, None]
+    to_next = stiffness[:half, half:] @ rotation
+    own = stiffness[:half, :half] + rotation.T @ stiffness[half:, half:] @ rotation
+    right = np.fft.irfft(np.linalg.inv(own + phase * to_next + phase.conj() * to_next.T), n=teeth, axis=0)
+    ahead = rotation @ right
+    return np.block([[right, np.roll(right, 1, axis=0) @ rotation.T], [np.roll(ahead, -1, axis=0), ahead @ rotation.T]])
 
 
 @dataclass(frozen=True)
