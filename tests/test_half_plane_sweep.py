@@ -14,7 +14,7 @@ from gearfe.cli import main
 from gearfe.contact.compliance import MeshingPair
 from gearfe.contact.finite_strain import finite_strain_shares
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
-from gearfe.contact.laws import HalfPlane
+from gearfe.contact.laws import HalfPlane, on_elements
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.stiffness.curve_error import torque_changes
@@ -110,7 +110,7 @@ def test_load_map() -> None:
 
 def test_no_other_solver_takes_it() -> None:
     with pytest.raises(InputError, match=r"gearfe.contact.half_plane solves it"):
-        HalfPlane().parameter(200e9, np.ones(1))
+        on_elements(HalfPlane())
     assert isinstance(position_solver(PAIR, elastic_of("half_plane")), HalfPlaneSolver)
     assert isinstance(elastic_of("half_plane").law, HalfPlane)
 

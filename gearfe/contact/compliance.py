@@ -32,7 +32,7 @@ from ..meshing.tooth_sector import SectorMesh
 from ..typing import Array, IntArray
 from .dissection import Condensed, condense
 from .flank import Flank, flank_of, normal_stress_rows
-from .laws import ContactLaw, HalfPlane
+from .laws import ContactLaw, HalfPlane, uses_stress
 from .position import FlankLoads
 
 
@@ -245,7 +245,7 @@ class MeshingPair:
     def __post_init__(self) -> None:
         check_deviations(self.deviations, self.law)
         widths = [body.width for body in self.bodies]
-        if self.law.uses_stress and widths != [self.width, self.width]:
+        if uses_stress(self.law) and widths != [self.width, self.width]:
             problem = f"the gears' surface stresses are made for contacts {widths} m wide"
             raise InputError("width", self.width, problem, "make the gears with it: gear_body(..., width=...)")
 

@@ -20,7 +20,7 @@ import numpy as np
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .closest import Projection, project
 from .compliance import MeshingPair
-from .laws import carrying
+from .laws import carrying, on_elements, uses_stress
 from .position import ranges
 
 
@@ -219,7 +219,7 @@ def batch_of(
     number = np.array([0, flanks[0].weights.size])[own] + quadrature[own] * first_edge[owner] + within
     lengths = np.concatenate([f.weights.ravel() for f in flanks])[number]
     gammas = [
-        np.repeat(elastic.law.parameter(body.surface_modulus, body.flank.sizes), n)
+        np.repeat(on_elements(elastic.law).parameter(body.surface_modulus, body.flank.sizes), n)
         for body, n in zip(elastic.bodies, quadrature, strict=True)
     ]
     last = np.concatenate([f.sizes for f in flanks])[np.array([0, flanks[0].edges])[gear] + first_edge + counts - 1]
@@ -255,7 +255,7 @@ def carried_by(elastic: MeshingPair, first: FirstContacts) -> BoolArray:
     """Whether pinion and wheel carry contact points of the law at each contact, shape (m, 2)."""
     load = first.pressure * first.width
     mean = (first.arc * load[:, None, :]).sum(axis=2) / load.sum(axis=1)[:, None]
-    return carrying(elastic.law, np.array([body.flank.ends[-1] for body in elastic.bodies]) - mean)
+    return carrying(on_elements(elastic.law), np.array([body.flank.ends[-1] for body in elastic.bodies]) - mean)
 
 
 def _blocks(batch: Batch, bears: BoolArray) -> list[Block]:
@@ -271,7 +271,7 @@ def _blocks(batch: Batch, bears: BoolArray) -> list[Block]:
 
 def _response(batch: Batch, windows: range, bears: BoolArray) -> Array:
     """Displacements and stresses of one gear's windows for forces on them, see `Block`."""
-    body, stressed = batch.elastic.bodies[batch.gear[windows[0]]], batch.elastic.law.uses_stress
+    body, stressed = batch.elastic.bodies[batch.gear[windows[0]]], uses_stress(batch.elastic.law)
     q, tooth = body.flank.shapes.shape[0], batch.tooth.tolist()
     nodes = batch.first_node - batch.first_node[windows[0]]
     row = 2 * int(nodes[windows[-1] + 1])

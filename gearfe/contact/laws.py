@@ -15,14 +15,13 @@ whole-gear route alone (`gearfe.verification.laws`).
 **On half-planes** (half_plane): `gearfe.contact.half_plane`, without contact elements.
 
 A law is a frozen dataclass whose fields are its parameters, and a line that names it (`gearfe.tables.laws`; for another
-package an entry point). One that derives from `HalfPlane` is solved as that is. One on the elements provides, and
-nothing else needs to be touched to add it:
+package an entry point); nothing else needs to be touched to add it. It has a ``name``, the text that selects it. One
+that derives from `HalfPlane` is solved as that is. One on the elements (`ElementLaw`) provides besides:
 
-1. ``name``: the text that selects it;
-2. ``uses_stress``: s above (0 or 1); with 1 the bodies keep the stress rows of their flanks;
-3. ``parameter(youngs_modulus, sizes)``: gamma at the edges of a flank, from the body's modulus (Pa) and its edge
+1. ``uses_stress``: s above (0 or 1); with 1 the bodies keep the stress rows of their flanks;
+2. ``parameter(youngs_modulus, sizes)``: gamma at the edges of a flank, from the body's modulus (Pa) and its edge
 lengths (m);
-4. ``sides``: ``both`` (unbiased: each flank carries half of the pressure), ``pinion``, ``wheel``, or ``tip``: of each
+3. ``sides``: ``both`` (unbiased: each flank carries half of the pressure), ``pinion``, ``wheel``, or ``tip``: of each
 tooth pair the gear whose tip is nearer to the contact. A corner that digs into the other flank then lies on the side
 that is integrated, which nothing cuts.
 """
@@ -31,7 +30,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar, Literal, Protocol, get_args
+from typing import Any, ClassVar, Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
 
@@ -47,6 +46,12 @@ class ContactLaw(Protocol):
 
     @property
     def name(self) -> str: ...
+
+
+@runtime_checkable
+class ElementLaw(ContactLaw, Protocol):
+    """A law on the elements of the flanks."""
+
     @property
     def uses_stress(self) -> bool: ...
     @property
@@ -54,7 +59,20 @@ class ContactLaw(Protocol):
     def parameter(self, youngs_modulus: float, sizes: Array) -> Array: ...
 
 
-def carrying(law: ContactLaw, to_tip: Array) -> BoolArray:
+def on_elements(law: ContactLaw) -> ElementLaw:
+    """The law, which has to be one on the elements of the flanks."""
+    if isinstance(law, ElementLaw):
+        return law
+    problem = "has no pressure at points of a mesh: gearfe.contact.half_plane solves it"
+    raise InputError("law", law.name, problem, "use nitsche or penalty here")
+
+
+def uses_stress(law: ContactLaw) -> bool:
+    """Whether the law needs the stress at the flanks."""
+    return isinstance(law, ElementLaw) and law.uses_stress
+
+
+def carrying(law: ElementLaw, to_tip: Array) -> BoolArray:
     """Which gears carry contact points at contacts that lie `to_tip` (m) from their tips, shape (m, 2)."""
     if law.sides == "both":
         return np.ones(to_tip.shape, dtype=bool)
@@ -144,13 +162,6 @@ class HalfPlane:
     """No overlap, no tension, on the panels of `gearfe.contact.half_plane`: half-planes instead of contact elements."""
 
     name: ClassVar[str] = "half_plane"
-    uses_stress: ClassVar[bool] = False
-    sides: ClassVar[Sides] = "both"
-
-    def parameter(self, youngs_modulus: float, sizes: Array) -> Array:  # noqa: ARG002
-        """None: only its own solver knows the law."""
-        problem = "has no pressure at points of a mesh: gearfe.contact.half_plane solves it"
-        raise InputError("law", self.name, problem, "use nitsche or penalty here")
 
 
 def law_named(name: str, **parameters: Any) -> ContactLaw:

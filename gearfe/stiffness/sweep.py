@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..contact.compliance import MeshingPair, gear_body
-from ..contact.laws import ContactLaw, HalfPlane, law_named, law_text
+from ..contact.laws import ContactLaw, HalfPlane, law_named, law_text, uses_stress
 from ..contact.position import Positions
 from ..elasticity import Material, Plane
 from ..errors import InputError
@@ -115,7 +115,7 @@ def elastic_pair(
                 plane,
                 gear.face_width,
                 points_per_edge=points_per_edge,
-                with_stress=chosen.uses_stress,
+                with_stress=uses_stress(chosen),
                 width=width,
             )
             for mesh, material, gear in zip(meshes, both, gears, strict=True)

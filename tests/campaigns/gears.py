@@ -189,8 +189,9 @@ def swap_checks(here: PositionSolver, angles: Any, twists: Any, found: Positions
     Its tooth 0 then stands at the wheel's angle + pi/z2, and the twist of the other gear is twist z2/z1.
     """
     pair, elastic = here.pair, here.elastic
-    sides = {"pinion": "wheel", "wheel": "pinion"}.get(elastic.law.sides, elastic.law.sides)
-    law: Any = elastic.law if sides == elastic.law.sides else replace(elastic.law, sides=sides)  # type: ignore[type-var]
+    sides = getattr(elastic.law, "sides", "both")
+    other_side = {"pinion": "wheel", "wheel": "pinion"}.get(sides, sides)
+    law: Any = elastic.law if sides == other_side else replace(elastic.law, sides=other_side)  # type: ignore[type-var]
     mirrored = GearPair(pair.wheel, pair.pinion, pair.centre_distance)
     other = MeshingPair(elastic.wheel, elastic.pinion, elastic.centre_distance, elastic.width, law)
     turned = elastic.wheel_angle(angles, twists) + math.pi / elastic.wheel.teeth
