@@ -112,30 +112,33 @@ class _Open:
     ----------
     numbers : ndarray, shape (m,)
         Of the positions in the batch, in rising order.
-    pairs
-        The tooth pairs.
+    found
+        Where the rigid flanks of the contacts' tooth pairs first touch.
+    state
+        What the next `half_plane_step.step` starts from.
     """
 
     numbers: IntArray
-    pairs: _Pairs
+    found: Touching
+    state: State
 
     @cached_property
     def couples(self) -> Couplings:
         """Which pairs share a position."""
-        found = self.pairs.found
-        return couplings(np.searchsorted(self.numbers, found.position), found.pair, len(self.numbers))
+        return couplings(np.searchsorted(self.numbers, self.found.position), self.found.pair, len(self.numbers))
 
     def kept(self, positions: BoolArray) -> _Open:
         """Only some of the positions, shape (m,)."""
         if positions.all():
             return self
-        return _Open(self.numbers[positions], taken(self.pairs, np.flatnonzero(positions[self.couples.position])))
+        index = np.flatnonzero(positions[self.couples.position])
+        return _Open(self.numbers[positions], taken(self.found, index), taken(self.state, index))
 
     def change(self, made: Step) -> Array:
         """What a step changed, shape (m,): the forces in units of their sum, and weighted by them the places and widths
         of the contacts, in units of these.
         """
-        new, old, spread = made.solution.force, self.pairs.state, made.spread
+        new, old, spread = made.solution.force, self.state, made.spread
         safe = np.where(spread > 0, spread, 1.0)
         moved = (spread > 0) * (0.5 * np.abs(made.place) / np.sqrt(safe) + np.abs(1 - old.spread / safe))
         all_ = np.abs(new - old.force) + MOVED * new * moved
@@ -143,23 +146,13 @@ class _Open:
 
     def moved_on(self, law: HalfPlanePair, made: Step, *, near: BoolArray | bool = False) -> _Open:
         """What the next step starts from."""
-        state = moved_on(law, self.pairs.state, made, near=near)
-        return _Open(self.numbers, _Pairs(self.pairs.found, state))
-
-
-@dataclass(frozen=True)
-class _Pairs:
-    """p contacts: where the rigid flanks of their tooth pairs first touch, and what the next `half_plane_step.step`
-    starts from."""
-
-    found: Touching
-    state: State
+        return replace(self, state=moved_on(law, self.state, made, near=near))
 
 
 def _first(law: HalfPlanePair, twists: Array, found: Touching) -> _Open:
     numbers = np.unique(found.position)
     couples = couplings(np.searchsorted(numbers, found.position), found.pair, len(numbers))
-    return _Open(numbers, _Pairs(found, first_state(law, twists, found, couples)[0]))
+    return _Open(numbers, found, first_state(law, twists, found, couples))
 
 
 def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) -> Positions:
@@ -174,7 +167,7 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
         while len(open_.numbers) and number - began < STEPS:
             number += 1
             couples = open_.couples
-            made = step(law, open_.pairs.state, couples, search=number - began <= SEARCHES)
+            made = step(law, open_.state, couples, search=number - began <= SEARCHES)
             iterations[open_.numbers] += 1
             unsettled = couples.total(~made.solution.settled | made.outgrown) > 0
             change = open_.change(made)
@@ -218,9 +211,10 @@ def _joined(parts: Sequence[_Open]) -> _Open:
     """One after the other, in rising order."""
     if len(parts) == 1:
         return parts[0]
-    pairs = joined([part.pairs for part in parts])
-    order = np.lexsort((pairs.found.pair, pairs.found.position))
-    return _Open(np.sort(np.concatenate([part.numbers for part in parts])), taken(pairs, order))
+    numbers = np.sort(np.concatenate([part.numbers for part in parts]))
+    found, state = joined([part.found for part in parts]), joined([part.state for part in parts])
+    order = np.lexsort((found.pair, found.position))
+    return _Open(numbers, taken(found, order), taken(state, order))
 
 
 @dataclass(frozen=True)
@@ -253,22 +247,24 @@ def _finished(law: HalfPlanePair, open_: _Open, twists: Array) -> _Ended:
 
     Windows and bearing panels are held, so that the differences are derivatives.
     """
-    pairs, couples, count = open_.pairs, open_.couples, len(open_.numbers)
+    found, couples, count = open_.found, open_.couples, len(open_.numbers)
     touch = np.full(count, np.inf)
-    np.minimum.at(touch, couples.position, pairs.found.twist)
+    np.minimum.at(touch, couples.position, found.twist)
     ahead = np.maximum(AHEAD * (twists[open_.numbers] - touch), LEAST_AHEAD)
-    turn = pairs.state.turn.copy()
+    turn = open_.state.turn.copy()
     turn[:, 1] *= np.exp(1j * ahead[couples.position])
-    shifted = replace(pairs.found, position=pairs.found.position + len(twists))
-    there = _Pairs(shifted, replace(pairs.state, turn=turn))
-    both = _Open(np.concatenate([open_.numbers, open_.numbers + len(twists)]), joined([pairs, there]))
-    made = step(law, both.pairs.state, both.couples, search=False, held=True)
+    both = _Open(
+        np.concatenate([open_.numbers, open_.numbers + len(twists)]),
+        joined([found, replace(found, position=found.position + len(twists))]),
+        joined([open_.state, replace(open_.state, turn=turn)]),
+    )
+    made = step(law, both.state, both.couples, search=False, held=True)
     for _ in range(HELD_STEPS - 1):
         both = both.moved_on(law, made)
-        made = step(law, both.pairs.state, both.couples, search=False, held=True)
+        made = step(law, both.state, both.couples, search=False, held=True)
     here, on = slice(0, len(couples.position)), slice(len(couples.position), None)
-    change, state = both.change(made)[:count], both.pairs.state
-    now = _Open(open_.numbers, _Pairs(pairs.found, taken(moved_on(law, state, made, near=False), here)))
+    change, state = both.change(made)[:count], both.state
+    now = replace(open_, state=taken(both.moved_on(law, made).state, here))
     one, two = (taken(state, here), taken(made, here)), (taken(state, on), taken(made, on))
     of_both = pair_sums(law, state, made)
     of_pairs = {name: values[here] for name, values in of_both.items()}
@@ -277,13 +273,12 @@ def _finished(law: HalfPlanePair, open_: _Open, twists: Array) -> _Ended:
     right = couples.total(~one[1].solution.settled) == 0
     settled = right & (change <= TOLERANCE) & (sums["tangent"] > 0)
     known = of_pairs | contact_rates(law, one, two, ahead[couples.position])
-    contacts = contacts_of(law, pairs.found, one, known)
-    whole = completed(law, pairs.found, one, couples)
+    contacts = contacts_of(law, found, one, known)
+    whole = completed(law, found, one, couples)
     if whole is None:
         return _Ended(settled, sums, contacts, now, False)
-    found, state, changed = whole
-    again = _Open(open_.numbers, _Pairs(found, state))
-    return _Ended(settled & ~changed, sums, contacts, _joined([now.kept(~changed), again.kept(changed)]), True)
+    again = _Open(open_.numbers, *whole[:2]).kept(whole[2])
+    return _Ended(settled & ~whole[2], sums, contacts, _joined([now.kept(~whole[2]), again]), True)
 
 
 def coupling_compliances(law: HalfPlanePair, pinion_angles: Array, twists: Array) -> tuple[Array, IntArray, Array]:

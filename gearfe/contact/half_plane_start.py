@@ -83,8 +83,8 @@ def _yield(law: HalfPlanePair, state: State, normal: ComplexArray, curvature: Ar
     return _Yield(law.compliance, blunt, along, np.abs(points - law.corner[state.flank]))
 
 
-def first_state(law: HalfPlanePair, twists: Array, found: Touching, couples: Couplings) -> tuple[State, Array]:
-    """What the balance of tooth pairs begins with at twists (rad) of the positions, and T by couple (m2/N)."""
+def first_state(law: HalfPlanePair, twists: Array, found: Touching, couples: Couplings) -> State:
+    """What the balance of tooth pairs begins with at twists (rad) of the positions."""
     state = unloaded_state(law, twists, found)
     normal = state.seen
     T = smooth_influence(law, normal, state.arc, couples).compliance
@@ -93,7 +93,7 @@ def first_state(law: HalfPlanePair, twists: Array, found: Touching, couples: Cou
     force = np.maximum(overlap, 0.0) / usual_approach(law)
     for _ in range(ROUNDS):
         force = forces_of_overlaps(overlap, yields.at(force), T, couples)
-    return replace(state, force=force, spread=0.25 * yields.half_width(force) ** 2), T
+    return replace(state, force=force, spread=0.25 * yields.half_width(force) ** 2)
 
 
 def expected_twists(law: HalfPlanePair, torques: Array, touching: Touching) -> Array:
