@@ -216,14 +216,17 @@ class _Group:
         """Values of all panels of each tooth pair, shape (P, z n), from those of the contacts, shape (p, n)."""
         return np.asarray(values[self.contacts].reshape(len(self.contacts), -1))
 
-    def responses(self, on: BoolArray, gap: Array) -> Array:
-        """Pressures on the panels `on` for the gap and for an even approach in each contact, shape (P, z n, 1 + z)."""
+    def responses(self, rows: IntArray, on: BoolArray, gap: Array) -> Array:
+        """Pressures of some tooth pairs on the panels `on` for the gap and for an even approach in each contact, shape
+        (rows, z n, 1 + z).
+        """
         z, size = self.contacts.shape[1], gap.shape[1]
-        right = np.zeros((*gap.shape, 1 + z))
-        right[..., 0] = -gap
+        right = np.zeros((len(rows), size, 1 + z))
+        right[..., 0] = -gap[rows]
         for k in range(z):
             right[:, k * (size // z) : (k + 1) * (size // z), 1 + k] = 1.0
-        system = np.where(on[:, :, None] & on[:, None, :], self.K, np.eye(size))
+        on = on[rows]
+        system = np.where(on[:, :, None] & on[:, None, :], self.K[rows], np.eye(size))
         return np.asarray(np.linalg.solve(system, right * on[:, :, None]))
 
 
@@ -277,16 +280,20 @@ def pressed(
     """
     groups, n = _groups(K, between, couples), gap.shape[1]
     gaps, on = [group.of(gap) for group in groups], bearing
+    responses = [np.empty((*own.shape, 1 + group.contacts.shape[1])) for group, own in zip(groups, gaps, strict=True)]
     y0 = -couples.times(T, carried)
-    pressure, approach = np.empty_like(gap), np.empty_like(gap)
+    pressure, approach, free, stiffness = np.empty_like(gap), np.empty_like(gap), np.empty(len(gap)), np.zeros(len(T))
+    changed = np.ones(len(gap), dtype=bool)
     for _ in range(1 if held else CHANGES):
-        free, stiffness = np.empty(len(gap)), np.zeros(len(T))
-        responses = [group.responses(group.of(on), own) for group, own in zip(groups, gaps, strict=True)]
-        for group, both in zip(groups, responses, strict=True):
-            count, z = group.contacts.shape
-            forces = (widths[group.contacts][:, :, None, :] @ both.reshape(count, z, n, 1 + z))[:, :, 0]
-            free[group.contacts] = forces[:, :, 0]
-            stiffness[couples.couple(group.contacts[:, :, None], group.contacts[:, None])] = forces[:, :, 1:]
+        for group, own, both in zip(groups, gaps, responses, strict=True):
+            rows = np.flatnonzero(changed[group.contacts].any(axis=1))
+            if len(rows) == 0:
+                continue
+            both[rows] = group.responses(rows, group.of(on), own)
+            contacts, z = group.contacts[rows], group.contacts.shape[1]
+            forces = (widths[contacts][:, :, None, :] @ both[rows].reshape(len(rows), z, n, 1 + z))[:, :, 0]
+            free[contacts] = forces[:, :, 0]
+            stiffness[couples.couple(contacts[:, :, None], contacts[:, None])] = forces[:, :, 1:]
         force = couples.solved(free - couples.times(stiffness, y0), stiffness, T)
         y = couples.times(T, force) + y0
         for group, both in zip(groups, responses, strict=True):
@@ -295,12 +302,12 @@ def pressed(
             approach[group.contacts] = (group.K @ p[:, :, None]).reshape(*group.contacts.shape, n)
         bound = ROUNDING * np.abs(approach).max(axis=1, keepdims=True)
         now = np.where(on, pressure > 0, gap + y[:, None] + approach < -bound)
-        settled = (now == on).all(axis=1)
-        if settled.all():
+        changed = (now != on).any(axis=1)
+        if not changed.any():
             break
         on = now
     # without a bearing panel the force is rounding
-    return Pressed(np.where(on.any(axis=1), force, 0.0), np.where(on, pressure, 0.0), approach, settled)
+    return Pressed(np.where(on.any(axis=1), force, 0.0), np.where(on, pressure, 0.0), approach, ~changed)
 
 
 def first_guess(gap: Array) -> BoolArray:
