@@ -46,6 +46,25 @@ JOINTS: dict[str, Kind] = {
         {"body": "a", "to": "b", "point": "point_a", "to_point": "point_b", "length_m": "length"},
     ),
     "fixed": Kind("gearfe.rigid.joints:Fixed", {"body": "a", "to": "b"}),
+    "gear": Kind("gearfe.rigid.gear_ratio:GearRatio", {"body": "a", "to": "b", "ratio": "ratio"}, ("ratio",)),
+    "belt": Kind(
+        "gearfe.rigid.belt:Belt",
+        {"body": "a", "to": "b", "radius_m": "radius_a", "to_radius_m": "radius_b", "crossed": "crossed"},
+        ("radius_m", "to_radius_m"),
+    ),
+    "rack": Kind(
+        "gearfe.rigid.rack:Rack",
+        {"body": "a", "to": "b", "point": "point", "direction": "direction", "radius_m": "radius"},
+        ("radius_m",),
+    ),
+    "rolling": Kind(
+        "gearfe.rigid.rolling:Rolling",
+        {
+            "body": "body", "to": "line", "point": "point", "to_point": "origin", "direction": "direction",
+            "radius_m": "radius",
+        },
+        ("radius_m",),
+    ),
     "prescribed": Kind(
         "gearfe.rigid.joints:Prescribed",
         {"body": "body", "to": "relative_to", "point": "point", "coordinate": "coordinate", "motion": "function"},
@@ -186,6 +205,12 @@ class JointTable:
     length_m: float | None = quantity(
         None, above=0.0, doc="distance that a distance joint keeps in m (default: at start)"
     )
+    ratio: float | None = quantity(None, doc="turns of 'to' per turn of the body: -z/z_to of external gears")
+    radius_m: float | None = quantity(
+        None, doc="radius of the body's pulley or wheel, or of a rack's pinion 'to', in m"
+    )
+    to_radius_m: float | None = quantity(None, above=0.0, doc="radius of the pulley of 'to' in m")
+    crossed: bool = quantity(False, doc="a crossed belt: the pulleys turn in opposite senses")
     coordinate: str | None = quantity(None, choices=("angle", "rate", "x", "y"), doc="what is prescribed")
     motion: Function | None = quantity(None, doc="rad, rad/s or m: a number or a function of time")
 
