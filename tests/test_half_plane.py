@@ -219,10 +219,10 @@ def test_forces_that_stand_still_by_chance_are_no_solution() -> None:
     """Places and widths count too: the first step moves the contacts by micrometres."""
     law, twist = law_of("rounded"), np.array([math.radians(0.05)])
     open_ = _first(law, twist, law.flanks.touching(np.array([0.1])).take([0]))
-    made = step(law, open_.pairs.state, open_.couples)
+    made = step(law, open_.state, open_.couples)
+    still = replace(open_, state=replace(open_.state, force=made.solution.force))
     assert np.abs(made.place).max() > 1e-6
-    still = replace(open_.pairs, state=replace(open_.pairs.state, force=made.solution.force))
-    assert replace(open_, pairs=still).change(made).min() > NEAR
+    assert still.change(made).min() > NEAR
 
 
 def test_an_undercuts_edge_on_a_nearly_flat_mate() -> None:
