@@ -7,7 +7,6 @@ import pytest
 
 from gearfe.contact.laws import HalfPlane, Nitsche, Penalty
 from gearfe.elasticity import Material
-from gearfe.stiffness import curve_cache
 from gearfe.stiffness.curve_cache import cached_curve, curve_key
 
 from .gears import pair
@@ -19,7 +18,7 @@ SWEEP = {"twist": 1e-3, "angles": np.radians([0.0, 6.0, 12.0]), "kinematics": "s
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(curve_cache, "cache_folder", lambda: tmp_path)
+    monkeypatch.setenv("GEARFE_CACHE", str(tmp_path))
     return tmp_path
 
 
@@ -74,7 +73,7 @@ def test_a_damaged_file_is_made_anew(folder):
 
 
 def test_without_a_cache(monkeypatch):
-    monkeypatch.setattr(curve_cache, "cache_folder", lambda: None)
+    monkeypatch.setenv("GEARFE_CACHE", "off")
     assert len(cached_curve(pair(20, 30), MODEL, SWEEP)) == 3
 
 

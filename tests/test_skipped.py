@@ -157,9 +157,7 @@ def test_modes_above_the_band_are_not_sought(monkeypatch):
 
 
 def test_cached_meshes_start_no_mesher(gears, tmp_path, monkeypatch):
-    from gearfe.meshing import cache
-
-    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
+    monkeypatch.setenv("GEARFE_CACHE", str(tmp_path))
     recipe = sector_recipes(gears, coarsen=COARSE)[0]
     first = sector_mesh(gears.pinion, recipe)
     monkeypatch.setattr(tooth_sector, "gmsh_session", touched)

@@ -18,4 +18,5 @@ COMMANDS: dict[str, str] = {
     "runup": "runup",
     "study": "study",
     "new": "new",
+    "cache": "cache",
 }

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
 from .. import __version__
-from ..cache import cache_folder
+from ..cache import cache_key, kept
 from ..config import load_job
 from ..errors import InputError
-from ..meshing.cache import cache_key
 from ..meshing.housing_mesh import RECIPE, bore_ranges, housing_mesh
 from ..progress import stage
 from ..reduction.modal_body import FORMAT, ModalBody
@@ -97,22 +97,19 @@ def reduced_housing(table: HousingTable, folder: str | Path = ".") -> ModalBody:
     recipe: list[object] = [dataclasses.replace(table, damping=HousingDampingTable()), RECIPE, FORMAT, __version__]
     if table.mesh.file is not None:
         recipe.append(fingerprint(Path(folder) / table.mesh.file, "housing.mesh"))
-    cache = cache_folder()
-    path = None if cache is None else cache / f"body-{cache_key('body', recipe)[:32]}.npz"
-    body = None
-    if path is not None and path.exists():
-        try:
-            body = ModalBody.load(path, verify=True)
-        except InputError:
-            body = None
-    if body is None:
-        body = reduced(housing_from_table(table, folder), table.reduction)
-        if path is not None:
-            try:
-                path.parent.mkdir(parents=True, exist_ok=True)
-                body.save(path)
-            except OSError:
-                pass
+
+    def read(path: Path) -> ModalBody | None:
+        with suppress(InputError):
+            return ModalBody.load(path, verify=True)
+        return None
+
+    body = kept(
+        "body",
+        cache_key("body", recipe),
+        read=read,
+        make=lambda: reduced(housing_from_table(table, folder), table.reduction),
+        write=lambda body, path: body.save(path),
+    )
     return damped(body, table)
 
 

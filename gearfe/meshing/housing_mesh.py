@@ -16,11 +16,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cache import cached_arrays
 from ..errors import InputError
 from ..prisms import ORDER, volume_ratios
 from ..progress import stage
 from ..tables.housing import HousingTable, ShaftAxisTable
-from .cache import cached_arrays
 from .session import gmsh_session
 
 Floats = NDArray[np.float64]

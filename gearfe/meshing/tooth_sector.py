@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cache import cached_arrays
 from ..errors import InputError
 from ..gear.involute import tooth_profile
 from ..gear.pair import Gear
 from ..typing import Array, IntArray
-from .cache import cached_arrays
 from .curved_triangles import least_jacobian, second_order
 from .session import gmsh_session
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..cache import cached_arrays
 from ..contact.half_plane import (
     HalfPlanePair,
     coupling_compliances,
@@ -22,7 +23,6 @@ from ..contact.position import Positions
 from ..errors import InputError
 from ..gear.pair import GearPair
 from ..gear.touching import Touching
-from ..meshing.cache import cached_arrays
 from ..progress import stage
 from ..stiffness.curve_cache import curve_key
 from ..stiffness.sweep import elastic_pair

@@ -19,11 +19,10 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..cache import cache_folder
+from ..cache import cache_key, kept
 from ..contact.laws import law_named
 from ..errors import InputError
 from ..gear.pair import GearPair
-from ..meshing.cache import cache_key
 from ..output.files import write_json
 from ..stopwatch import Stopwatch
 from ..tables.laws import DEFAULT_LAW
@@ -55,30 +54,32 @@ def cached_curve(
     estimate_error
         Whether the curve carries an estimate of its error, which is kept in a file beside it.
     """
-    folder = cache_folder()
-    path = None if folder is None else folder / f"curve-{curve_key(pair, model, sweep)[:32]}.csv"
-    found = None if path is None else _stored(path, pair)
-    if found is not None and path is not None and estimate_error:
-        error = _stored_error(path)
-        found = None if error is None else replace(found, error=error)
-    if found is not None:
-        return found
-    from .sweep import elastic_pair, sweep_stiffness
 
-    elastic = elastic_pair(pair, watch=watch, **model)
-    curve = sweep_stiffness(pair, elastic=elastic, progress=progress, estimate_error=estimate_error, **sweep)
-    if watch is not None:
-        for stage, seconds in curve.timings.items():
-            watch.seconds[stage] = watch.seconds.get(stage, 0.0) + seconds
-    if path is not None and not curve.failed.any():
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            curve.to_csv(path)
-            if curve.error is not None:
-                write_json(path.with_suffix(".error.json"), asdict(curve.error))
-        except OSError:
-            pass
-    return curve
+    def read(path: Path) -> StiffnessCurve | None:
+        found = _stored(path, pair)
+        if found is None or not estimate_error:
+            return found
+        error = _stored_error(path)
+        return None if error is None else replace(found, error=error)
+
+    def make() -> StiffnessCurve:
+        from .sweep import elastic_pair, sweep_stiffness
+
+        elastic = elastic_pair(pair, watch=watch, **model)
+        curve = sweep_stiffness(pair, elastic=elastic, progress=progress, estimate_error=estimate_error, **sweep)
+        if watch is not None:
+            for stage, seconds in curve.timings.items():
+                watch.seconds[stage] = watch.seconds.get(stage, 0.0) + seconds
+        return curve
+
+    def write(curve: StiffnessCurve, path: Path) -> None:
+        if curve.failed.any():
+            return
+        curve.to_csv(path)
+        if curve.error is not None:
+            write_json(path.with_suffix(".error.json"), asdict(curve.error))
+
+    return kept("curve", curve_key(pair, model, sweep), read=read, make=make, write=write, suffix=".csv")
 
 
 def curve_key(pair: GearPair, model: dict[str, Any], sweep: dict[str, Any]) -> str:
@@ -101,8 +102,6 @@ def _text_of(module: str) -> str:
 
 
 def _stored(path: Path, pair: GearPair) -> StiffnessCurve | None:
-    if not path.exists():
-        return None
     try:
         curve = StiffnessCurve.from_csv(path)
     except InputError:

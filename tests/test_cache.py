@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -10,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.cache import cache_folder
+from gearfe.cache import LOOK, cache_folder, cache_key, cached_arrays, entries, kept, trim
+from gearfe.cli import main
 from gearfe.errors import MissingLibraryError
 from gearfe.meshing import session
-from gearfe.meshing.cache import cache_key, cached_arrays
 
 
 @dataclasses.dataclass(frozen=True)
@@ -78,6 +79,53 @@ def test_key_sees_every_digit_and_the_class() -> None:
         cache_key("k", object())
 
 
+def test_the_entries_used_last_stay(tmp_path: Path) -> None:
+    """Beyond the limit, what was not used for longest goes; other files of the folder are left alone."""
+    for number in range(10):
+        cached_arrays("thing", number, lambda: {"x": np.zeros(1000)}, tmp_path)
+        path = tmp_path / f"thing-{cache_key('thing', number)[:32]}.npz"
+        os.utime(path, (1e9 + number, 1e9 + number))
+    (tmp_path / "notes.txt").write_text("mine")
+    size = entries(tmp_path)[0].size
+    cached_arrays("thing", 0, lambda: pytest.fail("made again"), tmp_path)  # used now
+    assert trim(tmp_path, 10 * size) == []
+    gone = trim(tmp_path, 5 * size)
+    assert [round(entry.used - 1e9) for entry in gone] == [1, 2, 3, 4, 5, 6]
+    assert len(entries(tmp_path)) == 4
+    assert (tmp_path / "notes.txt").exists()
+    cached_arrays("thing", 0, lambda: pytest.fail("went"), tmp_path)
+
+
+def test_a_new_entry_keeps_the_size_below_the_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GEARFE_CACHE_LIMIT_MB", "0.05")
+    keys = [f"{number * LOOK:08x}" + "0" * 24 for number in range(1, 20)]  # each looks at the size
+    for key in keys:
+        kept(
+            "text", key, read=Path.read_text, make=lambda: "x" * 5000, suffix=".txt", folder=tmp_path,
+            write=lambda text, path: path.write_text(text),
+        )  # fmt: skip
+    assert sum(entry.size for entry in entries(tmp_path)) <= 50_000
+
+
+def test_command_tells_and_cleans(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    monkeypatch.setenv("GEARFE_CACHE", str(tmp_path))
+    cached_arrays("thing", 1, lambda: {"x": np.zeros(1000)})
+    cached_arrays("other", 1, lambda: {"x": np.zeros(1000)})
+    assert main(["cache"]) == 0
+    assert "2 entries" in capsys.readouterr().out
+    assert main(["cache", "--clean", "thng"]) == 2
+    assert "did you mean 'thing'" in capsys.readouterr().err
+    assert main(["cache", "--clean", "thing"]) == 0
+    assert [entry.kind for entry in entries(tmp_path)] == ["other"]
+    assert main(["cache", "--clean"]) == 0
+    assert entries(tmp_path) == []
+    monkeypatch.setenv("GEARFE_CACHE", "off")
+    assert main(["cache"]) == 0
+    assert "nothing is kept" in capsys.readouterr().out
+
+
 def test_folder_from_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("GEARFE_CACHE", str(tmp_path))
     assert cache_folder() == tmp_path
@@ -126,5 +174,5 @@ def test_missing_system_library_names_the_packages(monkeypatch: pytest.MonkeyPat
 
 
 def test_cache_module_imports_no_mesher() -> None:
-    code = "import sys, gearfe.meshing.cache; assert not {'gmsh', 'meshio', 'skfem'} & set(sys.modules)"
+    code = "import sys, gearfe.cache; assert not {'gmsh', 'meshio', 'skfem'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,54 @@
+"""``gearfe cache``: what is kept on disk, how large it is, and away with it."""
+
+from __future__ import annotations
+
+import argparse
+
+HELP = "what is kept on disk (meshes, curves, housings, compiled kernels), its size; remove it"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument(
+        "--clean",
+        nargs="?",
+        const="all",
+        metavar="KIND",
+        help="remove all entries, or those of a kind",
+    )
+    parser.add_argument("--trim", action="store_true", help="remove the entries not used for longest beyond the limit")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Tell, and remove what is asked; 1 when something could not be removed."""
+    from ..cache import CACHE_VARIABLE, LIMIT_VARIABLE, cache_folder, entries, limit, remove, trim
+    from ..errors import unknown_name
+
+    folder = cache_folder()
+    if folder is None:
+        print(f"nothing is kept: {CACHE_VARIABLE} is off")
+        return 0
+    there = entries(folder)
+    kinds = sorted({entry.kind for entry in there})
+    failed = 0
+    if args.clean is not None:
+        if args.clean not in ("all", *kinds):
+            raise unknown_name("--clean", args.clean, ["all", *kinds])
+        chosen = [entry for entry in there if args.clean in ("all", entry.kind)]
+        gone = [entry for entry in chosen if remove(entry)]
+        failed = len(chosen) - len(gone)
+        print(f"removed: {len(gone)} entries, {_size(sum(entry.size for entry in gone))}")
+    elif args.trim:
+        gone = trim(folder, limit())
+        print(f"removed: {len(gone)} entries, {_size(sum(entry.size for entry in gone))}")
+    there = entries(folder)
+    for kind in sorted({entry.kind for entry in there}):
+        some = [entry.size for entry in there if entry.kind == kind]
+        print(f"  {kind:<14} {len(some):>6}  {_size(sum(some)):>10}")
+    total = _size(sum(entry.size for entry in there))
+    print(f"{folder}: {len(there)} entries, {total}; limit {_size(limit())} ({LIMIT_VARIABLE})")
+    return 1 if failed else 0
+
+
+def _size(count: int) -> str:
+    return f"{1e-6 * count:.1f} MB"
