@@ -18,6 +18,7 @@ HELP = "reduce a housing to a small elastic body: mass, bores, frequencies, mode
 
 #: Why a frequency has no estimate.
 _COARSE, _FEW = "the mesh is too coarse for one", "keep more modes (modes_below_Hz)"
+_UNTOLD = "matrices tell none"
 #: Modes drawn.
 _DRAWN = 6
 
@@ -59,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
         with stage("tables"):
             _write(made, body, fields, errors, mesh, left_out)
         with stage("pictures"):
-            problem = "" if args.no_pictures else _draw(made, body, fields)
+            problem = "" if args.no_pictures or not body.has_mesh else _draw(made, body, fields)
     if problem:
         print(f"warning: no pictures: {problem}")
     print(f"results in {folder}")
@@ -85,7 +86,12 @@ def _report(body: ModalBody, errors: dict[str, Any], mesh: MeshError, left_out: 
 
     for note in body.notes:
         print(f"note: {note}")
-    print(f"mass            {body.rigid_mass[0, 0]:.4f} kg")
+    mass = body.rigid_mass[0, 0]
+    print(
+        f"mass            {mass:.4f} kg"
+        if math.isfinite(mass)
+        else "mass            not told by matrices of a held body"
+    )
     print(f"mesh            {len(body.nodes)} nodes, {body.nodes.size} unknowns")
     kept = f"{body.modes} modes to {body.internal_hz[body.modes - 1]:.0f} Hz" if body.modes else "no modes"
     extra = len(body.internal_hz) - body.modes
@@ -99,12 +105,14 @@ def _report(body: ModalBody, errors: dict[str, Any], mesh: MeshError, left_out: 
         frequency = body.coupled.frequencies_hz[number]
         said = f"<= {100.0 * estimate:5.2f} %   (reduction {100.0 * errors['reduction'][number]:.1e} %)"
         if not math.isfinite(estimate):
-            said = "unknown: " + (_COARSE if number < body.modes else _FEW)
+            said = "unknown: " + (_UNTOLD if not body.has_mesh else _COARSE if number < body.modes else _FEW)
         print(f"  {number + 1:3d} {frequency:10.2f} Hz   {said}")
     bound = mesh.response + left_out.response
-    told = f"{100.0 * bound:.2g} % rms" if math.isfinite(bound) else "unknown: keep more modes"
+    why = "keep more modes" if body.has_mesh else _UNTOLD
+    told = f"{100.0 * bound:.2g} % rms" if math.isfinite(bound) else f"unknown: {why}"
     part = f" (mesh {100.0 * mesh.response:.2g} %, reduction {100.0 * left_out.response:.2g} %)"
-    print(f"response of the bores up to {left_out.band_hz:.0f} Hz (1 % damping): estimated error <= {told}{part}")
+    told += part if math.isfinite(bound) else ""
+    print(f"response of the bores up to {left_out.band_hz:.0f} Hz (1 % damping): estimated error <= {told}")
 
 
 def _write(
@@ -112,10 +120,13 @@ def _write(
 ) -> None:
     import numpy as np
 
+    from ..housing.superelement import write_matrix
     from ..output.files import write_csv, write_json
     from ..output.vtkhdf import write_vtkhdf
 
     body.save(folder / "housing.npz")
+    for name, matrix in (("stiffness", body.stiffness), ("mass", body.mass)):
+        write_matrix(folder / f"housing_{name}.mtx", matrix)
     shown = len(fields)
     vectors = body.coupled.vectors[:, :shown]
     participation = body.momentum @ vectors
@@ -129,7 +140,8 @@ def _write(
     columns["reduction_error_bound_percent"] = 100.0 * errors["reduction"]
     write_csv(folder / "modes.csv", columns)
     names = [f"mode_{k + 1:02d}_{body.coupled.frequencies_hz[k]:.1f}_Hz" for k in range(shown)]
-    write_vtkhdf(folder / "modes.vtkhdf", body.nodes, body.cells, point_data=dict(zip(names, fields, strict=True)))
+    if body.has_mesh:
+        write_vtkhdf(folder / "modes.vtkhdf", body.nodes, body.cells, point_data=dict(zip(names, fields, strict=True)))
     summary = {
         "mass_kg": body.rigid_mass[0, 0],
         "unknowns": body.nodes.size,

@@ -21,6 +21,7 @@ from .attachments import PLACE_TOLERANCE, Bore
 from .meshes import Prisms
 from .model import Housing
 from .own_mesh import fingerprint, own_housing
+from .superelement import superelement
 
 
 def housing_from_job(path: str | Path) -> Housing:
@@ -35,8 +36,9 @@ def housing_from_table(table: HousingTable, folder: str | Path = ".") -> Housing
     `folder`, as they are listed.
     """
     table.check("housing")
-    if table.body is not None:
-        raise InputError("housing.body", table.body, "is reduced: it has no mesh any more", "read it: ModalBody.load")
+    if table.reduced:
+        cure = "take gearfe.housing.build.reduced_housing"
+        raise InputError("housing", None, "is reduced: it has no mesh any more", cure)
     if table.mesh.file is not None:
         return own_housing(table, Path(folder), material(table))
     mesh = Prisms(housing_mesh(table))
@@ -94,6 +96,8 @@ def reduced_housing(table: HousingTable, folder: str | Path = ".") -> ModalBody:
     table.check("housing")
     if table.body is not None:
         return damped(_loaded(Path(folder) / table.body), table)
+    if table.superelement is not None:
+        return damped(superelement(table.superelement, folder), table)
     recipe: list[object] = [dataclasses.replace(table, damping=HousingDampingTable()), RECIPE, FORMAT, __version__]
     if table.mesh.file is not None:
         recipe.append(fingerprint(Path(folder) / table.mesh.file, "housing.mesh"))
@@ -142,7 +146,7 @@ def damped(body: ModalBody, table: HousingTable) -> ModalBody:
 
 def bore_points(table: HousingTable, folder: str | Path) -> dict[str, tuple[float, float, float]]:
     """Name -> reference point (m) of the attachments of a mesh file or a reduced body."""
-    if table.body is not None:
+    if table.reduced:
         body = reduced_housing(table, folder)
         rows = zip(body.attachment_names, body.attachment_points, strict=True)
         return {name: (float(x), float(y), float(z)) for name, (x, y, z) in rows}

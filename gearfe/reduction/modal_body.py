@@ -69,7 +69,8 @@ class ModalBody:
     rigid_mass : (6, 6)
         Mass, static moments and inertia about the origin: kinetic energy of rigid translations and rotations.
     tail, levels, next_hz
-        Matrix S, levels of corrections and frequency of the error bound in `gearfe.reduction.craig_bampton`.
+        Matrix S, levels of corrections and frequency of the error bound in `gearfe.reduction.craig_bampton`; a
+        frequency of 0 where nothing is known of what was left out.
     softening : (N, N)
         Estimate of how much too stiff the mesh makes the body, a quadratic form like the stiffness (see
         `gearfe.housing.mesh_error`); all zero where it was not asked for.
@@ -109,6 +110,11 @@ class ModalBody:
     def size(self) -> int:
         """Number of coordinates N."""
         return len(self.mass)
+
+    @property
+    def has_mesh(self) -> bool:
+        """Whether there is more to show than points: elements, and a surface that radiates."""
+        return len(self.elements) > 0
 
     @property
     def cells(self) -> dict[str, Ints]:

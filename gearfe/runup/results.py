@@ -115,7 +115,7 @@ def steady_result(
     moved = modal @ model.core.T.T
     acceleration = -(omega**2)[:, None] * (moved @ model.axial.T)
     housing, power = model.scene.housing, None
-    if housing is not None:
+    if housing is not None and housing.has_mesh:
         v = 1j * omega[:, None] * moved[:, : housing.size]
         square = np.einsum("ki,ki->k", v.conj(), v @ housing.radiation).real
         power = 0.5 * AIR_DENSITY * AIR_SPEED * np.maximum(square, 0.0)

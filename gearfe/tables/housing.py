@@ -113,6 +113,49 @@ class MeshBoreTable:
             raise InputError(f"{where}.direction", list(self.direction), "must not be zero", "give the axis")
 
 
+#: Forces in N, of the systems of units N, m, kg; N, mm, t; ...
+FORCES = {"mm": 1.0, "m": 1.0, "in": 4.4482216152605}
+
+
+@dataclass(frozen=True)
+class AttachmentTable:
+    """An attachment of a superelement: a point with six coordinates."""
+
+    name: str | None = quantity(None, doc="by default its number from 1 on")
+    point_mm: tuple[float, float, float] = quantity(doc="its point (mm)")
+    direction: tuple[float, float, float] = quantity((0.0, 1.0, 0.0), doc="axis of the bore, of any length")
+    rows: tuple[int, int, int, int, int, int] | None = quantity(
+        None,
+        low=1,
+        doc="rows of u_x, u_y, u_z and the rotations in the matrices, from 1 on; left out: six by six in order",
+    )
+    node: int | None = quantity(None, doc="or its node, in Abaqus' matrix input")
+
+    def check(self, where: str) -> None:
+        """Raise `InputError` for keys that contradict each other."""
+        if self.rows is not None and self.node is not None:
+            raise InputError(f"{where}.node", self.node, "stands beside rows", "leave one of them out")
+        if not any(self.direction):
+            raise InputError(f"{where}.direction", list(self.direction), "must not be zero", "give the axis")
+
+
+@dataclass(frozen=True)
+class SuperelementTable:
+    """Matrices of another program in place of a mesh."""
+
+    stiffness: str = quantity(doc="file of the stiffness matrix: Matrix Market, or Abaqus' matrix input")
+    mass: str = quantity(doc="file of the mass matrix")
+    unit: str = quantity(
+        "m", choices=("m", "mm", "in"), doc="of these matrices: m (N, m, kg), mm (N, mm, t) or in (lbf, in, s)"
+    )
+    attachments: tuple[AttachmentTable, ...] = quantity(doc="its attachments")
+
+    def check(self, where: str) -> None:
+        """Raise `InputError` for a superelement without attachments."""
+        if not self.attachments:
+            raise InputError(f"{where}.attachments", [], "is empty", f"add [[{where}.attachments]]")
+
+
 @dataclass(frozen=True)
 class HeldTable:
     """Nodes of a mesh of the user's own that are held: a group, or those on a plane."""
@@ -182,9 +225,13 @@ class HousingTable:
     held: tuple[HeldTable, ...] = quantity((), doc="[[housing.held]]: held faces of such a mesh; none: a free body")
     body: str | None = quantity(None, doc="reduced body (housing.npz of gearfe housing) in place of all this")
 
+    superelement: SuperelementTable | None = quantity(  # noqa: RUF009
+        None, doc="matrices of another program in place of all this"
+    )
+
     def check(self, where: str) -> None:
         """Rules that join several dimensions: everything lies where it can be joined to the rest."""
-        if self.body is not None or self.mesh.file is not None:
+        if self.reduced or self.mesh.file is not None:
             self._check_own(where)
             return
         for key in ("bores", "held"):
@@ -206,12 +253,18 @@ class HousingTable:
             _check_apart(first, second, where)
         self._check_size(f"{where}.mesh")
 
+    @property
+    def reduced(self) -> bool:
+        """Whether the body comes reduced, without a mesh."""
+        return self.body is not None or self.superelement is not None
+
     def _check_own(self, where: str) -> None:
         """What has no meaning beside a mesh of the user's own, or a reduced body."""
         taken = {"mesh", "bores", "held", "material", "reduction", "damping"}
         source = "mesh"
-        if self.body is not None:
-            taken, source = {"body", "reduction", "damping"}, "body"
+        if self.reduced:
+            source = "superelement" if self.body is None else "body"
+            taken = {source, "reduction", "damping"}
             if dataclasses.replace(self.reduction, band_Hz=0.0) != HousingReductionTable(band_Hz=0.0):
                 problem = "a reduced body has its modes"
                 raise InputError(f"{where}.reduction", None, problem, "leave all but band_Hz out, or reduce the mesh")
@@ -220,7 +273,7 @@ class HousingTable:
             if field.name not in taken and getattr(self, field.name) != default:
                 problem = f"stands beside {source}, which has it"
                 raise InputError(f"{where}.{field.name}", None, problem, "leave one of them out")
-        if self.body is None and not self.bores:
+        if not self.reduced and not self.bores:
             raise InputError(f"{where}.bores", None, "is required with a mesh", "add [[housing.bores]]")
 
     def _check_size(self, where: str) -> None:

@@ -178,7 +178,7 @@ def frames(
     body, chosen = scene.housing, np.asarray(steps, dtype=np.int64)
     arrays: dict[str, NDArray[np.generic]] = {"time": response.time[chosen]}
     factor = 1.0 if exaggeration is None else exaggeration
-    if body is not None:
+    if body is not None and body.has_mesh:
         from ..housing.mesh_checks import boundary_faces
 
         faces = boundary_faces(body.elements)

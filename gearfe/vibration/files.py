@@ -143,7 +143,7 @@ def write_run(
     started
         Of `time.perf_counter`: the watch gets the total.
     """
-    radiation = None if scene.housing is None else scene.housing.radiation
+    radiation = scene.housing.radiation if scene.housing is not None and scene.housing.has_mesh else None
     problems: list[str] = []
     with whole_set(folder, MAY_WRITE) as target:
 
@@ -250,7 +250,7 @@ def _fields(
     steps = field_steps(times, choice)
     series, still, film = (np.searchsorted(steps, some) for some in _shown(times, choice))
     write_gears(target / "gears.vtkhdf", scene, kept, series)
-    if scene.housing is not None:
+    if scene.housing is not None and scene.housing.has_mesh:
         write_housing(target / "housing.vtkhdf", scene.housing, kept, series, progress=progress)
     problem = draw_scene(target / "fields.png", frames(scene, kept, [int(still)]), title)
     if choice.animation and not problem:

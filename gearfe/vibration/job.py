@@ -237,7 +237,7 @@ def bore_places(table: HousingTable, folder: Path = Path()) -> dict[str, tuple[f
 
     Files that the table names are looked for in `folder`.
     """
-    if table.body is not None or table.mesh.file is not None:
+    if table.reduced or table.mesh.file is not None:
         from ..housing.build import bore_points
 
         return bore_points(table, folder)

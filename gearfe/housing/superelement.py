@@ -1,0 +1,269 @@
+r"""A housing from the matrices of another program: stiffness and mass over attachments and internal coordinates.
+
+With the attachments' six coordinates :math:`q_b` each and whatever the program put inside, :math:`q_i`, the modes with
+the attachments held, :math:`K_{ii}\Phi = M_{ii}\Phi\Lambda`, and the static shapes :math:`\Psi = -K_{ii}^{-1}K_{ib}`
+turn the coordinates to those of `gearfe.ModalBody`, all of them kept: frequencies and response stay the matrices'.
+
+Matrices are in Matrix Market format, or Abaqus' matrix input (lines of node, freedom, node, freedom, value).
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..output.files import whole_file
+from ..reduction.modal_body import ModalBody
+from ..tables.housing import FORCES, UNITS, AttachmentTable, SuperelementTable
+from ..textfile import read_text
+from ..typing import Array, IntArray
+
+#: Parts of the largest entry up to which matrices are symmetric; energy, against the largest, that is none; masses,
+#: relative to each other, that are the same in all directions.
+SYMMETRIC, NO_ENERGY, SAME_MASS = 1e-6, 1e-7, 1e-3
+#: Part of the largest square of a period below which a coordinate has no mass.
+MASSLESS = 1e-12
+NO_ESTIMATE = "matrices of another program: nothing tells the error of their mesh and reduction"
+MOTIONS = ("x", "y", "z", "rotation about x", "rotation about y", "rotation about z")
+Label = tuple[int, int]
+
+
+class Matrix(NamedTuple):
+    """A square matrix, and what its rows are where the file tells: node and freedom."""
+
+    values: Array
+    labels: list[Label]
+
+
+def superelement(table: SuperelementTable, folder: str | Path) -> ModalBody:
+    """The body of a [housing.superelement] table; files are looked for in `folder`.
+
+    Raises
+    ------
+    InputError
+        For files that cannot be read, matrices that are none of an elastic body, and points that do not fit them.
+    """
+    field = "housing.superelement"
+    K, M = (read_matrix(Path(folder) / getattr(table, name), f"{field}.{name}") for name in ("stiffness", "mass"))
+    if K.values.shape != M.values.shape or K.labels != M.labels:
+        problem = f"has {len(M.values)} coordinates, the stiffness {len(K.values)}"
+        if len(K.values) == len(M.values):
+            problem = "is of other nodes and freedoms than the stiffness"
+        raise InputError(f"{field}.mass", table.mass, problem, "write both of the same superelement")
+    _check_symmetric(K.values, f"{field}.stiffness", table.stiffness)
+    _check_symmetric(M.values, f"{field}.mass", table.mass)
+    rows = [_rows(one, i, K, field) for i, one in enumerate(table.attachments)]
+    bound = np.concatenate(rows)
+    twice = np.flatnonzero(np.bincount(bound) > 1)
+    if len(twice):
+        problem = f"row {int(twice[0]) + 1} belongs to two attachments, or stands twice in one"
+        raise InputError(f"{field}.attachments", None, problem, "each coordinate is one row")
+    order = np.concatenate([bound, np.setdiff1d(np.arange(len(K.values)), bound)])
+    # one energy in J: lengths in m, forces in N, angles in rad; internal coordinates may have any unit
+    force, length = FORCES[table.unit], UNITS[table.unit]
+    scale = np.concatenate([np.tile([1 / length] * 3 + [1.0] * 3, len(rows)), np.ones(len(K.values) - len(bound))])
+    k, m = (
+        force * length * np.outer(scale, scale) * 0.5 * (one.values + one.values.T)[np.ix_(order, order)]
+        for one in (K, M)
+    )
+    points = 1e-3 * np.array([one.point_mm for one in table.attachments])
+    return _body(k, m, points, table, field)
+
+
+def read_matrix(path: Path, field: str) -> Matrix:
+    """A matrix of Matrix Market format or Abaqus' matrix input; where it is half a symmetric one, the whole."""
+    text = read_text(path, field)
+    if text.lstrip().lower().startswith("%%matrixmarket"):
+        return Matrix(_market(path, field), [])
+    made: dict[tuple[Label, Label], float] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip() or line.lstrip().startswith("*"):
+            continue
+        cells = [cell.strip() for cell in line.split(",") if cell.strip()]
+        try:
+            a, b, c, d = (int(cell) for cell in cells[:4])
+            (value,) = (float(cell) for cell in cells[4:])
+        except ValueError:
+            problem = f"is neither Matrix Market nor Abaqus' matrix input: line {number} is {line.strip()[:60]!r}"
+            cure = "begin it with %%MatrixMarket, or write lines of node, freedom, node, freedom, value"
+            raise InputError(field, path.name, problem, cure) from None
+        made[(a, b), (c, d)] = value
+    labels = sorted({label for both in made for label in both})
+    place = {label: i for i, label in enumerate(labels)}
+    values = np.zeros((len(labels), len(labels)))
+    for (one, other), value in made.items():
+        values[place[one], place[other]] = value
+        if (other, one) not in made:
+            values[place[other], place[one]] = value
+    return Matrix(_checked(values, field, path), labels)
+
+
+def _market(path: Path, field: str) -> Array:
+    from scipy.io import mmread
+    from scipy.sparse import issparse
+
+    try:
+        found = mmread(path)
+    except Exception as error:
+        raise InputError(field, path.name, f"cannot be read as Matrix Market ({error})", "is it whole?") from None
+    values = np.asarray(found.toarray() if issparse(found) else found)
+    if np.iscomplexobj(values):
+        raise InputError(field, path.name, "is complex", "bring a real matrix; damping is [housing.damping]")
+    return _whole(_checked(np.asarray(values, dtype=float), field, path))
+
+
+def _checked(values: Array, field: str, path: Path) -> Array:
+    if values.ndim != 2 or values.shape[0] != values.shape[1] or not len(values):
+        raise InputError(field, path.name, f"must be a square matrix, but has the shape {values.shape}", "transpose?")
+    if not np.isfinite(values).all():
+        raise InputError(field, path.name, "holds numbers that are not finite", "write it anew")
+    return values
+
+
+def _whole(values: Array) -> Array:
+    """The matrix, both halves of it where the file has one."""
+    if not np.triu(values, 1).any() or not np.tril(values, -1).any():
+        return values + values.T - np.diag(np.diag(values))
+    return values
+
+
+def _check_symmetric(values: Array, field: str, name: str) -> None:
+    off = np.abs(values - values.T)
+    i, j = np.unravel_index(int(off.argmax()), off.shape)
+    if off[i, j] > SYMMETRIC * np.abs(values).max():
+        problem = (
+            f"is not symmetric: entry ({i + 1}, {j + 1}) is {values[i, j]:.6g}, ({j + 1}, {i + 1}) {values[j, i]:.6g}"
+        )
+        raise InputError(field, name, problem, "bring stiffness and mass of an elastic body without damping or spin")
+
+
+def _rows(one: AttachmentTable, i: int, matrix: Matrix, field: str) -> IntArray:
+    """Rows of an attachment's six coordinates, from 0."""
+    where, count = f"{field}.attachments[{i}]", len(matrix.values)
+    if one.node is not None:
+        if not matrix.labels:
+            raise InputError(f"{where}.node", one.node, "is not told by Matrix Market files", "give rows")
+        try:
+            return np.array([matrix.labels.index((one.node, freedom)) for freedom in range(1, 7)])
+        except ValueError:
+            known = ", ".join(str(node) for node in sorted({node for node, _ in matrix.labels})[:20])
+            problem = f"has no six freedoms 1 to 6 in the matrices, whose nodes are {known}"
+            raise InputError(f"{where}.node", one.node, problem, "retain all six freedoms of the node") from None
+    rows = np.array(one.rows if one.rows is not None else range(6 * i + 1, 6 * i + 7)) - 1
+    if rows.min() < 0 or rows.max() >= count:
+        given = list(one.rows) if one.rows is not None else None
+        problem = f"must be rows 1 to {count} of the matrices: {[int(row) + 1 for row in rows]}"
+        raise InputError(f"{where}.rows", given, problem, "six rows an attachment: u_x, u_y, u_z, and rotations")
+    return rows
+
+
+def rigid_shapes(points: Array) -> Array:
+    """Coordinates of the attachments in unit translations and rotations about the origin, shape (6 a, 6)."""
+    made = np.zeros((len(points), 6, 6))
+    made[:, range(6), range(6)] = 1.0
+    for axis in range(3):
+        made[:, :3, 3 + axis] = np.cross(np.eye(3)[axis], points)
+    return made.reshape(-1, 6)
+
+
+def _body(k: Array, m: Array, points: Array, table: SuperelementTable, field: str) -> ModalBody:
+    from scipy.linalg import eigh
+
+    b, size = 6 * len(points), len(k)
+    stiff, heavy = k[b:, b:], m[b:, b:]
+    if size > b and not np.linalg.eigvalsh(stiff / np.sqrt(np.outer(np.diag(stiff), np.diag(stiff))))[0] > 0.0:
+        problem = "is not positive definite with the attachments held: a part inside can move freely"
+        raise InputError(f"{field}.stiffness", table.stiffness, problem, "are these the attachments' rows?")
+    periods, modes = eigh(heavy, stiff) if size > b else (np.zeros(0), np.zeros((0, 0)))
+    if len(periods) and periods[0] < -SYMMETRIC * periods[-1]:
+        raise InputError(f"{field}.mass", table.mass, "is not positive: a motion has negative energy", "check its sign")
+    kept = np.flatnonzero(periods > MASSLESS * periods.max(initial=0.0))[::-1]
+    squares, modes = 1.0 / periods[kept], modes[:, kept] / np.sqrt(periods[kept])
+    static = -np.linalg.solve(stiff, k[b:, :b]) if size > b else np.zeros((0, b))
+    change = np.block([[np.eye(b), np.zeros((b, len(kept)))], [static, modes]])
+    K, M = (0.5 * (made + made.T) for made in (change.T @ one @ change for one in (k, m)))
+    K[:b, b:], K[b:, :b], K[b:, b:], M[b:, b:] = 0.0, 0.0, np.diag(squares), np.eye(len(kept))
+    rigid = np.vstack([rigid_shapes(points), np.zeros((len(kept), 6))])
+    free = _is_free(K[:b, :b], rigid[:b], points, table, field)
+    momentum, whole = np.full((6, len(K)), math.nan), np.full((6, 6), math.nan)
+    if free:
+        momentum, whole = rigid.T @ M, rigid.T @ M @ rigid
+        masses = np.diag(whole)[:3]
+        if not np.ptp(masses) <= SAME_MASS * masses.max():
+            told = ", ".join(f"{mass:.6g}" for mass in masses)
+            problem = f"differs by direction: {told} kg along x, y, z"
+            raise InputError(f"{field}.mass", table.mass, problem, "check the order of rows and the unit")
+    a = len(points)
+    shapes = np.zeros((3 * a, len(K)))
+    for i in range(a):
+        shapes[3 * i : 3 * i + 3, 6 * i : 6 * i + 3] = np.eye(3)
+    axes = np.array([one.direction for one in table.attachments], dtype=float)
+    return ModalBody(
+        mass=M,
+        damping=np.zeros_like(M),
+        stiffness=K,
+        attachment_names=tuple(one.name or str(i + 1) for i, one in enumerate(table.attachments)),
+        attachment_points=points,
+        attachment_axes=axes / np.linalg.norm(axes, axis=1, keepdims=True),
+        internal_hz=np.sqrt(squares) / (2 * math.pi),
+        modes=len(kept),
+        nodes=points,
+        elements=np.zeros((0, 4), dtype=np.int64),
+        shapes=shapes,
+        faces=np.zeros((0, 3), dtype=np.int64),
+        normals=np.zeros((a, 3)),
+        radiation=np.zeros_like(M),
+        momentum=momentum,
+        rigid_mass=whole,
+        tail=np.zeros((b, b)),
+        levels=0,
+        next_hz=0.0,  # nothing tells what was left out
+        softening=np.zeros_like(M),
+        held=not free,
+        solver="none",
+        notes=(NO_ESTIMATE,),
+    )
+
+
+def _is_free(stiffness: Array, rigid: Array, points: Array, table: SuperelementTable, field: str) -> bool:
+    """Whether the body has its six rigid motions; False where it is held.
+
+    Raises
+    ------
+    InputError
+        Where it is neither, or the points and units do not fit the matrices.
+    """
+    size = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+    scale = np.tile([1.0] * 3 + [1 / size] * 3, len(points))
+    values = np.linalg.eigvalsh(stiffness * np.outer(scale, scale))
+    if values[0] < -NO_ENERGY * values[-1]:
+        problem = "is not positive: a motion of the attachments gives energy"
+        raise InputError(f"{field}.stiffness", table.stiffness, problem, "check its sign")
+    idle = int((values < NO_ENERGY * values[-1]).sum())
+    if idle == 0:
+        return False
+    energy = np.einsum("ik,ij,jk->k", rigid, stiffness, rigid)
+    costs = energy * np.array([1.0] * 3 + [1 / size**2] * 3) > NO_ENERGY * values[-1] * len(points)
+    if idle == 6 and not costs.any():
+        return True
+    if idle == 6:
+        told = ", ".join(name for name, one in zip(MOTIONS, costs, strict=True) if one)
+        problem = f"the matrices have six motions without energy, but these cost some: {told}"
+        cure = "check point_mm, the unit, and the order of rows (u_x, u_y, u_z, rotations in rad about x, y, z)"
+        raise InputError(f"{field}.attachments", None, problem, cure)
+    problem = f"has {idle} motions of the attachments without energy: a free body has 6, a held one none"
+    raise InputError(
+        f"{field}.stiffness", table.stiffness, problem, "are all six coordinates of each attachment there?"
+    )
+
+
+def write_matrix(path: Path, matrix: Array) -> None:
+    """Write a symmetric matrix in Matrix Market format; `read_matrix` gives back every number exactly."""
+    from scipy.io import mmwrite
+
+    with whole_file(path) as temporary:
+        mmwrite(str(temporary), matrix, symmetry="symmetric", precision=17)

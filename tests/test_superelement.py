@@ -1,0 +1,205 @@
+"""Matrices of other programs as housings: there and back, units, orders of rows, and what is wrong with them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.io import mmwrite
+from scipy.sparse import coo_array
+
+from gearfe.cli import main
+from gearfe.config import build
+from gearfe.errors import InputError
+from gearfe.housing.build import housing_from_job, reduced_housing
+from gearfe.housing.superelement import read_matrix, superelement
+from gearfe.reduction.error import accelerances
+from gearfe.reduction.modal_body import ModalBody
+from gearfe.tables.housing import HousingTable, SuperelementTable
+from gearfe.train import build_train
+from gearfe.vibration.job import bore_places, job_scene, read_train_job, train_body
+from gearfe.vibration.mesh_stiffness import train_curves
+
+MESHES = Path(__file__).parent.parent / "meshes"
+POINTS = [(0.0, 31.0, 0.0), (0.0, -31.0, 0.0), (62.5, 31.0, 0.0), (62.5, -31.0, 0.0)]
+B = 24
+
+
+@pytest.fixture(scope="module")
+def bodies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModalBody]:
+    """The shipped box, held by its feet and free, with six modes and corrections."""
+    text = (MESHES / "box.toml").read_text()
+    folder = tmp_path_factory.mktemp("box")
+    (folder / "box.msh").write_bytes((MESHES / "box.msh").read_bytes())
+    made = {}
+    free = text[: text.index("[[housing.held]]")] + text[text.index("[housing.reduction]") :]
+    for name, job in {"held": text, "free": free}.items():
+        (folder / f"{name}.toml").write_text(job)
+        made[name] = housing_from_job(folder / f"{name}.toml").reduce(6, estimate=False)
+    return made
+
+
+def write(folder: Path, K: np.ndarray, M: np.ndarray) -> None:
+    mmwrite(folder / "K.mtx", K, precision=17)
+    mmwrite(folder / "M.mtx", M, precision=17)
+
+
+def table(**keys: Any) -> SuperelementTable:
+    points = [{"point_mm": list(point)} for point in POINTS]
+    return build(
+        SuperelementTable, {"stiffness": "K.mtx", "mass": "M.mtx", "attachments": points, **keys}, "superelement"
+    )
+
+
+def same(one: ModalBody, other: ModalBody, rel: float = 1e-9) -> None:
+    """Frequencies with free and with held attachments, and the response of the attachments."""
+    assert other.held == one.held
+    a, b = one.coupled.frequencies_hz, other.coupled.frequencies_hz
+    assert b[:20] == pytest.approx(a[:20], rel=rel, abs=1e-3)
+    assert np.sort(other.internal_hz) == pytest.approx(np.sort(one.internal_hz), rel=rel)
+    mine, yours = (accelerances(body, 4000.0, points=7) for body in (one, other))
+    assert np.abs(yours - mine).max() < 1e-7 * np.abs(mine).max()
+
+
+@pytest.mark.parametrize("kind", ["held", "free"])
+def test_there_and_back(kind, bodies, tmp_path) -> None:
+    body = bodies[kind]
+    write(tmp_path, body.stiffness, body.mass)
+    made = superelement(table(), tmp_path)
+    same(body, made)
+    assert made.attachment_points == pytest.approx(body.attachment_points, abs=1e-9)
+    if kind == "free":
+        assert made.rigid_mass == pytest.approx(body.rigid_mass, rel=1e-6, abs=1e-9)
+    else:
+        assert np.isnan(made.rigid_mass).all()
+
+
+def test_any_order_and_any_inner_coordinates(bodies, tmp_path) -> None:
+    """Rows shuffled, inner coordinates mixed and scaled, one of them without mass."""
+    body, rng = bodies["free"], np.random.default_rng(3)
+    size = body.size
+    inner = size - B
+    K, M = np.zeros((size + 1, size + 1)), np.zeros((size + 1, size + 1))
+    K[:size, :size], M[:size, :size] = body.stiffness, body.mass
+    K[size, size] = 1e12  # a spring to nothing: carries no mass
+    change = np.eye(size + 1)
+    change[B:size, B:size] = rng.normal(size=(inner, inner)) * 10 ** rng.uniform(-2, 2, inner)
+    shuffle = rng.permutation(size + 1)
+    K, M = ((change.T @ A @ change)[np.ix_(shuffle, shuffle)] for A in (K, M))
+    write(tmp_path, K, M)
+    place = np.argsort(shuffle)
+    rows = [[int(place[6 * i + j]) + 1 for j in range(6)] for i in range(4)]
+    points = [{"point_mm": list(point), "rows": one} for point, one in zip(POINTS, rows, strict=True)]
+    made = superelement(table(attachments=points), tmp_path)
+    assert made.size == size
+    same(body, made, rel=1e-7)
+
+
+@pytest.mark.parametrize(("unit", "force", "length"), [("mm", 1.0, 1e-3), ("in", 4.4482216152605, 0.0254)])
+def test_units_and_abaqus_matrix_input(unit, force, length, bodies, tmp_path) -> None:
+    """The same energy in other units; lines of node, freedom, node, freedom, value, one triangle of them."""
+    body = bodies["held"]
+    to = np.concatenate([np.tile([length] * 3 + [1.0] * 3, 4), np.ones(body.size - B)])
+    nodes = [(10 * (4 - i), k) for i in range(4) for k in range(1, 7)]  # in falling order, so that rows must be found
+    nodes += [(1000 + i, 1) for i in range(body.size - B)]
+    for name, A in (("K", body.stiffness), ("M", body.mass)):
+        own = coo_array(np.tril(A * np.outer(to, to) / (force * length)))
+        lines = [
+            f"{nodes[i][0]},{nodes[i][1]}, {nodes[j][0]},{nodes[j][1]}, {value:.17g}"
+            for i, j, value in zip(own.row, own.col, own.data, strict=True)
+        ]
+        (tmp_path / f"{name}.mtx").write_text("** a comment\n" + "\n".join(lines) + "\n")
+    points = [{"point_mm": list(point), "node": 10 * (4 - i)} for i, point in enumerate(POINTS)]
+    same(body, superelement(table(attachments=points, unit=unit), tmp_path))
+    points[1]["node"] = 7
+    with pytest.raises(InputError, match=r"attachments\[1\]\.node = 7: has no six freedoms.* 10, 20, 30, 40"):
+        superelement(table(attachments=points, unit=unit), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "keys", "told"),
+    [
+        ("unsymmetric", {}, r"stiffness = 'K\.mtx': is not symmetric: entry \(1, 2\)"),
+        ("smaller", {}, r"mass = 'M\.mtx': has 53 coordinates, the stiffness 54"),
+        ("nan", {}, "not finite"),
+        ("", {"attachments": [{"point_mm": [0, 0, 0], "rows": [1, 2, 3, 4, 5, 99]}]}, r"rows .*must be rows 1 to 54"),
+        (
+            "",
+            {"attachments": [{"point_mm": [0, 0, 0]}, {"point_mm": [9, 0, 0], "rows": [1, 2, 3, 4, 5, 6]}]},
+            "row 1 belongs",
+        ),
+        (
+            "",
+            {"attachments": [{"point_mm": [x * 1e-3, y * 1e-3, z]} for x, y, z in POINTS]},
+            "these cost some: rotation",
+        ),
+        ("rotations first", {}, "these cost some|differs by direction|motions"),
+        ("negative mass", {}, "is not positive"),
+        ("negative stiffness", {}, "is not positive"),
+        ("lost rows", {}, r"has \d+ motions of the attachments without energy"),
+        ("", {"stiffness": "none.mtx"}, "there is no such file"),
+        ("", {"stiffness": "text.mtx"}, "neither Matrix Market nor Abaqus' matrix input: line 1 is 'hello'"),
+        ("", {"stiffness": "cut.mtx"}, "cannot be read as Matrix Market"),
+        ("", {"attachments": [{"point_mm": [0, 0, 0], "node": 3}]}, "is not told by Matrix Market files"),
+    ],
+)
+def test_mistakes(change, keys, told, bodies, tmp_path) -> None:
+    body = bodies["free"]
+    K, M = body.stiffness.copy(), body.mass.copy()
+    if change == "unsymmetric":
+        K[0, 1] += 0.01 * K[0, 0]
+    elif change == "smaller":
+        M = M[:-1, :-1]
+    elif change == "nan":
+        M[0, 0] = np.nan
+    elif change == "rotations first":
+        swap = np.concatenate([np.add.outer(6 * np.arange(4), [3, 4, 5, 0, 1, 2]).ravel(), np.arange(B, len(K))])
+        K, M = K[np.ix_(swap, swap)], M[np.ix_(swap, swap)]
+    elif change == "negative mass":
+        M = -M
+    elif change == "negative stiffness":
+        K[:B, :B] *= -1
+    elif change == "lost rows":
+        K[:7], K[:, :7] = 0.0, 0.0
+    write(tmp_path, K, M)
+    (tmp_path / "text.mtx").write_text("hello\n")
+    (tmp_path / "cut.mtx").write_text("%%MatrixMarket matrix array real general\n3 3\n1\n")
+    with pytest.raises(InputError, match=told):
+        superelement(table(**keys), tmp_path)
+
+
+def test_commands(bodies, tmp_path, capsys) -> None:
+    """The matrices that gearfe housing leaves are a housing again, of gearfe housing and of a train."""
+    (tmp_path / "box.msh").write_bytes((MESHES / "box.msh").read_bytes())
+    text = (MESHES / "box.toml").read_text()
+    text = text.replace("[housing.reduction]", "[housing.reduction]\nmodes = 6")
+    text = text.replace('driven = "wheel"', 'driven = "wheel"\nstiffness_N_per_m = 1e8')
+    points = "".join(f"[[housing.superelement.attachments]]\npoint_mm = {list(point)}\n" for point in POINTS)
+    files = 'stiffness = "first/housing_stiffness.mtx"\nmass = "first/housing_mass.mtx"\n'
+    (tmp_path / "first.toml").write_text(text)
+    (tmp_path / "second.toml").write_text("[housing.superelement]\n" + files + points + text[text.index("[pair]") :])
+    found = {}
+    for name in ("first", "second"):
+        job = tmp_path / f"{name}.toml"
+        quick = ["--no-pictures"] if name == "first" else []
+        assert main(["housing", str(job), "--out", str(tmp_path / name), "--modes", "5", *quick]) == 0
+        summary = json.loads((tmp_path / name / "summary.json").read_text())
+        train = read_train_job(job)
+        model = build_train(job_scene(train, train_curves(train), train_body(train)))
+        found[name] = summary["frequencies_free_attachments_Hz"] + model.coupled_frequencies_hz.tolist()
+        assert bore_places(train.housing, tmp_path)["3"] == pytest.approx((0.0625, 0.031, 0))
+    assert found["second"] == pytest.approx(found["first"], rel=1e-9)
+    told = capsys.readouterr().out
+    assert "not told by matrices of a held body" in told
+    assert "nothing tells the error of their mesh and reduction" in told
+    assert {p.name for p in (tmp_path / "second").iterdir()} == {
+        "housing.npz", "housing_mass.mtx", "housing_stiffness.mtx", "modes.csv", "summary.json"
+    }  # fmt: skip
+    again = read_matrix(tmp_path / "second" / "housing_mass.mtx", "mass").values
+    loaded = ModalBody.load(tmp_path / "second" / "housing.npz")
+    assert (again == loaded.mass).all()
+    own = build(HousingTable, {"body": "second/housing.npz", "damping": {"ratio": 0.01}}, "housing")
+    assert reduced_housing(own, tmp_path).damping.any()
