@@ -55,7 +55,7 @@ def test_beside_contacts_as_on_a_fine_flank() -> None:
     for law, options in (("half_plane", {}), ("nitsche", {"flank_coarsen": 0.5})):
         elastic = elastic_pair(PAIR, law=law, **options)
         position = solve_position(PAIR, elastic, angle, twist)
-        found.append((elastic, position, pair_recovery(elastic).at(position, angle, twist)))
+        found.append((elastic, position, pair_recovery(elastic).at(position)))
     (elastic, position, fields), (_, _, fine) = found
     contacts = position.contacts
     assert isinstance(contacts, PairContacts)

@@ -2,6 +2,7 @@
 
 import csv
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -44,7 +45,7 @@ def position(gears, elastic):
 
 @pytest.fixture(scope="module")
 def fields(elastic, position):
-    return pair_recovery(elastic).at(position, ANGLE, TWIST)
+    return pair_recovery(elastic).at(position)
 
 
 def test_a_whole_gear_is_closed(elastic, gears):
@@ -129,7 +130,7 @@ def test_turning_the_whole_picture_changes_nothing(elastic, position, fields):
     recovery = pair_recovery(elastic).gears[0]
     from gearfe.stiffness.fields import gear_field
 
-    turned = gear_field(recovery, elastic, position, ANGLE + 0.4, 0)
+    turned = gear_field(recovery, elastic, replace(position, pinion_angle=ANGLE + 0.4), 0)
     np.testing.assert_allclose(turned.von_mises, fields[0].von_mises, rtol=1e-9)
     np.testing.assert_allclose(turned.displacement, fields[0].displacement @ turn(0.4).T, atol=1e-15)
 

@@ -45,18 +45,24 @@ def test_a_few_positions():
     assert (small.k_mesh > 1.0004 * curve.k_mesh).all()
 
 
+#: What the reference's rows at pair changes are good to: where it resolves the corner, and the worst elsewhere.
+SETTLED, UNSETTLED = 0.25e-2, 1.7e-2
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("plane", "twist_deg", "on_path", "at_changes"),
-    [("strain", 0.05, 0.1e-2, 0.25e-2), ("stress", 0.05, 0.1e-2, 1.0e-2), ("strain", 0.01, 0.1e-2, 1.2e-2)],
+    ("plane", "twist_deg", "at_changes"),
+    [("strain", 0.05, SETTLED), ("stress", 0.05, UNSETTLED), ("strain", 0.01, UNSETTLED)],
 )
-def test_the_full_cycle(plane, twist_deg, on_path, at_changes):
+def test_the_full_cycle(plane, twist_deg, at_changes):
     angles, k = reference(plane, twist_deg)
-    off = computed(plane, twist_deg, angles).k_mesh / k - 1
-    change = np.isin(angles, CHANGES)
-    worst = {"path": np.abs(off[~change]).max(), "changes": np.abs(off[change]).max()}
-    assert worst["path"] <= on_path, dict(zip(angles, off, strict=True))
-    assert worst["changes"] <= at_changes, dict(zip(angles, off, strict=True))
+    found = computed(plane, twist_deg, angles).k_mesh
+    off, change = np.abs(found / k - 1), np.isin(angles, CHANGES)
+    assert off[~change].max() <= 0.1e-2, dict(zip(angles, off, strict=True))
+    assert off[change].max() <= at_changes, dict(zip(angles, off, strict=True))
+    # another formulation, with corner elements a third as long
+    fine = computed(plane, twist_deg, angles[change], law="penalty", flank_coarsen=0.3).k_mesh
+    np.testing.assert_allclose(found[change], fine, rtol=0.3e-2)
 
 
 @pytest.mark.slow

@@ -272,7 +272,8 @@ def _finished(law: HalfPlanePair, open_: _Open, twists: Array) -> _Ended:
     sums["tangent"] = couples.total(of_both["torque_wheel"][on] - of_pairs["torque_wheel"]) / ahead
     right = couples.total(~one[1].solution.settled) == 0
     settled = right & (change <= TOLERANCE) & (sums["tangent"] > 0)
-    known = of_pairs | contact_rates(law, one, two, ahead[couples.position])
+    torques = {name: of_pairs[name] for name in ("torque_wheel", "torque_pinion")}
+    known = torques | contact_rates(law, one, two, ahead[couples.position])
     contacts = contacts_of(law, found, one, known)
     whole = completed(law, found, one, couples)
     if whole is None:

@@ -129,7 +129,7 @@ def _material(made: Step) -> Array:
 def contacts_of(
     law: HalfPlanePair, found: Touching, solved: tuple[State, Step], known: dict[str, Array]
 ) -> PairContacts:
-    """The contacts of a step that carry load; `known` are the torques and rates of all."""
+    """The contacts of a step that carry load; `known` are the torques of all, and what `contact_rates` gives."""
     index = np.flatnonzero(solved[1].solution.force > 0)
     state, made = taken(solved[0], index), taken(solved[1], index)
     force, pressure, width = made.solution.force, made.solution.pressure, made.width
@@ -138,12 +138,6 @@ def contacts_of(
         position=found.position[index],
         pair=found.pair[index],
         force=force * law.width,
-        force_rate=known["force_rate"][index],
-        normal_rate=known["normal_rate"][index],
-        growth=known["growth"][index],
-        arc_rate=known["arc_rate"][index],
-        torque_wheel=known["torque_wheel"][index],
-        torque_pinion=known["torque_pinion"][index],
         point=_centres(state, made),
         normal=state.normal,
         arc=arc,
@@ -156,6 +150,7 @@ def contacts_of(
         pressure=pressure,
         panel_arc=made.arcs,
         panel_radius=np.abs(law.tables.of(state.flank).at(made.arcs)[0]),
+        **{name: values[index] for name, values in known.items()},
     )
 
 

@@ -96,7 +96,8 @@ def bumped(body: GearBody, position: Positions, gear: int) -> tuple[FlankLoads, 
         x, z, tangent = _frame(body, centre)
         stress = half_plane_stress(x, z, edges, own[0] * line / load.sum())
         stress -= half_plane_stress(x, z, half * EDGES, bump)
-        local.append((int(loads.tooth[k]), _turned(stress, tangent)))
+        stress[2] = -stress[2]  # y out of the material
+        local.append((int(loads.tooth[k]), _turned(stress, tangent.real, tangent.imag)))
     return replace(loads, force=force), local
 
 
@@ -124,17 +125,11 @@ def _frame(body: GearBody, centre: float) -> tuple[Array, Array, complex]:
     return seen.real, np.maximum(depth, 0.0), tangent
 
 
-def _turned(stress: Array, tangent: complex) -> Array:
-    """Stresses along the tangent and the depth as xx, yy, xy in the axes of the tangent's components."""
-    (xx, zz, xz), c, s = stress, tangent.real, tangent.imag
-    xy = -xz  # y out of the material
-    return np.stack(
-        [
-            c * c * xx + s * s * zz - 2 * c * s * xy,
-            s * s * xx + c * c * zz + 2 * c * s * xy,
-            c * s * (xx - zz) + (c * c - s * s) * xy,
-        ]
-    )
+def _turned(stress: Array, c: Array | float, s: Array | float) -> Array:
+    """Components xx, yy, xy of plane stresses in axes turned by the angle of cosine c and sine s, shape (3, ...)."""
+    xx, yy, xy = stress
+    one, other = c * c * xx + s * s * yy - 2 * c * s * xy, s * s * xx + c * c * yy + 2 * c * s * xy
+    return np.stack([one, other, c * s * (xx - yy) + (c * c - s * s) * xy])
 
 
 @dataclass(frozen=True)
@@ -222,19 +217,10 @@ def _stress_rows(body: GearBody) -> Any:
     return csr_array((rows.ravel(), (row.ravel(), column.ravel())), shape=(3 * size, 2 * size))
 
 
-def gear_field(recovery: GearRecovery, pair: MeshingPair, position: Positions, angle: float, gear: int) -> GearField:
-    """Fields of one gear.
-
-    Parameters
-    ----------
-    position
-        A converged position.
-    angle
-        Angle (rad) of the frame of tooth 0 of this gear.
-    gear
-        0 pinion, 1 wheel.
-    """
+def gear_field(recovery: GearRecovery, pair: MeshingPair, position: Positions, gear: int) -> GearField:
+    """Fields of one gear (0 pinion, 1 wheel) at a converged position."""
     body, whole = recovery.body, recovery.whole
+    angle = pair.tooth_angle(gear, 0, position.pinion_angle, position.twist)
     teeth = body.teeth
     every = np.arange(teeth)
     local = sector_displacements(body, position.loads[gear], np.zeros_like(every), every)  # (s, 2, z)
@@ -250,14 +236,7 @@ def gear_field(recovery: GearRecovery, pair: MeshingPair, position: Positions, a
     counts = recovery.elements[whole.numbers]
     for tooth, stress in beside:
         sums[:, :, tooth % teeth] += counts[tooth % teeth][:, None] * stress.T
-    xx, yy, xy = sums[:, 0], sums[:, 1], sums[:, 2]
-    turned = np.stack(
-        [
-            c * c * xx + s * s * yy - 2 * c * s * xy,
-            s * s * xx + c * c * yy + 2 * c * s * xy,
-            c * s * (xx - yy) + (c * c - s * s) * xy,
-        ]
-    )
+    turned = _turned(sums.swapaxes(0, 1), c, s)
     numbers = whole.numbers.T.ravel()
     total = [np.bincount(numbers, part.ravel(), len(whole.points)) / recovery.elements for part in turned]
     across = body.material.poisson_ratio * (total[0] + total[1]) if body.plane == "strain" else np.zeros(len(total[0]))
@@ -278,16 +257,9 @@ class PairRecovery:
     pair: MeshingPair
     gears: tuple[GearRecovery, GearRecovery]
 
-    def at(self, position: Positions, pinion_angle: float, twist: float) -> tuple[GearField, GearField]:
-        """Fields of pinion and wheel.
-
-        Parameters
-        ----------
-        position
-            The solution at `pinion_angle` and `twist` (in all, lost motion included).
-        """
-        angles = [self.pair.tooth_angle(gear, 0, pinion_angle, twist) for gear in (0, 1)]
-        pinion, wheel = (gear_field(self.gears[g], self.pair, position, angles[g], g) for g in (0, 1))
+    def at(self, position: Positions) -> tuple[GearField, GearField]:
+        """Fields of pinion and wheel at a converged position."""
+        pinion, wheel = (gear_field(self.gears[gear], self.pair, position, gear) for gear in (0, 1))
         return pinion, wheel
 
 

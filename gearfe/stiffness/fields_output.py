@@ -89,24 +89,24 @@ def write_fields(
         return []
     recovery, solver = pair_recovery(elastic), position_solver(pair, elastic)
     names = ["fields.vtkhdf", "pressure.csv", "pressure.png"]
-    worst: tuple[float, int, tuple[GearField, GearField]] | None = None
+    worst: tuple[float, Positions, tuple[GearField, GearField]] | None = None
     pressures: list[tuple[float, list[FlankPressure]]] = []
     with VtkHdfSeries(folder / "fields.vtkhdf") as series, one_thread():
-        for done, (number, position) in enumerate(_solved(solver, curve, chosen), start=1):
-            angle, twist = _place(curve, number)
-            fields = recovery.at(position, angle, twist)
-            pressures.append((math.degrees(angle), flank_pressures(elastic, position)))
-            _add(series, math.degrees(angle), fields, first=done == 1)
+        places = curve.pinion_angle[chosen], curve.twist[chosen] + curve.lost_motion
+        for done, position in enumerate(_solved(solver, *places), start=1):
+            angle, fields = math.degrees(position.pinion_angle), recovery.at(position)
+            pressures.append((angle, flank_pressures(elastic, position)))
+            _add(series, angle, fields, first=done == 1)
             if angles_deg is not None:
-                names.append(_picture(folder, pair, fields, angle, twist))
+                names.append(_picture(folder, pair, fields, position))
             else:
                 peak = max(float(f.von_mises.max()) for f in fields)
                 if worst is None or peak > worst[0]:
-                    worst = (peak, int(number), fields)
+                    worst = (peak, position, fields)
             if progress is not None:
                 progress(done, len(chosen), "fields")
     if worst is not None:
-        names.append(_picture(folder, pair, worst[2], *_place(curve, worst[1])))
+        names.append(_picture(folder, pair, worst[2], worst[1]))
     write_csv(folder / "pressure.csv", pressure_table(pair, pressures))
     pressure_figure(folder / "pressure.png", **_pressure_lines(pair, pressures))
     return names
@@ -141,19 +141,13 @@ def told_size(elastic: MeshingPair, known_deg: Array, angles_deg: Sequence[float
     )
 
 
-def _place(curve: StiffnessCurve, number: int) -> tuple[float, float]:
-    """Pinion angle and twist in all (rad) of a position of the curve."""
-    return float(curve.pinion_angle[number]), float(curve.twist[number] + curve.lost_motion)
-
-
-def _solved(solver: PositionSolver, curve: StiffnessCurve, chosen: IntArray) -> Iterator[tuple[int, Positions]]:
-    """Positions of the curve solved again, a few side by side; one that does not converge again is left out."""
-    for first in range(0, len(chosen), SIDE_BY_SIDE):
-        part = chosen[first : first + SIDE_BY_SIDE]
-        made = solver.solve(curve.pinion_angle[part], curve.twist[part] + curve.lost_motion, kept=np.arange(len(part)))
-        for number, position in zip(part.tolist(), made, strict=True):
+def _solved(solver: PositionSolver, angles: Array, twists: Array) -> Iterator[Positions]:
+    """Positions at pinion angles and twists (rad), a few side by side; one that does not converge is left out."""
+    for first in range(0, len(angles), SIDE_BY_SIDE):
+        part = slice(first, first + SIDE_BY_SIDE)
+        for position in solver.solve(angles[part], twists[part], kept=np.arange(SIDE_BY_SIDE)):
             if position.status == "converged":
-                yield number, position
+                yield position
 
 
 def _add(series: VtkHdfSeries, time: float, fields: tuple[GearField, GearField], *, first: bool) -> None:
@@ -242,28 +236,24 @@ def frames_of(
     recovery, solver, place = pair_recovery(elastic), position_solver(pair, elastic), zone(pair, modules=1.5)
     frames: list[Frame] = []
     with one_thread():
-        for first in range(0, count, SIDE_BY_SIDE):
-            part = slice(first, first + SIDE_BY_SIDE)
-            made = solver.solve(angles[part], twists[part], kept=np.arange(len(angles[part])))
-            for angle, twist, position in zip(angles[part], twists[part], made, strict=True):
-                if position.status == "converged":
-                    fields = recovery.at(position, float(angle), float(twist))
-                    parts = [
-                        cut_out(1e3 * (f.points + f.displacement), f.triangles, 1e-6 * f.von_mises, place)
-                        for f in fields
-                    ]
-                    frames.append(Frame(math.degrees(angle), parts))
+        for position in _solved(solver, angles, twists):
+            parts = [
+                cut_out(1e3 * (f.points + f.displacement), f.triangles, 1e-6 * f.von_mises, place)
+                for f in recovery.at(position)
+            ]
+            frames.append(Frame(math.degrees(position.pinion_angle), parts))
             if progress is not None:
-                progress(min(first + SIDE_BY_SIDE, count), count, "frames solved")
+                progress(len(frames), count, "frames solved")
     return frames, place
 
 
-def _picture(folder: Path, pair: GearPair, fields: Sequence[GearField], angle: float, twist: float) -> str:
-    name = f"stress_{math.degrees(angle):.6g}deg.png"
+def _picture(folder: Path, pair: GearPair, fields: Sequence[GearField], position: Positions) -> str:
+    angle, twist = math.degrees(position.pinion_angle), math.degrees(position.twist)
+    name = f"stress_{angle:.6g}deg.png"
     parts = [(1e3 * (f.points + f.displacement), straight_triangles(f.triangles), 1e-6 * f.von_mises) for f in fields]
     title = (
-        f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, pinion at {math.degrees(angle):.6g}°, "
-        f"wheel twisted by {math.degrees(twist):.4g}°, deformation to scale"
+        f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, pinion at {angle:.6g}°, wheel twisted by {twist:.4g}°, "
+        "deformation to scale"
     )
     stress_figure(folder / name, title=title, parts=parts, zoom=zone(pair, modules=1.5))
     return name

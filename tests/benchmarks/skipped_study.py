@@ -102,8 +102,8 @@ def fields(quick: bool) -> tuple[float, float, str]:
 
     def recovered() -> None:
         recovery = pair_recovery(elastic)
-        for position, angle in zip(solved, at, strict=True):
-            recovery.at(position, float(angle), TWIST)
+        for position in solved:
+            recovery.at(position)
 
     return short, short + _cpu(recovered, 1), f"{len(at)} positions"
 
