@@ -189,6 +189,12 @@ def test_a_section_without_edge_has_no_stress(tmp_path: Path) -> None:
         load_mechanism(write(tmp_path, text))
 
 
+def test_methods_with_tiny_steps_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    path = write(tmp_path, CANTILEVER)
+    assert main(["mechanism", str(path), "--out", str(tmp_path / "out"), "--method", "explicit"]) == 2
+    assert "flexible links" in capsys.readouterr().err
+
+
 def test_the_command_writes_shape_and_forces(tmp_path: Path) -> None:
     out = tmp_path / "out"
     text = CANTILEVER + "[[paths]]\nbody = 'arm'\npoint = 'tip'\n[figure]\nmagnification = 5.0\n"

@@ -68,6 +68,9 @@ def run_mechanism(
     read = clock.perf_counter()
     times = output_times(end, run.step_s)
     method = run.method if method is None else method
+    if mechanism.links and method not in ("auto", "implicit"):
+        problem = "would follow the axial waves of flexible links with steps of next to no length"
+        raise InputError("run.method", method, problem, "leave it out: they take the implicit method")
     if tolerance is None:
         tolerance = mechanism.tolerance
     if run.analysis == "inverse":

@@ -150,6 +150,17 @@ class System:
             at += element.rows
         return full
 
+    def coordinate_names(self) -> list[str]:
+        """Names of all coordinates: body and coordinate with its unit, or element and number."""
+        names: list[str] = []
+        for element in self.elements:
+            label = element.name or type(element).__name__
+            if isinstance(element, PlanarScene):
+                names += [f"{b.name}_{c}" for b in element.scene.bodies for c in ("x_m", "y_m", "angle_rad")]
+            else:
+                names += [f"{label}_{k}" for k in range(element.size)]
+        return names
+
     def row_names(self) -> list[str]:
         """What each constraint holds, for messages."""
         names: list[str] = []
@@ -174,7 +185,9 @@ class System:
         keep = np.ones(self.rows, dtype=bool) if active is None else active
         G = self.jacobian(t, q)[keep]
         light = np.flatnonzero(extra)
-        free = np.column_stack([f, np.diag(extra)[:, light]])  # and the answers to units of the light accelerations
+        free = f[:, None]
+        if light.size:  # and the answers to units of the light accelerations
+            free = np.column_stack([f, np.diag(extra)[:, light]])
         right = G @ (inverse @ free)
         right[:, 0] += self.velocity_terms(t, q, v)[keep]
         pulls = solve_semidefinite(G @ inverse @ G.T, right)
@@ -204,6 +217,8 @@ def own_motion(answers: Array, light: np.ndarray) -> tuple[Array, Array]:
     `answers`, shape (size, 1 + k), hold the motion that the forces give, and those for a unit of each `light`
     coordinate.
     """
+    if not len(light):
+        return answers[:, 0], np.ones(1)
     shares = np.append(1.0, np.linalg.solve(np.eye(len(light)) - answers[light, 1:], answers[light, 0]))
     return answers @ shares, shares
 

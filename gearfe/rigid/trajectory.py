@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import InputError
 from ..typing import Array
 from .contract import Element
 from .dense import Dense
@@ -33,7 +35,7 @@ class IntegrationError(RuntimeError):
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Trajectory:
     """Result of `integrate`.
 
@@ -61,6 +63,47 @@ class Trajectory:
     method: str
     statistics: Mapping[str, Any]
     dense: Dense = field(repr=False)
+
+    def __repr__(self) -> str:
+        ends = f"{self.time[0]:g} to {self.time[-1]:g} s" if len(self.time) else "none"
+        lines = [
+            f"Trajectory: {self.message} at {self.reached:g} s",
+            f"  times: {len(self.time)}, {ends}",
+            f"  coordinates: {self.system.size}, constraints: {self.system.rows}",
+            f"  method: {self.method}, {self.statistics.get('scheme', '')}, {self.statistics.get('steps', 0)} steps",
+        ]
+        return "\n".join(lines)
+
+    def to_pandas(self) -> Any:
+        """Coordinates and velocities as a `pandas.DataFrame`, a row a time; names as in `System.coordinate_names`.
+
+        Raises
+        ------
+        InputError
+            Where pandas is not installed.
+        """
+        names = self.system.coordinate_names()
+        columns = [*names, *(f"rate of {name}" for name in names)]
+        frame = _library("pandas").DataFrame(np.hstack([self.q, self.v]), columns=columns)
+        return frame.set_index(_library("pandas").Index(self.time, name="time_s"))
+
+    def to_xarray(self) -> Any:
+        """Coordinates q, velocities v, accelerations a over (time_s, coordinate) and multipliers over (time_s, row).
+
+        Returns
+        -------
+        xarray.Dataset
+
+        Raises
+        ------
+        InputError
+            Where xarray is not installed.
+        """
+        states = {name: (("time_s", "coordinate"), getattr(self, name)) for name in "qva"}
+        held = {"multipliers": (("time_s", "row"), self.multipliers)}
+        labels = {"time_s": self.time, "coordinate": self.system.coordinate_names(), "row": self.system.row_names()}
+        attributes = {"status": str(self.status), "method": self.method}
+        return _library("xarray").Dataset({**states, **held}, coords=labels, attrs=attributes)
 
     @property
     def message(self) -> str:
@@ -150,3 +193,11 @@ class Trajectory:
                 continue
             out[i, keep] = least_norm_solution(S, right, 1e-14)
         return out
+
+
+def _library(name: str) -> Any:
+    """A library that is not needed but for this."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise InputError(name, None, "is not installed", f"pip install {name}, or take the arrays q, v, a") from None
