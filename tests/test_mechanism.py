@@ -364,7 +364,7 @@ def test_outputs_that_are_not_finite_are_no_success(tmp_path, capsys, value, mes
 
 def test_a_wrong_type_is_told_what_exists(tmp_path, capsys):
     """Also where the wrong type brings keys of its own."""
-    gear = '[joints.g]\ntype = "gear"\nratio = 2.0\nbody = "rod"\n'
+    gear = '[joints.g]\ntype = "worm"\nstarts = 2\nbody = "rod"\n'
     assert main(["mechanism", str(write(tmp_path, PENDULUM + gear)), "--out", str(tmp_path)]) == 2
-    known = "hinge, slot, prismatic, distance, fixed, prescribed"
-    assert f"joints.g.type = 'gear': must be one of {known}" in capsys.readouterr().err
+    known = "hinge, slot, prismatic, distance, fixed, gear, belt, rack, rolling, prescribed"
+    assert f"joints.g.type = 'worm': must be one of {known}" in capsys.readouterr().err
