@@ -51,8 +51,12 @@ def test_multipliers_of_oscillators_by_direct_integration():
 def test_branches_between_turning_points_are_unstable():
     system = duffing(0.05, 0.03, 0.2)
     made = curve(system.oscillator, np.arange(0.8, 1.4, 0.02))
-    stable = [abs(multipliers(system.oscillator, o)[0]) <= STABLE for o in made.orbits]
-    assert stable == [b != 1 for b in made.branch]
+    for orbit, branch in zip(made.orbits, made.branch, strict=True):
+        largest = abs(multipliers(system.oscillator, orbit)[0])
+        if math.isnan(orbit.error):  # next to a turning point
+            assert largest == pytest.approx(1.0, abs=0.1)
+        else:
+            assert (largest <= STABLE) == (branch != 1)
 
 
 def test_a_sum_resonance_of_two_modes():

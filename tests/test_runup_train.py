@@ -128,7 +128,7 @@ def test_the_jets_of_a_law_are_its_derivatives():
 
     def made(phase):  # type: ignore[no-untyped-def]
         out = np.zeros((300, RESULTS))
-        work, pairs = np.zeros((ROWS + law.slots, law.slots)), np.zeros((300, law.slots))
+        work, pairs = np.zeros((ROWS + 2 * law.slots, law.slots)), np.zeros((300, law.slots))
         arrays = (tables.nodes[0], tables.forces[0], tables.touch[0], tables.energies[0], tables.coupling[0])
         jets()(*arrays, law.reach, phase, approach, pairs, work, out)
         return out

@@ -148,6 +148,8 @@ def curves_figure(
             first = True
             for branch in dict.fromkeys(curve.branch.tolist()):
                 at = np.flatnonzero(curve.branch == branch)
+                if at[0] and curve.branch[at[0] - 1] == branch - 1:  # the turning point between them
+                    at = np.append(at[0] - 1, at)
                 for stable in (True, False):
                     shown = np.where(curve.stable[at] == stable, curve.value[at], np.nan)
                     if not np.isfinite(shown).any():

@@ -40,7 +40,7 @@ from .balance import (
 #: Newton steps of a corrector; a step is kept where the correction is smaller than this part of it.
 CORRECTIONS, CLOSE = 20, 0.35
 #: An extrapolation this near to what is found (in parts of the scale) is on the same curve.
-NEAR = 0.1
+NEAR = 0.2
 #: Steps along the curve, in parts of the scale: first, least, largest; growth from one to the next.
 FIRST, LEAST, LARGEST, GROWTH = 0.05, 1e-5, 0.4, 1.6
 #: Steps along the curve between two asked speeds, at most.
@@ -56,7 +56,7 @@ class Turn(NamedTuple):
     """A turning point."""
 
     speed: float  # rad/s
-    after: int  # number of the orbit before it
+    number: int  # of the orbit nearest to it
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class Curve:
     Attributes
     ----------
     orbits
-        At asked speeds, in the order in which the curve passes them.
+        At asked speeds in the order in which the curve passes them, and the one nearest to each turning point.
     branch
         Number of each orbit's branch: it grows at each turning point.
     turns
@@ -210,6 +210,9 @@ class _Walk:
                 step *= 0.5
                 continue
             if turned:
+                nearest = min(place, new, key=lambda p: abs(p.rising)).orbit
+                self.orbits.append(nearest)
+                self.branch.append(len(self.turns))
                 self.turns.append(Turn(_turning(place, new, step, self.unit), len(self.orbits) - 1))
                 self.heading = -self.heading
             off = self._left(b)

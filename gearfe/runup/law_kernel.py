@@ -21,9 +21,11 @@ from ..rigid import compiled
 MOST, SETTLED = 60, 1e-11
 #: Columns of the results: F, M, dF/d approach, dF/d phase = dM/d approach, dM/d phase, 1 where beyond the reach.
 FORCE, MOMENT, TANGENT, CROSS, BEND, BEYOND, RESULTS = range(7)
-#: Rows of the work space, before those of the matrix: gap, t', t'', Lambda and its derivative with the force, two of
-#: Phi and one of Lambda with the angle, whether a pair bears, two right sides that become solutions, g.
-GAPS, TOUCH1, TOUCH2, LAMBDA, GIVES, TURN, TURN2, SHIFT, BEARS, RIGHT1, RIGHT2, BEFORE, ROWS = range(13)
+#: Rows of the work space, before those of the matrix and of C: gap, t', t'', Lambda and its derivative with the force,
+#: two of Phi and one of Lambda with the angle, whether a pair bears, two right sides that become solutions, g, cell of
+#: the force with Lambda's polynomial there.
+GAPS, TOUCH1, TOUCH2, LAMBDA, GIVES, TURN, TURN2, SHIFT, BEARS, RIGHT1, RIGHT2, BEFORE, PART = range(13)
+ROWS = PART + 5
 
 
 def law_jets(nodes, forces, touch, energies, coupling, reach, phase, approach, pairs, work, out):
@@ -51,17 +53,22 @@ def law_jets(nodes, forces, touch, energies, coupling, reach, phase, approach, p
             work[TOUCH1, k] = c[1] + z * (2.0 * c[2] + 3.0 * z * c[3])
             work[TOUCH2, k] = 2.0 * c[2] + 6.0 * z * c[3]
         out[i, BEYOND] = 1.0 if approach[i] - least > reach else 0.0
+        for k in range(slots):
+            work[PART, k] = -1.0
+            for j in range(slots):
+                if j != k:
+                    work[ROWS + slots + k, j] = coupled(coupling, k, j, slots, cell, z, 0)
         settled = False
         for _ in range(MOST):
-            pair_laws(forces, energies, cell, z, pairs[i], work)
+            compliances(forces, energies, cell, z, pairs[i], work)
             for k in range(slots):
                 off = work[LAMBDA, k] - work[GAPS, k]
                 for j in range(slots):
                     if j != k:
-                        off += coupled(coupling, k, j, slots, cell, z, 0) * pairs[i, j]
+                        off += work[ROWS + slots + k, j] * pairs[i, j]
                 work[BEARS, k] = 1.0 if pairs[i, k] > 0.0 or off < 0.0 else 0.0
                 work[RIGHT1, k] = -off
-            matrix(coupling, slots, cell, z, work)
+            matrix(slots, work)
             for k in range(slots):
                 if work[BEARS, k] == 0.0:
                     work[RIGHT1, k] = -pairs[i, k]
@@ -83,7 +90,8 @@ def law_jets(nodes, forces, touch, energies, coupling, reach, phase, approach, p
             for k in range(RESULTS):
                 out[i, k] = math.nan
             continue
-        pair_laws(forces, energies, cell, z, pairs[i], work)
+        compliances(forces, energies, cell, z, pairs[i], work)
+        turning(forces, energies, cell, z, pairs[i], work)
         force = 0.0
         moment = 0.0
         bend = 0.0
@@ -103,7 +111,7 @@ def law_jets(nodes, forces, touch, energies, coupling, reach, phase, approach, p
             work[BEFORE, k] = shift
             work[RIGHT1, k] = 1.0 if F > 0.0 else 0.0
             work[RIGHT2, k] = -shift if F > 0.0 else 0.0
-        matrix(coupling, slots, cell, z, work)
+        matrix(slots, work)
         solved(slots, work)
         tangent = 0.0
         cross = 0.0
@@ -118,34 +126,37 @@ def law_jets(nodes, forces, touch, energies, coupling, reach, phase, approach, p
         out[i, BEND] = bend
 
 
-def pair_laws(forces, energies, cell, z, pairs, work):
-    """Lambda with its derivatives with force and angle, Phi's first and second derivative with the angle."""
+def compliances(forces, energies, cell, z, pairs, work):
+    """Lambda and its derivative with the force, from the polynomials of the pairs' cells."""
     parts = forces.shape[0] - 1
     for k in range(pairs.shape[0]):
         part = 0
         while part < parts - 1 and pairs[k] >= forces[part + 1]:
             part += 1
+        if work[PART, k] != part:
+            work[PART, k] = part
+            for b in range(1, 5):
+                c = energies[k, cell, part, b]
+                work[PART + b, k] = b * (c[0] + z * (c[1] + z * (c[2] + z * c[3])))
         f = pairs[k] - forces[part]
-        e = energies[k, cell, part]
-        value = 0.0
-        slope = 0.0
-        gives = 0.0
+        e1, e2, e3, e4 = work[PART + 1, k], work[PART + 2, k], work[PART + 3, k], work[PART + 4, k]
+        work[LAMBDA, k] = e1 + f * (e2 + f * (e3 + f * e4))
+        work[GIVES, k] = e2 + f * (2.0 * e3 + 3.0 * f * e4)
+
+
+def turning(forces, energies, cell, z, pairs, work):
+    """Phi's first and second derivative with the angle, and Lambda's."""
+    for k in range(pairs.shape[0]):
+        part = int(work[PART, k])
+        f = pairs[k] - forces[part]
         turn = 0.0
         turn2 = 0.0
         shift = 0.0
         for b in range(4, -1, -1):
-            c = e[b]
-            here = c[0] + z * (c[1] + z * (c[2] + z * c[3]))
-            one = c[1] + z * (2.0 * c[2] + 3.0 * z * c[3])
-            # Horner with derivatives over f: value' and value'' of the energy, its angle's slope with its own slope
-            gives = gives * f + 2.0 * slope
-            slope = slope * f + value
-            value = value * f + here
+            c = energies[k, cell, part, b]
             shift = shift * f + turn
-            turn = turn * f + one
+            turn = turn * f + c[1] + z * (2.0 * c[2] + 3.0 * z * c[3])
             turn2 = turn2 * f + 2.0 * c[2] + 6.0 * z * c[3]
-        work[LAMBDA, k] = slope
-        work[GIVES, k] = gives
         work[TURN, k] = turn
         work[SHIFT, k] = shift
         work[TURN2, k] = turn2
@@ -161,7 +172,7 @@ def coupled(coupling, k, j, slots, cell, z, order):
     return 2.0 * c[2] + 6.0 * z * c[3]
 
 
-def matrix(coupling, slots, cell, z, work):
+def matrix(slots, work):
     """J of the pairs that bear; ones on the diagonal for the others."""
     for k in range(slots):
         for j in range(slots):
@@ -169,7 +180,7 @@ def matrix(coupling, slots, cell, z, work):
             if j == k:
                 work[ROWS + k, j] = work[GIVES, k] if both else 1.0
             else:
-                work[ROWS + k, j] = coupled(coupling, k, j, slots, cell, z, 0) if both else 0.0
+                work[ROWS + k, j] = work[ROWS + slots + k, j] if both else 0.0
 
 
 def solved(slots, work):
@@ -190,13 +201,13 @@ def solved(slots, work):
         work[RIGHT2, k] /= work[ROWS + k, k]
 
 
-FUNCTIONS = (law_jets, pair_laws, coupled, matrix, solved)
+FUNCTIONS = (law_jets, compliances, turning, coupled, matrix, solved)
 NAMES = {
     "math": math, "MOST": MOST, "SETTLED": SETTLED,
     "FORCE": FORCE, "MOMENT": MOMENT, "TANGENT": TANGENT, "CROSS": CROSS, "BEND": BEND, "BEYOND": BEYOND,
     "RESULTS": RESULTS, "GAPS": GAPS, "TOUCH1": TOUCH1, "TOUCH2": TOUCH2, "LAMBDA": LAMBDA, "GIVES": GIVES,
     "TURN": TURN, "TURN2": TURN2, "SHIFT": SHIFT, "BEARS": BEARS, "RIGHT1": RIGHT1, "RIGHT2": RIGHT2,
-    "BEFORE": BEFORE, "ROWS": ROWS,
+    "BEFORE": BEFORE, "PART": PART, "ROWS": ROWS,
 }  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..typing import Array, ComplexArray
+from ..typing import Array, ComplexArray, IntArray
 
 #: Squares of frequencies below this part of the largest are round-off: such a mode moves freely.
 ROUND_OFF = 1e-12
@@ -86,8 +86,8 @@ class Linear:
         return Poles(values.astype(complex), np.asarray(vectors[:n] / rates[:, None], dtype=complex), into)
 
     @cached_property
-    def _pairs(self) -> tuple[Array, Array, Array]:
-        """Poles in pairs, conjugate or both real: sum and product (n, 2), and real residues (n, 2, entries).
+    def _pairs(self) -> tuple[Array, Array]:
+        """Poles in pairs, conjugate or both real: sum and product (n, 2), and a and b, (n, entries) beside each other.
 
         A pair gives :math:`(a s + b)/(s^2 - (\\lambda_1 + \\lambda_2) s + \\lambda_1\\lambda_2)`. The flexibility is
         symmetric: entries are those of its upper half.
@@ -102,22 +102,29 @@ class Linear:
         first, second = poles.values[one, None], poles.values[two, None]
         a, b = residues[one] + residues[two], -(residues[one] * second + residues[two] * first)
         sums = np.hstack([(first + second).real, (first * second).real])
-        return sums, np.ascontiguousarray(a.real), np.ascontiguousarray(b.real)
+        return sums, np.ascontiguousarray(np.hstack([a.real, b.real]))
+
+    @staticmethod
+    def _places_of_entries(p: int) -> IntArray:
+        """Entry of the upper half that stands at each place of a symmetric matrix, (p p,)."""
+        made = np.zeros((p, p), dtype=np.int64)
+        up = np.triu_indices(p)
+        made[up] = np.arange(len(up[0]))
+        return np.maximum(made, made.T).ravel()
 
     def _own(self, omega: Array) -> ComplexArray:
         """Flexibility of all freedoms without gyroscopic moments, (k, p, p)."""
-        sums, a, b = self._pairs
-        s = 1j * omega[:, None]
+        sums, numerators = self._pairs
         with np.errstate(divide="ignore", invalid="ignore"):  # infinite at the resonance of an undamped mode
-            inverse = 1.0 / ((sums[:, 1] - (omega**2)[:, None]) - s * sums[:, 0])
-            split = np.vstack([inverse.real, inverse.imag])
-            entries = [split @ x for x in (a, b)]
+            real, imaginary = sums[:, 1] - (omega**2)[:, None], -omega[:, None] * sums[:, 0]
+            size = 1.0 / (real**2 + imaginary**2)
+            real, imaginary = (real * size) @ numerators, (-imaginary * size) @ numerators
         k, p = len(omega), self.size + self.tilts.shape[1]
-        values = s * (entries[0][:k] + 1j * entries[0][k:]) + entries[1][:k] + 1j * entries[1][k:]
-        made = np.empty((k, p, p), dtype=complex)
-        up = np.triu_indices(p)
-        made[:, up[0], up[1]] = values
-        made[:, up[1], up[0]] = values
+        count, w = numerators.shape[1] // 2, omega[:, None]
+        values = np.empty((k, count), dtype=complex)
+        values.real = real[:, count:] - w * imaginary[:, :count]
+        values.imag = imaginary[:, count:] + w * real[:, :count]
+        made: ComplexArray = values[:, self._places_of_entries(p)].reshape(k, p, p)
         return made
 
     @cached_property

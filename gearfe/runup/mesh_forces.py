@@ -85,7 +85,7 @@ class MeshForces:
         if pairs is None:
             pairs = self._pairs[number, count] = np.zeros((count, slots))
         out = np.zeros((count, RESULTS))
-        work = np.zeros((ROWS + slots, slots))
+        work = np.zeros((ROWS + 2 * slots, slots))
         jets()(*tables, flank.law.reach, phase, np.ascontiguousarray(approach), pairs, work, out)
         push = 1.0 + flank.damping * rate
         acts = push > 0.0

@@ -235,7 +235,7 @@ def _tops(values: Array) -> list[int]:
 def summary(run: RunUp, modes: CoupledModes, multiples: int) -> dict[str, Any]:
     """What summary.json says of the run-up."""
     states, model = run.states, run.train.model
-    reached = {s.speed for s in states}
+    reached = {s.speed for s in states} & set(run.speeds.tolist())
     factors = [dynamic_factors(run, i) for i in range(len(model.meshes))]
     open_ = [np.array([s.apart[i] for s in states]) for i in range(len(model.meshes))]
 
@@ -251,7 +251,7 @@ def summary(run: RunUp, modes: CoupledModes, multiples: int) -> dict[str, Any]:
         "steady_states": len(states),
         "turning_speeds_rad_per_s": run.turning_speeds.tolist(),
         "bifurcations": [{"speed_rad_per_s": b.speed, "kind": b.kind, "branch": b.branch} for b in run.bifurcations],
-        "largest_error_estimate": max((s.error for s in states), default=None),
+        "largest_error_estimate": max((s.error for s in states if s.error == s.error), default=None),
         "tolerance": run.tolerance,
         "band_Hz": run.band_hz,
         "mesh_names": [line.name for line in model.meshes],
@@ -286,13 +286,14 @@ def warnings(run: RunUp) -> list[str]:
             f"at {len(beyond)} of {len(run.states)} states, the first at {beyond[0]:.6g} rad/s, a mesh goes beyond "
             "what its law is known for: write a larger law_torque_Nm in [[train.meshes]]"
         )
-    lost = sorted({s.speed for s in run.states} - {s.speed for s in run.states if s.stable is not False}, key=abs)
+    held = {s.speed for s in run.states if s.stable is not False}
+    lost = sorted({s.speed for s in run.states} & set(run.speeds.tolist()) - held, key=abs)
     if lost:
         found.append(
             f"at {len(lost)} speeds, {lost[0]:.6g} to {lost[-1]:.6g} rad/s, no motion with the period of the meshes is "
             "stable: what runs there repeats after several periods or not at all; look at a transient"
         )
-    late = [s for s in run.states if not s.error <= run.tolerance]
+    late = [s for s in run.states if s.error > run.tolerance]
     if late:
         worst = max(late, key=lambda s: s.error)
         found.append(

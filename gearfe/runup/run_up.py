@@ -39,7 +39,8 @@ class RunUp:
         Asked speeds (rad/s).
     states
         Steady states at these speeds in the order in which their curve passes them: on branch 0 upwards, after a
-        turning point on branch 1 back, after the next one on branch 2 upwards again.
+        turning point on branch 1 back, after the next one on branch 2 upwards again; and one next to each turning point,
+        as the last of its branch.
     turning_speeds : (turns,)
         Speeds of the turning points (rad/s), between branch 0 and 1, 1 and 2, ...
     bifurcations
@@ -67,7 +68,8 @@ class RunUp:
         known the first of all is taken, whose `stable` says so.
         """
         found: dict[float, list[SteadyState]] = {}
-        for state in self.states:
+        asked = set(self.speeds.tolist())
+        for state in (s for s in self.states if s.speed in asked):
             found.setdefault(state.speed, []).append(state)
         made = []
         for speed in sorted(found, key=abs):
@@ -177,7 +179,7 @@ def _numbered(curve: Curve, before: Sequence[tuple[Orbit, int]], turns: int) -> 
 def _bifurcations(states: Sequence[SteadyState], turns: Sequence[float]) -> tuple[Bifurcation, ...]:
     """Turning points, and where a branch's largest multiplier passes the unit circle."""
     found = [Bifurcation(speed, "turning point", branch) for branch, speed in enumerate(turns)]
-    for one, two in itertools.pairwise(states):
+    for one, two in itertools.pairwise(s for s in states if not math.isnan(s.error)):  # without those at turning points
         if one.branch != two.branch or one.stable == two.stable:
             continue
         assert one.multipliers is not None
