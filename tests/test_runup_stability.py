@@ -10,8 +10,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import mathieu_a, mathieu_b
 
+from gearfe.errors import InputError
 from gearfe.runup.balance import Oscillator, Pushes, settled, solve
 from gearfe.runup.condensed import condense
+from gearfe.runup.instability import instability_map
 from gearfe.runup.linear import Linear
 from gearfe.runup.run_up import run_up, steady_state
 from gearfe.runup.stability import STABLE, kind_of, multipliers
@@ -21,6 +23,11 @@ from gearfe.train.floquet import train_multipliers
 from .oscillators import duffing, meshing, monodromy
 from .test_runup_balance import curve, found, start_of
 from .test_runup_train import loaded, smooth
+from .trains import curve as stiffness_curve
+
+
+def smooth_of(teeth, swing):  # type: ignore[no-untyped-def]
+    return stiffness_curve(teeth, mean=1e8, swing=swing)
 
 
 @pytest.mark.parametrize("border", [mathieu_a, mathieu_b])
@@ -109,3 +116,22 @@ def test_an_undamped_train_is_unstable_at_twice_its_frequency():
     assert run.states[0].stable
     kinds = {b.kind for b in run.bifurcations}
     assert kinds == {"period doubling"}
+
+
+def test_the_map_without_damping_has_mathieus_tongue():
+    """A pair in a rigid housing, k (1 + e cos): unstable between the speeds of the characteristic values alone."""
+    model = build_train(loaded([(20, 30)], lambda teeth: smooth_of(teeth, 0.1), flexible=False))
+    train = condense(model)
+    stiffness, inertia = 1e8, model.shafts[1].rotor.polar
+    radius = abs(float(model.meshes[0].row[model.first[1] + 5]))
+    natural = radius * math.sqrt(stiffness / inertia)
+    edges = [
+        brentq(lambda w, border=border: border(1, 2 * 0.1 / w**2) - 4 / w**2, 1.8, 2.2) * natural / 20.0
+        for border in (mathieu_a, mathieu_b)
+    ]
+    low, high = sorted(edges)
+    speeds = [0.998 * low, 1.002 * low, 0.5 * (low + high), 0.998 * high, 1.002 * high]
+    made = instability_map(train, speeds, [0.5, 1.0])
+    assert (np.abs(made.multiplier) > 1.0 + 1e-3).tolist() == [[False, True, True, True, False]] * 2
+    with pytest.raises(InputError, match="must be > 0"):
+        instability_map(train, speeds, [0.0])

@@ -216,10 +216,10 @@ def job(tmp_path):  # type: ignore[no-untyped-def]
 
 def test_the_command_writes_tables_and_pictures(job, tmp_path, capsys):
     out = tmp_path / "out"
-    assert main(["runup", str(job(RUNUP)), "--out", str(out)]) == 0
+    assert main(["runup", str(job(RUNUP + "instability_loads = [0.5, 1.0]\n")), "--out", str(out)]) == 0
     names = sorted(path.name for path in out.iterdir())
     assert names == [
-        "campbell.png", "critical_speeds.csv", "meshes.png", "modes.csv", "orders.csv", "orders.png", "runup.csv",
+        "campbell.png", "critical_speeds.csv", "instability.csv", "instability.png", "meshes.png", "modes.csv", "orders.csv", "orders.png", "runup.csv",
         "summary.json", "waterfall.csv", "waterfall.npz", "waterfall.png",
     ]  # fmt: skip
     table = np.genfromtxt(out / "runup.csv", delimiter=",", names=True)

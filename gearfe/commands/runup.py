@@ -51,6 +51,7 @@ def run(args: argparse.Namespace) -> int:
     from ..output.files import output_folder
     from ..rigid import constant
     from ..runup.files import write_runup
+    from ..runup.instability import instability_map
     from ..runup.run_up import run_up
     from ..stopwatch import Stopwatch
     from ..train import build_train
@@ -80,13 +81,17 @@ def run(args: argparse.Namespace) -> int:
     if not made.states:
         problem = "has no periodic motion that was found at any of the speeds"
         raise _nothing(table, problem)
+    unstable = None
+    if table.instability_loads:
+        with watch.stage("instability"), stage("instability"):
+            unstable = instability_map(made.train, speeds, table.instability_loads, progress=_counted)
     further = {"variant": job.table.variant, "job": {"runup": asdict(table), "train": asdict(job.table)}}
     parts = [f"{len(model.shafts)} shafts, {len(model.meshes)} gear meshes"]
     parts += [f"load {x.torque_Nm:g} N m on {x.shaft}".replace("-", "−", 1) for x in job.table.loads[:1]]
     parts += [f"variant {job.table.variant}"] if job.table.variant else []
     summary, names = write_runup(
         folder, made, multiples=table.multiples, title=", ".join(parts), attachment=args.attachment,
-        draw=not args.no_pictures, watch=watch, further=further,
+        draw=not args.no_pictures, watch=watch, further=further, unstable=unstable,
     )  # fmt: skip
     for line in _told(summary):
         print(line)

@@ -183,6 +183,21 @@ def curves_figure(
     save(figure, path)
 
 
+def instability_figure(path: str | Path, *, title: str, speed: Array, load: Array, growth: Array) -> None:
+    """Growth (1/s) of vibration without damping over speed (n,) and load factor (m,), shape (m, n)."""
+    figure = new_figure(10.5, 4.6)
+    axes = figure.add_subplot()
+    axes.set_title(title, fontsize=11, loc="left")
+    rows = np.arange(len(load))
+    shown = axes.pcolormesh(speed, rows, growth, cmap="magma_r", shading="nearest", vmin=0.0)
+    axes.set_yticks(rows, [f"{x:g}" for x in load])
+    axes.set_xlabel("speed of the drive  (rad/s)")
+    axes.set_ylabel("factor on the loads")
+    _rpm(axes)
+    figure.colorbar(shown, ax=axes, pad=0.02, label="growth, and damping that holds it  (1/s)")
+    save(figure, path)
+
+
 def _label_order(axes: Any, line: OrderLine, low: float, high: float, highest: float, colour: str) -> None:
     """Name of an order where its line leaves the picture."""
     end = min(high, highest / line.slope)

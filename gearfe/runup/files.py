@@ -11,6 +11,7 @@ import numpy as np
 from ..output.arrays import save_arrays
 from ..output.files import whole_set, write_csv, write_json
 from . import pictures, report
+from .instability import InstabilityMap
 from .modes import coupled_modes, crossings
 from .run_up import RunUp
 
@@ -20,12 +21,13 @@ CAMPBELL = 7
 FILES = (
     "runup.csv", "orders.csv", "waterfall.csv", "waterfall.npz", "modes.csv", "critical_speeds.csv", "summary.json",
     "waterfall.png", "campbell.png", "orders.png", "meshes.png",
+    "instability.csv", "instability.png",
 )  # fmt: skip
 
 
 def write_runup(
     folder: Path, run: RunUp, *, multiples: int, title: str, attachment: str | None, draw: bool, watch: Any,
-    further: Mapping[str, Any],
+    further: Mapping[str, Any], unstable: InstabilityMap | None = None,
 ) -> tuple[dict[str, Any], list[str]]:  # fmt: skip
     """Write tables, pictures and the summary; returns the summary and the names of the files.
 
@@ -33,6 +35,8 @@ def write_runup(
     ----------
     further
         Entries of the summary that tell what was computed.
+    unstable
+        Map of parametric instability, where one was asked for.
     """
     bore = pictures.attachment_to_draw(run, attachment)
     with watch.stage("modes"):
@@ -46,12 +50,16 @@ def write_runup(
             save_arrays(target / "waterfall.npz", report.waterfall(run))
             write_csv(target / "modes.csv", report.mode_columns(modes))
             write_csv(target / "critical_speeds.csv", report.critical_columns(modes, met))
+            if unstable is not None:
+                write_csv(target / "instability.csv", report.instability_columns(unstable))
         if draw:
             with watch.stage("pictures"):
                 pictures.draw_waterfall(target / "waterfall.png", run, multiples, bore, title)
                 pictures.draw_campbell(target / "campbell.png", run, modes, met, multiples, title)
                 pictures.draw_orders(target / "orders.png", run, multiples, bore, title)
                 pictures.draw_forces(target / "meshes.png", run, title)
+                if unstable is not None:
+                    pictures.draw_instability(target / "instability.png", unstable, title)
         made = {**further, **report.summary(run, modes, multiples), "warnings": report.warnings(run)}
         made["timings_s"] = dict(watch.seconds)
         write_json(target / "summary.json", made)

@@ -9,8 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import unknown_name
-from ..output.runup_figures import OrderLine, Pieces, campbell_figure, curves_figure, waterfall_figure
+from ..output.runup_figures import (
+    OrderLine,
+    Pieces,
+    campbell_figure,
+    curves_figure,
+    instability_figure,
+    waterfall_figure,
+)
 from ..typing import Array
+from .instability import InstabilityMap
 from .modes import CoupledModes, Crossing
 from .report import dynamic_factors, orders
 from .results import SteadyState
@@ -99,6 +107,17 @@ def draw_forces(path: Path, run: RunUp, title: str) -> None:
     if max(float(p.value.max()) for p in open_.values()) > 0.0:
         panels.append(("without contact  (% of the time)", open_))
     curves_figure(path, title=f"Meshes in steady running\n{title}", panels=panels, turns=run.turning_speeds.tolist())
+
+
+def draw_instability(path: Path, made: InstabilityMap, title: str) -> None:
+    """Growth without damping over speed and load."""
+    instability_figure(
+        path,
+        title=f"Parametric instability without damping\n{title}",
+        speed=made.speeds,
+        load=made.loads,
+        growth=np.maximum(made.growth, 0.0),
+    )
 
 
 def order_lines(run: RunUp, multiples: int) -> list[OrderLine]:

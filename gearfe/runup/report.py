@@ -9,6 +9,7 @@ import numpy as np
 
 from ..typing import Array
 from ..vibration.radiation import power_level
+from .instability import InstabilityMap
 from .modes import CoupledModes, Crossing
 from .results import SteadyState
 from .run_up import RunUp
@@ -158,6 +159,18 @@ def mode_columns(modes: CoupledModes) -> dict[str, Any]:
     for j, part in enumerate(("shafts", "housing")):
         columns[f"kinetic_share_{part}"] = modes.kinetic[number, j]
     return columns
+
+
+def instability_columns(made: InstabilityMap) -> dict[str, Any]:
+    """Columns of instability.csv: a row for each speed and factor on the loads."""
+    mu = made.multiplier.ravel()
+    return {
+        "load_factor": np.repeat(made.loads, len(made.speeds)),
+        "speed_rad_per_s": np.tile(made.speeds, len(made.loads)),
+        "largest_multiplier": np.abs(mu),
+        "largest_multiplier_angle_deg": np.degrees(np.abs(np.angle(mu))),
+        "growth_per_s": made.growth.ravel(),
+    }
 
 
 def critical_columns(modes: CoupledModes, met: list[Crossing]) -> dict[str, Any]:

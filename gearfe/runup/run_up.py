@@ -39,8 +39,8 @@ class RunUp:
         Asked speeds (rad/s).
     states
         Steady states at these speeds in the order in which their curve passes them: on branch 0 upwards, after a
-        turning point on branch 1 back, after the next one on branch 2 upwards again; and one next to each turning point,
-        as the last of its branch.
+        turning point on branch 1 back, after the next one on branch 2 upwards again; and one next to each turning
+        point, as the last of its branch.
     turning_speeds : (turns,)
         Speeds of the turning points (rad/s), between branch 0 and 1, 1 and 2, ...
     bifurcations

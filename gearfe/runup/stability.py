@@ -17,13 +17,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..train.monodromy import flow, kick_times, monodromy
-from ..typing import Array, ComplexArray
+from ..train.monodromy import KICKS, flow, kick_times, monodromy
+from ..typing import Array, BoolArray, ComplexArray
 from .balance import Orbit, Oscillator, rates
+from .linear import Linear
 
 #: Least strength of the forces on a mode, in parts of its damping.
 REACHED = 0.01
-#: Steps of the period, of six kicks each: first, most. Where the forces' derivatives jump they are doubled until the
+#: Steps of the period, of seven kicks each: first, most. Where the forces' derivatives jump they are doubled until the
 #: largest modulus stands still to this part.
 STEPS, MOST, SETTLED = 64, 256, 3e-3
 #: Change of a derivative from one kick to the next, in parts of the largest, that is a jump.
@@ -56,34 +57,57 @@ def multipliers(system: Oscillator, orbit: Orbit, *, reached: float = REACHED, s
 
 def _multipliers(system: Oscillator, orbit: Orbit, reached: float, steps: int) -> tuple[ComplexArray, bool]:
     """Multipliers with so many steps, and whether derivatives jump."""
-    linear, omega0 = system.linear, system.omega0(orbit.speed)
-    m, period = linear.size, 2.0 * math.pi / omega0
-    edges = np.linspace(0.0, period, steps + 1)
-    times = kick_times(edges)
-    theta = omega0 * times.ravel()
+    theta = kicks(steps)
     turns = np.exp(1j * theta[:, None] * np.arange(orbit.harmonics + 1))
-    u, du = ((turns @ x).real for x in (orbit.places, rates(orbit.places, omega0)))
-    A, B = system.forces(theta, orbit.speed, u, du)[1:]
-    size = np.abs(A).max(axis=0)
+    u, du = ((turns @ x).real for x in (orbit.places, rates(orbit.places, system.omega0(orbit.speed))))
+    _, A, B = system.forces(theta, orbit.speed, u, du)
     order = np.argsort(theta, kind="stable")  # kicks step back, too
-    jumps = bool((np.abs(np.diff(A[order], axis=0)) > JUMP * size).any())
-    strength = np.einsum("ni,ij,nj->n", np.abs(linear.places), size, np.abs(linear.places)) / linear.squares
-    kept = strength > reached * np.diag(linear.damping) / np.sqrt(linear.squares)
+    jumps = bool((np.abs(np.diff(A[order], axis=0)) > JUMP * np.abs(A).max(axis=0)).any())
+    kept = strengths(system.linear, A) > reached * np.diag(system.linear.damping) / np.sqrt(system.linear.squares)
+    return around(system, orbit.speed, A, B, kept), jumps
+
+
+def kicks(steps: int) -> Array:
+    """(steps stages,) places of the period (rad) at which `around` takes derivatives."""
+    return kick_times(np.linspace(0.0, 2.0 * math.pi, steps + 1)).ravel()
+
+
+def strengths(linear: Linear, A: Array) -> Array:
+    """(n,) how much the largest derivatives of the forces change each mode's stiffness, relative to it."""
+    size, places = np.abs(A).max(axis=0), np.abs(linear.places)
+    return np.asarray(np.einsum("ni,ij,nj->n", places, size, places) / linear.squares)
+
+
+def around(
+    system: Oscillator, speed: float, A: Array, B: Array | None, kept: BoolArray, *, damped: bool = True
+) -> ComplexArray:
+    """Multipliers for the derivatives A, B of the forces at `kicks`, the largest modulus first.
+
+    Parameters
+    ----------
+    kept : (n,)
+        Modes that are integrated; the others yield as they do at rest.
+    damped
+        False: without the damping of the linear part.
+    """
+    linear, m = system.linear, system.linear.size
+    period = 2.0 * math.pi / system.omega0(speed)
+    stages = len(KICKS)
+    edges = np.linspace(0.0, period, len(A) // stages + 1)
     places, tilts = linear.places[kept], linear.tilts[kept]
-    swap = np.kron(np.diag(linear.momenta), np.array([[0.0, -1.0], [1.0, 0.0]])) * orbit.speed
-    D = linear.damping[np.ix_(kept, kept)] - tilts @ swap @ tilts.T
+    swap = np.kron(np.diag(linear.momenta), np.array([[0.0, -1.0], [1.0, 0.0]])) * speed
+    D = linear.damping if damped else np.zeros_like(linear.damping)
     # what the other modes yield at once: u = P y + R f, f = A u
     rest = linear.places[~kept].T @ (linear.places[~kept] / linear.squares[~kept, None])
     A = A @ np.linalg.inv(np.eye(m) - rest @ A)
-    strengths = np.concatenate([A, np.zeros_like(A) if B is None else B], axis=2).reshape(*times.shape, m, 2 * m)
+    both = np.concatenate([A, np.zeros_like(A) if B is None else B], axis=2).reshape(-1, stages, m, 2 * m)
     none = np.zeros_like(places)
     with np.errstate(over="ignore", invalid="ignore"):
-        constant = flow(linear.squares[kept], D, period)
-        X = monodromy(constant, edges, places, np.block([[places, none], [none, places]]), strengths)
+        constant = flow(linear.squares[kept], D[np.ix_(kept, kept)] - tilts @ swap @ tilts.T, period)
+        X = monodromy(constant, edges, places, np.block([[places, none], [none, places]]), both)
     made = np.linalg.eigvals(X) if np.isfinite(X).all() else np.array([np.inf])
-    decay = _free(linear.squares[~kept], np.diag(linear.damping)[~kept], period)
-    both = np.concatenate([made, decay]).astype(complex)
-    return np.asarray(both[np.argsort(-np.abs(both), kind="stable")]), jumps
+    made = np.concatenate([made, _free(linear.squares[~kept], np.diag(D)[~kept], period)]).astype(complex)
+    return np.asarray(made[np.argsort(-np.abs(made), kind="stable")])
 
 
 def kind_of(one: ComplexArray, two: ComplexArray) -> str:

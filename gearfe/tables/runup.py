@@ -25,6 +25,9 @@ class RunUpTable:
     )
     multiples: int = quantity(5, low=1, high=50, doc="multiples of each mesh frequency that are cut out as orders")
 
+    instability_loads: tuple[float, ...] = quantity(
+        (), above=0.0, doc="factors on all loads for a map of parametric instability without damping; empty: none"
+    )
     stability: bool = quantity(True, doc="false: leave out the Floquet multipliers")
 
     def check(self, where: str) -> None:

@@ -1,0 +1,94 @@
+r"""Parametric instability of a train without damping, over speed and load.
+
+Under a constant force a mesh changes its stiffness with the phase. Small motions beside this slow path feel
+
+.. math:: \ddot y + \Lambda y = P\,A(t)\,P^T y + \Omega\,G\dot y
+
+with the tangents A of the meshes under their steady forces. Where a multiplier of the period T has a modulus above 1,
+vibration grows by :math:`e^{\sigma t}`, :math:`\sigma = \ln|\mu|/T`: so much damping (1/s) holds it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..threads import one_thread
+from ..train.forces import CurveFlank
+from ..typing import Array, ComplexArray
+from .condensed import CondensedTrain
+from .stability import around, kicks, strengths
+
+#: Modes whose stiffness the meshes change by more than this part are integrated.
+REACHED = 1e-3
+#: Steps of the period, of seven kicks each.
+STEPS = 64
+
+
+@dataclass(frozen=True, eq=False)
+class InstabilityMap:
+    """Largest multipliers without damping.
+
+    Attributes
+    ----------
+    speeds : (n,), loads : (m,)
+        Of the drive (rad/s); factors on all loads of the train.
+    multiplier : (m, n)
+        The largest, complex.
+    growth : (m, n)
+        sigma (1/s).
+    """
+
+    speeds: Array
+    loads: Array
+    multiplier: ComplexArray
+    growth: Array
+
+
+def instability_map(
+    train: CondensedTrain, speeds: Sequence[float] | Array, loads: Sequence[float] | Array,
+    progress: Callable[[int, int], None] | None = None,
+) -> InstabilityMap:  # fmt: skip
+    """Growth without damping over speeds (rad/s) and factors on the loads.
+
+    Raises
+    ------
+    InputError
+        For factors that are not positive, and meshes that carry no force.
+    """
+    asked, factors = np.asarray(speeds, dtype=float), np.asarray(loads, dtype=float)
+    if not (factors > 0.0).all():
+        raise InputError("instability_loads", factors.tolist(), "must be > 0", "without a load no flank bears")
+    if (train.steady <= 0.0).any():
+        problem = "carries no force on its driving flanks, so its stiffness under load is open"
+        name = train.model.meshes[int(np.argmin(train.steady))].name
+        raise InputError(f"mesh {name!r}", None, problem, "give the train a load that presses them")
+    made = np.zeros((len(factors), len(asked)), dtype=complex)
+    theta, system = kicks(STEPS), train.system
+    with one_thread():
+        for i, factor in enumerate(factors):
+            A = _tangents(train, theta, float(factor))
+            kept = strengths(system.linear, A) > REACHED
+            for j, speed in enumerate(asked):
+                made[i, j] = around(system, float(speed), A, None, kept, damped=False)[0]
+                if progress is not None:
+                    progress(i * len(asked) + j + 1, made.size)
+    periods = 2.0 * math.pi / np.array([system.omega0(float(s)) for s in asked])
+    return InstabilityMap(asked, factors, made, np.log(np.abs(made)) / periods)
+
+
+def _tangents(train: CondensedTrain, theta: Array, factor: float) -> Array:
+    """Derivatives of the forces (S, m, m) where each mesh carries its steady force times a factor, without motion."""
+    u = np.tile(train.system.linear.rest, (len(theta), 1))
+    for numbers, steady in zip(train.flanks_of_mesh, train.steady, strict=True):
+        flank, (along, turn) = train.forces.flanks[numbers[0]], train.forces.freedoms[numbers[0]]
+        phase = flank.sense * (flank.ratio * train.forces.turns * theta + u[:, turn]) + flank.phase
+        if isinstance(flank, CurveFlank):
+            u[:, along] = flank.gap + factor * steady / flank.curve(phase).value
+        else:
+            u[:, along] = flank.gap + flank.law.approach(phase, factor * steady)
+    return train.forces(theta, 1.0, u, np.zeros_like(u)).by_place
