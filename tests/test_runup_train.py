@@ -219,8 +219,8 @@ def test_the_command_writes_tables_and_pictures(job, tmp_path, capsys):
     assert main(["runup", str(job(RUNUP + "instability_loads = [0.5, 1.0]\n")), "--out", str(out)]) == 0
     names = sorted(path.name for path in out.iterdir())
     assert names == [
-        "campbell.png", "critical_speeds.csv", "instability.csv", "instability.png", "meshes.png", "modes.csv", "orders.csv", "orders.png", "runup.csv",
-        "summary.json", "waterfall.csv", "waterfall.npz", "waterfall.png",
+        "campbell.png", "critical_speeds.csv", "instability.csv", "instability.png", "meshes.png", "modes.csv",
+        "orders.csv", "orders.png", "runup.csv", "summary.json", "waterfall.csv", "waterfall.npz", "waterfall.png",
     ]  # fmt: skip
     table = np.genfromtxt(out / "runup.csv", delimiter=",", names=True)
     assert table["speed_rad_per_s"].tolist() == np.linspace(500.0, 700.0, 6).tolist()
