@@ -14,6 +14,7 @@ import math
 import tomllib
 import types
 import typing
+from collections.abc import Iterable
 from dataclasses import MISSING
 from pathlib import Path
 from typing import Any, TypeVar
@@ -73,7 +74,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     """
     text = read_text(path, "job file")
     try:
-        return tomllib.loads(text)
+        tables = tomllib.loads(text)
     except RecursionError:
         raise InputError("job file", str(path), "is not valid TOML (lists within lists too deep)", "mend it") from None
     except tomllib.TOMLDecodeError as error:
@@ -81,6 +82,54 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     except ValueError:  # Python reads no whole number of more than some thousand digits
         problem = "holds a whole number with thousands of digits"
         raise InputError("job file", str(path), problem, "write it as 1e300") from None
+    for name, value in getattr(path, "changes", ()):
+        set_key(tables, name, value, f"--set {name}")
+    return tables
+
+
+class JobFile(str):
+    """Name of a job file, with changes of its keys: what `read_toml` reads is the file with these."""
+
+    __slots__ = ("changes",)
+    changes: tuple[tuple[str, Any], ...]
+
+    def __new__(cls, path: str, changes: Iterable[str] = ()) -> JobFile:
+        """The file, and changes written as ``table.key=value``; the value is TOML, or else a text."""
+        made = super().__new__(cls, path)
+        made.changes = tuple(_change(text) for text in changes)
+        return made
+
+
+def _change(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not (equals and name.strip()):
+        raise InputError("--set", text, "must be a key and its value", "write --set pair.pinion.teeth=21")
+    try:
+        return name.strip(), tomllib.loads(f"value = {value.strip()}")["value"]
+    except ValueError:
+        return name.strip(), value.strip()
+
+
+def set_key(tables: dict[str, Any], name: str, value: Any, field: str) -> None:
+    """Put a value under a dotted name into the tables of a job, as a TOML file would have it; see `InputError`."""
+    parts = name.split(".")
+    place: Any = tables
+    for i, part in enumerate(parts):
+        last = i == len(parts) - 1
+        if isinstance(place, list):
+            if not (part.isdigit() and int(part) < len(place)):
+                above = ".".join(parts[:i])
+                raise InputError(field, None, f"{above} has {len(place)} entries in the job, from 0 on", "choose one")
+            if last:
+                place[int(part)] = value
+            else:
+                place = place[int(part)]
+        elif last:
+            place[part] = value
+        else:
+            place = place.setdefault(part, {})
+        if not last and not isinstance(place, (dict, list)):
+            raise InputError(field, None, f"{part} is a value in the job, not a table", "name that key")
 
 
 @functools.cache

@@ -244,3 +244,34 @@ def test_a_closed_pipe_is_no_traceback(tmp_path, arguments):
     assert "Traceback" not in code.stderr
     assert "Exception ignored" not in code.stderr
     assert code.returncode == (2 if "no.toml" in arguments else CLOSED)
+
+
+def test_any_key_of_a_job_can_be_set(tmp_path):
+    changes = ["--set", "pair.pinion.teeth=21", "--set", "pair.pinion.pitch_diameter_mm = 52.5"]
+    assert main(["gear", str(JOB), "--out", str(tmp_path / "set"), *changes]) == 0
+    text = (
+        JOB.read_text()
+        .replace("teeth = 20", "teeth = 21")
+        .replace("pitch_diameter_mm = 50.0", "pitch_diameter_mm = 52.5")
+    )
+    (tmp_path / "job.toml").write_text(text)
+    assert main(["gear", str(tmp_path / "job.toml"), "--out", str(tmp_path / "file")]) == 0
+    by_set, by_file = ((tmp_path / name / "gear_pair.json").read_text() for name in ("set", "file"))
+    assert by_set == by_file
+    assert "52.5" in by_set
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("pair.pinion.teth=21", "did you mean 'teeth'"),
+        ("pear.pinion.teeth=21", "unknown name 'pear'"),
+        ("pair.pinion.teeth=many", "must be a number"),
+        ("pair.pinion.teeth", "must be a key and its value"),
+        ("pair.pinion.teeth.x=1", "teeth is a value in the job"),
+        ("train.meshes.9.backlash_um=1", "has 2 entries in the job"),
+    ],
+)
+def test_a_wrong_change_is_named(tmp_path, capsys, change, message):
+    assert main(["gear", str(JOB), "--out", str(tmp_path / "out"), "--set", change]) == 2
+    assert message in capsys.readouterr().err

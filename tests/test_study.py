@@ -20,14 +20,14 @@ import pytest
 from scipy.stats import norm, qmc, sobol_indices, truncnorm
 
 from gearfe.cli import main
-from gearfe.config import build, read_toml
+from gearfe.config import build, read_toml, set_key
 from gearfe.errors import InputError
 from gearfe.study.answer import Answer
 from gearfe.study.case import DIED, Task
 from gearfe.study.design import saltelli, study_cases
 from gearfe.study.expressions import parse, value_of
 from gearfe.study.job import read_study, run_study
-from gearfe.study.parameters import read_parameters, set_key
+from gearfe.study.parameters import read_parameters
 from gearfe.study.run import side_by_side
 from gearfe.study.statistics import pareto_set, proportion, spread
 from gearfe.tables.study import StudyTable
@@ -179,14 +179,14 @@ def test_rows_come_from_a_table(tmp_path):
 
 def test_a_key_is_set_where_it_stands():
     raw = {"train": {"meshes": [{"driver": "a"}, {"driver": "b"}]}}
-    set_key(raw, "train.meshes.1.backlash_um", 20.0)
-    set_key(raw, "pair.pinion.teeth", 21)
+    set_key(raw, "train.meshes.1.backlash_um", 20.0, "x")
+    set_key(raw, "pair.pinion.teeth", 21, "x")
     assert raw == {
         "train": {"meshes": [{"driver": "a"}, {"driver": "b", "backlash_um": 20.0}]},
         "pair": {"pinion": {"teeth": 21}},
     }
     with pytest.raises(InputError, match="has 2 entries"):
-        set_key(raw, "train.meshes.2.backlash_um", 20.0)
+        set_key(raw, "train.meshes.2.backlash_um", 20.0, "x")
 
 
 @pytest.mark.parametrize("name", ["gear_train.toml", "microgeometry.toml", "andrews.toml", "slider_crank.toml"])

@@ -14,12 +14,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from ..config import check_range
+from ..config import JobFile, check_range
 from ..errors import InputError, nearest, unknown_name
 
 Table = TypeVar("Table")
 #: What a help calls the value of an option.
 METAVARS = {float: "X", int: "N", str: "NAME"}
+#: What a help calls a job file.
+METAVARS_OF_FILES = {"job": "JOB.toml", "study": "STUDY.toml"}
 
 _NUMBER = re.compile(r"-(\d|\.\d|inf|nan)", re.IGNORECASE)
 
@@ -135,6 +137,27 @@ def add_keys(parser: Any, table: type, *keys: str, **renamed: str) -> None:
         else:
             options |= {"type": kinds[0], "metavar": "|".join(known["choices"] or ()) or METAVARS[kinds[0]]}
         parser.add_argument(_option(name), **options)
+
+
+def add_job(parser: argparse.ArgumentParser, dest: str, help_: str) -> None:
+    """The job file as an argument, and ``--set`` for any key of it."""
+    parser.add_argument(dest, metavar=METAVARS_OF_FILES.get(dest, "FILE.toml"), type=JobFile, help=help_)
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        dest="changes",
+        metavar="KEY=VALUE",
+        help="another value for a key of the file, as pair.pinion.teeth=21; may stand several times",
+    )
+
+
+def with_changes(parsed: argparse.Namespace) -> argparse.Namespace:
+    """The arguments, their job file with the changes of ``--set``."""
+    for dest, value in vars(parsed).items():
+        if isinstance(value, JobFile):
+            setattr(parsed, dest, JobFile(value, parsed.changes))
+    return parsed
 
 
 def with_keys(args: argparse.Namespace, table: Table, *keys: str, **renamed: str) -> Table:

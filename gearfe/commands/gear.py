@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from ..progress import stage
-from .arguments import check_option
+from .arguments import add_job, check_option
 
 HELP = "derived geometry of a gear pair, and a drawing of it in mesh"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("job", metavar="JOB.toml", help="job file with the table [pair]")
+    add_job(parser, "job", "job file with the table [pair]")
     parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
     parser.add_argument("--angle-deg", type=float, default=0.0, metavar="X", help="pinion angle of the drawing (deg)")
 

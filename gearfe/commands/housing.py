@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..progress import stage
+from .arguments import add_job
 
 if TYPE_CHECKING:
     from ..reduction.error import MeshError, ReductionError
@@ -24,7 +25,7 @@ _DRAWN = 6
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("job", help="job file with a table [housing]")
+    add_job(parser, "job", "job file with a table [housing]")
     parser.add_argument("--out", default="out/housing", help="folder for the results (default: %(default)s)")
     parser.add_argument("--modes", type=int, default=20, help="modes to list and to write (default: %(default)s)")
     parser.add_argument("--no-pictures", action="store_true", help="write no pictures")

@@ -13,7 +13,7 @@ from ..progress import count
 from ..tables.laws import check_law
 from ..tables.loadmap import LoadMapTable
 from ..tables.stiffness import StiffnessTable
-from .arguments import add_keys, add_removed, check_option, with_keys
+from .arguments import add_job, add_keys, add_removed, check_option, with_keys
 
 HELP = "stiffness, transmission error, load share, pressure, root stress over pinion angle and torque"
 
@@ -25,7 +25,7 @@ MODEL = ("law", "plane", "kinematics", "coarsen")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("job", metavar="JOB.toml", help="job file with the tables [pair], [stiffness] and [loadmap]")
+    add_job(parser, "job", "job file with the tables [pair], [stiffness] and [loadmap]")
     parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
     add_loads(parser)
     add_keys(parser, StiffnessTable, *MODEL)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..tables.mechanism import RunTable, read_mechanism_file
-from .arguments import add_keys, with_keys
+from .arguments import add_job, add_keys, with_keys
 
 #: Keys of [run] that options stand for, beside the end of the run.
 KEYS = ("analysis", "tolerance", "method", "reactions", "modes")
@@ -17,7 +17,7 @@ HELP = "trajectories, energies and reactions of a planar mechanism"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("file", help="mechanism file (TOML, see docs/mechanisms.md)")
+    add_job(parser, "file", "mechanism file (TOML, see docs/mechanisms.md)")
     parser.add_argument("--out", required=True, help="folder for the results")
     add_keys(parser, RunTable, *KEYS, until="end_s")
     parser.add_argument("--no-figures", action="store_true", help="tables and summary only")

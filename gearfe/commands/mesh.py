@@ -8,14 +8,14 @@ from typing import Any
 
 from ..progress import stage
 from ..tables.stiffness import StiffnessTable
-from .arguments import add_keys, with_keys
+from .arguments import add_job, add_keys, with_keys
 
 HELP = "meshes of a gear pair with named boundaries, as .msh, .vtu or .inp"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("job", metavar="JOB.toml", help="job file with the table [pair]")
+    add_job(parser, "job", "job file with the table [pair]")
     parser.add_argument("--out", metavar="FILE", required=True, help="file to write; its suffix chooses the format")
     parser.add_argument(
         "--gear", choices=("both", "pinion", "wheel"), default="both", help="which gear (default: both)"

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..progress import count
 from ..tables.microgeometry import MicrogeometryTable
 from ..tables.stiffness import StiffnessTable
-from .arguments import add_keys, with_keys
+from .arguments import add_job, add_keys, with_keys
 from .loadmap import add_loads, with_loads
 
 HELP = "reliefs, pitch errors, measured flanks: transmission error, orders, load sharing, pressure against torque"
@@ -22,7 +22,7 @@ FILES = ("microgeometry*.csv", "microgeometry*.png", "microgeometry.json")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     help_ = "job file with the tables [pair], [stiffness] and [microgeometry]"
-    parser.add_argument("job", metavar="JOB.toml", help=help_)
+    add_job(parser, "job", help_)
     parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
     add_loads(parser)
     add_keys(parser, MicrogeometryTable, "mesh_cycles", "flank")

@@ -14,7 +14,7 @@ from .. import __version__
 from ..errors import InputError, MissingLibraryError, NotFiniteWarning, unknown_name
 from ..progress import shown
 from . import COMMANDS
-from .arguments import CommandParser
+from .arguments import CommandParser, with_changes
 
 USAGE = "gearfe COMMAND ... ('gearfe COMMAND --help' tells a command's options)"
 
@@ -87,7 +87,7 @@ def run_command(module: Any, name: str, arguments: list[str]) -> int:
     """Run a command module (its contract is in `gearfe.commands`), called by `name`, with these arguments."""
     parser = CommandParser(prog=name, description=module.HELP)
     module.add_arguments(parser)
-    parsed = parser.parse_args(arguments)
+    parsed = with_changes(parser.parse_args(arguments))
     with shown(), _tables_watched() as told:
         code = int(module.run(parsed))
         return code or int(bool(told))

@@ -11,7 +11,7 @@ from pathlib import Path
 from ..progress import count
 from ..tables.microgeometry import MicrogeometryTable, ReliefTable
 from ..tables.stiffness import StiffnessTable
-from .arguments import add_keys, with_keys
+from .arguments import add_job, add_keys, with_keys
 
 HELP = "tip and root relief, crowning, slope: search for the best at some torques, with its tolerances"
 
@@ -22,7 +22,7 @@ FILES = ("relief*.csv", "relief.png", "relief.json")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     help_ = "job file with the tables [pair], [stiffness], [microgeometry] and [relief]"
-    parser.add_argument("job", metavar="JOB.toml", help=help_)
+    add_job(parser, "job", help_)
     parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
     add_keys(parser, ReliefTable, "positions", "map_points", "generations", "seed")
     add_keys(parser, StiffnessTable, "coarsen")

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..progress import count, stage
 from ..tables.runup import RunUpTable
-from .arguments import add_keys, with_keys
+from .arguments import add_job, add_keys, with_keys
 
 #: Keys of [runup] that options stand for.
 KEYS = ("speed_start_rad_per_s", "speed_stop_rad_per_s", "speeds", "tolerance", "band_Hz", "multiples")
@@ -21,7 +21,7 @@ HELP = "gear train over its speed: steady states on all branches, waterfall, ord
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("job", metavar="JOB.toml", help="job file with the tables [train] and [runup]")
+    add_job(parser, "job", "job file with the tables [train] and [runup]")
     parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
     parser.add_argument("--variant", metavar="NAME", help="a variant that the job file describes")
     parser.add_argument(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..progress import announce, count
 from ..tables.laws import check_law
 from ..tables.stiffness import StiffnessTable
-from .arguments import add_keys, add_removed, check_option, number, with_keys
+from .arguments import add_job, add_keys, add_removed, check_option, number, with_keys
 
 if TYPE_CHECKING:
     from ..stiffness.job import StiffnessJob
@@ -29,7 +29,7 @@ LOADS = ("twist_deg", "torque_Nm")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("job", metavar="JOB.toml", help="job file with the tables [pair] and [stiffness]")
+    add_job(parser, "job", "job file with the tables [pair] and [stiffness]")
     parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
     add_keys(parser.add_mutually_exclusive_group(), StiffnessTable, *LOADS)
     parser.add_argument("--angles", type=float, nargs=3, metavar=("START", "STEP", "STOP"), help="pinion angles (deg)")

@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from ..progress import count
+from .arguments import add_job
 
 HELP = "one job in many cases: parameters, designs, statistics, sensitivities; goes on where it was interrupted"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("study", metavar="STUDY.toml", help="file with a table [study], and the job or its name in it")
+    add_job(parser, "study", "file with a table [study], and the job or its name in it")
     parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the study's name)")
     parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one a processor); 1: none beside")
     parser.add_argument("--dask", metavar="ADDRESS", help="run the cases on the Dask cluster with this scheduler")

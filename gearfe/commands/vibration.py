@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..progress import count
 from ..tables.train import TrainTable
-from .arguments import add_keys, with_keys
+from .arguments import add_job, add_keys, with_keys
 
 if TYPE_CHECKING:
     from ..train.response import TrainResponse
@@ -31,7 +31,7 @@ HELP = "gear train in its housing: contact forces, speeds, vibration, spectrum, 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("job", metavar="JOB.toml", help="job file with the table [train]")
+    add_job(parser, "job", "job file with the table [train]")
     parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
     parser.add_argument("--variant", metavar="NAME", help="a variant that the job file describes")
     parser.add_argument(

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..config import set_key
 from ..errors import InputError
 from ..threads import one_thread
 from .answer import Answer
 from .expressions import parse, value_of
 from .kinds import Shared, solve
-from .parameters import set_key
 
 #: Of a row: solved; solved in part, the message says what failed; refused, as the job's command would; an error of
 #: the program itself; the process died of it.
@@ -51,7 +51,7 @@ class Task:
         """Tables of the job with these values."""
         made = copy.deepcopy(dict(self.raw))
         for name, value in zip(self.names, values, strict=True):
-            set_key(made, name, value)
+            set_key(made, name, value, f"study.parameters.{name}")
         return made
 
     def expressions(self) -> dict[str, ast.expr]:

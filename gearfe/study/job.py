@@ -78,8 +78,8 @@ def read_study(path: str | Path) -> Study:
     InputError
         For every mistake in the file that shows without solving a case.
     """
-    path = Path(path)
     raw = read_toml(path)
+    path = Path(path)
     if "study" not in raw:
         raise InputError("[study]", None, f"is missing in {path.name}", "add a table [study]")
     table: StudyTable = build(StudyTable, raw["study"], "study")

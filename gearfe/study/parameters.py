@@ -193,25 +193,3 @@ def _options(hint: Any) -> tuple[Any, ...]:
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
         return tuple(option for option in typing.get_args(hint) if option is not type(None))
     return (hint,)
-
-
-def set_key(tables: dict[str, Any], name: str, value: Any) -> None:
-    """Put a value under a dotted name into the tables of a job, as a TOML file would have it."""
-    parts = name.split(".")
-    place: Any = tables
-    for i, part in enumerate(parts):
-        last = i == len(parts) - 1
-        if isinstance(place, list):
-            if not (part.isdigit() and int(part) < len(place)):
-                above = ".".join(parts[:i])
-                raise InputError(f"{WHERE}.{name}", None, f"{above} has {len(place)} entries in the job", "choose one")
-            if last:
-                place[int(part)] = value
-            else:
-                place = place[int(part)]
-        elif last:
-            place[part] = value
-        else:
-            place = place.setdefault(part, {})
-        if not last and not isinstance(place, (dict, list)):
-            raise InputError(f"{WHERE}.{name}", None, f"{part} is a value in the job, not a table", "name that key")
