@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 from gearfe import InputError
 from gearfe.cli import main
 from gearfe.contact.half_plane import half_plane_pair
+from gearfe.gear import pitch_errors
 from gearfe.gear.deviation import NOMINAL
 from gearfe.gear.modifications import FlankModification, Relief, tooth_deviations
 from gearfe.loadmap.sweep import sweep_loads
@@ -82,6 +84,10 @@ def test_every_command_takes_the_same_deviations(tmp_path, capsys) -> None:
         assert one[name].astype(float) == pytest.approx(expected, rel=close, abs=1e-9), name
         assert other[name].astype(float) == pytest.approx(expected, rel=close, abs=1e-9), name
     assert np.ptp(own["transmission_error_unloaded_um"].astype(float)) > 1.0
+    pressure, others = (t["peak_pressure_MPa"].astype(float) for t in (own, one))
+    both = np.isfinite(pressure) & (one["edge"] == "none")
+    assert both.sum() >= 3
+    assert others[both] == pytest.approx(pressure[both], rel=1e-3)
 
 
 def test_a_mesh_law_has_the_transmission_error_of_its_flanks() -> None:
@@ -99,6 +105,25 @@ def test_a_mesh_law_has_the_transmission_error_of_its_flanks() -> None:
     kink = PAIR.pinion_angle_at(start)
     away = np.mod(made.nodes - kink + 0.5 * made.cycle, made.cycle) - 0.5 * made.cycle
     assert np.abs(away).min() < 1e-12
+
+
+def test_material_that_stands_out_leaves_the_stiffness(tmp_path) -> None:
+    """All teeth 15 um thicker: at any load, light ones too, the same stiffness, and a transmission error less by it."""
+    thick = tooth_deviations(PAIR.pinion, FlankModification(), pitch_errors.turns(PAIR.pinion, np.full(20, 15e-6)))
+    angles = np.linspace(0, 0.25, 7)
+    elastic = elastic_pair(PAIR, coarsen=2.0)
+    out = replace(elastic, deviations=(thick, NOMINAL[1]))
+    for torque in (1.0, 80.0):
+        plain, made = (
+            sweep_stiffness(PAIR, torque=torque, angles=at, elastic=one, kinematics="small")
+            for one, at in ((elastic, angles + 15e-6 / PAIR.pinion.reference_radius), (out, angles))
+        )
+        assert made.k_mesh == pytest.approx(plain.k_mesh, rel=1e-6)
+        moved = 15e-6 * math.cos(PAIR.pinion.pressure_angle)
+        assert made.transmission_error == pytest.approx(plain.transmission_error - moved, abs=1e-11)
+    found = sweep_loads(PAIR, np.geomspace(20, 200, 14), angles=angles, elastic=out, kinematics="small")
+    curve = found.curve_at(80.0, tolerance=0.1)
+    assert curve.k_mesh == pytest.approx(made.k_mesh, rel=2e-3)
 
 
 @pytest.mark.parametrize(

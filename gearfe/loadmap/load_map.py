@@ -25,6 +25,7 @@ from ..errors import InputError
 from ..output.files import write_csv
 from ..stiffness import curve_csv
 from ..stiffness.curve import COLUMNS, WHOLE, StiffnessCurve
+from ..stiffness.torque_control import ANGLE_ROUNDING
 from ..typing import Array, BoolArray
 from .root_map import RootMap, root_columns, root_of
 
@@ -168,6 +169,9 @@ class LoadMap:
             return made.reshape(values.shape[1:])
 
         first, radius = self.curves[after - 1], self.curves[0].base_radius
+        counted = (first.twist - first.torque_wheel / first.k_torsional)[~first.failed]  # where stiffness counts from
+        start = float(np.median(counted)) if len(counted) else 0.0
+        deflection = twist - (start if abs(start) > ANGLE_ROUNDING else 0.0)
         leading, shares = self._shares_between(pair, along)
         values = {name: along(self.quantity(name) / self.torque[:, None]) * torque for name in _PER_TORQUE}
         smooth = {name: np.exp(along(np.log(self.quantity(name)))) for name in _POWER_LAWS}
@@ -180,8 +184,8 @@ class LoadMap:
             wheel_angle=first.wheel_angle + (twist - first.twist),
             twist=twist,
             torque_wheel=np.where(lost, np.nan, torque),
-            k_torsional=torque / twist,
-            k_mesh=torque / twist / radius**2,
+            k_torsional=torque / deflection,
+            k_mesh=torque / deflection / radius**2,
             transmission_error=twist * radius,
             leading_pair=np.where(lost, np.nan, leading),
             load_share=np.where(lost[:, None], np.nan, shares),

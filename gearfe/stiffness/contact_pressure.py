@@ -7,7 +7,8 @@ has Hertz's peak pressure (Johnson, *Contact Mechanics*, 1985, eq. 4.45)
 
 The computed pressure has a half width b of its own, by its second moment (`gearfe.contact.elements.half_widths`), so
 :math:`|b/b_H - 1|` tells how far from Hertz's the contact is: the discretisation, flanks whose curvature changes along
-the contact, teeth that are no half-planes.
+the contact, teeth that are no half-planes. On flanks with deviations of micrometres, whose curvature where they touch
+may be that of a wave shorter than the contact, :math:`2F/(\pi b w)` itself stands for the pressure.
 
 Where the contact reaches an edge of a face, the pressure of linear elasticity has no bound (a sharp tip, the kink where
 a linear relief starts, the edge of an undercut), or the radius of a tip round decides it. What stands for it there is
@@ -30,6 +31,7 @@ from ..contact.compliance import MeshingPair
 from ..contact.flank import Flank, edge_nodes, edge_shapes
 from ..contact.half_plane_result import PairContacts
 from ..contact.position import Positions
+from ..gear.deviation import NOMINAL
 from ..gear.flank_curve import FlankCurve
 from ..typing import Array, IntArray
 from .positions import PositionSolver
@@ -62,6 +64,8 @@ def contact_pressures(solver: PositionSolver, found: Positions) -> dict[str, Arr
     hertz = np.sqrt(force / sum(elastic.contact_compliances) * np.where(flat, curvature, 0.0) / math.pi)
     blunted = 2 * force / (math.pi * np.hypot(width, BLUNTING * solver.pair.pinion.module))
     off = np.abs(width * math.pi * hertz / (2 * force) - 1)
+    if elastic.deviations != NOMINAL:  # waves shorter than the contact say nothing of its pressure; its width does
+        hertz = 2 * force / (math.pi * width)
     made = {name: np.where(found.status == "no_contact", 0.0, np.nan) for name in QUANTITIES[:2]}
     made["edge_pressure"], edge = np.full(len(found), np.nan), np.zeros(len(found), dtype=np.int64)
     np.maximum.at(edge, position, bears)

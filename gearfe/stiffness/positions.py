@@ -16,6 +16,7 @@ from ..contact.half_plane_result import flank_loads
 from ..contact.laws import HalfPlane
 from ..contact.position import TORQUES, Positions, joined, of_positions, taken, together
 from ..errors import InputError
+from ..gear.deviation import NOMINAL
 from ..gear.iso6336 import mesh_stiffness
 from ..gear.pair import GearPair
 from ..gear.touching import Touching
@@ -31,6 +32,10 @@ def position_solver(pair: GearPair, elastic: MeshingPair, *, resolved_only: bool
     if isinstance(elastic.law, HalfPlane):
         return HalfPlaneSolver(pair, elastic)
     return ElementSolver(pair, elastic, resolved_only=resolved_only)
+
+
+#: Pinion angles of a mesh cycle at which flanks with deviations are looked at for their first touch.
+LOOKS = 24
 
 
 class HalfPlaneSolver:
@@ -59,6 +64,17 @@ class HalfPlaneSolver:
         made = np.full(len(angles), math.inf)
         np.minimum.at(made, found.position, found.twist)
         return made
+
+    def first_touch(self, touching: Array) -> float:
+        """Twist (rad) that stiffness counts from: where unmodified flanks touch, or before, what stands out of them.
+
+        The first touch of the mesh cycle; those at some angles (rad), `touching`, are among it.
+        """
+        free = self.pair.contact_twist
+        if self.elastic.deviations == NOMINAL:
+            return free
+        angles = self.pair.mesh_cycle * np.arange(LOOKS) / LOOKS
+        return float(min(free, touching.min(initial=free), self.touching_twists(angles).min()))
 
     def touching(self, angles: Array) -> Touching:
         """Tooth pairs whose rigid flanks can meet at pinion angles (rad), by position; searched for once an angle."""
@@ -97,6 +113,7 @@ class ElementSolver:
         self.half_plane = HalfPlaneSolver(pair, elastic)
         self.curves = self.half_plane.curves
         self.touching, self.touching_twists = self.half_plane.touching, self.half_plane.touching_twists
+        self.first_touch = self.half_plane.first_touch
 
     def solve(self, angles: Array, twists: Array, kept: IntArray = NONE) -> Positions:
         """Positions at pinion angles and twists (rad), both of shape (n,); those numbered `kept` with loads."""

@@ -282,7 +282,8 @@ def assembled_curve(
     failed = ~np.isin(solved.status, SOLVED)
     total = np.where(failed & searched, np.nan, solved.twist)
     twist, torque = total - lost, solved.torque_wheel
-    stiffness = np.divide(torque, twist, out=np.zeros_like(torque), where=torque != 0.0)  # not-a-number stays
+    deflection = total - solver.first_touch(touching)
+    stiffness = np.divide(torque, deflection, out=np.zeros_like(torque), where=torque != 0.0)  # not-a-number stays
     cycles = np.round((asked - solved.pinion_angle[source]) / pair.mesh_cycle).astype(np.int64)
     leading, shares = load_shares(solved)
     pressures = contact_pressures(solver, solved)
