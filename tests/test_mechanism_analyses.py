@@ -28,7 +28,8 @@ from gearfe.rigid import (
     constant,
     integrate,
 )
-from gearfe.rigid.beam import Beam, BeamLink, Section
+from gearfe.rigid.beam import Beam
+from gearfe.rigid.beam_link import BeamLink, Section
 from gearfe.rigid.equilibrium import equilibrium
 from gearfe.rigid.inverse import prescribed_motion
 from gearfe.rigid.modes import modes

@@ -28,7 +28,8 @@ from gearfe.rigid import (
     integrate,
     smoothed_step,
 )
-from gearfe.rigid.beam import Beam, BeamLink, Section
+from gearfe.rigid.beam import Beam
+from gearfe.rigid.beam_link import BeamLink, Section
 from gearfe.rigid.carried import free_motions
 from gearfe.rigid.equilibrium import equilibrium, stiffness_at
 

@@ -10,7 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import InputError, unknown_name
-from ..rigid.beam import Beam, BeamLink, Section
+from ..rigid.beam import Beam
+from ..rigid.beam_link import BeamLink, Section
 from ..rigid.scene import PlanarScene
 from ..tables.beam import BeamTable
 from ..tables.mechanism import BodyTable, ForceTable, JointTable, MechanismFile

@@ -2,52 +2,24 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, unknown_name
-from ..rigid import (
-    GROUND,
-    Body,
-    Forced,
-    PlanarScene,
-    Scene,
-    Start,
-    System,
-    TimeFunction,
-    consistent_start,
-    constant,
-    polynomial,
-    sine,
-    smoothed_step,
-)
-from ..rigid.beam import BeamLink
-from ..tables.mechanism import (
-    FORCES,
-    JOINTS,
-    BodyTable,
-    FigureTable,
-    ForceTable,
-    FunctionTable,
-    JointTable,
-    Kind,
-    MechanismFile,
-    read_mechanism_file,
-)
+from ..rigid import GROUND, Forced, PlanarScene, Scene, Start, System, consistent_start
+from ..tables.kinds import FORCES, JOINTS
+from ..tables.mechanism import FigureTable, MechanismFile, read_mechanism_file
 from .expressions import FUNCTIONS, NAMED, OF_LINK, OF_POINT, OF_SECTION, PLAIN, Node, compute, parse, quantities
 from .links import FlexibleLink, bent_start, flexible_links, link_of
 from .loads import ExpressionLoad
-from .tables import ValueTable, read_table
+from .parts import body_of, part_of
+from .tables import read_table
 
 Point = tuple[float, float]
-#: Keys that may be expressions of the state.
-LOADS = ("x_N", "y_N", "moment_N_m")
 
 
 @dataclass(frozen=True)
@@ -296,14 +268,14 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
         if name in FUNCTIONS or name in (*NAMED, *PLAIN, "pi"):
             raise InputError("tables", name, "is the name of a function or a quantity", "rename the table")
     links = {name: link_of(file, name, table) for name, table in file.bodies.items() if table.bends}
-    bodies = [b for n, t in file.bodies.items() for b in (links[n].nodes() if n in links else (_body(file, n, t),))]
+    bodies = [b for n, t in file.bodies.items() for b in (links[n].nodes() if n in links else (body_of(file, n, t),))]
     if not bodies:
         raise InputError("bodies", None, "there is none", "add a table [bodies.NAME]")
     joints = tuple(
-        _part(file, links, tables, f"joints.{n}", n, table, JOINTS[table.type]) for n, table in file.joints.items()
+        part_of(file, links, tables, f"joints.{n}", n, table, JOINTS[table.type]) for n, table in file.joints.items()
     )
     forces = tuple(
-        _part(file, links, tables, f"forces.{n}", n, table, FORCES[table.type]) for n, table in file.forces.items()
+        part_of(file, links, tables, f"forces.{n}", n, table, FORCES[table.type]) for n, table in file.forces.items()
     )
     planar = PlanarScene(Scene(tuple(bodies), joints, forces))
     flexible = flexible_links(file, planar, links)
@@ -326,84 +298,4 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
     for name in (*file.figure.curves, *file.figure.reference_columns):
         if name not in outputs:
             raise unknown_name("figure", name, outputs)
-    return made
-
-
-def _body(file: MechanismFile, name: str, t: BodyTable) -> Body:
-    if t.beam is not None:
-        return link_of(file, name, t).rigid()
-    assert t.mass_kg is not None  # the table was checked
-    assert t.inertia_kg_m2 is not None
-    angle = t.angle_rad if t.angle_rad is not None else math.radians(t.angle_deg or 0.0)
-    return Body(name, t.mass_kg, t.inertia_kg_m2, t.centre_m, t.position_m, angle, t.velocity_m_per_s, t.rate_rad_per_s)
-
-
-def _place(
-    file: MechanismFile, links: Mapping[str, BeamLink], where: str, point: str | Point | None, label: str
-) -> tuple[str, Point]:
-    """Body of the scene, and the place in its frame, of a point of `where`: a body, or a point of a flexible link."""
-    body, _, at = where.partition(".")
-    place = (0.0, 0.0)
-    if at:
-        place = file.bodies[body].points_m[at]
-    elif isinstance(point, str):
-        points = file.ground.points_m if body == GROUND else file.bodies[body].points_m
-        if point == "centre" and body != GROUND and file.bodies[body].beam is None:
-            place = file.bodies[body].centre_m
-        elif point not in points:
-            raise unknown_name(f"{label}: points of {body}", point, points)
-        else:
-            place = points[point]
-    elif point is not None:
-        place = point
-    if body not in links:
-        return body, place
-    link = links[body]
-    return link.node_names[link.node(place[0])], (0.0, place[1])
-
-
-def _part(
-    file: MechanismFile,
-    links: Mapping[str, BeamLink],
-    tables: Mapping[str, ValueTable],
-    label: str,
-    name: str,
-    table: JointTable | ForceTable,
-    kind: Kind,
-) -> Any:
-    """Joint or force from its table: the class of its type, the keys as its fields, what is not given by default."""
-    module, _, cls = kind.reference.partition(":")
-    values: dict[str, Any] = {}
-    for body, point in (("body", "point"), ("to", "to_point")):
-        if body in kind.fields and getattr(table, body) is not None:
-            made = _place(file, links, getattr(table, body), getattr(table, point), f"{label}.{point}")
-            values[kind.fields[body]] = made[0]
-            if point in kind.fields:
-                values[kind.fields[point]] = made[1]
-    for key, field_name in kind.fields.items():
-        value = getattr(table, key)
-        if key in ("body", "to", "point", "to_point"):
-            continue
-        if isinstance(value, FunctionTable):
-            value = time_function(value)
-        elif isinstance(value, str) and key in LOADS:
-            node = parse(value, f"{label}.{key}", tables)
-            value = ExpressionLoad(value, f"{label}.{key}", node)
-        elif key.endswith("_deg") and value is not None:
-            value = math.radians(value)
-        if value is not None:
-            values[field_name] = value
-    return getattr(importlib.import_module(module), cls)(**values, name=name)
-
-
-def time_function(table: FunctionTable) -> TimeFunction:
-    """Function of time from a table."""
-    made = constant(table.constant)
-    if table.polynomial:
-        made = made + polynomial(table.polynomial, table.origin_s)
-    if table.step is not None:
-        assert table.step_width_s is not None
-        made = made + smoothed_step(table.step_centre_s, table.step_width_s, table.step)
-    if table.sine is not None:
-        made = made + sine(table.sine, 2 * math.pi * table.frequency_hz, math.radians(table.phase_deg))
     return made

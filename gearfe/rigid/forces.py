@@ -1,6 +1,6 @@
 """Planar forces as plain data, each with the forms and vectors that it acts along.
 
-A new force is a class here, or in a file of its own, with `parts`; its line in `gearfe.tables.mechanism.FORCES` makes
+A new force is a class here, or in a file of its own, with `parts`; its line in `gearfe.tables.kinds.FORCES` makes
 it known to mechanism files.
 """
 

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..typing import Array
+from .collocated import C, collocated
 from .contract import Element, LocalForce, ModalBlocks
 from .dense import Polynomials, hermite
 from .elimination import Minimal, is_linear, minimal
@@ -30,7 +31,6 @@ from .steps import StepControl, StepLaw, Watch, first_step
 from .system import System
 
 ROOT6 = math.sqrt(6.0)
-C = np.array([(4 - ROOT6) / 10, (4 + ROOT6) / 10, 1.0])
 A = np.array(
     [
         [(88 - 7 * ROOT6) / 360, (296 - 169 * ROOT6) / 1800, (-2 + 3 * ROOT6) / 225],
@@ -46,10 +46,6 @@ BACK = np.linalg.inv(BASIS)
 ERROR = np.array([-13 - 7 * ROOT6, -13 + 7 * ROOT6, -1.0]) / 3
 #: Cubic through values at 0, C: its powers of x - 1, lowest first.
 CUBIC = np.linalg.inv(np.vander(np.append(0.0, C) - 1.0, increasing=True))
-#: Coefficients of powers of x from (q, q') at 0, q at the first two stages, (q, q') at 1.
-_P = np.arange(6.0)
-PARABOLA = np.linalg.inv(np.vander(C, increasing=True))
-QUINTIC = np.linalg.inv(np.array([_P == 0, _P == 1, C[0] ** _P, C[1] ** _P, np.ones(6), _P], dtype=float))
 MOST_NEWTON = 10
 LAW = StepLaw(exponent=0.25, growth=5.0, least_error=1e-8, predictive=True)
 #: Share of a step that is tried after Newton did not converge.
@@ -122,33 +118,12 @@ def run_implicit(
     # accelerations of stiff links at the steps' ends are the rounding of their strains; those of others are exact
     dense: Polynomials
     if system.stressed and stages:
-        dense = collocated(record, np.array(stages), np.array(forces))
+        ends, q, v = (np.array([r[k] for r in record]) for k in range(3))
+        dense = collocated(ends, q, v, np.array(stages), np.array(forces))
     else:
         dense = hermite(*(np.array([r[k] for r in record]) for k in range(4)))
     counts = {"scheme": "Radau IIA of order 5", "steps": control.accepted}
     return dense, control.status, {**counts, "newton_iterations": newton, "rejected": control.rejected}
-
-
-@dataclass(frozen=True)
-class Collocated(Polynomials):
-    """Dense output through the stages; `forces`: multipliers of all rows, then stresses of the elements that have some.
-
-    Both are unknowns of the stages. From the coordinates between them they would be as far off as the stiffness times
-    the error of a strain, which is that of the coordinates.
-    """
-
-    forces: Polynomials | None = None
-
-
-def collocated(record: list[State], stages: Array, forces: Array) -> Collocated:
-    """Polynomials of degree 5 through the stages of every step and the coordinates and velocities of its ends."""
-    times, q, v = (np.array([r[k] for r in record]) for k in range(3))
-    h = np.diff(times)[:, None]
-    known = np.stack([q[:-1], h * v[:-1], stages[:, 0], stages[:, 1], q[1:], h * v[1:]])
-    scaled = np.einsum("jk,ksn->sjn", QUINTIC, known)
-    parabolas = np.einsum("jk,skn->sjn", PARABOLA, forces) / h[:, :, None] ** np.arange(3)[:, None]
-    coefficients = scaled / h[:, :, None] ** np.arange(6)[:, None]
-    return Collocated(times, coefficients, forces=Polynomials(times, parabolas))
 
 
 def in_modes(core: Minimal, start: Start) -> tuple[System, Start]:

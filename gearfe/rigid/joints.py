@@ -1,6 +1,6 @@
 """Planar joints as plain data, each with the forms that it holds at zero.
 
-A new joint is a class here, or in a file of its own, with `rows`; its line in `gearfe.tables.mechanism.JOINTS` makes it
+A new joint is a class here, or in a file of its own, with `rows`; its line in `gearfe.tables.kinds.JOINTS` makes it
 known to mechanism files. Nothing else changes: every integrator gets the joint from its forms (`gearfe.rigid.forms`).
 """
 

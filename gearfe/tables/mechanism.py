@@ -3,105 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import NamedTuple
 
 from ..config import TABLES, build, quantity, read_toml
 from ..errors import InputError, unknown_name
 from .beam import BeamTable, check_on_axis
+from .kinds import FORCES, JOINTS, Kind
 
 Pair = tuple[float, float]
-
-
-class Kind(NamedTuple):
-    """How a type of joint or force is written."""
-
-    reference: str  # "module:Class"
-    fields: Mapping[str, str]  # key of the table -> field of the class
-    required: tuple[str, ...] = ()
-
-
-#: Types of joints. A new one is a class (`gearfe.rigid.joints` says what it provides), and a line here.
-JOINTS: dict[str, Kind] = {
-    "hinge": Kind(
-        "gearfe.rigid.joints:Hinge", {"body": "a", "to": "b", "point": "point_a", "to_point": "point_b"}
-    ),
-    "slot": Kind(
-        "gearfe.rigid.joints:Slot",
-        {"body": "body", "to": "line", "point": "point", "to_point": "origin", "direction": "direction"},
-        ("direction",),
-    ),
-    "prismatic": Kind(
-        "gearfe.rigid.joints:Prismatic",
-        {
-            "body": "body", "to": "line", "point": "point", "to_point": "origin", "direction": "direction",
-            "angle_deg": "angle",
-        },
-        ("direction",),
-    ),
-    "distance": Kind(
-        "gearfe.rigid.distance:Distance",
-        {"body": "a", "to": "b", "point": "point_a", "to_point": "point_b", "length_m": "length"},
-    ),
-    "fixed": Kind("gearfe.rigid.joints:Fixed", {"body": "a", "to": "b"}),
-    "gear": Kind("gearfe.rigid.gear_ratio:GearRatio", {"body": "a", "to": "b", "ratio": "ratio"}, ("ratio",)),
-    "belt": Kind(
-        "gearfe.rigid.belt:Belt",
-        {"body": "a", "to": "b", "radius_m": "radius_a", "to_radius_m": "radius_b", "crossed": "crossed"},
-        ("radius_m", "to_radius_m"),
-    ),
-    "rack": Kind(
-        "gearfe.rigid.rack:Rack",
-        {"body": "a", "to": "b", "point": "point", "direction": "direction", "radius_m": "radius"},
-        ("radius_m",),
-    ),
-    "rolling": Kind(
-        "gearfe.rigid.rolling:Rolling",
-        {
-            "body": "body", "to": "line", "point": "point", "to_point": "origin", "direction": "direction",
-            "radius_m": "radius",
-        },
-        ("radius_m",),
-    ),
-    "prescribed": Kind(
-        "gearfe.rigid.joints:Prescribed",
-        {"body": "body", "to": "relative_to", "point": "point", "coordinate": "coordinate", "motion": "function"},
-        ("coordinate", "motion"),
-    ),
-}  # fmt: skip
-#: Types of forces, likewise (`gearfe.rigid.forces`).
-FORCES: dict[str, Kind] = {
-    "gravity": Kind(
-        "gearfe.rigid.forces:Gravity", {"acceleration_m_per_s2": "acceleration"}, ("acceleration_m_per_s2",)
-    ),
-    "spring": Kind(
-        "gearfe.rigid.forces:Spring",
-        {
-            "body": "a", "to": "b", "point": "point_a", "to_point": "point_b", "stiffness": "stiffness",
-            "damping": "damping", "free_length_m": "free_length",
-        },
-        ("body",),
-    ),
-    "coordinate_spring": Kind(
-        "gearfe.rigid.forces:CoordinateSpring",
-        {
-            "body": "body", "to": "relative_to", "coordinate": "coordinate", "stiffness": "stiffness",
-            "damping": "damping", "reference": "reference",
-        },
-        ("body", "coordinate"),
-    ),
-    "force": Kind(
-        "gearfe.rigid.forces:PointForce", {"body": "body", "point": "point", "x_N": "x", "y_N": "y"}, ("body",)
-    ),
-    "moment": Kind(
-        "gearfe.rigid.forces:Moment",
-        {"body": "body", "to": "reaction", "moment_N_m": "function"},
-        ("body", "moment_N_m"),
-    ),
-    "turning_frame": Kind("gearfe.rigid.turning:TurningFrame", {"rate_rad_per_s": "rate"}, ("rate_rad_per_s",)),
-}  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,102 @@
+"""Bodies, joints, forces and functions of time from their tables."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from ..errors import unknown_name
+from ..rigid import GROUND, Body, TimeFunction, constant, polynomial, sine, smoothed_step
+from ..rigid.beam_link import BeamLink
+from ..tables.kinds import Kind
+from ..tables.mechanism import BodyTable, ForceTable, FunctionTable, JointTable, MechanismFile
+from .expressions import parse
+from .links import link_of
+from .loads import ExpressionLoad
+from .tables import ValueTable
+
+Point = tuple[float, float]
+#: Keys that may be expressions of the state.
+LOADS = ("x_N", "y_N", "moment_N_m")
+
+
+def body_of(file: MechanismFile, name: str, t: BodyTable) -> Body:
+    if t.beam is not None:
+        return link_of(file, name, t).rigid()
+    assert t.mass_kg is not None  # the table was checked
+    assert t.inertia_kg_m2 is not None
+    angle = t.angle_rad if t.angle_rad is not None else math.radians(t.angle_deg or 0.0)
+    return Body(name, t.mass_kg, t.inertia_kg_m2, t.centre_m, t.position_m, angle, t.velocity_m_per_s, t.rate_rad_per_s)
+
+
+def _place(
+    file: MechanismFile, links: Mapping[str, BeamLink], where: str, point: str | Point | None, label: str
+) -> tuple[str, Point]:
+    """Body of the scene, and the place in its frame, of a point of `where`: a body, or a point of a flexible link."""
+    body, _, at = where.partition(".")
+    place = (0.0, 0.0)
+    if at:
+        place = file.bodies[body].points_m[at]
+    elif isinstance(point, str):
+        points = file.ground.points_m if body == GROUND else file.bodies[body].points_m
+        if point == "centre" and body != GROUND and file.bodies[body].beam is None:
+            place = file.bodies[body].centre_m
+        elif point not in points:
+            raise unknown_name(f"{label}: points of {body}", point, points)
+        else:
+            place = points[point]
+    elif point is not None:
+        place = point
+    if body not in links:
+        return body, place
+    link = links[body]
+    return link.node_names[link.node(place[0])], (0.0, place[1])
+
+
+def part_of(
+    file: MechanismFile,
+    links: Mapping[str, BeamLink],
+    tables: Mapping[str, ValueTable],
+    label: str,
+    name: str,
+    table: JointTable | ForceTable,
+    kind: Kind,
+) -> Any:
+    """Joint or force from its table: the class of its type, the keys as its fields, what is not given by default."""
+    module, _, cls = kind.reference.partition(":")
+    values: dict[str, Any] = {}
+    for body, point in (("body", "point"), ("to", "to_point")):
+        if body in kind.fields and getattr(table, body) is not None:
+            made = _place(file, links, getattr(table, body), getattr(table, point), f"{label}.{point}")
+            values[kind.fields[body]] = made[0]
+            if point in kind.fields:
+                values[kind.fields[point]] = made[1]
+    for key, field_name in kind.fields.items():
+        value = getattr(table, key)
+        if key in ("body", "to", "point", "to_point"):
+            continue
+        if isinstance(value, FunctionTable):
+            value = time_function(value)
+        elif isinstance(value, str) and key in LOADS:
+            node = parse(value, f"{label}.{key}", tables)
+            value = ExpressionLoad(value, f"{label}.{key}", node)
+        elif key.endswith("_deg") and value is not None:
+            value = math.radians(value)
+        if value is not None:
+            values[field_name] = value
+    return getattr(importlib.import_module(module), cls)(**values, name=name)
+
+
+def time_function(table: FunctionTable) -> TimeFunction:
+    """Function of time from a table."""
+    made = constant(table.constant)
+    if table.polynomial:
+        made = made + polynomial(table.polynomial, table.origin_s)
+    if table.step is not None:
+        assert table.step_width_s is not None
+        made = made + smoothed_step(table.step_centre_s, table.step_width_s, table.step)
+    if table.sine is not None:
+        made = made + sine(table.sine, 2 * math.pi * table.frequency_hz, math.radians(table.phase_deg))
+    return made
