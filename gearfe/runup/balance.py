@@ -43,7 +43,7 @@ COMES_BACK, PRESENT = 0.05, 1e-7
 #: Samples of the period for each harmonic of the highest.
 SAMPLES = 4
 #: The error estimate is multiplied by this.
-SAFETY = 2.0
+SAFETY = 3.0
 #: Most harmonics, and most unknown ones.
 MOST_HARMONICS, MOST_UNKNOWN = 4096, 400
 
