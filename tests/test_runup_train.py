@@ -192,6 +192,15 @@ def test_what_has_no_steady_state_is_told(stages, changes, speeds, words):
         run_up(model, speeds)
 
 
+def test_a_resonance_without_damping_is_told():
+    """The response as far as it exists, on both sides."""
+    model = build_train(loaded([(20, 30)], smooth, ratio=0.0, flexible=False))
+    resonance = 2 * math.pi * model.coupled_frequencies_hz[-1] / 20
+    made = run_up(model, resonance * np.array([0.8, 0.85, 0.9, 0.95, 1.0, 1.1, 1.2]))
+    assert any("too little damping at a resonance" in note for note in made.notes)
+    assert {0.8, 0.9, 1.1, 1.2} <= {round(s.speed / resonance, 6) for s in made.states}
+
+
 RUNUP = """
 [runup]
 speed_start_rad_per_s = 500.0

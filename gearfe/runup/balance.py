@@ -77,6 +77,8 @@ class Oscillator:
         Size of each freedom, by which errors are measured.
     orders
         Harmonics of the period that excite: mesh cycles in a period.
+    limit
+        Largest motion that means something, in parts of the scale.
     """
 
     linear: Linear
@@ -84,6 +86,7 @@ class Oscillator:
     turns: float
     scale: Array
     orders: tuple[int, ...] = (1,)
+    limit: float = math.inf
 
     def omega0(self, speed: float) -> float:
         """Angular frequency of the period (rad/s)."""

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..train.forces import CurveFlank, LawFlank
 from ..train.model import TrainModel
+from ..train.simulate import DIVERGED
 from ..typing import Array
 from .balance import Oscillator
 from .linear import Linear
@@ -74,7 +75,9 @@ def condense(model: TrainModel) -> CondensedTrain:
     forces = MeshForces(flanks, freedoms, sense * float(turns))
     steady = steady_forces(model.scene)
     orders = tuple(int(Fraction(c) * turns) for c in model.rolling.cycles)
-    system = Oscillator(linear, forces, float(turns), _scale(model, linear, freedoms, flanks), orders)
+    scale = _scale(model, linear, freedoms, flanks)
+    limit = DIVERGED * min(line.module for line in model.meshes) / float(scale[freedoms[:, 0]].max())
+    system = Oscillator(linear, forces, float(turns), scale, orders, limit)
     numbers, of_mesh = iter(range(len(flanks))), []
     for line in model.meshes:
         of_mesh.append(tuple(next(numbers) for _ in range(1 if line.backlash is None else 2)))

@@ -215,7 +215,7 @@ class _Walk:
                 self.branch.append(len(self.turns))
                 self.turns.append(Turn(_turning(place, new, step, self.unit), len(self.orbits) - 1))
                 self.heading = -self.heading
-            off = self._left(b)
+            off = self._left(b) or self._beyond(new.orbit)
             if passed:
                 landed = self._landed(place, new, float(speeds[passed[0]]))
                 if landed is None and step > 4.0 * LEAST:  # from nearer
@@ -236,6 +236,11 @@ class _Walk:
     def _left(self, speed: float) -> str:
         low, high = sorted((float(self.speeds[0]), float(self.speeds[-1])))
         return "" if low - self.unit < speed < high + self.unit else f"the curve leaves the range at {speed:.6g} rad/s"
+
+    def _beyond(self, orbit: Orbit) -> str:
+        if size_of(orbit.places, self.system.scale) <= self.system.limit:
+            return ""
+        return f"the motion grows beyond all that holds at {orbit.speed:.6g} rad/s: too little damping at a resonance"
 
     last: _Place | None = None
 

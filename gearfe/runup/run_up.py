@@ -24,7 +24,7 @@ from .results import SteadyState, steady_result
 from .stability import Bifurcation, kind_of, multipliers
 
 #: Where no motion is found at the first speed, others are tried so many times as far away, each a part of it farther.
-TRIES, AWAY = 12, 0.01
+TRIES, AWAY = 6, 0.01
 
 
 @dataclass(frozen=True, eq=False)
