@@ -33,7 +33,9 @@ _PUBLIC: dict[str, str] = {
     "read_study": "study.job",
     "optimise_relief": "microgeometry.relief",
     "run_study": "study.job",
+    "run_up": "runup.run_up",
     "simulate": "train",
+    "steady_state": "runup.run_up",
     "sweep_loads": "loadmap.sweep",
     "sweep_stiffness": "stiffness",
 }
