@@ -10,6 +10,7 @@ import pytest
 
 from gearfe.errors import InputError
 from gearfe.mechanisms import evaluate, load_mechanism
+from gearfe.mechanisms.job import run_mechanism
 from gearfe.mechanisms.loads import ExpressionLoad
 from gearfe.rigid import IntegrationError, integrate
 
@@ -159,3 +160,58 @@ def test_wrong_tables(tmp_path: Path, content: str, text: str) -> None:
 def test_a_division_by_zero_on_the_way_tells_time_and_values(tmp_path: Path) -> None:
     with pytest.raises(IntegrationError, match=r"forces.drive.moment_N_m = .* at 0\.5.* s"):
         ran(tmp_path, ROD + MOMENT.format("sqrt(0.5 - time)"))
+
+
+TABLED = """
+[joints.motor]
+type = "prescribed"
+body = "rod"
+coordinate = "{coordinate}"
+motion = {{ table = "drive" }}
+[tables.drive]
+file = "drive.csv"
+x = "t"
+y = "value"
+"""
+
+
+@pytest.mark.parametrize("coordinate", ["angle", "rate"])
+def test_a_motion_from_a_table_over_time(tmp_path: Path, coordinate: str) -> None:
+    """At the points the table's values; by the series, whose steps end at the points."""
+    t = np.linspace(0.0, 1.0, 11)
+    value = np.sin(t) if coordinate == "angle" else np.cos(t)
+    rows = "\n".join(f"{a},{b}" for a, b in zip(t, value, strict=True))
+    (tmp_path / "drive.csv").write_text("t,value\n" + rows + "\n", encoding="utf-8")
+    text = ROD.replace("angle_deg = 30.0\nrate_rad_per_s = 1.0\n", "") + TABLED.format(coordinate=coordinate)
+    mechanism, run = ran(tmp_path, text, backend="plain", method="taylor")
+    if coordinate == "angle":
+        np.testing.assert_allclose(run.q[::2, 2], np.sin(t), atol=1e-12)
+    else:
+        np.testing.assert_allclose(run.v[::2, 2], np.cos(t), atol=1e-10)
+        np.testing.assert_allclose(run.q[::2, 2], np.sin(t), atol=2e-3)
+    assert mechanism.known_until == 1.0
+
+
+@pytest.mark.parametrize(
+    ("content", "extra", "text"),
+    [
+        ("0.1,0\n1,1\n", "", "begins at 0.1 s"),
+        ("0,0\n1,1\n", 'interpolation = "linear"\n', "speed of a prescribed motion"),
+        ("0,0\n0.5,1\n", "", "after the end of a table"),
+    ],
+)
+def test_wrong_tables_over_time(tmp_path: Path, content: str, extra: str, text: str) -> None:
+    (tmp_path / "drive.csv").write_text("t,value\n" + content, encoding="utf-8")
+    path = write(tmp_path, ROD + TABLED.format(coordinate="rate") + extra)
+    with pytest.raises(InputError, match=text):
+        run_mechanism(load_mechanism(path), tmp_path / "out", figures=False)
+
+
+def test_a_flexible_link_driven_by_tables_beside_the_file(tmp_path: Path) -> None:
+    (tmp_path / "drive.csv").write_text("t,value\n0,2\n1,2\n", encoding="utf-8")
+    beam = (
+        "[bodies.rod.beam]\nlength_m = 1.0\ndiameter_m = 0.05\nyoungs_modulus_GPa = 200.0\ndensity_kg_per_m3 = 7850.0\n"
+    )
+    text = ROD.replace("mass_kg = 2.0\ninertia_kg_m2 = 0.5\n", "").replace("[joints.O]", beam + "[joints.O]")
+    _, run = ran(tmp_path, text + TABLED.format(coordinate="rate"), 0.1)
+    np.testing.assert_allclose(run.v[:, 2], 2.0, atol=1e-9)

@@ -59,6 +59,9 @@ def run_mechanism(
         raise InputError("--until", end, "must be finite and > 0 s", "give the end of the run")
     if end / run.step_s > 5e6:
         raise InputError("--until", end, "gives more than five million rows", "take a longer step_s or an earlier end")
+    if end > mechanism.known_until * (1.0 + 1e-9):
+        problem = f"is after the end of a table over time, {mechanism.known_until:g} s"
+        raise InputError("run.end_s", end, problem, "end the run before, or extend the table")
     if figures:
         from ..output.mechanism_figures import reference_table
 

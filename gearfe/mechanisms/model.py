@@ -16,7 +16,7 @@ from ..tables.mechanism import FigureTable, MechanismFile, read_mechanism_file
 from .expressions import FUNCTIONS, NAMED, OF_LINK, OF_POINT, OF_SECTION, PLAIN, Node, compute, parse, quantities
 from .links import FlexibleLink, bent_start, flexible_links, link_of
 from .loads import ExpressionLoad
-from .parts import body_of, part_of
+from .parts import body_of, known_until, part_of
 from .tables import read_table
 
 Point = tuple[float, float]
@@ -43,6 +43,7 @@ class Mechanism:
     outputs: Mapping[str, Node] = field(repr=False)
     path: Path = Path()
     links: Mapping[str, FlexibleLink] = field(default_factory=dict, repr=False)
+    known_until: float = math.inf  # end of the tables that are functions of time (s)
     unbent: bool = False  # made for the start of one with flexible links: nothing in it need be free to move
 
     @property
@@ -184,9 +185,8 @@ class Mechanism:
     def _bent_start(self, time: float) -> Start:
         """Flexible links start straight, with the velocities of the same mechanism with rigid ones."""
         bodies = {n: replace(b, flexible=False) if b.beam is not None else b for n, b in self.file.bodies.items()}
-        rigid = replace(
-            make_mechanism(replace(self.file, bodies=bodies, forces={}, outputs=(), figure=FigureTable())), unbent=True
-        )
+        file = replace(self.file, bodies=bodies, forces={}, outputs=(), figure=FigureTable())
+        rigid = replace(make_mechanism(file, self.path), unbent=True)
         known = rigid.start(time)
         q, v = bent_start(dict(self.links), self.planar, rigid.planar, np.stack([known.q, known.v]))
         made = consistent_start(self.system, time, q=q, v=v)
@@ -281,7 +281,7 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
     flexible = flexible_links(file, planar, links)
     system = System([planar, *(link.beam for link in flexible.values())])
     outputs: dict[str, Node] = {}
-    made = Mechanism(file, system, outputs, path, flexible)
+    made = Mechanism(file, system, outputs, path, flexible, known_until(file, tables))
     for _, load in planar.assembly.state_loads:
         if isinstance(load, ExpressionLoad):
             load.bind(made)

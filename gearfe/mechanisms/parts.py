@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from ..errors import unknown_name
+from ..errors import InputError, unknown_name
 from ..rigid import GROUND, Body, TimeFunction, constant, polynomial, sine, smoothed_step
 from ..rigid.beam_link import BeamLink
 from ..tables.kinds import Kind
@@ -78,7 +78,7 @@ def part_of(
         if key in ("body", "to", "point", "to_point"):
             continue
         if isinstance(value, FunctionTable):
-            value = time_function(value)
+            value = time_function(value, tables, f"{label}.{key}", smooth=key not in LOADS)
         elif isinstance(value, str) and key in LOADS:
             node = parse(value, f"{label}.{key}", tables)
             value = ExpressionLoad(value, f"{label}.{key}", node)
@@ -89,9 +89,21 @@ def part_of(
     return getattr(importlib.import_module(module), cls)(**values, name=name)
 
 
-def time_function(table: FunctionTable) -> TimeFunction:
-    """Function of time from a table."""
+def time_function(
+    table: FunctionTable, tables: Mapping[str, ValueTable], label: str, *, smooth: bool = False
+) -> TimeFunction:
+    """Function of time from its keys; a `smooth` one must not jump in speed."""
     made = constant(table.constant)
+    if table.table is not None:
+        if table.table not in tables:
+            raise unknown_name(f"{label}.table", table.table, tables)
+        known = tables[table.table]
+        if smooth and not known.cubic:
+            cure = 'write interpolation = "cubic" in its table'
+            raise InputError(f"{label}.table", table.table, "would make the speed of a prescribed motion jump", cure)
+        if known.x[0] > 0.0:
+            raise InputError(f"{label}.table", table.table, f"begins at {known.x[0]:g} s, after the run", "begin at 0")
+        made = known.over_time() if table.constant == 0.0 else known.over_time() + made
     if table.polynomial:
         made = made + polynomial(table.polynomial, table.origin_s)
     if table.step is not None:
@@ -100,3 +112,11 @@ def time_function(table: FunctionTable) -> TimeFunction:
     if table.sine is not None:
         made = made + sine(table.sine, 2 * math.pi * table.frequency_hz, math.radians(table.phase_deg))
     return made
+
+
+def known_until(file: MechanismFile, tables: Mapping[str, ValueTable]) -> float:
+    """Time at which the first table ends that is a function of time (s)."""
+    parts: list[JointTable | ForceTable] = [*file.joints.values(), *file.forces.values()]
+    given = [value for part in parts for value in vars(part).values() if isinstance(value, FunctionTable)]
+    ends = [float(tables[value.table].x[-1]) for value in given if value.table is not None]
+    return min(ends, default=math.inf)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..rigid import TimeFunction
 from ..tables.mechanism import ValueTableTable
 from ..textfile import read_text
 from ..typing import Array
@@ -41,6 +43,12 @@ class ValueTable:
         slopes = np.diff(self.y) / np.diff(self.x)
         zero = np.zeros_like(slopes)
         return np.stack([zero, zero, slopes, self.y[:-1]])
+
+    def over_time(self) -> TimeFunction:
+        """The table as a function of time: pieces that every method differentiates exactly, and that end steps."""
+        starts = (-math.inf, *(float(t) for t in self.x[1:-1]))
+        rows = tuple(tuple(float(c) for c in row[::-1]) for row in self._pieces.T)
+        return TimeFunction(starts, tuple(float(t) for t in self.x[:-1]), rows)
 
     def _at(self, x: float) -> tuple[float, Array]:
         k = min(max(int(np.searchsorted(self.x, x, side="right")) - 1, 0), len(self.x) - 2)

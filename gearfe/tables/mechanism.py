@@ -80,6 +80,7 @@ class FunctionTable:
     sine: float | None = quantity(None, doc="amplitude of a sine term")
     frequency_hz: float = quantity(0.0, low=0.0, doc="frequency of the sine in Hz")
     phase_deg: float = quantity(0.0, doc="phase of the sine in degrees")
+    table: str | None = quantity(None, doc="name of a table in [tables], over the time in s")
 
     def check(self, where: str) -> None:
         """A step needs its width."""
