@@ -114,8 +114,8 @@ def turning_speed(system: Single, speed: float, one: np.ndarray, two: np.ndarray
             state = one + s * (two - one) + x[0] * across
             return around(system, x[1], state, **options) - state
 
-        guess, _, status, message = fsolve(gap, guess, full_output=True, xtol=1e-8)
-        assert status == 1, message
+        guess = fsolve(gap, guess, xtol=1e-8, epsfcn=1e-10)
+        assert np.abs(gap(guess)).max() < 1e-7
         found.append(guess[1])
     fit = np.polynomial.Polynomial.fit(part, found, 4)
     roots = [r.real for r in fit.deriv().roots() if abs(r.imag) < 1e-9 and 0.0 < r.real < 1.0]

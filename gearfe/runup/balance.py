@@ -44,6 +44,8 @@ COMES_BACK, PRESENT = 0.05, 1e-7
 SAMPLES = 4
 #: The error estimate is multiplied by this.
 SAFETY = 3.0
+#: Where the estimate misses the tolerance, harmonics grow by this factor.
+GROWTH = 1.5
 #: Most harmonics, and most unknown ones.
 MOST_HARMONICS, MOST_UNKNOWN = 4096, 400
 
@@ -94,7 +96,7 @@ class Oscillator:
 
     def harmonics(self, speed: float, highest: float) -> int:
         """Harmonics up to an angular frequency (rad/s), and eight of each order at least."""
-        return min(max(8 * max(self.orders), math.ceil(highest / self.omega0(speed))), MOST_HARMONICS)
+        return rounded(max(8 * max(self.orders), highest / self.omega0(speed)))
 
     def flexibility(self, speed: float, count: int) -> ComplexArray:
         """H at harmonics 0 to `count`, (count + 1, m, m)."""
@@ -170,6 +172,11 @@ def analysis(values: Array) -> ComplexArray:
     made = np.fft.rfft(values, axis=0) * (2.0 / len(values))
     made[0] *= 0.5
     return np.asarray(made)
+
+
+def rounded(harmonics: float) -> int:
+    """Number of harmonics whose samples transform quickly, at least as many as asked for but for the most."""
+    return min(8 * math.ceil(harmonics / 8), MOST_HARMONICS)
 
 
 def samples_of(harmonics: int) -> int:
@@ -342,8 +349,10 @@ def settled(system: Oscillator, orbit: Orbit, before: Newton | None, tolerance: 
     while orbit.found:
         error, guess = error_of(system, orbit, before)
         orbit = replace(orbit, error=error)
-        if error <= tolerance or len(guess) > MOST_HARMONICS:
+        more = rounded(GROWTH * orbit.harmonics)
+        if error <= tolerance or more <= orbit.harmonics:
             break
+        guess = guess[: more + 1]
         steps = orbit.steps
         orbit, before = solve(system, orbit.speed, guess, tolerance, before)
         orbit = replace(orbit, steps=steps + orbit.steps)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 
@@ -41,6 +42,20 @@ class CondensedTrain:
     forces: MeshForces
     flanks_of_mesh: tuple[tuple[int, ...], ...]
     steady: Array
+
+    @cached_property
+    def bores_of_modes(self) -> Array:
+        """(bores, n) displacement along the shafts at each bore for unit modal coordinates."""
+        return np.asarray(self.model.axial @ self.model.core.T)
+
+    @cached_property
+    def radiation_of_modes(self) -> Array | None:
+        """(n, n) surface matrix of the housing in modal coordinates; None where the housing has no surface."""
+        housing = self.model.scene.housing
+        if housing is None or not housing.has_mesh:
+            return None
+        shapes = self.model.core.T[: housing.size]
+        return np.asarray(shapes.T @ housing.radiation @ shapes)
 
 
 def condense(model: TrainModel) -> CondensedTrain:

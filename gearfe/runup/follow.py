@@ -29,6 +29,7 @@ from .balance import (
     evaluate,
     jacobian,
     packed,
+    rounded,
     samples_of,
     settled,
     size_of,
@@ -48,6 +49,8 @@ MOST = 400
 #: Extrapolation takes so many speeds before, Newton's method then so many steps; else the speeds between are halved so
 #: many times.
 BACK, STEPS, HALVINGS = 4, 10, 3
+#: An error below this part of the tolerance lets so many of the harmonics go on.
+EASY, FEWER = 0.4, 0.8
 #: Change of the speed, relative, for a derivative.
 NUDGE = 1e-6
 
@@ -157,9 +160,11 @@ class _Walk:
         return orbit
 
     def _count(self, speed: float, orbit: Orbit) -> int:
-        """Harmonics at a speed: what is asked for, and more where the orbit before needed them."""
-        least = self.system.harmonics(speed, self.highest)
-        return least if orbit.error < 0.05 * self.tolerance else max(least, orbit.harmonics)
+        """Harmonics at a speed: what is asked for, and as many more as the orbit before needed."""
+        fewer = orbit.error < EASY * self.tolerance
+        return max(
+            self.system.harmonics(speed, self.highest), rounded(FEWER * orbit.harmonics if fewer else orbit.harmonics)
+        )
 
     def _onward(self, speed: float, halvings: int = HALVINGS) -> Orbit | None:
         """Orbit at a speed by extrapolation, where needed over speeds between."""

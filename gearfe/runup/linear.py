@@ -133,7 +133,8 @@ class Linear:
         return np.kron(np.diag(self.momenta), np.array([[0.0, -1.0], [1.0, 0.0]]))
 
     @cached_property
-    def _statics(self) -> Array:
+    def statics(self) -> Array:
+        """(m, m) flexibility of the freedoms at rest."""
         return np.asarray(self.places.T @ (self.places / self.squares[:, None]))
 
     @cached_property
@@ -157,7 +158,7 @@ class Linear:
     def flexibility(self, omega: Array, speed: float) -> ComplexArray:
         """H (k, m, m) at the angular frequencies (k,); `speed` turns the shafts."""
         made = self._turning(omega, speed)[0]
-        made[omega == 0.0] = self._statics
+        made[omega == 0.0] = self.statics
         return made
 
     def modal(self, omega: Array, speed: float, forces: ComplexArray) -> ComplexArray:

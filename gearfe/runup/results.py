@@ -13,7 +13,7 @@ import numpy as np
 
 from ..typing import Array, ComplexArray
 from ..vibration.radiation import AIR_DENSITY, AIR_SPEED
-from .balance import Orbit, analysis, evaluate, rates, samples_of, synthesis
+from .balance import Orbit, analysis, rates, samples_of, synthesis
 from .condensed import CondensedTrain
 from .mesh_forces import sampled
 from .stability import STABLE
@@ -109,16 +109,14 @@ def steady_result(
         approach[:, i], apart[i] = u[:, along], open_.mean()
         if line.law is None:
             force[:, i] += line.damping * du[:, along]
-    whole = evaluate(system, orbit.speed, orbit.places, samples, system.flexibility(orbit.speed, count))
     omega = omega0 * np.arange(count + 1)
-    modal = system.linear.modal(omega, orbit.speed, analysis(whole.pushes.value)[: count + 1])
-    moved = modal @ model.core.T.T
-    acceleration = -(omega**2)[:, None] * (moved @ model.axial.T)
-    housing, power = model.scene.housing, None
-    if housing is not None and housing.has_mesh:
-        v = 1j * omega[:, None] * moved[:, : housing.size]
-        square = np.einsum("ki,ki->k", v.conj(), v @ housing.radiation).real
-        power = 0.5 * AIR_DENSITY * AIR_SPEED * np.maximum(square, 0.0)
+    pushes = analysis(system.forces(theta, orbit.speed, u, du).value)[: count + 1]
+    modal = system.linear.modal(omega, orbit.speed, pushes)
+    acceleration = -(omega**2)[:, None] * (modal @ train.bores_of_modes.T)
+    power = None
+    if train.radiation_of_modes is not None:
+        square = (modal.conj() * (modal @ train.radiation_of_modes)).sum(axis=1).real
+        power = 0.5 * AIR_DENSITY * AIR_SPEED * omega**2 * np.maximum(square, 0.0)
     frequency = omega / (2.0 * math.pi)
     return SteadyState(
         orbit.speed, branch, orbit, 2.0 * math.pi / omega0, frequency, np.arange(count + 1) / system.turns, force,

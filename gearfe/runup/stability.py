@@ -27,8 +27,8 @@ REACHED = 0.01
 #: Steps of the period, of seven kicks each: first, most. Where the forces' derivatives jump they are doubled until the
 #: largest modulus stands still to this part.
 STEPS, MOST, SETTLED = 64, 256, 3e-3
-#: Change of a derivative from one kick to the next, in parts of the largest, that is a jump.
-JUMP = 0.7
+#: Change of a stiffness from one kick to the next, in parts of that of the whole system, that is a jump.
+JUMP = 0.5
 #: Imaginary part of a multiplier, in parts of its modulus, that is none.
 REAL = 1e-6
 #: A multiplier beyond this is an instability, not round-off.
@@ -62,7 +62,8 @@ def _multipliers(system: Oscillator, orbit: Orbit, reached: float, steps: int) -
     u, du = ((turns @ x).real for x in (orbit.places, rates(orbit.places, system.omega0(orbit.speed))))
     _, A, B = system.forces(theta, orbit.speed, u, du)
     order = np.argsort(theta, kind="stable")  # kicks step back, too
-    jumps = bool((np.abs(np.diff(A[order], axis=0)) > JUMP * np.abs(A).max(axis=0)).any())
+    changes = np.abs(np.diff(A[order], axis=0)).max(axis=0)
+    jumps = bool((np.diag(changes) * np.diag(system.linear.statics) > JUMP).any())
     kept = strengths(system.linear, A) > reached * np.diag(system.linear.damping) / np.sqrt(system.linear.squares)
     return around(system, orbit.speed, A, B, kept), jumps
 
