@@ -366,5 +366,5 @@ def test_a_wrong_type_is_told_what_exists(tmp_path, capsys):
     """Also where the wrong type brings keys of its own."""
     gear = '[joints.g]\ntype = "worm"\nstarts = 2\nbody = "rod"\n'
     assert main(["mechanism", str(write(tmp_path, PENDULUM + gear)), "--out", str(tmp_path)]) == 2
-    known = "hinge, slot, prismatic, distance, fixed, gear, belt, rack, rolling, prescribed"
+    known = "hinge, slot, prismatic, distance, fixed, gear, belt, rack, rolling, cam, prescribed"
     assert f"joints.g.type = 'worm': must be one of {known}" in capsys.readouterr().err

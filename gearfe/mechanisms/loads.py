@@ -84,7 +84,7 @@ def compiled(node: Node, names: Sequence[tuple[str, str | None]]) -> Evaluate:
 
         def looked_up(values: Sequence[float]) -> Dual:
             x, slope = parts[0](values)
-            if not table.x[0] <= x <= table.x[-1]:
+            if not table.covers(x):
                 problem = f"table {called!r} goes from {table.x[0]:g} to {table.x[-1]:g} and is asked at {x:g}"
                 raise Trouble(problem)
             return table.value(x), table.slope(x) * slope

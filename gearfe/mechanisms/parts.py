@@ -79,6 +79,8 @@ def part_of(
             continue
         if isinstance(value, FunctionTable):
             value = time_function(value, tables, f"{label}.{key}", smooth=key not in LOADS)
+        elif key == "profile":
+            value = _profile(value, tables, f"{label}.profile")
         elif isinstance(value, str) and key in LOADS:
             node = parse(value, f"{label}.{key}", tables)
             value = ExpressionLoad(value, f"{label}.{key}", node)
@@ -87,6 +89,17 @@ def part_of(
         if value is not None:
             values[field_name] = value
     return getattr(importlib.import_module(module), cls)(**values, name=name)
+
+
+def _profile(name: str, tables: Mapping[str, ValueTable], label: str) -> ValueTable:
+    """Table of a cam: one turn, with a steady curvature."""
+    if name not in tables:
+        raise unknown_name(label, name, tables)
+    table = tables[name]
+    if table.kind != "periodic" or abs(table.x[-1] - table.x[0] - 2 * math.pi) > 1e-6:
+        problem = "must be periodic over one turn, 0 to 2 pi rad"
+        raise InputError(label, name, problem, 'write interpolation = "periodic" in its table')
+    return table
 
 
 def time_function(
@@ -98,7 +111,9 @@ def time_function(
         if table.table not in tables:
             raise unknown_name(f"{label}.table", table.table, tables)
         known = tables[table.table]
-        if smooth and not known.cubic:
+        if known.kind == "periodic":
+            raise InputError(f"{label}.table", table.table, "is periodic", 'write interpolation = "cubic" in its table')
+        if smooth and known.kind == "linear":
             cure = 'write interpolation = "cubic" in its table'
             raise InputError(f"{label}.table", table.table, "would make the speed of a prescribed motion jump", cure)
         if known.x[0] > 0.0:

@@ -25,20 +25,27 @@ class ValueTable:
     ----------
     x, y : ndarray, shape (n,)
         Points, x rising.
-    cubic
-        Monotone cubics (Fritsch & Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304) instead of straight lines.
+    kind
+        "cubic": monotone cubics (Fritsch & Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304); "linear";
+        "periodic": a cubic spline that goes on beyond its ends, for which the last y is the first.
     """
 
     x: Array
     y: Array
-    cubic: bool = True
+    kind: str = "cubic"
+
+    def covers(self, x: float) -> bool:
+        """Whether it has a value at x."""
+        return self.kind == "periodic" or bool(self.x[0] <= x <= self.x[-1])
 
     @cached_property
     def _pieces(self) -> Array:
         """Coefficients of powers of x - x_k, highest first, shape (4, n - 1)."""
-        if self.cubic and len(self.x) > 2:
-            from scipy.interpolate import PchipInterpolator
+        if self.kind != "linear" and len(self.x) > 2:
+            from scipy.interpolate import CubicSpline, PchipInterpolator
 
+            if self.kind == "periodic":
+                return np.asarray(CubicSpline(self.x, self.y, bc_type="periodic").c, dtype=float)
             return np.asarray(PchipInterpolator(self.x, self.y).c, dtype=float)
         slopes = np.diff(self.y) / np.diff(self.x)
         zero = np.zeros_like(slopes)
@@ -51,13 +58,14 @@ class ValueTable:
         return TimeFunction(starts, tuple(float(t) for t in self.x[:-1]), rows)
 
     def _at(self, x: float) -> tuple[float, Array]:
+        if self.kind == "periodic":
+            x = float(self.x[0] + (x - self.x[0]) % (self.x[-1] - self.x[0]))
         k = min(max(int(np.searchsorted(self.x, x, side="right")) - 1, 0), len(self.x) - 2)
         return x - float(self.x[k]), self._pieces[:, k]
 
     def __call__(self, x: Array) -> Array:
         """y at many x, not-a-number beyond the table."""
-        inside = (x >= self.x[0]) & (x <= self.x[-1])
-        flat = [self.value(float(a)) if ok else np.nan for a, ok in zip(np.ravel(x), np.ravel(inside), strict=True)]
+        flat = [self.value(float(a)) if self.covers(float(a)) else np.nan for a in np.ravel(x)]
         return np.reshape(flat, np.shape(x))
 
     def value(self, x: float) -> float:
@@ -69,6 +77,11 @@ class ValueTable:
         """dy/dx at x."""
         h, c = self._at(x)
         return float((3.0 * c[0] * h + 2.0 * c[1]) * h + c[2])
+
+    def bend(self, x: float) -> float:
+        """Second derivative at x."""
+        h, c = self._at(x)
+        return float(6.0 * c[0] * h + 2.0 * c[1])
 
 
 def read_table(name: str, table: ValueTableTable, folder: Path) -> ValueTable:
@@ -98,4 +111,8 @@ def read_table(name: str, table: ValueTableTable, folder: Path) -> ValueTable:
         raise InputError(f"{label}.file", str(source), "needs two rows or more, all finite", "mend the file")
     if not (np.diff(x) > 0.0).all():
         raise InputError(f"{label}.x", table.x, "must rise from row to row", "sort the rows and drop doubles")
-    return ValueTable(x, y, table.interpolation == "cubic")
+    if table.interpolation == "periodic" and not (len(x) > 2 and abs(y[-1] - y[0]) <= 1e-9 * np.ptp(y)):
+        raise InputError(f"{label}.y", table.y, "must end with the value that it begins with", "close the period")
+    if table.interpolation == "periodic":
+        y[-1] = y[0]
+    return ValueTable(x, y, table.interpolation)

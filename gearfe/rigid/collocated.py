@@ -15,7 +15,9 @@ C = np.array([(4 - math.sqrt(6.0)) / 10, (4 + math.sqrt(6.0)) / 10, 1.0])
 _P = np.arange(6.0)
 #: Coefficients of powers of x from (q, q') at 0, q at the first two stages, (q, q') at 1.
 QUINTIC = np.linalg.inv(np.array([_P == 0, _P == 1, C[0] ** _P, C[1] ** _P, np.ones(6), _P], dtype=float))
-#: The same from values at the stages.
+#: Share of each in the middle of the step.
+MIDDLE = 0.5**_P @ QUINTIC
+#: Coefficients from values at the stages.
 PARABOLA = np.linalg.inv(np.vander(C, increasing=True))
 
 

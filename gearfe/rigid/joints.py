@@ -9,19 +9,36 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from ..errors import InputError
 from .forms import GROUND, Form, Frames, Point
 from .timefunctions import TimeFunction
 
 
+class Profile(Protocol):
+    """A function of an angle with two derivatives."""
+
+    def value(self, x: float) -> float:
+        """s(x)."""
+
+    def slope(self, x: float) -> float:
+        """s'(x)."""
+
+    def bend(self, x: float) -> float:
+        """s''(x)."""
+
+
 class Row(NamedTuple):
-    """One constraint: ``form = motion(t)``, or ``form = 0``."""
+    """One constraint: ``form = motion(t)``, ``form = 0``, or with a profile s of a body's angle ``form = s(theta)``.
+
+    A scene with a profile has no Taylor series.
+    """
 
     what: str  # it holds, for messages
     form: Form
     motion: TimeFunction | None = None
+    profile: tuple[str, Profile] | None = None  # name of the body, which the form names, too
 
 
 class Joint(ABC):

@@ -53,6 +53,8 @@ class PlanarScene(Element):
         self._forms = self.assembly.tables.forms
         self._vectors = self.assembly.tables.vectors
         self._forces = self.assembly.tables.forces
+        #: Constraints with a profile: row, which of its bodies, number of that, profile.
+        self._profiles = [(r, k, int(self._forms.bodies[r, k]), p) for r, k, p in self.assembly.profiles]
         self._loaded = bool(len(self._forces.spring) or len(self._forces.along))
         self._known: tuple[Array, Pose] | None = None
 
@@ -71,8 +73,8 @@ class PlanarScene(Element):
 
     @property
     def has_series(self) -> bool:
-        """Whether the Taylor kernels can run it: no load depends on the state."""
-        return not self.assembly.state_loads
+        """Whether the Taylor kernels can run it: no load depends on the state, no constraint has a profile."""
+        return not (self.assembly.state_loads or self.assembly.profiles)
 
     @property
     def driven(self) -> bool:
@@ -138,6 +140,8 @@ class PlanarScene(Element):
         row, one, two = self._forms.product.T
         if len(row):
             np.add.at(g, row, (pose.vector[one] * pose.vector[two]).sum(axis=1))
+        for r, _, body, profile in self._profiles:
+            g[r] -= profile.value(pose.row[body, 2])
         return g
 
     def jacobian(self, t: float, q: Array) -> Array:  # noqa: ARG002
@@ -157,6 +161,8 @@ class PlanarScene(Element):
         motion = self._motion(pose, v)
         spin = motion.row[self._forms.bodies[: self.rows], 2]
         out = (spin**2 * self._affine_bend(pose)[: self.rows]).sum(axis=1) - self._times(t, 2)
+        for r, _, body, profile in self._profiles:
+            out[r] -= profile.bend(pose.row[body, 2]) * motion.row[body, 2] ** 2
         row, one, two = self._forms.product.T
         if not len(row):
             return out
@@ -170,6 +176,8 @@ class PlanarScene(Element):
         """Gradients (rows, 2, 3) of all rows with respect to the poses of both bodies."""
         pose = self.pose(q)
         out = self._affine_gradients(pose)[: self.rows]
+        for r, side, body, profile in self._profiles:
+            out[r, side, 2] -= profile.slope(pose.row[body, 2])
         row, one, two = self._forms.product.T
         if len(row):
             J, V = self._vector_jacobian(pose), pose.vector
@@ -182,6 +190,8 @@ class PlanarScene(Element):
         full = np.zeros((self.size + 3, self.size + 3))
         angles = 3 * self._forms.bodies[: self.rows] + 2
         np.add.at(full, (angles, angles), multipliers[:, None] * self._affine_bend(pose)[: self.rows])
+        for r, _, body, profile in self._profiles:
+            full[3 * body + 2, 3 * body + 2] -= multipliers[r] * profile.bend(pose.row[body, 2])
         row, one, two = self._forms.product.T
         if not len(row):
             return full[: self.size, : self.size]

@@ -19,6 +19,7 @@ from ..errors import InputError
 from ..typing import Array, BoolArray, IntArray
 from .forces import Along, Tension, Weight
 from .forms import End, Form, Frames, Terms, Vector
+from .joints import Profile
 from .ordering import Factor, elimination_plan
 from .planar import Body, Scene
 from .statefunctions import StateFunction
@@ -82,6 +83,7 @@ class Assembly(NamedTuple):
     row_joint: tuple[int, ...]  # joint number of each constraint
     row_label: tuple[str, ...]  # what the constraint holds, for messages
     row_holds_length: BoolArray  # (m,) whether it holds lengths, not angles and directions alone
+    profiles: tuple[tuple[int, int, Profile], ...]  # constraint, which of its bodies, profile of that one's angle
     spring_label: tuple[str, ...]
     functions: tuple[TimeFunction, ...]  # in the order of the tables
     state_loads: tuple[tuple[int, StateFunction], ...]  # number among the forces along forms, and the load
@@ -100,6 +102,7 @@ class _Row(NamedTuple):
     form: Form
     bodies: tuple[int, int]
     motion: int
+    profile: tuple[int, Profile] | None = None  # which of its bodies turns it
 
 
 def assemble(scene: Scene) -> Assembly:
@@ -117,8 +120,10 @@ def assemble(scene: Scene) -> Assembly:
     rows: list[_Row] = []
     for number, joint in enumerate(scene.joints):
         label = f"{type(joint).__name__.lower()} {joint.name or number}"
-        for what, form, motion in joint.rows(frames):
-            rows.append(_Row(number, f"{label} ({what})", form, _two(form.bodies, n, label), numbered(motion)))
+        for what, form, motion, profile in joint.rows(frames):
+            bodies = _two(form.bodies, n, label)
+            held = None if profile is None else (bodies.index(scene.body_index[profile[0]]), profile[1])
+            rows.append(_Row(number, f"{label} ({what})", form, bodies, numbered(motion), held))
     plan = elimination_plan([(r.joint, r.bodies) for r in rows], n)
     rows = [rows[i] for i in plan.order]
     weight = np.zeros((n + 1, 3))
@@ -156,6 +161,7 @@ def assemble(scene: Scene) -> Assembly:
         row_label=tuple(r.label for r in rows),
         row_holds_length=lengths,
         spring_label=tuple(label for label, _ in tensions),
+        profiles=tuple((i, *row.profile) for i, row in enumerate(rows) if row.profile is not None),
         functions=tuple(functions),
         state_loads=tuple((k, a.load) for k, a in enumerate(along) if isinstance(a.load, StateFunction)),
         start_q=q0,

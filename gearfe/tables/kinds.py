@@ -56,6 +56,11 @@ JOINTS: dict[str, Kind] = {
         },
         ("radius_m",),
     ),
+    "cam": Kind(
+        "gearfe.rigid.cam:Cam",
+        {"body": "a", "to": "b", "point": "point", "coordinate": "coordinate", "profile": "profile"},
+        ("coordinate", "profile"),
+    ),
     "prescribed": Kind(
         "gearfe.rigid.joints:Prescribed",
         {"body": "body", "to": "relative_to", "point": "point", "coordinate": "coordinate", "motion": "function"},

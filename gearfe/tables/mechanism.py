@@ -100,7 +100,11 @@ class ValueTableTable:
     file: str = quantity(doc="CSV file with a header, beside the mechanism file")
     x: str = quantity(doc="column of the argument, rising")
     y: str = quantity(doc="column of the value")
-    interpolation: str = quantity("cubic", choices=("cubic", "linear"), doc="monotone cubics, or straight lines")
+    interpolation: str = quantity(
+        "cubic",
+        choices=("cubic", "linear", "periodic"),
+        doc="monotone cubics, straight lines, or a periodic spline with steady curvature",
+    )
 
 
 @dataclass(frozen=True)
@@ -123,7 +127,10 @@ class JointTable:
     )
     to_radius_m: float | None = quantity(None, above=0.0, doc="radius of the pulley of 'to' in m")
     crossed: bool = quantity(False, doc="a crossed belt: the pulleys turn in opposite senses")
-    coordinate: str | None = quantity(None, choices=("angle", "rate", "x", "y"), doc="what is prescribed")
+    coordinate: str | None = quantity(
+        None, choices=("angle", "rate", "x", "y"), doc="what is prescribed, or follows a cam"
+    )
+    profile: str | None = quantity(None, doc="table of a cam's lift in m (or rad) over its angle in rad")
     motion: Function | None = quantity(None, doc="rad, rad/s or m: a number or a function of time")
 
     def check(self, where: str) -> None:
