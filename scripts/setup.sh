@@ -3,7 +3,7 @@
 # wheels load. Usage: bash scripts/setup.sh [dev]   (dev adds the test tools). Safe to run again: it does only what is missing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-extras="${1:-}"
+extras="${1:-all}"
 
 python=""
 for candidate in "${PYTHON:-}" python3 python3.14 python3.13 python3.12 python3.11; do
@@ -46,9 +46,9 @@ if ! .venv/bin/python -m pip --version >/dev/null 2>&1; then
     rm -rf .venv
     "$python" -m venv .venv
 fi
-stamp=".venv/.gearfe-$(cksum pyproject.toml | tr ' ' '-' | cut -c1-24)-${extras:-run}"
+stamp=".venv/.gearfe-$(cksum pyproject.toml | tr ' ' '-' | cut -c1-24)-$extras"
 if [ ! -e "$stamp" ]; then
     echo "installing gearfe into .venv (a few minutes the first time)"
-    .venv/bin/python -m pip install --quiet --disable-pip-version-check -e ".${extras:+[$extras]}"
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check -e ".[$extras]"
     touch "$stamp"
 fi

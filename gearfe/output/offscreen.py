@@ -6,6 +6,7 @@ a picture and a message, not the results.
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import subprocess
 import sys
@@ -27,6 +28,8 @@ def draw_apart(module: str, path: str | Path, arrays: Mapping[str, Array], *, se
     seconds
         How long it may take.
     """
+    if importlib.util.find_spec("pyvista") is None:
+        return "pyvista is not installed: pip install 'gearfe[fields]'"
     with tempfile.TemporaryDirectory() as folder:
         job = Path(folder) / "job.npz"
         save_arrays(job, arrays)
