@@ -120,7 +120,7 @@ def test_fields(tmp_path):
 def test_animation(tmp_path, capsys):
     from PIL import Image
 
-    options = ["--twist-deg", "0.1", "--angles", "0", "3", "17", "--animate", "2", *QUICK, "--no-picture"]
+    options = ["--twist-deg", "0.1", "--angles", "0", "3", "17", "--animate", "2", *QUICK, "--no-pictures"]
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *options]) == 0
     assert sorted(p.name for p in tmp_path.iterdir()) == ["stiffness.csv", "stress.gif", "summary.json"]
     with Image.open(tmp_path / "stress.gif") as made:
@@ -325,7 +325,7 @@ def test_the_script(tmp_path):
 
 
 def test_the_estimate_reaches_beyond_the_coarsest_mesh(tmp_path, capsys):
-    options = ("--twist-deg", "0.5", "--angles", "2", "6", "8", "--coarsen", "4.5", "--no-picture")
+    options = ("--twist-deg", "0.5", "--angles", "2", "6", "8", "--coarsen", "4.5", "--no-pictures")
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *options]) == 0
     assert "discretisation error" in capsys.readouterr().out
 
@@ -339,7 +339,7 @@ def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
         return made.stated(np.where(bad, "not_converged", made.status))
 
     monkeypatch.setattr("gearfe.stiffness.positions.solve_elements", one_fails)
-    options = ("--twist-deg", "0.3", "--angles", "3", "3", "9", "--fields", "9", "6", "3", "--no-picture")
+    options = ("--twist-deg", "0.3", "--angles", "3", "3", "9", "--fields", "9", "6", "3", "--no-pictures")
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, "--law", "nitsche", *options]) == 1
     assert [r["status"] for r in rows(tmp_path)] == ["converged", "not_converged", "converged"]
     assert {p.name for p in tmp_path.glob("stress_*.png")} == {"stress_3deg.png", "stress_9deg.png"}
@@ -349,7 +349,7 @@ def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
 
 def test_load_and_pressure_are_told(tmp_path, capsys):
     """At 0.5 deg the torque is beyond what the steel bears, and tip rounds bear at pair changes."""
-    options = ("--twist-deg", "0.5", "--angles", "0", "3", "15", "--no-picture")
+    options = ("--twist-deg", "0.5", "--angles", "0", "3", "15", "--no-pictures")
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options]) == 0
     said = capsys.readouterr().out
     assert "torque at the wheel: mean" in said
@@ -361,6 +361,6 @@ def test_load_and_pressure_are_told(tmp_path, capsys):
     assert torque["largest"] == pytest.approx(curve.torque_wheel.max(), rel=1e-12)
     assert told["contact_pressure"]["largest_hertzian_MPa"] == pytest.approx(1e-6 * np.nanmax(curve.peak_pressure))
     assert told["contact_pressure"]["positions_with_a_rounded_edge_bearing"] == (curve.edge == "rounded").sum() > 0
-    light = ("--twist-deg", "0.01", "--angles", "12", "1", "14", "--no-picture")
+    light = ("--twist-deg", "0.01", "--angles", "12", "1", "14", "--no-pictures")
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *light]) == 0
     assert "case-hardened" not in capsys.readouterr().out

@@ -146,7 +146,7 @@ def test_the_command(tmp_path, capsys) -> None:
     assert all(float(row["root_stress_pinion_MPa"]) > 20 for row in rows)
     content = json.loads((tmp_path / "out" / "microgeometry.json").read_text())
     out = ["--out", str(tmp_path / "more")]
-    options = ["--torques-Nm", "70", "--positions", "4", "--mesh-cycles", "1", "--flank", "right", "--no-picture"]
+    options = ["--torques-Nm", "70", "--positions", "4", "--mesh-cycles", "1", "--flank", "right", "--no-pictures"]
     assert main(["microgeometry", str(job), *out, *options]) == 0
     assert "1 torques x 4 positions over 1 mesh cycles: 4 converged" in capsys.readouterr().out
     assert not list((tmp_path / "more").glob("*.png"))

@@ -71,7 +71,7 @@ def test_every_command_takes_the_same_deviations(tmp_path, capsys) -> None:
     job = tmp_path / "job.toml"
     job.write_text(JOB)
     for command in ("stiffness", "loadmap", "microgeometry"):
-        assert main([command, str(job), "--out", str(tmp_path / command), "--no-picture"]) == 0
+        assert main([command, str(job), "--out", str(tmp_path / command), "--no-pictures"]) == 0
     # -12 + 2 um at the pinion's tip, a wave of 1 um besides; -5 - 6 um at the wheel's form circle
     told = re.findall(r"up to ([0-9.]+) um \(pinion\) and ([0-9.]+) um \(wheel\)", capsys.readouterr().out)
     assert len(told) == 2

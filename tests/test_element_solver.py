@@ -108,7 +108,7 @@ def test_a_finer_flank_resolves_more() -> None:
 
 def test_the_command_says_the_cure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     options = ["--out", str(tmp_path), "--law", "nitsche", "--twist-deg", str(NARROW), "--angles", "2", "6", "14"]
-    assert main(["stiffness", str(JOB), *options, "--no-picture"]) == 1
+    assert main(["stiffness", str(JOB), *options, "--no-pictures"]) == 1
     said = capsys.readouterr().err
     assert 'law = "half_plane"' in said
     assert "flank_coarsen" in said

@@ -141,7 +141,7 @@ law = "half_plane"
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     job = tmp_path / "job.toml"
     job.write_text(JOB)
-    assert main(["stiffness", str(job), "--out", str(tmp_path / "out"), "--no-picture", "--fields"]) == 0
+    assert main(["stiffness", str(job), "--out", str(tmp_path / "out"), "--no-pictures", "--fields"]) == 0
     assert "half_plane" in capsys.readouterr().out
     curve = StiffnessCurve.from_csv(tmp_path / "out" / "stiffness.csv")
     assert set(curve.law) == {"half_plane"}

@@ -250,7 +250,7 @@ def test_backlash_and_law_of_the_job_reach_maps_and_trains(tmp_path):
         # half the backlash is 43 um, a tooth pair yields by some 20: with it in, k is a third
         assert (curve.k_tangent / curve.k_mesh < 1.3).all()
         assert curve.lost_motion > 0
-    options = ["--torques-Nm", "66.66666666666667", "100", "--positions", "8", "--no-picture"]
+    options = ["--torques-Nm", "66.66666666666667", "100", "--positions", "8", "--no-pictures"]
     assert main(["loadmap", str(tmp_path / "job.toml"), "--out", str(tmp_path / "out"), *options]) == 0
     mapped = LoadMap.from_csv(tmp_path / "out" / "loadmap.csv")
     assert set(mapped.quantity("law").ravel()) == {"half_plane"}

@@ -193,7 +193,7 @@ def test_command_on_the_folding_links(tmp_path, capsys):
         "2",
         "--reactions",
     ]
-    assert main([*arguments, "--no-figures"]) == 0
+    assert main([*arguments, "--no-pictures"]) == 0
     assert "1 free" in capsys.readouterr().out
     table = np.genfromtxt(tmp_path / "trajectory.csv", delimiter=",", names=True)
     header = (tmp_path / "trajectory.csv").read_text().splitlines()[0].split(",")
@@ -219,7 +219,7 @@ def test_command_on_the_folding_links(tmp_path, capsys):
 
 
 def test_command_on_andrews(tmp_path):
-    assert main(["mechanism", str(GEOMETRY / "andrews.toml"), "--out", str(tmp_path), "--no-figures"]) == 0
+    assert main(["mechanism", str(GEOMETRY / "andrews.toml"), "--out", str(tmp_path), "--no-pictures"]) == 0
     table = np.genfromtxt(tmp_path / "trajectory.csv", delimiter=",", names=True)
     names = ("beta", "theta", "gamma", "phi", "delta", "omega", "epsilon")
     expected = ("time_s", *(f"{n}_rad" for n in names), "beta_wrapped_rad", "theta_wrapped_rad")
@@ -235,7 +235,7 @@ def test_command_on_andrews(tmp_path):
 @pytest.mark.parametrize("method", ["explicit", "implicit"])
 def test_command_runs_other_methods_to_the_end(tmp_path, method):
     file = write(tmp_path, PENDULUM)
-    arguments = ["mechanism", str(file), "--out", str(tmp_path), "--no-figures", "--method", method]
+    arguments = ["mechanism", str(file), "--out", str(tmp_path), "--no-pictures", "--method", method]
     assert main([*arguments, "--tolerance", "1e-6"]) == 0
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["reached_s"] == 1.0
@@ -244,7 +244,7 @@ def test_command_runs_other_methods_to_the_end(tmp_path, method):
 
 def test_a_tolerance_of_zero_is_refused(tmp_path, capsys):
     file = write(tmp_path, PENDULUM)
-    assert main(["mechanism", str(file), "--out", str(tmp_path), "--no-figures", "--tolerance", "0"]) == 2
+    assert main(["mechanism", str(file), "--out", str(tmp_path), "--no-pictures", "--tolerance", "0"]) == 2
     assert ">= 1e-13 and <= 0.1" in capsys.readouterr().err
 
 
@@ -312,7 +312,7 @@ def test_a_planar_run_loads_no_heavy_library(tmp_path):
         str(GEOMETRY / "andrews.toml"),
         "--out",
         str(tmp_path),
-        "--no-figures",
+        "--no-pictures",
         "--until",
         "0.002",
     ]

@@ -174,7 +174,7 @@ def test_inverse_dynamics_of_a_driven_pendulum_is_the_closed_form(tmp_path: Path
     out = tmp_path / "out"
     path = write(tmp_path, ROD + DRIVE)
     assert (
-        main(["mechanism", str(path), "--analysis", "inverse", "--reactions", "--out", str(out), "--no-figures"]) == 0
+        main(["mechanism", str(path), "--analysis", "inverse", "--reactions", "--out", str(out), "--no-pictures"]) == 0
     )
     table, motion = rows(out / "reactions.csv"), rows(out / "trajectory.csv")
     t = np.array([float(r["time_s"]) for r in table])

@@ -93,7 +93,7 @@ def test_every_line_tells_its_unit_or_meaning():
 def test_the_stiffness_job_runs(tmp_path):
     path = tmp_path / "job.toml"
     assert main(["new", "stiffness", str(path)]) == 0
-    options = ["--angles", "1", "8", "17", "--coarsen", "3", "--no-estimate", "--no-picture"]
+    options = ["--angles", "1", "8", "17", "--coarsen", "3", "--no-estimate", "--no-pictures"]
     assert main(["stiffness", str(path), "--out", str(tmp_path / "out"), *options]) == 0
     assert (tmp_path / "out" / "stiffness.csv").exists()
 
@@ -101,7 +101,7 @@ def test_the_stiffness_job_runs(tmp_path):
 def test_the_mechanism_job_runs(tmp_path):
     path = tmp_path / "job.toml"
     assert main(["new", "mechanism", str(path)]) == 0
-    assert main(["mechanism", str(path), "--out", str(tmp_path / "out"), "--until", "0.2", "--no-figures"]) == 0
+    assert main(["mechanism", str(path), "--out", str(tmp_path / "out"), "--until", "0.2", "--no-pictures"]) == 0
     assert (tmp_path / "out" / "trajectory.csv").exists()
 
 

@@ -77,7 +77,7 @@ def test_in_a_job_file_and_on_the_command_line(springs: type, tmp_path: Path) ->
     text = JOB.read_text().replace('law = "nitsche"', 'law = "springs"\nlaw_parameters = { bed = 300.0 }\n#')
     job.write_text(text)
     assert read_stiffness_job(job).law == springs(300.0)
-    options = ["--twist-deg", "0.1", "--angles", "2", "6", "8", "--no-picture", "--no-estimate"]
+    options = ["--twist-deg", "0.1", "--angles", "2", "6", "8", "--no-pictures", "--no-estimate"]
     assert main(["stiffness", str(job), "--out", str(tmp_path / "one"), *options]) == 0
     line = ["--law", "springs", "--law-parameter", "bed", "300"]
     assert main(["stiffness", str(JOB), "--out", str(tmp_path / "two"), *options, *line]) == 0

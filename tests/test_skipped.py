@@ -98,7 +98,7 @@ def test_neighbour_teeth_only(gears, elastic):
 def test_fields_only_where_asked(tmp_path):
     job = str(ROOT / "geometry" / "gear_train.toml")
     plain = ["stiffness", job, "--twist-deg", "0.1", "--angles", "2", "3", "5", "--coarsen", "4"]
-    plain += ["--no-estimate", "--no-picture"]
+    plain += ["--no-estimate", "--no-pictures"]
     code = f"from gearfe.cli import main; assert main({[*plain, '--out', str(tmp_path / 'a')]!r}) == 0"
     loaded, _ = loaded_after(code)
     room = {"gearfe.stiffness.fields", "gearfe.stiffness.fields_output", "gearfe.output.vtkhdf"}

@@ -344,7 +344,7 @@ def test_another_study_does_not_go_on_here(tmp_path):
 
 def test_a_driver_that_is_killed_loses_nothing(tmp_path):
     path = written(tmp_path, cases=700)
-    command = [sys.executable, "-m", "gearfe", "study", str(path), "--out", str(tmp_path / "out"), "--no-picture"]
+    command = [sys.executable, "-m", "gearfe", "study", str(path), "--out", str(tmp_path / "out"), "--no-pictures"]
     run = subprocess.Popen([*command, "--jobs", "1"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     table = tmp_path / "out" / "study.csv"
     limit = time.monotonic() + 60.0
@@ -361,7 +361,7 @@ def test_a_driver_that_is_killed_loses_nothing(tmp_path):
         assert some.evaluate(dict(zip(study.task.names, study.cases[int(number)], strict=True)))["y"] == float(
             before[number][4]
         )
-    assert main(["study", str(path), "--out", str(tmp_path / "out"), "--no-picture", "--jobs", "1"]) == 0
+    assert main(["study", str(path), "--out", str(tmp_path / "out"), "--no-pictures", "--jobs", "1"]) == 0
     after = {row[0]: row for row in rows_of(tmp_path / "out")[1:]}
     assert len(after) == 700
     assert all(after[number] == row for number, row in before.items())

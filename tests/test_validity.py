@@ -52,7 +52,7 @@ def test_tables_of_others_do_not_say(tmp_path: Path) -> None:
 
 
 def test_the_command_tells_why(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ["--law", "half_plane", "--coarsen", "2", "--angles", "2", "6", "8", "--no-picture", "--no-estimate"]
+    options = ["--law", "half_plane", "--coarsen", "2", "--angles", "2", "6", "8", "--no-pictures", "--no-estimate"]
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), "--twist-deg", "0.6", *options]) == 0
     said = capsys.readouterr().err
     assert "2 positions are beyond validity" in said

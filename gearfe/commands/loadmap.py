@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_loads(parser)
     add_keys(parser, StiffnessTable, *MODEL)
     add_removed(parser, StiffnessTable.REMOVED)
-    parser.add_argument("--no-picture", action="store_true", help="leave out the picture")
+    parser.add_argument("--no-pictures", action="store_true", help="leave out the picture")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
         with watch.stage("table"):
             made_map.to_csv(made / "loadmap.csv")
             write_csv(made / "loadmap_torques.csv", torque_table(made_map))
-        if not args.no_picture:
+        if not args.no_pictures:
             from ..output.load_map_figures import load_map_figure
 
             with watch.stage("picture"):

@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_job(parser, "file", "mechanism file (TOML, see docs/mechanisms.md)")
     parser.add_argument("--out", required=True, help="folder for the results")
     add_keys(parser, RunTable, *KEYS, until="end_s")
-    parser.add_argument("--no-figures", action="store_true", help="tables and summary only")
+    parser.add_argument("--no-pictures", action="store_true", help="tables and summary only")
     parser.add_argument("--no-estimate", action="store_true", help="leave out the finer runs that estimate the error")
     parser.add_argument("--animation", action="store_true", help="write animation.gif")
 
@@ -39,13 +39,13 @@ def run(args: argparse.Namespace) -> int:
     if file.run.analysis in ("equilibrium", "modes"):
         from ..mechanisms.rest import run_rest
 
-        outcome = run_rest(mechanism, args.out, figures=not args.no_figures)
+        outcome = run_rest(mechanism, args.out, figures=not args.no_pictures)
         print(outcome.text)
         return 0 if outcome.complete else 1
     outcome = run_mechanism(
         mechanism,
         args.out,
-        figures=not args.no_figures,
+        figures=not args.no_pictures,
         animation=args.animation,
         estimate=not args.no_estimate,
     )

@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_loads(parser)
     add_keys(parser, MicrogeometryTable, "mesh_cycles", "flank")
     add_keys(parser, StiffnessTable, "coarsen")
-    parser.add_argument("--no-picture", action="store_true", help="leave out the pictures")
+    parser.add_argument("--no-pictures", action="store_true", help="leave out the pictures")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
             write_csv(place / "microgeometry_torques.csv", torque_table(made))
             write_csv(place / "microgeometry_pairs.csv", pair_table(made))
             write_csv(place / "microgeometry_orders.csv", order_table(made))
-        if not args.no_picture:
+        if not args.no_pictures:
             from ..output.microgeometry_figures import flank_figure, microgeometry_figure
 
             with watch.stage("pictures"):

@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_keys(parser, ReliefTable, "positions", "map_points", "generations", "seed")
     add_keys(parser, StiffnessTable, "coarsen")
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes (default 1); no digit changes")
-    parser.add_argument("--no-picture", action="store_true", help="leave out the picture")
+    parser.add_argument("--no-pictures", action="store_true", help="leave out the picture")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -103,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
     with whole_set(folder, FILES) as place:
         write_csv(place / "relief_map.csv", map_table(table, made))
         write_csv(place / "relief_torques.csv", compared)
-        if not args.no_picture:
+        if not args.no_pictures:
             from ..output.microgeometry_figures import relief_figure
 
             with watch.stage("picture"):

@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_removed(parser, StiffnessTable.REMOVED)
     parser.add_argument("--no-estimate", action="store_true", help="leave out the error estimate")
-    parser.add_argument("--no-picture", action="store_true", help="leave out the picture")
+    parser.add_argument("--no-pictures", action="store_true", help="leave out the picture")
     parser.add_argument(
         "--fields",
         nargs="*",
@@ -117,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
         if args.animate is not None:
             with watch.stage("animation"):
                 _animate(made / "stress.gif", job, elastic, curve, args.animate)
-        if not args.no_picture:
+        if not args.no_pictures:
             with watch.stage("picture"):
                 from ..output.figures import stiffness_figure
 

@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--write", metavar="FILE", help="where --row writes; files that the job names stay where they are"
     )
-    parser.add_argument("--no-picture", action="store_true", help="leave out the pictures")
+    parser.add_argument("--no-pictures", action="store_true", help="leave out the pictures")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     with watch.stage("statistics"):
         summary = made.summary()
     with whole_set(folder, ("study*.png",)) as place:
-        if not args.no_picture:
+        if not args.no_pictures:
             from ..study.pictures import write_figures
 
             with watch.stage("pictures"):

@@ -71,9 +71,11 @@ def base_jobs() -> dict[str, BaseJob]:
     housing = {**HOUSING, "mesh": {"size_mm": 20.0}, "reduction": {"modes": 5}}
     plain = ("--no-pictures", "--no-floquet", "--no-estimate")
     return {
-        "mechanism": BaseJob(toml_text(mechanism), ("mechanism", "--no-figures", "--reactions", "--no-estimate"), 0.45),
+        "mechanism": BaseJob(
+            toml_text(mechanism), ("mechanism", "--no-pictures", "--reactions", "--no-estimate"), 0.45
+        ),
         "stiffness": BaseJob(
-            toml_text({"pair": PAIR, "stiffness": sweep}), ("stiffness", "--no-picture", "--no-estimate"), 0.2
+            toml_text({"pair": PAIR, "stiffness": sweep}), ("stiffness", "--no-pictures", "--no-estimate"), 0.2
         ),
         "vibration": BaseJob(toml_text({"pair": PAIR, "train": train}), ("vibration", *plain), 0.25),
         "gear": BaseJob(toml_text({"pair": PAIR}), ("gear",), 0.02),

@@ -92,7 +92,7 @@ def test_the_stated_error_covers_the_shortest_steps(tmp_path: Path, tolerance: f
 
 
 def test_the_summary_states_the_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    command = ["mechanism", str(ROOT / "geometry" / "slider_crank.toml"), "--until", "0.5", "--no-figures", "--out"]
+    command = ["mechanism", str(ROOT / "geometry" / "slider_crank.toml"), "--until", "0.5", "--no-pictures", "--out"]
     assert main([*command, str(tmp_path / "a")]) == 0
     stated = json.loads((tmp_path / "a" / "summary.json").read_text())["error_estimate"]
     assert 0.0 < stated["coordinates_m_or_rad"] < 1e-7
@@ -107,7 +107,7 @@ def test_files_of_an_earlier_run_do_not_stay(tmp_path: Path) -> None:
     assert main([*command, "--reactions", "--no-estimate"]) == 0
     assert {"curves.png", "picture.png", "reactions.csv"} <= {p.name for p in tmp_path.iterdir()}
     (tmp_path / "notes.txt").write_text("mine\n")
-    assert main([*command, "--no-figures", "--no-estimate"]) == 0
+    assert main([*command, "--no-pictures", "--no-estimate"]) == 0
     assert {p.name for p in tmp_path.iterdir()} == {"trajectory.csv", "energy.csv", "summary.json", "notes.txt"}
 
 
