@@ -448,6 +448,28 @@ def test_gears_and_their_microgeometry(tmp_path):
     assert len(set(made.output("k"))) == 4
 
 
+def test_a_train_in_a_rigid_housing(tmp_path):
+    """The rows are those of the command with the same keys."""
+    raw = read_toml(JOBS / "gear_train.toml")
+    raw["train"] |= {"housing": "rigid", "duration_ms": 0.7, "method": "explicit"}
+    for name in ("variant", "variants"):
+        raw["train"].pop(name)
+    raw["train"]["curves"] = {"law": "curve", "load": "stiffness"}
+    raw["stiffness"] = {"twist_deg": 0.05, "law": "half_plane", "coarsen": 2.0, "angle_step_deg": 3.0}
+    raw["study"] = {
+        "job": "vibration", "design": "factorial", "parameters": {"train.drive.speed_rad_per_s": [300.0, 500.0]},
+        "outputs": {"force": "max(contact_force_1_N)", "last": "contact_force_2_N[20]"},
+    }  # fmt: skip
+    (tmp_path / "study.toml").write_text(toml_document(raw))
+    made = run_study(read_study(tmp_path / "study.toml"), tmp_path, jobs=1)
+    command = ["vibration", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out"), "--no-pictures"]
+    assert main([*command, "--no-floquet", "--no-estimate", "--set", "train.drive.speed_rad_per_s=500"]) == 0
+    with (tmp_path / "out" / "response.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert made.output("force")[1] == max(float(row["contact_force_1_N"]) for row in rows)
+    assert made.output("last")[1] == float(rows[20]["contact_force_2_N"])
+
+
 def test_command_leaves_tables_and_pictures(tmp_path, capsys):
     path = written(tmp_path, cases=16)
     text = path.read_text() + 'x = "x1[0]"\n[study.limits]\ny = { low = 0.0 }\n'

@@ -6,9 +6,8 @@ import argparse
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..progress import count
 from ..tables.train import TrainTable
@@ -19,9 +18,6 @@ if TYPE_CHECKING:
     from ..train.scene import TrainScene
     from ..vibration.files import OutputChoice, Written
     from ..vibration.job import TrainJob
-
-#: Tolerance that suffices for errors: forces and accelerations are within a hundredth of it.
-ROUGH = 1e-3
 
 #: Keys of [train] that options stand for.
 KEYS = ("tolerance", "method")
@@ -71,6 +67,7 @@ def run(args: argparse.Namespace) -> int:
     from ..stopwatch import Stopwatch
     from ..vibration.files import OutputChoice, check_choice, write_run
     from ..vibration.job import train_job
+    from ..vibration.run import band, described, repeater, simulated
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("reading"):
@@ -116,52 +113,6 @@ def run(args: argparse.Namespace) -> int:
     return 0 if response.status == "done" and not written.problems else 1
 
 
-def simulated(
-    job: TrainJob, curves: Sequence[str], *, watch: Any, progress: Any = None, floquet: bool, estimate: bool
-) -> tuple[TrainScene, Callable[[Any], Iterator[TrainResponse]], int]:
-    """Curves and housing of a job, each from the cache where it can be; the run over given times; samples in a step."""
-    from ..record_spectrum import finer
-    from ..train import build_train
-    from ..train.simulate import simulate_in_pieces
-    from ..vibration.job import job_scene, train_body
-    from ..vibration.mesh_stiffness import train_curves
-
-    with watch.stage("curves"):
-        stiffness = train_curves(job, curves, progress=progress, estimate=estimate)
-    with watch.stage("housing"):
-        body = train_body(job)
-    with watch.stage("model"):
-        scene = job_scene(job, stiffness, body)
-        model = build_train(scene)
-        highest = float(model.coupled_frequencies_hz.max(initial=0.0))
-    options: dict[str, Any] = {"tolerance": job.table.tolerance, "method": job.table.method, "band_hz": band(job)}
-
-    def pieces(times: Any) -> Iterator[TrainResponse]:
-        return simulate_in_pieces(model, finer(times, highest)[0], floquet=floquet, estimate=estimate, **options)
-
-    return scene, pieces, finer(job.times, highest)[1]
-
-
-def band(job: TrainJob) -> float:
-    """Highest frequency of interest (Hz)."""
-    return 5000.0 if job.housing is None else job.housing.reduction.band_Hz
-
-
-def repeater(job: TrainJob, every: int) -> Callable[[TrainScene], Callable[[Any], Iterator[TrainResponse]]]:
-    """The same run with another train, as many samples in an output step; differences of runs need fewer digits."""
-
-    def again(scene: TrainScene) -> Callable[[Any], Iterator[TrainResponse]]:
-        from ..record_spectrum import subdivided
-        from ..train import build_train
-        from ..train.simulate import simulate_in_pieces
-
-        model = build_train(scene)
-        options: dict[str, Any] = {"tolerance": max(job.table.tolerance, ROUGH), "method": job.table.method}
-        return lambda times: simulate_in_pieces(model, subdivided(times, every), **options)
-
-    return again
-
-
 def title(job: TrainJob) -> str:
     """Line above the pictures."""
     table = job.table
@@ -172,38 +123,6 @@ def title(job: TrainJob) -> str:
     if table.variant:
         parts.append(f"variant {table.variant}")
     return ", ".join(parts)
-
-
-def described(job: TrainJob, scene: TrainScene) -> dict[str, Any]:
-    """What was computed: entries of the summary."""
-    from dataclasses import asdict
-
-    from ..stiffness.report import versions
-    from ..train.kinematics import driving_senses
-    from ..train.phases import tooth_places
-    from ..vibration.report import stiffness_ranges
-
-    body = scene.housing
-    housing = None
-    if body is not None:
-        housing = {
-            "mass_kg": body.rigid_mass[0, 0],
-            "coordinates": body.size,
-            "modes": body.modes,
-            "unknowns": body.nodes.size,
-            "notes": list(body.notes),
-        }
-    return {
-        "variant": job.table.variant,
-        "housing": housing or "rigid",
-        "mesh_stiffness_N_per_m": stiffness_ranges(scene),
-        "mesh_phases_deg": {
-            mesh.name: math.degrees(phase)
-            for mesh, phase in zip(scene.meshes, tooth_places(scene, driving_senses(scene)).phases, strict=True)
-        },
-        "job": {"train": asdict(job.table), "stiffness": asdict(job.stiffness)},
-        "versions": versions(),
-    }
 
 
 def told(response: TrainResponse, scene: TrainScene, written: Written, choice: OutputChoice) -> list[str]:

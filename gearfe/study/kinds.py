@@ -1,7 +1,8 @@
-"""One case of each kind of job, in this process and without files: tables of a job in, tables and summary out.
+"""One case of each kind of job, in this process: tables of a job in, tables and summary out.
 
-What cases share is made once: a `Shared` keeps the condensed gears and the root meshes of the last pair, so that cases
-which differ in load or microgeometry alone cost positions only.
+Where a job leaves the integrator open (``auto``) it is fixed here: auto chooses by the clock, and a case must have the
+same digits wherever it runs. What cases share is made once: a `Shared` keeps the condensed gears and the root meshes of
+the last pair, so that cases which differ in load or microgeometry alone cost positions only.
 """
 
 from __future__ import annotations
@@ -9,13 +10,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from ..config import build, job_tables
+from ..stopwatch import Stopwatch
 from ..tables.loadmap import LoadMapTable
 from ..tables.stiffness import StiffnessTable
+from ..textfile import read_csv
 from .answer import Answer
 
 #: Tables of a job as parsed from TOML.
@@ -122,6 +126,28 @@ def _microgeometry(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Ans
     return Answer(rows, summary(job, table, made, deviations, {}), _positions(made.failed))
 
 
+def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
+    from ..rigid.integrate import use_compiled
+    from ..tables.train import train_tables
+    from ..vibration.files import OutputChoice, write_run
+    from ..vibration.job import train_job
+    from ..vibration.run import band, described, repeater, simulated
+
+    job, watch = train_job(path, train_tables(raw, path)), Stopwatch()
+    if job.table.method == "auto":
+        job = replace(job, table=replace(job.table, method="taylor" if use_compiled("auto") else "explicit"))
+    scene, pieces, every = simulated(job, (), watch=watch, floquet=False, estimate=estimate)
+    with TemporaryDirectory() as name:  # a response may be longer than memory
+        folder = Path(name)
+        made = write_run(
+            folder, scene, pieces, job.times, OutputChoice(pictures=False), title="", watch=watch, every=every,
+            further=described(job, scene), again=repeater(job, every) if estimate else None, band_hz=band(job),
+        )  # fmt: skip
+        rows = {table: read_csv(folder / f"{table}.csv", table) for table in ("response", "spectrum")}
+    status = made.response.status
+    return Answer(rows, made.summary, "" if status == "done" else status)
+
+
 def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
     from ..mechanisms.error_estimate import trajectory_error
     from ..mechanisms.job import output_times, summarise
@@ -133,7 +159,6 @@ def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
 
     mechanism = make_mechanism(build(MechanismFile, raw, ""), path)
     run, start = mechanism.file.run, mechanism.start()
-    # auto chooses by the clock, and a case must have the same digits wherever it runs
     stiff = any(element.stiff for element in mechanism.system.elements)
     method = ("implicit" if stiff else "taylor") if run.method == "auto" else run.method
     options: dict[str, Any] = {"method": method, "backend": "compiled" if use_compiled("auto") else "plain"}
@@ -180,5 +205,6 @@ _KINDS: dict[str, Callable[[Raw, Path, Shared, bool], Answer]] = {
     "stiffness": _stiffness,
     "loadmap": _loadmap,
     "microgeometry": _microgeometry,
+    "vibration": _vibration,
     "mechanism": _mechanism,
 }

@@ -9,7 +9,7 @@ from ..config import quantity
 from ..errors import InputError, unknown_name
 
 #: Kinds of job that a study can vary.
-KINDS = ("stiffness", "loadmap", "microgeometry", "mechanism")
+KINDS = ("stiffness", "loadmap", "microgeometry", "vibration", "mechanism")
 DESIGNS = ("factorial", "latin_hypercube", "sobol", "saltelli", "rows")
 
 

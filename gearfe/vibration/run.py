@@ -1,0 +1,84 @@
+"""The run of a vibration job: its curves and housing, each from the cache where it can be, and the transient."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from ..record_spectrum import finer, subdivided
+from ..stiffness.report import versions
+from ..train import build_train
+from ..train.kinematics import driving_senses
+from ..train.phases import tooth_places
+from ..train.response import TrainResponse
+from ..train.scene import TrainScene
+from ..train.simulate import simulate_in_pieces
+from .job import TrainJob, job_scene, train_body
+from .mesh_stiffness import train_curves
+from .report import stiffness_ranges
+
+#: Tolerance that suffices for errors: forces and accelerations are within a hundredth of it.
+ROUGH = 1e-3
+
+
+def simulated(
+    job: TrainJob, curves: Sequence[str], *, watch: Any, progress: Any = None, floquet: bool, estimate: bool
+) -> tuple[TrainScene, Callable[[Any], Iterator[TrainResponse]], int]:
+    """Curves and housing of a job, each from the cache where it can be; the run over given times; samples in a step."""
+    with watch.stage("curves"):
+        stiffness = train_curves(job, curves, progress=progress, estimate=estimate)
+    with watch.stage("housing"):
+        body = train_body(job)
+    with watch.stage("model"):
+        scene = job_scene(job, stiffness, body)
+        model = build_train(scene)
+        highest = float(model.coupled_frequencies_hz.max(initial=0.0))
+    options: dict[str, Any] = {"tolerance": job.table.tolerance, "method": job.table.method, "band_hz": band(job)}
+
+    def pieces(times: Any) -> Iterator[TrainResponse]:
+        return simulate_in_pieces(model, finer(times, highest)[0], floquet=floquet, estimate=estimate, **options)
+
+    return scene, pieces, finer(job.times, highest)[1]
+
+
+def band(job: TrainJob) -> float:
+    """Highest frequency of interest (Hz)."""
+    return 5000.0 if job.housing is None else job.housing.reduction.band_Hz
+
+
+def repeater(job: TrainJob, every: int) -> Callable[[TrainScene], Callable[[Any], Iterator[TrainResponse]]]:
+    """The same run with another train, as many samples in an output step; differences of runs need fewer digits."""
+
+    def again(scene: TrainScene) -> Callable[[Any], Iterator[TrainResponse]]:
+        model = build_train(scene)
+        options: dict[str, Any] = {"tolerance": max(job.table.tolerance, ROUGH), "method": job.table.method}
+        return lambda times: simulate_in_pieces(model, subdivided(times, every), **options)
+
+    return again
+
+
+def described(job: TrainJob, scene: TrainScene) -> dict[str, Any]:
+    """What was computed: entries of the summary."""
+    body = scene.housing
+    housing = None
+    if body is not None:
+        housing = {
+            "mass_kg": body.rigid_mass[0, 0],
+            "coordinates": body.size,
+            "modes": body.modes,
+            "unknowns": body.nodes.size,
+            "notes": list(body.notes),
+        }
+    return {
+        "variant": job.table.variant,
+        "housing": housing or "rigid",
+        "mesh_stiffness_N_per_m": stiffness_ranges(scene),
+        "mesh_phases_deg": {
+            mesh.name: math.degrees(phase)
+            for mesh, phase in zip(scene.meshes, tooth_places(scene, driving_senses(scene)).phases, strict=True)
+        },
+        "job": {"train": asdict(job.table), "stiffness": asdict(job.stiffness)},
+        "versions": versions(),
+    }
