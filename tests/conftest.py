@@ -1,6 +1,6 @@
-"""Meshes that tests make are kept in the repository's (ignored) mesh cache."""
+"""Meshes that tests make are kept in an ignored folder of the repository."""
 
 import os
 from pathlib import Path
 
-os.environ.setdefault("GEARFE_CACHE", str(Path(__file__).parents[1] / "meshes" / "cache"))
+os.environ.setdefault("GEARFE_CACHE", str(Path(__file__).parents[1] / ".test_cache"))

@@ -24,6 +24,7 @@ from gearfe.tables.stiffness import StiffnessTable
 from gearfe.tables.text import table_text
 from gearfe.tables.train import TrainShaftTable, TrainTable
 
+ROOT = Path(__file__).parents[1]
 SHIPPED = sorted((Path(__file__).parents[1] / "geometry").glob("*.toml"))
 
 KINDS = ("stiffness", "vibration", "mechanism")
@@ -149,3 +150,34 @@ def test_kinds_of_keys():
     assert tomllib.loads(text) == {"outer": example}
     assert "# flag = true " in text
     assert "# first (m)" in text
+
+
+def test_shipped_jobs_come_with_their_files(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "--list"]) == 0
+    told = capsys.readouterr().out
+    assert all(name in told for name in ("stiffness", "andrews.toml", "box.toml"))
+    assert main(["new", "andrews.toml"]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"andrews.toml", "andrews_reference.csv"}
+    assert "gearfe mechanism andrews.toml" in capsys.readouterr().out
+    for name in ("andrews.toml", "andrews_reference.csv"):
+        assert (tmp_path / name).read_bytes() == (ROOT / "geometry" / name).read_bytes()
+    assert main(["new", "andrews.toml", "mine.toml"]) == 2  # the table beside it would be replaced
+    assert "andrews_reference.csv" in capsys.readouterr().err
+    assert not (tmp_path / "mine.toml").exists()
+    assert main(["new", "andrew.toml"]) == 2
+    assert "did you mean 'andrews.toml'" in capsys.readouterr().err
+
+
+def test_every_shipped_file_is_in_the_wheel():
+    with (ROOT / "pyproject.toml").open("rb") as stream:
+        held = tomllib.load(stream)["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
+    suffixes = {".toml", ".csv", ".msh", ".inp"}
+    there = {
+        f"{folder}/{p.name}"
+        for folder in ("geometry", "meshes")
+        for p in (ROOT / folder).iterdir()
+        if p.suffix in suffixes
+    }
+    assert set(held) == there
+    assert all(place == f"gearfe/examples/{Path(name).name}" for name, place in held.items())

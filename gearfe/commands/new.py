@@ -1,20 +1,37 @@
-"""``gearfe new stiffness|microgeometry|study|vibration|mechanism [FILE]``: write a commented job file to start from."""
+"""``gearfe new KIND|JOB.toml [FILE]``: write a commented job file to start from, or a shipped job with its files."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-HELP = "write a commented job file to start from: stiffness, microgeometry, study, vibration or mechanism"
+HELP = "write a commented job file to start from, or a shipped job: gearfe new --list"
 
-KINDS = ("stiffness", "microgeometry", "study", "vibration", "mechanism")
+KINDS = {
+    "stiffness": "mesh stiffness of a gear pair",
+    "microgeometry": "reliefs and errors of micrometres, and the best relief",
+    "study": "many microgeometries of a pair: yield, sensitivities",
+    "vibration": "two shafts with a gear pair in a housing",
+    "mechanism": "a crank and a rod",
+}
+#: Command that runs a job with these tables, the first one that is there.
+RUNS = {
+    "bodies": "mechanism",
+    "study": "study",
+    "microgeometry": "microgeometry",
+    "train": "vibration",
+    "housing": "housing",
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("kind", metavar="KIND", help=", ".join(KINDS))
+    parser.add_argument(
+        "kind", nargs="?", metavar="KIND", help=f"{', '.join(KINDS)}, or a shipped job, as andrews.toml"
+    )
     parser.add_argument("file", nargs="?", metavar="FILE", help="file to write (default: KIND.toml)")
-    parser.add_argument("--force", action="store_true", help="replace the file when it exists")
+    parser.add_argument("--list", action="store_true", help="tell the kinds and the shipped jobs")
+    parser.add_argument("--force", action="store_true", help="replace files that exist")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -23,16 +40,53 @@ def run(args: argparse.Namespace) -> int:
     from ..output.files import whole_file
     from ..tables.examples import job_file
 
-    if args.kind not in KINDS:
-        raise unknown_name("kind of job", args.kind, KINDS)
-    target = Path(args.file or f"{args.kind}.toml")
+    shipped = {path.name: path for folder in _folders() for path in sorted(folder.glob("*.toml"))}
+    if args.list or args.kind is None:
+        for name, told in KINDS.items():
+            print(f"  {name:<26} {told}")
+        for name, path in shipped.items():
+            print(f"  {name:<26} {_first_line(path)}")
+        return 0
+    if args.kind not in (*KINDS, *shipped):
+        raise unknown_name("kind of job", args.kind, (*KINDS, *shipped))
+    target = Path(args.file or (args.kind if args.kind in shipped else f"{args.kind}.toml"))
     if target.is_dir():
         raise InputError("file", str(target), "is a folder", f"name a file in it, as {target / args.kind}.toml")
-    if target.exists() and not args.force:
-        raise InputError("file", str(target), "exists", "choose another name, or give --force to replace it")
-    text = job_file(args.kind)
-    with whole_file(target) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    print(f"written: {target}")
-    print(f"run it:  gearfe {args.kind} {target} --out out/{target.stem}")
+    source = shipped.get(args.kind)
+    text = job_file(args.kind) if source is None else source.read_text(encoding="utf-8")
+    named = [] if source is None else [p for p in source.parent.iterdir() if p != source and p.name in text]
+    files = {target: text.encode(), **{target.parent / path.name: path.read_bytes() for path in named}}
+    for path in files:
+        if path.exists() and not args.force:
+            raise InputError("file", str(path), "exists", "choose another name, or give --force to replace it")
+    for path, content in files.items():
+        with whole_file(path) as temporary:
+            temporary.write_bytes(content)
+    print("written: " + ", ".join(map(str, files)))
+    print(f"run it:  gearfe {_command(args.kind, text)} {target} --out out/{target.stem}")
     return 0
+
+
+def _command(kind: str, text: str) -> str:
+    """Command that runs a job."""
+    import tomllib
+
+    tables = tomllib.loads(text)
+    return kind if kind in KINDS else next((RUNS[name] for name in RUNS if name in tables), "stiffness")
+
+
+def _folders() -> list[Path]:
+    """Folders of the shipped jobs: in the installed package, or beside it in a copy of the repository."""
+    package = Path(__file__).parents[1]
+    found = (
+        [package / "examples"]
+        if (package / "examples").is_dir()
+        else [package.parent / n for n in ("geometry", "meshes")]
+    )
+    return [folder for folder in found if folder.is_dir()]
+
+
+def _first_line(path: Path) -> str:
+    """What a job says of itself in its first line."""
+    with path.open(encoding="utf-8") as stream:
+        return stream.readline().lstrip("# ").rstrip()
