@@ -1,95 +1,27 @@
-"""Studies: designs, expressions, statistics against theory; the same rows wherever cases run; nothing lost."""
+"""Studies: parameters, designs, expressions, statistics against theory."""
 
 from __future__ import annotations
 
-import csv
 import itertools
 import math
-import os
-import signal
-import subprocess
-import sys
-import time
 import tomllib
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import norm, qmc, sobol_indices, truncnorm
 
-from gearfe.cli import main
 from gearfe.config import build, read_toml, set_key
 from gearfe.errors import InputError
 from gearfe.study.answer import Answer
-from gearfe.study.case import DIED, Task
 from gearfe.study.design import saltelli, study_cases
 from gearfe.study.expressions import parse, value_of
 from gearfe.study.job import read_study, run_study
 from gearfe.study.parameters import read_parameters
-from gearfe.study.run import side_by_side
 from gearfe.study.statistics import pareto_set, proportion, spread
 from gearfe.tables.study import StudyTable
 from gearfe.tables.text import toml_document
 
-JOBS = Path(__file__).parents[1] / "geometry"
-
-#: Two free bodies at rest, whose places are the outputs: a job of two milliseconds.
-BASE = """
-[run]
-end_s = 1e-3
-step_s = 1e-3
-method = "explicit"
-[bodies.a]
-mass_kg = 1.0
-inertia_kg_m2 = 1.0
-position_m = [0.0, 0.0]
-[bodies.b]
-mass_kg = 1.0
-inertia_kg_m2 = 1.0
-position_m = [0.0, 0.0]
-[[outputs]]
-name = "x1"
-value = "x(a)"
-[[outputs]]
-name = "x2"
-value = "y(a)"
-[[outputs]]
-name = "x3"
-value = "x(b)"
-"""
-ISHIGAMI = """
-[study]
-job = "mechanism"
-base = "base.toml"
-design = "{design}"
-cases = {cases}
-seed = 3
-[study.parameters]
-bodies.a.position_m.0 = {{ low = -3.141592653589793, high = 3.141592653589793 }}
-bodies.a.position_m.1 = {{ low = -3.141592653589793, high = 3.141592653589793 }}
-bodies.b.position_m.0 = {{ low = -3.141592653589793, high = 3.141592653589793 }}
-[study.outputs]
-y = "sin(x1[0]) + 7*sin(x2[0])**2 + 0.1*x3[0]**4*sin(x1[0])"
-"""
-
-
-def written(folder: Path, design: str = "sobol", cases: int = 8, **more: str) -> Path:
-    """A study of Ishigami's function beside its base job."""
-    (folder / "base.toml").write_text(BASE)
-    text = ISHIGAMI.format(design=design, cases=cases)
-    for old, new in more.items():
-        text = text.replace(old.replace("__", " = "), new)
-    (folder / "study.toml").write_text(text)
-    return folder / "study.toml"
-
-
-def rows_of(folder: Path) -> list[list[str]]:
-    """Rows of study.csv without the seconds."""
-    with (folder / "study.csv").open(newline="") as stream:
-        return [row[:-1] for row in csv.reader(stream)]
-
+from .studies import JOBS, written
 
 # ------------------------------------------------------------------------------------------ parameters and designs
 
@@ -301,202 +233,32 @@ def test_points_for_the_indices_give_those_of_theory():
     np.testing.assert_allclose(found.total_order.ravel(), [(v1 + v13) / v, v2 / v, v13 / v], atol=0.01)
 
 
-# --------------------------------------------------------------------------------------------- running, going on
-
-
-def test_rows_do_not_depend_on_where_cases_run(tmp_path):
-    study = read_study(written(tmp_path, cases=24))
-    for name in ("one", "processes", "threads"):
-        (tmp_path / name).mkdir()
-    run_study(study, tmp_path / "one", jobs=1)
-    run_study(study, tmp_path / "processes", jobs=2)
-    with ThreadPoolExecutor(3) as executor:
-        run_study(study, tmp_path / "threads", executor=executor)
-    assert len(rows_of(tmp_path / "one")) == 25
-    assert rows_of(tmp_path / "one") == rows_of(tmp_path / "processes") == rows_of(tmp_path / "threads")
-
-
-def test_an_interrupted_study_goes_on(tmp_path):
-    """After a kill: rows that came out of order, a last line that is cut, cases missing."""
-    study = read_study(written(tmp_path))
-    run_study(study, tmp_path, jobs=1)
-    whole = rows_of(tmp_path)
-    lines = (tmp_path / "study.csv").read_text().splitlines(keepends=True)
-    kept = [lines[0], lines[5], lines[2], lines[7][:20]]
-    (tmp_path / "study.csv").write_text("".join(kept))
-    told = []
-    run_study(study, tmp_path, jobs=1, progress=lambda done, total, _: told.append((done, total)))
-    assert rows_of(tmp_path) == whole
-    assert told == [(n, 8) for n in range(3, 9)]  # two were there
-
-
-def test_another_study_does_not_go_on_here(tmp_path):
-    run_study(read_study(written(tmp_path)), tmp_path, jobs=1)
-    with pytest.raises(InputError, match=r"study.cases differs.*--restart"):
-        run_study(read_study(written(tmp_path, cases=9)), tmp_path, jobs=1)
-    study = read_study(written(tmp_path))
-    base = {**study.task.raw, "title": "another"}
-    with pytest.raises(InputError, match=r"base.title differs"):
-        run_study(replace(study, task=replace(study.task, raw=base)), tmp_path, jobs=1)
-    run_study(read_study(written(tmp_path, cases=9)), tmp_path, jobs=1, restart=True)
-    assert len(rows_of(tmp_path)) == 10
-
-
-def test_a_driver_that_is_killed_loses_nothing(tmp_path):
-    path = written(tmp_path, cases=700)
-    command = [sys.executable, "-m", "gearfe", "study", str(path), "--out", str(tmp_path / "out"), "--no-pictures"]
-    run = subprocess.Popen([*command, "--jobs", "1"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    table = tmp_path / "out" / "study.csv"
-    limit = time.monotonic() + 60.0
-    while not (table.exists() and table.stat().st_size > 2000) and time.monotonic() < limit:
-        time.sleep(0.01)
-    run.send_signal(signal.SIGKILL)
-    assert run.wait() == -signal.SIGKILL
-    before = {row[0]: row for row in rows_of(tmp_path / "out")[1:-1]}  # the last one may be cut
-    assert 10 < len(before) < 700
-    study = read_study(path)
-    some = replace(study, cases=study.cases[:5])
-    assert set(before) <= {str(n) for n in range(700)}
-    for number in list(before)[:5]:
-        assert some.evaluate(dict(zip(study.task.names, study.cases[int(number)], strict=True)))["y"] == float(
-            before[number][4]
-        )
-    assert main(["study", str(path), "--out", str(tmp_path / "out"), "--no-pictures", "--jobs", "1"]) == 0
-    after = {row[0]: row for row in rows_of(tmp_path / "out")[1:]}
-    assert len(after) == 700
-    assert all(after[number] == row for number, row in before.items())
-
-
-@dataclass(frozen=True)
-class Deadly(Task):
-    """A base job that kills the process that solves case 13."""
-
-    def tables(self, values):
-        if values[0] == 13.0:
-            os._exit(1)
-        return super().tables(values)
-
-
-def test_a_worker_that_dies_is_replaced(tmp_path):
-    study = read_study(written(tmp_path))
-    task = Deadly(**{**vars(study.task), "names": ("bodies.a.position_m.0",)})
-    cases = [(n, (float(n),)) for n in range(20)]
-    rows = [row for group in side_by_side(task, cases, 2) for row in group]
-    assert sorted(row.case for row in rows) == list(range(20))
-    assert [row.case for row in rows if row.status == DIED] == [13]
-    assert all(row.outputs == (math.sin(float(row.case)),) or row.case == 13 for row in rows)
-
-
-def test_cases_without_an_answer_are_rows(tmp_path):
-    path = written(tmp_path)
-    text = path.read_text().replace("bodies.a.position_m.1 = {", "bodies.a.mass_kg = {")  # negative in half the cases
-    path.write_text(text)
-    made = run_study(read_study(path), tmp_path, jobs=1)
-    bad = [i for i, status in enumerate(made.columns["status"]) if status == "invalid"]
-    masses = np.array([float(cell) for cell in made.columns["bodies.a.mass_kg"]])
-    assert bad == np.flatnonzero(masses <= 0.0).tolist() != []
-    assert all("bodies.a.mass_kg" in made.columns["message"][i] for i in bad)
-    assert np.isnan(made.output("y")[bad]).all()
-
-
-def test_a_hopeless_study_stops_and_keeps_its_rows(tmp_path):
-    path = written(tmp_path, cases=500)
-    ends = "{ low = -3.141592653589793, high = 3.141592653589793 }"
-    bad = path.read_text().replace(f"position_m.1 = {ends}", "mass_kg = { low = -3.0, high = -1.0 }")
-    path.write_text(bad)
-    with pytest.raises(InputError, match=r"first 50 cases have no answer.*mass_kg"):
-        run_study(read_study(path), tmp_path, jobs=1)
-    assert len(rows_of(tmp_path)) == 51
-
-
-def test_outputs_that_the_job_does_not_give_are_told_before_any_case(tmp_path):
-    path = written(tmp_path)
-    path.write_text(path.read_text().replace("sin(x1[0])", "sin(x1[0]) + energy.totl_J[0]"))
-    with pytest.raises(InputError, match="did you mean 'total_J'"):
-        run_study(read_study(path), tmp_path, jobs=1)
-    assert not (tmp_path / "study.csv").exists()
-
-
-# ------------------------------------------------------------------------------------------------ jobs and command
-
-
-def test_gears_and_their_microgeometry(tmp_path):
-    """A stiffness study gives what the sweep gives; cases that share gears have the digits of cases that do not."""
-    from gearfe.config import job_tables
-    from gearfe.gear.pair import GearPair
-    from gearfe.stiffness.job import StiffnessJob
-    from gearfe.stiffness.sweep import sweep_stiffness
-
-    job = "[pair]\npressure_angle_deg = 20.0\nface_width_mm = 10.0\n"
-    job += "[pair.pinion]\nteeth = 22\npitch_diameter_mm = 44.0\nbore_diameter_mm = 10.0\n"
-    job += "[pair.wheel]\nteeth = 33\npitch_diameter_mm = 66.0\nbore_diameter_mm = 15.0\n"
-    job += '[stiffness]\ntorque_Nm = 60.0\nlaw = "half_plane"\nangle_step_deg = 4.0\n[microgeometry]\n'
-    (tmp_path / "study.toml").write_text(
-        job + '[study]\njob = "stiffness"\ndesign = "factorial"\n'
-        "[study.parameters]\npair.pinion.profile_shift = [0.0, 0.1]\n"
-        "microgeometry.pinion.crowning_um = [0.0, 4.0]\n"
-        '[study.outputs]\nk = "mean(k_mesh_N_per_m)"\n'
+def test_elementary_effects_of_a_linear_function_are_its_slopes(tmp_path):
+    """y = 3 x1 - 2 x2 on ranges of 2 pi, x3 alone in a square: effects of the first are slopes times the range."""
+    path = written(tmp_path, "morris", 6)
+    path.write_text(
+        path.read_text().split("[study.outputs]")[0] + '[study.outputs]\ny = "3*x1[0] - 2*x2[0] + x3[0]**2"\n'
     )
-    study = read_study(tmp_path / "study.toml")
-    made = run_study(study, tmp_path, jobs=1)
-    for case, k in zip(study.cases, made.output("k"), strict=True):
-        raw = study.task.tables(case)
-        tables = job_tables(raw, "job", ("pair", "stiffness", "microgeometry"))
-        pair = GearPair.from_table(tables["pair"])
-        one = StiffnessJob(tables["pair"], tables["stiffness"], pair, tables["microgeometry"])
-        assert sweep_stiffness(pair, **one.model, **one.sweep).k_mesh.mean() == pytest.approx(k, rel=1e-12)
-    assert len(set(made.output("k"))) == 4
-
-
-def test_a_train_in_a_rigid_housing(tmp_path):
-    """The rows are those of the command with the same keys."""
-    raw = read_toml(JOBS / "gear_train.toml")
-    raw["train"] |= {"housing": "rigid", "duration_ms": 0.7, "method": "explicit"}
-    for name in ("variant", "variants"):
-        raw["train"].pop(name)
-    raw["train"]["curves"] = {"law": "curve", "load": "stiffness"}
-    raw["stiffness"] = {"twist_deg": 0.05, "law": "half_plane", "coarsen": 2.0, "angle_step_deg": 3.0}
-    raw["study"] = {
-        "job": "vibration", "design": "factorial", "parameters": {"train.drive.speed_rad_per_s": [300.0, 500.0]},
-        "outputs": {"force": "max(contact_force_1_N)", "last": "contact_force_2_N[20]"},
-    }  # fmt: skip
-    (tmp_path / "study.toml").write_text(toml_document(raw))
-    made = run_study(read_study(tmp_path / "study.toml"), tmp_path, jobs=1)
-    command = ["vibration", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out"), "--no-pictures"]
-    assert main([*command, "--no-floquet", "--no-estimate", "--set", "train.drive.speed_rad_per_s=500"]) == 0
-    with (tmp_path / "out" / "response.csv").open(newline="") as stream:
-        rows = list(csv.DictReader(stream))
-    assert made.output("force")[1] == max(float(row["contact_force_1_N"]) for row in rows)
-    assert made.output("last")[1] == float(rows[20]["contact_force_2_N"])
-
-
-def test_command_leaves_tables_and_pictures(tmp_path, capsys):
-    path = written(tmp_path, cases=16)
-    text = path.read_text() + 'x = "x1[0]"\n[study.limits]\ny = { low = 0.0 }\n'
-    path.write_text(text.replace("seed = 3", 'seed = 3\nminimise = ["y"]\nmaximise = ["x"]'))
-    assert main(["study", str(path), "--out", str(tmp_path / "out"), "--jobs", "1"]) == 0
-    told = capsys.readouterr().out
-    names = {"study.csv", "study.json", "study.png", "study_lines.png", "study_pareto.png", "study_tornado.png"}
-    assert {p.name for p in (tmp_path / "out").iterdir()} == names | {"summary.json"}
-    assert "16 cases: 16 done" in told
-    assert "within its limits" in told
-    assert "Pareto set" in told
-    assert main(["study", str(path), "--row", "5", "--write", str(tmp_path / "five.toml")]) == 0
     study = read_study(path)
-    assert read_toml(tmp_path / "five.toml") == study.task.tables(study.cases[5])
+    assert len(study.cases) == 6 * 4
+    found = run_study(study, tmp_path, jobs=1).summary()["outputs"]["y"]["morris"]
+    first, second, third = found.values()
+    assert first == pytest.approx({"mean": 6 * math.pi, "mean_size": 6 * math.pi, "deviation": 0.0}, abs=1e-9)
+    assert second == pytest.approx({"mean": -4 * math.pi, "mean_size": 4 * math.pi, "deviation": 0.0}, abs=1e-9)
+    # x3 goes from -3 pi/4 to pi/4 or from -pi/4 to 3 pi/4: its square changes by -pi^2/2 or pi^2/2
+    assert third["mean_size"] == pytest.approx(math.pi**2)
+    assert third["deviation"] > 0.0
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["--jobs", "0"], "--jobs"),
-        (["--row", "5"], "--write"),
-        (["--row", "99", "--write", "x.toml"], "must be >= 0 and <= 7"),
-    ],
-)
-def test_command_names_mistakes(tmp_path, capsys, arguments, told):
-    assert main(["study", str(written(tmp_path)), "--out", str(tmp_path / "out"), *arguments]) == 2
-    assert told in capsys.readouterr().err
+def test_points_of_an_optimiser_side_by_side(tmp_path):
+    study = read_study(written(tmp_path))
+    points = [{"bodies.a.position_m.0": 0.1 * n, "bodies.a.mass_kg": 1.0 - 0.6 * n} for n in range(4)]
+    found = study.evaluate_all(points, jobs=2)
+    np.testing.assert_allclose([one["y"] for one in found[:2]], np.sin([0.0, 0.1]), rtol=1e-12)
+    assert math.isnan(found[2]["y"])  # a mass below 0 has no answer
+    assert study.evaluate_all(points, jobs=1)[:2] == found[:2]
+    with pytest.raises(InputError, match="different parameters"):
+        study.evaluate_all([points[0], {"bodies.a.mass_kg": 1.0}])
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,8 @@ from ..textfile import read_csv
 from ..typing import Array
 from .parameters import Parameter, key_hint, read_parameters
 
-#: Cases of one study at most.
-MOST = 10_000_000
+#: Cases of one study at most; levels of a grid of Morris's.
+MOST, LEVELS = 10_000_000, 4
 
 #: Case by case the values of the parameters.
 Cases = Sequence[tuple[Any, ...]]
@@ -52,6 +52,8 @@ def _shares(table: StudyTable, d: int) -> Array:
     n, seed = table.cases, table.seed
     if table.design == "latin_hypercube":
         return np.asarray(qmc.LatinHypercube(d, rng=np.random.default_rng(seed)).random(n))
+    if table.design == "morris":
+        return trajectories(n, d, np.random.default_rng(seed))
     power = max(0, math.ceil(math.log2(n)))
     if table.design == "sobol":
         return np.asarray(qmc.Sobol(d, rng=np.random.default_rng(seed)).random_base2(power)[:n])
@@ -73,6 +75,23 @@ def saltelli(points: Array) -> Array:
     for i in range(d):
         mixed[i, :, i] = second[:, i]
     return np.concatenate([first, second, mixed.reshape(n * d, d)])
+
+
+def trajectories(count: int, d: int, rng: np.random.Generator) -> Array:
+    """Points of Morris's trajectories in the unit cube, (count (d + 1), d).
+
+    Each begins on a random point of a grid and changes one coordinate after the other, in random order, by half of the
+    levels (Morris, Technometrics 33 (1991) 161, section 3). Levels stand at (i + 1/2) / `LEVELS`, for distributions may
+    have no ends.
+    """
+    made = np.empty((count, d + 1, d))
+    for one in made:
+        low = (rng.integers(0, LEVELS // 2, d) + 0.5) / LEVELS
+        up = rng.random(d) < 0.5
+        one[:] = np.where(up, low, low + 0.5)
+        for step, i in enumerate(rng.permutation(d), start=1):
+            one[step:, i] = low[i] + 0.5 if up[i] else low[i]
+    return made.reshape(count * (d + 1), d)
 
 
 def _rows(table: StudyTable, folder: Path) -> tuple[tuple[Parameter, ...], Cases]:

@@ -69,6 +69,53 @@ class Study:
         with one_thread():
             return evaluate(task, list(values.values()), HERE)[0]
 
+    def evaluate_all(
+        self, points: Sequence[Mapping[str, Any]], *, jobs: int | None = None, executor: Executor | None = None
+    ) -> list[dict[str, float]]:
+        """Outputs at many points, side by side: what an optimiser that asks for several at a time is told.
+
+        Parameters
+        ----------
+        points
+            Parameter -> value, the same parameters in all of them.
+        jobs, executor
+            As of `run_study`.
+
+        Returns
+        -------
+        list of dict
+            In the order of the points; not-a-number where a point has no answer.
+
+        Raises
+        ------
+        InputError
+            Points that name different parameters.
+        """
+        if not points:
+            return []
+        names = tuple(points[0])
+        if any(tuple(point) != names for point in points):
+            raise InputError("points", None, "name different parameters", "give the same ones, in the same order")
+        task = Task(**{**vars(self.task), "names": names})
+        found: dict[int, Row] = {}
+        for group in _rows(task, list(enumerate(tuple(point.values()) for point in points)), jobs, executor, None):
+            found |= {row.case: row for row in group}
+        return [dict(zip(task.outputs, found[number].outputs, strict=True)) for number in range(len(points))]
+
+
+def _rows(
+    task: Task,
+    cases: Sequence[tuple[int, tuple[Any, ...]]],
+    jobs: int | None,
+    executor: Executor | None,
+    workers: int | None,
+) -> Iterator[list[Row]]:
+    """Rows of the cases from where they are to run."""
+    if executor is not None:
+        return side_by_side(task, cases, workers or getattr(executor, "_max_workers", None) or 4, executor)
+    many = min(jobs or os.cpu_count() or 1, max(1, len(cases)))
+    return serially(task, cases) if many == 1 else side_by_side(task, cases, many)
+
 
 def read_study(path: str | Path) -> Study:
     """Read a study and its base job; every parameter's key exists, every output can be read.
@@ -147,15 +194,8 @@ def run_study(
     journal = Journal(folder, study.head, versions(), study.task.names, tuple(study.table.outputs))
     bad, first = 0, ""
     missing = [n for n in _order(study) if n not in journal.done]
-    cases = ((n, study.cases[n]) for n in missing)
-    rows: Iterator[list[Row]]
-    if executor is not None:
-        many = workers or getattr(executor, "_max_workers", None) or 4
-        rows = side_by_side(study.task, cases, many, executor)
-    else:
-        many = min(jobs or os.cpu_count() or 1, max(1, len(missing)))
-        rows = serially(study.task, cases) if many == 1 else side_by_side(study.task, cases, many)
-    for group in rows:
+    cases = [(n, study.cases[n]) for n in missing]
+    for group in _rows(study.task, cases, jobs, executor, workers):
         journal.append(group, study.cases)
         if progress is not None:
             progress(len(journal.done), len(study.cases), "cases")

@@ -33,10 +33,13 @@ def write_figures(folder: Path, result: StudyResult, summary: Mapping[str, Any],
         columns = {**numbers, **outputs}
         parallel_figure(folder / "study_lines.png", title=title, columns=columns, colour=next(iter(outputs)))
         sobol = {name: (summary["outputs"][name].get("sobol") or {}).get("total_order", {}) for name in outputs}
+        morris = {name: _sizes(summary["outputs"][name].get("morris") or {}) for name in outputs}
         whole = all(sobol.values())
-        effects = sobol if whole else {name: summary["outputs"][name]["effects"]["change"] for name in outputs}
+        effects = {name: summary["outputs"][name]["effects"]["change"] for name in outputs}
+        effects = sobol if whole else morris if all(morris.values()) else effects
         if any(effects.values()):
             what = "Sobol's total index of" if whole else "change over the parameter's range:"
+            what = "mean size of the elementary effects on" if effects is morris else what
             notes = {name: f"{what} {name}" for name in outputs}
             tornado_figure(folder / "study_tornado.png", title=title, effects=effects, notes=notes)
     aims = [*table.minimise, *table.maximise]
@@ -44,3 +47,7 @@ def write_figures(folder: Path, result: StudyResult, summary: Mapping[str, Any],
         pair = [(name, outputs[name]) for name in aims]
         best, good = result.pareto(), result.good
         pareto_figure(folder / "study_pareto.png", title=title, first=pair[0], second=pair[1], best=best, good=good)
+
+
+def _sizes(effects: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
+    return {name: one["mean_size"] for name, one in effects.items()}

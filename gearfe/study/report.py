@@ -29,6 +29,11 @@ def told(summary: Mapping[str, Any]) -> list[str]:
 
 
 def _effects(one: Mapping[str, Any]) -> list[str]:
+    morris = one.get("morris")
+    if morris:
+        sizes = sorted(morris.items(), key=lambda item: -item[1]["mean_size"])
+        parts = [f"{name} {e['mean_size']:.3g} (deviation {e['deviation']:.2g})" for name, e in sizes[:4]]
+        return ["  elementary effects, mean size: " + ", ".join(parts)]
     sobol, change = one.get("sobol"), one["effects"]["change"]
     if sobol:
         totals = sorted(sobol["total_order"].items(), key=lambda item: -item[1])

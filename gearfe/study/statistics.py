@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import MissingLibraryError
 from ..tables.study import LimitTable, StudyTable
 from ..typing import Array, BoolArray, IntArray
 from .case import DONE
@@ -92,6 +93,8 @@ class StudyResult:
             outputs[name]["effects"] = self.effects(name)
             if self.table.design == "saltelli":
                 outputs[name]["sobol"] = self.sobol(name)
+            if self.table.design == "morris":
+                outputs[name]["morris"] = self.morris(name)
         made: dict[str, Any] = {
             "cases": len(done),
             "statuses": dict(Counter(self.columns["status"])),
@@ -156,6 +159,69 @@ class StudyResult:
             low, high = np.ravel(ends.low).tolist(), np.ravel(ends.high).tolist()
             told[f"{key}_interval"] = dict(zip(self.parameters, map(list, zip(low, high, strict=True)), strict=True))
         return told
+
+    def morris(self, name: str) -> dict[str, Any] | None:
+        """Elementary effects of an output: parameter -> mean, mean size, deviation; None where a case has no value.
+
+        An effect is the change of the output over the change of the parameter as a share of its distribution, along the
+        trajectories of `gearfe.study.design.trajectories`. Sizes tell what matters, deviations what is not linear or
+        acts together with others (Morris 1991; Campolongo et al., Environ. Model. Softw. 22 (2007) 1509).
+        """
+        d, values = len(self.parameters), self.output(name)
+        if not (self.done & np.isfinite(values)).all():
+            return None
+        cells = np.array([self.columns[one] for one in self.parameters], dtype=object).T.reshape(-1, d + 1, d)
+        changes = np.diff(values.reshape(-1, d + 1), axis=1)
+        moved = cells[:, 1:] != cells[:, :-1]  # (trajectories, steps, parameters): one each
+        numbers = [_number(cell) for cell in cells.ravel()]
+        rising = np.diff(np.array(numbers).reshape(cells.shape), axis=1) >= 0.0
+        told = {}
+        for i, parameter in enumerate(self.parameters):
+            own = moved[:, :, i]
+            effects = np.where(rising[:, :, i], changes, -changes)[own] / 0.5
+            told[parameter] = {
+                "mean": float(effects.mean()) if len(effects) else 0.0,
+                "mean_size": float(np.abs(effects).mean()) if len(effects) else 0.0,
+                "deviation": float(effects.std(ddof=1)) if len(effects) > 1 else 0.0,
+            }
+        return told
+
+    def to_pandas(self) -> Any:
+        """The rows as a `pandas.DataFrame`: numbers where all cells of a column are."""
+        try:
+            import pandas
+        except ImportError:
+            raise MissingLibraryError("pandas is not installed: pip install pandas") from None
+        return pandas.DataFrame({name: _numbers(cells) for name, cells in self.columns.items()})
+
+    def to_xarray(self) -> Any:
+        """The rows as an `xarray.Dataset` over the dimension ``case``."""
+        try:
+            import xarray
+        except ImportError:
+            raise MissingLibraryError("xarray is not installed: pip install xarray") from None
+        made = {name: ("case", _numbers(cells)) for name, cells in self.columns.items() if name != "case"}
+        return xarray.Dataset(made, coords={"case": _numbers(self.columns["case"])})
+
+
+def _numbers(cells: Sequence[str]) -> Any:
+    """Numbers where all cells are, else texts."""
+    try:
+        return np.array([int(cell) for cell in cells])
+    except ValueError:
+        pass
+    try:
+        return np.array([float(cell) for cell in cells])
+    except ValueError:
+        return np.array(cells, dtype=object)
+
+
+def _number(cell: str) -> float:
+    """A number; a text stands for 0, for it has no direction."""
+    try:
+        return float(cell)
+    except ValueError:
+        return 0.0
 
 
 def spread(values: Array) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from ..errors import InputError, unknown_name
 
 #: Kinds of job that a study can vary.
 KINDS = ("stiffness", "loadmap", "microgeometry", "vibration", "mechanism")
-DESIGNS = ("factorial", "latin_hypercube", "sobol", "saltelli", "rows")
+DESIGNS = ("factorial", "latin_hypercube", "sobol", "saltelli", "morris", "rows")
 
 
 @dataclass(frozen=True)
@@ -64,9 +64,11 @@ class StudyTable:
         "latin_hypercube",
         choices=DESIGNS,
         doc="factorial: all combinations; latin_hypercube, sobol: that many random cases; saltelli: those that Sobol's "
-        "indices need; rows: a CSV file",
+        "indices need; morris: those of elementary effects; rows: a CSV file",
     )
-    cases: int = quantity(64, low=1, high=10_000_000, doc="number of random cases; saltelli: of base points")
+    cases: int = quantity(
+        64, low=1, high=10_000_000, doc="number of random cases; saltelli: base points; morris: trajectories"
+    )
     seed: int = quantity(1, low=0, doc="seed of the random cases")
     rows_csv: str | None = quantity(None, doc="CSV file whose columns are named as the keys, for design = rows")
     parameters: dict[str, Any] = quantity(  # noqa: RUF009
