@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
+from gearfe.contact.moved_faces import Faces
 from gearfe.gear.deviation import Deviation, ToothDeviations
 from gearfe.gear.pair import TipRelief
 from gearfe.gear.touching import face_of
@@ -62,3 +63,32 @@ def test_an_even_deviation_turns_the_wheel() -> None:
     one = solve_half_plane(law, angles, twist)
     two = solve_half_plane(half_plane_pair(pair, elastic), angles, twist + earlier)
     assert one.torque_wheel == pytest.approx(two.torque_wheel, rel=2e-3)
+
+
+def test_heights_are_those_of_the_flank_across_the_begin_of_a_relief() -> None:
+    """A linear relief has a kink; wherever it stands under the contact, heights belong to the arcs they are told of."""
+    pair = PAIRS["rounded"]
+    flank = face_of(pair.pinion).flank
+    kink = flank.start + 0.55 * (flank.end - flank.start)
+    relief = ToothDeviations((Deviation.straight([flank.start, kink, flank.end], [0.0, 0.0, -30e-6]),))
+    law = half_plane_pair(pair, elastic_pair(pair, law="half_plane"), deviations=(relief, ToothDeviations()))
+    tables = law.tables.of(np.array([[0, 1]]))
+    low, high = tables.low[0, 0, 0], tables.high[0, 0, 0]
+    arcs = np.linspace(low + 0.2 * (high - low), high - 0.2 * (high - low), 4001)
+    bends = np.abs(np.diff(tables.at(np.stack([arcs, arcs])[None])[1][0, 0]))
+    middle = arcs[np.argmax(bends)]  # where the tangent turns most: the kink
+    moved = 0
+    for shift in -1.4e-4 + np.linspace(-3e-7, 3e-7, 61):  # a place of x stands at the kink
+        start = np.array([[middle + shift, 0.5 * (tables.low[0, 1, 0] + tables.high[0, 1, 0])]])
+        point, along = tables.at(start[:, :, None])
+        way = along[:, :, 0] / np.abs(along[:, :, 0]) * np.array([1.0, -1.0])
+        turn = -1j / way * np.exp(0.05j)  # along the tangent but for 3 deg, so that Newton has a way to go
+        faces = Faces(turn, -point[:, :, 0] * turn, np.zeros((1, 2)), start)
+        found, heights, points = faces.heights(tables, np.linspace(-1.5e-4, 1.5e-4, 31)[None])
+        exact = tables.at(found)[0]
+        moved += int((found[0, 0] > middle).any() and (found[0, 0] < middle).any())
+        np.testing.assert_allclose(points, exact, rtol=0, atol=1e-16)
+        seen = (exact - point) * turn[:, :, None]
+        np.testing.assert_allclose(heights, seen.real, rtol=0, atol=1e-15)
+        np.testing.assert_allclose(-seen.imag[0, 0], np.linspace(-1.5e-4, 1.5e-4, 31), rtol=0, atol=3e-9)
+    assert moved > 30

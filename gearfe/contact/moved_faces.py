@@ -66,9 +66,10 @@ class Faces:
             seen = (((d * t + c) * t + b) * t + a + stretch * (s - start)) * turn + offset
             move = _WAYS * (x + seen.imag) / np.maximum(STEEPEST, -_WAYS * tangent.imag)
             new = np.minimum(np.maximum(s + move, flanks.low), flanks.high)
-            t, s = t + (new - s), new
+            s = new
             if (np.abs(move) <= close).all():
                 break
+        (a, b, c, d), t = flanks.pieces(s)  # the last move may have crossed the begin of a relief
         point = ((d * t + c) * t + b) * t + a
         return s, ((point + stretch * (s - start)) * turn + offset).real, point
 
