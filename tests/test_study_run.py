@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 import os
 import signal
@@ -10,7 +11,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,9 +19,8 @@ import pytest
 from gearfe.cli import main
 from gearfe.config import read_toml
 from gearfe.errors import InputError
-from gearfe.study.case import DIED, Task
+from gearfe.study.case import DIED
 from gearfe.study.job import read_study, run_study
-from gearfe.study.run import side_by_side
 from gearfe.tables.text import toml_document
 
 from .studies import JOBS, rows_of, written
@@ -91,24 +91,29 @@ def test_a_driver_that_is_killed_loses_nothing(tmp_path):
     assert all(after[number] == row for number, row in before.items())
 
 
-@dataclass(frozen=True)
-class Deadly(Task):
-    """A base job that kills the process that solves case 13."""
-
-    def tables(self, values):
-        if values[0] == 13.0:
-            os._exit(1)
-        return super().tables(values)
-
-
 def test_a_worker_that_dies_is_replaced(tmp_path):
-    study = read_study(written(tmp_path))
-    task = Deadly(**{**vars(study.task), "names": ("bodies.a.position_m.0",)})
-    cases = [(n, (float(n),)) for n in range(20)]
-    rows = [row for group in side_by_side(task, cases, 2) for row in group]
-    assert sorted(row.case for row in rows) == list(range(20))
-    assert [row.case for row in rows if row.status == DIED] == [13]
-    assert all(row.outputs == (math.sin(float(row.case)),) or row.case == 13 for row in rows)
+    """Case 13 ends its process; in a program of its own, as users have it."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.deadly", str(written(tmp_path))], capture_output=True, text=True, check=True,
+        cwd=JOBS.parent, env={**os.environ, "PYTHONPATH": str(JOBS.parent)},
+    )  # fmt: skip
+    rows = json.loads(done.stdout)
+    assert sorted(case for case, _, _ in rows) == list(range(20))
+    assert [case for case, status, _ in rows if status == DIED] == [13]
+    assert all(value == math.sin(case) for case, _, value in rows if case != 13)
+
+
+def test_workers_end_with_their_driver(tmp_path):
+    path = written(tmp_path, cases=100000)
+    command = [sys.executable, "-m", "gearfe", "study", str(path), "--out", str(tmp_path / "out"), "--jobs", "2"]
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    table = tmp_path / "out" / "study.csv"
+    limit = time.monotonic() + 60.0
+    while not (table.exists() and table.stat().st_size > 2000) and time.monotonic() < limit:
+        time.sleep(0.02)
+    run.kill()
+    assert run.stdout is not None
+    run.communicate(timeout=20.0)  # ends when the last process that holds the pipe does
 
 
 def test_cases_without_an_answer_are_rows(tmp_path):

@@ -8,11 +8,13 @@ Where a case runs changes no digit of its row.
 from __future__ import annotations
 
 import itertools
+import os
 import signal
+import threading
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
-from multiprocessing import get_context
+from multiprocessing import connection, get_context, parent_process
 from typing import Any
 
 from ..threads import one_thread
@@ -97,8 +99,21 @@ def side_by_side(
 
 
 def _processes(workers: int) -> Executor:
-    """Fresh processes, whatever this one has loaded; workers leave Ctrl-C to the program that started them."""
-    return ProcessPoolExecutor(workers, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_IGN))
+    """Fresh processes, whatever this one has loaded."""
+    return ProcessPoolExecutor(workers, get_context("spawn"), _begin)
+
+
+def _begin() -> None:
+    """A worker leaves Ctrl-C to the program that started it, and ends with it, however that ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+
+
+def _end_with(sentinel: int) -> None:
+    connection.wait([sentinel])
+    os._exit(1)
 
 
 def _end(pool: Any) -> None:
