@@ -27,7 +27,7 @@ RUNS = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument(
-        "kind", nargs="?", metavar="KIND", help=f"{', '.join(KINDS)}, or a shipped job, as andrews.toml"
+        "kind", nargs="?", metavar="KIND", help=f"{', '.join(KINDS)}, or a shipped job, as housing.toml"
     )
     parser.add_argument("file", nargs="?", metavar="FILE", help="file to write (default: KIND.toml)")
     parser.add_argument("--list", action="store_true", help="tell the kinds and the shipped jobs")
