@@ -150,7 +150,17 @@ def test_the_radiated_power_of_one_coordinate(tmp_path, scene):
 def test_a_run_that_ended_early_is_written(tmp_path, scene):
     short = {
         name: getattr(made_up(), name)[:40]
-        for name in ("time", "drive_angle", "drive_torque", "contact_force", "speed", "speed_absolute", "acceleration")
+        for name in (
+            "time",
+            "drive_angle",
+            "drive_torque",
+            "mesh_power",
+            "friction_power",
+            "contact_force",
+            "speed",
+            "speed_absolute",
+            "acceleration",
+        )
     }
     short |= {
         name: getattr(made_up(), name)[:40]

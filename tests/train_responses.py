@@ -46,6 +46,8 @@ def made_up(**changes: Any) -> TrainResponse:
         "time": time,
         "drive_angle": 600.0 * time,
         "drive_torque": 49.0 + tone(time, 13, 4.0),
+        "mesh_power": np.full((COUNT, 2), 3e4),
+        "friction_power": np.full((COUNT, 2), 150.0),
         "mesh_names": ("gear1-gear2", "gear3-gear4"),
         "transmission_error": np.column_stack([2e-5 + tone(time, 13, 1e-6), 3e-5 + tone(time, 9, 1e-6)]),
         "contact_force": np.column_stack([2000 + tone(time, 13, 150.0), 3000 + tone(time, 9, 200.0)]),

@@ -157,6 +157,12 @@ def told(response: TrainResponse, scene: TrainScene, written: Written, choice: O
             )
             most = "" if factor is None else f"; largest force {factor:.3g} times the steady one"
             lines.append(f"mesh {i + 1}: {contact['flanks'][i]}; {parts}{most}")
+    friction = summary.get("friction", {})
+    for i, coefficient in enumerate(friction.get("coefficients", ())):
+        if coefficient > 0.0:
+            share = friction["efficiency"][i]
+            told = "" if share is None else f", efficiency {100 * share:.4g} %"
+            lines.append(f"mesh {i + 1}: friction {coefficient:.4g}, loss {friction['mean_loss_W'][i]:.4g} W{told}")
     if response.common_period_s:
         count = summary.get("mean_over_common_periods", 0)
         lines.append(

@@ -139,6 +139,12 @@ class MeshLaw:
         cell = np.clip(np.searchsorted(self.nodes, rest, side="right") - 1, 0, len(self.nodes) - 2)
         return turn.astype(np.int64), cell, rest - self.nodes[cell]
 
+    def pair_phases(self, angles: ArrayLike) -> Array:
+        """psi_k (rad) of the pairs in the slots at pinion angles (n,), shape (n, slots)."""
+        angle = np.asarray(angles, dtype=float)
+        made: Array = angle[:, None] + self.cycle * (np.arange(self.slots) - self.place(angle)[0][:, None])
+        return made
+
     def touching(self, angles: ArrayLike) -> Array:
         """Approach (m) at which the first pair touches."""
         _, cell, z = self.place(np.asarray(angles, dtype=float))

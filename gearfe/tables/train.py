@@ -102,6 +102,14 @@ class TrainMeshTable:
         doc="normal backlash (um); left out: with a map that of the gears, or no back flanks where they have none; "
         "with a curve or a constant a spring that acts both ways",
     )
+    friction: float | None = quantity(
+        None, low=0.0, high=0.5, doc="coefficient of friction of the teeth, with a map; left out: none, or by the oil"
+    )
+    oil_viscosity_mPa_s: float | None = quantity(
+        None, above=0.0, doc="viscosity of the oil: mean coefficient of friction by Schlenk (ISO/TR 14179-2), instead"
+    )
+    roughness_um: float | None = quantity(None, above=0.0, doc="mean Ra of both gears' flanks, for that")
+    oil_factor: float | None = quantity(None, above=0.0, doc="X_L for that; left out: 1, mineral oil")
     curve: str | None = quantity(None, doc="CSV file with pinion_angle_deg and k_mesh_N_per_m, beside the job file")
     load_map: str | None = quantity(
         None, doc="CSV file of gearfe loadmap, beside the job file: its curve at the torque that the mesh carries"
@@ -121,6 +129,18 @@ class TrainMeshTable:
         if given and self.law == "map":
             cure = f'write law = "curve", or leave {given[0]} out: a map is made of contact solutions'
             raise InputError(f"{where}.law", self.law, f"contradicts {given[0]}", cure)
+        oil = [k for k in ("oil_viscosity_mPa_s", "roughness_um", "oil_factor") if getattr(self, k) is not None]
+        if oil and self.friction is not None:
+            problem = f"stands beside friction = {self.friction:g}"
+            raise InputError(f"{where}.{oil[0]}", getattr(self, oil[0]), problem, "give the coefficient or the oil")
+        for key in ("oil_viscosity_mPa_s", "roughness_um"):
+            if oil and getattr(self, key) is None:
+                raise InputError(f"{where}.{key}", None, f"is required beside {oil[0]}", "add it")
+        if (oil or self.friction) and (given or self.law in ("curve", "linear")):
+            key = oil[0] if oil else "friction"
+            problem = "needs a mesh law: a curve does not tell how tooth pairs share the load"
+            cure = 'write law = "map", or leave friction out'
+            raise InputError(f"{where}.{key}", getattr(self, key), problem, cure)
         if self.backlash_um is not None and self.backlash_um < 0.0:
             problem = "must be >= 0 um: less is a wedged mesh, whose flanks all bear without a load"
             raise InputError(

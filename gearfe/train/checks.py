@@ -13,6 +13,7 @@ from ..meshlaw.law import MeshLaw
 from ..stiffness.curve import StiffnessCurve
 from ..stiffness.periodic import PeriodicInterpolant
 from .flanks import check_flanks
+from .friction import check_friction
 from .kinematics import driving_senses
 from .phases import tooth_places
 from .scene import Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
@@ -164,6 +165,7 @@ def _check_mesh(scene: TrainScene, mesh: GearMesh) -> None:
         raise InputError(
             f"{label} damping", mesh.damping, "must be finite and >= 0 N s/m", "negative damping feeds energy in"
         )
+    check_friction(label, mesh.friction, isinstance(mesh.stiffness, MeshLaw))
     check_curve(mesh, one.gear.teeth)
 
 

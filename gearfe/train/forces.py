@@ -7,7 +7,9 @@ angle, g the shaft's ratio to it, u a coordinate. With u, u' along the direction
   :math:`\varphi = s\,(g\psi + u_r) + \varphi_0` and r the driver's rotation. The part with the mean :math:`k_0` stands
   in the system's stiffness. A flank that may part bears where :math:`u_d > j`;
 - of a *flank with a mesh law* (`gearfe.meshlaw.law`): :math:`-(F\,\langle 1 + \chi u_d'\rangle - k_0 u_d)` along d, and
-  :math:`-s M` along r, the driver's rotation relative to the line of centres;
+  :math:`-s M` along r, the driver's rotation relative to the line of centres; with *friction* (`gearfe.train.friction`)
+  :math:`-\sum\mu N_k \tanh(v_k/v_0)` across the line of action, and that times :math:`e_k` along the driver's turn
+  against the driven gear;
 - *gyroscopic*: :math:`-J_p\Omega\,(u_{d+1}', -u_d')`, :math:`\Omega = g\psi' + u_{d+2}'`, on the tilts d, d + 1 of a
   shaft with the spin d + 2;
 - *torques*: functions of time along a direction.
@@ -22,6 +24,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,6 +33,25 @@ from ..rigid.timefunctions import TimeFunction
 from ..stiffness.periodic import PeriodicInterpolant
 from ..typing import Array
 from .arrays import cubics
+from .friction import Sliding
+
+
+class Drag(NamedTuple):
+    """Friction of a flank: force across the line of action (N), its moment about the pitch point (N m), the power that
+    it takes (W)."""
+
+    across: Array
+    turning: Array
+    power: Array
+
+
+class FlankForces(NamedTuple):
+    """Forces of a flank at n times, (n,) each: along the approach (N), damping included; of a law the moment on the
+    phase (N m), and its friction."""
+
+    force: Array
+    moment: Array | None = None
+    drag: Drag | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,15 +90,15 @@ class CurveFlank(Flank):
     curve: PeriodicInterpolant
     parts: bool
 
-    def forces(self, angle: Array, u: Array, du: Array) -> tuple[Array, None]:  # noqa: ARG002
-        """Force along the approach (N), shape (n,), and no moment on the phase."""
+    def forces(self, angle: Array, rate: Array, u: Array, du: Array) -> FlankForces:  # noqa: ARG002
+        """Forces at rotations of the drive (rad) and their rates, (n,), u and du of shape (n, directions)."""
         phase, approach = self.place(angle, u)
         nodes, table = self.curve.nodes, self._cubics
         place = phase - np.floor((phase - nodes[0]) / self.curve.period) * self.curve.period
         cell = np.minimum(np.searchsorted(nodes[1:], place, side="right"), len(nodes) - 2)
         c, x = table[cell].T, place - nodes[cell]
         force = (c[0] + x * (c[1] + x * (c[2] + x * c[3]))) * approach
-        return (np.maximum(force, 0.0) if self.parts else force), None
+        return FlankForces(np.maximum(force, 0.0) if self.parts else force)
 
     @cached_property
     def _cubics(self) -> Array:
@@ -85,15 +107,26 @@ class CurveFlank(Flank):
 
 @dataclass(frozen=True, eq=False)
 class LawFlank(Flank):
-    """A mesh law; `damping` is chi (s/m)."""
+    """A mesh law; `damping` is chi (s/m), `sliding` its friction or None."""
 
     law: MeshLaw
     damping: float
+    sliding: Sliding | None = None
 
-    def forces(self, angle: Array, u: Array, du: Array) -> tuple[Array, Array]:
-        """Force along the approach, damping included (N), and moment on the phase (N m), shape (n,)."""
-        made = self.law(*self.place(angle, u))
-        return made.force * np.maximum(1.0 + self.damping * du[:, self.direction], 0.0), made.moment
+    def forces(self, angle: Array, rate: Array, u: Array, du: Array) -> FlankForces:
+        """Forces at rotations of the drive (rad) and their rates, (n,), u and du of shape (n, directions)."""
+        phase, approach = self.place(angle, u)
+        made = self.law(phase, approach)
+        presses = np.maximum(1.0 + self.damping * du[:, self.direction], 0.0)
+        one = self.sliding
+        if one is None:
+            return FlankForces(made.force * presses, made.moment)
+        e = one.radius * (self.law.pair_phases(phase) - one.pitch_phase)
+        spin = one.ratio * rate + du[:, one.spin]
+        speed = du[:, one.across, None] + e * spin[:, None]
+        drag = one.coefficient * made.pair_forces * presses[:, None] * np.tanh(speed / one.speed)
+        friction = Drag(*(np.asarray((drag * arm).sum(axis=1)) for arm in (1.0, e, speed)))
+        return FlankForces(made.force * presses, made.moment, friction)
 
 
 @dataclass(frozen=True)
@@ -135,10 +168,10 @@ class TrainForces:
         """Flanks with mesh laws."""
         return tuple(f for f in self.flanks if isinstance(f, LawFlank))
 
-    def of_flank(self, flank: Flank, t: Array, u: Array, du: Array) -> Array:
-        """Force of a flank (N) at the times t (n,), u and du of shape (n, directions)."""
+    def of_flank(self, flank: Flank, t: Array, u: Array, du: Array) -> FlankForces:
+        """Forces of a flank at the times t (n,), u and du of shape (n, directions)."""
         assert isinstance(flank, CurveFlank | LawFlank)
-        return flank.forces(self.angle(t), u, du)[0]
+        return flank.forces(self.angle(t), self.angle(t, 1), u, du)
 
     def __call__(self, t: Array, u: Array, du: Array) -> Array:
         """Forces at the times t (n,), u and du of shape (n, directions); shape (n, directions)."""
@@ -146,10 +179,13 @@ class TrainForces:
         angle, rate = self.angle(t), self.angle(t, 1)
         for flank in self.flanks:
             assert isinstance(flank, CurveFlank | LawFlank)
-            force, moment = flank.forces(angle, u, du)
-            out[:, flank.direction] += flank.mean * u[:, flank.direction] - force
-            if moment is not None:
-                out[:, flank.turn] -= flank.sense * moment
+            made = flank.forces(angle, rate, u, du)
+            out[:, flank.direction] += flank.mean * u[:, flank.direction] - made.force
+            if made.moment is not None:
+                out[:, flank.turn] -= flank.sense * made.moment
+            if isinstance(flank, LawFlank) and flank.sliding is not None and made.drag is not None:
+                out[:, flank.sliding.across] -= made.drag.across
+                out[:, flank.sliding.spin] -= made.drag.turning
         for gyro in self.gyros:
             d = gyro.direction
             momentum = gyro.polar * (gyro.ratio * rate + du[:, d + 2])

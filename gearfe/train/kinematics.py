@@ -146,6 +146,17 @@ def driving_senses(scene: TrainScene) -> tuple[float, ...]:
 
 def drive_sense(speed: TimeFunction) -> float:
     """Sense in which the drive turns: that of its first speed that is not zero; 0 where it stands still."""
-    times = [0.0, *speed.breaks, *(0.5 * (a + b) for a, b in zip((0.0, *speed.breaks), speed.breaks, strict=False))]
-    found = [float(speed(t)) for t in sorted(times)]
+    found = [float(speed(t)) for t in _looks(speed)]
     return next((math.copysign(1.0, s) for s in found if s != 0.0), 0.0)
+
+
+def fastest(speed: TimeFunction) -> float:
+    """Largest speed of the drive (rad/s), without sign and oscillating parts."""
+    steady = replace(speed, sines=())
+    return max(abs(float(steady(t))) for t in _looks(speed))
+
+
+def _looks(speed: TimeFunction) -> list[float]:
+    """Times at which a function of time is looked at: its breaks, and between them."""
+    ends = (0.0, *speed.breaks)
+    return sorted([*ends, *(0.5 * (a + b) for a, b in zip(ends, speed.breaks, strict=False))])

@@ -16,14 +16,15 @@ A mesh law (`gearfe.meshlaw`) takes the place of :math:`k\,\delta`. Its phase is
 line of centres, whose turn is :math:`t\cdot(u_2 - u_1)/a` with the displacements of the gears' centres, and its moment
 M acts on that: on the driver, and across the line of centres. The back flanks, where a backlash j is known, have the
 line of action :math:`n_b = -\cos\alpha_w\,t + \sin\alpha_w\,c` and bear behind j. Damping of such a mesh grows with
-its force, :math:`d\,\dot\delta\,F/F_0`, and never pulls; :math:`F_0` is the force in steady running.
+its force, :math:`d\,\dot\delta\,F/F_0`, and never pulls; :math:`F_0` is the force in steady running. Friction acts
+across the line of action, see `gearfe.train.friction`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,6 +36,7 @@ from ..typing import Array, IntArray
 from .checks import interpolant
 from .elements import LinearForce, RigidShaft
 from .forces import CurveFlank, Flank, LawFlank
+from .friction import CREEP, NEAR, Lubrication, Sliding
 from .scene import GearMesh, TrainScene
 
 #: Least force F0 of a mesh's damping, in parts of the largest that its law is known for.
@@ -73,6 +75,11 @@ class MeshLine:
         Ratio of the driver's shaft to the drive, its driving sense (+1 or -1), start of the curve (rad).
     module
         m.
+    slides : (3, system size)
+        Displacement of the driver against the driven gear at P across both lines of action, a x n and a x n_b, and the
+        driver's turn against the driven gear's.
+    sliding
+        Friction, the numbers of its directions still to be filled in; None without.
     """
 
     name: str
@@ -92,6 +99,20 @@ class MeshLine:
     sense: float
     phase: float
     module: float
+    slides: Array
+    sliding: Sliding | None
+
+    @property
+    def columns(self) -> list[Array]:
+        """Directions of its flanks: approaches, then of a law the driver's turn, then those of friction."""
+        if self.rigid:
+            return []
+        made = [self.row] + ([] if self.backlash is None else [self.back])
+        if self.law is not None:
+            made.append(self.turn)
+        if self.sliding is not None:
+            made += [self.slides[0], self.slides[2]] + ([] if self.backlash is None else [self.slides[1]])
+        return made
 
     @property
     def rigid(self) -> bool:
@@ -127,14 +148,18 @@ class MeshLine:
         damping = 0.0 if self.law is not None else self.damping
         return LinearForce(tuple(bodies), damping * square, self.mean * square, f"mesh {self.name}")
 
-    def flanks(self, directions: Sequence[int], turn: int) -> tuple[Flank, ...]:
-        """Driving and back flanks along the directions of their approaches; `turn` is that of the driver's rotation."""
+    def flanks(self, first: int) -> tuple[Flank, ...]:
+        """Driving and back flanks, `first` the number of their first direction, see `columns`."""
         ends = [(1.0, self.mean, 0.0)] + ([] if self.backlash is None else [(-1.0, 0.0, self.backlash)])
+        turn = first + len(ends) if self.law is not None else 3 * self.driver + 2
         made: list[Flank] = []
-        for direction, (side, mean, gap) in zip(directions, ends, strict=True):
-            place = (direction, turn, self.ratio, side * self.sense, side * self.phase, mean, gap)
+        for number, (side, mean, gap) in enumerate(ends):
+            place = (first + number, turn, self.ratio, side * self.sense, side * self.phase, mean, gap)
             if self.law is not None:
-                made.append(LawFlank(*place, self.law, self.damping / self.reference))
+                sliding = self.sliding
+                if sliding is not None:
+                    sliding = replace(sliding, across=turn + 1 + 2 * number, spin=turn + 2)
+                made.append(LawFlank(*place, self.law, self.damping / self.reference, sliding))
             elif self.curve is not None:
                 made.append(CurveFlank(*place, self.curve, not self.pulls))
         return tuple(made)
@@ -142,10 +167,10 @@ class MeshLine:
 
 def mesh_line(
     scene: TrainScene, mesh: GearMesh, shafts: Sequence[RigidShaft], first: IntArray, ratios: Sequence[float],
-    size: int, sense: float, phase: float, force: float,
+    size: int, sense: float, phase: float, force: float, speed: float,
 ) -> MeshLine:  # fmt: skip
     """Line of action of a mesh in a train whose shafts' coordinates begin at `first` of `size`; `force` (N) is that of
-    steady running.
+    steady running, `speed` the largest of the drive (rad/s).
     """
     names = [s.name for s in scene.shafts]
     one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
@@ -187,10 +212,28 @@ def mesh_line(
     turn[first[i] + 5] += 1.0
     if mesh.stiffness is not None:
         damping = mesh.damping + scene.damping.beta * mean
+    spin = np.zeros(size)
+    spin[first[i] + 5], spin[first[j] + 5] = 1.0, -1.0
+    slides = np.array([*(relative(np.cross(a, n), point, point) for n in (line, back)), spin])
+    sliding = _sliding(mesh, pair, force, (ratios[i], ratios[j]), speed)
     return MeshLine(
         mesh.name, relative(line, point, point), relative(back, point, point), turn, line, point, curve, law, backlash,
-        mean, damping, reference, i, ratios[i], sense, phase, one.gear.module,
+        mean, damping, reference, i, ratios[i], sense, phase, one.gear.module, slides, sliding,
     )  # fmt: skip
+
+
+def _sliding(mesh: GearMesh, pair: GearPair, force: float, ratios: tuple[float, float], speed: float) -> Sliding | None:
+    """Friction of a mesh under a force (N), the drive turning with a speed (rad/s)."""
+    given = mesh.friction
+    if isinstance(given, Lubrication):
+        given = given.coefficient(pair, force, ratios[0] * speed)
+    if not given > 0.0:
+        return None
+    relative = ratios[0] - ratios[1]
+    slow = NEAR * pair.base_pitch * abs(relative * speed) or CREEP
+    arm = pair.pinion.base_radius * math.tan(pair.working_pressure_angle)
+    pitch = pair.pinion_angle_at(arm)
+    return Sliding(given, slow, 0, 0, relative, pair.pinion.base_radius, pitch, arm)
 
 
 def mean_tangent(law: MeshLaw, force: float) -> float:

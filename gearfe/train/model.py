@@ -22,7 +22,7 @@ from .checks import check_scene
 from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge
 from .forces import Flank, Gyro, TrainForces, derivative
 from .inertia import rotor
-from .kinematics import Rolling, driving_senses, load_end, rolling, steady_forces
+from .kinematics import Rolling, driving_senses, fastest, load_end, rolling, steady_forces
 from .mesh_element import MeshLine, mesh_line
 from .phases import tooth_places
 from .scene import Drive, TrainScene
@@ -139,7 +139,7 @@ def build_train(scene: TrainScene) -> TrainModel:
     senses = driving_senses(scene)
     phases = tooth_places(scene, senses).phases
     lines = tuple(
-        mesh_line(scene, mesh, shafts, first, ratios, size, sense, phase, float(force))
+        mesh_line(scene, mesh, shafts, first, ratios, size, sense, phase, float(force), fastest(scene.drive.speed))
         for mesh, sense, phase, force in zip(scene.meshes, senses, phases, steady_forces(scene), strict=True)
     )
     torques = _torques(scene, shafts, first, ratios, angle, size)
@@ -196,7 +196,7 @@ def _forces(
     scene: TrainScene, lines: tuple[MeshLine, ...], torques: tuple[tuple[Array, TimeFunction], ...],
     angle: TimeFunction, first: IntArray, ratios: list[float], shafts: tuple[RigidShaft, ...], size: int,
 ) -> tuple[TrainForces, Array]:  # fmt: skip
-    """All that is not constant: three directions a shaft (tilts, spin), up to three a mesh, one a torque."""
+    """All that is not constant: three directions a shaft (tilts, spin), up to six a mesh, one a torque."""
     unit = np.eye(size)
     columns = [column for i in first for column in unit[i + 3 : i + 6]]
     gyros: tuple[Gyro, ...] = ()
@@ -204,15 +204,8 @@ def _forces(
         gyros = tuple(Gyro(3 * i, g, s.rotor.polar) for i, (g, s) in enumerate(zip(ratios, shafts, strict=True)))
     flanks: list[Flank] = []
     for line in lines:
-        if line.rigid:
-            continue
-        at = len(columns)
-        columns += [line.row] + ([] if line.backlash is None else [line.back])
-        directions, turn = range(at, len(columns)), 3 * line.driver + 2
-        if line.law is not None:
-            turn = len(columns)
-            columns.append(line.turn)
-        flanks += line.flanks(directions, turn)
+        flanks += line.flanks(len(columns))
+        columns += line.columns
     at = len(columns)
     columns += [direction for direction, _ in torques]
     numbered = tuple((at + i, function) for i, (_, function) in enumerate(torques))

@@ -26,6 +26,8 @@ class Motion:
         Along the lines of action (m).
     drive_torque : (n,)
         Torque of the drive on its shaft (N m).
+    mesh_power, friction_power : (n, meshes)
+        What the driver gives to the mesh, and what friction takes of it (W).
     """
 
     time: Array
@@ -35,6 +37,8 @@ class Motion:
     contact_force: Array
     approach: Array
     drive_torque: Array
+    mesh_power: Array
+    friction_power: Array
 
 
 def motion(model: TrainModel, trajectory: Trajectory) -> Motion:
@@ -58,7 +62,12 @@ def motion(model: TrainModel, trajectory: Trajectory) -> Motion:
         row = model.spin_reference[[s.name for s in model.scene.shafts].index(drive.shaft)]
         push = -drive.stiffness * (q @ row) - drive.damping * (v @ row)
     rows = np.array([line.row for line in model.meshes]).reshape(-1, q.shape[1])
-    return Motion(t, q, v, a, contact_forces(model, t, q, v, multipliers), q @ rows.T, push)
+    force, drag, loss = contact_forces(model, t, q, v, multipliers)
+    drivers = [line.driver for line in model.meshes]
+    spin = [int(model.first[i]) + 5 for i in drivers]
+    speed = model.angle(t, 1)[:, None] * model.ratios[drivers] + v[:, spin]
+    arms = rows[np.arange(len(rows)), spin]
+    return Motion(t, q, v, a, force, q @ rows.T, push, speed * (arms * force + drag), loss)
 
 
 def forces(model: TrainModel, t: Array, q: Array, v: Array) -> Array:
@@ -68,21 +77,28 @@ def forces(model: TrainModel, t: Array, q: Array, v: Array) -> Array:
     return made
 
 
-def contact_forces(model: TrainModel, t: Array, q: Array, v: Array, multipliers: dict[str, Array]) -> Array:
-    """F of each mesh (N): spring and damper, or the multiplier of a rigid mesh; of back flanks negative."""
-    out = np.zeros((len(t), len(model.meshes)))
+def contact_forces(
+    model: TrainModel, t: Array, q: Array, v: Array, multipliers: dict[str, Array]
+) -> tuple[Array, Array, Array]:
+    """Of each mesh F (N): spring and damper, or the multiplier of a rigid mesh; of back flanks negative. Then of its
+    friction the torque against the driver (N m) and the power that it takes (W).
+    """
+    out, torque, power = np.zeros((3, len(t), len(model.meshes)))
     u, du = q @ model.directions, v @ model.directions
     flanks = iter(model.forces.flanks)
     for i, line in enumerate(model.meshes):
         if line.rigid:
             out[:, i] = multipliers[f"mesh {line.name}"][:, 0]
             continue
-        out[:, i] = model.forces.of_flank(next(flanks), t, u, du)
-        if line.backlash is not None:
-            out[:, i] -= model.forces.of_flank(next(flanks), t, u, du)
+        for side in (1.0,) if line.backlash is None else (1.0, -1.0):
+            made = model.forces.of_flank(next(flanks), t, u, du)
+            out[:, i] += side * made.force
+            if line.sliding is not None and made.drag is not None:
+                torque[:, i] += line.sliding.arm * made.drag.across + made.drag.turning
+                power[:, i] += made.drag.power
         if line.law is None:
             out[:, i] += line.damping * (v @ line.row)
-    return out
+    return out, torque, power
 
 
 def joint_multipliers(model: TrainModel, t: Array, q: Array, v: Array, a: Array) -> dict[str, Array]:

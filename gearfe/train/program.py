@@ -6,8 +6,8 @@ Rows of a memory hold series. Inputs are linear in the motion. Each operation th
 
 with a cubic of a phase z (or its slope) whose coefficients n stand in the row of its cell, and the product of two rows.
 The forces of tooth pairs (mesh laws) are solved for between the operations `before` and `after`: from
-:math:`t + \Lambda(z, f) + \sum C F = \delta`, in which their highest order is linear. Outputs take rows to the
-directions of the forces.
+:math:`t + \Lambda(z, f) + \sum C F = \delta`, in which their highest order is linear. Friction needs tanh of a row: of
+:math:`s = \tanh x,\ y = 1 - s^2` follows :math:`s' = y x'`. Outputs take rows to the directions of the forces.
 """
 
 from __future__ import annotations
@@ -35,8 +35,10 @@ F, FULL, GAP, H1, H2, H3, TOUCHES, ENERGIES, PER_SLOT = range(9)
 COUPLE, NUMBERS, PER_COUPLE = range(3)
 #: Column of the phase of a cell's node, and of F_0 beside the coefficients of t.
 ORIGIN = 4
-#: No polynomial, a cubic, its slope.
-NOTHING, CUBIC, SLOPE = range(3)
+#: Rows of a slot's friction: e of the pair, its coefficients, v/v0, tanh of that, 1 - tanh2, e tanh, normal force.
+ARM, LEVER, SPEED, SIGN, REST, TURNS, NORMAL, PER_SLIDE = range(8)
+#: No polynomial, a cubic, its slope; or tanh of a row, into the row after it what is left of 1 - tanh2.
+NOTHING, CUBIC, SLOPE, TANH = range(4)
 #: What a step may not pass: the cell of a phase, touch of a flank with a curve, pull of a damper, the cell of a pair.
 PHASE, TOUCH, PULL, PAIR = range(4)
 #: Instead of the number of a piece: no condition.
@@ -76,6 +78,8 @@ class Flanks(NamedTuple):
     row: IntArray  # (f,) first row
     piece: IntArray  # (f,) first whole number
     first: IntArray  # (f + 2,) first operation before the solution of each flank, first and end of those after them
+    slides: IntArray  # (f,) first row of friction, -1 without
+    slide: Array  # (f, 2) r_b1 and psi_C of friction
 
 
 class Program(NamedTuple):
@@ -143,15 +147,17 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
     laws = {id(flank.law): flank.law for flank in forces.contacts}
     tables = law_arrays(list(laws.values()))
     first, rows, pieces = [], [], []
+    slides: list[int] = []
     flanks: tuple[Flank, ...] = (*forces.curves, *forces.contacts)
     for number, flank in enumerate(flanks):
         first.append(len(made.before))
         rows.append(made.rows)
         pieces.append(made.pieces)
+        slides.append(-1)
         if isinstance(flank, CurveFlank):
             _curve(made, number, flank)
         elif isinstance(flank, LawFlank):
-            _contact(made, number, flank, tables.touch.shape[1])
+            slides[-1] = _contact(made, number, flank, tables.touch.shape[1])
     first += [len(made.before), len(made.before) + len(made.after)]
     count, order = len(forces.curves), list(laws)
     numbers = [order.index(id(flank.law)) for flank in forces.contacts]
@@ -163,7 +169,11 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
         Flanks(
             _ints([*range(count), *(-1 for _ in numbers)]),
             _ints([*(0 for _ in range(count)), *numbers]),
-            *(_ints(x) for x in (rows, pieces, first)),
+            _ints(rows),
+            _ints(pieces),
+            _ints(first),
+            _ints(slides),
+            np.array([_slide(flank) for flank in flanks]).reshape(-1, 2),
         ),
         _ints(made.watches).reshape(-1, 4),
         curve_arrays([flank.curve for flank in forces.curves]),
@@ -196,7 +206,8 @@ def _curve(made: Tables, number: int, flank: CurveFlank) -> None:
     made.pieces += PER_FLANK
 
 
-def _contact(made: Tables, number: int, flank: LawFlank, slots: int) -> None:
+def _contact(made: Tables, number: int, flank: LawFlank, slots: int) -> int:
+    """A flank with a mesh law; the first row of its friction, -1 without."""
     row = _place(made, flank, SLOTS + PER_SLOT * slots + PER_COUPLE * (slots * (slots - 1) // 2))
     made.read(row + DAMPED, flank.direction, 1, 0.0, flank.damping, 1.0)
     pull, moment = made.take(), made.take()
@@ -239,7 +250,42 @@ def _contact(made: Tables, number: int, flank: LawFlank, slots: int) -> None:
     if flank.damping > 0.0:
         made.watches.append((PULL, number, row + DAMPED, 0))
     made.watches.append((PHASE, number, row + Z, 0))  # the last: pairs go on to other slots with it
+    slides = _friction(made, flank, row, slots)
     made.pieces += PER_FLANK + slots
+    return slides
+
+
+def _slide(flank: Flank) -> tuple[float, float]:
+    sliding = flank.sliding if isinstance(flank, LawFlank) else None
+    return (0.0, 0.0) if sliding is None else (sliding.radius, sliding.pitch_phase)
+
+
+def _friction(made: Tables, flank: LawFlank, row: int, slots: int) -> int:
+    """Friction of the pairs of a flank: its first row, -1 without."""
+    sliding = flank.sliding
+    if sliding is None:
+        return -1
+    first, scale = made.take(PER_SLIDE * slots), 1.0 / sliding.speed
+    spin = made.read(made.take(), sliding.spin, 1, sliding.ratio * scale, scale)
+    across, turning = made.take(), made.take()
+    made.after += [operation(across), operation(turning)]
+    for slot in range(slots):
+        own, pair = first + PER_SLIDE * slot, row + SLOTS + PER_SLOT * slot
+        need = (made.pieces + PER_FLANK + slot, ALWAYS)
+        acts = (need[0], made.pieces + 2)
+        made.read(own + SPEED, sliding.across, 1, 0.0, scale)
+        made.after += [
+            operation(own + ARM, kind=CUBIC, z=row, cell=own + LEVER, needs=need),
+            operation(own + SPEED, A=own + ARM, B=spin, keep=1.0, needs=need),
+            operation(own + SIGN, kind=TANH, z=own + SPEED, needs=need),
+            operation(own + TURNS, A=own + ARM, B=own + SIGN, needs=need),
+            operation(own + NORMAL, A=pair + FULL, B=row + DAMPED, needs=need),
+            operation(across, A=own + NORMAL, B=own + SIGN, keep=1.0, needs=acts),
+            operation(turning, A=own + NORMAL, B=own + TURNS, keep=1.0, needs=acts),
+        ]
+    made.force(sliding.across, across, -sliding.coefficient)
+    made.force(sliding.spin, turning, -sliding.coefficient)
+    return first
 
 
 def _pair(made: Tables, row: int, own: int, need: tuple[int, int]) -> None:

@@ -17,6 +17,8 @@ SAMPLED = (
     "contact_force",
     "transmission_error",
     "drive_torque",
+    "mesh_power",
+    "friction_power",
     "speed",
     "speed_absolute",
     "acceleration",
@@ -49,6 +51,9 @@ class TrainResponse:
     transmission_error : (n, m)
         Approach of both gears along the line of action (m), by turns, tilts and displacements: the dynamic transmission
         error. 0 where unmodified driving flanks touch.
+    mesh_power, friction_power : (n, m)
+        What the driver of each mesh gives to it, without what its elastic energy takes and returns, and what friction
+        takes of it (W).
     shaft_names : tuple of s names
     speed, speed_absolute : (n, s)
         Spin of each shaft about the axis (rad/s): relative to its first bore, as a hinge measures it, and absolute.
@@ -86,7 +91,8 @@ class TrainResponse:
     statistics, estimates : mapping
         ``steps``, ``method``, ``scheme``, ``seconds``, ``compile_seconds``, ``choice``, ``free_coordinates``,
         ``redundant_constraints`` (names),
-        ``smallest_contact_force_N``; for each mesh ``contacts_lost``, ``contacts_regained``, ``share_without_contact``
+        ``smallest_contact_force_N``; for each mesh ``friction_coefficients``,
+        ``contacts_lost``, ``contacts_regained``, ``share_without_contact``
         and ``longest_without_contact_s`` (None for meshes that do not part); error estimates asked for
         (``integration``, ``reduction``).
     warnings : tuple of str
@@ -98,6 +104,8 @@ class TrainResponse:
     contact_force: Array
     transmission_error: Array
     drive_torque: Array
+    mesh_power: Array
+    friction_power: Array
     shaft_names: tuple[str, ...]
     speed: Array
     speed_absolute: Array

@@ -16,6 +16,7 @@ from ..rigid.timefunctions import TimeFunction
 from ..stiffness.curve import StiffnessCurve
 from ..stiffness.periodic import PeriodicInterpolant
 from ..typing import Array
+from .friction import Lubrication
 
 Vector = tuple[float, float, float]
 
@@ -100,6 +101,8 @@ class GearMesh:
     backlash
         Normal backlash (m), along the line of action. None: with a law that of the gears, or no back flanks where they
         have none; with a curve or a constant a spring that acts both ways.
+    friction
+        Coefficient of friction, or what it follows from; for meshes with a law. See `gearfe.train.friction`.
     """
 
     driver: str
@@ -110,6 +113,7 @@ class GearMesh:
     interpolation: str = "cubic"
     centre_distance: float | None = None
     backlash: float | None = None
+    friction: float | Lubrication = 0.0
 
     @property
     def name(self) -> str:

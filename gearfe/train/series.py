@@ -28,12 +28,15 @@ from .program import (
     H2,
     H3,
     JACOBIAN,
+    LEVER,
     NUMBERS,
     ORIGIN,
     PER_COUPLE,
     PER_FLANK,
+    PER_SLIDE,
     PER_SLOT,
     SLOTS,
+    TANH,
     TOUCHES,
     F,
     train_program,
@@ -133,6 +136,11 @@ def step_begins(t, s, p, memory, pieces):
                 for a in range(4):
                     memory[couple, a] = p.laws.coupling[law, slot * slots + up, cell, a]
                 couple += PER_COUPLE
+            if p.flanks.slides[k] >= 0:
+                lever = p.flanks.slides[k] + PER_SLIDE * slot + LEVER
+                begin = p.laws.nodes[law, cell] + slot * cycle - p.flanks.slide[k, 1]
+                memory[lever, 0] = p.flanks.slide[k, 0] * begin
+                memory[lever, 1] = p.flanks.slide[k, 0]
 
 
 def operate(j, operations, first, end, memory, pieces):
@@ -146,9 +154,12 @@ def operate(j, operations, first, end, memory, pieces):
         a = operations.ints[i, 1]
         b = operations.ints[i, 2]
         kind = operations.ints[i, 3]
+        z = operations.ints[i, 4]
         value = 0.0
+        if kind == TANH:
+            hyperbolic_tangent(j, z, row, memory)
+            continue
         if kind > 0:
-            z = operations.ints[i, 4]
             n = operations.ints[i, 5]
             c = operations.ints[i, 6]
             if kind == 1:
@@ -165,6 +176,23 @@ def operate(j, operations, first, end, memory, pieces):
             for k in range(j + 1):  # Cauchy
                 value += memory[a, k] * memory[b, j - k]
         memory[row, j] = operations.reals[i, 2] * memory[row, j] + operations.reals[i, 1] * value
+
+
+def hyperbolic_tangent(j, x, row, memory):
+    """Order j of s = tanh x in a row and of y = 1 - s2 in the next, from s' = y x'."""
+    if j == 0:
+        s = np.tanh(memory[x, 0])
+        memory[row, 0] = s
+        memory[row + 1, 0] = (1.0 - s) * (1.0 + s)
+        return
+    value = 0.0
+    for k in range(1, j + 1):
+        value += k * memory[x, k] * memory[row + 1, j - k]
+    memory[row, j] = value / j
+    rest = 0.0
+    for k in range(j + 1):
+        rest -= memory[row, k] * memory[row, j - k]
+    memory[row + 1, j] = rest
 
 
 def pair_forces(j, slots, memory, row, pieces, at):
@@ -276,7 +304,7 @@ def train_series(forces: TrainForces) -> SeriesLaw:
     for module in (tables, corners):
         found = {name: value for name, value in vars(module).items() if name.isupper()}
         constants |= {name: value for name, value in found.items() if isinstance(value, int | float)}
-    own = (step_begins, operate, pair_forces, *corners.FUNCTIONS)
+    own = (step_begins, operate, hyperbolic_tangent, pair_forces, *corners.FUNCTIONS)
     return SeriesLaw(
         begin, train_order, train_corner, (*own, time_series), program, rows, pieces, constants,
     )  # fmt: skip

@@ -212,6 +212,7 @@ class _SoFar:
             "smallest_contact_force_N": self.least.tolist(),
             "steady_forces_N": steady_forces(model.scene).tolist(),
             "flanks": [line.told for line in model.meshes],
+            "friction_coefficients": [0.0 if x.sliding is None else x.sliding.coefficient for x in model.meshes],
             **parted(self.parting, [line.rigid or line.pulls for line in model.meshes]),
         }
 
@@ -324,8 +325,7 @@ def _too_far(model: TrainModel, reach: Array, shafts: Array, limit: float) -> st
 
 
 def _cut(moved: Motion, first: int, keep: int) -> Motion:
-    names = ("time", "q", "v", "a", "contact_force", "approach", "drive_torque")
-    return Motion(*(getattr(moved, name)[first:keep] for name in names))
+    return Motion(*(getattr(moved, name)[first:keep] for name in Motion.__dataclass_fields__))
 
 
 def _response(
@@ -345,6 +345,8 @@ def _response(
         contact_force=moved.contact_force,
         transmission_error=moved.approach,
         drive_torque=moved.drive_torque,
+        mesh_power=moved.mesh_power,
+        friction_power=moved.friction_power,
         shaft_names=tuple(s.name for s in scene.shafts),
         speed=rate + moved.v @ model.spin_reference.T,
         speed_absolute=rate + moved.v[:, spin],

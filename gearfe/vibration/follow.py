@@ -33,6 +33,8 @@ class Followed:
         Number of output times.
     least_force, least_loaded_force, largest_force, mean_force : (meshes,)
         Of all samples (N); under load: after the load's ramps; the mean over `periods` common mesh periods at the end.
+    mean_power, mean_loss : (meshes,)
+        Power that drivers give to the meshes and that friction takes (W), over the same times.
     periods
         Whole periods of the mean, 0 where it is over all times under load.
     peak_acceleration, start_acceleration : (attachments,)
@@ -51,6 +53,8 @@ class Followed:
     least_loaded_force: Array
     largest_force: Array
     mean_force: Array
+    mean_power: Array
+    mean_loss: Array
     periods: int
     peak_acceleration: Array
     start_acceleration: Array
@@ -107,20 +111,23 @@ def follow(
             if record is not None and count:
                 record.add(piece)
             envelope.add(passed, _drawn(piece))
-            mean.add(piece.time, piece.contact_force)
+            mean.add(piece.time, np.hstack([piece.contact_force, piece.mesh_power, piece.friction_power]))
             extremes.add(piece)
             inside = wanted[(wanted >= passed) & (wanted < passed + count)]
             kept.append(piece.at(inside - passed))
             passed += count
     if extremes is None:
         raise InputError("response", None, "the run has no piece", "give the response")
+    force, power, loss = np.split(mean.value, 3)
     return Followed(
         piece,
         (passed + every - 1) // every,
         extremes.least,
         extremes.least_loaded if np.isfinite(extremes.least_loaded).all() else extremes.least,
         extremes.largest,
-        mean.value,
+        force,
+        power,
+        loss,
         mean.periods,
         extremes.peak,
         extremes.start,

@@ -25,6 +25,7 @@ from ..tables.microgeometry import MicrogeometryTable
 from ..tables.pair import DEFAULTS, PairTable
 from ..tables.stiffness import StiffnessTable
 from ..tables.train import TrainGearTable, TrainMeshTable, TrainTable, read_train_tables
+from ..train.friction import Lubrication
 from ..train.scene import Bearing, Damping, Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
 from ..typing import Array
 
@@ -119,7 +120,7 @@ def job_scene(
         ShaftGear(g.name, g.shaft, 1e-3 * g.y_mm, train_gear(job, g, f"train.gears[{i}]"), _density(job, g))
         for i, g in enumerate(t.gears)
     )
-    meshes = tuple(_mesh(job, m, c) for m, c in zip(t.meshes, curves, strict=True))
+    meshes = tuple(_mesh(job, m, c, geometry_only) for m, c in zip(t.meshes, curves, strict=True))
     drive = None
     if t.drive is not None:
         speed = _ramp(t.drive.speed_rad_per_s, t.drive.ramp_centre_ms, t.drive.ramp_width_ms)
@@ -199,7 +200,7 @@ def _density(job: TrainJob, table: TrainGearTable) -> float:
     return (job.pair.material_of(table.gear) if table.gear else job.pair.material).density_kg_per_m3
 
 
-def _mesh(job: TrainJob, table: TrainMeshTable, stiffness: Stiffness) -> GearMesh:
+def _mesh(job: TrainJob, table: TrainMeshTable, stiffness: Stiffness, geometry_only: bool) -> GearMesh:
     distance = table.centre_distance_mm
     if distance is None and job.pair is not None and job.pair.centre_distance_mm is not None:
         sides = {g.name: g.gear for g in job.table.gears}
@@ -214,7 +215,15 @@ def _mesh(job: TrainJob, table: TrainMeshTable, stiffness: Stiffness) -> GearMes
         job.table.curves.interpolation,
         None if distance is None else 1e-3 * distance,
         None if table.backlash_um is None else 1e-6 * table.backlash_um,
+        0.0 if geometry_only else _friction(table),
     )
+
+
+def _friction(table: TrainMeshTable) -> float | Lubrication:
+    if table.oil_viscosity_mPa_s is None or table.roughness_um is None:
+        return table.friction or 0.0
+    factor = 1.0 if table.oil_factor is None else table.oil_factor
+    return Lubrication(1e-3 * table.oil_viscosity_mPa_s, 1e-6 * table.roughness_um, factor)
 
 
 def _ramp(height: float, centre_ms: float, width_ms: float | None) -> TimeFunction:

@@ -113,6 +113,8 @@ def train_summary(followed: Followed, timings: Mapping[str, float], **further: A
         if len(force) and force[0] != 0.0:
             summary["contact_force_ratios_to_first"] = force / force[0]
         summary["contact"] = contact_summary(followed)
+        if any(response.statistics.get("friction_coefficients", ())):
+            summary["friction"] = friction_summary(followed)
     if made is not None:
         spectrum = made.spectrum
         summary["spectrum"] = {
@@ -152,6 +154,24 @@ def contact_summary(followed: Followed) -> dict[str, Any]:
     names = ("flanks", "contacts_lost", "contacts_regained", "share_without_contact", "longest_without_contact_s")
     told = {name: statistics[name] for name in names if name in statistics}
     return {**told, "dynamic_factors": factors}
+
+
+def friction_summary(followed: Followed) -> dict[str, Any]:
+    """Coefficients of friction, and mean powers and efficiency of the meshes over the times of the mean forces.
+
+    The efficiency is what leaves a mesh over what enters it, 1 - loss/power where its driver drives. 0 where friction
+    takes all; None where nothing enters.
+    """
+    power, loss = followed.mean_power, followed.mean_loss
+    entering = np.where(power > 0.0, power, loss - power)
+    efficiency = [max(0.0, 1.0 - b / a) if a > 0.0 else None for a, b in zip(entering, loss, strict=True)]
+    return {
+        "coefficients": followed.response.statistics["friction_coefficients"],
+        "mean_mesh_power_W": power,
+        "mean_loss_W": loss,
+        "mean_loss_of_all_meshes_W": float(loss.sum()),
+        "efficiency": efficiency,
+    }
 
 
 def stiffness_ranges(scene: TrainScene) -> dict[str, tuple[float | None, float | None]]:

@@ -77,6 +77,10 @@ def response_columns(response: TrainResponse, radiation: Array | None = None) ->
     made |= {f"acceleration_absolute_{name}_rad_per_s2": response.acceleration_absolute[:, i] for i, name in shafts}
     for i in range(len(response.mesh_names)):
         made[f"transmission_error_{i + 1}_um"] = 1e6 * response.transmission_error[:, i]
+    for i, coefficient in enumerate(response.statistics.get("friction_coefficients", ())):
+        if coefficient > 0.0:
+            made[f"mesh_power_{i + 1}_W"] = response.mesh_power[:, i]
+            made[f"friction_power_{i + 1}_W"] = response.friction_power[:, i]
     if radiation is not None and response.modal_velocity is not None:
         made["instantaneous_radiated_power_W"] = instantaneous_power(radiation, response.modal_velocity)
     made["band_limited"] = np.zeros(len(response.time), dtype=np.int64)

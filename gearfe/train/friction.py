@@ -1,0 +1,122 @@
+r"""Friction of a mesh with a law: Coulomb's, pair by pair, from the normal force and the sliding speed.
+
+Tooth pair k touches on the line of action at P + e_k n, P the pitch point, :math:`e_k = r_{b1}(\psi_k - \psi_C)`,
+:math:`\psi_C` the phase at which a pair passes P. There the driver's flank slides on the driven one, along q = a x n,
+with
+
+.. math:: v_k = q\cdot\big(\dot u_1(P) - \dot u_2(P)\big) + e_k\,(\Omega_1 - \Omega_2) ,
+
+:math:`\Omega` the whole speeds about the axis a: rolling gears slide with :math:`e_k(\Omega_1 - \Omega_2)`. The driver
+feels :math:`-\mu N_k \tanh(v_k/v_0)\,q`, the driven gear its opposite, :math:`N_k` the pair's normal force, damping
+included. As :math:`v_k` belongs to this force, the loss is :math:`\sum \mu N_k v_k\tanh(v_k/v_0) \ge 0` whatever the
+motion. The pair's place is that on the path of contact: beyond its ends, where edges bear, the lever arms are some
+per cent off.
+
+:math:`\mu` is given, or the mean coefficient along the path by Schlenk (ISO/TR 14179-2:2001; Niemann and Winter,
+Maschinenelemente II):
+
+.. math:: \mu = 0.048\,\Big(\frac{F_{bt}/b}{v_{\Sigma C}\,\rho_{redC}}\Big)^{0.2} \eta^{-0.05} R_a^{0.25} X_L
+
+with F_bt/b in N/mm (150 at least), the sum of the surface speeds at P :math:`v_{\Sigma C} = 2 v_t\sin\alpha_w` in m/s
+(v_t 50 at most), the reduced radius of curvature there in mm, the oil's viscosity in mPa s, and the mean roughness of
+both flanks in um.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ..errors import InputError
+from ..gear.mesh_geometry import MeshGeometry
+
+#: Largest coefficient that is no slip of the pen.
+MOST = 0.5
+#: v0: the sliding speed so many base pitches from the pitch point, at the largest speed of the drive ...
+NEAR = 0.01
+#: ... and where the drive stands still (m/s).
+CREEP = 1e-3
+#: Range of the formula: least load of a width (N/m), largest speed of the pitch circles (m/s).
+LEAST_LOAD, FASTEST = 150e3, 50.0
+
+
+@dataclass(frozen=True)
+class Lubrication:
+    """What the mean coefficient of friction by Schlenk follows from.
+
+    Parameters
+    ----------
+    viscosity
+        Dynamic, of the oil at its temperature in the mesh (Pa s).
+    roughness
+        Mean Ra of both gears' flanks (m).
+    oil_factor
+        X_L, 1 for mineral oils.
+    """
+
+    viscosity: float
+    roughness: float
+    oil_factor: float = 1.0
+
+    def coefficient(self, pair: MeshGeometry, force: float, speed: float) -> float:
+        """Mean coefficient of a pair under a mesh force (N), the pinion turning with a speed (rad/s).
+
+        Raises
+        ------
+        InputError
+            For gears at rest, whose coefficient the formula does not tell.
+        """
+        if not abs(speed) > 0.0:
+            problem = "cannot be computed: the gears stand still"
+            raise InputError("coefficient of friction", None, problem, "give the coefficient itself")
+        one, two, sine = pair.pinion_working_radius, pair.wheel_working_radius, math.sin(pair.working_pressure_angle)
+        width = min(pair.pinion.face_width, pair.wheel.face_width)
+        load = max(abs(force) / width, LEAST_LOAD)
+        sum_speed = 2.0 * min(abs(speed) * one, FASTEST) * sine
+        radius = one * two * sine / (one + two)
+        base = (1e-3 * load / (sum_speed * 1e3 * radius)) ** 0.2
+        film = (1e3 * self.viscosity) ** -0.05 * (1e6 * self.roughness) ** 0.25
+        return 0.048 * base * film * self.oil_factor
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """Friction of a flank, for `gearfe.train.forces`.
+
+    Attributes
+    ----------
+    coefficient, speed
+        mu; v0 (m/s).
+    across, spin
+        Numbers of the directions of the displacement of P along q and of the driver's turn against the driven gear.
+    ratio
+        The driver's ratio to the drive less the driven gear's.
+    radius, pitch_phase
+        r_b1 (m); psi_C (rad).
+    arm
+        Lever arm (m) of a force along q at P about the driver's axis.
+    """
+
+    coefficient: float
+    speed: float
+    across: int
+    spin: int
+    ratio: float
+    radius: float
+    pitch_phase: float
+    arm: float
+
+
+def check_friction(label: str, friction: float | Lubrication, has_law: bool) -> None:
+    """Raise `InputError` for friction out of range, or of a mesh whose tooth pairs are not known."""
+    if isinstance(friction, Lubrication):
+        for name, unit in (("viscosity", "Pa s"), ("roughness", "m"), ("oil_factor", "")):
+            value = getattr(friction, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"{label} {name}", value, f"must be finite and > 0 {unit}".rstrip(), "see Lubrication")
+    elif not (math.isfinite(friction) and 0.0 <= friction <= MOST):
+        cure = "0.03 to 0.08 is usual for lubricated steel gears"
+        raise InputError(f"{label} friction", friction, f"must be 0 to {MOST:g}", cure)
+    if friction != 0.0 and not has_law:
+        problem = "needs a mesh law: a curve does not tell how tooth pairs share the load"
+        raise InputError(f"{label} friction", None, problem, 'write law = "map", or leave friction out')
