@@ -14,9 +14,9 @@ from gearfe.tables.examples import job_file
 from .housing_meshes import box
 
 SHIPPED = Path(__file__).parents[1] / "geometry" / "gear_train.toml"
-RIGID_TRAIN = (
-    job_file("vibration").replace('# housing = "elastic"', 'housing = "rigid" #').replace('load = "torque"', "")
-).replace("# stiffness_N_per_m (not set):", "stiffness_N_per_m = 2e8 #")
+RIGID_TRAIN = (job_file("vibration").replace('# housing = "elastic"', 'housing = "rigid" #')).replace(
+    "# stiffness_N_per_m (not set):", "stiffness_N_per_m = 2e8 #"
+)
 PAIR = job_file("stiffness")
 HOUSING = "[housing]\n[housing.material]\n"
 MECHANISM = job_file("mechanism")

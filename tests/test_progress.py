@@ -124,7 +124,7 @@ def test_a_wait_of_a_minute_is_announced_to_library_users_too(capsys):
     assert (stream.getvalue(), capsys.readouterr().err) == ("gearfe: compiling\n", "")
 
 
-TRAIN = job_file("vibration").replace('# housing = "elastic"', 'housing = "rigid" #').replace('load = "torque"', "")
+TRAIN = job_file("vibration").replace('# housing = "elastic"', 'housing = "rigid" #')
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import pytest
 from gearfe.config import load_job
 from gearfe.errors import InputError
 from gearfe.stiffness.curve import StiffnessCurve
+from gearfe.tables.train import TrainCurvesTable
 from gearfe.train import build_train, simulate
 from gearfe.train.kinematics import steady_forces
 from gearfe.vibration.job import bore_places, job_scene, read_train_job
@@ -96,7 +97,8 @@ def test_the_shipped_job_is_what_it_says() -> None:
 
 def test_variants_differ_in_curves_and_damping() -> None:
     standard, tutorial, operating = (read_train_job(SHIPPED, name).table for name in (None, "tutorial", "operating"))
-    assert (standard.curves, standard.damping.ratio) == (operating.curves, 0.0)
+    assert (standard.curves, standard.damping.ratio) == (TrainCurvesTable(), 0.0)  # mesh laws are the default
+    assert (standard.curves.law, tutorial.curves.law, operating.curves.law) == ("map", "curve", "curve")
     assert math.pi * 2000.0 * standard.damping.rayleigh_beta_s == pytest.approx(0.01, rel=0.01)  # 1 % at 2 kHz
     assert (tutorial.curves.interpolation, tutorial.curves.load, tutorial.damping.ratio) == ("linear", "stiffness", 0.0)
     assert (operating.curves.interpolation, operating.curves.load, operating.damping.ratio) == ("cubic", "torque", 0.01)
@@ -158,6 +160,21 @@ def built(path: Path) -> None:
         ('housing = "rigid"', 'housing = "elastic"', "needs a table \\[housing\\]"),
         ("attachments = [3, 4]", "attachments = [3, 5]", "unknown attachment '5'"),
         ("teeth = 27\n", 'gear = "wheel"\n', "stands beside gear"),
+        (
+            "stiffness_N_per_m = 2e8",
+            "[train.curves]\nload = 'torque'",
+            "curves.load = 'torque': is of stiffness curves",
+        ),
+        ("stiffness_N_per_m = 2e8", "[train.curves]\npositions = 36", "curves.positions = 36: is of stiffness curves"),
+        ("2e8", "2e8\nfriction = 0.6", "friction = 0.6: must be"),
+        ("2e8", "2e8\nfriction = 0.06", "needs a mesh law"),
+        ("stiffness_N_per_m = 2e8", "friction = 0.06\n[train.curves]\nlaw = 'curve'", "needs a mesh law, but"),
+        ("stiffness_N_per_m = 2e8", "roughness_um = 0.5", "oil_viscosity_mPa_s: is required beside roughness_um"),
+        (
+            "stiffness_N_per_m = 2e8",
+            "oil_viscosity_mPa_s = 20.0\nroughness_um = 0.5\nfriction = 0.05",
+            "stands beside friction = 0.05",
+        ),
     ],
 )
 def test_mistakes_in_a_file(tmp_path: Path, old: str, new: str, words: str) -> None:

@@ -198,18 +198,20 @@ class TrainRigidBoreTable:
 
 @dataclass(frozen=True)
 class TrainCurvesTable:
-    """How the stiffness curves are computed and read."""
+    """What computed meshes are made of: mesh laws, or stiffness curves and how these are computed and read."""
 
-    load: str = quantity(
-        "stiffness",
-        choices=("stiffness", "torque"),
-        doc="load and angles of [stiffness], or the torque that each mesh carries",
-    )
-    positions: int = quantity(36, low=8, high=10_000, doc='positions in one mesh cycle, for load = "torque"')
     law: str = quantity(
-        "curve",
+        "map",
         choices=("map", "curve", "linear"),
-        doc="of meshes whose stiffness is computed: map, curve or linear, see [[train.meshes]]",
+        doc="of meshes that are computed: map, curve or linear, see [[train.meshes]]",
+    )
+    load: str | None = quantity(
+        None,
+        choices=("stiffness", "torque"),
+        doc="of curves: load and angles of [stiffness] (when left out), or the torque that each mesh carries",
+    )
+    positions: int | None = quantity(
+        None, low=8, high=10_000, doc='positions in one mesh cycle, for load = "torque"; left out: 36'
     )
     interpolation: str = quantity(
         "cubic", choices=("cubic", "linear"), doc="between the positions: cubic (monotone) or linear"
@@ -268,6 +270,21 @@ class TrainTable:
             self.chosen(self.variant)
         self._check_names(where)
 
+    def check_laws(self) -> None:
+        """Nothing that is given for stiffness curves stands beside mesh laws alone, nor friction beside curves."""
+        given = ("curve", "load_map", "stiffness_N_per_m", "rigid")
+        computed = [m.law or self.curves.law for m in self.meshes if not any(getattr(m, k) for k in given)]
+        for key in ("load", "positions"):
+            value = getattr(self.curves, key)
+            if value is not None and computed and set(computed) == {"map"}:
+                cure = 'leave it out, or write law = "curve" beside it for k(phi) delta'
+                problem = 'is of stiffness curves, but the meshes have mesh laws (law = "map", the default)'
+                raise InputError(f"train.curves.{key}", value, problem, cure)
+        for i, mesh in enumerate(self.meshes):
+            if (mesh.friction or mesh.roughness_um) and (mesh.law or self.curves.law) != "map":
+                problem = f"needs a mesh law, but law = {self.curves.law!r} in train.curves"
+                raise InputError(f"train.meshes[{i}].friction", mesh.friction, problem, 'write law = "map" in the mesh')
+
     def _check_names(self, where: str) -> None:
         """Shafts and gears have names of their own, and what names one names one that is there."""
         names: dict[str, list[str]] = {}
@@ -310,6 +327,7 @@ def train_tables(raw: dict[str, Any], path: str | Path, variant: str | None = No
     tables = job_tables(raw, path, ("train",), ("pair", "stiffness", "microgeometry", "housing"))
     table: TrainTable = tables["train"]
     table = table.chosen(table.variant if variant is None else variant)
+    table.check_laws()
     if table.housing == "elastic" and "housing" not in tables:
         raise InputError("train.housing", "elastic", "needs a table [housing]", 'add it, or write housing = "rigid"')
     return {**tables, "train": table}

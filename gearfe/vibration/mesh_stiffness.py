@@ -28,6 +28,8 @@ from .job import Stiffness, TrainJob, job_scene
 ROOM = 5.0
 #: Positions at which the error of a law's stiffness is estimated.
 ESTIMATED = 8
+#: Positions of a curve at the carried torque.
+POSITIONS = 36
 
 
 def train_curves(
@@ -130,14 +132,14 @@ def _computed_curve(
     tables = StiffnessJob(job.pair, job.stiffness, pair)
     model = {**tables.model, "materials": _materials(job, mesh)}
     model["deviations"] = _deviations(job, scene, number, pair, model["law"])
-    if job.table.curves.load == "stiffness":
+    if job.table.curves.load in (None, "stiffness"):
         with stage(mesh.name):
             return cached_curve(pair, model, tables.sweep, watch=watch, progress=progress, estimate_error=estimate)
     torque = _carried_torque(scene, number)
     if not torque > 0.0:
         problem = 'carries no torque, so train.curves.load = "torque" has no load to compute its curve with'
         raise InputError(f"mesh {mesh.name!r}", None, problem, 'add a load, or write load = "stiffness"')
-    count = job.table.curves.positions
+    count = job.table.curves.positions or POSITIONS
     sweep = {
         "torque": torque,
         "angles": pair.mesh_cycle * np.arange(count) / count,
@@ -160,7 +162,7 @@ def _computed_law(job: TrainJob, scene: TrainScene, number: int, estimate: bool)
 
     mesh, table = scene.meshes[number], job.table.meshes[number]
     if job.pair is None:
-        problem = "has no mesh law: there is no table [pair] to compute it with"
+        problem = "has no stiffness: there is no table [pair] to compute it with"
         raise InputError(f"mesh {mesh.name!r}", None, problem, "add curve, stiffness_N_per_m or rigid to it, or [pair]")
     alike = [i for i, other in enumerate(scene.meshes) if gears(other) == gears(mesh)]
     steady = max(_carried_torque(scene, i) for i in alike)
