@@ -105,7 +105,7 @@ def test_a_rigid_train(job, tmp_path, capsys):
     for part in ("mesh 1 (pinion-wheel): 1909.9 Hz", "resolution 500 Hz", "transient: done", "mean contact force"):
         assert part in said.out
     assert sorted(p.name for p in out.iterdir()) == [
-        "response.csv", "response.png", "spectrum.csv", "spectrum.png", "summary.json",
+        "response.csv", "response.png", "spectrum.csv", "spectrum.png", "summary.json", "transmission_error.png",
     ]  # fmt: skip
     names, values = table(out / "response.csv")
     assert names[:4] == ["time_s", "drive_angle_deg", "contact_force_1_N", "speed_one_rad_per_s"]
@@ -141,6 +141,29 @@ def test_a_curve_from_a_file(job, tmp_path):
     assert main(["vibration", str(job), "--out", str(tmp_path), "--curve", str(curve), "--no-pictures"]) == 0
     low, high = json.loads((tmp_path / "summary.json").read_text())["mesh_stiffness_N_per_m"]["pinion-wheel"]
     assert (low, high) == pytest.approx((0.95e8, 1.05e8), rel=1e-9)
+
+
+def test_a_mesh_law_with_friction(job, tmp_path, capsys):
+    """75 N m at 400 rad/s leave the mesh: what comes in is that and the loss, in table, summary and on the terminal."""
+    text = SMALL.replace(
+        "stiffness_N_per_m = 1e8\ndamping_N_s_per_m = 2000.0", "friction = 0.05\nlaw_torque_Nm = 200.0"
+    )
+    job.write_text(text + "[train.damping]\nratio = 0.05\n")
+    out = tmp_path / "out"
+    assert main(["vibration", str(job), "--out", str(out), "--no-estimate"]) == 0
+    said = capsys.readouterr().out
+    assert "mesh 1: friction 0.05, loss " in said
+    names, values = table(out / "response.csv")
+    by_name = dict(zip(names, values.T, strict=True))
+    assert (by_name["friction_power_1_W"] >= 0.0).all()
+    friction = json.loads((out / "summary.json").read_text())["friction"]
+    assert friction["coefficients"] == [0.05]
+    (power,), (loss,), (efficiency,) = (friction[k] for k in ("mean_mesh_power_W", "mean_loss_W", "efficiency"))
+    assert power - loss == pytest.approx(75.0 * 400.0, rel=0.01)
+    assert efficiency == pytest.approx(1.0 - loss / power)
+    # half-half sharing on the path, Niemann and Winter: H_V = .1566 here; the law shares the load a little otherwise
+    assert 1.0 - efficiency == pytest.approx(0.05 * 0.1566, rel=0.06)
+    assert (out / "transmission_error.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_window_and_record(job, tmp_path):

@@ -14,6 +14,7 @@ from gearfe.rigid import TimeFunction, constant, integrate, smoothed_step
 from gearfe.rigid.compiled import available
 from gearfe.train import Damping, Drive, Load, build_train, simulate
 from gearfe.train.motion import motion
+from gearfe.train.static_error import static_errors
 
 from .mesh_laws import hertzian_law
 from .trains import base_radius, curve, train
@@ -80,6 +81,22 @@ def test_slow_running_is_the_static_transmission_error():
     run = made.transmission_error[late, 0]
     static = law.approach(line.sense * line.ratio * model.angle(made.time[late]) + line.phase, 60.0 / R2)
     assert np.abs(run - static).max() < 1e-3 * np.ptp(static)
+    assert static_errors(scene, made.drive_angle[late])[0] == pytest.approx(static, abs=1e-14)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_static_errors_beside_laws_and_springs(sign):
+    """Of a law the mirrored approach on the back flanks; of a spring force over stiffness; none of a rigid mesh."""
+    law, j, angle, shape = hertzian_law(relief=5e-6), 20e-6, np.linspace(0.0, 1.0, 301), curve(20)
+    load, force = constant(sign * 60.0), 60.0 / R2
+    (found,) = static_errors(pair(law, torque=load, backlash=j), angle)
+    expected = law.approach(angle, force) if sign > 0.0 else -j - law.approach(-angle, force)
+    assert found == pytest.approx(expected, abs=1e-14)
+    (found,) = static_errors(pair(shape, torque=load, backlash=j), angle)
+    yields = force / np.asarray(shape(sign * angle).value)
+    assert found == pytest.approx(yields if sign > 0.0 else -j - yields, rel=1e-12)
+    assert static_errors(pair(None, torque=load), angle) == (None,)
+    assert (static_errors(pair(law, torque=load), angle)[0] is None) == (sign < 0.0)
 
 
 @needs_numba

@@ -17,6 +17,8 @@ from .files import whole_file
 
 COLOURS = (BLUE, ORANGE, GREEN, RED, "#6d4c9f", "#0f766e", "#8a5a2b")
 _DPI = 130
+#: First and last place of stretches.
+Spans = Sequence[tuple[float, float]]
 #: Lines of the meshes.
 _DASHES = ((0, (6, 3)), (0, (2, 2)), (0, (6, 2, 2, 2)))
 
@@ -39,6 +41,7 @@ def response_figure(
     accelerations: Mapping[str, Array],
     attachment: tuple[str, Array],
     means: Mapping[str, float],
+    apart: Mapping[str, Spans] | None = None,
 ) -> None:
     """Contact forces, shaft speeds, angular accelerations and one normal acceleration over the drive's rotation.
 
@@ -54,6 +57,8 @@ def response_figure(
         Label and normal acceleration (m/s2).
     means
         Label of a force -> its mean after the start (kN), drawn as a level.
+    apart
+        Label of a force -> (first, last) rotations (deg) between which the teeth are apart, drawn as bars below.
     """
     figure = _fixed(11.5, 7.6)
     figure.suptitle(title, fontsize=12, x=0.012, y=0.985, ha="left")
@@ -63,6 +68,7 @@ def response_figure(
         axes[0].plot(angle, values, color=colour, linewidth=1.3, label=label)
         if label in means:
             axes[0].axhline(means[label], color=colour, linewidth=0.9, dashes=(6, 4))
+    _bars(axes[0], list(forces), apart or {})
     axes[0].legend(fontsize=8.5, frameon=False, ncols=2, loc="upper left", bbox_to_anchor=(0.0, 1.0))
     top = max(float(np.max(v)) for v in forces.values())
     low = min(0.0, *(float(np.min(v)) for v in forces.values()))
@@ -98,6 +104,56 @@ def response_figure(
     for part in (axes[0], axes[-3], turning, normal):
         part.set_xlabel("rotation of the drive  (deg)")
     _save(figure, path)
+
+
+def transmission_figure(
+    path: str | Path,
+    *,
+    title: str,
+    angle: Array,
+    dynamic: Mapping[str, Array],
+    static: Mapping[str, Array],
+    apart: Mapping[str, Spans],
+) -> None:
+    """Dynamic beside static transmission error over the drive's rotation, a panel for each mesh.
+
+    Parameters
+    ----------
+    angle : (n,)
+        Rotation of the drive (deg).
+    dynamic, static
+        Mesh -> approach along the line of action (um); static where it is known.
+    apart
+        Mesh -> (first, last) rotations (deg) between which its teeth are apart, drawn as bars below.
+    """
+    figure = _fixed(11.5, 1.3 + 2.7 * len(dynamic))
+    figure.suptitle(title, fontsize=12, x=0.012, y=0.985, ha="left")
+    tall = 1.3 + 2.7 * len(dynamic)
+    room = {"top": 1.0 - 0.75 / tall, "bottom": 0.55 / tall, "hspace": 0.32}
+    grid = figure.add_gridspec(len(dynamic), 1, left=0.062, right=0.985, **room)
+    for number, (colour, (name, values)) in enumerate(zip(_cycle(), dynamic.items(), strict=False)):
+        axes = _panel(figure.add_subplot(grid[number]), "approach  (µm)", "abcdefgh"[number % 8], name)
+        axes.plot(angle, values, color=colour, linewidth=1.2, label="dynamic")
+        if name in static:
+            axes.plot(angle, static[name], color="#111827", linewidth=1.0, dashes=(4, 2), label="static")
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, high + 0.15 * (high - low))
+        _bars(axes, [name], apart)
+        axes.legend(fontsize=8.5, frameon=False, ncols=3, loc="upper right")
+        axes.set_xlim(float(angle[0]), float(angle[-1]) if angle[-1] > angle[0] else float(angle[0]) + 1.0)
+    axes.set_xlabel("rotation of the drive  (deg)")
+    _save(figure, path)
+
+
+def _bars(axes: Any, names: Sequence[str], apart: Mapping[str, Spans]) -> None:
+    """Bars at the lower edge, one row a name, where its teeth are apart."""
+    shown = [name for name in names if apart.get(name)]
+    for row, name in enumerate(shown):
+        spans = [(first, last - first) for first, last in apart[name]]
+        colour = COLOURS[names.index(name) % len(COLOURS)] if len(names) > 1 else RED
+        place = (0.012 + 0.03 * row, 0.022)
+        label = "teeth apart" if row == 0 else None
+        axes.broken_barh(spans, place, transform=axes.get_xaxis_transform(), color=colour, linewidth=0, label=label)
 
 
 def spectrum_figure(

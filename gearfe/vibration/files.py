@@ -29,6 +29,7 @@ MAY_WRITE = (
     "response.png",
     "spectrum.png",
     "radiated_power.png",
+    "transmission_error.png",
     "gears.vtkhdf",
     "housing.vtkhdf",
     "fields.png",
@@ -223,12 +224,14 @@ def _shown(times: Array, choice: OutputChoice) -> tuple[IntArray, int, IntArray]
 def _pictures(
     target: Path, scene: TrainScene, made: Followed, spectra: TrainSpectra, choice: OutputChoice, title: str
 ) -> None:
-    from .pictures import attachment_to_draw, draw_power, draw_response, draw_spectrum
+    from .pictures import attachment_to_draw, draw_power, draw_response, draw_spectrum, draw_transmission
 
     response = made.curves
     loaded = next((load.bore for load in scene.loads if load.bore is not None), None)
     attachment = attachment_to_draw(response, choice.attachment, loaded)
     draw_response(target / "response.png", response, attachment, title, made.mean_force)
+    if scene.drive is not None and any(mesh.stiffness is not None for mesh in scene.meshes):
+        draw_transmission(target / "transmission_error.png", scene, response, title)
     draw_spectrum(target / "spectrum.png", response, spectra, attachment, title)
     if spectra.power is not None:
         draw_power(target / "radiated_power.png", response, spectra, title)

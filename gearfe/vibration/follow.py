@@ -256,7 +256,7 @@ class Envelope:
 
 
 #: What the pictures draw.
-_CURVES = ("drive_angle", "contact_force", "speed", "acceleration", "attachment_acceleration")
+_CURVES = ("drive_angle", "contact_force", "transmission_error", "speed", "acceleration", "attachment_acceleration")
 
 
 def _drawn(piece: TrainResponse) -> Array:

@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import unknown_name
-from ..output.train_figures import Mark, power_figure, response_figure, spectrum_figure
+from ..output.train_figures import Mark, Spans, power_figure, response_figure, spectrum_figure, transmission_figure
 from ..spectrum import nearest_line, peaks
 from ..train.response import TrainResponse
+from ..train.scene import TrainScene
+from ..train.static_error import static_errors
 from .report import lines_of
 from .spectra import TrainSpectra
 
@@ -42,7 +44,42 @@ def draw_response(path: Path, response: TrainResponse, attachment: str, title: s
         accelerations=dict(zip(labels, 1e-3 * (response.acceleration * signs).T, strict=True)),
         attachment=(f"normal acceleration at attachment {attachment}", _acceleration(response, attachment)),
         means=means,
+        apart=dict(zip(names, _apart(response, drive), strict=True)),
     )
+
+
+def draw_transmission(path: Path, scene: TrainScene, response: TrainResponse, title: str) -> None:
+    """Dynamic and static transmission error of the meshes that yield."""
+    sense = float(np.sign(response.drive_angle[-1])) or 1.0
+    static = static_errors(scene, response.drive_angle)
+    apart = _apart(response, sense)
+    names = [f"mesh {i + 1}, {name}" for i, name in enumerate(response.mesh_names)]
+    elastic = [i for i, mesh in enumerate(scene.meshes) if mesh.stiffness is not None]
+    transmission_figure(
+        path,
+        title=f"Transmission error along the line of action\n{title}",
+        angle=np.degrees(response.drive_angle) * sense,
+        dynamic={names[i]: 1e6 * response.transmission_error[:, i] for i in elastic},
+        static={names[i]: 1e6 * one for i in elastic if (one := static[i]) is not None},
+        apart={names[i]: apart[i] for i in elastic},
+    )
+
+
+def _apart(response: TrainResponse, sense: float) -> list[Spans]:
+    """Rotations of the drive (deg) between which the teeth of each mesh are apart; none for meshes that do not part.
+
+    Where curves are the extremes of parts of the run, all of a part in which the least force is 0. Before the load comes
+    teeth only just touch: that is not told.
+    """
+    angle = np.degrees(response.drive_angle) * sense
+    lost = response.statistics.get("contacts_lost", [None] * len(response.mesh_names))
+    found: list[Spans] = []
+    loaded = response.time[:-1] >= response.load_end_s
+    for number, force in zip(lost, response.contact_force.T, strict=True):
+        open_ = np.concatenate([[False], (force[:-1] == 0.0) & loaded, [False]]) if number is not None else np.zeros(2, dtype=bool)
+        turns = np.flatnonzero(np.diff(open_.astype(np.int8)))
+        found.append([(float(angle[a]), float(angle[b])) for a, b in turns.reshape(-1, 2)])
+    return found
 
 
 def draw_spectrum(path: Path, response: TrainResponse, made: TrainSpectra, attachment: str, title: str) -> None:

@@ -1,0 +1,50 @@
+"""Static transmission error: the approach of a mesh that carries its steady force while the gears roll slowly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..meshlaw.law import MeshLaw
+from ..typing import Array
+from .checks import interpolant
+from .kinematics import driving_senses, rolling, steady_forces
+from .phases import tooth_places
+from .scene import GearMesh, TrainScene
+
+
+def static_errors(scene: TrainScene, angle: Array) -> tuple[Array | None, ...]:
+    """Approach of each mesh (m) at rotations of the drive (rad), bodies rolling rigidly; None where nothing yields.
+
+    A force that presses the back flanks makes the mirrored approach behind the backlash. None also where a force is
+    beyond what a law is known for, or presses flanks of which nothing is known.
+    """
+    senses = driving_senses(scene)
+    phases, ratios = tooth_places(scene, senses).phases, rolling(scene).ratios
+    shafts = [shaft.name for shaft in scene.shafts]
+    made: list[Array | None] = []
+    for mesh, sense, phase, force in zip(scene.meshes, senses, phases, steady_forces(scene).tolist(), strict=True):
+        ratio = float(ratios[shafts.index(scene.gear(mesh.driver).shaft)])
+        made.append(_approach(mesh, force, sense * ratio * angle + phase))
+    return tuple(made)
+
+
+def _approach(mesh: GearMesh, force: float, phase: Array) -> Array | None:
+    law, gap = mesh.stiffness, mesh.backlash
+    if law is None:
+        return None
+    if isinstance(law, MeshLaw):
+        gap = law.backlash or None if gap is None else gap
+        if abs(force) > law.largest_force or (force < 0.0 and gap is None):
+            return None
+        return _side(lambda x: law.approach(x, abs(force)), phase, force, gap)
+    curve = interpolant(mesh)
+    if gap is None:  # a spring that acts both ways
+        return force / np.asarray(curve(phase).value)
+    return _side(lambda x: abs(force) / np.asarray(curve(x).value), phase, force, gap)
+
+
+def _side(approach: Callable[[Array], Array], phase: Array, force: float, gap: float | None) -> Array:
+    """The approach of the flanks that the force presses."""
+    return approach(phase) if force >= 0.0 or gap is None else -gap - approach(-phase)
