@@ -13,7 +13,7 @@ Forces are sampled over the period and transformed (alternating frequency/time; 
 
 Harmonics at which the forces' changes move the freedoms little are no unknowns of Newton's method but follow by
 substitution, which converges there by itself. The error is estimated from what is left of the equations with twice the
-harmonics and samples.
+harmonics and four times the samples.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ COMES_BACK, PRESENT = 0.05, 1e-7
 #: Samples of the period for each harmonic of the highest.
 SAMPLES = 4
 #: The error estimate is multiplied by this.
-SAFETY = 3.0
+SAFETY = 2.0
 #: Where the estimate misses the tolerance, harmonics grow by this factor.
 GROWTH = 1.5
 #: Most harmonics, and most unknown ones.
@@ -328,15 +328,15 @@ def solve(
 
 
 def error_of(system: Oscillator, orbit: Orbit, before: Newton | None) -> tuple[float, ComplexArray]:
-    """Error estimate of an orbit, and the amplitudes that twice the harmonics and samples would make at once.
+    """Error estimate of an orbit, and the amplitudes that twice the harmonics would make at once.
 
-    What is left of the equations is taken to a change of the unknowns by the Jacobian; the other harmonics change by
-    it themselves.
+    What is left of the equations on four times the samples is taken to a change of the unknowns by the Jacobian; the
+    other harmonics change by it themselves.
     """
     count = 2 * orbit.harmonics
     H = system.flexibility(orbit.speed, count)
     places = orbit.with_harmonics(count)
-    left = evaluate(system, orbit.speed, places, samples_of(count), H)
+    left = evaluate(system, orbit.speed, places, samples_of(2 * count), H)
     if before is None:
         before = newton(system, orbit.speed, unknown_waves(system, places, left.pushes, H), left.pushes, H)
     step = -left.residual
