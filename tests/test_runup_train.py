@@ -20,6 +20,7 @@ from gearfe.runup.modes import coupled_modes, crossings
 from gearfe.runup.run_up import run_up, steady_state
 from gearfe.train import Damping, Load, build_train, simulate
 from gearfe.train.arrays import law_arrays
+from gearfe.train.friction import Lubrication
 
 from .mesh_laws import hertzian_law
 from .test_cli_vibration import SMALL
@@ -130,7 +131,7 @@ def test_the_jets_of_a_law_are_its_derivatives():
         out = np.zeros((300, RESULTS))
         work, pairs = np.zeros((ROWS + 2 * law.slots, law.slots)), np.zeros((300, law.slots))
         arrays = (tables.nodes[0], tables.forces[0], tables.touch[0], tables.energies[0], tables.coupling[0])
-        jets()(*arrays, law.reach, phase, approach, pairs, work, out)
+        jets()(*arrays, law.reach, phase, approach, pairs, np.zeros((2, *pairs.shape)), work, out)
         return out
 
     out, true, h = made(phase), law(phase, approach), 1e-8
@@ -256,3 +257,59 @@ def test_the_command_writes_tables_and_pictures(job, tmp_path, capsys):
 def test_mistakes_in_a_job_are_told(job, capsys, extra, words):
     assert main(["runup", str(job(extra))]) == 2
     assert words in capsys.readouterr().err
+
+
+@needs_numba
+@pytest.mark.parametrize(("friction", "backlash", "torque"), [(0.06, None, 60.0), (0.1, 20e-6, 2.0)])
+def test_derivatives_of_the_forces(friction, backlash, torque):
+    """Differences of the forces at random places, friction and both flanks included."""
+    scene = loaded([(20, 30)], lambda teeth: hertzian_law(relief=4e-6), torque=torque, backlash=backlash)
+    scene = dataclasses.replace(scene, meshes=(dataclasses.replace(scene.meshes[0], friction=friction, damping=500.0),))
+    system = condense(build_train(scene)).system
+    m, rng = system.linear.size, np.random.default_rng(2)
+    assert m == (4 if backlash is None else 6)
+    theta = np.linspace(0.0, 2 * math.pi, 200, endpoint=False)
+    u = system.linear.rest + 0.5 * system.scale * rng.normal(size=(200, m))
+    du = 600.0 * system.scale * rng.normal(size=(200, m))
+    at = system.forces(theta, 600.0, u, du)
+    for j in range(m):
+        h = 1e-5 * system.scale[j]
+        step = h * np.eye(m)[j]
+        for made, change in ((at.by_place, (step, 0.0)), (at.by_rate, (0.0, 600.0 * step))):
+            above = system.forces(theta, 600.0, u + change[0], du + change[1]).value
+            below = system.forces(theta, 600.0, u - change[0], du - change[1]).value
+            width = 2 * h * (1.0 if made is at.by_place else 600.0)
+            size = max(np.abs(made[:, :, j]).max(), 1e-6 * np.abs(at.value).max() / width)
+            off = np.abs((above - below) / width - made[:, :, j]).max(axis=1) / size
+            assert np.median(off) < 1e-6
+            assert (off < 1e-3).mean() > 0.97  # beside the places where pairs come and go
+
+
+@needs_numba
+def test_friction_as_in_a_transient():
+    scene = loaded([(20, 30)], lambda teeth: hertzian_law(relief=4e-6), speed=700.0)
+    scene = dataclasses.replace(scene, meshes=(dataclasses.replace(scene.meshes[0], friction=0.08),))
+    model, free = (
+        build_train(scene),
+        build_train(loaded([(20, 30)], lambda teeth: hertzian_law(relief=4e-6), speed=700.0)),
+    )
+    state, without = (steady_state(m, 700.0, tolerance=3e-4) for m in (model, free))
+    force, error, acceleration = settled_transient(model, state, 60)
+    assert state.force.mean(axis=0) == pytest.approx(force.mean(axis=0), rel=2e-4)
+    assert np.ptp(state.transmission_error) == pytest.approx(np.ptp(error), rel=3e-3)
+    lines = analysis(acceleration)[1:12]
+    off = np.abs(state.acceleration[1:12] - lines).max()
+    assert off < 3e-3 * np.abs(lines).max()
+    assert off < 0.1 * np.abs(state.acceleration[1:12] - without.acceleration[1:12]).max()  # friction shows
+
+
+@needs_numba
+def test_friction_of_an_oil_follows_the_speed():
+    """Models built for two speeds rub alike at the same one."""
+    oil = Lubrication(viscosity=0.04, roughness=0.4e-6)
+    made = []
+    for built in (400.0, 800.0):
+        scene = loaded([(20, 30)], lambda teeth: hertzian_law(), speed=built, flexible=False)
+        scene = dataclasses.replace(scene, meshes=(dataclasses.replace(scene.meshes[0], friction=oil),))
+        made.append(steady_state(build_train(scene), 600.0))
+    assert made[0].force == pytest.approx(made[1].force, rel=1e-6)

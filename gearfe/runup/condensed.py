@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from fractions import Fraction
@@ -10,13 +11,16 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import InputError
+from ..gear.mesh_geometry import MeshGeometry
 from ..train.forces import CurveFlank, LawFlank
+from ..train.friction import Lubrication
+from ..train.kinematics import drive_sense, fastest, steady_forces
 from ..train.model import TrainModel
 from ..train.simulate import DIVERGED
 from ..typing import Array
 from .balance import Oscillator
 from .linear import Linear
-from .mesh_forces import MeshForces
+from .mesh_forces import MeshForces, Rubbing
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,15 +71,14 @@ def condense(model: TrainModel) -> CondensedTrain:
         For meshes that share no common period within the bound of `gearfe.train.kinematics`, rigid meshes, loads that
         oscillate, and parts that nothing holds.
     """
-    from ..train.kinematics import drive_sense, steady_forces
-
     _check(model)
     core, turns = model.core, model.rolling.common_turns
     assert turns is not None
     assert model.scene.drive is not None
     flanks = [f for f in model.forces.flanks if isinstance(f, CurveFlank | LawFlank)]
-    used = sorted({x for f in flanks for x in (f.direction, f.turn)})
-    freedoms = np.array([[used.index(f.direction), used.index(f.turn)] for f in flanks])
+    reads = [_directions(f) for f in flanks]
+    used = sorted({x for four in reads for x in four if x >= 0})
+    freedoms = np.array([[used.index(x) if x >= 0 else -1 for x in four] for four in reads])
     to_modes = core.T.T @ model.directions
     push = core.constant + core.T.T @ sum(
         (d * float(f(model.torque_end)) for d, f in model.torques), start=np.zeros(len(core.T))
@@ -87,16 +90,45 @@ def condense(model: TrainModel) -> CondensedTrain:
         np.array([g.polar * g.ratio for g in gyros]),
     )  # fmt: skip
     sense = drive_sense(model.scene.drive.speed) or 1.0
-    forces = MeshForces(flanks, freedoms, sense * float(turns))
     steady = steady_forces(model.scene)
+    of_mesh = _of_meshes(model)
+    mesh_of = {number: mesh for mesh, numbers in enumerate(of_mesh) for number in numbers}
+    rubbing = [_rubbing(model, flank, mesh_of[i], float(steady[mesh_of[i]])) for i, flank in enumerate(flanks)]
+    forces = MeshForces(flanks, freedoms, sense * float(turns), rubbing)
     orders = tuple(int(Fraction(c) * turns) for c in model.rolling.cycles)
     scale = _scale(model, linear, freedoms, flanks)
     limit = DIVERGED * min(line.module for line in model.meshes) / float(scale[freedoms[:, 0]].max())
     system = Oscillator(linear, forces, float(turns), scale, orders, limit)
-    numbers, of_mesh = iter(range(len(flanks))), []
-    for line in model.meshes:
-        of_mesh.append(tuple(next(numbers) for _ in range(1 if line.backlash is None else 2)))
-    return CondensedTrain(model, system, forces, tuple(of_mesh), steady)
+    return CondensedTrain(model, system, forces, of_mesh, steady)
+
+
+def _of_meshes(model: TrainModel) -> tuple[tuple[int, ...], ...]:
+    """Numbers of the flanks of each mesh: driving ones first."""
+    ends = np.cumsum([0, *(1 if line.backlash is None else 2 for line in model.meshes)])
+    return tuple(tuple(range(a, b)) for a, b in itertools.pairwise(ends.tolist()))
+
+
+def _rubbing(model: TrainModel, flank: CurveFlank | LawFlank, mesh: int, force: float) -> Rubbing | None:
+    """Friction of a flank of a mesh, whose coefficient may follow from the speed."""
+    if not isinstance(flank, LawFlank) or flank.sliding is None:
+        return None
+    scene, given = model.scene, model.scene.meshes[mesh].friction
+    coefficient = None
+    if isinstance(given, Lubrication):
+        one, two = (scene.gear(name).gear for name in (scene.meshes[mesh].driver, scene.meshes[mesh].driven))
+        pair, oil, ratio = MeshGeometry(one, two, scene.meshes[mesh].centre_distance), given, flank.ratio
+
+        def coefficient(speed: float) -> float:
+            return oil.coefficient(pair, force, ratio * speed)
+
+    assert scene.drive is not None
+    return Rubbing(flank.sliding, fastest(scene.drive.speed), coefficient)
+
+
+def _directions(flank: CurveFlank | LawFlank) -> tuple[int, int, int, int]:
+    """Numbers of a flank's approach and turn, and of those of its friction or -1."""
+    sliding = flank.sliding if isinstance(flank, LawFlank) else None
+    return flank.direction, flank.turn, *((-1, -1) if sliding is None else (sliding.across, sliding.spin))
 
 
 def _check(model: TrainModel) -> None:
@@ -119,8 +151,10 @@ def _scale(model: TrainModel, linear: Linear, freedoms: Array, flanks: list[Curv
     """Approach of each mesh under its steady force; rotations that move a base circle so far."""
     size = max(float(np.abs(linear.rest[np.unique(freedoms[:, 0])]).max()), 1e-9)
     scale = np.full(linear.size, size)
-    for flank, (d, r) in zip(flanks, freedoms, strict=True):
+    for flank, (d, r, _, s) in zip(flanks, freedoms, strict=True):
         if flank.mean > 0.0:
             scale[d] = max(abs(float(linear.rest[d])), 0.1 * size)
-        scale[r] = size / (0.5 * model.meshes[0].module * 2.0 * math.pi)
+        for turn in (r, s):
+            if turn >= 0:
+                scale[turn] = size / (0.5 * model.meshes[0].module * 2.0 * math.pi)
     return scale

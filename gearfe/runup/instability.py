@@ -85,7 +85,7 @@ def _tangents(train: CondensedTrain, theta: Array, factor: float) -> Array:
     """Derivatives of the forces (S, m, m) where each mesh carries its steady force times a factor, without motion."""
     u = np.tile(train.system.linear.rest, (len(theta), 1))
     for numbers, steady in zip(train.flanks_of_mesh, train.steady, strict=True):
-        flank, (along, turn) = train.forces.flanks[numbers[0]], train.forces.freedoms[numbers[0]]
+        flank, (along, turn) = train.forces.flanks[numbers[0]], train.forces.freedoms[numbers[0], :2]
         phase = flank.sense * (flank.ratio * train.forces.turns * theta + u[:, turn]) + flank.phase
         if isinstance(flank, CurveFlank):
             u[:, along] = flank.gap + factor * steady / flank.curve(phase).value

@@ -28,8 +28,10 @@ GAPS, TOUCH1, TOUCH2, LAMBDA, GIVES, TURN, TURN2, SHIFT, BEARS, RIGHT1, RIGHT2, 
 ROWS = PART + 5
 
 
-def law_jets(nodes, forces, touch, energies, coupling, reach, phase, approach, pairs, work, out):
-    """Results (n, RESULTS) at phases and approaches (n,); `pairs` (n, s) are pair forces to begin with, then found."""
+def law_jets(nodes, forces, touch, energies, coupling, reach, phase, approach, pairs, slopes, work, out):
+    """Results (n, RESULTS) at phases and approaches (n,); `pairs` (n, s) are pair forces to begin with, then found, and
+    `slopes` (2, n, s) their derivatives with approach and phase.
+    """
     slots = touch.shape[0]
     cells = nodes.shape[0] - 1
     cycle = nodes[cells] - nodes[0]
@@ -119,6 +121,8 @@ def law_jets(nodes, forces, touch, energies, coupling, reach, phase, approach, p
             tangent += work[RIGHT1, k]
             cross += work[RIGHT2, k]
             bend -= work[BEFORE, k] * work[RIGHT2, k]
+            slopes[0, i, k] = work[RIGHT1, k]
+            slopes[1, i, k] = work[RIGHT2, k]
         out[i, FORCE] = force
         out[i, MOMENT] = moment
         out[i, TANGENT] = tangent

@@ -101,7 +101,7 @@ def steady_result(
     for i, (line, numbers) in enumerate(zip(model.meshes, train.flanks_of_mesh, strict=True)):
         open_ = np.ones(samples, dtype=bool)
         for number, sign in zip(numbers, (1.0, -1.0), strict=False):
-            at = train.forces.flank(number, theta, u, du)
+            at = train.forces.flank(number, theta, orbit.speed, u, du)
             force[:, i] += sign * at.force
             open_ &= at.apart
             beyond |= bool(at.beyond.any())
