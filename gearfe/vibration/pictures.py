@@ -76,7 +76,11 @@ def _apart(response: TrainResponse, sense: float) -> list[Spans]:
     found: list[Spans] = []
     loaded = response.time[:-1] >= response.load_end_s
     for number, force in zip(lost, response.contact_force.T, strict=True):
-        open_ = np.concatenate([[False], (force[:-1] == 0.0) & loaded, [False]]) if number is not None else np.zeros(2, dtype=bool)
+        open_ = (
+            np.concatenate([[False], (force[:-1] == 0.0) & loaded, [False]])
+            if number is not None
+            else np.zeros(2, dtype=bool)
+        )
         turns = np.flatnonzero(np.diff(open_.astype(np.int8)))
         found.append([(float(angle[a]), float(angle[b])) for a, b in turns.reshape(-1, 2)])
     return found
