@@ -125,15 +125,15 @@ def _run_trajectory(case: Case, job_path: Path) -> Found:
     mechanism = load_mechanism(job_path)
     start, run_table = mechanism.start(), mechanism.file.run
     times = output_times(run_table.end_s, run_table.step_s)
-    made = integrate(mechanism.system, times, start=start, tolerance=run_table.tolerance, raise_on_failure=False)
+    made = integrate(mechanism.system, times, start=start, tolerance=mechanism.tolerance, raise_on_failure=False)
     if made.status != 0:
         return made.message
-    stated = trajectory_error(mechanism, start, evaluate(mechanism, made), run_table.tolerance).coordinates
+    stated = trajectory_error(mechanism, start, evaluate(mechanism, made), mechanism.tolerance).coordinates
     backend = "compiled" if compiled_is_ready() else "plain"
-    finest = 1e-12 if made.method == "taylor" else max(1e-11, 1e-5 * run_table.tolerance)
+    finest = 1e-12 if made.method == "taylor" else max(1e-11, 1e-5 * mechanism.tolerance)
     options: dict[str, Any] = {"method": made.method, "start": start, "backend": backend, "raise_on_failure": False}
     truth = integrate(mechanism.system, times, tolerance=finest, **options)
-    while truth.status != 0 and 10.0 * finest <= FAR_FINER * run_table.tolerance:
+    while truth.status != 0 and 10.0 * finest <= FAR_FINER * mechanism.tolerance:
         finest *= 10.0  # redundant loops stop at folds when rounding is all that the tolerance leaves
         truth = integrate(mechanism.system, times, tolerance=finest, **options)
     if truth.status != 0:

@@ -50,7 +50,7 @@ def run(case: Case, folder: Path) -> Finding:
     table = mechanism.file.run
     times = output_times(table.end_s, table.step_s)
     made = integrate(
-        mechanism.system, times, start=start, method=table.method, tolerance=table.tolerance, raise_on_failure=False
+        mechanism.system, times, start=start, method=table.method, tolerance=mechanism.tolerance, raise_on_failure=False
     )
     measures: dict[str, Any] = {
         "method": made.method,
