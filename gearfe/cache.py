@@ -89,6 +89,10 @@ def kept(
             os.utime(path)  # used now
         return found
     made = make()
+    # who was first wins, so that two processes that make the same go on with the same digits
+    found = read(path) if path.exists() else None
+    if found is not None:
+        return found
     with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
         write(made, path)

@@ -79,6 +79,18 @@ def test_key_sees_every_digit_and_the_class() -> None:
         cache_key("k", object())
 
 
+def test_the_first_of_two_processes_wins(tmp_path: Path) -> None:
+    """What another process kept meanwhile is what both go on with."""
+    other = {"x": np.arange(3.0)}
+
+    def slowly() -> dict[str, np.ndarray]:
+        cached_arrays("thing", 1, lambda: other, tmp_path)
+        return {"x": np.nextafter(other["x"], 9.0)}
+
+    np.testing.assert_array_equal(cached_arrays("thing", 1, slowly, tmp_path)["x"], other["x"])
+    np.testing.assert_array_equal(cached_arrays("thing", 1, slowly, tmp_path)["x"], other["x"])
+
+
 def test_the_entries_used_last_stay(tmp_path: Path) -> None:
     """Beyond the limit, what was not used for longest goes; other files of the folder are left alone."""
     for number in range(10):

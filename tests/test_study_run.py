@@ -197,6 +197,11 @@ def test_a_train_in_a_rigid_housing(tmp_path):
         rows = list(csv.DictReader(stream))
     assert made.output("force")[1] == max(float(row["contact_force_1_N"]) for row in rows)
     assert made.output("last")[1] == float(rows[20]["contact_force_2_N"])
+    raw["train"] |= {"duration_ms": 0.035, "step_us": 35.0}  # too short for a spectrum
+    raw["study"]["outputs"] = {"force": "max(contact_force_1_N)"}
+    (tmp_path / "study.toml").write_text(toml_document(raw))
+    short = run_study(read_study(tmp_path / "study.toml"), tmp_path, jobs=1, restart=True)
+    assert list(short.columns["status"]) == ["done", "done"]
 
 
 def test_command_leaves_tables_and_pictures(tmp_path, capsys):

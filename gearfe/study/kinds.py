@@ -143,7 +143,7 @@ def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
             folder, scene, pieces, job.times, OutputChoice(pictures=False), title="", watch=watch, every=every,
             further=described(job, scene), again=repeater(job, every) if estimate else None, band_hz=band(job),
         )  # fmt: skip
-        rows = {table: read_csv(folder / f"{table}.csv", table) for table in ("response", "spectrum")}
+        rows = {path.stem: read_csv(path, path.stem) for path in sorted(folder.glob("*.csv"))}  # a short run has one
     status = made.response.status
     return Answer(rows, made.summary, "" if status == "done" else status)
 
