@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from gearfe.cli import main
-from gearfe.output.housing_figures import draw_modes
+from gearfe.figures.housing import draw_modes
 from gearfe.reduction.modal_body import ModalBody
 
 JOB = """

@@ -16,12 +16,12 @@ import sys
 for name in {left_out!r}:
     sys.modules[name] = None
 from gearfe.cli import main
-from gearfe.output.offscreen import draw_apart
+from gearfe.figures.offscreen import draw_apart
 job, crank, out = sys.argv[1:]
 coarse = ["--coarsen", "4", "--angles", "0", "9", "9", "--no-estimate", "--no-pictures"]
 assert main(["stiffness", job, "--out", out + "/pair", "--fields", "0", *coarse]) == 0
 assert main(["mechanism", crank, "--out", out + "/crank", "--until", "0.05", "--no-pictures"]) == 0
-print(draw_apart("gearfe.output.housing_figures", out + "/x.png", {{}}, seconds=1.0))
+print(draw_apart("gearfe.figures.housing", out + "/x.png", {{}}, seconds=1.0))
 """
 
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError, NotFiniteWarning
+from gearfe.figures.train_scene import draw_scene, sharp_edges
 from gearfe.housing import Attachment, Housing
-from gearfe.output.train_scene import draw_scene, sharp_edges
 from gearfe.stopwatch import Stopwatch
 from gearfe.train import GearMesh, Shaft, ShaftGear, TrainScene
 from gearfe.vibration.fields import (

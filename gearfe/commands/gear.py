@@ -34,9 +34,9 @@ def run(args: argparse.Namespace) -> int:
 
     pair = GearPair.from_table(tables["pair"])  # gears that cannot run together: NumPy alone tells
 
+    from ..figures.style import pair_figure
     from ..gear.derived import derived_geometry, iso_values
     from ..gear.drawing import pair_drawing
-    from ..output.figures import pair_figure
     from ..output.files import output_folder, whole_set, write_json
     from ..stiffness.job import StiffnessJob
 

@@ -168,8 +168,8 @@ def _write(
 def _draw(folder: Path, body: ModalBody, fields: Any) -> str:
     import numpy as np
 
+    from ..figures.housing import draw_modes
     from ..housing.mesh_checks import boundary_faces
-    from ..output.housing_figures import draw_modes
 
     faces = boundary_faces(body.elements)
     rigid = int(np.sum(body.coupled.frequencies_hz[: len(fields)] <= 0.0))

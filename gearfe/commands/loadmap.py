@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
             made_map.to_csv(made / "loadmap.csv")
             write_csv(made / "loadmap_torques.csv", torque_table(made_map))
         if not args.no_pictures:
-            from ..output.load_map_figures import load_map_figure
+            from ..figures.load_map import load_map_figure
 
             with watch.stage("picture"):
                 load_map_figure(made / "loadmap.png", **figure_arguments(job, made_map))

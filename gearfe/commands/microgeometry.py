@@ -97,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
             write_csv(place / "microgeometry_pairs.csv", pair_table(made))
             write_csv(place / "microgeometry_orders.csv", order_table(made))
         if not args.no_pictures:
-            from ..output.microgeometry_figures import flank_figure, microgeometry_figure
+            from ..figures.microgeometry import flank_figure, microgeometry_figure
 
             with watch.stage("pictures"):
                 flank_figure(place / "microgeometry_flanks.png", **flank_figure_arguments(table, pair, beside))

@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
         write_csv(place / "relief_map.csv", map_table(table, made))
         write_csv(place / "relief_torques.csv", compared)
         if not args.no_pictures:
-            from ..output.microgeometry_figures import relief_figure
+            from ..figures.microgeometry import relief_figure
 
             with watch.stage("picture"):
                 relief_figure(place / "relief.png", **figure_arguments(table, made, compared))

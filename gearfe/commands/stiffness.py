@@ -119,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
                 _animate(made / "stress.gif", job, elastic, curve, args.animate)
         if not args.no_pictures:
             with watch.stage("picture"):
-                from ..output.figures import stiffness_figure
+                from ..figures.style import stiffness_figure
 
                 stiffness_figure(made / "stiffness.png", **figure_arguments(job, curve))
         watch.seconds["total"] = time.perf_counter() - started
@@ -135,7 +135,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _animate(path: Path, job: StiffnessJob, elastic: Any, curve: Any, number: int) -> None:
-    from ..output.animation import stress_animation
+    from ..figures.animation import stress_animation
     from ..stiffness.fields_output import frames_of
 
     frames, zone = frames_of(job.pair, elastic, curve, number, count)

@@ -39,7 +39,7 @@ def zone(pair: GearPair, *, modules: float = 3.0) -> tuple[float, float, float]:
 
 
 def pair_drawing(pair: GearPair, pinion_angle: float = 0.0) -> dict[str, Any]:
-    """Arguments of `gearfe.output.figures.pair_figure` at a pinion angle (rad)."""
+    """Arguments of `gearfe.figures.style.pair_figure` at a pinion angle (rad)."""
     a = pair.working_centre_distance
     pinion, wheel = pair.pinion, pair.wheel
     outlines = [

@@ -104,7 +104,7 @@ def warnings(job: StiffnessJob, made: LoadMap) -> list[str]:
 
 
 def figure_arguments(job: StiffnessJob, made: LoadMap) -> dict[str, Any]:
-    """Arguments of `gearfe.output.load_map_figures.load_map_figure`."""
+    """Arguments of `gearfe.figures.load_map.load_map_figure`."""
     pair, cycle = job.pair, np.degrees(made.mesh_cycle)
     angle = np.degrees(made.pinion_angle)
     inside = bool(len(angle) and np.isclose(angle[0], 0.0) and angle[-1] < cycle)

@@ -63,7 +63,7 @@ def run_mechanism(
         problem = f"is after the end of a table over time, {mechanism.known_until:g} s"
         raise InputError("run.end_s", end, problem, "end the run before, or extend the table")
     if figures:
-        from ..output.mechanism_figures import reference_table
+        from ..figures.mechanism import reference_table
 
         reference_table(mechanism)  # a mistake in it is told before the run
     folder = output_folder(out)
@@ -99,11 +99,11 @@ def run_mechanism(
             write_links(made, mechanism, trajectory)
         written = clock.perf_counter()
         if figures:
-            from ..output.mechanism_figures import draw_figures
+            from ..figures.mechanism import draw_figures
 
             draw_figures(made, mechanism, results)
         if animation:
-            from ..output.mechanism_figures import draw_animation
+            from ..figures.mechanism import draw_animation
 
             draw_animation(made, mechanism, trajectory)
         timings = {

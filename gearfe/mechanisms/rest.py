@@ -46,7 +46,7 @@ def run_rest(mechanism: Mechanism, out: str | Path, *, figures: bool = True) -> 
 
             write_links(made, mechanism, results.trajectory)
         if figures:
-            from ..output.mechanism_figures import draw_figures, draw_modes
+            from ..figures.mechanism import draw_figures, draw_modes
 
             draw_figures(made, mechanism, results)
             if found is not None:

@@ -190,7 +190,7 @@ def summary(
 
 
 def figure_arguments(table: ReliefTable, made: ReliefResult, compared: Mapping[str, Array]) -> dict[str, Any]:
-    """Arguments of `gearfe.output.microgeometry_figures.relief_figure`."""
+    """Arguments of `gearfe.figures.microgeometry.relief_figure`."""
     names = names_of(table)
     return {
         "names": names,

@@ -190,7 +190,7 @@ def warnings(pair: GearPair, made: LoadedMesh) -> list[str]:
 
 
 def flank_figure_arguments(table: MicrogeometryTable, pair: GearPair, folder: Path) -> dict[str, Any]:
-    """Arguments of `gearfe.output.microgeometry_figures.flank_figure`: both flanks of both gears."""
+    """Arguments of `gearfe.figures.microgeometry.flank_figure`: both flanks of both gears."""
     charts = []
     for g, name in enumerate(GEARS):
         gear, active = getattr(pair, name), active_rolls(pair)[g]
@@ -223,7 +223,7 @@ def flank_figure_arguments(table: MicrogeometryTable, pair: GearPair, folder: Pa
 
 
 def figure_arguments(job: StiffnessJob, made: LoadedMesh) -> dict[str, Any]:
-    """Arguments of `gearfe.output.microgeometry_figures.microgeometry_figure`."""
+    """Arguments of `gearfe.figures.microgeometry.microgeometry_figure`."""
     pair, own = job.pair, made.pairs
     order, free = made.spectrum(unloaded=True)
     _, loaded = made.spectrum()

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import unknown_name
-from ..output.runup_figures import (
+from ..figures.runup import (
     OrderLine,
     Pieces,
     campbell_figure,

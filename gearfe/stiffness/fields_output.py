@@ -12,12 +12,12 @@ import numpy as np
 from ..contact.compliance import MeshingPair
 from ..contact.position import Positions
 from ..errors import InputError
+from ..figures.animation import Frame, cut_out
+from ..figures.pressure import pressure_figure
+from ..figures.style import stress_figure
 from ..gear.drawing import zone
 from ..gear.pair import GearPair
-from ..output.animation import Frame, cut_out
-from ..output.figures import stress_figure
 from ..output.files import write_csv
-from ..output.pressure_figures import pressure_figure
 from ..output.vtkhdf import VtkHdfSeries
 from ..threads import one_thread
 from ..typing import Array, IntArray

@@ -226,7 +226,7 @@ def warnings(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
 
 
 def figure_arguments(job: StiffnessJob, curve: StiffnessCurve) -> dict[str, Any]:
-    """Arguments of `gearfe.output.figures.stiffness_figure`: two mesh cycles from pinion angle 0."""
+    """Arguments of `gearfe.figures.style.stiffness_figure`: two mesh cycles from pinion angle 0."""
     table, pair = job.table, job.pair
     cycle = curve.mesh_cycle
     folded, first = np.unique(np.round(fold(curve.pinion_angle, cycle), 12), return_index=True)

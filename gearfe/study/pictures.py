@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..output.study_figures import parallel_figure, pareto_figure, scatter_figure, tornado_figure
+from ..figures.study import parallel_figure, pareto_figure, scatter_figure, tornado_figure
 from .statistics import StudyResult
 
 

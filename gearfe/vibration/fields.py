@@ -168,7 +168,7 @@ def write_housing(
 def frames(
     scene: TrainScene, response: TrainResponse, steps: Sequence[int] | Ints, *, exaggeration: float | None = None
 ) -> dict[str, NDArray[np.generic]]:
-    """Arrays that `gearfe.output.train_scene` draws: surfaces in all `steps`, in m, and their colours.
+    """Arrays that `gearfe.figures.train_scene` draws: surfaces in all `steps`, in m, and their colours.
 
     Parameters
     ----------

@@ -247,7 +247,7 @@ def _fields(
     progress: Callable[[int, int, str], None] | None,
 ) -> list[str]:
     """Write and draw the fields of the response at the output times of `field_steps`."""
-    from ..output.train_scene import draw_scene
+    from ..figures.train_scene import draw_scene
     from .fields import frames, write_gears, write_housing
 
     steps = field_steps(times, choice)

@@ -1,4 +1,4 @@
-"""From the response of a train to the arguments of `gearfe.output.train_figures`: units, signs, labels, marks."""
+"""From the response of a train to the arguments of `gearfe.figures.train`: units, signs, labels, marks."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import unknown_name
-from ..output.train_figures import Mark, Spans, power_figure, response_figure, spectrum_figure, transmission_figure
+from ..figures.train import Mark, Spans, power_figure, response_figure, spectrum_figure, transmission_figure
 from ..spectrum import nearest_line, peaks
 from ..train.response import TrainResponse
 from ..train.scene import TrainScene

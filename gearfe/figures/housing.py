@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from ..output.arrays import load_arrays
+from ..output.files import whole_file
 from ..typing import Array, IntArray
-from .arrays import load_arrays
-from .files import whole_file
 from .offscreen import draw_apart
 
 #: Largest displacement in a picture of a mode, in parts of the body's size.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..typing import Array
-from .figures import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save, tidy
+from .style import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save, tidy
 
 #: Lines of a panel; of more torques or profiles, so many are drawn.
 MOST_LINES = 24

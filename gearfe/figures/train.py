@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..output.files import whole_file
 from ..typing import Array
-from .figures import BLUE, GREEN, GREY, ORANGE, RED, new_figure
-from .files import whole_file
+from .style import BLUE, GREEN, GREY, ORANGE, RED, new_figure
 
 COLOURS = (BLUE, ORANGE, GREEN, RED, "#6d4c9f", "#0f766e", "#8a5a2b")
 _DPI = 130

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..typing import Array
-from .figures import new_figure, save, tidy
+from .style import new_figure, save, tidy
 
 
 def pressure_figure(path: str | Path, *, title: str, lines: Sequence[Sequence[tuple[float, Array, Array]]]) -> None:

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..output.arrays import load_arrays
+from ..output.files import whole_file
 from ..typing import Array, IntArray
-from .arrays import load_arrays
-from .files import whole_file
 from .offscreen import draw_apart
 
 _SECONDS = 300.0

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..output.files import whole_file
 from ..progress import count, stage
 from ..textfile import read_text
-from .files import whole_file
 
 
 @stage("pictures")
@@ -31,7 +31,7 @@ def draw_figures(folder: Path, mechanism: Any, results: Any) -> None:
     axes.set_title(f"{mechanism.file.title or 'mechanism'} at {time:g} s")
     _save(plt, figure, folder / "picture.png")
     if mechanism.links:
-        from .link_files import draw_links
+        from ..output.link_files import draw_links
 
         draw_links(plt, folder / "links.png", mechanism, results)
 

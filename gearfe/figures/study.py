@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..typing import Array, BoolArray, IntArray
-from .figures import BLUE, GREY, ORANGE, RED, new_figure, save, tidy
+from .style import BLUE, GREY, ORANGE, RED, new_figure, save, tidy
 
 #: Parameters and outputs that a picture shows at most, and cases of which every one is drawn.
 MOST, DRAWN = 6, 4000

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from ..output.files import whole_file
 from ..typing import Array, IntArray
-from .files import whole_file
 
 BLUE, ORANGE, GREEN, RED, GREY = "#1f5a99", "#d9730d", "#3a8c5c", "#b3261e", "#6b7280"
 PINION_FILL, WHEEL_FILL = "#dbe7f3", "#f3e6d8"

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ..output.files import whole_file
 from ..typing import Array, IntArray
-from .figures import color_limit, draw_zone, new_figure
-from .files import whole_file
+from .style import color_limit, draw_zone, new_figure
 
 Part = tuple[Array, IntArray, Array]
 

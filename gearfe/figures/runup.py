@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..typing import Array, IntArray
-from .figures import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save, tidy
+from .style import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save, tidy
 
 COLOURS = (BLUE, ORANGE, GREEN, RED, "#6d4c9f", "#0f766e", "#8a5a2b")
 

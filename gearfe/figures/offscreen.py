@@ -14,8 +14,8 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
+from ..output.arrays import save_arrays
 from ..typing import Array
-from .arrays import save_arrays
 
 
 def draw_apart(module: str, path: str | Path, arrays: Mapping[str, Array], *, seconds: float) -> str:
