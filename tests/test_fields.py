@@ -13,10 +13,10 @@ from gearfe.contact.compliance import turn
 from gearfe.contact.laws import Penalty
 from gearfe.elasticity import element_stiffness
 from gearfe.errors import InputError
+from gearfe.figures import animation
 from gearfe.figures.style import color_limit
 from gearfe.gear.drawing import path_place
 from gearfe.meshing.whole_gear import whole_gear
-from gearfe.output import animation
 from gearfe.stiffness.contact_pressure import flank_pressures
 from gearfe.stiffness.fields import gear_recovery, pair_recovery, straight_triangles
 from gearfe.stiffness.fields_output import chosen_positions, fields_size, frames_of, told_size, write_fields
