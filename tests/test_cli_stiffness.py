@@ -259,7 +259,7 @@ def test_interrupted_output_leaves_nothing(tmp_path, monkeypatch, problem):
     def fails(*args, **kwargs):
         raise problem(28, "No space left on device") if problem is OSError else problem
 
-    monkeypatch.setattr("gearfe.figures.style.save", fails)
+    monkeypatch.setattr("gearfe.figures.stiffness.save", fails)
     code = main(["stiffness", str(JOB), "--out", str(tmp_path), "--twist-deg", "0.05", *QUICK])
     assert code == {KeyboardInterrupt: 130, OSError: 2}[problem]
     assert not list(tmp_path.iterdir())

@@ -204,7 +204,7 @@ def test_wrong_tables_over_time(tmp_path: Path, content: str, extra: str, text: 
     (tmp_path / "drive.csv").write_text("t,value\n" + content, encoding="utf-8")
     path = write(tmp_path, ROD + TABLED.format(coordinate="rate") + extra)
     with pytest.raises(InputError, match=text):
-        run_mechanism(load_mechanism(path), tmp_path / "out", figures=False)
+        run_mechanism(load_mechanism(path), tmp_path / "out")
 
 
 def test_a_flexible_link_driven_by_tables_beside_the_file(tmp_path: Path) -> None:

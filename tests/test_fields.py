@@ -13,13 +13,13 @@ from gearfe.contact.compliance import turn
 from gearfe.contact.laws import Penalty
 from gearfe.elasticity import element_stiffness
 from gearfe.errors import InputError
-from gearfe.figures import animation
-from gearfe.figures.style import color_limit
+from gearfe.figures import stress
+from gearfe.figures.stress import color_limit
 from gearfe.gear.drawing import path_place
 from gearfe.meshing.whole_gear import whole_gear
 from gearfe.stiffness.contact_pressure import flank_pressures
 from gearfe.stiffness.fields import gear_recovery, pair_recovery, straight_triangles
-from gearfe.stiffness.fields_output import chosen_positions, fields_size, frames_of, told_size, write_fields
+from gearfe.stiffness.fields_output import chosen_positions, fields_size, told_size, write_fields
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 
 from .gears import pair
@@ -195,8 +195,11 @@ def test_a_one_sided_law_presses_on_both_flanks(gears):
 def test_the_series_and_the_table_of_pressures(gears, elastic, tmp_path):
     h5py = pytest.importorskip("h5py")
     curve = sweep_stiffness(gears, twist=TWIST, angles=np.radians([1.0, 2.0]), elastic=elastic)
-    names = write_fields(tmp_path, gears, elastic, curve, None)
-    assert sorted(names) == sorted(p.name for p in tmp_path.iterdir())
+    drawn = []
+    pressures = write_fields(tmp_path, gears, elastic, curve, None, draw=lambda position, fields: drawn.append(fields))
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["fields.vtkhdf", "pressure.csv"]
+    assert [angle for angle, _ in pressures] == pytest.approx([1.0, 2.0])
+    assert len(drawn) == 1  # the most stressed one
     with h5py.File(tmp_path / "fields.vtkhdf") as file:
         root = file["VTKHDF"]
         np.testing.assert_allclose(root["Steps/Values"][:], [1.0, 2.0])
@@ -237,9 +240,9 @@ def turn3(angle):
 def test_an_animation_is_one_whole_file(gears, elastic, tmp_path, monkeypatch):
     image = pytest.importorskip("PIL.Image")
     curve = sweep_stiffness(gears, twist=TWIST, angles=np.arange(5) * gears.mesh_cycle / 5, elastic=elastic)
-    frames, place = frames_of(gears, elastic, curve, 3)
+    frames = stress.frames_of(gears, elastic, curve, 3)
     np.testing.assert_allclose([f.angle for f in frames], np.degrees(gears.mesh_cycle) * np.arange(3) / 3)
-    animation.stress_animation(tmp_path / "a.gif", frames, title="test", zoom=place)
+    stress.stress_animation(tmp_path / "a.gif", gears, elastic, curve, 3)
     with image.open(tmp_path / "a.gif") as made:
         assert made.n_frames == 3
         assert made.info["loop"] == 0
@@ -255,7 +258,7 @@ def test_an_animation_is_one_whole_file(gears, elastic, tmp_path, monkeypatch):
 
     monkeypatch.setattr(image.Image, "save", broken)
     with pytest.raises(OSError, match="no space"):
-        animation.stress_animation(tmp_path / "b.gif", frames, title="test", zoom=place)
+        stress.stress_animation(tmp_path / "b.gif", gears, elastic, curve, 3)
     assert [p.name for p in tmp_path.iterdir()] == ["a.gif"]
 
 

@@ -222,7 +222,7 @@ def test_inverse_is_forward_dynamics_of_a_four_bar() -> None:
 def test_what_has_no_rest_is_told(tmp_path: Path, change: tuple[str, str], analysis: str, text: str) -> None:
     made = ROD.replace(*change, 1).replace("[run]\n", f'[run]\nanalysis = "{analysis}"\n')
     with pytest.raises(InputError, match=text):
-        run_rest(load_mechanism(write(tmp_path, made)), tmp_path / "out", figures=False)
+        run_rest(load_mechanism(write(tmp_path, made)), tmp_path / "out")
     assert not list((tmp_path / "out").glob("*.csv"))
 
 

@@ -190,7 +190,7 @@ def test_a_mechanism_loads_neither_finite_elements_nor_compiled_kernels(tmp_path
     job = str(ROOT / "geometry" / "andrews.toml")
     code = (
         "from gearfe.mechanisms import load_mechanism\nfrom gearfe.mechanisms.job import run_mechanism\n"
-        f"made = run_mechanism(load_mechanism({job!r}), {str(out)!r}, tolerance=1e-8, figures=False)\n"
+        f"made = run_mechanism(load_mechanism({job!r}), {str(out)!r}, tolerance=1e-8)\n"
         "assert made.complete"
     )
     loaded, _ = loaded_after(code, GEARFE_CACHE=str(tmp_path / "empty"))

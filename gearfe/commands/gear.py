@@ -34,9 +34,8 @@ def run(args: argparse.Namespace) -> int:
 
     pair = GearPair.from_table(tables["pair"])  # gears that cannot run together: NumPy alone tells
 
-    from ..figures.style import pair_figure
+    from ..figures.gears import pair_figure
     from ..gear.derived import derived_geometry, iso_values
-    from ..gear.drawing import pair_drawing
     from ..output.files import output_folder, whole_set, write_json
     from ..stiffness.job import StiffnessJob
 
@@ -45,11 +44,9 @@ def run(args: argparse.Namespace) -> int:
     geometry = derived_geometry(pair)
     moduli = [material.youngs_modulus for material in job.materials]
     iso = iso_values(pair, moduli[0], moduli[1])
-    title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, pinion angle {args.angle_deg:g}°"
     with whole_set(folder) as made:
         with stage("drawing"):
-            drawing = pair_drawing(pair, math.radians(args.angle_deg))
-            pair_figure(made / "gear_pair.png", title=title, notes=_notes(geometry), **drawing)
+            pair_figure(made / "gear_pair.png", pair, math.radians(args.angle_deg), _notes(geometry))
         write_json(made / "gear_pair.json", {**geometry, "iso_6336": iso, "warnings": list(pair.warnings)})
     _show(geometry)
     _show({"iso_6336": iso})

@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
 
     import numpy as np
 
-    from ..loadmap.report import figure_arguments, summary, told, torque_table, warnings
+    from ..loadmap.report import summary, told, torque_table, warnings
     from ..loadmap.sweep import sweep_loads
     from ..output.files import output_folder, whole_set, write_csv, write_json
     from ..stiffness.job import StiffnessJob
@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
             from ..figures.load_map import load_map_figure
 
             with watch.stage("picture"):
-                load_map_figure(made / "loadmap.png", **figure_arguments(job, made_map))
+                load_map_figure(made / "loadmap.png", job, made_map)
         watch.seconds["total"] = time.perf_counter() - started
         write_json(made / "loadmap.json", summary(job, table, made_map, watch.seconds))
         names = sorted(path.name for path in made.iterdir())

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..tables.mechanism import RunTable, read_mechanism_file
 from .arguments import add_job, add_keys, with_keys
+
+if TYPE_CHECKING:
+    from ..mechanisms.model import Mechanism
+    from ..mechanisms.results import Results
+    from ..rigid.modes import Modes
 
 #: Keys of [run] that options stand for, beside the end of the run.
 KEYS = ("analysis", "tolerance", "method", "reactions", "modes")
@@ -39,15 +46,31 @@ def run(args: argparse.Namespace) -> int:
     if file.run.analysis in ("equilibrium", "modes"):
         from ..mechanisms.rest import run_rest
 
-        outcome = run_rest(mechanism, args.out, figures=not args.no_pictures)
+        outcome = run_rest(mechanism, args.out, draw=None if args.no_pictures else partial(_draw_rest, mechanism))
         print(outcome.text)
         return 0 if outcome.complete else 1
     outcome = run_mechanism(
         mechanism,
         args.out,
-        figures=not args.no_pictures,
-        animation=args.animation,
         estimate=not args.no_estimate,
+        draw=partial(_draw, mechanism, args) if args.animation or not args.no_pictures else None,
     )
     print(outcome.text)
     return 0 if outcome.complete else 1
+
+
+def _draw(mechanism: Mechanism, args: argparse.Namespace, folder: Path, results: Results) -> None:
+    from ..figures.mechanism import draw_animation, draw_figures
+
+    if not args.no_pictures:
+        draw_figures(folder, mechanism, results)
+    if args.animation:
+        draw_animation(folder, mechanism, results.trajectory)
+
+
+def _draw_rest(mechanism: Mechanism, folder: Path, results: Results, modes: Modes | None) -> None:
+    from ..figures.mechanism import draw_figures, draw_modes
+
+    draw_figures(folder, mechanism, results)
+    if modes is not None:
+        draw_modes(folder, mechanism, results.trajectory.q[0], modes)

@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..output.files import output_folder, whole_set, write_json
     from ..stiffness.job import StiffnessJob
-    from ..stiffness.report import figure_arguments, summary, told, warnings
+    from ..stiffness.report import summary, told, warnings
     from ..stiffness.sweep import elastic_pair, sweep_stiffness
     from ..stopwatch import Stopwatch
 
@@ -109,19 +109,18 @@ def run(args: argparse.Namespace) -> int:
         with watch.stage("table"):
             curve.to_csv(made / "stiffness.csv")
         if chosen is not None:
-            from ..stiffness.fields_output import write_fields
-
-            angles = None if isinstance(chosen, str) else chosen
             with watch.stage("fields"):
-                write_fields(made, job.pair, elastic, curve, angles, progress=count)
+                _fields(made, job, elastic, curve, None if isinstance(chosen, str) else chosen)
         if args.animate is not None:
             with watch.stage("animation"):
-                _animate(made / "stress.gif", job, elastic, curve, args.animate)
+                from ..figures.stress import stress_animation
+
+                stress_animation(made / "stress.gif", job.pair, elastic, curve, args.animate, count)
         if not args.no_pictures:
             with watch.stage("picture"):
-                from ..figures.style import stiffness_figure
+                from ..figures.stiffness import stiffness_figure
 
-                stiffness_figure(made / "stiffness.png", **figure_arguments(job, curve))
+                stiffness_figure(made / "stiffness.png", job, curve)
         watch.seconds["total"] = time.perf_counter() - started
         write_json(made / "summary.json", summary(job, curve, watch.seconds))
         names = sorted(path.name for path in made.iterdir())
@@ -134,14 +133,17 @@ def run(args: argparse.Namespace) -> int:
     return 1 if curve.failed.any() else 0
 
 
-def _animate(path: Path, job: StiffnessJob, elastic: Any, curve: Any, number: int) -> None:
-    from ..figures.animation import stress_animation
-    from ..stiffness.fields_output import frames_of
+def _fields(folder: Path, job: StiffnessJob, elastic: Any, curve: Any, angles_deg: list[float] | None) -> None:
+    from ..figures.stiffness import pressure_figure
+    from ..figures.stress import stress_figure
+    from ..stiffness.fields_output import write_fields
 
-    frames, zone = frames_of(job.pair, elastic, curve, number, count)
-    if frames:
-        teeth = f"{job.pair.pinion.teeth}/{job.pair.wheel.teeth}"
-        stress_animation(path, frames, title=f"Gear pair {teeth}, von Mises stress", zoom=zone, progress=count)
+    def draw(position: Any, fields: Any) -> None:
+        stress_figure(folder, job.pair, position, fields)
+
+    pressures = write_fields(folder, job.pair, elastic, curve, angles_deg, draw=draw, progress=count)
+    if pressures:
+        pressure_figure(folder / "pressure.png", job.pair, pressures)
 
 
 def field_angle(text: str) -> str | float:

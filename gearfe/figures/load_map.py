@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..gear.deviation_job import GEARS
+from ..loadmap.load_map import LoadMap
+from ..stiffness.job import StiffnessJob
 from ..typing import Array
 from .style import BLUE, ORANGE, new_figure, save, tidy
 
@@ -15,33 +17,13 @@ from .style import BLUE, ORANGE, new_figure, save, tidy
 MOST_LINES = 24
 
 
-def load_map_figure(
-    path: str | Path,
-    *,
-    title: str,
-    angle: Array,
-    torque: Array,
-    panels: Mapping[str, Array],
-    peak_to_peak: Array,
-    mean_stiffness: Array,
-) -> None:
-    """Panels over the pinion angle coloured by torque, and mean stiffness and transmission error over the torque.
-
-    Parameters
-    ----------
-    angle : ndarray, shape (n,)
-        Pinion angles (deg).
-    torque : ndarray, shape (m,)
-        N m.
-    panels
-        Label of the axis with its unit -> values, shape (m, n).
-    peak_to_peak, mean_stiffness : ndarray, shape (m,)
-        Peak-to-peak transmission error (um) and mean stiffness (N/um) of each torque.
-    """
+def load_map_figure(path: str | Path, job: StiffnessJob, made: LoadMap) -> None:
+    """Panels over the pinion angle coloured by torque, and mean stiffness and transmission error over the torque."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm, Normalize
 
+    angle, torque, panels = _over_the_cycle(made)
     count = len(panels) + 2
     columns = -(-count // 2)
     figure = new_figure(3.9 * columns + 0.9, 6.6)
@@ -62,7 +44,10 @@ def load_map_figure(
         axes.set_title(label, loc="left", fontsize=9.5)
         axes.set_xlabel("pinion angle (deg)", fontsize=9)
         axes.tick_params(labelsize=8.5)
-    over = {"mean stiffness  (N/µm)": mean_stiffness, "transmission error, peak to peak  (µm)": peak_to_peak}
+    over = {
+        "mean stiffness  (N/µm)": 1e-6 * made.quantity("k_mesh").mean(axis=1),
+        "transmission error, peak to peak  (µm)": 1e6 * made.peak_to_peak,
+    }
     for axes, (label, values), color in zip(every[len(panels) :], over.items(), (BLUE, ORANGE), strict=False):
         tidy(axes)
         axes.plot(torque, values, "o-", color=color, markersize=3.5, linewidth=1.4)
@@ -78,8 +63,28 @@ def load_map_figure(
     if logarithmic:
         _plain_ticks(bar.ax.yaxis)
     bar.set_label("torque at the wheel (N m)")
+    pair, model = job.pair, job.table
+    title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, plane {model.plane}, law {model.law}"
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
     save(figure, path, dpi=110)
+
+
+def _over_the_cycle(made: LoadMap) -> tuple[Array, Array, dict[str, Array]]:
+    """Pinion angles (deg), shape (n,), torques (N m), shape (m,), and label -> values, shape (m, n)."""
+    cycle, angle = np.degrees(made.mesh_cycle), np.degrees(made.pinion_angle)
+    inside = bool(len(angle) and np.isclose(angle[0], 0.0) and angle[-1] < cycle)
+    close = slice(0, 1 if inside else 0)  # the first position again at the end of the cycle
+    panels = {
+        "mesh stiffness k  (N/µm)": 1e-6 * made.quantity("k_mesh"),
+        "transmission error  (µm)": 1e6 * made.quantity("transmission_error"),
+        "largest load share of a pair  (–)": np.stack([c.load_share.max(axis=1) for c in made.curves]),
+        "Hertzian pressure  (MPa)": 1e-6 * made.quantity("peak_pressure"),
+    }
+    if made.root is not None:
+        for g, gear in enumerate(GEARS):
+            panels[f"root stress, {gear}  (MPa)"] = 1e-6 * made.root.largest[:, :, g]
+    closed = {name: np.concatenate([values, values[:, close]], axis=1) for name, values in panels.items()}
+    return np.append(angle, [cycle] if inside else []), made.torque, closed
 
 
 def _is_geometric(torque: Array) -> bool:

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..mechanisms.model import Mechanism
+from ..mechanisms.results import Results, reference_table
 from ..output.files import whole_file
 from ..progress import count, stage
-from ..textfile import read_text
+from ..rigid import Trajectory
+from ..rigid.modes import Modes
 
 
 @stage("pictures")
-def draw_figures(folder: Path, mechanism: Any, results: Any) -> None:
+def draw_figures(folder: Path, mechanism: Mechanism, results: Results) -> None:
     """curves.png (outputs over time, with reference markers where the file names a table) and picture.png."""
     plt = _pyplot()
     trajectory = results.trajectory
@@ -31,12 +32,10 @@ def draw_figures(folder: Path, mechanism: Any, results: Any) -> None:
     axes.set_title(f"{mechanism.file.title or 'mechanism'} at {time:g} s")
     _save(plt, figure, folder / "picture.png")
     if mechanism.links:
-        from ..output.link_files import draw_links
-
-        draw_links(plt, folder / "links.png", mechanism, results)
+        _links(plt, folder / "links.png", mechanism, results)
 
 
-def draw_modes(folder: Path, mechanism: Any, q: np.ndarray, modes: Any) -> None:
+def draw_modes(folder: Path, mechanism: Mechanism, q: np.ndarray, modes: Modes) -> None:
     """modes.png: the first six shapes, 15 % of the mechanism's length at the largest, over the state of rest."""
     plt = _pyplot()
     count = min(6, len(modes.rates))
@@ -59,7 +58,7 @@ def draw_modes(folder: Path, mechanism: Any, q: np.ndarray, modes: Any) -> None:
 
 
 @stage("animation")
-def draw_animation(folder: Path, mechanism: Any, trajectory: Any) -> None:
+def draw_animation(folder: Path, mechanism: Mechanism, trajectory: Trajectory) -> None:
     """animation.gif with the number of frames that the file asks for."""
     plt = _pyplot()
     from matplotlib.animation import PillowWriter
@@ -81,7 +80,7 @@ def draw_animation(folder: Path, mechanism: Any, trajectory: Any) -> None:
     plt.close(figure)
 
 
-def _curves(plt: Any, path: Path, mechanism: Any, results: Any) -> None:
+def _curves(plt: Any, path: Path, mechanism: Mechanism, results: Results) -> None:
     table = mechanism.file.figure
     names = table.curves or tuple(results.outputs)
     if not names:
@@ -103,31 +102,28 @@ def _curves(plt: Any, path: Path, mechanism: Any, results: Any) -> None:
     _save(plt, figure, path)
 
 
-def reference_table(mechanism: Any) -> dict[str, np.ndarray] | None:
-    """Columns of the file that ``figure.reference`` names; None where it names none.
-
-    Raises
-    ------
-    InputError
-        When it cannot be read, or lacks a column.
-    """
-    table = mechanism.file.figure
-    if table.reference is None:
-        return None
-    source = mechanism.path.parent / table.reference
-    lines = [line for line in read_text(source, "figure.reference").splitlines() if not line.startswith("#")]
-    try:
-        rows = list(csv.DictReader(lines))
-        made = {name: np.array([float(row[name]) for row in rows]) for name in (rows[0] if rows else {})}
-    except (ValueError, TypeError, csv.Error) as error:
-        raise InputError("figure.reference", str(source), f"is no table of numbers ({error})", "mend it") from None
-    for name in ("t", *table.reference_columns.values()):
-        if name not in made:
-            raise InputError("figure.reference", str(source), f"has no column {name!r}", "check its header")
-    return made
+def _links(plt: Any, path: Path, mechanism: Mechanism, results: Results) -> None:
+    """links.png: axial force and bending moment along every link, the range over the run and the last time."""
+    count = len(mechanism.links)
+    figure, rows = plt.subplots(count, 3, figsize=(11, 1.0 + 2.2 * count), squeeze=False)
+    for axes, (name, link) in zip(rows, mechanism.links.items(), strict=True):
+        s = link.beam.link.stations
+        values = [1e3 * link.offsets(results.trajectory.q)[:, :, 1]]
+        values += [results.sections[name][:, :, k] for k in (0, 2)]
+        for ax, value, label in zip(
+            axes, values, ("deflection in mm", "axial force in N", "bending moment in N m"), strict=True
+        ):
+            ax.fill_between(s, value.min(axis=0), value.max(axis=0), alpha=0.25, label="over the run")
+            ax.plot(s, value[-1], lw=1.4, label=f"at {results.trajectory.time[-1]:.4g} s")
+            ax.set_title(f"{name}: {label}", fontsize=9)
+            ax.grid(alpha=0.3)
+        axes[0].legend(fontsize=7)
+    for ax in rows[-1]:
+        ax.set_xlabel("s in m")
+    _save(plt, figure, path)
 
 
-def _points(mechanism: Any) -> list[tuple[int, list[tuple[float, float]]]]:
+def _points(mechanism: Mechanism) -> list[tuple[int, list[tuple[float, float]]]]:
     """Body number and the named points of each body, relative to the mass centre."""
     return [
         (mechanism.scene.body_index[name], [mechanism.point(f"{name}.{p}")[1] for p in table.points_m])
@@ -142,7 +138,7 @@ def _place(q: np.ndarray, body: int, point: tuple[float, float]) -> tuple[np.nda
     return q[:, 3 * body] + c * x - s * y, q[:, 3 * body + 1] + s * x + c * y
 
 
-def _paths(axes: Any, mechanism: Any, q: np.ndarray) -> None:
+def _paths(axes: Any, mechanism: Mechanism, q: np.ndarray) -> None:
     for path in mechanism.file.paths:
         body = mechanism.scene.body_index[path.body]
         if body == len(mechanism.scene.bodies):
@@ -157,7 +153,7 @@ def _paths(axes: Any, mechanism: Any, q: np.ndarray) -> None:
         axes.plot(*_place(q, body, point), lw=0.7, alpha=0.6, label=label)
 
 
-def _draw(axes: Any, mechanism: Any, q: np.ndarray, alpha: float = 1.0) -> None:
+def _draw(axes: Any, mechanism: Mechanism, q: np.ndarray, alpha: float = 1.0) -> None:
     """Bodies as outlines of their points, mass centres, points at rest."""
     for body, points in _points(mechanism):
         ends = np.array([[float(a[0]) for a in _place(q, body, p)] for p in points]).reshape(-1, 2)
@@ -179,8 +175,9 @@ def _draw(axes: Any, mechanism: Any, q: np.ndarray, alpha: float = 1.0) -> None:
         axes.plot(x, y, "k^", ms=6, mfc="none")
 
 
-def _frame(axes: Any, mechanism: Any, q: np.ndarray) -> None:
-    x, y = [], []
+def _frame(axes: Any, mechanism: Mechanism, q: np.ndarray) -> None:
+    x: list[float] = []
+    y: list[float] = []
     for body, points in _points(mechanism):
         for point in [*points, (0.0, 0.0)]:
             a, b = _place(q, body, point)
@@ -190,9 +187,9 @@ def _frame(axes: Any, mechanism: Any, q: np.ndarray) -> None:
         shapes = link.exaggerated(q, link.beam.link.ends, mechanism.file.figure.magnification)
         x += [shapes[:, :, 0].min(), shapes[:, :, 0].max()]
         y += [shapes[:, :, 1].min(), shapes[:, :, 1].max()]
-    for a, b in mechanism.file.ground.points_m.values():
-        x.append(a)
-        y.append(b)
+    ground = mechanism.file.ground.points_m.values()
+    x += [place[0] for place in ground]
+    y += [place[1] for place in ground]
     pad = 0.06 * max(max(x) - min(x), max(y) - min(y), 1e-9)
     axes.set_xlim(min(x) - pad, max(x) + pad)
     axes.set_ylim(min(y) - pad, max(y) + pad)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -36,28 +35,6 @@ def zone(pair: GearPair, *, modules: float = 3.0) -> tuple[float, float, float]:
     start, end = (path_place(pair, s) for s in pair.path_limits(rounded=False))
     half = 0.5 * math.dist(start, end) + 1e3 * modules * 0.5 * pair.pinion.module
     return 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]), half
-
-
-def pair_drawing(pair: GearPair, pinion_angle: float = 0.0) -> dict[str, Any]:
-    """Arguments of `gearfe.figures.style.pair_figure` at a pinion angle (rad)."""
-    a = pair.working_centre_distance
-    pinion, wheel = pair.pinion, pair.wheel
-    outlines = [
-        gear_outline(pinion, pinion_angle, (0.0, 0.0)),
-        gear_outline(wheel, pair.wheel_angle_at(pinion_angle) + pair.wheel_phase, (a, 0.0)),
-    ]
-    circles = []
-    for gear, x, pitch in ((pinion, 0.0, pair.pinion_working_radius), (wheel, a, pair.wheel_working_radius)):
-        radii = {"bore": 0.5 * gear.bore_diameter, "pitch": pitch, "base": gear.base_radius, "tip": gear.tip_radius}
-        circles += [(kind, (1e3 * x, 0.0), 1e3 * radius) for kind, radius in radii.items()]
-    x, y, half = zone(pair)
-    return {
-        "outlines": outlines,
-        "circles": circles,
-        "line_of_action": np.array([path_place(pair, 0.0), path_place(pair, pair.tangent_length)]),
-        "path_points": {name: path_place(pair, point.pinion_roll) for name, point in pair.path.items()},
-        "zoom": (x, y, half),
-    }
 
 
 def single_pair_stretches(pair: GearPair, start: float, end: float) -> list[tuple[float, float]]:

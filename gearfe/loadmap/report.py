@@ -101,33 +101,3 @@ def warnings(job: StiffnessJob, made: LoadMap) -> list[str]:
             + cure_of(made.status[made.failed])
         )
     return said
-
-
-def figure_arguments(job: StiffnessJob, made: LoadMap) -> dict[str, Any]:
-    """Arguments of `gearfe.figures.load_map.load_map_figure`."""
-    pair, cycle = job.pair, np.degrees(made.mesh_cycle)
-    angle = np.degrees(made.pinion_angle)
-    inside = bool(len(angle) and np.isclose(angle[0], 0.0) and angle[-1] < cycle)
-    close = slice(0, 1 if inside else 0)  # the first position again at the end of the cycle
-
-    def closed(values: Array) -> Array:
-        return np.concatenate([values, values[:, close]], axis=1)
-
-    share = np.stack([c.load_share.max(axis=1) for c in made.curves])
-    panels = {
-        "mesh stiffness k  (N/µm)": 1e-6 * made.quantity("k_mesh"),
-        "transmission error  (µm)": 1e6 * made.quantity("transmission_error"),
-        "largest load share of a pair  (–)": share,
-        "Hertzian pressure  (MPa)": 1e-6 * made.quantity("peak_pressure"),
-    }
-    if made.root is not None:
-        for g, gear in enumerate(GEARS):
-            panels[f"root stress, {gear}  (MPa)"] = 1e-6 * made.root.largest[:, :, g]
-    return {
-        "title": f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, plane {job.table.plane}, law {job.table.law}",
-        "angle": np.append(angle, [cycle] if inside else []),
-        "torque": made.torque,
-        "panels": {name: closed(values) for name, values in panels.items()},
-        "peak_to_peak": 1e6 * made.peak_to_peak,
-        "mean_stiffness": 1e-6 * made.quantity("k_mesh").mean(axis=1),
-    }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time as clock
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from ..rigid import Start, integrate
 from ..rigid.inverse import prescribed_motion
 from .error_estimate import TrajectoryError, trajectory_error
 from .model import Mechanism
-from .results import Results, evaluate, reactions
+from .results import Results, evaluate, reactions, reference_table
 
 #: Files that depend on the options: what is left of them from an earlier run is removed.
 MAY_WRITE = (
@@ -43,14 +44,13 @@ def run_mechanism(
     tolerance: float | None = None,
     method: str | None = None,
     until: float | None = None,
-    reactions: bool = False,
-    figures: bool = True,
-    animation: bool = False,
     estimate: bool = True,
+    draw: Callable[[Path, Results], None] | None = None,
 ) -> Outcome:
     """Integrate, write ``trajectory.csv``, ``energy.csv``, ``summary.json`` and what else is asked.
 
-    All files appear together, or none. With `estimate` two finer runs tell how far off it is.
+    All files appear together, or none. With `estimate` two finer runs tell how far off it is; `draw` adds pictures to
+    the folder.
     """
     began = clock.perf_counter()
     run = mechanism.file.run
@@ -62,9 +62,7 @@ def run_mechanism(
     if end > mechanism.known_until * (1.0 + 1e-9):
         problem = f"is after the end of a table over time, {mechanism.known_until:g} s"
         raise InputError("run.end_s", end, problem, "end the run before, or extend the table")
-    if figures:
-        from ..figures.mechanism import reference_table
-
+    if draw is not None:
         reference_table(mechanism)  # a mistake in it is told before the run
     folder = output_folder(out)
     start = mechanism.start()
@@ -92,20 +90,14 @@ def run_mechanism(
     error = trajectory_error(mechanism, start, results, tolerance) if estimate else None
     estimated = clock.perf_counter()
     with whole_set(folder, MAY_WRITE) as made:
-        warnings = tuple(write_tables(made, mechanism, results, reactions or run.reactions))
+        warnings = tuple(write_tables(made, mechanism, results, run.reactions))
         if mechanism.links:
-            from ..output.link_files import write_links
+            from .link_files import write_links
 
             write_links(made, mechanism, trajectory)
         written = clock.perf_counter()
-        if figures:
-            from ..figures.mechanism import draw_figures
-
-            draw_figures(made, mechanism, results)
-        if animation:
-            from ..figures.mechanism import draw_animation
-
-            draw_animation(made, mechanism, trajectory)
+        if draw is not None:
+            draw(made, results)
         timings = {
             "read_s": read - began,
             "compile_s": compiling,

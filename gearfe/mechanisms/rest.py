@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,11 +22,13 @@ from .model import Mechanism
 from .results import Results, evaluate, reactions
 
 
-def run_rest(mechanism: Mechanism, out: str | Path, *, figures: bool = True) -> Outcome:
+def run_rest(
+    mechanism: Mechanism, out: str | Path, *, draw: Callable[[Path, Results, Modes | None], None] | None = None
+) -> Outcome:
     """Find the equilibrium downhill from the start, and modes where the file asks for them; all files, or none.
 
     ``equilibrium.csv`` has the outputs, ``bodies.csv`` the poses, ``reactions.csv`` the forces of the joints,
-    ``modes.csv`` frequencies and damping, ``shapes.csv`` the motions.
+    ``modes.csv`` frequencies and damping, ``shapes.csv`` the motions; `draw` adds pictures to the folder.
     """
     began = clock.perf_counter()
     folder = output_folder(out)
@@ -42,15 +45,11 @@ def run_rest(mechanism: Mechanism, out: str | Path, *, figures: bool = True) -> 
         if found is not None:
             _write_modes(made, mechanism, found)
         if mechanism.links:
-            from ..output.link_files import write_links
+            from .link_files import write_links
 
             write_links(made, mechanism, results.trajectory)
-        if figures:
-            from ..figures.mechanism import draw_figures, draw_modes
-
-            draw_figures(made, mechanism, results)
-            if found is not None:
-                draw_modes(made, mechanism, rest.q, found)
+        if draw is not None:
+            draw(made, results, found)
         summary = _summary(mechanism, start, rest, results, found)
         summary["timings"] = {"whole_s": clock.perf_counter() - began}
         summary["warnings"] = list(told)

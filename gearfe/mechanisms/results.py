@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass, field
 from typing import TypeGuard
 
 import numpy as np
 
+from ..errors import InputError
 from ..progress import stage
 from ..rigid import CoordinateSpring, Moment, PointForce, Spring, StateFunction, TimeFunction, Trajectory
+from ..textfile import read_text
 from ..typing import Array
 from .expressions import PLAIN, compute, quantities
 from .model import Mechanism
@@ -175,3 +178,27 @@ def reactions(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
             out[f"{name}_x_N"][i], out[f"{name}_y_N"][i] = wrench[:2]
             out[f"{name}_moment_N_m"][i] = wrench[2] - (arm[0] * wrench[1] - arm[1] * wrench[0])
     return out
+
+
+def reference_table(mechanism: Mechanism) -> dict[str, Array] | None:
+    """Columns of the file that ``figure.reference`` names; None where it names none.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read, or lacks a column.
+    """
+    table = mechanism.file.figure
+    if table.reference is None:
+        return None
+    source = mechanism.path.parent / table.reference
+    lines = [line for line in read_text(source, "figure.reference").splitlines() if not line.startswith("#")]
+    try:
+        rows = list(csv.DictReader(lines))
+        made = {name: np.array([float(row[name]) for row in rows]) for name in (rows[0] if rows else {})}
+    except (ValueError, TypeError, csv.Error) as error:
+        raise InputError("figure.reference", str(source), f"is no table of numbers ({error})", "mend it") from None
+    for name in ("t", *table.reference_columns.values()):
+        if name not in made:
+            raise InputError("figure.reference", str(source), f"has no column {name!r}", "check its header")
+    return made

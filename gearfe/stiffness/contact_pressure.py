@@ -128,6 +128,15 @@ class FlankPressure:
     radius: Array
     pressure: Array
 
+    @property
+    def shown(self) -> IntArray:
+        """Contact points with pressure and one neighbour on either side."""
+        carries = self.pressure > 0
+        near = carries.copy()
+        near[1:] |= carries[:-1]
+        near[:-1] |= carries[1:]
+        return np.flatnonzero(near)
+
     def at_nodes(self, count: int) -> Array:
         """Pressure (Pa) at the `count` nodes of the tooth's contact surface, linear between the contact points."""
         return np.asarray(np.interp(0.5 * np.arange(count), self.place, self.pressure, left=0.0, right=0.0))

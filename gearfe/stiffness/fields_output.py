@@ -1,4 +1,4 @@
-"""Fields of chosen positions of a sweep as files: a VTKHDF series, pressures along the flanks, pictures, frames."""
+"""Fields of chosen positions of a sweep as files: a VTKHDF series, and the pressures along the flanks."""
 
 from __future__ import annotations
 
@@ -12,10 +12,6 @@ import numpy as np
 from ..contact.compliance import MeshingPair
 from ..contact.position import Positions
 from ..errors import InputError
-from ..figures.animation import Frame, cut_out
-from ..figures.pressure import pressure_figure
-from ..figures.style import stress_figure
-from ..gear.drawing import zone
 from ..gear.pair import GearPair
 from ..output.files import write_csv
 from ..output.vtkhdf import VtkHdfSeries
@@ -23,14 +19,14 @@ from ..threads import one_thread
 from ..typing import Array, IntArray
 from .contact_pressure import FlankPressure, flank_pressures
 from .curve import StiffnessCurve
-from .fields import GearField, pair_recovery, straight_triangles
+from .fields import GearField, pair_recovery
 from .positions import PositionSolver, position_solver
 
 Progress = Callable[[int, int, str], None]
 
 GEARS = ("pinion", "wheel")
-#: Positions solved side by side, and positions drawn in the picture of the pressures.
-SIDE_BY_SIDE, MOST_LINES = 8, 12
+#: Positions solved side by side.
+SIDE_BY_SIDE = 8
 
 
 def chosen_positions(curve: StiffnessCurve, angles_deg: Sequence[float] | None) -> IntArray:
@@ -71,9 +67,10 @@ def write_fields(
     curve: StiffnessCurve,
     angles_deg: Sequence[float] | None,
     *,
-    progress: Callable[[int, int, str], None] | None = None,
-) -> list[str]:
-    """Write ``fields.vtkhdf`` (time: pinion angle in deg), the pressures and pictures; return the files' names.
+    draw: Callable[[Positions, tuple[GearField, GearField]], None] | None = None,
+    progress: Progress | None = None,
+) -> list[tuple[float, list[FlankPressure]]]:
+    """Write ``fields.vtkhdf`` (time: pinion angle in deg) and ``pressure.csv``.
 
     Without a single solution nothing is written.
 
@@ -82,34 +79,38 @@ def write_fields(
     folder
         Where to write.
     angles_deg
-        Pinion angles (deg) out of the curve's; None writes all, and the picture of the most stressed one only.
+        Pinion angles (deg) out of the curve's; None writes all.
+    draw
+        Called with the chosen positions and their fields; of all positions with the most stressed one alone.
+
+    Returns
+    -------
+    list of (float, list of FlankPressure)
+        Pinion angles (deg), and the pressures along the flanks.
     """
     chosen = chosen_positions(curve, angles_deg)
     if len(chosen) == 0:
         return []
     recovery, solver = pair_recovery(elastic), position_solver(pair, elastic)
-    names = ["fields.vtkhdf", "pressure.csv", "pressure.png"]
     worst: tuple[float, Positions, tuple[GearField, GearField]] | None = None
     pressures: list[tuple[float, list[FlankPressure]]] = []
     with VtkHdfSeries(folder / "fields.vtkhdf") as series, one_thread():
         places = curve.pinion_angle[chosen], curve.twist[chosen] + curve.lost_motion
-        for done, position in enumerate(_solved(solver, *places), start=1):
+        for done, position in enumerate(solved_positions(solver, *places), start=1):
             angle, fields = math.degrees(position.pinion_angle), recovery.at(position)
             pressures.append((angle, flank_pressures(elastic, position)))
             _add(series, angle, fields, first=done == 1)
-            if angles_deg is not None:
-                names.append(_picture(folder, pair, fields, position))
-            else:
-                peak = max(float(f.von_mises.max()) for f in fields)
-                if worst is None or peak > worst[0]:
-                    worst = (peak, position, fields)
+            peak = max(float(f.von_mises.max()) for f in fields)
+            if draw is not None and angles_deg is not None:
+                draw(position, fields)
+            elif worst is None or peak > worst[0]:
+                worst = (peak, position, fields)
             if progress is not None:
                 progress(done, len(chosen), "fields")
-    if worst is not None:
-        names.append(_picture(folder, pair, worst[2], worst[1]))
+    if draw is not None and worst is not None:
+        draw(*worst[1:])
     write_csv(folder / "pressure.csv", pressure_table(pair, pressures))
-    pressure_figure(folder / "pressure.png", **_pressure_lines(pair, pressures))
-    return names
+    return pressures
 
 
 def fields_size(elastic: MeshingPair, positions: int) -> int:
@@ -141,7 +142,7 @@ def told_size(elastic: MeshingPair, known_deg: Array, angles_deg: Sequence[float
     )
 
 
-def _solved(solver: PositionSolver, angles: Array, twists: Array) -> Iterator[Positions]:
+def solved_positions(solver: PositionSolver, angles: Array, twists: Array) -> Iterator[Positions]:
     """Positions at pinion angles and twists (rad), a few side by side; one that does not converge is left out."""
     for first in range(0, len(angles), SIDE_BY_SIDE):
         part = slice(first, first + SIDE_BY_SIDE)
@@ -188,72 +189,10 @@ def pressure_table(pair: GearPair, pressures: Sequence[tuple[float, list[FlankPr
     for angle, flanks in pressures:
         for one in flanks:
             gear = (pair.pinion, pair.wheel)[one.gear]
-            for k in _shown(one):
+            for k in one.shown:
                 above = one.radius[k] > gear.base_radius
                 row = (angle, GEARS[one.gear], one.pair, one.tooth % gear.teeth, 2e3 * one.radius[k])
                 roll = 1e3 * gear.roll_length(float(one.radius[k])) if above else math.nan
                 for name, value in zip(names, (*row, roll, 1e-6 * one.pressure[k]), strict=True):
                     columns[name].append(value)
     return columns
-
-
-def _shown(one: FlankPressure) -> IntArray:
-    """Contact points with pressure and one neighbour on either side."""
-    carries = one.pressure > 0
-    near = carries.copy()
-    near[1:] |= carries[:-1]
-    near[:-1] |= carries[1:]
-    return np.flatnonzero(near)
-
-
-def _pressure_lines(pair: GearPair, pressures: Sequence[tuple[float, list[FlankPressure]]]) -> dict[str, Any]:
-    """Arguments of the figure: lines of at most `MOST_LINES` positions, over the diameter."""
-    pick = np.unique(np.linspace(0, len(pressures) - 1, min(len(pressures), MOST_LINES)).round().astype(int))
-    lines: list[list[tuple[float, Array, Array]]] = [[], []]
-    for number in pick:
-        angle, flanks = pressures[number]
-        for one in flanks:
-            k = _shown(one)
-            if len(k):
-                lines[one.gear].append((angle, 2e3 * one.radius[k], 1e-6 * one.pressure[k]))
-    return {"title": f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, pressure along the flanks", "lines": lines}
-
-
-def frames_of(
-    pair: GearPair, elastic: MeshingPair, curve: StiffnessCurve, count: int, progress: Progress | None = None
-) -> tuple[list[Frame], tuple[float, float, float]]:
-    """Frames of the von Mises stress in the meshing zone over one mesh cycle, and the zone (mm).
-
-    The twists are the curve's own where it has them, interpolated between its positions otherwise.
-
-    Raises
-    ------
-    InputError
-        When the curve does not cover the mesh cycle.
-    """
-    angles = np.arange(count) * curve.mesh_cycle / count
-    twists = curve.interpolant("twist")(angles).value + curve.lost_motion
-    recovery, solver, place = pair_recovery(elastic), position_solver(pair, elastic), zone(pair, modules=1.5)
-    frames: list[Frame] = []
-    with one_thread():
-        for position in _solved(solver, angles, twists):
-            parts = [
-                cut_out(1e3 * (f.points + f.displacement), f.triangles, 1e-6 * f.von_mises, place)
-                for f in recovery.at(position)
-            ]
-            frames.append(Frame(math.degrees(position.pinion_angle), parts))
-            if progress is not None:
-                progress(len(frames), count, "frames solved")
-    return frames, place
-
-
-def _picture(folder: Path, pair: GearPair, fields: Sequence[GearField], position: Positions) -> str:
-    angle, twist = math.degrees(position.pinion_angle), math.degrees(position.twist)
-    name = f"stress_{angle:.6g}deg.png"
-    parts = [(1e3 * (f.points + f.displacement), straight_triangles(f.triangles), 1e-6 * f.von_mises) for f in fields]
-    title = (
-        f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, pinion at {angle:.6g}°, wheel twisted by {twist:.4g}°, "
-        "deformation to scale"
-    )
-    stress_figure(folder / name, title=title, parts=parts, zoom=zone(pair, modules=1.5))
-    return name

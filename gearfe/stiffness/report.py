@@ -1,4 +1,4 @@
-"""What the stiffness command tells and draws: the printed lines, the summary, the arguments of the figure."""
+"""What the stiffness command tells: the printed lines and the summary."""
 
 from __future__ import annotations
 
@@ -16,14 +16,11 @@ from .. import __version__
 from ..errors import InputError
 from ..gear.derived import derived_geometry, iso_values
 from ..gear.deviation_job import GEARS
-from ..gear.drawing import single_pair_stretches
 from ..gear.modifications import CHECKED, ends_of
 from ..gear.validity import overlaps, told_overlaps
-from ..typing import Array, IntArray
 from .contact_pressure import largest_pressures
 from .curve import StiffnessCurve
 from .job import StiffnessJob
-from .periodic import fold
 
 #: Allowable contact stress of case-hardened steel for unlimited life (Pa): ISO 6336-5, material quality MQ.
 USUAL_STEEL = 1500e6
@@ -223,52 +220,3 @@ def warnings(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
             f"{more} deg): {cure_of(curve.status[curve.failed])}"
         )
     return said
-
-
-def figure_arguments(job: StiffnessJob, curve: StiffnessCurve) -> dict[str, Any]:
-    """Arguments of `gearfe.figures.style.stiffness_figure`: two mesh cycles from pinion angle 0."""
-    table, pair = job.table, job.pair
-    cycle = curve.mesh_cycle
-    folded, first = np.unique(np.round(fold(curve.pinion_angle, cycle), 12), return_index=True)
-    angles = np.concatenate([folded, folded + cycle, [2 * cycle] if len(folded) and folded[0] == 0 else []])
-    pick = np.concatenate([first, first, first[:1] if len(angles) % 2 else []]).astype(int)
-    try:
-        interpolant = curve.interpolant(method=table.interpolation)
-    except InputError:
-        line = (angles, curve.k_mesh[pick])
-    else:
-        fine = np.linspace(0.0, 2 * cycle, 1201)
-        line = (fine, interpolant(fine).value)
-    load = f"twist {table.twist_deg:g}°" if table.twist_deg is not None else f"wheel torque {table.torque_Nm:g} N m"
-    moduli = [material.youngs_modulus for material in job.materials]
-    levels = {r"ISO 6336 $c_\gamma b$": 1e-6 * iso_values(pair, moduli[0], moduli[1])["c_gamma_times_width_N_per_m"]}
-    level = cycle_statistics(curve, table.interpolation)
-    if level is not None:
-        levels = {"mean over the cycle": 1e-6 * level["mean_N_per_m"], **levels}
-    lost = curve.failed[pick]
-    return {
-        "title": f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, {load}, plane {table.plane}, law {table.law}",
-        "line": (np.degrees(line[0]), 1e-6 * line[1]),
-        "points": (np.degrees(angles), 1e-6 * curve.k_mesh[pick]),
-        "failed": np.degrees(angles[lost]),
-        "single": [(math.degrees(a), math.degrees(b)) for a, b in single_pair_stretches(pair, 0.0, 2 * cycle)],
-        "levels": levels,
-        "shares": _shares(curve, angles, pick),
-    }
-
-
-def _shares(curve: StiffnessCurve, angles: Array, pick: IntArray) -> list[tuple[Array, Array]]:
-    """For each tooth pair its share of the load against the pinion angle (deg), along its whole way through contact."""
-    moved = np.round((angles - curve.pinion_angle[pick]) / curve.mesh_cycle)
-    leading = curve.leading_pair[pick] - moved
-    columns = np.arange(curve.load_share.shape[1])
-    number = leading[:, None] - columns
-    share = curve.load_share[pick]
-    found = []
-    for pair in np.unique(number[(share > 0) & np.isfinite(number)])[::-1]:
-        mine = np.where(number == pair, share, 0.0).sum(axis=1)
-        mine[~np.isfinite(leading)] = np.nan
-        carries = np.flatnonzero(mine > 0)
-        stretch = slice(max(0, carries[0] - 1), carries[-1] + 2)
-        found.append((np.degrees(angles[stretch]), mine[stretch]))
-    return found

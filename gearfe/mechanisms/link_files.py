@@ -1,4 +1,4 @@
-"""Flexible links of a mechanism: links.csv, links.vtkhdf with stress, and links.png with forces along them."""
+"""Files of a mechanism's flexible links: links.csv, and links.vtkhdf with stress."""
 
 from __future__ import annotations
 
@@ -7,17 +7,19 @@ from typing import Any
 
 import numpy as np
 
+from ..output.files import csv_table
+from ..output.vtkhdf import VtkHdfSeries
 from ..progress import stage
+from ..rigid import Trajectory
 from ..typing import Array
-from .files import csv_table, whole_file
-from .vtkhdf import VtkHdfSeries
+from .model import Mechanism
 
 #: Names of the forces at the nodes, in their order.
 FORCES = ("axial_force_N", "shear_force_N", "bending_moment_N_m")
 
 
 @stage("flexible links")
-def write_links(folder: Path, mechanism: Any, trajectory: Any) -> None:
+def write_links(folder: Path, mechanism: Mechanism, trajectory: Trajectory) -> None:
     """links.csv and links.vtkhdf: shape, forces and edge stress of every node at the times of the frames."""
     times = _times(mechanism, trajectory)
     q = trajectory.dense(times)
@@ -63,7 +65,7 @@ def write_links(folder: Path, mechanism: Any, trajectory: Any) -> None:
             series.add(float(time), np.concatenate(points), grid, point_data=fields)
 
 
-def _times(mechanism: Any, trajectory: Any) -> Array:
+def _times(mechanism: Mechanism, trajectory: Trajectory) -> Array:
     if len(trajectory.time) == 1:
         return np.asarray(trajectory.time, dtype=float)
     return np.linspace(trajectory.time[0], trajectory.time[-1], mechanism.file.run.frames)
@@ -81,27 +83,3 @@ def _strip(link: Any, q: Array, forces: Array) -> tuple[Array, Array]:
         sides.append(at[:, :2] + sign * across)
         values.append(np.stack([stress, forces[:, 0], forces[:, 2], deflection], axis=1))
     return np.concatenate(sides), np.concatenate(values)
-
-
-def draw_links(plt: Any, path: Path, mechanism: Any, results: Any) -> None:
-    """links.png: axial force and bending moment along every link, the range over the run and the last time."""
-    count = len(mechanism.links)
-    figure, rows = plt.subplots(count, 3, figsize=(11, 1.0 + 2.2 * count), squeeze=False)
-    for axes, (name, link) in zip(rows, mechanism.links.items(), strict=True):
-        s = link.beam.link.stations
-        values = [1e3 * link.offsets(results.trajectory.q)[:, :, 1]]
-        values += [results.sections[name][:, :, k] for k in (0, 2)]
-        for ax, value, label in zip(
-            axes, values, ("deflection in mm", "axial force in N", "bending moment in N m"), strict=True
-        ):
-            ax.fill_between(s, value.min(axis=0), value.max(axis=0), alpha=0.25, label="over the run")
-            ax.plot(s, value[-1], lw=1.4, label=f"at {results.trajectory.time[-1]:.4g} s")
-            ax.set_title(f"{name}: {label}", fontsize=9)
-            ax.grid(alpha=0.3)
-        axes[0].legend(fontsize=7)
-    for ax in rows[-1]:
-        ax.set_xlabel("s in m")
-    figure.tight_layout()
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, dpi=130)
-    plt.close(figure)

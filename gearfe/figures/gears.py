@@ -1,0 +1,115 @@
+"""Picture of a gear pair in mesh."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..gear.drawing import gear_outline, path_place, zone
+from ..gear.pair import GearPair
+from .style import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save
+
+PINION_FILL, WHEEL_FILL = "#dbe7f3", "#f3e6d8"
+
+
+def pair_figure(path: str | Path, pair: GearPair, pinion_angle: float, notes: str = "") -> None:
+    """Meshed pair: the whole gears, and the meshing zone with line of action and path of contact.
+
+    Parameters
+    ----------
+    pinion_angle
+        rad.
+    notes
+        Text below the enlarged zone, for the derived geometry.
+    """
+    outlines = [
+        gear_outline(pair.pinion, pinion_angle, (0.0, 0.0)),
+        gear_outline(
+            pair.wheel, pair.wheel_angle_at(pinion_angle) + pair.wheel_phase, (pair.working_centre_distance, 0.0)
+        ),
+    ]
+    line_of_action = np.array([path_place(pair, 0.0), path_place(pair, pair.tangent_length)])
+    figure = new_figure(12.5, 6.4)
+    whole, near = figure.subplots(1, 2, width_ratios=(1.0, 1.0))
+    styles = {
+        "pitch": (GREY, (0, (7, 2, 1.5, 2)), 0.9, "working pitch circles"),
+        "base": (GREEN, (0, (4, 3)), 0.9, "base circles"),
+        "tip": ("#9ca3af", (0, (1, 2)), 0.8, "tip circles"),
+    }
+    angle = np.linspace(0, 2 * np.pi, 721)
+    for axes in (whole, near):
+        for outline, fill, edge in zip(outlines, (PINION_FILL, WHEEL_FILL), (BLUE, ORANGE), strict=True):
+            axes.fill(outline[:, 0], outline[:, 1], facecolor=fill, edgecolor=edge, linewidth=1.1)
+        named = set()
+        for kind, x, radius in _circles(pair):
+            if kind == "bore":
+                axes.fill(
+                    x + radius * np.cos(angle), radius * np.sin(angle), facecolor="white", edgecolor="#374151", lw=1
+                )
+                continue
+            color, dash, width, label = styles[kind]
+            axes.plot(
+                x + radius * np.cos(angle),
+                radius * np.sin(angle),
+                color=color,
+                linestyle=dash,
+                linewidth=width,
+                label=None if kind in named else label,
+            )
+            named.add(kind)
+        axes.plot(line_of_action[:, 0], line_of_action[:, 1], color=RED, linewidth=1.0, label="line of action")
+        axes.set_aspect("equal")
+        axes.set_xlabel("x (mm)")
+    whole.set_ylabel("y (mm)")
+    for x in (0.0, 1e3 * pair.working_centre_distance):
+        whole.plot(x, 0.0, "+", color="#374151", markersize=9)
+    x, y, half = zone(pair)
+    whole.add_patch(_rectangle(x, y, half))
+    teeth = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}"
+    whole.set_title(f"{teeth}, pinion angle {math.degrees(pinion_angle):g}°", loc="left", fontsize=11)
+    path_points = {name: path_place(pair, point.pinion_roll) for name, point in pair.path.items()}
+    marks = np.array(list(path_points.values()))
+    near.plot(marks[:, 0], marks[:, 1], color=RED, linewidth=2.4, label="path of contact A–E")
+    near.plot(marks[:, 0], marks[:, 1], "o", color=RED, markersize=4)
+    for letter, (px, py) in path_points.items():
+        near.annotate(
+            letter, (px, py), xytext=(6, 5), textcoords="offset points", color=RED, weight="bold", fontsize=10
+        )
+    near.set_xlim(x - half, x + half)
+    near.set_ylim(y - half, y + half)
+    near.set_title("meshing zone", loc="left", fontsize=11)
+    near.legend(fontsize=8, loc="upper right", framealpha=0.95)
+    if notes:
+        near.text(
+            0.015,
+            0.015,
+            notes,
+            transform=near.transAxes,
+            fontsize=8,
+            va="bottom",
+            family="monospace",
+            bbox={"facecolor": "white", "alpha": 0.9, "edgecolor": "#d1d5db"},
+        )
+    save(figure, path)
+
+
+def _circles(pair: GearPair) -> list[tuple[str, float, float]]:
+    """Kind, x of the centre and radius (mm) of the circles of both gears."""
+    found = []
+    gears = (
+        (pair.pinion, 0.0, pair.pinion_working_radius),
+        (pair.wheel, pair.working_centre_distance, pair.wheel_working_radius),
+    )
+    for gear, x, pitch in gears:
+        radii = {"bore": 0.5 * gear.bore_diameter, "pitch": pitch, "base": gear.base_radius, "tip": gear.tip_radius}
+        found += [(kind, 1e3 * x, 1e3 * radius) for kind, radius in radii.items()]
+    return found
+
+
+def _rectangle(x: float, y: float, half: float) -> Any:
+    from matplotlib.patches import Rectangle
+
+    return Rectangle((x - half, y - half), 2 * half, 2 * half, fill=False, edgecolor="#374151", linewidth=0.9)

@@ -1,0 +1,137 @@
+"""Pictures of a stiffness curve, and of the pressures along the flanks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..gear.derived import iso_values
+from ..gear.drawing import single_pair_stretches
+from ..gear.pair import GearPair
+from ..stiffness.contact_pressure import FlankPressure
+from ..stiffness.curve import StiffnessCurve
+from ..stiffness.job import StiffnessJob
+from ..stiffness.periodic import fold
+from ..stiffness.report import cycle_statistics
+from ..typing import Array, IntArray
+from .style import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save, tidy
+
+#: Positions in the picture of the pressures at most.
+MOST_LINES = 12
+
+
+def stiffness_figure(path: str | Path, job: StiffnessJob, curve: StiffnessCurve) -> None:
+    """Stiffness along the line of action and load sharing against the pinion angle, two mesh cycles from angle 0."""
+    table, pair, cycle = job.table, job.pair, curve.mesh_cycle
+    folded, first = np.unique(np.round(fold(curve.pinion_angle, cycle), 12), return_index=True)
+    angles = np.concatenate([folded, folded + cycle, [2 * cycle] if len(folded) and folded[0] == 0 else []])
+    pick = np.concatenate([first, first, first[:1] if len(angles) % 2 else []]).astype(int)
+    solved, line = curve.k_mesh[pick], (angles, curve.k_mesh[pick])
+    with suppress(InputError):  # positions that do not cover the cycle are joined by straight lines
+        fine = np.linspace(0.0, 2 * cycle, 1201)
+        line = fine, curve.interpolant(method=table.interpolation)(fine).value
+    shares = _shares(curve, angles, pick)
+    figure = new_figure(9.0, 6.2 if shares else 4.4)
+    grid = figure.add_gridspec(2, 1, height_ratios=(2.6, 1.0)) if shares else figure.add_gridspec(1, 1)
+    axes = figure.add_subplot(grid[0])
+    tidy(axes)
+    for number, ends in enumerate(np.degrees(single_pair_stretches(pair, 0.0, 2 * cycle))):
+        axes.axvspan(*ends, color="#f3f4f6", zorder=0, label=None if number else "single-pair contact (rigid)")
+    low, high = 1e-6 * np.nanmin(solved, initial=np.inf), 1e-6 * np.nanmax(solved, initial=-np.inf)
+    for (label, level), dashes in zip(_levels(job, curve).items(), ((6, 3), (2, 2), (6, 2, 2, 2)), strict=False):
+        if low - (high - low) <= level <= high + (high - low):
+            axes.axhline(level, color=GREY, linewidth=1.1, dashes=dashes, label=f"{label}: {level:.4g}")
+        else:
+            axes.plot([], [], " ", label=f"{label}: {level:.4g} (off the scale)")
+    axes.plot(np.degrees(line[0]), 1e-6 * line[1], color=BLUE, linewidth=2.0, label="k, interpolated")
+    look = {"markersize": 4.5, "markerfacecolor": "white"}
+    axes.plot(np.degrees(angles), 1e-6 * solved, "o", color=BLUE, label="solved positions", **look)
+    failed = np.degrees(angles[curve.failed[pick]])
+    if len(failed):
+        bottom = axes.get_ylim()[0]
+        axes.plot(failed, np.full(len(failed), bottom), "x", color=RED, clip_on=False, label="failed positions")
+    axes.set_ylabel("mesh stiffness k  (N/µm)")
+    load = f"twist {table.twist_deg:g}°" if table.twist_deg is not None else f"wheel torque {table.torque_Nm:g} N m"
+    teeth = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}"
+    axes.set_title(f"{teeth}, {load}, plane {table.plane}, law {table.law}", fontsize=11, loc="left")
+    axes.set_xlim(*np.degrees(line[0][[0, -1]]))
+    axes.margins(y=0.12)
+    figure.legend(fontsize=8.5, loc="outside lower center", ncols=3, frameon=False)
+    if shares:
+        lower = figure.add_subplot(grid[1], sharex=axes)
+        tidy(lower)
+        axes.tick_params(labelbottom=False)
+        for number, (angle, share) in enumerate(shares):
+            color = (BLUE, ORANGE, GREEN)[number % 3]
+            lower.plot(angle, share, ".-", color=color, linewidth=1.4, markersize=4)
+        lower.set_ylim(-0.03, 1.06)
+        lower.set_ylabel("load share (–)")
+        axes = lower
+    axes.set_xlabel("pinion angle (deg)")
+    save(figure, path)
+
+
+def _levels(job: StiffnessJob, curve: StiffnessCurve) -> dict[str, float]:
+    """Horizontal lines to compare with: label -> stiffness (N/um)."""
+    moduli = [material.youngs_modulus for material in job.materials]
+    found = {r"ISO 6336 $c_\gamma b$": 1e-6 * iso_values(job.pair, moduli[0], moduli[1])["c_gamma_times_width_N_per_m"]}
+    level = cycle_statistics(curve, job.table.interpolation)
+    return found if level is None else {"mean over the cycle": 1e-6 * level["mean_N_per_m"], **found}
+
+
+def _shares(curve: StiffnessCurve, angles: Array, pick: IntArray) -> list[tuple[Array, Array]]:
+    """For each tooth pair its share of the load against the pinion angle (deg), along its whole way through contact."""
+    moved = np.round((angles - curve.pinion_angle[pick]) / curve.mesh_cycle)
+    leading = curve.leading_pair[pick] - moved
+    columns = np.arange(curve.load_share.shape[1])
+    number = leading[:, None] - columns
+    share = curve.load_share[pick]
+    found = []
+    for pair in np.unique(number[(share > 0) & np.isfinite(number)])[::-1]:
+        mine = np.where(number == pair, share, 0.0).sum(axis=1)
+        mine[~np.isfinite(leading)] = np.nan
+        carries = np.flatnonzero(mine > 0)
+        stretch = slice(max(0, carries[0] - 1), carries[-1] + 2)
+        found.append((np.degrees(angles[stretch]), mine[stretch]))
+    return found
+
+
+def pressure_figure(path: str | Path, pair: GearPair, pressures: Sequence[tuple[float, list[FlankPressure]]]) -> None:
+    """Pressure against the diameter, one line per loaded flank, coloured by the pinion angle.
+
+    Parameters
+    ----------
+    pressures
+        For each position its pinion angle (deg) and the pressures along its flanks.
+    """
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    pick = np.unique(np.linspace(0, len(pressures) - 1, min(len(pressures), MOST_LINES)).round().astype(int))
+    lines = [(pressures[i][0], flank) for i in pick for flank in pressures[i][1] if len(flank.shown)]
+    angles = [angle for angle, _ in lines] or [0.0]
+    norm = Normalize(min(angles), max(*angles, min(angles) + 1e-6))
+    colors = colormaps["viridis"]
+    figure = new_figure(10.5, 4.2)
+    both: Any = figure.subplots(1, 2, sharey=True)
+    for axes, name in zip(both, ("pinion", "wheel"), strict=True):
+        tidy(axes)
+        axes.set_title(name, loc="left", fontsize=10)
+        axes.set_xlabel("diameter (mm)")
+    for angle, flank in lines:
+        k = flank.shown
+        color = colors(0.95 * norm(angle))
+        both[flank.gear].plot(2e3 * flank.radius[k], 1e-6 * flank.pressure[k], linewidth=1.5, color=color)
+    both[0].set_ylim(bottom=0.0)  # shared, and only now that both are drawn
+    both[0].set_ylabel("contact pressure (MPa)")
+    title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, pressure along the flanks"
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    bar = figure.colorbar(ScalarMappable(norm, colors), ax=list(both), pad=0.015, aspect=30)
+    bar.set_label("pinion angle (deg)")
+    save(figure, path, dpi=120)
