@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import sys
 import time
 from contextlib import ExitStack
@@ -91,10 +92,17 @@ def _cluster(address: str, stack: ExitStack) -> dict[str, Any]:
     except (OSError, ValueError, TimeoutError) as error:
         problem = f"does not answer ({type(error).__name__})"
         raise InputError("--dask", address, problem, "is the scheduler running there?") from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # `check` tells of a lost connection
     workers = sum(client.nthreads().values())
     if not workers:
         raise InputError("--dask", address, "has no workers", "start some: dask worker ADDRESS")
-    return {"executor": client.get_executor(pure=False), "workers": workers}
+
+    def check() -> None:
+        if client.status != "running":
+            problem = f"does not answer any more ({client.status})"
+            raise InputError("--dask", address, problem, "rows are kept: start it anew and give the same command")
+
+    return {"executor": client.get_executor(pure=False), "workers": workers, "check": check}
 
 
 def _write_case(study: Any, number: int, path: Path) -> int:

@@ -6,6 +6,8 @@ left behind. Geometry is built in millimetres, because gmsh's CAD kernel has an 
 
 from __future__ import annotations
 
+import ctypes
+import signal
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -42,6 +44,26 @@ def import_gmsh() -> ModuleType:
 
 
 @contextmanager
+def _pipes_as_before() -> Iterator[None]:
+    """Keep what SIGPIPE does: gmsh sets it so that a pipe whose other end went away ends the program.
+
+    Python makes an error of such a pipe, by which a pool of processes learns that one of them died. `signal.signal`
+    would do in the main thread only.
+    """
+    if not hasattr(signal, "SIGPIPE"):
+        yield
+        return
+    get, set_ = ctypes.pythonapi.PyOS_getsig, ctypes.pythonapi.PyOS_setsig
+    get.restype = set_.restype = ctypes.c_void_p
+    get.argtypes, set_.argtypes = [ctypes.c_int], [ctypes.c_int, ctypes.c_void_p]
+    before = get(signal.SIGPIPE)
+    try:
+        yield
+    finally:
+        set_(signal.SIGPIPE, before)
+
+
+@contextmanager
 def gmsh_session(
     name: str = "gearfe", *, threads: int = 1, options: Mapping[str, float] | None = None
 ) -> Iterator[Any]:
@@ -68,7 +90,8 @@ def gmsh_session(
     with _LOCK:
         ours = not gmsh.isInitialized()
         if ours:
-            gmsh.initialize(interruptible=False, readConfigFiles=False)
+            with _pipes_as_before():
+                gmsh.initialize(interruptible=False, readConfigFiles=False)
         wanted = {
             "General.Terminal": 0.0,
             "General.Verbosity": 1.0,

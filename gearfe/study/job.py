@@ -109,10 +109,11 @@ def _rows(
     jobs: int | None,
     executor: Executor | None,
     workers: int | None,
+    check: Callable[[], None] | None = None,
 ) -> Iterator[list[Row]]:
     """Rows of the cases from where they are to run."""
     if executor is not None:
-        return side_by_side(task, cases, workers or getattr(executor, "_max_workers", None) or 4, executor)
+        return side_by_side(task, cases, workers or getattr(executor, "_max_workers", None) or 4, executor, check)
     many = min(jobs or os.cpu_count() or 1, max(1, len(cases)))
     return serially(task, cases) if many == 1 else side_by_side(task, cases, many)
 
@@ -159,6 +160,7 @@ def run_study(
     jobs: int | None = None,
     executor: Executor | None = None,
     workers: int | None = None,
+    check: Callable[[], None] | None = None,
     restart: bool = False,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> StudyResult:
@@ -174,6 +176,8 @@ def run_study(
         Where cases run instead: any of `concurrent.futures`, or a cluster's.
     workers
         How many cases the executor runs side by side; None: as many as it tells, else 4.
+    check
+        Called now and then while the executor works; raises when that will not answer any more.
     restart
         Begin anew, whatever the folder holds.
     progress
@@ -195,7 +199,7 @@ def run_study(
     bad, first = 0, ""
     missing = [n for n in _order(study) if n not in journal.done]
     cases = [(n, study.cases[n]) for n in missing]
-    for group in _rows(study.task, cases, jobs, executor, workers):
+    for group in _rows(study.task, cases, jobs, executor, workers, check):
         journal.append(group, study.cases)
         if progress is not None:
             progress(len(journal.done), len(study.cases), "cases")

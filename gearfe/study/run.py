@@ -12,7 +12,7 @@ import os
 import signal
 import threading
 from collections import Counter, deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from multiprocessing import connection, get_context, parent_process
 from typing import Any
@@ -24,8 +24,8 @@ from .case import DIED, HERE, Row, Task, solve_case, solve_group
 GROUP_SECONDS, WAITING = 0.5, 2
 #: How often cases run again after the worker that had them died.
 AGAIN = 2
-#: Cases of a group at most.
-LARGEST = 1000
+#: Cases of a group at most, and seconds between two looks whether an executor still answers.
+LARGEST, LOOK_SECONDS = 1000, 1.0
 
 #: (number, values)
 Case = tuple[int, tuple[Any, ...]]
@@ -39,7 +39,11 @@ def serially(task: Task, cases: Iterable[Case]) -> Iterator[list[Row]]:
 
 
 def side_by_side(
-    task: Task, cases: Iterable[Case], workers: int, executor: Executor | None = None
+    task: Task,
+    cases: Iterable[Case],
+    workers: int,
+    executor: Executor | None = None,
+    check: Callable[[], None] | None = None,
 ) -> Iterator[list[Row]]:
     """Rows in the order in which they come.
 
@@ -49,6 +53,8 @@ def side_by_side(
         How many processes there are.
     executor
         Where the cases run; it stays open. None: on processes of our own, and one that dies is replaced.
+    check
+        Called now and then while cases run; raises when the executor will not answer any more.
     """
     pool = executor or _processes(workers)
     ahead = iter(cases)
@@ -71,7 +77,11 @@ def side_by_side(
                     break
             if not (running or lost):
                 return
-            for future in wait(running, return_when=FIRST_COMPLETED).done if running else ():
+            look = None if check is None else LOOK_SECONDS
+            ended = wait(running, look, FIRST_COMPLETED).done if running else ()
+            if check is not None:
+                check()
+            for future in ended:
                 group = running.pop(future)
                 try:
                     rows = future.result()
