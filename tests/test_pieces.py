@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gearfe.figures.spectra import largest_lines
 from gearfe.record_spectrum import finer
 from gearfe.rigid import smoothed_step
 from gearfe.stopwatch import Stopwatch
@@ -19,7 +20,6 @@ from gearfe.train.response import SAMPLED, joined
 from gearfe.train.simulate import simulate_in_pieces
 from gearfe.vibration.files import OutputChoice, write_all, write_run
 from gearfe.vibration.follow import Envelope, RunningMean
-from gearfe.vibration.pictures import _largest
 
 from .train_responses import made_up, table
 from .trains import TORQUE, curve, train
@@ -86,8 +86,8 @@ def test_the_files_of_pieces(model, tmp_path, small_pieces):
     pieces = list(simulate_in_pieces(model, times))
     for folder in ("one", "two"):
         (tmp_path / folder).mkdir()
-    options = {"title": "", "watch": Stopwatch(), "every": every}
-    choice = OutputChoice(pictures=False)
+    options = {"watch": Stopwatch(), "every": every}
+    choice = OutputChoice()
     one = write_run(tmp_path / "one", model.scene, lambda _: pieces, outputs, choice, **options)
     two = write_all(tmp_path / "two", model.scene, joined(pieces), choice, **options)
     assert one.names == two.names == ("response.csv", "spectrum.csv", "summary.json")
@@ -113,8 +113,8 @@ def test_a_long_run_needs_the_memory_of_a_piece(model, tmp_path, small_pieces):
 
         gc.collect()
         tracemalloc.start()
-        options = {"title": "", "watch": Stopwatch(), "every": every}
-        write_run(tmp_path, model.scene, pieces, outputs, OutputChoice(pictures=False), **options)
+        options = {"watch": Stopwatch(), "every": every}
+        write_run(tmp_path, model.scene, pieces, outputs, OutputChoice(), **options)
         most = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return most
@@ -135,8 +135,8 @@ def test_a_run_that_ends_early_is_made_again(tmp_path, model):
         status = "diverged" if len(times) > 121 else "done"
         return [replace(whole.at(np.arange(121)), status=status, time_reached=float(whole.time[120]))]
 
-    options = {"title": "", "watch": Stopwatch()}
-    choice = OutputChoice(pictures=False, spectrum_start=6e-3)
+    options = {"watch": Stopwatch()}
+    choice = OutputChoice(spectrum_start=6e-3)
     written = write_run(tmp_path, model.scene, pieces, whole.time, choice, **options)
     assert asked == [201, 121]
     assert written.response.status == "diverged"
@@ -178,11 +178,11 @@ def test_the_largest_of_many_lines():
     value = np.abs(np.random.default_rng(3).standard_normal(50_001))
     value[[7, 12_345, 40_000]] = 50.0, 60.0, 70.0
     frequency = 1e-3 * np.arange(50_001)
-    shown, height = _largest(frequency, value, 45.0)
+    shown, height = largest_lines(frequency, value, 45.0)
     assert len(shown) <= 2001
     assert height[0] == value[0]
     tall = shown[1:][height[1:] > 10.0]
     assert tall == pytest.approx([0.007, 12.345, 40.0], abs=0.5 * 45.0 / 1999)
     assert np.diff(shown).min() > 0.0
-    few = _largest(frequency[:101], value[:101], 1.0)
+    few = largest_lines(frequency[:101], value[:101], 1.0)
     assert (few[1] == value[:101]).all()

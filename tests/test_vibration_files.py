@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError, NotFiniteWarning
+from gearfe.figures.train import TrainPictures
 from gearfe.figures.train_scene import draw_scene, sharp_edges
 from gearfe.housing import Attachment, Housing
 from gearfe.stopwatch import Stopwatch
@@ -62,7 +63,7 @@ def scene():
 
 def test_columns_and_digits(tmp_path, scene):
     response = made_up()
-    written = write_all(tmp_path, scene, response, OutputChoice(), title="made up", watch=Stopwatch())
+    written = write_all(tmp_path, scene, response, OutputChoice(), draw=TrainPictures("made up"), watch=Stopwatch())
     names, values = table(tmp_path / "response.csv")
     assert names[: len(COLUMNS)] == COLUMNS
     assert values.shape == (COUNT, len(names))
@@ -85,11 +86,11 @@ def test_a_response_with_numbers_that_are_none_is_told(tmp_path, scene):
     made = made_up()
     made.drive_angle[7] = math.nan
     with pytest.warns(NotFiniteWarning, match=r"response.csv: column drive_angle_deg: 1 of .* the first in row 8"):
-        write_all(tmp_path, scene, made, OutputChoice(pictures=False), title="", watch=Stopwatch())
+        write_all(tmp_path, scene, made, OutputChoice(), watch=Stopwatch())
 
 
 def test_spectrum_of_known_lines(tmp_path, scene):
-    write_all(tmp_path, scene, made_up(), OutputChoice(pictures=False), title="", watch=Stopwatch())
+    write_all(tmp_path, scene, made_up(), OutputChoice(), watch=Stopwatch())
     names, values = table(tmp_path / "spectrum.csv")
     by_name = dict(zip(names, values.T, strict=True))
     assert by_name["frequency_Hz"] == pytest.approx(np.arange(101) / 7e-3, rel=1e-13)
@@ -107,7 +108,7 @@ def test_spectrum_of_known_lines(tmp_path, scene):
 
 
 def test_summary_of_a_known_response(tmp_path, scene):
-    write_all(tmp_path, scene, made_up(), OutputChoice(pictures=False), title="", watch=Stopwatch())
+    write_all(tmp_path, scene, made_up(), OutputChoice(), watch=Stopwatch())
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["mean_over_common_periods"] == 3
     # bins 13 and 9 of 7 ms leave a known rest over 3 periods of 1.5708 ms at the end
@@ -168,7 +169,7 @@ def test_a_run_that_ended_early_is_written(tmp_path, scene):
     }
     response = made_up(**short, status="diverged", time_reached=39 * STEP)
     choice = OutputChoice(spectrum_start=5e-3)  # beyond what was reached
-    written = write_all(tmp_path, scene, response, choice, title="", watch=Stopwatch())
+    written = write_all(tmp_path, scene, response, choice, watch=Stopwatch())
     assert {"response.csv", "spectrum.csv", "summary.json"} <= set(written.names)
     assert len(table(tmp_path / "response.csv")[1]) == 40
     summary = json.loads((tmp_path / "summary.json").read_text())

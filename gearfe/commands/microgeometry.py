@@ -50,8 +50,6 @@ def run(args: argparse.Namespace) -> int:
     from ..microgeometry.job import checked_model, law_remarks
     from ..microgeometry.report import (
         cell_table,
-        figure_arguments,
-        flank_figure_arguments,
         order_table,
         pair_table,
         summary,
@@ -100,8 +98,8 @@ def run(args: argparse.Namespace) -> int:
             from ..figures.microgeometry import flank_figure, microgeometry_figure
 
             with watch.stage("pictures"):
-                flank_figure(place / "microgeometry_flanks.png", **flank_figure_arguments(table, pair, beside))
-                microgeometry_figure(place / "microgeometry.png", **figure_arguments(job, made))
+                flank_figure(place / "microgeometry_flanks.png", table, pair, beside)
+                microgeometry_figure(place / "microgeometry.png", made)
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "microgeometry.json", summary(job, table, made, deviations, watch.seconds))
         names = sorted(path.name for path in place.iterdir())

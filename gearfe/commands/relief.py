@@ -53,7 +53,6 @@ def run(args: argparse.Namespace) -> int:
     from ..microgeometry.relief import optimise_relief
     from ..microgeometry.relief_job import (
         comparison,
-        figure_arguments,
         map_table,
         named,
         relief_problem,
@@ -107,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
             from ..figures.microgeometry import relief_figure
 
             with watch.stage("picture"):
-                relief_figure(place / "relief.png", **figure_arguments(table, made, compared))
+                relief_figure(place / "relief.png", table, made, compared)
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "relief.json", summary(job, base, table, made, errors, watch.seconds))
         names = sorted(path.name for path in place.iterdir())

@@ -48,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
 
     import numpy as np
 
+    from ..figures.runup import RunUpPictures
     from ..output.files import output_folder
     from ..rigid import constant
     from ..runup.files import write_runup
@@ -90,8 +91,9 @@ def run(args: argparse.Namespace) -> int:
     parts += [f"load {x.torque_Nm:g} N m on {x.shaft}".replace("-", "−", 1) for x in job.table.loads[:1]]
     parts += [f"variant {job.table.variant}"] if job.table.variant else []
     summary, names = write_runup(
-        folder, made, multiples=table.multiples, title=", ".join(parts), attachment=args.attachment,
-        draw=not args.no_pictures, watch=watch, further=further, unstable=unstable,
+        folder, made, multiples=table.multiples, attachment=args.attachment,
+        draw=None if args.no_pictures else RunUpPictures(", ".join(parts)), watch=watch, further=further,
+        unstable=unstable,
     )  # fmt: skip
     for line in _told(summary):
         print(line)

@@ -59,11 +59,11 @@ def run(args: argparse.Namespace) -> int:
         summary = made.summary()
     with whole_set(folder, ("study*.png",)) as place:
         if not args.no_pictures:
-            from ..study.pictures import write_figures
+            from ..figures.study import study_figures
 
             with watch.stage("pictures"):
                 title = f"{Path(args.study).stem}: {len(made.done)} cases of a {study.table.job} job"
-                write_figures(place, made, summary, title)
+                study_figures(place, made, summary, title)
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "summary.json", {**summary, "timings_s": dict(watch.seconds)})
         names = sorted(["study.csv", "study.json", *(path.name for path in place.iterdir())])

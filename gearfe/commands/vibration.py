@@ -63,6 +63,7 @@ def run(args: argparse.Namespace) -> int:
     if args.spectrum_ms is not None:
         check_range(args.spectrum_ms, "--spectrum-ms", {"above": 0.0, "doc": "duration of the record (ms)"})
 
+    from ..figures.train import TrainPictures
     from ..output.files import output_folder
     from ..stopwatch import Stopwatch
     from ..vibration.files import OutputChoice, check_choice, write_run
@@ -73,7 +74,6 @@ def run(args: argparse.Namespace) -> int:
     with watch.stage("reading"):
         job = train_job(args.job, tables)
         choice = OutputChoice(
-            pictures=not args.no_pictures,
             fields=args.fields,
             animation=not args.no_animation,
             attachment=args.attachment,
@@ -94,8 +94,8 @@ def run(args: argparse.Namespace) -> int:
         pieces,
         job.times,
         choice,
-        title=title(job),
         watch=watch,
+        draw=None if args.no_pictures else TrainPictures(title(job)),
         every=every,
         further=described(job, scene),
         progress=count,
@@ -128,7 +128,7 @@ def title(job: TrainJob) -> str:
 def told(response: TrainResponse, scene: TrainScene, written: Written, choice: OutputChoice) -> list[str]:
     """Lines for the terminal."""
     from ..vibration.errors import with_error
-    from ..vibration.pictures import attachment_to_draw
+    from ..vibration.report import attachment_to_draw
 
     summary = written.summary
     stiffness = summary["mesh_stiffness_N_per_m"]

@@ -2,101 +2,121 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from ..gear import pitch_errors
+from ..gear.deviation_job import GEARS, active_rolls, flank_deviations
+from ..gear.pair import GearPair
+from ..microgeometry.loaded_mesh import LoadedMesh
+from ..microgeometry.relief import ReliefResult
+from ..microgeometry.relief_job import in_units, names_of
+from ..tables.microgeometry import VARIABLES, MicrogeometryTable, ReliefTable
 from ..typing import Array
-from .style import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save, tidy
+from .style import BLUE, GREY, ORANGE, RED, new_figure, save, tidy
 
 #: Lines of a panel; of more torques or profiles, so many are drawn.
 MOST_LINES = 24
 
 
-def flank_figure(path: str | Path, *, charts: Sequence[Mapping[str, Any]], band_label: str | None) -> None:
-    """K-charts: deviation over roll length of both flanks of both gears, and their index deviations.
+@dataclass(frozen=True)
+class _Chart:
+    """Deviations of the flanks of one side of a gear.
 
-    Parameters
+    Attributes
     ----------
-    charts
-        Of each flank: title, roll (mm), lines (um, one array a profile), band (um, half its width, or None), active
-        (ends of the path of contact, mm), pitch (index deviations, um, or None).
-    band_label
-        What the band is.
+    roll, active
+        Roll lengths, and ends of the path of contact (mm).
+    lines
+        Deviations (um), one array a profile.
+    band
+        Half the width of the tolerance (um), where there is one.
+    pitch
+        Index deviations (um), where teeth differ.
     """
-    pitch = any(chart["pitch"] is not None for chart in charts)
+
+    title: str
+    roll: Array
+    active: tuple[float, ...]
+    lines: list[Array]
+    band: Array | None
+    pitch: Array | None
+
+
+def _chart(table: MicrogeometryTable, pair: GearPair, g: int, side: str, folder: Path) -> _Chart:
+    name, gear, active = GEARS[g], (pair.pinion, pair.wheel)[g], active_rolls(pair)[g]
+    ends = gear.form_roll, gear.profile.tip_roll
+    roll = np.unique(np.concatenate([np.linspace(*ends, 400), active]))
+    of = getattr(table, name).flank(side)
+    own = flank_deviations(of, gear, active, f"microgeometry.{name}", folder, wheel=g == 1)
+    index, band = 1e6 * np.array(own.turn) * gear.reference_radius, None
+    if table.tolerance_class is not None:
+        allowed = pitch_errors.tolerances(gear, table.tolerance_class)
+        band = 1e6 * (0.5 * allowed.form + allowed.slope * ((roll - ends[0]) / (ends[1] - ends[0])))
+    return _Chart(
+        title=f"{name}, {side} flanks{', driving' if side == table.flank else ''}",
+        roll=1e3 * roll,
+        active=tuple(1e3 * s for s in active),
+        lines=[np.zeros(len(roll)) if one is None else 1e6 * one.at(roll)[0] for one in own.profiles],
+        band=band,
+        pitch=index if len(index) > 1 else None,
+    )
+
+
+def flank_figure(path: str | Path, table: MicrogeometryTable, pair: GearPair, folder: Path) -> None:
+    """K-charts: deviation over roll length of both flanks of both gears, and their index deviations."""
+    charts = [_chart(table, pair, g, side, folder) for g in (0, 1) for side in ("left", "right")]
+    pitch = any(chart.pitch is not None for chart in charts)
     figure = new_figure(11.0, 7.6 if pitch else 5.0)
     grid = figure.subplots(2 if pitch else 1, len(charts), squeeze=False, height_ratios=(2.2, 1) if pitch else None)
     for column, chart in enumerate(charts):
         axes = grid[0][column]
         tidy(axes)
-        lines = chart["lines"]
-        if chart["band"] is not None:
+        lines = chart.lines
+        if chart.band is not None:
             middle = np.mean(lines, axis=0)
-            edges = (middle - chart["band"], middle + chart["band"])
-            axes.fill_betweenx(chart["roll"], *edges, color="#e5e7eb")
+            edges = (middle - chart.band, middle + chart.band)
+            axes.fill_betweenx(chart.roll, *edges, color="#e5e7eb")
         for i in np.unique(np.linspace(0, len(lines) - 1, min(len(lines), MOST_LINES)).round().astype(int)):
-            axes.plot(lines[i], chart["roll"], color=BLUE, linewidth=1.4 if len(lines) == 1 else 0.7)
-        for end in chart["active"]:
+            axes.plot(lines[i], chart.roll, color=BLUE, linewidth=1.4 if len(lines) == 1 else 0.7)
+        for end in chart.active:
             axes.axhline(end, color=GREY, linewidth=0.9, linestyle=(0, (4, 3)))
-        axes.set_title(chart["title"], loc="left", fontsize=9.5)
+        axes.set_title(chart.title, loc="left", fontsize=9.5)
         axes.set_xlabel("deviation (µm), + material", fontsize=9)
         if column == 0:
             axes.set_ylabel("roll length (mm)", fontsize=9)
         if pitch:
             below = grid[1][column]
             tidy(below)
-            if chart["pitch"] is None:
+            if chart.pitch is None:
                 below.set_visible(False)
                 continue
-            below.bar(np.arange(len(chart["pitch"])), chart["pitch"], color=ORANGE, width=0.7)
+            below.bar(np.arange(len(chart.pitch)), chart.pitch, color=ORANGE, width=0.7)
             below.set_xlabel("tooth", fontsize=9)
             if column == 0:
                 below.set_ylabel("index deviation (µm)", fontsize=9)
-    grey = "" if band_label is None else f"; grey: {band_label}"
+    allowed = f"; grey: profile tolerances, ISO 1328-1 class {table.tolerance_class}"
+    grey = "" if table.tolerance_class is None else allowed
     title = "Deviations of the flanks; dashed: ends of the path of contact" + grey
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
     save(figure, path, dpi=110)
 
 
-def microgeometry_figure(
-    path: str | Path,
-    *,
-    title: str,
-    cycles: Array,
-    torque: Array,
-    error: Array,
-    error_unloaded: Array,
-    path_loads: tuple[Array, Array, Array, Array, Array],
-    order: Array,
-    spectrum: Array,
-    spectrum_unloaded: Array,
-    mesh_order: int,
-) -> None:
-    """Harris map, peak-to-peak error, pressure and load share along the path, and the orders of the error.
-
-    Parameters
-    ----------
-    cycles : ndarray, shape (n,)
-        Pinion angle in mesh cycles.
-    torque : ndarray, shape (m,)
-        N m.
-    error, error_unloaded : ndarray, shape (m, n), (n,)
-        Transmission error (um).
-    path_loads
-        Of all loaded tooth pairs: number of the torque, roll length of the pinion (mm), pressure (MPa), whether an edge
-        bears, load share (-).
-    order, spectrum, spectrum_unloaded : ndarray, shape (k,)
-        Orders of the pinion's turn, and amplitudes (um) at the largest torque and unloaded.
-    mesh_order
-        Order of the mesh.
-    """
+def microgeometry_figure(path: str | Path, made: LoadedMesh) -> None:
+    """Harris map, peak-to-peak error, pressure and load share along the path, and the orders of the error."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
+    pair, own, torque = made.pair, made.pairs, made.torque
+    cycles, mesh_order = made.pinion_angle / pair.mesh_cycle, pair.pinion.teeth
+    error, error_unloaded = 1e6 * made.transmission_error, 1e6 * made.transmission_error_unloaded
+    order, free = made.spectrum(unloaded=True)
+    spectrum, spectrum_unloaded = 1e6 * made.spectrum()[1][-1], 1e6 * free
+    roll, stress, edge = 1e3 * own.roll[:, 0], 1e-6 * own.pressure, own.mark != ""
     figure = new_figure(12.0, 7.4)
     grid = figure.add_gridspec(2, 3, width_ratios=(1.5, 1, 1.3))
     places = (grid[0, 0], grid[0, 1], grid[:, 2], grid[1, 0], grid[1, 1])
@@ -104,16 +124,15 @@ def microgeometry_figure(
     norm = Normalize(float(torque[0]), float(torque[-1] if len(torque) > 1 else 1.01 * torque[0]))
     colors = colormaps["viridis"]
     shown = np.unique(np.linspace(0, len(torque) - 1, min(len(torque), MOST_LINES)).round().astype(int))
-    number, roll, stress, edge, part = path_loads
     tidy(harris)
     marker = "." if len(cycles) < 60 else ""
     harris.plot(cycles, error_unloaded, color=RED, linewidth=1.2, marker=marker, markersize=3, label="unloaded")
     for i in shown:
         color = colors(0.95 * norm(torque[i]))
         harris.plot(cycles, error[i], color=color, linewidth=1.1, marker=marker, markersize=3)
-        rows = np.flatnonzero(number == i)
+        rows = np.flatnonzero(own.torque == i)
         rows = rows[np.argsort(roll[rows])]
-        share.plot(roll[rows], part[rows], ".", markersize=2.5, color=color)
+        share.plot(roll[rows], own.share[rows], ".", markersize=2.5, color=color)
         smooth, sharp = rows[~edge[rows]], rows[edge[rows]]
         pressure.plot(roll[smooth], stress[smooth], ".", markersize=2.5, color=color)
         pressure.plot(roll[sharp], stress[sharp], "x", markersize=4, color=color)
@@ -144,64 +163,50 @@ def microgeometry_figure(
         axes.tick_params(labelsize=8.5)
     bar = figure.colorbar(ScalarMappable(norm, colors), ax=pressure, shrink=0.95, aspect=25, pad=0.02)
     bar.set_label("torque at the wheel (N m)")
+    title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, {made.mesh_cycles} mesh cycles"
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
     save(figure, path, dpi=110)
 
 
-def relief_figure(
-    path: str | Path,
-    *,
-    names: Sequence[str],
-    axes_values: Sequence[Array],
-    objective: Array,
-    best: Sequence[float],
-    torque: Array,
-    peak_to_peak: Mapping[str, Array],
-    value: float,
-    sensitivity: Mapping[str, tuple[float, float]],
-) -> None:
+def relief_figure(path: str | Path, table: ReliefTable, made: ReliefResult, compared: Mapping[str, Array]) -> None:
     """Map of the objective over one or two variables, error against torque of the best one, and its sensitivity.
 
     Parameters
     ----------
-    names
-        Of the variables, with units.
-    axes_values, objective
-        Values of the first one or two variables, and the objective over them.
-    best
-        Values of the best.
-    torque, peak_to_peak
-        Torques (N m), and label -> peak-to-peak error (um) there.
-    value, sensitivity
-        Objective of the best, and variable -> objective at its low and high tolerance.
+    compared
+        Of `gearfe.microgeometry.relief_job.comparison`.
     """
+    names, best, value = names_of(table), in_units(table, made.x), made.best.value
+    places = [axis / VARIABLES[one.key][1] for axis, one in zip(made.axes, table.variables, strict=False)]
+    objective = np.where(np.isfinite(made.map), made.map, np.nan)
     figure = new_figure(12.0, 4.2)
     first, second, third = figure.subplots(1, 3, width_ratios=(1.3, 1.1, 1))
-    if len(axes_values) == 2:
-        filled = first.contourf(axes_values[0], axes_values[1], objective.T, levels=20, cmap="viridis")
+    if len(places) == 2:
+        filled = first.contourf(places[0], places[1], objective.T, levels=20, cmap="viridis")
         figure.colorbar(filled, ax=first, shrink=0.9)
         first.plot(best[0], best[1], "o", color="white", markeredgecolor="black")
         first.set_ylabel(names[1], fontsize=9)
     else:
         tidy(first)
-        first.plot(axes_values[0], objective, ".-", color=BLUE)
+        first.plot(places[0], objective, ".-", color=BLUE)
         first.axvline(best[0], color=GREY, linewidth=1)
     first.set_xlabel(names[0], fontsize=9)
     first.set_title("objective", loc="left", fontsize=9.5)
     tidy(second)
-    for (label, values), color in zip(peak_to_peak.items(), (GREY, BLUE, GREEN), strict=False):
-        second.plot(torque, values, "o-", markersize=3, color=color, label=label)
+    for label, color in (("without", GREY), ("best", BLUE)):
+        values = compared[f"peak_to_peak_{label}_um"]
+        second.plot(compared["torque_Nm"], values, "o-", markersize=3, color=color, label=label)
     second.set_ylim(bottom=0)
     second.legend(fontsize=8, frameon=False)
     second.set_xlabel("torque at the wheel (N m)", fontsize=9)
     second.set_title("transmission error, peak to peak (µm)", loc="left", fontsize=9.5)
     tidy(third)
-    for i, (low, high) in enumerate(sensitivity.values()):
+    for i, (low, high) in enumerate(zip(made.low, made.high, strict=True)):
         third.plot([value, low], [i - 0.06, i - 0.06], "-", color=ORANGE, linewidth=5, label="-" if i == 0 else None)
         third.plot([value, high], [i + 0.06, i + 0.06], "-", color=BLUE, linewidth=5, label="+" if i == 0 else None)
     third.axvline(value, color=GREY, linewidth=1)
-    third.set_ylim(-0.6, len(sensitivity) - 0.4)
+    third.set_ylim(-0.6, len(names) - 0.4)
     third.legend(fontsize=8, frameon=False)
-    third.set_yticks(range(len(sensitivity)), [name.replace(" ", "\n", 1) for name in sensitivity], fontsize=8)
+    third.set_yticks(range(len(names)), [name.replace(" ", "\n", 1) for name in names], fontsize=8)
     third.set_title("objective within tolerances", loc="left", fontsize=9.5)
     save(figure, path, dpi=110)

@@ -1,4 +1,4 @@
-"""From the [relief] table of a job file to the search, and from its result to tables, lines and pictures."""
+"""From the [relief] table of a job file to the search, and from its result to tables and lines."""
 
 from __future__ import annotations
 
@@ -186,24 +186,4 @@ def summary(
         },
         "evaluations": made.evaluations,
         "timings_s": dict(timings),
-    }
-
-
-def figure_arguments(table: ReliefTable, made: ReliefResult, compared: Mapping[str, Array]) -> dict[str, Any]:
-    """Arguments of `gearfe.figures.microgeometry.relief_figure`."""
-    names = names_of(table)
-    return {
-        "names": names,
-        "axes_values": [axis / VARIABLES[one.key][1] for axis, one in zip(made.axes, table.variables, strict=False)],
-        "objective": np.where(np.isfinite(made.map), made.map, np.nan),
-        "best": in_units(table, made.x),
-        "torque": compared["torque_Nm"],
-        "peak_to_peak": {
-            "without": compared["peak_to_peak_without_um"],
-            "best": compared["peak_to_peak_best_um"],
-        },
-        "value": made.best.value,
-        "sensitivity": {
-            name: (float(low), float(high)) for name, low, high in zip(names, made.low, made.high, strict=True)
-        },
     }

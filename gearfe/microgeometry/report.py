@@ -1,17 +1,16 @@
-"""What the microgeometry command tells and draws: tables, printed lines, the summary, the arguments of its pictures."""
+"""What the microgeometry command tells: tables, printed lines, the summary."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..gear import pitch_errors
 from ..gear.deviation import ToothDeviations
-from ..gear.deviation_job import GEARS, active_rolls, flank_deviations
+from ..gear.deviation_job import GEARS
 from ..gear.pair import GearPair
 from ..gear.validity import overlaps, told_overlaps
 from ..stiffness.job import StiffnessJob
@@ -187,55 +186,3 @@ def warnings(pair: GearPair, made: LoadedMesh) -> list[str]:
         cure = "rough flanks may not settle; take smoother ones, or other torques"
         said.append(f"{int(made.failed.sum())} positions have no numbers ({told}): {cure}")
     return said
-
-
-def flank_figure_arguments(table: MicrogeometryTable, pair: GearPair, folder: Path) -> dict[str, Any]:
-    """Arguments of `gearfe.figures.microgeometry.flank_figure`: both flanks of both gears."""
-    charts = []
-    for g, name in enumerate(GEARS):
-        gear, active = getattr(pair, name), active_rolls(pair)[g]
-        ends = gear.form_roll, gear.profile.tip_roll
-        roll = np.unique(np.concatenate([np.linspace(*ends, 400), active]))
-        for side in ("left", "right"):
-            own = flank_deviations(
-                getattr(table, name).flank(side), gear, active, f"microgeometry.{name}", folder, wheel=g == 1
-            )
-            lines = [np.zeros(len(roll)) if one is None else 1e6 * one.at(roll)[0] for one in own.profiles]
-            index = 1e6 * np.array(own.turn) * gear.reference_radius
-            driving = ", driving" if side == table.flank else ""
-            band = None
-            if table.tolerance_class is not None:
-                allowed = pitch_errors.tolerances(gear, table.tolerance_class)
-                share = (roll - ends[0]) / (ends[1] - ends[0])
-                band = 1e6 * (0.5 * allowed.form + allowed.slope * share)
-            charts.append(
-                {
-                    "title": f"{name}, {side} flanks{driving}",
-                    "roll": 1e3 * roll,
-                    "lines": lines,
-                    "band": band,
-                    "active": tuple(1e3 * s for s in active),
-                    "pitch": index if len(index) > 1 else None,
-                }
-            )
-    label = None if table.tolerance_class is None else f"profile tolerances, ISO 1328-1 class {table.tolerance_class}"
-    return {"charts": charts, "band_label": label}
-
-
-def figure_arguments(job: StiffnessJob, made: LoadedMesh) -> dict[str, Any]:
-    """Arguments of `gearfe.figures.microgeometry.microgeometry_figure`."""
-    pair, own = job.pair, made.pairs
-    order, free = made.spectrum(unloaded=True)
-    _, loaded = made.spectrum()
-    return {
-        "title": f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, {made.mesh_cycles} mesh cycles",
-        "cycles": made.pinion_angle / pair.mesh_cycle,
-        "torque": made.torque,
-        "error": 1e6 * made.transmission_error,
-        "error_unloaded": 1e6 * made.transmission_error_unloaded,
-        "path_loads": (own.torque, 1e3 * own.roll[:, 0], 1e-6 * own.pressure, own.mark != "", own.share),
-        "order": order,
-        "spectrum": 1e6 * loaded[-1],
-        "spectrum_unloaded": 1e6 * free,
-        "mesh_order": pair.pinion.teeth,
-    }

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..output.arrays import save_arrays
 from ..output.files import whole_set, write_csv, write_json
-from . import pictures, report
+from . import report
 from .instability import InstabilityMap
-from .modes import coupled_modes, crossings
+from .modes import CoupledModes, Crossing, coupled_modes, crossings
 from .run_up import RunUp
 
 #: Speeds of the Campbell diagram.
@@ -25,8 +25,20 @@ FILES = (
 )  # fmt: skip
 
 
+class Pictures(Protocol):
+    """Who draws a run-up: `gearfe.figures.runup.RunUpPictures`. Pictures stand above the results that they draw."""
+
+    def __call__(
+        self, folder: Path, run: RunUp, modes: CoupledModes, met: list[Crossing], multiples: int, bore: int
+    ) -> None:
+        """Draw into a folder."""
+
+    def instability(self, path: Path, made: InstabilityMap) -> None:
+        """Draw the map of parametric instability."""
+
+
 def write_runup(
-    folder: Path, run: RunUp, *, multiples: int, title: str, attachment: str | None, draw: bool, watch: Any,
+    folder: Path, run: RunUp, *, multiples: int, attachment: str | None, draw: Pictures | None, watch: Any,
     further: Mapping[str, Any], unstable: InstabilityMap | None = None,
 ) -> tuple[dict[str, Any], list[str]]:  # fmt: skip
     """Write tables, pictures and the summary; returns the summary and the names of the files.
@@ -38,7 +50,7 @@ def write_runup(
     unstable
         Map of parametric instability, where one was asked for.
     """
-    bore = pictures.attachment_to_draw(run, attachment)
+    bore = report.attachment_to_draw(run, attachment)
     with watch.stage("modes"):
         modes = coupled_modes(run.train, np.linspace(run.speeds[0], run.speeds[-1], CAMPBELL), run.band_hz)
         met = crossings(run.train, modes, multiples)
@@ -52,14 +64,11 @@ def write_runup(
             write_csv(target / "critical_speeds.csv", report.critical_columns(modes, met))
             if unstable is not None:
                 write_csv(target / "instability.csv", report.instability_columns(unstable))
-        if draw:
+        if draw is not None:
             with watch.stage("pictures"):
-                pictures.draw_waterfall(target / "waterfall.png", run, multiples, bore, title)
-                pictures.draw_campbell(target / "campbell.png", run, modes, met, multiples, title)
-                pictures.draw_orders(target / "orders.png", run, multiples, bore, title)
-                pictures.draw_forces(target / "meshes.png", run, title)
+                draw(target, run, modes, met, multiples, bore)
                 if unstable is not None:
-                    pictures.draw_instability(target / "instability.png", unstable, title)
+                    draw.instability(target / "instability.png", unstable)
         made = {**further, **report.summary(run, modes, multiples), "warnings": report.warnings(run)}
         made["timings_s"] = dict(watch.seconds)
         write_json(target / "summary.json", made)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import unknown_name
 from ..typing import Array
 from ..vibration.radiation import power_level
 from .instability import InstabilityMap
@@ -314,3 +315,14 @@ def warnings(run: RunUp) -> list[str]:
             f"{worst.speed:.6g} rad/s: their motion has more harmonics than the program takes"
         )
     return found
+
+
+def attachment_to_draw(run: RunUp, asked: str | None) -> int:
+    """Number of the attachment in the pictures: the asked one, else the bore that carries the load's reaction."""
+    names = run.train.model.bores
+    if asked is not None:
+        if asked not in names:
+            raise unknown_name("--attachment", asked, names)
+        return names.index(asked)
+    loaded = [load.bore for load in run.train.model.scene.loads if load.bore in names]
+    return names.index(loaded[0]) if loaded and loaded[0] is not None else len(names) - 1

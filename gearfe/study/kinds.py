@@ -140,7 +140,7 @@ def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
     with TemporaryDirectory() as name:  # a response may be longer than memory
         folder = Path(name)
         made = write_run(
-            folder, scene, pieces, job.times, OutputChoice(pictures=False), title="", watch=watch, every=every,
+            folder, scene, pieces, job.times, OutputChoice(), watch=watch, every=every,
             further=described(job, scene), again=repeater(job, every) if estimate else None, band_hz=band(job),
         )  # fmt: skip
         rows = {path.stem: read_csv(path, path.stem) for path in sorted(folder.glob("*.csv"))}  # a short run has one

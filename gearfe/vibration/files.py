@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ..train.scene import TrainScene
 from ..typing import Array, IntArray
 from .errors import Run, with_errors
 from .follow import Followed, follow
-from .report import train_summary
+from .report import attachment_to_draw, train_summary
 from .spectra import TrainRecord, TrainSpectra, record
 
 #: Frames of the animation, and steps of the field files at most.
@@ -43,8 +43,8 @@ class OutputChoice:
 
     Attributes
     ----------
-    pictures, fields, animation
-        Whether to draw curves and spectra, to write fields with a picture, and the animation.
+    fields, animation
+        Whether to write fields, and to draw an animation of them.
     attachment
         Name of the attachment in the pictures; None: the bore that carries the load's reaction.
     picture_time
@@ -53,7 +53,6 @@ class OutputChoice:
         Record of the spectrum, see `gearfe.vibration.spectra.TrainRecord` (s).
     """
 
-    pictures: bool = True
     fields: bool = False
     animation: bool = True
     attachment: str | None = None
@@ -61,6 +60,16 @@ class OutputChoice:
     window: str = "none"
     spectrum_start: float = 0.0
     spectrum_length: float | None = None
+
+
+class Pictures(Protocol):
+    """Who draws a run: `gearfe.figures.train.TrainPictures`. Pictures stand above the results that they draw."""
+
+    def curves(self, folder: Path, scene: TrainScene, made: Followed, spectra: TrainSpectra, attachment: str) -> None:
+        """Draw curves and spectra into a folder."""
+
+    def fields(self, path: Path, scene: TrainScene, response: TrainResponse, steps: IntArray) -> str:
+        """Draw the fields at some output times; an empty text, or why nothing was drawn."""
 
 
 @dataclass(frozen=True)
@@ -118,8 +127,8 @@ def write_run(
     times: Array,
     choice: OutputChoice,
     *,
-    title: str,
     watch: Stopwatch,
+    draw: Pictures | None = None,
     every: int = 1,
     further: Mapping[str, Any] | None = None,
     progress: Callable[[int, int, str], None] | None = None,
@@ -137,6 +146,8 @@ def write_run(
         Makes the run over the given output times, `every` samples in a step, and hands it over piece by piece.
     times : (n,)
         Output times (s).
+    draw
+        Draws the pictures.
     again
         Makes the same of a changed train: the summary's numbers then have estimates of their errors.
     band_hz
@@ -182,12 +193,14 @@ def write_run(
         with watch.stage("tables"):
             if spectra is not None:
                 write_csv(target / "spectrum.csv", spectra.columns())
-        if choice.pictures and spectra is not None:
+        if draw is not None and spectra is not None:
             with watch.stage("pictures"):
-                _pictures(target, scene, made, spectra, choice, title)
+                loaded = next((load.bore for load in scene.loads if load.bore is not None), None)
+                attachment = attachment_to_draw(made.curves, choice.attachment, loaded)
+                draw.curves(target, scene, made, spectra, attachment)
         if choice.fields and made.outputs:
             with watch.stage("fields"):
-                problems += _fields(target, scene, made.kept, times[: made.outputs], choice, title, progress)
+                problems += _fields(target, scene, made.kept, times[: made.outputs], choice, draw, progress)
         if started is not None:
             watch.seconds["total"] = time.perf_counter() - started
         summary = {**run.summary, "timings_s": dict(watch.seconds)}
@@ -221,41 +234,26 @@ def _shown(times: Array, choice: OutputChoice) -> tuple[IntArray, int, IntArray]
     return series, int(np.abs(times - wanted).argmin()), film
 
 
-def _pictures(
-    target: Path, scene: TrainScene, made: Followed, spectra: TrainSpectra, choice: OutputChoice, title: str
-) -> None:
-    from .pictures import attachment_to_draw, draw_power, draw_response, draw_spectrum, draw_transmission
-
-    response = made.curves
-    loaded = next((load.bore for load in scene.loads if load.bore is not None), None)
-    attachment = attachment_to_draw(response, choice.attachment, loaded)
-    draw_response(target / "response.png", response, attachment, title, made.mean_force)
-    if scene.drive is not None and any(mesh.stiffness is not None for mesh in scene.meshes):
-        draw_transmission(target / "transmission_error.png", scene, response, title)
-    draw_spectrum(target / "spectrum.png", response, spectra, attachment, title)
-    if spectra.power is not None:
-        draw_power(target / "radiated_power.png", response, spectra, title)
-
-
 def _fields(
     target: Path,
     scene: TrainScene,
     kept: TrainResponse,
     times: Array,
     choice: OutputChoice,
-    title: str,
+    draw: Pictures | None,
     progress: Callable[[int, int, str], None] | None,
 ) -> list[str]:
     """Write and draw the fields of the response at the output times of `field_steps`."""
-    from ..figures.train_scene import draw_scene
-    from .fields import frames, write_gears, write_housing
+    from .fields import write_gears, write_housing
 
     steps = field_steps(times, choice)
     series, still, film = (np.searchsorted(steps, some) for some in _shown(times, choice))
     write_gears(target / "gears.vtkhdf", scene, kept, series)
     if scene.housing is not None and scene.housing.has_mesh:
         write_housing(target / "housing.vtkhdf", scene.housing, kept, series, progress=progress)
-    problem = draw_scene(target / "fields.png", frames(scene, kept, [int(still)]), title)
+    if draw is None:
+        return []
+    problem = draw.fields(target / "fields.png", scene, kept, still[None])
     if choice.animation and not problem:
-        problem = draw_scene(target / "fields.gif", frames(scene, kept, film), title)
+        problem = draw.fields(target / "fields.gif", scene, kept, film)
     return [f"fields were not drawn: {problem}"] if problem else []

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import unknown_name
 from ..meshlaw.law import MeshLaw
 from ..spectrum import OrderLine, nearest_line, order_lines, peaks
 from ..stiffness.curve import StiffnessCurve
@@ -192,3 +193,18 @@ def stiffness_ranges(scene: TrainScene) -> dict[str, tuple[float | None, float |
             values = given.k_mesh if isinstance(given, StiffnessCurve) else given.values
             found[mesh.name] = (float(np.nanmin(values)), float(np.nanmax(values)))
     return found
+
+
+def attachment_to_draw(response: TrainResponse, asked: str | None, loaded: str | None) -> str:
+    """Name of the attachment in the pictures: the asked one, else the bore that carries the load's reaction."""
+    names = response.attachment_names
+    if asked is not None and asked not in names:
+        raise unknown_name("--attachment", asked, names)
+    if asked is not None:
+        return asked
+    return loaded if loaded is not None and loaded in names else names[-1]
+
+
+def attachment_acceleration(response: TrainResponse, attachment: str) -> Array:
+    """Normal acceleration at an attachment (m/s2), shape (n,)."""
+    return np.asarray(response.attachment_acceleration[:, response.attachment_names.index(attachment)])

@@ -1,0 +1,157 @@
+"""Pictures of a run-up over speed and frequency: waterfall, Campbell diagram, parametric instability."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..runup.instability import InstabilityMap
+from ..runup.modes import CoupledModes, Crossing
+from ..runup.report import orders
+from ..runup.run_up import RunUp
+from .style import BLUE, COLOURS, RED, new_figure, save, tidy
+
+#: A mode is drawn strong where so much of its strain energy is in the meshes.
+STRONG = 0.03
+#: Reference of the levels of accelerations (m/s2), ISO 1683.
+REFERENCE = 1e-6
+
+
+class OrderLine(NamedTuple):
+    """An order of a mesh: its label, and frequency (kHz) for 1 rad/s of the drive."""
+
+    label: str
+    slope: float
+    mesh: int
+
+
+def draw_waterfall(path: Path, run: RunUp, multiples: int, bore: int, title: str) -> None:
+    """Spectra of one attachment over the speed of a slow run-up: coloured tracks, the meshes' orders named."""
+    from matplotlib.collections import LineCollection
+
+    swept = sorted(run.sweep(), key=lambda s: s.speed)
+    lines = max(int((s.frequency <= run.band_hz).sum()) for s in swept)
+    frequency, level = np.full((len(swept), lines), np.nan), np.full((len(swept), lines), np.nan)
+    for row, s in enumerate(swept):
+        count = int((s.frequency <= run.band_hz).sum())
+        frequency[row, :count] = 1e-3 * s.frequency[:count]
+        size = np.maximum(np.abs(s.acceleration[:count, bore]), 1e-12)
+        level[row, :count] = 20.0 * np.log10(size / math.sqrt(2.0) / REFERENCE)
+    speed, highest = np.array([s.speed for s in swept]), 1e-3 * run.band_hz
+    name = run.train.model.bores[bore]
+    figure = new_figure(10.5, 6.4)
+    axes = figure.add_subplot()
+    axes.set_title(f"Normal acceleration at attachment {name} in steady running\n{title}", fontsize=11, loc="left")
+    axes.set_facecolor("#0b1020")
+    top = float(np.nanmax(level[:, 1:], initial=0.0))
+    segments, values = [], []
+    for k in range(1, frequency.shape[1]):
+        points = np.stack([speed, frequency[:, k]], axis=1)
+        both = np.isfinite(points[:-1, 1]) & np.isfinite(points[1:, 1])
+        segments += [points[i : i + 2] for i in np.flatnonzero(both)]
+        values += [0.5 * (level[i, k] + level[i + 1, k]) for i in np.flatnonzero(both)]
+    order = np.argsort(values)  # loud ones on top
+    tracks = LineCollection(
+        [segments[i] for i in order], array=np.array(values)[order], cmap="inferno", linewidths=2.6, capstyle="butt"
+    )
+    tracks.set_clim(top - 70.0, top)
+    axes.add_collection(tracks)
+    axes.set_xlim(float(speed[0]), float(speed[-1]))
+    axes.set_ylim(0.0, highest)
+    for line in order_lines(run, multiples):
+        _label_order(axes, line, float(speed[0]), float(speed[-1]), highest, "white")
+    axes.set_xlabel("speed of the drive  (rad/s)")
+    axes.set_ylabel("frequency  (kHz)")
+    _rpm(axes)
+    figure.colorbar(tracks, ax=axes, pad=0.09, label="level of the acceleration  (dB re 1 µm/s²)")
+    save(figure, path)
+
+
+def draw_campbell(path: Path, run: RunUp, modes: CoupledModes, met: list[Crossing], multiples: int, title: str) -> None:
+    """Natural frequencies over the speed with the meshes' orders; modes with much strain in meshes are drawn strong."""
+    share = modes.strain[:, : len(run.train.model.meshes)].sum(axis=1)
+    rising, highest = np.argsort(modes.speeds), 1e-3 * run.band_hz
+    speed, frequency, damping = modes.speeds[rising], 1e-3 * modes.frequency[rising], modes.damping_ratio[rising[-1]]
+    crossings = [(c.speed, 1e-3 * c.frequency) for c in met if share[c.mode] >= STRONG]
+    figure = new_figure(10.5, 6.4)
+    axes = figure.add_subplot()
+    tidy(axes)
+    axes.set_title(
+        f"Natural frequencies of the coupled train and orders of its meshes\n{title}", fontsize=11, loc="left"
+    )
+    low, high = float(speed[0]), float(speed[-1])
+    taken: list[float] = []
+    for mode in range(frequency.shape[1]):
+        strong = share[mode] >= STRONG
+        axes.plot(speed, frequency[:, mode], color=BLUE if strong else "#b6c2d1", linewidth=1.6 if strong else 0.7)
+        if strong and frequency[-1, mode] <= highest:
+            place = float(frequency[-1, mode])
+            while any(abs(place - t) < 0.028 * highest for t in taken):
+                place += 0.007 * highest
+            taken.append(place)
+            text = f"{mode + 1}: {100.0 * share[mode]:.0f} % in meshes, {100.0 * damping[mode]:.2g} % damping"
+            axes.annotate(
+                text, (high, float(frequency[-1, mode])), (high + 0.012 * (high - low), place), fontsize=7.5,
+                color=BLUE, va="center", annotation_clip=False,
+            )  # fmt: skip
+    for line in order_lines(run, multiples):
+        axes.plot([low, high], [line.slope * low, line.slope * high], color=COLOURS[1 + line.mesh], linewidth=1.0)
+        _label_order(axes, line, low, high, highest, COLOURS[1 + line.mesh])
+    if crossings:
+        axes.plot(*np.array(crossings).T, "o", color=RED, markersize=4.0, markerfacecolor="white", zorder=5)
+    axes.set_xlim(low, high)
+    axes.set_ylim(0.0, highest)
+    axes.set_xlabel("speed of the drive  (rad/s)")
+    axes.set_ylabel("frequency  (kHz)")
+    _rpm(axes)
+    save(figure, path)
+
+
+def draw_instability(path: Path, made: InstabilityMap, title: str) -> None:
+    """Growth of vibration without damping over speed and load."""
+    figure = new_figure(10.5, 4.6)
+    axes = figure.add_subplot()
+    axes.set_title(f"Parametric instability without damping\n{title}", fontsize=11, loc="left")
+    rows = np.arange(len(made.loads))
+    shown = axes.pcolormesh(
+        made.speeds, rows, np.maximum(made.growth, 0.0), cmap="magma_r", shading="nearest", vmin=0.0
+    )
+    axes.set_yticks(rows, [f"{x:g}" for x in made.loads])
+    axes.set_xlabel("speed of the drive  (rad/s)")
+    axes.set_ylabel("factor on the loads")
+    _rpm(axes)
+    figure.colorbar(shown, ax=axes, pad=0.02, label="growth, and damping that holds it  (1/s)")
+    save(figure, path)
+
+
+def order_lines(run: RunUp, multiples: int) -> list[OrderLine]:
+    """Lines of the meshes' orders, one for those that agree."""
+    made = []
+    for k, names in orders(run, multiples).items():
+        slope = 1e-3 * k / run.train.system.turns / (2.0 * math.pi)
+        made.append(OrderLine(names[0].replace(" x mesh ", "×m"), slope, int(names[0].rsplit(" ", 1)[1]) - 1))
+    return made
+
+
+def _label_order(axes: Any, line: OrderLine, low: float, high: float, highest: float, colour: str) -> None:
+    """Name of an order where its line leaves the picture."""
+    end = min(high, highest / line.slope)
+    if end <= low:
+        return
+    above = line.slope * high > highest
+    y = 0.985 * highest if above else line.slope * (high - 0.01 * (high - low))
+    axes.annotate(
+        line.label, (y / line.slope, y), (-4, 0) if above else (0, 3), textcoords="offset points", fontsize=7.5,
+        color=colour, ha="right", va="top" if above else "bottom",
+    )  # fmt: skip
+
+
+def _rpm(axes: Any) -> None:
+    """Upper axis in turns per minute."""
+    factor = 30.0 / np.pi
+    upper = axes.secondary_xaxis("top", functions=(lambda x: factor * x, lambda x: x / factor))
+    upper.set_xlabel("speed of the drive  (rpm)", fontsize=8.5)
+    upper.tick_params(labelsize=8)

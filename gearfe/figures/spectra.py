@@ -1,0 +1,154 @@
+"""Pictures of a gear train's spectra: acceleration at an attachment, radiated power."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..spectrum import nearest_line, peaks
+from ..train.response import TrainResponse
+from ..typing import Array
+from ..vibration.radiation import RadiatedPower
+from ..vibration.report import lines_of
+from ..vibration.spectra import TrainSpectra
+from .style import BLUE, GREEN, GREY, ORANGE, RED, fixed, panel, save_fixed
+
+#: Lines that a picture shows at most: more than it has columns of pixels.
+_DRAWN = 2000
+#: Lines that are named in the picture of a spectrum, and the least amplitude of such a line in parts of the largest.
+_NAMED, _LEAST = 5, 0.2
+#: End of the frequency axis: this multiple of the highest mesh frequency, unless larger lines lie above it.
+_MESH_MULTIPLES = 4.2
+#: Lines of the meshes.
+_DASHES = ((0, (6, 3)), (0, (2, 2)), (0, (6, 2, 2, 2)))
+
+
+def draw_spectrum(path: Path, response: TrainResponse, made: TrainSpectra, attachment: str, title: str) -> None:
+    """Amplitude spectrum of the acceleration at an attachment as lines, its largest lines named."""
+    name, spectrum = f"attachment_{attachment}_acceleration_m_per_s2", made.spectrum
+    amplitude = made.amplitude(name)
+    lines = lines_of(response, float(spectrum.frequency[-1]))
+    named = []
+    for peak in peaks(spectrum.frequency, amplitude, _NAMED, above=_LEAST):
+        line = nearest_line(peak.frequency, lines, 0.51 * spectrum.resolution)
+        what = "" if line is None else f"\n{line.name} × {line.order}"
+        named.append((1e-3 * peak.frequency, peak.amplitude, f"{peak.frequency:.0f} Hz: {peak.amplitude:.3g}{what}"))
+    window = "no window" if spectrum.window == "none" else f"window: {spectrum.window}"
+    highest = _highest(response, made, [f for f, _, _ in named])
+    frequency, amplitude = largest_lines(1e-3 * spectrum.frequency, amplitude, highest)
+    figure = fixed(10.5, 4.9)
+    head = f"Normal acceleration at attachment {attachment}\n{title}"
+    axes = _frequency_axes(figure, head, response, made, highest)
+    _note(figure, f"resolution {spectrum.resolution:.1f} Hz, {window}")
+    axes.vlines(frequency, 0.0, amplitude, color=BLUE, linewidth=2.2)
+    axes.plot(frequency, amplitude, "o", color=BLUE, markersize=3.4, markerfacecolor="white")
+    shown = (frequency <= highest) & (frequency > 0.0)
+    top = float(amplitude[shown].max(initial=0.0)) or 1.0
+    axes.set_ylim(0.0, 1.3 * top)
+    placed: list[tuple[float, float]] = []
+    for place, size, label in named:
+        height = size + 0.03 * top
+        while any(abs(place - p) < 0.09 * highest and abs(height - h) < 0.065 * top for p, h in placed):
+            height += 0.066 * top
+        placed.append((place, height))
+        axes.annotate(
+            label,
+            (place, size),
+            (place, height),
+            fontsize=8.5,
+            ha="left" if place < 0.08 * highest else "center",
+            va="bottom",
+            bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 0.6},
+        )
+    axes.set_ylabel("amplitude  (m/s²)")
+    save_fixed(figure, path)
+
+
+def draw_power(path: Path, response: TrainResponse, made: TrainSpectra, power: RadiatedPower, title: str) -> None:
+    """Level of the equivalent radiated power of each line; the housing is elastic."""
+    found = peaks(power.frequency, power.power, 3)
+    highest = _highest(response, made, [1e-3 * p.frequency for p in found])
+    frequency, level = largest_lines(1e-3 * power.frequency, power.level, highest)
+    figure = fixed(10.5, 4.6)
+    axes = _frequency_axes(figure, f"Equivalent radiated power of the housing\n{title}", response, made, highest)
+    _note(figure, f"mean power {power.mean_level:.1f} dB, resolution {made.spectrum.resolution:.1f} Hz")
+    shown = (frequency <= highest) & (frequency > 0.0) & np.isfinite(level)
+    top = float(level[shown].max(initial=-300.0)) if shown.any() else 0.0
+    bottom = max(top - 60.0, float(level[shown].min(initial=300.0)) - 3.0) if shown.any() else -10.0
+    width = 0.72 * float(np.median(np.diff(frequency)))
+    axes.bar(frequency[shown], level[shown] - bottom, width=width, bottom=bottom, color=BLUE, linewidth=0)
+    axes.set_ylim(bottom, top + 0.18 * (top - bottom) + 1.0)
+    axes.set_ylabel("radiated power level  (dB re 1 pW)")
+    save_fixed(figure, path)
+
+
+def _frequency_axes(figure: Any, title: str, response: TrainResponse, made: TrainSpectra, highest: float) -> Any:
+    """Axes up to `highest` (kHz) with the meshes' lines and their multiples, and orders of the first shaft on top."""
+    axes = figure.add_axes((0.062, 0.175, 0.925, 0.615))
+    panel(axes, "", "", "")
+    head, _, scene = title.partition("\n")
+    figure.text(0.062, 0.945, head, fontsize=11)
+    figure.text(0.062, 0.9, scene, fontsize=8.5, color="#374151")
+    axes.set_xlim(0.0, highest)
+    axes.set_xlabel("frequency  (kHz)")
+    first = {f"mesh {i + 1}": f for i, f in enumerate(response.mesh_frequencies_Hz)}
+    lines = lines_of(response, float(made.spectrum.frequency[-1]))
+    groups = {name: f"{name}: {first[name]:.1f} Hz and its multiples" for name in sorted({line.name for line in lines})}
+    named: set[str] = set()
+    for line in sorted(lines, key=lambda line: (groups[line.name], str(line.order), line.frequency)):
+        place = 1e-3 * line.frequency
+        if place > highest:
+            continue
+        number = list(groups).index(line.name)
+        colour, dash = (ORANGE, GREEN, RED, GREY)[number % 4], _DASHES[number % len(_DASHES)]
+        label = None if line.name in named else groups[line.name]
+        named.add(line.name)
+        axes.axvline(place, color=colour, linewidth=1.0, linestyle=dash, zorder=1, label=label)
+        axes.annotate(
+            str(line.order),
+            (place, 1.0),
+            (-1.5 if number % 2 else 1.5, -3),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            fontsize=7.5,
+            color=colour,
+            ha="right" if number % 2 else "left",
+            va="top",
+        )
+    if named:
+        figure.legend(fontsize=8.5, loc="lower center", ncols=4, frameon=False)
+    name, turns = response.shaft_names[0], 1e-3 * float(abs(response.shaft_frequencies_Hz[0]))
+    if turns > 0.0:
+        above = axes.secondary_xaxis("top", functions=(lambda f: f / turns, lambda order: order * turns))
+        above.set_xlabel(f"order of the shaft {name}", fontsize=9)
+        above.tick_params(labelsize=8.5)
+    return axes
+
+
+def _note(figure: Any, note: str) -> None:
+    """Small text above: resolution, window, mean."""
+    figure.text(0.987, 0.945, note, fontsize=8.5, color="#374151", ha="right")
+
+
+def largest_lines(frequency: Array, value: Array, highest: float) -> tuple[Array, Array]:
+    """Lines up to `highest`; of so many that they would lie on each other the largest of each group of neighbours.
+
+    A group stands at the middle of its frequencies, the constant by itself.
+    """
+    count = int(np.searchsorted(frequency, highest, side="right"))
+    group = -(-(count - 1) // _DRAWN)
+    if group <= 1:
+        return frequency[:count], value[:count]
+    starts = np.arange(1, count, group)
+    ends = np.append(starts[1:], count)
+    middle = 0.5 * (frequency[starts] + frequency[ends - 1])
+    return np.append(frequency[0], middle), np.append(value[0], np.maximum.reduceat(value[:count], starts))
+
+
+def _highest(response: TrainResponse, made: TrainSpectra, lines: list[float]) -> float:
+    """End of the frequency axis (kHz)."""
+    top = 1e-3 * float(made.spectrum.frequency[-1])
+    meshes = 1e-3 * float(np.max(np.abs(response.mesh_frequencies_Hz), initial=0.0))
+    return min(top, max([_MESH_MULTIPLES * meshes, *(1.08 * f for f in lines)]) or top)
