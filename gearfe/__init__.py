@@ -23,6 +23,7 @@ _PUBLIC: dict[str, str] = {
     "LoadedMesh": "microgeometry.loaded_mesh",
     "Material": "elasticity",
     "ModalBody": "reduction.modal_body",
+    "Search": "study.search",
     "StiffnessCurve": "stiffness",
     "TrainModel": "train",
     "TrainResponse": "train",

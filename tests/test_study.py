@@ -34,7 +34,7 @@ def test_distributions_have_their_quantiles():
         "pair.pinion.teeth": {"low": 18, "high": 20},
         "stiffness.plane": ["strain", "stress"],
     }
-    even, normal, cut, whole, listed = read_parameters(given, "stiffness")
+    even, normal, cut, whole, listed = read_parameters(given, "stiffness", {})
     share = np.array([0.05, 0.3, 0.5, 0.95])
     np.testing.assert_allclose(even.at(share), 0.9 + 0.2 * share)
     np.testing.assert_allclose(normal.at(share), norm(1.25, 0.05).ppf(share))
@@ -44,9 +44,24 @@ def test_distributions_have_their_quantiles():
     assert listed.at(np.array([0.1, 0.9])) == ["strain", "stress"]
 
 
+def test_slopes_of_a_class_are_within_its_tolerance():
+    """f_HaT of 40 teeth of 3 mm in class 6: (0.001 d + 0.4 m + 4) sqrt(2) um."""
+    wheel = {"teeth": 40, "pitch_diameter_mm": 120.0, "bore_diameter_mm": 20.0}
+    pinion = {"teeth": 20, "pitch_diameter_mm": 60.0, "bore_diameter_mm": 20.0}
+    base = {"pair": {"pressure_angle_deg": 20.0, "face_width_mm": 10.0, "pinion": pinion, "wheel": wheel}}
+    given = {"microgeometry.wheel.left.slope_um": {"iso_class": 6, "mean": 2.0}}
+    (slope,) = read_parameters(given, "microgeometry", base)
+    allowed = (0.12 + 1.2 + 4.0) * math.sqrt(2.0)
+    share = np.array([1e-9, 0.3, 0.5, 1.0 - 1e-9])
+    np.testing.assert_allclose(slope.at(share), truncnorm(-3.0, 3.0, 2.0, allowed / 3.0).ppf(share), atol=1e-6)
+    for key, told in (("microgeometry.wheel.crowning_um", "no tolerance"), ("pair.pinion.teeth", "no tolerance")):
+        with pytest.raises(InputError, match=told):
+            read_parameters({key: {"iso_class": 6}}, "microgeometry", base)
+
+
 def test_names_may_be_tables_within_tables_or_quoted():
-    nested = read_parameters({"pair": {"pinion": {"profile_shift": {"low": 0.0, "high": 0.3}}}}, "stiffness")
-    quoted = read_parameters({"pair.pinion.profile_shift": {"low": 0.0, "high": 0.3}}, "stiffness")
+    nested = read_parameters({"pair": {"pinion": {"profile_shift": {"low": 0.0, "high": 0.3}}}}, "stiffness", {})
+    quoted = read_parameters({"pair.pinion.profile_shift": {"low": 0.0, "high": 0.3}}, "stiffness", {})
     assert nested == quoted
 
 
@@ -61,6 +76,8 @@ def test_names_may_be_tables_within_tables_or_quoted():
         ({"pair.addendum": {"low": 1.0, "hgih": 2.0}}, "did you mean 'high'"),
         ({"pair.addendum": {"low": 2.0, "high": 1.0}}, "must be > low"),
         ({"pair.addendum": {"mean": 2.0}}, "is required beside mean"),
+        ({"pair.addendum": {"iso_class": 6, "low": 2.0}}, "stands beside iso_class"),
+        ({"pair.addendum": {"iso_class": 12}}, "iso_class"),
         ({"pair.pinion.teeth": {"low": 18.2, "high": 18.8}}, "holds no whole number"),
         ({"stiffness.plane": {"low": 0, "high": 1}}, "is no number"),
         ({"train.meshes.first.backlash_um": [1.0]}, "an entry has a number"),
@@ -68,7 +85,7 @@ def test_names_may_be_tables_within_tables_or_quoted():
 )
 def test_wrong_parameters_are_named(given, told):
     with pytest.raises(InputError, match=told):
-        read_parameters(given, "stiffness")
+        read_parameters(given, "stiffness", {})
 
 
 def table(**keys) -> StudyTable:
@@ -80,10 +97,11 @@ def test_designs_are_those_of_their_seed(tmp_path):
     keys = {"pair.addendum": {"low": 0.9, "high": 1.1}, "pair.pinion.teeth": {"low": 18, "high": 40}}
     for design in ("latin_hypercube", "sobol", "saltelli"):
         made = [
-            study_cases(table(design=design, cases=16, seed=seed, parameters=keys), tmp_path)[1] for seed in (1, 1, 2)
+            study_cases(table(design=design, cases=16, seed=seed, parameters=keys), tmp_path, {})[1]
+            for seed in (1, 1, 2)
         ]
         assert made[0] == made[1] != made[2]
-    one = [case[0] for case in study_cases(table(cases=50, parameters=keys), tmp_path)[1]]
+    one = [case[0] for case in study_cases(table(cases=50, parameters=keys), tmp_path, {})[1]]
     assert sorted(int((value - 0.9) / 0.2 * 50) for value in one) == list(range(50))  # one in each of 50 equal parts
 
 
@@ -93,17 +111,17 @@ def test_factorial_is_all_combinations(tmp_path):
         "pair.pinion.teeth": {"low": 18, "high": 20},
         "stiffness.plane": ["strain", "stress"],
     }
-    cases = study_cases(table(design="factorial", parameters=keys), tmp_path)[1]
+    cases = study_cases(table(design="factorial", parameters=keys), tmp_path, {})[1]
     assert cases == list(itertools.product([0.9, 1.0, 1.1], [18, 19, 20], ["strain", "stress"]))
     with pytest.raises(InputError, match="no levels"):
-        study_cases(table(design="factorial", parameters={"pair.addendum": {"low": 0.9, "high": 1.1}}), tmp_path)
+        study_cases(table(design="factorial", parameters={"pair.addendum": {"low": 0.9, "high": 1.1}}), tmp_path, {})
 
 
 def test_rows_come_from_a_table(tmp_path):
     (tmp_path / "rows.csv").write_text(
         "pair.pinion.teeth,pair.addendum,stiffness.plane\n20,1.0,strain\n21,1.1,stress\n"
     )
-    parameters, cases = study_cases(table(design="rows", rows_csv="rows.csv"), tmp_path)
+    parameters, cases = study_cases(table(design="rows", rows_csv="rows.csv"), tmp_path, {})
     assert [one.name for one in parameters] == ["pair.pinion.teeth", "pair.addendum", "stiffness.plane"]
     assert cases == [(20, 1.0, "strain"), (21, 1.1, "stress")]
     assert isinstance(cases[0][0], int)
@@ -250,17 +268,6 @@ def test_elementary_effects_of_a_linear_function_are_its_slopes(tmp_path):
     assert third["deviation"] > 0.0
 
 
-def test_points_of_an_optimiser_side_by_side(tmp_path):
-    study = read_study(written(tmp_path))
-    points = [{"bodies.a.position_m.0": 0.1 * n, "bodies.a.mass_kg": 1.0 - 0.6 * n} for n in range(4)]
-    found = study.evaluate_all(points, jobs=2)
-    np.testing.assert_allclose([one["y"] for one in found[:2]], np.sin([0.0, 0.1]), rtol=1e-12)
-    assert math.isnan(found[2]["y"])  # a mass below 0 has no answer
-    assert study.evaluate_all(points, jobs=1)[:2] == found[:2]
-    with pytest.raises(InputError, match="different parameters"):
-        study.evaluate_all([points[0], {"bodies.a.mass_kg": 1.0}])
-
-
 @pytest.mark.parametrize(
     ("keys", "told"),
     [
@@ -279,4 +286,4 @@ def test_points_of_an_optimiser_side_by_side(tmp_path):
 )
 def test_wrong_tables_are_named(keys, told, tmp_path):
     with pytest.raises(InputError, match=told):
-        study_cases(table(**{"parameters": {"pair.addendum": {"low": 0.9, "high": 1.1}}, **keys}), tmp_path)
+        study_cases(table(**{"parameters": {"pair.addendum": {"low": 0.9, "high": 1.1}}, **keys}), tmp_path, {})

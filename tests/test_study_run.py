@@ -18,7 +18,7 @@ import pytest
 
 from gearfe.cli import main
 from gearfe.config import read_toml
-from gearfe.errors import InputError
+from gearfe.errors import InputError, MissingLibraryError
 from gearfe.study.case import DIED
 from gearfe.study.job import read_study, run_study
 from gearfe.tables.text import toml_document
@@ -254,3 +254,26 @@ def test_a_full_disk_stops_and_keeps_all_rows(tmp_path):
     after = rows_of(tmp_path / "out")
     assert len(after) == 301
     assert all(row in after for row in before[:-1])
+
+
+def test_rows_for_other_programs(tmp_path):
+    pandas, parquet = pytest.importorskip("pandas"), pytest.importorskip("pyarrow.parquet")
+    path = written(tmp_path)
+    assert main(["study", str(path), "--out", str(tmp_path / "out"), "--jobs", "1", "--no-pictures", "--parquet"]) == 0
+    made = run_study(read_study(path), tmp_path / "out", jobs=1)
+    frame = made.to_pandas()
+    pandas.testing.assert_frame_equal(frame, parquet.read_table(tmp_path / "out" / "study.parquet").to_pandas())
+    assert frame["y"].to_numpy() == pytest.approx(made.output("y"), abs=0.0)
+    assert set(frame["status"]) == {"done"}
+    xarray = pytest.importorskip("xarray")
+    assert isinstance(made.to_xarray(), xarray.Dataset)
+
+
+@pytest.mark.parametrize(
+    ("library", "call"), [("pandas", "to_pandas"), ("xarray", "to_xarray"), ("pyarrow", "to_parquet")]
+)
+def test_a_library_that_is_missing_is_named(tmp_path, monkeypatch, library, call):
+    made = run_study(read_study(written(tmp_path)), tmp_path, jobs=1)
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(MissingLibraryError, match=r"gearfe\[study\]"):
+        getattr(made, call)(*([tmp_path / "x"] if call == "to_parquet" else []))

@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--write", metavar="FILE", help="where --row writes; files that the job names stay where they are"
     )
+    parser.add_argument("--parquet", action="store_true", help="also the rows as study.parquet")
     parser.add_argument("--no-pictures", action="store_true", help="leave out the pictures")
 
 
@@ -57,7 +58,9 @@ def run(args: argparse.Namespace) -> int:
         made = run_study(study, folder, restart=args.restart, progress=count, **where)
     with watch.stage("statistics"):
         summary = made.summary()
-    with whole_set(folder, ("study*.png",)) as place:
+    with whole_set(folder, ("study*.png", "study.parquet")) as place:
+        if args.parquet:
+            made.to_parquet(place / "study.parquet")
         if not args.no_pictures:
             from ..figures.study import study_figures
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +23,8 @@ MOST, LEVELS = 10_000_000, 4
 Cases = Sequence[tuple[Any, ...]]
 
 
-def study_cases(table: StudyTable, folder: Path) -> tuple[tuple[Parameter, ...], Cases]:
-    """Parameters and cases of a study; files that it names lie in `folder`.
+def study_cases(table: StudyTable, folder: Path, base: Mapping[str, Any]) -> tuple[tuple[Parameter, ...], Cases]:
+    """Parameters and cases of a study; files that it names lie in `folder`; `base` are the job's tables.
 
     Raises
     ------
@@ -32,8 +32,8 @@ def study_cases(table: StudyTable, folder: Path) -> tuple[tuple[Parameter, ...],
         For names that do not exist, values that are no distribution, and designs of too many cases.
     """
     if table.design == "rows":
-        return _rows(table, folder)
-    parameters = read_parameters(table.parameters, table.job)
+        return _rows(table, folder, base)
+    parameters = read_parameters(table.parameters, table.job, base)
     if table.design == "factorial":
         levels = [one.levels() for one in parameters]
         count = math.prod(map(len, levels))
@@ -94,12 +94,12 @@ def trajectories(count: int, d: int, rng: np.random.Generator) -> Array:
     return made.reshape(count * (d + 1), d)
 
 
-def _rows(table: StudyTable, folder: Path) -> tuple[tuple[Parameter, ...], Cases]:
+def _rows(table: StudyTable, folder: Path, base: Mapping[str, Any]) -> tuple[tuple[Parameter, ...], Cases]:
     assert table.rows_csv is not None
     columns = read_csv(folder / table.rows_csv, "study.rows_csv")
     columns.pop("case", None)
     hints = {name: key_hint(table.job, name) for name in columns}
-    parameters = tuple(read_parameters({name: [0.0] for name in hints}, table.job))
+    parameters = tuple(read_parameters({name: [0.0] for name in hints}, table.job, base))
     made = [
         [_cell(text, one, table.rows_csv, i) for i, text in enumerate(columns[one.name], start=1)] for one in parameters
     ]

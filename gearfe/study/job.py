@@ -69,41 +69,8 @@ class Study:
         with one_thread():
             return evaluate(task, list(values.values()), HERE)[0]
 
-    def evaluate_all(
-        self, points: Sequence[Mapping[str, Any]], *, jobs: int | None = None, executor: Executor | None = None
-    ) -> list[dict[str, float]]:
-        """Outputs at many points, side by side: what an optimiser that asks for several at a time is told.
 
-        Parameters
-        ----------
-        points
-            Parameter -> value, the same parameters in all of them.
-        jobs, executor
-            As of `run_study`.
-
-        Returns
-        -------
-        list of dict
-            In the order of the points; not-a-number where a point has no answer.
-
-        Raises
-        ------
-        InputError
-            Points that name different parameters.
-        """
-        if not points:
-            return []
-        names = tuple(points[0])
-        if any(tuple(point) != names for point in points):
-            raise InputError("points", None, "name different parameters", "give the same ones, in the same order")
-        task = Task(**{**vars(self.task), "names": names})
-        found: dict[int, Row] = {}
-        for group in _rows(task, list(enumerate(tuple(point.values()) for point in points)), jobs, executor, None):
-            found |= {row.case: row for row in group}
-        return [dict(zip(task.outputs, found[number].outputs, strict=True)) for number in range(len(points))]
-
-
-def _rows(
+def solved_rows(
     task: Task,
     cases: Sequence[tuple[int, tuple[Any, ...]]],
     jobs: int | None,
@@ -133,7 +100,7 @@ def read_study(path: str | Path) -> Study:
     table: StudyTable = build(StudyTable, raw["study"], "study")
     base = path if table.base is None else path.parent / table.base
     tables = {name: one for name, one in (raw if table.base is None else read_toml(base)).items() if name != "study"}
-    parameters, cases = study_cases(table, path.parent)
+    parameters, cases = study_cases(table, path.parent, tables)
     names = tuple(one.name for one in parameters)
     task = Task(table.job, base, tables, table.estimate, names, table.outputs)
     task.expressions()
@@ -199,7 +166,7 @@ def run_study(
     bad, first = 0, ""
     missing = [n for n in _order(study) if n not in journal.done]
     cases = [(n, study.cases[n]) for n in missing]
-    for group in _rows(study.task, cases, jobs, executor, workers, check):
+    for group in solved_rows(study.task, cases, jobs, executor, workers, check):
         journal.append(group, study.cases)
         if progress is not None:
             progress(len(journal.done), len(study.cases), "cases")

@@ -87,8 +87,8 @@ class Journal:
             raise InputError("--out", str(self.path.parent), problem, "give --restart to begin anew")
         self.done = {int(row[0]) for row in rows if row}
 
-    def append(self, rows: Iterable[Row], values: Sequence[Sequence[Any]]) -> None:
-        """Add finished cases, once each; `values` of all cases."""
+    def append(self, rows: Iterable[Row], values: Sequence[Sequence[Any]] | Mapping[int, Sequence[Any]]) -> None:
+        """Add finished cases, once each; `values` by number of the case."""
         fresh = [row for row in rows if row.case not in self.done]
         text = "".join(
             _line((row.case, *values[row.case], *row.outputs, row.status, row.message, float(f"{row.seconds:.4g}")))
@@ -110,11 +110,12 @@ class Journal:
 
 def _line(cells: Sequence[Any]) -> str:
     stream = io.StringIO()
-    csv.writer(stream, lineterminator="\n").writerow([_text(cell) for cell in cells])
+    csv.writer(stream, lineterminator="\n").writerow([cell_text(cell) for cell in cells])
     return stream.getvalue()
 
 
-def _text(cell: Any) -> str:
+def cell_text(cell: Any) -> str:
+    """A value as it stands in the table: a number reads the same again."""
     if isinstance(cell, float):
         return repr(cell)
     return json.dumps(cell) if isinstance(cell, (list, dict)) else str(cell)

@@ -88,8 +88,8 @@ def _steps(share: Array, count: int) -> Array:
     return np.minimum((np.asarray(share) * count).astype(int), count - 1)
 
 
-def read_parameters(given: Mapping[str, Any], kind: str) -> tuple[Parameter, ...]:
-    """Parameters of a job of this kind.
+def read_parameters(given: Mapping[str, Any], kind: str, base: Mapping[str, Any]) -> tuple[Parameter, ...]:
+    """Parameters of a job of this kind; `base` are its tables, whose gears tolerances are of.
 
     Raises
     ------
@@ -108,10 +108,28 @@ def read_parameters(given: Mapping[str, Any], kind: str) -> tuple[Parameter, ...
         found = build(DistributionTable, spec, label)
         if not {int, float} & set(_options(hint)):
             raise InputError(label, None, "is no number: low, high, mean do not apply", "give a list of values")
+        if found.iso_class is not None:
+            found = _of_class(found, found.iso_class, name, base)
         if whole and found.low is not None and found.high is not None and math.ceil(found.low) > found.high:
             raise InputError(label, (found.low, found.high), "holds no whole number", "widen it")
         made.append(Parameter(name, whole, distribution=found))
     return tuple(made)
+
+
+def _of_class(found: DistributionTable, class_: int, name: str, base: Mapping[str, Any]) -> DistributionTable:
+    """Normal, three deviations to the tolerance f_HaT of the profile slope, and cut off there."""
+    from ..gear.pair import GearPair
+    from ..gear.pitch_errors import tolerances
+    from ..tables.pair import PairTable
+
+    parts = name.split(".")
+    if parts[-1] != "slope_um" or parts[1] not in ("pinion", "wheel"):
+        cure = "use it for slope_um; pitch errors of a class: pitch_class, and vary pitch_seed"
+        raise InputError(f"{WHERE}.{name}.iso_class", class_, "has no tolerance for this key", cure)
+    pair = GearPair.from_table(build(PairTable, base.get("pair", {}), "pair"))
+    allowed = 1e6 * tolerances(getattr(pair, parts[1]), class_).slope
+    mean = found.mean or 0.0
+    return DistributionTable(mean=mean, deviation=allowed / 3.0, low=mean - allowed, high=mean + allowed)
 
 
 def _flat(given: Mapping[str, Any], above: str) -> dict[str, Any]:
@@ -128,7 +146,7 @@ def _flat(given: Mapping[str, Any], above: str) -> dict[str, Any]:
                 raise unknown_name(f"{WHERE}.{name}", wrong, _KEYS)
             found |= _flat(value, f"{name}.")
         else:
-            cure = "write [a, b, c], { low = a, high = b } or { mean = a, deviation = b }"
+            cure = "write [a, b, c], { low = a, high = b }, { mean = a, deviation = b } or { iso_class = 6 }"
             raise InputError(f"{WHERE}.{name}", value, "must be a list of values or a distribution", cure)
     return found
 

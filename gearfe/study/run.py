@@ -56,7 +56,7 @@ def side_by_side(
     check
         Called now and then while cases run; raises when the executor will not answer any more.
     """
-    pool = executor or _processes(workers)
+    pool = executor or processes(workers)
     ahead = iter(cases)
     running: dict[Future[list[Row]], list[Case]] = {}
     suspects: deque[Case] = deque()
@@ -95,7 +95,7 @@ def side_by_side(
                 lost += [(group, lost[0][1]) for group in running.values()]
                 running.clear()
                 pool.shutdown(wait=False, cancel_futures=True)
-                pool = _processes(workers)
+                pool = processes(workers)
             for group, reason in lost:
                 for case in group:
                     deaths[case[0]] += alone
@@ -105,10 +105,10 @@ def side_by_side(
                         yield [Row(case[0], (float("nan"),) * len(task.outputs), DIED, reason, 0.0)]
     finally:
         if executor is None:
-            _end(pool)
+            end_processes(pool)
 
 
-def _processes(workers: int) -> Executor:
+def processes(workers: int) -> Executor:
     """Fresh processes, whatever this one has loaded."""
     return ProcessPoolExecutor(workers, get_context("spawn"), _begin)
 
@@ -126,9 +126,9 @@ def _end_with(sentinel: int) -> None:
     os._exit(1)
 
 
-def _end(pool: Any) -> None:
+def end_processes(pool: Any) -> None:
     """End a pool without waiting for what still runs."""
-    processes = list((getattr(pool, "_processes", None) or {}).values())
+    running = list((getattr(pool, "_processes", None) or {}).values())
     pool.shutdown(wait=False, cancel_futures=True)
-    for process in processes:
+    for process in running:
         process.terminate()

@@ -6,11 +6,13 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import MissingLibraryError
+from ..output.files import whole_file
 from ..tables.study import LimitTable, StudyTable
 from ..typing import Array, BoolArray, IntArray
 from .case import DONE
@@ -191,7 +193,7 @@ class StudyResult:
         try:
             import pandas
         except ImportError:
-            raise MissingLibraryError("pandas is not installed: pip install pandas") from None
+            raise MissingLibraryError("pandas is not installed: pip install gearfe[study]") from None
         return pandas.DataFrame({name: _numbers(cells) for name, cells in self.columns.items()})
 
     def to_xarray(self) -> Any:
@@ -199,9 +201,19 @@ class StudyResult:
         try:
             import xarray
         except ImportError:
-            raise MissingLibraryError("xarray is not installed: pip install xarray") from None
+            raise MissingLibraryError("xarray is not installed: pip install gearfe[study]") from None
         made = {name: ("case", _numbers(cells)) for name, cells in self.columns.items() if name != "case"}
         return xarray.Dataset(made, coords={"case": _numbers(self.columns["case"])})
+
+    def to_parquet(self, path: str | Path) -> None:
+        """Write the rows as an Apache Parquet file, whole or not at all."""
+        try:
+            import pyarrow
+            from pyarrow import parquet
+        except ImportError:
+            raise MissingLibraryError("pyarrow is not installed: pip install gearfe[study]") from None
+        with whole_file(path) as temporary:
+            parquet.write_table(pyarrow.table({n: _numbers(cells) for n, cells in self.columns.items()}), temporary)
 
 
 def _numbers(cells: Sequence[str]) -> Any:

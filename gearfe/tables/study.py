@@ -21,10 +21,24 @@ class DistributionTable:
     high: float | None = quantity(None, doc="upper end")
     mean: float | None = quantity(None, doc="mean of a normal distribution")
     deviation: float | None = quantity(None, above=0.0, doc="its standard deviation")
+    iso_class: int | None = quantity(
+        None,
+        low=1,
+        high=11,
+        doc="for slope_um: normal about mean, cut off at the tolerance of this class of ISO 1328-1",
+    )
     count: int | None = quantity(None, low=2, high=100_000, doc="even steps from low to high for a factorial design")
 
     def check(self, where: str) -> None:
-        """Ends or mean and deviation, not half of them."""
+        """Ends or mean and deviation, not half of them; or a class."""
+        if self.iso_class is not None:
+            for name in ("low", "high", "deviation", "count"):
+                if getattr(self, name) is not None:
+                    problem = "stands beside iso_class"
+                    raise InputError(
+                        f"{where}.{name}", getattr(self, name), problem, "the class gives it: leave it out"
+                    )
+            return
         for one, other in (("mean", "deviation"), ("deviation", "mean")):
             if getattr(self, one) is not None and getattr(self, other) is None:
                 raise InputError(f"{where}.{other}", None, f"is required beside {one}", "add it")
@@ -72,7 +86,7 @@ class StudyTable:
     seed: int = quantity(1, low=0, doc="seed of the random cases")
     rows_csv: str | None = quantity(None, doc="CSV file whose columns are named as the keys, for design = rows")
     parameters: dict[str, Any] = quantity(  # noqa: RUF009
-        dict, doc="dotted name of a key of the job -> list of values, or low and high, or mean and deviation"
+        dict, doc="dotted name of a key of the job -> list of values, or low and high, mean and deviation, or iso_class"
     )
     outputs: dict[str, str] = quantity(  # noqa: RUF009
         doc="name -> expression of the job's columns and of summary, as `ptp(transmission_error_um)`"

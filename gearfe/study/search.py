@@ -1,0 +1,292 @@
+"""What an optimiser asks of a study: points are solved side by side, kept on disk, and never solved twice.
+
+The study says what is searched: parameters between their ends, the output in `minimise` or `maximise`, and the limits
+of outputs as constraints. `Search.evolve` is scipy's differential evolution; any other optimiser is an `Optimiser`,
+with `ask` and `tell`, or calls `Search.solve` itself.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..errors import InputError
+from ..typing import Array
+from .case import DIED, DONE, Row
+from .job import Study, check_outputs, solved_rows
+from .journal import Journal, cell_text
+from .run import end_processes, processes
+
+#: A constraint's value of a point that has no answer, beyond its limit.
+FAR = 1e30
+
+Point = Mapping[str, Any]
+
+
+class Optimiser(Protocol):
+    """What asks for points and is told their outputs."""
+
+    def ask(self) -> Sequence[Point]:
+        """Points to solve side by side, parameter -> value; none: it has ended."""
+
+    def tell(self, points: Sequence[Point], outputs: Sequence[Mapping[str, float]]) -> None:
+        """Outputs of these points, not-a-number where a point has no answer."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A point and its outputs; `case` is its row in the table."""
+
+    case: int
+    point: dict[str, Any]
+    outputs: dict[str, float]
+
+
+class Search:
+    """Points of a study, solved when they are asked for the first time.
+
+    Use it with ``with``: its processes stay between the points of one round and the next, and end with it.
+
+    Parameters
+    ----------
+    study
+        Its parameters are the coordinates; its design is not used.
+    folder
+        Of ``study.csv`` and ``study.json``: a search that was interrupted finds its points there. None: kept in memory.
+    jobs, executor
+        As of `gearfe.study.job.run_study`.
+    progress
+        Called with points solved, points asked for, and a name.
+
+    Raises
+    ------
+    InputError
+        Outputs that the job does not give, a folder with another study.
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        folder: str | Path | None = None,
+        *,
+        jobs: int | None = None,
+        executor: Executor | None = None,
+        progress: Callable[[int, int, str], None] | None = None,
+    ) -> None:
+        from ..stiffness.report import versions
+
+        check_outputs(study)
+        self.study = study
+        self._jobs, self._executor, self._progress = jobs or os.cpu_count() or 1, executor, progress
+        self._own: Executor | None = None
+        self._case: dict[tuple[str, ...], int] = {}
+        self._rows: list[Row] = []
+        self._points: list[tuple[Any, ...]] = []
+        self._journal: Journal | None = None
+        if folder is not None:
+            names, outputs = study.task.names, tuple(study.table.outputs)
+            head = {**study.head, "search": True}
+            Path(folder).mkdir(parents=True, exist_ok=True)
+            self._journal = Journal(Path(folder), head, versions(), names, outputs)
+            columns = self._journal.finish()
+            for i, case in enumerate(columns["case"]):
+                self._case[tuple(columns[name][i] for name in names)] = len(self._rows)
+                found = tuple(float(columns[name][i]) for name in outputs)
+                status, message, seconds = (columns[name][i] for name in ("status", "message", "seconds"))
+                self._rows.append(Row(int(case), found, status, message, float(seconds)))
+                self._points.append(tuple(_cell(columns[name][i]) for name in names))
+
+    def __enter__(self) -> Search:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._own is not None:
+            end_processes(self._own)
+            self._own = None
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def solve(self, points: Sequence[Point]) -> list[dict[str, float]]:
+        """Outputs at these points, in their order; not-a-number where a point has no answer.
+
+        Raises
+        ------
+        InputError
+            Points that do not name every parameter of the study, and no others.
+        """
+        names, asked, fresh = self.study.task.names, [], {}
+        for point in points:
+            if set(point) != set(names):
+                wrong = sorted(set(point) ^ set(names))
+                raise InputError("points", wrong[0], "stands in a point or in the study alone", f"name {names}")
+            values = tuple(_plain(point[name]) for name in names)
+            key = tuple(map(cell_text, values))
+            asked.append(key)
+            if key not in self._case and key not in fresh:
+                fresh[key] = values
+        if fresh:
+            self._solve(fresh)
+        outputs = self.study.task.outputs
+        return [dict(zip(outputs, self._rows[self._case[key]].outputs, strict=True)) for key in asked]
+
+    def _solve(self, fresh: Mapping[tuple[str, ...], tuple[Any, ...]]) -> None:
+        first = max((row.case for row in self._rows), default=-1) + 1
+        cases = list(enumerate(fresh.values(), start=first))
+        values = dict(cases)
+        made: dict[int, Row] = {}
+        executor = self._executor
+        if executor is None and self._jobs > 1:
+            executor = self._own = self._own or processes(self._jobs)
+        for rows in solved_rows(self.study.task, cases, self._jobs, executor, None):
+            made |= {row.case: row for row in rows}
+            self._keep([row for row in rows if row.status != DIED], values, first + len(cases))
+        died = [(case, values[case]) for case, row in made.items() if row.status == DIED]
+        if died:
+            if self._own is not None:  # whose fault it was is found out by processes of their own
+                end_processes(self._own)
+                self._own = None
+                for rows in solved_rows(self.study.task, died, self._jobs, None, None):
+                    made |= {row.case: row for row in rows}
+            self._keep([made[case] for case, _ in died], values, first + len(cases))
+        for (case, point), key in zip(cases, fresh, strict=True):
+            self._case[key] = len(self._rows)
+            self._rows.append(made[case])
+            self._points.append(point)
+
+    def _keep(self, rows: Sequence[Row], values: Mapping[int, Sequence[Any]], total: int) -> None:
+        if self._journal is not None:
+            self._journal.append(rows, values)
+            if self._progress is not None:
+                self._progress(len(self._journal.done), total, "points")
+
+    def run(self, optimiser: Optimiser) -> Solution | None:
+        """Ask, solve, tell, until the optimiser asks for nothing more; then the best point."""
+        while points := optimiser.ask():
+            optimiser.tell(points, self.solve(points))
+        return self.best()
+
+    @property
+    def aim(self) -> tuple[str, float]:
+        """The one output that the study minimises or maximises, and its sign.
+
+        Raises
+        ------
+        InputError
+            Where there is not one.
+        """
+        table = self.study.table
+        aims = [(name, 1.0) for name in table.minimise] + [(name, -1.0) for name in table.maximise]
+        if len(aims) != 1:
+            cure = "name one output in minimise or maximise; the others may have limits"
+            raise InputError("study.minimise", [name for name, _ in aims], "must be one output for a search", cure)
+        return aims[0]
+
+    def best(self) -> Solution | None:
+        """The best point of all that keep the limits; None where none does."""
+        name, sign = self.aim
+        outputs, found, least = tuple(self.study.table.outputs), None, math.inf
+        for row, values in zip(self._rows, self._points, strict=True):
+            told = dict(zip(outputs, row.outputs, strict=True))
+            if row.status == DONE and sign * told[name] < least and self._excess(told) <= 0.0:
+                least = sign * told[name]
+                found = Solution(row.case, dict(zip(self.study.task.names, values, strict=True)), told)
+        return found
+
+    def _excess(self, outputs: Mapping[str, float]) -> float:
+        """How far the worst output is beyond its limits; infinite where one has no value."""
+        worst = -math.inf
+        for name, limit in self.study.table.limits.items():
+            value = outputs[name]
+            beyond = max(
+                -math.inf if limit.high is None else value - limit.high,
+                -math.inf if limit.low is None else limit.low - value,
+            )
+            worst = max(worst, beyond if math.isfinite(value) else math.inf)
+        return worst
+
+    def bounds(self) -> list[tuple[float, float]]:
+        """Ends of the parameters.
+
+        Raises
+        ------
+        InputError
+            For a parameter without two ends.
+        """
+        made = []
+        for one in self.study.parameters:
+            d = one.distribution
+            if d is None or d.low is None or d.high is None:
+                where = f"study.parameters.{one.name}"
+                raise InputError(where, None, "has no two ends to search between", "write { low = a, high = b }")
+            made.append((d.low, d.high))
+        return made
+
+    def evolve(self, *, rounds: int = 40, population: int = 10, seed: int = 1) -> Solution | None:
+        """Search by differential evolution (Storn & Price 1997, by scipy), limits as its constraints (Lampinen 2002).
+
+        Parameters
+        ----------
+        rounds
+            Generations at most; it ends before where the members agree within 1 %.
+        population
+            Members for each parameter.
+        seed
+            The same seed asks for the same points: a search that was interrupted goes on where it stood.
+
+        Returns
+        -------
+        Solution or None
+            The best point of all; None where none keeps the limits.
+        """
+        from scipy.optimize import NonlinearConstraint, differential_evolution
+
+        name, sign = self.aim
+        whole = [one.whole for one in self.study.parameters]
+
+        def solved(x: Array) -> list[dict[str, float]]:
+            named = (zip(self.study.task.names, row, whole, strict=True) for row in np.atleast_2d(x.T).tolist())
+            return self.solve([{name: round(value) if w else value for name, value, w in row} for row in named])
+
+        def objective(x: Array) -> Array:
+            values = np.array([sign * one[name] for one in solved(x)])
+            return np.where(np.isfinite(values), values, np.inf)
+
+        def excess(x: Array) -> Array:
+            return np.array([[min(self._excess(one), FAR) for one in solved(x)]])
+
+        limited = bool(self.study.table.limits)
+        differential_evolution(
+            objective,
+            self.bounds(),
+            constraints=(NonlinearConstraint(excess, -np.inf, 0.0),) if limited else (),
+            maxiter=rounds,
+            popsize=population,
+            polish=False,
+            rng=np.random.default_rng(seed),
+            integrality=whole,
+            vectorized=True,
+            updating="deferred",
+        )
+        return self.best()
+
+
+def _plain(value: Any) -> Any:
+    """A number of NumPy as Python's."""
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _cell(text: str) -> Any:
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
