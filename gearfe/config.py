@@ -138,6 +138,11 @@ def type_hints(cls: Any) -> dict[str, Any]:
     return typing.get_type_hints(cls)
 
 
+def fields_of(table: type) -> dict[str, dataclasses.Field[Any]]:
+    """Fields of a dataclass by name."""
+    return {field.name: field for field in dataclasses.fields(typing.cast(Any, table))}
+
+
 def build(cls: type[T], table: Any, where: str) -> T:
     """Frozen dataclass `cls` from a parsed TOML table; `where` is the table's name for messages.
 
@@ -151,19 +156,19 @@ def build(cls: type[T], table: Any, where: str) -> T:
     InputError
         Unknown key (with the nearest known one), missing key, wrong type, value out of range.
     """
-    fields = {f.name: f for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    fields, kind = fields_of(cls), typing.cast(Any, cls)
     if isinstance(table, str) and hasattr(cls, "SHORT"):
-        table = {cls.SHORT: table}  # type: ignore[attr-defined]
+        table = {kind.SHORT: table}
     if not isinstance(table, dict):
         raise InputError(where, table, "must be a table of keys and values", f"write [{where}] and its keys below it")
-    hints = type_hints(typing.cast(Any, cls))
+    hints = type_hints(kind)
     # what chooses among kinds first: a wrong kind brings keys of its own
     for name, spec in fields.items():
         if spec.metadata.get("choices") and name in table:
             _convert(hints[name], table[name], _joined(where, name), spec.metadata)
     for key in table:
         if key in getattr(cls, "REMOVED", ()):
-            raise InputError(_joined(where, key), table[key], *cls.REMOVED[key])  # type: ignore[attr-defined]
+            raise InputError(_joined(where, key), table[key], *kind.REMOVED[key])
         if key not in fields:
             raise unknown_name(where or "job file", key, fields)
     values: dict[str, Any] = {}
@@ -227,14 +232,13 @@ def _convert(hint: Any, value: Any, label: str, meta: Any) -> Any:
         options = [a for a in typing.get_args(hint) if a is not type(None)]
         # the option that is written like the value tells what is wrong with it
         options.sort(key=lambda option: not _written_like(option, value))
-        problem: InputError | None = None
+        problems: list[InputError] = []
         for option in options:
             try:
                 return _convert(option, value, label, meta)
             except InputError as error:
-                problem = problem or error
-        assert problem is not None
-        raise problem
+                problems.append(error)
+        raise problems[0]
     if origin is tuple:
         return _convert_tuple(hint, value, label, meta)
     if origin is dict:

@@ -6,6 +6,9 @@ import difflib
 import math
 import reprlib
 from collections.abc import Iterable
+from typing import TypeVar
+
+T = TypeVar("T")
 
 #: Characters of a text, digits of a whole number and entries of a list that a message shows.
 LONGEST_TEXT, MOST_DIGITS, MOST_ENTRIES = 80, 18, 6
@@ -55,6 +58,19 @@ class InputError(ValueError):
 
     def __reduce__(self) -> tuple[object, ...]:
         return (InputError, (self.field, self.value, self.problem, self.cure))
+
+
+def given(value: T | None, field: str) -> T:
+    """The value of an optional key that other keys make necessary.
+
+    Raises
+    ------
+    InputError
+        Where it is missing.
+    """
+    if value is None:
+        raise InputError(field, None, "is required here", "add it")
+    return value
 
 
 class NotFiniteWarning(UserWarning):

@@ -12,12 +12,15 @@ import re
 import typing
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from ..config import JobFile, check_range
+from ..config import JobFile, check_range, fields_of
 from ..errors import InputError, nearest, unknown_name
 
-Table = TypeVar("Table")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Table = TypeVar("Table", bound="DataclassInstance")
 #: What a help calls the value of an option.
 METAVARS = {float: "X", int: "N", str: "NAME"}
 #: What a help calls a job file.
@@ -41,7 +44,7 @@ class CommandParser(argparse.ArgumentParser):
         """Tell a mistake in the words of ``argparse``."""
         raise InputError("command line", None, message, f"{self.prog} --help tells the options")
 
-    def parse_args(self, args: Sequence[str], namespace: Any = None) -> Any:  # type: ignore[override]
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Namespace of the arguments.
 
         Raises
@@ -106,7 +109,7 @@ def _counts(action: argparse.Action) -> tuple[int, float]:
 
 def check_option(option: str, value: Any, table: type, key: str) -> None:
     """Raise `InputError` for a value that the `key` of a table does not allow."""
-    known = table.__dataclass_fields__[key].metadata  # type: ignore[attr-defined]
+    known = fields_of(table)[key].metadata
     if isinstance(value, (int, float)):
         check_range(value, option, known)
     elif (choices := known["choices"]) and value not in choices:
@@ -129,7 +132,7 @@ def add_keys(parser: Any, table: type, *keys: str, **renamed: str) -> None:
     """
     hints = typing.get_type_hints(table)
     for name, key in ({k: k for k in keys} | renamed).items():
-        known = table.__dataclass_fields__[key].metadata  # type: ignore[attr-defined]
+        known = fields_of(table)[key].metadata
         options: dict[str, Any] = {"dest": name, "help": known["doc"].removeprefix("true: ").replace("%", "%%")}
         kinds = [kind for kind in typing.get_args(hints[key]) or (hints[key],) if kind is not type(None)]
         if kinds == [bool]:
@@ -168,7 +171,7 @@ def with_keys(args: argparse.Namespace, table: Table, *keys: str, **renamed: str
         if value is not None:
             check_option(_option(name), value, type(table), key)
             changes[key] = value
-    return replace(table, **changes)  # type: ignore[type-var]
+    return replace(table, **changes)
 
 
 def _option(name: str) -> str:

@@ -130,5 +130,5 @@ def _drop_output() -> None:
             os.dup2(nowhere, stream.fileno())
 
 
-def _module(name: str):  # type: ignore[no-untyped-def]
+def _module(name: str) -> Any:
     return importlib.import_module(f".{COMMANDS[name]}", __package__)

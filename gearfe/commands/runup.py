@@ -72,13 +72,12 @@ def run(args: argparse.Namespace) -> int:
         body = train_body(job)
     with watch.stage("model"):
         scene = job_scene(job, stiffness, body)
-        assert scene.drive is not None
         speeds = np.linspace(table.speed_start_rad_per_s, table.speed_stop_rad_per_s, table.speeds)
-        model = build_train(replace(scene, drive=replace(scene.drive, speed=constant(float(speeds[0])))))
+        model = build_train(replace(scene, drive=replace(scene.driven, speed=constant(float(speeds[0])))))
     band = table.band_Hz or (5000.0 if job.housing is None else job.housing.reduction.band_Hz)
     with watch.stage("steady states"), stage("steady states"):
-        options = {"tolerance": table.tolerance, "band_hz": band, "stability": table.stability}
-        made = run_up(model, speeds, progress=_counted, **options)  # type: ignore[arg-type]
+        options: dict[str, Any] = {"tolerance": table.tolerance, "band_hz": band, "stability": table.stability}
+        made = run_up(model, speeds, progress=_counted, **options)
     if not made.states:
         problem = "has no periodic motion that was found at any of the speeds"
         raise _nothing(table, problem)

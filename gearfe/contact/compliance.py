@@ -44,14 +44,14 @@ class FarField:
     ----------
     flank : ndarray, shape (f, r)
         Flank displacements for the modes of the cut sides.
-    stress : ndarray, shape (e q, r), or None
-        Normal stress for the same.
+    stress : ndarray, shape (e q, r)
+        Normal stress for the same; no rows where no law asks for it.
     driven : dict of int to ndarray, shape (r, f)
         Step k -> modes of tooth k for flank forces on tooth 0 (1/N), for the few k that can matter.
     """
 
     flank: Array
-    stress: Array | None
+    stress: Array
     driven: dict[int, Array]
 
 
@@ -73,9 +73,10 @@ class GearBody:
         X_k: displacements of the cut sides of tooth k for forces on the cut sides of tooth 0 (m/N).
     width
         Width of the contact (m): the mate may be narrower.
-    stress_own : ndarray, shape (e q, f), or None
+    stress_own : ndarray, shape (e q, f)
         Normal stress at the quadrature points for flank forces with the cut sides held (Pa/N), per area of contact: the
-        body's own times thickness/width, as a pressure on the width of the contact spreads over the thickness.
+        body's own times thickness/width, as a pressure on the width of the contact spreads over the thickness. No rows
+        where no law asks for it.
     far : FarField
         The same cyclic part in its numerical rank.
     condensed
@@ -90,7 +91,7 @@ class GearBody:
     own: Array
     interface: Array
     coupling: Array
-    stress_own: Array | None
+    stress_own: Array
     far: FarField
     condensed: Condensed
     width: float
@@ -150,7 +151,7 @@ def gear_body(
     own = dpotri(factor, lower=1)[0]
     own = np.tril(own) + np.tril(own, -1).T
     coupling = _cyclic_compliance(stiffness[f:, f:] + stiffness[f:, :f] @ interface, mesh.teeth)
-    stress_own = stress_interface = None
+    stress_own, stress_interface = np.zeros((0, f)), np.zeros((0, len(stiffness) - f))
     if with_stress:
         unknowns, rows = normal_stress_rows(mesh, material, plane, points_per_edge)
         every = np.repeat(unknowns, rows.shape[1], axis=0)
@@ -178,20 +179,17 @@ def gear_body(
 REACH = 12
 
 
-def _far_field(interface: Array, stress: Array | None, coupling: Array) -> FarField:
+def _far_field(interface: Array, stress: Array, coupling: Array) -> FarField:
     """Compress displacements and stresses onto the side motions that reach the flank (Saint-Venant: a dozen or two)."""
-    rows = interface if stress is None else np.concatenate([interface, stress * (_norm(interface) / _norm(stress))])
+    scale = np.linalg.norm(interface) / np.linalg.norm(stress) if len(stress) else 1.0
+    rows = np.concatenate([interface, stress * scale])
     triangular = np.linalg.qr(rows, mode="r")
     _, values, modes = np.linalg.svd(triangular, full_matrices=False)
     basis = modes[values > 1e-13 * values[0]].T
     flank, teeth = interface @ basis, len(coupling)
     steps = range(-REACH, REACH + 1)
     driven = dict(zip(steps, basis.T @ coupling[[k % teeth for k in steps]] @ basis @ flank.T, strict=True))
-    return FarField(flank, None if stress is None else stress @ basis, driven)
-
-
-def _norm(matrix: Array) -> float:
-    return float(np.linalg.norm(matrix))
+    return FarField(flank, stress @ basis, driven)
 
 
 def _cyclic_compliance(stiffness: Array, teeth: int) -> Array:

@@ -292,8 +292,6 @@ def _response(batch: Batch, windows: range, bears: BoolArray) -> Array:
                 part += body.own[of_flank[i], of_flank[j]]
             if i not in rows:
                 continue
-            assert body.far.stress is not None
-            assert body.stress_own is not None
             part = matrix[rows[i], moved[j]]
             np.matmul(body.far.stress[of_points[i]], driven, out=part)
             if i == j:

@@ -29,11 +29,12 @@ that is integrated, which nothing cuts.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
 
+from ..config import fields_of
 from ..errors import InputError
 from ..tables.laws import law_class
 from ..typing import Array, BoolArray
@@ -82,7 +83,7 @@ def carrying(law: ElementLaw, to_tip: Array) -> BoolArray:
 
 def law_text(law: ContactLaw) -> str:
     """Name and parameters in one line without commas, for tables and reports."""
-    told = {field.name: getattr(law, field.name) for field in fields(law)}  # type: ignore[arg-type]
+    told = {name: getattr(law, name) for name in fields_of(type(law))}
     if isinstance(law, Penalty):
         told["stiffness"] = "300E/h" if law.stiffness is None else f"{law.stiffness * 1e-9:.12g}N/mm3"
     texts = {name: f"{v:.12g}" if isinstance(v, float) else str(v).replace(",", "") for name, v in told.items()}
@@ -167,7 +168,7 @@ class HalfPlane:
 def law_named(name: str, **parameters: Any) -> ContactLaw:
     """The law called `name` (`gearfe.tables.laws`) with the parameters given, the others by default."""
     kind = law_class(name)
-    known = [field.name for field in fields(kind)]
+    known = list(fields_of(kind))
     for key, value in parameters.items():
         if key not in known:
             problem = "is no parameter of the law " + name

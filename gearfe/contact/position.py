@@ -8,20 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..typing import Array, BoolArray, IntArray
-
-Record = TypeVar("Record")
+from ..typing import Array, BoolArray, Dataclass, IntArray
 
 
-def taken(record: Record, index: Any) -> Record:
+def taken(record: Dataclass, index: Any) -> Dataclass:
     """The entries `index` of every array, of records within the record likewise; None stays."""
     made: dict[str, Any] = {}
-    for field in fields(record):  # type: ignore[arg-type]
+    for field in fields(record):
         value = getattr(record, field.name)
         if isinstance(value, np.ndarray):
             made[field.name] = value[index]
@@ -30,12 +28,12 @@ def taken(record: Record, index: Any) -> Record:
     return type(record)(**made)
 
 
-def joined(parts: Sequence[Record]) -> Record:
-    """Records of one kind put one after the other."""
+def joined(parts: Sequence[Dataclass]) -> Dataclass:
+    """Dataclasss of one kind put one after the other."""
     if len(parts) == 1:
         return parts[0]
     made: dict[str, Any] = {}
-    for field in fields(parts[0]):  # type: ignore[arg-type]
+    for field in fields(parts[0]):
         values = [getattr(part, field.name) for part in parts]
         if isinstance(values[0], np.ndarray):
             made[field.name] = np.concatenate(values)
@@ -44,10 +42,10 @@ def joined(parts: Sequence[Record]) -> Record:
     return type(parts[0])(**made)
 
 
-def of_positions(record: Record, chosen: IntArray) -> Record:
+def of_positions(record: Dataclass, chosen: IntArray) -> Dataclass:
     """The entries of the positions `chosen`, numbered in their order; the record's are sorted by `position`."""
-    position: IntArray = record.position  # type: ignore[attr-defined]
-    first, end = (np.searchsorted(position, chosen, side=side) for side in ("left", "right"))
+    where: Any = record
+    first, end = (np.searchsorted(where.position, chosen, side=side) for side in ("left", "right"))
     made: Any = taken(record, ranges(first, end - first))
     return replace(made, position=np.repeat(np.arange(len(chosen)), end - first))
 

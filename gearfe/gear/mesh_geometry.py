@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from .involute import inv, inverse_inv
 from .spur_gear import Gear
@@ -131,8 +132,8 @@ class MeshGeometry:
         pinion = self.pinion
         return pinion.base_radius * (pinion_angle + self.working_pressure_angle + pinion.base_angle)
 
-    def wheel_angle_at(self, pinion_angle: float, twist: float = 0.0) -> float:
-        """Wheel angle (rad) from its meshing position, -pinion angle/ratio + twist."""
+    def wheel_angle_at(self, pinion_angle: Any, twist: Any = 0.0) -> Any:
+        """Wheel angle (rad; a number or an array) from its meshing position, -pinion angle/ratio + twist."""
         return twist - pinion_angle / self.gear_ratio
 
     @property

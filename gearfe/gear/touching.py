@@ -79,7 +79,9 @@ class Face:
         made = np.exp(1j * (flank.base_angle - s / flank.base_radius)) * (flank.base_radius + 1j * beside)
         if self.round_ is None:
             return made
-        return np.where(u > 1.0, complex(*self.round_.centre) + self.round_.radius * self._round_normals(u), made)
+        return np.where(
+            u > 1.0, complex(*self.round_.centre) + self.round_.radius * _round_normals(self.round_, u), made
+        )
 
     def normals(self, u: Array) -> ComplexArray:
         """Outward unit normals as complex numbers."""
@@ -91,12 +93,7 @@ class Face:
             forward = (s - depth) / flank.base_radius
             size = np.hypot(forward, slope)
             made = made * np.where(size > 0.0, (forward - 1j * slope) / np.where(size > 0.0, size, 1.0), 1.0)
-        return made if self.round_ is None else np.where(u > 1.0, self._round_normals(u), made)
-
-    def _round_normals(self, u: Array) -> ComplexArray:
-        assert self.round_ is not None
-        start, end = self.round_.start_angle, self.round_.end_angle
-        return np.asarray(np.exp(1j * (start + (u - 1.0) * (end - start))))
+        return made if self.round_ is None else np.where(u > 1.0, _round_normals(self.round_, u), made)
 
     def speeds(self, u: Array) -> Array:
         """Arc length per unit of u (m)."""
@@ -361,3 +358,9 @@ def candidates(pair: MeshGeometry, angles: Array) -> tuple[IntArray, Array, IntA
 
 def _cross(a: ComplexArray, b: ComplexArray) -> Array:
     return np.asarray((np.conj(a) * b).imag)
+
+
+def _round_normals(round_: Arc, u: Array) -> ComplexArray:
+    """Normals of a tip round at parameters u in [1, 2]."""
+    start, end = round_.start_angle, round_.end_angle
+    return np.asarray(np.exp(1j * (start + (u - 1.0) * (end - start))))

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, given
 from ..meshing.mesh_file import MeshFile, read_mesh_file
 from ..solid import SolidMaterial
 from ..tables.housing import UNITS, HeldTable, HousingTable, MeshBoreTable
@@ -30,9 +30,8 @@ def own_housing(table: HousingTable, folder: Path, material: SolidMaterial) -> H
     InputError
         For every mistake in file, bores and held faces, in the table's keys.
     """
-    assert table.mesh.file is not None
     field = "housing.mesh"
-    found = read_mesh_file(folder / table.mesh.file, field, table.mesh.size_mm)
+    found = read_mesh_file(folder / given(table.mesh.file, field), field, table.mesh.size_mm)
     mesh = found._replace(nodes=UNITS[table.mesh.unit] * found.nodes)
     used = np.unique(mesh.tets)
     notes = [told_size(mesh.nodes[used])]
@@ -93,7 +92,7 @@ def fitted_cylinder(points: Array) -> tuple[Array, Array, float, float]:
         offset = at - foot
         return foot, axis, np.linalg.norm(offset - np.outer(offset @ axis, axis), axis=1)
 
-    best = None
+    fits = []
     for start in starts:
         frame = np.linalg.svd(np.outer(start, start))[0].T[[1, 2, 0]]
         # a circle through the points seen along the start (Kasa's equations)
@@ -106,10 +105,9 @@ def fitted_cylinder(points: Array) -> tuple[Array, Array, float, float]:
             return np.asarray(distance - distance.mean())
 
         found = least_squares(off, [0.0, 0.0, x, y], xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60)
-        if best is None or found.cost < best[0].cost:
-            best = found, frame
-    assert best is not None
-    foot, axis, distance = parts(best[0].x, best[1])
+        fits.append((found, frame))
+    best, frame = min(fits, key=lambda fit: fit[0].cost)
+    foot, axis, distance = parts(best.x, frame)
     axis = axis * np.sign(axis[np.argmax(np.abs(axis))])
     radius = float(distance.mean())
     return middle + size * foot, axis, size * radius, size * float(np.abs(distance - radius).max())
@@ -119,13 +117,12 @@ def _attachment(bore: MeshBoreTable, i: int, mesh: MeshFile, used: IntArray) -> 
     field, name = f"housing.bores[{i}]", bore.name or str(i + 1)
     point = None if bore.point_mm is None else 1e-3 * np.array(bore.point_mm)
     if bore.group is None:
-        assert point is not None
-        assert bore.radius_mm is not None
         along = None if bore.range_mm is None else (1e-3 * bore.range_mm[0], 1e-3 * bore.range_mm[1])
-        x, y, z = (float(one) for one in point)
-        given = Bore((x, y, z), bore.direction, 1e-3 * bore.radius_mm, along, name)
+        x, y, z = (float(one) for one in given(point, f"{field}.point_mm"))
+        radius = 1e-3 * given(bore.radius_mm, f"{field}.radius_mm")
+        there = Bore((x, y, z), bore.direction, radius, along, name)
         try:
-            made, notes = bore_attachment(given, i + 1, mesh.nodes[used])
+            made, notes = bore_attachment(there, i + 1, mesh.nodes[used])
         except InputError as error:
             cure = "check point_mm, direction, radius_mm and range_mm, and the unit of the mesh"
             raise InputError(field, name, error.problem, cure) from None
@@ -149,10 +146,10 @@ def _attachment(bore: MeshBoreTable, i: int, mesh: MeshFile, used: IntArray) -> 
 def _held(held: HeldTable, field: str, mesh: MeshFile, used: IntArray) -> IntArray:
     if held.group is not None:
         return mesh.group(held.group, f"{field}.group")
-    assert held.point_mm is not None
-    x, y, z = (1e-3 * one for one in held.point_mm)
+    point = given(held.point_mm, f"{field}.point_mm")
+    x, y, z = (1e-3 * one for one in point)
     try:
         return used[plane_nodes(Plane((x, y, z), held.normal), mesh.nodes[used])]
     except InputError as error:
         cure = "check point_mm and normal, and the unit of the mesh"
-        raise InputError(field, list(held.point_mm), error.problem, cure) from None
+        raise InputError(field, list(point), error.problem, cure) from None

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError, given, unknown_name
 from ..rigid.beam import Beam
 from ..rigid.beam_link import BeamLink, Section
 from ..rigid.scene import PlanarScene
@@ -26,15 +26,12 @@ def section_of(table: BeamTable) -> Section:
         return Section.rectangle(table.width_m, table.height_m)
     if table.diameter_m is not None:
         return Section.tube(table.diameter_m, table.inner_diameter_m)
-    assert table.area_m2 is not None  # the table was checked
-    assert table.second_moment_m4 is not None
-    return Section(table.area_m2, table.second_moment_m4, table.edge_m)
+    return Section(given(table.area_m2, "area_m2"), given(table.second_moment_m4, "second_moment_m4"), table.edge_m)
 
 
 def link_of(file: MechanismFile, name: str, table: BodyTable) -> BeamLink:
     """Flexible link from its tables, with nodes wherever points, joints or forces are."""
-    beam = table.beam
-    assert beam is not None
+    beam = given(table.beam, f"bodies.{name}.beam")
     points = {x for x, _ in table.points_m.values()}
     parts: list[JointTable | ForceTable] = [*file.joints.values(), *file.forces.values()]
     for part in parts:
@@ -136,8 +133,8 @@ def flexible_links(file: MechanismFile, planar: PlanarScene, links: dict[str, Be
     made = {}
     for name, link in links.items():
         table = file.bodies[name]
-        assert table.beam is not None
-        made[name] = FlexibleLink(Beam(planar, link), dict(table.points_m), table.beam.frame == "start")
+        beam = given(table.beam, f"bodies.{name}.beam")
+        made[name] = FlexibleLink(Beam(planar, link), dict(table.points_m), beam.frame == "start")
     return made
 
 

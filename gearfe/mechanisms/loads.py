@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, given
 from ..rigid import StateFunction
 from ..typing import Array
 from .expressions import OF_POINT, Node, quantities
@@ -151,12 +151,10 @@ class ExpressionLoad(StateFunction):
         for kind, what in self.names:
             where: list[tuple[int, float, float, float]] = []  # body, sign, place in its frame
             if kind in ("angle", "rate"):
-                assert what is not None
-                for body, sign in mechanism.angle_of(what, self.label):
+                for body, sign in mechanism.angle_of(given(what, self.label), self.label):
                     where.append((body, sign, 0.0, 0.0))
             elif kind in OF_POINT:
-                assert what is not None
-                body, (x, y) = mechanism.point(what, self.label)
+                body, (x, y) = mechanism.point(given(what, self.label), self.label)
                 where.append((body, 1.0, x, y))
             self.places.append((kind, where))
 

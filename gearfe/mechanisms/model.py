@@ -6,13 +6,15 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError, given, unknown_name
 from ..rigid import GROUND, Forced, PlanarScene, Scene, Start, System, consistent_start
 from ..tables.kinds import FORCES, JOINTS
 from ..tables.mechanism import FigureTable, MechanismFile, read_mechanism_file
+from ..typing import Array
 from .expressions import FUNCTIONS, NAMED, OF_LINK, OF_POINT, OF_SECTION, PLAIN, Node, compute, parse, quantities
 from .links import FlexibleLink, bent_start, flexible_links, link_of
 from .loads import ExpressionLoad
@@ -85,7 +87,9 @@ class Mechanism:
             at = points[name]
         return index[body], (at[0] - centre[0], at[1] - centre[1])
 
-    def values(self, wanted: set[tuple[str, str | None]], q, v=None, a=None, sections=None):  # type: ignore[no-untyped-def]
+    def values(
+        self, wanted: set[tuple[str, str | None]], q: Any, v: Any = None, a: Any = None, sections: Any = None
+    ) -> Any:
         """Quantities of bodies, joints and points for states of shape (n, size).
 
         `sections`: link -> forces at its nodes, shape (n, nodes, 3); from the states where not given.
@@ -94,18 +98,18 @@ class Mechanism:
         for kind, what in wanted:
             if kind in PLAIN:
                 continue
-            assert what is not None
+            where = given(what, f"expression {kind}")
             if kind in OF_SECTION or kind in OF_LINK:
-                found[kind, what] = self._of_link(kind, what, q, v, sections)
+                found[kind, what] = self._of_link(kind, where, q, v, sections)
             elif kind in OF_POINT:
-                x, y = self._point_values(kind, what, q, v, a)
+                x, y = self._point_values(kind, where, q, v, a)
                 found[kind, what] = x if kind.endswith("x") else y
             else:
                 source = {"angle": q, "rate": v, "angular_acceleration": a}[kind]
-                found[kind, what] = self._angle(what, source)
+                found[kind, what] = self._angle(where, source)
         return found
 
-    def _angle(self, what: str, source):  # type: ignore[no-untyped-def]
+    def _angle(self, what: str, source: Array) -> Array:
         total = np.zeros(len(source))
         for body, sign in self.angle_of(what, "expression"):
             total = total + sign * source[:, 3 * body + 2]
@@ -124,7 +128,7 @@ class Mechanism:
         bodies = [(self.point(body, label)[0], sign) for body, sign in pair]
         return [(body, sign) for body, sign in bodies if body != ground]
 
-    def _of_link(self, kind: str, what: str, q, v, sections):  # type: ignore[no-untyped-def]
+    def _of_link(self, kind: str, what: str, q: Any, v: Any, sections: Any) -> Any:
         name, _, point = what.partition(".")
         if name not in self.links:
             raise unknown_name(f"expression {kind}({what}): flexible links", name, self.links)
@@ -144,7 +148,7 @@ class Mechanism:
             return link.edge_stress(forces, f"expression {kind}({what})")
         return forces[:, ("axial_force", "shear_force", "bending_moment").index(kind)]
 
-    def _point_values(self, kind: str, where: str, q, v, a):  # type: ignore[no-untyped-def]
+    def _point_values(self, kind: str, where: str, q: Any, v: Any, a: Any) -> tuple[Array, Array]:
         body, (lx, ly) = self.point(where, "expression")
         if body == len(self.scene.bodies):
             zero = np.zeros(len(q))
@@ -208,16 +212,16 @@ class Mechanism:
                 problem = f"uses {kind}; only {', '.join(allowed)} can be forced here"
                 raise InputError(label, None, problem, "use one of these")
 
-        def position(q):  # type: ignore[no-untyped-def]
+        def position(q: Array) -> float:
             return float(np.asarray(compute(node, self.values(wanted, q[None, :]))).reshape(-1)[0])
 
-        def slope(q):  # type: ignore[no-untyped-def]
+        def slope(q: Array) -> Array:
             steps = 1e-6 * np.diag(self.system.units)
             states = np.concatenate([q + steps, q - steps])
             ends = np.broadcast_to(compute(node, self.values(wanted, states)), len(states))
             return (ends[: len(q)] - ends[len(q) :]) / (2e-6 * self.system.units)
 
-        def rate_slope(q):  # type: ignore[no-untyped-def]
+        def rate_slope(q: Array) -> Array:
             n = len(q)
             states = np.broadcast_to(q, (n + 1, n))
             made = np.broadcast_to(

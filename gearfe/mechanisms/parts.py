@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError, given, unknown_name
 from ..rigid import GROUND, Body, TimeFunction, constant, polynomial, sine, smoothed_step
 from ..rigid.beam_link import BeamLink
 from ..tables.kinds import Kind
@@ -25,10 +25,9 @@ LOADS = ("x_N", "y_N", "moment_N_m")
 def body_of(file: MechanismFile, name: str, t: BodyTable) -> Body:
     if t.beam is not None:
         return link_of(file, name, t).rigid()
-    assert t.mass_kg is not None  # the table was checked
-    assert t.inertia_kg_m2 is not None
+    mass, inertia = given(t.mass_kg, f"bodies.{name}.mass_kg"), given(t.inertia_kg_m2, f"bodies.{name}.inertia_kg_m2")
     angle = t.angle_rad if t.angle_rad is not None else math.radians(t.angle_deg or 0.0)
-    return Body(name, t.mass_kg, t.inertia_kg_m2, t.centre_m, t.position_m, angle, t.velocity_m_per_s, t.rate_rad_per_s)
+    return Body(name, mass, inertia, t.centre_m, t.position_m, angle, t.velocity_m_per_s, t.rate_rad_per_s)
 
 
 def _place(
@@ -122,8 +121,7 @@ def time_function(
     if table.polynomial:
         made = made + polynomial(table.polynomial, table.origin_s)
     if table.step is not None:
-        assert table.step_width_s is not None
-        made = made + smoothed_step(table.step_centre_s, table.step_width_s, table.step)
+        made = made + smoothed_step(table.step_centre_s, given(table.step_width_s, f"{label}.step_width_s"), table.step)
     if table.sine is not None:
         made = made + sine(table.sine, 2 * math.pi * table.frequency_hz, math.radians(table.phase_deg))
     return made

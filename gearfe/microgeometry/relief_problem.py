@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -65,16 +66,17 @@ class Variable:
     def applied(self, made: FlankModification, gear: Gear, value: float) -> FlankModification:
         """The modification with another value (m)."""
         name, _, part = self.quantity.partition(".")
-        if not part:
-            return replace(made, **{name: value})  # type: ignore[arg-type]
+        change: Any = value
+        if part:
+            change = self._relieved(getattr(made, name) or Relief(0.0, 0.5 * sum(ends_of(gear))), gear, value)
+        return replace(made, **{name: change})
+
+    def _relieved(self, own: Relief, gear: Gear, value: float) -> Relief:
+        """The relief with another amount or length (m)."""
         low, high = ends_of(gear)
-        own: Relief | None = getattr(made, name)
-        if own is None:
-            own = Relief(0.0, 0.5 * (low + high))
-        if part == "amount":
-            return replace(made, **{name: replace(own, amount=value)})  # type: ignore[arg-type]
-        start = high - value if name == "tip_relief" else low + value
-        return replace(made, **{name: replace(own, start=start)})  # type: ignore[arg-type]
+        if self.quantity.endswith(".amount"):
+            return replace(own, amount=value)
+        return replace(own, start=high - value if self.quantity.startswith("tip_relief") else low + value)
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,6 @@ def condense(model: TrainModel) -> CondensedTrain:
     _check(model)
     core, turns = model.core, model.rolling.common_turns
     assert turns is not None
-    assert model.scene.drive is not None
     flanks = [f for f in model.forces.flanks if isinstance(f, CurveFlank | LawFlank)]
     reads = [_directions(f) for f in flanks]
     used = sorted({x for four in reads for x in four if x >= 0})
@@ -89,7 +88,7 @@ def condense(model: TrainModel) -> CondensedTrain:
         core.squares, core.damping, to_modes[:, used], push, to_modes[:, tilts],
         np.array([g.polar * g.ratio for g in gyros]),
     )  # fmt: skip
-    sense = drive_sense(model.scene.drive.speed) or 1.0
+    sense = drive_sense(model.scene.driven.speed) or 1.0
     steady = steady_forces(model.scene)
     of_mesh = _of_meshes(model)
     mesh_of = {number: mesh for mesh, numbers in enumerate(of_mesh) for number in numbers}
@@ -121,8 +120,7 @@ def _rubbing(model: TrainModel, flank: CurveFlank | LawFlank, mesh: int, force: 
         def coefficient(speed: float) -> float:
             return oil.coefficient(pair, force, ratio * speed)
 
-    assert scene.drive is not None
-    return Rubbing(flank.sliding, fastest(scene.drive.speed), coefficient)
+    return Rubbing(flank.sliding, fastest(scene.driven.speed), coefficient)
 
 
 def _directions(flank: CurveFlank | LawFlank) -> tuple[int, int, int, int]:

@@ -94,7 +94,7 @@ class _Place(NamedTuple):
 
 
 def follow(
-    system: Oscillator, speeds: Sequence[float], start: Orbit, *, tolerance: float, highest: float,
+    system: Oscillator, speeds: Sequence[float] | Array, start: Orbit, *, tolerance: float, highest: float,
     progress: Callable[[int, int], None] | None = None,
 ) -> Curve:  # fmt: skip
     """Along the curve of solutions from an orbit at the first of the speeds, until it passes the first or the last one.

@@ -151,8 +151,8 @@ def run_up(
                 notes.append(f"no periodic motion was found at {left[0]:.6g} rad/s")
                 left = left[1:]
                 continue
-            options = {"tolerance": tolerance, "highest": 2.0 * math.pi * band_hz, "progress": progress}
-            curve = follow(train.system, left, start, **options)  # type: ignore[arg-type]
+            highest = 2.0 * math.pi * band_hz
+            curve = follow(train.system, left, start, tolerance=tolerance, highest=highest, progress=progress)
             first = len(turns)
             orbits += _numbered(curve, orbits, first)
             turns += [turn.speed for turn in curve.turns]
@@ -223,8 +223,7 @@ def _checked(model: TrainModel, speeds: ArrayLike | Sequence[float]) -> Array:
         raise InputError("speeds", None, problem, "ask for speeds of one sense; a train at rest has no orders")
     if len(asked) > 1 and not ((np.diff(sizes) > 0.0).all() or (np.diff(sizes) < 0.0).all()):
         raise InputError("speeds", None, "do not rise or fall all the way", "sort them, each once")
-    assert model.scene.drive is not None
-    sense = drive_sense(model.scene.drive.speed)
+    sense = drive_sense(model.scene.driven.speed)
     if sense * asked[0] < 0.0:
         problem = "turns against the drive of the model, whose driving flanks are others"
         raise InputError("speeds", float(asked[0]), problem, "build the model with a drive of this sense")

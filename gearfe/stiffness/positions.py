@@ -240,8 +240,9 @@ def at_torques(
         return twists_for_torque(solve, aim, most=most, tolerance=accepted, **at)
 
     found = search(np.arange(len(goal)))
-    for _ in range(SHARE_PASSES if shares_of else 0):
-        assert shares_of is not None
+    for _ in range(SHARE_PASSES):
+        if shares_of is None:
+            break
         share = shares_of(found)
         aim = goal / (1 + share)
         with np.errstate(invalid="ignore"):

@@ -238,14 +238,14 @@ def _checked_load(pair: GearPair, twist: float | None, torque: float | None, twi
     if twist_from not in ("contact", "centred"):
         raise InputError("twist_from", twist_from, "must be contact or centred")
     lost = pair.contact_twist if twist_from == "contact" else 0.0
-    if (twist is None) == (torque is None):
-        problem = "neither is given" if twist is None else "both are given"
-        raise InputError("twist, torque", None, problem, "give exactly one of them")
+    if twist is not None and torque is not None:
+        raise InputError("twist, torque", None, "both are given", "give exactly one of them")
     if torque is not None:
         if not (math.isfinite(torque) and torque > 0):
             raise InputError("torque", torque, "must be finite and > 0 N m", "give the torque at the wheel's hub")
         return float(torque)
-    assert twist is not None
+    if twist is None:
+        raise InputError("twist, torque", None, "neither is given", "give exactly one of them")
     most = math.pi / pair.wheel.teeth - lost
     if not (math.isfinite(twist) and 0 < twist < most):
         problem = f"must be > 0 and < {most:.6g} rad ({math.degrees(most):.6g} deg, half a pitch of the wheel)"
@@ -308,7 +308,7 @@ def assembled_curve(
     }
     return StiffnessCurve(
         pinion_angle=asked,
-        wheel_angle=pair.wheel_angle_at(asked, total[source]),  # type: ignore[arg-type]
+        wheel_angle=pair.wheel_angle_at(asked, total[source]),
         leading_pair=leading[source] - cycles,
         law=np.full(len(source), law.name),
         contact_law=law_text(law),

@@ -70,11 +70,10 @@ def twists_for_torque(
     little, much = np.zeros(len(goal)), np.full(len(goal), np.nan)  # torques there
     iterations, failures = np.zeros((2, len(goal)), dtype=np.int64)
     reached = np.zeros(len(goal), dtype=bool)
-    found, open_ = None, np.arange(len(goal))
-    for _ in range(MAX_SOLUTIONS):
+    open_ = np.arange(len(goal))
+    found = made = solve(open_, twist)
+    for count in range(1, MAX_SOLUTIONS + 1):
         at, touch, asked = twist[open_], touching[open_], goal[open_]
-        made = solve(open_, at)
-        found = made if found is None else found.replaced(open_, made)
         torque, tangent = made.torque_wheel, np.nan_to_num(made.tangent)
         solved, failed, clear = (made.status == s for s in ("converged", "not_converged", "no_contact"))
         iterations[open_] += made.iterations
@@ -94,9 +93,10 @@ def twists_for_torque(
         narrow = width <= 1e-14 * at
         goes_on = ~reached[open_] & (solved | failed | clear) & (failures[open_] < MAX_FAILURES) & ~jumps & ~narrow
         open_ = open_[goes_on & (tried != at) & (at < most)]
-        if len(open_) == 0:
+        if len(open_) == 0 or count == MAX_SOLUTIONS:
             break
-    assert found is not None
+        made = solve(open_, twist[open_])
+        found = found.replaced(open_, made)
     given_up = ~reached & np.isin(found.status, ("converged", "no_contact"))
     status = np.where(given_up, NOT_REACHED, found.status)
     return replace(found.stated(status), iterations=iterations)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, given
 from ..tables.study import StudyTable
 from ..textfile import read_csv
 from ..typing import Array
@@ -95,14 +95,12 @@ def trajectories(count: int, d: int, rng: np.random.Generator) -> Array:
 
 
 def _rows(table: StudyTable, folder: Path, base: Mapping[str, Any]) -> tuple[tuple[Parameter, ...], Cases]:
-    assert table.rows_csv is not None
-    columns = read_csv(folder / table.rows_csv, "study.rows_csv")
+    file = given(table.rows_csv, "study.rows_csv")
+    columns = read_csv(folder / file, "study.rows_csv")
     columns.pop("case", None)
     hints = {name: key_hint(table.job, name) for name in columns}
     parameters = tuple(read_parameters({name: [0.0] for name in hints}, table.job, base))
-    made = [
-        [_cell(text, one, table.rows_csv, i) for i, text in enumerate(columns[one.name], start=1)] for one in parameters
-    ]
+    made = [[_cell(text, one, file, i) for i, text in enumerate(columns[one.name], start=1)] for one in parameters]
     return parameters, list(zip(*made, strict=True))
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..config import TABLES, build, table_class, type_hints
-from ..errors import InputError, unknown_name
+from ..errors import InputError, given, unknown_name
 from ..tables.study import DistributionTable
 from ..typing import Array
 
@@ -53,20 +53,19 @@ class Parameter:
         if d is None:
             return [self.values[i] for i in _steps(share, len(self.values))]
         if d.mean is None:
-            assert d.low is not None
-            assert d.high is not None
+            least, most = given(d.low, f"{self.name}.low"), given(d.high, f"{self.name}.high")
             if self.whole:
-                first = math.ceil(d.low)
-                return [first + int(i) for i in _steps(share, math.floor(d.high) - first + 1)]
-            return (d.low + (d.high - d.low) * share).tolist()
+                first = math.ceil(least)
+                return [first + int(i) for i in _steps(share, math.floor(most) - first + 1)]
+            return (least + (most - least) * share).tolist()
         from scipy.special import ndtr, ndtri
 
-        assert d.deviation is not None
-        low, high = (None if end is None else (end - d.mean) / d.deviation for end in (d.low, d.high))
+        deviation = given(d.deviation, f"{self.name}.deviation")
+        low, high = (None if end is None else (end - d.mean) / deviation for end in (d.low, d.high))
         below, upto = 0.0 if low is None else ndtr(low), 1.0 if high is None else ndtr(high)
         # a share of 0 has no value in a tail without an end
         inside = np.clip(below + (upto - below) * share, np.finfo(float).tiny, 1.0 - np.finfo(float).epsneg)
-        values = d.mean + d.deviation * ndtri(inside)
+        values = d.mean + deviation * ndtri(inside)
         made = np.clip(values, d.low, d.high) if low is not None or high is not None else values
         return [round(v) for v in made.tolist()] if self.whole else made.tolist()
 

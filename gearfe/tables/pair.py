@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..config import quantity
-from ..errors import InputError
+from ..errors import InputError, given
 
 #: What holds where the file gives no value; the other keys are required.
 DEFAULTS: dict[str, float] = {
@@ -99,9 +99,7 @@ class PairTable(ToothFormTable):
         own: GearTable = getattr(self, side)
         if own.pitch_diameter_mm is not None:
             return own.pitch_diameter_mm / own.teeth
-        module = own.module_mm if own.module_mm is not None else self.module_mm
-        assert module is not None
-        return module
+        return given(own.module_mm if own.module_mm is not None else self.module_mm, "pair.module_mm")
 
     def material_of(self, side: str) -> MaterialTable:
         """Material of the gear `side`."""

@@ -101,19 +101,13 @@ def _check_bore(scene: TrainScene, shaft: Shaft, bore: str, a: np.ndarray) -> No
 
 
 def _check_ends(scene: TrainScene) -> None:
-    if scene.drive is None:
-        problem = "nothing holds the train: no shaft is driven, so any torque would spin it up without end"
-        raise InputError("train.drive", None, problem, "prescribe the speed of one shaft relative to one of its bores")
-    if scene.drive.stiffness is not None and not (math.isfinite(scene.drive.stiffness) and scene.drive.stiffness > 0.0):
-        raise InputError(
-            "drive stiffness", scene.drive.stiffness, "must be finite and > 0 N m/rad", "None for a rigid drive"
-        )
-    if not (math.isfinite(scene.drive.damping) and scene.drive.damping >= 0.0):
-        raise InputError(
-            "drive damping", scene.drive.damping, "must be finite and >= 0", "negative damping feeds energy in"
-        )
+    drive = scene.driven
+    if drive.stiffness is not None and not (math.isfinite(drive.stiffness) and drive.stiffness > 0.0):
+        raise InputError("drive stiffness", drive.stiffness, "must be finite and > 0 N m/rad", "None for a rigid drive")
+    if not (math.isfinite(drive.damping) and drive.damping >= 0.0):
+        raise InputError("drive damping", drive.damping, "must be finite and >= 0", "negative damping feeds energy in")
     shafts = {s.name: s for s in scene.shafts}
-    parts: list[tuple[str, Drive | Load]] = [("drive", scene.drive)]
+    parts: list[tuple[str, Drive | Load]] = [("drive", drive)]
     parts += [(f"load on {x.shaft!r}", x) for x in scene.loads]
     for label, part in parts:
         _known(label, "shaft", part.shaft, shafts)

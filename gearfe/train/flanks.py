@@ -30,7 +30,6 @@ def check_flanks(scene: TrainScene) -> None:
     Oscillating parts of loads are left out: what matters is the torque about which they swing. Inertia alone is no
     mistake: a drive that slows down lets teeth part for a while, of which the run warns.
     """
-    assert scene.drive is not None
     if not scene.loads or not scene.meshes:
         return
     times = _times(scene)
@@ -54,8 +53,7 @@ def one_sided(scene: TrainScene) -> BoolArray:
 
 
 def _times(scene: TrainScene) -> Array:
-    assert scene.drive is not None
-    breaks = {b for load in scene.loads for b in load.torque.breaks} | set(scene.drive.speed.breaks)
+    breaks = {b for load in scene.loads for b in load.torque.breaks} | set(scene.driven.speed.breaks)
     ends = sorted({0.0, *(b for b in breaks if b > 0.0)})
     inner = [np.linspace(a, b, LOOKS) for a, b in itertools.pairwise(ends)]
     return np.unique(np.concatenate([ends, *inner]))
@@ -63,8 +61,7 @@ def _times(scene: TrainScene) -> Array:
 
 def _inertia(scene: TrainScene, times: Array) -> Array:
     """Torque of inertia of each shaft as it rolls with the drive (N m), shape (shafts, times)."""
-    assert scene.drive is not None
-    push = replace(scene.drive.speed, sines=())(times, 1)
+    push = replace(scene.driven.speed, sines=())(times, 1)
     axis = scene.frame[2]
     polar = [rotor(s, tuple(g for g in scene.gears if g.shaft == s.name), axis).polar for s in scene.shafts]
     ratios = [float(r) for r in rolling(scene).ratios]
@@ -73,7 +70,6 @@ def _inertia(scene: TrainScene, times: Array) -> Array:
 
 def _told(scene: TrainScene, number: int, time: float, senses: tuple[float, ...]) -> InputError:
     """The load that does most to press the back flanks of a mesh, and what to change."""
-    assert scene.drive is not None
     mesh = scene.meshes[number]
     alone = [
         float(balanced_forces(scene, senses, load_torques(replace(scene, loads=(load,)), [time]))[number, 0])
@@ -82,7 +78,7 @@ def _told(scene: TrainScene, number: int, time: float, senses: tuple[float, ...]
     load = scene.loads[int(np.argmin(alone))]
     torque = float(replace(load.torque, sines=())(time))
     ratios = dict(zip((s.name for s in scene.shafts), rolling(scene).ratios, strict=True))
-    speed = float(ratios[load.shaft]) * drive_sense(scene.drive.speed)
+    speed = float(ratios[load.shaft]) * drive_sense(scene.driven.speed)
     when = f" at {1e3 * time:.4g} ms" if time > 0.0 else ""
     force = f"by statics the force of mesh {mesh.name!r} is {min(alone):.6g} N{when}"
     flanks = f"it would press the back flanks, whose stiffness is not known: {force}"

@@ -54,8 +54,7 @@ def train_multipliers(model: TrainModel) -> tuple[ComplexArray | None, str]:
 
 def why_not(model: TrainModel) -> str:
     """Why a train has no multipliers, or nothing."""
-    drive = model.scene.drive
-    assert drive is not None
+    drive = model.scene.driven
     reasons = (
         (bool(drive.speed.sines) or model.steady_speed == 0.0, "the drive has no steady speed"),
         (any(load.torque.sines for load in model.scene.loads), "a load oscillates: no motion repeats with the meshes"),

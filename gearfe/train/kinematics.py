@@ -53,8 +53,7 @@ def rolling(scene: TrainScene) -> Rolling:
     InputError
         For shafts that neither drive nor mesh hold, and for loops of gears whose ratios contradict each other.
     """
-    assert scene.drive is not None
-    known = {scene.drive.shaft: Fraction(1)}
+    known = {scene.driven.shaft: Fraction(1)}
     links = []
     for mesh in scene.meshes:
         one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
@@ -119,13 +118,12 @@ def load_torques(scene: TrainScene, times: Sequence[float] | Array) -> Array:
 
 def balanced_forces(scene: TrainScene, senses: Sequence[float], torques: Array) -> Array:
     """Mesh forces (N), shape (meshes, n), that balance the torques (N m) on the shafts, shape (shafts, n)."""
-    assert scene.drive is not None
     names = [s.name for s in scene.shafts]
     arms = np.zeros((len(names), len(scene.meshes)))
     for column, (mesh, sense) in enumerate(zip(scene.meshes, senses, strict=True)):
         for gear in (scene.gear(mesh.driver), scene.gear(mesh.driven)):
             arms[names.index(gear.shaft), column] += sense * gear.gear.base_radius
-    free = [k for k, name in enumerate(names) if name != scene.drive.shaft]
+    free = [k for k, name in enumerate(names) if name != scene.driven.shaft]
     return np.asarray(np.linalg.lstsq(arms[free], torques[free], rcond=None)[0])
 
 
@@ -134,10 +132,9 @@ def driving_senses(scene: TrainScene) -> tuple[float, ...]:
 
     Where the drive stands still, the loads tell it.
     """
-    assert scene.drive is not None
     ratios = dict(zip((s.name for s in scene.shafts), rolling(scene).ratios, strict=True))
     made = tuple(math.copysign(1.0, ratios[scene.gear(mesh.driver).shaft]) for mesh in scene.meshes)
-    sense = drive_sense(scene.drive.speed)
+    sense = drive_sense(scene.driven.speed)
     if sense == 0.0:
         pressing = balanced_forces(scene, made, load_torques(scene, [load_end(scene)])).sum()
         sense = math.copysign(1.0, pressing)

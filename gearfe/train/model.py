@@ -84,9 +84,8 @@ class TrainModel:
     @property
     def steady_speed(self) -> float:
         """Speed of the drive once its function of time has ended (rad/s)."""
-        assert self.scene.drive is not None
-        breaks = self.scene.drive.speed.breaks
-        return float(self.scene.drive.speed(max(breaks, default=0.0)))
+        breaks = self.scene.driven.speed.breaks
+        return float(self.scene.driven.speed(max(breaks, default=0.0)))
 
     @property
     def torque_end(self) -> float:
@@ -119,12 +118,11 @@ def build_train(scene: TrainScene) -> TrainModel:
     """
     check_scene(scene)
     kinematics = rolling(scene)
-    assert scene.drive is not None
     frame = scene.frame
-    angle = scene.drive.speed.integral(0.0, 0.0)
+    angle = scene.driven.speed.integral(0.0, 0.0)
     housing = _housing(scene)
     ratios = [float(r) for r in kinematics.ratios]
-    begin = float(scene.drive.speed(0.0))
+    begin = float(scene.driven.speed(0.0))
     shafts = tuple(
         RigidShaft(
             rotor(shaft, tuple(g for g in scene.gears if g.shaft == shaft.name), frame[2]),
@@ -139,7 +137,7 @@ def build_train(scene: TrainScene) -> TrainModel:
     senses = driving_senses(scene)
     phases = tooth_places(scene, senses).phases
     lines = tuple(
-        mesh_line(scene, mesh, shafts, first, ratios, size, sense, phase, float(force), fastest(scene.drive.speed))
+        mesh_line(scene, mesh, shafts, first, ratios, size, sense, phase, float(force), fastest(scene.driven.speed))
         for mesh, sense, phase, force in zip(scene.meshes, senses, phases, steady_forces(scene), strict=True)
     )
     torques = _torques(scene, shafts, first, ratios, angle, size)
@@ -229,7 +227,6 @@ def _housing(scene: TrainScene) -> ModalBlocks | None:
 
 def _supports(scene: TrainScene, shafts: tuple[RigidShaft, ...], housing: ModalBlocks | None) -> list[Element]:
     """Hinges or bearings of all bores, and the drive."""
-    assert scene.drive is not None
     made: list[Element] = []
     bearings = {b.bore: b for b in scene.bearings}
     for shaft, body in zip(scene.shafts, shafts, strict=True):
@@ -248,13 +245,13 @@ def _supports(scene: TrainScene, shafts: tuple[RigidShaft, ...], housing: ModalB
             made.append(
                 LinearForce((body,), scene.damping.alpha * body.mass(), np.zeros((6, 6)), f"damping of {body.name}")
             )
-        if shaft.name == scene.drive.shaft:
+        if shaft.name == scene.driven.shaft:
             row = np.eye(6)[5:]
             touches: tuple[Element, ...] = (body,)
             if housing is not None:
-                row = np.hstack([row, -(bore_selector(scene, scene.drive.bore)[:, 3:] @ scene.frame[2])[None, :]])
+                row = np.hstack([row, -(bore_selector(scene, scene.driven.bore)[:, 3:] @ scene.frame[2])[None, :]])
                 touches = (body, housing)
-            made.append(_drive(scene.drive, touches, row))
+            made.append(_drive(scene.driven, touches, row))
     return made
 
 
@@ -310,8 +307,7 @@ def _used_bores(scene: TrainScene) -> tuple[str, ...]:
 
 def _measured_against(scene: TrainScene, name: str) -> str:
     """Bore against which a shaft's rotation is measured: the drive's, the load's, or its first."""
-    assert scene.drive is not None
-    ends = [(scene.drive.shaft, scene.drive.bore), *((x.shaft, x.bore) for x in scene.loads)]
+    ends = [(scene.driven.shaft, scene.driven.bore), *((x.shaft, x.bore) for x in scene.loads)]
     return next((bore for shaft, bore in ends if shaft == name and bore is not None), scene.shaft(name).bores[0])
 
 

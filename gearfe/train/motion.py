@@ -54,8 +54,7 @@ def motion(model: TrainModel, trajectory: Trajectory) -> Motion:
     else:
         q, v, a = trajectory.q, trajectory.v, trajectory.a
     multipliers = joint_multipliers(model, t, q, v, a)
-    drive = model.scene.drive
-    assert drive is not None
+    drive = model.scene.driven
     if drive.stiffness is None:
         push = -multipliers["drive"][:, 0]
     else:

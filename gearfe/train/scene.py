@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..errors import InputError
 from ..gear.pair import Gear
 from ..meshlaw.law import MeshLaw
 from ..reduction.modal_body import ModalBody
@@ -220,6 +221,22 @@ class TrainScene:
     bearings: tuple[Bearing, ...] = ()
     damping: Damping = Damping()
     axis: Vector = (0.0, 1.0, 0.0)
+
+    @property
+    def driven(self) -> Drive:
+        """The drive, of a train that has one.
+
+        Raises
+        ------
+        InputError
+            For a train without.
+        """
+        if self.drive is None:
+            problem = "nothing holds the train: no shaft is driven, so any torque would spin it up without end"
+            raise InputError(
+                "train.drive", None, problem, "prescribe the speed of one shaft relative to one of its bores"
+            )
+        return self.drive
 
     @property
     def bore_points(self) -> dict[str, Array]:

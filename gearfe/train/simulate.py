@@ -81,8 +81,14 @@ def simulate(
     IntegrationError
         For a run that ended early; its ``result`` is the response.
     """
-    options = {"tolerance": tolerance, "method": method, "floquet": floquet, "estimate": estimate, "band_hz": band_hz}
-    made = joined(list(simulate_in_pieces(model, times, backend=backend, **options)))  # type: ignore[arg-type]
+    options: dict[str, Any] = {
+        "tolerance": tolerance,
+        "method": method,
+        "floquet": floquet,
+        "estimate": estimate,
+        "band_hz": band_hz,
+    }
+    made = joined(list(simulate_in_pieces(model, times, backend=backend, **options)))
     if raise_on_failure and made.status != "done":
         raise IntegrationError(made, made.status, made.time_reached, float(np.max(times)))
     return made

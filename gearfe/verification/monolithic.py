@@ -88,15 +88,14 @@ def solve_monolithic(
         small = solve_monolithic(replace(pair, kinematics="small"), law, pinion_angle, twist, tolerance=ROUGHLY)
         if small.solution is not None:
             start = contact_at(problem, small.solution.u)
-    solution: ContactSolution | None = solve_contact(problem, start, tolerance=tolerance)
-    assert solution is not None
-    iterations = solution.iterations
-    if solution.status != "converged":
-        solution, more = _raised(pair, law, pinion_angle, twist, tolerance)
-        iterations += more
-    if solution is None:
+    solution = solve_contact(problem, start, tolerance=tolerance)
+    if solution.status == "converged":
+        return _position(pair, problem, solution, solution.iterations)
+    raised, more = _raised(pair, law, pinion_angle, twist, tolerance)
+    iterations = solution.iterations + more
+    if raised is None:
         return MonolithicPosition("not_converged", *FAILED, iterations)
-    return _position(pair, problem, solution, iterations)
+    return _position(pair, problem, raised, iterations)
 
 
 def _raised(

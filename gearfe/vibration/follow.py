@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -270,6 +271,6 @@ def _curves(piece: TrainResponse, values: Array) -> TrainResponse:
         return empty
     widths = [1] + [1 if getattr(piece, n).ndim == 1 else getattr(piece, n).shape[1] for n in _CURVES]
     parts = np.split(values, np.cumsum(widths)[:-1], axis=1)
-    made = dict(zip(("time", *_CURVES), parts, strict=True))
+    made: dict[str, Any] = dict(zip(("time", *_CURVES), parts, strict=True))
     made |= {name: made[name][:, 0] for name in ("time", "drive_angle")}
-    return replace(empty, **made)  # type: ignore[arg-type]
+    return replace(empty, **made)

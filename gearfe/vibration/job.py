@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, given
 from ..gear.pair import Gear, GearPair
 from ..meshlaw.law import MeshLaw
 from ..rigid import TimeFunction, constant, smoothed_step
@@ -89,8 +89,7 @@ def train_body(job: TrainJob) -> ModalBody | None:
         return None
     from ..housing.build import reduced_housing
 
-    assert job.housing is not None
-    return reduced_housing(job.housing, job.path.parent)
+    return reduced_housing(given(job.housing, "housing"), job.path.parent)
 
 
 def job_scene(
@@ -173,13 +172,12 @@ def train_gear(job: TrainJob, table: TrainGearTable, where: str) -> Gear:
             return DEFAULTS[key]
         raise InputError(f"{where}.{key}", None, "is required", "add it here, or to a table [pair]")
 
-    assert table.teeth is not None
-    module = 1e-3 * value("module_mm")
-    bore = 0.2 * module * table.teeth if table.bore_diameter_mm is None else 1e-3 * table.bore_diameter_mm
+    teeth, module = given(table.teeth, f"{where}.teeth"), 1e-3 * value("module_mm")
+    bore = 0.2 * module * teeth if table.bore_diameter_mm is None else 1e-3 * table.bore_diameter_mm
     form = {key: value(key) for key in ("profile_shift", "addendum", "dedendum", "rack_tip_radius", "tip_shortening")}
     try:
         return Gear(
-            table.teeth,
+            teeth,
             module,
             math.radians(value("pressure_angle_deg")),
             1e-3 * value("face_width_mm"),

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..contact.compliance import check_deviations
 from ..contact.laws import ContactLaw
-from ..errors import InputError
+from ..errors import InputError, given
 from ..gear.deviation import NOMINAL, ToothDeviations
 from ..gear.deviation_job import deviations_of
 from ..gear.pair import GearPair
@@ -214,10 +214,10 @@ def _deviations(
 def _materials(job: TrainJob, mesh: GearMesh) -> Any:
     from ..elasticity import Material
 
-    assert job.pair is not None
+    pair = given(job.pair, "pair")
     sides = {g.name: g.gear for g in job.table.gears}
     made = []
     for name in (mesh.driver, mesh.driven):
-        table = job.pair.material_of(sides[name]) if sides[name] else job.pair.material
+        table = pair.material_of(sides[name]) if sides[name] else pair.material
         made.append(Material(table.youngs_modulus_GPa * 1e9, table.poisson_ratio, density=table.density_kg_per_m3))
     return tuple(made)
