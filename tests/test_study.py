@@ -71,6 +71,8 @@ def test_names_may_be_tables_within_tables_or_quoted():
         ({"pair.pinion.teth": [20]}, "did you mean 'teeth'"),
         ({"pear.pinion.teeth": [20]}, "did you mean 'pair'"),
         ({"pair.pinion": [20]}, "is a table, not a key"),
+        ({"pair.pinion.teeth": [20], "pair": {"pinion": {"teeth": [21]}}}, "stands there twice"),
+        ({"loadmap.positions": [20]}, "is no table that a stiffness job reads"),
         ({"pair.addendum": []}, "is empty"),
         ({"pair.addendum": 1.0}, "must be a list of values or a distribution"),
         ({"pair.addendum": {"low": 1.0, "hgih": 2.0}}, "did you mean 'high'"),
@@ -80,7 +82,7 @@ def test_names_may_be_tables_within_tables_or_quoted():
         ({"pair.addendum": {"iso_class": 12}}, "iso_class"),
         ({"pair.pinion.teeth": {"low": 18.2, "high": 18.8}}, "holds no whole number"),
         ({"stiffness.plane": {"low": 0, "high": 1}}, "is no number"),
-        ({"train.meshes.first.backlash_um": [1.0]}, "an entry has a number"),
+        ({"microgeometry.pinion.waviness.first.waves": [1]}, "an entry has a number"),
     ],
 )
 def test_wrong_parameters_are_named(given, told):

@@ -90,12 +90,13 @@ def _cluster(address: str, stack: ExitStack) -> dict[str, Any]:
         from dask.distributed import Client
     except ImportError:
         raise MissingLibraryError("--dask needs dask.distributed: pip install gearfe[cluster]") from None
+    logging.disable(logging.CRITICAL)  # of a lost connection `check` tells
+    stack.callback(logging.disable, logging.NOTSET)
     try:
         client = stack.enter_context(Client(address, timeout=20))
     except (OSError, ValueError, TimeoutError) as error:
         problem = f"does not answer ({type(error).__name__})"
         raise InputError("--dask", address, problem, "is the scheduler running there?") from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # `check` tells of a lost connection
     workers = sum(client.nthreads().values())
     if not workers:
         raise InputError("--dask", address, "has no workers", "start some: dask worker ADDRESS")

@@ -81,6 +81,8 @@ def value_of(tree: ast.expr, answer: Answer, label: str) -> float:
         with np.errstate(all="ignore"):
             found = _value(tree, answer, label)
             made = np.asarray(np.nan if found is None else found, dtype=float)
+    except InputError:
+        raise
     except (TypeError, ValueError, IndexError, KeyError, ZeroDivisionError, OverflowError, RecursionError) as error:
         raise InputError(label, None, f"has no value ({error})", "look at the job's own tables") from None
     if made.size != 1:

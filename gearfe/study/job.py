@@ -98,7 +98,7 @@ def read_study(path: str | Path) -> Study:
     if "study" not in raw:
         raise InputError("[study]", None, f"is missing in {path.name}", "add a table [study]")
     table: StudyTable = build(StudyTable, raw["study"], "study")
-    base = path if table.base is None else path.parent / table.base
+    base = (path if table.base is None else path.parent / table.base).absolute()
     tables = {name: one for name, one in (raw if table.base is None else read_toml(base)).items() if name != "study"}
     parameters, cases = study_cases(table, path.parent, tables)
     names = tuple(one.name for one in parameters)

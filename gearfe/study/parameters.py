@@ -19,6 +19,15 @@ from ..typing import Array
 
 _KEYS = {field.name for field in dataclasses.fields(DistributionTable)}
 WHERE = "study.parameters"
+_OF_TRAINS = ("pair", "stiffness", "microgeometry", "housing", "train")
+#: Kind of job -> the tables that decide it.
+READ = {
+    "stiffness": ("pair", "stiffness", "microgeometry"),
+    "loadmap": ("pair", "stiffness", "microgeometry", "loadmap"),
+    "microgeometry": ("pair", "stiffness", "microgeometry"),
+    "vibration": _OF_TRAINS,
+    "runup": (*_OF_TRAINS, "runup"),
+}
 
 
 @dataclass(frozen=True)
@@ -137,17 +146,24 @@ def _flat(given: Mapping[str, Any], above: str) -> dict[str, Any]:
     for key, value in given.items():
         name = f"{above}{key}"
         if isinstance(value, list) or (isinstance(value, dict) and value and set(value) <= _KEYS):
-            found[name] = value
+            found |= _once(found, {name: value})
         elif isinstance(value, dict) and value:
             near = [k for k in value if k in _KEYS and not isinstance(value[k], (dict, list))]
             if near:
                 wrong = next(k for k in value if k not in _KEYS)
                 raise unknown_name(f"{WHERE}.{name}", wrong, _KEYS)
-            found |= _flat(value, f"{name}.")
+            found |= _once(found, _flat(value, f"{name}."))
         else:
             cure = "write [a, b, c], { low = a, high = b }, { mean = a, deviation = b } or { iso_class = 6 }"
             raise InputError(f"{WHERE}.{name}", value, "must be a list of values or a distribution", cure)
     return found
+
+
+def _once(found: Mapping[str, Any], more: dict[str, Any]) -> dict[str, Any]:
+    for name in more:
+        if name in found:
+            raise InputError(f"{WHERE}.{name}", None, "stands there twice, quoted and as tables", "leave one out")
+    return more
 
 
 def key_hint(kind: str, name: str) -> Any:
@@ -166,9 +182,11 @@ def key_hint(kind: str, name: str) -> Any:
 
         hint = MechanismFile
     else:
-        known = [table for table in TABLES if table != "study"]
-        if parts[0] not in known:
-            raise unknown_name(where, parts[0], known)
+        if parts[0] in TABLES and parts[0] not in READ[kind]:
+            problem = f"is no table that a {kind} job reads: it would change nothing"
+            raise InputError(where, parts[0], problem, "vary keys of " + ", ".join(READ[kind]))
+        if parts[0] not in READ[kind]:
+            raise unknown_name(where, parts[0], READ[kind])
         hint, where, rest = table_class(parts[0]), f"{where}.{parts[0]}", parts[1:]
         if not rest:
             raise InputError(where, None, "is a table, not a key", "name a key in it")

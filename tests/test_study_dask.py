@@ -1,0 +1,72 @@
+"""Studies on a Dask cluster, where it is installed: the same rows, and a scheduler that goes away is told."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+
+import pytest
+
+from gearfe.cli import main
+from gearfe.study.job import read_study, run_study
+
+from .studies import rows_of, written
+
+pytest.importorskip("distributed")
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """A scheduler and a worker with two processes: the scheduler's process and its address."""
+    place = tmp_path / "scheduler.json"
+    common = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
+    dask = [sys.executable, "-m", "dask"]
+    address = ["--scheduler-file", str(place), "--no-dashboard"]
+    scheduler = subprocess.Popen([*dask, "scheduler", *address, "--host", "127.0.0.1", "--port", "0"], **common)
+    workers = subprocess.Popen([*dask, "worker", *address, "--nthreads", "1", "--nworkers", "2"], **common)
+    from dask.distributed import Client
+
+    limit = time.monotonic() + 60.0
+    while not place.exists() and time.monotonic() < limit:
+        time.sleep(0.1)
+    at = json.loads(place.read_text())["address"]
+    with Client(at, timeout=30) as client:
+        client.wait_for_workers(2, timeout=60)
+    yield scheduler, at
+    for process in (workers, scheduler):
+        process.terminate()
+        process.wait(timeout=20)
+
+
+def test_rows_on_dask_are_those_of_one_process(cluster, tmp_path):
+    path = written(tmp_path, cases=40)
+    (tmp_path / "one").mkdir()
+    run_study(read_study(path), tmp_path / "one", jobs=1)
+    command = ["study", str(path), "--out", str(tmp_path / "dask"), "--dask", cluster[1], "--no-pictures"]
+    assert main(command) == 0
+    assert rows_of(tmp_path / "dask") == rows_of(tmp_path / "one")
+
+
+def test_a_scheduler_that_goes_away_is_told_and_rows_are_kept(cluster, tmp_path):
+    scheduler, at = cluster
+    path = written(tmp_path, cases=100_000)
+    command = [sys.executable, "-m", "gearfe", "study", str(path), "--out", str(tmp_path / "out"), "--dask", at]
+    run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    table = tmp_path / "out" / "study.csv"
+    limit = time.monotonic() + 60.0
+    while not (table.exists() and table.stat().st_size > 2000) and time.monotonic() < limit:
+        time.sleep(0.02)
+    scheduler.kill()
+    told = run.communicate(timeout=60.0)[1]
+    assert run.returncode == 2
+    assert "does not answer any more" in told
+    assert "Traceback" not in told
+    assert 10 < len(rows_of(tmp_path / "out")) < 100_000
+
+
+def test_dask_that_is_missing_is_named(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "dask.distributed", None)
+    assert main(["study", str(written(tmp_path)), "--out", str(tmp_path / "out"), "--dask", "tcp://127.0.0.1:1"]) != 0
+    assert "gearfe[cluster]" in capsys.readouterr().err
