@@ -58,25 +58,23 @@ def extra_energy(pair: MeshingPair, position: Positions) -> float:
 
 
 @pytest.mark.parametrize("angle_deg", [4.0, 13.0])
-def test_share_is_the_rate_of_the_extra_energy(angle_deg: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_share_is_the_rate_of_the_extra_energy(angle_deg: float) -> None:
     """Delta T = d(W_SVK - W_linear)/d twist, by central differences, with every sector taken along."""
-    monkeypatch.setattr(finite_strain, "NEIGHBOURS", 15)
     gears, pair = meshing_pair(coarsen=2.0)
     angle, twist = math.radians(angle_deg), math.radians(0.05)
     step = 0.02 * twist
     energies = [extra_energy(pair, solve_position(gears, pair, angle, twist + sign * step)) for sign in (-1, 1)]
     found = solve_positions(gears, pair, [angle], twist)
-    share = finite_strain.finite_strain_shares(pair, found)
+    share = finite_strain.finite_strain_shares(pair, found, neighbours=15)
     assert share * found.torque_wheel == pytest.approx((energies[1] - energies[0]) / (2 * step), rel=3e-3)
 
 
-def test_few_neighbours_suffice(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_few_neighbours_suffice() -> None:
     """The effect is cubic in the strain: the loaded teeth and their neighbours carry all but a few parts in 1e5."""
     gears, pair = meshing_pair(coarsen=2.0)
     found = solve_positions(gears, pair, [math.radians(13)], math.radians(0.05))
     near = finite_strain.finite_strain_shares(pair, found)
-    monkeypatch.setattr(finite_strain, "NEIGHBOURS", 15)
-    assert near == pytest.approx(finite_strain.finite_strain_shares(pair, found), abs=5e-5)
+    assert near == pytest.approx(finite_strain.finite_strain_shares(pair, found, neighbours=15), abs=5e-5)
 
 
 def test_sampled_shares_follow_the_curve() -> None:

@@ -87,7 +87,7 @@ def test_the_shipped_job_is_what_it_says() -> None:
     assert job.table.variant == "standard"
     assert len(job.times) == 201
     assert job.times[-1] == pytest.approx(7e-3)
-    scene = job_scene(job, [1e8, 1e8], None, geometry_only=True)
+    scene = job_scene(job)
     assert steady_forces(scene) == pytest.approx([1961.56, 2942.34], rel=1e-5)  # 100 N m/33.987 mm, and 2/3 of it
     assert [g.along for g in scene.gears] == [0.010, 0.010, -0.002, -0.002]
     model = build_train(scene)

@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
 
     import numpy as np
 
-    from ..loadmap.report import summary, told, torque_table, warnings
+    from ..loadmap.report import report_lines, summary, torque_table, warnings
     from ..loadmap.sweep import sweep_loads
     from ..output.files import output_folder, whole_set, write_csv, write_json
     from ..stiffness.job import StiffnessJob
@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(made / "loadmap.json", summary(job, table, made_map, watch.seconds))
         names = sorted(path.name for path in made.iterdir())
-    for line in [*told(made_map), *deviation_lines(job)]:
+    for line in [*report_lines(made_map), *deviation_lines(job)]:
         print(line)
     print(f"written to {folder}: " + ", ".join(names))
     print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))

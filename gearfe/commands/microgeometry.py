@@ -52,8 +52,8 @@ def run(args: argparse.Namespace) -> int:
         cell_table,
         order_table,
         pair_table,
+        report_lines,
         summary,
-        told,
         torque_table,
         warnings,
     )
@@ -103,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "microgeometry.json", summary(job, table, made, deviations, watch.seconds))
         names = sorted(path.name for path in place.iterdir())
-    for line in [*told(made), *law_remarks(job)]:
+    for line in [*report_lines(made), *law_remarks(job)]:
         print(line)
     print(f"written to {folder}: " + ", ".join(names))
     print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))

@@ -56,8 +56,8 @@ def run(args: argparse.Namespace) -> int:
         map_table,
         named,
         relief_problem,
+        report_lines,
         summary,
-        told,
         with_pitch_errors,
     )
     from ..output.files import output_folder, whole_set, write_csv, write_json
@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "relief.json", summary(job, base, table, made, errors, watch.seconds))
         names = sorted(path.name for path in place.iterdir())
-    for line in [*told(table, made, errors), *law_remarks(job)]:
+    for line in [*report_lines(table, made, errors), *law_remarks(job)]:
         print(line)
     print(f"written to {folder}: " + ", ".join(names))
     print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))

@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..output.files import output_folder, whole_set, write_json
     from ..stiffness.job import StiffnessJob
-    from ..stiffness.report import summary, told, warnings
+    from ..stiffness.report import report_lines, summary, warnings
     from ..stiffness.sweep import elastic_pair, sweep_stiffness
     from ..stopwatch import Stopwatch
 
@@ -124,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(made / "summary.json", summary(job, curve, watch.seconds))
         names = sorted(path.name for path in made.iterdir())
-    for line in told(job, curve):
+    for line in report_lines(job, curve):
         print(line)
     print(f"written to {folder}: " + ", ".join(names))
     print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))

@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..output.files import output_folder, whole_set, write_json
     from ..stopwatch import Stopwatch
-    from ..study.report import told
+    from ..study.report import report_lines
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     folder = output_folder(args.out or Path("out") / Path(args.study).stem)
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "summary.json", {**summary, "timings_s": dict(watch.seconds)})
         names = sorted(["study.csv", "study.json", *(path.name for path in place.iterdir())])
-    for line in told(summary):
+    for line in report_lines(summary):
         print(line)
     print(f"written to {folder}: " + ", ".join(names))
     print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))

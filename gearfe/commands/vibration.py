@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
         started=started,
     )
     response = written.response
-    for line in told(response, scene, written, choice):
+    for line in report_lines(response, scene, written, choice):
         print(line)
     print(f"written to {folder}: " + ", ".join(written.names))
     print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
@@ -125,7 +125,7 @@ def title(job: TrainJob) -> str:
     return ", ".join(parts)
 
 
-def told(response: TrainResponse, scene: TrainScene, written: Written, choice: OutputChoice) -> list[str]:
+def report_lines(response: TrainResponse, scene: TrainScene, written: Written, choice: OutputChoice) -> list[str]:
     """Lines for the terminal."""
     from ..vibration.errors import with_error
     from ..vibration.report import attachment_to_draw

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .closest import Projection, project
-from .compliance import MeshingPair
+from .compliance import GearBody, MeshingPair
 from .laws import carrying, on_elements, uses_stress
 from .position import ranges
 
@@ -95,7 +95,7 @@ class Batch:
         Nodes and shape functions of each contact point.
     weight : ndarray, shape (q,)
         Area of each contact point (m2).
-    fade : ndarray, shape (q,)
+    end_weighting : ndarray, shape (q,)
         Half of the point's own stretch of surface, in edges of the mate. Where a stretch lies across the end of the
         mate's surface (a sharp tip), the part that is past it does not count, so that sliding past the corner is
         continuous.
@@ -124,7 +124,7 @@ class Batch:
     slave_nodes: IntArray
     slave_shapes: Array
     weight: Array
-    fade: Array
+    end_weighting: Array
     parameter: Array
     blocks: list[Block]
 
@@ -161,12 +161,12 @@ class Batch:
     def project(self, placed: ComplexArray, points: IntArray, start: Array) -> Projection:
         """Closest points of the contact points `points` on their mates, from starting places."""
         mates = self.counts, self.facing[points]
-        return project(self.slaves(placed, points), placed, *mates, start, self.fade[points])
+        return project(self.slaves(placed, points), placed, *mates, start, self.end_weighting[points])
 
     def areas(self, place: Array, points: IntArray) -> Array:
         """Areas of contact points (m2) as far as they lie before the end of the mate's surface."""
         past = self.counts[self.facing[points]] - place
-        return self.weight[points] * np.clip(0.5 + past / (2 * self.fade[points]), 0.0, 1.0)
+        return self.weight[points] * np.clip(0.5 + past / (2 * self.end_weighting[points]), 0.0, 1.0)
 
 
 def windows_of(elastic: MeshingPair, first: FirstContacts, share: float, margin: int) -> tuple[IntArray, IntArray]:
@@ -244,7 +244,7 @@ def batch_of(
         slave_nodes=(first_node[owner] + 2 * (within // quadrature[own]))[:, None] + np.arange(3),
         slave_shapes=shapes[np.array([0, quadrature[0]])[own] + within % quadrature[own]],
         weight=elastic.width * np.where(bears[owner] & bears[facing], 0.5, 1.0) * lengths,
-        fade=0.5 * lengths / last[facing],
+        end_weighting=0.5 * lengths / last[facing],
         parameter=np.concatenate(gammas)[number],
         blocks=[],
     )
@@ -260,18 +260,17 @@ def carried_by(elastic: MeshingPair, first: FirstContacts) -> BoolArray:
 
 def _blocks(batch: Batch, bears: BoolArray) -> list[Block]:
     """The response of pinion and wheel in each position."""
-    made = []
+    made, bodies, stressed = [], batch.elastic.bodies, bears & uses_stress(batch.elastic.law)
     edges = np.searchsorted(2 * batch.position + batch.gear, np.arange(2 * batch.size + 1)).tolist()
     for start, end in itertools.pairwise(edges):
         points = slice(*np.searchsorted(batch.owner, [start, end]).tolist())
         nodes = slice(int(batch.first_node[start]), int(batch.first_node[end]))
-        made.append(Block(nodes, points, _response(batch, range(start, end), bears)))
+        made.append(Block(nodes, points, _response(batch, bodies[batch.gear[start]], range(start, end), stressed)))
     return made
 
 
-def _response(batch: Batch, windows: range, bears: BoolArray) -> Array:
+def _response(batch: Batch, body: GearBody, windows: range, stressed: BoolArray) -> Array:
     """Displacements and stresses of one gear's windows for forces on them, see `Block`."""
-    body, stressed = batch.elastic.bodies[batch.gear[windows[0]]], uses_stress(batch.elastic.law)
     q, tooth = body.flank.shapes.shape[0], batch.tooth.tolist()
     nodes = batch.first_node - batch.first_node[windows[0]]
     row = 2 * int(nodes[windows[-1] + 1])
@@ -279,7 +278,7 @@ def _response(batch: Batch, windows: range, bears: BoolArray) -> Array:
     for w in windows:
         first, end = int(batch.first_edge[w]), int(batch.first_edge[w] + batch.counts[w])
         moved[w], of_flank[w] = slice(2 * nodes[w], 2 * nodes[w + 1]), slice(4 * first, 4 * end + 2)
-        if stressed and bears[w]:
+        if stressed[w]:
             of_points[w], rows[w] = slice(q * first, q * end), slice(row, row + q * (end - first))
             row = rows[w].stop
     matrix = np.empty((row, 2 * int(nodes[windows[-1] + 1])))

@@ -1,4 +1,4 @@
-r"""Contact of many positions in lockstep: Newton's method on the pressures at the points of finite-element flanks.
+r"""Contact of a batch of positions: Newton's method on the pressures at the points of finite-element flanks.
 
 With the rows :math:`G = n\cdot D` of the gaps' variation at the present state u, the areas W, the compliance C of the
 flanks and the stress rows S, a step solves
@@ -44,11 +44,11 @@ def step(batch: Batch, state: State, rows: Seen, equations: dict[int, Equations]
     pressure = state.pressure[points]
     guess, stress = batch.respond(rows.forces(pressure, size), live.tolist())
     opened = rows.gap + rows.closing(guess - state.displacement)
-    asked = -batch.parameter[points] * opened - stress[points]
+    trial = -batch.parameter[points] * opened - stress[points]
     for b, (start, end) in zip(live.tolist(), itertools.pairwise([*first.tolist(), len(at)]), strict=True):
         own = equations[b]
         mine = start + np.searchsorted(points[start:end], own.points)
-        right = asked[mine] - pressure[mine] + own.matrix @ pressure[mine]
+        right = trial[mine] - pressure[mine] + own.matrix @ pressure[mine]
         pressure[start:end] = 0.0
         pressure[mine] = own.solve(right, rows.reached[mine], held=held)
     forces = rows.forces(pressure, size)
@@ -129,7 +129,7 @@ def solve(batch: Batch, state: State, tolerance: float) -> Outcome:
             done |= set(np.flatnonzero(converged).tolist())
             live &= ~converged
         at, bears = batch.at[found.points], state.pressure[found.points] > 0
-        asks = found.asked > 0 if number else bears
+        asks = found.trial > 0 if number else bears
         # mixing may open all gaps by the overlap of a stiff law: then the points that bear are where to go on
         asks = asks | (bears & (np.bincount(at[asks], minlength=batch.size) == 0)[at])
         live &= np.bincount(at[asks], minlength=batch.size) > 0
@@ -191,7 +191,7 @@ def _error(batch: Batch, state: State, found: Seen) -> Array:
     def total(values: Array) -> Array:
         return np.bincount(at, values, batch.size)
 
-    off = total(found.area * np.abs(pressure - found.asked)) / np.maximum(total(found.area * found.asked), 1e-300)
+    off = total(found.area * np.abs(pressure - found.trial)) / np.maximum(total(found.area * found.trial), 1e-300)
     now = found.forces(pressure, len(batch.points))
     of = batch.node_position
     turned = np.bincount(of, np.abs(state.forces - now), batch.size)
@@ -200,8 +200,8 @@ def _error(batch: Batch, state: State, found: Seen) -> Array:
 
 def _rounding(batch: Batch, found: Seen) -> Array:
     """Smallest error that rounding lets the law reach in each position: gamma times the last bit of a coordinate."""
-    at, bears = batch.at[found.points], found.asked > 0
+    at, bears = batch.at[found.points], found.trial > 0
     stiff = np.bincount(at, found.area * bears * batch.parameter[found.points], batch.size)
-    load = np.bincount(at, found.area * found.asked, batch.size)
+    load = np.bincount(at, found.area * found.trial, batch.size)
     extent = batch.elastic.centre_distance
     return np.asarray(np.finfo(float).eps * extent * stiff / np.maximum(load, 1e-300))

@@ -49,7 +49,7 @@ class Seen:
         Foot points on the mates' chains of edges, gaps (m), and areas as far as they face the mate (m2).
     reached : ndarray of bool, shape (k,)
         Whether the mate has a point that is closest.
-    asked : ndarray, shape (k,)
+    trial : ndarray, shape (k,)
         Pressure that the law asks for (Pa).
     """
 
@@ -60,7 +60,7 @@ class Seen:
     gap: Array
     area: Array
     reached: BoolArray
-    asked: Array
+    trial: Array
 
     def forces(self, pressure: Array, count: int) -> ComplexArray:
         """G^T W p (N), shape (n,), for pressures (Pa), shape (k,)."""
@@ -86,7 +86,7 @@ def seen(batch: Batch, state: State, turn: ComplexArray, points: IntArray) -> Se
         axis=1,
     )
     reached = found.reached
-    asked = np.maximum(-batch.parameter[points] * found.gap - state.stress[points], 0.0)
+    trial = np.maximum(-batch.parameter[points] * found.gap - state.stress[points], 0.0)
     return Seen(
         points=points,
         nodes=np.concatenate([batch.slave_nodes[points], found.edge[:, None] + np.arange(3)], axis=1),
@@ -95,7 +95,7 @@ def seen(batch: Batch, state: State, turn: ComplexArray, points: IntArray) -> Se
         gap=found.gap,
         area=np.where(reached, batch.areas(found.place, points), 0.0),
         reached=reached,
-        asked=np.where(reached, asked, 0.0),
+        trial=np.where(reached, trial, 0.0),
     )
 
 

@@ -58,21 +58,24 @@ def with_shares(found: Positions, share: Array) -> Positions:
     return replace(found, contacts=replace(contacts, torque_wheel=raised), **made)
 
 
-def finite_strain_shares(pair: MeshingPair, found: Positions) -> Array:
-    """Delta T / T of each position, shape (n,), from its loads; not-a-number where there are none."""
+def finite_strain_shares(pair: MeshingPair, found: Positions, neighbours: int = NEIGHBOURS) -> Array:
+    """Delta T / T of each position, shape (n,), from its loads; not-a-number where there are none.
+
+    So many `neighbours` of a loaded tooth on either side take part.
+    """
     shares = np.full(len(found), np.nan)
     loaded = np.unique(found.loads[0].position)
     for first in range(0, len(loaded), TOGETHER):
         mine = loaded[first : first + TOGETHER]
         part = found.take(mine)
-        shares[mine] = sum(_extra_torques(pair, gear, part) for gear in (0, 1)) / part.torque_wheel
+        shares[mine] = sum(_extra_torques(pair, gear, part, neighbours) for gear in (0, 1)) / part.torque_wheel
     return shares
 
 
-def _extra_torques(pair: MeshingPair, gear: int, found: Positions) -> Array:
+def _extra_torques(pair: MeshingPair, gear: int, found: Positions, neighbours: int) -> Array:
     """Delta T from one gear (N m), shape (n,)."""
     body, loads = pair.bodies[gear], found.loads[gear]
-    near = (loads.tooth[:, None] + np.arange(-NEIGHBOURS, NEIGHBOURS + 1)) % body.teeth
+    near = (loads.tooth[:, None] + np.arange(-neighbours, neighbours + 1)) % body.teeth
     sectors = np.unique(loads.position[:, None] * body.teeth + near)
     position, tooth = np.divmod(sectors, body.teeth)
     energy = _energy_rates(body, sector_displacements(body, loads, position, tooth, rates=True))

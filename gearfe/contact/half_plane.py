@@ -63,7 +63,7 @@ STEPS, NEAR = 30, 2e-5
 #: What moves of contacts by their width count as changes of force: they are of second order there (see above).
 MOVED = 0.1
 #: Change from which on windows grow that cut a pressure.
-GROWING = 5e-3
+WIDENED_BELOW = 5e-3
 #: Steps in which windows are searched for: where the pressure moves by what one panel makes of its end, a window that
 #: follows it might do so for ever.
 SEARCHES = 12
@@ -173,7 +173,7 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
             change = open_.change(made)
             near = (change <= NEAR) & ~unsettled & (number - began > 1)
             bears = couples.total(made.solution.force) > 0
-            open_ = open_.moved_on(law, made, near=(change <= GROWING)[couples.position])
+            open_ = open_.moved_on(law, made, near=(change <= WIDENED_BELOW)[couples.position])
             if (near & bears).any():
                 done.append(open_.kept(near & bears))
             if near.any():

@@ -21,7 +21,7 @@ import numpy as np
 from ..gear.touching import Touching
 from ..typing import Array, ComplexArray
 from .half_plane_pair import HalfPlanePair
-from .half_plane_step import WINDOW, State, smooth_influence, usual_approach
+from .half_plane_step import WINDOW, State, reference_approach, smooth_influence
 from .panels import PANELS, Couplings, couplings, forces_of_overlaps
 
 #: Positions solved side by side.
@@ -90,7 +90,7 @@ def first_state(law: HalfPlanePair, twists: Array, found: Touching, couples: Cou
     T = smooth_influence(law, normal, state.arc, couples).compliance
     yields = _yield(law, state, normal, found.curvature)
     overlap = found.arm[:, 1] * (twists[found.position] - found.twist)
-    force = np.maximum(overlap, 0.0) / usual_approach(law)
+    force = np.maximum(overlap, 0.0) / reference_approach(law)
     for _ in range(ROUNDS):
         force = forces_of_overlaps(overlap, yields.at(force), T, couples)
     return replace(state, force=force, spread=0.25 * yields.half_width(force) ** 2)

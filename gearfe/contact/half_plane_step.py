@@ -19,7 +19,7 @@ WINDOW, WIDER = 1.25, 1.6
 LEAST_FORCE, LEAST_WIDTH = 1e-4, 1e-6
 #: Half width (modules) of Hertz's contacts whose approach first forces are made with: a length, as T in them is what
 #: the logarithms of lengths in metres leave.
-USUAL_WIDTH = 0.01
+REFERENCE_WIDTH = 0.01
 #: Distance (m) from an edge that is none.
 LEAST_DISTANCE = 1e-9
 #: Directions of the forces of a contact on pinion and wheel along n.
@@ -169,9 +169,9 @@ def answers(law: HalfPlanePair, values: Array, normal: ComplexArray, couples: Co
     return answer[:, couples.second, couples.step + most].swapaxes(0, 1).view(complex)
 
 
-def usual_approach(law: HalfPlanePair) -> float:
+def reference_approach(law: HalfPlanePair) -> float:
     """Approach of both faces by a unit force per width of a usual contact (m2/N)."""
-    return float(law.compliance * (0.5 - np.log(0.5 * USUAL_WIDTH * law.pair.pinion.module)))
+    return float(law.compliance * (0.5 - np.log(0.5 * REFERENCE_WIDTH * law.pair.pinion.module)))
 
 
 def least_force(law: HalfPlanePair) -> float:
@@ -179,7 +179,7 @@ def least_force(law: HalfPlanePair) -> float:
     return float(LEAST_WIDTH**2 * law.pair.pinion.module / (0.2 * law.compliance))
 
 
-def usual_width(law: HalfPlanePair, force: Array) -> Array:
+def reference_width(law: HalfPlanePair, force: Array) -> Array:
     """Half width (m) of a usual contact that carries forces per width (N/m)."""
     return np.asarray(np.sqrt(0.2 * law.compliance * law.pair.pinion.module * force))
 
@@ -221,7 +221,7 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
     low, high, found = state.low, state.high, None
     if search:
         floor = np.maximum(force, LEAST_FORCE * couples.total(force)[couples.position] + least_force(law))
-        scale, reach = usual_width(law, floor), faces.range(tables, state.ends)
+        scale, reach = reference_width(law, floor), faces.range(tables, state.ends)
         look = np.minimum(np.maximum(scale[:, None] * LOOK, reach[0][:, None]), reach[1][:, None])
         arcs, heights, _ = faces.heights(tables, look)
         gap = heights[:, 1] - heights[:, 0]
@@ -260,7 +260,7 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
     slope = (between * (middle[:, 1:] - middle[:, :-1])).sum(axis=1) / np.where(area > 0, half * area, 1.0)
     outgrown: BoolArray = np.zeros(len(p), dtype=bool)
     if found is not None:
-        place, slope = np.where(loaded, place, found.nearest), np.where(loaded, slope, found.lean)
+        place, slope = np.where(loaded, place, found.nearest), np.where(loaded, slope, found.mean_slope)
         outgrown = ((p[:, 0] > 0) & (low > reach[0])) | ((p[:, -1] > 0) & (high < reach[1]))
     energy = 0.5 * (
         (p * width * solution.approach).sum(axis=1)

@@ -90,14 +90,14 @@ class Windows:
         Ends of the window along x (m).
     nearest : ndarray, shape (p,)
         x where the faces are nearest to each other (m).
-    lean : ndarray, shape (p,)
+    mean_slope : ndarray, shape (p,)
         Slope of the mean of both faces there (-).
     """
 
     low: Array
     high: Array
     nearest: Array
-    lean: Array
+    mean_slope: Array
 
 
 #: Places at which a window is searched for, in units of the contact's expected half width.

@@ -206,9 +206,9 @@ class Positions:
         none = np.where(status == "no_contact", 0.0, np.nan)
         names = (*TORQUES, "energy")
         numbers: dict[str, Any] = {name: np.where(good, getattr(self, name), none) for name in names}
-        return replace(self.told(good), status=status, contacts=_among(self.contacts, good), **numbers)
+        return replace(self.with_loads(good), status=status, contacts=_among(self.contacts, good), **numbers)
 
-    def told(self, kept: BoolArray) -> Positions:
+    def with_loads(self, kept: BoolArray) -> Positions:
         """These with loads and point pressures of some alone, shape (n,)."""
         points = None if self.points is None else _among(self.points, kept)
         return replace(self, loads=tuple(_among(one, kept) for one in self.loads), points=points)

@@ -28,7 +28,7 @@ import numpy as np
 from ..gear.touching import Touching
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .half_plane_pair import HalfPlanePair
-from .half_plane_step import SIGN, WIDER, WINDOW, State, Step, answers, usual_approach
+from .half_plane_step import SIGN, WIDER, WINDOW, State, Step, answers, reference_approach
 from .moved_faces import WAY, Faces
 from .panels import EDGES, Couplings, log_integral, mean_log
 from .position import joined, taken
@@ -75,7 +75,7 @@ def completed(
     outside = outside[0] | outside[1]
     for i in np.flatnonzero((outside & (gap < 0)).any(axis=1)).tolist():
         exact = gap[i] + _beside_ellipse(law, state, made, i, x[i])
-        bound = -MISSED * usual_approach(law) * total[couples.position[i]]
+        bound = -MISSED * reference_approach(law) * total[couples.position[i]]
         if i not in cut and (outside[i] & (exact < bound)).any():
             cut[i] = _added(law, state, made, i, Seen(x[i], arcs[i], heights[i], exact), bound)
     if not cut:
@@ -211,7 +211,7 @@ def _added(law: HalfPlanePair, state: State, made: Step, i: int, seen: Seen, bou
                 normal=along[None] / np.abs(along),
                 arc=seen.arcs[None, :, k],
                 ends=limits,
-                force=-seen.gap[[k]] / usual_approach(law),
+                force=-seen.gap[[k]] / reference_approach(law),
                 spread=nothing,
                 low=nothing,
                 high=nothing,

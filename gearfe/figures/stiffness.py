@@ -16,7 +16,7 @@ from ..gear.pair import GearPair
 from ..stiffness.contact_pressure import FlankPressure
 from ..stiffness.curve import StiffnessCurve
 from ..stiffness.job import StiffnessJob
-from ..stiffness.periodic import fold
+from ..stiffness.periodic import wrapped_phase
 from ..stiffness.report import cycle_statistics
 from ..typing import Array, IntArray
 from .style import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save, tidy
@@ -28,8 +28,8 @@ MOST_LINES = 12
 def stiffness_figure(path: str | Path, job: StiffnessJob, curve: StiffnessCurve) -> None:
     """Stiffness along the line of action and load sharing against the pinion angle, two mesh cycles from angle 0."""
     table, pair, cycle = job.table, job.pair, curve.mesh_cycle
-    folded, first = np.unique(np.round(fold(curve.pinion_angle, cycle), 12), return_index=True)
-    angles = np.concatenate([folded, folded + cycle, [2 * cycle] if len(folded) and folded[0] == 0 else []])
+    wrapped, first = np.unique(np.round(wrapped_phase(curve.pinion_angle, cycle), 12), return_index=True)
+    angles = np.concatenate([wrapped, wrapped + cycle, [2 * cycle] if len(wrapped) and wrapped[0] == 0 else []])
     pick = np.concatenate([first, first, first[:1] if len(angles) % 2 else []]).astype(int)
     solved, line = curve.k_mesh[pick], (angles, curve.k_mesh[pick])
     with suppress(InputError):  # positions that do not cover the cycle are joined by straight lines

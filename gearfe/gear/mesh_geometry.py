@@ -45,12 +45,12 @@ class MeshGeometry:
     wheel: Gear
     centre_distance: float | None = None
 
-    @property
+    @cached_property
     def gear_ratio(self) -> float:
         """Gear ratio z2/z1 (-)."""
         return self.wheel.teeth / self.pinion.teeth
 
-    @property
+    @cached_property
     def reference_centre_distance(self) -> float:
         """Reference centre distance a_0 = (r_1 + r_2) (m)."""
         return self.pinion.reference_radius + self.wheel.reference_radius
@@ -67,7 +67,7 @@ class MeshGeometry:
             return alpha
         return inverse_inv(inv(alpha) + 2.0 * shift * math.tan(alpha) / (self.pinion.teeth + self.wheel.teeth))
 
-    @property
+    @cached_property
     def working_centre_distance(self) -> float:
         """Centre distance a = a_0 cos(alpha)/cos(alpha_w) (m)."""
         if self.centre_distance is not None:
@@ -77,22 +77,22 @@ class MeshGeometry:
         ratio = math.cos(self.pinion.pressure_angle) / math.cos(self.working_pressure_angle)
         return self.reference_centre_distance * ratio
 
-    @property
+    @cached_property
     def pinion_working_radius(self) -> float:
         """Radius of the pinion's working pitch circle a/(1 + z2/z1) (m)."""
         return self.working_centre_distance / (1.0 + self.gear_ratio)
 
-    @property
+    @cached_property
     def wheel_working_radius(self) -> float:
         """Radius of the wheel's working pitch circle (m)."""
         return self.working_centre_distance - self.pinion_working_radius
 
-    @property
+    @cached_property
     def base_pitch(self) -> float:
         """Base pitch p_b (m)."""
         return self.pinion.base_pitch
 
-    @property
+    @cached_property
     def normal_backlash(self) -> float:
         """Backlash j_bn along the line of action (m): r_b1, r_b2 times the angles that the two teeth leave free."""
         half = inv(self.working_pressure_angle)
@@ -102,22 +102,22 @@ class MeshGeometry:
         gap = self.base_pitch - tooth1 - tooth2
         return 0.0 if abs(gap) < 1e-12 else gap
 
-    @property
+    @cached_property
     def backlash(self) -> float:
         """Circumferential backlash j_wt = j_bn/cos(alpha_w) at the working pitch circles (m)."""
         return self.normal_backlash / math.cos(self.working_pressure_angle)
 
-    @property
+    @cached_property
     def contact_twist(self) -> float:
         """Twist of the wheel (rad) at which rigid driving flanks just touch: half the backlash, j_bn/(2 r_b2)."""
         return 0.5 * self.normal_backlash / self.wheel.base_radius
 
-    @property
+    @cached_property
     def mesh_cycle(self) -> float:
         """Pinion angle from one tooth to the next, 2 pi/z1 (rad)."""
         return 2.0 * math.pi / self.pinion.teeth
 
-    @property
+    @cached_property
     def tangent_length(self) -> float:
         """Length a sin(alpha_w) of the line of action between the base circles (m): s1 + s2 on it."""
         return self.working_centre_distance * math.sin(self.working_pressure_angle)
@@ -136,7 +136,7 @@ class MeshGeometry:
         """Wheel angle (rad; a number or an array) from its meshing position, -pinion angle/ratio + twist."""
         return twist - pinion_angle / self.gear_ratio
 
-    @property
+    @cached_property
     def wheel_phase(self) -> float:
         """Angle pi + pi/z2 (rad) of the wheel's tooth frame at pinion angle 0: a space faces the pinion."""
         return math.pi + math.pi / self.wheel.teeth
@@ -157,32 +157,32 @@ class MeshGeometry:
         end = min(tip(self.pinion), self.tangent_length - self.wheel.form_roll)
         return start, end
 
-    @property
+    @cached_property
     def contact_ratio(self) -> float:
         """Nominal transverse contact ratio eps_alpha (-): path between the tip circles (or form points, when they
         cut it short) over the base pitch; tip rounds and relief do not count."""
         start, end = self.path_limits(rounded=False)
         return (end - start) / self.base_pitch
 
-    @property
+    @cached_property
     def contact_ratio_active(self) -> float:
         """Contact ratio (-) of the path between the starts of the tip rounds; relief does not count."""
         start, end = self.path_limits()
         return (end - start) / self.base_pitch
 
-    @property
+    @cached_property
     def contact_ratio_effective(self) -> float:
         """Contact ratio (-) of the full involute only: the path ends where a tip round or a tip relief starts. This is
         what an unloaded pair has; under load, contact grows into the relieved part up to `contact_ratio_active`."""
         start, end = self.path_limits(relieved=True)
         return max(0.0, end - start) / self.base_pitch
 
-    @property
+    @cached_property
     def path_length(self) -> float:
         """Length g_alpha of the nominal path of contact (m)."""
         return self.contact_ratio * self.base_pitch
 
-    @property
+    @cached_property
     def path(self) -> dict[str, PathPoint]:
         """Points A, B, C, D, E of the active path (tip rounds respected, relief not).
 

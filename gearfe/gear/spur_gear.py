@@ -101,32 +101,32 @@ class Gear:
             raise InputError("tip_round", self.tip_round, problem, "use a smaller tip round")
         _ = self.profile
 
-    @property
+    @cached_property
     def pitch_diameter(self) -> float:
         """Reference diameter d = z m (m)."""
         return self.teeth * self.module
 
-    @property
+    @cached_property
     def reference_radius(self) -> float:
         """Reference radius r = z m/2 (m)."""
         return 0.5 * self.pitch_diameter
 
-    @property
+    @cached_property
     def base_radius(self) -> float:
         """Base radius r_b = r cos(alpha) (m)."""
         return self.reference_radius * math.cos(self.pressure_angle)
 
-    @property
+    @cached_property
     def base_pitch(self) -> float:
         """Base pitch p_b = pi m cos(alpha) (m)."""
         return math.pi * self.module * math.cos(self.pressure_angle)
 
-    @property
+    @cached_property
     def tip_radius(self) -> float:
         """Tip radius r_a = r + (h_aP + x - k) m (m)."""
         return self.module * (self.teeth / 2 + self.addendum + self.profile_shift - self.tip_shortening)
 
-    @property
+    @cached_property
     def root_radius(self) -> float:
         """Root radius r_f = r + (x - h_fP) m (m)."""
         return self.module * (self.teeth / 2 + self.profile_shift - self.dedendum)
@@ -136,32 +136,32 @@ class Gear:
         """Exact half profile, see `gearfe.gear.involute.tooth_profile`."""
         return tooth_profile(self)
 
-    @property
+    @cached_property
     def form_roll(self) -> float:
         """Roll length of the form point, where the involute starts (m)."""
         return self.profile.form_roll
 
-    @property
+    @cached_property
     def form_radius(self) -> float:
         """Root form radius r_Ff (m)."""
         return math.hypot(self.base_radius, self.profile.form_roll)
 
-    @property
+    @cached_property
     def undercut(self) -> bool:
         """True when the rack's tip cuts into the involute."""
         return self.profile.undercut
 
-    @property
+    @cached_property
     def half_thickness_angle(self) -> float:
         """Half the angular tooth thickness psi at the reference circle (rad)."""
         return half_tooth_angle(self)
 
-    @property
+    @cached_property
     def base_angle(self) -> float:
         """Polar angle psi + inv(alpha) at which the left involute leaves the base circle (rad)."""
         return self.half_thickness_angle + inv(self.pressure_angle)
 
-    @property
+    @cached_property
     def tip_thickness(self) -> float:
         """Tooth thickness at the tip circle, as if not rounded (m)."""
         return 2.0 * self.tip_radius * self.profile.tip_half_angle

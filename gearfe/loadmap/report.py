@@ -62,7 +62,7 @@ def _largest(values: Array) -> float:
     return float(np.nanmax(values)) if np.isfinite(values).any() else float("nan")
 
 
-def told(made: LoadMap) -> list[str]:
+def report_lines(made: LoadMap) -> list[str]:
     """Lines to print."""
     count = Counter(map(str, made.status.ravel()))
     statuses = ", ".join(f"{n} {status}" for status, n in count.items())

@@ -34,7 +34,15 @@ from ..elasticity import Material, Plane
 from ..errors import InputError
 from ..gear.deviation import NOMINAL, ToothDeviations
 from ..gear.pair import GearPair
-from ..stiffness.positions import PositionSolver, Progress, at_torques, closed, honest, position_solver, usual_stiffness
+from ..stiffness.positions import (
+    PositionSolver,
+    Progress,
+    at_torques,
+    checked_contact,
+    closed,
+    position_solver,
+    standard_stiffness,
+)
 from ..stiffness.sweep import STEEL, assembled_curve, distinct_angles, elastic_pair
 from ..stopwatch import Stopwatch
 from ..tables.laws import DEFAULT_LAW
@@ -129,7 +137,8 @@ def sweep_loads(
     n = len(solved_angles)
     levels = [found.take(slice(row * n, (row + 1) * n)) for row in range(len(goals))]
     curves = tuple(
-        assembled_curve(solver, asked, source, honest(level, touching), touching, searched=True) for level in levels
+        assembled_curve(solver, asked, source, checked_contact(level, touching), touching, searched=True)
+        for level in levels
     )
     root = None
     if at_roots is not None:
@@ -156,7 +165,7 @@ def _cells(
     rest = np.setdiff1d(np.arange(len(goals)), known)
     groups = [known, *np.array_split(rest, max(1, math.ceil(len(rest) * n / TOGETHER)))]
     strain = StrainShares(solver.elastic, angles, goals, known) if finite else None
-    usual = touch + torque / usual_stiffness(solver)
+    usual = touch + torque / standard_stiffness(solver)
     parts: list[Positions] = []
     at_roots: list[ToothRoots] = []
     order: list[IntArray] = []
@@ -175,7 +184,7 @@ def _cells(
             factor = torque[cells][made.position] / found.torque_wheel[made.position]
             at_roots.append(replace(made, position=cells[made.position], stress=made.stress * factor[:, None]))
         found = closed(with_shares(found, share), torque[cells], touch[cells])
-        parts.append(found.told(np.zeros(len(cells), dtype=bool)))
+        parts.append(found.with_loads(np.zeros(len(cells), dtype=bool)))
         order.append(cells)
         if progress is not None:
             progress(sum(len(part) for part in order), len(torque), "cells")

@@ -124,7 +124,7 @@ def comparison(made: ReliefResult) -> dict[str, Array]:
     }
 
 
-def told(table: ReliefTable, made: ReliefResult, errors: PitchErrors | None) -> list[str]:
+def report_lines(table: ReliefTable, made: ReliefResult, errors: PitchErrors | None) -> list[str]:
     """Lines to print."""
     values = ", ".join(f"{n} = {v:.4g}" for n, v in zip(names_of(table), in_units(table, made.x), strict=True))
     lines = [f"best of {made.evaluations} evaluations: {values}"]

@@ -142,7 +142,7 @@ def _pitch(own: ToothDeviations, gear: Any) -> dict[str, float]:
     }
 
 
-def told(made: LoadedMesh) -> list[str]:
+def report_lines(made: LoadedMesh) -> list[str]:
     """Lines to print."""
     m, n = made.twist.shape
     lines = [

@@ -98,14 +98,14 @@ def periodic_interpolant(
     if method not in METHODS:
         raise InputError("interpolation", method, "must be one of " + ", ".join(METHODS))
     phase, values = np.asarray(phase, dtype=float), np.asarray(values, dtype=float)
-    folded = fold(phase, period)
+    wrapped = wrapped_phase(phase, period)
     known = np.isfinite(values)
-    order = np.flatnonzero(known)[np.argsort(folded[known], kind="stable")]
-    nodes = folded[order]
+    order = np.flatnonzero(known)[np.argsort(wrapped[known], kind="stable")]
+    nodes = wrapped[order]
     if len(nodes):
         starts = np.flatnonzero(np.concatenate([[True], np.diff(nodes) > 1e-9 * period]))
         order = np.minimum.reduceat(order, starts)
-        nodes = folded[order]
+        nodes = wrapped[order]
     gaps = np.diff(np.append(nodes, nodes[0] + period)) if len(nodes) else np.array([period])
     k = int(np.argmax(gaps))
     if gaps[k] > widest_gap * period * (1 + 1e-9):
@@ -117,17 +117,17 @@ def periodic_interpolant(
         raise InputError("stiffness curve", None, problem, "ask for angles over a whole cycle, or for smaller steps")
     at = values[order]
     slopes = _monotone_slopes(gaps, at) if method == "cubic" else np.zeros(len(at))
-    missing = np.setdiff1d(np.round(folded[~known], 12), np.round(nodes, 12))
+    missing = np.setdiff1d(np.round(wrapped[~known], 12), np.round(nodes, 12))
     return PeriodicInterpolant(
         period, np.append(nodes, nodes[0] + period), np.append(at, at[0]), np.append(slopes, slopes[0]), method, missing
     )
 
 
-def fold(phase: Array, period: float) -> Array:
+def wrapped_phase(phase: Array, period: float) -> Array:
     """Phases reduced to [0, period); a rounding error below a whole number of periods counts as that number."""
-    folded = np.mod(phase, period)
-    folded[folded > period * (1 - 1e-9)] = 0.0
-    return folded
+    wrapped = np.mod(phase, period)
+    wrapped[wrapped > period * (1 - 1e-9)] = 0.0
+    return wrapped
 
 
 def _monotone_slopes(intervals: Array, values: Array) -> Array:

@@ -125,7 +125,7 @@ class ElementSolver:
         found = solve_elements(self.elastic, expected.pinion_angle, expected.twist, first)
         status = np.where(thin, "under_resolved", np.where(loaded, found.status, expected.status))
         iterations = np.where(loaded & ~thin, found.iterations, expected.iterations)
-        return replace(found.stated(status), iterations=iterations).told(np.isin(np.arange(len(found)), kept))
+        return replace(found.stated(status), iterations=iterations).with_loads(np.isin(np.arange(len(found)), kept))
 
     def elements_per_contact(self, found: Positions) -> Array:
         """Elements that see the contact of positions of `half_plane`, shape (n,): harmonic means, by force, over their
@@ -181,13 +181,13 @@ def at_twists(
 def check_torque(solver: PositionSolver, torque: float) -> None:
     """Raise `InputError` for a torque (N m) that small strain is not meant for."""
     pair = solver.pair
-    most = MOST_YIELD * pair.pinion.module * usual_stiffness(solver) / pair.wheel.base_radius
+    most = MOST_YIELD * pair.pinion.module * standard_stiffness(solver) / pair.wheel.base_radius
     if torque > most:
         problem = f"must be <= {most:.3g} N m: the teeth would yield by more than {MOST_YIELD:g} modules"
         raise InputError("torque", torque, problem, "linear elasticity does not reach so far; give less")
 
 
-def usual_stiffness(solver: PositionSolver) -> float:
+def standard_stiffness(solver: PositionSolver) -> float:
     """Torque per twist by the standard's mesh stiffness (N m/rad)."""
     pair, elastic = solver.pair, solver.elastic
     moduli = [body.material.youngs_modulus for body in elastic.bodies]
@@ -223,7 +223,7 @@ def at_torques(
         Relative error of the torque, by default the solver's.
     """
     accepted = solver.torque_tolerance if tolerance is None else tolerance
-    twist = touching + goal / usual_stiffness(solver) if first is None else first
+    twist = touching + goal / standard_stiffness(solver) if first is None else first
     share = np.broadcast_to(share, goal.shape)
     if isinstance(solver, ElementSolver) and first is None:
         twist = at_torques(solver.half_plane, angles, goal, touching, None)[0].twist
@@ -294,7 +294,7 @@ def closed(found: Positions, goal: Array, touching: Array) -> Positions:
     return replace(found, twist=np.where(good, twist, found.twist), contacts=contacts, **moments)
 
 
-def honest(found: Positions, touching: Array) -> Positions:
+def checked_contact(found: Positions, touching: Array) -> Positions:
     """Mark positions without contact whose exact rigid flanks overlap, and take all numbers off failed ones.
 
     `touching` are the twists (rad), shape (n,), at which the rigid flanks touch.

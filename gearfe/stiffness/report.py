@@ -23,7 +23,7 @@ from .curve import StiffnessCurve
 from .job import StiffnessJob
 
 #: Allowable contact stress of case-hardened steel for unlimited life (Pa): ISO 6336-5, material quality MQ.
-USUAL_STEEL = 1500e6
+ALLOWABLE_STRESS = 1500e6
 
 #: Packages whose versions decide the numbers.
 PACKAGES = ("numpy", "scipy", "gmsh")
@@ -111,7 +111,7 @@ def deviation_lines(job: StiffnessJob) -> list[str]:
     return [f"flanks with the deviations of [microgeometry], up to {both}"]
 
 
-def told(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
+def report_lines(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
     """Lines to print."""
     moduli = [material.youngs_modulus for material in job.materials]
     iso = iso_values(job.pair, moduli[0], moduli[1])
@@ -148,7 +148,7 @@ def _pressure_summary(curve: StiffnessCurve) -> dict[str, Any]:
         "largest_at_edges_MPa": 1e-6 * found["edge"],
         "positions_with_a_rounded_edge_bearing": found["rounded"],
         "positions_with_a_singular_edge_bearing": found["singular"],
-        "usual_steel_MPa": 1e-6 * USUAL_STEEL,
+        "usual_steel_MPa": 1e-6 * ALLOWABLE_STRESS,
     }
 
 
@@ -158,9 +158,9 @@ def pressure_lines(curve: StiffnessCurve) -> list[str]:
     if found["path"] > 0:
         line = f"Hertzian pressure on the flanks: largest {1e-6 * found['path']:.4g} MPa"
         line += f" (the computed contact is {100 * found['path_error']:.2g} % off Hertz's)"
-        if found["path"] > USUAL_STEEL:
+        if found["path"] > ALLOWABLE_STRESS:
             line += (
-                f", beyond the {1e-6 * USUAL_STEEL:.0f} MPa that case-hardened steel bears for long (ISO 6336-5): "
+                f", beyond the {1e-6 * ALLOWABLE_STRESS:.0f} MPa that case-hardened steel bears for long (ISO 6336-5): "
                 "linear elasticity goes on where the steel would not"
             )
         lines.append(line)

@@ -36,14 +36,14 @@ from ..typing import Array, IntArray
 from .contact_pressure import EDGES, contact_pressures
 from .curve import SOLVED, ErrorEstimate, StiffnessCurve
 from .curve_error import COARSENING, curve_error
-from .periodic import fold
+from .periodic import wrapped_phase
 from .positions import (
     PositionSolver,
     Progress,
     at_torque,
     at_twists,
     check_torque,
-    honest,
+    checked_contact,
     load_shares,
     position_solver,
 )
@@ -224,7 +224,7 @@ def sweep_stiffness(
             solved = at_twists(solver, solved_angles, np.full(len(solved_angles), load), progress, finite=finite)
         else:
             solved = at_torque(solver, solved_angles, load, touching, progress, finite=finite)
-    solved = honest(solved, touching)
+    solved = checked_contact(solved, touching)
     error = None
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
@@ -255,12 +255,12 @@ def _checked_load(pair: GearPair, twist: float | None, torque: float | None, twi
 
 def distinct_angles(angles: Array, cycle: float) -> tuple[Array, IntArray]:
     """Angles within one cycle that have to be solved, and for each asked angle the number of its own."""
-    folded = fold(angles, cycle)
-    order = np.argsort(folded, kind="stable")
-    new = np.concatenate([[True], np.diff(folded[order]) > 1e-9 * cycle])
+    wrapped = wrapped_phase(angles, cycle)
+    order = np.argsort(wrapped, kind="stable")
+    new = np.concatenate([[True], np.diff(wrapped[order]) > 1e-9 * cycle])
     source = np.empty(len(angles), dtype=np.int64)
     source[order] = np.cumsum(new) - 1
-    return folded[order][new], source
+    return wrapped[order][new], source
 
 
 def assembled_curve(

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 
-def told(summary: Mapping[str, Any]) -> list[str]:
+def report_lines(summary: Mapping[str, Any]) -> list[str]:
     """What the command tells of a study."""
     statuses = ", ".join(f"{n} {status}" for status, n in summary["statuses"].items())
     lines = [f"{summary['cases']} cases: {statuses}; {summary['seconds_of_all_cases']:.3g} s of work"]

@@ -99,17 +99,17 @@ def contact_at(
     law, places = problem.law, problem.mesh.doflocs.T + u[problem.unknowns]
     points = problem.points(places)
     slave, surface = problem.at(points)
-    moved, fade = slave.interpolate(u), problem.fade(points)
+    moved, end_weighting = slave.interpolate(u), problem.end_weighting(points)
     where = (slave.global_coordinates() + moved)[:, :, 0].T
-    found = _closest(problem, places[problem.chain_nodes], where, points.mate, fade)
+    found = _closest(problem, places[problem.chain_nodes], where, points.mate, end_weighting)
     reached, normal, tangent = found.reached, _plane(found.normal), _plane(found.tangent)
-    over = (problem.counts[points.mate] - found.place) / (2 * fade)
+    over = (problem.counts[points.mate] - found.place) / (2 * end_weighting)
     share = np.where(reached, np.clip(0.5 + over, 0.0, 1.0), 0.0)
     stress, rate = problem.constitution.surface_stress(np.asarray(moved.grad), normal[:, :, None], **surface)
     if law.name == "exact":
-        hats, _ = hat_functions(points)
-        multipliers = np.zeros(hats.shape[1]) if multipliers is None else multipliers
-        pressure, active = np.where(reached, hats @ multipliers, 0.0), np.zeros(len(where), dtype=bool)
+        basis, _ = multiplier_basis(points)
+        multipliers = np.zeros(basis.shape[1]) if multipliers is None else multipliers
+        pressure, active = np.where(reached, basis @ multipliers, 0.0), np.zeros(len(where), dtype=bool)
         on = np.flatnonzero(reached)
     else:
         multipliers = np.zeros(0)
@@ -129,7 +129,7 @@ def contact_at(
         "p": pressure,
         "active": active.astype(float),
         "share": share,
-        "share_rate": np.where((share > 0) & (share < 1), -0.5 / fade, 0.0),
+        "share_rate": np.where((share > 0) & (share < 1), -0.5 / end_weighting, 0.0),
     }
     fields: dict[str, Any] = {name: value[..., on, None] for name, value in at_points.items()}
     fields["X_xi"] = edge_tangents(problem.mesh, mate, mate_xi)[:, :, None]
@@ -138,12 +138,12 @@ def contact_at(
     return ContactState(u, points, found, slave, pressure, share, on, pairs, fields, contact, stress_loads, multipliers)
 
 
-def _closest(problem: ContactProblem, nodes: Array, where: Array, mate: IntArray, fade: Array) -> Projection:
+def _closest(problem: ContactProblem, nodes: Array, where: Array, mate: IntArray, end_weighting: Array) -> Projection:
     """Closest points of points at `where` on the chains with these nodes."""
     start, slave, master = np.empty(len(where)), where @ PLANE, nodes @ PLANE
     for k, chain in enumerate(np.split(master, np.cumsum(2 * problem.counts + 1)[:-1])):
         start[mate == k] = nearest_places(slave[mate == k], chain)
-    return project(slave, master, problem.counts, mate, start, fade)
+    return project(slave, master, problem.counts, mate, start, end_weighting)
 
 
 def _plane(vectors: ComplexArray) -> Array:
@@ -151,8 +151,8 @@ def _plane(vectors: ComplexArray) -> Array:
     return np.stack([vectors.real, vectors.imag])
 
 
-def hat_functions(points: Points) -> tuple[csr_matrix, Array]:
-    """Values of the exact law's hats at the points, shape (q, m), and the law's parameter of each (Pa/m).
+def multiplier_basis(points: Points) -> tuple[csr_matrix, Array]:
+    """Values of the multiplier functions at the points, shape (q, m), and the law's parameter of each (Pa/m).
 
     A node that two couples share counts once for each.
     """

@@ -12,7 +12,7 @@ points, each takes half of the integrals.
 .. math::
     \lambda_i \ge 0, \qquad \int \psi_i\, g \ge 0, \qquad \lambda_i \int \psi_i\, g = 0 ,
 
-and hats :math:`\psi_i` that are linear on the halves of the quadratic edges of one surface, one for each of its nodes.
+and basis :math:`\psi_i` that are linear on the halves of the quadratic edges of one surface, one for each of its nodes.
 They are not negative, so neither are the pressures. Stability: for :math:`\lambda = \sum \lambda_i \psi_i` take the
 displacement :math:`v = \sum \lambda_i N_i` with the same nodal values. On each edge the symmetric part of :math:`\int
 \psi_i N_j` is positive definite, so :math:`\int \lambda v \ge c \lVert\lambda\rVert^2` with one c for all meshes, and
@@ -93,7 +93,7 @@ class Penalty:
 
 @dataclass(frozen=True)
 class Exact:
-    """No overlap in the mean of each hat, no tension. Two sides would ask twice for the same thing."""
+    """No overlap in the mean of each multiplier function, no tension. Two sides would ask twice for the same thing."""
 
     sides: Sides = "tip"
     name: ClassVar[str] = "exact"

@@ -19,7 +19,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from ..typing import Array, IntArray
-from .contact_state import ContactState, contact_at, hat_functions
+from .contact_state import ContactState, contact_at, multiplier_basis
 from .forms import gap_change, unit_pressure_work
 from .problem import ContactProblem
 
@@ -134,10 +134,10 @@ def _newton_step(
     if problem.law.name != "exact":
         step[free] = factor.solve((out + state.forces)[free])
         return step, state.multipliers, matrix.diagonal()
-    # K du = out + B lambda,  G du = -(mean gap times area),  with B and G the work and the gaps of the active hats
-    hats, areas, gaps, parameter = _mean_gaps(state)
+    # K du = out + B lambda,  G du = -(mean gap times area),  with B and G the work and the gaps of the active basis
+    basis, areas, gaps, parameter = _mean_gaps(state)
     active = np.flatnonzero((state.multipliers - parameter * (gaps - closing) > 0) & (areas > 0))
-    work, change = ((hats.T @ state.rows(form))[active].tocsc() for form in (unit_pressure_work, gap_change))
+    work, change = ((basis.T @ state.rows(form))[active].tocsc() for form in (unit_pressure_work, gap_change))
     loose = factor.solve(out[free])
     pushed = factor.solve(work[:, free].T.toarray())
     aim = np.zeros(len(state.multipliers))
@@ -149,8 +149,8 @@ def _newton_step(
 
 def _mean_gaps(state: ContactState) -> tuple[Any, Array, Array, Array]:
     """Hats at the points, their areas (m2), mean gaps (m) and the law's parameter (Pa/m)."""
-    hats, parameter = hat_functions(state.points)
+    basis, parameter = multiplier_basis(state.points)
     weight = state.points.weight * state.share
-    areas = hats.T @ weight
-    gaps = np.divide(hats.T @ (weight * state.projection.gap), areas, out=np.ones(len(areas)), where=areas > 0)
-    return hats, areas, gaps, parameter
+    areas = basis.T @ weight
+    gaps = np.divide(basis.T @ (weight * state.projection.gap), areas, out=np.ones(len(areas)), where=areas > 0)
+    return basis, areas, gaps, parameter

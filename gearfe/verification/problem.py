@@ -216,7 +216,7 @@ class ContactProblem:
         fields = {"n0": n0[:, :, None], "lam": points.lam[:, None], "mu": points.mu[:, None]}
         return edge_points(self.mesh, points.edges, points.xi, points.weight), fields
 
-    def fade(self, points: Points) -> Array:
+    def end_weighting(self, points: Points) -> Array:
         """Distance from the mate's sharp end (edges) within which a point counts in part: half its stretch of surface.
 
         Next to nothing for segments, which end where the mate does.

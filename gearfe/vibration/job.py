@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -92,12 +92,10 @@ def train_body(job: TrainJob) -> ModalBody | None:
     return reduced_housing(given(job.housing, "housing"), job.path.parent)
 
 
-def job_scene(
-    job: TrainJob, curves: Sequence[Stiffness], body: ModalBody | None, *, geometry_only: bool = False
-) -> TrainScene:
+def job_scene(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: ModalBody | None = None) -> TrainScene:
     """The train of a job with the stiffness of each mesh and its reduced housing.
 
-    With `geometry_only` the bores stand still where the shafts need them: enough for kinematics and statics.
+    Without `curves` its meshes are rigid and rub nothing: enough for kinematics and statics.
     """
     t = job.table
     shafts = tuple(
@@ -119,7 +117,10 @@ def job_scene(
         ShaftGear(g.name, g.shaft, 1e-3 * g.y_mm, train_gear(job, g, f"train.gears[{i}]"), _density(job, g))
         for i, g in enumerate(t.gears)
     )
-    meshes = tuple(_mesh(job, m, c, geometry_only) for m, c in zip(t.meshes, curves, strict=True))
+    if curves is None:
+        meshes = tuple(_mesh(job, m, None, 0.0) for m in t.meshes)
+    else:
+        meshes = tuple(_mesh(job, m, c, _friction(m)) for m, c in zip(t.meshes, curves, strict=True))
     drive = None
     if t.drive is not None:
         speed = _ramp(t.drive.speed_rad_per_s, t.drive.ramp_centre_ms, t.drive.ramp_width_ms)
@@ -145,10 +146,10 @@ def job_scene(
         tuple(Bearing(str(b.attachment), b.stiffness, b.damping) for b in t.bearings),
         damping,
     )
-    if geometry_only:
+    if curves is None:
         from ..train.checks import check_scene
 
-        check_scene(scene)
+        check_scene(replace(scene, meshes=tuple(replace(mesh, backlash=None, damping=0.0) for mesh in meshes)))
     return scene
 
 
@@ -198,7 +199,7 @@ def _density(job: TrainJob, table: TrainGearTable) -> float:
     return (job.pair.material_of(table.gear) if table.gear else job.pair.material).density_kg_per_m3
 
 
-def _mesh(job: TrainJob, table: TrainMeshTable, stiffness: Stiffness, geometry_only: bool) -> GearMesh:
+def _mesh(job: TrainJob, table: TrainMeshTable, stiffness: Stiffness, friction: float | Lubrication) -> GearMesh:
     distance = table.centre_distance_mm
     if distance is None and job.pair is not None and job.pair.centre_distance_mm is not None:
         sides = {g.name: g.gear for g in job.table.gears}
@@ -213,7 +214,7 @@ def _mesh(job: TrainJob, table: TrainMeshTable, stiffness: Stiffness, geometry_o
         job.table.curves.interpolation,
         None if distance is None else 1e-3 * distance,
         None if table.backlash_um is None else 1e-6 * table.backlash_um,
-        0.0 if geometry_only else _friction(table),
+        friction,
     )
 
 

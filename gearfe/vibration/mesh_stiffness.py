@@ -55,7 +55,7 @@ def train_curves(
     if files and len(files) not in (1, len(meshes)):
         problem = f"{len(files)} files for {len(meshes)} meshes"
         raise InputError("curve", [str(f) for f in files], problem, "give one for all, or one a mesh")
-    scene = job_scene(job, [1e8] * len(meshes), None, geometry_only=True)
+    scene = job_scene(job)
     found: list[Stiffness] = []
     for number, (mesh, made) in enumerate(zip(meshes, scene.meshes, strict=True)):
         teeth = scene.gear(made.driver).gear.teeth
