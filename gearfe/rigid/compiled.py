@@ -20,6 +20,7 @@ from types import FunctionType, SimpleNamespace
 from typing import Any
 
 from .. import cache
+from .parts import part_options
 
 #: One text of all sources in the folder of compiled code: numba files compiled code under the path of its source.
 SOURCE = "kernels.py"
@@ -74,7 +75,8 @@ def _roots() -> list[Path]:
 def _made_by() -> Iterator[str]:
     """What decides compiled code beside its source: Python, the compiler, the processor."""
     yield sys.version
-    yield Path(__file__).read_text(encoding="utf-8")
+    for maker in ("compiled.py", "packed.py", "parts.py"):
+        yield Path(__file__).with_name(maker).read_text(encoding="utf-8")
     for name in ("numba", "llvmlite"):
         found = importlib.util.find_spec(name)
         place = Path(found.origin).parent / "_version.py" if found is not None and found.origin else None
@@ -161,8 +163,9 @@ def _compile(
                     made.__code__ = made.__code__.replace(co_filename=str(source))
                 scope[name] = numba.njit(made, cache=source is not None, no_cfunc_wrapper=True, **common)
             else:
+                inlined = {"forceinline": name in inline}
                 scope[name] = numba.njit(
-                    made, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=name in inline, **common
+                    made, no_cpython_wrapper=True, no_cfunc_wrapper=True, **inlined, **part_options(), **common
                 )
     finally:
         numba.config.CACHE_DIR = before

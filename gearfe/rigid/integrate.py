@@ -38,7 +38,7 @@ LOCAL_SHARE = 5e-4
 IMPLICIT_TRIAL, LOADING_LINALG, PLAIN_TRIAL = 0.02, 0.25, 0.01
 #: Rates from which on steps of a series or of Runge-Kutta are below the rounding of the run's time.
 HOPELESS = 1e12
-COMPILING = "compiling the kernels once, about a minute; backend='plain' does without"
+COMPILING = "compiling the kernels once, about a quarter of a minute; backend='plain' does without"
 
 
 @stage("integrating")
@@ -244,13 +244,13 @@ def _taylor(
     if jit and not compiled_is_ready():
         announce(COMPILING)
     assembly = carrying(scene.assembly, start.excess)
-    key = (order, jit, assembly.tables.light.size)
-    known = scene.__dict__.setdefault("_work", {})
-    if key not in known:
-        known[key] = taylor.work_space(assembly.tables, order)
+    known = scene.__dict__.setdefault("_prepared", {})
+    prepared = known.get((order, jit))
+    if prepared is None or prepared.tables is not assembly.tables:
+        prepared = known[order, jit] = taylor.prepare(assembly.tables, order, jit)
     made = taylor.integrate_scene(
         assembly, start, float(times[-1]), tolerance=local, order=order, longest=options["longest"], most=most, jit=jit,
-        work=known[key], watch=watch,
+        prepared=prepared, watch=watch,
     )  # fmt: skip
     statistics = {
         "scheme": "Taylor series",

@@ -23,6 +23,7 @@ from .contract import LocalForce, SeriesLaw
 from .dense import Dense, within_run
 from .elimination import Minimal, is_linear
 from .explicit import Problem, run_problem
+from .parts import uncollected
 from .start import Start
 from .status import Status
 from .steps import Watch
@@ -132,7 +133,7 @@ class SeriesRun:
         if "loaded" in vars(kernels):
             return 0.0
         began = time.perf_counter()
-        with stage("compiling the kernels"):
+        with stage("compiling the kernels"), uncollected():
             self.steps(0.0, np.zeros(2 * self.core.T.shape[1]), 0.0, np.zeros(1), 1)
         kernels.loaded = True
         return time.perf_counter() - began

@@ -25,6 +25,8 @@ from . import (
     kernel_singular,
 )
 from .dense import Polynomials
+from .packed import Packed
+from .parts import uncollected
 from .start import Start
 from .status import Status
 from .steps import Watch
@@ -179,6 +181,20 @@ def work_space(tables: Tables, order: int) -> Work:
     return Work._make(arrays)
 
 
+class Prepared(NamedTuple):
+    """Tables and work space of a scene, and what kernels get of them: the same, or both as blocks."""
+
+    tables: Tables
+    work: Work
+    handed: tuple[Any, Any]
+
+
+def prepare(tables: Tables, order: int, jit: bool) -> Prepared:
+    """What runs of one scene at one order share."""
+    work = work_space(tables, order)
+    return Prepared(tables, work, (Packed(tables), Packed(work)) if jit else (tables, work))
+
+
 @dataclass(frozen=True)
 class TaylorRun:
     """Result of the loop.
@@ -217,17 +233,19 @@ def kernels(jit: bool) -> SimpleNamespace:
     return compiled.bind((*FUNCTIONS, *kernel_run.STARTERS), NAMES, compiled=False)
 
 
-def load_kernels(tables: Tables, w: Work, run: Run) -> float:
+def load_kernels(prepared: Prepared, run: Run) -> float:
     """Compile the kernels, or load them, by a run of no length; seconds that this took."""
     if _LOADED:
         return 0.0
     began = time.perf_counter()
-    times, coefficients = np.zeros(2), np.zeros((1, run.order + 1, w.q.size - 3))
+    width = prepared.work.q.size - 3
+    times, coefficients = np.zeros(2), np.zeros((1, run.order + 1, width))
     state = first_state(run.end)
     state[kernel_names.BEGUN] = 1.0
-    with stage("compiling the kernels"):
-        kernels(True).integrate_series(tables, w, run, state, times, coefficients, np.zeros(1, dtype=np.int64))
-        kernels(True).sample(times, coefficients, 1.0, np.zeros(1), 0, np.zeros((1, w.q.size - 3)))
+    with stage("compiling the kernels"), uncollected():
+        singular = np.zeros(1, dtype=np.int64)
+        kernels(True).integrate_series(*prepared.handed, Packed(run), state, times, coefficients, singular)
+        kernels(True).sample(times, coefficients, 1.0, np.zeros(1), 0, np.zeros((1, width)))
     _LOADED.append(True)
     return time.perf_counter() - began
 
@@ -252,19 +270,21 @@ def integrate_scene(
     longest: float = math.inf,
     most: int = 1_000_000,
     jit: bool = True,
-    work: Work | None = None,
+    prepared: Prepared | None = None,
     watch: Watch | None = None,
 ) -> TaylorRun:
     """Integrate the scene from its consistent start to the time `end`; `tolerance` is that of the last terms."""
     order = order or order_for(tolerance)
     tables, t0 = assembly.tables, start.time
-    w = work or work_space(tables, order)
+    shared = prepared or prepare(tables, order, jit)
+    w = shared.work
     w.q[:-3], w.v[:-3], w.base[:] = start.q, start.v, ~start.active
     sign = 1.0 if end >= t0 else -1.0
     run = Run(t0, end, sign, order, float(tolerance), assembly.length, float(longest), assembly.breaks)
     state = first_state(t0)
-    compiling = load_kernels(tables, w, run) if jit else 0.0
+    compiling = load_kernels(shared, run) if jit else 0.0
     advance = kernels(jit).integrate_series
+    handed = (*shared.handed, Packed(run) if jit else run)
     parts = []
     room, done = min(FIRST_COMPILED if jit else FIRST_STEPS, most), 0
 
@@ -276,7 +296,7 @@ def integrate_scene(
     while True:
         times, coefficients = np.empty(room + 1), np.empty((room, order + 1, w.q.size - 3))
         singular = np.zeros(room, dtype=np.int64)
-        status, count = advance(tables, w, run, state, times, coefficients, singular)
+        status, count = advance(*handed, state, times, coefficients, singular)
         if status == Status.SINGULAR_START:
             rows, shift, ahead, row, status = kernels(False).begin(tables, w, run, t0)
             state[:] = t0 + shift, rows, ahead, 1.0, 0.0, row

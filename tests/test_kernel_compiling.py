@@ -1,0 +1,83 @@
+"""Compiled kernels: named arrays as blocks, functions as parts of others."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from gearfe.rigid import compiled
+from gearfe.rigid.packed import Packed
+from gearfe.typing import Array, IntArray
+
+needs_numba = pytest.mark.skipif(not compiled.available(), reason="numba is not installed")
+
+
+class Inner(NamedTuple):
+    weights: Array  # (n,)
+    chosen: IntArray  # (m,)
+    factor: float
+
+
+class Outer(NamedTuple):
+    cube: Array  # (a, b, c)
+    inner: Inner
+    count: int
+    out: Array  # (b,)
+
+
+def weighted(inner, cube, b):  # type: ignore[no-untyped-def]
+    """factor sum_k w_k cube[chosen_k, b, k]."""
+    total = 0.0
+    for k in range(inner.chosen.shape[0]):
+        total += inner.weights[k] * cube[inner.chosen[k], b, k]
+    return inner.factor * total
+
+
+def fill_out(outer):  # type: ignore[no-untyped-def]
+    """out_b = the weighted sum of row b, `count` times."""
+    for b in range(outer.out.shape[0]):
+        outer.out[b] = 0.0
+        for _ in range(outer.count):
+            outer.out[b] += weighted(outer.inner, outer.cube, b)
+    return outer.out.shape[0]
+
+
+def sample() -> Outer:
+    rng = np.random.default_rng(5)
+    chosen = np.array([2, 0, 1, 2], dtype=np.int64)
+    return Outer(rng.normal(size=(3, 5, 4)), Inner(rng.normal(size=4), chosen, 0.75), 3, np.zeros(5))
+
+
+@needs_numba
+def test_a_block_reads_as_the_named_tuple_it_was_made_from(tmp_path, monkeypatch):
+    monkeypatch.setenv("GEARFE_CACHE", str(tmp_path))
+    names = compiled.bind((weighted, fill_out), {}, compiled=True, entries=("fill_out",))
+    outer = sample()
+    assert names.fill_out(Packed(outer)) == 5
+    k = np.arange(4)
+    rows = outer.cube[outer.inner.chosen, :, k]  # (4, 5)
+    assert np.allclose(outer.out, 3 * 0.75 * outer.inner.weights @ rows, rtol=1e-14)
+
+
+@needs_numba
+def test_parts_give_what_numba_alone_gives(tmp_path, monkeypatch):
+    """One compilation with all parts in their entry against numba's own, each function for itself."""
+    results = []
+    for number, options in enumerate((None, {})):
+        monkeypatch.setenv("GEARFE_CACHE", str(tmp_path / str(number)))
+        if options is not None:
+            monkeypatch.setattr(compiled, "part_options", lambda: {})
+        names = compiled.bind((weighted, fill_out), {}, compiled=True, entries=("fill_out",))
+        outer = sample()
+        names.fill_out(Packed(outer))
+        results.append(outer.out)
+    assert np.allclose(*results, rtol=1e-15, atol=0.0)
+
+
+def test_arrays_that_are_not_contiguous_or_of_another_type_are_refused():
+    with pytest.raises(TypeError, match="weights: float64 array, C-contiguous: False"):
+        Packed(Inner(np.zeros(8)[::2], np.zeros(2, dtype=np.int64), 1.0))
+    with pytest.raises(TypeError, match="chosen: int32"):
+        Packed(Inner(np.zeros(8), np.zeros(2, dtype=np.int32), 1.0))
