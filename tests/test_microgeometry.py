@@ -15,7 +15,7 @@ from gearfe.gear.deviation import NOMINAL, ToothDeviations
 from gearfe.gear.deviation_job import deviations_of
 from gearfe.gear.modifications import FlankModification, Relief, Waviness, tooth_deviations
 from gearfe.gear.pair import GearPair, TipRelief
-from gearfe.microgeometry.loaded_mesh import full_period
+from gearfe.microgeometry.loaded_mesh import BACK, full_period
 from gearfe.microgeometry.solve import load_mesh
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 from gearfe.tables.microgeometry import MicrogeometryTable
@@ -187,3 +187,26 @@ def test_the_room_behind_the_teeth(flank) -> None:
     assert np.abs(bodily - backlash).max() < 8e-6 * math.sin(2 * np.pi / 20) + 1e-9
     thick = room({"pitch_um": index.tolist()}, {"pitch_um": index.tolist()}, middle)[0]
     assert np.ptp(thick) > 10e-6
+
+
+def test_gears_that_jam_have_no_numbers() -> None:
+    """Teeth thicker than the space by 11 um: until the driving flanks yield by that, the back flanks would bear."""
+    pair = gear_pair(tip_round=1e-4, tooth_thinning=5e-6)
+    cosine = math.cos(pair.pinion.pressure_angle)
+    thick = 1e-6 * 10.0 * cosine
+    law = half_plane_pair(pair, elastic_pair(pair, coarsen=3.0))
+    table = build(MicrogeometryTable, {"pinion": {"pitch_um": [10.0] * 20}}, "microgeometry")
+    own, back = (deviations_of(table, pair, flank=side) for side in ("left", "right"))
+    angles = (np.arange(5) + 0.3) * pair.mesh_cycle / 5
+    free = load_mesh(law.deviated(own), [5.0, 250.0], angles=angles)
+    yields = free.transmission_error - free.transmission_error_unloaded
+    room = pair.normal_backlash - 2 * thick + yields
+    assert (room[0] < 0).all()
+    assert (room[1] > 0).all()
+    made = load_mesh(law.deviated(own), [5.0, 250.0], angles=angles, back=back)
+    assert made.statuses == {BACK: 5, "converged": 5}
+    assert np.isnan(made.twist[0]).all()
+    assert made.back_clearance == pytest.approx(room)
+    assert (made.twist[1] == free.twist[1]).all()
+    assert set(made.pairs.torque) == {1}
+    assert len(made.pairs.force) == (free.pairs.torque == 1).sum()

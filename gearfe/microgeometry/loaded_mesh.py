@@ -20,6 +20,9 @@ from ..gear.pair import GearPair
 from ..gear.validity import MOST_OVERLAP, overlaps
 from ..typing import Array, BoolArray, IntArray
 
+#: Status of a cell whose back flanks would bear: gears that jam carry the torque on both flanks, which this is not for.
+BACK = "back_flanks_bear"
+
 
 @dataclass(frozen=True)
 class PairLoads:
@@ -73,8 +76,10 @@ class LoadedMesh:
         Twist at which the rigid flanks touch, from there (rad).
     twist_unloaded_back : ndarray, shape (n,), or None
         The same of the back flanks, > 0 where they lie behind those without deviations.
+    back_clearance : ndarray, shape (m, n), or None
+        Normal clearance (m) of the back flanks, unloaded themselves; < 0 where they would bear.
     status : ndarray of str, shape (m, n)
-        ``converged``, or why there are no numbers.
+        ``converged``, or why there are no numbers: `BACK`, or what the search for the torque says.
     pairs
         Loaded tooth pairs.
     root_stress : ndarray, shape (m, n, 2), or None
@@ -91,6 +96,7 @@ class LoadedMesh:
     tangent: Array
     twist_unloaded: Array
     twist_unloaded_back: Array | None
+    back_clearance: Array | None
     status: NDArray[np.str_]
     pairs: PairLoads
     root_stress: Array | None
@@ -105,13 +111,6 @@ class LoadedMesh:
     def transmission_error_unloaded(self) -> Array:
         """Unloaded transmission error (m), shape (n,)."""
         return self.twist_unloaded * self.pair.wheel.base_radius
-
-    @property
-    def back_clearance(self) -> Array | None:
-        """Normal clearance (m) of the back flanks, unloaded themselves, shape (m, n); < 0 where they would bear."""
-        if self.twist_unloaded_back is None:
-            return None
-        return self.pair.normal_backlash + self.pair.wheel.base_radius * (self.twist_unloaded_back + self.twist)
 
     @property
     def peak_to_peak(self) -> Array:

@@ -17,7 +17,7 @@ from ..stiffness.job import StiffnessJob
 from ..stiffness.report import versions
 from ..tables.microgeometry import MicrogeometryTable
 from ..typing import Array
-from .loaded_mesh import LoadedMesh
+from .loaded_mesh import BACK, LoadedMesh
 
 #: Harmonics of the mesh order in the table by torque.
 HARMONICS = 5
@@ -152,6 +152,9 @@ def report_lines(made: LoadedMesh) -> list[str]:
     ]
     table = torque_table(made)
     for i in sorted({0, m // 2, m - 1}):
+        if made.failed[i].any():
+            lines.append(f"at {made.torque[i]:.4g} N m: {made.failed[i].sum()} of {n} positions have no numbers")
+            continue
         line = (
             f"at {made.torque[i]:.4g} N m: transmission error {table['transmission_error_mean_um'][i]:.4g} um with "
             f"{table['transmission_error_peak_to_peak_um'][i]:.3g} um peak to peak, pressure "
@@ -164,7 +167,7 @@ def report_lines(made: LoadedMesh) -> list[str]:
             line += f", root stress {both}"
         lines.append(line)
     best = int(np.argmin(np.where(np.isfinite(made.peak_to_peak), made.peak_to_peak, np.inf)))
-    if m > 2:
+    if m > 2 and np.isfinite(made.peak_to_peak[best]):
         lines.append(f"least peak-to-peak error: {1e6 * made.peak_to_peak[best]:.3g} um at {made.torque[best]:.4g} N m")
     return lines
 
@@ -173,16 +176,20 @@ def warnings(pair: GearPair, made: LoadedMesh) -> list[str]:
     """Sentences about what deserves a look."""
     said, beyond = list(pair.warnings), made.beyond_validity
     said += told_overlaps(beyond, overlaps(pair, made.twist[beyond == 1]).max(initial=0.0))
-    room = made.back_clearance
-    if room is not None and (least := float(np.nanmin(room))) < 0.0:
+    room, jammed = made.back_clearance, made.status == BACK
+    if room is not None and jammed.any():
         i, j = np.unravel_index(int(np.nanargmin(room)), room.shape)
         where = f"{made.torque[i]:.4g} N m and {np.degrees(made.pinion_angle[j]):.4g} deg"
         said.append(
-            f"the back flanks, which do not bear here, overlap by up to {-1e6 * least:.3g} um (at {where}): more "
-            f"material stands out than {1e6 * pair.normal_backlash:.3g} um of backlash leave room for; thin the teeth"
+            f"{int(jammed.sum())} positions have no numbers, for the back flanks would bear, too: they overlap by up "
+            f"to {-1e6 * room[i, j]:.3g} um (at {where}), more material stands out than "
+            f"{1e6 * pair.normal_backlash:.3g} um of backlash leave room for; thin the teeth (tooth_thinning_um)"
         )
-    if made.failed.any():
-        told = ", ".join(f"{count} {status}" for status, count in made.statuses.items() if status != "converged")
+    lost = made.failed & ~jammed
+    if lost.any():
+        told = ", ".join(
+            f"{count} {status}" for status, count in made.statuses.items() if status not in (BACK, "converged")
+        )
         cure = "rough flanks may not settle; take smoother ones, or other torques"
-        said.append(f"{int(made.failed.sum())} positions have no numbers ({told}): {cure}")
+        said.append(f"{int(lost.sum())} positions have no numbers ({told}): {cure}")
     return said

@@ -23,7 +23,7 @@ from ..stiffness.positions import Progress
 from ..threads import one_thread
 from ..typing import Array, IntArray
 from .cells import solve_cells
-from .loaded_mesh import LoadedMesh, PairLoads, full_period
+from .loaded_mesh import BACK, LoadedMesh, PairLoads, full_period
 
 #: Cells solved at once, and most in all.
 AT_ONCE, MOST_CELLS = 512, 1_000_000
@@ -60,7 +60,8 @@ def load_mesh(
         Of the same elastic gears (`gearfe.loadmap.root_stress.pair_roots`), for root stresses, too.
     back
         Deviations of the back flanks of pinion and wheel, of the pair seen from the other side as
-        `gearfe.gear.deviation_job.deviations_of` gives them, to know the room behind the teeth.
+        `gearfe.gear.deviation_job.deviations_of` gives them, to know the room behind the teeth: positions without
+        have the status `gearfe.microgeometry.loaded_mesh.BACK` and no numbers.
     progress
         Called with cells done, cells in all, and a name.
 
@@ -112,23 +113,30 @@ def load_mesh(
             if progress is not None:
                 progress(int(numbers[-1]) + 1, count, "cells")
     shape, lost = (len(goals), n), pair.contact_twist
-
-    def whole(name: str) -> Array:
-        return np.concatenate([one[name] for one in cells]).reshape(shape)
-
+    whole = {name: np.concatenate([one[name] for one in cells]).reshape(shape) for name in CELL}
+    loads = {name: np.concatenate([getattr(one, name) for one in pairs]) for name in PairLoads.__annotations__}
+    whole["twist"], room = whole["twist"] - lost, None
+    if behind is not None:
+        room = pair.normal_backlash + pair.wheel.base_radius * (behind - lost + whole["twist"])
+        jammed = room < 0.0
+        whole["status"] = np.where(jammed, BACK, whole["status"])
+        for name in ("twist", "torque_pinion", "tangent"):
+            whole[name] = np.where(jammed, np.nan, whole[name])
+        if stress is not None:
+            stress[jammed.ravel()] = np.nan
+        bears = ~jammed[loads["torque"], loads["angle"]]
+        loads = {name: values[bears] for name, values in loads.items()}
     found = LoadedMesh(
         torque=goals,
         pinion_angle=place,
         mesh_cycles=cycles,
-        twist=whole("twist") - lost,
-        torque_pinion=whole("torque_pinion"),
-        tangent=whole("tangent"),
         twist_unloaded=touch - lost,
         twist_unloaded_back=None if behind is None else behind - lost,
-        status=whole("status"),
-        pairs=PairLoads(**{f: np.concatenate([getattr(one, f) for one in pairs]) for f in PairLoads.__annotations__}),
+        back_clearance=room,
+        pairs=PairLoads(**loads),
         root_stress=None if stress is None else stress.reshape(*shape, 2),
         pair=pair,
+        **whole,
     )
     _check_contact(found, law, met.pair, met.position, met.twist - lost)
     return found

@@ -110,13 +110,14 @@ def _microgeometry(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Ans
     table, job = tables["microgeometry"], _pair_job({**tables, "microgeometry": None}, path)
     torques = table.torques()
     deviations = deviations_of(table, job.pair, path.parent)
+    back = deviations_of(table, job.pair, path.parent, flank={"left": "right", "right": "left"}[table.flank])
     model = checked_model(job)
     elastic = _elastic(job, model, shared)
     roots = None
     if table.root_stress:
         roots = shared.get(_key(job, model), "roots", lambda: pair_roots(job.pair, elastic))
     law = half_plane_pair(job.pair, elastic, deviations=deviations)
-    made = load_mesh(law, torques, positions=table.positions, mesh_cycles=table.mesh_cycles, roots=roots)
+    made = load_mesh(law, torques, positions=table.positions, mesh_cycles=table.mesh_cycles, roots=roots, back=back)
     rows: dict[str, Any] = {
         "microgeometry": cell_table(made),
         "torques": torque_table(made),
