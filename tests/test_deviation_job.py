@@ -61,7 +61,11 @@ def test_a_k_chart_and_a_relief_are_the_same() -> None:
     other = deviations_of(table(points=points), PAIR)[0].profiles[0]
     diameter = 2e3 * math.hypot(PINION.base_radius, HIGH - 3e-3)
     third = deviations_of(table(tip_relief_um=20.0, tip_relief_start_diameter_mm=diameter), PAIR)[0].profiles[0]
+    ends = {"tip_relief_um": 10.0, "tip_relief_length_mm": 3.0}  # half of it at half of its length
+    middle = 2e3 * math.hypot(PINION.base_radius, HIGH - 1.5e-3)
+    fourth = deviations_of(table(**ends, tip_relief_end_diameter_mm=middle), PAIR)[0].profiles[0]
     s = np.linspace(LOW, HIGH, 99)
+    assert one.at(s)[0] == pytest.approx(fourth.at(s)[0], abs=1e-15)
     assert one.at(s)[0] == pytest.approx(other.at(s)[0], abs=1e-15)
     assert one.at(s)[0] == pytest.approx(third.at(s)[0], abs=1e-15)
 
@@ -73,6 +77,7 @@ def test_a_k_chart_and_a_relief_are_the_same() -> None:
         ({"tip_relief_length_mm": 2.0}, r"tip_relief_um: is required"),
         ({"tip_relief_um": 5.0, "tip_relief_length_mm": 20.0}, r"tip_relief_length_mm = 20.*on the active flank"),
         ({"tip_relief_um": 5.0, "tip_relief_length_mm": 2.0, "tip_relief_start_mm": 9.0}, "stands beside"),
+        ({"tip_relief_um": 5.0, "tip_relief_end_mm": 14.0, "tip_relief_end_diameter_mm": 54.0}, "stands beside"),
         ({"points": [[6.0, 0.0], [9.0, 1.0]]}, r"points: covers 6 to 9 mm.*must cover"),
         ({"points": [[9.0, 0.0], [9.0, 1.0]]}, "rising"),
         ({"pitch_um": [1.0, 2.0]}, r"pinion.pitch_um = 2: must have one entry for each of the 20 teeth"),

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, unknown_name
-from ..tables.microgeometry import STARTS, FlankTable, MicrogeometryTable
+from ..tables.microgeometry import ENDS, STARTS, FlankTable, MicrogeometryTable
 from ..textfile import read_text
 from ..typing import Array, IntArray
 from . import pitch_errors
@@ -157,8 +157,9 @@ def _relief(table: FlankTable, gear: Gear, where: str, end: str) -> Relief | Non
         )
         value = next(one for one in (length, start, diameter) if one is not None)
         raise InputError(f"{where}.{given}", value, problem, "start it between form point and tip round")
-    last = getattr(table, f"{name}_end_mm")
-    return Relief(1e-6 * amount, roll, getattr(table, f"{name}_shape"), None if last is None else 1e-3 * last)
+    last, across = (getattr(table, f"{name}_{key}") for key in ENDS)
+    until = gear.roll_length(0.5e-3 * across) if across is not None else None if last is None else 1e-3 * last
+    return Relief(1e-6 * amount, roll, getattr(table, f"{name}_shape"), until)
 
 
 def _index_deviations(table: FlankTable, gear: Gear, where: str, folder: Path) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, fields
 
 from ..config import quantity
@@ -11,6 +12,8 @@ from .loadmap import LoadMapTable
 SHAPES = ("linear", "arc", "parabolic")
 #: Keys of which at most one says where a relief starts.
 STARTS = ("length_mm", "start_mm", "start_diameter_mm")
+#: Keys of which at most one says where it has its amount.
+ENDS = ("end_mm", "end_diameter_mm")
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,7 @@ class FlankTable:
     tip_relief_end_mm: float | None = quantity(
         None, doc="roll length where it has its amount (mm), if not the tip circle", above=0.0
     )
+    tip_relief_end_diameter_mm: float | None = quantity(None, doc="or the diameter there (mm)", above=0.0)
     tip_relief_shape: str = quantity("linear", doc="linear, arc or parabolic", choices=SHAPES)
     root_relief_um: float | None = quantity(None, doc="root relief (um), at the form circle", low=0.0)
     root_relief_length_mm: float | None = quantity(None, doc="roll length of it from the form circle (mm)", above=0.0)
@@ -41,6 +45,7 @@ class FlankTable:
     root_relief_end_mm: float | None = quantity(
         None, doc="roll length where it has its amount (mm), if not the form circle", low=0.0
     )
+    root_relief_end_diameter_mm: float | None = quantity(None, doc="or the diameter there (mm)", above=0.0)
     root_relief_shape: str = quantity("linear", doc="linear, arc or parabolic", choices=SHAPES)
     crowning_um: float = quantity(0.0, doc="profile crowning (um), the ends lie that much back")
     slope_um: float = quantity(0.0, doc="profile slope (um), from form to tip circle, > 0: more material at the tip")
@@ -61,8 +66,8 @@ class FlankTable:
 
     def check(self, where: str) -> None:
         """Raise `InputError` for keys that contradict each other."""
-        for name in ("tip_relief", "root_relief"):
-            given = [f"{name}_{key}" for key in STARTS if getattr(self, f"{name}_{key}") is not None]
+        for name, keys in itertools.product(("tip_relief", "root_relief"), (STARTS, ENDS)):
+            given = [f"{name}_{key}" for key in keys if getattr(self, f"{name}_{key}") is not None]
             if len(given) > 1:
                 value = getattr(self, given[1])
                 raise InputError(f"{where}.{given[1]}", value, f"stands beside {given[0]}", "leave one of them out")
@@ -86,9 +91,10 @@ class GearMicrogeometryTable(FlankTable):
         if own is not None:
             given = {f.name: getattr(own, f.name) for f in fields(FlankTable)}
             changed = {name: value for name, value in given.items() if value != getattr(default, name)}
-            for relief in ("tip_relief", "root_relief"):  # another start takes the place of the shared one
-                if any(f"{relief}_{key}" in changed for key in STARTS):
-                    made |= dict.fromkeys((f"{relief}_{key}" for key in STARTS), None)
+            # another start or end takes the place of the shared one
+            for relief, keys in itertools.product(("tip_relief", "root_relief"), (STARTS, ENDS)):
+                if any(f"{relief}_{key}" in changed for key in keys):
+                    made |= dict.fromkeys((f"{relief}_{key}" for key in keys), None)
             made |= changed
         return FlankTable(**made)
 
