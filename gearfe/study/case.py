@@ -107,8 +107,8 @@ def solve_case(task: Task, number: int, values: Sequence[Any], shared: Shared) -
 def _keep_memory() -> None:
     """Freed memory stays with the process, once for each process.
 
-    Dask's workers give it back at once (MALLOC_TRIM_THRESHOLD_=65536), and pages that come and go cost a microgeometry a
-    third of its time.
+    Dask's workers give it back at once (MALLOC_TRIM_THRESHOLD_=65536), and pages that come and go cost a microgeometry
+    a third of its time.
     """
     if os.environ.get("MALLOC_TRIM_THRESHOLD_"):
         with suppress(OSError, AttributeError):  # of glibc alone
