@@ -8,8 +8,27 @@ from __future__ import annotations
 from importlib import import_module
 
 TYPE_CHECKING = False  # `typing` itself would be a third of the import
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # what type checkers and the API reference see; below, the same names load on first use
     from typing import Any
+
+    from .elasticity import Material
+    from .errors import InputError
+    from .gear import Gear, GearPair
+    from .housing import Housing
+    from .housing.build import housing_from_job
+    from .loadmap.load_map import LoadMap
+    from .loadmap.sweep import sweep_loads
+    from .microgeometry.loaded_mesh import LoadedMesh
+    from .microgeometry.relief import optimise_relief
+    from .microgeometry.solve import load_mesh
+    from .reduction.modal_body import ModalBody
+    from .runup.run_up import run_up, steady_state
+    from .stiffness.curve import StiffnessCurve
+    from .stiffness.sweep import sweep_stiffness
+    from .study.job import read_study, run_study
+    from .study.search import Search
+    from .train import TrainModel, TrainResponse, TrainScene, build_train
+    from .train.simulate import simulate
 
 __version__ = "0.1.0"
 
@@ -41,7 +60,34 @@ _PUBLIC: dict[str, str] = {
     "sweep_stiffness": "stiffness",
 }
 
-__all__ = ["__version__", *sorted(_PUBLIC)]  # noqa: PLE0604
+# written out for type checkers; a test holds it against the names above
+__all__ = [
+    "Gear",
+    "GearPair",
+    "Housing",
+    "InputError",
+    "LoadMap",
+    "LoadedMesh",
+    "Material",
+    "ModalBody",
+    "Search",
+    "StiffnessCurve",
+    "TrainModel",
+    "TrainResponse",
+    "TrainScene",
+    "__version__",
+    "build_train",
+    "housing_from_job",
+    "load_mesh",
+    "optimise_relief",
+    "read_study",
+    "run_study",
+    "run_up",
+    "simulate",
+    "steady_state",
+    "sweep_loads",
+    "sweep_stiffness",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -1,0 +1,133 @@
+"""The pages' promises: Python blocks run, tables are TOML, command lines are understood, the reference is complete."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gearfe
+from gearfe import Material, build_train
+from gearfe.commands import COMMANDS
+from gearfe.commands.arguments import CommandParser
+from gearfe.errors import InputError
+
+from . import gears, trains
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted([*(ROOT / "docs").rglob("*.md"), ROOT / "README.md"])
+#: Pages whose Python runs, block by block. The others need a cluster, an optimiser, or minutes.
+RUN = ("fields.md", "housing.md", "howto.md", "loadmap.md", "mesh_law.md", "microgeometry.md", "runup.md", "start.md")
+PLACES = {"angles": np.zeros(3), "approaches": np.full(3, 1e-5)}
+BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+
+
+def blocks(page: Path, kind: str) -> list[str]:
+    return [text for name, text in BLOCK.findall(page.read_text(encoding="utf-8")) if name == kind]
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+def known() -> dict[str, object]:
+    """What pages take as known: the README's pair, a train."""
+    steel = Material(200e9, 0.3)
+    return {"pair": gears.pair(), "steel": steel, "model": build_train(trains.train([(20, 30)])), **PLACES}
+
+
+@pytest.mark.parametrize("page", RUN)
+def test_python_runs(page: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    for folder in ("geometry", "meshes"):
+        (tmp_path / folder).symlink_to(ROOT / folder)
+    monkeypatch.chdir(tmp_path)
+    names = known()
+    for text in blocks(ROOT / "docs" / page, "python"):
+        exec(compile(text, page, "exec"), names)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_python_imports_what_there_is(page: Path) -> None:
+    """Blocks that need a cluster or an optimiser are at least Python, and what they import of this package is there."""
+    for text in blocks(page, "python"):
+        compile(text, str(page), "exec")
+        for line in re.findall(r"^from gearfe[\w.]* import [\w, ]+$", text, re.MULTILINE):
+            exec(line)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_tables_are_toml(page: Path) -> None:
+    for text in blocks(page, "toml"):
+        tomllib.loads(text)
+
+
+def command_lines(page: Path) -> list[str]:
+    text = page.read_text(encoding="utf-8")
+    shown = [line for block in blocks(page, "") for line in block.splitlines()]
+    quoted = re.findall(r"`(gearfe \w[^`]*)`", text)
+    lines = [line.partition(" #")[0].strip().removeprefix(".venv/bin/") for line in [*shown, *quoted]]
+    return [
+        line for line in lines if line.startswith("gearfe ") and len(line.split()) > 2 and not set("$[") & set(line)
+    ]
+
+
+def test_commands_are_understood() -> None:
+    """Their options are known, and the shipped jobs that they name exist."""
+    seen = 0
+    for page in PAGES:
+        for line in command_lines(page):
+            _, command, *rest = shlex.split(line)
+            module = importlib.import_module(f"gearfe.commands.{COMMANDS[command]}")
+            parser = CommandParser(prog=command)
+            module.add_arguments(parser)
+            try:
+                parsed = parser.parse_args(rest)
+            except InputError as error:
+                if "required" not in str(error):  # a line that shows one option of a command
+                    raise AssertionError(f"{page.name}: {line}: {error}") from error
+                continue
+            seen += 1
+            for value in vars(parsed).values():
+                if isinstance(value, str) and value.startswith(("geometry/", "meshes/")):
+                    assert (ROOT / value).exists(), line
+    assert seen > 20
+
+
+def test_the_reference_has_every_public_name() -> None:
+    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    told = re.findall(r"^::: ([\w.]+)$", page, re.MULTILINE)
+    assert {f"gearfe.{name}" for name in gearfe.__all__ if not name.startswith("__")} <= set(told)
+    for name in told:
+        module, _, last = name.rpartition(".")
+        assert getattr(importlib.import_module(module), last).__doc__, name
+
+
+def test_types_of_public_names_are_those_of_their_modules() -> None:
+    """What a type checker is told is what loads."""
+    text = (ROOT / "gearfe" / "__init__.py").read_text(encoding="utf-8")
+    for module, names in re.findall(r"^    from \.([\w.]+) import ([\w, ]+)$", text, re.MULTILINE):
+        for name in names.split(","):
+            found = getattr(importlib.import_module(f"gearfe.{module}"), name.strip())
+            assert found is getattr(gearfe, name.strip()), name
+    assert sorted(gearfe.__all__) == sorted(["__version__", *gearfe._PUBLIC])
+
+
+def test_the_site_builds(tmp_path: Path) -> None:
+    """Strictly: a dead link, a missing page or anchor, a name that the reference cannot find ends it."""
+    pytest.importorskip("mkdocs", reason="pip install 'gearfe[docs]'")
+    line = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--site-dir", str(tmp_path)]
+    done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    page = (tmp_path / "api.html").read_text(encoding="utf-8")
+    assert 'id="gearfe.GearPair"' in page
+    assert "centre_distance" in page
+    pages = [(path, path.read_text(encoding="utf-8")) for path in tmp_path.rglob("*.html")]
+    fetched = r"<(?:script|link|img)[^>]*(?:src|href)=\"?https?://"
+    assert not [path.name for path, text in pages if re.search(fetched, text)]  # it opens offline
