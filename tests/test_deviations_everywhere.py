@@ -16,12 +16,14 @@ from gearfe.cli import main
 from gearfe.contact.half_plane import half_plane_pair
 from gearfe.gear import pitch_errors
 from gearfe.gear.deviation import NOMINAL
+from gearfe.gear.deviation_job import deviations_of
 from gearfe.gear.modifications import FlankModification, Relief, tooth_deviations
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.meshlaw.make import mesh_law
 from gearfe.microgeometry.solve import load_mesh
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
-from gearfe.vibration.job import read_train_job
+from gearfe.train.static_error import static_errors
+from gearfe.vibration.job import job_scene, read_train_job
 from gearfe.vibration.mesh_stiffness import train_curves
 
 from .gears import pair as gear_pair
@@ -185,10 +187,41 @@ def test_a_train_takes_the_flanks_that_drive(tmp_path) -> None:
     assert math.isclose(found["right"].mesh_cycle, PAIR.mesh_cycle)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_train_takes_the_pitch_errors_of_its_teeth(sign, tmp_path) -> None:
+    """Static error of the train over the full period, as the contact solutions of the same tables have it."""
+    rng, torque = np.random.default_rng(3), 30.0
+    lists = ""
+    for name, teeth in (("pinion", 20), ("wheel", 30)):
+        for side in ("left", "right"):
+            values = ", ".join(f"{x:.3f}" for x in rng.uniform(-6.0, 6.0, teeth))
+            lists += f"[microgeometry.{name}.{side}]\npitch_um = [{values}]\n"
+    text = train_text(lists, law='"map"').replace("= -300.0", f"= {sign * 300.0}")
+    path = tmp_path / "job.toml"
+    path.write_text(text.replace("torque_Nm = -30.0", f"torque_Nm = {sign * torque}"))
+    job = read_train_job(path)
+    scene = job_scene(job, train_curves(job))
+    assert job.microgeometry is not None
+    side = "left" if sign > 0 else "right"
+    law = half_plane_pair(PAIR, elastic_pair(PAIR, coarsen=2.0))
+    law = law.deviated(deviations_of(job.microgeometry, PAIR, tmp_path, flank=side))
+    found = load_mesh(law, [torque], positions=5)
+    assert len(found.pinion_angle) == 5 * 60
+    (static,) = static_errors(scene, sign * found.pinion_angle)
+    expected = found.transmission_error[0]
+    assert np.ptp(expected) > 8e-6
+    # an error turns its tooth by up to 2.4e-4 rad, too, which a shift of the touching curve leaves out: it shows where
+    # a tooth comes in ahead of its path by its tip, and t is steep
+    off = np.abs(static - expected)
+    assert np.quantile(off, 0.95) < 0.05e-6
+    assert off.max() < 0.2e-6
+
+
 @pytest.mark.parametrize(
     ("more", "law", "told"),
     [
-        ("[microgeometry.pinion]\npitch_class = 7\n", "map", "stand unevenly"),
+        ("[microgeometry.pinion]\npitch_class = 7\n", "curve", 'stand unevenly.*law = "map"'),
+        ("[microgeometry.pinion]\npitch_um = [1.0, 2.0]\n", "map", "one entry for each of the 20 teeth"),
         ("[microgeometry.pinion.left]\ncrowning_um = 5.0\n", "map", "left and right flanks differ"),
     ],
 )

@@ -165,9 +165,8 @@ def report_lines(response: TrainResponse, scene: TrainScene, written: Written, c
             lines.append(f"mesh {i + 1}: friction {coefficient:.4g}, loss {friction['mean_loss_W'][i]:.4g} W{told}")
     if response.common_period_s:
         count = summary.get("mean_over_common_periods", 0)
-        lines.append(
-            f"common mesh period {1e3 * response.common_period_s:.4g} ms; means are over the last {count} of them"
-        )
+        means = f"over the last {count} of them" if count else "over all times under load, which are fewer"
+        lines.append(f"common period of the meshes {1e3 * response.common_period_s:.4g} ms; means are {means}")
     frequencies = enumerate(response.coupled_frequencies_Hz[:10])
     shown = ", ".join(f"{f:.0f}{off('coupled_frequencies_Hz', i)}" for i, f in frequencies)
     more = f"{shown} Hz ..." if shown else "none, nothing is left to vibrate"

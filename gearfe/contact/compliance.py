@@ -288,7 +288,7 @@ def check_deviations(deviations: tuple[ToothDeviations, ToothDeviations], law: C
             problem = f"its teeth {what}: curves, load maps and mesh laws are of one mesh cycle that repeats"
             cure = (
                 "leave out pitch errors, measured teeth that differ, and waves that are no multiple of the teeth; "
-                "gearfe microgeometry takes them"
+                'gearfe microgeometry takes them, and pitch errors also trains with law = "map"'
             )
             raise InputError(f"deviations of the {name}", None, problem, cure)
     if deviations != NOMINAL and not isinstance(law, HalfPlane):

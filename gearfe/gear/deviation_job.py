@@ -93,6 +93,29 @@ def flank_deviations(
         raise _named(error, where) from None
 
 
+def pitch_errors_of(
+    table: MicrogeometryTable, gear: Gear, name: str, folder: str | Path = "."
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """How much earlier left and right flanks of each tooth touch along the line of action (m), teeth counted from 0
+    counter-clockwise; empty for flanks without pitch errors. `name` is ``pinion`` or ``wheel``.
+
+    Raises
+    ------
+    InputError
+        For every mistake, in the table's own keys.
+    """
+    own, where = getattr(table, name), f"microgeometry.{name}"
+    made = []
+    for side in ("left", "right"):
+        try:
+            index = _index_deviations(own.flank(side), gear, where, Path(folder))
+            turn = pitch_errors.turns(gear, index) if index.any() else ()
+        except InputError as error:
+            raise _named(error, where) from None
+        made.append(tuple(gear.base_radius * e for e in turn))
+    return made[0], made[1]
+
+
 def _mirrored(values: Sequence[Any], wheel: bool) -> tuple[Any, ...]:
     """What belongs to teeth, in the order that the pair has seen from the other side: j is -j, on the wheel -1 - j."""
     return tuple(values[(-j - wheel) % len(values)] for j in range(len(values)))

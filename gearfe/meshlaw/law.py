@@ -130,7 +130,11 @@ class MeshLaw:
     def largest_force(self) -> float:
         """Mesh force (N) up to which the law is known at every phase."""
         angles = self.nodes[0] + self.cycle * np.linspace(0.0, 1.0, 10 * len(self.nodes))
-        return 0.999 * float(self(angles, self.touching(angles) + self.reach).force.min())
+        return 0.999 * float(self.most(angles).min())
+
+    def most(self, angles: ArrayLike, shifts: ArrayLike = 0.0) -> Array:
+        """Mesh force (N) up to which the law is known at pinion angles (n,); `shifts` as in `__call__`."""
+        return self(angles, self.touching(angles, shifts) + self.reach, shifts).force
 
     def place(self, angles: Array) -> tuple[IntArray, IntArray, Array]:
         """Mesh cycle, cell and angle beyond its first node (rad)."""
@@ -145,10 +149,14 @@ class MeshLaw:
         made: Array = angle[:, None] + self.cycle * (np.arange(self.slots) - self.place(angle)[0][:, None])
         return made
 
-    def touching(self, angles: ArrayLike) -> Array:
-        """Approach (m) at which the first pair touches."""
+    def pair_numbers(self, angles: ArrayLike) -> IntArray:
+        """Numbers k of the tooth pairs in the slots at pinion angles (n,), shape (n, slots)."""
+        return np.asarray(np.arange(self.slots) - self.place(np.asarray(angles, dtype=float))[0][:, None])
+
+    def touching(self, angles: ArrayLike, shifts: ArrayLike = 0.0) -> Array:
+        """Approach (m) at which the first pair touches; `shifts` as in `__call__`."""
         _, cell, z = self.place(np.asarray(angles, dtype=float))
-        found: Array = _powers(self.touch[:, cell], z[None])[0].min(axis=0)
+        found: Array = (_powers(self.touch[:, cell], z[None])[0].T + np.asarray(shifts, dtype=float)).min(axis=1)
         return found
 
     def __call__(self, angles: ArrayLike, approaches: ArrayLike, shifts: ArrayLike = 0.0) -> MeshForces:
@@ -203,8 +211,8 @@ class MeshLaw:
                     value[:, low, low + apart] = value[:, low + apart, low] = one
         return made[0], made[1]
 
-    def approach(self, angles: ArrayLike, forces: ArrayLike) -> Array:
-        """Approach (m) that makes a mesh force (N): the static transmission error under load.
+    def approach(self, angles: ArrayLike, forces: ArrayLike, shifts: ArrayLike = 0.0) -> Array:
+        """Approach (m) that makes a mesh force (N): static transmission error under load; `shifts` as in `__call__`.
 
         Raises
         ------
@@ -214,16 +222,15 @@ class MeshLaw:
         angle, force = np.broadcast_arrays(
             np.atleast_1d(np.asarray(angles, dtype=float)), np.asarray(forces, dtype=float)
         )
-        first = self.touching(angle)
+        first, most = self.touching(angle, shifts), self.most(angle, shifts)
         low, high = first.copy(), first + self.reach
-        most = self(angle, high).force
         if (force > most).any():
             raise InputError(
                 "force", float(force.max()), f"must be <= {most.min():.6g} N", "make the law for larger torques"
             )
         delta = first + self.reach * np.maximum(force, 0.0) / most
         for _ in range(STEPS):
-            made = self(angle, delta)
+            made = self(angle, delta, shifts)
             off = made.force - force
             low, high = np.where(off < 0.0, delta, low), np.where(off > 0.0, delta, high)
             new = delta - off / np.maximum(made.tangent, 1e-300)

@@ -139,6 +139,10 @@ def _check(model: TrainModel) -> None:
     if model.rolling.common_turns is None:
         problem = "have no common period to repeat with: " + model.rolling.note
         raise InputError("train.meshes", None, problem, "look at it with gearfe vibration")
+    for gear in model.scene.gears:
+        if any(gear.pitch_errors):
+            problem = "has pitch errors: its motion repeats with the full period of the teeth, not with the meshes"
+            raise InputError(f"gear {gear.name!r}", None, problem, "look at it with gearfe vibration")
     for load in model.scene.loads:
         if load.torque.sines:
             problem = "oscillates: no motion repeats with the meshes"

@@ -160,7 +160,20 @@ def _check_mesh(scene: TrainScene, mesh: GearMesh) -> None:
             f"{label} damping", mesh.damping, "must be finite and >= 0 N s/m", "negative damping feeds energy in"
         )
     check_friction(label, mesh.friction, isinstance(mesh.stiffness, MeshLaw))
+    for gear in (one, two):
+        _check_pitch_errors(label, gear, isinstance(mesh.stiffness, MeshLaw))
     check_curve(mesh, one.gear.teeth)
+
+
+def _check_pitch_errors(label: str, gear: ShaftGear, law: bool) -> None:
+    """Pitch errors are one a tooth, at meshes that know their tooth pairs."""
+    for errors in gear.pitch_errors:
+        if errors and not law:
+            problem = f"has teeth with pitch errors on gear {gear.name!r}, which curves and rigid meshes do not know"
+            raise InputError(label, None, problem, 'take a mesh law (law = "map"), or leave the pitch errors out')
+        if len(errors) not in (0, gear.gear.teeth) or not np.isfinite(errors).all():
+            problem = f"must be finite, one for each of the {gear.gear.teeth} teeth of gear {gear.name!r}, or none"
+            raise InputError("pitch_errors", len(errors), problem, "give as many as the gear has teeth")
 
 
 def check_curve(mesh: GearMesh, teeth: int) -> None:

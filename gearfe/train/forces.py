@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -107,16 +107,24 @@ class CurveFlank(Flank):
 
 @dataclass(frozen=True, eq=False)
 class LawFlank(Flank):
-    """A mesh law; `damping` is chi (s/m), `sliding` its friction or None."""
+    """A mesh law; `damping` is chi (s/m), `sliding` its friction or None.
+
+    `shifts`, shape (L,), is the approach (m) by which tooth pair k touches later, k taken modulo L: its pitch errors.
+    """
 
     law: MeshLaw
     damping: float
     sliding: Sliding | None = None
+    shifts: Array = field(default_factory=lambda: np.zeros(1))
+
+    def shifts_at(self, phase: Array) -> Array:
+        """Shifts (m) of the pairs in the law's slots at phases (n,), shape (n, slots)."""
+        return np.asarray(self.shifts[self.law.pair_numbers(phase) % len(self.shifts)])
 
     def forces(self, angle: Array, rate: Array, u: Array, du: Array) -> FlankForces:
         """Forces at rotations of the drive (rad) and their rates, (n,), u and du of shape (n, directions)."""
         phase, approach = self.place(angle, u)
-        made = self.law(phase, approach)
+        made = self.law(phase, approach, self.shifts_at(phase))
         presses = np.maximum(1.0 + self.damping * du[:, self.direction], 0.0)
         one = self.sliding
         if one is None:

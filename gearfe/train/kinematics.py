@@ -34,7 +34,8 @@ class Rolling:
     cycles
         Mesh cycles in one turn of the drive, one a mesh.
     common_turns
-        Turns of the drive after which all meshes are in phase again; None beyond `MOST_CYCLES`.
+        Turns of the drive after which all meshes are in phase again, the teeth with pitch errors, too; None beyond
+        `MOST_CYCLES`.
     note
         Why there is none.
     """
@@ -76,11 +77,13 @@ def rolling(scene: TrainScene) -> Rolling:
     cycles = tuple(
         abs(known[scene.gear(mesh.driver).shaft]) * scene.gear(mesh.driver).gear.teeth for mesh in scene.meshes
     )
-    common, note = _common(cycles)
+    uneven = [g.shaft for g in scene.gears if any(g.pitch_errors)]
+    common, note = _common((*cycles, *(abs(known[shaft]) for shaft in uneven)))
     return Rolling(tuple(known[s.name] for s in scene.shafts), cycles, common, note)
 
 
 def _common(cycles: tuple[Fraction, ...]) -> tuple[Fraction | None, str]:
+    """Turns after which what repeats so often in a turn is in phase again, or why there are none."""
     if not cycles:
         return None, "the train has no meshes"
     periods = [1 / c for c in cycles]

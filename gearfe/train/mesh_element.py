@@ -78,6 +78,8 @@ class MeshLine:
     slides : (3, system size)
         Displacement of the driver against the driven gear at P across both lines of action, a x n and a x n_b, and the
         driver's turn against the driven gear's.
+    shifts : (two arrays)
+        How much later the pairs of the driving and of the back flanks touch (m), see `gearfe.train.phases.pair_shifts`.
     sliding
         Friction, the numbers of its directions still to be filled in; None without.
     """
@@ -101,6 +103,7 @@ class MeshLine:
     module: float
     slides: Array
     sliding: Sliding | None
+    shifts: tuple[Array, Array]
 
     @property
     def columns(self) -> list[Array]:
@@ -159,7 +162,7 @@ class MeshLine:
                 sliding = self.sliding
                 if sliding is not None:
                     sliding = replace(sliding, across=turn + 1 + 2 * number, spin=turn + 2)
-                made.append(LawFlank(*place, self.law, self.damping / self.reference, sliding))
+                made.append(LawFlank(*place, self.law, self.damping / self.reference, sliding, self.shifts[number]))
             elif self.curve is not None:
                 made.append(CurveFlank(*place, self.curve, not self.pulls))
         return tuple(made)
@@ -167,10 +170,10 @@ class MeshLine:
 
 def mesh_line(
     scene: TrainScene, mesh: GearMesh, shafts: Sequence[RigidShaft], first: IntArray, ratios: Sequence[float],
-    size: int, sense: float, phase: float, force: float, speed: float,
+    size: int, sense: float, phase: float, force: float, speed: float, shifts: tuple[Array, Array],
 ) -> MeshLine:  # fmt: skip
     """Line of action of a mesh in a train whose shafts' coordinates begin at `first` of `size`; `force` (N) is that of
-    steady running, `speed` the largest of the drive (rad/s).
+    steady running, `speed` the largest of the drive (rad/s), `shifts` what `pair_shifts` says.
     """
     names = [s.name for s in scene.shafts]
     one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
@@ -218,7 +221,7 @@ def mesh_line(
     sliding = _sliding(mesh, pair, force, (ratios[i], ratios[j]), speed)
     return MeshLine(
         mesh.name, relative(line, point, point), relative(back, point, point), turn, line, point, curve, law, backlash,
-        mean, damping, reference, i, ratios[i], sense, phase, one.gear.module, slides, sliding,
+        mean, damping, reference, i, ratios[i], sense, phase, one.gear.module, slides, sliding, shifts,
     )  # fmt: skip
 
 

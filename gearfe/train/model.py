@@ -24,7 +24,7 @@ from .forces import Flank, Gyro, TrainForces, derivative
 from .inertia import rotor
 from .kinematics import Rolling, driving_senses, fastest, load_end, rolling, steady_forces
 from .mesh_element import MeshLine, mesh_line
-from .phases import tooth_places
+from .phases import pair_shifts, tooth_places
 from .scene import Drive, TrainScene
 from .series import train_series
 
@@ -135,11 +135,14 @@ def build_train(scene: TrainScene) -> TrainModel:
     first = np.array([0 if housing is None else housing.size] + [6] * (len(shafts) - 1)).cumsum()
     size = sum(b.size for b in bodies)
     senses = driving_senses(scene)
-    phases = tooth_places(scene, senses).phases
+    places, speed = tooth_places(scene, senses), fastest(scene.driven.speed)
     lines = tuple(
-        mesh_line(scene, mesh, shafts, first, ratios, size, sense, phase, float(force), fastest(scene.driven.speed))
-        for mesh, sense, phase, force in zip(scene.meshes, senses, phases, steady_forces(scene), strict=True)
-    )
+        mesh_line(
+            scene, mesh, shafts, first, ratios, size, sense, phase, float(force), speed,
+            pair_shifts(scene, mesh, sense, places),
+        )
+        for mesh, sense, phase, force in zip(scene.meshes, senses, places.phases, steady_forces(scene), strict=True)
+    )  # fmt: skip
     torques = _torques(scene, shafts, first, ratios, angle, size)
     forces, directions = _forces(scene, lines, torques, angle, first, ratios, shafts, size)
     series = train_series(forces)

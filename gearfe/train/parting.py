@@ -67,7 +67,7 @@ def beyond_law(model: TrainModel, moved: Motion) -> tuple[int, str] | None:
             if not isinstance(flank, LawFlank):
                 continue
             phase, approach = flank.place(model.angle(moved.time), u)
-            past = approach > flank.law.touching(phase) + flank.law.reach
+            past = approach > flank.law.touching(phase, flank.shifts_at(phase)) + flank.law.reach
             if past.any() and (first is None or int(np.argmax(past)) < first[0]):
                 at = int(np.argmax(past))
                 force, most = abs(float(moved.contact_force[at, i])), flank.law.largest_force

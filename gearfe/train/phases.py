@@ -22,6 +22,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..gear.mesh_geometry import MeshGeometry
+from ..typing import Array
 from .scene import GearMesh, TrainScene
 
 #: Agreement of the shafts' places that a check asks for, relative to the centre distance.
@@ -159,3 +160,34 @@ def _check(join: _Join, found: dict[str, float], room: float) -> None:
         problem = f"contradicts the teeth of gears that it shares with other meshes, which make it {degrees} deg"
         cure = f"leave it out, or write {degrees} (whole pitches of {math.degrees(pitch):.6g} deg more are the same)"
         raise InputError(f"mesh {mesh.name!r} phase_deg", math.degrees(mesh.phase), problem, cure)
+
+
+def pair_shifts(scene: TrainScene, mesh: GearMesh, sense: float, places: ToothPlaces) -> tuple[Array, Array]:
+    r"""How much later the tooth pairs of a mesh touch by the pitch errors of its gears (m): driving and back flanks.
+
+    Pair k is the k-th tooth of the driver behind the one whose place is the phase. It meets the driver's tooth
+    :math:`s(k + m_1)` and the driven gear's :math:`m_2 - s k`, with m1, m2 from the places at the start, and touches
+    later by :math:`-(e_1 + e_2)`. On the back flanks all is seen from the other side, with the sense -s.
+
+    Returns
+    -------
+    Arrays of the length of a period, the least common multiple of the numbers of teeth, or (1,) without errors.
+    """
+    join = _join(scene, mesh, sense)
+    return _shifts(scene, join, places, join.sense), _shifts(scene, join, places, -join.sense)
+
+
+def _shifts(scene: TrainScene, join: _Join, places: ToothPlaces, sense: float) -> Array:
+    one, two = scene.gear(join.mesh.driver), scene.gear(join.mesh.driven)
+    errors = [np.array(g.pitch_errors[0 if sense > 0.0 else 1] or (0.0,)) for g in (one, two)]
+    if not any(e.any() for e in errors):
+        return np.zeros(1)
+    p1, p2 = (2.0 * math.pi / teeth for teeth in join.teeth)
+    driver, driven = (places.angles[g.name] for g in (one, two))
+    phase = join.sense * sense * join.phase(driver)
+    first = round((phase - sense * (driver - join.towards)) / p1)
+    facing = (join.towards + math.pi - driven - sense * phase * p2 / p1) / p2 - 0.5 * sense
+    k = np.arange(math.lcm(*join.teeth))
+    turn = round(sense)
+    met = turn * (k + first), round(facing) - turn * k
+    return -np.asarray(sum(e[j % len(e)] for e, j in zip(errors, met, strict=True)))

@@ -80,6 +80,8 @@ class Flanks(NamedTuple):
     first: IntArray  # (f + 2,) first operation before the solution of each flank, first and end of those after them
     slides: IntArray  # (f,) first row of friction, -1 without
     slide: Array  # (f, 2) r_b1 and psi_C of friction
+    shifted: IntArray  # (f + 1,) first of the shifts of each flank
+    shifts: Array  # of the tooth pairs (m), one flank after the other
 
 
 class Program(NamedTuple):
@@ -174,6 +176,8 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
             _ints(first),
             _ints(slides),
             np.array([_slide(flank) for flank in flanks]).reshape(-1, 2),
+            _ints(np.cumsum([0, *(len(_shifts(flank)) for flank in flanks)])),
+            np.concatenate([np.zeros(0), *(_shifts(flank) for flank in flanks)]),
         ),
         _ints(made.watches).reshape(-1, 4),
         curve_arrays([flank.curve for flank in forces.curves]),
@@ -258,6 +262,10 @@ def _contact(made: Tables, number: int, flank: LawFlank, slots: int) -> int:
 def _slide(flank: Flank) -> tuple[float, float]:
     sliding = flank.sliding if isinstance(flank, LawFlank) else None
     return (0.0, 0.0) if sliding is None else (sliding.radius, sliding.pitch_phase)
+
+
+def _shifts(flank: Flank) -> Array:
+    return flank.shifts if isinstance(flank, LawFlank) else np.zeros(1)
 
 
 def _friction(made: Tables, flank: LawFlank, row: int, slots: int) -> int:

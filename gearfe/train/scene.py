@@ -69,6 +69,11 @@ class ShaftGear:
         Teeth and sizes.
     density
         kg/m3.
+    pitch_errors : (left, right), each a tuple of z numbers, or empty
+        How much earlier the flanks of each tooth touch along the line of action (m): index deviations times the cosine
+        of the pressure angle. Teeth count about the axis of the train, from the one that stands at the gear's angle in
+        `gearfe.train.phases.tooth_places`. Left flanks drive where the driver turns about the axis. For meshes with a
+        law.
     """
 
     name: str
@@ -76,6 +81,7 @@ class ShaftGear:
     along: float
     gear: Gear
     density: float = 7850.0
+    pitch_errors: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
 
 
 @dataclass(frozen=True)

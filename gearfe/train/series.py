@@ -128,6 +128,9 @@ def step_begins(t, s, p, memory, pieces):
             memory[own + TOUCHES, ORIGIN] = p.laws.forces[law, part] if part >= 0 else 0.0
             for a in range(4):
                 memory[own + TOUCHES, a] = p.laws.touch[law, slot, cell, a]
+            period = p.flanks.shifted[k + 1] - p.flanks.shifted[k]
+            number = (slot - pieces[at]) % period  # of the pair
+            memory[own + TOUCHES, 0] += p.flanks.shifts[p.flanks.shifted[k] + number]
             for power in range(5):
                 for a in range(4):
                     if part >= 0:
@@ -266,7 +269,7 @@ def train_begin(t, sign, u, du, p, forces, memory, pieces):
         turn, cell = ahead_of(flank.law.nodes, phase, speed)
         pieces[at : at + 3] = turn, cell, 0 if 1.0 + flank.damping * du[flank.direction] > 0.0 else -1
         force = np.zeros(slots)
-        made = flank.law([phase], [approach]).pair_forces[0]
+        made = flank.law([phase], [approach], flank.shifts_at(np.array([phase]))).pair_forces[0]
         shift = turn - int(flank.law.place(np.array([phase]))[0][0])  # a node at which a cycle ends lies behind
         for slot in range(flank.law.slots):
             if 0 <= slot + shift < slots:

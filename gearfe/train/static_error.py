@@ -10,7 +10,7 @@ from ..meshlaw.law import MeshLaw
 from ..typing import Array
 from .checks import interpolant
 from .kinematics import driving_senses, rolling, steady_forces
-from .phases import tooth_places
+from .phases import pair_shifts, tooth_places
 from .scene import GearMesh, TrainScene
 
 
@@ -21,24 +21,35 @@ def static_errors(scene: TrainScene, angle: Array) -> tuple[Array | None, ...]:
     beyond what a law is known for, or presses flanks of which nothing is known.
     """
     senses = driving_senses(scene)
-    phases, ratios = tooth_places(scene, senses).phases, rolling(scene).ratios
+    places, ratios = tooth_places(scene, senses), rolling(scene).ratios
     shafts = [shaft.name for shaft in scene.shafts]
     made: list[Array | None] = []
-    for mesh, sense, phase, force in zip(scene.meshes, senses, phases, steady_forces(scene).tolist(), strict=True):
+    for mesh, sense, phase, force in zip(
+        scene.meshes, senses, places.phases, steady_forces(scene).tolist(), strict=True
+    ):
         ratio = float(ratios[shafts.index(scene.gear(mesh.driver).shaft)])
-        made.append(_approach(mesh, force, sense * ratio * angle + phase))
+        shifts = pair_shifts(scene, mesh, sense, places)
+        made.append(_approach(mesh, force, sense * ratio * angle + phase, shifts))
     return tuple(made)
 
 
-def _approach(mesh: GearMesh, force: float, phase: Array) -> Array | None:
+def _approach(mesh: GearMesh, force: float, phase: Array, shifts: tuple[Array, Array]) -> Array | None:
     law, gap = mesh.stiffness, mesh.backlash
     if law is None:
         return None
     if isinstance(law, MeshLaw):
         gap = law.backlash or None if gap is None else gap
-        if abs(force) > law.largest_force or (force < 0.0 and gap is None):
+        if force < 0.0 and gap is None:
             return None
-        return _side(lambda x: law.approach(x, abs(force)), phase, force, gap)
+        own = shifts[0 if force >= 0.0 else 1]
+
+        def late(x: Array) -> Array:
+            return np.asarray(own[law.pair_numbers(x) % len(own)])
+
+        place = phase if force >= 0.0 else -phase
+        if (abs(force) > law.most(place, late(place))).any():
+            return None
+        return _side(lambda x: law.approach(x, abs(force), late(x)), phase, force, gap)
     curve = interpolant(mesh)
     if gap is None:  # a spring that acts both ways
         return force / np.asarray(curve(phase).value)

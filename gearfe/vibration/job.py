@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, given
+from ..gear.deviation_job import pitch_errors_of
 from ..gear.pair import Gear, GearPair
 from ..meshlaw.law import MeshLaw
 from ..rigid import TimeFunction, constant, smoothed_step
@@ -117,6 +118,8 @@ def job_scene(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: Mo
         ShaftGear(g.name, g.shaft, 1e-3 * g.y_mm, train_gear(job, g, f"train.gears[{i}]"), _density(job, g))
         for i, g in enumerate(t.gears)
     )
+    if curves is not None and job.microgeometry is not None:
+        gears = tuple(_uneven(job, made, g.gear) for made, g in zip(gears, t.gears, strict=True))
     if curves is None:
         meshes = tuple(_mesh(job, m, None, 0.0) for m in t.meshes)
     else:
@@ -189,6 +192,13 @@ def train_gear(job: TrainJob, table: TrainGearTable, where: str) -> Gear:
         )
     except InputError as error:
         raise InputError(f"{where}.{error.field}", error.value, error.problem, error.cure) from None
+
+
+def _uneven(job: TrainJob, made: ShaftGear, name: str) -> ShaftGear:
+    """A gear with the pitch errors of its table in [microgeometry]."""
+    if not name or job.microgeometry is None:
+        return made
+    return replace(made, pitch_errors=pitch_errors_of(job.microgeometry, made.gear, name, job.path.parent))
 
 
 def _density(job: TrainJob, table: TrainGearTable) -> float:

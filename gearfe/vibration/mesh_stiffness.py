@@ -189,6 +189,7 @@ def _deviations(
     job: TrainJob, scene: TrainScene, number: int, pair: GearPair, law: ContactLaw
 ) -> tuple[ToothDeviations, ToothDeviations]:
     """Deviations of the flanks that drive a mesh: the left ones where the driver turns about the axis of the shafts.
+    Pitch errors are left out of those of a mesh law.
 
     Raises
     ------
@@ -203,8 +204,10 @@ def _deviations(
     driving, back = (
         deviations_of(job.microgeometry, pair, job.path.parent, flank=flank, gears=gears) for flank in flanks
     )
-    check_deviations(driving, law)
     mapped = (job.table.meshes[number].law or job.table.curves.law) == "map"
+    if mapped:  # pitch errors are the train's own
+        driving, back = ((replace(a, turn=(0.0,)), replace(b, turn=(0.0,))) for a, b in (driving, back))
+    check_deviations(driving, law)
     if (mesh.backlash is not None or (mapped and pair.normal_backlash > 0.0)) and back != driving:
         problem = f"left and right flanks differ, but mesh {mesh.name!r} takes its back flanks as its driving ones"
         raise InputError("microgeometry", None, problem, "give both the same, or the mesh no backlash")

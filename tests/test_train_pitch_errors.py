@@ -1,0 +1,170 @@
+"""Pitch errors of a train's gears: which teeth meet, energy, slow running, shaft orders, from the job file."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gearfe.errors import InputError
+from gearfe.gear.involute import inv
+from gearfe.rigid import constant, smoothed_step
+from gearfe.rigid.compiled import available
+from gearfe.train import Damping, TrainScene, build_train, simulate
+from gearfe.train.forces import LawFlank
+from gearfe.train.kinematics import driving_senses
+from gearfe.train.model import TrainModel
+from gearfe.train.phases import tooth_places
+from gearfe.train.static_error import static_errors
+
+from .mesh_laws import hertzian_law
+from .test_train_contact import free_energy, free_pair, pair
+from .trains import curve, train
+
+needs_numba = pytest.mark.skipif(not available(), reason="numba is not installed")
+
+
+def uneven(scene: TrainScene, seed: int = 0, size: float = 5e-6) -> TrainScene:
+    """All flanks of all gears with errors of their own."""
+    rng = np.random.default_rng(seed)
+    gears = tuple(
+        dataclasses.replace(g, pitch_errors=tuple(tuple(rng.uniform(-size, size, g.gear.teeth)) for _ in range(2)))
+        for g in scene.gears
+    )
+    return dataclasses.replace(scene, gears=gears)
+
+
+def facing(scene: TrainScene, number: int, side: float, turned: float, psi: float) -> tuple[int, int, float]:
+    """Teeth of driver and driven gear that meet at the driver's rotation `turned`, and their gap (m) without errors.
+
+    From the places of involutes on the line of action: with the driver's centre in the origin, the driven gear's at
+    (a, 0) and the driver turning counter-clockwise (else all is seen from behind), a flank of roll length s stands at
+    s = r_b (theta + alpha_w), theta the angle at which its involute leaves the base circle; both gears' rolls make up
+    the length a sin(alpha_w) where they touch. `psi` is the angle of the driver's tooth that is asked for.
+    """
+    mesh, sense = scene.meshes[number], driving_senses(scene)[number]
+    places = tooth_places(scene, driving_senses(scene)).angles
+    one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
+    arm = np.subtract(scene.shaft(two.shaft).point, scene.shaft(one.shaft).point)
+    towards = math.atan2(scene.frame[1] @ arm, scene.frame[0] @ arm)
+    a = 0.5 * 2.5e-3 * (one.gear.teeth + two.gear.teeth)
+    seen = sense * side  # +1: from the front
+
+    def middles(item: Any, turn: float, line: float) -> np.ndarray:
+        tau = places[item.name] + 2 * math.pi * np.arange(item.gear.teeth) / item.gear.teeth + turn
+        return np.asarray(seen * (tau - line))
+
+    alpha = one.gear.pressure_angle  # unshifted gears at their reference distance
+    driver = middles(one, sense * turned, towards)
+    driven = middles(two, -sense * turned * one.gear.teeth / two.gear.teeth, towards + math.pi)
+    j1 = int(np.argmin(np.abs(np.angle(np.exp(1j * (driver - psi))))))
+    assert abs(np.angle(np.exp(1j * (driver[j1] - psi)))) < 1e-9
+
+    def roll(gear: Any, tau: float) -> float:
+        root = gear.half_thickness_angle + inv(gear.pressure_angle)
+        return float(gear.base_radius * (np.angle(np.exp(1j * tau)) + root + alpha))
+
+    gaps = np.array([a * math.sin(alpha) - roll(one.gear, driver[j1]) - roll(two.gear, t) for t in driven])
+    j2 = int(np.argmin(np.abs(gaps)))
+    return j1, j2, float(gaps[j2])
+
+
+def two_stages(driver: int, driven: int) -> TrainScene:
+    return train([(20, 31), (driver, driven)], stiffness=law_of)
+
+
+def idler() -> TrainScene:
+    """Shafts s0, s1, s2, the gear of s1 between the others."""
+    scene = train([(20, 31), (31, 27)], stiffness=law_of, ys=[0.012, 0.012])
+    return dataclasses.replace(
+        scene,
+        gears=tuple(g for g in scene.gears if g.name != "d1"),
+        meshes=(scene.meshes[0], dataclasses.replace(scene.meshes[1], driver="g0")),
+    )
+
+
+def law_of(teeth: int) -> Any:
+    return hertzian_law(2 * math.pi / teeth)
+
+
+@pytest.mark.parametrize("speed", [600.0, -600.0])
+@pytest.mark.parametrize(
+    ("made", "phases"),
+    [(lambda: two_stages(30, 27), (0.1, 0.2)), (lambda: two_stages(23, 40), (0.0, 0.05)), (idler, (None, 0.04))],
+)
+def test_which_teeth_meet(made: Any, phases: tuple[float | None, ...], speed: float) -> None:
+    """By the places of all flanks on the line of action, for driving and back flanks and both senses."""
+    scene = uneven(made())
+    meshes = tuple(dataclasses.replace(m, phase=p, backlash=0.0) for m, p in zip(scene.meshes, phases, strict=True))
+    drive = dataclasses.replace(scene.drive, speed=constant(speed))
+    scene = dataclasses.replace(scene, meshes=meshes, drive=drive, loads=())
+    model = build_train(scene)
+    flanks = [f for f in model.forces.flanks if isinstance(f, LawFlank)]
+    assert len(flanks) == 4
+    looked = 0
+    for number, flank in enumerate(flanks):
+        i, side = number // 2, (1.0, -1.0)[number % 2]
+        gears = [scene.gear(name) for name in (meshes[i].driver, meshes[i].driven)]
+        errors = [g.pitch_errors[0 if model.meshes[i].sense * side > 0.0 else 1] for g in gears]
+        for angle in np.linspace(0.01, 40.0, 61):
+            drive_angle = np.array([math.copysign(angle, speed)])
+            phase = flank.place(drive_angle, np.zeros((1, 100)))[0]
+            turned = abs(model.meshes[i].ratio) * angle
+            for shift, psi in zip(flank.shifts_at(phase)[0], flank.law.pair_phases(phase)[0], strict=True):
+                j1, j2, gap = facing(scene, i, side, turned, psi)
+                if abs(psi) < 4.0 / gears[0].gear.teeth:  # about the path of contact
+                    looked += 1
+                    assert abs(gap) < 1e-9
+                    assert shift == pytest.approx(-errors[0][j1] - errors[1][j2], abs=1e-18)
+    assert looked > 300
+
+
+@needs_numba
+def test_a_free_pair_with_pitch_errors_keeps_its_energy() -> None:
+    """Each tooth pair at its own approach, through the full period of 60 mesh cycles."""
+    law = hertzian_law(relief=3e-6)
+    model = build_train(uneven(free_pair(law, 800.0).scene, size=3e-6))
+    times = np.linspace(0.0, 60 * 2 * math.pi / 20 / 600.0, 2001)
+    energy, elastic_part, _ = free_energy(model, shifted(model), times, 1e-10)
+    assert np.abs(energy - energy[0]).max() < 1e-9 * energy.max()
+    assert np.abs(energy - energy[0]).max() < 1e-6 * elastic_part.max()
+
+
+def shifted(model: TrainModel) -> Any:
+    (flank,) = (f for f in model.forces.flanks if isinstance(f, LawFlank))
+    return lambda phase, approach: flank.law(phase, approach, flank.shifts_at(phase))
+
+
+@needs_numba
+def test_slow_running_has_the_orders_of_the_shafts() -> None:
+    """The static error at all times; a sine of one turn of the pinion is order 1 of its shaft, with its amplitude."""
+    law, e = hertzian_law(), 10e-6
+    scene = pair(law, speed=1.0, torque=smoothed_step(0.01, 0.02, 5.0), damping=Damping(ratio=0.05))
+    errors = tuple(e * math.sin(2 * math.pi * j / 20) for j in range(20))
+    gears = (dataclasses.replace(scene.gears[0], pitch_errors=(errors, (0.0,) * 20)), *scene.gears[1:])
+    scene = dataclasses.replace(scene, gears=gears)
+    model = build_train(scene)
+    times = 0.05 + 4 * math.pi * np.arange(1200) / 1200  # two turns
+    made = simulate(model, np.concatenate([[0.0], times]), tolerance=1e-6)
+    run = made.transmission_error[1:, 0]
+    static = static_errors(scene, made.drive_angle[1:])[0]
+    assert static is not None
+    assert np.abs(run - static).max() < 1e-3 * np.ptp(static)
+    amplitude = 2.0 * np.abs(np.fft.rfft(run)) / len(run)
+    # each pair holds the error of its tooth over about a pitch: the hold of a staircase
+    assert int(np.argmax(amplitude[1:])) + 1 == 2  # twice in two turns
+    assert amplitude[2] == pytest.approx(e, rel=0.02)
+
+
+def test_mistakes() -> None:
+    scene = uneven(pair(hertzian_law()))
+    few = dataclasses.replace(scene.gears[0], pitch_errors=((1e-6,) * 19, ()))
+    with pytest.raises(InputError, match="one for each of the 20 teeth"):
+        build_train(dataclasses.replace(scene, gears=(few, scene.gears[1])))
+    for stiffness in (curve(20), 1e8, None):
+        mesh = dataclasses.replace(scene.meshes[0], stiffness=stiffness)
+        with pytest.raises(InputError, match="pitch errors on gear 'd0', which curves and rigid meshes do not know"):
+            build_train(dataclasses.replace(scene, meshes=(mesh,)))
