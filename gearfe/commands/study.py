@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--restart", action="store_true", help="begin anew, whatever the folder holds")
     parser.add_argument("--row", type=int, metavar="CASE", help="write the job file of a case to --write, and stop")
     parser.add_argument(
-        "--write", metavar="FILE", help="where --row writes; files that the job names stay where they are"
+        "--write", metavar="FILE", help="where --row writes; files that the job names stay, and are found"
     )
     parser.add_argument("--parquet", action="store_true", help="also the rows as study.parquet")
     parser.add_argument("--no-pictures", action="store_true", help="leave out the pictures")
@@ -112,14 +112,16 @@ def _cluster(address: str, stack: ExitStack) -> dict[str, Any]:
 def _write_case(study: Any, number: int, path: Path) -> int:
     from ..errors import InputError
     from ..output.files import whole_file
+    from ..study.case import job_beside
     from ..tables.text import toml_document
 
     if not 0 <= number < len(study.cases):
         raise InputError("--row", number, f"must be >= 0 and <= {len(study.cases) - 1}", "see the column case")
     values = dict(zip(study.task.names, study.cases[number], strict=True))
     head = f"# Case {number} of the study {study.path.name}: " + ", ".join(f"{k} = {v!r}" for k, v in values.items())
+    raw = job_beside(study.task.tables(study.cases[number]), study.task.path.parent, path.absolute().parent)
     with whole_file(path) as temporary:
-        temporary.write_text(f"{head}\n\n{toml_document(study.task.tables(study.cases[number]))}", encoding="utf-8")
+        temporary.write_text(f"{head}\n\n{toml_document(raw)}", encoding="utf-8")
     print(f"written: {path}")
     print(f"run it:  gearfe {study.table.job} {path} --out out/{path.stem}")
     return 0

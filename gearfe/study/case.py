@@ -103,6 +103,16 @@ def solve_case(task: Task, number: int, values: Sequence[Any], shared: Shared) -
     return Row(number, found, status, " ".join(message.split()), time.perf_counter() - began)
 
 
+def job_beside(raw: Any, folder: Path, place: Path) -> Any:
+    """Tables of a job in `folder` as they stand in a job file in `place`: the files that they name are found from there."""
+    if isinstance(raw, dict):
+        return {key: job_beside(value, folder, place) for key, value in raw.items()}
+    if isinstance(raw, (list, tuple)):
+        return [job_beside(value, folder, place) for value in raw]
+    named = isinstance(raw, str) and Path(raw).suffix and not Path(raw).is_absolute() and (folder / raw).is_file()
+    return Path(os.path.relpath(folder / raw, place)).as_posix() if named else raw
+
+
 @functools.cache
 def _keep_memory() -> None:
     """Freed memory stays with the process, once for each process.

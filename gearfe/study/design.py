@@ -98,7 +98,7 @@ def _rows(table: StudyTable, folder: Path, base: Mapping[str, Any]) -> tuple[tup
     file = given(table.rows_csv, "study.rows_csv")
     columns = read_csv(folder / file, "study.rows_csv")
     columns.pop("case", None)
-    hints = {name: key_hint(table.job, name) for name in columns}
+    hints = {name: key_hint(table.job, name, base) for name in columns}
     parameters = tuple(read_parameters({name: [0.0] for name in hints}, table.job, base))
     made = [[_cell(text, one, file, i) for i, text in enumerate(columns[one.name], start=1)] for one in parameters]
     return parameters, list(zip(*made, strict=True))

@@ -55,24 +55,30 @@ class Journal:
         self.columns = (*FIRST, *parameters, *outputs, *LAST)
         self.done: set[int] = set()
         plain = json.loads(json.dumps(head, default=str))
+        made: dict[str, Any] = {"study": plain, "versions": [{"rows_before": 0, **versions}]}
         if self.path.exists():
-            self._same(folder / HEAD, plain)
+            there = self._same(folder / HEAD, plain)
             self._recover()
+            if {**there["versions"][-1], "rows_before": 0} != made["versions"][0]:
+                there["versions"].append({"rows_before": len(self.done), **versions})
+                write_json(folder / HEAD, there)
         else:
-            write_json(folder / HEAD, {"study": plain, "versions": dict(versions)})
+            write_json(folder / HEAD, made)
             with whole_file(self.path) as temporary:
                 temporary.write_text(_line(self.columns), encoding="utf-8")
 
-    def _same(self, path: Path, head: dict[str, Any]) -> None:
+    def _same(self, path: Path, head: dict[str, Any]) -> dict[str, Any]:
         cure = "choose another --out, or give --restart to begin anew"
         try:
-            there = json.loads(path.read_text(encoding="utf-8"))["study"]
+            there: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+            study, _ = there["study"], there["versions"][-1]["rows_before"]
         except (OSError, ValueError, KeyError, TypeError):
             problem = f"holds a {TABLE} without its {HEAD}"
             raise InputError("--out", str(path.parent), problem, cure) from None
-        key = _difference(there, head)
+        key = _difference(study, head)
         if key:
             raise InputError("--out", str(path.parent), f"holds the rows of another study: {key} differs", cure)
+        return there
 
     def _recover(self) -> None:
         """Numbers of the rows that are there; what a kill left of a last row goes."""

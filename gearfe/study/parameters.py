@@ -106,7 +106,7 @@ def read_parameters(given: Mapping[str, Any], kind: str, base: Mapping[str, Any]
     """
     made = []
     for name, spec in _flat(given, "").items():
-        hint, label = key_hint(kind, name), f"{WHERE}.{name}"
+        hint, label = key_hint(kind, name, base), f"{WHERE}.{name}"
         whole = int in _options(hint) and float not in _options(hint)
         if isinstance(spec, list):
             if not spec:
@@ -166,8 +166,8 @@ def _once(found: Mapping[str, Any], more: dict[str, Any]) -> dict[str, Any]:
     return more
 
 
-def key_hint(kind: str, name: str) -> Any:
-    """Type of the key with this dotted name in a job of this kind.
+def key_hint(kind: str, name: str, base: Mapping[str, Any]) -> Any:
+    """Type of the key with this dotted name in a job of this kind; `base` are its tables.
 
     Raises
     ------
@@ -190,8 +190,12 @@ def key_hint(kind: str, name: str) -> Any:
         hint, where, rest = table_class(parts[0]), f"{where}.{parts[0]}", parts[1:]
         if not rest:
             raise InputError(where, None, "is a table, not a key", "name a key in it")
+    there: Any = base if rest is parts else base.get(parts[0])
     for part in rest:
-        hint = _below(hint, part, where)
+        named = [option for option in _options(hint) if typing.get_origin(option) is dict]
+        if isinstance(there, Mapping) and part not in there and any(map(_of_tables, named)):
+            raise unknown_name(where, part, there)  # a body, say: a new one would have no other keys
+        hint, there = _below(hint, part, where), there.get(part) if isinstance(there, Mapping) else None
         where = f"{where}.{part}"
     if any(dataclasses.is_dataclass(option) for option in _options(hint)):
         raise InputError(where, None, "is a table, not a key", "name a key in it")
@@ -221,6 +225,10 @@ def _below(hint: Any, part: str, where: str) -> Any:
         if option is Any:
             return Any
     raise InputError(where, part, "has nothing below it", "name the key itself")
+
+
+def _of_tables(hint: Any) -> bool:
+    return any(dataclasses.is_dataclass(option) for option in _options(typing.get_args(hint)[1]))
 
 
 def _options(hint: Any) -> tuple[Any, ...]:

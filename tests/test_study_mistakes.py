@@ -1,0 +1,206 @@
+"""Studies by the command: each mistake is told before cases run, and kills at random moments lose nothing."""
+
+from __future__ import annotations
+
+import json
+import math
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from gearfe.cli import main
+from gearfe.config import job_tables, read_toml
+from gearfe.study.job import read_study, run_study
+
+from .studies import rows_of, written
+
+PLACE = "bodies.a.position_m.0 = {"
+OUTPUT = 'y = "'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (PLACE, "bodies.a.postion_m.0 = {", "did you mean 'position_m'"),
+        (PLACE, "bodies.c.mass_kg = [1]\nbodies.a.position_m.0 = {", "unknown name 'c'; known names: a, b"),
+        (PLACE, '"bodies.a.position_m.1" = [0.0]\nbodies.a.position_m.0 = {', "stands there twice"),
+        (PLACE, "bodies.a.position_m = [0.0]\nbodies.a.position_m.0 = {", "TOML"),
+        (PLACE, "bodies.a.position_m.7 = {", "has 2 entries, 0 to 1"),
+        ("bodies.b.position_m.0 = {", "bodies.b = {", "is a table, not a key"),
+        ("low = -3.14", "low = 4.0, hgih = -3.14", "did you mean 'high'"),
+        ("{ low = -3.141592653589793", "{ low = 3.2", "must be > low"),
+        (OUTPUT, 'y = "xx1 + ', "did you mean 'x1'"),
+        (OUTPUT, 'y = "summary.energy_drft_J + ', "did you mean 'energy_drift_J'"),
+        (OUTPUT, 'y = "x1 + ', "gives 2 values"),
+        (OUTPUT, 'y = "open(0) + ', "unknown name 'open'"),
+        ("[study.outputs]", "[study.limits.z]\nlow = 1.0\n[study.outputs]", "unknown name 'z'"),
+        ('"mechanism"', '"mechnism"', "did you mean 'mechanism'"),
+        ('"sobol"', '"sobl"', "did you mean 'sobol'"),
+        ("cases = 8", "cases = 0", "must be finite and >= 1"),
+        ("cases = 8", "cases = 8\ncores = 2", "unknown name 'cores'"),
+        ('"base.toml"', '"bse.toml"', "there is no such file"),
+        ('design = "sobol"', 'design = "rows"\nrows_csv = "rows.csv"', "columns are the parameters"),
+    ],
+)
+def test_mistakes_are_told_before_cases_run(tmp_path, capsys, old, new, told):
+    path = written(tmp_path)
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new, 1))
+    assert main(["study", str(path), "--out", str(tmp_path / "out"), "--jobs", "1", "--no-pictures"]) == 2
+    error = capsys.readouterr().err
+    assert told in error
+    assert "Traceback" not in error
+    assert not (tmp_path / "out" / "study.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ("bodies.a.mass_kg\n1.0\nheavy\n", "heavy"),
+        ("bodies.a.mas_kg\n1.0\n", "did you mean 'mass_kg'"),
+        ("bodies.a.mass_kg\n", "no rows"),
+        ("bodies.a.mass_kg\nnan\n", "must be finite"),
+        (None, "there is no such file"),
+    ],
+)
+def test_a_wrong_table_of_rows_is_told(tmp_path, capsys, content, told):
+    path = written(tmp_path)
+    head, _, outputs = path.read_text().partition("[study.parameters]")
+    text = head.replace('"sobol"', '"rows"\nrows_csv = "rows.csv"') + outputs[outputs.index("[study.outputs]") :]
+    path.write_text(text)
+    if content is not None:
+        (tmp_path / "rows.csv").write_text(content)
+    code = main(["study", str(path), "--out", str(tmp_path / "out"), "--jobs", "1", "--no-pictures"])
+    error = capsys.readouterr().err
+    assert code == (1 if content and "heavy" in content else 2)  # a row with a cell that is no number has no answer
+    assert told in error
+
+
+def test_a_folder_of_another_study_is_refused(tmp_path, capsys):
+    out = ["--out", str(tmp_path / "out"), "--jobs", "1", "--no-pictures"]
+    path = written(tmp_path)
+    assert main(["study", str(path), *out]) == 0
+    before = rows_of(tmp_path / "out")
+    base = tmp_path / "base.toml"
+    base.write_text(base.read_text().replace("mass_kg = 1.0", "mass_kg = 2.0"))
+    assert main(["study", str(path), *out]) == 2
+    assert "base.bodies.a.mass_kg differs; choose another --out, or give --restart" in capsys.readouterr().err
+    assert rows_of(tmp_path / "out") == before
+    assert main(["study", str(path), *out, "--restart"]) == 0
+    (tmp_path / "out" / "study.json").unlink()
+    assert main(["study", str(path), *out]) == 2
+    assert "without its study.json" in capsys.readouterr().err
+
+
+def test_gears_that_cannot_be_are_rows_and_stop_a_study(tmp_path, capsys):
+    """Teeth from 4 to 8: those below 8 are refused; with none above, the study stops after 50."""
+    text = "[pair]\nmodule_mm = 2.0\npressure_angle_deg = 20.0\nface_width_mm = 10.0\n"
+    text += "[pair.pinion]\nteeth = 20\nbore_diameter_mm = 8.0\n[pair.wheel]\nteeth = 31\nbore_diameter_mm = 15.0\n"
+    text += (
+        '[stiffness]\ntorque_Nm = 40.0\ncoarsen = 3.0\nangle_step_deg = 9.0\n[study]\njob = "stiffness"\ncases = 60\n'
+    )
+    text += '[study.outputs]\nk = "mean(k_mesh_N_per_m)"\n[study.parameters]\n'
+    path = tmp_path / "study.toml"
+    path.write_text(text + "pair.pinion.teeth = { low = 3, high = 7 }\n")
+    command = ["study", str(path), "--out", str(tmp_path / "out"), "--jobs", "1", "--no-pictures"]
+    assert main(command) == 2
+    assert "the first 50 cases have no answer" in capsys.readouterr().err
+    assert [row[3] for row in rows_of(tmp_path / "out")[1:]] == ["invalid"] * 50
+    path.write_text(text.replace("cases = 60", 'design = "factorial"') + "pair.pinion.teeth = [7, 20]\n")
+    assert main([*command, "--restart"]) == 1
+    assert "1 of 2 cases are not solved wholly; case 0: pair.pinion.teeth = 7: must be" in capsys.readouterr().err
+
+
+def test_a_case_that_is_written_elsewhere_finds_its_files(tmp_path):
+    text = "[pair]\nmodule_mm = 2.0\npressure_angle_deg = 20.0\nface_width_mm = 10.0\n"
+    text += "[pair.pinion]\nteeth = 20\nbore_diameter_mm = 8.0\n[pair.wheel]\nteeth = 31\nbore_diameter_mm = 15.0\n"
+    text += '[microgeometry]\ntorques_Nm = [40.0]\n[microgeometry.pinion]\npitch_csv = "pitch.csv"\n'
+    (tmp_path / "pair.toml").write_text(text)
+    (tmp_path / "pitch.csv").write_text("tooth,pitch_um\n" + "".join(f"{n},{n % 3}\n" for n in range(1, 21)))
+    (tmp_path / "study.toml").write_text(
+        '[study]\njob = "microgeometry"\nbase = "pair.toml"\n[study.parameters]\n'
+        'microgeometry.wheel.slope_um = [1.0, 2.0]\n[study.outputs]\nx = "1"\n'
+    )
+    (tmp_path / "far" / "away").mkdir(parents=True)
+    case = tmp_path / "far" / "away" / "one.toml"
+    assert main(["study", str(tmp_path / "study.toml"), "--row", "1", "--write", str(case)]) == 0
+    made = read_toml(case)["microgeometry"]["pinion"]["pitch_csv"]
+    assert (case.parent / made).resolve() == tmp_path / "pitch.csv"
+    assert not Path(made).is_absolute()
+    job_tables(read_toml(case), case, ("pair", "microgeometry"))
+
+
+def test_versions_stand_with_the_rows_that_they_made(tmp_path):
+    study = read_study(written(tmp_path))
+    run_study(study, tmp_path, jobs=1)
+    head = json.loads((tmp_path / "study.json").read_text())
+    assert [v["rows_before"] for v in head["versions"]] == [0]
+    run_study(study, tmp_path, jobs=1)
+    assert json.loads((tmp_path / "study.json").read_text()) == head
+    head["versions"][0]["numpy"] = "0.1"  # as if another one had begun
+    (tmp_path / "study.json").write_text(json.dumps(head))
+    run_study(study, tmp_path, jobs=1)
+    assert [v["rows_before"] for v in json.loads((tmp_path / "study.json").read_text())["versions"]] == [0, 8]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the workers in /proc")
+def test_twenty_kills_at_random_moments_lose_nothing(tmp_path):
+    """Driver or a worker, by turns of a seed: rows that stood stay as they were; the rest is done, each case once."""
+    dice, path = random.Random(7), written(tmp_path, cases=3000)  # noqa: S311
+    command = [sys.executable, "-m", "gearfe", "study", str(path), "--out", str(tmp_path / "out"), "--no-pictures"]
+    table, kept, kills = tmp_path / "out" / "study.csv", {}, {"driver": 0, "worker": 0}
+    while sum(kills.values()) < 20:
+        run = subprocess.Popen([*command, "--jobs", "2"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        whom = dice.choice(list(kills))
+        size = table.stat().st_size if table.exists() else 0
+        while run.poll() is None and whom == "worker" and not (table.exists() and table.stat().st_size > size):
+            time.sleep(0.01)
+        time.sleep(dice.uniform(0.0, 3.0 if whom == "driver" else 0.2))
+        victims = [run.pid] if whom == "driver" else _workers(run.pid)
+        if run.poll() is None and victims:
+            _kill(dice.choice(victims))
+            kills[whom] += 1
+            time.sleep(0.3)
+        if whom == "worker" and run.poll() is None:
+            _kill(run.pid)  # goes on in another driver, with what the replaced worker did
+        run.wait()
+        rows = {row[0]: row for row in rows_of(tmp_path / "out")[1:] if len(row) == 6} if table.exists() else {}
+        for number, row in kept.items():
+            assert rows[number] == row
+        kept = {n: row for n, row in rows.items() if row[5] == ""}
+        if len(kept) == 3000:
+            break
+    assert min(kills.values()) > 3
+    assert subprocess.run([*command, "--jobs", "2"], capture_output=True, check=False).returncode == 0
+    rows = rows_of(tmp_path / "out")[1:]
+    assert [row[0] for row in rows] == [str(n) for n in range(3000)]
+    for row in rows:
+        x1, x2, x3, y = map(float, row[1:5])
+        assert y == pytest.approx(
+            math.sin(x1) + 7 * math.sin(x2) ** 2 + 0.1 * x3**4 * math.sin(x1), rel=1e-12, abs=1e-12
+        )
+        assert row[5] == "done"
+
+
+def _workers(driver: int) -> list[int]:
+    """Processes of a driver that solve cases: multiprocessing's helper for resources is none."""
+    try:
+        found = [int(pid) for pid in Path(f"/proc/{driver}/task/{driver}/children").read_text().split()]
+        return [pid for pid in found if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    except (OSError, ValueError):
+        return []
+
+
+def _kill(pid: int) -> None:
+    import os
+
+    try:
+        os.kill(pid, signal.SIGKILL)
+    except ProcessLookupError:
+        pass
