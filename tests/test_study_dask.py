@@ -70,3 +70,14 @@ def test_dask_that_is_missing_is_named(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "dask.distributed", None)
     assert main(["study", str(written(tmp_path)), "--out", str(tmp_path / "out"), "--dask", "tcp://127.0.0.1:1"]) != 0
     assert "gearfe[cluster]" in capsys.readouterr().err
+
+
+def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch, capsys):
+    from gearfe.commands import study as command
+
+    monkeypatch.setattr(command, "PATIENCE_S", 1)
+    run = ["study", str(written(tmp_path)), "--out", str(tmp_path / "out"), "--dask"]
+    assert main([*run, "tcp://127.0.0.1:9"]) == 2
+    assert "does not answer" in capsys.readouterr().err
+    assert main([*run, "nonsense"]) == 2
+    assert "--dask = 'nonsense'" in capsys.readouterr().err

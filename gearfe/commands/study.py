@@ -13,6 +13,8 @@ from typing import Any
 from ..progress import count
 from .arguments import add_job
 
+#: How long a scheduler has to answer.
+PATIENCE_S = 20
 HELP = "one job in many cases: parameters, designs, statistics, sensitivities; goes on where it was interrupted"
 
 
@@ -24,9 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dask", metavar="ADDRESS", help="run the cases on the Dask cluster with this scheduler")
     parser.add_argument("--restart", action="store_true", help="begin anew, whatever the folder holds")
     parser.add_argument("--row", type=int, metavar="CASE", help="write the job file of a case to --write, and stop")
-    parser.add_argument(
-        "--write", metavar="FILE", help="where --row writes; files that the job names stay, and are found"
-    )
+    parser.add_argument("--write", metavar="FILE", help="where --row writes; files of the job stay and are found")
     parser.add_argument("--parquet", action="store_true", help="also the rows as study.parquet")
     parser.add_argument("--no-pictures", action="store_true", help="leave out the pictures")
 
@@ -93,7 +93,7 @@ def _cluster(address: str, stack: ExitStack) -> dict[str, Any]:
     logging.disable(logging.CRITICAL)  # of a lost connection `check` tells
     stack.callback(logging.disable, logging.NOTSET)
     try:
-        client = stack.enter_context(Client(address, timeout=20))
+        client = stack.enter_context(Client(address, timeout=PATIENCE_S))
     except (OSError, ValueError, TimeoutError) as error:
         problem = f"does not answer ({type(error).__name__})"
         raise InputError("--dask", address, problem, "is the scheduler running there?") from None

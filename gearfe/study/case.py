@@ -104,7 +104,7 @@ def solve_case(task: Task, number: int, values: Sequence[Any], shared: Shared) -
 
 
 def job_beside(raw: Any, folder: Path, place: Path) -> Any:
-    """Tables of a job in `folder` as they stand in a job file in `place`: the files that they name are found from there."""
+    """Tables of a job in `folder` for a job file in `place`, from where the files that they name are found."""
     if isinstance(raw, dict):
         return {key: job_beside(value, folder, place) for key, value in raw.items()}
     if isinstance(raw, (list, tuple)):
