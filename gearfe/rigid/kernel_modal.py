@@ -124,6 +124,22 @@ def set_weights(squares, reach, pull, tolerance, weight):
         weight[i] = 1.0 / (tolerance * limit + 1e-100)
 
 
+def velocity_term(y, j, power, weight):
+    """Size of the term j of the velocity, over the trial step, in parts of the limits."""
+    size = 0.0
+    for i in range(weight.shape[0]):
+        off = y[j, i] * weight[i]
+        size += off * off
+    return j * math.sqrt(size) * power
+
+
+def last_size(y, last, end, weight):
+    """Size of the last term, or of the one before if that asks for a shorter step: a series may be even or odd."""
+    size = velocity_term(y, last, end**last, weight)
+    before = velocity_term(y, last - 1, end ** (last - 1), weight)
+    return max(size, before ** (last / (last - 1.0)))
+
+
 def modal_steps(
     squares, damping, diagonal, full, constant, W, offset, parameters, memory, pieces, t, t1, state, h, reach,
     pull, breaks, tolerance, longest, asked, at, found, T, Y, work,
@@ -178,11 +194,7 @@ def modal_steps(
                 end = min(1.0, law_corner(1, 1.0, parameters, memory, pieces, True))  # noqa: F821
                 power = end * end
             power *= end
-            size = 0.0
-            for i in range(n):
-                off = y[j + 2, i] * weight[i]
-                size += off * off
-            size = (j + 2.0) * math.sqrt(size) * power  # the term of the velocity, over the trial step
+            size = velocity_term(y, j + 2, power, weight)
             if size < 1.0 and before < 1.0 and j >= LEAST - 2:
                 last = j + 2
                 break
@@ -198,15 +210,12 @@ def modal_steps(
                 break
             continue
         x = end
+        size = last_size(y, last, end, weight)
         if 1.0 <= size < 1e-3 * largest:  # the sum holds: the motion itself tells its size, as at a start from rest
             evaluate(y, last, end, s, value, rate)
             widen(state, value, rate, end * step, reach, pull)
             set_weights(squares, reach, pull, tolerance, weight)
-            size = 0.0
-            for i in range(n):
-                off = y[last, i] * weight[i]
-                size += off * off
-            size = last * math.sqrt(size) * power
+            size = last_size(y, last, end, weight)
         if size > 1.0:  # too long: as far as the last term allows
             x = end * size ** (-1.0 / last)
         if still < 20:  # corners that the law does not get past are no reason to stand still
@@ -249,4 +258,4 @@ def work_space(n, directions, orders):
     return *series, np.zeros(n), np.zeros(n), np.zeros(n)
 
 
-FUNCTIONS = (project, add_forces, next_order, evaluate, widen, set_weights, modal_steps)
+FUNCTIONS = (project, add_forces, next_order, evaluate, widen, set_weights, velocity_term, last_size, modal_steps)
