@@ -5,11 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..progress import count, stage
 from ..tables.runup import RunUpTable
 from .arguments import add_job, add_keys, with_keys
 
@@ -46,18 +45,12 @@ def run(args: argparse.Namespace) -> int:
     if args.no_stability:
         table = replace(table, stability=False)
 
-    import numpy as np
-
     from ..figures.runup import RunUpPictures
     from ..output.files import output_folder
-    from ..rigid import constant
     from ..runup.files import write_runup
-    from ..runup.instability import instability_map
-    from ..runup.run_up import run_up
+    from ..runup.job import described, solved
     from ..stopwatch import Stopwatch
-    from ..train import build_train
-    from ..vibration.job import job_scene, train_body, train_job
-    from ..vibration.mesh_stiffness import train_curves
+    from ..vibration.job import train_job
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("reading"):
@@ -66,32 +59,13 @@ def run(args: argparse.Namespace) -> int:
         if args.attachment is not None and args.attachment not in bores:
             raise unknown_name("--attachment", args.attachment, bores)
         folder = output_folder(args.out or Path("out") / Path(args.job).stem)
-    with watch.stage("curves"):
-        stiffness = train_curves(job, args.curve, progress=count)
-    with watch.stage("housing"):
-        body = train_body(job)
-    with watch.stage("model"):
-        scene = job_scene(job, stiffness, body)
-        speeds = np.linspace(table.speed_start_rad_per_s, table.speed_stop_rad_per_s, table.speeds)
-        model = build_train(replace(scene, drive=replace(scene.driven, speed=constant(float(speeds[0])))))
-    band = table.band_Hz or (5000.0 if job.housing is None else job.housing.reduction.band_Hz)
-    with watch.stage("steady states"), stage("steady states"):
-        options: dict[str, Any] = {"tolerance": table.tolerance, "band_hz": band, "stability": table.stability}
-        made = run_up(model, speeds, progress=_counted, **options)
-    if not made.states:
-        problem = "has no periodic motion that was found at any of the speeds"
-        raise _nothing(table, problem)
-    unstable = None
-    if table.instability_loads:
-        with watch.stage("instability"), stage("instability"):
-            unstable = instability_map(made.train, speeds, table.instability_loads, progress=_counted)
-    further = {"variant": job.table.variant, "job": {"runup": asdict(table), "train": asdict(job.table)}}
-    parts = [f"{len(model.shafts)} shafts, {len(model.meshes)} gear meshes"]
+    made, unstable = solved(job, table, args.curve, watch=watch)
+    parts = [f"{len(job.table.shafts)} shafts, {len(job.table.meshes)} gear meshes"]
     parts += [f"load {x.torque_Nm:g} N m on {x.shaft}".replace("-", "−", 1) for x in job.table.loads[:1]]
     parts += [f"variant {job.table.variant}"] if job.table.variant else []
     summary, names = write_runup(
         folder, made, multiples=table.multiples, attachment=args.attachment,
-        draw=None if args.no_pictures else RunUpPictures(", ".join(parts)), watch=watch, further=further,
+        draw=None if args.no_pictures else RunUpPictures(", ".join(parts)), watch=watch, further=described(job, table),
         unstable=unstable,
     )  # fmt: skip
     for line in _told(summary):
@@ -108,17 +82,6 @@ def _own_table(job: str) -> RunUpTable:
 
     found: RunUpTable = load_job(job, ("runup",))["runup"]
     return found
-
-
-def _counted(number: int, of: int) -> None:
-    count(number, of, "speeds")
-
-
-def _nothing(table: RunUpTable, problem: str) -> Exception:
-    from ..errors import InputError
-
-    value = [table.speed_start_rad_per_s, table.speed_stop_rad_per_s]
-    return InputError("runup", value, problem, "add damping, or look at a transient: gearfe vibration")
 
 
 def _told(summary: dict[str, Any]) -> list[str]:

@@ -6,17 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
-
 from ..output.arrays import save_arrays
 from ..output.files import whole_set, write_csv, write_json
 from . import report
 from .instability import InstabilityMap
-from .modes import CoupledModes, Crossing, coupled_modes, crossings
+from .modes import CoupledModes, Crossing
 from .run_up import RunUp
 
-#: Speeds of the Campbell diagram.
-CAMPBELL = 7
 #: All that a run can write.
 FILES = (
     "runup.csv", "orders.csv", "waterfall.csv", "waterfall.npz", "modes.csv", "critical_speeds.csv", "summary.json",
@@ -52,18 +48,12 @@ def write_runup(
     """
     bore = report.attachment_to_draw(run, attachment)
     with watch.stage("modes"):
-        modes = coupled_modes(run.train, np.linspace(run.speeds[0], run.speeds[-1], CAMPBELL), run.band_hz)
-        met = crossings(run.train, modes, multiples)
+        modes, met = report.campbell(run, multiples)
     with whole_set(folder, may_write=FILES) as target:
         with watch.stage("tables"):
-            write_csv(target / "runup.csv", report.runup_columns(run))
-            write_csv(target / "orders.csv", report.order_columns(run, multiples))
-            write_csv(target / "waterfall.csv", report.waterfall_columns(run))
+            for name, columns in report.tables(run, modes, met, multiples, unstable).items():
+                write_csv(target / f"{name}.csv", columns)
             save_arrays(target / "waterfall.npz", report.waterfall(run))
-            write_csv(target / "modes.csv", report.mode_columns(modes))
-            write_csv(target / "critical_speeds.csv", report.critical_columns(modes, met))
-            if unstable is not None:
-                write_csv(target / "instability.csv", report.instability_columns(unstable))
         if draw is not None:
             with watch.stage("pictures"):
                 draw(target, run, modes, met, multiples, bore)

@@ -11,13 +11,36 @@ from ..errors import unknown_name
 from ..typing import Array
 from ..vibration.radiation import power_level
 from .instability import InstabilityMap
-from .modes import CoupledModes, Crossing
+from .modes import CoupledModes, Crossing, coupled_modes, crossings
 from .results import SteadyState
 from .run_up import RunUp
+
+#: Speeds of the Campbell diagram.
+CAMPBELL = 7
 
 #: Peaks of the dynamic factor that rise by this part of it over the valleys beside them are critical speeds.
 RISE = 0.03
 RPM = 30.0 / math.pi
+
+
+def campbell(run: RunUp, multiples: int) -> tuple[CoupledModes, list[Crossing]]:
+    """Coupled modes over the speeds of a run, and where mesh orders meet them."""
+    modes = coupled_modes(run.train, np.linspace(run.speeds[0], run.speeds[-1], CAMPBELL), run.band_hz)
+    return modes, crossings(run.train, modes, multiples)
+
+
+def tables(
+    run: RunUp, modes: CoupledModes, met: list[Crossing], multiples: int, unstable: InstabilityMap | None = None
+) -> dict[str, dict[str, Any]]:
+    """Columns of all tables, by the names of their files."""
+    made = {
+        "runup": runup_columns(run),
+        "orders": order_columns(run, multiples),
+        "waterfall": waterfall_columns(run),
+        "modes": mode_columns(modes),
+        "critical_speeds": critical_columns(modes, met),
+    }
+    return made if unstable is None else {**made, "instability": instability_columns(unstable)}
 
 
 def runup_columns(run: RunUp) -> dict[str, Any]:

@@ -1,0 +1,61 @@
+"""The run-up of a job: its train in steady running at all speeds of its table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..progress import count, stage
+from ..rigid import constant
+from ..tables.runup import RunUpTable
+from ..train import build_train
+from ..vibration.job import TrainJob, job_scene, train_body
+from ..vibration.mesh_stiffness import train_curves
+from .instability import InstabilityMap, instability_map
+from .run_up import RunUp, run_up
+
+
+def solved(
+    job: TrainJob, table: RunUpTable, curves: Sequence[str] = (), *, watch: Any
+) -> tuple[RunUp, InstabilityMap | None]:
+    """Steady states of the train of a job, and its map of parametric instability where the table asks for one.
+
+    Raises
+    ------
+    InputError
+        Where no periodic motion was found at any of the speeds, and for what a train or a run-up refuses.
+    """
+    with watch.stage("curves"):
+        stiffness = train_curves(job, curves, progress=count)
+    with watch.stage("housing"):
+        body = train_body(job)
+    with watch.stage("model"):
+        scene = job_scene(job, stiffness, body)
+        speeds = np.linspace(table.speed_start_rad_per_s, table.speed_stop_rad_per_s, table.speeds)
+        model = build_train(replace(scene, drive=replace(scene.driven, speed=constant(float(speeds[0])))))
+    band = table.band_Hz or (5000.0 if job.housing is None else job.housing.reduction.band_Hz)
+    with watch.stage("steady states"), stage("steady states"):
+        options: dict[str, Any] = {"tolerance": table.tolerance, "band_hz": band, "stability": table.stability}
+        made = run_up(model, speeds, progress=_counted, **options)
+    if not made.states:
+        value = [table.speed_start_rad_per_s, table.speed_stop_rad_per_s]
+        problem = "has no periodic motion that was found at any of the speeds"
+        raise InputError("runup", value, problem, "add damping, or look at a transient: gearfe vibration")
+    unstable = None
+    if table.instability_loads:
+        with watch.stage("instability"), stage("instability"):
+            unstable = instability_map(made.train, speeds, table.instability_loads, progress=_counted)
+    return made, unstable
+
+
+def described(job: TrainJob, table: RunUpTable) -> dict[str, Any]:
+    """What was computed: entries of the summary."""
+    return {"variant": job.table.variant, "job": {"runup": asdict(table), "train": asdict(job.table)}}
+
+
+def _counted(number: int, of: int) -> None:
+    count(number, of, "speeds")
