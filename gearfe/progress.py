@@ -50,8 +50,8 @@ class _Stage:
 class Display:
     """Shows the innermost stages of a run; a thread looks at them, so that work itself never waits."""
 
-    def __init__(self, stream: TextIO, *, rewritten: bool, silent: float = SILENT) -> None:
-        self._stream, self._rewritten = stream, rewritten
+    def __init__(self, stream: TextIO, *, rewritten: bool, silent: float = SILENT, each: bool = False) -> None:
+        self._stream, self._rewritten, self._each = stream, rewritten, each
         self._begun, self._silent = time.monotonic(), silent
         self._stages: list[_Stage] = []
         self._lock = threading.RLock()
@@ -67,7 +67,7 @@ class Display:
         """A stage begins."""
         with self._lock:
             self._stages.append(_Stage(name))
-            if self._rewritten:
+            if self._rewritten or self._each:
                 self._show()
 
     def leave(self) -> None:
@@ -154,13 +154,17 @@ _displays: list[Display] = []
 
 
 @contextmanager
-def shown(stream: TextIO | None = None) -> Iterator[None]:
-    """Show stages inside on `stream` (stderr): as one line that is rewritten where it is a terminal."""
+def shown(stream: TextIO | None = None, *, verbose: bool = False) -> Iterator[None]:
+    """Show stages inside on `stream` (stderr): as one line that is rewritten where it is a terminal.
+
+    With `verbose` each stage is a line from the begin of the run.
+    """
     stream = sys.stderr if stream is None else stream
     if stream is None or _displays:
         yield
         return
-    _displays.append(Display(stream, rewritten=stream.isatty()))
+    rewritten = stream.isatty() and not verbose
+    _displays.append(Display(stream, rewritten=rewritten, silent=0.0 if verbose else SILENT, each=verbose))
     try:
         yield
     finally:

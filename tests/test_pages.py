@@ -16,7 +16,7 @@ import pytest
 import gearfe
 from gearfe import Material, build_train
 from gearfe.commands import COMMANDS
-from gearfe.commands.arguments import CommandParser
+from gearfe.commands.program import parser_of
 from gearfe.errors import InputError
 
 from . import gears, trains
@@ -24,7 +24,8 @@ from . import gears, trains
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*(ROOT / "docs").rglob("*.md"), ROOT / "README.md"])
 #: Pages whose Python runs, block by block. The others need a cluster, an optimiser, or minutes.
-RUN = ("fields.md", "housing.md", "howto.md", "loadmap.md", "mesh_law.md", "microgeometry.md", "runup.md", "start.md")
+RUN = ("exchange.md", "fields.md", "housing.md", "howto.md", "loadmap.md", "mesh_law.md")
+RUN += ("microgeometry.md", "runup.md", "start.md")
 PLACES = {"angles": np.zeros(3), "approaches": np.full(3, 1e-5)}
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
@@ -85,8 +86,7 @@ def test_commands_are_understood() -> None:
         for line in command_lines(page):
             _, command, *rest = shlex.split(line)
             module = importlib.import_module(f"gearfe.commands.{COMMANDS[command]}")
-            parser = CommandParser(prog=command)
-            module.add_arguments(parser)
+            parser = parser_of(module, f"gearfe {command}")
             try:
                 parsed = parser.parse_args(rest)
             except InputError as error:

@@ -133,13 +133,21 @@ def add_keys(parser: Any, table: type, *keys: str, **renamed: str) -> None:
     hints = typing.get_type_hints(table)
     for name, key in ({k: k for k in keys} | renamed).items():
         known = fields_of(table)[key].metadata
-        options: dict[str, Any] = {"dest": name, "help": known["doc"].removeprefix("true: ").replace("%", "%%")}
+        told = known["doc"].removeprefix("true: ") + _default_of(fields_of(table)[key])
+        options: dict[str, Any] = {"dest": name, "help": told.replace("%", "%%")}
         kinds = [kind for kind in typing.get_args(hints[key]) or (hints[key],) if kind is not type(None)]
         if kinds == [bool]:
             options |= {"action": "store_const", "const": True}
         else:
             options |= {"type": kinds[0], "metavar": "|".join(known["choices"] or ()) or METAVARS[kinds[0]]}
         parser.add_argument(_option(name), **options)
+
+
+def _default_of(field: Any) -> str:
+    """The default of a key, for a help; options without a default of their own leave what the file says."""
+    default = field.default
+    plain = isinstance(default, (int, float, str)) and not isinstance(default, bool) and default != ""
+    return f" (default: the file's, or {default})" if plain and "default" not in field.metadata["doc"] else ""
 
 
 def add_job(parser: argparse.ArgumentParser, dest: str, help_: str) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 from ..progress import stage
 from .arguments import add_job, check_option
+from .common import add_folder
 
 HELP = "derived geometry of a gear pair, and a drawing of it in mesh"
 
@@ -17,7 +18,7 @@ HELP = "derived geometry of a gear pair, and a drawing of it in mesh"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_job(parser, "job", "job file with the table [pair]")
-    parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
+    add_folder(parser)
     parser.add_argument("--angle-deg", type=float, default=0.0, metavar="X", help="pinion angle of the drawing (deg)")
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..progress import stage
 from .arguments import add_job
+from .common import add_folder
 
 if TYPE_CHECKING:
     from ..reduction.error import MeshError, ReductionError
@@ -26,7 +27,7 @@ _DRAWN = 6
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_job(parser, "job", "job file with a table [housing]")
-    parser.add_argument("--out", default="out/housing", help="folder for the results (default: %(default)s)")
+    add_folder(parser, default="out/housing")
     parser.add_argument("--modes", type=int, default=20, help="modes to list and to write (default: %(default)s)")
     parser.add_argument("--no-pictures", action="store_true", help="write no pictures")
 
@@ -46,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     from ..output.files import output_folder, whole_set
     from ..reduction.error import mesh_error, reduction_error
 
-    folder = output_folder(args.out)
+    folder = output_folder(args.out or "out/housing")
     started = time.perf_counter()
     body = reduced_housing(table, Path(args.job).parent)
     seconds = time.perf_counter() - started

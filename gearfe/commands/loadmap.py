@@ -14,6 +14,7 @@ from ..tables.laws import check_law
 from ..tables.loadmap import LoadMapTable
 from ..tables.stiffness import StiffnessTable
 from .arguments import add_job, add_keys, add_removed, check_option, with_keys
+from .common import add_folder
 
 HELP = "stiffness, transmission error, load share, pressure, root stress over pinion angle and torque"
 
@@ -26,7 +27,7 @@ MODEL = ("law", "plane", "kinematics", "coarsen")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_job(parser, "job", "job file with the tables [pair], [stiffness] and [loadmap]")
-    parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
+    add_folder(parser)
     add_loads(parser)
     add_keys(parser, StiffnessTable, *MODEL)
     add_removed(parser, StiffnessTable.REMOVED)

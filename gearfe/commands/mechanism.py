@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..tables.mechanism import RunTable, read_mechanism_file
 from .arguments import add_job, add_keys, with_keys
+from .common import add_folder
 
 if TYPE_CHECKING:
     from ..mechanisms.model import Mechanism
@@ -25,7 +26,7 @@ HELP = "trajectories, energies and reactions of a planar mechanism"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_job(parser, "file", "mechanism file (TOML, see docs/mechanisms.md)")
-    parser.add_argument("--out", required=True, help="folder for the results")
+    add_folder(parser)
     add_keys(parser, RunTable, *KEYS, until="end_s")
     parser.add_argument("--no-pictures", action="store_true", help="tables and summary only")
     parser.add_argument("--no-estimate", action="store_true", help="leave out the finer runs that estimate the error")
@@ -43,15 +44,16 @@ def run(args: argparse.Namespace) -> int:
     from ..mechanisms.model import make_mechanism
 
     mechanism = make_mechanism(file, Path(args.file))
+    folder = args.out or Path("out") / Path(args.file).stem
     if file.run.analysis in ("equilibrium", "modes"):
         from ..mechanisms.rest import run_rest
 
-        outcome = run_rest(mechanism, args.out, draw=None if args.no_pictures else partial(_draw_rest, mechanism))
+        outcome = run_rest(mechanism, folder, draw=None if args.no_pictures else partial(_draw_rest, mechanism))
         print(outcome.text)
         return 0 if outcome.complete else 1
     outcome = run_mechanism(
         mechanism,
-        args.out,
+        folder,
         estimate=not args.no_estimate,
         draw=partial(_draw, mechanism, args) if args.animation or not args.no_pictures else None,
     )

@@ -11,6 +11,7 @@ from ..progress import count
 from ..tables.microgeometry import MicrogeometryTable
 from ..tables.stiffness import StiffnessTable
 from .arguments import add_job, add_keys, with_keys
+from .common import add_folder
 from .loadmap import add_loads, with_loads
 
 HELP = "reliefs, pitch errors, measured flanks: transmission error, orders, load sharing, pressure against torque"
@@ -23,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     help_ = "job file with the tables [pair], [stiffness] and [microgeometry]"
     add_job(parser, "job", help_)
-    parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
+    add_folder(parser)
     add_loads(parser)
     add_keys(parser, MicrogeometryTable, "mesh_cycles", "flank")
     add_keys(parser, StiffnessTable, "coarsen")

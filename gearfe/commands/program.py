@@ -12,9 +12,9 @@ from typing import Any, TextIO
 
 from .. import __version__
 from ..errors import InputError, MissingLibraryError, NotFiniteWarning, unknown_name
-from ..progress import shown
-from . import COMMANDS
+from . import COMMANDS, EXAMPLES
 from .arguments import CommandParser, with_changes
+from .common import add_telling, run_and_keep
 
 USAGE = "gearfe COMMAND ... ('gearfe COMMAND --help' tells a command's options)"
 
@@ -85,12 +85,20 @@ def _run(arguments: list[str]) -> int:
 
 def run_command(module: Any, name: str, arguments: list[str]) -> int:
     """Run a command module (its contract is in `gearfe.commands`), called by `name`, with these arguments."""
-    parser = CommandParser(prog=name, description=module.HELP)
-    module.add_arguments(parser)
+    parser = parser_of(module, name)
     parsed = with_changes(parser.parse_args(arguments))
-    with shown(), _tables_watched() as told:
-        code = int(module.run(parsed))
+    with _tables_watched() as told:
+        code = run_and_keep(module.run, parsed, [*name.split()[1:], *arguments])
         return code or int(bool(told))
+
+
+def parser_of(module: Any, name: str) -> CommandParser:
+    """Parser of a command module, called by `name`, with the options that all commands have."""
+    example = EXAMPLES.get(name.rsplit(maxsplit=1)[-1], "")
+    parser = CommandParser(prog=name, description=module.HELP, epilog=example and f"example: {example}")
+    module.add_arguments(parser)
+    add_telling(parser)
+    return parser
 
 
 @contextmanager

@@ -12,6 +12,7 @@ from ..progress import count
 from ..tables.microgeometry import MicrogeometryTable, ReliefTable
 from ..tables.stiffness import StiffnessTable
 from .arguments import add_job, add_keys, with_keys
+from .common import add_folder
 
 HELP = "tip and root relief, crowning, slope: search for the best at some torques, with its tolerances"
 
@@ -23,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     help_ = "job file with the tables [pair], [stiffness], [microgeometry] and [relief]"
     add_job(parser, "job", help_)
-    parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
+    add_folder(parser)
     add_keys(parser, ReliefTable, "positions", "map_points", "generations", "seed")
     add_keys(parser, StiffnessTable, "coarsen")
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes (default 1); no digit changes")

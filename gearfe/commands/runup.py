@@ -11,6 +11,7 @@ from typing import Any
 
 from ..tables.runup import RunUpTable
 from .arguments import add_job, add_keys, with_keys
+from .common import add_folder
 
 #: Keys of [runup] that options stand for.
 KEYS = ("speed_start_rad_per_s", "speed_stop_rad_per_s", "speeds", "tolerance", "band_Hz", "multiples")
@@ -21,7 +22,7 @@ HELP = "gear train over its speed: steady states on all branches, waterfall, ord
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_job(parser, "job", "job file with the tables [train] and [runup]")
-    parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
+    add_folder(parser)
     parser.add_argument("--variant", metavar="NAME", help="a variant that the job file describes")
     parser.add_argument(
         "--curve", nargs="+", metavar="FILE", default=(), help="stiffness curves (CSV): one, or one a mesh"

@@ -13,6 +13,7 @@ from ..progress import announce, count
 from ..tables.laws import check_law
 from ..tables.stiffness import StiffnessTable
 from .arguments import add_job, add_keys, add_removed, check_option, number, with_keys
+from .common import add_folder
 
 if TYPE_CHECKING:
     from ..stiffness.job import StiffnessJob
@@ -30,7 +31,7 @@ LOADS = ("twist_deg", "torque_Nm")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_job(parser, "job", "job file with the tables [pair] and [stiffness]")
-    parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
+    add_folder(parser)
     add_keys(parser.add_mutually_exclusive_group(), StiffnessTable, *LOADS)
     parser.add_argument("--angles", type=float, nargs=3, metavar=("START", "STEP", "STOP"), help="pinion angles (deg)")
     add_keys(parser, StiffnessTable, *KEYS)

@@ -12,6 +12,7 @@ from typing import Any
 
 from ..progress import count
 from .arguments import add_job
+from .common import add_folder
 
 #: How long a scheduler has to answer.
 PATIENCE_S = 20
@@ -21,7 +22,7 @@ HELP = "one job in many cases: parameters, designs, statistics, sensitivities; g
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_job(parser, "study", "file with a table [study], and the job or its name in it")
-    parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the study's name)")
+    add_folder(parser, default="out/ and the study's name")
     parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one a processor); 1: none beside")
     parser.add_argument("--dask", metavar="ADDRESS", help="run the cases on the Dask cluster with this scheduler")
     parser.add_argument("--restart", action="store_true", help="begin anew, whatever the folder holds")
@@ -58,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
         made = run_study(study, folder, restart=args.restart, progress=count, **where)
     with watch.stage("statistics"):
         summary = made.summary()
-    with whole_set(folder, ("study*.png", "study.parquet")) as place:
+    with whole_set(folder, ("study*.png", "study.parquet"), ("study.csv", "study.json")) as place:
         if args.parquet:
             made.to_parquet(place / "study.parquet")
         if not args.no_pictures:

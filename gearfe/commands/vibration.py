@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from ..progress import count
 from ..tables.train import TrainTable
 from .arguments import add_job, add_keys, with_keys
+from .common import add_folder
 
 if TYPE_CHECKING:
     from ..train.response import TrainResponse
@@ -28,7 +29,7 @@ HELP = "gear train in its housing: contact forces, speeds, vibration, spectrum, 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_job(parser, "job", "job file with the table [train]")
-    parser.add_argument("--out", metavar="DIR", default=None, help="output folder (default: out/ and the job's name)")
+    add_folder(parser)
     parser.add_argument("--variant", metavar="NAME", help="a variant that the job file describes")
     parser.add_argument(
         "--curve", nargs="+", metavar="FILE", default=(), help="stiffness curves (CSV): one, or one a mesh"

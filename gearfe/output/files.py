@@ -22,6 +22,10 @@ Columns = Mapping[str, Any]
 WRITING, LEFTOVER_S = ".writing-", 86400.0
 #: Rows of a table that are text at a time.
 AT_ONCE = 4096
+#: The file that tells of a run, and those that are made from its other files after it.
+SUMMARY, KEPT_LATER = "summary.json", ("report.html", "tables.npz", "tables.h5", "tables.mat", "tables.uff")
+
+_records: list[list[tuple[Path, list[str]]]] = []
 
 
 @contextmanager
@@ -167,7 +171,18 @@ def _plain(value: Any) -> Any:
 
 
 @contextmanager
-def whole_set(folder: Path, may_write: Sequence[str] = ()) -> Iterator[Path]:
+def recorded() -> Iterator[list[tuple[Path, list[str]]]]:
+    """Yield a list that gets the folder and the names of each set of files written inside."""
+    found: list[tuple[Path, list[str]]] = []
+    _records.append(found)
+    try:
+        yield found
+    finally:
+        _records.remove(found)
+
+
+@contextmanager
+def whole_set(folder: Path, may_write: Sequence[str] = (), beside: Sequence[str] = ()) -> Iterator[Path]:
     """Yield a temporary folder inside `folder`; its files move to `folder` when all of them are written, else none.
 
     Parameters
@@ -175,17 +190,23 @@ def whole_set(folder: Path, may_write: Sequence[str] = ()) -> Iterator[Path]:
     may_write
         Patterns of all files that this kind of run can write: those of an earlier run that this one does not replace
         are removed, so that no old picture stands beside new tables.
+    beside
+        Files of the same run that are in the folder already.
     """
     _remove_leftovers(folder)
     with tempfile.TemporaryDirectory(prefix=WRITING, dir=folder) as name:
         made = Path(name)
         yield made
         new = {path.name for path in made.iterdir()}
+        if SUMMARY in new:
+            may_write = (*may_write, *KEPT_LATER)
         for path in sorted(made.iterdir()):
             path.replace(folder / path.name)
         for old in {old for pattern in may_write for old in folder.glob(pattern)}:
             if old.name not in new and old.is_file():
                 old.unlink()
+        for record in _records:
+            record.append((folder, sorted([*new, *beside])))
 
 
 def _remove_leftovers(folder: Path) -> None:

@@ -1,0 +1,137 @@
+"""Options that commands share: what is told, and in which forms the results of a run are kept besides."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import shlex
+import sys
+import time
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Any, TextIO
+
+from ..config import JobFile
+from ..errors import InputError
+from ..progress import shown
+
+#: Formats of ``--format`` beside CSV; their writers are in `gearfe.output.formats`.
+FORMATS = ("npz", "h5", "mat", "uff")
+REPORT = "report.html"
+
+
+def add_folder(parser: argparse.ArgumentParser, default: str = "out/ and the job's name") -> None:
+    """``--out``, and how the results in that folder are kept and told."""
+    parser.add_argument("--out", metavar="DIR", default=None, help=f"output folder (default: {default})")
+    parser.add_argument(
+        "--format",
+        metavar="NAME",
+        default="csv",
+        help=f"tables also as tables.NAME: {', '.join(FORMATS)}, or several, as mat,h5 (default: csv alone)",
+    )
+    parser.add_argument(
+        "--report", action="store_true", help=f"pictures, figures, tables and job in one page, {REPORT}"
+    )
+    parser.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
+
+
+def add_telling(parser: argparse.ArgumentParser) -> None:
+    """``-q`` and ``-v``."""
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument("-q", "--quiet", action="store_true", help="print warnings and errors only")
+    group.add_argument("-v", "--verbose", action="store_true", help="tell each stage of the work as it begins")
+
+
+def run_and_keep(run: Callable[[argparse.Namespace], int], parsed: argparse.Namespace, line: list[str]) -> int:
+    """Run a command, tell what it says as its options ask, and keep the results in the forms asked for."""
+    formats = _formats(getattr(parsed, "format", "csv"))
+    as_json, report = getattr(parsed, "json", False), getattr(parsed, "report", False)
+    if not (formats or as_json or report or parsed.quiet):
+        with shown(verbose=parsed.verbose):
+            return int(run(parsed))
+
+    from ..output.files import recorded
+
+    said = io.StringIO()
+    with redirect_stdout(_Both(said, None if parsed.quiet or as_json else sys.stdout)):
+        with recorded() as folders, shown(io.StringIO() if parsed.quiet else None, verbose=parsed.verbose):
+            code = int(run(parsed))
+        for folder, names in folders:
+            kept = _keep(folder, names, formats, parsed, said.getvalue(), line if report else None)
+            if kept:
+                print(f"also written: {', '.join(kept)}")
+    if as_json:
+        told = {"folder": str(folders[-1][0]), **_summary(*folders[-1])} if folders else {}
+        print(json.dumps({"exit_code": code, **told}, indent=2))
+    return code
+
+
+class _Both(io.TextIOBase):
+    """Text for a buffer and, where there is one, another stream."""
+
+    def __init__(self, kept: io.StringIO, shown_on: TextIO | None) -> None:
+        self._kept, self._shown = kept, shown_on
+
+    def write(self, text: str) -> int:
+        """Write to both."""
+        if self._shown is not None:
+            self._shown.write(text)
+        return self._kept.write(text)
+
+    def flush(self) -> None:
+        """Flush what is seen."""
+        if self._shown is not None:
+            self._shown.flush()
+
+
+def _formats(text: str) -> tuple[str, ...]:
+    """Formats beside CSV that a value of ``--format`` names."""
+    names = [name.strip() for name in text.split(",")]
+    for name in names:
+        if name not in ("csv", *FORMATS):
+            raise InputError("--format", text, "must name formats of " + ", ".join(("csv", *FORMATS)), "as mat,h5")
+    return tuple(dict.fromkeys(name for name in names if name != "csv"))
+
+
+def _keep(
+    folder: Path,
+    names: list[str],
+    formats: tuple[str, ...],
+    parsed: argparse.Namespace,
+    said: str,
+    line: list[str] | None,
+) -> list[str]:
+    """Write the tables in other formats and the report; those of an earlier run that this one does not replace go."""
+    if not formats and line is None:
+        return []
+    from ..output.files import whole_set
+    from ..output.formats import read_csv, write_tables
+    from ..output.report_page import PICTURES, Report, report_page
+
+    tables = {Path(name).stem: read_csv(folder / name) for name in names if name.endswith(".csv")}
+    with whole_set(folder) as made:
+        if formats and tables:
+            write_tables(made, tables, formats)
+        if line is not None:
+            job = next((value for value in vars(parsed).values() if isinstance(value, JobFile)), None)
+            page = Report(
+                title=f"gearfe {line[0]}" + ("" if job is None else f": {Path(job).name}"),
+                command=shlex.join(["gearfe", *line]),
+                said=said,
+                summary=_summary(folder, names),
+                tables=tables,
+                pictures=[folder / name for name in names if Path(name).suffix in PICTURES],
+                job=("", "") if job is None else (str(job), Path(job).read_text(encoding="utf-8-sig")),
+            )
+            (made / REPORT).write_text(report_page(page, time.strftime("%Y-%m-%d %H:%M")), encoding="utf-8")
+        return sorted(path.name for path in made.iterdir())
+
+
+def _summary(folder: Path, names: list[str]) -> dict[str, Any]:
+    """What the run left as JSON: its summary, or the one file that it wrote."""
+    found = [name for name in names if name.endswith(".json")]
+    chosen = "summary.json" if "summary.json" in found else next(iter(found), None)
+    made: dict[str, Any] = {"files": names}
+    return made if chosen is None else {**made, **json.loads((folder / chosen).read_text(encoding="utf-8"))}
