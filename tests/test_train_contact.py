@@ -181,3 +181,43 @@ def test_a_law_that_does_not_reach_says_what_to_ask_for():
     assert made.status == "beyond the mesh law"
     assert made.time_reached < 1.2e-3
     assert any("N m" in warning and "law_torque_Nm" in warning for warning in made.warnings)
+
+
+def runge_kutta(model, times, tolerance):  # type: ignore[no-untyped-def]
+    """Forces and approaches of a train of one mesh by scipy's DOP853, from the forces' plain formulas."""
+    core, W = model.core, model.directions
+    n = len(core.squares)
+
+    def rhs(t, y):  # type: ignore[no-untyped-def]
+        q, v = core.origin + core.T @ y[:n], core.T @ y[n:]
+        force = W @ model.forces.at_one_time(t, q @ W, v @ W)
+        return np.r_[y[n:], core.constant - core.squares * y[:n] - core.damping @ y[n:] + core.T.T @ force]
+
+    y = solve_ivp(rhs, (0.0, times[-1]), np.zeros(2 * n), "DOP853", t_eval=times, rtol=tolerance, atol=1e-20).y
+    u, du = (core.origin + y[:n].T @ core.T.T) @ W, y[n:].T @ core.T.T @ W
+    pushes = [model.forces.of_flank(flank, times, u, du).force for flank in model.forces.flanks]
+    return pushes[0] - pushes[1], u[:, model.forces.flanks[0].direction]
+
+
+@needs_numba
+def test_parting_and_back_flanks_against_runge_kutta():
+    """Lift-off, back flank and return, with friction and both kinds of damping: the error follows the tolerance.
+
+    Steps of order 8 that know nothing of cells and touches; the estimate of the error covers the true one.
+    """
+    law, torque = hertzian_law(relief=3e-6), constant(10.0) + TimeFunction(sines=((25.0, 6e3, 3.2),))
+    scene = pair(law, torque=torque, backlash=8e-6, damping=Damping(ratio=0.005))
+    mesh = dataclasses.replace(scene.meshes[0], damping=300.0, friction=0.05)
+    model, times = build_train(dataclasses.replace(scene, meshes=(mesh,))), np.linspace(0.0, 0.7e-3, 71)
+    force, approach = runge_kutta(model, times, 1e-10)
+    assert (force[1:10] > 0.0).all()
+    assert (force[-10:] > 0.0).all()
+    assert (force < 0.0).sum() > 10
+    assert (force == 0.0).sum() > 10
+    own = 1e-8  # error of Runge-Kutta, from runs at 1e-11 and 1e-12
+    for tolerance in (1e-4, 1e-6, 1e-8):
+        made = simulate(model, times, tolerance=tolerance, estimate=True)
+        off = np.abs(made.contact_force[:, 0] - force).max() / np.abs(force).max()
+        assert off < tolerance + own
+        assert np.abs(made.transmission_error[:, 0] - approach).max() < (tolerance + own) * np.abs(approach).max()
+        assert off < made.estimates["integration"] + own
