@@ -205,7 +205,7 @@ def _index_deviations(table: FlankTable, gear: Gear, where: str, folder: Path) -
     if len(given) != gear.teeth:
         key = "pitch_um" if table.pitch_um else "single_pitch_um"
         problem = f"must have one entry for each of the {gear.teeth} teeth"
-        raise InputError(f"{where}.{key}", len(given), problem, "give as many as the gear has teeth")
+        raise InputError(f"{where}.{key}", f"a list of {len(given)}", problem, "give as many as the gear has teeth")
     return made + given
 
 

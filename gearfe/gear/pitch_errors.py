@@ -107,7 +107,7 @@ def from_single(single: ArrayLike) -> Array:
     left = float(f.sum())
     if abs(left) > CLOSED:
         problem = f"must add up to 0 round the gear, within {1e6 * CLOSED:g} um: the sum is {1e6 * left:.4g} um"
-        raise InputError("single pitch deviations", len(f), problem, "subtract their mean")
+        raise InputError("single_pitch_um", f"a list of {len(f)}", problem, "subtract their mean")
     f = f - left / len(f)
     return np.cumsum(f) - f[0]
 

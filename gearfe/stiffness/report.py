@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import platform
 from collections import Counter
@@ -32,12 +33,15 @@ PACKAGES = ("numpy", "scipy", "gmsh")
 def versions() -> dict[str, str]:
     """Versions of this program, of Python and of the packages that decide the numbers."""
     found = {"gearfe": __version__, "python": platform.python_version()}
-    for name in PACKAGES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "absent"
-    return found
+    return found | {name: _version(name) for name in PACKAGES}
+
+
+@functools.cache  # looks through all packages
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "absent"
 
 
 def cycle_statistics(curve: StiffnessCurve, method: str) -> dict[str, float] | None:

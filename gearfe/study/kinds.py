@@ -113,10 +113,10 @@ def _microgeometry(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Ans
     back = deviations_of(table, job.pair, path.parent, flank={"left": "right", "right": "left"}[table.flank])
     model = checked_model(job)
     elastic = _elastic(job, model, shared)
-    roots = None
+    roots, key = None, _key(job, model)
     if table.root_stress:
-        roots = shared.get(_key(job, model), "roots", lambda: pair_roots(job.pair, elastic))
-    law = half_plane_pair(job.pair, elastic, deviations=deviations)
+        roots = shared.get(key, "roots", lambda: pair_roots(job.pair, elastic))
+    law = shared.get(key, "law", lambda: half_plane_pair(job.pair, elastic)).deviated(deviations)
     made = load_mesh(law, torques, positions=table.positions, mesh_cycles=table.mesh_cycles, roots=roots, back=back)
     rows: dict[str, Any] = {
         "microgeometry": cell_table(made),

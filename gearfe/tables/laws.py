@@ -47,7 +47,7 @@ def check_law(label: str, name: str) -> None:
 def law_class(name: str) -> Any:
     """Class of the law called `name`."""
     check_law("law", name)
-    reference = known_laws()[name]
+    reference = LAWS.get(name) or known_laws()[name]
     module, _, attribute = reference.partition(":")
     try:
         return getattr(importlib.import_module(module), attribute)
