@@ -149,6 +149,22 @@ def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
     return Answer(rows, made.summary, "" if status == "done" else status)
 
 
+def _runup(raw: Raw, path: Path, _shared: Shared, _estimate: bool) -> Answer:
+    from ..runup import report
+    from ..runup.job import described, solved
+    from ..tables.train import train_tables
+    from ..vibration.job import train_job
+
+    table, job = job_tables(raw, path, ("runup",))["runup"], train_job(path, train_tables(raw, path))
+    run, unstable = solved(job, table, watch=Stopwatch())
+    modes, met = report.campbell(run, table.multiples)
+    told = report.warnings(run)
+    made = {**described(job, table), **report.summary(run, modes, table.multiples), "warnings": told}
+    whole = made["speeds_reached"] == made["speeds"]
+    rows = report.tables(run, modes, met, table.multiples, unstable)
+    return Answer(rows, made, "" if whole else "; ".join(told) or "not all speeds were reached")
+
+
 def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
     from ..mechanisms.error_estimate import trajectory_error
     from ..mechanisms.job import output_times, summarise
@@ -207,5 +223,6 @@ _KINDS: dict[str, Callable[[Raw, Path, Shared, bool], Answer]] = {
     "loadmap": _loadmap,
     "microgeometry": _microgeometry,
     "vibration": _vibration,
+    "runup": _runup,
     "mechanism": _mechanism,
 }

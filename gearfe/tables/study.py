@@ -9,7 +9,7 @@ from ..config import quantity
 from ..errors import InputError, unknown_name
 
 #: Kinds of job that a study can vary.
-KINDS = ("stiffness", "loadmap", "microgeometry", "vibration", "mechanism")
+KINDS = ("stiffness", "loadmap", "microgeometry", "vibration", "runup", "mechanism")
 DESIGNS = ("factorial", "latin_hypercube", "sobol", "saltelli", "morris", "rows")
 
 
