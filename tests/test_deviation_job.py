@@ -80,7 +80,7 @@ def test_a_k_chart_and_a_relief_are_the_same() -> None:
         ({"tip_relief_um": 5.0, "tip_relief_end_mm": 14.0, "tip_relief_end_diameter_mm": 54.0}, "stands beside"),
         ({"points": [[6.0, 0.0], [9.0, 1.0]]}, r"points: covers 6 to 9 mm.*must cover"),
         ({"points": [[9.0, 0.0], [9.0, 1.0]]}, "rising"),
-        ({"pitch_um": [1.0, 2.0]}, r"pinion.pitch_um = 2: must have one entry for each of the 20 teeth"),
+        ({"pitch_um": [1.0, 2.0]}, r"pinion.pitch_um = .a list of 2.: must have one entry for each of the 20 teeth"),
         ({"pitch_um": [1.0], "pitch_class": 5}, "stands beside pitch_um"),
         ({"pitch_class": 12}, "<= 11"),
         ({"measured_csv": "none.csv"}, "there is no such file"),

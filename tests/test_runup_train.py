@@ -202,6 +202,29 @@ def test_a_resonance_without_damping_is_told():
     assert {0.8, 0.9, 1.1, 1.2} <= {round(s.speed / resonance, 6) for s in made.states}
 
 
+def test_motions_that_turn_back_out_of_the_range_are_told_and_the_rest_is_found(monkeypatch):
+    """As if the curve of the first motion left the range where it began."""
+    from gearfe.runup import run_up as module
+
+    real, calls = module.follow, []
+
+    def turning(system, speeds, start, **options):  # type: ignore[no-untyped-def]
+        calls.append(float(speeds[0]))
+        made = real(system, speeds, start, **options)
+        short = {"orbits": made.orbits[:1], "branch": made.branch[:1], "turns": ()}
+        return made if len(calls) > 1 else dataclasses.replace(made, **short)
+
+    monkeypatch.setattr(module, "follow", turning)
+    speeds = np.array([400.0, 450.0, 500.0])
+    made = run_up(build_train(loaded([(20, 30)], smooth, ratio=0.05, flexible=False)), speeds)
+    assert {s.speed for s in made.states} == set(speeds.tolist())
+    assert calls == [400.0, 450.0]
+    assert made.notes == (
+        "the motions from 400 rad/s on turn back and leave the range where they began; others were looked for from "
+        "450 rad/s on",
+    )
+
+
 RUNUP = """
 [runup]
 speed_start_rad_per_s = 500.0

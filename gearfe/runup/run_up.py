@@ -156,11 +156,14 @@ def run_up(
             first = len(turns)
             orbits += _numbered(curve, orbits, first)
             turns += [turn.speed for turn in curve.turns]
-            if not curve.note:
-                break
-            notes.append(curve.note)
             reached = max(range(len(left)), key=lambda k: any(o.speed == left[k] for o in curve.orbits) * (k + 1))
-            left = left[reached + 1 :]
+            missing = left[reached + 1 :]
+            if curve.note:
+                notes.append(curve.note)
+            elif len(missing):
+                back = f"the motions from {left[0]:.6g} rad/s on turn back and leave the range where they began"
+                notes.append(f"{back}; others were looked for from {missing[0]:.6g} rad/s on")
+            left = missing
         found: list[ComplexArray | None] = [None] * len(orbits)
         if stability:
             ways = map if executor is None else executor.map
