@@ -8,9 +8,10 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.rigid import constant, integrate
+from gearfe.rigid import TimeFunction, constant, integrate
 from gearfe.rigid.compiled import available
 from gearfe.train import Drive, build_train
+from gearfe.train.forces import LawFlank
 from gearfe.train.motion import motion
 
 from .mesh_laws import hertzian_law
@@ -90,3 +91,54 @@ def test_without_damping_time_runs_back() -> None:
     start = dataclasses.replace(again.start, q=there.q[-1], v=-there.v[-1] - 2.0 * speeds)
     back = integrate(again.system, times, method="taylor", tolerance=1e-11, start=start)
     assert motion(again, back).contact_force[::-1, 0] == pytest.approx(forces, abs=3e-4 * np.abs(forces).max())
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.06])
+def test_driven_rattle_balances_momentum_and_energy(friction: float) -> None:
+    """A light load, 2000 rad/s that swing, damping in contact: balances within 1e-6 at the tolerance 1e-6.
+
+    Momentum of the driven shaft against the impulses on it, and kinetic and elastic energy against the work of drive,
+    load, damping and friction: forces by their plain formulas, integrated by Gauss' rule over each step.
+    """
+    law, torque, backlash = hertzian_law(relief=3e-6), 0.2, 30e-6
+    scene = pair(law, torque=constant(torque), backlash=backlash)
+    mesh = dataclasses.replace(scene.meshes[0], damping=3000.0, friction=friction)
+    speed = constant(2000.0) + TimeFunction(sines=((20.0, 400.0, 0.3),))
+    drive = dataclasses.replace(scene.drive, speed=speed)
+    model = build_train(dataclasses.replace(scene, meshes=(mesh,), drive=drive))
+
+    def run(times):  # type: ignore[no-untyped-def]
+        return integrate(model.system, times, method="taylor", tolerance=1e-6, start=model.start)
+
+    ends = run(np.array([0.0, 0.02])).dense.times
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    inner = ends[:-1, None] + 0.5 * np.diff(ends)[:, None] * (1.0 + nodes)
+    times = np.append(np.hstack([ends[:-1, None], inner]).ravel(), ends[-1])
+    share = np.append(np.hstack([0.0 * ends[:-1, None], 0.5 * np.diff(ends)[:, None] * weights]).ravel(), 0.0)
+    again = run(times)
+    assert np.array_equal(again.dense.times, ends)  # the same steps
+    moved = motion(model, again)
+    line, spin = model.meshes[0], [int(i) + 5 for i in model.first]
+    rates = moved.v[:, spin] + model.angle(times, 1)[:, None] * model.ratios
+    force, approach = moved.contact_force[:, 0], moved.approach[:, 0]
+    assert (force > 0.0).sum() > 1000
+    assert (force < 0.0).sum() > 1000
+    assert (force == 0.0).sum() > 1000
+    phase = model.angle(times) + moved.q[:, spin[0]] + line.phase
+    front, rear = law(phase, approach), law(-phase, -approach - backlash)
+    drag, u, du = 0.0 * times, moved.q @ model.directions, moved.v @ model.directions
+    for flank in model.forces.flanks:
+        made = model.forces.of_flank(flank, times, u, du).drag
+        if made is not None and isinstance(flank, LawFlank) and flank.sliding is not None:
+            columns = model.directions[spin[1], [flank.sliding.across, flank.sliding.spin]]
+            drag = drag + columns @ [made.across, made.turning]
+    pull = line.row[spin[1]] * force + drag
+    inertia = np.array([s.rotor.polar for s in model.shafts])
+    lacks = inertia[1] * (rates[:, 1] - rates[0, 1]) - np.cumsum(share * (torque - pull))
+    assert np.abs(lacks[:: 1 + len(nodes)]).max() < 1e-6 * inertia[1] * np.ptp(rates[:, 1])
+    damped = (force - front.force + rear.force) * (moved.v @ line.row)
+    power = moved.drive_torque * rates[:, 0] + torque * rates[:, 1] - damped - moved.friction_power[:, 0]
+    energy = 0.5 * rates**2 @ inertia + front.energy + rear.energy
+    lacks = energy - energy[0] - np.cumsum(share * power)
+    assert np.abs(lacks[:: 1 + len(nodes)]).max() < 1e-6 * (share * np.abs(power)).sum()
+    assert np.abs(lacks[:: 1 + len(nodes)]).max() < 1e-7 * (0.5 * rates**2 @ inertia).max()

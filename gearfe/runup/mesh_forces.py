@@ -17,7 +17,7 @@ import numpy as np
 
 from ..train.arrays import cubics, law_arrays
 from ..train.forces import CurveFlank, LawFlank
-from ..train.friction import Sliding
+from ..train.friction import Sliding, smooth_sign
 from ..typing import Array, BoolArray, IntArray
 from .balance import Pushes
 from .law_kernel import BEND, BEYOND, CROSS, FORCE, MOMENT, RESULTS, ROWS, TANGENT, jets
@@ -70,7 +70,7 @@ class Rubbing:
     coefficient: Callable[[float], float] | None
 
     def at(self, speed: float) -> Sliding:
-        """Friction at a speed; its tanh is as wide along the path of contact as at the model's."""
+        """Friction at a speed; it sets in as far along the path of contact as at the model's."""
         mu = self.sliding.coefficient if self.coefficient is None else self.coefficient(speed)
         return replace(self.sliding, coefficient=mu, speed=self.sliding.speed * abs(speed / self.speed))
 
@@ -191,8 +191,8 @@ def _drag(
     """Friction of `gearfe.train.friction` with its derivatives."""
     arm = one.radius * (flank.law.pair_phases(phase) - one.pitch_phase)
     turning = one.ratio * speed + rates[:, 2, None]
-    share = np.tanh((rates[:, 1, None] + arm * turning) / one.speed)
-    steep = one.coefficient * pairs * push[:, None] * (1.0 - share**2) / one.speed
+    share, slope = smooth_sign((rates[:, 1, None] + arm * turning) / one.speed)
+    steep = one.coefficient * pairs * push[:, None] * slope / one.speed
     pulls = one.coefficient * share
     drag = pulls * pairs * push[:, None]
     arms = np.stack([np.ones_like(arm), arm])  # of the force and of its moment

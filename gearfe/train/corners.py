@@ -1,12 +1,13 @@
 # mypy: ignore-errors
-"""Where a step of a train's series ends: phases and pair forces that leave their cells, flanks that meet or part.
+"""Where a step of a train's series ends: phases and pair forces that leave their cells, flanks that meet or part,
+flanks that slide fast enough for full friction.
 
 The functions see each other and their constants by name, in plain Python and compiled.
 """
 
 from __future__ import annotations
 
-from .program import BEFORE, GAP, PAIR, PER_FLANK, PHASE, TOUCH, F
+from .program import BEFORE, GAP, PAIR, PER_FLANK, PHASE, SLIDE, TOUCH, UNKNOWN, F
 
 #: Part of a cell's width by which a corner is passed in its prediction, so that the step contains it.
 PAST = 2e-3
@@ -66,6 +67,11 @@ def bounds(w, p, pieces):
             width = p.laws.forces[law, part + 1] - p.laws.forces[law, part]
             return 0.0, (width if part < p.laws.parts[law] - 1 else 1e300), SAME * width
         return -1e300, 0.0, SAME * SMALL
+    if kind == SLIDE:
+        side = pieces[at + PER_FLANK + p.laws.touch.shape[1] + p.watches[w, 3]]
+        if side == 0:
+            return -1.0, 1.0, SAME
+        return (1.0 if side == 1 else -1e300), (-1.0 if side == -1 else 1e300), SAME
     slack = SAME * SMALL if kind == TOUCH else SAME
     return (0.0, 1e300, slack) if pieces[at + 2] >= 0 else (-1e300, 0.0, slack)
 
@@ -87,6 +93,11 @@ def go_on(w, last, x, corner, p, memory, pieces):
         memory[row + BEFORE, slot] = p.laws.forces[law, part] + value if part >= 0 else 0.0
         if up or (down and part >= 0):
             pieces[at + PER_FLANK + slot] = part + 1 if up else part - 1
+            if p.flanks.slides[k] >= 0 and part == 0 and down:
+                pieces[at + PER_FLANK + p.laws.touch.shape[1] + slot] = UNKNOWN
+    elif kind == SLIDE:
+        if up or down:
+            pieces[at + PER_FLANK + p.laws.touch.shape[1] + slot] += 1 if up else -1
     elif kind != PHASE:
         if up or down:
             pieces[at + 2] = 0 if up else -1
@@ -107,6 +118,8 @@ def go_on(w, last, x, corner, p, memory, pieces):
                 inside = 0 <= come < slots
                 pieces[at + PER_FLANK + to] = pieces[at + PER_FLANK + come] if inside else -1
                 memory[row + BEFORE, to] = memory[row + BEFORE, come] if inside else 0.0
+                if p.flanks.slides[k] >= 0:
+                    pieces[at + PER_FLANK + slots + to] = UNKNOWN
 
 
 def leaves(memory, row, last, low, high, slack, limit):

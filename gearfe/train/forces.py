@@ -8,7 +8,7 @@ angle, g the shaft's ratio to it, u a coordinate. With u, u' along the direction
   in the system's stiffness. A flank that may part bears where :math:`u_d > j`;
 - of a *flank with a mesh law* (`gearfe.meshlaw.law`): :math:`-(F\,\langle 1 + \chi u_d'\rangle - k_0 u_d)` along d, and
   :math:`-s M` along r, the driver's rotation relative to the line of centres; with *friction* (`gearfe.train.friction`)
-  :math:`-\sum\mu N_k \tanh(v_k/v_0)` across the line of action, and that times :math:`e_k` along the driver's turn
+  :math:`-\sum\mu N_k s(v_k/v_0)` across the line of action, and that times :math:`e_k` along the driver's turn
   against the driven gear;
 - *gyroscopic*: :math:`-J_p\Omega\,(u_{d+1}', -u_d')`, :math:`\Omega = g\psi' + u_{d+2}'`, on the tilts d, d + 1 of a
   shaft with the spin d + 2;
@@ -33,7 +33,7 @@ from ..rigid.timefunctions import TimeFunction
 from ..stiffness.periodic import PeriodicInterpolant
 from ..typing import Array
 from .arrays import cubics
-from .friction import Sliding
+from .friction import Sliding, smooth_sign
 
 
 class Drag(NamedTuple):
@@ -132,7 +132,7 @@ class LawFlank(Flank):
         e = one.radius * (self.law.pair_phases(phase) - one.pitch_phase)
         spin = one.ratio * rate + du[:, one.spin]
         speed = du[:, one.across, None] + e * spin[:, None]
-        drag = one.coefficient * made.pair_forces * presses[:, None] * np.tanh(speed / one.speed)
+        drag = one.coefficient * made.pair_forces * presses[:, None] * smooth_sign(speed / one.speed)[0]
         friction = Drag(*(np.asarray((drag * arm).sum(axis=1)) for arm in (1.0, e, speed)))
         return FlankForces(made.force * presses, made.moment, friction)
 

@@ -7,10 +7,11 @@ with
 .. math:: v_k = q\cdot\big(\dot u_1(P) - \dot u_2(P)\big) + e_k\,(\Omega_1 - \Omega_2) ,
 
 :math:`\Omega` the whole speeds about the axis a: rolling gears slide with :math:`e_k(\Omega_1 - \Omega_2)`. The driver
-feels :math:`-\mu N_k \tanh(v_k/v_0)\,q`, the driven gear its opposite, :math:`N_k` the pair's normal force, damping
-included. As :math:`v_k` belongs to this force, the loss is :math:`\sum \mu N_k v_k\tanh(v_k/v_0) \ge 0` whatever the
-motion. The pair's place is that on the path of contact: beyond its ends, where edges bear, the lever arms are some
-per cent off.
+feels :math:`-\mu N_k s(v_k/v_0)\,q`, the driven gear its opposite, :math:`N_k` the pair's normal force, damping
+included, with the sign :math:`s(x) = x\,(15 - 10 x^2 + 3 x^4)/8` within :math:`\pm 1` and :math:`\pm 1` beyond: a
+polynomial between two borders that steps end on, where a function as tanh has terms that show too late in a series. As
+:math:`v_k` belongs to this force, the loss is :math:`\sum \mu N_k v_k s(v_k/v_0) \ge 0` whatever the motion. The pair's
+place is that on the path of contact: beyond its ends, where edges bear, the lever arms are some per cent off.
 
 :math:`\mu` is given, or the mean coefficient along the path by Schlenk (ISO/TR 14179-2:2001; Niemann and Winter,
 Maschinenelemente II):
@@ -27,17 +28,27 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..errors import InputError
 from ..gear.mesh_geometry import MeshGeometry
+from ..typing import Array
 
 #: Largest coefficient that is no slip of the pen.
 MOST = 0.5
 #: v0: the sliding speed so many base pitches from the pitch point, at the largest speed of the drive ...
-NEAR = 0.01
+NEAR = 0.02
 #: ... and where the drive stands still (m/s).
-CREEP = 1e-3
+CREEP = 2e-3
 #: Range of the formula: least load of a width (N/m), largest speed of the pitch circles (m/s).
 LEAST_LOAD, FASTEST = 150e3, 50.0
+
+
+def smooth_sign(x: Array) -> tuple[Array, Array]:
+    """s(x) and its slope, see the module's docstring."""
+    inside = np.clip(x, -1.0, 1.0)
+    square = inside * inside
+    return inside * (15.0 - square * (10.0 - 3.0 * square)) / 8.0, 1.875 * (1.0 - square) ** 2
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ Rows of a memory hold series. Inputs are linear in the motion. Each operation th
 
 with a cubic of a phase z (or its slope) whose coefficients n stand in the row of its cell, and the product of two rows.
 The forces of tooth pairs (mesh laws) are solved for between the operations `before` and `after`: from
-:math:`t + \Lambda(z, f) + \sum C F = \delta`, in which their highest order is linear. Friction needs tanh of a row: of
-:math:`s = \tanh x,\ y = 1 - s^2` follows :math:`s' = y x'`. Outputs take rows to the directions of the forces.
+:math:`t + \Lambda(z, f) + \sum C F = \delta`, in which their highest order is linear. Friction needs the
+smoothed sign of a row (`gearfe.train.friction`). Outputs take rows to the directions of the forces.
 """
 
 from __future__ import annotations
@@ -35,17 +35,20 @@ F, FULL, GAP, H1, H2, H3, TOUCHES, ENERGIES, PER_SLOT = range(9)
 COUPLE, NUMBERS, PER_COUPLE = range(3)
 #: Column of the phase of a cell's node, and of F_0 beside the coefficients of t.
 ORIGIN = 4
-#: Rows of a slot's friction: e of the pair, its coefficients, v/v0, tanh of that, 1 - tanh2, e tanh, normal force.
-ARM, LEVER, SPEED, SIGN, REST, TURNS, NORMAL, PER_SLIDE = range(8)
-#: No polynomial, a cubic, its slope; or tanh of a row, into the row after it what is left of 1 - tanh2.
-NOTHING, CUBIC, SLOPE, TANH = range(4)
-#: What a step may not pass: the cell of a phase, touch of a flank with a curve, pull of a damper, the cell of a pair.
-PHASE, TOUCH, PULL, PAIR = range(4)
+#: Rows of a slot's friction: e of the pair, its coefficients, v/v0, its smoothed sign with what makes it, e times
+#: that, normal force.
+ARM, LEVER, SPEED, SIGN, SQUARE, INNER, TURNS, NORMAL, PER_SLIDE = range(9)
+#: No polynomial, a cubic, its slope; or the smoothed sign of a row.
+NOTHING, CUBIC, SLOPE, SMOOTH = range(4)
+#: What a step may not pass: the cell of a phase, touch of a flank with a curve, pull of a damper, the cell of a pair,
+#: the range of its sliding speed.
+PHASE, TOUCH, PULL, PAIR, SLIDE = range(5)
 #: Instead of the number of a piece: no condition.
 ALWAYS = -1
 #: Whole numbers of a flank: mesh cycle, cell, whether it bears (a curve) or damping acts (>= 0: it does); then the
-#: cells of the slots, -1 for pairs that do not bear.
-PER_FLANK = 3
+#: cells of the slots, -1 for pairs that do not bear; with friction the ranges of v/v0: -1, 0 (within +-1), 1, or not
+#: known.
+PER_FLANK, UNKNOWN = 3, 2
 
 
 class Inputs(NamedTuple):
@@ -253,9 +256,9 @@ def _contact(made: Tables, number: int, flank: LawFlank, slots: int) -> int:
     made.force(flank.turn, moment, -flank.sense)
     if flank.damping > 0.0:
         made.watches.append((PULL, number, row + DAMPED, 0))
+    slides = _friction(made, number, flank, row, slots)
     made.watches.append((PHASE, number, row + Z, 0))  # the last: pairs go on to other slots with it
-    slides = _friction(made, flank, row, slots)
-    made.pieces += PER_FLANK + slots
+    made.pieces += PER_FLANK + slots * (1 if flank.sliding is None else 2)
     return slides
 
 
@@ -268,7 +271,7 @@ def _shifts(flank: Flank) -> Array:
     return flank.shifts if isinstance(flank, LawFlank) else np.zeros(1)
 
 
-def _friction(made: Tables, flank: LawFlank, row: int, slots: int) -> int:
+def _friction(made: Tables, number: int, flank: LawFlank, row: int, slots: int) -> int:
     """Friction of the pairs of a flank: its first row, -1 without."""
     sliding = flank.sliding
     if sliding is None:
@@ -281,11 +284,12 @@ def _friction(made: Tables, flank: LawFlank, row: int, slots: int) -> int:
         own, pair = first + PER_SLIDE * slot, row + SLOTS + PER_SLOT * slot
         need = (made.pieces + PER_FLANK + slot, ALWAYS)
         acts = (need[0], made.pieces + 2)
+        made.watches.append((SLIDE, number, own + SPEED, slot))
         made.read(own + SPEED, sliding.across, 1, 0.0, scale)
         made.after += [
             operation(own + ARM, kind=CUBIC, z=row, cell=own + LEVER, needs=need),
             operation(own + SPEED, A=own + ARM, B=spin, keep=1.0, needs=need),
-            operation(own + SIGN, kind=TANH, z=own + SPEED, needs=need),
+            operation(own + SIGN, kind=SMOOTH, z=own + SPEED, cell=need[0] + slots, needs=need),
             operation(own + TURNS, A=own + ARM, B=own + SIGN, needs=need),
             operation(own + NORMAL, A=pair + FULL, B=row + DAMPED, needs=need),
             operation(across, A=own + NORMAL, B=own + SIGN, keep=1.0, needs=acts),

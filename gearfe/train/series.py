@@ -36,8 +36,9 @@ from .program import (
     PER_SLIDE,
     PER_SLOT,
     SLOTS,
-    TANH,
+    SMOOTH,
     TOUCHES,
+    UNKNOWN,
     F,
     train_program,
 )
@@ -159,8 +160,8 @@ def operate(j, operations, first, end, memory, pieces):
         kind = operations.ints[i, 3]
         z = operations.ints[i, 4]
         value = 0.0
-        if kind == TANH:
-            hyperbolic_tangent(j, z, row, memory)
+        if kind == SMOOTH:
+            smoothed_sign(j, z, row, operations.ints[i, 5], memory, pieces)
             continue
         if kind > 0:
             n = operations.ints[i, 5]
@@ -181,21 +182,25 @@ def operate(j, operations, first, end, memory, pieces):
         memory[row, j] = operations.reals[i, 2] * memory[row, j] + operations.reals[i, 1] * value
 
 
-def hyperbolic_tangent(j, x, row, memory):
-    """Order j of s = tanh x in a row and of y = 1 - s2 in the next, from s' = y x'."""
-    if j == 0:
-        s = np.tanh(memory[x, 0])
-        memory[row, 0] = s
-        memory[row + 1, 0] = (1.0 - s) * (1.0 + s)
+def smoothed_sign(j, x, row, piece, memory, pieces):
+    """Order j of s(x) in a row, of x2 and of s / x in the next ones; a range that is not known follows from x."""
+    if j == 0 and pieces[piece] == UNKNOWN:
+        pieces[piece] = 1 if memory[x, 0] > 1.0 else -1 if memory[x, 0] < -1.0 else 0
+    if pieces[piece] != 0:
+        memory[row, j] = float(pieces[piece]) if j == 0 else 0.0
         return
-    value = 0.0
-    for k in range(1, j + 1):
-        value += k * memory[x, k] * memory[row + 1, j - k]
-    memory[row, j] = value / j
-    rest = 0.0
+    square = 0.0
     for k in range(j + 1):
-        rest -= memory[row, k] * memory[row, j - k]
-    memory[row + 1, j] = rest
+        square += memory[x, k] * memory[x, j - k]
+    memory[row + 1, j] = square
+    inner = -1.25 * square
+    for k in range(j + 1):
+        inner += 0.375 * memory[row + 1, k] * memory[row + 1, j - k]
+    memory[row + 2, j] = inner + 1.875 if j == 0 else inner
+    value = 0.0
+    for k in range(j + 1):
+        value += memory[x, k] * memory[row + 2, j - k]
+    memory[row, j] = value
 
 
 def pair_forces(j, slots, memory, row, pieces, at):
@@ -276,6 +281,8 @@ def train_begin(t, sign, u, du, p, forces, memory, pieces):
                 force[slot + shift] = made[slot]
         part = np.minimum(np.searchsorted(flank.law.forces, force, side="right") - 1, len(flank.law.forces) - 2)
         pieces[at + PER_FLANK : at + PER_FLANK + slots] = np.where(force > 0.0, part, -1)
+        if flank.sliding is not None:
+            pieces[at + PER_FLANK + slots : at + PER_FLANK + 2 * slots] = UNKNOWN
         memory[row + BEFORE, :slots] = force
 
 
@@ -307,7 +314,7 @@ def train_series(forces: TrainForces) -> SeriesLaw:
     for module in (tables, corners):
         found = {name: value for name, value in vars(module).items() if name.isupper()}
         constants |= {name: value for name, value in found.items() if isinstance(value, int | float)}
-    own = (step_begins, operate, hyperbolic_tangent, pair_forces, *corners.FUNCTIONS)
+    own = (step_begins, operate, smoothed_sign, pair_forces, *corners.FUNCTIONS)
     return SeriesLaw(
         begin, train_order, train_corner, (*own, time_series), program, rows, pieces, constants,
     )  # fmt: skip
