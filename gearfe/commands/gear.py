@@ -6,12 +6,17 @@ import argparse
 import math
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..progress import stage
 from .arguments import add_job, check_option
 from .common import add_folder
 
+if TYPE_CHECKING:
+    from ..gear.pair import Gear
+
+#: Forms of ``--export``.
+EXPORTS = ("csv", "dxf", "step", "brep")
 HELP = "derived geometry of a gear pair, and a drawing of it in mesh"
 
 
@@ -19,17 +24,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_job(parser, "job", "job file with the table [pair]")
     add_folder(parser)
+    parser.add_argument(
+        "--export",
+        metavar="NAME",
+        default="",
+        help=f"each gear also as {', '.join(EXPORTS)}, or several, as dxf,step: outline of a tooth (csv), of the gear "
+        "(dxf), solid (step, brep); mm",
+    )
     parser.add_argument("--angle-deg", type=float, default=0.0, metavar="X", help="pinion angle of the drawing (deg)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the geometry, write gear_pair.png and gear_pair.json."""
     from ..config import load_job
+    from ..errors import unknown_name
     from ..tables.stiffness import StiffnessTable
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness",))
     check_option("--angle-deg", args.angle_deg, StiffnessTable, "angle_start_deg")
+    exports = [name.strip() for name in args.export.split(",") if name.strip()]
+    for name in exports:
+        if name not in EXPORTS:
+            raise unknown_name("--export", name, EXPORTS)
 
     from ..gear.pair import GearPair
 
@@ -45,16 +62,42 @@ def run(args: argparse.Namespace) -> int:
     geometry = derived_geometry(pair)
     moduli = [material.youngs_modulus for material in job.materials]
     iso = iso_values(pair, moduli[0], moduli[1])
-    with whole_set(folder) as made:
+    with whole_set(folder, tuple(f"{side}.{name}" for side in ("pinion", "wheel") for name in EXPORTS)) as made:
+        for side, gear in (("pinion", pair.pinion), ("wheel", pair.wheel)):
+            for name in exports:
+                with stage(f"writing {side}.{name}"):
+                    _export(made / f"{side}.{name}", gear)
         with stage("drawing"):
             pair_figure(made / "gear_pair.png", pair, math.radians(args.angle_deg), _notes(geometry))
         write_json(made / "gear_pair.json", {**geometry, "iso_6336": iso, "warnings": list(pair.warnings)})
+        names = sorted(path.name for path in made.iterdir())
     _show(geometry)
     _show({"iso_6336": iso})
-    print(f"written to {folder}: gear_pair.json, gear_pair.png")
+    print(f"written to {folder}: " + ", ".join(names))
     for sentence in pair.warnings:
         print(f"gearfe: warning: {sentence}", file=sys.stderr)
     return 0
+
+
+def _export(path: Path, gear: Gear) -> None:
+    """A gear in the form that the suffix names."""
+    import numpy as np
+
+    from ..gear.drawing import gear_outline
+    from ..gear.outline import outline_columns
+    from ..meshing.gear_solid import write_solid
+    from ..output.dxf import write_dxf
+    from ..output.files import write_csv
+
+    if path.suffix == ".csv":
+        write_csv(path, outline_columns(gear))
+    elif path.suffix == ".dxf":
+        circles = {"bore": gear.bore_diameter, "reference_circle": gear.pitch_diameter}
+        radii = {name: 0.5e3 * diameter for name, diameter in circles.items()}
+        radii["base_circle"] = 1e3 * gear.base_radius
+        write_dxf(path, {"outline": np.asarray(gear_outline(gear, 0.0, (0.0, 0.0), per_segment=100))[:-1]}, radii)
+    else:
+        write_solid(path, gear)
 
 
 def _notes(geometry: dict[str, Any]) -> str:

@@ -1,16 +1,24 @@
-"""``gearfe mesh JOB.toml --out FILE``: the meshes of a gear pair for another program."""
+"""``gearfe mesh JOB.toml --out FILE``: the meshes of a gear pair for another program, or a deck that runs there."""
 
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..progress import stage
 from ..tables.stiffness import StiffnessTable
-from .arguments import add_job, add_keys, with_keys
+from .arguments import add_job, add_keys, check_option, with_keys
 
-HELP = "meshes of a gear pair with named boundaries, as .msh, .vtu or .inp"
+if TYPE_CHECKING:
+    from ..meshing.export import MeshPart
+    from ..stiffness.job import StiffnessJob
+
+HELP = "meshes of a gear pair with named boundaries, as .msh, .vtu or .inp, or a CalculiX deck of its contact"
+
+#: Teeth of each gear whose flanks are fine in a deck, where --teeth does not tell.
+DECK_TEETH = 3
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,6 +29,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--gear", choices=("both", "pinion", "wheel"), default="both", help="which gear (default: both)"
     )
     parser.add_argument("--sector", action="store_true", help="one tooth of each gear instead of whole gears")
+    parser.add_argument(
+        "--teeth", type=int, metavar="N", help="fine flanks at the N teeth of each gear in mesh alone, as 3"
+    )
+    parser.add_argument("--angle-deg", type=float, default=0.0, metavar="X", help="pinion angle (deg, default: 0)")
+    parser.add_argument(
+        "--deck",
+        action="store_true",
+        help="an input deck that CalculiX runs as it is: contact at the load of [stiffness] (.inp)",
+    )
+    parser.add_argument("--no-pictures", action="store_true", help="no picture of the mesh beside it")
     add_keys(parser, StiffnessTable, "coarsen", "flank_coarsen")
 
 
@@ -32,30 +50,35 @@ def run(args: argparse.Namespace) -> int:
     tables = load_job(args.job, ("pair",), ("stiffness",))
     table = with_keys(args, tables.get("stiffness", StiffnessTable()), "coarsen", "flank_coarsen")
     table.check("stiffness")
+    check_option("--angle-deg", args.angle_deg, StiffnessTable, "angle_start_deg")
+    _check(args)
 
     from ..gear.pair import GearPair
 
     pair = GearPair.from_table(tables["pair"])  # gears that cannot run together: NumPy alone tells
 
     from ..meshing.export import export_mesh, format_of
-    from ..meshing.recipe import sector_recipes
-    from ..meshing.tooth_sector import sector_mesh
     from ..output.files import output_folder
     from ..stiffness.job import StiffnessJob
 
     format_of(args.out)
     job = StiffnessJob(tables["pair"], table, pair)
     output_folder(Path(args.out).parent)
-    recipes = sector_recipes(job.pair, coarsen=table.coarsen, flank_coarsen=table.flank_coarsen)
-    parts: dict[str, Any] = {}
-    for number, name in enumerate(("pinion", "wheel")):
-        if args.gear in ("both", name):
-            gear = (job.pair.pinion, job.pair.wheel)[number]
-            angle, place = (job.pair.wheel_phase, job.pair.working_centre_distance) if number else (0.0, 0.0)
-            with stage(f"meshing the {name}"):
-                parts[name] = _part(sector_mesh(gear, recipes[number]), angle, place, sector=args.sector)
-    with stage("writing"):
-        counts = export_mesh(args.out, parts, plane=job.table.plane)
+    if args.deck:
+        parts = _deck(args, job)
+        counts = {
+            f"{name}_{key}": len(part.boundaries[key]) for name, part in parts.items() for key in ("bore", "contact")
+        }
+        counts = {**{name: len(part.triangles) for name, part in parts.items()}, **counts}
+    else:
+        parts = _parts(args, job, wheel_angle=pair.wheel_angle_at(math.radians(args.angle_deg)))
+        with stage("writing"):
+            counts = export_mesh(args.out, parts, plane=job.table.plane)
+    if not args.no_pictures:
+        from ..figures.mesh import mesh_figure
+
+        with stage("picture"):
+            mesh_figure(Path(args.out).with_suffix(".png"), parts, None if args.sector else pair)
     nodes = sum(len(part.points) for part in parts.values())
     print(f"written to {args.out}: {nodes} nodes, millimetres, groups with their elements or edges:")
     for name, count in counts.items():
@@ -63,13 +86,92 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _part(mesh: Any, angle: float, x: float, *, sector: bool) -> Any:
-    import numpy as np
+def _check(args: argparse.Namespace) -> None:
+    """Raise `InputError` for options that do not go together."""
+    from ..errors import InputError
 
+    if args.teeth is not None and args.teeth < 1:
+        raise InputError("--teeth", args.teeth, "must be >= 1", "3 reach as far as a common pair meshes")
+    if args.teeth is not None and args.sector:
+        raise InputError("--teeth", args.teeth, "goes with whole gears", "leave out --sector")
+    if args.deck and (args.sector or args.gear != "both"):
+        raise InputError("--deck", None, "needs both whole gears", "leave out --sector and --gear")
+    if args.deck and Path(args.out).suffix.lower() != ".inp":
+        raise InputError("--out", args.out, "must end in .inp for a deck", "as --out pair.inp")
+
+
+def _parts(args: argparse.Namespace, job: StiffnessJob, wheel_angle: float) -> dict[str, MeshPart]:
+    """The meshes in their places, the wheel turned by `wheel_angle` (rad) from where a space faces the pinion."""
+    from ..meshing.recipe import sector_recipes
+    from ..meshing.tooth_sector import sector_mesh
+
+    pair, table = job.pair, job.table
+    recipes = sector_recipes(pair, coarsen=table.coarsen, flank_coarsen=table.flank_coarsen)
+    turned = (math.radians(args.angle_deg), wheel_angle + pair.wheel_phase)
+    parts = {}
+    for number, name in enumerate(("pinion", "wheel")):
+        if args.gear in ("both", name):
+            gear = (pair.pinion, pair.wheel)[number]
+            with stage(f"meshing the {name}"):
+                if args.teeth is None:
+                    made = _uniform(sector_mesh(gear, recipes[number]), sector=args.sector)
+                else:
+                    from ..meshing.mixed_gear import mixed_gear, teeth_in_mesh
+
+                    fine = teeth_in_mesh(gear, turned[number], math.pi * number, min(args.teeth, gear.teeth))
+                    made = mixed_gear(gear, recipes[number], fine)
+            parts[name] = _placed(made, turned[number], pair.working_centre_distance * number)
+    return parts
+
+
+def _uniform(mesh: Any, *, sector: bool) -> MeshPart:
+    """The same elements on all teeth."""
     from ..meshing.export import MeshPart
     from ..meshing.whole_gear import whole_gear
 
-    whole = mesh if sector else whole_gear(mesh)
-    c, s = np.cos(angle), np.sin(angle)
-    points = whole.points @ np.array([[c, s], [-s, c]]) + np.array([x, 0.0])
-    return MeshPart(points, whole.triangles, whole.boundaries)
+    if sector:
+        return MeshPart(mesh.points, mesh.triangles, {**mesh.boundaries, "contact": mesh.contact_edges()})
+    whole = whole_gear(mesh)
+    boundaries = {**whole.boundaries, "contact": whole.contact.reshape(-1, 3)}
+    return MeshPart(whole.points, whole.triangles, boundaries)
+
+
+def _placed(part: MeshPart, angle: float, x: float) -> MeshPart:
+    from dataclasses import replace
+
+    import numpy as np
+
+    c, s = math.cos(angle), math.sin(angle)
+    return replace(part, points=part.points @ np.array([[c, s], [-s, c]]) + np.array([x, 0.0]))
+
+
+def _deck(args: argparse.Namespace, job: StiffnessJob) -> dict[str, MeshPart]:
+    """Solve the position here, and write the deck of the same twist."""
+    import numpy as np
+
+    from .. import __version__
+    from ..errors import InputError
+    from ..meshing.deck import Deck, write_deck
+    from ..stiffness.sweep import sweep_stiffness
+
+    args.teeth = DECK_TEETH if args.teeth is None else args.teeth
+    sweep = {**job.sweep, "angles": np.array([math.radians(args.angle_deg)])}
+    curve = sweep_stiffness(job.pair, **sweep, **job.model)
+    twist, torque = float(curve.twist[0]), float(curve.torque_wheel[0])
+    if not math.isfinite(torque) or twist <= 0.0:
+        raise InputError("--deck", None, f"the position has no solution here ({curve.status[0]})", "try another load")
+    parts = _parts(args, job, wheel_angle=float(curve.wheel_angle[0]) - twist)
+    pair = job.pair
+    width = min(pair.pinion.face_width, pair.wheel.face_width)
+    heading = (
+        f"gearfe {__version__}, {job.table.law}: torque {torque:.9g} N m at the wheel's hub, twist {twist:.9g} rad",
+        f"centre of the wheel x = {1e3 * pair.working_centre_distance:.9g} mm, pinion angle {args.angle_deg:g} deg",
+        "contact acts between the driving flanks of the fine teeth",
+    )
+    materials = [(m.youngs_modulus, m.poisson_ratio) for m in job.materials]
+    deck = Deck(parts, materials, pair.working_centre_distance, twist, width, job.table.plane, heading)
+    with stage("writing"):
+        write_deck(args.out, deck)
+    print(f"run it: ccx {Path(args.out).stem}; torque at the wheel's hub by gearfe: {torque:.6g} N m")
+    print(f"twist of the wheel: {twist:.9g} rad")
+    return parts

@@ -1,0 +1,73 @@
+"""A gear as a solid for CAD: STEP or BREP, through gmsh's OpenCASCADE kernel. Millimetres."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from ..gear.outline import Piece, tooth_outline
+from ..gear.pair import Gear
+from .session import gmsh_session
+
+
+def write_solid(path: Path, gear: Gear) -> None:
+    """Write the gear with its bore, extruded over the face width, its middle plane at z = 0, tooth 0 on +x.
+
+    Arcs are arcs, other pieces cubic splines through 49 points of the exact curve (within 1e-5 mm of it).
+    """
+    with gmsh_session("gear solid") as gmsh:
+        occ = gmsh.model.occ
+        width = 1e3 * gear.face_width
+        loop = occ.addCurveLoop(_outline(occ, gear, -0.5 * width))
+        bore = occ.addCurveLoop([occ.addCircle(0.0, 0.0, -0.5 * width, 0.5e3 * gear.bore_diameter)])
+        occ.extrude([(2, occ.addPlaneSurface([loop, bore]))], 0.0, 0.0, width)
+        occ.synchronize()
+        gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
+        with _without_words():
+            gmsh.write(str(path))
+
+
+@contextmanager
+def _without_words() -> Iterator[None]:
+    """Send what OpenCASCADE's writer prints past every option of gmsh nowhere."""
+    sys.stdout.flush()
+    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nowhere)
+
+
+def _outline(occ: Any, gear: Gear, z: float) -> list[int]:
+    """Curves round the gear, each beginning at the point where the one before ends."""
+    pieces = tooth_outline(gear)
+    turns = [2.0 * math.pi * k / gear.teeth for k in range(gear.teeth)]
+    starts = [[occ.addPoint(*_placed(piece.points[0], turn, z)) for piece in pieces] for turn in turns]
+    around = [tag for tooth in starts for tag in tooth]
+    curves = []
+    for k, turn in enumerate(turns):
+        for i, piece in enumerate(pieces):
+            number = k * len(pieces) + i
+            curves.append(_curve(occ, piece, turn, z, around[number], around[(number + 1) % len(around)]))
+    return curves
+
+
+def _curve(occ: Any, piece: Piece, turn: float, z: float, start: int, end: int) -> int:
+    if piece.arc is not None:
+        return int(occ.addCircleArc(start, occ.addPoint(*_placed(piece.arc[0], turn, z)), end))
+    inner = [occ.addPoint(*_placed(point, turn, z)) for point in piece.points[1:-1]]
+    return int(occ.addSpline([start, *inner, end]))
+
+
+def _placed(point: Any, turn: float, z: float) -> tuple[float, float, float]:
+    c, s = math.cos(turn), math.sin(turn)
+    x, y = 1e3 * float(point[0]), 1e3 * float(point[1])
+    return c * x - s * y, s * x + c * y, z

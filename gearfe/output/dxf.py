@@ -1,0 +1,39 @@
+"""Drawings as DXF (AutoCAD 2000), through ezdxf. Millimetres."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from ..errors import MissingLibraryError
+from ..typing import Array
+
+
+def write_dxf(path: Path, outlines: Mapping[str, Array], circles: Mapping[str, float]) -> None:
+    """Write closed outlines and circles about the origin, each on a layer of its name.
+
+    Parameters
+    ----------
+    outlines
+        Layer -> points (mm), shape (n, 2), without the first one again at the end.
+    circles
+        Layer -> radius (mm).
+
+    Raises
+    ------
+    MissingLibraryError
+        Without ezdxf.
+    """
+    try:
+        import ezdxf
+    except ImportError:
+        raise MissingLibraryError("DXF needs ezdxf: pip install 'gearfe[exchange]'") from None
+    document = ezdxf.new("R2000", units=ezdxf.units.MM)
+    space = document.modelspace()
+    for layer, points in outlines.items():
+        document.layers.add(layer)
+        space.add_lwpolyline(points.tolist(), close=True, dxfattribs={"layer": layer})
+    for layer, radius in circles.items():
+        document.layers.add(layer)
+        space.add_circle((0.0, 0.0), radius, dxfattribs={"layer": layer})
+    document.saveas(path)

@@ -1,0 +1,103 @@
+"""Gears for CAD, read back by the libraries that read such files, against the exact profile."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe.cli import main
+from gearfe.gear.outline import tooth_outline
+from gearfe.gear.pair import Gear
+from gearfe.meshing.gear_solid import write_solid
+from gearfe.meshing.session import gmsh_session
+from gearfe.output.formats import read_csv
+from gearfe.tables.examples import job_file
+
+from .gears import gear
+
+
+def area(wheel: Gear) -> float:
+    """Area of a gear with its bore (mm2), by the divergence theorem over a fine outline."""
+    points = 1e3 * np.concatenate([piece.points[:-1] for piece in tooth_outline(wheel, 1500)])
+    step = 2.0 * math.pi / wheel.teeth
+    turned = points[0] @ np.array([[math.cos(step), math.sin(step)], [-math.sin(step), math.cos(step)]])
+    x, y = np.vstack([points, turned]).T
+    sector = 0.5 * float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))
+    return wheel.teeth * sector - math.pi * (0.5e3 * wheel.bore_diameter) ** 2
+
+
+FORMS = {
+    "rounded": {"tip_round": 1e-4},
+    "undercut": {"profile_shift": -0.3},
+    "shifted": {"profile_shift": 0.5, "rack_tip_radius": 0.1},
+}
+
+
+def test_pieces_of_a_tooth_join_and_have_outward_normals():
+    pieces = tooth_outline(gear(17, tip_round=1e-4, profile_shift=0.2))
+    for one, two in pairwise(pieces):
+        np.testing.assert_allclose(one.points[-1], two.points[0], rtol=0, atol=1e-15)
+    for piece in pieces:  # counter-clockwise: the outside is on the right
+        along = np.diff(piece.points, axis=0)
+        normal = 0.5 * (piece.normals[1:] + piece.normals[:-1])
+        assert (along[:, 0] * normal[:, 1] - along[:, 1] * normal[:, 0] < 0).all(), piece.name
+
+
+@pytest.mark.parametrize(("suffix", "form"), [("step", "rounded"), ("step", "undercut"), ("brep", "shifted")])
+def test_solids_have_the_volume_and_the_flanks_of_the_gear(suffix, form, tmp_path):
+    made = gear(13, **FORMS[form])
+    path = tmp_path / f"gear.{suffix}"
+    write_solid(path, made)
+    flank = 1e3 * made.profile.points_of_roll(np.linspace(made.profile.form_roll, made.profile.round_roll, 37))
+    with gmsh_session() as gmsh:
+        gmsh.model.occ.importShapes(str(path))
+        gmsh.model.occ.synchronize()
+        ((_, solid),) = gmsh.model.getEntities(3)
+        volume = gmsh.model.occ.getMass(3, solid)
+        places = np.column_stack([flank, np.zeros(len(flank))]).ravel()
+        off = np.full(len(flank), np.inf)
+        for _, face in gmsh.model.getEntities(2):
+            found, _ = gmsh.model.getClosestPoint(2, face, places)
+            off = np.minimum(off, np.abs(found - places).reshape(-1, 3).max(axis=1))
+    assert volume == pytest.approx(area(made) * 1e3 * made.face_width, rel=1e-5)
+    assert off.max() < 1e-5  # mm
+
+
+def test_the_command_exports_both_gears(tmp_path, capfd):
+    (tmp_path / "pair.toml").write_text(job_file("stiffness"))
+    line = ["gear", str(tmp_path / "pair.toml"), "--out", str(tmp_path / "out"), "--export"]
+    assert main([*line, "csv,step"]) == 0
+    out = capfd.readouterr().out
+    assert "pinion.csv, pinion.step, wheel.csv, wheel.step" in out
+    assert "*****" not in out  # the CAD kernel's own words
+    table = read_csv(tmp_path / "out" / "wheel.csv")
+    assert table["radius_mm"].max() == pytest.approx(0.5 * (75.0 + 2 * 2.5), abs=1e-9)  # 30 teeth, 2.5 mm
+    assert table["radius_mm"].min() == pytest.approx(0.5 * (75.0 - 2 * 1.25 * 2.5), abs=1e-9)
+    assert set(table["piece"]) >= {"involute_left", "tip_right", "trochoid_left"}
+    assert main([*line, "iges"]) == 2
+    assert "brep, csv, dxf, step" in capfd.readouterr().err
+    # a later export leaves no old solid of other gears
+    assert main([*line, "csv"]) == 0
+    assert not (tmp_path / "out" / "wheel.step").exists()
+
+
+def test_a_drawing_in_layers(tmp_path):
+    ezdxf = pytest.importorskip("ezdxf", reason="pip install 'gearfe[exchange]'")
+    (tmp_path / "pair.toml").write_text(job_file("stiffness"))
+    assert main(["gear", str(tmp_path / "pair.toml"), "--out", str(tmp_path), "--export", "dxf", "-q"]) == 0
+    drawing = ezdxf.readfile(Path(tmp_path / "pinion.dxf"))
+    assert drawing.units == ezdxf.units.MM
+    (outline,) = drawing.modelspace().query('LWPOLYLINE[layer=="outline"]')
+    x, y = np.array(outline.get_points("xy")).T
+    assert outline.closed
+    radii = {circle.dxf.layer: circle.dxf.radius for circle in drawing.modelspace().query("CIRCLE")}
+    assert radii == pytest.approx(
+        {"bore": 5.0, "reference_circle": 25.0, "base_circle": 25.0 * math.cos(math.radians(25))}
+    )
+    made = gear(20, tip_round=1e-4)
+    enclosed = 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+    assert enclosed - math.pi * 25.0 == pytest.approx(area(made), rel=1e-5)
