@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..progress import count
-from ..tables.train import TrainTable
+from ..tables.train import TrainTable, told
 from .arguments import add_job, add_keys, with_keys
 from .common import add_folder
 
@@ -119,8 +119,8 @@ def title(job: TrainJob) -> str:
     table = job.table
     parts = [f"{len(table.shafts)} shafts, {len(table.meshes)} gear meshes"]
     if table.drive is not None:
-        parts.append(f"drive {table.drive.speed_rad_per_s:g} rad/s")
-    parts += [f"load {load.torque_Nm:g} N m on {load.shaft}".replace("-", "−", 1) for load in table.loads[:1]]
+        parts.append("drive " + told(table.drive.speed_rad_per_s, "rad/s"))
+    parts += [f"load {told(x.torque_Nm, 'N m')} on {x.shaft}".replace("-", "−", 1) for x in table.loads[:1]]
     if table.variant:
         parts.append(f"variant {table.variant}")
     return ", ".join(parts)

@@ -78,6 +78,11 @@ class TimeFunction:
         """Times at which one piece hands over to the next (s)."""
         return self.starts[1:]
 
+    @property
+    def ends(self) -> bool:
+        """Whether it is constant in the end."""
+        return not self.sines and not any(self.coefficients[-1][1:])
+
     def integral(self, value: float = 0.0, at: float = 0.0) -> TimeFunction:
         """Antiderivative that takes `value` at the time `at`: a prescribed rate becomes a prescribed angle."""
         rows: list[tuple[float, ...]] = []

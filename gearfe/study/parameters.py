@@ -197,7 +197,7 @@ def key_hint(kind: str, name: str, base: Mapping[str, Any]) -> Any:
             raise unknown_name(where, part, there)  # a body, say: a new one would have no other keys
         hint, there = _below(hint, part, where), there.get(part) if isinstance(there, Mapping) else None
         where = f"{where}.{part}"
-    if any(dataclasses.is_dataclass(option) for option in _options(hint)):
+    if all(dataclasses.is_dataclass(option) for option in _options(hint)):  # a number may be a function of time, too
         raise InputError(where, None, "is a table, not a key", "name a key in it")
     return hint
 

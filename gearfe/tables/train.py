@@ -12,6 +12,7 @@ from typing import Any
 from ..config import job_tables, quantity, read_toml
 from ..errors import InputError, unknown_name
 from .pair import ToothFormTable
+from .timefunction import TrainFunctionTable
 
 Five = tuple[float, float, float, float, float]
 
@@ -157,13 +158,19 @@ class TrainDriveTable:
 
     shaft: str = quantity(doc="shaft that is driven")
     attachment: int | str = quantity(doc="bore against which its rotation is prescribed")
-    speed_rad_per_s: float = quantity(doc="speed about +y (rad/s)")
+    speed_rad_per_s: float | TrainFunctionTable = quantity(  # noqa: RUF009
+        doc="speed about +y (rad/s), or a function of time"
+    )
     ramp_centre_ms: float = quantity(0.0, doc="middle of the smoothed step from rest to the speed (ms)")
     ramp_width_ms: float | None = quantity(None, above=0.0, doc="duration of that step (ms); left out: constant speed")
     stiffness_Nm_per_rad: float | None = quantity(
         None, above=0.0, doc="of an elastic coupling (N m/rad); left out: rigid"
     )
     damping_Nm_s_per_rad: float = quantity(0.0, low=0.0, doc="of that coupling (N m s/rad)")
+
+    def check(self, where: str) -> None:
+        """A ramp is of a number."""
+        _check_ramp(where, "speed_rad_per_s", self.speed_rad_per_s, self.ramp_width_ms)
 
 
 @dataclass(frozen=True)
@@ -172,9 +179,26 @@ class TrainLoadTable:
 
     shaft: str = quantity(doc="shaft that is loaded")
     attachment: int | str | None = quantity(None, doc="bore on which the torque reacts; left out: outside of the train")
-    torque_Nm: float = quantity(doc="torque about +y on the shaft (N m)")
+    torque_Nm: float | TrainFunctionTable = quantity(  # noqa: RUF009
+        doc="torque about +y on the shaft (N m), or a function of time"
+    )
     ramp_centre_ms: float = quantity(0.0, doc="middle of the smoothed step from 0 to the torque (ms)")
     ramp_width_ms: float | None = quantity(None, above=0.0, doc="duration of that step (ms); left out: constant torque")
+
+    def check(self, where: str) -> None:
+        """A ramp is of a number."""
+        _check_ramp(where, "torque_Nm", self.torque_Nm, self.ramp_width_ms)
+
+
+def _check_ramp(where: str, key: str, value: float | TrainFunctionTable, width: float | None) -> None:
+    if isinstance(value, TrainFunctionTable) and width is not None:
+        problem = f"stands beside a function of time in {key}"
+        raise InputError(f"{where}.ramp_width_ms", width, problem, "write the ramp in steps of the function")
+
+
+def told(value: float | TrainFunctionTable, unit: str) -> str:
+    """A number with its unit, or that it changes."""
+    return "changing" if isinstance(value, TrainFunctionTable) else f"{value:g} {unit}"
 
 
 @dataclass(frozen=True)

@@ -56,8 +56,11 @@ def why_not(model: TrainModel) -> str:
     """Why a train has no multipliers, or nothing."""
     drive = model.scene.driven
     reasons = (
-        (bool(drive.speed.sines) or model.steady_speed == 0.0, "the drive has no steady speed"),
-        (any(load.torque.sines for load in model.scene.loads), "a load oscillates: no motion repeats with the meshes"),
+        (not drive.speed.ends or model.steady_speed == 0.0, "the drive has no steady speed"),
+        (
+            not all(load.torque.ends for load in model.scene.loads),
+            "a load changes all the time: no motion repeats with the meshes",
+        ),
         (model.rolling.common_turns is None, model.rolling.note),
         (not len(model.core.squares), "nothing can vibrate: rigid meshes in a rigid housing follow the drive"),
         (

@@ -343,7 +343,7 @@ def _response(
     bodies = 0 if model.housing is None else model.housing.size
     poses, centres = _gear_poses(model, moved)
     speed, common = abs(model.steady_speed), model.rolling.common_turns
-    steady = not scene.drive.speed.sines if scene.drive else False
+    steady = scene.drive.speed.ends if scene.drive else False
     return TrainResponse(
         time=t,
         drive_angle=model.angle(t),

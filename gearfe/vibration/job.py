@@ -19,16 +19,18 @@ from ..errors import InputError, given
 from ..gear.deviation_job import pitch_errors_of
 from ..gear.pair import Gear, GearPair
 from ..meshlaw.law import MeshLaw
-from ..rigid import TimeFunction, constant, smoothed_step
+from ..rigid import TimeFunction, smoothed_step
 from ..stiffness.curve import StiffnessCurve
 from ..tables.housing import HousingTable
 from ..tables.microgeometry import MicrogeometryTable
 from ..tables.pair import DEFAULTS, PairTable
 from ..tables.stiffness import StiffnessTable
+from ..tables.timefunction import TrainFunctionTable
 from ..tables.train import TrainGearTable, TrainMeshTable, TrainTable, read_train_tables
 from ..train.friction import Lubrication
 from ..train.scene import Bearing, Damping, Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
 from ..typing import Array
+from .timefunctions import time_function
 
 if TYPE_CHECKING:
     from ..reduction.modal_body import ModalBody
@@ -126,16 +128,17 @@ def job_scene(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: Mo
         meshes = tuple(_mesh(job, m, c, _friction(m)) for m, c in zip(t.meshes, curves, strict=True))
     drive = None
     if t.drive is not None:
-        speed = _ramp(t.drive.speed_rad_per_s, t.drive.ramp_centre_ms, t.drive.ramp_width_ms)
+        ramp = (t.drive.ramp_centre_ms, t.drive.ramp_width_ms)
+        speed = _over_time(job, t.drive.speed_rad_per_s, *ramp, "train.drive.speed_rad_per_s")
         coupling = (t.drive.stiffness_Nm_per_rad, t.drive.damping_Nm_s_per_rad)
         drive = Drive(t.drive.shaft, str(t.drive.attachment), speed, *coupling)
     loads = tuple(
         Load(
             x.shaft,
             None if x.attachment is None else str(x.attachment),
-            _ramp(x.torque_Nm, x.ramp_centre_ms, x.ramp_width_ms),
+            _over_time(job, x.torque_Nm, x.ramp_centre_ms, x.ramp_width_ms, f"train.loads[{i}].torque_Nm"),
         )
-        for x in t.loads
+        for i, x in enumerate(t.loads)
     )
     damping = Damping(t.damping.ratio, t.damping.rayleigh_alpha_per_s, t.damping.rayleigh_beta_s, t.damping.gyroscopic)
     scene = TrainScene(
@@ -235,8 +238,13 @@ def _friction(table: TrainMeshTable) -> float | Lubrication:
     return Lubrication(1e-3 * table.oil_viscosity_mPa_s, 1e-6 * table.roughness_um, factor)
 
 
-def _ramp(height: float, centre_ms: float, width_ms: float | None) -> TimeFunction:
-    return constant(height) if width_ms is None else smoothed_step(1e-3 * centre_ms, 1e-3 * width_ms, height)
+def _over_time(
+    job: TrainJob, value: float | TrainFunctionTable, centre_ms: float, width_ms: float | None, where: str
+) -> TimeFunction:
+    """A number with its ramp, or a function of time."""
+    if width_ms is None or isinstance(value, TrainFunctionTable):
+        return time_function(value, where, job.path.parent, float(job.times[-1]))
+    return smoothed_step(1e-3 * centre_ms, 1e-3 * width_ms, value)
 
 
 def _rigid_bores(job: TrainJob) -> dict[str, tuple[float, float, float]]:
