@@ -12,12 +12,12 @@ from gearfe.meshlaw.law import MeshLaw
 CYCLE = 2 * math.pi / 20
 
 
-def hertzian_law(cycle: float = CYCLE, *, relief: float = 0.0, backlash: float = 0.0) -> MeshLaw:
+def hertzian_law(cycle: float = CYCLE, *, relief: float = 0.0, backlash: float = 0.0, cells: int = 12) -> MeshLaw:
     """Pairs that yield as Hertz's contacts on springs that vary with the angle, 1.6 of them on average.
 
     Flanks touch late beside the middle part of their path, and by `relief` (m) within it.
     """
-    cells, half = 12, 0.5333 * cycle
+    half = 0.5333 * cycle
     angle = 0.9333 * cycle * -1.0 + cycle * np.arange(2 * cells + 1) / cells
     middle = -0.0
     beyond = np.maximum(np.abs(angle - middle) - half, 0.0)
