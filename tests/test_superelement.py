@@ -141,7 +141,7 @@ def test_units_and_abaqus_matrix_input(unit, force, length, bodies, tmp_path) ->
         ("negative stiffness", {}, "is not positive"),
         ("lost rows", {}, r"has \d+ motions of the attachments without energy"),
         ("", {"stiffness": "none.mtx"}, "there is no such file"),
-        ("", {"stiffness": "text.mtx"}, "neither Matrix Market nor Abaqus' matrix input: line 1 is 'hello'"),
+        ("", {"stiffness": "text.mtx"}, "neither Matrix Market nor Abaqus' matrix input nor DMIG: line 1 is 'hello'"),
         ("", {"stiffness": "cut.mtx"}, "cannot be read as Matrix Market"),
         ("", {"attachments": [{"point_mm": [0, 0, 0], "node": 3}]}, "is not told by Matrix Market files"),
     ],
@@ -203,3 +203,68 @@ def test_commands(bodies, tmp_path, capsys) -> None:
     assert (again == loaded.mass).all()
     own = build(HousingTable, {"body": "second/housing.npz", "damping": {"ratio": 0.01}}, "housing")
     assert reduced_housing(own, tmp_path).damping.any()
+
+
+def card(text: str, large: bool) -> str:
+    """A Nastran field."""
+    return f"{text:<16}" if large else f"{text:<8}"
+
+
+def dmig(name: str, values: np.ndarray, labels: list[tuple[int, int]], *, large: bool) -> str:
+    """A matrix as Nastran punches it: the lower half of a symmetric one, 9 digits (small: 7 characters of a number)."""
+    lines = [f"DMIG    {name:<8}0       6       2       0"]
+    star = "*" if large else " "
+    for j, (node, freedom) in enumerate(labels):
+        cells = [(labels[i], values[i, j]) for i in range(j, len(labels)) if values[i, j]]
+        head = "".join(card(x, large) for x in (name, str(node), str(freedom), ""))
+        told = [(g, c, f"{x:.9E}".replace("E", "D") if large else short(x)) for (g, c), x in cells]
+        rows = ["".join(card(str(x), large) for x in (*row, "")) for row in told]
+        if large:
+            lines += ["DMIG*   " + head, *(f"{star:<8}{row}" for row in rows)]
+        else:
+            lines += ["DMIG    " + head + rows[0]]
+            lines += [" " * 8 + "".join(rows[i : i + 2]) for i in range(1, len(rows), 2)]
+    return "\n".join(lines) + "\n"
+
+
+def short(value: float) -> str:
+    """A number of powers of two in eight characters, as 2.5+10."""
+    digits, power = f"{value:.3e}".split("e")
+    return f"{digits}{int(power):+d}"
+
+
+def test_nastran_punch_file_with_both_matrices(bodies, tmp_path) -> None:
+    """Grid points with six freedoms, scalar points for the modes, stiffness and mass in one file."""
+    body = bodies["held"]
+    size = len(body.mass)
+    labels = [(101 + i // 6, 1 + i % 6) if i < B else (501 + i, 0) for i in range(size)]
+    text = "$ superelement\n" + dmig("KAAX", body.stiffness, labels, large=True)
+    (tmp_path / "box.pch").write_text(text + dmig("MAAX", body.mass, labels, large=True))
+    points = [{"point_mm": list(point), "node": 101 + i} for i, point in enumerate(POINTS)]
+    made = superelement(table(stiffness="box.pch", mass="box.pch", attachments=points), tmp_path)
+    same(body, made, rel=1e-8)  # ten digits stand in the file
+
+
+def test_small_fields_commas_and_freedoms_without_mass(tmp_path) -> None:
+    labels = [(1, 1), (1, 2), (7, 0)]
+    K = np.array([[2.5e10, -4.0, 0.0], [-4.0, 8.0, 0.125], [0.0, 0.125, 1.0]])
+    (tmp_path / "K.bdf").write_text(dmig("K2GG", K, labels, large=False) + "ENDDATA\n")
+    found = read_matrix(tmp_path / "K.bdf", "x")
+    assert found.labels == labels
+    assert (found.values == K).all()
+    (tmp_path / "c.bdf").write_text("DMIG,A,0,6,1,0\nDMIG,A,1,1,,1,1,1.5,,\n,1,2,-2.5+1,\n")
+    assert read_matrix(tmp_path / "c.bdf", "x").values.tolist() == [[1.5, -25.0], [-25.0, 0.0]]
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("DMIG,K,0,6,3,0\nDMIG,K,1,1,,1,1,1.5,1.0\n", "complex"),
+        ("DMIG,A,0,6,2,0\nDMIG,A,1,1,,1,1,1.\nDMIG,B,0,6,2,0\nDMIG,B,1,1,,1,1,1.\n", "there are A, B"),
+        ("DMIG,K,0,6,2,0\nDMIG,K,1,1,,1,1,many\n", "line 2"),
+    ],
+)
+def test_dmig_that_cannot_be_taken(text, part, tmp_path) -> None:
+    (tmp_path / "K.pch").write_text(text)
+    with pytest.raises(InputError, match=part):
+        read_matrix(tmp_path / "K.pch", "housing.superelement.stiffness")

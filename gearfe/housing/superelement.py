@@ -4,12 +4,14 @@ With the attachments' six coordinates :math:`q_b` each and whatever the program 
 the attachments held, :math:`K_{ii}\Phi = M_{ii}\Phi\Lambda`, and the static shapes :math:`\Psi = -K_{ii}^{-1}K_{ib}`
 turn the coordinates to those of `gearfe.ModalBody`, all of them kept: frequencies and response stay the matrices'.
 
-Matrices are in Matrix Market format, or Abaqus' matrix input (lines of node, freedom, node, freedom, value).
+Matrices are in Matrix Market format, Abaqus' matrix input (lines of node, freedom, node, freedom, value), or DMIG
+entries of Nastran.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,6 +23,7 @@ from ..reduction.modal_body import ModalBody
 from ..tables.housing import FORCES, UNITS, AttachmentTable, SuperelementTable
 from ..textfile import read_text
 from ..typing import Array, IntArray
+from .dmig import Entries, Label, read_dmig
 
 #: Parts of the largest entry up to which matrices are symmetric; energy, against the largest, that is none; masses,
 #: relative to each other, that are the same in all directions.
@@ -29,7 +32,6 @@ SYMMETRIC, NO_ENERGY, SAME_MASS = 1e-6, 1e-7, 1e-3
 MASSLESS = 1e-12
 NO_ESTIMATE = "matrices of another program: nothing tells the error of their mesh and reduction"
 MOTIONS = ("x", "y", "z", "rotation about x", "rotation about y", "rotation about z")
-Label = tuple[int, int]
 
 
 class Matrix(NamedTuple):
@@ -48,7 +50,11 @@ def superelement(table: SuperelementTable, folder: str | Path) -> ModalBody:
         For files that cannot be read, matrices that are none of an elastic body, and points that do not fit them.
     """
     field = "housing.superelement"
-    K, M = (read_matrix(Path(folder) / getattr(table, name), f"{field}.{name}") for name in ("stiffness", "mass"))
+    K, M = (
+        read_matrix(Path(folder) / getattr(table, name), f"{field}.{name}", initial)
+        for name, initial in (("stiffness", "K"), ("mass", "M"))
+    )
+    M = _with_rows_of(K, M)
     if K.values.shape != M.values.shape or K.labels != M.labels:
         problem = f"has {len(M.values)} coordinates, the stiffness {len(K.values)}"
         if len(K.values) == len(M.values):
@@ -74,11 +80,26 @@ def superelement(table: SuperelementTable, folder: str | Path) -> ModalBody:
     return _body(k, m, points, table, field)
 
 
-def read_matrix(path: Path, field: str) -> Matrix:
-    """A matrix of Matrix Market format or Abaqus' matrix input; where it is half a symmetric one, the whole."""
+def _with_rows_of(stiffness: Matrix, mass: Matrix) -> Matrix:
+    """The mass with zeros where its file leaves out freedoms that have none."""
+    if not mass.labels or not set(mass.labels) < set(stiffness.labels):
+        return mass
+    place = [stiffness.labels.index(label) for label in mass.labels]
+    values = np.zeros_like(stiffness.values)
+    values[np.ix_(place, place)] = mass.values
+    return Matrix(values, stiffness.labels)
+
+
+def read_matrix(path: Path, field: str, initial: str = "K") -> Matrix:
+    """A matrix of Matrix Market format, Abaqus' matrix input or DMIG; where it is half a symmetric one, the whole.
+
+    Of several matrices in a DMIG file that one is taken whose name begins with `initial`.
+    """
     text = read_text(path, field)
     if text.lstrip().lower().startswith("%%matrixmarket"):
         return Matrix(_market(path, field), [])
+    if re.search(r"^DMIG[ *,]", text, re.MULTILINE | re.IGNORECASE):
+        return _assembled(read_dmig(text, path, field, initial), field, path)
     made: dict[tuple[Label, Label], float] = {}
     for number, line in enumerate(text.splitlines(), start=1):
         if not line.strip() or line.lstrip().startswith("*"):
@@ -88,10 +109,17 @@ def read_matrix(path: Path, field: str) -> Matrix:
             a, b, c, d = (int(cell) for cell in cells[:4])
             (value,) = (float(cell) for cell in cells[4:])
         except ValueError:
-            problem = f"is neither Matrix Market nor Abaqus' matrix input: line {number} is {line.strip()[:60]!r}"
+            problem = (
+                f"is neither Matrix Market nor Abaqus' matrix input nor DMIG: line {number} is {line.strip()[:60]!r}"
+            )
             cure = "begin it with %%MatrixMarket, or write lines of node, freedom, node, freedom, value"
             raise InputError(field, path.name, problem, cure) from None
         made[(a, b), (c, d)] = value
+    return _assembled(made, field, path)
+
+
+def _assembled(made: Entries, field: str, path: Path) -> Matrix:
+    """The matrix of single entries."""
     labels = sorted({label for both in made for label in both})
     place = {label: i for i, label in enumerate(labels)}
     values = np.zeros((len(labels), len(labels)))

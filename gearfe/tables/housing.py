@@ -129,7 +129,7 @@ class AttachmentTable:
         low=1,
         doc="rows of u_x, u_y, u_z and the rotations in the matrices, from 1 on; left out: six by six in order",
     )
-    node: int | None = quantity(None, doc="or its node, in Abaqus' matrix input")
+    node: int | None = quantity(None, doc="or its node, in Abaqus' matrix input or DMIG")
 
     def check(self, where: str) -> None:
         """Raise `InputError` for keys that contradict each other."""
@@ -143,7 +143,9 @@ class AttachmentTable:
 class SuperelementTable:
     """Matrices of another program in place of a mesh."""
 
-    stiffness: str = quantity(doc="file of the stiffness matrix: Matrix Market, or Abaqus' matrix input")
+    stiffness: str = quantity(
+        doc="file of the stiffness matrix: Matrix Market, Abaqus' matrix input, or Nastran's DMIG"
+    )
     mass: str = quantity(doc="file of the mass matrix")
     unit: str = quantity(
         "m", choices=("m", "mm", "in"), doc="of these matrices: m (N, m, kg), mm (N, mm, t) or in (lbf, in, s)"
