@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from typing import NamedTuple
 
 import numpy as np
@@ -81,3 +83,24 @@ def test_arrays_that_are_not_contiguous_or_of_another_type_are_refused():
         Packed(Inner(np.zeros(8)[::2], np.zeros(2, dtype=np.int64), 1.0))
     with pytest.raises(TypeError, match="chosen: int32"):
         Packed(Inner(np.zeros(8), np.zeros(2, dtype=np.int32), 1.0))
+
+
+@needs_numba
+def test_code_in_the_cache_is_found_by_another_process(tmp_path, monkeypatch):
+    """With a block as argument, whose type another process makes anew."""
+    monkeypatch.setenv("GEARFE_CACHE", str(tmp_path))
+    told = [
+        subprocess.run(
+            [sys.executable, "-c", "from tests.test_kernel_compiling import hits; print(*hits())"],
+            capture_output=True, text=True, check=True,
+        ).stdout.split()
+        for _ in range(2)
+    ]  # fmt: skip
+    assert told == [["0", "1", "5"], ["1", "0", "5"]]
+
+
+def hits() -> tuple[int, int, int]:
+    """How often a kernel was found in the cache, and not; what it returned."""
+    names = compiled.bind((weighted, fill_out), {}, compiled=True, entries=("fill_out",))
+    made = names.fill_out(Packed(sample()))
+    return sum(names.fill_out.stats.cache_hits.values()), sum(names.fill_out.stats.cache_misses.values()), made

@@ -32,7 +32,7 @@ from ..meshing.tooth_sector import SectorMesh
 from ..typing import Array, IntArray
 from .dissection import Condensed, condense
 from .flank import Flank, flank_of, normal_stress_rows
-from .laws import ContactLaw, HalfPlane, uses_stress
+from .laws import ContactLaw, check_deviations, uses_stress
 from .position import FlankLoads
 
 
@@ -278,22 +278,6 @@ class MeshingPair:
     def centre(self, gear: int) -> Array:
         """Centre of the pinion (0) or wheel (1), shape (2,) (m)."""
         return np.array([gear * self.centre_distance, 0.0])
-
-
-def check_deviations(deviations: tuple[ToothDeviations, ToothDeviations], law: ContactLaw) -> None:
-    """Raise `InputError` for deviations that a law, or the one mesh cycle of a curve or map, cannot have."""
-    for name, own in zip(("pinion (driver)", "wheel (driven)"), deviations, strict=True):
-        if not own.alike:
-            what = "stand unevenly" if len(set(own.turn)) > 1 else "have different flanks"
-            problem = f"its teeth {what}: curves, load maps and mesh laws are of one mesh cycle that repeats"
-            cure = (
-                "leave out pitch errors, measured teeth that differ, and waves that are no multiple of the teeth; "
-                'gearfe microgeometry takes them, and pitch errors also trains with law = "map"'
-            )
-            raise InputError(f"deviations of the {name}", None, problem, cure)
-    if deviations != NOMINAL and not isinstance(law, HalfPlane):
-        problem = "takes flanks from meshes, which have no deviations of micrometres"
-        raise InputError("law", law.name, problem, 'write law = "half_plane", or leave [microgeometry] out')
 
 
 def turn(angle: float) -> Array:

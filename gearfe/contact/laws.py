@@ -36,6 +36,7 @@ import numpy as np
 
 from ..config import fields_of
 from ..errors import InputError
+from ..gear.deviation import NOMINAL, ToothDeviations
 from ..tables.laws import law_class
 from ..typing import Array, BoolArray
 
@@ -176,3 +177,19 @@ def law_named(name: str, **parameters: Any) -> ContactLaw:
             raise InputError(f"law_parameters.{key}", value, problem, cure)
     made: ContactLaw = kind(**parameters)
     return made
+
+
+def check_deviations(deviations: tuple[ToothDeviations, ToothDeviations], law: ContactLaw) -> None:
+    """Raise `InputError` for deviations that a law, or the one mesh cycle of a curve or map, cannot have."""
+    for name, own in zip(("pinion (driver)", "wheel (driven)"), deviations, strict=True):
+        if not own.alike:
+            what = "stand unevenly" if len(set(own.turn)) > 1 else "have different flanks"
+            problem = f"its teeth {what}: curves, load maps and mesh laws are of one mesh cycle that repeats"
+            cure = (
+                "leave out pitch errors, measured teeth that differ, and waves that are no multiple of the teeth; "
+                'gearfe microgeometry takes them, and pitch errors also trains with law = "map"'
+            )
+            raise InputError(f"deviations of the {name}", None, problem, cure)
+    if deviations != NOMINAL and not isinstance(law, HalfPlane):
+        problem = "takes flanks from meshes, which have no deviations of micrometres"
+        raise InputError("law", law.name, problem, 'write law = "half_plane", or leave [microgeometry] out')

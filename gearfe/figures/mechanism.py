@@ -13,34 +13,35 @@ from ..output.files import whole_file
 from ..progress import count, stage
 from ..rigid import Trajectory
 from ..rigid.modes import Modes
+from .style import fixed, new_figure, save_fixed
 
 
 @stage("pictures")
 def draw_figures(folder: Path, mechanism: Mechanism, results: Results) -> None:
     """curves.png (outputs over time, with reference markers where the file names a table) and picture.png."""
-    plt = _pyplot()
     trajectory = results.trajectory
     if len(trajectory.time) > 1:
-        _curves(plt, folder / "curves.png", mechanism, results)
+        _curves(folder / "curves.png", mechanism, results)
     asked = mechanism.file.run.picture_s
     time = trajectory.time[-1] if asked is None else min(asked, trajectory.time[-1])
-    figure, axes = plt.subplots(figsize=(7, 6))
+    figure = fixed(7, 6)
+    axes = figure.add_axes((0.12, 0.09, 0.85, 0.84))
     _paths(axes, mechanism, trajectory.q)
     q = trajectory.dense(np.array([time]))
     _draw(axes, mechanism, q)
     _frame(axes, mechanism, trajectory.q)
     axes.set_title(f"{mechanism.file.title or 'mechanism'} at {time:g} s")
-    _save(plt, figure, folder / "picture.png")
+    save_fixed(figure, folder / "picture.png")
     if mechanism.links:
-        _links(plt, folder / "links.png", mechanism, results)
+        _links(folder / "links.png", mechanism, results)
 
 
 def draw_modes(folder: Path, mechanism: Mechanism, q: np.ndarray, modes: Modes) -> None:
     """modes.png: the first six shapes, 15 % of the mechanism's length at the largest, over the state of rest."""
-    plt = _pyplot()
     count = min(6, len(modes.rates))
     columns = min(3, count)
-    figure, axes = plt.subplots(-(-count // columns), columns, figsize=(4 * columns, 3.4 * -(-count // columns)))
+    figure = new_figure(4 * columns, 3.4 * -(-count // columns))
+    axes = figure.subplots(-(-count // columns), columns)
     size = 0.15 * mechanism.planar.assembly.length / mechanism.system.units
     for k, ax in enumerate(np.ravel(axes)):
         if k >= count:
@@ -54,19 +55,20 @@ def draw_modes(folder: Path, mechanism: Mechanism, q: np.ndarray, modes: Modes) 
         _frame(ax, mechanism, np.stack([q, moved, q - size * shape]))
         ax.set_aspect("equal", adjustable="datalim")
         ax.set_title(f"{k + 1}: {modes.frequencies[k]:.4g} Hz", fontsize=9)
-    _save(plt, figure, folder / "modes.png")
+    save_fixed(figure, folder / "modes.png")
 
 
 @stage("animation")
 def draw_animation(folder: Path, mechanism: Mechanism, trajectory: Trajectory) -> None:
     """animation.gif with the number of frames that the file asks for."""
-    plt = _pyplot()
     from matplotlib.animation import PillowWriter
 
     frames = mechanism.file.run.frames
     times = np.linspace(trajectory.time[0], trajectory.time[-1], frames)
     states = trajectory.dense(times)
-    figure, axes = plt.subplots(figsize=(4.8, 4.2), dpi=80)
+    figure = fixed(4.8, 4.2)
+    figure.set_dpi(80)
+    axes = figure.add_axes((0.16, 0.12, 0.8, 0.8))
     writer = PillowWriter(fps=25)
     with whole_file(folder / "animation.gif") as temporary, writer.saving(figure, str(temporary), dpi=80):
         for done, (time, q) in enumerate(zip(times, states, strict=True)):
@@ -77,17 +79,20 @@ def draw_animation(folder: Path, mechanism: Mechanism, trajectory: Trajectory) -
             _frame(axes, mechanism, trajectory.q)
             axes.set_title(f"{time:.4g} s", fontsize=9)
             writer.grab_frame()
-    plt.close(figure)
 
 
-def _curves(plt: Any, path: Path, mechanism: Mechanism, results: Results) -> None:
+def _curves(path: Path, mechanism: Mechanism, results: Results) -> None:
     table = mechanism.file.figure
     names = table.curves or tuple(results.outputs)
     if not names:
         return
     time = results.trajectory.time
     reference = reference_table(mechanism)
-    figure, all_axes = plt.subplots(len(names), 1, sharex=True, figsize=(8, 1.2 + 1.7 * len(names)), squeeze=False)
+    height = 1.2 + 1.7 * len(names)
+    figure = fixed(8, height)
+    room = {"left": 0.13, "right": 0.98, "top": 1.0 - 0.15 / height, "bottom": 0.55 / height, "hspace": 0.12}
+    all_axes = figure.subplots(len(names), 1, sharex=True, squeeze=False, gridspec_kw=room)
+    shown = False
     for axes, name in zip(all_axes[:, 0], names, strict=True):
         axes.plot(time, results.outputs[name], lw=1.2)
         column = table.reference_columns.get(name)
@@ -95,17 +100,20 @@ def _curves(plt: Any, path: Path, mechanism: Mechanism, results: Results) -> Non
             period = next(o.wrap for o in mechanism.file.outputs if o.name == name)
             value = reference[column] if period is None else np.mod(reference[column], period)
             axes.plot(reference["t"][:: table.every], value[:: table.every], "o", ms=3, mfc="none", label="reference")
-            axes.legend(loc="upper right", fontsize=7)
-        axes.set_ylabel(name, fontsize=7)
+            if not shown:
+                axes.legend(loc="upper right", fontsize=8)
+            shown = True
+        axes.set_ylabel(name, fontsize=8)
         axes.grid(alpha=0.3)
     all_axes[-1, 0].set_xlabel("time in s")
-    _save(plt, figure, path)
+    save_fixed(figure, path)
 
 
-def _links(plt: Any, path: Path, mechanism: Mechanism, results: Results) -> None:
+def _links(path: Path, mechanism: Mechanism, results: Results) -> None:
     """links.png: axial force and bending moment along every link, the range over the run and the last time."""
     count = len(mechanism.links)
-    figure, rows = plt.subplots(count, 3, figsize=(11, 1.0 + 2.2 * count), squeeze=False)
+    figure = new_figure(11, 1.0 + 2.2 * count)
+    rows = figure.subplots(count, 3, squeeze=False)
     for axes, (name, link) in zip(rows, mechanism.links.items(), strict=True):
         s = link.beam.link.stations
         values = [1e3 * link.offsets(results.trajectory.q)[:, :, 1]]
@@ -120,7 +128,7 @@ def _links(plt: Any, path: Path, mechanism: Mechanism, results: Results) -> None
         axes[0].legend(fontsize=7)
     for ax in rows[-1]:
         ax.set_xlabel("s in m")
-    _save(plt, figure, path)
+    save_fixed(figure, path)
 
 
 def _points(mechanism: Mechanism) -> list[tuple[int, list[tuple[float, float]]]]:
@@ -197,19 +205,3 @@ def _frame(axes: Any, mechanism: Mechanism, q: np.ndarray) -> None:
     axes.grid(alpha=0.3)
     axes.set_xlabel("x in m")
     axes.set_ylabel("y in m")
-
-
-def _pyplot() -> Any:
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    return plt
-
-
-def _save(plt: Any, figure: Any, path: Path) -> None:
-    figure.tight_layout()
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, dpi=130)
-    plt.close(figure)

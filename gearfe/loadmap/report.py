@@ -13,9 +13,10 @@ from ..gear.derived import derived_geometry
 from ..gear.validity import overlaps, told_overlaps
 from ..stiffness.contact_pressure import largest_pressures
 from ..stiffness.job import StiffnessJob
-from ..stiffness.report import cure_of, pressure_lines, versions
+from ..stiffness.report import cure_of, pressure_lines
 from ..tables.loadmap import LoadMapTable
 from ..typing import Array
+from ..versions import versions
 from .load_map import LoadMap
 from .root_map import GEARS
 

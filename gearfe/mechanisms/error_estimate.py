@@ -26,6 +26,8 @@ from .results import Results, evaluate
 
 #: The finer runs' tolerance is that much smaller, their longest step that share of the median step of the first one.
 SHARPER, SHORTER, SAFETY = 30.0, 0.6, 2.0
+#: Runs of the length of one with an estimate: itself, and two with shorter steps.
+RUNS = 1.0 + 2.0 / SHORTER
 LEAST_TOLERANCE = 1e-13
 #: Below this a smaller tolerance leaves the steps of series as they are, so that the longest step alone makes a run
 #: finer: then it is that share of the shortest step, for at most so many times the steps.

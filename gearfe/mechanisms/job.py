@@ -16,7 +16,7 @@ from ..output.files import output_folder, whole_set, write_csv, write_json
 from ..progress import stage
 from ..rigid import Start, integrate
 from ..rigid.inverse import prescribed_motion
-from .error_estimate import TrajectoryError, trajectory_error
+from .error_estimate import RUNS, TrajectoryError, trajectory_error
 from .model import Mechanism
 from .results import Results, evaluate, reactions, reference_table
 
@@ -78,6 +78,7 @@ def run_mechanism(
         trajectory, estimate = prescribed_motion(mechanism.system, start, times), False
     else:
         options: dict[str, Any] = {"method": method, "tolerance": tolerance, "raise_on_failure": False}
+        options["runs"] = RUNS if estimate else 1.0
         trajectory = integrate(mechanism.system, times, start=start, **options)
     integrated = clock.perf_counter()
     compiling = float(trajectory.statistics.get("compile_seconds", 0.0))

@@ -2,34 +2,22 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
-from collections.abc import Mapping, Sequence
-from functools import cache
-from pathlib import Path
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
-from ..cache import cached_arrays
 from ..contact.half_plane import (
     HalfPlanePair,
     coupling_compliances,
-    half_plane_pair,
     solve_half_plane,
 )
-from ..contact.laws import law_named
 from ..contact.position import Positions
 from ..errors import InputError
-from ..gear.pair import GearPair
 from ..gear.touching import Touching
-from ..progress import stage
-from ..stiffness.curve_cache import curve_key
-from ..stiffness.sweep import elastic_pair
 from ..typing import Array, IntArray
 from .fit import Couple, PairForces, TouchCurve, fit_law, touch_cubics
 from .law import NEVER, MeshLaw
-from .store import law_arrays, law_of_arrays
 
 #: Cells of the phase in a mesh cycle, at least, and pinion angles in each at which contacts are solved.
 CELLS, SAMPLES = 24, 3
@@ -44,31 +32,6 @@ LOOKS = 6
 #: Corners of the touching curve are nodes; others are left out so near to them, and of corners so near to each other
 #: one stays (parts of a cell).
 NEAR, SAME = 0.4, 0.02
-
-
-def cached_law(pair: GearPair, model: Mapping[str, Any], force: float) -> MeshLaw:
-    """Law of a pair for mesh forces up to `force` (N), from disk when it was made before.
-
-    Parameters
-    ----------
-    model
-        Keyword arguments of `gearfe.stiffness.sweep.elastic_pair`; the contact law is the half-plane law in any case.
-    """
-    own = {**model, "law": law_named("half_plane")}
-
-    def made() -> dict[str, Array]:
-        with stage("mesh law"):
-            return law_arrays(mesh_law(half_plane_pair(pair, elastic_pair(pair, **own)), force))
-
-    recipe = [curve_key(pair, own, {"force": force}), _source()]
-    return law_of_arrays(cached_arrays("mesh-law", recipe, made))
-
-
-@cache
-def _source() -> str:
-    """Hash of the text of this room."""
-    files = sorted(Path(__file__).parent.glob("*.py"))
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
 def mesh_law(pair: HalfPlanePair, force: float) -> MeshLaw:

@@ -15,9 +15,9 @@ from ..gear.deviation_job import GEARS, active_rolls, deviations_of, modificatio
 from ..gear.pair import GearPair
 from ..loadmap.root_stress import PairRoots
 from ..stiffness.job import StiffnessJob
-from ..stiffness.report import versions
 from ..tables.microgeometry import VARIABLES, MicrogeometryTable, ReliefTable
 from ..typing import Array
+from ..versions import versions
 from .relief import ReliefResult
 from .relief_problem import Evaluation, ReliefProblem, Variable
 

@@ -14,9 +14,9 @@ from ..gear.deviation_job import GEARS
 from ..gear.pair import GearPair
 from ..gear.validity import overlaps, told_overlaps
 from ..stiffness.job import StiffnessJob
-from ..stiffness.report import versions
 from ..tables.microgeometry import MicrogeometryTable
 from ..typing import Array
+from ..versions import versions
 from .loaded_mesh import BACK, LoadedMesh
 
 #: Harmonics of the mesh order in the table by torque.

@@ -53,6 +53,7 @@ def integrate(
     longest: float = math.inf,
     most_steps: int = 1_000_000,
     raise_on_failure: bool = True,
+    runs: float = 1.0,
 ) -> Trajectory:
     """Integrate a system over the given times.
 
@@ -81,6 +82,9 @@ def integrate(
         Give up after this number of steps.
     raise_on_failure : bool
         Raise where the end is not reached; without it the trajectory as far as it came is returned, with its status.
+    runs : float
+        How many runs of this length the caller makes by the way chosen here, this one included: they share what
+        loading compiled kernels costs.
 
     Returns
     -------
@@ -100,7 +104,7 @@ def integrate(
     _check(asked, method, tolerance, backend)
     if start is None:
         start = _default_start(system, float(asked[0]))
-    ways = ways_of(system, start, asked, method, backend, {"tolerance": tolerance, "longest": longest})
+    ways = ways_of(system, start, asked, method, backend, {"tolerance": tolerance, "longest": longest}, runs)
     with np.errstate(over="ignore", invalid="ignore"):  # a state that is not finite has a status of its own
         if len(ways) == 1:
             dense, status, statistics = ways[0].run(start, asked, most_steps, partial(_counted, start.time, asked[-1]))
@@ -156,7 +160,7 @@ def _dropped_rows_hold(system: System, start: Start, dense: Dense, tolerance: fl
 
 
 def ways_of(
-    system: System, start: Start, times: Array, method: str, backend: str, options: dict[str, Any]
+    system: System, start: Start, times: Array, method: str, backend: str, options: dict[str, Any], runs: float = 1.0
 ) -> list[Way]:
     """Ways to integrate that `method` and `backend` leave open, the one to begin with first."""
     planar = system.planar is not None
@@ -178,7 +182,7 @@ def ways_of(
     plain = Way("taylor", "plain", partial(_taylor, system, False, options), PLAIN_TRIAL)
     if not use_compiled(backend):
         return [plain, implicit] if auto else [plain]
-    loading = loading_seconds()
+    loading = loading_seconds() / runs
     quick = Way("taylor", "compiled", partial(_taylor, system, True, options), loading, loading, COMPILED_FASTER)
     if backend == "compiled" or loading <= plain_seconds_spent():
         return [quick, implicit] if auto else [quick]

@@ -8,7 +8,6 @@ was made from.
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -34,8 +33,10 @@ class Packed:
     """
 
     def __init__(self, named: Any) -> None:
+        from .packed_type import PackedType  # numba
+
         words: list[int] = []
-        self._numba_type_ = packed_type(_lay_out(named, words))
+        self._numba_type_ = PackedType(_lay_out(named, words))
         self._held = named, np.array(words, dtype=np.int64)
         self.address = _address(self._held[1])
 
@@ -66,101 +67,8 @@ def _address(array: np.ndarray) -> int:
     return int(array.__array_interface__["data"][0])
 
 
-def _size(member: Any) -> int:
+def size_of(member: Any) -> int:
     """Words of a member."""
     if isinstance(member[0], str):
         return max(1, 1 + int(member[1]))
-    return sum(_size(inner) for _, inner in member)
-
-
-@lru_cache
-def packed_type(layout: Layout) -> Any:
-    """Numba's type of such a block."""
-    return _taught()(layout)
-
-
-@lru_cache(maxsize=1)
-def _taught() -> Any:
-    """Class of the types, which numba has been taught."""
-    from llvmlite import ir
-    from numba.core import types
-    from numba.core.typing.templates import AttributeTemplate
-    from numba.extending import (
-        NativeValue,
-        infer_getattr,
-        lower_getattr_generic,
-        models,
-        register_model,
-        unbox,
-    )
-    from numba.np import arrayobj
-
-    numbers = {"d": types.float64, "l": types.int64, "L": types.uint64}
-
-    class PackedType(types.Type):
-        def __init__(self, layout: Layout) -> None:
-            self.layout = layout
-            super().__init__(name=f"Packed({layout})")
-
-        def member(self, name: str) -> tuple[int, Any]:
-            """First word and layout of a member."""
-            first = 0
-            for own, inner in self.layout:
-                if own == name:
-                    return first, inner
-                first += _size(inner)
-            raise AttributeError(name)
-
-    @register_model(PackedType)
-    class _Model(models.PrimitiveModel):
-        def __init__(self, manager: Any, kind: Any) -> None:
-            super().__init__(manager, kind, ir.IntType(64).as_pointer())
-
-    def kind_of(inner: Any) -> Any:
-        if not isinstance(inner[0], str):
-            return PackedType(inner)
-        return numbers[inner[0]] if inner[1] < 0 else types.Array(numbers[inner[0]], inner[1], "C")
-
-    @infer_getattr
-    class _Members(AttributeTemplate):
-        key = PackedType
-
-        def generic_resolve(self, kind: Any, name: str) -> Any:
-            return kind_of(kind.member(name)[1]) if name in dict(kind.layout) else None
-
-    @lower_getattr_generic(PackedType)
-    def _get(context: Any, builder: Any, kind: Any, block: Any, name: str) -> Any:
-        first, inner = kind.member(name)
-        word = ir.IntType(64)
-
-        def place(k: int) -> Any:
-            return builder.gep(block, [word(first + k)], inbounds=True)
-
-        def load(k: int, as_float: bool = False) -> Any:
-            where = builder.bitcast(place(k), ir.DoubleType().as_pointer()) if as_float else place(k)
-            read = builder.load(where)
-            read.set_metadata("invariant.load", builder.module.add_metadata([]))
-            return read
-
-        if not isinstance(inner[0], str):
-            return place(0)
-        if inner[1] < 0:
-            return load(0, inner[0] == "d")
-        array_type = kind_of(inner)
-        array = arrayobj.make_array(array_type)(context, builder)
-        shape = [load(1 + axis) for axis in range(inner[1])]
-        strides = [word(8)]
-        for length in reversed(shape[1:]):
-            strides.insert(0, builder.mul(length, strides[0]))
-        data = builder.inttoptr(load(0), context.get_value_type(array_type.dtype).as_pointer())
-        arrayobj.populate_array(array, data=data, shape=shape, strides=strides, itemsize=word(8), meminfo=None)
-        return array._getvalue()
-
-    @unbox(PackedType)
-    def _unbox(_: Any, value: Any, c: Any) -> Any:
-        number = c.pyapi.object_getattr_string(value, "address")
-        address = c.pyapi.long_as_longlong(number)
-        c.pyapi.decref(number)
-        return NativeValue(c.builder.inttoptr(address, ir.IntType(64).as_pointer()))
-
-    return PackedType
+    return sum(size_of(inner) for _, inner in member)

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..config import load_job
-from ..contact.compliance import check_deviations
-from ..contact.laws import ContactLaw, law_named
+from ..contact.laws import ContactLaw, check_deviations, law_named
 from ..elasticity import Material
 from ..errors import InputError
 from ..gear.deviation import NOMINAL, ToothDeviations

@@ -2,46 +2,26 @@
 
 from __future__ import annotations
 
-import functools
 import math
-import platform
 from collections import Counter
 from collections.abc import Mapping
-from importlib import metadata
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import __version__
 from ..errors import InputError
 from ..gear.derived import derived_geometry, iso_values
 from ..gear.deviation_job import GEARS
 from ..gear.modifications import CHECKED, ends_of
 from ..gear.validity import overlaps, told_overlaps
+from ..versions import versions
 from .contact_pressure import largest_pressures
 from .curve import StiffnessCurve
 from .job import StiffnessJob
 
 #: Allowable contact stress of case-hardened steel for unlimited life (Pa): ISO 6336-5, material quality MQ.
 ALLOWABLE_STRESS = 1500e6
-
-#: Packages whose versions decide the numbers.
-PACKAGES = ("numpy", "scipy", "gmsh")
-
-
-def versions() -> dict[str, str]:
-    """Versions of this program, of Python and of the packages that decide the numbers."""
-    found = {"gearfe": __version__, "python": platform.python_version()}
-    return found | {name: _version(name) for name in PACKAGES}
-
-
-@functools.cache  # looks through all packages
-def _version(name: str) -> str:
-    try:
-        return metadata.version(name)
-    except metadata.PackageNotFoundError:
-        return "absent"
 
 
 def cycle_statistics(curve: StiffnessCurve, method: str) -> dict[str, float] | None:

@@ -155,7 +155,7 @@ def run_study(
     InputError
         Outputs that the job does not give, a folder with another study, a study whose first cases all have no answer.
     """
-    from ..stiffness.report import versions
+    from ..versions import versions
 
     folder = Path(folder)
     base = check_outputs(study)

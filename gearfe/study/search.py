@@ -80,7 +80,7 @@ class Search:
         executor: Executor | None = None,
         progress: Callable[[int, int, str], None] | None = None,
     ) -> None:
-        from ..stiffness.report import versions
+        from ..versions import versions
 
         check_outputs(study)
         self.study = study

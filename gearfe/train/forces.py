@@ -21,6 +21,7 @@ the driving one's at the mirrored phase, behind the backlash j.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -55,7 +56,7 @@ class FlankForces(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Flank:
+class Flank(ABC):
     """One side of a mesh.
 
     Attributes
@@ -77,6 +78,10 @@ class Flank:
     phase: float
     mean: float
     gap: float
+
+    @abstractmethod
+    def forces(self, angle: Array, rate: Array, u: Array, du: Array) -> FlankForces:
+        """Forces at rotations of the drive (rad) and their rates, (n,), u and du of shape (n, directions)."""
 
     def place(self, angle: Array, u: Array) -> tuple[Array, Array]:
         """Phase (rad) and approach beyond the gap (m), u of shape (n, directions)."""
@@ -176,18 +181,19 @@ class TrainForces:
         """Flanks with mesh laws."""
         return tuple(f for f in self.flanks if isinstance(f, LawFlank))
 
-    def of_flank(self, flank: Flank, t: Array, u: Array, du: Array) -> FlankForces:
-        """Forces of a flank at the times t (n,), u and du of shape (n, directions)."""
-        assert isinstance(flank, CurveFlank | LawFlank)
-        return flank.forces(self.angle(t), self.angle(t, 1), u, du)
-
-    def __call__(self, t: Array, u: Array, du: Array) -> Array:
-        """Forces at the times t (n,), u and du of shape (n, directions); shape (n, directions)."""
-        out = np.zeros_like(u)
+    def of_flanks(self, t: Array, u: Array, du: Array) -> list[FlankForces]:
+        """Forces of each flank at the times t (n,), u and du of shape (n, directions)."""
         angle, rate = self.angle(t), self.angle(t, 1)
-        for flank in self.flanks:
-            assert isinstance(flank, CurveFlank | LawFlank)
-            made = flank.forces(angle, rate, u, du)
+        return [flank.forces(angle, rate, u, du) for flank in self.flanks]
+
+    def __call__(self, t: Array, u: Array, du: Array, flanks: list[FlankForces] | None = None) -> Array:
+        """Forces at the times t (n,), u and du of shape (n, directions); shape (n, directions).
+
+        `flanks`: what `of_flanks` says, where it is known already.
+        """
+        out = np.zeros_like(u)
+        rate = self.angle(t, 1)
+        for flank, made in zip(self.flanks, flanks or self.of_flanks(t, u, du), strict=True):
             out[:, flank.direction] += flank.mean * u[:, flank.direction] - made.force
             if made.moment is not None:
                 out[:, flank.turn] -= flank.sense * made.moment

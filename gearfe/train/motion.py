@@ -8,6 +8,7 @@ import numpy as np
 
 from ..rigid import Trajectory
 from ..typing import Array
+from .forces import FlankForces
 from .model import TrainModel
 
 
@@ -43,17 +44,21 @@ class Motion:
 
 def motion(model: TrainModel, trajectory: Trajectory) -> Motion:
     """Motion at the trajectory's times."""
-    core, t = model.core, trajectory.time
-    if trajectory.method in ("taylor", "explicit"):
+    core, t, W = model.core, trajectory.time, model.directions
+    by_modes = trajectory.method in ("taylor", "explicit")
+    if by_modes:
         state = trajectory.dense.state(t)  # type: ignore[attr-defined]
         n = core.T.shape[1]
         y, dy = state[:, :n], state[:, n:]
         q, v = core.origin + y @ core.T.T, dy @ core.T.T
-        ddy = core.constant - y * core.squares - dy @ core.damping.T + forces(model, t, q, v) @ core.T
-        a = ddy @ core.T.T
     else:
         q, v, a = trajectory.q, trajectory.v, trajectory.a
-    multipliers = joint_multipliers(model, t, q, v, a)
+    u, du = q @ W, v @ W
+    flanks = model.forces.of_flanks(t, u, du)
+    acting = model.forces(t, u, du, flanks) @ W.T
+    if by_modes:
+        a = (core.constant - y * core.squares - dy @ core.damping.T + acting @ core.T) @ core.T.T
+    multipliers = joint_multipliers(model, q, v, a, acting)
     drive = model.scene.driven
     if drive.stiffness is None:
         push = -multipliers["drive"][:, 0]
@@ -61,7 +66,7 @@ def motion(model: TrainModel, trajectory: Trajectory) -> Motion:
         row = model.spin_reference[[s.name for s in model.scene.shafts].index(drive.shaft)]
         push = -drive.stiffness * (q @ row) - drive.damping * (v @ row)
     rows = np.array([line.row for line in model.meshes]).reshape(-1, q.shape[1])
-    force, drag, loss = contact_forces(model, t, q, v, multipliers)
+    force, drag, loss = contact_forces(model, v, flanks, multipliers)
     drivers = [line.driver for line in model.meshes]
     spin = [int(model.first[i]) + 5 for i in drivers]
     speed = model.angle(t, 1)[:, None] * model.ratios[drivers] + v[:, spin]
@@ -69,28 +74,20 @@ def motion(model: TrainModel, trajectory: Trajectory) -> Motion:
     return Motion(t, q, v, a, force, q @ rows.T, push, speed * (arms * force + drag), loss)
 
 
-def forces(model: TrainModel, t: Array, q: Array, v: Array) -> Array:
-    """All forces but the constant blocks on the system's coordinates, shape (n, size)."""
-    W = model.directions
-    made: Array = model.forces(t, q @ W, v @ W) @ W.T
-    return made
-
-
 def contact_forces(
-    model: TrainModel, t: Array, q: Array, v: Array, multipliers: dict[str, Array]
+    model: TrainModel, v: Array, flanks: list[FlankForces], multipliers: dict[str, Array]
 ) -> tuple[Array, Array, Array]:
     """Of each mesh F (N): spring and damper, or the multiplier of a rigid mesh; of back flanks negative. Then of its
     friction the torque against the driver (N m) and the power that it takes (W).
     """
-    out, torque, power = np.zeros((3, len(t), len(model.meshes)))
-    u, du = q @ model.directions, v @ model.directions
-    flanks = iter(model.forces.flanks)
+    out, torque, power = np.zeros((3, len(v), len(model.meshes)))
+    found = iter(flanks)
     for i, line in enumerate(model.meshes):
         if line.rigid:
             out[:, i] = multipliers[f"mesh {line.name}"][:, 0]
             continue
         for side in (1.0,) if line.backlash is None else (1.0, -1.0):
-            made = model.forces.of_flank(next(flanks), t, u, du)
+            made = next(found)
             out[:, i] += side * made.force
             if line.sliding is not None and made.drag is not None:
                 torque[:, i] += line.sliding.arm * made.drag.across + made.drag.turning
@@ -100,13 +97,14 @@ def contact_forces(
     return out, torque, power
 
 
-def joint_multipliers(model: TrainModel, t: Array, q: Array, v: Array, a: Array) -> dict[str, Array]:
-    """Multipliers of each joint, (n, rows): the least ones where joints are redundant.
+def joint_multipliers(model: TrainModel, q: Array, v: Array, a: Array, acting: Array) -> dict[str, Array]:
+    """Multipliers of each joint, (n, rows): the least ones where joints are redundant; `acting` are the forces of the
+    train on the coordinates, (n, size).
 
     From ``M a = f - G^T lambda``, so the force on the coordinates is ``-G^T lambda``.
     """
     system = model.system
-    left = forces(model, t, q, v) - v @ system.damping.T - q @ system.stiffness - a @ system.mass
+    left = acting - v @ system.damping.T - q @ system.stiffness - a @ system.mass
     multipliers = left @ model.multipliers_of_forces
     found, at = {}, 0
     for element, _ in system.joints:

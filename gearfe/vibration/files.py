@@ -132,7 +132,7 @@ def write_run(
     every: int = 1,
     further: Mapping[str, Any] | None = None,
     progress: Callable[[int, int, str], None] | None = None,
-    again: Callable[[TrainScene], Callable[[Array], Iterable[TrainResponse]]] | None = None,
+    again: Callable[[TrainScene, str], Callable[[Array], Iterable[TrainResponse]]] | None = None,
     band_hz: float = 5000.0,
     started: float | None = None,
 ) -> Written:
@@ -149,7 +149,8 @@ def write_run(
     draw
         Draws the pictures.
     again
-        Makes the same of a changed train: the summary's numbers then have estimates of their errors.
+        Makes the same of a changed train by the method that the run took: the summary's numbers then have estimates
+        of their errors.
     band_hz
         Upper end of the band (Hz) in which the reduction's error is told.
     started
@@ -173,7 +174,8 @@ def write_run(
 
         def repeated(changed: TrainScene) -> Run:
             assert again is not None
-            found = follow(again(changed)(times), times, every, record=recorded(times, choice))
+            method = str(response.statistics["method"])
+            found = follow(again(changed, method)(times), times, every, record=recorded(times, choice))
             return Run(train_summary(found, {}), found.spectra)
 
         made = followed(times, choice)

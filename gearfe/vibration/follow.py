@@ -141,7 +141,7 @@ def follow(
 class RunningMean:
     """Mean over the last whole periods after `begin` of values that arrive piece by piece.
 
-    The integral is that of cubic splines through the samples, so its ends need not lie on them. Without a whole period
+    The integral is that of cubics through the samples, so its ends need not lie on them. Without a whole period
     (or without any) the mean is that of all times after `begin`, and the number of periods 0.
 
     Parameters
@@ -165,8 +165,6 @@ class RunningMean:
 
     def add(self, time: Array, values: Array) -> None:
         """Go on with samples (n,), (n, k)."""
-        from scipy.interpolate import CubicSpline
-
         if not len(time):
             return
         if self._last is not None:
@@ -174,7 +172,7 @@ class RunningMean:
         self._last = time[-_SHARED:], values[-_SHARED:]
         end = float(time[-1])
         if len(time) > 1 and end > self._to:
-            self._total = self._total + CubicSpline(time, values).integrate(max(self._to, float(time[0])), end)
+            self._total = self._total + _integral(time, values, max(self._to, float(time[0])))
             self._to = end
 
     @property
@@ -183,6 +181,19 @@ class RunningMean:
         if not self._to > self._from:
             return np.full(0 if self._last is None else self._last[1].shape[1], np.nan)
         return np.asarray(self._total) / (self._to - self._from)
+
+
+def _integral(time: Array, values: Array, begin: float) -> Array:
+    """From `begin` to the last of the times, (k,), of the cubics through samples (n, k) with slopes by differences."""
+    at = max(int(np.searchsorted(time, begin, side="right")) - 1, 0)
+    slope = np.gradient(values, time, axis=0, edge_order=2 if len(time) > 2 else 1)
+    h = np.diff(time)[:, None]
+    whole = 0.5 * h * (values[:-1] + values[1:]) + h * h / 12.0 * (slope[:-1] - slope[1:])
+    x, h0 = begin - time[at], float(h[at, 0])  # less the part of its interval before `begin`
+    rise, (m0, m1) = (values[at + 1] - values[at]) / h0, slope[at : at + 2]
+    c2, c3 = (3.0 * rise - 2.0 * m0 - m1) / h0, (m0 + m1 - 2.0 * rise) / h0**2
+    before = x * (values[at] + x * (m0 / 2.0 + x * (c2 / 3.0 + x * c3 / 4.0)))
+    return np.asarray(whole[at:].sum(axis=0) - before)
 
 
 @dataclass

@@ -6,12 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..contact.compliance import check_deviations
-from ..contact.laws import ContactLaw
 from ..errors import InputError, given
 from ..gear.deviation import NOMINAL, ToothDeviations
 from ..gear.deviation_job import deviations_of
@@ -23,6 +21,9 @@ from ..train.kinematics import driving_senses, steady_forces
 from ..train.mesh_element import mean_value
 from ..train.scene import GearMesh, TrainScene
 from .job import Stiffness, TrainJob, job_scene
+
+if TYPE_CHECKING:
+    from ..contact.laws import ContactLaw
 
 #: A mesh law is made for so many times the torque in steady running: vibration has room.
 ROOM = 5.0
@@ -152,7 +153,7 @@ def _computed_curve(
 def _computed_law(job: TrainJob, scene: TrainScene, number: int, estimate: bool) -> MeshLaw:
     """Mesh law of a mesh with the driver as pinion; meshes of the same gears share the one for the largest torque."""
     from ..contact.laws import law_named
-    from ..meshlaw.make import cached_law
+    from ..meshlaw.cached import cached_law
     from ..stiffness.curve_cache import cached_curve
     from ..stiffness.job import StiffnessJob
 
@@ -207,6 +208,8 @@ def _deviations(
     mapped = (job.table.meshes[number].law or job.table.curves.law) == "map"
     if mapped:  # pitch errors are the train's own
         driving, back = ((replace(a, turn=(0.0,)), replace(b, turn=(0.0,))) for a, b in (driving, back))
+    from ..contact.laws import check_deviations
+
     check_deviations(driving, law)
     if (mesh.backlash is not None or (mapped and pair.normal_backlash > 0.0)) and back != driving:
         problem = f"left and right flanks differ, but mesh {mesh.name!r} takes its back flanks as its driving ones"

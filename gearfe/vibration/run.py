@@ -8,13 +8,13 @@ from dataclasses import asdict
 from typing import Any
 
 from ..record_spectrum import finer, subdivided
-from ..stiffness.report import versions
 from ..train import build_train
 from ..train.kinematics import driving_senses
 from ..train.phases import tooth_places
 from ..train.response import TrainResponse
 from ..train.scene import TrainScene
 from ..train.simulate import simulate_in_pieces
+from ..versions import versions
 from .job import TrainJob, job_scene, train_body
 from .mesh_stiffness import train_curves
 from .report import stiffness_ranges
@@ -48,12 +48,14 @@ def band(job: TrainJob) -> float:
     return 5000.0 if job.housing is None else job.housing.reduction.band_Hz
 
 
-def repeater(job: TrainJob, every: int) -> Callable[[TrainScene], Callable[[Any], Iterator[TrainResponse]]]:
-    """The same run with another train, as many samples in an output step; differences of runs need fewer digits."""
+def repeater(job: TrainJob, every: int) -> Callable[[TrainScene, str], Callable[[Any], Iterator[TrainResponse]]]:
+    """The same run with another train by a method, as many samples in an output step; differences of runs need fewer
+    digits.
+    """
 
-    def again(scene: TrainScene) -> Callable[[Any], Iterator[TrainResponse]]:
+    def again(scene: TrainScene, method: str) -> Callable[[Any], Iterator[TrainResponse]]:
         model = build_train(scene)
-        options: dict[str, Any] = {"tolerance": max(job.table.tolerance, ROUGH), "method": job.table.method}
+        options: dict[str, Any] = {"tolerance": max(job.table.tolerance, ROUGH), "method": method}
         return lambda times: simulate_in_pieces(model, subdivided(times, every), **options)
 
     return again

@@ -1,0 +1,26 @@
+"""Versions of the program and of what decides its numbers."""
+
+from __future__ import annotations
+
+import functools
+import platform
+from importlib import metadata
+
+from . import __version__
+
+#: Packages whose versions decide the numbers.
+PACKAGES = ("numpy", "scipy", "gmsh")
+
+
+def versions() -> dict[str, str]:
+    """Versions of this program, of Python and of the packages that decide the numbers."""
+    found = {"gearfe": __version__, "python": platform.python_version()}
+    return found | {name: _version(name) for name in PACKAGES}
+
+
+@functools.cache  # looks through all packages
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "absent"
