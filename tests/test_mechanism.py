@@ -333,8 +333,8 @@ def test_the_core_knows_no_mechanism():
     import tokenize
 
     for path in (ROOT / "gearfe").rglob("*.py"):
-        if path.relative_to(ROOT / "gearfe").parts[0] in ("benchmark", "stress"):
-            continue  # the rooms that run the shipped scenes
+        if path.relative_to(ROOT / "gearfe").parts[0] == "commands":
+            continue  # their help shows the shipped files
         text = path.read_text()
         tree = ast.parse(text)
         prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
