@@ -37,6 +37,7 @@ TABLES: dict[str, str] = {
     "housing": "gearfe.tables.housing:HousingTable",
     "train": "gearfe.tables.train:TrainTable",
     "runup": "gearfe.tables.runup:RunUpTable",
+    "spectrum": "gearfe.tables.spectrum:SpectrumTable",
     "study": "gearfe.tables.study:StudyTable",
 }
 

@@ -6,6 +6,7 @@ import argparse
 import math
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,9 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--curve", nargs="+", metavar="FILE", default=(), help="stiffness curves (CSV): one, or one a mesh"
     )
     add_keys(parser, TrainTable, *KEYS)
-    parser.add_argument("--window", metavar="NAME", default="none", help="none, hann, hamming, blackman or flattop")
+    parser.add_argument("--window", metavar="NAME", help="none, hann, hamming, blackman or flattop")
     parser.add_argument(
-        "--spectrum-from-ms", type=float, metavar="T", default=0.0, help="begin of the spectrum's record"
+        "--spectrum-from-ms", type=float, metavar="T", help="begin of the spectrum's record (default: [spectrum], or 0)"
     )
     parser.add_argument("--spectrum-ms", type=float, metavar="T", help="its duration (default: to the end)")
     parser.add_argument("--attachment", metavar="NAME", help="attachment in the pictures (default: that of the load)")
@@ -60,13 +61,15 @@ def run(args: argparse.Namespace) -> int:
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
     tables = read_train_tables(args.job, args.variant)
     tables["train"] = with_keys(args, tables["train"], *KEYS)
-    check_range(args.spectrum_from_ms, "--spectrum-from-ms", {"low": 0.0, "doc": "begin of the record (ms)"})
+    if args.spectrum_from_ms is not None:
+        check_range(args.spectrum_from_ms, "--spectrum-from-ms", {"low": 0.0, "doc": "begin of the record (ms)"})
     if args.spectrum_ms is not None:
         check_range(args.spectrum_ms, "--spectrum-ms", {"above": 0.0, "doc": "duration of the record (ms)"})
 
     from ..figures.train import TrainPictures
     from ..output.files import output_folder
     from ..stopwatch import Stopwatch
+    from ..vibration.analysis import Analysis, options, record_start
     from ..vibration.files import OutputChoice, check_choice, write_run
     from ..vibration.job import train_job
     from ..vibration.run import band, described, repeater, simulated
@@ -79,16 +82,19 @@ def run(args: argparse.Namespace) -> int:
             animation=not args.no_animation,
             attachment=args.attachment,
             picture_time=None if args.picture_ms is None else 1e-3 * args.picture_ms,
-            window=args.window,
-            spectrum_start=1e-3 * args.spectrum_from_ms,
-            spectrum_length=None if args.spectrum_ms is None else 1e-3 * args.spectrum_ms,
+            spectrum_start=1e-3 * (args.spectrum_from_ms or 0.0),
+            **options(job.spectrum, args.window, args.spectrum_ms),
         )
-        check_choice(choice, job.times, tuple(str(a) for s in job.table.shafts for a in s.attachments))
+        bores = tuple(str(a) for s in job.table.shafts for a in s.attachments)
+        check_choice(choice, job.times, bores)
         folder = output_folder(args.out or Path("out") / Path(args.job).stem)
     estimate = not args.no_estimate
     scene, pieces, every = simulated(
         job, args.curve, watch=watch, progress=count, floquet=not args.no_floquet, estimate=estimate
     )
+    start = record_start(job, scene, every, args.spectrum_from_ms, watch.stage)
+    choice = replace(choice, spectrum_start=start)
+    check_choice(choice, job.times, bores)
     written = write_run(
         folder,
         scene,
@@ -97,6 +103,7 @@ def run(args: argparse.Namespace) -> int:
         choice,
         watch=watch,
         draw=None if args.no_pictures else TrainPictures(title(job)),
+        beside=Analysis(job, scene, every, start),
         every=every,
         further=described(job, scene),
         progress=count,

@@ -13,10 +13,12 @@ from ..train.response import TrainResponse
 from ..train.scene import TrainScene
 from ..train.static_error import static_errors
 from ..typing import Array, IntArray
+from ..vibration.analysis import Analysed
 from ..vibration.fields import frames
 from ..vibration.follow import Followed
 from ..vibration.report import attachment_acceleration
 from ..vibration.spectra import TrainSpectra
+from .short_time import draw_measured, draw_spectrogram, draw_tracks
 from .spectra import draw_power, draw_spectrum
 from .style import BLUE, COLOURS, GREY, RED, fixed, panel, save_fixed
 from .train_scene import draw_scene
@@ -40,6 +42,15 @@ class TrainPictures:
         draw_spectrum(folder / "spectrum.png", response, spectra, attachment, self.title)
         if spectra.power is not None:
             draw_power(folder / "radiated_power.png", response, spectra, spectra.power, self.title)
+
+    def analysis(self, folder: Path, made: Analysed, spectra: TrainSpectra | None, attachment: str) -> None:
+        """``spectrogram.png``, ``order_tracks.png``, ``measured.png``, those that there is something for."""
+        if made.falls:
+            draw_spectrogram(folder / "spectrogram.png", made, attachment, self.title)
+        if made.tracks is not None:
+            draw_tracks(folder / "order_tracks.png", made, made.tracks, attachment, self.title)
+        if made.measured:
+            draw_measured(folder / "measured.png", made, spectra, self.title)
 
     def fields(self, path: Path, scene: TrainScene, response: TrainResponse, steps: IntArray) -> str:
         """Fields at some output times; returns an empty text, or why nothing was drawn."""

@@ -25,7 +25,7 @@ READ = {
     "stiffness": ("pair", "stiffness", "microgeometry"),
     "loadmap": ("pair", "stiffness", "microgeometry", "loadmap"),
     "microgeometry": ("pair", "stiffness", "microgeometry"),
-    "vibration": _OF_TRAINS,
+    "vibration": (*_OF_TRAINS, "spectrum"),
     "runup": (*_OF_TRAINS, "runup"),
 }
 

@@ -348,7 +348,7 @@ def read_train_tables(path: str | Path, variant: str | None = None) -> dict[str,
 
 def train_tables(raw: dict[str, Any], path: str | Path, variant: str | None = None) -> dict[str, Any]:
     """The same of tables that are parsed; `path` is named in messages."""
-    tables = job_tables(raw, path, ("train",), ("pair", "stiffness", "microgeometry", "housing"))
+    tables = job_tables(raw, path, ("train",), ("pair", "stiffness", "microgeometry", "housing", "spectrum"))
     table: TrainTable = tables["train"]
     table = table.chosen(table.variant if variant is None else variant)
     table.check_laws()

@@ -16,6 +16,7 @@ from ..stopwatch import Stopwatch
 from ..train.response import TrainResponse
 from ..train.scene import TrainScene
 from ..typing import Array, IntArray
+from . import analysis
 from .errors import Run, with_errors
 from .follow import Followed, follow
 from .report import attachment_to_draw, train_summary
@@ -34,6 +35,7 @@ MAY_WRITE = (
     "housing.vtkhdf",
     "fields.png",
     "fields.gif",
+    *analysis.FILES,
 )
 
 
@@ -67,6 +69,9 @@ class Pictures(Protocol):
 
     def curves(self, folder: Path, scene: TrainScene, made: Followed, spectra: TrainSpectra, attachment: str) -> None:
         """Draw curves and spectra into a folder."""
+
+    def analysis(self, folder: Path, made: analysis.Analysed, spectra: TrainSpectra | None, attachment: str) -> None:
+        """Draw what [spectrum] asks for beside the spectrum."""
 
     def fields(self, path: Path, scene: TrainScene, response: TrainResponse, steps: IntArray) -> str:
         """Draw the fields at some output times; an empty text, or why nothing was drawn."""
@@ -129,6 +134,7 @@ def write_run(
     *,
     watch: Stopwatch,
     draw: Pictures | None = None,
+    beside: analysis.Analysis | None = None,
     every: int = 1,
     further: Mapping[str, Any] | None = None,
     progress: Callable[[int, int, str], None] | None = None,
@@ -148,6 +154,8 @@ def write_run(
         Output times (s).
     draw
         Draws the pictures.
+    beside
+        What [spectrum] asks for beside the spectrum.
     again
         Makes the same of a changed train by the method that the run took: the summary's numbers then have estimates
         of their errors.
@@ -163,7 +171,7 @@ def write_run(
         def followed(times: Array, choice: OutputChoice) -> Followed:
             table, keep = target / "response.csv", field_steps(times, choice) if choice.fields else None
             with watch.stage("transient"):
-                run = _timed(pieces(times), watch)
+                run = _timed(pieces(times) if beside is None else beside.watching(pieces(times)), watch)
                 record = recorded(times, choice)
                 return follow(run, times, every, table=table, radiation=radiation, record=record, keep=keep)
 
@@ -195,11 +203,16 @@ def write_run(
         with watch.stage("tables"):
             if spectra is not None:
                 write_csv(target / "spectrum.csv", spectra.columns())
+        loaded = next((load.bore for load in scene.loads if load.bore is not None), None)
         if draw is not None and spectra is not None:
             with watch.stage("pictures"):
-                loaded = next((load.bore for load in scene.loads if load.bore is not None), None)
                 attachment = attachment_to_draw(made.curves, choice.attachment, loaded)
                 draw.curves(target, scene, made, spectra, attachment)
+        if beside is not None and beside.wanted and made.outputs > 1:
+            with watch.stage("spectra over time"):
+                attachment = attachment_to_draw(made.curves, choice.attachment, loaded)
+                analysed = beside.write(target, spectra, attachment, None if draw is None else draw.analysis)
+            run = Run({**run.summary, **analysed}, spectra)
         if choice.fields and made.outputs:
             with watch.stage("fields"):
                 problems += _fields(target, scene, made.kept, times[: made.outputs], choice, draw, progress)

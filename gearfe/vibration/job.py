@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,7 @@ from ..stiffness.curve import StiffnessCurve
 from ..tables.housing import HousingTable
 from ..tables.microgeometry import MicrogeometryTable
 from ..tables.pair import DEFAULTS, PairTable
+from ..tables.spectrum import SpectrumTable
 from ..tables.stiffness import StiffnessTable
 from ..tables.timefunction import TrainFunctionTable
 from ..tables.train import TrainGearTable, TrainMeshTable, TrainTable, read_train_tables
@@ -50,6 +51,8 @@ class TrainJob:
         [train], with the chosen variant's curves and damping.
     pair, stiffness, housing, microgeometry
         The other tables, None where the file has none.
+    spectrum
+        [spectrum], with its defaults where the file has none.
     """
 
     path: Path
@@ -58,6 +61,7 @@ class TrainJob:
     stiffness: StiffnessTable
     housing: HousingTable | None
     microgeometry: MicrogeometryTable | None = None
+    spectrum: SpectrumTable = field(default_factory=SpectrumTable)
 
     @property
     def times(self) -> Array:
@@ -81,9 +85,9 @@ def read_train_job(path: str | Path, variant: str | None = None) -> TrainJob:
 def train_job(path: str | Path, tables: Mapping[str, Any]) -> TrainJob:
     """The job of tables that are read; curves that they name lie beside `path`."""
     stiffness = tables.get("stiffness", StiffnessTable())
-    return TrainJob(
-        Path(path), tables["train"], tables.get("pair"), stiffness, tables.get("housing"), tables.get("microgeometry")
-    )
+    housing, uneven = tables.get("housing"), tables.get("microgeometry")
+    spectrum = tables.get("spectrum", SpectrumTable())
+    return TrainJob(Path(path), tables["train"], tables.get("pair"), stiffness, housing, uneven, spectrum)
 
 
 def train_body(job: TrainJob) -> ModalBody | None:

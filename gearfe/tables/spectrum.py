@@ -1,0 +1,55 @@
+"""Table ``[spectrum]``: the record that a spectrum is of, spectra over short times, orders, measured ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..config import quantity
+from ..errors import InputError
+
+STEADY = "steady"
+
+
+@dataclass(frozen=True)
+class MeasuredTable:
+    """Measured accelerations to draw beside the computed ones."""
+
+    file: str = quantity(
+        doc="CSV with time_s or frequency_Hz and acceleration_m_per_s2, or a universal file (.uff, .unv: dataset 58)"
+    )
+    attachment: int | str = quantity(doc="attachment that it was measured at")
+    name: str = quantity("measured", doc="what the picture calls it")
+    number: int = quantity(1, low=1, doc="which data set of a universal file")
+
+
+@dataclass(frozen=True)
+class SpectrumTable:
+    """Spectra of a run."""
+
+    window: str | None = quantity(
+        None, choices=("none", "hann", "hamming", "blackman", "flattop"), doc="window of the spectrum; left out: none"
+    )
+    spectrum_from: float | str = quantity(
+        0.0, low=0.0, doc='begin of the record (ms), or "steady": where the start-up has died away'
+    )
+    spectrum_ms: float | None = quantity(None, above=0.0, doc="duration of the record (ms); left out: to the end")
+    short_time_ms: float | None = quantity(
+        None, above=0.0, doc="duration of the parts of spectra over time (ms); left out: none"
+    )
+    order_turns: float | None = quantity(
+        None, above=0.0, doc="turns of the first shaft in the parts that orders are tracked over; left out: none"
+    )
+    orders: tuple[float, ...] = quantity(
+        (),
+        above=0.0,
+        doc="orders that are tracked (turns of the first shaft); left out: multiples 1 to 3 of the meshes",
+    )
+    measured: tuple[MeasuredTable, ...] = quantity((), doc="[[spectrum.measured]]")
+
+    def check(self, where: str) -> None:
+        """A text is the one word that is known."""
+        if isinstance(self.spectrum_from, str) and self.spectrum_from != STEADY:
+            cure = f'write milliseconds, or "{STEADY}"'
+            raise InputError(f"{where}.spectrum_from", self.spectrum_from, "is no time", cure)
+        if self.orders and self.order_turns is None:
+            raise InputError(f"{where}.order_turns", None, "is required beside orders", "write order_turns = 4")

@@ -1,0 +1,260 @@
+"""What ``[spectrum]`` asks for beside the spectrum: over short times, orders over a run-up, measured ones beside."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..output.files import write_csv
+from ..spectrum import Waterfall
+from ..tables.spectrum import STEADY, SpectrumTable
+from ..train.kinematics import rolling
+from ..train.response import TrainResponse
+from ..train.scene import TrainScene
+from ..typing import Array
+from .job import TrainJob
+from .measured import Measured, read_measured
+from .run import repeater
+from .short_time import OrderTracks, averaged, order_tracks, short_time, steady_from
+from .spectra import TrainSpectra
+from .tracked import Tracked
+
+#: Multiples of the meshes' orders that are tracked where none are named.
+MULTIPLES = 3
+#: Files that an analysis may write.
+FILES = (
+    "spectrogram.csv", "spectrogram.png", "spectrum_averaged.csv", "order_tracks.csv", "order_tracks.png",
+    "measured.csv", "measured.png",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Analysed:
+    """What an analysis found.
+
+    Attributes
+    ----------
+    names
+        Signals, as in response.csv.
+    falls
+        Spectra over short times, one a signal; none where they were not asked for.
+    average
+        (lines, signals) of these, from `start` (s) on, over so many `parts`.
+    tracks
+        Orders; None where they were not asked for.
+    mesh_orders
+        Turns of the first shaft after which each mesh repeats once, inverted.
+    measured
+        Measured spectra, and the computed one at each of their attachments.
+    """
+
+    names: tuple[str, ...]
+    falls: list[Waterfall]
+    average: Array
+    parts: int
+    start: float
+    tracks: OrderTracks | None
+    mesh_orders: Array
+    measured: tuple[Measured, ...]
+
+
+class AnalysisPictures(Protocol):
+    """Who draws an analysis: `gearfe.figures.short_time.draw_analysis`."""
+
+    def __call__(self, folder: Path, made: Analysed, spectra: TrainSpectra | None, attachment: str) -> None:
+        """Draw into a folder."""
+
+
+class Analysis:
+    """Follows a run beside its files.
+
+    Parameters
+    ----------
+    job, scene
+        The job and its train.
+    every
+        Samples of the response in an output step.
+    start
+        Begin of the spectrum's record (s).
+
+    Raises
+    ------
+    InputError
+        Measured files that cannot be read, or name attachments that the train does not have.
+    """
+
+    def __init__(self, job: TrainJob, scene: TrainScene, every: int, start: float) -> None:
+        self.table, self.scene, self.every, self.start = job.spectrum, scene, every, start
+        self._step = 1e-6 * job.table.step_us
+        self.measured = read_measured(job)
+        ratios = dict(zip((s.name for s in scene.shafts), rolling(scene).ratios, strict=True))
+        #: turns of the first shaft for one of the drive
+        self.ratio = float(ratios[scene.shafts[0].name])
+        cycles = [abs(ratios[scene.gear(m.driver).shaft]) * scene.gear(m.driver).gear.teeth for m in scene.meshes]
+        self.mesh_orders = np.array([float(c) for c in cycles]) / abs(self.ratio)
+        self._tracked: Tracked | None = None
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anything is asked for."""
+        return bool(self.measured) or self._over_time
+
+    @property
+    def _over_time(self) -> bool:
+        return self.table.short_time_ms is not None or self.table.order_turns is not None
+
+    def watching(self, pieces: Iterable[TrainResponse]) -> Iterator[TrainResponse]:
+        """The pieces as they go by."""
+        self._tracked = Tracked(self.every, self._step) if self._over_time else None
+        for piece in pieces:
+            if self._tracked is not None:
+                self._tracked.add(piece)
+            yield piece
+
+    def made(self) -> Analysed:
+        """What was found, when the run has gone by.
+
+        Raises
+        ------
+        InputError
+            Parts or turns that are longer than the run.
+        """
+        falls: list[Waterfall] = []
+        average, parts, tracks = np.zeros((0, 0)), 0, None
+        names: tuple[str, ...] = ()
+        if self._tracked is not None:
+            time, angle, values = self._tracked.finished()
+            names, table = self._tracked.names, self.table
+            if table.short_time_ms is not None:
+                falls = short_time(values, self._tracked.step, 1e-3 * table.short_time_ms)
+                lines = falls[0].frequency <= self._tracked.highest * (1.0 + 1e-12)
+                falls = [Waterfall(time[0] + f.time, f.frequency[lines], f.amplitude[:, lines]) for f in falls]
+                columns = [averaged(fall, self.start) for fall in falls]
+                average, parts = np.column_stack([one for one, _ in columns]), columns[0][1]
+            if table.order_turns is not None:
+                orders = np.array(table.orders) if table.orders else self._orders()
+                turned = self.ratio * angle
+                tracks = order_tracks(time, turned, values, orders, table.order_turns, self._tracked.highest)
+        return Analysed(names, falls, average, parts, self.start, tracks, self.mesh_orders, self.measured)
+
+    def _orders(self) -> Array:
+        return np.unique(np.outer(self.mesh_orders, np.arange(1, MULTIPLES + 1)).round(9))
+
+    def write(
+        self, folder: Path, spectra: TrainSpectra | None, attachment: str, draw: AnalysisPictures | None
+    ) -> dict[str, Any]:
+        """Write tables and pictures into a folder; entries of the summary."""
+        made = self.made()
+        told: dict[str, Any] = {}
+        if made.falls:
+            write_csv(folder / "spectrogram.csv", spectrogram_columns(made))
+            names = [f"{name}_rms_amplitude" for name in made.names]
+            columns = {"frequency_Hz": made.falls[0].frequency, **dict(zip(names, made.average.T, strict=True))}
+            write_csv(folder / "spectrum_averaged.csv", columns)
+            told["spectrogram"] = {"parts": len(made.falls[0].time), "averaged_parts": made.parts}
+        if made.tracks is not None:
+            write_csv(folder / "order_tracks.csv", track_columns(made))
+            told["order_tracks"] = {"parts": len(made.tracks.time), "orders": made.tracks.orders.tolist()}
+        if made.measured:
+            write_csv(folder / "measured.csv", measured_columns(made))
+            told["measured"] = [self._compared(one, spectra) for one in made.measured]
+        if draw is not None and told:
+            draw(folder, made, spectra, attachment)
+        return told
+
+    def _compared(self, one: Measured, spectra: TrainSpectra | None) -> dict[str, Any]:
+        """Rms of a measured spectrum, and of the computed one in the same band."""
+        found: dict[str, Any] = {"name": one.name, "attachment": one.attachment}
+        low, high = float(one.frequency[one.frequency > 0.0].min()), float(one.frequency[-1])
+        found |= {"from_Hz": low, "to_Hz": high, "measured_rms_m_per_s2": _rms(one.amplitude[one.frequency > 0.0])}
+        if spectra is not None:
+            frequency = spectra.spectrum.frequency
+            lines = (frequency >= low * (1.0 - 1e-9)) & (frequency <= high * (1.0 + 1e-9)) & (frequency > 0.0)
+            amplitude = spectra.amplitude(f"attachment_{one.attachment}_acceleration_m_per_s2")[lines]
+            found["computed_rms_m_per_s2"] = _rms(amplitude) / math.sqrt(spectra.spectrum.noise_bandwidth)
+        return found
+
+
+def _rms(amplitude: Array) -> float:
+    return math.sqrt(0.5 * float((np.asarray(amplitude) ** 2).sum()))
+
+
+def steady_start(job: TrainJob, scene: TrainScene, every: int) -> float:
+    """Time (s) from which a run is steady, from a rough one; see `gearfe.vibration.short_time.steady_from`.
+
+    Raises
+    ------
+    InputError
+        When it is not steady for its last quarter.
+    """
+    tracked, period = Tracked(every, 1e-6 * job.table.step_us), None
+    for piece in repeater(job, every)(scene)(job.times):
+        tracked.add(piece)
+        period = piece.common_period_s
+    time, _, values = tracked.finished()
+    kinds = ("contact_force", "transmission_error", "attachment")
+    groups = [values[:, [i for i, name in enumerate(tracked.names) if name.startswith(kind)]] for kind in kinds]
+    start = steady_from(time, [group for group in groups if group.shape[1]], period)
+    last = job.times[np.searchsorted(job.times, start * (1.0 - 1e-12), side="left")]
+    return float(last)
+
+
+def record_start(
+    job: TrainJob, scene: TrainScene, every: int, asked_ms: float | None, watch: Callable[[str], Any]
+) -> float:
+    """Begin of the spectrum's record (s): the option's, or that of [spectrum]; "steady" is looked for."""
+    if asked_ms is not None:
+        return 1e-3 * asked_ms
+    given = job.spectrum.spectrum_from
+    if given != STEADY:
+        return 1e-3 * float(given)
+    with watch("steady part"):
+        return steady_start(job, scene, every)
+
+
+def spectrogram_columns(made: Analysed) -> dict[str, Any]:
+    """Columns of spectrogram.csv: a row for each part and frequency."""
+    fall = made.falls[0]
+    columns: dict[str, Any] = {
+        "time_s": np.repeat(fall.time, len(fall.frequency)),
+        "frequency_Hz": np.tile(fall.frequency, len(fall.time)),
+    }
+    return columns | {name: one.amplitude.ravel() for name, one in zip(made.names, made.falls, strict=True)}
+
+
+def track_columns(made: Analysed) -> dict[str, Any]:
+    """Columns of order_tracks.csv: a row for each order and part; not-a-number above the band is an empty cell."""
+    assert made.tracks is not None
+    t = made.tracks
+    count = len(t.orders)
+    columns: dict[str, Any] = {
+        "order": np.repeat(t.orders, len(t.time)),
+        "time_s": np.tile(t.time, count),
+        "speed_rad_per_s": np.tile(t.speed, count),
+        "frequency_Hz": np.outer(t.orders, np.abs(t.speed)).ravel() / (2.0 * math.pi),
+    }
+    size = np.abs(t.amplitude).transpose(1, 0, 2).reshape(count * len(t.time), -1)
+    return columns | {name: size[:, i] for i, name in enumerate(made.names)}
+
+
+def measured_columns(made: Analysed) -> dict[str, Any]:
+    """Columns of measured.csv: a row for each line of each measured spectrum."""
+    return {
+        "name": [one.name for one in made.measured for _ in one.frequency],
+        "attachment": [one.attachment for one in made.measured for _ in one.frequency],
+        "frequency_Hz": np.concatenate([one.frequency for one in made.measured]),
+        "acceleration_m_per_s2": np.concatenate([one.amplitude for one in made.measured]),
+    }
+
+
+def options(table: SpectrumTable, window: str | None, length_ms: float | None) -> dict[str, Any]:
+    """Window and duration of the spectrum's record: the options', or those of [spectrum]."""
+    duration = table.spectrum_ms if length_ms is None else length_ms
+    return {
+        "window": window or table.window or "none", "spectrum_length": None if duration is None else 1e-3 * duration
+    }  # fmt: skip

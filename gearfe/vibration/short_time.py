@@ -1,0 +1,179 @@
+r"""Spectra over short times, orders over a run-up, and where a run is steady; all of equally spaced samples.
+
+**Orders.** The amplitude of the order k is that of its Fourier integral over the angle :math:`\varphi` of a shaft, with
+Hann's window w over a part of :math:`\Phi` round :math:`\varphi_0`,
+
+.. math::
+    \hat x_k(\varphi_0) = \frac{2}{\int w\,d\varphi} \int_{\varphi_0-\Phi/2}^{\varphi_0+\Phi/2}
+    w\, x\, e^{-i k \varphi}\,d\varphi, \qquad w = 1 + \cos\frac{2\pi(\varphi-\varphi_0)}{\Phi},
+
+which resamples the signal over the angle without interpolation: the trapezoidal sum is taken over the samples at hand,
+whose angles are known exactly. An order whose frequency lies above the band of the samples has no value.
+
+**Steady.** The run is cut into parts of whole periods; a signal is steady from the first part on after which its mean
+and its rms about that stay within `STEADY_WITHIN` of those of the last quarter.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..spectrum import Waterfall, waterfall
+from ..typing import Array, ComplexArray
+
+#: Parts of a run, at least; how near they must stay to be steady, in parts of the largest signal of a group, and of
+#: that part of the largest level of the run where nothing vibrates in the end.
+PARTS, STEADY_WITHIN, STILL = 20, 0.05, 0.02
+#: How far parts of spectra over short times lie apart, in parts of their duration.
+HOP = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class OrderTracks:
+    """Amplitudes of orders along a run-up.
+
+    Attributes
+    ----------
+    time, speed : (m,)
+        When the shaft is in the middle of each part (s), and how fast it turns there (rad/s).
+    orders : (k,)
+    amplitude : (m, k, s)
+        Of s signals, complex: the part is ``Re(amplitude exp(i order angle))``; not-a-number above the band.
+    """
+
+    time: Array
+    speed: Array
+    orders: Array
+    amplitude: ComplexArray
+
+
+def short_time(values: Array, step: float, length: float, window: str = "hann") -> list[Waterfall]:
+    """Spectra over parts of `length` (s), one `Waterfall` a signal; `values` (n, s) are `step` (s) apart.
+
+    Raises
+    ------
+    InputError
+        Parts that are longer than the run or hold less than eight samples.
+    """
+    count, duration = round(length / step), (len(values) - 1) * step
+    if not 8 <= count <= len(values):
+        problem = f"must be >= {8e3 * step:.4g} ms (eight samples) and <= {1e3 * duration:.4g} ms (the run)"
+        raise InputError("spectrum.short_time_ms", 1e3 * length, problem, "choose another duration")
+    return [waterfall(one, step, count, hop=max(1, round(HOP * count)), window=window) for one in values.T]
+
+
+def averaged(fall: Waterfall, start: float) -> tuple[Array, int]:
+    """Root mean square of the amplitudes over the parts that begin at `start` (s) or later, and how many these are."""
+    half = 0.5 / float(fall.frequency[1])
+    used = fall.time - half >= start - 1e-9
+    amplitude = fall.amplitude[used] if used.any() else fall.amplitude[-1:]
+    return np.sqrt((amplitude**2).mean(axis=0)), len(amplitude)
+
+
+def order_tracks(
+    time: Array, angle: Array, values: Array, orders: Array, turns: float, highest: float = math.inf
+) -> OrderTracks:
+    """Amplitudes of `orders` over parts of so many turns, half of one apart.
+
+    Parameters
+    ----------
+    time, angle : (n,)
+        Of the samples (s, rad); the longest stretch in which the angle goes one way counts.
+    values : (n, s)
+    highest
+        End of the samples' band (Hz).
+
+    Raises
+    ------
+    InputError
+        When the shaft makes less turns.
+    """
+    first, last, sense = _one_way(angle)
+    t, phi, x = time[first:last], sense * angle[first:last], values[first:last]
+    width = 2.0 * math.pi * turns
+    whole = float(phi[-1] - phi[0]) if len(phi) else 0.0
+    if whole < width:
+        problem = f"the first shaft makes {whole / (2.0 * math.pi):.4g} turns in one sense"
+        raise InputError("spectrum.order_turns", turns, problem, "take less turns, or a longer run")
+    middles = phi[0] + 0.5 * width * np.arange(1, int(2.0 * whole / width * (1.0 + 1e-12)))
+    ends = np.searchsorted(phi, [middles - 0.5 * width, middles + 0.5 * width])
+    places = np.interp(middles, phi, t)
+    speeds = np.interp(middles, phi, np.gradient(phi, t))
+    made = np.full((len(middles), len(orders), values.shape[1]), np.nan, dtype=complex)
+    for i, (middle, low, high) in enumerate(zip(middles, *ends, strict=True)):
+        part = phi[low:high]
+        weight = 1.0 + np.cos(2.0 * math.pi * (part - middle) / width)
+        steps = np.diff(part)
+        quadrature = np.zeros(len(part))  # the trapezoidal rule: the window is zero at both ends
+        quadrature[:-1] += 0.5 * steps
+        quadrature[1:] += 0.5 * steps
+        quadrature *= weight
+        known = orders * speeds[i] / (2.0 * math.pi) <= highest
+        kernel = np.exp(-1j * np.outer(orders[known], part)) * quadrature
+        made[i, known] = 2.0 / quadrature.sum() * (kernel @ x[low:high])
+    return OrderTracks(places, sense * speeds, np.asarray(orders, dtype=float), made)
+
+
+def _one_way(angle: Array) -> tuple[int, int, float]:
+    """Longest stretch in which an angle rises or falls all the time: first, end, sense."""
+    if len(angle) < 2:
+        return 0, len(angle), 1.0
+    sign = np.sign(np.diff(angle))
+    borders = np.flatnonzero(np.diff(sign, prepend=np.nan, append=np.nan) != 0.0)
+    lengths = np.where(sign[borders[:-1]] == 0.0, 0, np.diff(borders))
+    best = int(np.argmax(lengths))
+    return int(borders[best]), int(borders[best + 1]) + 1, float(sign[borders[best]] or 1.0)
+
+
+def steady_from(time: Array, groups: list[Array], period: float | None) -> float:
+    """Time (s) from which all signals are steady; see the module.
+
+    Parameters
+    ----------
+    time : (n,)
+        Equally spaced.
+    groups : list of (n, s)
+        Signals of one kind each, as forces: what is small beside the largest of its group counts little.
+    period
+        After which a steady run repeats (s), or None.
+
+    Raises
+    ------
+    InputError
+        When the run has not been steady for its last quarter.
+    """
+    step, duration = float(time[1] - time[0]), float(time[-1] - time[0])
+    part = duration / PARTS
+    if period:
+        part = period * math.ceil(part / period * (1.0 - 1e-9))
+    count = int(duration / part * (1.0 + 1e-9))
+    cure = "compute for longer (duration_ms), or give the begin of the record in ms"
+    if count < 4:
+        problem = f"has only {count} parts of {1e3 * part:.4g} ms in the run: at least 4 tell whether it is steady"
+        raise InputError("spectrum.spectrum_from", "steady", problem, cure)
+    begin = time[-1] - part * np.arange(count, 0, -1)  # parts end with the run
+    off = np.zeros(count)
+    for values in groups:
+        mean, rms = np.empty((count, values.shape[1])), np.empty((count, values.shape[1]))
+        for i, start in enumerate(begin):
+            low = round((start - time[0]) / step)
+            some = values[low : low + max(2, round(part / step))]
+            mean[i], rms[i] = some.mean(axis=0), some.std(axis=0)
+        tail = max(1, count // 4)
+        for level in (mean, rms):
+            last = level[-tail:].mean(axis=0)
+            scale = max(np.abs(last).max(initial=0.0), STILL * np.abs(level).max(initial=0.0))
+            off = np.maximum(off, np.abs(level - last).max(axis=1, initial=0.0) / (scale or 1.0))
+    late = np.flatnonzero(off > STEADY_WITHIN)
+    first = int(late[-1]) + 1 if len(late) else 0
+    if first > count - max(1, count // 4):
+        worst = off[-max(1, count // 4) :].max()
+        problem = (
+            f"the run is not steady: forces or accelerations still change by {100 * worst:.3g} % in its last quarter"
+        )
+        raise InputError("spectrum.spectrum_from", "steady", problem, cure)
+    return float(begin[first])
