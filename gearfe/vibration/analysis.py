@@ -193,7 +193,7 @@ def steady_start(job: TrainJob, scene: TrainScene, every: int) -> float:
         When it is not steady for its last quarter.
     """
     tracked, period = Tracked(every, 1e-6 * job.table.step_us), None
-    for piece in repeater(job, every)(scene)(job.times):
+    for piece in repeater(job, every)(scene, job.table.method)(job.times):
         tracked.add(piece)
         period = piece.common_period_s
     time, _, values = tracked.finished()

@@ -28,7 +28,7 @@ from ..typing import Array, ComplexArray
 #: Parts of a run, at least; how near they must stay to be steady, in parts of the largest signal of a group, and of
 #: that part of the largest level of the run where nothing vibrates in the end.
 PARTS, STEADY_WITHIN, STILL = 20, 0.05, 0.02
-#: How far parts of spectra over short times lie apart, in parts of their duration.
+#: How far parts of spectra and orders lie apart, in parts of their length.
 HOP = 0.25
 
 
@@ -77,7 +77,7 @@ def averaged(fall: Waterfall, start: float) -> tuple[Array, int]:
 def order_tracks(
     time: Array, angle: Array, values: Array, orders: Array, turns: float, highest: float = math.inf
 ) -> OrderTracks:
-    """Amplitudes of `orders` over parts of so many turns, half of one apart.
+    """Amplitudes of `orders` over parts of so many turns.
 
     Parameters
     ----------
@@ -99,7 +99,8 @@ def order_tracks(
     if whole < width:
         problem = f"the first shaft makes {whole / (2.0 * math.pi):.4g} turns in one sense"
         raise InputError("spectrum.order_turns", turns, problem, "take less turns, or a longer run")
-    middles = phi[0] + 0.5 * width * np.arange(1, int(2.0 * whole / width * (1.0 + 1e-12)))
+    count = int((whole - width) / (HOP * width) * (1.0 + 1e-12)) + 1
+    middles = phi[0] + width * (0.5 + HOP * np.arange(count))
     ends = np.searchsorted(phi, [middles - 0.5 * width, middles + 0.5 * width])
     places = np.interp(middles, phi, t)
     speeds = np.interp(middles, phi, np.gradient(phi, t))
