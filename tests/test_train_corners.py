@@ -8,7 +8,7 @@ import pytest
 from gearfe.rigid import TimeFunction, compiled, constant, kernel_modal, smoothed_step
 from gearfe.stiffness.periodic import periodic_interpolant
 from gearfe.train import build_train, simulate
-from gearfe.train.corners import train_corner
+from gearfe.train.corners import leaves, train_corner
 from gearfe.train.forces import CurveFlank, Gyro, LawFlank, TrainForces
 from gearfe.train.series import train_order, train_series
 
@@ -164,3 +164,13 @@ def test_compiled_series_against_plain_runge_kutta(method):
     truth = simulate(model, times, tolerance=1e-11, backend="plain").contact_force
     assert made.statistics["backend"] == "compiled"
     assert np.abs(made.contact_force - truth).max() < 1e-7 * np.abs(truth).max()
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_what_begins_a_slack_outside_and_comes_in_does_not_leave(sign):
+    """Two pairs that part within a nanosecond: the gap of the one is still open by rounding where the other parts."""
+    memory, bounds = np.array([[1.3e-15, -1.7e-5, -1.2e-5]]) * sign, (-1e300, 0.0) if sign > 0.0 else (0.0, 1e300)
+    assert leaves(memory, 0, 2, *bounds, 1e-16, 7e-11) == 2.0
+    assert leaves(memory, 0, 2, *bounds, 1e-16, 1.0) == 2.0
+    memory[0, 2] *= -2.0  # comes back: 1.7e-5 x = 2.4e-5 x2
+    assert leaves(memory, 0, 2, *bounds, 1e-16, 1.0) == pytest.approx(1.7 / 2.4, rel=1e-6)

@@ -130,6 +130,10 @@ def leaves(memory, row, last, low, high, slack, limit):
     before = 0.0
     value = memory[row, 0]
     slope = memory[row, 1]
+    if slope < 0.0:  # one that begins a rounding or a slack outside, on its way in, does not leave there
+        high = max(high, value)
+    else:
+        low = min(low, value)
     for i in range(LOOKS):
         end = limit * (i + 1) / LOOKS
         there, rate = polynomial(memory, row, last, end)
