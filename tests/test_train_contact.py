@@ -195,7 +195,7 @@ def runge_kutta(model, times, tolerance):  # type: ignore[no-untyped-def]
 
     y = solve_ivp(rhs, (0.0, times[-1]), np.zeros(2 * n), "DOP853", t_eval=times, rtol=tolerance, atol=1e-20).y
     u, du = (core.origin + y[:n].T @ core.T.T) @ W, y[n:].T @ core.T.T @ W
-    pushes = [model.forces.of_flank(flank, times, u, du).force for flank in model.forces.flanks]
+    pushes = [made.force for made in model.forces.of_flanks(times, u, du)]
     return pushes[0] - pushes[1], u[:, model.forces.flanks[0].direction]
 
 

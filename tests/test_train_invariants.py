@@ -127,8 +127,8 @@ def test_driven_rattle_balances_momentum_and_energy(friction: float) -> None:
     phase = model.angle(times) + moved.q[:, spin[0]] + line.phase
     front, rear = law(phase, approach), law(-phase, -approach - backlash)
     drag, u, du = 0.0 * times, moved.q @ model.directions, moved.v @ model.directions
-    for flank in model.forces.flanks:
-        made = model.forces.of_flank(flank, times, u, du).drag
+    for flank, pushes in zip(model.forces.flanks, model.forces.of_flanks(times, u, du), strict=True):
+        made = pushes.drag
         if made is not None and isinstance(flank, LawFlank) and flank.sliding is not None:
             columns = model.directions[spin[1], [flank.sliding.across, flank.sliding.spin]]
             drag = drag + columns @ [made.across, made.turning]
