@@ -336,3 +336,15 @@ def test_friction_of_an_oil_follows_the_speed():
         scene = dataclasses.replace(scene, meshes=(dataclasses.replace(scene.meshes[0], friction=oil),))
         made.append(steady_state(build_train(scene), 600.0))
     assert made[0].force == pytest.approx(made[1].force, rel=1e-6)
+
+
+@needs_numba
+def test_rayleigh_damping_of_a_law_as_in_a_transient():
+    """It acts in contact only; the constant damper that keeps the modes apart is taken off by the forces."""
+    scene = loaded([(20, 30)], lambda teeth: hertzian_law(relief=4e-6), speed=700.0, flexible=False)
+    model = build_train(dataclasses.replace(scene, damping=Damping(beta=3e-6)))
+    state = steady_state(model, 700.0, tolerance=1e-4)
+    force, error, _ = settled_transient(model, state, 60)
+    assert np.count_nonzero(model.core.damping - np.diag(np.diag(model.core.damping))) == 0
+    assert np.ptp(state.force, axis=0) == pytest.approx(np.ptp(force, axis=0), rel=2e-3)
+    assert np.ptp(state.transmission_error) == pytest.approx(np.ptp(error), rel=1e-3)

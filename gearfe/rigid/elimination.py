@@ -15,6 +15,10 @@ import numpy as np
 from ..typing import Array
 from .system import System
 
+#: Entries of the damping beside the diagonal that are smaller than this part of the largest one are round-off:
+#: proportional damping stays diagonal, and costs nothing.
+ROUND_OFF = 1e-14
+
 
 @dataclass(frozen=True)
 class Minimal:
@@ -87,4 +91,7 @@ def _minimal(system: System) -> Minimal:
         origin, T = zero, root
     squares, turn = np.linalg.eigh(T.T @ system.stiffness @ T)
     T = T @ turn
-    return Minimal(system, T, origin, squares, T.T @ system.damping @ T, -T.T @ (system.stiffness @ origin))
+    damping = T.T @ system.damping @ T
+    least = ROUND_OFF * float(np.abs(damping).max(initial=0.0))
+    damping = np.where((np.abs(damping) > least) | np.eye(len(damping), dtype=bool), damping, 0.0)
+    return Minimal(system, T, origin, squares, damping, -T.T @ (system.stiffness @ origin))

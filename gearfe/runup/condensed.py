@@ -85,7 +85,7 @@ def condense(model: TrainModel) -> CondensedTrain:
     gyros = model.forces.gyros
     tilts = [column for g in gyros for column in (g.direction, g.direction + 1)]
     linear = Linear(
-        core.squares, core.damping, to_modes[:, used], push, to_modes[:, tilts],
+        core.squares, _damping(model), to_modes[:, used], push, to_modes[:, tilts],
         np.array([g.polar * g.ratio for g in gyros]),
     )  # fmt: skip
     sense = drive_sense(model.scene.driven.speed) or 1.0
@@ -147,6 +147,16 @@ def _check(model: TrainModel) -> None:
         if load.torque.sines:
             problem = "oscillates: no motion repeats with the meshes"
             raise InputError(f"load on {load.shaft!r}", None, problem, "look at it with gearfe vibration")
+
+
+def _damping(model: TrainModel) -> Array:
+    """Of the coordinates, without what the forces of mesh laws take off."""
+    made = model.core.damping.copy()
+    for line in model.meshes:
+        if line.law is not None:
+            along = model.core.T.T @ line.row
+            made -= line.rayleigh * np.outer(along, along)
+    return made
 
 
 def _scale(model: TrainModel, linear: Linear, freedoms: Array, flanks: list[CurveFlank | LawFlank]) -> Array:

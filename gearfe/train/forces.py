@@ -115,12 +115,14 @@ class LawFlank(Flank):
     """A mesh law; `damping` is chi (s/m), `sliding` its friction or None.
 
     `shifts`, shape (L,), is the approach (m) by which tooth pair k touches later, k taken modulo L: its pitch errors.
+    `rayleigh` (N s/m) is what the system's constant part damps along the approach already.
     """
 
     law: MeshLaw
     damping: float
     sliding: Sliding | None = None
     shifts: Array = field(default_factory=lambda: np.zeros(1))
+    rayleigh: float = 0.0
 
     def shifts_at(self, phase: Array) -> Array:
         """Shifts (m) of the pairs in the law's slots at phases (n,), shape (n, slots)."""
@@ -197,6 +199,8 @@ class TrainForces:
             out[:, flank.direction] += flank.mean * u[:, flank.direction] - made.force
             if made.moment is not None:
                 out[:, flank.turn] -= flank.sense * made.moment
+            if isinstance(flank, LawFlank):
+                out[:, flank.direction] += flank.rayleigh * du[:, flank.direction]
             if isinstance(flank, LawFlank) and flank.sliding is not None and made.drag is not None:
                 out[:, flank.sliding.across] -= made.drag.across
                 out[:, flank.sliding.spin] -= made.drag.turning

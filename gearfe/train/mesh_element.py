@@ -67,6 +67,9 @@ class MeshLine:
         j (m); None: without back flanks, a curve then acts both ways.
     mean, damping
         Mean of k (N/m), infinite for a rigid mesh; d (N s/m), the Rayleigh part included.
+    rayleigh
+        The Rayleigh part (N s/m). Of a law it stands in the constant part, which then is damped alike in all modes, and
+        the law's forces take it off again.
     reference
         F0 (N) of a law.
     driver
@@ -95,6 +98,7 @@ class MeshLine:
     backlash: float | None
     mean: float
     damping: float
+    rayleigh: float
     reference: float
     driver: int
     ratio: float
@@ -148,7 +152,7 @@ class MeshLine:
         if self.rigid:
             return LinearJoint(tuple(bodies), self.row[None, :], np.zeros(1), name=f"mesh {self.name}")
         square = np.outer(self.row, self.row)
-        damping = 0.0 if self.law is not None else self.damping
+        damping = self.rayleigh if self.law is not None else self.damping
         return LinearForce(tuple(bodies), damping * square, self.mean * square, f"mesh {self.name}")
 
     def flanks(self, first: int) -> tuple[Flank, ...]:
@@ -162,7 +166,9 @@ class MeshLine:
                 sliding = self.sliding
                 if sliding is not None:
                     sliding = replace(sliding, across=turn + 1 + 2 * number, spin=turn + 2)
-                made.append(LawFlank(*place, self.law, self.damping / self.reference, sliding, self.shifts[number]))
+                rayleigh = self.rayleigh if number == 0 else 0.0
+                chi = self.damping / self.reference
+                made.append(LawFlank(*place, self.law, chi, sliding, self.shifts[number], rayleigh))
             elif self.curve is not None:
                 made.append(CurveFlank(*place, self.curve, not self.pulls))
         return tuple(made)
@@ -201,7 +207,7 @@ def mesh_line(
     line = math.cos(alpha) * sense * along + math.sin(alpha) * across
     back = -math.cos(alpha) * sense * along + math.sin(alpha) * across
     turn = np.zeros(size)
-    curve, law, backlash, mean, damping, reference = None, None, mesh.backlash, math.inf, 0.0, 1.0
+    curve, law, backlash, mean, rayleigh, reference = None, None, mesh.backlash, math.inf, 0.0, 1.0
     if isinstance(mesh.stiffness, MeshLaw):
         law = mesh.stiffness
         turn = relative(along / distance, centre, centre + arm)
@@ -214,14 +220,15 @@ def mesh_line(
         mean = mean_value(curve)
     turn[first[i] + 5] += 1.0
     if mesh.stiffness is not None:
-        damping = mesh.damping + scene.damping.beta * mean
+        rayleigh = scene.damping.beta * mean
     spin = np.zeros(size)
     spin[first[i] + 5], spin[first[j] + 5] = 1.0, -1.0
     slides = np.array([*(relative(np.cross(a, n), point, point) for n in (line, back)), spin])
     sliding = _sliding(mesh, pair, force, (ratios[i], ratios[j]), speed)
     return MeshLine(
         mesh.name, relative(line, point, point), relative(back, point, point), turn, line, point, curve, law, backlash,
-        mean, damping, reference, i, ratios[i], sense, phase, one.gear.module, slides, sliding, shifts,
+        mean, mesh.damping + rayleigh, rayleigh, reference, i, ratios[i], sense, phase, one.gear.module, slides,
+        sliding, shifts,
     )  # fmt: skip
 
 

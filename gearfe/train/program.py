@@ -217,6 +217,8 @@ def _contact(made: Tables, number: int, flank: LawFlank, slots: int) -> int:
     """A flank with a mesh law; the first row of its friction, -1 without."""
     row = _place(made, flank, SLOTS + PER_SLOT * slots + PER_COUPLE * (slots * (slots - 1) // 2))
     made.read(row + DAMPED, flank.direction, 1, 0.0, flank.damping, 1.0)
+    if flank.rayleigh > 0.0:
+        made.force(flank.direction, made.read(made.take(), flank.direction, 1, 0.0, flank.rayleigh), 1.0)
     pull, moment = made.take(), made.take()
     made.after += [operation(pull), operation(moment)]
     cells = made.pieces + PER_FLANK
