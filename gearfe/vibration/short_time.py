@@ -25,9 +25,9 @@ from ..errors import InputError
 from ..spectrum import Waterfall, waterfall
 from ..typing import Array, ComplexArray
 
-#: Parts of a run, at least; how near they must stay to be steady, in parts of the largest signal of a group, and of
-#: that part of the largest level of the run where nothing vibrates in the end.
-PARTS, STEADY_WITHIN, STILL = 20, 0.05, 0.02
+#: Parts of a run, at least; how near they must stay to be steady where the motion repeats, and where it does not; which
+#: part of the largest signal, or of their own largest level, signals must have to count.
+PARTS, STEADY_WITHIN, WITHOUT_PERIOD, STILL = 20, 0.01, 0.05, 0.02
 #: How far parts of spectra and orders lie apart, in parts of their length.
 HOP = 0.25
 
@@ -165,11 +165,14 @@ def steady_from(time: Array, groups: list[Array], period: float | None) -> float
             some = values[low : low + max(2, round(part / step))]
             mean[i], rms[i] = some.mean(axis=0), some.std(axis=0)
         tail = max(1, count // 4)
-        for level in (mean, rms):
-            last = level[-tail:].mean(axis=0)
-            scale = max(np.abs(last).max(initial=0.0), STILL * np.abs(level).max(initial=0.0))
-            off = np.maximum(off, np.abs(level - last).max(axis=1, initial=0.0) / (scale or 1.0))
-    late = np.flatnonzero(off > STEADY_WITHIN)
+        last = [level[-tail:].mean(axis=0) for level in (mean, rms)]
+        # what is little beside its group, or beside what it was at the start, need not come to rest
+        least = STILL * np.maximum(rms.max(axis=0), last[1].max(initial=0.0))
+        for level, end, floor in ((mean, last[0], np.maximum(least, last[1])), (rms, last[1], least)):
+            scale = np.maximum(np.abs(end), floor)
+            scale[scale == 0.0] = 1.0
+            off = np.maximum(off, (np.abs(level - end) / scale).max(axis=1, initial=0.0))
+    late = np.flatnonzero(off > (STEADY_WITHIN if period else WITHOUT_PERIOD))
     first = int(late[-1]) + 1 if len(late) else 0
     if first > count - max(1, count // 4):
         worst = off[-max(1, count // 4) :].max()
