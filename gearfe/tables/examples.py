@@ -142,7 +142,7 @@ JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]]]] = {
     "vibration": (
         "A gear train in its housing: two shafts with one gear pair. Run it: gearfe vibration FILE --out DIR. Shafts "
         "run along y; speeds and torques count positive about +y. " + OPTIONAL_KEYS,
-        {"pair": PAIR, "stiffness": {"twist_deg": 0.05}, "train": TRAIN, "housing": HOUSING},
+        {"pair": PAIR, "stiffness": {"twist_deg": 0.05}, "train": TRAIN, "housing": HOUSING, "spectrum": {}},
     ),
 }
 
