@@ -9,7 +9,7 @@ import time
 HELP = "run time against error of all jobs, beside other programs; the accuracy page"
 
 #: Jobs by name; `all` is all of them.
-JOBS = ("sweep", "mechanism", "housing", "transient", "skipped", "references")
+JOBS = ("sweep", "mechanism", "housing", "transient", "skipped", "references", "cold")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=True,
         help="run the other programs that are there (default: yes)",
     )
+    parser.add_argument("--against", default="", metavar="REV", help="cold: another commit to run beside this state")
     parser.add_argument("--page", metavar="FILE.md", help="write the accuracy page from the results and stop")
 
 
@@ -41,7 +42,9 @@ def run(args: argparse.Namespace) -> int:
     from .run import run_jobs
 
     begin = time.perf_counter()
-    record = run_jobs(JOBS if args.job == "all" else (args.job,), args.out, quick=args.quick, peers=args.peers)
+    record = run_jobs(
+        JOBS if args.job == "all" else (args.job,), args.out, quick=args.quick, peers=args.peers, against=args.against
+    )
     print(f"results in {record.folder}; {time.perf_counter() - begin:.0f} s")
     for failure in record.failures:
         print(f"gearfe: warning: {failure}", file=sys.stderr)

@@ -80,11 +80,14 @@ class Record:
         Small settings: a smoke run that proves that everything works, not how fast.
     peers
         Whether other programs run too.
+    against
+        Commit that whole commands are compared with; empty for none.
     """
 
     folder: Path
     quick: bool = False
     peers: bool = True
+    against: str = ""
     say: Callable[[str], None] = told
     failures: list[str] = field(default_factory=list)
 
@@ -112,11 +115,22 @@ class Record:
 
 
 def open_record(
-    out: str | Path, *, quick: bool = False, peers: bool = True, say: Callable[[str], None] = told
+    out: str | Path,
+    *,
+    quick: bool = False,
+    peers: bool = True,
+    against: str = "",
+    say: Callable[[str], None] = told,
 ) -> Record:
     """The record in folder `out`; rows of another program, machine or setting are removed first, and this is said."""
     folder = output_folder(out)
-    state = {"quick": quick, "machine": machine(), "versions": versions(), "sources": sources_hash()}
+    state = {
+        "quick": quick,
+        "against": against,
+        "machine": machine(),
+        "versions": versions(),
+        "sources": sources_hash(),
+    }
     path = folder / "run.json"
     if path.exists():
         before = json.loads(path.read_text(encoding="utf-8"))
@@ -127,7 +141,7 @@ def open_record(
                 if "_outcomes" not in old.name:
                     old.unlink()
     write_json(path, state)
-    return Record(folder, quick, peers, say)
+    return Record(folder, quick, peers, against, say)
 
 
 def machine() -> dict[str, Any]:

@@ -19,17 +19,24 @@ JOBS = {
     "transient": "transient_study",
     "skipped": "skipped_study",
     "references": "reference_study",
+    "cold": "cold_study",
 }
 
 
 def run_jobs(
-    jobs: Sequence[str], out: str | Path, *, quick: bool = False, peers: bool = True, say: Callable[[str], None] = told
+    jobs: Sequence[str],
+    out: str | Path,
+    *,
+    quick: bool = False,
+    peers: bool = True,
+    against: str = "",
+    say: Callable[[str], None] = told,
 ) -> Record:
     """Run jobs, one thread each, draw the pictures; finished rows of an earlier run in `out` are kept."""
     from .pictures import draw_all
 
     logging.getLogger("skfem").setLevel(logging.ERROR)  # it tells about memory layouts, once a position
-    record = open_record(out, quick=quick, peers=peers, say=say)
+    record = open_record(out, quick=quick, peers=peers, against=against, say=say)
     for job in jobs:
         say(job)
         module = importlib.import_module(f".{JOBS[job]}", __package__)

@@ -111,7 +111,7 @@ def fields(quick: bool) -> tuple[float, float, str]:
 def _process(code: str, **extra: str) -> float:
     """Processor seconds of a fresh Python that runs `code`."""
     env = {**os.environ, **extra, "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
-    wrapped = f"import os\n{code}\nt = os.times()\nprint('CPU', t.user + t.system)"
+    wrapped = f"{code}\nimport time\nprint('CPU', time.process_time())"
     done = subprocess.run([sys.executable, "-c", wrapped], check=True, capture_output=True, text=True, env=env)
     return float(done.stdout.rpartition("CPU")[2])
 

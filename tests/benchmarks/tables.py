@@ -367,6 +367,22 @@ SECTIONS: tuple[Section, ...] = (
         "transient",
     ),
     Section(
+        "cold",
+        "Whole commands",
+        "What a user waits for: fresh processes, one thread, the smallest of three runs; compiled kernels, meshes, "
+        "curves and housings are in the cache, or kernels alone, or nothing (then the kernels are compiled, too). "
+        "Beside it, where measured, an earlier state.",
+        {
+            "what": ("command", PLAIN),
+            "cached": ("in the cache", PLAIN),
+            "cpu_s": ("CPU (s)", digits),
+            "peak_MB": ("peak of memory (MB)", digits),
+            "before_cpu_s": ("before, CPU (s)", digits),
+            "ratio": ("ratio", digits),
+        },
+        "cold",
+    ),
+    Section(
         "skipped",
         "What is skipped",
         "Processor seconds with the omission and without it; the result is the same (`tests/test_skipped.py` "
