@@ -13,6 +13,7 @@ from .arguments import add_job
 from .common import add_folder
 
 if TYPE_CHECKING:
+    from ..housing.modal_test import Comparison
     from ..reduction.error import MeshError, ReductionError
     from ..reduction.modal_body import ModalBody
 
@@ -29,6 +30,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_job(parser, "job", "job file with a table [housing]")
     add_folder(parser, default="out/housing")
     parser.add_argument("--modes", type=int, default=20, help="modes to list and to write (default: %(default)s)")
+    parser.add_argument(
+        "--compare",
+        metavar="FILE",
+        help="modes of a test (.csv, .uff) or another reduced body (.npz): frequencies, MAC, damping beside those here",
+    )
     parser.add_argument("--no-pictures", action="store_true", help="write no pictures")
 
 
@@ -47,6 +53,11 @@ def run(args: argparse.Namespace) -> int:
     from ..output.files import output_folder, whole_set
     from ..reduction.error import mesh_error, reduction_error
 
+    test = None
+    if args.compare is not None:
+        from ..housing.modal_test import compare, read_modes
+
+        test = read_modes(args.compare)
     folder = output_folder(args.out or "out/housing")
     started = time.perf_counter()
     body = reduced_housing(table, Path(args.job).parent)
@@ -57,10 +68,13 @@ def run(args: argparse.Namespace) -> int:
         mesh = mesh_error(body, table.reduction.band_Hz)
         left_out = reduction_error(body, table.reduction.band_Hz)
         errors = _frequency_errors(body, shown, mesh)
+    compared = None if test is None else compare(body, test, args.modes)
     _report(body, errors, mesh, left_out, seconds)
-    with whole_set(folder, ("housing.png", "modes.png")) as made:
+    with whole_set(folder, ("housing.png", "modes.png", "comparison.csv", "mac.csv", "mac.png")) as made:
         with stage("tables"):
             _write(made, body, fields, errors, mesh, left_out)
+        if compared is not None:
+            _compare(made, compared, args)
         with stage("pictures"):
             problem = "" if args.no_pictures or not body.has_mesh else _draw(made, body, fields)
     if problem:
@@ -115,6 +129,33 @@ def _report(body: ModalBody, errors: dict[str, Any], mesh: MeshError, left_out: 
     part = f" (mesh {100.0 * mesh.response:.2g} %, reduction {100.0 * left_out.response:.2g} %)"
     told += part if math.isfinite(bound) else ""
     print(f"response of the bores up to {left_out.band_hz:.0f} Hz (1 % damping): estimated error <= {told}")
+
+
+def _compare(folder: Path, made: Comparison, args: argparse.Namespace) -> None:
+    """Tell and write the modes of a test beside the body's."""
+    from ..output.files import write_csv
+
+    columns = made.columns()
+    write_csv(folder / "comparison.csv", columns)
+    names = [f"mode_{n + 1}_{f:.1f}_Hz" for n, f in zip(made.numbers, made.frequencies, strict=True)]
+    write_csv(
+        folder / "mac.csv", {"test_frequency_Hz": made.test.frequencies, **dict(zip(names, made.mac.T, strict=True))}
+    )
+    if not args.no_pictures:
+        from ..figures.mac import mac_figure
+
+        mac_figure(folder / "mac.png", made, Path(args.compare).name)
+    print(f"compared with {args.compare}: points within {1e3 * made.distance:.3g} mm of a node")
+    for i in range(len(made.pairs)):
+        hz, other = columns["test_frequency_Hz"][i], columns["frequency_Hz"][i]
+        off, mac = columns["frequency_difference_percent"][i], columns["mac"][i]
+        told = "no partner" if made.pairs[i] < 0 else f"{other:10.2f} Hz  {off:+6.2f} %   MAC {mac:.3f}"
+        print(f"  {i + 1:3d} {hz:10.2f} Hz   {told}")
+    ratios = made.damping_ratios()
+    if ratios:
+        print(
+            "measured damping, for the job: [housing.damping] ratio = [" + ", ".join(f"{r:.4g}" for r in ratios) + "]"
+        )
 
 
 def _write(
