@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,8 @@ def draw_modes(
     titles: Sequence[str],
     *,
     marked: IntArray | None = None,
+    held: IntArray | None = None,
+    labels: Mapping[str, Array] | None = None,
 ) -> str:
     """Draw deformed surfaces side by side into one picture.
 
@@ -50,7 +52,11 @@ def draw_modes(
     titles
         One a picture.
     marked
-        Numbers of points to mark (the attachments' nodes).
+        Numbers of points to mark in red (the attachments' nodes).
+    held
+        Numbers of points to mark in green (those that are held).
+    labels
+        Name -> place (m), for the attachments.
 
     Returns
     -------
@@ -58,13 +64,16 @@ def draw_modes(
         Empty when the picture was drawn, else why not.
     """
     used, renumbered = np.unique(faces, return_inverse=True)
-    keep = np.isin(np.arange(len(points)), [] if marked is None else marked)
+    named = {} if labels is None else dict(labels)
     arrays = {
         "points": points[used],
         "faces": renumbered.reshape(faces.shape),
         "fields": fields[:, used],
         "titles": np.array(list(titles)),
-        "marked": points[keep],
+        "marked": points[np.zeros(0, dtype=int) if marked is None else marked],
+        "held": points[np.zeros(0, dtype=int) if held is None else held],
+        "names": np.array(list(named)),
+        "places": np.array(list(named.values())).reshape(-1, 3),
     }
     return draw_apart(__name__, path, arrays, seconds=_SECONDS)
 
@@ -94,14 +103,28 @@ def _draw(job: Path, target: Path) -> None:
         moved = points + field * (EXAGGERATION * size / most) if most > 0.0 else points
         surface = pyvista.PolyData(moved, cells)
         if most > 0.0:
-            surface["size"] = magnitude / most
-            plotter.add_mesh(surface, scalars="size", cmap="viridis", show_scalar_bar=False, smooth_shading=False)
+            surface["displacement / largest"] = magnitude / most
+            bar = {"title_font_size": 13, "label_font_size": 11, "color": "black", "n_labels": 2, "fmt": "%.1f"}
+            bar |= {"width": 0.4, "height": 0.06, "position_x": 0.55, "position_y": 0.02}
+            plotter.add_mesh(
+                surface, scalars="displacement / largest", cmap="viridis", clim=(0.0, 1.0), show_scalar_bar=number == 0,
+                scalar_bar_args=bar, smooth_shading=False, ambient=0.35, diffuse=0.75,
+            )  # fmt: skip
+            rest = pyvista.PolyData(points, cells).extract_feature_edges(feature_angle=30.0)
+            plotter.add_mesh(rest, color="dimgray", line_width=1.0, opacity=0.7)
         else:
-            plotter.add_mesh(surface, color="lightsteelblue", smooth_shading=False)
+            plotter.add_mesh(surface, color="#c9d3e0", smooth_shading=False, ambient=0.35, diffuse=0.75)
             edges = surface.extract_feature_edges(feature_angle=30.0)
             plotter.add_mesh(edges, color="black", line_width=1.5)
-            if len(stored["marked"]):
-                plotter.add_points(stored["marked"], color="crimson", point_size=5, render_points_as_spheres=True)
+            for key, colour in (("marked", "crimson"), ("held", "seagreen")):
+                if len(stored[key]):
+                    plotter.add_points(stored[key], color=colour, point_size=5, render_points_as_spheres=True)
+            if len(stored["names"]):
+                plotter.add_point_labels(
+                    stored["places"], [str(name) for name in stored["names"]], font_size=16, bold=True,
+                    text_color="crimson", shape_color="white", shape_opacity=0.85, show_points=False,
+                    always_visible=True,
+                )  # fmt: skip
         plotter.add_text(str(title), font_size=9, color="black")
         centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
         plotter.camera_position = [centre + size * np.array([0.75, 1.25, 0.75]), centre, (0.0, 0.0, 1.0)]

@@ -56,7 +56,7 @@ def stiffness_figure(path: str | Path, job: StiffnessJob, curve: StiffnessCurve)
         bottom = axes.get_ylim()[0]
         axes.plot(failed, np.full(len(failed), bottom), "x", color=RED, clip_on=False, label="failed positions")
     axes.set_ylabel("mesh stiffness k  (N/µm)")
-    load = f"twist {table.twist_deg:g}°" if table.twist_deg is not None else f"wheel torque {table.torque_Nm:g} N m"
+    load = f"wheel torque {table.torque_Nm:g} N m" if table.twist_deg is None else _twist(table.twist_deg, curve)
     teeth = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}"
     axes.set_title(f"{teeth}, {load}, plane {table.plane}, law {table.law}", fontsize=11, loc="left")
     axes.set_xlim(*np.degrees(line[0][[0, -1]]))
@@ -66,14 +66,28 @@ def stiffness_figure(path: str | Path, job: StiffnessJob, curve: StiffnessCurve)
         lower = figure.add_subplot(grid[1], sharex=axes)
         tidy(lower)
         axes.tick_params(labelbottom=False)
+        angles_deg = np.degrees(angles)
         for number, (angle, share) in enumerate(shares):
             color = (BLUE, ORANGE, GREEN)[number % 3]
             lower.plot(angle, share, ".-", color=color, linewidth=1.4, markersize=4)
-        lower.set_ylim(-0.03, 1.06)
+            top = int(np.nanargmax(share))
+            place = (angle[top], share[top])
+            side = "left" if angle[top] <= angles_deg[0] else "right" if angle[top] >= angles_deg[-1] else "center"
+            where = {"xytext": (3 if side == "left" else 0, 4), "textcoords": "offset points", "ha": side}
+            lower.annotate(f"pair {number + 1}", place, color=color, fontsize=8, **where)
+        lower.set_ylim(-0.03, 1.22)
+        lower.set_yticks([0.0, 0.5, 1.0])
         lower.set_ylabel("load share (–)")
         axes = lower
     axes.set_xlabel("pinion angle (deg)")
     save(figure, path)
+
+
+def _twist(twist_deg: float, curve: StiffnessCurve) -> str:
+    """A twist, and the torques that it takes."""
+    torques = curve.torque_wheel[np.isfinite(curve.torque_wheel)]
+    told = f" (wheel torque {torques.min():.4g} to {torques.max():.4g} N m)" if len(torques) else ""
+    return f"twist {twist_deg:g}°{told}"
 
 
 def _levels(job: StiffnessJob, curve: StiffnessCurve) -> dict[str, float]:
@@ -116,7 +130,8 @@ def pressure_figure(path: str | Path, pair: GearPair, pressures: Sequence[tuple[
     pick = np.unique(np.linspace(0, len(pressures) - 1, min(len(pressures), MOST_LINES)).round().astype(int))
     lines = [(pressures[i][0], flank) for i in pick for flank in pressures[i][1] if len(flank.shown)]
     angles = [angle for angle, _ in lines] or [0.0]
-    norm = Normalize(min(angles), max(*angles, min(angles) + 1e-6))
+    several = max(angles) > min(angles)
+    norm = Normalize(min(angles), max(angles) if several else min(angles) + 1.0)
     colors = colormaps["viridis"]
     figure = new_figure(10.5, 4.2)
     both: Any = figure.subplots(1, 2, sharey=True)
@@ -131,7 +146,8 @@ def pressure_figure(path: str | Path, pair: GearPair, pressures: Sequence[tuple[
     both[0].set_ylim(bottom=0.0)  # shared, and only now that both are drawn
     both[0].set_ylabel("contact pressure (MPa)")
     title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, pressure along the flanks"
-    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
-    bar = figure.colorbar(ScalarMappable(norm, colors), ax=list(both), pad=0.015, aspect=30)
-    bar.set_label("pinion angle (deg)")
+    figure.suptitle(title + ("" if several else f" at {angles[0]:g}°"), x=0.01, ha="left", fontsize=11)
+    if several:
+        bar = figure.colorbar(ScalarMappable(norm, colors), ax=list(both), pad=0.015, aspect=30)
+        bar.set_label("pinion angle (deg)")
     save(figure, path, dpi=120)

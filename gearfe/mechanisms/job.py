@@ -23,7 +23,8 @@ from .results import Results, evaluate, reactions, reference_table
 #: Files that depend on the options: what is left of them from an earlier run is removed.
 MAY_WRITE = (
     "trajectory.csv", "energy.csv", "equilibrium.csv", "bodies.csv", "modes.csv", "shapes.csv", "modes.png",
-    "reactions.csv", "curves.png", "picture.png", "animation.gif", "links.csv", "links.vtkhdf", "links.png",
+    "reactions.csv", "curves.png", "energy.png", "picture.png", "animation.gif", "links.csv", "links.vtkhdf",
+    "links.png",
 )  # fmt: skip
 
 
