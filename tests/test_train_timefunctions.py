@@ -106,7 +106,7 @@ def job(tmp_path, drive: str = DRIVE, load: str = LOAD):
     return path
 
 
-def test_a_linear_ramp_turns_as_its_integral(tmp_path):
+def test_a_linear_ramp_turns_as_its_integral(tmp_path, capsys):
     """Speed 200 + 1e5 t: the angle is 200 t + 5e4 t^2, the acceleration of a shaft on a rigid drive 1e5."""
     for drive in ('speed_rad_per_s = "200 + 1e5*time"', "speed_rad_per_s = { points = [[0, 200.0], [2, 400.0]] }"):
         path = job(tmp_path, drive)
@@ -116,6 +116,8 @@ def test_a_linear_ramp_turns_as_its_integral(tmp_path):
         t = made["time_s"]
         np.testing.assert_allclose(np.radians(made["drive_angle_deg"]), 200.0 * t + 5e4 * t**2, atol=1e-12)
         np.testing.assert_allclose(made["speed_one_rad_per_s"], 200.0 + 1e5 * t, rtol=1e-12)
+        told = capsys.readouterr().out
+        assert ("636.6 to 1273.2 Hz" if "time" in drive else "1273.2 Hz") in told  # 20 teeth
 
 
 def test_a_mistake_in_a_job_is_told_with_its_key(tmp_path, capsys):
@@ -135,3 +137,25 @@ def test_a_load_that_never_rests_has_no_multipliers(tmp_path, capsys):
     for load, changes in (('"75 + 10*sin(9000*time)"', True), ('"75"', False)):
         assert main(["vibration", str(job(tmp_path, load=f"torque_Nm = {load}")), *out]) == 0
         assert ("a load changes all the time" in capsys.readouterr().out) == changes
+
+
+def test_a_sine_and_its_expression_move_a_train_alike(tmp_path):
+    """Speed and load swing, once as exact sines, once as pieces of polynomials: the forces agree to the tolerance."""
+    swings = {
+        "sines": (
+            "{ constant = 600.0, sines = [{ amplitude = 20.0, frequency_Hz = 800.0 }] }",
+            "{ constant = 75.0, sines = [{ amplitude = 10.0, frequency_Hz = 300.0, phase_deg = 90.0 }] }",
+        ),
+        "text": ('"600 + 20*sin(2*pi*800*time)"', '"75 + 10*cos(2*pi*300*time)"'),
+    }
+    force = []
+    for name, (speed, torque) in swings.items():
+        path = job(tmp_path, f"speed_rad_per_s = {speed}", f"torque_Nm = {torque}")
+        out = tmp_path / name
+        assert main(["vibration", str(path), "--out", str(out), "--no-pictures", "--no-estimate"]) == 0
+        made = np.genfromtxt(out / "response.csv", delimiter=",", names=True)
+        force.append(made["contact_force_1_N"])
+        t = made["time_s"]
+        np.testing.assert_allclose(made["speed_one_rad_per_s"], 600 + 20 * np.sin(1600 * math.pi * t), rtol=1e-10)
+    assert np.ptp(force[0]) > 100.0
+    np.testing.assert_allclose(force[0], force[1], atol=1e-6 * np.abs(force[0]).max())

@@ -155,7 +155,7 @@ def report_lines(response: TrainResponse, scene: TrainScene, written: Written, c
             if mean is None or not math.isfinite(mean[i])
             else f", mean contact force {mean[i]:.1f}{off('mean_contact_forces_N', i)} N"
         )
-        lines.append(f"mesh {i + 1} ({name}): {frequency:.1f} Hz, {k}{force}")
+        lines.append(f"mesh {i + 1} ({name}): {_frequency(scene, response, float(frequency))}, {k}{force}")
     contact = summary.get("contact", {})
     for i, share in enumerate(contact.get("share_without_contact", ())):
         if share is not None:
@@ -207,3 +207,13 @@ def report_lines(response: TrainResponse, scene: TrainScene, written: Written, c
             decibels = None if part is None else 10.0 * math.log10(1.0 + float(part) / max(made.power.mean, 1e-300))
             lines.append(f"radiated power: mean {made.power.mean_level:.1f}{with_error(decibels)} dB re 1e-12 W")
     return lines
+
+
+def _frequency(scene: TrainScene, response: TrainResponse, frequency: float) -> str:
+    """A mesh frequency; that of the first and the last moment where the speed never rests."""
+    speed = scene.driven.speed
+    nominal = float(speed(max(speed.breaks, default=0.0)))
+    if speed.ends or nominal == 0.0:
+        return f"{frequency:.1f} Hz"
+    first, last = (frequency * abs(float(speed(t)) / nominal) for t in (0.0, response.time_reached))
+    return f"{first:.1f} to {last:.1f} Hz"
