@@ -38,7 +38,8 @@ class Case:
     @property
     def command(self) -> tuple[str, ...]:
         """Words after the interpreter."""
-        return ("-m", "gearfe.cli", *self.arguments)
+        out = () if self.arguments == ("--help",) else ("--out", "out")
+        return ("-m", "gearfe.cli", *self.arguments, *out)
 
 
 TRAIN, ANDREWS, SLIDER = (str(GEOMETRY / f"{name}.toml") for name in ("gear_train", "andrews", "slider_crank"))
