@@ -20,7 +20,7 @@ from ..typing import Array
 from .job import TrainJob
 from .measured import Measured, read_measured
 from .run import repeater
-from .short_time import OrderTracks, averaged, order_tracks, short_time, steady_from
+from .short_time import OrderTracks, averaged, check_part, check_turns, order_tracks, short_time, steady_from
 from .spectra import TrainSpectra
 from .tracked import Tracked
 
@@ -85,7 +85,8 @@ class Analysis:
     Raises
     ------
     InputError
-        Measured files that cannot be read, or name attachments that the train does not have.
+        Measured files that cannot be read, or name attachments that the train does not have; parts and turns that
+        are longer than the run.
     """
 
     def __init__(self, job: TrainJob, scene: TrainScene, every: int, start: float) -> None:
@@ -98,6 +99,10 @@ class Analysis:
         cycles = [abs(ratios[scene.gear(m.driver).shaft]) * scene.gear(m.driver).gear.teeth for m in scene.meshes]
         self.mesh_orders = np.array([float(c) for c in cycles]) / abs(self.ratio)
         self._tracked: Tracked | None = None
+        if self.table.short_time_ms is not None:  # told before the long computation
+            check_part(1e-3 * self.table.short_time_ms, self._step, float(job.times[-1]))
+        if self.table.order_turns is not None:
+            check_turns(self.ratio * scene.driven.speed.integral()(job.times), self.table.order_turns)
 
     @property
     def wanted(self) -> bool:

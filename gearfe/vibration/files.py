@@ -208,7 +208,9 @@ def write_run(
             with watch.stage("pictures"):
                 attachment = attachment_to_draw(made.curves, choice.attachment, loaded)
                 draw.curves(target, scene, made, spectra, attachment)
-        if beside is not None and beside.wanted and made.outputs > 1:
+        if beside is not None and beside.wanted and response.status != "done":
+            problems.append("spectra over time and measured ones are left out: the run ended early")
+        elif beside is not None and beside.wanted:
             with watch.stage("spectra over time"):
                 attachment = attachment_to_draw(made.curves, choice.attachment, loaded)
                 analysed = beside.write(target, spectra, attachment, None if draw is None else draw.analysis)

@@ -59,11 +59,32 @@ def short_time(values: Array, step: float, length: float, window: str = "hann") 
     InputError
         Parts that are longer than the run or hold less than eight samples.
     """
-    count, duration = round(length / step), (len(values) - 1) * step
-    if not 8 <= count <= len(values):
-        problem = f"must be >= {8e3 * step:.4g} ms (eight samples) and <= {1e3 * duration:.4g} ms (the run)"
-        raise InputError("spectrum.short_time_ms", 1e3 * length, problem, "choose another duration")
+    check_part(length, step, (len(values) - 1) * step)
+    count = round(length / step)
     return [waterfall(one, step, count, hop=max(1, round(HOP * count)), window=window) for one in values.T]
+
+
+def check_part(length: float, step: float, duration: float) -> None:
+    """Raise `InputError` unless parts of `length` (s) hold eight samples and are no longer than the run."""
+    if not 8 * step * (1.0 - 1e-9) <= length <= duration * (1.0 + 1e-9):
+        problem = f"must be >= {8e3 * step:.4g} ms (eight samples) and <= {1e3 * duration:.4g} ms (the run)"
+        raise InputError("spectrum.short_time_ms", float(f"{1e3 * length:.12g}"), problem, "choose another duration")
+
+
+def check_turns(angle: Array, turns: float) -> tuple[int, int, float]:
+    """First and end of the longest stretch in which an angle (rad) goes one way, and its sense; not too short.
+
+    Raises
+    ------
+    InputError
+        When it is less than so many turns.
+    """
+    first, last, sense = _one_way(angle)
+    whole = float(abs(angle[last - 1] - angle[first])) / (2.0 * math.pi) if last > first else 0.0
+    if whole * (1.0 + 1e-9) < turns:
+        problem = f"the first shaft makes {whole:.4g} turns in one sense"
+        raise InputError("spectrum.order_turns", turns, problem, "take less turns, or a longer run")
+    return first, last, sense
 
 
 def averaged(fall: Waterfall, start: float) -> tuple[Array, int]:
@@ -92,14 +113,10 @@ def order_tracks(
     InputError
         When the shaft makes less turns.
     """
-    first, last, sense = _one_way(angle)
+    first, last, sense = check_turns(angle, turns)
     t, phi, x = time[first:last], sense * angle[first:last], values[first:last]
-    width = 2.0 * math.pi * turns
-    whole = float(phi[-1] - phi[0]) if len(phi) else 0.0
-    if whole < width:
-        problem = f"the first shaft makes {whole / (2.0 * math.pi):.4g} turns in one sense"
-        raise InputError("spectrum.order_turns", turns, problem, "take less turns, or a longer run")
-    count = int((whole - width) / (HOP * width) * (1.0 + 1e-12)) + 1
+    width, whole = 2.0 * math.pi * turns, float(phi[-1] - phi[0])
+    count = max(1, int((whole - width) / (HOP * width) * (1.0 + 1e-9)) + 1)
     middles = phi[0] + width * (0.5 + HOP * np.arange(count))
     ends = np.searchsorted(phi, [middles - 0.5 * width, middles + 0.5 * width])
     places = np.interp(middles, phi, t)
