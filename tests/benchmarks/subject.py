@@ -14,10 +14,13 @@ if TYPE_CHECKING:
     from gearfe.gear.pair import GearPair
     from gearfe.housing import Housing
     from gearfe.tables.housing import HousingTable
+    from gearfe.train import TrainScene
 
 ROOT = Path(__file__).resolve().parents[2]
 GEOMETRY = ROOT / "geometry"
 DATA = ROOT / "tests" / "data"
+#: Speed (rad/s) and backlash (m) of the train whose teeth part.
+PARTING_SPEED, PARTING_BACKLASH = 713.0, 40e-6
 
 
 def given_file(path: Path) -> Path:
@@ -83,23 +86,33 @@ def train_model(variant: str, *, quick: bool = False, modes: int | None = None) 
     Parameters
     ----------
     variant
-        ``tutorial`` or ``operating``.
+        ``tutorial`` or ``operating``; ``parting``: the latter at a resonance, with backlash, so that teeth part.
     modes
         Of the housing with held bores, in place of the job's choice by frequency.
     """
+    from gearfe.rigid import constant
     from gearfe.train import build_train
     from gearfe.vibration.job import job_scene, read_train_job, train_body
     from gearfe.vibration.mesh_stiffness import train_curves
 
-    job = read_train_job(given_file(GEOMETRY / "gear_train.toml"), variant)
+    parting = variant == "parting"
+    job = read_train_job(given_file(GEOMETRY / "gear_train.toml"), "operating" if parting else variant)
+
+    def built(scene: TrainScene) -> Any:
+        if parting:
+            meshes = tuple(replace(mesh, backlash=PARTING_BACKLASH) for mesh in scene.meshes)
+            drive = replace(scene.driven, speed=constant(PARTING_SPEED))
+            scene = replace(scene, meshes=meshes, drive=drive)
+        return build_train(scene)
+
     if quick:
         job = replace(job, table=replace(job.table, housing="rigid"))
-        return build_train(job_scene(job, (1.1e8, 1.1e8), None))
+        return built(job_scene(job, (1.1e8, 1.1e8), None))
     if modes is not None:
         assert job.housing is not None
         reduction = replace(job.housing.reduction, modes=modes)
         job = replace(job, housing=replace(job.housing, reduction=reduction))
-    return build_train(job_scene(job, train_curves(job), train_body(job)))
+    return built(job_scene(job, train_curves(job), train_body(job)))
 
 
 def train_times(quick: bool) -> np.ndarray:

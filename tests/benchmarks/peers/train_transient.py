@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,11 @@ def answer(task: dict[str, Any]) -> dict[str, Any]:
     start = np.concatenate(core.reduce(model.start.q, model.start.v))
     rhs = plain_rhs(core) if task["quick"] else compiled_rhs(core, model.forces)
     rhs(0.0, start, np.empty_like(start))
-    runs = {"sundials": _sundials, "scipy_ivp": _scipy, "exudyn": _exudyn}
+    runs: dict[str, Callable[..., States]] = {
+        "sundials": _sundials,
+        "scipy_ivp": partial(_scipy, _approaches(model)),
+        "exudyn": _exudyn,
+    }
     (at, states), cost = measured(lambda: runs[task["peer"]](task, core, rhs, start, times), runs=3, most_s=30.0)
     return {"times": at.tolist(), "states": states.tolist(), **cost.columns, "unknowns": len(core.squares)}
 
@@ -77,7 +82,7 @@ def law_parameters(forces: Any) -> tuple[Any, ...]:
     """Functions of time with the directions of the torques, flanks and their curves, gyroscopic moments."""
     if len(forces.curves) < len(forces.flanks):
         raise PeerError("peers know stiffness curves only")
-    names = ("direction", "turn", "ratio", "sense", "phase", "mean")
+    names = ("direction", "turn", "ratio", "sense", "phase", "mean", "gap", "parts")
     flanks = np.array([[getattr(flank, name) for name in names] for flank in forces.curves])
     gyros = np.array([[g.direction, g.ratio, g.polar] for g in forces.gyros]).reshape(-1, 3)
     functions = [forces.angle, *(torque for _, torque in forces.torques)]
@@ -109,7 +114,10 @@ def train_law(t, u, du, parameters, out):  # type: ignore[no-untyped-def]
                 high = middle
         x = place - curves.nodes[low]
         c0, c1, c2, c3 = curves.cubics[low, 0], curves.cubics[low, 1], curves.cubics[low, 2], curves.cubics[low, 3]
-        out[d] -= (c0 + x * (c1 + x * (c2 + x * c3)) - flanks[k, 5]) * u[d]
+        out[d] += flanks[k, 5] * u[d]
+        approach = u[d] - flanks[k, 6]
+        if approach > 0.0 or flanks[k, 7] == 0.0:
+            out[d] -= (c0 + x * (c1 + x * (c2 + x * c3))) * approach
     for k in range(gyros.shape[0]):
         d = int(gyros[k, 0])
         momentum = gyros[k, 2] * (gyros[k, 1] * now[0, 1] + du[d + 2])
@@ -179,7 +187,9 @@ def _scale(core: Any) -> np.ndarray:
     return np.concatenate([rate / omega, np.full(len(omega), rate)])
 
 
-def _scipy(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray) -> States:
+def _scipy(
+    approaches: list[Any], task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray
+) -> States:
     from scipy.integrate import solve_ivp
 
     work = np.empty_like(start)
@@ -188,13 +198,37 @@ def _scipy(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: 
         rhs(t, y, work)
         return work.copy()
 
-    made = solve_ivp(
-        right, (times[0], times[-1]), start, task["method"], t_eval=times, rtol=task["tolerance"],
-        atol=task["tolerance"] * _scale(core),
-    )  # fmt: skip
-    if not made.success:
-        raise PeerError(made.message)
-    return times, np.asarray(made.y.T)
+    method, *events = task["method"].split(", ")
+    flanks = approaches if events else []
+    bears = [flank(times[0], start) > 0.0 for flank in flanks]
+    t, y, found = times[0], start, np.zeros((len(times), len(start)))
+    while t < times[-1]:
+        for flank, closed in zip(flanks, bears, strict=True):
+            flank.terminal, flank.direction = True, -1.0 if closed else 1.0
+        asked = (times >= t) if t == times[0] else (times > t)
+        made = solve_ivp(
+            right, (t, times[-1]), y, method, t_eval=times[asked], rtol=task["tolerance"],
+            atol=task["tolerance"] * _scale(core), events=flanks or None,
+        )  # fmt: skip
+        if not made.success:
+            raise PeerError(made.message)
+        found[np.flatnonzero(asked)[: len(made.t)]] = np.reshape(made.y, (len(start), -1)).T
+        if made.status == 0:
+            break
+        k = next(i for i, at in enumerate(made.t_events) if len(at))
+        t, y, bears[k] = made.t_events[k][0], made.y_events[k][0], not bears[k]
+    return times, found
+
+
+def _approaches(model: Any) -> list[Any]:
+    """For each flank that may part a function of time and state whose zeros are where it meets and parts."""
+    core, made = model.core, []
+    for flank in model.forces.curves:
+        row = core.T.T @ model.directions[:, flank.direction]
+        rest = float(core.origin @ model.directions[:, flank.direction]) - flank.gap
+        if flank.parts:
+            made.append(lambda _, y, row=row, rest=rest: row @ y[: len(row)] + rest)
+    return made
 
 
 def _exudyn(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray) -> States:
