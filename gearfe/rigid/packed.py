@@ -8,14 +8,15 @@ was made from.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+if TYPE_CHECKING:
+    from .packed_type import Layout
+
 #: Types of elements: float64, int64, uint64.
 ELEMENTS = "dlL"
-#: Each member: type and number of axes of an array ("d", 2), a number ("d", -1), or the members of a named tuple.
-Layout = tuple[tuple[str, Any], ...]
 
 
 class Packed:
@@ -65,10 +66,3 @@ def _lay_out(named: Any, words: list[int]) -> Layout:
 
 def _address(array: np.ndarray) -> int:
     return int(array.__array_interface__["data"][0])
-
-
-def size_of(member: Any) -> int:
-    """Words of a member."""
-    if isinstance(member[0], str):
-        return max(1, 1 + int(member[1]))
-    return sum(size_of(inner) for _, inner in member)

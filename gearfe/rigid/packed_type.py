@@ -14,8 +14,8 @@ from numba.core.typing.templates import AttributeTemplate
 from numba.extending import NativeValue, infer_getattr, lower_getattr_generic, models, register_model, unbox
 from numba.np import arrayobj
 
-from .packed import Layout, size_of
-
+#: Each member: type and number of axes of an array ("d", 2), a number ("d", -1), or the members of a named tuple.
+Layout = tuple[tuple[str, Any], ...]
 NUMBERS = {"d": types.float64, "l": types.int64, "L": types.uint64}
 
 
@@ -32,6 +32,13 @@ class PackedType(types.Type):
                 return first, inner
             first += size_of(inner)
         raise AttributeError(name)
+
+
+def size_of(member: Any) -> int:
+    """Words of a member."""
+    if isinstance(member[0], str):
+        return max(1, 1 + int(member[1]))
+    return sum(size_of(inner) for _, inner in member)
 
 
 @register_model(PackedType)
