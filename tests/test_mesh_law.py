@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -113,10 +114,11 @@ def test_approach_carries_the_force(law):
 
 
 def test_files(law, tmp_path):
-    save_law(law, tmp_path / "law.npz")
+    save_law(replace(law, back=law.stiffer(0.1)), tmp_path / "law.npz")
     same = load_law(tmp_path / "law.npz")
     angle, approach = places(law, 20)
     assert (same(angle, approach).force == law(angle, approach).force).all()
+    assert (same.sides[1](angle, approach).force == law.stiffer(0.1)(angle, approach).force).all()
     write_law_csv(law, tmp_path / "law.csv")
     rows = (tmp_path / "law.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 1 + law.slots * (len(law.nodes) - 1)

@@ -286,7 +286,8 @@ def test_mistakes_in_a_job_are_told(job, capsys, extra, words):
 @pytest.mark.parametrize(("friction", "backlash", "torque"), [(0.06, None, 60.0), (0.1, 20e-6, 2.0)])
 def test_derivatives_of_the_forces(friction, backlash, torque):
     """Differences of the forces at random places, friction and both flanks included."""
-    scene = loaded([(20, 30)], lambda teeth: hertzian_law(relief=4e-6), torque=torque, backlash=backlash)
+    law = dataclasses.replace(hertzian_law(relief=4e-6), back=hertzian_law(relief=1e-6, cells=10))
+    scene = loaded([(20, 30)], lambda teeth: law, torque=torque, backlash=backlash)
     scene = dataclasses.replace(scene, meshes=(dataclasses.replace(scene.meshes[0], friction=friction, damping=500.0),))
     system = condense(build_train(scene)).system
     m, rng = system.linear.size, np.random.default_rng(2)

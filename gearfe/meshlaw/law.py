@@ -96,6 +96,8 @@ class MeshLaw:
         Approach beyond the first touch (m) up to which the law is known.
     error
         Estimate of the relative error of its stiffness; not-a-number where there is none.
+    back
+        Law of the back flanks, of the pair seen from behind; None: they are the mirror image of the driving ones.
     """
 
     nodes: Array
@@ -107,14 +109,23 @@ class MeshLaw:
     backlash: float
     reach: float
     error: float = math.nan
+    back: MeshLaw | None = None
 
     def stiffer(self, part: float) -> MeshLaw:
         """All forces larger by a part of themselves at the same approach."""
         factor = 1.0 + part
-        powers = factor ** (1.0 - np.arange(5))
         return replace(
-            self, forces=factor * self.forces, energies=self.energies * powers, coupling=self.coupling / factor
+            self,
+            forces=factor * self.forces,
+            energies=self.energies * factor ** (1.0 - np.arange(5)),
+            coupling=self.coupling / factor,
+            back=None if self.back is None else self.back.stiffer(part),
         )
+
+    @property
+    def sides(self) -> tuple[MeshLaw, MeshLaw]:
+        """Of the driving flanks, and of the back flanks at the mirrored phase."""
+        return self, self.back or self
 
     @property
     def cycle(self) -> float:

@@ -19,16 +19,20 @@ ARRAYS = {"nodes": 1, "forces": 1, "touch": 3, "energies": 5, "coupling": 4}
 
 
 def law_arrays(law: MeshLaw) -> dict[str, Array]:
-    """A law as named arrays."""
+    """A law as named arrays, those of a law of its own for the back flanks beginning with ``back_``."""
     numbers = np.array([*law.base_radii, law.backlash, law.reach])
-    return {**{name: getattr(law, name) for name in ARRAYS}, "numbers": numbers}
+    made = {**{name: getattr(law, name) for name in ARRAYS}, "numbers": numbers}
+    behind = {} if law.back is None else law_arrays(law.back)
+    return {**made, **{f"back_{name}": values for name, values in behind.items()}}
 
 
 def law_of_arrays(arrays: Mapping[str, Array]) -> MeshLaw:
     """The law of `law_arrays`."""
     pinion, wheel, backlash, reach = arrays["numbers"].tolist()
     nodes, forces, touch, energies, coupling = (np.ascontiguousarray(arrays[name], dtype=float) for name in ARRAYS)
-    return MeshLaw(nodes, forces, touch, energies, coupling, (pinion, wheel), backlash, reach)
+    behind = {name.removeprefix("back_"): values for name, values in arrays.items() if name.startswith("back_")}
+    back = law_of_arrays(behind) if behind else None
+    return MeshLaw(nodes, forces, touch, energies, coupling, (pinion, wheel), backlash, reach, back=back)
 
 
 def save_law(law: MeshLaw, path: str | Path) -> None:

@@ -206,6 +206,9 @@ def check_curve(mesh: GearMesh, teeth: int) -> None:
         problem = f"has a period of {math.degrees(period):.9g} deg, {needs}"
         raise InputError(label, None, problem, "take the curve of these gears, the driver as pinion")
     if isinstance(curve, MeshLaw):
+        if abs(curve.sides[1].cycle - wanted) > SAME * wanted:
+            problem = f"has a law of the back flanks with a period of {math.degrees(curve.sides[1].cycle):.9g} deg"
+            raise InputError(label, None, problem, "take that of the same gears, seen from behind")
         return
     table = interpolant(mesh)
     gaps = np.diff(table.nodes)

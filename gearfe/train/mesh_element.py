@@ -168,7 +168,7 @@ class MeshLine:
                     sliding = replace(sliding, across=turn + 1 + 2 * number, spin=turn + 2)
                 rayleigh = self.rayleigh if number == 0 else 0.0
                 chi = self.damping / self.reference
-                made.append(LawFlank(*place, self.law, chi, sliding, self.shifts[number], rayleigh))
+                made.append(LawFlank(*place, self.law.sides[number], chi, sliding, self.shifts[number], rayleigh))
             elif self.curve is not None:
                 made.append(CurveFlank(*place, self.curve, not self.pulls))
         return tuple(made)

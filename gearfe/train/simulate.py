@@ -16,6 +16,7 @@ from ..progress import count, stage
 from ..record_spectrum import FASTEST, SPARE
 from ..rigid import IntegrationError, Start, Status, Trajectory, integrate
 from ..typing import Array
+from .flanks import NONE
 from .floquet import train_multipliers
 from .kinematics import steady_forces
 from .model import TrainModel
@@ -279,7 +280,7 @@ def _whole(
     band_hz: float | None,
 ) -> TrainResponse:
     """The last piece with what holds for the whole run."""
-    warnings = so_far.pulls(model)
+    warnings = so_far.pulls(model) + _loose(model)
     if response.status != "done":
         reached = response.time_reached
         warnings.append(f"the run ended at {1e3 * reached:.6g} ms of {1e3 * asked:.6g} ms: {response.status}{why}")
@@ -298,6 +299,17 @@ def _whole(
             f"period of {1e3 * period:.4g} ms; add damping, or change the speed"
         )
     return replace(response, floquet=multipliers, floquet_note=note, estimates=estimates, warnings=tuple(warnings))
+
+
+def _loose(model: TrainModel) -> list[str]:
+    """Sentences about meshes whose teeth may part and that nothing presses together in steady running."""
+    forces = np.abs(steady_forces(model.scene))
+    return [
+        f"no load keeps the teeth of mesh {line.name} in contact: what they do depends on how they begin, and without "
+        "damping it does not settle"
+        for line, idle in zip(model.meshes, forces <= NONE * forces.max(initial=0.0), strict=True)
+        if idle and not (line.rigid or line.pulls)
+    ]
 
 
 def _ended(model: TrainModel, trajectory: Trajectory, moved: Motion) -> tuple[str, int, str]:

@@ -41,15 +41,16 @@ def _approach(mesh: GearMesh, force: float, phase: Array, shifts: tuple[Array, A
         gap = law.backlash or None if gap is None else gap
         if force < 0.0 and gap is None:
             return None
-        own = shifts[0 if force >= 0.0 else 1]
+        side = 0 if force >= 0.0 else 1
+        acting, own = law.sides[side], shifts[side]
 
         def late(x: Array) -> Array:
-            return np.asarray(own[law.pair_numbers(x) % len(own)])
+            return np.asarray(own[acting.pair_numbers(x) % len(own)])
 
         place = phase if force >= 0.0 else -phase
-        if (abs(force) > law.most(place, late(place))).any():
+        if (abs(force) > acting.most(place, late(place))).any():
             return None
-        return _side(lambda x: law.approach(x, abs(force), late(x)), phase, force, gap)
+        return _side(lambda x: acting.approach(x, abs(force), late(x)), phase, force, gap)
     curve = interpolant(mesh)
     if gap is None:  # a spring that acts both ways
         return force / np.asarray(curve(phase).value)

@@ -132,7 +132,7 @@ def _computed_curve(
         raise InputError(f"mesh {mesh.name!r}", None, problem, "add curve, stiffness_N_per_m or rigid to it, or [pair]")
     tables = StiffnessJob(job.pair, job.stiffness, pair)
     model = {**tables.model, "materials": _materials(job, mesh)}
-    model["deviations"] = _deviations(job, scene, number, pair, model["law"])
+    model["deviations"], _ = _deviations(job, scene, number, pair, model["law"])
     if job.table.curves.load in (None, "stiffness"):
         with stage(mesh.name):
             return cached_curve(pair, model, tables.sweep, watch=watch, progress=progress, estimate_error=estimate)
@@ -175,9 +175,11 @@ def _computed_law(job: TrainJob, scene: TrainScene, number: int, estimate: bool)
     pair = GearPair(one, two, distance)
     tables = StiffnessJob(job.pair, job.stiffness, pair)
     model = {**tables.model, "materials": materials, "law": law_named("half_plane")}
-    model["deviations"] = _deviations(job, scene, number, pair, model["law"])
+    model["deviations"], back = _deviations(job, scene, number, pair, model["law"])
     with stage(mesh.name):
         law = cached_law(pair, model, most / pair.wheel.base_radius)
+        if back != model["deviations"]:
+            law = replace(law, back=cached_law(pair, {**model, "deviations": back}, most / pair.wheel.base_radius))
         if not estimate:
             return law
         angles = pair.mesh_cycle * np.arange(ESTIMATED) / ESTIMATED
@@ -188,17 +190,17 @@ def _computed_law(job: TrainJob, scene: TrainScene, number: int, estimate: bool)
 
 def _deviations(
     job: TrainJob, scene: TrainScene, number: int, pair: GearPair, law: ContactLaw
-) -> tuple[ToothDeviations, ToothDeviations]:
-    """Deviations of the flanks that drive a mesh: the left ones where the driver turns about the axis of the shafts.
-    Pitch errors are left out of those of a mesh law.
+) -> tuple[tuple[ToothDeviations, ToothDeviations], tuple[ToothDeviations, ToothDeviations]]:
+    """Deviations of the driving flanks of a mesh, the left ones where the driver turns about the axis of the shafts,
+    and of its back flanks, those of the driving ones where these never bear. A mesh law's have no pitch errors.
 
     Raises
     ------
     InputError
-        For deviations that the law or one mesh cycle cannot have, and where the back flanks may bear and are others.
+        For deviations that the law or one mesh cycle cannot have, and where a curve's back flanks bear and are others.
     """
     if job.microgeometry is None:
-        return NOMINAL
+        return NOMINAL, NOMINAL
     mesh, sides = scene.meshes[number], {g.name: g.gear for g in job.table.gears}
     gears = (sides[mesh.driver], sides[mesh.driven])
     flanks = ("left", "right") if driving_senses(scene)[number] > 0.0 else ("right", "left")
@@ -211,10 +213,13 @@ def _deviations(
     from ..contact.laws import check_deviations
 
     check_deviations(driving, law)
-    if (mesh.backlash is not None or (mapped and pair.normal_backlash > 0.0)) and back != driving:
-        problem = f"left and right flanks differ, but mesh {mesh.name!r} takes its back flanks as its driving ones"
-        raise InputError("microgeometry", None, problem, "give both the same, or the mesh no backlash")
-    return driving
+    if mesh.backlash is None and not (mapped and pair.normal_backlash > 0.0):
+        back = driving
+    check_deviations(back, law)
+    if back != driving and not mapped:
+        problem = f"left and right flanks differ, but mesh {mesh.name!r} has one curve for both"
+        raise InputError("microgeometry", None, problem, 'write law = "map", or give the mesh no backlash')
+    return driving, back
 
 
 def _materials(job: TrainJob, mesh: GearMesh) -> Any:
