@@ -135,8 +135,9 @@ def set_key(tables: dict[str, Any], name: str, value: Any, field: str) -> None:
 
 @functools.cache
 def type_hints(cls: Any) -> dict[str, Any]:
-    """Types of a table's fields (evaluated once: that takes longer than reading a table)."""
-    return typing.get_type_hints(cls)
+    """Types of a table's fields (evaluated once: that takes longer than reading a table); a choice is a text."""
+    hints = typing.get_type_hints(cls)
+    return {name: str if typing.get_origin(hint) is typing.Literal else hint for name, hint in hints.items()}
 
 
 def fields_of(table: type) -> dict[str, dataclasses.Field[Any]]:

@@ -20,11 +20,10 @@ from pathlib import Path
 import numpy as np
 
 from gearfe import GearPair, sweep_stiffness
-from gearfe.contact.laws import law_named
+from gearfe.contact.model import DEFAULT_MODEL
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh
 from gearfe.stiffness.job import read_stiffness_job
-from gearfe.stiffness.sweep import flank_factor
 from gearfe.tables.laws import LAWS
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -70,7 +69,7 @@ def main() -> None:
     ]
     for law in LAWS:
         for size in SIZES:
-            factor = flank_factor(law_named(law), size)
+            factor = DEFAULT_MODEL.changed(law=law, coarsen=size).mesh_flank_coarsen
             mesher = meshing_seconds(pair, size, factor)
             sweep_stiffness(pair, law=law, coarsen=size, **common)  # fills the mesh cache
             best = None

@@ -101,8 +101,8 @@ def main() -> None:
     for _ in range(args.pairs):
         pair, materials, plane = draw(random)
         angles = positions(pair, random, args.positions)
-        coarse = elastic_pair(pair, materials, plane=plane, law=args.law)
-        fine = elastic_pair(pair, materials, plane=plane, law="nitsche", coarsen=args.finest)
+        coarse = elastic_pair(pair, materials=materials, plane=plane, law=args.law)
+        fine = elastic_pair(pair, materials=materials, plane=plane, law="nitsche", coarsen=args.finest)
         for twist in args.twists:
             if twist * pair.wheel.teeth > args.most_load:
                 continue

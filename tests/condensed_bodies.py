@@ -16,6 +16,7 @@ from gearfe.contact.element_batch import FirstContacts
 from gearfe.contact.elements import solve_elements
 from gearfe.contact.flank import flank_of, normal_stress_rows
 from gearfe.contact.laws import ContactLaw
+from gearfe.contact.model import PairModel
 from gearfe.contact.position import Positions
 from gearfe.verification.bodies import Bodies, ElasticBody
 
@@ -80,7 +81,7 @@ def pressed_pair(lower: GearBody, upper: GearBody, law: ContactLaw, overlap: flo
     centre = left + np.array([CENTRES * size, 0.0])
     pinion = turned(lower, 0.0, left)
     wheel = turned(upper, np.pi - np.pi / TEETH, centre + np.array([0.0, overlap]))
-    return MeshingPair(pinion, wheel, CENTRES * size, lower.thickness, law)
+    return MeshingPair(pinion, wheel, CENTRES * size, lower.thickness, PairModel(law=law))
 
 
 def pressed(pair: MeshingPair, low: float, high: float, pressure: Callable[[Array], Array]) -> Positions:

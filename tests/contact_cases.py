@@ -8,6 +8,7 @@ from functools import cache
 
 from gearfe.contact.compliance import GearBody, MeshingPair, gear_body
 from gearfe.contact.laws import ContactLaw
+from gearfe.contact.model import PairModel
 from gearfe.elasticity import Material, Plane
 from gearfe.gear.pair import Gear, GearPair, TipRelief
 from gearfe.meshing.recipe import sector_recipes
@@ -60,7 +61,7 @@ def bodies(name: str, coarsen: float, plane: Plane, points: int = 4) -> tuple[Ge
 def condensed(name: str, coarsen: float, plane: Plane, law: ContactLaw, points: int = 4) -> MeshingPair:
     """The pair on the condensed route."""
     pinion, wheel = bodies(name, coarsen, plane, points)
-    return MeshingPair(pinion, wheel, gears(name).working_centre_distance, WIDTH, law)
+    return MeshingPair(pinion, wheel, gears(name).working_centre_distance, WIDTH, PairModel(law=law))
 
 
 @cache

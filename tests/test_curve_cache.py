@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from gearfe.contact.laws import HalfPlane, Nitsche, Penalty
+from gearfe.contact.model import PairModel
 from gearfe.elasticity import Material
 from gearfe.stiffness.curve_cache import cached_curve, curve_key
 
 from .gears import pair
 
 STEEL = Material(200e9, 0.3, density=7850.0)
-MODEL = {"materials": (STEEL, STEEL), "plane": "strain", "law": Nitsche(1.0), "coarsen": 1.5, "points_per_edge": 4}
+MODEL = PairModel((STEEL, STEEL), "strain", Nitsche(1.0), coarsen=1.5)
 SWEEP = {"twist": 1e-3, "angles": np.radians([0.0, 6.0, 12.0]), "kinematics": "small"}
 
 
@@ -46,20 +47,19 @@ def test_everything_that_decides_a_curve_is_in_its_key():
         curve_key(pair(20, 31), MODEL, SWEEP),
         curve_key(pair(20, 30, centre_distance=62.51e-3), MODEL, SWEEP),
         curve_key(pair(20, 30, tip_round=1e-5), MODEL, SWEEP),
-        curve_key(gears, MODEL | {"materials": (STEEL, other)}, SWEEP),
-        curve_key(gears, MODEL | {"plane": "stress"}, SWEEP),
-        curve_key(gears, MODEL | {"law": Nitsche(2.0)}, SWEEP),
-        curve_key(gears, MODEL | {"law": Penalty()}, SWEEP),
-        curve_key(gears, MODEL | {"coarsen": 3.0}, SWEEP),
+        curve_key(gears, MODEL.changed(materials=(STEEL, other)), SWEEP),
+        curve_key(gears, MODEL.changed(plane="stress"), SWEEP),
+        curve_key(gears, MODEL.changed(law=Nitsche(2.0)), SWEEP),
+        curve_key(gears, MODEL.changed(law=Penalty()), SWEEP),
+        curve_key(gears, MODEL.changed(coarsen=3.0), SWEEP),
         curve_key(gears, MODEL, SWEEP | {"twist": np.nextafter(1e-3, 1)}),
         curve_key(gears, MODEL, SWEEP | {"angles": np.radians([0.0, 6.0, 12.5])}),
         curve_key(gears, MODEL, SWEEP | {"kinematics": "finite"}),
     ]
     assert len(set(keys)) == len(keys)
-    unnamed = {name: value for name, value in MODEL.items() if name != "law"}
-    assert curve_key(gears, unnamed, SWEEP) == curve_key(gears, MODEL | {"law": HalfPlane()}, SWEEP)
-    assert curve_key(gears, MODEL | {"law": "half_plane"}, SWEEP) == curve_key(gears, unnamed, SWEEP) not in keys
-    assert curve_key(pair(20, 30), dict(MODEL), dict(SWEEP)) == keys[0]
+    named, given = MODEL.changed(law="half_plane"), MODEL.changed(law=HalfPlane())
+    assert curve_key(gears, named, SWEEP) == curve_key(gears, given, SWEEP) not in keys
+    assert curve_key(pair(20, 30), replace(MODEL), dict(SWEEP)) == keys[0]
 
 
 def test_a_damaged_file_is_made_anew(folder):

@@ -13,6 +13,7 @@ from gearfe.contact.elements import first_contacts, solve_elements
 from gearfe.contact.finite_strain import finite_strain_shares
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
+from gearfe.contact.model import PairModel
 from gearfe.contact.position import Positions
 
 from .contact_cases import IRON, STEEL, WIDTH, condensed, gears, meshes
@@ -189,7 +190,7 @@ def test_where_a_sharp_corner_bears_calculix_agrees(law: ContactLaw, degrees: fl
     """CalculiX 2.20, surface to surface, NLGEOM, corner strips of 0.01 mm: see docs/development/verification.md."""
     pair = gears("reference")
     elastic = [gear_body(mesh, STEEL, "strain", WIDTH) for mesh in meshes("reference", 1.0)]
-    both = MeshingPair(elastic[0], elastic[1], pair.working_centre_distance, WIDTH, law)
+    both = MeshingPair(elastic[0], elastic[1], pair.working_centre_distance, WIDTH, PairModel(law=law))
     found = solve_one("reference", both, math.radians(degrees), TWIST)
     share = float(finite_strain_shares(both, solve("reference", both, [math.radians(degrees)], TWIST))[0])
     k_mesh = found.torque_wheel * (1 + share) / TWIST / pair.wheel.base_radius**2

@@ -12,6 +12,7 @@ import pytest
 from gearfe.contact import finite_strain
 from gearfe.contact.compliance import MeshingPair, gear_body, sector_displacements
 from gearfe.contact.laws import Nitsche
+from gearfe.contact.model import PairModel
 from gearfe.contact.position import Positions
 from gearfe.elasticity import Material, physical_gradients, triangle_shapes
 from gearfe.gear.pair import Gear, GearPair
@@ -33,7 +34,7 @@ def meshing_pair(coarsen: float) -> tuple[GearPair, MeshingPair]:
         gear_body(sector_mesh(gear, recipe, cache=False), Material(), "strain", gear.face_width)
         for gear, recipe in zip((pinion, wheel), sector_recipes(pair, coarsen=coarsen), strict=True)
     ]
-    return pair, MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, 10e-3, Nitsche())
+    return pair, MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, 10e-3, PairModel(law=Nitsche()))
 
 
 def extra_energy(pair: MeshingPair, position: Positions) -> float:

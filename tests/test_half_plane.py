@@ -192,8 +192,8 @@ def test_one_gear_softer_and_wider() -> None:
     pair = GearPair(gear(20, tip_round=1e-4), gear(30, tip_round=1e-4, width=14e-3))
     metals = (Material(), Material(70e9, 0.34))
     angles, twist = angles_of(pair, 3), math.radians(0.5)
-    reference = solve_positions(pair, elastic_pair(pair, metals, law="nitsche", coarsen=1.5), angles, twist)
-    law = half_plane_pair(pair, elastic_pair(pair, metals, law="penalty", flank_coarsen=4.0))
+    reference = solve_positions(pair, elastic_pair(pair, materials=metals, law="nitsche", coarsen=1.5), angles, twist)
+    law = half_plane_pair(pair, elastic_pair(pair, materials=metals, law="penalty", flank_coarsen=4.0))
     expected = np.array([p.torque_wheel for p in reference])
     assert np.abs(solve_half_plane(law, angles, twist).torque_wheel / expected - 1).max() < 1.5e-3
 

@@ -11,6 +11,7 @@ import pytest
 from gearfe.contact import laws
 from gearfe.contact.compliance import MeshingPair, gear_body
 from gearfe.contact.finite_strain import NEIGHBOURS, finite_strain_shares
+from gearfe.contact.model import PairModel
 from gearfe.elasticity import Material
 from gearfe.gear.pair import Gear, GearPair
 from gearfe.meshing.recipe import sector_recipes
@@ -63,7 +64,7 @@ def both_routes(angle_deg: float, twist_deg: float, neighbours: int = NEIGHBOURS
     ]
     steel, width = Material(), 10e-3
     bodies = [gear_body(mesh, steel, "strain", width) for mesh in meshes]
-    condensed = MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, laws.Nitsche())
+    condensed = MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, PairModel(law=laws.Nitsche()))
     pinion, wheel = (ElasticGear(mesh, steel, "strain", width) for mesh in meshes)
     full = WholePair(pinion, wheel, pair.working_centre_distance, width, kinematics="finite")
     place = math.radians(angle_deg), math.radians(twist_deg)

@@ -16,6 +16,7 @@ import pytest
 from gearfe import InputError, sweep_stiffness
 from gearfe.cli import main
 from gearfe.contact.laws import Penalty, law_named
+from gearfe.contact.model import PairModel
 from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.stiffness.curve_cache import curve_key
 from gearfe.stiffness.job import read_stiffness_job
@@ -68,7 +69,7 @@ def test_in_python(springs: type) -> None:
     assert set(by_name.law) == {"springs"}
     assert (by_name.torque_wheel < same.torque_wheel).all()
     assert law_named("springs", bed=7.0) == springs(7.0)
-    keys = {curve_key(gears, {"law": law}, given) for law in (springs(300.0), springs(7.0), Penalty())}
+    keys = {curve_key(gears, PairModel(law=law), given) for law in (springs(300.0), springs(7.0), Penalty())}
     assert len(keys) == 3
 
 

@@ -94,7 +94,7 @@ def curve(pair_changes=None, sweep_changes=None):
     job = StiffnessJob(
         table, build(StiffnessTable, SWEEP | (sweep_changes or {}), "stiffness"), GearPair.from_table(table)
     )
-    found = sweep_stiffness(job.pair, **job.model, **job.sweep)
+    found = sweep_stiffness(job.pair, job.model, **job.sweep)
     assert set(found.status) == {"converged"}
     return found
 

@@ -173,7 +173,7 @@ def test_gears_and_their_microgeometry(tmp_path):
         tables = job_tables(raw, "job", ("pair", "stiffness", "microgeometry"))
         pair = GearPair.from_table(tables["pair"])
         one = StiffnessJob(tables["pair"], tables["stiffness"], pair, tables["microgeometry"])
-        assert sweep_stiffness(pair, **one.model, **one.sweep).k_mesh.mean() == pytest.approx(k, rel=1e-12)
+        assert sweep_stiffness(pair, one.model, **one.sweep).k_mesh.mean() == pytest.approx(k, rel=1e-12)
     assert len(set(made.output("k"))) == 4
 
 

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ..config import JobFile, check_range, fields_of
+from ..config import JobFile, check_range, fields_of, type_hints
 from ..errors import InputError, nearest, unknown_name
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ def add_keys(parser: Any, table: type, *keys: str, **renamed: str) -> None:
     renamed
         Option -> key, where the option has a name of its own.
     """
-    hints = typing.get_type_hints(table)
+    hints = type_hints(table)
     for name, key in ({k: k for k in keys} | renamed).items():
         known = fields_of(table)[key].metadata
         told = known["doc"].removeprefix("true: ") + _default_of(fields_of(table)[key])

@@ -67,11 +67,11 @@ def run(args: argparse.Namespace) -> int:
     made_map = sweep_loads(
         job.pair,
         torques,
+        model,
         angles=np.arange(table.positions) * job.pair.mesh_cycle / table.positions,
         root_stress=table.root_stress,
-        kinematics=job.table.kinematics,  # type: ignore[arg-type]
+        kinematics=job.table.kinematics,
         progress=count,
-        **model,
     )
     watch.seconds.update(made_map.timings)
     with whole_set(folder) as made:

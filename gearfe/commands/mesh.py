@@ -156,7 +156,7 @@ def _deck(args: argparse.Namespace, job: StiffnessJob) -> dict[str, MeshPart]:
 
     args.teeth = DECK_TEETH if args.teeth is None else args.teeth
     sweep = {**job.sweep, "angles": np.array([math.radians(args.angle_deg)])}
-    curve = sweep_stiffness(job.pair, **sweep, **job.model)
+    curve = sweep_stiffness(job.pair, job.model, **sweep)
     twist, torque = float(curve.twist[0]), float(curve.torque_wheel[0])
     if not math.isfinite(torque) or twist <= 0.0:
         raise InputError("--deck", None, f"the position has no solution here ({curve.status[0]})", "try another load")

@@ -48,9 +48,9 @@ def run(args: argparse.Namespace) -> int:
     from ..contact.half_plane import half_plane_pair
     from ..gear.deviation_job import deviations_of
     from ..loadmap.root_stress import pair_roots
-    from ..microgeometry.job import checked_model, law_remarks
     from ..microgeometry.report import (
         cell_table,
+        law_remarks,
         order_table,
         pair_table,
         report_lines,
@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
         other = {"left": "right", "right": "left"}[table.flank]
         back = deviations_of(table, pair, beside, flank=other)
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
-    elastic = elastic_pair(pair, watch=watch, **checked_model(job))
+    elastic = elastic_pair(pair, job.model, law="half_plane", watch=watch)
     roots = None
     if table.root_stress:
         with watch.stage("root meshes"), one_thread():

@@ -50,7 +50,6 @@ def run(args: argparse.Namespace) -> int:
 
     from ..contact.half_plane import half_plane_pair
     from ..loadmap.root_stress import pair_roots
-    from ..microgeometry.job import checked_model, law_remarks
     from ..microgeometry.relief import optimise_relief
     from ..microgeometry.relief_job import (
         comparison,
@@ -61,6 +60,7 @@ def run(args: argparse.Namespace) -> int:
         summary,
         with_pitch_errors,
     )
+    from ..microgeometry.report import law_remarks
     from ..output.files import output_folder, whole_set, write_csv, write_json
     from ..stiffness.job import StiffnessJob
     from ..stiffness.sweep import elastic_pair
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     watch = Stopwatch({"program start": time.perf_counter() - started})
     job = StiffnessJob(tables["pair"], with_keys(args, tables.get("stiffness", StiffnessTable()), "coarsen"), pair)
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
-    elastic = elastic_pair(pair, watch=watch, **checked_model(job))
+    elastic = elastic_pair(pair, job.model, law="half_plane", watch=watch)
     roots = None
     if table.root_stress_weight:
         with watch.stage("root meshes"), one_thread():

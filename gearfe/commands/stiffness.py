@@ -98,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
 
             angle_numbers(np.degrees(sweep["angles"]), chosen)
     folder = output_folder(args.out or Path("out") / Path(args.job).stem)
-    elastic = elastic_pair(job.pair, watch=watch, **model)
+    elastic = elastic_pair(job.pair, model, watch=watch)
     if chosen is not None:
         from ..stiffness.fields_output import told_size
 

@@ -27,12 +27,13 @@ from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 
 from ..elasticity import Material, Plane, element_stiffness
 from ..errors import InputError
-from ..gear.deviation import NOMINAL, ToothDeviations
+from ..gear.deviation import ToothDeviations
 from ..meshing.tooth_sector import SectorMesh
 from ..typing import Array, IntArray
 from .dissection import Condensed, condense
 from .flank import Flank, flank_of, normal_stress_rows
-from .laws import ContactLaw, check_deviations, uses_stress
+from .laws import ContactLaw, uses_stress
+from .model import DEFAULT_MODEL, PairModel
 from .position import FlankLoads
 
 
@@ -222,30 +223,31 @@ class MeshingPair:
         a (m).
     width
         Common face width (m).
-    law
-        Contact law.
-    coarsen, flank_coarsen, points_per_edge
-        What the meshes were asked for, see `gearfe.stiffness.sweep.elastic_pair`; for a coarser one of the same kind.
-    deviations
-        Of micrometres, which no mesh has.
+    model
+        What they were made with.
     """
 
     pinion: GearBody
     wheel: GearBody
     centre_distance: float
     width: float
-    law: ContactLaw
-    coarsen: float = 1.0
-    flank_coarsen: float = 1.0
-    points_per_edge: int = 4
-    deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL
+    model: PairModel = DEFAULT_MODEL
 
     def __post_init__(self) -> None:
-        check_deviations(self.deviations, self.law)
         widths = [body.width for body in self.bodies]
         if uses_stress(self.law) and widths != [self.width, self.width]:
             problem = f"the gears' surface stresses are made for contacts {widths} m wide"
             raise InputError("width", self.width, problem, "make the gears with it: gear_body(..., width=...)")
+
+    @property
+    def law(self) -> ContactLaw:
+        """Contact law."""
+        return self.model.law
+
+    @property
+    def deviations(self) -> tuple[ToothDeviations, ToothDeviations]:
+        """Deviations of the driving flanks of pinion and wheel."""
+        return self.model.deviations
 
     @property
     def bodies(self) -> tuple[GearBody, GearBody]:

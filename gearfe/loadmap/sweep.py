@@ -28,11 +28,9 @@ from numpy.typing import ArrayLike
 
 from ..contact.compliance import MeshingPair
 from ..contact.finite_strain import with_shares
-from ..contact.laws import ContactLaw
+from ..contact.model import DEFAULT_MODEL, PairModel
 from ..contact.position import Positions, joined, together
-from ..elasticity import Material, Plane
 from ..errors import InputError
-from ..gear.deviation import NOMINAL, ToothDeviations
 from ..gear.pair import GearPair
 from ..stiffness.positions import (
     PositionSolver,
@@ -43,9 +41,8 @@ from ..stiffness.positions import (
     position_solver,
     standard_stiffness,
 )
-from ..stiffness.sweep import STEEL, assembled_curve, distinct_angles, elastic_pair
+from ..stiffness.sweep import assembled_curve, distinct_angles, elastic_pair
 from ..stopwatch import Stopwatch
-from ..tables.laws import DEFAULT_LAW
 from ..threads import one_thread
 from ..typing import Array, IntArray
 from .cells import StrainShares, predicted
@@ -68,19 +65,14 @@ ANGLES = 18
 def sweep_loads(
     pair: GearPair,
     torques: ArrayLike,
+    model: PairModel = DEFAULT_MODEL,
     *,
     angles: ArrayLike | None = None,
     root_stress: bool = False,
-    materials: Material | tuple[Material, Material] = STEEL,
-    plane: Plane = "strain",
-    law: str | ContactLaw = DEFAULT_LAW,
     kinematics: Literal["small", "finite"] = "finite",
-    coarsen: float = 1.0,
-    flank_coarsen: float = 1.0,
-    points_per_edge: int = 4,
-    deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL,
     elastic: MeshingPair | None = None,
     progress: Progress | None = None,
+    **changes: Any,
 ) -> LoadMap:
     """Stiffness, transmission error, load share, peak pressure and root stress over pinion angle and torque.
 
@@ -93,7 +85,7 @@ def sweep_loads(
         solved once.
     root_stress
         Also the tension at the tooth roots, on refined meshes of its own, see `gearfe.loadmap.root_stress`.
-    materials, plane, law, kinematics, coarsen, flank_coarsen, points_per_edge, deviations, elastic, progress
+    model, kinematics, elastic, progress, changes
         See `gearfe.stiffness.sweep.sweep_stiffness`.
 
     Returns
@@ -117,8 +109,7 @@ def sweep_loads(
         raise InputError("angles", angles, "must be a list of finite angles (rad)", "give at least one angle")
     watch = Stopwatch()
     if elastic is None:
-        sizes: dict[str, Any] = {"coarsen": coarsen, "flank_coarsen": flank_coarsen, "points_per_edge": points_per_edge}
-        elastic = elastic_pair(pair, materials, plane=plane, law=law, deviations=deviations, watch=watch, **sizes)
+        elastic = elastic_pair(pair, model, watch=watch, **changes)
     solved_angles, source = distinct_angles(asked, cycle)
     if len(goals) * len(solved_angles) > MOST_CELLS:
         problem = f"makes more than {MOST_CELLS} cells with {len(solved_angles)} angles"

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from ..cache import cached_arrays
-from ..contact.laws import law_named
+from ..contact.laws import HalfPlane
+from ..contact.model import PairModel
 from ..gear.pair import GearPair
 from ..progress import stage
 from ..stiffness.curve_cache import curve_key
@@ -18,15 +18,15 @@ from .law import MeshLaw
 from .store import law_arrays, law_of_arrays
 
 
-def cached_law(pair: GearPair, model: Mapping[str, Any], force: float) -> MeshLaw:
+def cached_law(pair: GearPair, model: PairModel, force: float) -> MeshLaw:
     """Law of a pair for mesh forces up to `force` (N), from disk when it was made before.
 
     Parameters
     ----------
     model
-        Keyword arguments of `gearfe.stiffness.sweep.elastic_pair`; the contact law is the half-plane law in any case.
+        Of the pair; the contact law is the half-plane law in any case.
     """
-    own = {**model, "law": law_named("half_plane")}
+    own = replace(model, law=HalfPlane())
 
     def made() -> dict[str, Array]:
         from ..contact.half_plane import half_plane_pair
@@ -34,7 +34,7 @@ def cached_law(pair: GearPair, model: Mapping[str, Any], force: float) -> MeshLa
         from .make import mesh_law
 
         with stage("mesh law"):
-            return law_arrays(mesh_law(half_plane_pair(pair, elastic_pair(pair, **own)), force))
+            return law_arrays(mesh_law(half_plane_pair(pair, elastic_pair(pair, own)), force))
 
     recipe = [curve_key(pair, own, {"force": force}), _source()]
     return law_of_arrays(cached_arrays("mesh-law", recipe, made))

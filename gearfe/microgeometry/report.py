@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..contact.laws import HalfPlane
 from ..gear import pitch_errors
 from ..gear.deviation import ToothDeviations
 from ..gear.deviation_job import GEARS
@@ -193,3 +194,11 @@ def warnings(pair: GearPair, made: LoadedMesh) -> list[str]:
         cure = "rough flanks may not settle; take smoother ones, or other torques"
         said.append(f"{int(lost.sum())} positions have no numbers ({told}): {cure}")
     return said
+
+
+def law_remarks(job: StiffnessJob) -> list[str]:
+    """A line to print where [stiffness] names another law than the one that solves deviations."""
+    name = job.law.name
+    if name == HalfPlane.name:
+        return []
+    return [f"contact law: half_plane, as deviations need it; law = {name!r} of [stiffness] is for its curve alone"]

@@ -20,12 +20,11 @@ import numpy as np
 
 from .. import __version__
 from ..cache import cache_key, kept
-from ..contact.laws import law_named
+from ..contact.model import PairModel
 from ..errors import InputError
 from ..gear.pair import GearPair
 from ..output.files import write_json
 from ..stopwatch import Stopwatch
-from ..tables.laws import DEFAULT_LAW
 from .curve import ErrorEstimate, StiffnessCurve
 
 #: Rooms whose text decides a curve, beside `gearfe.elasticity`.
@@ -34,7 +33,7 @@ ROOMS = ("contact", "gear", "meshing", "stiffness")
 
 def cached_curve(
     pair: GearPair,
-    model: dict[str, Any],
+    model: PairModel,
     sweep: dict[str, Any],
     *,
     watch: Stopwatch | None = None,
@@ -47,8 +46,10 @@ def cached_curve(
     ----------
     pair
         The gears, the driver as pinion.
-    model, sweep
-        Keyword arguments of `sweep_stiffness`, such as those of `gearfe.stiffness.job.StiffnessJob`.
+    model
+        Of the pair.
+    sweep
+        Other keyword arguments of `sweep_stiffness`, such as those of `gearfe.stiffness.job.StiffnessJob`.
     watch, progress
         See `sweep_stiffness`.
     estimate_error
@@ -65,7 +66,7 @@ def cached_curve(
     def make() -> StiffnessCurve:
         from .sweep import elastic_pair, sweep_stiffness
 
-        elastic = elastic_pair(pair, watch=watch, **model)
+        elastic = elastic_pair(pair, model, watch=watch)
         curve = sweep_stiffness(pair, elastic=elastic, progress=progress, estimate_error=estimate_error, **sweep)
         if watch is not None:
             for stage, seconds in curve.timings.items():
@@ -82,16 +83,14 @@ def cached_curve(
     return kept("curve", curve_key(pair, model, sweep), read=read, make=make, write=write, suffix=".csv")
 
 
-def curve_key(pair: GearPair, model: dict[str, Any], sweep: dict[str, Any]) -> str:
+def curve_key(pair: GearPair, model: PairModel, sweep: dict[str, Any]) -> str:
     """Hash (hex) of all that decides a curve."""
     import scipy
 
     versions = {"numpy": np.__version__, "scipy": scipy.__version__, "gearfe": __version__, "source": _source()}
-    law = model.get("law", DEFAULT_LAW)
-    law = law_named(law) if isinstance(law, str) else law
-    kind = type(law)
+    kind = type(model.law)
     versions["law"] = f"{kind.__module__}:{kind.__qualname__} {_text_of(kind.__module__)}"
-    return cache_key("curve", {"pair": pair, "model": {**model, "law": law}, "sweep": sweep, "versions": versions})
+    return cache_key("curve", {"pair": pair, "model": model, "sweep": sweep, "versions": versions})
 
 
 @cache

@@ -40,6 +40,7 @@ from ..contact.compliance import MeshingPair
 from ..contact.half_plane_pair import HalfPlanePair, half_plane_pair
 from ..contact.half_plane_result import PairContacts
 from ..contact.half_plane_step import SIGN, smooth_influence
+from ..contact.model import COARSENING
 from ..contact.panels import Couplings, couplings
 from ..contact.position import Positions
 from ..typing import Array, BoolArray, ComplexArray, IntArray
@@ -47,9 +48,9 @@ from .curve import ErrorEstimate
 from .positions import HalfPlaneSolver, PositionSolver, at_twists, position_solver
 from .torque_control import ANGLE_ROUNDING
 
-#: Coarsening c, assumed order of convergence p, share of the meshes' common error at the default sizes, and largest
-#: number of positions solved twice.
-COARSENING, ORDER, COMMON, POSITIONS = 1.6, 1.0, 5e-5, 20
+#: Assumed order of convergence p, share of the meshes' common error at the default sizes, and largest number of
+#: positions solved twice.
+ORDER, COMMON, POSITIONS = 1.0, 5e-5, 20
 #: Standard deviations that cover 95 %.
 COVERAGE = 2.0
 #: Way ahead in twist for the derivative of the energy, as a share of the way in which the forces double.
@@ -70,7 +71,7 @@ def curve_error(solver: PositionSolver, coarse: MeshingPair, solved: Positions, 
     again = position_solver(solver.pair, coarse, resolved_only=False)
     there = at_twists(again, chosen.pinion_angle, chosen.twist, None, finite=finite)
     other = np.where(there.status == "converged", there.torque_wheel, np.nan)
-    coarsen = elastic.coarsen * max(1.0, elastic.flank_coarsen)
+    coarsen = elastic.model.coarsen * max(1.0, elastic.model.flank_coarsen)
     return error_estimate(chosen.pinion_angle, chosen.torque_wheel, other, coarsen=coarsen, unseen=rounding)
 
 

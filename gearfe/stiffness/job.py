@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..config import load_job
-from ..contact.laws import ContactLaw, check_deviations, law_named
+from ..contact.laws import ContactLaw, law_named
+from ..contact.model import PairModel
 from ..elasticity import Material
 from ..errors import InputError
 from ..gear.deviation import NOMINAL, ToothDeviations
@@ -72,25 +73,11 @@ class StiffnessJob:
         return made if self.microgeometry is None else {**made, "microgeometry": asdict(self.microgeometry)}
 
     @property
-    def model(self) -> dict[str, Any]:
-        """Keyword arguments of `gearfe.stiffness.sweep.elastic_pair`.
-
-        Raises
-        ------
-        InputError
-            For deviations that a curve or the law cannot have.
-        """
-        t, deviations = self.table, self.deviations
-        check_deviations(deviations, self.law)
-        return {
-            "materials": self.materials,
-            "plane": t.plane,
-            "law": self.law,
-            "coarsen": t.coarsen,
-            "flank_coarsen": t.flank_coarsen,
-            "points_per_edge": t.points_per_edge,
-            "deviations": deviations,
-        }
+    def model(self) -> PairModel:
+        """What `gearfe.stiffness.sweep.elastic_pair` makes of the gears."""
+        t = self.table
+        sizes = t.coarsen, t.flank_coarsen, t.points_per_edge
+        return PairModel(self.materials, t.plane, self.law, *sizes, self.deviations)
 
     @property
     def sweep(self) -> dict[str, Any]:

@@ -19,23 +19,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..contact.compliance import MeshingPair, gear_body
-from ..contact.laws import ContactLaw, HalfPlane, law_named, law_text, uses_stress
+from ..contact.laws import law_text, uses_stress
+from ..contact.model import COARSENING, DEFAULT_MODEL, PairModel
 from ..contact.position import Positions
-from ..elasticity import Material, Plane
 from ..errors import InputError
-from ..gear.deviation import NOMINAL, ToothDeviations
 from ..gear.pair import GearPair
 from ..gear.validity import MOST_OVERLAP, overlaps
 from ..meshing.recipe import sector_recipes
 from ..meshing.tooth_sector import sector_mesh
 from ..stopwatch import Stopwatch
-from ..tables.laws import DEFAULT_LAW
-from ..tables.stiffness import check_flank_coarsen
 from ..threads import one_thread
 from ..typing import Array, IntArray
 from .contact_pressure import EDGES, contact_pressures
 from .curve import SOLVED, ErrorEstimate, StiffnessCurve
-from .curve_error import COARSENING, curve_error
+from .curve_error import curve_error
 from .periodic import wrapped_phase
 from .positions import (
     PositionSolver,
@@ -51,123 +48,62 @@ from .positions import (
 __all__ = ["ErrorEstimate", "StiffnessCurve", "elastic_pair", "sweep_stiffness"]
 
 
-#: Flank elements of the half-plane law, which need not resolve contacts: times those of the laws on the mesh, and at
-#: most so many times the default ones.
-HALF_PLANE_FLANK, HALF_PLANE_COARSEST = 4.0, 6.0
-
-#: Structural steel, the material where none is given.
-STEEL = Material()
-
-
 def elastic_pair(
-    pair: GearPair,
-    materials: Material | tuple[Material, Material] = STEEL,
-    *,
-    plane: Plane = "strain",
-    law: str | ContactLaw = DEFAULT_LAW,
-    coarsen: float = 1.0,
-    flank_coarsen: float = 1.0,
-    points_per_edge: int = 4,
-    deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL,
-    watch: Stopwatch | None = None,
+    pair: GearPair, model: PairModel = DEFAULT_MODEL, *, watch: Stopwatch | None = None, **changes: Any
 ) -> MeshingPair:
     """Mesh both gears (or read their meshes from the cache) and condense them to their flanks.
 
     Parameters
     ----------
-    materials
-        Of both gears, or of pinion and wheel.
-    plane
-        ``strain`` or ``stress``.
-    law
-        Contact law, or the name of one with its default parameter.
-    coarsen, flank_coarsen
-        Factor on all element sizes, and besides on those of the driving flanks. The half-plane law's flanks are coarser
-        by `HALF_PLANE_FLANK`, as far as `HALF_PLANE_COARSEST` allows.
-    points_per_edge
-        Contact points on each edge of a flank.
-    deviations
-        Of the driving flanks of pinion and wheel, all teeth alike; the half-plane law alone takes them.
+    model
+        Materials, contact law, element sizes.
     watch
         Takes the time of the stages.
+    changes
+        Fields of the model to change, such as ``law="nitsche"``; see `PairModel.changed`.
     """
-    if plane not in ("strain", "stress"):
-        raise InputError("plane", plane, "must be strain or stress")
-    # the error estimate of a mesh at the limit is coarser by COARSENING
-    if not (math.isfinite(coarsen) and 0.2 <= coarsen <= 5.0 * COARSENING):
-        raise InputError("coarsen", coarsen, "must be >= 0.2 and <= 5", "1 is the default mesh, 2 twice its sizes")
-    check_flank_coarsen(coarsen, flank_coarsen, "flank_coarsen")
-    chosen = law_named(law) if isinstance(law, str) else law
-    asked = coarsen, flank_coarsen, points_per_edge
-    flank_coarsen = flank_factor(chosen, coarsen, flank_coarsen)
-    both = (materials, materials) if isinstance(materials, Material) else materials
+    model = model.changed(**changes)
     watch = watch or Stopwatch()
     gears = (pair.pinion, pair.wheel)
     with watch.stage("meshes"):
-        recipes = sector_recipes(pair, coarsen=coarsen, flank_coarsen=flank_coarsen)
+        recipes = sector_recipes(pair, coarsen=model.coarsen, flank_coarsen=model.mesh_flank_coarsen)
         meshes = [sector_mesh(gear, recipe) for gear, recipe in zip(gears, recipes, strict=True)]
     width = min(gear.face_width for gear in gears)
+    options: dict[str, Any] = {"points_per_edge": model.points_per_edge, "with_stress": uses_stress(model.law)}
     with watch.stage("condensation"), one_thread():
-        bodies = [
-            gear_body(
-                mesh,
-                material,
-                plane,
-                gear.face_width,
-                points_per_edge=points_per_edge,
-                with_stress=uses_stress(chosen),
-                width=width,
-            )
-            for mesh, material, gear in zip(meshes, both, gears, strict=True)
-        ]
-    return MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, chosen, *asked, deviations)
+        one, two = (
+            gear_body(mesh, material, model.plane, gear.face_width, width=width, **options)
+            for mesh, material, gear in zip(meshes, model.materials, gears, strict=True)
+        )
+    return MeshingPair(one, two, pair.working_centre_distance, width, model)
 
 
 def coarser(pair: GearPair, elastic: MeshingPair) -> MeshingPair:
     """The same gears on meshes `COARSENING` times coarser."""
-    return elastic_pair(
-        pair,
-        (elastic.pinion.material, elastic.wheel.material),
-        plane=elastic.pinion.plane,
-        law=elastic.law,
-        coarsen=COARSENING * elastic.coarsen,
-        flank_coarsen=elastic.flank_coarsen,
-        points_per_edge=elastic.points_per_edge,
-        deviations=elastic.deviations,
-    )
-
-
-def flank_factor(law: ContactLaw, coarsen: float, flank_coarsen: float = 1.0) -> float:
-    """`flank_coarsen` of the mesh that a law gets: the half-plane law's is coarser, see `elastic_pair`."""
-    if not isinstance(law, HalfPlane):
-        return flank_coarsen
-    return min(HALF_PLANE_FLANK * flank_coarsen, max(1.0, HALF_PLANE_COARSEST / coarsen))
+    return elastic_pair(pair, elastic.model, coarsen=COARSENING * elastic.model.coarsen)
 
 
 def sweep_stiffness(
     pair: GearPair,
+    model: PairModel = DEFAULT_MODEL,
     *,
     twist: float | None = None,
     torque: float | None = None,
     angles: ArrayLike | None = None,
-    materials: Material | tuple[Material, Material] = STEEL,
-    plane: Plane = "strain",
-    law: str | ContactLaw = DEFAULT_LAW,
     kinematics: Literal["small", "finite"] = "finite",
     twist_from: Literal["contact", "centred"] = "contact",
     solve_all: bool = False,
-    coarsen: float = 1.0,
-    flank_coarsen: float = 1.0,
-    points_per_edge: int = 4,
-    deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL,
     estimate_error: bool = False,
     elastic: MeshingPair | None = None,
     progress: Progress | None = None,
+    **changes: Any,
 ) -> StiffnessCurve:
     """Mesh stiffness over the rotation of the pinion, at a given twist or a given torque.
 
     Parameters
     ----------
+    model, changes
+        Model of the pair, and fields of it to change, such as ``law="nitsche"``; see `elastic_pair`.
     twist
         Twist of the wheel (rad), > 0, counted as `twist_from` says.
     torque
@@ -175,8 +111,6 @@ def sweep_stiffness(
     angles : array_like, shape (n,), optional
         Pinion angles (rad); without them, 20 over one mesh cycle. Positions that differ by whole mesh cycles are
         solved once.
-    materials, plane, law, coarsen, flank_coarsen, points_per_edge, deviations
-        See `elastic_pair`.
     kinematics
         ``small``: small strain in each hub's frame; ``finite`` (default) adds the first-order effect of finite strain
         on the torque, see `gearfe.contact.finite_strain`.
@@ -188,7 +122,7 @@ def sweep_stiffness(
     estimate_error
         Estimate the discretisation error from coarser meshes.
     elastic
-        The pair from `elastic_pair`, when it is there already; its arguments are not looked at then.
+        The pair from `elastic_pair`, when it is there already; the model is not looked at then.
     progress
         Called with positions done, positions in all, and the stage's name.
 
@@ -211,8 +145,7 @@ def sweep_stiffness(
         raise InputError("angles", angles, "must be a list of finite angles (rad)", "give at least one angle")
     watch, finite = Stopwatch(), kinematics == "finite"
     if elastic is None:
-        sizes: dict[str, Any] = {"coarsen": coarsen, "flank_coarsen": flank_coarsen, "points_per_edge": points_per_edge}
-        elastic = elastic_pair(pair, materials, plane=plane, law=law, deviations=deviations, watch=watch, **sizes)
+        elastic = elastic_pair(pair, model, watch=watch, **changes)
     solved_angles, source = (asked, np.arange(len(asked))) if solve_all else distinct_angles(asked, cycle)
     solver = position_solver(pair, elastic)
     if torque is not None:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..config import build, job_tables
+from ..gear.deviation import NOMINAL
 from ..stopwatch import Stopwatch
 from ..tables.loadmap import LoadMapTable
 from ..tables.stiffness import StiffnessTable
@@ -102,7 +103,6 @@ def _microgeometry(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Ans
     from ..contact.half_plane import half_plane_pair
     from ..gear.deviation_job import deviations_of
     from ..loadmap.root_stress import pair_roots
-    from ..microgeometry.job import checked_model
     from ..microgeometry.report import cell_table, order_table, pair_table, summary, torque_table
     from ..microgeometry.solve import load_mesh
 
@@ -111,7 +111,7 @@ def _microgeometry(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Ans
     torques = table.torques()
     deviations = deviations_of(table, job.pair, path.parent)
     back = deviations_of(table, job.pair, path.parent, flank={"left": "right", "right": "left"}[table.flank])
-    model = checked_model(job)
+    model = job.model.changed(law="half_plane")
     elastic = _elastic(job, model, shared)
     roots, key = None, _key(job, model)
     if table.root_stress:
@@ -204,18 +204,17 @@ def _pair_job(tables: dict[str, Any], path: Path) -> Any:
     return StiffnessJob(tables["pair"], table, pair, tables.get("microgeometry"), path.parent)
 
 
-def _elastic(job: Any, model: dict[str, Any], shared: Shared) -> Any:
+def _elastic(job: Any, model: Any, shared: Shared) -> Any:
     """Condensed gears with the deviations of the job: these cost nothing, so the gears are shared without them."""
     from ..stiffness.sweep import elastic_pair
 
-    smooth = {name: value for name, value in model.items() if name != "deviations"}
-    made = shared.get(_key(job, model), "elastic", lambda: elastic_pair(job.pair, **smooth))
-    return replace(made, deviations=model["deviations"]) if "deviations" in model else made
+    made = shared.get(_key(job, model), "elastic", lambda: elastic_pair(job.pair, replace(model, deviations=NOMINAL)))
+    return replace(made, model=model)
 
 
-def _key(job: Any, model: dict[str, Any]) -> str:
+def _key(job: Any, model: Any) -> str:
     """What decides the condensed gears."""
-    return repr((job.pair_table, sorted((name, value) for name, value in model.items() if name != "deviations")))
+    return repr((job.pair_table, replace(model, deviations=NOMINAL)))
 
 
 def _positions(failed: Any) -> str:

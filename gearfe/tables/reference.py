@@ -7,7 +7,7 @@ import types
 import typing
 from typing import Any
 
-from ..config import TABLES, table_class
+from ..config import TABLES, table_class, type_hints
 from .mechanism import MechanismFile
 from .text import inner_table, toml_value
 
@@ -33,7 +33,7 @@ def reference_page() -> str:
 def _sections(table: type, name: str, seen: dict[type, str]) -> list[str]:
     """The table's keys, then its nested tables; one that was described before is named only."""
     seen[table] = name
-    hints = typing.get_type_hints(table)
+    hints = type_hints(table)
     rows: list[str] = []
     below: list[str] = []
     for field in dataclasses.fields(table):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from ..config import quantity
 from ..errors import InputError
@@ -52,7 +52,7 @@ class StiffnessTable:
         None, doc="twist of the wheel against the pinion (deg), or give torque_Nm", above=0.0, below=36.0
     )
     torque_Nm: float | None = quantity(None, doc="torque at the wheel's hub (N m), or give twist_deg", above=0.0)
-    twist_from: str = quantity(
+    twist_from: Literal["contact", "centred"] = quantity(
         "contact",
         doc="where twist_deg counts from: contact (where unmodified driving flanks touch) or centred (a wheel space "
         "faces the pinion tooth; half the backlash is then lost motion)",
@@ -63,7 +63,9 @@ class StiffnessTable:
     angle_stop_deg: float | None = quantity(
         None, doc="last pinion angle (deg); without it, one mesh cycle", low=-FAR_DEG, high=FAR_DEG
     )
-    plane: str = quantity("strain", doc="plane strain or plane stress", choices=("strain", "stress"))
+    plane: Literal["strain", "stress"] = quantity(
+        "strain", doc="plane strain or plane stress", choices=("strain", "stress")
+    )
     law: str = quantity(
         DEFAULT_LAW,
         doc="contact law: half_plane (every load), nitsche or penalty (on the flanks' elements), or another package's",
@@ -71,7 +73,7 @@ class StiffnessTable:
     law_parameters: dict[str, float] = quantity(  # noqa: RUF009
         dict, doc="parameters of a law of another package, by name (in its own units)"
     )
-    kinematics: str = quantity(
+    kinematics: Literal["small", "finite"] = quantity(
         "finite",
         doc="small (small strain) or finite (with the first-order effect of finite strain on the torque)",
         choices=("small", "finite"),

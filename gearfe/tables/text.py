@@ -11,6 +11,8 @@ import typing
 from collections.abc import Mapping
 from typing import Any
 
+from ..config import type_hints
+
 #: Columns of a line before its comment is put above it.
 _WIDTH, _COMMENT = 118, 40
 
@@ -38,7 +40,7 @@ def table_text(
     seen = set() if seen is None else seen
     brief = brief or cls in seen
     seen.add(cls)
-    hints = typing.get_type_hints(cls)
+    hints = type_hints(cls)
     own, below = [f"[{name}]"] if name else [], []
     for field in dataclasses.fields(cls):
         inner, many = inner_table(hints[field.name])

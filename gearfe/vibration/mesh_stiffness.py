@@ -131,8 +131,8 @@ def _computed_curve(
         problem = "has no stiffness: there is no table [pair] to compute it with"
         raise InputError(f"mesh {mesh.name!r}", None, problem, "add curve, stiffness_N_per_m or rigid to it, or [pair]")
     tables = StiffnessJob(job.pair, job.stiffness, pair)
-    model = {**tables.model, "materials": _materials(job, mesh)}
-    model["deviations"], _ = _deviations(job, scene, number, pair, model["law"])
+    deviations, _ = _deviations(job, scene, number, pair, tables.law)
+    model = replace(tables.model, materials=_materials(job, mesh), deviations=deviations)
     if job.table.curves.load in (None, "stiffness"):
         with stage(mesh.name):
             return cached_curve(pair, model, tables.sweep, watch=watch, progress=progress, estimate_error=estimate)
@@ -152,7 +152,7 @@ def _computed_curve(
 
 def _computed_law(job: TrainJob, scene: TrainScene, number: int, estimate: bool) -> MeshLaw:
     """Mesh law of a mesh with the driver as pinion; meshes of the same gears share the one for the largest torque."""
-    from ..contact.laws import law_named
+    from ..contact.laws import HalfPlane
     from ..meshlaw.cached import cached_law
     from ..stiffness.curve_cache import cached_curve
     from ..stiffness.job import StiffnessJob
@@ -174,12 +174,12 @@ def _computed_law(job: TrainJob, scene: TrainScene, number: int, estimate: bool)
     one, two, distance, materials = gears(mesh)
     pair = GearPair(one, two, distance)
     tables = StiffnessJob(job.pair, job.stiffness, pair)
-    model = {**tables.model, "materials": materials, "law": law_named("half_plane")}
-    model["deviations"], back = _deviations(job, scene, number, pair, model["law"])
+    deviations, back = _deviations(job, scene, number, pair, HalfPlane())
+    model = replace(tables.model, materials=materials, law=HalfPlane(), deviations=deviations)
     with stage(mesh.name):
         law = cached_law(pair, model, most / pair.wheel.base_radius)
-        if back != model["deviations"]:
-            law = replace(law, back=cached_law(pair, {**model, "deviations": back}, most / pair.wheel.base_radius))
+        if back != deviations:
+            law = replace(law, back=cached_law(pair, replace(model, deviations=back), most / pair.wheel.base_radius))
         if not estimate:
             return law
         angles = pair.mesh_cycle * np.arange(ESTIMATED) / ESTIMATED

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.contact.laws import law_named
+from gearfe.contact.model import DEFAULT_MODEL
 from gearfe.gear.pair import GearPair
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh
 from gearfe.stiffness.curve import StiffnessCurve
-from gearfe.stiffness.sweep import elastic_pair, flank_factor, sweep_stiffness
+from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 from gearfe.tables.laws import DEFAULT_LAW, LAWS
 
 from .record import Record
@@ -91,7 +91,7 @@ def sizes(record: Record) -> None:
     table, pair, at = record.table("sweep_sizes", "law", "coarsen"), shipped_pair(), angles(record)
 
     def make(law: str, coarsen: float) -> Mapping[str, Any]:
-        factor = flank_factor(law_named(law), coarsen)
+        factor = DEFAULT_MODEL.changed(law=law, coarsen=coarsen).mesh_flank_coarsen
         recipes = sector_recipes(pair, coarsen=coarsen, flank_coarsen=factor)
 
         def mesh() -> None:

@@ -96,9 +96,8 @@ def _run_curve(case: Case, job_path: Path) -> Found:
     del case
     angles = job.pair.mesh_cycle * (np.arange(6) + 0.19) / 6
     options = {**job.sweep, "angles": angles}
-    curve = sweep_stiffness(job.pair, estimate_error=True, **options, **job.model)
-    finer = {**job.model, "coarsen": max(0.2, FINER * job.table.coarsen)}
-    truth = sweep_stiffness(job.pair, **options, **finer)
+    curve = sweep_stiffness(job.pair, job.model, estimate_error=True, **options)
+    truth = sweep_stiffness(job.pair, job.model, coarsen=max(0.2, FINER * job.table.coarsen), **options)
     if curve.error is None or not math.isfinite(curve.error.worst) or (truth.status != "converged").any():
         return "the curve has no estimate, or the finer one did not converge everywhere"
     off = np.abs(curve.torque_wheel / truth.torque_wheel - 1)

@@ -96,7 +96,7 @@ def run(case: Case, folder: Path) -> Finding:
     """The sweep of the job, and the checks."""
     job = read_stiffness_job(case.write(folder))
     sweep = job.sweep
-    elastic = elastic_pair(job.pair, **job.model)
+    elastic = elastic_pair(job.pair, job.model)
     curve = sweep_stiffness(job.pair, elastic=elastic, **sweep)
     counts = Counter(str(s) for s in curve.status)
     total = np.where(np.isfinite(curve.twist), curve.twist, 0.0) + curve.lost_motion
@@ -193,7 +193,8 @@ def swap_checks(here: PositionSolver, angles: Any, twists: Any, found: Positions
     other_side = {"pinion": "wheel", "wheel": "pinion"}.get(sides, sides)
     law: Any = elastic.law if sides == other_side else replace(elastic.law, sides=other_side)  # type: ignore[type-var]
     mirrored = GearPair(pair.wheel, pair.pinion, pair.centre_distance)
-    other = MeshingPair(elastic.wheel, elastic.pinion, elastic.centre_distance, elastic.width, law)
+    model = elastic.model.changed(law=law, materials=elastic.model.materials[::-1])
+    other = MeshingPair(elastic.wheel, elastic.pinion, elastic.centre_distance, elastic.width, model)
     turned = elastic.wheel_angle(angles, twists) + math.pi / elastic.wheel.teeth
     turns = twists * elastic.wheel.teeth / elastic.pinion.teeth
     checks = []

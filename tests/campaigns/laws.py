@@ -86,7 +86,7 @@ def draw(random: np.random.Generator, number: int) -> Case:
 def _pair(key: str, size: float) -> MeshingPair:
     """Condensed gears of a scene (key: the text of its [pair]) with stress rows, so that any law can use them."""
     job = _read(key)
-    return elastic_pair(job.pair, **{**job.model, "law": Nitsche(), "flank_coarsen": size})
+    return elastic_pair(job.pair, job.model, law=Nitsche(), flank_coarsen=size)
 
 
 @lru_cache(maxsize=4)
@@ -106,7 +106,7 @@ def _angles(job: StiffnessJob) -> Any:
 def _truth(key: str, twist: float) -> Any:
     """Torques by the half-plane law (N m): many cases of a scene are held against the same."""
     job = _read(key)
-    return _torques(job, elastic_pair(job.pair, **{**job.model, "law": HalfPlane()}), _angles(job), twist)[0]
+    return _torques(job, elastic_pair(job.pair, job.model, law=HalfPlane()), _angles(job), twist)[0]
 
 
 def run(case: Case, folder: Path) -> Finding:
@@ -117,8 +117,9 @@ def run(case: Case, folder: Path) -> Finding:
     lost = job.pair.contact_twist if job.table.twist_from == "contact" else 0.0
     twist = job.sweep["twist"] + lost
     if family.startswith("noise"):
-        return _noise(case, job, elastic_pair(job.pair, **job.model), twist)
-    elastic = replace(_pair(plain, value if family == "size" else 1.0), law=job.law)
+        return _noise(case, job, elastic_pair(job.pair, job.model), twist)
+    elastic = _pair(plain, value if family == "size" else 1.0)
+    elastic = replace(elastic, model=replace(elastic.model, law=job.law))
     torque, iterations, status = _torques(job, elastic, _angles(job), twist)
     truth = _truth(plain, twist)
     off = np.abs(torque / truth - 1)
