@@ -30,6 +30,7 @@ class _Stage:
     total: float = 0.0
     what: str = ""
     counted: float = 0.0  # when the count began
+    first: float = 0.0  # what was done then
 
     def text(self, now: float) -> str:
         """Name, how far it is, its rate and the time that is left."""
@@ -41,9 +42,10 @@ class _Stage:
         far = f"{self.done} of {self.total}" if whole else f"{100.0 * share:.0f} %"
         parts = [f"{what} {far}".strip()]
         spent = now - self.counted
-        if spent >= SETTLED and 0.0 < share < 1.0:
-            parts += [f"{self.done / spent:.3g}/s"] if whole else []
-            parts.append(f"{_duration(spent * (1.0 - share) / share)} left")
+        made = self.done - self.first
+        if spent >= SETTLED and made > 0.0 and share < 1.0:
+            parts += [f"{made / spent:.3g}/s"] if whole else []
+            parts.append(f"{_duration(spent * (self.total - self.done) / made)} left")
         return f"{self.name}: {', '.join(parts)}"
 
 
@@ -85,7 +87,7 @@ class Display:
                 self._stages.append(_Stage(what))
             at = self._stages[-1]
             if at.what != what or done < at.done or not at.counted:
-                at.counted = time.monotonic()
+                at.counted, at.first = time.monotonic(), done
             at.done, at.total, at.what = done, total, what
 
     def say(self, text: str) -> None:

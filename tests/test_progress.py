@@ -71,6 +71,8 @@ def test_short_runs_are_silent():
 def test_rate_and_remaining_time():
     assert _Stage("positions", 30, 120, "positions", 10.0).text(20.0) == "positions: 30 of 120, 3/s, 30 s left"
     assert _Stage("integrating", 0.25, 1.0, "ms", 0.0).text(100.0) == "integrating: ms 25 %, 5 min 00 s left"
+    gone_on = _Stage("cases", 930, 1000, "cases", 10.0, 900.0)  # 900 stood there before
+    assert gone_on.text(20.0) == "cases: 930 of 1000, 3/s, 23 s left"
     assert _Stage("meshing").text(50.0) == "meshing"
     assert _Stage("a", 5, 5, "", 0.0).text(9.0) == "a: 5 of 5"
 

@@ -72,6 +72,7 @@ def test_names_may_be_tables_within_tables_or_quoted():
         ({"pear.pinion.teeth": [20]}, "did you mean 'pair'"),
         ({"pair.pinion": [20]}, "is a table, not a key"),
         ({"pair.pinion.teeth": [20], "pair": {"pinion": {"teeth": [21]}}}, "stands there twice"),
+        ({"train.meshes": [[]], "train.meshes.0.backlash_um": [20.0]}, "is an entry of train.meshes, which is varied"),
         ({"loadmap.positions": [20]}, "is no table that a stiffness job reads"),
         ({"pair.addendum": []}, "is empty"),
         ({"pair.addendum": 1.0}, "must be a list of values or a distribution"),
@@ -87,7 +88,7 @@ def test_names_may_be_tables_within_tables_or_quoted():
 )
 def test_wrong_parameters_are_named(given, told):
     with pytest.raises(InputError, match=told):
-        read_parameters(given, "stiffness", {})
+        read_parameters(given, "vibration" if "train.meshes" in given else "stiffness", {})
 
 
 def table(**keys) -> StudyTable:

@@ -99,6 +99,43 @@ def test_a_folder_of_another_study_is_refused(tmp_path, capsys):
     assert "without its study.json" in capsys.readouterr().err
 
 
+def test_a_file_that_the_job_names_is_a_part_of_the_study(tmp_path, capsys):
+    """Another content under the same name would make other rows."""
+    pitch, path = tmp_path / "pitch.csv", tmp_path / "study.toml"
+    pitch.write_text("tooth,pitch_um\n" + "".join(f"{n},{n % 3}\n" for n in range(20)))
+    text = "[pair]\nmodule_mm = 2.0\npressure_angle_deg = 20.0\nface_width_mm = 10.0\n"
+    text += "[pair.pinion]\nteeth = 20\nbore_diameter_mm = 8.0\n[pair.wheel]\nteeth = 31\nbore_diameter_mm = 15.0\n"
+    text += "[microgeometry]\ntorques_Nm = [40.0]\npositions = 3\nmesh_cycles = 1\n"
+    text += '[study]\njob = "microgeometry"\ndesign = "factorial"\n[study.parameters]\n'
+    text += 'microgeometry.pinion.pitch_csv = ["pitch.csv"]\n[study.outputs]\nx = "mean(k_tangent_N_per_m)"\n'
+    path.write_text(text)
+    command = ["study", str(path), "--out", str(tmp_path / "out"), "--jobs", "1", "--no-pictures"]
+    assert main(command) == 0
+    assert main(command) == 0
+    pitch.write_text(pitch.read_text().replace("1,1\n", "1,2\n", 1))
+    assert main(command) == 2
+    assert "files.pitch.csv differs" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="locks of a folder are POSIX")
+def test_a_folder_has_one_writer(tmp_path, capsys):
+    path, out = written(tmp_path, cases=100_000), tmp_path / "out"
+    command = ["study", str(path), "--out", str(out), "--jobs", "1", "--no-pictures"]
+    first = subprocess.Popen([sys.executable, "-m", "gearfe", *command], stdout=subprocess.DEVNULL)
+    limit = time.monotonic() + 60.0
+    while not ((out / "study.csv").exists() and len(rows_of(out)) > 5) and time.monotonic() < limit:
+        time.sleep(0.02)
+    for more in ([], ["--restart"]):
+        assert main([*command, *more]) == 2
+        assert "is being written by another study" in capsys.readouterr().err
+    first.kill()
+    first.wait()
+    assert len(rows_of(out)) > 5
+    path.write_text(path.read_text().replace("100000", "10"))
+    assert main([*command, "--restart"]) == 0  # free again
+    assert len(rows_of(out)) == 11
+
+
 def test_gears_that_cannot_be_are_rows_and_stop_a_study(tmp_path, capsys):
     """Teeth from 4 to 8: those below 8 are refused; with none above, the study stops after 50."""
     text = "[pair]\nmodule_mm = 2.0\npressure_angle_deg = 20.0\nface_width_mm = 10.0\n"

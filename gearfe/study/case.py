@@ -103,14 +103,26 @@ def solve_case(task: Task, number: int, values: Sequence[Any], shared: Shared) -
     return Row(number, found, status, " ".join(message.split()), time.perf_counter() - began)
 
 
+def _names_file(text: Any, folder: Path) -> bool:
+    return isinstance(text, str) and bool(Path(text).suffix) and (folder / text).is_file()
+
+
 def job_beside(raw: Any, folder: Path, place: Path) -> Any:
     """Tables of a job in `folder` for a job file in `place`, from where the files that they name are found."""
     if isinstance(raw, dict):
         return {key: job_beside(value, folder, place) for key, value in raw.items()}
     if isinstance(raw, (list, tuple)):
         return [job_beside(value, folder, place) for value in raw]
-    named = isinstance(raw, str) and Path(raw).suffix and not Path(raw).is_absolute() and (folder / raw).is_file()
+    named = _names_file(raw, folder) and not Path(raw).is_absolute()
     return Path(os.path.relpath(folder / raw, place)).as_posix() if named else raw
+
+
+def files_named(raw: Any, folder: Path) -> set[str]:
+    """Files in `folder` that tables of a job name."""
+    if isinstance(raw, (dict, list, tuple)):
+        inside = raw.values() if isinstance(raw, dict) else raw
+        return {name for value in inside for name in files_named(value, folder)}
+    return {raw} if _names_file(raw, folder) else set()
 
 
 @functools.cache

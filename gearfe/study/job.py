@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
@@ -13,9 +14,9 @@ from ..config import build, read_toml
 from ..errors import InputError
 from ..tables.study import StudyTable
 from ..threads import one_thread
-from .case import DIED, ERROR, HERE, INVALID, Row, Task, evaluate
+from .case import DIED, ERROR, HERE, INVALID, Row, Task, evaluate, files_named
 from .design import Cases, study_cases
-from .journal import HEAD, TABLE, Journal
+from .journal import HEAD, TABLE, Journal, only_writer
 from .parameters import Parameter
 from .run import serially, side_by_side
 from .statistics import StudyResult
@@ -52,9 +53,14 @@ class Study:
 
     @property
     def head(self) -> dict[str, Any]:
-        """What decides the rows."""
-        head = {"study": asdict(self.table), "base": dict(self.task.raw)}
-        return head if self.table.design != "rows" else {**head, "rows": [list(row) for row in self.cases]}
+        """What decides the rows: study, base job, rows of a file, and the content of the files that these name."""
+        head: dict[str, Any] = {"study": asdict(self.table), "base": dict(self.task.raw)}
+        if self.table.design == "rows":
+            head["rows"] = [list(row) for row in self.cases]
+        folder = self.task.path.parent
+        named = files_named([self.table.parameters, head["base"], head.get("rows", [])], folder)
+        contents = {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in sorted(named)}
+        return {**head, "files": contents}
 
     def evaluate(self, values: Mapping[str, Any]) -> dict[str, float]:
         """Outputs with some parameters at these values, the others as the base job has them.
@@ -153,31 +159,34 @@ def run_study(
     Raises
     ------
     InputError
-        Outputs that the job does not give, a folder with another study, a study whose first cases all have no answer.
+        Outputs that the job does not give, a folder with another study or that another program writes, a study whose
+        first cases all have no answer.
     """
     from ..versions import versions
 
     folder = Path(folder)
     base = check_outputs(study)
-    if restart:
-        for name in (TABLE, HEAD):
-            (folder / name).unlink(missing_ok=True)
-    journal = Journal(folder, study.head, versions(), study.task.names, tuple(study.table.outputs))
-    bad, first = 0, ""
-    missing = [n for n in _order(study) if n not in journal.done]
-    cases = [(n, study.cases[n]) for n in missing]
-    for group in solved_rows(study.task, cases, jobs, executor, workers, check):
-        journal.append(group, study.cases)
-        if progress is not None:
-            progress(len(journal.done), len(study.cases), "cases")
-        for row in group:
-            hopeless = row.status in (INVALID, ERROR, DIED)
-            first = first or (row.message if hopeless else "")
-            bad = bad + 1 if hopeless and bad >= 0 else -1
-        if bad >= HOPELESS:
-            problem = f"the first {bad} cases have no answer; one of them: {first}"
-            raise InputError("study", None, problem, "change the base job or the parameters; their rows are kept")
-    return StudyResult(study.table, journal.finish(), base)
+    folder.mkdir(parents=True, exist_ok=True)
+    with only_writer(folder):
+        if restart:
+            for name in (TABLE, HEAD):
+                (folder / name).unlink(missing_ok=True)
+        journal = Journal(folder, study.head, versions(), study.task.names, tuple(study.table.outputs))
+        bad, first = 0, ""
+        missing = [n for n in _order(study) if n not in journal.done]
+        cases = [(n, study.cases[n]) for n in missing]
+        for group in solved_rows(study.task, cases, jobs, executor, workers, check):
+            journal.append(group, study.cases)
+            if progress is not None:
+                progress(len(journal.done), len(study.cases), "cases")
+            for row in group:
+                hopeless = row.status in (INVALID, ERROR, DIED)
+                first = first or (row.message if hopeless else "")
+                bad = bad + 1 if hopeless and bad >= 0 else -1
+            if bad >= HOPELESS:
+                problem = f"the first {bad} cases have no answer; one of them: {first}"
+                raise InputError("study", None, problem, "change the base job or the parameters; their rows are kept")
+        return StudyResult(study.table, journal.finish(), base)
 
 
 def _order(study: Study) -> Sequence[int]:

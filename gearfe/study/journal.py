@@ -10,7 +10,8 @@ import csv
 import io
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +19,44 @@ from ..errors import InputError
 from ..output.files import whole_file, write_json
 from .case import Row
 
+try:
+    import fcntl
+except ImportError:  # of POSIX alone
+    fcntl = None  # type: ignore[assignment]
+
 TABLE, HEAD = "study.csv", "study.json"
 #: Columns beside parameters and outputs.
 FIRST, LAST = ("case",), ("status", "message", "seconds")
 
 
+@contextmanager
+def only_writer(folder: Path) -> Iterator[None]:
+    """Hold the folder; however the program ends, the system gives it free (flock(2), where system and disk have it).
+
+    Raises
+    ------
+    InputError
+        When another program holds it.
+    """
+    if fcntl is None:
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            problem, cure = "is being written by another study", "wait for its end, or choose another --out"
+            raise InputError("--out", str(folder), problem, cure) from None
+        except OSError:  # a file system without locks
+            pass
+        yield
+    finally:
+        os.close(handle)
+
+
 class Journal:
-    """Rows of a study in a folder; the only writer.
+    """Rows of a study in a folder; the only writer, see `only_writer`.
 
     Parameters
     ----------

@@ -102,10 +102,15 @@ def read_parameters(given: Mapping[str, Any], kind: str, base: Mapping[str, Any]
     Raises
     ------
     InputError
-        Names of keys that do not exist, with the near match; values that are no distribution.
+        Names of keys that do not exist, with the near match, or that clash; values that are no distribution.
     """
-    made = []
-    for name, spec in _flat(given, "").items():
+    made, flat = [], _flat(given, "")
+    for name, spec in flat.items():
+        whole_key = next((other for other in flat if name.startswith(f"{other}.")), None)
+        if whole_key is not None:
+            raise InputError(
+                f"{WHERE}.{name}", None, f"is an entry of {whole_key}, which is varied, too", "leave one out"
+            )
         hint, label = key_hint(kind, name, base), f"{WHERE}.{name}"
         whole = int in _options(hint) and float not in _options(hint)
         if isinstance(spec, list):

@@ -11,6 +11,7 @@ import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -21,7 +22,7 @@ from ..errors import InputError
 from ..typing import Array
 from .case import DIED, DONE, Row
 from .job import Study, check_outputs, solved_rows
-from .journal import Journal, cell_text
+from .journal import Journal, cell_text, only_writer
 from .run import end_processes, processes
 
 #: A constraint's value of a point that has no answer, beyond its limit.
@@ -68,7 +69,7 @@ class Search:
     Raises
     ------
     InputError
-        Outputs that the job does not give, a folder with another study.
+        Outputs that the job does not give, a folder with another study or that another program writes.
     """
 
     def __init__(
@@ -80,8 +81,6 @@ class Search:
         executor: Executor | None = None,
         progress: Callable[[int, int, str], None] | None = None,
     ) -> None:
-        from ..versions import versions
-
         check_outputs(study)
         self.study = study
         self._jobs, self._executor, self._progress = jobs or os.cpu_count() or 1, executor, progress
@@ -90,23 +89,34 @@ class Search:
         self._rows: list[Row] = []
         self._points: list[tuple[Any, ...]] = []
         self._journal: Journal | None = None
+        self._held = ExitStack()
         if folder is not None:
-            names, outputs = study.task.names, tuple(study.table.outputs)
-            head = {**study.head, "search": True}
             Path(folder).mkdir(parents=True, exist_ok=True)
-            self._journal = Journal(Path(folder), head, versions(), names, outputs)
-            columns = self._journal.finish()
-            for i, case in enumerate(columns["case"]):
-                self._case[tuple(columns[name][i] for name in names)] = len(self._rows)
-                found = tuple(float(columns[name][i]) for name in outputs)
-                status, message, seconds = (columns[name][i] for name in ("status", "message", "seconds"))
-                self._rows.append(Row(int(case), found, status, message, float(seconds)))
-                self._points.append(tuple(_cell(columns[name][i]) for name in names))
+            with ExitStack() as held:
+                held.enter_context(only_writer(Path(folder)))
+                self._journal = self._known(Path(folder))
+                self._held = held.pop_all()
+
+    def _known(self, folder: Path) -> Journal:
+        """The points that stand in the folder, from now on with those of this search."""
+        from ..versions import versions
+
+        names, outputs = self.study.task.names, tuple(self.study.table.outputs)
+        journal = Journal(folder, {**self.study.head, "search": True}, versions(), names, outputs)
+        columns = journal.finish()
+        for i, case in enumerate(columns["case"]):
+            self._case[tuple(columns[name][i] for name in names)] = len(self._rows)
+            found = tuple(float(columns[name][i]) for name in outputs)
+            status, message, seconds = (columns[name][i] for name in ("status", "message", "seconds"))
+            self._rows.append(Row(int(case), found, status, message, float(seconds)))
+            self._points.append(tuple(_cell(columns[name][i]) for name in names))
+        return journal
 
     def __enter__(self) -> Search:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._held.close()
         if self._own is not None:
             end_processes(self._own)
             self._own = None
