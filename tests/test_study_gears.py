@@ -83,7 +83,7 @@ def test_gears_are_condensed_once_for_the_cases_that_share_them(tmp_path, monkey
     (tmp_path / "study.toml").write_text((PAIR + LOADMAP).replace("face_width_mm = 10.0", "face_width_mm = 11.0"))
     study = read_study(tmp_path / "study.toml")
     condensed, elastic_pair = [], sweep.elastic_pair
-    monkeypatch.setattr(sweep, "elastic_pair", lambda pair, **k: condensed.append(pair) or elastic_pair(pair, **k))
+    monkeypatch.setattr(sweep, "elastic_pair", lambda *given: condensed.append(given) or elastic_pair(*given))
     assert [case[1] for case in study.cases] == [0.0, 0.1, 0.0, 0.1]
     run_study(study, tmp_path / "out", jobs=1)
     assert len(condensed) == 3
@@ -100,7 +100,7 @@ def test_error_estimates_are_outputs(tmp_path):
     tables = job_tables(study.task.tables(study.cases[0]), "job", ("pair", "stiffness", "microgeometry"))
     pair = GearPair.from_table(tables["pair"])
     one = StiffnessJob(tables["pair"], tables["stiffness"], pair, tables["microgeometry"])
-    curve = sweep.sweep_stiffness(pair, estimate_error=True, **one.model, **one.sweep)
+    curve = sweep.sweep_stiffness(pair, one.model, estimate_error=True, **one.sweep)
     assert made.output("worst")[0] == pytest.approx(curve.error.worst, rel=1e-12)
     assert made.output("worst")[0] > 0.0
 
