@@ -9,9 +9,12 @@ HELP = "write a commented job file to start from, or a shipped job: gearfe new -
 
 KINDS = {
     "stiffness": "mesh stiffness of a gear pair",
+    "loadmap": "stiffness and root stress over angle and torque",
     "microgeometry": "reliefs and errors of micrometres, and the best relief",
     "study": "many microgeometries of a pair: yield, sensitivities",
     "vibration": "two shafts with a gear pair in a housing",
+    "runup": "that train over its speed: orders, critical speeds",
+    "housing": "a parametric housing: frequencies, modes, reduced body",
     "mechanism": "a crank and a rod",
 }
 #: Command that runs a job with these tables, the first one that is there.

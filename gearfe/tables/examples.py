@@ -124,11 +124,20 @@ MECHANISM: dict[str, Any] = {
     "paths": [{"body": "rod", "point": "B"}],
 }  # fmt: skip
 
+LOADMAP: dict[str, Any] = {"torques_Nm": [20.0, 50.0, 100.0, 200.0], "root_stress": True}
+
+RUNUP: dict[str, Any] = {"speed_start_rad_per_s": 100.0, "speed_stop_rad_per_s": 1200.0}
+
 #: Kind -> what the file is about, and its tables.
 JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]]]] = {
     "stiffness": (
         "Mesh stiffness of a gear pair. Run it: gearfe stiffness FILE --out DIR. " + OPTIONAL_KEYS,
         {"pair": PAIR, "stiffness": STIFFNESS},
+    ),
+    "loadmap": (
+        "Mesh stiffness and root stress of a gear pair over angle and torque. Run it: gearfe loadmap FILE --out DIR. "
+        + OPTIONAL_KEYS,
+        {"pair": PAIR, "loadmap": LOADMAP},
     ),
     "microgeometry": (
         "Deviations of micrometres of a gear pair, and the search for the best relief. Run it: gearfe microgeometry "
@@ -144,13 +153,23 @@ JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]]]] = {
         "run along y; speeds and torques count positive about +y. " + OPTIONAL_KEYS,
         {"pair": PAIR, "stiffness": {"twist_deg": 0.05}, "train": TRAIN, "housing": HOUSING, "spectrum": {}},
     ),
+    "runup": (
+        "Steady states of a gear train over the speed of its drive: waterfall, orders, critical speeds. Run it: gearfe "
+        "runup FILE --out DIR. " + OPTIONAL_KEYS,
+        {"pair": PAIR, "stiffness": {"twist_deg": 0.05}, "train": TRAIN, "housing": HOUSING, "runup": RUNUP},
+    ),
+    "housing": (
+        "An elastic housing: frequencies, modes, a reduced body. Run it: gearfe housing FILE --out DIR. Your own mesh "
+        "instead: gearfe new box.toml. " + OPTIONAL_KEYS,
+        {"housing": HOUSING},
+    ),
 }
 
 MECHANISM_HEAD = "A planar mechanism. Run it: gearfe mechanism FILE --out DIR. " + OPTIONAL_KEYS
 
 
 def job_file(kind: str) -> str:
-    """Text of an example job file: ``stiffness``, ``microgeometry``, ``study``, ``vibration`` or ``mechanism``."""
+    """Text of an example job file: a kind of `JOBS`, or ``mechanism``."""
     if kind == "mechanism":
         # this job is one table, the file itself; the title stands above the tables
         cls = importlib.import_module("gearfe.tables.mechanism").MechanismFile

@@ -49,7 +49,8 @@ def table_text(
         given = example.get(field.name)
         if inner is None and isinstance(given, Mapping):
             lines = [f"{_key(key)} = {toml_value(value)}" for key, value in given.items()]
-            below.append("\n".join([f"[{full}] # {doc}", *lines, ""]))
+            head = f"[{full}] # {doc}" if len(full) + len(doc) < _WIDTH - 4 else f"{_wrapped(doc)}[{full}]"
+            below.append("\n".join([head, *lines, ""]))
         elif inner is None:
             line = _line(field, example, doc, brief)
             if line:
