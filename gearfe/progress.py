@@ -165,7 +165,8 @@ def shown(stream: TextIO | None = None, *, verbose: bool = False) -> Iterator[No
     if stream is None or _displays:
         yield
         return
-    rewritten = stream.isatty() and not verbose
+    notebook = type(stream).__module__.startswith("ipykernel")  # it rewrites lines as a terminal does
+    rewritten = (stream.isatty() or notebook) and not verbose
     _displays.append(Display(stream, rewritten=rewritten, silent=0.0 if verbose else SILENT, each=verbose))
     try:
         yield

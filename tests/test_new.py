@@ -11,7 +11,7 @@ from gearfe.cli import main
 from gearfe.config import TABLES, build, load_job, quantity, table_class
 from gearfe.tables.examples import JOBS, job_file
 from gearfe.tables.mechanism import BodyTable, MechanismFile, RunTable, read_mechanism_file
-from gearfe.tables.microgeometry import GearMicrogeometryTable, VariableTable, WavinessTable
+from gearfe.tables.microgeometry import GearMicrogeometryTable, VariableTable
 from gearfe.tables.text import table_text
 from gearfe.tables.train import TrainShaftTable
 

@@ -16,6 +16,11 @@ PINION_FILL, WHEEL_FILL = "#dbe7f3", "#f3e6d8"
 
 
 def pair_figure(path: str | Path, pair: GearPair, pinion_angle: float, notes: str = "") -> None:
+    """Write `pair_picture`."""
+    save(pair_picture(pair, pinion_angle, notes), path)
+
+
+def pair_picture(pair: GearPair, pinion_angle: float, notes: str = "") -> Any:
     """Meshed pair: the whole gears, and the meshing zone with line of action and path of contact.
 
     Parameters
@@ -93,7 +98,7 @@ def pair_figure(path: str | Path, pair: GearPair, pinion_angle: float, notes: st
             family="monospace",
             bbox={"facecolor": "white", "alpha": 0.9, "edgecolor": "#d1d5db"},
         )
-    save(figure, path)
+    return figure
 
 
 def _circles(pair: GearPair) -> list[tuple[str, float, float]]:

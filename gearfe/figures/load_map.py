@@ -18,6 +18,13 @@ MOST_LINES = 24
 
 
 def load_map_figure(path: str | Path, job: StiffnessJob, made: LoadMap) -> None:
+    """Write `load_map_picture`."""
+    pair, model = job.pair, job.table
+    title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, plane {model.plane}, law {model.law}"
+    save(load_map_picture(made, title), path, dpi=110)
+
+
+def load_map_picture(made: LoadMap, title: str = "") -> Any:
     """Panels over the pinion angle coloured by torque, and mean stiffness and transmission error over the torque."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -63,10 +70,8 @@ def load_map_figure(path: str | Path, job: StiffnessJob, made: LoadMap) -> None:
     if logarithmic:
         _plain_ticks(bar.ax.yaxis)
     bar.set_label("torque at the wheel (N m)")
-    pair, model = job.pair, job.table
-    title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, plane {model.plane}, law {model.law}"
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
-    save(figure, path, dpi=110)
+    return figure
 
 
 def _over_the_cycle(made: LoadMap) -> tuple[Array, Array, dict[str, Array]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -106,6 +107,11 @@ def flank_figure(path: str | Path, table: MicrogeometryTable, pair: GearPair, fo
 
 
 def microgeometry_figure(path: str | Path, made: LoadedMesh) -> None:
+    """Write `microgeometry_picture`."""
+    save(microgeometry_picture(made), path, dpi=110)
+
+
+def microgeometry_picture(made: LoadedMesh) -> Any:
     """Harris map, peak-to-peak error, pressure and load share along the path, and the orders of the error."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -165,7 +171,7 @@ def microgeometry_figure(path: str | Path, made: LoadedMesh) -> None:
     bar.set_label("torque at the wheel (N m)")
     title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, {made.mesh_cycles} mesh cycles"
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
-    save(figure, path, dpi=110)
+    return figure
 
 
 def relief_figure(path: str | Path, table: ReliefTable, made: ReliefResult, compared: Mapping[str, Array]) -> None:

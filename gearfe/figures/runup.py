@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -62,10 +62,15 @@ def draw_orders(path: Path, run: RunUp, multiples: int, bore: int, title: str) -
     rms = {f"rms below {1e-3 * run.band_hz:g} kHz": _pieces(run, [s.rms(run.band_hz)[bore] for s in run.states])}
     panels = [("amplitude  (m/s²)", {n: size[n] for n in size if n in loudest}), ("rms  (m/s²)", rms)]
     head = f"Normal acceleration at attachment {name}: orders of the drive, and rms\n{title}"
-    _curves(path, run, panels, head, logarithmic=True)
+    save(_curves(run, panels, head, logarithmic=True), path)
 
 
 def draw_forces(path: Path, run: RunUp, title: str) -> None:
+    """Write `forces_picture`."""
+    save(forces_picture(run, title), path)
+
+
+def forces_picture(run: RunUp, title: str = "") -> Any:
     """Dynamic transmission error, dynamic factor, and share without contact of all meshes."""
     lines = run.train.model.meshes
     states = run.states
@@ -80,12 +85,12 @@ def draw_forces(path: Path, run: RunUp, title: str) -> None:
     ]
     if max(float(p.value.max()) for p in open_.values()) > 0.0:
         panels.append(("without contact  (% of the time)", open_))
-    _curves(path, run, panels, f"Meshes in steady running\n{title}")
+    return _curves(run, panels, f"Meshes in steady running\n{title}")
 
 
 def _curves(
-    path: Path, run: RunUp, panels: Sequence[tuple[str, Mapping[str, Pieces]]], title: str, *, logarithmic: bool = False
-) -> None:
+    run: RunUp, panels: Sequence[tuple[str, Mapping[str, Pieces]]], title: str, *, logarithmic: bool = False
+) -> Any:
     """Curves over the speed, panel by panel; unstable stretches dashed, turning points as thin lines.
 
     Parameters
@@ -132,7 +137,7 @@ def _curves(
             low, high = axes.get_ylim()
             axes.set_ylim(low, high + 0.12 * (high - low))
     axes.set_xlabel("speed of the drive  (rad/s)")
-    save(figure, path)
+    return figure
 
 
 def _line(state: SteadyState, harmonic: int, bore: int) -> float:

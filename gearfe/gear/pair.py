@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import InputError
+from ..shown import Shown
 from ..tables.pair import GearTable, PairTable
 from .mesh_geometry import MeshGeometry, PathPoint
 from .pair_checks import check_pair, pair_warnings
@@ -34,7 +35,7 @@ KEYS: dict[str, tuple[str, float]] = {
 
 
 @dataclass(frozen=True)
-class GearPair(MeshGeometry):
+class GearPair(MeshGeometry, Shown):
     """Two external spur gears in mesh, checked when made.
 
     Parameters
@@ -52,6 +53,17 @@ class GearPair(MeshGeometry):
 
     def __post_init__(self) -> None:
         check_pair(self)
+
+    def facts(self) -> dict[str, str]:
+        """Teeth, module, centre distance, contact ratio."""
+        return {
+            "teeth": f"{self.pinion.teeth}/{self.wheel.teeth}",
+            "module": f"{1e3 * self.pinion.module:.6g} mm",
+            "centre distance": f"{1e3 * self.working_centre_distance:.6g} mm",
+            "working pressure angle": f"{math.degrees(self.working_pressure_angle):.5g} deg",
+            "contact ratio": f"{self.contact_ratio:.4g}",
+            "backlash": f"{1e3 * self.backlash:.4g} mm",
+        }
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..output.files import write_csv
+from ..shown import Shown
 from ..stiffness import curve_csv
 from ..stiffness.curve import COLUMNS, WHOLE, StiffnessCurve
 from ..stiffness.torque_control import ANGLE_ROUNDING
@@ -36,8 +37,8 @@ TORQUE = "torque_Nm"
 TOLERANCE = 1e-2
 
 
-@dataclass(frozen=True)
-class LoadMap:
+@dataclass(frozen=True, repr=False)
+class LoadMap(Shown):
     """A gear pair's behaviour over torque and angle.
 
     Attributes
@@ -220,6 +221,23 @@ class LoadMap:
         return front, shares[:, :used]
 
     # ---- tables ------------------------------------------------------------------------------------------------------
+
+    AXES = (TORQUE, "pinion_angle_deg")
+
+    def facts(self) -> dict[str, str]:
+        """Torques, angles, stiffness and transmission error."""
+        k, error = 1e-6 * self.quantity("k_mesh").mean(axis=1), 1e6 * self.peak_to_peak
+        return {
+            "torques": f"{len(self.torque)}, {self.torque[0]:.4g} to {self.torque[-1]:.4g} N m at the wheel",
+            "pinion angles": f"{len(self.pinion_angle)}, {int(self.failed.sum())} cells failed",
+            "mean stiffness": f"{k[0]:.4g} to {k[-1]:.4g} N/um",
+            "transmission error": f"peak to peak {error[0]:.3g} to {error[-1]:.3g} um",
+            "root stress": "no" if self.root is None else f"up to {1e-6 * np.nanmax(self.root.largest):.4g} MPa",
+        }
+
+    def columns(self) -> dict[str, list[str]]:
+        """Those of the CSV file."""
+        return self.table()
 
     def table(self) -> dict[str, list[str]]:
         """Columns of the CSV file as text, one row per cell: torque by torque, angle by angle."""

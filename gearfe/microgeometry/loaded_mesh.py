@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..gear.pair import GearPair
 from ..gear.validity import MOST_OVERLAP, overlaps
+from ..shown import Shown
 from ..typing import Array, BoolArray, IntArray
 
 #: Status of a cell whose back flanks would bear: gears that jam carry the torque on both flanks, which this is not for.
@@ -58,8 +59,8 @@ class PairLoads:
     mark: NDArray[np.str_]
 
 
-@dataclass(frozen=True)
-class LoadedMesh:
+@dataclass(frozen=True, repr=False)
+class LoadedMesh(Shown):
     """Results over m torques and n pinion angles.
 
     Attributes
@@ -101,6 +102,16 @@ class LoadedMesh:
     pairs: PairLoads
     root_stress: Array | None
     pair: GearPair
+
+    def facts(self) -> dict[str, str]:
+        """Torques, angles and transmission error."""
+        error = 1e6 * self.peak_to_peak
+        return {
+            "gears": f"{self.pair.pinion.teeth}/{self.pair.wheel.teeth} teeth",
+            "torques": f"{len(self.torque)}, {self.torque[0]:.4g} to {self.torque[-1]:.4g} N m at the wheel",
+            "pinion angles": f"{len(self.pinion_angle)} over {self.mesh_cycles} mesh cycles",
+            "transmission error": f"peak to peak {error[0]:.3g} to {error[-1]:.3g} um",
+        }
 
     @property
     def transmission_error(self) -> Array:

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, unknown_name
 from ..output.arrays import load_arrays, save_arrays
+from ..shown import Shown
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -33,8 +34,8 @@ Ints = NDArray[np.int64]
 FORMAT = 3
 
 
-@dataclass(frozen=True, eq=False)
-class ModalBody:
+@dataclass(frozen=True, eq=False, repr=False)
+class ModalBody(Shown):
     """Constant matrices of an elastic body over ``[attachments (6 each) | internal]``, N coordinates.
 
     Attributes
@@ -142,6 +143,19 @@ class ModalBody:
             raise unknown_name("attachment", name, self.attachment_names)
         first = 6 * self.attachment_names.index(name)
         return slice(first, first + 6)
+
+    def facts(self) -> dict[str, str]:
+        """Mass, attachments, coordinates and first frequencies."""
+        rigid, mass = self.coupled.frequencies_hz, self.rigid_mass[0, 0]
+        first = ", ".join(f"{f:.1f}" for f in rigid[rigid > 0.0][:3])
+        return {
+            "mass": f"{mass:.4g} kg" if math.isfinite(mass) else "not known",
+            "held": "yes" if self.held else "no: free",
+            "attachments": ", ".join(self.attachment_names),
+            "coordinates": f"{len(self.mass)}, {self.modes} of them modes",
+            "frequencies": f"{first}, ... Hz",
+            "mesh": f"{len(self.nodes)} nodes" if len(self.elements) else "none",
+        }
 
     def reconstruct(self, q: Floats) -> Floats:
         """Nodal field of coordinates: displacement from q, velocity from its rate, acceleration from its second rate.

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..shown import Shown
 from ..typing import Array
 from .contract import Element
 from .dense import Dense
@@ -36,7 +37,7 @@ class IntegrationError(RuntimeError):
 
 
 @dataclass(frozen=True, repr=False)
-class Trajectory:
+class Trajectory(Shown):
     """Result of `integrate`.
 
     Parameters
@@ -64,15 +65,15 @@ class Trajectory:
     statistics: Mapping[str, Any]
     dense: Dense = field(repr=False)
 
-    def __repr__(self) -> str:
+    def facts(self) -> dict[str, str]:
+        """How far the run came, its size and method."""
         ends = f"{self.time[0]:g} to {self.time[-1]:g} s" if len(self.time) else "none"
-        lines = [
-            f"Trajectory: {self.message} at {self.reached:g} s",
-            f"  times: {len(self.time)}, {ends}",
-            f"  coordinates: {self.system.size}, constraints: {self.system.rows}",
-            f"  method: {self.method}, {self.statistics.get('scheme', '')}, {self.statistics.get('steps', 0)} steps",
-        ]
-        return "\n".join(lines)
+        return {
+            "status": f"{self.message} at {self.reached:g} s",
+            "times": f"{len(self.time)}, {ends}",
+            "coordinates": f"{self.system.size}, constraints {self.system.rows}",
+            "method": f"{self.method}, {self.statistics.get('scheme', '')}, {self.statistics.get('steps', 0)} steps",
+        }
 
     def to_pandas(self) -> Any:
         """Coordinates and velocities as a `pandas.DataFrame`, a row a time; names as in `System.coordinate_names`.

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..shown import Shown
 from ..threads import one_thread
 from ..train.kinematics import drive_sense
 from ..train.model import TrainModel
@@ -27,8 +28,8 @@ from .stability import Bifurcation, kind_of, multipliers
 TRIES, AWAY = 6, 0.01
 
 
-@dataclass(frozen=True, eq=False)
-class RunUp:
+@dataclass(frozen=True, eq=False, repr=False)
+class RunUp(Shown):
     """Steady states along a range of speeds.
 
     Attributes
@@ -60,6 +61,16 @@ class RunUp:
     notes: tuple[str, ...]
     tolerance: float
     band_hz: float
+
+    def facts(self) -> dict[str, str]:
+        """Speeds, states and what happens between them."""
+        unstable = sum(state.stable is False for state in self.states)
+        return {
+            "speeds": f"{len(self.speeds)}, {self.speeds[0]:.4g} to {self.speeds[-1]:.4g} rad/s",
+            "steady states": f"{len(self.states)}, {unstable} of them unstable",
+            "turning points": ", ".join(f"{speed:.5g}" for speed in self.turning_speeds) or "none",
+            "teeth apart": f"at {sum(bool(state.apart.any()) for state in self.states)} states",
+        }
 
     def sweep(self, *, up: bool = True) -> tuple[SteadyState, ...]:
         """One state at each speed that was reached: what a slow run-up, or a slow run-down, meets there.

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, unknown_name
 from ..output.files import write_csv
+from ..shown import Shown
 from ..typing import Array, BoolArray, IntArray
 from . import curve_csv
 from .periodic import PeriodicInterpolant, ValueAndSlope, periodic_interpolant
@@ -99,8 +100,8 @@ class ErrorEstimate:
         return OUTLIER * float(np.nanmax(self.relative)) if np.isfinite(self.relative).any() else float("nan")
 
 
-@dataclass(frozen=True)
-class StiffnessCurve:
+@dataclass(frozen=True, repr=False)
+class StiffnessCurve(Shown):
     """Mesh stiffness of a gear pair over the pinion's rotation; all arrays have one entry per position, shape (n,).
 
     Attributes
@@ -228,6 +229,27 @@ class StiffnessCurve:
         return self.interpolant(quantity, method=method)(phase)
 
     # ---- tables ------------------------------------------------------------------------------------------------------
+
+    AXES = ("pinion_angle_deg",)
+
+    def facts(self) -> dict[str, str]:
+        """Positions, stiffness, transmission error and torque."""
+        angle, solved = np.degrees(self.pinion_angle), ~self.failed
+        told = {"positions": f"{len(self)}, {solved.sum()} solved"}
+        if not solved.any():
+            return told
+        k, error, torque = 1e-6 * self.k_mesh, 1e6 * self.transmission_error, self.torque_wheel
+        return told | {
+            "pinion angle": f"{angle.min():.4g} to {angle.max():.4g} deg",
+            "mesh stiffness": f"{np.nanmin(k):.4g} to {np.nanmax(k):.4g} N/um, mean {np.nanmean(k):.4g}",
+            "transmission error": f"{np.nanmean(error):.4g} um, peak to peak {np.ptp(error[solved]):.3g}",
+            "torque at the wheel": f"{np.nanmin(torque):.4g} to {np.nanmax(torque):.4g} N m",
+            "law": self.contact_law,
+        }
+
+    def columns(self) -> dict[str, list[str]]:
+        """Those of the CSV file."""
+        return self.table()
 
     def table(self) -> dict[str, list[str]]:
         """Columns of the CSV file as text."""

@@ -126,7 +126,7 @@ MECHANISM: dict[str, Any] = {
 
 LOADMAP: dict[str, Any] = {"torques_Nm": [20.0, 50.0, 100.0, 200.0], "root_stress": True}
 
-RUNUP: dict[str, Any] = {"speed_start_rad_per_s": 100.0, "speed_stop_rad_per_s": 1200.0}
+RUNUP: dict[str, Any] = {"speed_start_rad_per_s": 300.0, "speed_stop_rad_per_s": 1200.0, "speeds": 100}
 
 #: Kind -> what the file is about, and its tables.
 JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]]]] = {

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..shown import Shown
 from ..typing import Array, ComplexArray, IntArray
 
 #: What has a row for each output time.
@@ -31,8 +32,8 @@ SAMPLED = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class TrainResponse:
+@dataclass(frozen=True, eq=False, repr=False)
+class TrainResponse(Shown):
     """Response of a gear train at n output times; SI units.
 
     Attributes
@@ -131,6 +132,39 @@ class TrainResponse:
     statistics: Mapping[str, Any] = field(default_factory=dict)
     estimates: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+
+    AXES = ("time_s",)
+
+    def facts(self) -> dict[str, str]:
+        """How far the run came, and its largest numbers."""
+        told = {
+            "status": f"{self.status} at {1e3 * self.time_reached:.4g} ms, {len(self.time)} times",
+            "shafts": ", ".join(self.shaft_names),
+            "attachments": ", ".join(self.attachment_names),
+        }
+        for name, force in zip(self.mesh_names, self.contact_force.T, strict=True):
+            told[f"mesh {name}"] = f"{force.min():.4g} to {force.max():.4g} N" if len(force) else "no times"
+        return told
+
+    def columns(self) -> dict[str, Array]:
+        """Forces, speeds, accelerations and transmission errors over time, each with its unit."""
+        made = {"time_s": self.time, "drive_angle_deg": np.degrees(self.drive_angle)}
+        for i in range(len(self.mesh_names)):
+            made[f"contact_force_{i + 1}_N"] = self.contact_force[:, i]
+        shafts = list(enumerate(self.shaft_names))
+        made |= {f"speed_{name}_rad_per_s": self.speed[:, i] for i, name in shafts}
+        made |= {f"acceleration_{name}_rad_per_s2": self.acceleration[:, i] for i, name in shafts}
+        for i, name in enumerate(self.attachment_names):
+            made[f"attachment_{name}_acceleration_m_per_s2"] = self.attachment_acceleration[:, i]
+        made |= {f"speed_absolute_{name}_rad_per_s": self.speed_absolute[:, i] for i, name in shafts}
+        made |= {f"acceleration_absolute_{name}_rad_per_s2": self.acceleration_absolute[:, i] for i, name in shafts}
+        for i in range(len(self.mesh_names)):
+            made[f"transmission_error_{i + 1}_um"] = 1e6 * self.transmission_error[:, i]
+        for i, coefficient in enumerate(self.statistics.get("friction_coefficients", ())):
+            if coefficient > 0.0:
+                made[f"mesh_power_{i + 1}_W"] = self.mesh_power[:, i]
+                made[f"friction_power_{i + 1}_W"] = self.friction_power[:, i]
+        return made
 
     def every(self, count: int, first: int = 0) -> TrainResponse:
         """The response at each `count`-th of its times from number `first` on."""

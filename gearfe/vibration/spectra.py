@@ -65,22 +65,7 @@ def response_columns(response: TrainResponse, radiation: Array | None = None) ->
 
     The values are those of the motion at the times, so they hold vibration of all frequencies: ``band_limited`` is 0.
     """
-    made = {"time_s": response.time, "drive_angle_deg": np.degrees(response.drive_angle)}
-    for i in range(len(response.mesh_names)):
-        made[f"contact_force_{i + 1}_N"] = response.contact_force[:, i]
-    shafts = list(enumerate(response.shaft_names))
-    made |= {f"speed_{name}_rad_per_s": response.speed[:, i] for i, name in shafts}
-    made |= {f"acceleration_{name}_rad_per_s2": response.acceleration[:, i] for i, name in shafts}
-    for i, name in enumerate(response.attachment_names):
-        made[f"attachment_{name}_acceleration_m_per_s2"] = response.attachment_acceleration[:, i]
-    made |= {f"speed_absolute_{name}_rad_per_s": response.speed_absolute[:, i] for i, name in shafts}
-    made |= {f"acceleration_absolute_{name}_rad_per_s2": response.acceleration_absolute[:, i] for i, name in shafts}
-    for i in range(len(response.mesh_names)):
-        made[f"transmission_error_{i + 1}_um"] = 1e6 * response.transmission_error[:, i]
-    for i, coefficient in enumerate(response.statistics.get("friction_coefficients", ())):
-        if coefficient > 0.0:
-            made[f"mesh_power_{i + 1}_W"] = response.mesh_power[:, i]
-            made[f"friction_power_{i + 1}_W"] = response.friction_power[:, i]
+    made = response.columns()
     if radiation is not None and response.modal_velocity is not None:
         made["instantaneous_radiated_power_W"] = instantaneous_power(radiation, response.modal_velocity)
     made["band_limited"] = np.zeros(len(response.time), dtype=np.int64)

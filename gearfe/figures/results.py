@@ -1,0 +1,152 @@
+"""Pictures of results as Python has them, without the job: what `gearfe.shown.Shown.plot` gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .style import BLUE, COLOURS, GREY, ORANGE, RED, new_figure, tidy
+
+if TYPE_CHECKING:
+    from ..gear.pair import GearPair
+    from ..loadmap.load_map import LoadMap
+    from ..microgeometry.loaded_mesh import LoadedMesh
+    from ..reduction.modal_body import ModalBody
+    from ..rigid.trajectory import Trajectory
+    from ..runup.run_up import RunUp
+    from ..stiffness.curve import StiffnessCurve
+    from ..train.response import TrainResponse
+
+#: Faces of a body that are drawn at most.
+MOST_FACES = 30_000
+
+
+def picture(result: Any) -> Any:
+    """The picture of a result, as a matplotlib figure."""
+    return PICTURES[type(result).__name__](result)
+
+
+def pair_plot(pair: GearPair) -> Any:
+    """The gears in mesh."""
+    from .gears import pair_picture
+
+    return pair_picture(pair, 0.0)
+
+
+def curve_plot(curve: StiffnessCurve) -> Any:
+    """Stiffness and transmission error over the pinion angle."""
+    figure = new_figure(8.5, 4.8)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    angle = np.degrees(curve.pinion_angle)
+    upper.plot(angle, 1e-6 * curve.k_mesh, ".-", color=BLUE, linewidth=1.5)
+    upper.set_ylabel("mesh stiffness  (N/µm)")
+    lower.plot(angle, 1e6 * curve.transmission_error, ".-", color=ORANGE, linewidth=1.5)
+    lower.set_ylabel("transmission error  (µm)")
+    for axes in (upper, lower):
+        tidy(axes)
+        for failed in angle[curve.failed]:
+            axes.axvline(failed, color=RED, linewidth=0.8)
+    lower.set_xlabel("pinion angle  (deg)")
+    return figure
+
+
+def map_plot(made: LoadMap) -> Any:
+    """Stiffness, transmission error, load share, pressure, root stress."""
+    from .load_map import load_map_picture
+
+    return load_map_picture(made)
+
+
+def mesh_plot(made: LoadedMesh) -> Any:
+    """Harris map, load share, pressure, orders."""
+    from .microgeometry import microgeometry_picture
+
+    return microgeometry_picture(made)
+
+
+def response_plot(response: TrainResponse) -> Any:
+    """Contact forces, and accelerations of the attachments, over time."""
+    figure = new_figure(9.0, 5.2)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    time = 1e3 * response.time
+    for colour, name, force in zip(COLOURS * 8, response.mesh_names, 1e-3 * response.contact_force.T, strict=False):
+        upper.plot(time, force, color=colour, linewidth=1.2, label=name)
+    upper.set_ylabel("contact force  (kN)")
+    for colour, name, values in zip(
+        COLOURS * 8, response.attachment_names, response.attachment_acceleration.T, strict=False
+    ):
+        lower.plot(time, values, color=colour, linewidth=1.0, label=f"attachment {name}")
+    lower.set_ylabel("acceleration  (m/s²)")
+    lower.set_xlabel("time  (ms)")
+    for axes in (upper, lower):
+        tidy(axes)
+        axes.margins(x=0.0)
+        axes.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def runup_plot(run: RunUp) -> Any:
+    """Dynamic transmission error and dynamic factor of all meshes over the speed."""
+    from .runup import forces_picture
+
+    return forces_picture(run)
+
+
+def trajectory_plot(run: Trajectory) -> Any:
+    """Coordinates over time: one panel for each body, or element."""
+    names = run.system.coordinate_names()
+    groups: dict[str, list[int]] = {}
+    for i, name in enumerate(names):
+        groups.setdefault(
+            name.rpartition("_")[0].removesuffix("_angle").removesuffix("_x").removesuffix("_y"), []
+        ).append(i)
+    figure = new_figure(9.0, 1.0 + 1.6 * len(groups))
+    panels = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, (group, members) in zip(panels, groups.items(), strict=True):
+        tidy(axes)
+        for colour, i in zip(COLOURS * 8, members, strict=False):
+            axes.plot(run.time, run.q[:, i], color=colour, linewidth=1.2, label=names[i].removeprefix(f"{group}_"))
+        axes.set_ylabel(group, fontsize=9)
+        axes.margins(x=0.0)
+        axes.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    panels[-1].set_xlabel("time  (s)")
+    return figure
+
+
+def body_plot(body: ModalBody) -> Any:
+    """The outer surface with the attachments."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    figure = new_figure(7.5, 6.0)
+    axes = figure.add_subplot(projection="3d")
+    corners = 1e3 * body.nodes[body.faces[:: max(1, len(body.faces) // MOST_FACES), :3]]
+    if len(corners):
+        surface = Poly3DCollection(corners, facecolors="#cbd5e1", shade=True, linewidths=0.0, antialiaseds=False)
+        axes.add_collection3d(surface)
+    places = 1e3 * body.attachment_points
+    axes.plot(*places.T, "o", color=RED, zorder=10)
+    for name, place in zip(body.attachment_names, places, strict=True):
+        axes.text(*place, f"  {name}", color=RED, zorder=11)
+    spread = 1e3 * (body.nodes if len(body.nodes) else body.attachment_points)
+    low, high = spread.min(axis=0), spread.max(axis=0)
+    for set_, a, b in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), low, high, strict=True):
+        set_(a, b if b > a else a + 1.0)
+    axes.set_box_aspect(np.maximum(high - low, 0.05 * (high - low).max() + 1e-9))
+    axes.set(xlabel="x  (mm)", ylabel="y  (mm)", zlabel="z  (mm)")
+    axes.tick_params(labelsize=8, colors=GREY)
+    return figure
+
+
+#: Class of a result -> its picture. Names, so that one picture loads none of the other results.
+PICTURES: dict[str, Callable[[Any], Any]] = {
+    "GearPair": pair_plot,
+    "LoadMap": map_plot,
+    "LoadedMesh": mesh_plot,
+    "ModalBody": body_plot,
+    "RunUp": runup_plot,
+    "StiffnessCurve": curve_plot,
+    "TrainResponse": response_plot,
+    "Trajectory": trajectory_plot,
+}

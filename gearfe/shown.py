@@ -1,0 +1,85 @@
+"""How results show themselves: a line at the prompt, a table in a notebook, a data frame, a picture."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from .errors import MissingLibraryError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Shown:
+    """A result that shows itself: `facts` are a class's own, and `columns` where the result is a table."""
+
+    def facts(self) -> Mapping[str, str]:
+        """What the result is, in a few words: name -> value with its unit."""
+        raise NotImplementedError
+
+    def columns(self) -> Mapping[str, Iterable[Any]]:
+        """The result as a table: name with unit -> values, all of one length."""
+        raise NotImplementedError(f"{type(self).__name__} is no table")
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}: " + ", ".join(f"{name} {value}" for name, value in self.facts().items())
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        import html
+
+        cell = '<td style="text-align:left">{}</td>'
+        rows = "".join(
+            f"<tr>{cell.format(html.escape(name))}{cell.format(html.escape(value))}</tr>"
+            for name, value in self.facts().items()
+        )
+        return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
+
+    def plot(self) -> Figure:
+        """A picture of the result, which a notebook shows; ``.savefig("name.png")`` keeps it."""
+        # pictures stand above all results, so they are looked up where one is asked for
+        figure: Figure = importlib.import_module(".figures.results", __package__).picture(self)
+        return figure
+
+    #: Columns that number the rows: the dimensions of `to_xarray`.
+    AXES: ClassVar[tuple[str, ...]] = ()
+
+    def to_pandas(self) -> Any:
+        """The table as a `pandas.DataFrame`: numbers where all cells of a column are.
+
+        Raises
+        ------
+        MissingLibraryError
+            Where pandas is not installed.
+        """
+        return library("pandas").DataFrame({name: numbers(cells) for name, cells in self.columns().items()})
+
+    def to_xarray(self) -> Any:
+        """The table as an `xarray.Dataset` over `AXES`; needs pandas, too."""
+        library("xarray")
+        return self.to_pandas().set_index(list(self.AXES)).to_xarray()
+
+
+def numbers(cells: Iterable[Any]) -> list[Any]:
+    """The cells of a column as numbers where all of them are, else as they stand."""
+    cells = list(cells)
+    try:
+        return [float(cell) for cell in cells]
+    except ValueError:
+        return cells
+
+
+def library(name: str) -> Any:
+    """A library of the extra ``study``.
+
+    Raises
+    ------
+    MissingLibraryError
+        Where it is not installed.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise MissingLibraryError(f"{name} is not installed: pip install 'gearfe[study]'") from None
