@@ -131,16 +131,17 @@ def oscillators(tolerance):
     kernels = compiled.bind((*kernel_modal.FUNCTIONS, order, corner), names, compiled=False, alias=alias)
     squares, diagonal = np.array([0.0, 4.0, 900.0]), np.array([0.0, 0.0, 1.2])
     state, asked = np.array([0.1, 1.0, 1e-3, 0.5, 0.0, 1.0]), np.linspace(0.25, 4.0, 16)
-    found, T, Y = np.zeros((16, 6)), np.zeros(999), np.zeros((999, 6))
-    made = kernels.modal_steps(
+    equations = kernel_modal.Equations(
         squares, np.diag(diagonal), diagonal, False, np.zeros(3), np.zeros((1, 3)), np.zeros(1), np.zeros(1),
-        np.zeros((1, 21)), np.zeros(1, dtype=np.int64), 0.0, 4.0, state, 0.1, np.abs(state[:3]), np.zeros(3),
-        np.array([0.7]), tolerance, np.inf, asked, 0, found, T, Y, kernel_modal.work_space(3, 1, 21),
+        np.array([0.7]), tolerance, np.inf,
     )  # fmt: skip
+    work = kernel_modal.work_space((np.zeros((1, 21)), np.zeros(1, dtype=np.int64)), state, 1)
+    out = kernel_modal.Output(asked, np.zeros((16, 6)), np.zeros(999), np.zeros((999, 6)))
+    made = kernels.modal_steps(equations, work, out, 0.0, 4.0, 0.1, 0)
     status, steps, _, _, _, passed = made
     assert (status, passed) == (0, 16)
-    assert 0.7 in T[:steps]  # a step ends where a force may break
-    return found, asked
+    assert 0.7 in out.ends[:steps]  # a step ends where a force may break
+    return out.found, asked
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-8, 1e-12])

@@ -1,4 +1,3 @@
-# mypy: ignore-errors
 """Taylor series in modal coordinates, compiled: y'' = c - w^2 y - D y' + W^T phi(t, u, u'), u = W y + offset.
 
 With y = sum_j y_j x^j, x = (t - t0) / s running from 0 to 1 over the trial step s, the equation of motion gives
@@ -6,7 +5,7 @@ With y = sum_j y_j x^j, x = (t - t0) / s running from 0 to 1 over the trial step
     (j + 2)(j + 1) y_{j+2} = s^2 (c_j - w^2 y_j + W^T phi_j) - s (j + 1) D y_{j+1}
 
 (Hairer, Norsett & Wanner I, Sec. I.8). phi_j comes from the law's own recurrences (`gearfe.rigid.contract.SeriesLaw`),
-bound by the names `law_order`, `law_corner`. One order costs two small products with W, half a stage of
+which stand in for `law_order`, `law_corner`. One order costs two small products with W, half a stage of
 a Runge-Kutta method of order 8, and takes the fastest mode further. A step ends where its law has a corner; the number
 of orders follows from the terms.
 """
@@ -14,14 +13,68 @@ of orders follows from the terms.
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
+
+from ..typing import Array, IntArray
 
 #: Orders that are computed in any case: a force that sets in as a polynomial of degree 5 shows up to order 7.
 LEAST = 8
 
 
-def project(W, y, j, out):
+class Equations(NamedTuple):
+    """What holds for a whole run, for n coordinates and p directions."""
+
+    squares: Array  # (n,) w^2 (rad2/s2)
+    damping: Array  # (n, n) D
+    diagonal: Array  # (n,) of D
+    full: bool  # whether D has more than its diagonal
+    constant: Array  # (n,) c
+    W: Array  # (p, n)
+    offset: Array  # (p,)
+    law: Any  # parameters of the law
+    breaks: Array  # times at which steps end (s)
+    tolerance: float
+    longest: float  # step (s)
+
+
+class Work(NamedTuple):
+    """What changes from step to step, and scratch arrays; K orders."""
+
+    memory: Array  # (rows, K) of the law
+    pieces: IntArray
+    state: Array  # (2n,)
+    reach: Array  # (n,) largest coordinates and accelerations so far
+    pull: Array
+    y: Array  # (K, n) series of the coordinates
+    u: Array  # (p, K) and along the directions
+    force: Array  # (p,)
+    weight: Array  # (n,)
+    value: Array
+    rate: Array
+
+
+class Output(NamedTuple):
+    """What a run fills."""
+
+    asked: Array  # (a,) times (s)
+    found: Array  # (a, 2n) states there
+    ends: Array  # (room,) of the steps (s)
+    states: Array  # (room, 2n) there
+
+
+def law_order(j: int, t: float, s: float, u: Array, law: Any, memory: Array, pieces: IntArray, out: Array) -> None:
+    """Bound to the law's own `gearfe.rigid.contract.SeriesLaw.order`."""
+    raise NotImplementedError
+
+
+def law_corner(last: int, limit: float, law: Any, memory: Array, pieces: IntArray, ahead: bool) -> float:
+    """Bound to the law's own `gearfe.rigid.contract.SeriesLaw.corner`."""
+    raise NotImplementedError
+
+
+def project(W: Array, y: Array, j: int, out: Array) -> None:
     """out[k, j] = sum_i W[k, i] y[j, i]; four directions at a time, so that y is read once for all."""
     n = y.shape[1]
     rows = W.shape[0]
@@ -44,7 +97,7 @@ def project(W, y, j, out):
         p += 1
 
 
-def add_forces(W, force, factor, y, row):
+def add_forces(W: Array, force: Array, factor: float, y: Array, row: int) -> None:
     """y[row] += factor W^T force, directions without force left out."""
     n = y.shape[1]
     p = 0
@@ -67,8 +120,9 @@ def add_forces(W, force, factor, y, row):
         p = second + 1
 
 
-def next_order(squares, damping, diagonal, full, constant, W, force, s, y, j):
+def next_order(run: Equations, force: Array, s: float, y: Array, j: int) -> None:
     """Order j + 2 of the coordinates."""
+    squares, diagonal, constant, damping = run.squares, run.diagonal, run.constant, run.damping
     n = squares.shape[0]
     below = 1.0 / ((j + 2.0) * (j + 1.0))
     square = s * s * below
@@ -78,16 +132,16 @@ def next_order(squares, damping, diagonal, full, constant, W, force, s, y, j):
     if j == 0:
         for i in range(n):
             y[2, i] += square * constant[i]
-    if full:
+    if run.full:
         for i in range(n):
             value = 0.0
             for k in range(n):
                 value += damping[i, k] * y[j + 1, k]
             y[j + 2, i] -= slope * (value - diagonal[i] * y[j + 1, i])
-    add_forces(W, force, square, y, j + 2)
+    add_forces(run.W, force, square, y, j + 2)
 
 
-def evaluate(y, last, x, s, value, rate):
+def evaluate(y: Array, last: int, x: float, s: float, value: Array, rate: Array) -> None:
     """Coordinates and velocities at x (Horner)."""
     n = y.shape[1]
     for i in range(n):
@@ -101,15 +155,16 @@ def evaluate(y, last, x, s, value, rate):
         rate[i] /= s
 
 
-def widen(state, value, rate, step, reach, pull):
+def widen(w: Work, step: float) -> None:
     """Largest coordinates and accelerations so far, the mean acceleration of a step standing for all of it."""
+    state, value, rate, reach, pull = w.state, w.value, w.rate, w.reach, w.pull
     n = value.shape[0]
     for i in range(n):
         reach[i] = max(reach[i], abs(value[i]))
         pull[i] = max(pull[i], abs(rate[i] - state[n + i]) / step)
 
 
-def set_weights(squares, reach, pull, tolerance, weight):
+def set_weights(squares: Array, reach: Array, pull: Array, tolerance: float, weight: Array) -> None:
     """1 / limit of each coordinate: `tolerance` of its largest value, and of what its largest acceleration makes."""
     n = squares.shape[0]
     far = 0.0
@@ -124,7 +179,7 @@ def set_weights(squares, reach, pull, tolerance, weight):
         weight[i] = 1.0 / (tolerance * limit + 1e-100)
 
 
-def velocity_term(y, j, power, weight):
+def velocity_term(y: Array, j: int, power: float, weight: Array) -> float:
     """Size of the term j of the velocity, over the trial step, in parts of the limits."""
     size = 0.0
     for i in range(weight.shape[0]):
@@ -133,7 +188,7 @@ def velocity_term(y, j, power, weight):
     return j * math.sqrt(size) * power
 
 
-def last_size(y, last, end, weight):
+def last_size(y: Array, last: int, end: float, weight: Array) -> float:
     """Size of the last term, or of the one before if that asks for a shorter step: a series may be even or odd."""
     size = velocity_term(y, last, end**last, weight)
     before = velocity_term(y, last - 1, end ** (last - 1), weight)
@@ -141,18 +196,21 @@ def last_size(y, last, end, weight):
 
 
 def modal_steps(
-    squares, damping, diagonal, full, constant, W, offset, parameters, memory, pieces, t, t1, state, h, reach,
-    pull, breaks, tolerance, longest, asked, at, found, T, Y, work,
-):  # fmt: skip
-    """Steps from t to t1, or until T is full; states at the `asked` times go to `found`, step ends to T, Y.
+    run: Equations, w: Work, out: Output, t: float, t1: float, h: float, at: int
+) -> tuple[int, int, float, float, int, int]:
+    """Steps from t to t1, or until `out.ends` is full; h is the trial step, `at` the number of asked times passed.
 
-    h is the trial step; reach, pull are the largest coordinates and accelerations so far. A coordinate's limit is
-    `tolerance` of its reach, and of what its pull makes of it: accelerations then hold as well as coordinates. `work`:
-    scratch arrays, see `work_space`. Returns (status, steps, time, h, orders computed, number of asked times passed).
+    A coordinate's limit is `tolerance` of its reach, and of what its pull makes of it: accelerations then hold as well
+    as coordinates. Returns (status, steps, time, h, orders computed, number of asked times passed).
     """
+    squares, offset, W, breaks, tolerance, longest = (
+        run.squares, run.offset, run.W, run.breaks, run.tolerance, run.longest,
+    )  # fmt: skip
+    law, memory, pieces, state, reach, pull = run.law, w.memory, w.pieces, w.state, w.reach, w.pull
+    y, u, force, weight, value, rate = w.y, w.u, w.force, w.weight, w.value, w.rate
+    asked, found, T, Y = out.asked, out.found, out.ends, out.states
     n = squares.shape[0]
     most = memory.shape[1] - 1
-    y, u, force, weight, value, rate = work
     sign = 1.0 if t1 >= t else -1.0
     begin = t
     count = 0
@@ -188,10 +246,10 @@ def modal_steps(
         largest = 0.0
         for j in range(most - 1):
             project(W, y, j + 1, u)
-            law_order(j, t, s, u, parameters, memory, pieces, force)  # noqa: F821
-            next_order(squares, damping, diagonal, full, constant, W, force, s, y, j)
+            law_order(j, t, s, u, law, memory, pieces, force)
+            next_order(run, force, s, y, j)
             if j == 1:
-                end = min(1.0, law_corner(1, 1.0, parameters, memory, pieces, True))  # noqa: F821
+                end = min(1.0, law_corner(1, 1.0, law, memory, pieces, True))
                 power = end * end
             power *= end
             size = velocity_term(y, j + 2, power, weight)
@@ -213,13 +271,13 @@ def modal_steps(
         size = last_size(y, last, end, weight)
         if 1.0 <= size < 1e-3 * largest:  # the sum holds: the motion itself tells its size, as at a start from rest
             evaluate(y, last, end, s, value, rate)
-            widen(state, value, rate, end * step, reach, pull)
+            widen(w, end * step)
             set_weights(squares, reach, pull, tolerance, weight)
             size = last_size(y, last, end, weight)
         if size > 1.0:  # too long: as far as the last term allows
             x = end * size ** (-1.0 / last)
         if still < 20:  # corners that the law does not get past are no reason to stand still
-            corner = law_corner(last - 2, x, parameters, memory, pieces, False)  # noqa: F821
+            corner = law_corner(last - 2, x, law, memory, pieces, False)
             x = min(x, corner)
         if x * step <= 1e-15 * max(abs(t), abs(t1 - begin)):
             still += 1
@@ -238,7 +296,7 @@ def modal_steps(
                 found[at, n + i] = rate[i]
             at += 1
         evaluate(y, last, x, s, value, rate)
-        widen(state, value, rate, x * step, reach, pull)
+        widen(w, x * step)
         for i in range(n):
             state[i] = Y[count, i] = value[i]
             state[n + i] = Y[count, n + i] = rate[i]
@@ -252,10 +310,11 @@ def modal_steps(
     return status, count, t, h, orders, at
 
 
-def work_space(n, directions, orders):
-    """Scratch arrays of `modal_steps`: series of coordinates and along directions, forces, three of size n."""
+def work_space(law: tuple[Array, IntArray], state: Array, directions: int) -> Work:
+    """Arrays of a run from `state`, with the memory and the pieces of its law."""
+    n, orders = len(state) // 2, law[0].shape[1]
     series = np.zeros((orders, n)), np.zeros((directions, orders)), np.zeros(directions)
-    return *series, np.zeros(n), np.zeros(n), np.zeros(n)
+    return Work(*law, state.copy(), np.abs(state[:n]), np.zeros(n), *series, np.zeros(n), np.zeros(n), np.zeros(n))
 
 
 FUNCTIONS = (project, add_forces, next_order, evaluate, widen, set_weights, velocity_term, last_size, modal_steps)

@@ -23,6 +23,7 @@ from .contract import LocalForce, SeriesLaw
 from .dense import Dense, within_run
 from .elimination import Minimal, is_linear
 from .explicit import Problem, run_problem
+from .packed import Packed
 from .parts import uncollected
 from .start import Start
 from .status import Status
@@ -149,36 +150,28 @@ class SeriesRun:
         offset = np.atleast_1d(core.origin[self.index] @ self.force.W)
         diagonal = np.diagonal(core.damping).copy()
         full = not np.array_equal(core.damping, np.diag(diagonal))
-        kernels = self._bound
+        equations = kernel_modal.Equations(
+            core.squares, np.ascontiguousarray(core.damping), diagonal, full, core.constant, W, offset,
+            series.parameters, np.asarray(core.system.breaks, dtype=float), self.tolerance, self.longest,
+        )  # fmt: skip
         memory, pieces = np.zeros((series.rows, ORDER + 1)), np.zeros(series.pieces, dtype=np.int64)
-        work = kernel_modal.work_space(n, W.shape[0], ORDER + 1)
+        series.begin(t0, 1.0 if t1 >= t0 else -1.0, W @ y0[:n] + offset, W @ y0[n:], memory, pieces)
+        work = kernel_modal.work_space((memory, pieces), y0, len(W))
         found = np.empty((len(asked), 2 * n))
         rates = np.sqrt(np.abs(core.squares).max(initial=0.0)) + np.abs(diagonal).max(initial=0.0)
-        t, state, h, status, at, orders = (
-            t0,
-            y0.copy(),
-            5.0 / max(rates, 1.0 / max(abs(t1 - t0), 1e-300)),
-            int(Status.MOST_STEPS),
-            0,
-            0,
-        )
-        reach, pull = np.abs(y0[:n]), np.zeros(n)
+        t, h, status, at, orders = t0, 5.0 / max(rates, 1.0 / max(abs(t1 - t0), 1e-300)), _FULL, 0, 0
         ends, states, room = [np.array([t0])], [y0[None, :]], 512
-        series.begin(t0, 1.0 if t1 >= t0 else -1.0, W @ y0[:n] + offset, W @ y0[n:], memory, pieces)
+        run, scratch, kernels = Packed(equations), Packed(work), self._bound
         if watch is not None:
-            watch(t, 0, state)
+            watch(t, 0, work.state)
         while status == _FULL and sum(map(len, ends)) - 1 < most:
             room = min(room, most + 1 - sum(map(len, ends)))
-            T, Y = np.empty(room), np.empty((room, 2 * n))
-            status, count, t, h, further, at = kernels.modal_steps(
-                core.squares, core.damping, diagonal, full, core.constant, W, offset, series.parameters, memory, pieces,
-                t, t1, state, h, reach, pull, core.system.breaks, self.tolerance, self.longest, asked,
-                at, found, T, Y, work,
-            )  # fmt: skip
+            out = kernel_modal.Output(np.ascontiguousarray(asked), found, np.empty(room), np.empty((room, 2 * n)))
+            status, count, t, h, further, at = kernels.modal_steps(run, scratch, Packed(out), t, t1, h, at)
             orders += further
-            ends.append(T[:count])
-            states.append(Y[:count])
-            if watch is not None and status == _FULL and not watch(t, sum(map(len, ends)) - 1, state):
+            ends.append(out.ends[:count])
+            states.append(out.states[:count])
+            if watch is not None and status == _FULL and not watch(t, sum(map(len, ends)) - 1, work.state):
                 status = Status.STOPPED
             room = min(4 * room, 20_000)
         return np.concatenate(ends), np.vstack(states), found[:at], Status(status), orders
