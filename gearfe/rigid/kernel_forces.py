@@ -1,10 +1,12 @@
-# mypy: ignore-errors
 """Taylor series of the applied forces: tensions of springs along vectors, forces along forms, weight."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+from ..typing import Array
 from .kernel_names import (
     AS,
     BS,
@@ -28,8 +30,12 @@ from .kernel_names import (
     VY,
 )
 
+if TYPE_CHECKING:
+    from .tables import Forces, Forms, Tables, Vectors
+    from .taylor import Work
 
-def spring_orders(forces, vs, ss, j):
+
+def spring_orders(forces: Forces, vs: Array, ss: Array, j: int) -> None:
     """Order j of the length L and of 1/L of every spring."""
     for k in range(ss.shape[2]):
         square = 0.0
@@ -50,7 +56,7 @@ def spring_orders(forces, vs, ss, j):
             ss[INVERSE, j, k] = -inverse * ss[INVERSE, 0, k]
 
 
-def force_orders(tb, w, k, at, F):
+def force_orders(tb: Tables, w: Work, k: int, at: int, F: Array) -> None:
     """Order k of all applied forces: F gets what does not turn with a body, A and B (at row `at`) what does."""
     forms, forces, bs, QS = tb.forms, tb.forces, w.bs, w.QS
     for i in range(F.shape[0]):
@@ -80,7 +86,7 @@ def force_orders(tb, w, k, at, F):
             bs[BS, at, b] += forms.factor[r, side, KS] * value
 
 
-def form_order(forms, QS, bs, r, j):
+def form_order(forms: Forms, QS: Array, bs: Array, r: int, j: int) -> float:
     """Order j of the affine form r."""
     value = forms.constant[r] if j == 0 else 0.0
     for side in range(2):
@@ -91,7 +97,7 @@ def form_order(forms, QS, bs, r, j):
     return value
 
 
-def add_force(vectors, bs, at, k, fx, fy, F):
+def add_force(vectors: Vectors, bs: Array, at: int, k: int, fx: float, fy: float, F: Array) -> None:
     """The generalised force of (fx, fy) on the vector k: F gets what does not turn with a body, A and B what does."""
     for side in range(2):
         b = vectors.bodies[k, side]
@@ -100,7 +106,7 @@ def add_force(vectors, bs, at, k, fx, fy, F):
     add_arms(vectors, bs, at, k, fx, fy)
 
 
-def add_arms(vectors, bs, at, k, fx, fy):
+def add_arms(vectors: Vectors, bs: Array, at: int, k: int, fx: float, fy: float) -> None:
     """The torques of (fx, fy) on the vector k join the sums A and B."""
     for side in range(2):
         b = vectors.bodies[k, side]
@@ -110,7 +116,7 @@ def add_arms(vectors, bs, at, k, fx, fy):
         bs[BS, at, b] += x * fy - y * fx
 
 
-def spring_force(forces, vs, ss, k, e):
+def spring_force(forces: Forces, vs: Array, ss: Array, k: int, e: int) -> tuple[float, float]:
     """Order k of the force of spring e on its first point: (k_s (L - L0) + c L') / L times the span."""
     stiffness = forces.spring[e, STIFFNESS]
     damping = forces.spring[e, DAMPING]

@@ -1,4 +1,3 @@
-# mypy: ignore-errors
 """Finding a passing singular position: the rows that pass together, its moment, the state there (in w.qn, w.vn).
 
 The conditions are in `kernel_singular`. All rows that pass at the same moment take part, however many loops fold.
@@ -6,8 +5,11 @@ The conditions are in `kernel_singular`. All rows that pass at the same moment t
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+from ..typing import Array
 from .kernel_rows import add_transposed, copy, fill, residuals, time_series, times_gradients
 from .kernel_series import small_solve
 from .kernel_singular import (
@@ -21,12 +23,16 @@ from .kernel_singular import (
     weighted,
 )
 
+if TYPE_CHECKING:
+    from .tables import Forms, Tables
+    from .taylor import Border, Run, Work
+
 #: Pivot of another row at the singular position of one row below which it passes with it (eps^(2/3): at the distance d
 #: between two, rounding leaves eps / d^2 of the velocities, more than taking both for one does).
 SAME = 4e-11
 
 
-def moved_state(w, run, h):
+def moved_state(w: Work, run: Run, h: float) -> None:
     """State of the series at h with the corrections w.dq, w.dv."""
     evaluate(w.QS, run.order, h, w.qn, w.vn)
     for i in range(w.qn.shape[0]):
@@ -34,12 +40,12 @@ def moved_state(w, run, h):
         w.vn[i] += w.dv[i]
 
 
-def time_to_singular(border, p, mass):
+def time_to_singular(border: Border, p: int, mass: Array) -> float:
     """Time from here to the moment at which P_p vanishes along B_p."""
     return -weighted(border.P[p], border.B[p], mass) / border.schur[p, p]
 
 
-def locate(tb, w, run, t, guess, reach, where):
+def locate(tb: Tables, w: Work, run: Run, t: float, guess: float, reach: float, where: int) -> tuple[int, float]:
     """Time (from the point of expansion) of the singular position near `guess`; count = 0 when there is none.
 
     Newton on: regular rows of g = 0, z^T G v = 0, and time such that B . G^T z = 0. It is a true crossing when z^T g
@@ -57,7 +63,7 @@ def locate(tb, w, run, t, guess, reach, where):
     return count, h
 
 
-def meet(tb, w, run, guess, reach, where):
+def meet(tb: Tables, w: Work, run: Run, guess: float, reach: float, where: int) -> tuple[int, float]:
     """Number of rows (w.skip = 2) that pass about when the row `where` does, and its time along the series."""
     h = guess
     for _ in range(30):
@@ -83,7 +89,7 @@ def meet(tb, w, run, guess, reach, where):
     return 0, h
 
 
-def converge(tb, w, run, t, h, guess, reach):
+def converge(tb: Tables, w: Work, run: Run, t: float, h: float, guess: float, reach: float) -> tuple[int, float]:
     """Newton of `locate` from the time h for the rows with w.skip = 2."""
     forms, vectors, mass, border, q, v = tb.forms, tb.vectors, tb.mass, w.border, w.qn, w.vn
     n = q.shape[0]
@@ -128,14 +134,14 @@ def converge(tb, w, run, t, h, guess, reach):
     return 0, h
 
 
-def add_rates(forms, TF, order, factor, out):
+def add_rates(forms: Forms, TF: Array, order: int, factor: float, out: Array) -> None:
     """out += factor times the coefficient `order` of every row's time function."""
     for r in range(out.shape[0]):
         if forms.motion[r] >= 0:
             out[r] += factor * TF[forms.motion[r], order]
 
 
-def split(tb, w, count, where):
+def split(tb: Tables, w: Work, count: int, where: int) -> bool:
     """Whether some rows pass at another moment than the row `where`; then those that pass with it (w.skip = 2) are
     left."""
     forms, mass, border = tb.forms, tb.mass, w.border
@@ -161,7 +167,7 @@ def split(tb, w, count, where):
     return kept < count
 
 
-def exchange(tb, w, count):
+def exchange(tb: Tables, w: Work, count: int) -> int:
     """Number of singular rows that are left when every redundant row that has a gradient of its own here takes the
     place of a row that lost its.
 
@@ -195,7 +201,7 @@ def exchange(tb, w, count):
     return count
 
 
-def passes(tb, w, count):
+def passes(tb: Tables, w: Work, count: int) -> bool:
     """Whether z^T g vanishes, so that two branches cross, for all singular rows."""
     forms, border = tb.forms, w.border
     residuals(forms, tb.vectors, w.qn, w.c, w.s, w.TF[:, 0], w.mu)

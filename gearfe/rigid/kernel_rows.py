@@ -1,4 +1,3 @@
-# mypy: ignore-errors
 """Constraint rows of a planar scene: residuals, gradients, S = G M^-1 G^T = L D L^T. Plain loops, compiled
 when numba is.
 
@@ -9,32 +8,38 @@ Coordinates q hold (x, y, theta) of every body and of the ground, shape (3 (n + 
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..typing import Array, IntArray
 from .kernel_names import EW, EX, EY, KC, KS, KT, KX, KY
 
+if TYPE_CHECKING:
+    from .ordering import Factor
+    from .tables import Forms, Times, Vectors
 
-def fill(x, value):
+
+def fill(x: Array, value: float) -> None:
     """x := value (a loop compiles far faster than a slice assignment, which brings its error messages along)."""
     for i in range(x.shape[0]):
         x[i] = value
 
 
-def copy(x, y):
+def copy(x: Array, y: Array) -> None:
     """y := x."""
     for i in range(x.shape[0]):
         y[i] = x[i]
 
 
-def trigonometry(q, c, s):
+def trigonometry(q: Array, c: Array, s: Array) -> None:
     """Cosine and sine of every angle."""
     for b in range(c.shape[0]):
         c[b] = math.cos(q[3 * b + 2])
         s[b] = math.sin(q[3 * b + 2])
 
 
-def vector_at(vectors, k, q, c, s):
+def vector_at(vectors: Vectors, k: int, q: Array, c: Array, s: Array) -> tuple[float, float]:
     """Components of vector k."""
     x = 0.0
     y = 0.0
@@ -47,7 +52,7 @@ def vector_at(vectors, k, q, c, s):
     return x, y
 
 
-def arm_at(vectors, k, a, c, s):
+def arm_at(vectors: Vectors, k: int, a: int, c: Array, s: Array) -> tuple[float, float]:
     """Arm of vector k at its end a, in the ground's axes."""
     b = vectors.bodies[k, a]
     px = vectors.end[k, a, EX]
@@ -55,7 +60,7 @@ def arm_at(vectors, k, a, c, s):
     return c[b] * px - s[b] * py, s[b] * px + c[b] * py
 
 
-def vector_rate(vectors, k, v, c, s):
+def vector_rate(vectors: Vectors, k: int, v: Array, c: Array, s: Array) -> tuple[float, float]:
     """Components of the rate of vector k."""
     x = 0.0
     y = 0.0
@@ -68,7 +73,7 @@ def vector_rate(vectors, k, v, c, s):
     return x, y
 
 
-def gradients(forms, vectors, q, c, s, G):
+def gradients(forms: Forms, vectors: Vectors, q: Array, c: Array, s: Array, G: Array) -> None:
     """G[r, side] = gradient of constraint r with respect to (x, y, theta) of its body on that side; shape (m, 2, 3)."""
     for r in range(G.shape[0]):
         for a in range(2):
@@ -88,7 +93,7 @@ def gradients(forms, vectors, q, c, s, G):
                 G[r, a, 2] += rx * uy - ry * ux
 
 
-def gradient_rates(forms, vectors, q, v, c, s, H):
+def gradient_rates(forms: Forms, vectors: Vectors, q: Array, v: Array, c: Array, s: Array, H: Array) -> None:
     """H = dG/dt along the velocity v, same layout as G."""
     for r in range(H.shape[0]):
         for a in range(2):
@@ -110,7 +115,7 @@ def gradient_rates(forms, vectors, q, v, c, s, H):
                 H[r, a, 2] += rx * dy - ry * dx - spin * (rx * ux + ry * uy)
 
 
-def residuals(forms, vectors, q, c, s, f, g):
+def residuals(forms: Forms, vectors: Vectors, q: Array, c: Array, s: Array, f: Array, g: Array) -> None:
     """Value of every constraint; f holds the value of every time function."""
     for r in range(g.shape[0]):
         value = forms.constant[r]
@@ -128,7 +133,7 @@ def residuals(forms, vectors, q, c, s, f, g):
         g[forms.product[p, 0]] += ux * vx + uy * vy
 
 
-def times_gradients(forms, G, u, out):
+def times_gradients(forms: Forms, G: Array, u: Array, out: Array) -> None:
     """out = G u, one number per row."""
     for r in range(out.shape[0]):
         a = 3 * forms.bodies[r, 0]
@@ -139,7 +144,7 @@ def times_gradients(forms, G, u, out):
         )  # fmt: skip
 
 
-def add_transposed(forms, G, mu, factor, out):
+def add_transposed(forms: Forms, G: Array, mu: Array, factor: float, out: Array) -> None:
     """out += factor G^T mu."""
     for r in range(mu.shape[0]):
         for side in range(2):
@@ -150,7 +155,9 @@ def add_transposed(forms, G, mu, factor, out):
             out[b + 2] += G[r, side, 2] * value
 
 
-def factorise(plan, mass, G, skip, val, diag, bound):
+def factorise(
+    plan: Factor, mass: Array, G: Array, skip: IntArray, val: Array, diag: Array, bound: float
+) -> tuple[float, int]:
     """L D L^T of S in val (m reciprocals of D, then the entries of L); rows with skip != 0 become unit rows.
 
     Rows whose pivot falls below `bound` of their diagonal become unit rows, too, and get skip = 2.
@@ -208,7 +215,7 @@ def factorise(plan, mass, G, skip, val, diag, bound):
     return least, where
 
 
-def solve(plan, val, x):
+def solve(plan: Factor, val: Array, x: Array) -> None:
     """x := S^-1 x with the factor of `factorise`."""
     m = x.shape[0]
     for e in range(plan.row.shape[0]):
@@ -219,7 +226,7 @@ def solve(plan, val, x):
         x[plan.column[e]] -= val[m + e] * x[plan.row[e]]
 
 
-def time_series(times, t, forward, orders, out):
+def time_series(times: Times, t: float, forward: bool, orders: int, out: Array) -> None:
     """Taylor coefficients of every time function at t, on the piece ahead in the direction of travel;
     (functions, orders)."""
     width = times.factor.shape[1]

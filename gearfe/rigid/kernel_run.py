@@ -1,4 +1,3 @@
-# mypy: ignore-errors
 """The integration loop of the Taylor method: expand, choose the step, land, project; land on singular positions rather
 than jump them.
 
@@ -10,8 +9,11 @@ it, so a step never crosses one: it ends there, and the next one is expanded the
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+from ..typing import Array, IntArray
 from .kernel_locate import exchange, locate
 from .kernel_names import AHEAD, BEGUN, LAST_STEP, ROW, SINGULAR, TIME
 from .kernel_rows import copy, fill
@@ -19,13 +21,17 @@ from .kernel_series import expand
 from .kernel_singular import evaluate, factor_at, next_singular, project
 from .status import Status
 
+if TYPE_CHECKING:
+    from .tables import Tables
+    from .taylor import Run, Work
+
 DONE, STEP_TOO_SMALL, MOST_STEPS = int(Status.DONE), int(Status.STEP_TOO_SMALL), int(Status.MOST_STEPS)
 NO_BRANCH, NOT_FINITE, SINGULAR_START = int(Status.NO_BRANCH), int(Status.NOT_FINITE), int(Status.SINGULAR_START)
 #: Angle (rad) that bodies turn against each other between two looks for singular positions.
 FAR = 0.5
 
 
-def step_length(QS, run):
+def step_length(QS: Array, run: Run) -> float:
     """Longest step whose last two terms stay below the tolerance."""
     order = run.order
     last = 0.0
@@ -46,7 +52,7 @@ def step_length(QS, run):
     return step
 
 
-def clear_series(w, order):
+def clear_series(w: Work, order: int) -> None:
     """Series that holds position and velocity only."""
     copy(w.q, w.QS[0])
     copy(w.v, w.QS[1])
@@ -54,7 +60,7 @@ def clear_series(w, order):
         fill(w.QS[j], 0.0)
 
 
-def singular_behind(tb, w, run, t, ahead, where):
+def singular_behind(tb: Tables, w: Work, run: Run, t: float, ahead: float, where: int) -> tuple[int, float]:
     """A start just past a singular position begins on it: (singular rows, time from the start to it)."""
     copy(w.base, w.skip)
     clear_series(w, run.order)
@@ -67,7 +73,7 @@ def singular_behind(tb, w, run, t, ahead, where):
     return count, found
 
 
-def begin(tb, w, run, t):
+def begin(tb: Tables, w: Work, run: Run, t: float) -> tuple[int, float, float, int, int]:
     """Consistent start beside a singular position: (singular rows, time shift, time to the one ahead, its row, status).
 
     The state is in w.q, w.v.
@@ -101,7 +107,7 @@ def begin(tb, w, run, t):
     return 0, 0.0, ahead, where, DONE
 
 
-def turned(QS, q):
+def turned(QS: Array, q: Array) -> float:
     """Largest angle by which two bodies (or a body and the ground) turned against each other in the series."""
     most = 0.0
     least = 0.0
@@ -111,7 +117,7 @@ def turned(QS, q):
     return most - least
 
 
-def singular_within(tb, w, run, h, low, high):
+def singular_within(tb: Tables, w: Work, run: Run, h: float, low: float, high: float) -> tuple[float, int]:
     """First singular position of the series within low < sign tau < high, from looks inside the step: (time, row).
 
     The row is -1 where there is none.
@@ -130,7 +136,7 @@ def singular_within(tb, w, run, h, low, high):
     return np.inf, -1
 
 
-def land(tb, w, run, state, h, close):
+def land(tb: Tables, w: Work, run: Run, state: Array, h: float, close: float) -> tuple[float, int, float, int, int]:
     """End of a step of at most |h|: (step, singular rows there, time to the next ones, their row, status).
 
     The state there is in w.qn, w.vn.
@@ -178,7 +184,9 @@ def land(tb, w, run, state, h, close):
     return h, 0, np.inf, -1, STEP_TOO_SMALL
 
 
-def integrate_series(tb, w, run, state, T, C, singular):
+def integrate_series(
+    tb: Tables, w: Work, run: Run, state: Array, T: Array, C: Array, singular: IntArray
+) -> tuple[int, int]:
     """Integrate from (w.q, w.v) to run.end, or until the arrays are full; call again with the same arguments to go on.
 
     `state` holds time, singular rows, time to the singular position ahead, 1 once begun, last step, row of the one
@@ -253,7 +261,7 @@ def integrate_series(tb, w, run, state, T, C, singular):
     return status, count
 
 
-def sample(T, C, sign, times, derivative, out):
+def sample(T: Array, C: Array, sign: float, times: Array, derivative: int, out: Array) -> None:
     """Coordinates or a derivative of them at `times` (in order of travel) from the pieces of `integrate_series`."""
     piece = 0
     last = C.shape[0] - 1

@@ -1,4 +1,3 @@
-# mypy: ignore-errors
 """Taylor series of the index-3 equations of a planar scene about one point.
 
 With q(t) = sum_j q_j (t - t0)^j and the multipliers likewise, order k of the motion and order k + 2 of the
@@ -26,12 +25,20 @@ is solved exactly: (1 - X) q_c = (q_N)_c once per order. No 1/m of a light link 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from ..typing import Array
 from .kernel_forces import add_arms, add_force, force_orders, spring_orders
 from .kernel_names import AS, BS, CS, DT, EW, EX, EY, KC, KS, SN, VX, VY
 from .kernel_rows import add_transposed, fill, solve, time_series, times_gradients, trigonometry
 
+if TYPE_CHECKING:
+    from .ordering import Factor
+    from .tables import Forms, Tables, Vectors
+    from .taylor import Border, Run, Work
 
-def angle_orders(bs, j, known):
+
+def angle_orders(bs: Array, j: int, known: int) -> None:
     """Orders j of sine and cosine from the orders of theta below `known`: what theta_j itself adds comes later."""
     for b in range(bs.shape[2]):
         sine = 0.0
@@ -43,7 +50,7 @@ def angle_orders(bs, j, known):
         bs[CS, j, b] = cosine / j
 
 
-def vector_orders(vectors, QS, bs, vs, j, first):
+def vector_orders(vectors: Vectors, QS: Array, bs: Array, vs: Array, j: int, first: int) -> None:
     """Orders j of the vectors from number `first` on, from the orders j of q, sine and cosine."""
     for k in range(first, vs.shape[2]):
         x = 0.0
@@ -58,7 +65,7 @@ def vector_orders(vectors, QS, bs, vs, j, first):
         vs[VY, j, k] = y
 
 
-def row_orders(forms, TF, bs, vs, j, out):
+def row_orders(forms: Forms, TF: Array, bs: Array, vs: Array, j: int, out: Array) -> None:
     """Order j >= 2 of every constraint without the part of q_j."""
     for r in range(out.shape[0]):
         value = 0.0
@@ -77,7 +84,7 @@ def row_orders(forms, TF, bs, vs, j, out):
         out[forms.product[p, 0]] += value
 
 
-def product_forces(forms, vectors, LM, bs, vs, at, F):
+def product_forces(forms: Forms, vectors: Vectors, LM: Array, bs: Array, vs: Array, at: int, F: Array) -> None:
     """Known part of order `at` of the forces of constraints with products, from the multipliers below that order."""
     for p in range(forms.product.shape[0]):
         r = forms.product[p, 0]
@@ -91,7 +98,7 @@ def product_forces(forms, vectors, LM, bs, vs, at, F):
             add_force(vectors, bs, at, forms.product[p, 1 + one], -fx, -fy, F)
 
 
-def add_multipliers(forms, vectors, LM, bs, vs, at, values):
+def add_multipliers(forms: Forms, vectors: Vectors, LM: Array, bs: Array, vs: Array, at: int, values: Array) -> None:
     """Multipliers `values` (one per constraint) join order `at`: what turns with a body goes into A, B."""
     for r in range(values.shape[0]):
         value = values[r]
@@ -103,7 +110,9 @@ def add_multipliers(forms, vectors, LM, bs, vs, at, values):
     add_product_multipliers(forms, vectors, bs, vs, at, 0, values)
 
 
-def add_product_multipliers(forms, vectors, bs, vs, at, i, values):
+def add_product_multipliers(
+    forms: Forms, vectors: Vectors, bs: Array, vs: Array, at: int, i: int, values: Array
+) -> None:
     """Order `at` of the force of every product gains order i of its vectors times its multiplier."""
     for p in range(forms.product.shape[0]):
         value = values[forms.product[p, 0]]
@@ -112,7 +121,7 @@ def add_product_multipliers(forms, vectors, bs, vs, at, i, values):
             add_arms(vectors, bs, at, forms.product[p, 1 + one], -vs[VX, i, k] * value, -vs[VY, i, k] * value)
 
 
-def torque_orders(bs, at, F):
+def torque_orders(bs: Array, at: int, F: Array) -> None:
     """F gains order `at` of s A + c B for every body."""
     for b in range(bs.shape[2]):
         torque = 0.0
@@ -121,7 +130,7 @@ def torque_orders(bs, at, F):
         F[3 * b + 2] += torque
 
 
-def finish_order(tb, w, j):
+def finish_order(tb: Tables, w: Work, j: int) -> None:
     """Everything that follows from q_j: sine, cosine, vectors, springs."""
     bs = w.bs
     for b in range(bs.shape[2]):
@@ -133,7 +142,7 @@ def finish_order(tb, w, j):
     spring_orders(tb.forces, w.vs, w.ss, j)
 
 
-def expand(tb, w, run, t, singular):
+def expand(tb: Tables, w: Work, run: Run, t: float, singular: int) -> None:
     """Fill w.QS[2..order] from w.QS[0], w.QS[1]; w.G, w.val hold gradients and factor there, w.border singular rows.
 
     `singular` is their number: 0 at a regular position.
@@ -183,7 +192,7 @@ def expand(tb, w, run, t, singular):
         finish_order(tb, w, j)
 
 
-def constrained(tb, singular, w, mu, u, q):
+def constrained(tb: Tables, singular: int, w: Work, mu: Array, u: Array, q: Array) -> None:
     """q := the motion that a free motion u becomes under the constraints; mu (and border.nu): gaps in, multipliers
     out."""
     border, F = w.border, w.F
@@ -200,7 +209,7 @@ def constrained(tb, singular, w, mu, u, q):
         q[i] = u[i] - F[i] * tb.mass[i]
 
 
-def carry_responses(tb, singular, w):
+def carry_responses(tb: Tables, singular: int, w: Work) -> None:
     """w.carry: what a unit of every light coordinate adds to coordinates (X) and multipliers (Y, W); 1 - X = L U.
 
     D (1 - X) is symmetric and positive definite, so it needs no pivots.
@@ -230,7 +239,7 @@ def carry_responses(tb, singular, w):
                 lu[e, c] /= lu[c, c]
 
 
-def add_carried(tb, singular, w, mu, q):
+def add_carried(tb: Tables, singular: int, w: Work, mu: Array, q: Array) -> None:
     """Motion q and multipliers mu (and border.nu) of the masses N become those of the masses M."""
     carry, light = w.carry, tb.light
     lu, own = carry.lu, carry.own
@@ -253,7 +262,7 @@ def add_carried(tb, singular, w, mu, q):
             w.border.nu[p] += carry.W[c, p] * value
 
 
-def start_series(tb, w, order):
+def start_series(tb: Tables, w: Work, order: int) -> None:
     """Orders 0 and 1 from position and velocity; all others zero."""
     QS, bs = w.QS, w.bs
     for j in range(2, order + 2):
@@ -271,7 +280,7 @@ def start_series(tb, w, order):
     finish_order(tb, w, 1)
 
 
-def border_rows(tb, w, j, singular):
+def border_rows(tb: Tables, w: Work, j: int, singular: int) -> None:
     """Order j + 1 of Z^T g with q_j and q_{j+1} left out: border.nu; the part of q_j is B q_j."""
     border, bs, work, u = w.border, w.bs, w.mu, w.u
     angle_orders(bs, j + 1, j)
@@ -286,7 +295,7 @@ def border_rows(tb, w, j, singular):
         border.nu[p] = value
 
 
-def border_solve(plan, val, border, mu, singular):
+def border_solve(plan: Factor, val: Array, border: Border, mu: Array, singular: int) -> None:
     """Bordered solve: in come the regular right-hand side in mu and the one of the rows B in nu; out the
     multipliers."""
     for p in range(singular):
@@ -299,7 +308,7 @@ def border_solve(plan, val, border, mu, singular):
             mu[r] -= border.Y[p, r] * border.nu[p]
 
 
-def small_solve(matrix, size, x, work):
+def small_solve(matrix: Array, size: int, x: Array, work: Array) -> None:
     """x := matrix^-1 x by Gaussian elimination with row pivots (a few unknowns)."""
     for i in range(size):
         for j in range(size):

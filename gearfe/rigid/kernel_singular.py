@@ -1,4 +1,3 @@
-# mypy: ignore-errors
 """Projection onto the constraints, and passing singular positions: where they are, and the state on them.
 
 At a passing singular position a combination z^T g of the constraints loses its gradient, G^T z = 0, while the motion
@@ -8,8 +7,11 @@ selects: z^T G v = 0 holds the position to it, z^T g'' = 0 its velocity, and bot
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+from ..typing import Array
 from .kernel_rows import (
     add_transposed,
     factorise,
@@ -24,6 +26,10 @@ from .kernel_rows import (
 )
 from .kernel_series import border_solve
 
+if TYPE_CHECKING:
+    from .tables import Forms, Tables
+    from .taylor import Border, Run, Work
+
 #: Pivot of S relative to its diagonal below which a singular position is looked for.
 NEAR = 0.3
 #: Pivot (square of a distance in rad) of other rows at the singular position of one row below which they are tried
@@ -31,7 +37,7 @@ NEAR = 0.3
 TOGETHER = 1e-6
 
 
-def evaluate(QS, order, h, q, v):
+def evaluate(QS: Array, order: int, h: float, q: Array, v: Array) -> None:
     """State of the series at t0 + h."""
     for i in range(q.shape[0]):
         q[i] = QS[order, i]
@@ -42,14 +48,14 @@ def evaluate(QS, order, h, q, v):
             q[i] = q[i] * h + QS[j, i]
 
 
-def factor_at(tb, w, q):
+def factor_at(tb: Tables, w: Work, q: Array) -> tuple[float, int]:
     """w.G, w.val, w.diag at the coordinates q; the least pivot ratio and its row."""
     trigonometry(q, w.c, w.s)
     gradients(tb.forms, tb.vectors, q, w.c, w.s, w.G)
     return factorise(tb.plan, tb.mass, w.G, w.base, w.val, w.diag, 0.0)
 
 
-def project(tb, w, run, t, q, v):
+def project(tb: Tables, w: Work, run: Run, t: float, q: Array, v: Array) -> tuple[float, float]:
     """Onto g = 0 and G v = df/dt by the smallest change in the mass norm; w.G, w.val, w.diag belong to the new point.
 
     Returns the first position change relative to the length (and 1 rad), and the least pivot ratio.
@@ -78,7 +84,7 @@ def project(tb, w, run, t, q, v):
     return first, least
 
 
-def least_change(tb, w, run, u):
+def least_change(tb: Tables, w: Work, run: Run, u: Array) -> float:
     """u -= M^-1 G^T S^-1 w.mu: the smallest change (in the mass norm) that lowers G u by w.mu. Returns its largest
     entry, in units of the length and 1 rad."""
     for r in range(w.mu.shape[0]):
@@ -95,7 +101,7 @@ def least_change(tb, w, run, u):
     return biggest
 
 
-def regular_parts(tb, w, row):
+def regular_parts(tb: Tables, w: Work, row: int) -> None:
     """w.mu := S^-1 S e_row over the rows that are not skipped: how they make up the gradient of `row`."""
     fill(w.F, 0.0)
     for side in range(2):
@@ -109,7 +115,7 @@ def regular_parts(tb, w, row):
     solve(tb.plan, w.val, w.mu)
 
 
-def row_square(forms, mass, G, r):
+def row_square(forms: Forms, mass: Array, G: Array, r: int) -> float:
     """Square of the gradient of row r in the norm of the inverse masses."""
     total = 0.0
     for side in range(2):
@@ -119,7 +125,7 @@ def row_square(forms, mass, G, r):
     return total
 
 
-def next_singular(tb, w, run, q, v, low, high):
+def next_singular(tb: Tables, w: Work, run: Run, q: Array, v: Array, low: float, high: float) -> tuple[float, int]:
     """First singular position from here within low < sign tau < high, judged from all small pivots: (tau, row).
 
     The row is -1 where there is none.
@@ -175,7 +181,7 @@ def next_singular(tb, w, run, q, v, low, high):
     return found, first
 
 
-def singular_frame(tb, w, q, v, bound):
+def singular_frame(tb: Tables, w: Work, q: Array, v: Array, bound: float) -> int:
     """Z, B, the bordered system and p = G^T Z (in border.P) of the rows with w.skip = 2, which are left out.
 
     Rows with pivots below `bound` join them. Returns their number (0 when the bordered system is singular, too).
@@ -220,7 +226,7 @@ def singular_frame(tb, w, q, v, bound):
     return count if border_share(border, count, mass) > 1e-8 else 0
 
 
-def weighted(a, b, mass):
+def weighted(a: Array, b: Array, mass: Array) -> float:
     """a . M^-1 b."""
     total = 0.0
     for i in range(a.shape[0]):
@@ -228,7 +234,7 @@ def weighted(a, b, mass):
     return total
 
 
-def border_share(border, count, mass):
+def border_share(border: Border, count: int, mass: Array) -> float:
     """Least share of a direction B that neither the regular rows nor the other directions hold (pivots of L D L^T)."""
     L = border.small
     least = 1.0
@@ -247,7 +253,7 @@ def border_share(border, count, mass):
     return least
 
 
-def border_change(tb, w, run, count, u):
+def border_change(tb: Tables, w: Work, run: Run, count: int, u: Array) -> float:
     """u -= the smallest change that lowers [G_reg; B] u by (w.mu, border.nu); returns its largest entry, in units of
     the length and 1 rad."""
     forms, plan, mass, border = tb.forms, tb.plan, tb.mass, w.border
@@ -268,7 +274,7 @@ def border_change(tb, w, run, count, u):
     return biggest
 
 
-def combination(border, p, values):
+def combination(border: Border, p: int, values: Array) -> float:
     """z_p . values."""
     total = 0.0
     for r in range(values.shape[0]):
