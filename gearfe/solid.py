@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,65 +130,6 @@ def assemble(nodes: Array, tets: IntArray, material: SolidMaterial, *, mass_rule
     n = len(nodes)
     stiffness = sparse.bsr_array((blocks, pattern.columns, pattern.starts), shape=(3 * n, 3 * n)).tocsr()
     return SolidMatrices(stiffness, sparse.csr_array((mass, pattern.columns, pattern.starts), shape=(n, n)))
-
-
-class ElementMatrices(NamedTuple):
-    """Element matrices of ``m`` elements with ``a`` nodes each."""
-
-    #: (m, a, 3, a, 3) stiffness (N/m)
-    stiffness: Array
-    #: (m, a, a) mass of one axis (kg)
-    mass: Array
-
-
-def general_element_matrices(
-    nodes: Array, tets: IntArray, material: SolidMaterial, *, mass_rule: MassRule = "exact"
-) -> ElementMatrices:
-    """Element matrices of any tetrahedra, curved or not, by scikit-fem's weak forms and isoparametric maps.
-
-    The exact mass of a curved second-order element needs degree 7 (4 from the product, 3 from the volume ratio).
-    """
-    from skfem import Basis, BilinearForm, ElementTetP1, ElementTetP2, ElementVector
-    from skfem.helpers import ddot, div, sym_grad
-
-    lam, mu = material.lame_lambda, material.shear_modulus
-
-    @BilinearForm
-    def stiffness(u: Any, v: Any, _: Any) -> Any:
-        return lam * div(u) * div(v) + 2.0 * mu * ddot(sym_grad(u), sym_grad(v))
-
-    @BilinearForm
-    def mass(u: Any, v: Any, _: Any) -> Any:
-        return material.density * u * v
-
-    scalar = ElementTetP1() if tets.shape[1] == 4 else ElementTetP2()
-    mesh = skfem_mesh(nodes, tets)
-    a = tets.shape[1]
-    exact_order = 2 if a == 4 else 7
-    k = stiffness.coo_data(Basis(mesh, ElementVector(scalar), intorder=1 if a == 4 else CURVED_DEGREE)).tolocal()
-    m = mass.coo_data(Basis(mesh, scalar, intorder=exact_order if mass_rule == "exact" else 2)).tolocal()
-    return ElementMatrices(k.reshape(len(tets), a, 3, a, 3), m)
-
-
-def skfem_mesh(nodes: Array, tets: IntArray) -> Any:
-    """scikit-fem mesh of the elements, geometry of the same order as the elements (``MeshTet1`` or ``MeshTet2``).
-
-    scikit-fem numbers vertices first and midside nodes by its own edges, so node numbers change; element order and the
-    order of nodes within an element stay.
-    """
-    from skfem import ElementTetP2, MeshTet1, MeshTet2
-    from skfem.assembly import Dofs
-
-    corners, renumbered = np.unique(tets[:, :4], return_inverse=True)
-    linear = MeshTet1(
-        np.ascontiguousarray(nodes[corners].T), np.ascontiguousarray(renumbered.reshape(-1, 4).T), validate=False
-    )
-    if tets.shape[1] == 4:
-        return linear
-    dofs = Dofs(linear, ElementTetP2())
-    locations = np.zeros((3, dofs.N))
-    locations[:, dofs.element_dofs.T] = nodes[tets].transpose(2, 0, 1)
-    return MeshTet2(locations, linear.t, validate=False)
 
 
 def curved_elements(nodes: Array, tets: IntArray) -> BoolArray:

@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -216,20 +215,6 @@ def peaks(frequency: ArrayLike, amplitude: ArrayLike, count: int = 5, *, above: 
     return tuple(Peak(int(k), float(f[k]), float(a[k])) for k in found[:count])
 
 
-def band_rms(spectrum: Spectrum, low: float = 0.0, high: float = math.inf) -> Any:
-    """Root mean square of the part between two frequencies (Hz, both included): a number, or (s,) for s signals.
-
-    Over the whole range and without a window it is the rms of the samples (Parseval).
-    """
-    if not 0.0 <= low <= high:
-        raise InputError("band", [low, high], "must be 0 <= low <= high (Hz)", "swap them")
-    inside = (spectrum.frequency >= low) & (spectrum.frequency <= high)
-    weight = np.where(inside, spectrum.weight, 0.0)
-    square = np.tensordot(weight, spectrum.amplitude**2, axes=1) / spectrum.noise_bandwidth
-    root = np.sqrt(square)
-    return float(root) if root.ndim == 0 else root
-
-
 def order_lines(fundamentals: Mapping[str, float], highest: float, *, orders: int = 1000) -> tuple[OrderLine, ...]:
     """Multiples of named frequencies (Hz) up to `highest` (Hz), ascending; of equal ones the lower order first.
 
@@ -253,40 +238,6 @@ def nearest_line(frequency: float, lines: Iterable[OrderLine], within: float) ->
     """Line nearest to a frequency (Hz), no farther than `within` (Hz); of equally near ones the lowest order."""
     near = [line for line in lines if abs(line.frequency - frequency) <= within]
     return min(near, key=lambda line: (round(abs(line.frequency - frequency), 6), line.order), default=None)
-
-
-def line_amplitudes(values: ArrayLike, step: float, frequencies: ArrayLike) -> ComplexArray:
-    """Complex amplitudes at given frequencies that need not lie on bins, by least squares with a constant.
-
-    Parameters
-    ----------
-    values : (n,) or (n, s)
-        Samples.
-    step
-        Time between samples (s).
-    frequencies : (k,)
-        Frequencies (Hz), > 0 and below Nyquist, farther apart than about one bin.
-
-    Returns
-    -------
-    ndarray of complex, shape (k,) or (k, s)
-
-    Raises
-    ------
-    InputError
-        Frequencies out of range, or too close to be told apart in this record.
-    """
-    x, f = np.asarray(values, dtype=float), np.atleast_1d(np.asarray(frequencies, dtype=float))
-    if not (np.all(f > 0.0) and np.all(f < 0.5 / step)):
-        raise InputError("frequencies", f.tolist(), f"must lie between 0 and {0.5 / step:g} Hz", "leave the others out")
-    angle = 2.0 * math.pi * np.outer(step * np.arange(len(x)), f)
-    basis = np.column_stack([np.ones(len(x)), np.cos(angle), np.sin(angle)])
-    if basis.shape[1] > len(x) or np.linalg.cond(basis) > 1e3:
-        raise InputError(
-            "frequencies", f.tolist(), "are too close for this record", "take a longer one, or fewer lines"
-        )
-    found = np.linalg.lstsq(basis, x, rcond=None)[0]
-    return np.asarray(found[1 : 1 + len(f)] - 1j * found[1 + len(f) :])
 
 
 def waterfall(

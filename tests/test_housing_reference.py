@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 from gearfe.housing import Housing
-from gearfe.reduction.transient import newmark, smooth_ramp
 from gearfe.solid import SolidMaterial
+
+from .newmark import newmark, smooth_ramp
 
 DATA = Path(__file__).parent / "data"
 REFERENCE: dict[str, Any] = json.loads((DATA / "gearbox_housing.json").read_text())

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
+from skfem import Basis, BilinearForm, ElementTetP1, ElementTetP2, ElementVector, MeshTet1, MeshTet2
+from skfem.assembly import Dofs
+from skfem.helpers import ddot, div, sym_grad
 
 from gearfe.errors import InputError
 from gearfe.housing.mesh_checks import boundary_faces
@@ -14,12 +19,11 @@ from gearfe.housing.surface import nodal_normals, surface_area, surface_quadratu
 from gearfe.reduction.lanczos import lowest_modes
 from gearfe.reduction.sparse_solver import factorize
 from gearfe.solid import (
+    CURVED_DEGREE,
     SolidMaterial,
     assemble,
     curved_elements,
-    general_element_matrices,
     jacobian_determinants,
-    skfem_mesh,
 )
 from tests.housing_meshes import box
 
@@ -33,15 +37,58 @@ def wavy(points: np.ndarray) -> np.ndarray:
     return np.column_stack([x + 0.03 * np.sin(2 * y + z), y + 0.04 * np.sin(3 * x), z + 0.03 * np.cos(2 * x + y)])
 
 
+def skfem_mesh(nodes: np.ndarray, tets: np.ndarray) -> Any:
+    """scikit-fem mesh of the elements, geometry of the same order as the elements (``MeshTet1`` or ``MeshTet2``).
+
+    scikit-fem numbers vertices first and midside nodes by its own edges, so node numbers change; element order and the
+    order of nodes within an element stay.
+    """
+    corners, renumbered = np.unique(tets[:, :4], return_inverse=True)
+    linear = MeshTet1(
+        np.ascontiguousarray(nodes[corners].T), np.ascontiguousarray(renumbered.reshape(-1, 4).T), validate=False
+    )
+    if tets.shape[1] == 4:
+        return linear
+    dofs = Dofs(linear, ElementTetP2())
+    locations = np.zeros((3, dofs.N))
+    locations[:, dofs.element_dofs.T] = nodes[tets].transpose(2, 0, 1)
+    return MeshTet2(locations, linear.t, validate=False)
+
+
+def general_element_matrices(nodes: np.ndarray, tets: np.ndarray, rule: str) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness (m, a, 3, a, 3) and mass of one axis (m, a, a) of any tetrahedra, curved or not, by scikit-fem's weak
+    forms and isoparametric maps.
+
+    The exact mass of a curved second-order element needs degree 7 (4 from the product, 3 from the volume ratio).
+    """
+    lam, mu = STEEL.lame_lambda, STEEL.shear_modulus
+
+    @BilinearForm
+    def stiffness(u: Any, v: Any, _: Any) -> Any:
+        return lam * div(u) * div(v) + 2.0 * mu * ddot(sym_grad(u), sym_grad(v))
+
+    @BilinearForm
+    def mass(u: Any, v: Any, _: Any) -> Any:
+        return STEEL.density * u * v
+
+    scalar = ElementTetP1() if tets.shape[1] == 4 else ElementTetP2()
+    mesh = skfem_mesh(nodes, tets)
+    a = tets.shape[1]
+    exact_order = 2 if a == 4 else 7
+    k = stiffness.coo_data(Basis(mesh, ElementVector(scalar), intorder=1 if a == 4 else CURVED_DEGREE)).tolocal()
+    m = mass.coo_data(Basis(mesh, scalar, intorder=exact_order if rule == "exact" else 2)).tolocal()
+    return k.reshape(len(tets), a, 3, a, 3), m
+
+
 def general_matrices(nodes: np.ndarray, tets: np.ndarray, rule: str) -> tuple[sparse.csr_array, sparse.csr_array]:
     """Matrices summed from scikit-fem's general vector forms, the independent route."""
-    local = general_element_matrices(nodes, tets, STEEL, mass_rule=rule)  # type: ignore[arg-type]
+    stiffness, mass = general_element_matrices(nodes, tets, rule)
     a, n = tets.shape[1], len(nodes)
     rows = (3 * tets[:, :, None] + np.arange(3)).reshape(len(tets), -1)
     at = (np.repeat(rows, 3 * a, axis=1).ravel(), np.tile(rows, (1, 3 * a)).ravel())
-    k = sparse.csr_array((local.stiffness.ravel(), at), shape=(3 * n, 3 * n))
+    k = sparse.csr_array((stiffness.ravel(), at), shape=(3 * n, 3 * n))
     at = (np.repeat(tets, a, axis=1).ravel(), np.tile(tets, (1, a)).ravel())
-    return k, sparse.csr_array((local.mass.ravel(), at), shape=(n, n))
+    return k, sparse.csr_array((mass.ravel(), at), shape=(n, n))
 
 
 @pytest.mark.parametrize("rule", ["exact", "4-point"])

@@ -16,9 +16,10 @@ from gearfe.housing import Attachment, Housing, Plane
 from gearfe.reduction.craig_bampton import reduce_model
 from gearfe.reduction.error import reduction_error
 from gearfe.reduction.modal_body import ModalBody
-from gearfe.reduction.transient import newmark, smooth_ramp
 from gearfe.solid import SolidMaterial
 from tests.housing_meshes import box
+
+from .newmark import newmark, smooth_ramp
 
 SIZE = (0.4, 0.08, 0.06)
 E, RHO = 200e9, 7850.0

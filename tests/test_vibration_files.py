@@ -21,7 +21,6 @@ from gearfe.vibration.fields import (
     gear_surface,
     moved,
     solids,
-    step_at,
     write_gears,
     write_housing,
 )
@@ -298,13 +297,6 @@ def test_a_picture_and_a_film(tmp_path, scene, block):
 def test_a_scene_that_cannot_be_drawn_says_why(tmp_path):
     assert "apt-get install" in draw_scene(tmp_path / "none.png", {"time": np.zeros(1)}, "nothing")
     assert not list(tmp_path.iterdir())
-
-
-def test_instants(scene):
-    response = made_up()
-    assert step_at(response, 4.55e-3) == 130
-    with pytest.raises(InputError, match="outside of the run"):
-        step_at(response, 8e-3)
 
 
 def test_sharp_edges_of_a_tent():

@@ -11,7 +11,6 @@ import signal
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from importlib import metadata
 from types import ModuleType
 from typing import Any
 
@@ -112,11 +111,3 @@ def gmsh_session(
                 gmsh.model.remove()
                 for key, value in before.items():
                     gmsh.option.setNumber(key, value)
-
-
-def gmsh_version() -> str:
-    """Version of the installed gmsh package, read without importing it (the import alone costs tenths of a second)."""
-    try:
-        return metadata.version("gmsh")
-    except metadata.PackageNotFoundError:
-        return str(import_gmsh().__version__)

@@ -211,21 +211,6 @@ def frames(
     return arrays
 
 
-def step_at(response: TrainResponse, time: float) -> int:
-    """Number of the output time nearest to `time` (s).
-
-    Raises
-    ------
-    InputError
-        When the run does not reach it.
-    """
-    step = 0.5 * float(response.time[1] - response.time[0]) if len(response.time) > 1 else 0.0
-    if not response.time[0] - step <= time <= response.time[-1] + step:
-        problem = f"lies outside of the run, {response.time[0]:g}..{response.time[-1]:g} s"
-        raise InputError("time of the picture", time, problem, "choose another one")
-    return int(np.argmin(np.abs(response.time - time)))
-
-
 def _coordinates(response: TrainResponse) -> tuple[Array, Array]:
     if response.modal is None or response.modal_acceleration is None:
         raise InputError("housing", None, "is rigid and has no field", "take an elastic housing")

@@ -16,8 +16,8 @@ import numpy as np
 from gearfe.housing import Housing
 from gearfe.reduction.craig_bampton import reduce_model
 from gearfe.reduction.sparse_solver import installed_solvers
-from gearfe.reduction.transient import newmark, smooth_ramp
 
+from ..newmark import newmark, smooth_ramp
 from .peers.process import missing, run_python
 from .record import Record
 from .subject import DATA, given_file, housing_of

@@ -17,10 +17,9 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ..errors import InputError
-from ..threads import one_thread
-from ..typing import Array
-from .sparse_solver import factorize
+from gearfe.reduction.sparse_solver import factorize
+from gearfe.threads import one_thread
+from gearfe.typing import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +50,6 @@ def newmark(
     step: float,
     steps: int,
     watch: Any = slice(None),
-    solver: str = "auto",
 ) -> Transient:
     """Integrate from rest.
 
@@ -65,18 +63,14 @@ def newmark(
         Step (s) and number of steps.
     watch
         Index of the unknowns that are kept.
-    solver
-        Sparse solver, see `gearfe.reduction.sparse_solver`.
     """
-    if not step > 0.0:
-        raise InputError("step", step, "must be > 0", "give seconds")
     n = mass.shape[0]
     matrix = mass + (0.5 * step) * damping + (0.25 * step**2) * stiffness
-    solve, solve_mass = _solver(matrix, solver), None
+    solve, solve_mass = _solver(matrix), None
     u, v, a = np.zeros(n), np.zeros(n), np.zeros(n)
     first = np.asarray(load(0.0), dtype=float)
     if np.any(first):
-        solve_mass = _solver(mass, solver)
+        solve_mass = _solver(mass)
         a = solve_mass(_padded(first, n))
     kept = [(u[watch], v[watch], a[watch])]
     for number in range(1, steps + 1):
@@ -103,9 +97,9 @@ def _padded(force: Array, n: int) -> Array:
     return full
 
 
-def _solver(matrix: Any, solver: str) -> Callable[[Array], Array]:
+def _solver(matrix: Any) -> Callable[[Array], Array]:
     if sparse.issparse(matrix):
-        return factorize(matrix, solver=solver).solve
+        return factorize(matrix).solve
     from scipy.linalg import cho_factor, cho_solve
 
     factor = cho_factor(matrix)
