@@ -101,8 +101,8 @@ def test_a_mechanism_without_a_folder_goes_to_out(tmp_path, monkeypatch, capsys)
     monkeypatch.chdir(tmp_path)
     told(capsys, "new", "mechanism", "crank.toml")
     out, _ = told(capsys, "mechanism", "crank.toml", "--until", "0.1", "--no-pictures", "--no-estimate", "--json")
-    assert Path(json.loads(out)["folder"]) == Path("out/crank")
-    assert (tmp_path / "out" / "crank" / "trajectory.csv").exists()
+    assert Path(json.loads(out)["folder"]) == Path("out/crank/mechanism")
+    assert (tmp_path / "out/crank/mechanism/trajectory.csv").exists()
 
 
 def test_quiet_and_verbose(tmp_path, capsys):

@@ -22,9 +22,11 @@ FORMATS = ("npz", "h5", "mat", "uff")
 REPORT = "report.html"
 
 
-def add_folder(parser: argparse.ArgumentParser, default: str = "out/ and the job's name") -> None:
+def add_folder(parser: argparse.ArgumentParser) -> None:
     """``--out``, and how the results in that folder are kept and told."""
-    parser.add_argument("--out", metavar="DIR", default=None, help=f"output folder (default: {default})")
+    command = parser.prog.split()[-1]
+    parser.add_argument("--out", metavar="DIR", default=None, help=f"output folder (default: out/JOB/{command})")
+    parser.set_defaults(folder_of=command)
     parser.add_argument(
         "--format",
         metavar="NAME",
@@ -42,6 +44,14 @@ def add_telling(parser: argparse.ArgumentParser) -> None:
     group = parser.add_mutually_exclusive_group()
     group.add_argument("-q", "--quiet", action="store_true", help="print warnings and errors only")
     group.add_argument("-v", "--verbose", action="store_true", help="tell each stage of the work as it begins")
+
+
+def with_folder(parsed: argparse.Namespace) -> argparse.Namespace:
+    """The arguments, their ``--out`` by default ``out/JOB/COMMAND``: no command writes over another's summary."""
+    if getattr(parsed, "folder_of", None) and parsed.out is None:
+        job = next(value for value in vars(parsed).values() if isinstance(value, JobFile))
+        parsed.out = str(Path("out") / Path(job).stem / parsed.folder_of)
+    return parsed
 
 
 def run_and_keep(run: Callable[[argparse.Namespace], int], parsed: argparse.Namespace, line: list[str]) -> int:

@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     from ..stiffness.job import StiffnessJob
 
     job = StiffnessJob(tables["pair"], tables.get("stiffness", StiffnessTable()), pair)
-    folder = output_folder(args.out or Path("out") / Path(args.job).stem)
+    folder = output_folder(args.out)
     geometry = derived_geometry(pair)
     moduli = [material.youngs_modulus for material in job.materials]
     iso = iso_values(pair, moduli[0], moduli[1])

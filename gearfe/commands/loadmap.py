@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         beside = Path(args.job).parent
         job = StiffnessJob(tables["pair"], tables["stiffness"], pair, tables.get("microgeometry"), beside)
         model = job.model
-    folder = output_folder(args.out or Path("out") / Path(args.job).stem)
+    folder = output_folder(args.out)
     made_map = sweep_loads(
         job.pair,
         torques,

@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     from ..mechanisms.model import make_mechanism
 
     mechanism = make_mechanism(file, Path(args.file))
-    folder = args.out or Path("out") / Path(args.file).stem
+    folder = args.out
     if file.run.analysis in ("equilibrium", "modes"):
         from ..mechanisms.rest import run_rest
 

@@ -24,7 +24,11 @@ DECK_TEETH = 3
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_job(parser, "job", "job file with the table [pair]")
-    parser.add_argument("--out", metavar="FILE", required=True, help="file to write; its suffix chooses the format")
+    parser.add_argument(
+        "--out",
+        metavar="FILE",
+        help="file to write; its suffix chooses the format (default: out/JOB/mesh/gears.msh, .inp of a deck)",
+    )
     parser.add_argument(
         "--gear", choices=("both", "pinion", "wheel"), default="both", help="which gear (default: both)"
     )
@@ -46,6 +50,7 @@ def run(args: argparse.Namespace) -> int:
     """Write the file and name its groups."""
     from ..config import load_job
 
+    args.out = args.out or str(Path("out") / Path(args.job).stem / "mesh" / ("gears.inp" if args.deck else "gears.msh"))
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness",))
     table = with_keys(args, tables.get("stiffness", StiffnessTable()), "coarsen", "flank_coarsen")

@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
         deviations = deviations_of(table, pair, beside)
         other = {"left": "right", "right": "left"}[table.flank]
         back = deviations_of(table, pair, beside, flank=other)
-    folder = output_folder(args.out or Path("out") / Path(args.job).stem)
+    folder = output_folder(args.out)
     elastic = elastic_pair(pair, job.model, law="half_plane", watch=watch)
     roots = None
     if table.root_stress:

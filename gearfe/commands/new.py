@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
         with whole_file(path) as temporary:
             temporary.write_bytes(content)
     print("written: " + ", ".join(map(str, files)))
-    print(f"run it:  gearfe {_command(args.kind, text)} {target} --out out/{target.stem}")
+    print(f"run it:  gearfe {_command(args.kind, text)} {target}")
     return 0
 
 

@@ -14,7 +14,7 @@ from .. import __version__
 from ..errors import InputError, MissingLibraryError, NotFiniteWarning, unknown_name
 from . import COMMANDS, EXAMPLES
 from .arguments import CommandParser, with_changes
-from .common import add_telling, run_and_keep
+from .common import add_telling, run_and_keep, with_folder
 
 USAGE = "gearfe COMMAND ... ('gearfe COMMAND --help' tells a command's options)"
 
@@ -86,7 +86,7 @@ def _run(arguments: list[str]) -> int:
 def run_command(module: Any, name: str, arguments: list[str]) -> int:
     """Run a command module (its contract is in `gearfe.commands`), called by `name`, with these arguments."""
     parser = parser_of(module, name)
-    parsed = with_changes(parser.parse_args(arguments))
+    parsed = with_folder(with_changes(parser.parse_args(arguments)))
     with _tables_watched() as told:
         code = run_and_keep(module.run, parsed, [*name.split()[1:], *arguments])
         return code or int(bool(told))

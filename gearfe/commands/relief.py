@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     job = StiffnessJob(tables["pair"], with_keys(args, tables.get("stiffness", StiffnessTable()), "coarsen"), pair)
-    folder = output_folder(args.out or Path("out") / Path(args.job).stem)
+    folder = output_folder(args.out)
     elastic = elastic_pair(pair, job.model, law="half_plane", watch=watch)
     roots = None
     if table.root_stress_weight:

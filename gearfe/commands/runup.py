@@ -6,7 +6,6 @@ import argparse
 import sys
 import time
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from ..tables.runup import RunUpTable
@@ -59,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
         bores = [str(a) for s in job.table.shafts for a in s.attachments]
         if args.attachment is not None and args.attachment not in bores:
             raise unknown_name("--attachment", args.attachment, bores)
-        folder = output_folder(args.out or Path("out") / Path(args.job).stem)
+        folder = output_folder(args.out)
     made, unstable = solved(job, table, args.curve, watch=watch)
     parts = [f"{len(job.table.shafts)} shafts, {len(job.table.meshes)} gear meshes"]
     parts += [f"load {told(x.torque_Nm, 'N m')} on {x.shaft}".replace("-", "−", 1) for x in job.table.loads[:1]]

@@ -97,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
             from ..stiffness.fields_output import angle_numbers
 
             angle_numbers(np.degrees(sweep["angles"]), chosen)
-    folder = output_folder(args.out or Path("out") / Path(args.job).stem)
+    folder = output_folder(args.out)
     elastic = elastic_pair(job.pair, model, watch=watch)
     if chosen is not None:
         from ..stiffness.fields_output import told_size

@@ -22,7 +22,7 @@ HELP = "one job in many cases: parameters, designs, statistics, sensitivities; g
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_job(parser, "study", "file with a table [study], and the job or its name in it")
-    add_folder(parser, default="out/ and the study's name")
+    add_folder(parser)
     parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one a processor); 1: none beside")
     parser.add_argument("--dask", metavar="ADDRESS", help="run the cases on the Dask cluster with this scheduler")
     parser.add_argument("--restart", action="store_true", help="begin anew, whatever the folder holds")
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     from ..study.report import report_lines
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
-    folder = output_folder(args.out or Path("out") / Path(args.study).stem)
+    folder = output_folder(args.out)
     with ExitStack() as stack, watch.stage("cases"):
         where: dict[str, Any] = {"jobs": args.jobs}
         if args.dask is not None:

@@ -7,7 +7,6 @@ import math
 import sys
 import time
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..progress import count
@@ -87,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
         )
         bores = tuple(str(a) for s in job.table.shafts for a in s.attachments)
         check_choice(choice, job.times, bores)
-        folder = output_folder(args.out or Path("out") / Path(args.job).stem)
+        folder = output_folder(args.out)
     estimate = not args.no_estimate
     scene, pieces, every = simulated(
         job, args.curve, watch=watch, progress=count, floquet=not args.no_floquet, estimate=estimate

@@ -17,6 +17,9 @@ from pathlib import Path
 from ..output.arrays import save_arrays
 from ..typing import Array
 
+#: Why nothing is drawn where the extra is not installed.
+MISSING = "pyvista is not installed: pip install 'gearfe[fields]'"
+
 
 def draw_apart(module: str, path: str | Path, arrays: Mapping[str, Array], *, seconds: float) -> str:
     """Run ``python -m module JOB PATH`` on stored arrays; return an empty text, or why nothing was drawn.
@@ -29,7 +32,7 @@ def draw_apart(module: str, path: str | Path, arrays: Mapping[str, Array], *, se
         How long it may take.
     """
     if importlib.util.find_spec("pyvista") is None:
-        return "pyvista is not installed: pip install 'gearfe[fields]'"
+        return MISSING
     with tempfile.TemporaryDirectory() as folder:
         job = Path(folder) / "job.npz"
         save_arrays(job, arrays)
