@@ -31,7 +31,7 @@ from .linear import Linear
 #: Newton steps, and halvings of one of them.
 STEPS, HALVINGS = 60, 8
 #: A motion is found where what is left of the equations is smaller than this part of the tolerance.
-FOUND = 1e-2
+FOUND = 3e-2
 #: Where Newton's method goes to and fro over a touch of flanks that falls on a sample, this many steps without halving
 #: what is left end it; less than this is left to the error estimate to judge, which asks for more samples.
 IDLE, LEFT = 8, 1e-4
@@ -39,7 +39,7 @@ IDLE, LEFT = 8, 1e-4
 SLOW = 0.2
 #: Harmonics are unknowns of Newton's method where a change of them comes back larger than this through the forces, and
 #: they are larger than this part of the scale.
-COMES_BACK, PRESENT = 0.05, 1e-7
+COMES_BACK, PRESENT = 0.1, 1e-7
 #: Samples of the period for each harmonic of the highest.
 SAMPLES = 4
 #: The error estimate is multiplied by this.
@@ -113,6 +113,8 @@ class Orbit:
         Of the drive (rad/s).
     places : (K + 1, m)
         Complex amplitudes of the freedoms at the harmonics 0 to K of the period.
+    forces : (K + 1, m)
+        Of the forces on them.
     error
         Estimate of the error of the freedoms, in parts of their scale; not-a-number where there is none.
     found
@@ -123,6 +125,7 @@ class Orbit:
 
     speed: float
     places: ComplexArray
+    forces: ComplexArray
     error: float
     found: bool
     steps: int
@@ -133,11 +136,8 @@ class Orbit:
         return len(self.places) - 1
 
     def with_harmonics(self, count: int) -> ComplexArray:
-        """Amplitudes up to another harmonic, new ones 0."""
-        made = np.zeros((count + 1, self.places.shape[1]), dtype=complex)
-        shared = min(count + 1, len(self.places))
-        made[:shared] = self.places[:shared]
-        return made
+        """Amplitudes of the freedoms up to another harmonic, new ones 0."""
+        return widened(self.places, count)
 
 
 class Newton(NamedTuple):
@@ -145,7 +145,6 @@ class Newton(NamedTuple):
 
     waves: IntArray
     factors: tuple[Array, Array]
-    positive: bool  # sign of its determinant
 
     def __call__(self, residual: Array) -> Array:
         """Jacobian's inverse times a vector."""
@@ -156,7 +155,16 @@ class Evaluated(NamedTuple):
     """The equations at some amplitudes."""
 
     residual: ComplexArray  # (K + 1, m)
+    forces: ComplexArray  # (K + 1, m)
     pushes: Pushes
+
+
+def widened(amplitudes: ComplexArray, count: int) -> ComplexArray:
+    """(count + 1, m) amplitudes up to another harmonic, new ones 0."""
+    made = np.zeros((count + 1, amplitudes.shape[1]), dtype=complex)
+    shared = min(count + 1, len(amplitudes))
+    made[:shared] = amplitudes[:shared]
+    return made
 
 
 def synthesis(amplitudes: ComplexArray, samples: int) -> Array:
@@ -197,9 +205,15 @@ def evaluate(
     theta = 2.0 * math.pi * np.arange(samples) / samples
     u, du = synthesis(places, samples), synthesis(rates(places, system.omega0(speed)), samples)
     pushes = system.forces(theta, speed, u, du)
-    residual = places - (flexibility @ analysis(pushes.value)[: len(places), :, None])[..., 0]
-    residual[0] -= system.linear.rest
-    return Evaluated(residual, pushes)
+    forces = analysis(pushes.value)[: len(places)]
+    return Evaluated(places - moved(system, flexibility, forces), forces, pushes)
+
+
+def moved(system: Oscillator, flexibility: ComplexArray, forces: ComplexArray) -> ComplexArray:
+    """Amplitudes (K + 1, m) of the freedoms under forces of such amplitudes and the constant one."""
+    made = (flexibility @ forces[..., None])[..., 0]
+    made[0] += system.linear.rest
+    return np.asarray(made)
 
 
 def jacobian(system: Oscillator, speed: float, waves: IntArray, pushes: Pushes, flexibility: ComplexArray) -> Array:
@@ -239,13 +253,22 @@ def unpacked(x: Array, scale: Array) -> ComplexArray:
     return np.asarray(made * scale)
 
 
-def unknown_waves(system: Oscillator, places: ComplexArray, pushes: Pushes, flexibility: ComplexArray) -> IntArray:
-    """Harmonics that need Newton's method: where a change comes back through the forces, and which are there."""
+def flexibility_of(system: Oscillator, speed: float, count: int) -> ComplexArray:
+    """H at harmonics 0 to `count`, made at once up to where `error_of` asks for it."""
+    return system.flexibility(speed, 2 * count)[: count + 1]
+
+
+def unknown_waves(
+    system: Oscillator, places: ComplexArray, pushes: Pushes, flexibility: ComplexArray, least: float = COMES_BACK
+) -> IntArray:
+    """Harmonics that need Newton's method: where this part of a change comes back through the forces, and which are
+    there.
+    """
     ratio = system.scale[None, :] / system.scale[:, None]
     strength = np.abs(pushes.by_place).mean(axis=0) * ratio
     back = ((np.abs(flexibility) * ratio) @ strength).sum(axis=2).max(axis=1)
     there: BoolArray = np.abs(places / system.scale).max(axis=1) > PRESENT
-    taken = there & (back > COMES_BACK)
+    taken = there & (back > least)
     taken[0] = True
     found = np.flatnonzero(taken)
     if len(found) > MOST_UNKNOWN:
@@ -257,10 +280,7 @@ def unknown_waves(system: Oscillator, places: ComplexArray, pushes: Pushes, flex
 def newton(system: Oscillator, speed: float, waves: IntArray, pushes: Pushes, flexibility: ComplexArray) -> Newton:
     """Factorised Jacobian."""
     J = jacobian(system, speed, waves, pushes, flexibility)
-    lu, pivots = lu_factor(J, check_finite=False)
-    swaps = int((pivots != np.arange(len(pivots))).sum())
-    positive = bool((int((np.diag(lu) < 0.0).sum()) + swaps) % 2 == 0)
-    return Newton(waves, (lu, pivots), positive)
+    return Newton(waves, lu_factor(J, check_finite=False))
 
 
 def size_of(amplitudes: ComplexArray, scale: Array) -> float:
@@ -289,12 +309,12 @@ def solve(
         A Jacobian to begin with, such as that of a neighbouring speed; a new one is made where it is too slow.
     """
     count = len(guess) - 1
-    H, samples, scale = system.flexibility(speed, count), samples_of(count), system.scale
+    H, samples, scale = flexibility_of(system, speed, count), samples_of(count), system.scale
     places = guess.copy()
     places[0] = places[0].real
     at = evaluate(system, speed, places, samples, H)
     size, fresh, taken = size_of(at.residual, scale), False, 0
-    best, idle = (size, places), 0
+    best, idle = (size, places, at.forces), 0
     if before is not None and before.waves[-1] > count:
         before = None
     enough = FOUND * tolerance
@@ -308,23 +328,22 @@ def solve(
         part = 1.0
         for _ in range(HALVINGS if fresh else 1):
             new = evaluate(system, speed, places + part * step, samples, H)
-            found = size_of(new.residual, scale)
-            if found <= (1.0 - 0.1 * part) * size:
+            left = size_of(new.residual, scale)
+            if left <= (1.0 - 0.1 * part) * size:
                 break
             part *= 0.5
         else:
             if not fresh:  # this was another motion's Jacobian
                 before = None
                 continue
-        if found > SLOW * size:
+        if left > SLOW * size:
             before = None
-        places, at, size, fresh = places + part * step, new, found, False
+        places, at, size, fresh = places + part * step, new, left, False
         idle = 0 if size < 0.5 * best[0] else idle + 1
         if size < best[0]:
-            best = size, places
-    return Orbit(
-        speed, best[1], math.nan, bool(best[0] < (enough if idle < IDLE else max(enough, LEFT))), taken
-    ), before
+            best = size, places, at.forces
+    found = best[0] < (enough if idle < IDLE else max(enough, LEFT))
+    return Orbit(speed, best[1], best[2], math.nan, bool(found), taken), before
 
 
 def error_of(system: Oscillator, orbit: Orbit, before: Newton | None) -> tuple[float, ComplexArray]:

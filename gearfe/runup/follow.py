@@ -6,7 +6,8 @@ With the unknown harmonics x in parts of their scale and :math:`\sigma = \Omega/
 .. math:: t_x\cdot(x - x_0) + t_\sigma(\sigma - \sigma_0) = s
 
 (Keller 1977; Nayfeh & Balachandran, Applied Nonlinear Dynamics, Sec. 6.1). Where the curve goes on smoothly from one
-asked speed to the next, extrapolation and Newton's method at that speed do; the two agree or the short steps decide.
+asked speed to the next, extrapolation of the forces (which know nothing of the resonances behind them) and Newton's
+method at that speed do; the two agree or the short steps decide.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ from .balance import (
     Orbit,
     Oscillator,
     evaluate,
+    flexibility_of,
     jacobian,
+    moved,
     packed,
     rounded,
     samples_of,
@@ -36,6 +39,7 @@ from .balance import (
     solve,
     unknown_waves,
     unpacked,
+    widened,
 )
 
 #: Newton steps of a corrector; a step is kept where the correction is smaller than this part of it.
@@ -44,11 +48,15 @@ CORRECTIONS, CLOSE = 20, 0.35
 NEAR = 0.2
 #: Steps along the curve, in parts of the scale: first, least, largest; growth from one to the next.
 FIRST, LEAST, LARGEST, GROWTH = 0.05, 1e-5, 0.4, 1.6
+#: A tangent has all harmonics of which this part of a change comes back through the forces: it sees no others.
+ALONG = 0.05
+#: A step this long at most leads round a turning point.
+TURNING = 0.1
 #: Steps along the curve between two asked speeds, at most.
 MOST = 400
 #: Extrapolation takes so many speeds before, Newton's method then so many steps; else the speeds between are halved so
 #: many times.
-BACK, STEPS, HALVINGS = 4, 10, 3
+BACK, STEPS, HALVINGS = 3, 10, 3
 #: An error below this part of the tolerance lets so many of the harmonics go on.
 EASY, FEWER = 0.4, 0.8
 #: Change of the speed, relative, for a derivative.
@@ -181,12 +189,14 @@ class _Walk:
         """Orbit at a speed from those before on this branch, where both agree."""
         back, system = self.back[-BACK:], self.system
         count = self._count(speed, back[-1])
-        known = np.array([o.with_harmonics(count) for o in back])
-        places = _lagrange(np.array([o.speed for o in back]), known, speed)
+        known = np.array([widened(o.forces, count) for o in back])
+        forces = _lagrange(np.array([o.speed for o in back]), known, speed)
+        places = moved(system, flexibility_of(system, speed, count), forces)
         orbit, self.before = solve(system, speed, places, self.tolerance, self.before, steps=STEPS)
         if not orbit.found:
             return None
-        step, off = size_of(places - known[-1], system.scale), size_of(orbit.places - places, system.scale)
+        step = size_of(places - back[-1].with_harmonics(count), system.scale)
+        off = size_of(orbit.places - places, system.scale)
         if off > max(CLOSE * step, NEAR):
             return None
         self.back.append(orbit)
@@ -211,14 +221,15 @@ class _Walk:
             asked = [k for k in (self.number - 1, self.number, self.number + 1) if 0 <= k < len(speeds)]
             a, b = place.orbit.speed, new.orbit.speed
             passed = [k for k in asked if (a - speeds[k]) * (b - speeds[k]) <= 0.0 and a != speeds[k]]
-            if turned and passed and step > 2.0 * LEAST:  # in which order: shorter steps tell
+            if turned and step > (2.0 * LEAST if passed else TURNING):  # in which order, and where: shorter steps tell
                 step *= 0.5
                 continue
             if turned:
                 nearest = min(place, new, key=lambda p: abs(p.rising)).orbit
                 self.orbits.append(nearest)
                 self.branch.append(len(self.turns))
-                self.turns.append(Turn(_turning(place, new, step, self.unit), len(self.orbits) - 1))
+                speed = _turning(place, new, step, self.unit, self.system.linear.size)
+                self.turns.append(Turn(speed, len(self.orbits) - 1))
                 self.heading = -self.heading
             off = self._left(b) or self._beyond(new.orbit)
             if passed:
@@ -263,7 +274,7 @@ class _Walk:
 
     def _tangent(self, orbit: Orbit, last: _Place | None, sign: float) -> _Place | None:
         at, H = self._equations(orbit)
-        waves = unknown_waves(self.system, orbit.places, at.pushes, H)
+        waves = unknown_waves(self.system, orbit.places, at.pushes, H, ALONG)
         M = self._bordered(orbit, waves, at, H)
         if last is None:
             M[-1, -1] = sign
@@ -294,7 +305,7 @@ class _Walk:
         speed = place.orbit.speed + step * place.rising * self.unit
         guess = place.orbit.with_harmonics(max(self._count(speed, place.orbit), int(waves[-1])))
         guess[waves] += unpacked(step * place.along, system.scale)
-        made = self._newton(Orbit(speed, guess, math.nan, False, 0), place, step)
+        made = self._newton(Orbit(speed, guess, np.zeros_like(guess), math.nan, False, 0), place, step)
         if made is None or made.steps > CORRECTIONS:
             return None, False
         new = self._tangent(made, place, 1.0)
@@ -316,7 +327,7 @@ class _Walk:
             )
             found = math.hypot(size_of(at.residual, scale), last)
             if found < FOUND * self.tolerance:
-                return replace(orbit, found=True, steps=taken)
+                return replace(orbit, forces=at.forces, found=True, steps=taken)
             if not math.isfinite(found) or found > 10.0 * size:
                 return None
             if factors is None or found > 0.2 * size:
@@ -359,7 +370,12 @@ def _lagrange(x: Array, values: ComplexArray, at: float) -> ComplexArray:
     return np.asarray(np.tensordot(np.array(weights), values, axes=1))
 
 
-def _turning(a: _Place, b: _Place, step: float, unit: float) -> float:
-    """Speed (rad/s) where the tangent's rise vanishes, which it does linearly from one point to the next."""
-    part = step * a.rising / (a.rising - b.rising)
-    return a.orbit.speed + 0.5 * a.rising * part * unit
+def _turning(a: _Place, b: _Place, step: float, unit: float, m: int) -> float:
+    """Speed (rad/s) at which the cubic turns that has the speeds and rises of two points, a step along the first's
+    tangent apart.
+    """
+    turned = _moved(a, b.waves, m) @ b.along + a.rising * b.rising
+    one, two, rise = step * unit * a.rising, step * unit * b.rising / turned, b.orbit.speed - a.orbit.speed
+    cubic = np.polynomial.Polynomial([a.orbit.speed, one, 3.0 * rise - 2.0 * one - two, one + two - 2.0 * rise])
+    ends = np.real(cubic.deriv().roots())
+    return float(cubic(ends[(ends >= 0.0) & (ends <= 1.0)][0]))

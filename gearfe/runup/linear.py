@@ -58,6 +58,7 @@ class Linear:
     constant: Array
     tilts: Array = field(default_factory=lambda: np.zeros((0, 0)))
     momenta: Array = field(default_factory=lambda: np.zeros(0))
+    _last: dict[float, tuple[Array, ComplexArray, ComplexArray]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         n = len(self.squares)
@@ -104,9 +105,10 @@ class Linear:
         sums = np.hstack([(first + second).real, (first * second).real])
         return sums, np.ascontiguousarray(np.hstack([a.real, b.real]))
 
-    @staticmethod
-    def _places_of_entries(p: int) -> IntArray:
-        """Entry of the upper half that stands at each place of a symmetric matrix, (p p,)."""
+    @cached_property
+    def _entries(self) -> IntArray:
+        """Entry of the upper half that stands at each place of the flexibility of all freedoms, (p p,)."""
+        p = self.size + self.tilts.shape[1]
         made = np.zeros((p, p), dtype=np.int64)
         up = np.triu_indices(p)
         made[up] = np.arange(len(up[0]))
@@ -124,7 +126,7 @@ class Linear:
         values = np.empty((k, count), dtype=complex)
         values.real = real[:, count:] - w * imaginary[:, :count]
         values.imag = imaginary[:, count:] + w * real[:, :count]
-        made: ComplexArray = values[:, self._places_of_entries(p)].reshape(k, p, p)
+        made: ComplexArray = values[:, self._entries].reshape(k, p, p)
         return made
 
     @cached_property
@@ -143,23 +145,27 @@ class Linear:
         return np.asarray(self.places.T @ (self.constant / self.squares))
 
     def _turning(self, omega: Array, speed: float) -> tuple[ComplexArray, ComplexArray]:
-        """Flexibility at the freedoms, (k, m, m), and gyroscopic moments for unit forces, (k, 2 s, m)."""
+        """Flexibility at the freedoms, (k, m, m), and gyroscopic moments for unit forces, (k, 2 s, m).
+
+        Those of the last speed are kept: its first frequencies are asked for again and again.
+        """
         m, count = self.size, len(omega)
+        if speed in self._last and np.array_equal(self._last[speed][0][:count], omega):
+            return self._last[speed][1][:count], self._last[speed][2][:count]
         p = m + self.tilts.shape[1]
         whole = self._own(omega)
-        own = whole[:, :m, :m]
-        if p == m:
-            return own, np.zeros((count, 0, m), dtype=complex)
         react = 1j * speed * omega[:, None, None] * self._swap
         left = np.eye(p - m) - react @ whole[:, m:, m:]
         moments = np.asarray(np.linalg.solve(left, react @ whole[:, m:, :m]), dtype=complex)
-        return np.asarray(own + whole[:, :m, m:] @ moments), moments
+        made = np.asarray(whole[:, :m, :m] + whole[:, :m, m:] @ moments)
+        made[omega == 0.0] = self.statics
+        self._last.clear()
+        self._last[speed] = omega, made, moments
+        return made, moments
 
     def flexibility(self, omega: Array, speed: float) -> ComplexArray:
         """H (k, m, m) at the angular frequencies (k,); `speed` turns the shafts."""
-        made = self._turning(omega, speed)[0]
-        made[omega == 0.0] = self.statics
-        return made
+        return self._turning(omega, speed)[0]
 
     def modal(self, omega: Array, speed: float, forces: ComplexArray) -> ComplexArray:
         """Modal coordinates (k, n) under forces (k, m) at the freedoms, the constant force included at omega = 0."""

@@ -110,8 +110,7 @@ def steady_result(
         if line.law is None:
             force[:, i] += line.damping * du[:, along]
     omega = omega0 * np.arange(count + 1)
-    pushes = analysis(system.forces(theta, orbit.speed, u, du).value)[: count + 1]
-    modal = system.linear.modal(omega, orbit.speed, pushes)
+    modal = system.linear.modal(omega, orbit.speed, orbit.forces)
     acceleration = -(omega**2)[:, None] * (modal @ train.bores_of_modes.T)
     power = None
     if train.radiation_of_modes is not None:
