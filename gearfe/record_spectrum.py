@@ -32,7 +32,7 @@ from .typing import Array, ComplexArray
 
 #: Sampling frequency of the motion, in parts of twice the highest natural frequency, at least: with 2 the leakage of a
 #: fast mode through the ends of a record is within 1e-3 of the largest line; on lines of the record it would need 1.
-SPARE = 2.0
+OVERSAMPLING = 2.0
 #: Modes beyond this (Hz) are springs in place of constraints: their motion follows that of the others.
 FASTEST = 1e6
 #: Half length of the filter in kept samples, and the attenuation (dB) for which Kaiser's formulas ask that length.
@@ -44,9 +44,9 @@ _BETA = 0.1102 * (STOP_BAND_DB - 8.7)
 def samples_per_step(step: float, highest: float) -> int:
     """How many samples a step of the output (s) needs for modes up to `highest` (Hz): 1, or an even number.
 
-    Half the sampling frequency then lies `SPARE` times above the highest mode, of those up to `FASTEST`.
+    Half the sampling frequency then lies `OVERSAMPLING` times above the highest mode, of those up to `FASTEST`.
     """
-    needed = 2.0 * SPARE * min(highest, FASTEST) * step * (1.0 - 1e-9)
+    needed = 2.0 * OVERSAMPLING * min(highest, FASTEST) * step * (1.0 - 1e-9)
     return 1 if needed <= 1.0 else 2 * math.ceil(0.5 * needed)
 
 

@@ -110,7 +110,7 @@ def frame_body(scene: TrainScene, *, uneven: float = 0.0, skew: float = 0.0) -> 
         attachment_axes=np.tile([0.0, 1.0, 0.0], (n, 1)), internal_hz=np.array([3000.0, 5200.0]), modes=2, nodes=points,
         elements=np.zeros((0, 4), dtype=np.int64), shapes=shapes, faces=none, normals=np.zeros((n, 3)),
         radiation=np.zeros_like(M), momentum=np.zeros((6, size)), rigid_mass=np.eye(6),
-        tail=np.zeros((2, 2)), levels=1, next_hz=math.inf,
+        truncation=np.zeros((2, 2)), corrections=1, next_hz=math.inf,
         softening=np.zeros_like(M), held=True, solver="none",
     )  # fmt: skip
 

@@ -84,7 +84,7 @@ def _yield(law: HalfPlanePair, state: State, normal: ComplexArray, curvature: Ar
 
 
 def first_state(law: HalfPlanePair, twists: Array, found: Touching, couples: Couplings) -> State:
-    """What the balance of tooth pairs begins with at twists (rad) of the positions."""
+    """What the iteration for all tooth pairs begins with at twists (rad) of the positions."""
     state = unloaded_state(law, twists, found)
     normal = state.seen
     T = smooth_influence(law, normal, state.arc, couples).compliance

@@ -1,4 +1,4 @@
-"""One step of the half-plane law's balance: its equations are in `gearfe.contact.half_plane`."""
+"""One step of the half-plane law's iteration: its equations are in `gearfe.contact.half_plane`."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _BETWEEN = np.diff(MIDDLES)
 
 @dataclass(frozen=True)
 class State:
-    """What a step of the balance of p contacts starts from; pinion and wheel in the second axis.
+    """What a step for p contacts starts from; pinion and wheel in the second axis.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Smooth:
 
 @dataclass(frozen=True)
 class Step:
-    """One step of the balance of p contacts: the problem that was solved, its solution, and what follows from it.
+    """One step for p contacts: the problem that was solved, its solution, and what follows from it.
 
     Attributes
     ----------

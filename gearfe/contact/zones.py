@@ -1,8 +1,8 @@
 r"""Where else do the flanks of tooth pairs bear, besides the contacts that are solved already?
 
-The balance (`.half_plane`) starts with one contact a tooth pair, where the rigid flanks first touch. Waves on a flank,
-or a tip that runs along the mate's root, may let the pair bear in several places. Each stretch of pressure then becomes
-a contact of its own, with its own centre, normal and window:
+The iteration (`.half_plane`) starts with one contact a tooth pair, where the rigid flanks first touch. Waves on a
+flank, or a tip that runs along the mate's root, may let the pair bear in several places. Each stretch of pressure then
+becomes a contact of its own, with its own centre, normal and window:
 
 - *pressure with a hole*: the window of the contact is cut in the middle of the hole;
 - *overlap outside of all windows*: with the solved forces, the faces must be clear of each other everywhere. Where

@@ -207,7 +207,7 @@ class Housing:
         solver: str = "auto",
         estimate: bool = True,
     ) -> ModalBody:
-        """Reduced body: static shapes, modes with the attachments held, quasi-static corrections.
+        """Reduced body: constraint modes, modes with the attachments held, quasi-static corrections.
 
         Parameters
         ----------
@@ -258,8 +258,8 @@ class Housing:
             radiation=self.surface.radiation(found.shapes),
             momentum=np.asarray((mass @ motions).T @ found.shapes),
             rigid_mass=motions.T @ (mass @ motions),
-            tail=found.tail,
-            levels=found.levels,
+            truncation=found.truncation,
+            corrections=found.corrections,
             next_hz=float(np.sqrt(max(found.next_eigenvalue, 0.0)) / (2.0 * np.pi)),
             softening=np.zeros_like(found.mass),
             held=len(self.fixed) > 0,
@@ -272,7 +272,7 @@ class Housing:
         """The reduced body with an estimate of the mesh's error, for frequencies up to the highest mode kept.
 
         The fields are those in which forces on the attachments move the body, by the mode acceleration method: its
-        static shapes, and the modes with free attachments. What else there is in the body counts as without error.
+        constraint modes, and the modes with free attachments. What else there is in the body counts as without error.
         """
         kept = body.coupled.frequencies_hz <= body.highest_hz
         squares = (2.0 * np.pi * body.coupled.frequencies_hz[kept]) ** 2

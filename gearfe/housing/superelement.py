@@ -1,7 +1,7 @@
 r"""A housing from the matrices of another program: stiffness and mass over attachments and internal coordinates.
 
 With the attachments' six coordinates :math:`q_b` each and whatever the program put inside, :math:`q_i`, the modes with
-the attachments held, :math:`K_{ii}\Phi = M_{ii}\Phi\Lambda`, and the static shapes :math:`\Psi = -K_{ii}^{-1}K_{ib}`
+the attachments held, :math:`K_{ii}\Phi = M_{ii}\Phi\Lambda`, and the constraint modes :math:`\Psi = -K_{ii}^{-1}K_{ib}`
 turn the coordinates to those of `gearfe.ModalBody`, all of them kept: frequencies and response stay the matrices'.
 
 Matrices are in Matrix Market format, Abaqus' matrix input (lines of node, freedom, node, freedom, value), or DMIG
@@ -247,8 +247,8 @@ def _body(k: Array, m: Array, points: Array, table: SuperelementTable, field: st
         radiation=np.zeros_like(M),
         momentum=momentum,
         rigid_mass=whole,
-        tail=np.zeros((b, b)),
-        levels=0,
+        truncation=np.zeros((b, b)),
+        corrections=0,
         next_hz=0.0,  # nothing tells what was left out
         softening=np.zeros_like(M),
         held=not free,

@@ -15,7 +15,7 @@ SHARE_POWER = 0.75
 SHARE_ANGLES, SHARE_ERROR = 24, 5e-5
 
 
-def spent(found: Positions) -> Array:
+def strain_load(found: Positions) -> Array:
     """T^p sum s^(1 + p) of the torques that the pairs of positions carry, shape (n,); 0 without contact."""
     position, torque = found.contacts.position, np.maximum(found.contacts.torque_wheel, 0.0)
     power, whole = (np.bincount(position, values, len(found)) for values in (torque ** (1 + SHARE_POWER), torque))
@@ -37,7 +37,7 @@ def between(known: Array, goals: Array) -> tuple[IntArray, Array]:
 
 
 def predicted(known: Positions, goals: Array, touching: Array, others: Array) -> tuple[Array, Array]:
-    """Twists (rad) at which cells carry their torque, and what is `spent` in them.
+    """Twists (rad) at which cells carry their torque, and their `strain_load`.
 
     Parameters
     ----------
@@ -60,13 +60,14 @@ def predicted(known: Positions, goals: Array, touching: Array, others: Array) ->
         steep = (known.torque_wheel / known.tangent).reshape(shape) / delta
         interval = np.log(goals[pair[1]] / goals[pair[0]])[:, None]
         twist = touching + np.exp(hermite(t, np.log(delta)[pair], steep[pair] * interval))
-    each = spent(known).reshape(shape) / goals[:, None] ** SHARE_POWER
+    each = strain_load(known).reshape(shape) / goals[:, None] ** SHARE_POWER
     carried = ((1 - t) * each[pair[0]] + t * each[pair[1]]) * others[:, None] ** SHARE_POWER
     return twist.ravel(), carried.ravel()
 
 
 class StrainShares:
-    """Shares of finite strain c = kappa spent of the cells of a map; each learns its kappa when it is first asked for.
+    """Shares of finite strain in the cells of a map, c = kappa times `strain_load`; each learns its kappa when it is
+    first asked for.
 
     Parameters
     ----------
@@ -84,12 +85,12 @@ class StrainShares:
         self._pairs = np.zeros(self._kappa.shape, dtype=np.int64)
 
     def expected(self, rows: IntArray, carried: Array) -> Array:
-        """Before cells of the torques `rows` are solved, from what is `spent` in them."""
+        """Before cells of the torques `rows` are solved, from their `strain_load`."""
         return np.nan_to_num(self._between(rows)[0].ravel() * carried)
 
     def at(self, rows: IntArray, found: Positions) -> Array:
         """Of all solved cells of the torques `rows`, shape (cells,)."""
-        carried = spent(found)
+        carried = strain_load(found)
         if np.isnan(self._kappa[rows]).any():
             count = np.bincount(found.contacts.position, minlength=len(found))
             self._pairs[rows] = count.reshape(len(rows), -1)

@@ -1,4 +1,4 @@
-"""How far a run is from the exact motion, estimated from two more runs with finer steps and disturbed starts.
+"""How far a run is from the exact motion, estimated from two more runs with finer steps and perturbed starts.
 
 With an error that falls with the tolerance, the difference to a finer run is the error of the coarser one up to the
 share of the finer one, 1/`SHARPER`. Rounding does not fall with the tolerance, and runs share part of it. It is
@@ -55,7 +55,7 @@ class TrajectoryError:
 
 @stage("error estimate by finer runs")
 def trajectory_error(mechanism: Mechanism, start: Start, results: Results, tolerance: float) -> TrajectoryError:
-    """Run again twice, finer, from starts disturbed to both sides, and compare at the output times."""
+    """Run again twice, finer, from starts perturbed to both sides, and compare at the output times."""
     made = results.trajectory
     used = max(tolerance / SHARPER, LEAST_TOLERANCE)
     worst, outputs = 0.0, dict.fromkeys(results.outputs, 0.0)
@@ -63,8 +63,8 @@ def trajectory_error(mechanism: Mechanism, start: Start, results: Results, toler
     if not (np.isfinite(by_q).all() and np.isfinite(by_v).all()):  # a run beyond all numbers
         return TrajectoryError(math.nan, dict.fromkeys(results.outputs, math.nan), used)
     for sign in (1.0, -1.0):
-        disturbed = replace(start, q=start.q + sign * by_q, v=start.v + sign * by_v)
-        finer = finer_run(mechanism, disturbed, made, used)
+        perturbed = replace(start, q=start.q + sign * by_q, v=start.v + sign * by_v)
+        finer = finer_run(mechanism, perturbed, made, used)
         if finer is None or len(finer.time) < len(made.time):
             return TrajectoryError(math.nan, dict.fromkeys(results.outputs, math.nan), used)
         with np.errstate(over="ignore", invalid="ignore"):

@@ -8,7 +8,7 @@ each) move their rows through the constant matrix B, the internal unknowns ``u_i
     \Psi = -K_{ii}^{-1} K_{ib},\qquad K_{ii}\Phi = M_{ii}\Phi\Lambda,\qquad
     X = K_{ii}^{-1}(M_{ii}\Psi + M_{ib}) .
 
-``Psi`` are the static shapes (the static response at the interfaces is exact), ``Phi`` the lowest modes with the
+``Psi`` are the constraint modes (the static response at the interfaces is exact), ``Phi`` the lowest modes with the
 interfaces held (Craig, Bampton, AIAA J. 6, 1968), ``X`` the first-order inertia corrections: the quasi-static part of
 all modes that are left out. ``X`` is freed of ``Phi`` and made M-orthonormal, and both are turned to the principal axes
 of their stiffness: all internal coordinates have unit mass and diagonal stiffness. One more level repeats ``K^-1 M`` on
@@ -62,9 +62,9 @@ class Reduction:
         Diagonal of the internal stiffness (rad^2/s^2), ascending: modes first, then corrections.
     modes
         How many of the k internal coordinates are modes.
-    tail : (k, k), or (m, m) without corrections
+    truncation : (k, k), or (m, m) without corrections
         S of the error bound.
-    levels
+    corrections
         Levels of correction vectors.
     next_eigenvalue
         Square of ``w_next``; infinite when no mode is left out.
@@ -79,8 +79,8 @@ class Reduction:
     shapes: Array
     eigenvalues: Array
     modes: int
-    tail: Array
-    levels: int
+    truncation: Array
+    corrections: int
     next_eigenvalue: float
     solver: str
     solved_columns: int
@@ -148,10 +148,10 @@ def reduce_model(
     # principal axes of the whole inner space: the projection is exact whatever the modes' last digits are
     eigenvalues, axes = np.linalg.eigh(_symmetric(inner.T @ (k_ii @ inner)))
     inner = inner @ axes
-    tail = left
+    truncation = left
     if corrections and m:  # of the next level only what is K-orthogonal to the vectors kept
         last = axes[len(axes) - len(left) :]
-        tail = _symmetric(last.T @ (left - (last / eigenvalues) @ last.T) @ last)
+        truncation = _symmetric(last.T @ (left - (last / eigenvalues) @ last.T) @ last)
     size = m + len(eigenvalues)
     k_red, m_red = np.zeros((size, size)), np.eye(size)
     k_red[:m, :m] = _symmetric((boundary.T @ (stiffness @ boundary)).toarray() + psi.T @ k_ib) if m else 0.0
@@ -171,8 +171,8 @@ def reduce_model(
         shapes=shapes,
         eigenvalues=eigenvalues,
         modes=len(modes.eigenvalues),
-        tail=tail,
-        levels=corrections,
+        truncation=truncation,
+        corrections=corrections,
         next_eigenvalue=modes.next_eigenvalue,
         solver=factor.solver,
         solved_columns=m + modes.columns + columns,
@@ -228,7 +228,7 @@ def rigid_shift(stiffness: Any, mass: Any) -> float:
 
 def _check(count: int | None, below_hz: float, corrections: int) -> None:
     if count is not None and count < 0:
-        raise InputError("modes", count, "must be 0 or more", "0 keeps static shapes and corrections only")
+        raise InputError("modes", count, "must be 0 or more", "0 keeps constraint modes and corrections only")
     if not below_hz > 0.0:
         raise InputError("below_hz", below_hz, "must be > 0", "give a frequency in Hz")
     if count is None and math.isinf(below_hz):

@@ -155,7 +155,7 @@ def lost_stiffness(body: ModalBody, omega: float) -> Array:
     if math.isinf(body.next_hz):
         return np.zeros((m, m))
     left = 1.0 - (omega / (2.0 * math.pi * body.next_hz)) ** 2
-    if body.levels == 0:
-        return np.asarray(omega**4 / left * body.tail)
+    if body.corrections == 0:
+        return np.asarray(omega**4 / left * body.truncation)
     weights = body.mass[m:, :m] / (np.diag(body.stiffness)[m:, None] - omega**2)
-    return np.asarray(omega**8 / left * (weights.T @ body.tail @ weights))
+    return np.asarray(omega**8 / left * (weights.T @ body.truncation @ weights))

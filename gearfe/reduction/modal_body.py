@@ -31,7 +31,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: Written to files; a file of another format is refused with a message.
-FORMAT = 3
+FORMAT = 4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,7 +69,7 @@ class ModalBody(Shown):
         Linear (kg m/s) and angular momentum about the frame's origin (kg m2/s) for unit coordinate rates.
     rigid_mass : (6, 6)
         Mass, static moments and inertia about the origin: kinetic energy of rigid translations and rotations.
-    tail, levels, next_hz
+    truncation, corrections, next_hz
         Matrix S, levels of corrections and frequency of the error bound in `gearfe.reduction.craig_bampton`; a
         frequency of 0 where nothing is known of what was left out.
     softening : (N, N)
@@ -99,8 +99,8 @@ class ModalBody(Shown):
     radiation: Floats
     momentum: Floats
     rigid_mass: Floats
-    tail: Floats
-    levels: int
+    truncation: Floats
+    corrections: int
     next_hz: float
     softening: Floats
     held: bool

@@ -21,8 +21,8 @@ ROUND_OFF = 1e-14
 
 
 @dataclass(frozen=True)
-class Minimal:
-    """Minimal (modal) coordinates of a system.
+class ModalCoordinates:
+    """ModalCoordinates (modal) coordinates of a system.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Minimal:
     constant: Array
 
     def reduce(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Minimal coordinates and velocities of a state on the constraints."""
+        """ModalCoordinates coordinates and velocities of a state on the constraints."""
         back = self.T.T @ self.system.mass
         return back @ (q - self.origin), back @ v
 
@@ -66,18 +66,18 @@ def is_linear(system: System) -> bool:
     return all(e.constant_jacobian for e, _ in system.joints)
 
 
-def minimal(system: System) -> Minimal:
-    """Minimal coordinates of a system whose joints are all linear and constant; redundant rows do no harm.
+def modal_coordinates(system: System) -> ModalCoordinates:
+    """ModalCoordinates coordinates of a system whose joints are all linear and constant; redundant rows do no harm.
 
     They are made once and stay with the system.
     """
-    known: Minimal | None = system.__dict__.get("_minimal")
+    known: ModalCoordinates | None = system.__dict__.get("_modal_coordinates")
     if known is None:
-        known = system.__dict__["_minimal"] = _minimal(system)
+        known = system.__dict__["_modal_coordinates"] = _modal_coordinates(system)
     return known
 
 
-def _minimal(system: System) -> Minimal:
+def _modal_coordinates(system: System) -> ModalCoordinates:
     root = np.linalg.cholesky(system.inverse_mass)  # root root^T = M^-1
     zero = np.zeros(system.size)
     G = system.jacobian(0.0, zero)
@@ -94,4 +94,4 @@ def _minimal(system: System) -> Minimal:
     damping = T.T @ system.damping @ T
     least = ROUND_OFF * float(np.abs(damping).max(initial=0.0))
     damping = np.where((np.abs(damping) > least) | np.eye(len(damping), dtype=bool), damping, 0.0)
-    return Minimal(system, T, origin, squares, damping, -T.T @ (system.stiffness @ origin))
+    return ModalCoordinates(system, T, origin, squares, damping, -T.T @ (system.stiffness @ origin))

@@ -23,7 +23,7 @@ from ..typing import Array
 from .collocated import MIDDLE, C, collocated
 from .contract import Element, LocalForce, ModalBlocks
 from .dense import Polynomials, hermite
-from .elimination import Minimal, is_linear, minimal
+from .elimination import ModalCoordinates, is_linear, modal_coordinates
 from .explicit import on_constraints
 from .start import Start
 from .status import Status
@@ -71,7 +71,7 @@ def run_implicit(
     """Integrate; returns (dense output, status, statistics). Linear constant constraints are eliminated before."""
     options: dict[str, Any] = {"longest": longest, "most": most}
     if system.joints and is_linear(system) and all(isinstance(e, LocalForce) for e, _ in system.forces):
-        core = minimal(system)
+        core = modal_coordinates(system)
         inner, begin = in_modes(core, start)
         local = max(MODES_SHARE * tolerance, 1e-13)
 
@@ -137,7 +137,7 @@ def _gap_between(system: System, here: State, h: float, made: Step, active: np.n
     return float(np.abs(gap).max())
 
 
-def in_modes(core: Minimal, start: Start) -> tuple[System, Start]:
+def in_modes(core: ModalCoordinates, start: Start) -> tuple[System, Start]:
     """The system in its minimal coordinates, which no joint holds, and its start there."""
     body = ModalBlocks(np.eye(len(core.squares)), core.damping, np.diag(core.squares))
     elements: list[Element] = [body]

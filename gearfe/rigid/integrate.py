@@ -18,7 +18,7 @@ from .backend import COMPILED_FASTER, compiled_is_ready, loading_seconds, plain_
 from .carried import loose_link
 from .choice import Choice, Way, joined, joined_statistics
 from .dense import Dense
-from .elimination import is_linear, minimal
+from .elimination import is_linear, modal_coordinates
 from .modal import series_force
 from .scene import PlanarScene
 from .start import Start, consistent_start
@@ -213,7 +213,7 @@ def _explicit(
     if backend == "compiled":
         use_compiled(backend)  # refused without numba
     if is_linear(system):
-        return run_modal_explicit(minimal(system), start, times, most=most, watch=watch, **options)
+        return run_modal_explicit(modal_coordinates(system), start, times, most=most, watch=watch, **options)
     return run_explicit(system, start, times, most=most, watch=watch, **options)
 
 
@@ -227,7 +227,7 @@ def _modal_taylor(
         raise InputError("method", "taylor", problem, "use method='explicit' or 'implicit'")
     if not use_compiled(backend):
         raise InputError("backend", backend, "has no series in modal coordinates", "use method='explicit', or numba")
-    return run_modal_taylor(minimal(system), start, times, most=most, watch=watch, **options)
+    return run_modal_taylor(modal_coordinates(system), start, times, most=most, watch=watch, **options)
 
 
 def _implicit(

@@ -21,7 +21,7 @@ from ..typing import Array
 from . import compiled, kernel_modal
 from .contract import LocalForce, SeriesLaw
 from .dense import Dense, within_run
-from .elimination import Minimal, is_linear
+from .elimination import ModalCoordinates, is_linear
 from .explicit import Problem, run_problem
 from .packed import Packed
 from .parts import uncollected
@@ -37,7 +37,7 @@ PLAIN_SHARE = 0.03
 _FULL = int(Status.MOST_STEPS)
 
 
-def modal_problem(core: Minimal) -> Problem:
+def modal_problem(core: ModalCoordinates) -> Problem:
     """The equations of motion in modal coordinates."""
     n = core.T.shape[1]
 
@@ -55,7 +55,7 @@ def modal_problem(core: Minimal) -> Problem:
 
 
 def run_modal_explicit(
-    core: Minimal, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
+    core: ModalCoordinates, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
     watch: Watch | None = None,
 ) -> tuple[Dense, Status, dict[str, Any]]:  # fmt: skip
     """Integrate by Runge-Kutta; returns (dense output, status, statistics)."""
@@ -67,7 +67,7 @@ def run_modal_explicit(
 
 
 def run_modal_taylor(
-    core: Minimal, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
+    core: ModalCoordinates, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
     watch: Watch | None = None,
 ) -> tuple[Dense, Status, dict[str, Any]]:  # fmt: skip
     """Integrate by Taylor series in compiled code; returns (dense output, status, statistics)."""
@@ -115,7 +115,7 @@ def _kernels(order: Any, corner: Any, helpers: tuple[Any, ...], constants: tuple
 class SeriesRun:
     """Compiled integration of a system by Taylor series, from any state."""
 
-    core: Minimal
+    core: ModalCoordinates
     force: LocalForce
     index: np.ndarray
     series: SeriesLaw

@@ -41,7 +41,7 @@ LOOKS = 24
 class HalfPlaneSolver:
     """Positions of one pair by the half-plane law."""
 
-    #: Relative change of the forces from one step of the balance to the next leaves this of the torque.
+    #: Relative change of the forces from one step of the iteration to the next leaves this of the torque.
     torque_tolerance = 1e-7
 
     def __init__(self, pair: GearPair, elastic: MeshingPair) -> None:

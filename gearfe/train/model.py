@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..rigid import Element, LinearJoint, LocalForce, ModalBlocks, Start, System, TimeFunction, consistent_start
-from ..rigid.elimination import Minimal, minimal
+from ..rigid.elimination import ModalCoordinates, modal_coordinates
 from ..typing import Array, IntArray
 from .checks import check_scene
 from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge
@@ -62,7 +62,7 @@ class TrainModel:
     scene: TrainScene
     rolling: Rolling
     system: System
-    core: Minimal
+    core: ModalCoordinates
     start: Start
     angle: TimeFunction
     shafts: tuple[RigidShaft, ...]
@@ -266,10 +266,10 @@ def _drive(drive: Drive, touches: tuple[Element, ...], row: Array) -> Element:
     return LinearForce(touches, drive.damping * square, drive.stiffness * square, "drive")
 
 
-def _damped(scene: TrainScene, elements: list[Element], bodies: list[Element]) -> tuple[System, Minimal]:
+def _damped(scene: TrainScene, elements: list[Element], bodies: list[Element]) -> tuple[System, ModalCoordinates]:
     """System and minimal coordinates; modal damping is written in the modes of the coupled system itself."""
     system = System(elements)
-    core = minimal(system)
+    core = modal_coordinates(system)
     ratios = np.atleast_1d(np.asarray(scene.damping.ratio, dtype=float))
     if not ratios.any():
         return system, core
@@ -280,7 +280,9 @@ def _damped(scene: TrainScene, elements: list[Element], bodies: list[Element]) -
     whole = LinearForce(tuple(bodies), back.T @ (factors[:, None] * back), np.zeros_like(system.mass), "modal damping")
     damped = System([*elements, whole])
     made = replace(core, system=damped, damping=core.damping + np.diag(factors))
-    damped.__dict__["_minimal"] = made  # the modes are those without damping, and its matrix stays exactly diagonal
+    damped.__dict__["_modal_coordinates"] = (
+        made  # the modes are those without damping, and its matrix stays exactly diagonal
+    )
     return damped, made
 
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..progress import count, stage
-from ..record_spectrum import FASTEST, SPARE
+from ..record_spectrum import FASTEST, OVERSAMPLING
 from ..rigid import IntegrationError, Start, Status, Trajectory, integrate
 from ..typing import Array
 from .flanks import NONE
@@ -156,7 +156,7 @@ def _ends(model: TrainModel, t: Array) -> Iterator[int]:
     """Number of the last time of each piece: a piece is as long as its samples and its steps allow."""
     samples = max(LEAST_SAMPLES, PIECE_NUMBERS // model.system.size)
     highest = min(float(model.coupled_frequencies_hz.max(initial=0.0)), FASTEST)
-    span = samples / max(2.0 * SPARE * highest, 1e-300)
+    span = samples / max(2.0 * OVERSAMPLING * highest, 1e-300)
     at = 0
     while at < len(t) - 1:
         far = int(np.searchsorted(t, t[at] + span, side="right")) - 1

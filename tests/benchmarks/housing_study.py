@@ -210,10 +210,10 @@ def others(record: Record) -> None:
         error = float(np.max(np.abs(found / exact("exact") - 1.0)))
         return {"unknowns": reference_or_small(record, "exact").unknowns, "error": error, **answer}
 
-    record.row(table, {"program": "gearfe", "what": "modes, static shapes, corrections, assembly included"}, ours)
+    record.row(table, {"program": "gearfe", "what": "modes, constraint modes, corrections, assembly included"}, ours)
     for name, what, make in (
         ("calculix", "modes only, assembly included", calculix),
-        ("exudyn", "modes and static shapes, matrices given", exudyn),
+        ("exudyn", "modes and constraint modes, matrices given", exudyn),
     ):
         why = missing(name)
         if why:

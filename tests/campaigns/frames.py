@@ -56,7 +56,7 @@ def symmetric_frame(random: np.random.Generator, names: tuple[str, ...], points:
         attachment_axes=np.tile([0.0, 1.0, 0.0], (a, 1)), internal_hz=own_hz, modes=INTERNAL, nodes=points,
         elements=np.zeros((0, 4), dtype=np.int64), shapes=np.zeros((3 * a, n)), faces=np.zeros((0, 3), dtype=np.int64),
         normals=np.zeros((a, 3)), radiation=np.zeros((n, n)), momentum=np.zeros((6, n)), rigid_mass=np.eye(6),
-        tail=np.zeros((m, m)), levels=1, next_hz=math.inf,
+        truncation=np.zeros((m, m)), corrections=1, next_hz=math.inf,
         softening=np.zeros((n, n)), held=True, solver="none",
     )  # fmt: skip
     return body.with_damping(ratio=float(random.choice([0.0, 0.01, 0.05]))), reflect
