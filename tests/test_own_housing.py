@@ -104,6 +104,27 @@ def test_formats(mesh, box, formats) -> None:
     same(box, housing_from_table(table(mesh=mesh), formats))
 
 
+@pytest.mark.parametrize(
+    ("ending", "group"),
+    [("inp", "Surface1"), ("bdf", "1"), ("med", None), ("mesh", "1"), ("unv", None), ("vtk", None), ("msh", None)],
+)
+def test_what_gmsh_writes(ending, group, tmp_path) -> None:
+    """As a user's first export comes, without groups of his own: triangles beside the tetrahedra, no BEGIN BULK, ..."""
+    with gmsh_session("box") as gmsh:
+        gmsh.model.occ.addBox(0, 0, 0, 3, 2, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.option.setNumber("Mesh.SaveAll", 1)
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(2)
+        gmsh.write(str(tmp_path / f"box.{ending}"))
+    mesh = read_mesh_file(tmp_path / f"box.{ending}", "housing.mesh", 1.0)
+    assert mesh.tets.shape[1] == 10
+    assert np.ptp(mesh.nodes[mesh.tets].reshape(-1, 3), axis=0) == pytest.approx([3.0, 2.0, 1.0])
+    if group is not None:
+        on = mesh.nodes[mesh.group(group, "group")]
+        assert np.ptp(on, axis=0)[1:] == pytest.approx([2.0, 1.0])
+
+
 def test_nastran_groups_are_numbers_of_properties(box, formats) -> None:
     """Coordinates of a file with fields of eight characters are rounded to some um; bores are groups by number."""
     found = read_mesh_file(formats / "box.bdf", "mesh", 1.0)

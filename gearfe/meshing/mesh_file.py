@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import itertools
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,11 +17,13 @@ from .session import gmsh_session
 
 #: Formats of CAD programs, which have no mesh yet.
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
-#: Formats that gmsh reads and meshio does not; and surfaces, which have no inside.
-BY_GMSH = (".unv",)
+#: Formats of which gmsh reads more than meshio, as decks without BEGIN BULK; and surfaces, which have no inside.
+BY_GMSH = (".unv", ".bdf", ".nas", ".med", ".mesh")
 SURFACES = (".stl", ".ply", ".off", ".obj", ".wkt", ".svg")
 #: Arrays of whole numbers by which formats tell groups that have no name.
 NUMBERED = ("gmsh:physical", "medit:ref", "nastran:ref", "ref", "cell_tags", "point_tags", "avsucd:material")
+#: Triangles of .inp files, as gmsh and CalculiX write them beside the tetrahedra, that meshio's reader does not name.
+TRIANGLES = {"CPS6": "triangle6", "CPE3": "triangle", "S6": "triangle6", "M3D3": "triangle", "M3D6": "triangle6"}
 INSIDE = "mesh its inside: give the CAD model (.step), or what gmsh FILE -3 -order 2 makes of it"
 #: The same tetrahedron with its second and third corner exchanged.
 MIRRORED = [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]
@@ -118,7 +119,9 @@ def read_mesh_file(path: str | Path, field: str, size: float) -> MeshFile:
 
 def _read(path: Path, field: str) -> Any:
     import meshio
+    from meshio.abaqus._abaqus import abaqus_to_meshio_type
 
+    abaqus_to_meshio_type.update(TRIANGLES)
     said = io.StringIO()
     try:  # meshio prints what it tried, and ends the process when nothing helps
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
@@ -136,20 +139,43 @@ def _read(path: Path, field: str) -> Any:
 
 
 def _by_gmsh(path: Path, field: str) -> Any:
-    """What gmsh reads, through a file of its own."""
-    with gmsh_session("housing") as gmsh, tempfile.TemporaryDirectory() as folder:
+    """A mesh as gmsh reads it; where it names no groups, properties and references are the numbers of its entities."""
+    import meshio
+    from meshio.gmsh.common import _gmsh_to_meshio_type
+
+    with gmsh_session("housing") as gmsh:
         try:
             gmsh.merge(str(path))
         except Exception as error:
             raise InputError(
                 field, path.name, f"cannot be read ({error})", "is it whole? or write it as .msh"
             ) from None
-        if not len(gmsh.model.mesh.getElements()[0]):
+        model = gmsh.model
+        kinds, _, members = model.mesh.getElements()
+        if not len(kinds):
             raise InputError(field, path.name, "has no elements", "is it whole? or write it as .msh (gmsh)")
-        gmsh.option.setNumber("Mesh.Binary", 1)
-        gmsh.option.setNumber("Mesh.SaveAll", 1)
-        gmsh.write(str(Path(folder) / "mesh.msh"))
-        return _read(Path(folder) / "mesh.msh", field)
+        points, number = _nodes(model)
+        counts = [model.mesh.getElementProperties(kind)[3] for kind in kinds]
+        cells = [
+            (_gmsh_to_meshio_type[kind], number[nodes.astype(np.int64)].reshape(-1, count))
+            for kind, nodes, count in zip(kinds, members, counts, strict=True)
+        ]
+        groups: dict[str, list[IntArray]] = {}
+        for dimension, tag in model.getPhysicalGroups():
+            nodes = model.mesh.getNodesForPhysicalGroup(dimension, tag)[0]
+            groups.setdefault(model.getPhysicalName(dimension, tag).strip() or str(tag), []).append(nodes)
+        for dimension, tag in () if groups else [*model.getEntities(2), *model.getEntities(3)]:
+            groups.setdefault(str(tag), [np.concatenate(model.mesh.getElements(dimension, tag)[2])])  # faces first
+        sets = {name: number[np.concatenate(parts).astype(np.int64)] for name, parts in groups.items()}
+    return meshio.Mesh(points, cells, point_sets=sets)
+
+
+def _nodes(model: Any) -> tuple[Array, IntArray]:
+    """Nodes of gmsh's model, and the row of each by its tag."""
+    tags, points, _ = model.mesh.getNodes()
+    number = np.full(int(tags.max()) + 1, -1)
+    number[tags.astype(np.int64)] = np.arange(len(tags))
+    return points.reshape(-1, 3), number
 
 
 def _groups(mesh: Any) -> Iterator[tuple[str, IntArray]]:
@@ -211,12 +237,10 @@ def _meshed(path: Path, field: str, size: float) -> MeshFile:
             raise InputError(
                 field, path.name, f"cannot be meshed ({error})", "mend the solid, or other size_mm"
             ) from None
-        tags, points, _ = gmsh.model.mesh.getNodes()
-        number = np.full(int(tags.max()) + 1, -1)
-        number[tags.astype(np.int64)] = np.arange(len(tags))
+        points, number = _nodes(gmsh.model)
         _, cells = gmsh.model.mesh.getElementsByType(11)
         groups = {
             str(tag): number[gmsh.model.mesh.getNodes(2, tag, includeBoundary=True)[0].astype(np.int64)]
             for _, tag in gmsh.model.getEntities(2)
         }
-    return MeshFile(points.reshape(-1, 3), number[cells.astype(np.int64)].reshape(-1, 10), groups)
+    return MeshFile(points, number[cells.astype(np.int64)].reshape(-1, 10), groups)
