@@ -143,8 +143,10 @@ def assemble_prisms(
     """
     plane = plane_integrals(points, triangles)
     count = len(levels)
+    size = len(points) * count
     keys: list[Ints] = []
-    data: dict[str, list[Floats]] = {}
+    terms: list[Floats] = []
+    masses: list[Floats] = []
     sets, which = np.unique(solid, axis=0, return_inverse=True)
     for number, active in enumerate(sets):
         if not active.any():
@@ -154,37 +156,46 @@ def assemble_prisms(
         rows, columns = np.repeat(nodes, 10, axis=1).ravel(), np.tile(nodes, (1, 10)).ravel()
         pairs, inverse = np.unique(rows * len(points) + columns, return_inverse=True)
         flat = {
-            name: np.bincount(inverse, weights=values[active].ravel(), minlength=len(pairs))
+            name: np.bincount(inverse, weights=values[active].ravel(), minlength=len(pairs))[:, None]
             for name, values in plane.items()
         }
         p, q = np.nonzero(line["touch"] > 0.0)
         first = (pairs // len(points))[:, None] * count + p
         second = (pairs % len(points))[:, None] * count + q
-        keys.append((first * (len(points) * count) + second).ravel())
+        keys.append((first * size + second).ravel())
         m, d, k, dt = (line[name][p, q] for name in ("mass", "slope", "stiffness", "slope of the column's"))
-        # names: derivative of the row's function, of the column's; y lies between x and z
-        for name, values, along in (
-            ("xx", flat["xx"], m), ("zz", flat["zz"], m), ("xz", flat["xz"], m), ("zx", flat["zx"], m),
-            ("xy", flat["x0"], dt), ("yx", flat["0x"], d), ("zy", flat["z0"], dt), ("yz", flat["0z"], d),
-            ("yy", flat["00"], k), ("mass", flat["00"], m),
-        ):  # fmt: skip
-            data.setdefault(name, []).append(np.asarray(values[:, None] * along, dtype=float).ravel())
+        # derivative of the row's function, of the column's; y lies between x and z
+        products = [[flat["xx"] * m, flat["x0"] * dt, flat["xz"] * m],
+                    [flat["0x"] * d, flat["00"] * k, flat["0z"] * d],
+                    [flat["zx"] * m, flat["z0"] * dt, flat["zz"] * m]]  # fmt: skip
+        terms.append(isotropic_blocks(products, material).reshape(-1, 3, 3))
+        masses.append((material.density * flat["00"] * m).ravel())
     found, place = np.unique(np.concatenate(keys), return_inverse=True)
-    size = len(points) * count
-    summed = {name: np.bincount(place, weights=np.concatenate(v), minlength=len(found)) for name, v in data.items()}
     used, rows = np.unique(found // size, return_inverse=True)
     columns = np.searchsorted(used, found % size)
     starts = np.searchsorted(rows, np.arange(len(used) + 1))
-    blocks = np.empty((len(found), 3, 3))
-    lam, mu = material.lame_lambda, material.shear_modulus
-    for i, a in enumerate("xyz"):
-        for j, b in enumerate("xyz"):
-            blocks[:, i, j] = lam * summed[a + b] + mu * summed[b + a]
-        blocks[:, i, i] += mu * (summed["xx"] + summed["yy"] + summed["zz"])
+    mass, blocks = np.zeros(len(found)), np.zeros((len(found), 3, 3))
+    for here in reversed(np.split(place, np.cumsum([len(one) for one in masses])[:-1])):
+        mass[here] += masses.pop()  # the entries of one set are different ones
+        blocks[here] += terms.pop()
     n = len(used)
-    stiffness = sparse.bsr_array((blocks, columns, starts), shape=(3 * n, 3 * n)).tocsr()
-    nodal = sparse.csr_array((material.density * summed["mass"], columns, starts), shape=(n, n))
-    return PrismMatrices(used, SolidMatrices(stiffness, nodal))
+    stiffness = sparse.bsr_array((blocks, columns, starts), shape=(3 * n, 3 * n))
+    return PrismMatrices(used, SolidMatrices(stiffness, sparse.csr_array((mass, columns, starts), shape=(n, n))))
+
+
+def isotropic_blocks(products: list[list[Floats]], material: SolidMaterial) -> Floats:
+    """(..., 3, 3) stiffness of isotropic elasticity between two functions.
+
+    With ``P_ij`` (...) the integral of d_i (row's function) times d_j (column's), entry (i, j) is
+    ``lambda P_ij + mu P_ji``, and mu times the trace of P more on the diagonal.
+    """
+    lam, mu = material.lame_lambda, material.shear_modulus
+    blocks = np.empty((*products[0][0].shape, 3, 3))
+    trace = mu * (products[0][0] + products[1][1] + products[2][2])
+    for i in range(3):
+        for j in range(3):
+            blocks[..., i, j] = lam * products[i][j] + mu * products[j][i] + (trace if i == j else 0.0)
+    return blocks
 
 
 def _line_integrals(levels: Floats, layers: Ints) -> dict[str, Floats]:

@@ -82,8 +82,8 @@ class SolidMaterial:
 class SolidMatrices(NamedTuple):
     """Assembled matrices of a body; ``n`` nodes."""
 
-    #: (3n, 3n) stiffness (N/m), symmetric, CSR
-    stiffness: sparse.csr_array
+    #: (3n, 3n) stiffness (N/m), symmetric, in blocks of a node's three rows
+    stiffness: sparse.bsr_array
     #: (n, n) mass of one axis (kg), CSR; the full mass is ``kron(mass, eye(3))``
     nodal_mass: sparse.csr_array
 
@@ -128,7 +128,7 @@ def assemble(nodes: Array, tets: IntArray, material: SolidMaterial, *, mass_rule
         for j in range(3):
             blocks[:, i, j] = summed([part.stiffness(i, j) for part in parts])
     n = len(nodes)
-    stiffness = sparse.bsr_array((blocks, pattern.columns, pattern.starts), shape=(3 * n, 3 * n)).tocsr()
+    stiffness = sparse.bsr_array((blocks, pattern.columns, pattern.starts), shape=(3 * n, 3 * n))
     return SolidMatrices(stiffness, sparse.csr_array((mass, pattern.columns, pattern.starts), shape=(n, n)))
 
 

@@ -166,7 +166,7 @@ def lame_errors(divisions: int) -> tuple[float, float]:
         return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), p[:, 2]])
 
     nodes, tets = box((divisions, 2 * divisions, 1), (outer - inner, np.pi / 2, 0.3), mapped=ring)
-    k = assemble(nodes, tets, STEEL).stiffness
+    k = assemble(nodes, tets, STEEL).stiffness.tocsr()
     faces = boundary_faces(tets)
     faces = faces[np.all(np.abs(np.linalg.norm(nodes[faces][..., :2], axis=2) - inner) < 1e-9, axis=1)]
     quadrature = surface_quadrature(nodes, faces)
@@ -237,7 +237,7 @@ def test_clamped_square_plate() -> None:
         body = assemble(nodes, tets, SolidMaterial(e, nu, rho))
         edge = (np.minimum(nodes[:, :2], a - nodes[:, :2]) < 1e-9).any(axis=1)
         free = (3 * np.flatnonzero(~edge)[:, None] + np.arange(3)).ravel()
-        k, m = body.stiffness[free][:, free], body.nodal_mass[free[::3] // 3][:, free[::3] // 3]
+        k, m = body.stiffness.tocsr()[free][:, free], body.nodal_mass[free[::3] // 3][:, free[::3] // 3]
         found.append(
             np.sqrt(lowest_modes(factorize(k).solve, sparse.kron(m, np.eye(3), format="csr"), count=1).eigenvalues[0])
         )

@@ -29,7 +29,7 @@ def clamped(cells: tuple[int, int, int], size: tuple[float, float, float], order
     held = np.flatnonzero(nodes[:, 0] < 1e-9)
     free = (3 * np.flatnonzero(nodes[:, 0] > 1e-9)[:, None] + np.arange(3)).ravel()
     found = assemble(nodes, tets, STEEL)
-    k, m = found.stiffness[free][:, free], found.mass[free][:, free]
+    k, m = found.stiffness.tocsr()[free][:, free], found.mass[free][:, free]
     modes = lowest_modes(factorize(k).solve, m, count=6)
     fields = np.zeros((nodes.size, 6))
     fields[free] = modes.vectors

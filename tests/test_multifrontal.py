@@ -54,7 +54,7 @@ def test_factor_and_solutions(width: int, leaf: int, strip: int, monkeypatch: py
     monkeypatch.setattr(module, "STRIP", strip)
     matrix = grid((6, 5, 4), width)
     rng = np.random.default_rng(1)
-    graph = node_graph(matrix, width)
+    graph = node_graph(sparse.bsr_array(matrix, blocksize=(width, width)))
     for order in (np.arange(graph.shape[0]), rng.permutation(graph.shape[0])):
         factor = multifrontal(matrix, graph, order)
         found = lower(factor)
@@ -67,7 +67,7 @@ def test_factor_and_solutions(width: int, leaf: int, strip: int, monkeypatch: py
 def test_nodes_without_coupling_and_separate_parts() -> None:
     parts = [grid((3, 3, 3)), sparse.csr_array([[5.0]]), grid((40, 1, 1)), sparse.csr_array(2.0 * np.eye(3))]
     matrix = sparse.csr_array(sparse.block_diag(parts))
-    graph = node_graph(matrix, 1)
+    graph = node_graph(sparse.bsr_array(matrix, blocksize=(1, 1)))
     b = np.arange(1.0, matrix.shape[0] + 1.0)
     factor = multifrontal(matrix, graph, np.random.default_rng(0).permutation(matrix.shape[0]))
     np.testing.assert_allclose(matrix @ factor.solve(b), b, rtol=1e-12)
@@ -75,7 +75,7 @@ def test_nodes_without_coupling_and_separate_parts() -> None:
 
 def test_indefinite_matrices_have_no_factor() -> None:
     matrix = grid((5, 4, 3))
-    graph = node_graph(matrix, 1)
+    graph = node_graph(sparse.bsr_array(matrix, blocksize=(1, 1)))
     lowest = float(np.linalg.eigvalsh(matrix.toarray())[0])
     identity = sparse.eye_array(matrix.shape[0])
     multifrontal(matrix - 0.999 * lowest * identity, graph, np.arange(graph.shape[0]))
@@ -91,7 +91,7 @@ def test_cost_of_a_plate_stays_near_linear() -> None:
     stored = []
     for side in (40, 80):
         matrix = grid((side, side, 1))
-        graph = node_graph(matrix, 1)
+        graph = node_graph(sparse.bsr_array(matrix, blocksize=(1, 1)))
         fronts = multifrontal(matrix, graph, metis_order(graph)).fronts
         stored.append(sum(front.pivot.size + front.coupling.size for front in fronts))
     assert np.log(stored[1] / stored[0]) / np.log(4.0) < 1.2

@@ -160,7 +160,7 @@ def clamped(cells: tuple[int, int, int], size: tuple[float, float, float], bend:
     held = np.flatnonzero(mesh.nodes[:, 0] < 1e-9)
     free = (3 * np.flatnonzero(mesh.nodes[:, 0] > 1e-9)[:, None] + np.arange(3)).ravel()
     found = mesh.assemble(STEEL)
-    k, m = found.stiffness[free][:, free], found.mass[free][:, free]
+    k, m = found.stiffness.tocsr()[free][:, free], found.mass[free][:, free]
     modes = lowest_modes(factorize(k).solve, m, count=6)
     fields = np.zeros((mesh.nodes.size, 6))
     fields[free] = modes.vectors

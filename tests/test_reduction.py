@@ -92,7 +92,7 @@ def test_shapes_of_the_reduced_matrices(body: ModalBody) -> None:
 
 def test_reduced_matrices_are_projections_of_the_full_ones(body: ModalBody) -> None:
     housing = beam()
-    for reduced, full in ((body.mass, housing.matrices.mass), (body.stiffness, housing.matrices.stiffness)):
+    for reduced, full in ((body.mass, housing.matrices().mass), (body.stiffness, housing.matrices().stiffness)):
         projected = body.shapes.T @ (full @ body.shapes)
         scale = np.sqrt(np.outer(np.diag(reduced), np.diag(reduced)))
         np.testing.assert_allclose(projected / scale, reduced / scale, atol=1e-9)
@@ -312,7 +312,7 @@ def test_bad_requests_are_named(body: ModalBody) -> None:
         body.reconstruct(np.zeros(3))
     housing = beam(cells=(1, 1, 1))
     with pytest.raises(InputError, match="neither"):
-        reduce_model(housing.matrices.stiffness, housing.matrices.mass, np.zeros((0, 0)), housing.internal)
+        reduce_model(housing.partition(housing.matrices()))
     assert body.attachment("right") == slice(0, 6)
 
 

@@ -10,11 +10,11 @@ import numpy as np
 from scipy import sparse
 
 from ..errors import InputError
-from ..reduction.craig_bampton import rigid_shift
+from ..reduction.craig_bampton import Partition, rigid_shift
 from ..reduction.lanczos import lowest_modes
 from ..reduction.sparse_solver import factorize
 from ..threads import one_thread
-from ..typing import Array, IntArray
+from ..typing import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +69,13 @@ class FullModel:
         return np.asarray((self.transform @ q).reshape(-1, 3))
 
 
-def full_model(stiffness: Any, mass: Any, interface: Any, internal: IntArray, *, held: bool, solver: str) -> FullModel:
-    """Model of a body from nodal matrices, interface rows and internal rows (`gearfe.reduction.craig_bampton`)."""
-    count = len(internal)
-    unit = sparse.csc_array((np.ones(count), (internal, np.arange(count))), shape=(stiffness.shape[0], count))
-    transform = sparse.hstack([interface, unit], format="csc")
-    k, m = (sparse.csr_array(transform.T @ (matrix @ transform)) for matrix in (stiffness, mass))
-    return FullModel(m, k, transform, interface.shape[1], held, solver)
+def full_model(parts: Partition, *, held: bool, solver: str) -> FullModel:
+    """Model over all unknowns of a body that is split into interfaces and internal rows."""
+    k, m = (
+        sparse.csr_array(sparse.block_array([[bb, ib.T], [ib, ii]]))
+        for bb, ib, ii in ((parts.k_bb, parts.k_ib, parts.k_ii), (parts.m_bb, parts.m_ib, parts.m_ii))
+    )
+    count, rows = len(parts.internal), len(parts.boundary)
+    unit = sparse.csc_array((np.ones(count), (parts.internal, np.arange(count))), shape=(rows, count))
+    transform = sparse.hstack([sparse.csc_array(parts.boundary), unit], format="csc")
+    return FullModel(m, k, transform, parts.boundary.shape[1], held, solver)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..progress import stage
-from ..reduction.craig_bampton import reduce_model
+from ..reduction.craig_bampton import Partition, partition, reduce_model
 from ..reduction.modal_body import ModalBody
 from ..solid import MassRule, SolidMaterial, SolidMatrices
 from .attachments import (
@@ -172,9 +172,8 @@ class Housing:
         """(n, 3) coordinates (m)."""
         return self.mesh.nodes
 
-    @cached_property
     def matrices(self) -> SolidMatrices:
-        """Nodal stiffness and mass, assembled on first use."""
+        """Nodal stiffness and mass, assembled anew: they are large, and no one needs them for long."""
         with stage("assembling"):
             return self.mesh.assemble(self.material)
 
@@ -195,7 +194,7 @@ class Housing:
     @property
     def mass_kg(self) -> float:
         """Mass (kg)."""
-        return float(self.matrices.nodal_mass.sum())
+        return float(self.matrices().nodal_mass.sum())
 
     def reduce(
         self,
@@ -224,12 +223,11 @@ class Housing:
         estimate
             Whether the body carries an estimate of the mesh's error (`ModalBody.softening`).
         """
-        stiffness, mass = self.matrices.stiffness, self.matrices.mass
+        matrices, motions = self.matrices(), rigid_motions(self.nodes)
+        parts, momenta = self.partition(matrices), np.asarray(matrices.mass @ motions)
+        del matrices  # a quarter of the peak of memory
         found = reduce_model(
-            stiffness,
-            mass,
-            interface_matrix(self.attachments, self.nodes),
-            self.internal,
+            parts,
             count=modes,
             below_hz=below_hz if modes is None else np.inf,
             at_least=least_modes,
@@ -239,7 +237,6 @@ class Housing:
         )
         if len(found.mass) == 0:
             raise InputError("modes", modes, "leaves no coordinate: there is no attachment either", "keep a mode")
-        motions = rigid_motions(self.nodes)
         count = len(self.attachments)
         body = ModalBody(
             mass=found.mass,
@@ -256,8 +253,8 @@ class Housing:
             faces=self.surface.faces,
             normals=nodal_normals(self.nodes, self.surface.faces),
             radiation=self.surface.radiation(found.shapes),
-            momentum=np.asarray((mass @ motions).T @ found.shapes),
-            rigid_mass=motions.T @ (mass @ motions),
+            momentum=momenta.T @ found.shapes,
+            rigid_mass=motions.T @ momenta,
             truncation=found.truncation,
             corrections=found.corrections,
             next_hz=float(np.sqrt(max(found.next_eigenvalue, 0.0)) / (2.0 * np.pi)),
@@ -291,9 +288,12 @@ class Housing:
 
     def full_model(self, solver: str = "auto") -> FullModel:
         """The same body without reduction, over [attachments | all internal unknowns]."""
+        return full_model(self.partition(self.matrices()), held=len(self.fixed) > 0, solver=solver)
+
+    def partition(self, matrices: SolidMatrices) -> Partition:
+        """The matrices over the attachments' coordinates and the internal unknowns."""
         interface = interface_matrix(self.attachments, self.nodes)
-        k, m = self.matrices.stiffness, self.matrices.mass
-        return full_model(k, m, interface, self.internal, held=len(self.fixed) > 0, solver=solver)
+        return partition(matrices.stiffness, matrices.mass, interface, self.internal)
 
 
 def rigid_motions(nodes: Floats) -> Floats:

@@ -18,11 +18,13 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..meshing.housing_mesh import Extrusion
-from ..prisms import ORDER, lagrange, plane_parts, triangle_maps, triangle_rule
+from ..prisms import ORDER, isotropic_blocks, lagrange, plane_parts, triangle_maps, triangle_rule
 from ..solid import SolidMaterial
 
 #: Error over what the next order's functions take one by one.
 FACTOR = 4.0
+#: Elements whose matrices are made at a time: they stay in the processor's cache.
+ELEMENTS = 32
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -54,7 +56,7 @@ def prism_energy_lost(
         Sets of nodes that are held or move as a rigid thing: no function acts within one.
     """
     count, levels = fields.shape[1], len(mesh.levels)
-    field = fields.reshape(-1, 3 * count)
+    field = fields.reshape(-1, 3, count)
     plane, numbers, line = _plane(mesh), _number(mesh), _line()
     still = np.zeros((len(mesh.points) * levels, len(rigid)), dtype=bool)
     for column, chosen in enumerate(rigid):
@@ -67,16 +69,21 @@ def prism_energy_lost(
         chosen = np.flatnonzero(solid)
         half = 0.5 * (mesh.levels[ORDER * layer + ORDER] - mesh.levels[ORDER * layer])
         own = mesh.triangles[chosen][:, :, None] * levels + ORDER * layer + np.arange(ORDER + 1)
-        values = field[np.searchsorted(used, own)].reshape(len(chosen), 10, ORDER + 1, 3, count)
+        own = np.searchsorted(used, own)
         for group in groups:
-            found, blocks = _residual(plane, line, group, chosen, half, material, values, squares)
-            place, signs = group.numbers.place[chosen], group.numbers.signs[chosen]
-            found *= signs[:, :, None, None, None]
-            total = len(group.numbers.node)
-            entries = (np.ones(place.size), (place.ravel(), np.arange(place.size)))
-            gather = sparse.csr_array(entries, shape=(total, place.size))
-            residual = (gather @ found.reshape(place.size, -1)).reshape(total, -1, 3, count)
-            stiffness = (gather @ blocks.reshape(place.size, -1)).reshape(total, -1, 3, 3)
+            total, lines = len(group.numbers.node), len(line.mass[group.line])
+            residual, stiffness = np.zeros((total, lines, 3, count)), np.zeros((total, lines, 3, 3))
+            for first in range(0, len(chosen), ELEMENTS):
+                part = slice(first, first + ELEMENTS)
+                elements = _elements(plane, line, group, chosen[part], half, material)
+                found = elements.residual(field[own[part]], squares)
+                place, signs = group.numbers.place[chosen[part]], group.numbers.signs[chosen[part]]
+                found *= signs[:, :, None, None, None]
+                rows, inverse = np.unique(place, return_inverse=True)
+                entries = (np.ones(place.size), (inverse.ravel(), np.arange(place.size)))
+                gather = sparse.csr_array(entries, shape=(len(rows), place.size))
+                residual[rows] += (gather @ found.reshape(place.size, -1)).reshape(-1, lines, 3, count)
+                stiffness[rows] += (gather @ elements.own.reshape(place.size, -1)).reshape(-1, lines, 3, 3)
             inside = _acting(group.numbers, ORDER * layer + 1, levels, still)
             for j in range(residual.shape[1]):
                 if group.line == _ALL and j == 0:
@@ -213,65 +220,58 @@ def _line() -> _Line:
     return _Line(mass, row_slope, column_slope, stiffness, themselves)
 
 
-def _residual(
-    plane: _Plane,
-    line: _Line,
-    group: _Group,
-    chosen: Ints,
-    half: float,
-    material: SolidMaterial,
-    values: Floats,
-    squares: Floats,
-) -> tuple[Floats, Floats]:
-    """(m, s, j, 3, k) residuals and (m, s, j, 3, 3) stiffnesses of a layer's elements."""
-    lam, mu = material.lame_lambda, material.shear_modulus
-    m, count = len(chosen), len(squares)
+class _Elements(NamedTuple):
+    """Matrices of elements between added functions, (plane s) x (line j), and their own, (plane 10) x (line 4)."""
+
+    #: (m, s j 3, 120) stiffness (N/m)
+    stiffness: Floats
+    #: (m, s j, 40) mass of one axis (kg)
+    mass: Floats
+    #: (m, s, j, 3, 3) stiffness of each added function with itself
+    own: Floats
+
+    def residual(self, values: Floats, squares: Floats) -> Floats:
+        """(m, s, j, 3, k) forces that nodal displacements (m, 10, 4, 3, k) leave unbalanced."""
+        m, count = len(values), len(squares)
+        shape = (*self.own.shape[:4], count)
+        left = np.matmul(self.mass, values.reshape(m, -1, 3 * count)).reshape(shape)
+        left *= squares
+        left -= np.matmul(self.stiffness, values.reshape(m, -1, count)).reshape(shape)
+        return np.asarray(left)
+
+
+def _elements(
+    plane: _Plane, line: _Line, group: _Group, chosen: Ints, half: float, material: SolidMaterial
+) -> _Elements:
+    """Matrices of the chosen triangles' elements in a layer of half the thickness `half`."""
     added = {name: part[chosen][:, group.plane] for name, part in plane.added.items()}
-    own = {name: part[chosen] for name, part in plane.own.items()}
-    along = {
-        "mass": half * line.mass[group.line],
-        "y0": line.row_slope[group.line],
-        "0y": line.column_slope[group.line],
-        "yy": line.stiffness[group.line] / half,
-    }
-    s, j = added["0"].shape[1], len(along["mass"])
-    turned = np.ascontiguousarray(values.transpose(2, 0, 1, 3, 4)).reshape(ORDER + 1, -1)
-    summed = {name: (matrix @ turned).reshape(j, m, 10, 3, count) for name, matrix in along.items()}
-    # derivatives of the added function and of the field: names of plane factors and of line factors
-    names = {
-        "xx": ("x", "x", "mass"), "zz": ("z", "z", "mass"), "xz": ("x", "z", "mass"), "zx": ("z", "x", "mass"),
-        "xy": ("x", "0", "0y"), "zy": ("z", "0", "0y"), "yx": ("0", "x", "y0"), "yz": ("0", "z", "y0"),
-        "yy": ("0", "0", "yy"),
-    }  # fmt: skip
-    residual = np.zeros((m, s, j, 3, count))
-    for name, (row, column, factor) in names.items():
-        a, b = ("xyz".index(letter) for letter in name)
-        matrix = added[row] @ own[column].transpose(0, 2, 1)
-        components = [0, 1, 2] if a == b else [a, b]
-        part = summed[factor][:, :, :, components]
-        part = np.matmul(matrix, part.transpose(1, 2, 0, 3, 4).reshape(m, 10, -1)).reshape(m, s, j, -1, count)
-        if a == b:
-            residual -= mu * part
-            residual[:, :, :, a] -= (lam + mu) * part[:, :, :, a]
-        else:  # row a takes lam d_a s d_b u_b, row b takes mu d_a s d_b u_a
-            residual[:, :, :, a] -= lam * part[:, :, :, 1]
-            residual[:, :, :, b] -= mu * part[:, :, :, 0]
-    inertia = added["0"] @ own["0"].transpose(0, 2, 1)
-    part = summed["mass"].transpose(1, 2, 0, 3, 4).reshape(m, 10, -1)
-    residual += material.density * squares * np.matmul(inertia, part).reshape(m, s, j, 3, count)
-    mass, slope, stiff = (part[group.line] for part in line.own)
+    lower = {name: part[chosen].transpose(0, 2, 1) for name, part in plane.own.items()}
+    mass, row_slope, column_slope, stiff = (
+        factor * part[group.line] for factor, part in zip((half, 1.0, 1.0, 1.0 / half), line[:4], strict=True)
+    )
+
+    def product(row: str, column: str, along: Floats) -> Floats:
+        return np.asarray((added[row] @ lower[column])[:, :, None, :, None] * along[:, None, :])
+
+    # derivative of the added function, of the field; y lies between x and z
+    both = isotropic_blocks(
+        [[product("x", "x", mass), product("x", "0", column_slope), product("x", "z", mass)],
+         [product("0", "x", row_slope), product("0", "0", stiff), product("0", "z", row_slope)],
+         [product("z", "x", mass), product("z", "0", column_slope), product("z", "z", mass)]], material
+    )  # fmt: skip
     areas = np.maximum(plane.areas[chosen][:, None], 1e-300)
 
-    def plane_own(one: str, two: str) -> Floats:
-        return np.asarray(np.sum(added[one] * added[two] / areas, axis=2))
+    def with_itself(one: str, two: str, along: Floats) -> Floats:
+        return np.asarray(np.sum(added[one] * added[two] / areas, axis=2)[:, :, None] * along)
 
-    g = np.empty((m, s, j, 3, 3))
-    for a, b, one, two, along_y in (
-        (0, 0, "x", "x", half * mass), (2, 2, "z", "z", half * mass), (0, 2, "x", "z", half * mass),
-        (0, 1, "x", "0", slope), (2, 1, "z", "0", slope), (1, 1, "0", "0", stiff / half),
-    ):  # fmt: skip
-        g[..., a, b] = plane_own(one, two)[:, :, None] * along_y
-        g[..., b, a] = g[..., a, b]
-    blocks = lam * g + mu * g.swapaxes(3, 4)
-    blocks += mu * np.trace(g, axis1=3, axis2=4)[..., None, None] * np.eye(3)
-    return residual, blocks
+    m_own, s_own, k_own = (part[group.line] for part in line.own)
+    xy, yz = with_itself("x", "0", s_own), with_itself("z", "0", s_own)
+    xz = with_itself("x", "z", half * m_own)
+    own = isotropic_blocks(
+        [[with_itself("x", "x", half * m_own), xy, xz],
+         [xy, with_itself("0", "0", k_own / half), yz],
+         [xz, yz, with_itself("z", "z", half * m_own)]], material
+    )  # fmt: skip
+    m, s, j = both.shape[:3]
+    stiffness = both.transpose(0, 1, 2, 5, 3, 4, 6).reshape(m, 3 * s * j, -1)
+    return _Elements(stiffness, material.density * product("0", "0", mass).reshape(m, s * j, -1), own)

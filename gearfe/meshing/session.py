@@ -66,7 +66,7 @@ def _pipes_as_before() -> Iterator[None]:
 def gmsh_session(
     name: str = "gearfe", *, threads: int = 1, options: Mapping[str, float] | None = None
 ) -> Iterator[Any]:
-    """Yield the gmsh module with a fresh model called `name`; quiet, deterministic, closed again on the way out.
+    """Yield the gmsh module with a fresh model called `name`; quiet, on one thread, closed again on the way out.
 
     Where the caller's own program has gmsh open already, only the model is added and removed again, and that
     session's options are left as they were found.
@@ -76,7 +76,8 @@ def gmsh_session(
     name
         Name of the model.
     threads
-        Threads gmsh may use. One is the default: meshes are then the same on every run.
+        Threads gmsh may use. One is the default: meshes are then the same on every run, but for those of its
+        anisotropic mesher (the housing's), which depend on where its vertices lie in memory.
     options
         gmsh's numeric options for this session.
 

@@ -86,12 +86,60 @@ class Reduction:
     solved_columns: int
 
 
+@dataclass(frozen=True)
+class Partition:
+    """Matrices over the interface coordinates (b, m of them) and the internal unknowns (i, k of them).
+
+    Attributes
+    ----------
+    boundary : (n, m)
+        B: displacement of every row for unit interface coordinates; zero in internal and held rows. m may be 0.
+    internal : (k,)
+        Rows that are free and in no interface.
+    k_ii, m_ii : (k, k) sparse
+        Stiffness and mass of the internal unknowns.
+    k_ib, m_ib : (k, m)
+        Their coupling with the interfaces.
+    k_bb, m_bb : (m, m)
+        Stiffness and mass of the interfaces.
+    """
+
+    boundary: Array
+    internal: IntArray
+    k_ii: Any
+    m_ii: Any
+    k_ib: Array
+    m_ib: Array
+    k_bb: Array
+    m_bb: Array
+
+
+def partition(stiffness: Any, mass: Any, interface: Any, internal: IntArray) -> Partition:
+    """Split a sparse model, so that the whole matrices (n, n) need be kept no longer; see `Partition`."""
+    boundary = np.asarray(interface.toarray() if sparse.issparse(interface) else interface, dtype=float)
+    found = []
+    for matrix in (stiffness, mass):
+        product = np.asarray(matrix @ boundary)
+        found.append((_submatrix(matrix, internal), product[internal], _symmetric(boundary.T @ product)))
+    (k_ii, k_ib, k_bb), (m_ii, m_ib, m_bb) = found
+    return Partition(boundary, internal, k_ii, m_ii, k_ib, m_ib, k_bb, m_bb)
+
+
+def _submatrix(matrix: Any, rows: IntArray) -> Any:
+    """These rows and columns of a sparse matrix; blocks (BSR) stay blocks where the rows are whole ones."""
+    width = matrix.blocksize[0] if matrix.format == "bsr" else 1
+    chosen = rows[::width] // width
+    if width == 1 or not np.array_equal(rows, (width * chosen[:, None] + np.arange(width)).ravel()):
+        return sparse.csr_array(matrix)[rows][:, rows]
+    nodes = len(matrix.indptr) - 1
+    blocks = sparse.csr_array((np.arange(len(matrix.indices)), matrix.indices, matrix.indptr), shape=(nodes, nodes))
+    blocks = blocks[chosen][:, chosen]
+    return sparse.bsr_array((matrix.data[blocks.data], blocks.indices, blocks.indptr), shape=(len(rows),) * 2)
+
+
 @one_thread()
 def reduce_model(
-    stiffness: Any,
-    mass: Any,
-    interface: Any,
-    internal: IntArray,
+    parts: Partition,
     *,
     count: int | None = None,
     below_hz: float = math.inf,
@@ -104,12 +152,8 @@ def reduce_model(
 
     Parameters
     ----------
-    stiffness, mass : (n, n) sparse
-        Full matrices, symmetric.
-    interface : (n, m) sparse
-        B: displacement of every row for unit interface coordinates; zero in internal and held rows. m may be 0.
-    internal : (k,)
-        Rows that are free and in no interface.
+    parts
+        The model, split into interfaces and internal unknowns (`partition`).
     count, below_hz
         Number of modes with the interfaces held, and their highest frequency (Hz): whichever ends first.
     at_least
@@ -127,12 +171,8 @@ def reduce_model(
         Neither `count` nor a finite `below_hz`; negative values; a model that can still move with its interfaces held.
     """
     _check(count, below_hz, corrections)
-    boundary = sparse.csc_array(interface)
-    m = boundary.shape[1]
-    k_rows, m_rows = sparse.csr_array(stiffness)[internal], sparse.csr_array(mass)[internal]
-    k_ii, m_ii = k_rows[:, internal], m_rows[:, internal]
-    k_ib, m_ib = ((rows @ boundary).toarray() for rows in (k_rows, m_rows))
-    del k_rows, m_rows
+    k_ii, m_ii, k_ib, m_ib = parts.k_ii, parts.m_ii, parts.k_ib, parts.m_ib
+    m = k_ib.shape[1]
     shift = rigid_shift(k_ii, m_ii) if m == 0 and free else 0.0
     with stage("factorising"):
         factor = factorize(k_ii + shift * m_ii if shift else k_ii, solver=solver)
@@ -154,17 +194,15 @@ def reduce_model(
         truncation = _symmetric(last.T @ (left - (last / eigenvalues) @ last.T) @ last)
     size = m + len(eigenvalues)
     k_red, m_red = np.zeros((size, size)), np.eye(size)
-    k_red[:m, :m] = _symmetric((boundary.T @ (stiffness @ boundary)).toarray() + psi.T @ k_ib) if m else 0.0
-    if m:
-        m_bb = (boundary.T @ (mass @ boundary)).toarray()
-        m_red[:m, :m] = _symmetric(m_bb + psi.T @ m_ib + coupling.T @ psi)
+    k_red[:m, :m] = _symmetric(parts.k_bb + psi.T @ k_ib)
+    m_red[:m, :m] = _symmetric(parts.m_bb + psi.T @ m_ib + coupling.T @ psi)
     m_red[:m, m:] = coupling.T @ inner
     m_red[m:, :m] = m_red[:m, m:].T
     k_red[range(m, size), range(m, size)] = eigenvalues
-    shapes = np.zeros((stiffness.shape[0], size))
-    shapes[:, :m] = boundary.toarray()
-    shapes[internal, :m] = psi
-    shapes[internal, m:] = inner
+    shapes = np.zeros((len(parts.boundary), size))
+    shapes[:, :m] = parts.boundary
+    shapes[parts.internal, :m] = psi
+    shapes[parts.internal, m:] = inner
     return Reduction(
         mass=m_red,
         stiffness=k_red,

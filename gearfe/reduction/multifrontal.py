@@ -107,7 +107,7 @@ def multifrontal(matrix: Any, graph: Any, order: IntArray) -> MultifrontalFactor
     Parameters
     ----------
     matrix : (n, n) sparse
-        Both triangles stored.
+        Both triangles stored; best in blocks (BSR) of b rows.
     graph : (n / b, n / b) sparse CSR
         Which nodes, of b unknowns each, are coupled; no diagonal.
     order : (n / b,)
@@ -122,7 +122,7 @@ def multifrontal(matrix: Any, graph: Any, order: IntArray) -> MultifrontalFactor
     tree = _fronts(graph, order)
     number = np.empty(nodes, dtype=np.int64)
     number[tree.order] = np.arange(nodes)
-    blocks = sparse.csr_array(matrix).tobsr((width, width))
+    blocks = sparse.bsr_array(matrix, blocksize=(width, width))
     rows, columns = number[np.repeat(np.arange(nodes), np.diff(blocks.indptr))], number[blocks.indices]
     kept = np.flatnonzero(columns >= rows)  # the upper triangle, by rows, with the place of its blocks as values
     upper = sparse.csr_array((kept, (rows[kept], columns[kept])), shape=graph.shape)

@@ -134,18 +134,17 @@ def factorize(matrix: Any, *, solver: str = "auto", block: int = 3) -> Factoriza
 def _multifrontal(matrix: Any, block: int) -> Callable[[Array], Array]:
     from .multifrontal import NotPositiveDefinite, multifrontal
 
-    graph = node_graph(matrix, block if matrix.shape[0] % block == 0 else 1)
+    width = block if matrix.shape[0] % block == 0 else 1
+    blocks = sparse.bsr_array(matrix, blocksize=(width, width))
+    graph = node_graph(blocks)
     try:
-        return multifrontal(matrix, graph, metis_order(graph)).solve
+        return multifrontal(blocks, graph, metis_order(graph)).solve
     except NotPositiveDefinite as error:
         raise _not_definite() from error
 
 
-def node_graph(matrix: Any, block: int) -> Any:
-    """Which nodes, of `block` unknowns each, a matrix couples: CSR, without the diagonal."""
-    csr = sparse.csr_array(matrix)
-    pattern = sparse.csr_array((np.ones(csr.nnz, dtype=np.int8), csr.indices, csr.indptr), shape=csr.shape)
-    blocks = pattern.tobsr((block, block))
+def node_graph(blocks: Any) -> Any:
+    """Which nodes a matrix in blocks (BSR) couples: CSR, without the diagonal."""
     nodes = len(blocks.indptr) - 1
     rows = np.repeat(np.arange(nodes, dtype=np.int32), np.diff(blocks.indptr))
     off = rows != blocks.indices

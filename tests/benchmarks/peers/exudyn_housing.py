@@ -27,8 +27,8 @@ def answer(task: dict[str, Any]) -> dict[str, Any]:
     free[housing.fixed] = False
     number = np.cumsum(free) - 1
     rows = (3 * np.flatnonzero(free)[:, None] + np.arange(3)).ravel()
-    stiffness = csr_matrix(csr_matrix(housing.matrices.stiffness)[rows][:, rows])
-    mass = csr_matrix(csr_matrix(housing.matrices.mass)[rows][:, rows])
+    stiffness = csr_matrix(csr_matrix(housing.matrices().stiffness)[rows][:, rows])
+    mass = csr_matrix(csr_matrix(housing.matrices().mass)[rows][:, rows])
     bores = [[int(number[n]) for n in a.nodes] for a in housing.attachments]
 
     def run() -> np.ndarray:
