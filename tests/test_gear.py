@@ -183,6 +183,22 @@ def test_iso_6336_stiffness_of_the_shipped_pair():
     assert iso6336.pair_modulus(210e9, 70e9) == pytest.approx(105e9)
 
 
+def test_iso_6336_dynamic_factor():
+    """Clause 6.5 by hand: 200 N/mm, c' 13.1 N/(mm um), 2 um of pitch and 1.5 um of profile deviation, 5 um relief."""
+    mean = 13.1 * (0.75 * SHIPPED.contact_ratio + 0.25)
+    assert 1.0 < SHIPPED.contact_ratio <= 1.5
+    given = {"stiffness": 1e7 * mean, "mass": 0.1, "force": 2000.0 / math.cos(math.radians(25))}
+    speed = np.array([0.5, 0.85, 1.0, 1.15, 1.325, 1.5, 3.0]) * math.sqrt(1e7 * mean / 0.1) / 20
+    p, f, k = 13.1 * 2.0 / 200, 13.1 * 1.5 / 200, abs(1 - 13.1 * 5.0 / 200)
+    sub, top = 0.32 * p + 0.34 * f + 0.23 * k, 1 + 0.32 * p + 0.34 * f + 0.90 * k
+    end = 0.47 * p + 0.47 * f + 0.75
+    by_hand = [1 + 0.5 * sub, 1 + 0.85 * sub, top, top, 0.5 * (top + end), end, end]
+    found = iso6336.dynamic_factor(SHIPPED, speed * (1 - 1e-12), **given, relief=5e-6, pitch=2e-6, profile=1.5e-6)
+    assert found == pytest.approx(by_hand, rel=1e-9)
+    light = iso6336.dynamic_factor(SHIPPED, speed[:2], **{**given, "force": 500.0 / math.cos(math.radians(25))})
+    assert light == pytest.approx([1 + 0.5 * 0.23, 1.9], rel=1e-9)  # N_S = 0.5 + 0.35 sqrt(0.5) = 0.75
+
+
 def test_random_legal_gears_have_simple_profiles():
     """Over random racks and teeth: segments joined, radius never falling, polar angle inside the half pitch."""
     random = np.random.default_rng(20)

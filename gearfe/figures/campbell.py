@@ -12,7 +12,7 @@ from ..runup.instability import InstabilityMap
 from ..runup.modes import CoupledModes, Crossing
 from ..runup.report import orders
 from ..runup.run_up import RunUp
-from .style import BLUE, COLOURS, RED, new_figure, save, tidy
+from .style import BLUE, COLOURS, GREY, RED, new_figure, save, tidy
 
 #: A mode is drawn strong where so much of its strain energy is in the meshes.
 STRONG = 0.03
@@ -45,7 +45,6 @@ def draw_waterfall(path: Path, run: RunUp, multiples: int, bore: int, title: str
     figure = new_figure(10.5, 6.4)
     axes = figure.add_subplot()
     axes.set_title(f"Normal acceleration at attachment {name} in steady running\n{title}", fontsize=11, loc="left")
-    axes.set_facecolor("#0b1020")
     top = float(np.nanmax(level[:, 1:], initial=0.0))
     segments, values = [], []
     for k in range(1, frequency.shape[1]):
@@ -55,14 +54,14 @@ def draw_waterfall(path: Path, run: RunUp, multiples: int, bore: int, title: str
         values += [0.5 * (level[i, k] + level[i + 1, k]) for i in np.flatnonzero(both)]
     order = np.argsort(values)  # loud ones on top
     tracks = LineCollection(
-        [segments[i] for i in order], array=np.array(values)[order], cmap="inferno", linewidths=2.6, capstyle="butt"
+        [segments[i] for i in order], array=np.array(values)[order], cmap="YlOrRd", linewidths=2.6, capstyle="butt"
     )
     tracks.set_clim(top - 70.0, top)
     axes.add_collection(tracks)
     axes.set_xlim(float(speed[0]), float(speed[-1]))
     axes.set_ylim(0.0, highest)
     for line in order_lines(run, multiples):
-        _label_order(axes, line, float(speed[0]), float(speed[-1]), highest, "white")
+        _label_order(axes, line, float(speed[0]), float(speed[-1]), highest, "black")
     axes.set_xlabel("speed of the drive  (rad/s)")
     axes.set_ylabel("frequency  (kHz)")
     _rpm(axes)
@@ -87,15 +86,15 @@ def draw_campbell(path: Path, run: RunUp, modes: CoupledModes, met: list[Crossin
     for mode in range(frequency.shape[1]):
         strong = share[mode] >= STRONG
         axes.plot(speed, frequency[:, mode], color=BLUE if strong else "#b6c2d1", linewidth=1.6 if strong else 0.7)
-        if strong and frequency[-1, mode] <= highest:
-            place = float(frequency[-1, mode])
-            while any(abs(place - t) < 0.028 * highest for t in taken):
-                place += 0.007 * highest
-            taken.append(place)
-            text = f"{mode + 1}: {100.0 * share[mode]:.0f} % in meshes, {100.0 * damping[mode]:.2g} % damping"
+        if frequency[-1, mode] <= highest:
+            taken.append(max(float(frequency[-1, mode]), taken[-1] + 0.028 * highest if taken else 0.0))
+            part = int(modes.strain[mode].argmax())
+            most = f"{100.0 * modes.strain[mode, part]:.0f} % in {modes.strain_in[part]}"
+            where = f"{100.0 * share[mode]:.0f} % in meshes" if strong else most
             axes.annotate(
-                text, (high, float(frequency[-1, mode])), (high + 0.012 * (high - low), place), fontsize=7.5,
-                color=BLUE, va="center", annotation_clip=False,
+                f"{mode + 1}: {where}, {100.0 * damping[mode]:.2g} % damping", (high, float(frequency[-1, mode])),
+                (high + 0.03 * (high - low), taken[-1]), fontsize=7.5, color=BLUE if strong else GREY, va="center",
+                annotation_clip=False, arrowprops={"arrowstyle": "-", "color": "#b6c2d1", "linewidth": 0.5},
             )  # fmt: skip
     for line in order_lines(run, multiples):
         axes.plot([low, high], [line.slope * low, line.slope * high], color=COLOURS[1 + line.mesh], linewidth=1.0)

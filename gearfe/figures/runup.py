@@ -12,12 +12,15 @@ import numpy as np
 
 from ..runup.instability import InstabilityMap
 from ..runup.modes import CoupledModes, Crossing
-from ..runup.report import dynamic_factors, orders
+from ..runup.report import dynamic_factors, iso_dynamic_factors, orders
 from ..runup.results import SteadyState
 from ..runup.run_up import RunUp
 from ..typing import Array, IntArray
 from .campbell import draw_campbell, draw_instability, draw_waterfall
 from .style import COLOURS, GREY, new_figure, save, tidy
+
+#: Label of the axis of dynamic factors.
+FACTOR = "dynamic factor $K_v$"
 
 
 @dataclass(frozen=True)
@@ -81,11 +84,17 @@ def forces_picture(run: RunUp, title: str = "") -> Any:
         open_[f"mesh {i + 1}"] = _pieces(run, [100.0 * s.apart[i] for s in states])
     panels = [
         ("dynamic transmission error,\npeak to peak  (µm)", error),
-        ("dynamic factor $K_v$", factor),
+        (FACTOR, factor),
     ]
     if max(float(p.value.max()) for p in open_.values()) > 0.0:
         panels.append(("without contact  (% of the time)", open_))
-    return _curves(run, panels, f"Meshes in steady running\n{title}")
+    figure = _curves(run, panels, f"Meshes in steady running\n{title}")
+    (axes,) = (axes for axes in figure.axes if axes.get_ylabel() == FACTOR)
+    for i, colour in zip(range(len(lines)), _cycle(), strict=False):
+        label = f"mesh {i + 1}, ISO 6336-1 B"
+        axes.plot(run.speeds, iso_dynamic_factors(run, i), color=colour, linewidth=1.0, dashes=(1, 1.5), label=label)
+    axes.legend(fontsize=8, frameon=False, ncols=4, loc="upper left")
+    return figure
 
 
 def _curves(

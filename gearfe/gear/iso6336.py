@@ -1,14 +1,34 @@
-"""Tooth stiffness after ISO 6336-1:2006, clause 9, method B: a sanity check for the level of a computed curve.
+r"""Tooth stiffness and dynamic factor after ISO 6336-1:2006, method B: sanity checks for the level of what is computed.
 
-The minimum flexibility q' of a tooth pair is a series in the virtual tooth numbers and profile shifts,
+Clause 9: the minimum flexibility q' of a tooth pair is a series in the virtual tooth numbers and profile shifts,
 valid for x1 >= x2 and -0.5 <= x1 + x2 <= 2 and for loads of at least 100 N per mm of face width; the factors turn the
 theoretical single stiffness c'_th = 1/q' into that of a solid steel gear with the basic rack at hand.
+
+Clause 6.5: with :math:`N = n_1/n_{E1}`, :math:`n_{E1}` the speed at which teeth mesh as often as
+:math:`\sqrt{c_\gamma/m_{red}}` swings,
+
+.. math::
+    B_p = \frac{c' f_{pb,eff}}{K_A F_t/b},\quad B_f = \frac{c' f_{f\alpha,eff}}{K_A F_t/b},\quad
+    B_k = \Big|1 - \frac{c' C_a}{K_A F_t/b}\Big|
+
+.. math::
+    K_v = \begin{cases}
+    1 + N\,(C_{v1}B_p + C_{v2}B_f + C_{v3}B_k) & N \le N_S\\
+    1 + C_{v1}B_p + C_{v2}B_f + C_{v4}B_k & N_S < N \le 1.15\\
+    C_{v5}B_p + C_{v6}B_f + C_{v7} & N \ge 1.5
+    \end{cases}
+
+and straight between 1.15 and 1.5; N_S is 0.85, less below 100 N/mm.
 """
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..typing import Array
 from .mesh_geometry import MeshGeometry
 from .spur_gear import Gear
 
@@ -63,3 +83,40 @@ def single_stiffness(pair: MeshGeometry, pinion_modulus: float, wheel_modulus: f
 def mesh_stiffness(pair: MeshGeometry, pinion_modulus: float, wheel_modulus: float) -> float:
     """c_gamma = c' (0.75 eps_alpha + 0.25), mean stiffness of the mesh per face width (N/m^2)."""
     return single_stiffness(pair, pinion_modulus, wheel_modulus) * (0.75 * pair.contact_ratio + 0.25)
+
+
+def dynamic_factor(
+    pair: MeshGeometry, speeds: ArrayLike, *, stiffness: float, mass: float, force: float, relief: float = 0.0,
+    pitch: float = 0.0, profile: float = 0.0,
+) -> Array:  # fmt: skip
+    """K_v of a spur pair at speeds of its pinion.
+
+    Parameters
+    ----------
+    speeds : array_like, shape (n,)
+        rad/s.
+    stiffness
+        Mean stiffness of the mesh, c_gamma b (N/m).
+    mass
+        Reduced mass of pinion and wheel, and of what turns with them, on the line of action (kg).
+    force
+        Along the line of action, K_A included (N).
+    relief, pitch, profile
+        C_a; effective deviations f_pb,eff and f_falpha,eff (m).
+    """
+    N = np.abs(np.asarray(speeds, dtype=float)) * pair.pinion.teeth / math.sqrt(stiffness / mass)
+    ratio, width = pair.contact_ratio, min(pair.pinion.face_width, pair.wheel.face_width)
+    load = force * math.cos(pair.pinion.pressure_angle) / width
+    single = stiffness / width / (0.75 * ratio + 0.25)
+    p, f, k = single * pitch / load, single * profile / load, abs(1.0 - single * relief / load)
+    if ratio <= 2.0:
+        of_pitch, of_profile, below, at, beyond = 0.32, 0.34, 0.23, 0.90, 0.47
+    else:
+        of_pitch, of_profile, below = 0.32, 0.57 / (ratio - 0.3), 0.096 / (ratio - 1.56)
+        at, beyond = (0.57 - 0.05 * ratio) / (ratio - 1.44), 0.12 / (ratio - 1.74)
+    still = 0.125 * math.sin(math.pi * (min(max(ratio, 1.5), 2.5) - 2.0)) + 0.875
+    whole = of_pitch * p + of_profile * f
+    resonant, fast = 1.0 + whole + at * k, 0.47 * p + beyond * f + still
+    first = 0.85 if load >= 100e3 else 0.5 + 0.35 * math.sqrt(load / 100e3)
+    later = fast + (resonant - fast) * np.clip((1.5 - N) / 0.35, 0.0, 1.0)
+    return np.where(first >= N, 1.0 + N * (whole + below * k), later)

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import unknown_name
+from ..gear.iso6336 import dynamic_factor
+from ..gear.mesh_geometry import MeshGeometry
 from ..typing import Array
 from ..vibration.radiation import power_level
 from .instability import InstabilityMap
@@ -90,6 +92,24 @@ def dynamic_factors(run: RunUp, mesh: int) -> Array:
     steady = abs(float(run.train.steady[mesh]))
     largest = np.array([np.abs(s.force[:, mesh]).max() for s in run.states])
     return np.asarray(largest / steady) if steady > 0.0 else np.full(len(largest), np.nan)
+
+
+def iso_dynamic_factors(run: RunUp, mesh: int) -> Array:
+    """K_v of a mesh at the asked speeds by ISO 6336-1, method B, gears without deviations but for the relief of `Gear`:
+    with the mesh's own mean stiffness, and all that turns with its gears.
+    """
+    model = run.train.model
+    line, given = model.meshes[mesh], model.scene.meshes[mesh]
+    one, two = (model.scene.gear(name) for name in (given.driver, given.driven))
+    names = [shaft.name for shaft in model.scene.shafts]
+    inertia = [model.shafts[names.index(gear.shaft)].rotor.polar for gear in (one, two)]
+    mass = 1.0 / sum(gear.gear.base_radius**2 / polar for gear, polar in zip((one, two), inertia, strict=True))
+    relief = min(0.0 if g.gear.tip_relief is None else g.gear.tip_relief.amount for g in (one, two))
+    force = abs(float(run.train.steady[mesh]))
+    if not force > 0.0:
+        return np.full(len(run.speeds), np.nan)
+    pair, speeds = MeshGeometry(one.gear, two.gear, given.centre_distance), line.ratio * run.speeds
+    return dynamic_factor(pair, speeds, stiffness=line.mean, mass=mass, force=force, relief=relief)
 
 
 def power_in_band(state: SteadyState, band_hz: float) -> float:
