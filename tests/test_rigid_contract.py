@@ -197,9 +197,8 @@ def test_convergence_order_of_the_series():
     fine = integrate(system, [0.0, 1.0], tolerance=1e-13, start=start, backend="plain").q[-1, 2]
     steps, errors = [], []
     for count in (30, 45, 67, 100):
-        made = taylor.integrate_scene(
-            system.planar.assembly, start, 1.0, tolerance=1e3, order=8, jit=False, longest=1.0 / count
-        )
+        prepared = taylor.prepare(system.planar.assembly, 8, jit=False)
+        made = taylor.integrate_scene(prepared, start, 1.0, tolerance=1e3, longest=1.0 / count)
         steps.append(len(made.dense.coefficients))
         errors.append(abs(made.dense(np.array([1.0]))[0, 2] - fine))
     assert slope(steps, errors) >= 6.5

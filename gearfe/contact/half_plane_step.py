@@ -10,7 +10,7 @@ from ..gear.flank_curve import FlankTables
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .half_plane_pair import HalfPlanePair, opened, panel_influence, sideways, widths_in_smooth
 from .moved_faces import LOOK, WAY, Faces, windows
-from .panels import MIDDLES, PANELS, WIDTHS, Couplings, Pressed, first_guess, influence, pressed
+from .panels import MIDDLES, PANELS, WIDTHS, Couplings, Panels, Pressed, first_guess, influence, pressed
 
 #: Gap at the window's ends in units of that at the ends of Hertz's contact of the same force, and what it grows by
 #: where the pressure reaches an end: beside edges contacts are wider.
@@ -243,7 +243,7 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
     shared = panel_influence(law, couples, normal, arcs, width, y)
     bearing = state.bearing if state.bearing.any() else first_guess(gap)
     both = shared[:, 0] + shared[:, 1]
-    solution = pressed(K, both, gap, width, smooth.compliance, force, couples, bearing, held=held)
+    solution = pressed(Panels(K, both, gap, width), smooth.compliance, force, couples, bearing, held=held)
 
     p, loaded = solution.pressure, solution.force > 0
     shares = p * width / np.where(loaded, solution.force, 1.0)[:, None]

@@ -247,21 +247,11 @@ def _groups(K: Array, between: Array, couples: Couplings) -> list[_Group]:
     return made
 
 
-def pressed(
-    K: Array,
-    between: Array,
-    gap: Array,
-    widths: Array,
-    T: Array,
-    carried: Array,
-    couples: Couplings,
-    bearing: BoolArray,
-    *,
-    held: bool = False,
-) -> Pressed:
-    """Solve the unilateral problem.
+@dataclass(frozen=True)
+class Panels:
+    """Panels of p contacts, n each.
 
-    Parameters
+    Attributes
     ----------
     K : ndarray, shape (p, n, n)
         Approach of the panels' middles for pressures on the panels of the same contact (m/Pa).
@@ -269,6 +259,21 @@ def pressed(
         The same between contacts of one tooth pair, in the order of `Couplings.neighbours`.
     gap, widths : ndarray, shape (p, n)
         Gap at the panels' middles and widths of the panels (m).
+    """
+
+    K: Array
+    between: Array
+    gap: Array
+    widths: Array
+
+
+def pressed(
+    panels: Panels, T: Array, carried: Array, couples: Couplings, bearing: BoolArray, *, held: bool = False
+) -> Pressed:
+    """Solve the unilateral problem.
+
+    Parameters
+    ----------
     T : ndarray, shape (c,)
         Compliance between the contacts (m2/N), by couple.
     carried : ndarray, shape (p,)
@@ -278,7 +283,8 @@ def pressed(
     held
         Whether that is no guess but what bears.
     """
-    groups, n = _groups(K, between, couples), gap.shape[1]
+    gap, widths, n = panels.gap, panels.widths, panels.gap.shape[1]
+    groups = _groups(panels.K, panels.between, couples)
     gaps, on = [group.of(gap) for group in groups], bearing
     responses = [np.empty((*own.shape, 1 + group.contacts.shape[1])) for group, own in zip(groups, gaps, strict=True)]
     y0 = -couples.times(T, carried)

@@ -124,17 +124,16 @@ class Housing:
             replace(given, nodes=_renumbered(f"attachment {given.name!r}", given.nodes, new_number))
             for given in attachments
         ]
-        notes = [*mesh.notes, *([LINEAR_NOTE] if mesh.tets.shape[1] == 4 else [])]
-        return cls.of_mesh(
+        housing = cls.of_mesh(
             Tetrahedra(mesh.nodes, mesh.tets, mass),
             bores,
             _fixed_nodes(fixed, mesh.nodes, new_number),
             material=material,
             attachments=made,
             outer=outer,
-            original=mesh.original,
-            notes=notes,
         )
+        notes = (*mesh.notes, *([LINEAR_NOTE] if mesh.tets.shape[1] == 4 else []), *housing.notes)
+        return replace(housing, original=mesh.original, notes=notes)
 
     @classmethod
     def of_mesh(
@@ -146,11 +145,10 @@ class Housing:
         material: SolidMaterial = STEEL,
         attachments: Sequence[Attachment] = (),
         outer: Outer | None = None,
-        original: Ints | None = None,
-        notes: Sequence[str] = (),
     ) -> Housing:
         """Housing from a mesh that is in order; see `from_arrays`. `fixed` are numbers of nodes."""
-        made, notes = [], list(notes)
+        made: list[Attachment] = []
+        notes: list[str] = []
         for number, bore in enumerate(bores, start=1):
             attachment, remarks = bore_attachment(bore, number, mesh.nodes)
             made.append(attachment)
@@ -163,7 +161,7 @@ class Housing:
             fixed=fixed,
             material=material,
             surface=mesh.surface([fixed, *(a.nodes for a in made)], outer),
-            original=np.arange(len(mesh.nodes)) if original is None else original,
+            original=np.arange(len(mesh.nodes)),
             notes=(*notes, *([FREE_NOTE] if len(fixed) == 0 else [])),
         )
 

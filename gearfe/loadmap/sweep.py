@@ -35,6 +35,7 @@ from ..gear.pair import GearPair
 from ..stiffness.positions import (
     PositionSolver,
     Progress,
+    TorqueGoals,
     at_torques,
     checked_contact,
     closed,
@@ -165,16 +166,17 @@ def _cells(
         ahead: dict[str, Any] = {}
         if rows is not known:
             twist, carried = predicted(parts[0], goals[known], touching, goals[rows])
-            ahead["first"] = np.where(np.isfinite(twist), twist, usual[cells])
-            ahead["share"] = 0.0 if strain is None else strain.expected(rows, carried)
+            expected = 0.0 if strain is None else strain.expected(rows, carried)
+            ahead["start"] = np.where(np.isfinite(twist), twist, usual[cells]), expected
         shares_of = None if strain is None else partial(strain.at, rows)
         ahead |= {"kept": np.arange(len(cells)), "tolerance": ACCEPTED}
-        found, share = at_torques(solver, angle[cells], torque[cells], touch[cells], shares_of, **ahead)
+        own = TorqueGoals(angle[cells], torque[cells], touch[cells])
+        found, share = at_torques(solver, own, shares_of, **ahead)
         if roots is not None:
             made = roots.at(found)
-            factor = torque[cells][made.position] / found.torque_wheel[made.position]
+            factor = own.torque[made.position] / found.torque_wheel[made.position]
             at_roots.append(replace(made, position=cells[made.position], stress=made.stress * factor[:, None]))
-        found = closed(with_shares(found, share), torque[cells], touch[cells])
+        found = closed(with_shares(found, share), own)
         parts.append(found.with_loads(np.zeros(len(cells), dtype=bool)))
         order.append(cells)
         if progress is not None:

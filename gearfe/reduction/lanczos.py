@@ -24,6 +24,10 @@ TOLERANCE = 1e-5
 NEAR = 1e-3
 
 
+#: Seed of the random start.
+SEED = 1
+
+
 @dataclass(frozen=True)
 class Modes:
     """Lowest modes of a pair (K, M).
@@ -55,7 +59,6 @@ def lowest_modes(
     at_least: int = 0,
     shift: float = 0.0,
     block: int = 8,
-    seed: int = 1,
 ) -> Modes:
     """Modes with the lowest eigenvalues: the first `count` of them, or all with ``lambda <= limit``.
 
@@ -75,8 +78,6 @@ def lowest_modes(
         s >= 0 (rad^2/s^2), for pairs whose K is singular.
     block
         Columns a step.
-    seed
-        Seed of the random start.
     """
     n = mass.shape[0]
     wanted = n if count is None else min(count, n)
@@ -84,7 +85,7 @@ def lowest_modes(
         return Modes(np.zeros(0), np.zeros((n, 0)), math.inf, 0)
     p = max(1, min(block, n))
     basis = _Basis(n, mass, capacity=min(n, 4 * min(wanted, 60) + 4 * p), width=p)
-    start = solve(np.asarray(mass @ np.random.default_rng(seed).standard_normal((n, p))))
+    start = solve(np.asarray(mass @ np.random.default_rng(SEED).standard_normal((n, p))))
     columns = p
     basis.append(start)
     projected = np.zeros((0, 0))

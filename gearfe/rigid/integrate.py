@@ -250,12 +250,11 @@ def _taylor(
     assembly = carrying(scene.assembly, start.excess)
     known = scene.__dict__.setdefault("_prepared", {})
     prepared = known.get((order, jit))
-    if prepared is None or prepared.tables is not assembly.tables:
-        prepared = known[order, jit] = taylor.prepare(assembly.tables, order, jit)
+    if prepared is None or prepared.assembly.tables is not assembly.tables:
+        prepared = known[order, jit] = taylor.prepare(assembly, order, jit)
     made = taylor.integrate_scene(
-        assembly, start, float(times[-1]), tolerance=local, order=order, longest=options["longest"], most=most, jit=jit,
-        prepared=prepared, watch=watch,
-    )  # fmt: skip
+        prepared, start, float(times[-1]), tolerance=local, longest=options["longest"], most=most, watch=watch
+    )
     statistics = {
         "scheme": "Taylor series",
         "steps": len(made.singular),

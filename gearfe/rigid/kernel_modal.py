@@ -13,6 +13,7 @@ of orders follows from the terms.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,14 +65,13 @@ class Output(NamedTuple):
     states: Array  # (room, 2n) there
 
 
-def law_order(j: int, t: float, s: float, u: Array, law: Any, memory: Array, pieces: IntArray, out: Array) -> None:
-    """Bound to the law's own `gearfe.rigid.contract.SeriesLaw.order`."""
+def _unbound(*_: Any) -> Any:
     raise NotImplementedError
 
 
-def law_corner(last: int, limit: float, law: Any, memory: Array, pieces: IntArray, ahead: bool) -> float:
-    """Bound to the law's own `gearfe.rigid.contract.SeriesLaw.corner`."""
-    raise NotImplementedError
+#: Stand for the law's own `order` and `corner`, see `gearfe.rigid.contract.SeriesLaw`, until they are bound.
+law_order: Callable[[int, float, float, Array, Any, Array, IntArray, Array], None] = _unbound
+law_corner: Callable[[int, float, Any, Array, IntArray, bool], float] = _unbound
 
 
 def project(W: Array, y: Array, j: int, out: Array) -> None:

@@ -182,17 +182,20 @@ def work_space(tables: Tables, order: int) -> Work:
 
 
 class Prepared(NamedTuple):
-    """Tables and work space of a scene, and what kernels get of them: the same, or both as blocks."""
+    """Tables and work space of a scene at one order, and what kernels get of them: the same, or both as blocks."""
 
-    tables: Tables
+    assembly: Assembly
+    order: int
+    jit: bool  # whether for compiled kernels
     work: Work
     handed: tuple[Any, Any]
 
 
-def prepare(tables: Tables, order: int, jit: bool) -> Prepared:
+def prepare(assembly: Assembly, order: int, jit: bool) -> Prepared:
     """What runs of one scene at one order share."""
+    tables = assembly.tables
     work = work_space(tables, order)
-    return Prepared(tables, work, (Packed(tables), Packed(work)) if jit else (tables, work))
+    return Prepared(assembly, order, jit, work, (Packed(tables), Packed(work)) if jit else (tables, work))
 
 
 @dataclass(frozen=True)
@@ -261,30 +264,25 @@ def order_for(tolerance: float) -> int:
 
 
 def integrate_scene(
-    assembly: Assembly,
+    shared: Prepared,
     start: Start,
     end: float,
     *,
     tolerance: float,
-    order: int | None = None,
     longest: float = math.inf,
     most: int = 1_000_000,
-    jit: bool = True,
-    prepared: Prepared | None = None,
     watch: Watch | None = None,
 ) -> TaylorRun:
     """Integrate the scene from its consistent start to the time `end`; `tolerance` is that of the last terms."""
-    order = order or order_for(tolerance)
-    tables, t0 = assembly.tables, start.time
-    shared = prepared or prepare(tables, order, jit)
-    w = shared.work
+    assembly, order, jit, w, both = shared
+    t0 = start.time
     w.q[:-3], w.v[:-3], w.base[:] = start.q, start.v, ~start.active
     sign = 1.0 if end >= t0 else -1.0
     run = Run(t0, end, sign, order, float(tolerance), assembly.length, float(longest), assembly.breaks)
     state = first_state(t0)
     compiling = load_kernels(shared, run) if jit else 0.0
     advance = kernels(jit).integrate_series
-    handed = (*shared.handed, Packed(run) if jit else run)
+    handed = (*both, Packed(run) if jit else run)
     parts = []
     room, done = min(FIRST_COMPILED if jit else FIRST_STEPS, most), 0
 
@@ -298,7 +296,7 @@ def integrate_scene(
         singular = np.zeros(room, dtype=np.int64)
         status, count = advance(*handed, state, times, coefficients, singular)
         if status == Status.SINGULAR_START:
-            rows, shift, ahead, row, status = kernels(False).begin(tables, w, run, t0)
+            rows, shift, ahead, row, status = kernels(False).begin(assembly.tables, w, run, t0)
             state[:] = t0 + shift, rows, ahead, 1.0, 0.0, row
             if status == Status.DONE:
                 continue

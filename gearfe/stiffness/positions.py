@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -194,39 +194,50 @@ def standard_stiffness(solver: PositionSolver) -> float:
     return mesh_stiffness(pair, moduli[0], moduli[1]) * elastic.width * pair.wheel.base_radius**2
 
 
+@dataclass(frozen=True)
+class TorqueGoals:
+    """Positions that are to carry torques.
+
+    Attributes
+    ----------
+    angle, torque, touching : ndarray, shape (n,)
+        Pinion angles (rad), torques at the wheel's hub (N m), and twists at which the rigid flanks touch (rad).
+    """
+
+    angle: Array
+    torque: Array
+    touching: Array
+
+
 def at_torques(
     solver: PositionSolver,
-    angles: Array,
-    goal: Array,
-    touching: Array,
+    goals: TorqueGoals,
     shares_of: Callable[[Positions], Array] | None,
     *,
-    first: Array | None = None,
-    share: Array | float = 0.0,
+    start: tuple[Array, Array | float] | None = None,
     kept: IntArray = NONE,
     tolerance: float | None = None,
     progress: Progress | None = None,
 ) -> tuple[Positions, Array]:
-    """Small-strain positions whose torques make `goal` (N m) with their shares of finite strain, and these shares.
+    """Small-strain positions whose torques make the goals with their shares of finite strain, and these shares.
 
     Laws on elements start from the twists of the half-plane law, so that they are asked for loads near the goal.
 
     Parameters
     ----------
-    touching
-        Twists (rad), shape (n,), at which the rigid flanks touch.
     shares_of
         Says the shares of positions; without it there are none.
-    first, share
+    start
         Twists to start from (rad), by default by the standard's stiffness, and shares expected there.
     tolerance
         Relative error of the torque, by default the solver's.
     """
     accepted = solver.torque_tolerance if tolerance is None else tolerance
-    twist = touching + goal / standard_stiffness(solver) if first is None else first
+    angles, goal, touching = goals.angle, goals.torque, goals.touching
+    twist, share = (touching + goal / standard_stiffness(solver), 0.0) if start is None else start
     share = np.broadcast_to(share, goal.shape)
-    if isinstance(solver, ElementSolver) and first is None:
-        twist = at_torques(solver.half_plane, angles, goal, touching, None)[0].twist
+    if isinstance(solver, ElementSolver) and start is None:
+        twist = at_torques(solver.half_plane, goals, None)[0].twist
 
     def search(chosen: IntArray) -> Positions:
         def solve(numbers: IntArray, twists: Array) -> Positions:
@@ -262,7 +273,7 @@ def at_torque(
     solver: PositionSolver, angles: Array, torque: float, touching: Array, progress: Progress | None, *, finite: bool
 ) -> Positions:
     """Positions at pinion angles (rad), shape (n,), that carry `torque` (N m); with or without finite strain."""
-    cycle, goal = solver.elastic.pitch_angle, np.full(len(angles), torque)
+    cycle, goals = solver.elastic.pitch_angle, TorqueGoals(angles, np.full(len(angles), torque), touching)
     sampled = sample_numbers(angles, cycle)
 
     def shares_of(found: Positions) -> Array:
@@ -271,20 +282,20 @@ def at_torque(
         )
 
     shares = shares_of if finite else None
-    found = with_shares(*at_torques(solver, angles, goal, touching, shares, kept=sampled, progress=progress))
-    return closed(found, goal, touching)
+    found = with_shares(*at_torques(solver, goals, shares, kept=sampled, progress=progress))
+    return closed(found, goals)
 
 
-def closed(found: Positions, goal: Array, touching: Array) -> Positions:
-    """Positions whose torques are nearly `goal` (N m), brought there by the last small step of their twists.
+def closed(found: Positions, goals: TorqueGoals) -> Positions:
+    """Positions whose torques are nearly the goals, brought there by the last small step of their twists.
 
     Moments change with the torque, widths of contacts with its root.
     """
-    good = found.status == "converged"
+    goal, good = goals.torque, found.status == "converged"
     factor = np.where(good, goal / np.where(good, found.torque_wheel, 1.0), 1.0)
     moments = {name: getattr(found, name) * factor for name in TORQUES if name != "tangent"}
     moments["torque_wheel"] = np.where(good, goal, found.torque_wheel)
-    twist = newton_twist(found.twist, touching, found.torque_wheel, found.tangent, goal)
+    twist = newton_twist(found.twist, goals.touching, found.torque_wheel, found.tangent, goal)
     contacts, of_contacts = found.contacts, factor[found.contacts.position]
     contacts = replace(
         contacts,
