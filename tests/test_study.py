@@ -229,29 +229,38 @@ def ishigami(x1, x2, x3):
     return np.sin(x1) + 7.0 * np.sin(x2) ** 2 + 0.1 * x3**4 * np.sin(x1)
 
 
-def test_ishigami_through_the_whole_machinery(tmp_path):
-    """The study's indices are those of the function at the study's points."""
-    study = read_study(written(tmp_path, "saltelli", 64))
+def ishigamis_indices() -> tuple[list[float], list[float]]:
+    """First order and total for a = 7, b = 0.1 (Saltelli et al., Global Sensitivity Analysis, 2008, section 4.6)."""
+    a, b, pi4 = 7.0, 0.1, math.pi**4
+    v1, v2, v13 = 0.5 * (1 + b * pi4 / 5) ** 2, a**2 / 8, b**2 * pi4**2 * (1 / 18 - 1 / 50)
+    v = v1 + v2 + v13
+    return [v1 / v, v2 / v, 0.0], [(v1 + v13) / v, v2 / v, v13 / v]
+
+
+@pytest.mark.parametrize(("n", "close"), [(64, 0.5), pytest.param(1024, 0.04, marks=pytest.mark.slow)])
+def test_ishigami_through_the_whole_machinery(n, close, tmp_path):
+    """The study's indices are those of the function at the study's points; with many points, those of theory."""
+    study = read_study(written(tmp_path, "saltelli", n))
     found = run_study(study, tmp_path, jobs=1).summary()["outputs"]["y"]["sobol"]
     y = ishigami(*np.array(study.cases).T)
-    parts = {"f_A": y[None, :64], "f_B": y[None, 64:128], "f_AB": y[128:].reshape(3, 1, 64)}
-    direct = sobol_indices(func=parts, n=64)
-    np.testing.assert_allclose(list(found["first_order"].values()), direct.first_order.ravel(), rtol=1e-12)
-    np.testing.assert_allclose(list(found["total_order"].values()), direct.total_order.ravel(), rtol=1e-12)
+    parts = {"f_A": y[None, :n], "f_B": y[None, n : 2 * n], "f_AB": y[2 * n :].reshape(3, 1, n)}
+    direct = sobol_indices(func=parts, n=n)
+    for order, known in zip(("first_order", "total_order"), ishigamis_indices(), strict=True):
+        values = list(found[order].values())
+        np.testing.assert_allclose(values, getattr(direct, order).ravel(), rtol=1e-12)
+        np.testing.assert_allclose(values, known, atol=close)
 
 
 def test_points_for_the_indices_give_those_of_theory():
-    """Ishigami's function for a = 7, b = 0.1 (Saltelli et al., Global Sensitivity Analysis, 2008, section 4.6)."""
+    """Of Ishigami's function."""
     n = 1 << 14
     shares = saltelli(qmc.Sobol(6, rng=np.random.default_rng(3)).random_base2(14))
     y = ishigami(*((2.0 * shares - 1.0) * math.pi).T)
     parts = {"f_A": y[None, :n], "f_B": y[None, n : 2 * n], "f_AB": y[2 * n :].reshape(3, 1, n)}
     found = sobol_indices(func=parts, n=n)
-    a, b, pi4 = 7.0, 0.1, math.pi**4
-    v1, v2, v13 = 0.5 * (1 + b * pi4 / 5) ** 2, a**2 / 8, b**2 * pi4**2 * (1 / 18 - 1 / 50)
-    v = v1 + v2 + v13
-    np.testing.assert_allclose(found.first_order.ravel(), [v1 / v, v2 / v, 0.0], atol=0.01)
-    np.testing.assert_allclose(found.total_order.ravel(), [(v1 + v13) / v, v2 / v, v13 / v], atol=0.01)
+    first, total = ishigamis_indices()
+    np.testing.assert_allclose(found.first_order.ravel(), first, atol=0.01)
+    np.testing.assert_allclose(found.total_order.ravel(), total, atol=0.01)
 
 
 def test_elementary_effects_of_a_linear_function_are_its_slopes(tmp_path):
