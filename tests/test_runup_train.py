@@ -18,6 +18,7 @@ from gearfe.runup.condensed import condense
 from gearfe.runup.law_kernel import BEND, CROSS, FORCE, MOMENT, TANGENT
 from gearfe.runup.modes import coupled_modes, crossings
 from gearfe.runup.run_up import run_up, steady_state
+from gearfe.runup.swinging import mesh_modes, swinging, write_modes
 from gearfe.train import Damping, Load, build_train, simulate
 from gearfe.train.arrays import law_arrays
 from gearfe.train.friction import Lubrication
@@ -165,6 +166,28 @@ def test_campbell_frequencies_are_those_of_the_whole_train():
     assert modes.strain.sum(axis=1) == pytest.approx(1.0)
 
 
+def test_modes_swing_as_fields(tmp_path):
+    """Each mode by itself, at its natural frequency; gears stand still but for it; the size is the one that is told."""
+    h5py = pytest.importorskip("h5py")
+    model = build_train(loaded([(20, 30)], smooth))
+    modes = coupled_modes(condense(model), np.array([200.0]), 6000.0)
+    chosen = mesh_modes(modes, 1, 0.5)
+    assert (modes.strain[chosen, 0] >= 0.5).all()
+    made = swinging(model, [0, chosen[0]], 8)
+    assert made.time == pytest.approx(np.concatenate([1 + np.arange(8) / 8, chosen[0] + 1 + np.arange(8) / 8]))
+    turn = made.gear_pose[:, :, 3:] @ model.scene.frame[2]
+    assert made.gear_pose[4] == pytest.approx(-made.gear_pose[0], abs=1e-12)
+    assert made.gear_pose[9] == pytest.approx(made.gear_pose[8] / math.sqrt(2.0), abs=1e-12)
+    rates = np.repeat(2 * math.pi * model.coupled_frequencies_hz[[0, chosen[0]]], 8)
+    assert made.acceleration_absolute == pytest.approx(-((rates**2)[:, None]) * turn, rel=1e-9, abs=1e-6)
+    write_modes(tmp_path, model, chosen[:1])
+    with h5py.File(tmp_path / "mode_gears.vtkhdf") as file:
+        root = file["VTKHDF"]
+        assert root["Steps"]["Values"][:] == pytest.approx(chosen[0] + 1 + np.arange(16) / 16)
+        moved = np.linalg.norm(root["PointData"]["displacement_m"][:], axis=1).max()
+    assert 0.005 < moved / 0.2 < 0.03  # two gears of 50 and 75 mm
+
+
 def test_critical_speeds_lie_where_orders_meet_modes():
     model = build_train(loaded([(20, 30)], smooth))
     made = condense(model)
@@ -249,11 +272,12 @@ def job(tmp_path):  # type: ignore[no-untyped-def]
 
 def test_the_command_writes_tables_and_pictures(job, tmp_path, capsys):
     out = tmp_path / "out"
-    assert main(["runup", str(job(RUNUP + "instability_loads = [0.5, 1.0]\n")), "--out", str(out)]) == 0
+    assert main(["runup", str(job(RUNUP + "instability_loads = [0.5, 1.0]\n")), "--out", str(out), "--fields"]) == 0
     names = sorted(path.name for path in out.iterdir())
     assert names == [
-        "campbell.png", "critical_speeds.csv", "instability.csv", "instability.png", "meshes.png", "modes.csv",
-        "orders.csv", "orders.png", "runup.csv", "summary.json", "waterfall.csv", "waterfall.npz", "waterfall.png",
+        "campbell.png", "critical_speeds.csv", "instability.csv", "instability.png", "meshes.png",
+        "mode_gears.vtkhdf", "modes.csv", "orders.csv", "orders.png",
+        "runup.csv", "summary.json", "waterfall.csv", "waterfall.npz", "waterfall.png",
     ]  # fmt: skip
     table = np.genfromtxt(out / "runup.csv", delimiter=",", names=True)
     assert table["speed_rad_per_s"].tolist() == np.linspace(500.0, 700.0, 6).tolist()

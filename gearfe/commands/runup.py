@@ -29,6 +29,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_keys(parser, RunUpTable, *KEYS)
     parser.add_argument("--attachment", metavar="NAME", help="attachment in the pictures (default: that of the load)")
     parser.add_argument("--no-stability", action="store_true", help="leave out the Floquet multipliers")
+    parser.add_argument(
+        "--fields", action="store_true", help="the modes that the meshes swing in, for ParaView (VTKHDF series)"
+    )
     parser.add_argument("--no-pictures", action="store_true", help="tables and summary only")
 
 
@@ -66,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     summary, names = write_runup(
         folder, made, multiples=table.multiples, attachment=args.attachment,
         draw=None if args.no_pictures else RunUpPictures(", ".join(parts)), watch=watch, further=described(job, table),
-        unstable=unstable,
+        unstable=unstable, fields=args.fields,
     )  # fmt: skip
     for line in _told(summary):
         print(line)

@@ -9,13 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..runup.instability import InstabilityMap
-from ..runup.modes import CoupledModes, Crossing
+from ..runup.modes import STRONG, CoupledModes, Crossing
 from ..runup.report import orders
 from ..runup.run_up import RunUp
 from .style import BLUE, COLOURS, GREY, RED, new_figure, save, tidy
 
-#: A mode is drawn strong where so much of its strain energy is in the meshes.
-STRONG = 0.03
 #: Reference of the levels of accelerations (m/s2), ISO 1683.
 REFERENCE = 1e-6
 

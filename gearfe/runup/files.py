@@ -10,14 +10,15 @@ from ..output.arrays import save_arrays
 from ..output.files import whole_set, write_csv, write_json
 from . import report
 from .instability import InstabilityMap
-from .modes import CoupledModes, Crossing
+from .modes import STRONG, CoupledModes, Crossing
 from .run_up import RunUp
+from .swinging import mesh_modes, write_modes
 
 #: All that a run can write.
 FILES = (
     "runup.csv", "orders.csv", "waterfall.csv", "waterfall.npz", "modes.csv", "critical_speeds.csv", "summary.json",
     "waterfall.png", "campbell.png", "orders.png", "meshes.png",
-    "instability.csv", "instability.png",
+    "instability.csv", "instability.png", "mode_gears.vtkhdf", "mode_housing.vtkhdf",
 )  # fmt: skip
 
 
@@ -35,7 +36,7 @@ class Pictures(Protocol):
 
 def write_runup(
     folder: Path, run: RunUp, *, multiples: int, attachment: str | None, draw: Pictures | None, watch: Any,
-    further: Mapping[str, Any], unstable: InstabilityMap | None = None,
+    further: Mapping[str, Any], unstable: InstabilityMap | None = None, fields: bool = False,
 ) -> tuple[dict[str, Any], list[str]]:  # fmt: skip
     """Write tables, pictures and the summary; returns the summary and the names of the files.
 
@@ -45,6 +46,8 @@ def write_runup(
         Entries of the summary that tell what was computed.
     unstable
         Map of parametric instability, where one was asked for.
+    fields
+        Whether modes that the meshes swing in are written as fields.
     """
     bore = report.attachment_to_draw(run, attachment)
     with watch.stage("modes"):
@@ -59,6 +62,10 @@ def write_runup(
                 draw(target, run, modes, met, multiples, bore)
                 if unstable is not None:
                     draw.instability(target / "instability.png", unstable)
+        if fields:
+            with watch.stage("fields"):
+                model = run.train.model
+                write_modes(target, model, mesh_modes(modes, len(model.meshes), STRONG))
         made = {**further, **report.summary(run, modes, multiples), "warnings": report.warnings(run)}
         made["timings_s"] = dict(watch.seconds)
         write_json(target / "summary.json", made)

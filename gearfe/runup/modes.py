@@ -14,6 +14,9 @@ import numpy as np
 from ..typing import Array
 from .condensed import CondensedTrain
 
+#: The meshes swing in a mode where so much of its strain energy is in them.
+STRONG = 0.03
+
 
 @dataclass(frozen=True, eq=False)
 class CoupledModes:

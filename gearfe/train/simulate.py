@@ -136,7 +136,7 @@ def _pieces(
         last = status != "done" or end == len(t) - 1
         if finer is not None:
             finer.compare(model, t[begin : end + 1], kept, int(trajectory.statistics["steps"]))
-        response = _response(model, kept, status, so_far.reached, so_far.statistics(model, trajectory))
+        response = response_of(model, kept, status, so_far.reached, so_far.statistics(model, trajectory))
         if last:
             if begin:
                 count(0, 0)  # what follows is no part of the count
@@ -346,9 +346,10 @@ def _cut(moved: Motion, first: int, keep: int) -> Motion:
     return Motion(*(getattr(moved, name)[first:keep] for name in Motion.__dataclass_fields__))
 
 
-def _response(
+def response_of(
     model: TrainModel, moved: Motion, status: str, reached: float, statistics: dict[str, Any]
 ) -> TrainResponse:
+    """A motion as a response, without multipliers and estimates."""
     scene, t = model.scene, moved.time
     spin = [int(i) + 5 for i in model.first]
     rate, push = (model.angle(t, k)[:, None] * model.ratios for k in (1, 2))

@@ -20,6 +20,7 @@ from ..gear.drawing import gear_outline
 from ..gear.spur_gear import Gear
 from ..output.vtkhdf import VtkHdfSeries
 from ..reduction.modal_body import ModalBody
+from ..train.kinematics import driving_senses
 from ..train.phases import tooth_places
 from ..train.response import TrainResponse
 from ..train.scene import ShaftGear, TrainScene
@@ -92,8 +93,7 @@ def cylinder_surface(radius: float, low: float, high: float) -> tuple[Array, Int
 def solids(scene: TrainScene, response: TrainResponse, *, per_segment: int = 2) -> tuple[Solid, ...]:
     """Surfaces of all gears and of the shafts that carry them, where they stand at the start."""
     frame = scene.frame
-    first = {gear.name: _spin(response, response.gear_names.index(gear.name), frame) for gear in scene.gears}
-    senses = [-1.0 if first[mesh.driver][-1] < 0.0 else 1.0 for mesh in scene.meshes]
+    senses = driving_senses(scene) if scene.drive is not None else (1.0,) * len(scene.meshes)
     angles = tooth_places(scene, senses).angles
     found = []
     carried: set[str] = set()
@@ -215,10 +215,6 @@ def _coordinates(response: TrainResponse) -> tuple[Array, Array]:
     if response.modal is None or response.modal_acceleration is None:
         raise InputError("housing", None, "is rigid and has no field", "take an elastic housing")
     return response.modal, response.modal_acceleration
-
-
-def _spin(response: TrainResponse, gear: int, frame: Array) -> Array:
-    return np.asarray(response.gear_pose[:, gear, 3:] @ frame[2])
 
 
 def _shaft(scene: TrainScene, gear: ShaftGear, number: int) -> Solid:
