@@ -12,9 +12,16 @@ from . import progress
 
 @dataclass
 class Stopwatch:
-    """Seconds by stage."""
+    """Seconds by stage.
+
+    Attributes
+    ----------
+    begun
+        When the whole began, of `time.perf_counter`.
+    """
 
     seconds: dict[str, float] = field(default_factory=dict)
+    begun: float = field(default_factory=time.perf_counter)
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:

@@ -18,8 +18,8 @@ from gearfe.stopwatch import Stopwatch
 from gearfe.train import Damping, Load, build_train, simulate
 from gearfe.train.response import SAMPLED, joined
 from gearfe.train.simulate import simulate_in_pieces
-from gearfe.vibration.files import OutputChoice, write_all, write_run
-from gearfe.vibration.follow import Envelope, RunningMean
+from gearfe.vibration.files import OutputChoice, write_run
+from gearfe.vibration.follow import Envelope, RunningMean, TrainRun
 
 from .train_responses import made_up, table
 from .trains import TORQUE, curve, train
@@ -86,10 +86,12 @@ def test_the_files_of_pieces(model, tmp_path, small_pieces):
     pieces = list(simulate_in_pieces(model, times))
     for folder in ("one", "two"):
         (tmp_path / folder).mkdir()
-    options = {"watch": Stopwatch(), "every": every}
-    choice = OutputChoice()
-    one = write_run(tmp_path / "one", model.scene, lambda _: pieces, outputs, choice, **options)
-    two = write_all(tmp_path / "two", model.scene, joined(pieces), choice, **options)
+
+    def written(name, parts):
+        planned = TrainRun(model.scene, outputs, lambda _: parts, every)
+        return write_run(tmp_path / name, planned, OutputChoice(), watch=Stopwatch())
+
+    one, two = written("one", pieces), written("two", [joined(pieces)])
     assert one.names == two.names == ("response.csv", "spectrum.csv", "summary.json")
     texts = [(tmp_path / folder / "response.csv").read_text() for folder in ("one", "two")]
     assert texts[0] == texts[1]
@@ -113,8 +115,7 @@ def test_a_long_run_needs_the_memory_of_a_piece(model, tmp_path, small_pieces):
 
         gc.collect()
         tracemalloc.start()
-        options = {"watch": Stopwatch(), "every": every}
-        write_run(tmp_path, model.scene, pieces, outputs, OutputChoice(), **options)
+        write_run(tmp_path, TrainRun(model.scene, outputs, pieces, every), OutputChoice(), watch=Stopwatch())
         most = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return most
@@ -135,9 +136,8 @@ def test_a_run_that_ends_early_is_made_again(tmp_path, model):
         status = "diverged" if len(times) > 121 else "done"
         return [replace(whole.at(np.arange(121)), status=status, time_reached=float(whole.time[120]))]
 
-    options = {"watch": Stopwatch()}
     choice = OutputChoice(spectrum_start=6e-3)
-    written = write_run(tmp_path, model.scene, pieces, whole.time, choice, **options)
+    written = write_run(tmp_path, TrainRun(model.scene, whole.time, pieces), choice, watch=Stopwatch())
     assert asked == [201, 121]
     assert written.response.status == "diverged"
     assert written.spectra.spectrum.resolution == pytest.approx(1 / (120 * 35e-6))

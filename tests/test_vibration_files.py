@@ -24,7 +24,8 @@ from gearfe.vibration.fields import (
     write_gears,
     write_housing,
 )
-from gearfe.vibration.files import OutputChoice, write_all
+from gearfe.vibration.files import OutputChoice, write_run
+from gearfe.vibration.follow import TrainRun
 from gearfe.vibration.report import mean_over_periods
 from gearfe.vibration.spectra import response_columns, spectra
 
@@ -60,9 +61,17 @@ def scene():
 # ---- files of a known response ---------------------------------------------------------------------------------------
 
 
+def write_all(folder, scene, response, choice, **options):
+    """The files of a response at hand."""
+    if response.status != "done":
+        choice = replace(choice, spectrum_start=0.0, spectrum_length=None)
+    planned = TrainRun(scene, response.time, lambda _: [response])
+    return write_run(folder, planned, choice, watch=Stopwatch(), **options)
+
+
 def test_columns_and_digits(tmp_path, scene):
     response = made_up()
-    written = write_all(tmp_path, scene, response, OutputChoice(), draw=TrainPictures("made up"), watch=Stopwatch())
+    written = write_all(tmp_path, scene, response, OutputChoice(), draw=TrainPictures("made up"))
     names, values = table(tmp_path / "response.csv")
     assert names[: len(COLUMNS)] == COLUMNS
     assert values.shape == (COUNT, len(names))
@@ -85,11 +94,11 @@ def test_a_response_with_numbers_that_are_none_is_told(tmp_path, scene):
     made = made_up()
     made.drive_angle[7] = math.nan
     with pytest.warns(NotFiniteWarning, match=r"response.csv: column drive_angle_deg: 1 of .* the first in row 8"):
-        write_all(tmp_path, scene, made, OutputChoice(), watch=Stopwatch())
+        write_all(tmp_path, scene, made, OutputChoice())
 
 
 def test_spectrum_of_known_lines(tmp_path, scene):
-    write_all(tmp_path, scene, made_up(), OutputChoice(), watch=Stopwatch())
+    write_all(tmp_path, scene, made_up(), OutputChoice())
     names, values = table(tmp_path / "spectrum.csv")
     by_name = dict(zip(names, values.T, strict=True))
     assert by_name["frequency_Hz"] == pytest.approx(np.arange(101) / 7e-3, rel=1e-13)
@@ -107,7 +116,7 @@ def test_spectrum_of_known_lines(tmp_path, scene):
 
 
 def test_summary_of_a_known_response(tmp_path, scene):
-    write_all(tmp_path, scene, made_up(), OutputChoice(), watch=Stopwatch())
+    write_all(tmp_path, scene, made_up(), OutputChoice())
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["mean_over_common_periods"] == 3
     # bins 13 and 9 of 7 ms leave a known rest over 3 periods of 1.5708 ms at the end
@@ -168,7 +177,7 @@ def test_a_run_that_ended_early_is_written(tmp_path, scene):
     }
     response = made_up(**short, status="diverged", time_reached=39 * STEP)
     choice = OutputChoice(spectrum_start=5e-3)  # beyond what was reached
-    written = write_all(tmp_path, scene, response, choice, watch=Stopwatch())
+    written = write_all(tmp_path, scene, response, choice)
     assert {"response.csv", "spectrum.csv", "summary.json"} <= set(written.names)
     assert len(table(tmp_path / "response.csv")[1]) == 40
     summary = json.loads((tmp_path / "summary.json").read_text())

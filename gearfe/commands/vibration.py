@@ -71,9 +71,9 @@ def run(args: argparse.Namespace) -> int:
     from ..vibration.analysis import Analysis, options, record_start
     from ..vibration.files import OutputChoice, check_choice, write_run
     from ..vibration.job import train_job
-    from ..vibration.run import band, described, repeater, simulated
+    from ..vibration.run import simulated
 
-    watch = Stopwatch({"program start": time.perf_counter() - started})
+    watch = Stopwatch({"program start": time.perf_counter() - started}, started)
     with watch.stage("reading"):
         job = train_job(args.job, tables)
         choice = OutputChoice(
@@ -87,28 +87,20 @@ def run(args: argparse.Namespace) -> int:
         bores = tuple(str(a) for s in job.table.shafts for a in s.attachments)
         check_choice(choice, job.times, bores)
         folder = output_folder(args.out)
-    estimate = not args.no_estimate
-    scene, pieces, every = simulated(
-        job, args.curve, watch=watch, progress=count, floquet=not args.no_floquet, estimate=estimate
-    )
+    chosen = {"floquet": not args.no_floquet, "estimate": not args.no_estimate}
+    planned = simulated(job, args.curve, watch=watch, progress=count, **chosen)
+    scene, every = planned.scene, planned.every
     start = record_start(job, scene, every, args.spectrum_from_ms, watch.stage)
     choice = replace(choice, spectrum_start=start)
     check_choice(choice, job.times, bores)
     written = write_run(
         folder,
-        scene,
-        pieces,
-        job.times,
+        planned,
         choice,
         watch=watch,
         draw=None if args.no_pictures else TrainPictures(title(job)),
         beside=Analysis(job, scene, every, start),
-        every=every,
-        further=described(job, scene),
         progress=count,
-        again=repeater(job, every) if estimate else None,
-        band_hz=band(job),
-        started=started,
     )
     response = written.response
     for line in report_lines(response, scene, written, choice):

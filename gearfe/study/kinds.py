@@ -133,21 +133,18 @@ def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
     from ..vibration.analysis import Analysis, options, record_start
     from ..vibration.files import OutputChoice, write_run
     from ..vibration.job import train_job
-    from ..vibration.run import band, described, repeater, simulated
+    from ..vibration.run import simulated
 
     job, watch = train_job(path, train_tables(raw, path)), Stopwatch()
     if job.table.method == "auto":
         job = replace(job, table=replace(job.table, method="taylor" if use_compiled("auto") else "explicit"))
-    scene, pieces, every = simulated(job, (), watch=watch, floquet=False, estimate=estimate)
-    start = record_start(job, scene, every, None, watch.stage)
+    planned = simulated(job, (), watch=watch, floquet=False, estimate=estimate)
+    start = record_start(job, planned.scene, planned.every, None, watch.stage)
     choice = OutputChoice(spectrum_start=start, **options(job.spectrum, None, None))
-    beside = Analysis(job, scene, every, start)
+    beside = Analysis(job, planned.scene, planned.every, start)
     with TemporaryDirectory() as name:  # a response may be longer than memory
         folder = Path(name)
-        made = write_run(
-            folder, scene, pieces, job.times, choice, watch=watch, every=every, beside=beside,
-            further=described(job, scene), again=repeater(job, every) if estimate else None, band_hz=band(job),
-        )  # fmt: skip
+        made = write_run(folder, planned, choice, watch=watch, beside=beside)
         files = sorted(folder.glob("*.csv"), key=lambda path: (path.stem != "response", path.stem))
         rows = {path.stem: read_csv(path, path.stem) for path in files}  # a short run has one
     status = made.response.status

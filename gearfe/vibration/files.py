@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, given
 from ..output.files import whole_set, write_csv, write_json
 from ..stopwatch import Stopwatch
 from ..train.response import TrainResponse
@@ -18,7 +18,7 @@ from ..train.scene import TrainScene
 from ..typing import Array, IntArray
 from . import analysis
 from .errors import Run, with_errors
-from .follow import Followed, follow
+from .follow import Followed, TrainRun, follow
 from .report import attachment_to_draw, train_summary
 from .spectra import TrainRecord, TrainSpectra, record
 
@@ -110,37 +110,15 @@ def check_choice(choice: OutputChoice, times: np.ndarray, attachments: tuple[str
         raise InputError("--picture-ms", float(f"{1e3 * time:.12g}"), problem, "choose another time")
 
 
-def write_all(
-    folder: Path,
-    scene: TrainScene,
-    response: TrainResponse,
-    choice: OutputChoice,
-    *,
-    every: int = 1,
-    **options: Any,
-) -> Written:
-    """Write the files of a response at hand, `every` samples of which make an output step; see `write_run`."""
-    if response.status != "done":
-        choice = replace(choice, spectrum_start=0.0, spectrum_length=None)
-    return write_run(folder, scene, lambda _: [response], response.time[::every], choice, every=every, **options)
-
-
 def write_run(
     folder: Path,
-    scene: TrainScene,
-    pieces: Callable[[Array], Iterable[TrainResponse]],
-    times: Array,
+    planned: TrainRun,
     choice: OutputChoice,
     *,
     watch: Stopwatch,
     draw: Pictures | None = None,
     beside: analysis.Analysis | None = None,
-    every: int = 1,
-    further: Mapping[str, Any] | None = None,
     progress: Callable[[int, int, str], None] | None = None,
-    again: Callable[[TrainScene, str], Callable[[Array], Iterable[TrainResponse]]] | None = None,
-    band_hz: float = 5000.0,
-    started: float | None = None,
 ) -> Written:
     """Write ``response.csv``, ``spectrum.csv``, ``summary.json`` and what else is chosen while a run goes on.
 
@@ -148,22 +126,12 @@ def write_run(
 
     Parameters
     ----------
-    pieces
-        Makes the run over the given output times, `every` samples in a step, and hands it over piece by piece.
-    times : (n,)
-        Output times (s).
     draw
         Draws the pictures.
     beside
         What [spectrum] asks for beside the spectrum.
-    again
-        Makes the same of a changed train by the method that the run took: the summary's numbers then have estimates
-        of their errors.
-    band_hz
-        Upper end of the band (Hz) in which the reduction's error is told.
-    started
-        Of `time.perf_counter`: the watch gets the total.
     """
+    scene, times, every = planned.scene, planned.times, planned.every
     radiation = scene.housing.radiation if scene.housing is not None and scene.housing.has_mesh else None
     problems: list[str] = []
     with whole_set(folder, MAY_WRITE) as target:
@@ -171,7 +139,7 @@ def write_run(
         def followed(times: Array, choice: OutputChoice) -> Followed:
             table, keep = target / "response.csv", field_steps(times, choice) if choice.fields else None
             with watch.stage("transient"):
-                run = _timed(pieces(times) if beside is None else beside.watching(pieces(times)), watch)
+                run = _timed(planned.pieces(times) if beside is None else beside.watching(planned.pieces(times)), watch)
                 record = recorded(times, choice)
                 return follow(run, times, every, table=table, radiation=radiation, record=record, keep=keep)
 
@@ -181,7 +149,7 @@ def write_run(
             return TrainRecord(times, every, radiation, **options) if len(times) > 2 else None
 
         def repeated(changed: TrainScene) -> Run:
-            assert again is not None
+            again = given(planned.again, "again")
             method = str(response.statistics["method"])
             found = follow(again(changed, method)(times), times, every, record=recorded(times, choice))
             return Run(train_summary(found, {}), found.spectra)
@@ -196,10 +164,10 @@ def write_run(
             watch.seconds["transient"] -= compiling
             watch.seconds["compiling"] = compiling
         spectra = made.spectra
-        run = Run(train_summary(made, {}, **(further or {})), spectra)
-        if again is not None:
+        run = Run(train_summary(made, {}, **planned.further), spectra)
+        if planned.again is not None:
             with watch.stage("error estimates"):
-                run = Run(with_errors(run, scene, repeated, band_hz=band_hz), spectra)
+                run = Run(with_errors(run, scene, repeated, band_hz=planned.band_hz), spectra)
         with watch.stage("tables"):
             if spectra is not None:
                 write_csv(target / "spectrum.csv", spectra.columns())
@@ -218,8 +186,7 @@ def write_run(
         if choice.fields and made.outputs:
             with watch.stage("fields"):
                 problems += _fields(target, scene, made.kept, times[: made.outputs], choice, draw, progress)
-        if started is not None:
-            watch.seconds["total"] = time.perf_counter() - started
+        watch.seconds["total"] = time.perf_counter() - watch.begun
         summary = {**run.summary, "timings_s": dict(watch.seconds)}
         write_json(target / "summary.json", summary)
         names = tuple(sorted(path.name for path in target.iterdir()))

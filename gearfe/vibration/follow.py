@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import InputError
 from ..output.files import csv_table
 from ..train.response import TrainResponse, joined
+from ..train.scene import TrainScene
 from ..typing import Array, IntArray
 from .spectra import TrainRecord, TrainSpectra, response_columns
 
@@ -20,6 +21,36 @@ from .spectra import TrainRecord, TrainSpectra, response_columns
 DRAWN = 4000
 #: Samples that a spline through a piece shares with the piece before.
 _SHARED = 3
+
+
+@dataclass(frozen=True)
+class TrainRun:
+    """A transient that is computed when its pieces are taken.
+
+    Attributes
+    ----------
+    scene
+        The train.
+    times : (n,)
+        Output times (s).
+    pieces
+        Makes the run over the given output times, `every` samples in a step, and hands it over piece by piece.
+    further
+        Entries of the summary.
+    again
+        Makes the same of a changed train by the method that the run took: the summary's numbers then have estimates
+        of their errors.
+    band_hz
+        Upper end of the band (Hz) in which the reduction's error is told.
+    """
+
+    scene: TrainScene
+    times: Array
+    pieces: Callable[[Array], Iterable[TrainResponse]]
+    every: int = 1
+    further: Mapping[str, Any] = field(default_factory=dict)
+    again: Callable[[TrainScene, str], Callable[[Array], Iterable[TrainResponse]]] | None = None
+    band_hz: float = 5000.0
 
 
 @dataclass(frozen=True, eq=False)

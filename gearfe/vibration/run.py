@@ -15,6 +15,7 @@ from ..train.response import TrainResponse
 from ..train.scene import TrainScene
 from ..train.simulate import simulate_in_pieces
 from ..versions import versions
+from .follow import TrainRun
 from .job import TrainJob, job_scene, train_body
 from .mesh_stiffness import train_curves
 from .report import stiffness_ranges
@@ -25,8 +26,8 @@ ROUGH = 1e-3
 
 def simulated(
     job: TrainJob, curves: Sequence[str], *, watch: Any, progress: Any = None, floquet: bool, estimate: bool
-) -> tuple[TrainScene, Callable[[Any], Iterator[TrainResponse]], int]:
-    """Curves and housing of a job, each from the cache where it can be; the run over given times; samples in a step."""
+) -> TrainRun:
+    """The run of a job, its curves and housing each from the cache where it can be."""
     with watch.stage("curves"):
         stiffness = train_curves(job, curves, progress=progress, estimate=estimate)
     with watch.stage("housing"):
@@ -40,7 +41,9 @@ def simulated(
     def pieces(times: Any) -> Iterator[TrainResponse]:
         return simulate_in_pieces(model, finer(times, highest)[0], floquet=floquet, estimate=estimate, **options)
 
-    return scene, pieces, finer(job.times, highest)[1]
+    every = finer(job.times, highest)[1]
+    again = repeater(job, every) if estimate else None
+    return TrainRun(scene, job.times, pieces, every, described(job, scene), again, band(job))
 
 
 def band(job: TrainJob) -> float:
