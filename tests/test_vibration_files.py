@@ -14,8 +14,10 @@ from gearfe.errors import InputError, NotFiniteWarning
 from gearfe.figures.train import TrainPictures
 from gearfe.figures.train_scene import draw_scene, sharp_edges
 from gearfe.housing import Attachment, Housing
+from gearfe.rigid import constant
 from gearfe.stopwatch import Stopwatch
-from gearfe.train import GearMesh, Shaft, ShaftGear, TrainScene
+from gearfe.train import Drive, GearMesh, Shaft, ShaftGear, TrainScene
+from gearfe.train.kinematics import rolling
 from gearfe.vibration.fields import (
     frames,
     gear_surface,
@@ -55,7 +57,7 @@ def scene():
         ShaftGear("gear4", "output", -2e-3, gears.wheel),
     )
     meshes = (GearMesh("gear1", "gear2", 1e8), GearMesh("gear3", "gear4", 1e8, phase=0.1))
-    return TrainScene(shafts, on, meshes, None)
+    return TrainScene(shafts, on, meshes, Drive("drive", "1", constant(600.0)))
 
 
 # ---- files of a known response ---------------------------------------------------------------------------------------
@@ -235,6 +237,24 @@ def test_gears_turn_and_move_as_told(scene):
     assert after == pytest.approx(np.column_stack([before[:, 2], before[:, 1], -before[:, 0]]), abs=1e-15)
     both = moved(part, response, scene.frame, 2) - centre
     assert both == pytest.approx(np.array([1e-4, 2e-4, 3e-4]) + after + np.cross([1e-3, 0.0, -2e-3], after), abs=1e-15)
+
+
+def test_smooth_rolling_is_no_vibration(scene):
+    """What is left is the displacement, and the radius times what a gear turns further than the drive makes it."""
+    angle = np.zeros(COUNT)
+    angle[3] = 0.7
+    pose = np.zeros((COUNT, 4, 6))
+    ratios = rolling(scene).ratios
+    shafts = [shaft.name for shaft in scene.shafts]
+    for g, gear in enumerate(scene.gears):
+        pose[:, g, 3:] = np.outer(float(ratios[shafts.index(gear.shaft)]) * angle, scene.frame[2])
+    pose[3, :, :3] = [1e-6, 2e-6, 2e-6]
+    shown = frames(scene, made_up(gear_pose=pose, drive_angle=angle), [3], exaggeration=1.0)
+    assert shown["gear_values"] == pytest.approx(3.0, rel=1e-5)  # um
+    pose[3, :, :3] = 0.0
+    pose[3, 0, 3:] += 1e-6 * scene.frame[2]
+    turned = frames(scene, made_up(gear_pose=pose, drive_angle=angle), [3], exaggeration=1.0)["gear_values"]
+    assert turned.max() == pytest.approx(1e3 * 1e3 * scene.gears[0].gear.tip_radius * 1e-6, rel=1e-4)
 
 
 def test_the_series_of_the_gears(tmp_path, scene):

@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
             raise unknown_name("--attachment", args.attachment, bores)
         folder = output_folder(args.out)
     made, unstable = solved(job, table, args.curve, watch=watch)
-    parts = [f"{len(job.table.shafts)} shafts, {len(job.table.meshes)} gear meshes"]
+    parts = [f"{len(job.table.shafts)} shafts, {len(job.table.meshes)} gear mesh{'es' * (len(job.table.meshes) != 1)}"]
     parts += [f"load {told(x.torque_Nm, 'N m')} on {x.shaft}".replace("-", "−", 1) for x in job.table.loads[:1]]
     parts += [f"variant {job.table.variant}"] if job.table.variant else []
     summary, names = write_runup(

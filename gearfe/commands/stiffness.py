@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..config import check_range
 from ..progress import announce, count
 from ..tables.laws import check_law
 from ..tables.stiffness import StiffnessTable
@@ -44,6 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_removed(parser, StiffnessTable.REMOVED)
     parser.add_argument("--no-estimate", action="store_true", help="leave out the error estimate")
+    parser.add_argument(
+        "--range", type=float, metavar="X", help="end of the colours in the pictures of --fields (MPa; default: chosen)"
+    )
     parser.add_argument("--no-pictures", action="store_true", help="leave out the picture")
     parser.add_argument(
         "--fields",
@@ -64,6 +68,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compute the curve and write the files; 1 when a position failed."""
+    if args.range is not None:
+        check_range(args.range, "--range", {"above": 0.0, "doc": "end of the colours (MPa)"})
     started = time.perf_counter()
     from ..config import load_job
     from ..errors import InputError
@@ -111,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
             curve.to_csv(made / "stiffness.csv")
         if chosen is not None:
             with watch.stage("fields"):
-                _fields(made, job, elastic, curve, None if isinstance(chosen, str) else chosen)
+                _fields(made, job, elastic, curve, None if isinstance(chosen, str) else chosen, args.range)
         if args.animate is not None:
             with watch.stage("animation"):
                 from ..figures.stress import stress_animation
@@ -134,13 +140,15 @@ def run(args: argparse.Namespace) -> int:
     return 1 if curve.failed.any() else 0
 
 
-def _fields(folder: Path, job: StiffnessJob, elastic: Any, curve: Any, angles_deg: list[float] | None) -> None:
+def _fields(
+    folder: Path, job: StiffnessJob, elastic: Any, curve: Any, angles_deg: list[float] | None, most: float | None
+) -> None:
     from ..figures.stiffness import pressure_figure
     from ..figures.stress import stress_figure
     from ..stiffness.fields_output import write_fields
 
     def draw(position: Any, fields: Any) -> None:
-        stress_figure(folder, job.pair, position, fields)
+        stress_figure(folder, job.pair, position, fields, most)
 
     pressures = write_fields(folder, job.pair, elastic, curve, angles_deg, draw=draw, progress=count)
     if pressures:

@@ -41,6 +41,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--spectrum-ms", type=float, metavar="T", help="its duration (default: to the end)")
     parser.add_argument("--attachment", metavar="NAME", help="attachment in the pictures (default: that of the load)")
+    parser.add_argument(
+        "--band", nargs=2, type=float, metavar=("LOW", "HIGH"), help="frequencies of the pictures' spectra (Hz)"
+    )
+    parser.add_argument(
+        "--range", type=float, metavar="X", help="end of the colours in the picture of --fields (m/s2; default: chosen)"
+    )
     parser.add_argument("--no-pictures", action="store_true", help="tables and summary only")
     parser.add_argument("--no-floquet", action="store_true", help="leave out the stability analysis")
     parser.add_argument("--no-estimate", action="store_true", help="leave out the error estimates")
@@ -55,6 +61,7 @@ def run(args: argparse.Namespace) -> int:
     """Compute and write; 1 when the run ended early or a picture could not be drawn."""
     started = time.perf_counter()
     from ..config import check_range
+    from ..errors import InputError
     from ..tables.train import read_train_tables
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
@@ -64,6 +71,11 @@ def run(args: argparse.Namespace) -> int:
         check_range(args.spectrum_from_ms, "--spectrum-from-ms", {"low": 0.0, "doc": "begin of the record (ms)"})
     if args.spectrum_ms is not None:
         check_range(args.spectrum_ms, "--spectrum-ms", {"above": 0.0, "doc": "duration of the record (ms)"})
+
+    if args.range is not None:
+        check_range(args.range, "--range", {"above": 0.0, "doc": "end of the colours (m/s2)"})
+    if args.band is not None and not 0.0 <= args.band[0] < args.band[1]:
+        raise InputError("--band", args.band, "must be two rising frequencies >= 0", "as --band 200 4000")
 
     from ..figures.train import TrainPictures
     from ..output.files import output_folder
@@ -98,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
         planned,
         choice,
         watch=watch,
-        draw=None if args.no_pictures else TrainPictures(title(job)),
+        draw=None if args.no_pictures else TrainPictures(title(job), args.band and tuple(args.band), args.range),
         beside=Analysis(job, scene, every, start),
         progress=count,
     )
@@ -115,7 +127,7 @@ def run(args: argparse.Namespace) -> int:
 def title(job: TrainJob) -> str:
     """Line above the pictures."""
     table = job.table
-    parts = [f"{len(table.shafts)} shafts, {len(table.meshes)} gear meshes"]
+    parts = [f"{len(table.shafts)} shafts, {len(table.meshes)} gear mesh{'es' * (len(table.meshes) != 1)}"]
     if table.drive is not None:
         parts.append("drive " + told(table.drive.speed_rad_per_s, "rad/s"))
     parts += [f"load {told(x.torque_Nm, 'N m')} on {x.shaft}".replace("-", "−", 1) for x in table.loads[:1]]

@@ -13,8 +13,11 @@ from ..typing import Array
 from ..vibration.radiation import RadiatedPower
 from ..vibration.report import lines_of
 from ..vibration.spectra import TrainSpectra
+from .labels import label_lines
 from .style import BLUE, GREEN, GREY, ORANGE, RED, fixed, panel, save_fixed
 
+#: Frequencies (Hz) between which a spectrum is drawn; None: from 0 to where the lines end.
+Band = tuple[float, float] | None
 #: Lines that a picture shows at most: more than it has columns of pixels.
 _DRAWN = 2000
 #: Lines that are named in the picture of a spectrum, and the least amplitude of such a line in parts of the largest.
@@ -25,10 +28,12 @@ _MESH_MULTIPLES = 4.2
 _DASHES = ((0, (6, 3)), (0, (2, 2)), (0, (6, 2, 2, 2)))
 
 
-def draw_spectrum(path: Path, response: TrainResponse, made: TrainSpectra, attachment: str, title: str) -> None:
+def draw_spectrum(
+    path: Path, response: TrainResponse, made: TrainSpectra, attachment: str, title: str, band: Band = None
+) -> None:
     """Amplitude spectrum of the acceleration at an attachment as lines, its largest lines named."""
     name, spectrum = f"attachment_{attachment}_acceleration_m_per_s2", made.spectrum
-    amplitude = made.amplitude(name)
+    amplitude = _inside(spectrum.frequency, made.amplitude(name), band)
     lines = lines_of(response, float(spectrum.frequency[-1]))
     named = []
     for peak in peaks(spectrum.frequency, amplitude, _NAMED, above=_LEAST):
@@ -36,45 +41,35 @@ def draw_spectrum(path: Path, response: TrainResponse, made: TrainSpectra, attac
         what = "" if line is None else f"\n{line.name} × {line.order}"
         named.append((1e-3 * peak.frequency, peak.amplitude, f"{peak.frequency:.0f} Hz: {peak.amplitude:.3g}{what}"))
     window = "no window" if spectrum.window == "none" else f"window: {spectrum.window}"
-    highest = _highest(response, made, [f for f, _, _ in named])
+    lowest, highest = _ends(response, made, [f for f, _, _ in named], band)
     frequency, amplitude = largest_lines(1e-3 * spectrum.frequency, amplitude, highest)
     figure = fixed(10.5, 4.9)
     head = f"Normal acceleration at attachment {attachment}\n{title}"
-    axes = _frequency_axes(figure, head, response, made, highest)
+    axes = _frequency_axes(figure, head, response, made, (lowest, highest))
     _note(figure, f"resolution {spectrum.resolution:.1f} Hz, {window}")
     axes.vlines(frequency, 0.0, amplitude, color=BLUE, linewidth=2.2)
     axes.plot(frequency, amplitude, "o", color=BLUE, markersize=3.4, markerfacecolor="white")
-    shown = (frequency <= highest) & (frequency > 0.0)
+    shown = (frequency <= highest) & (frequency > lowest)
     top = float(amplitude[shown].max(initial=0.0)) or 1.0
     axes.set_ylim(0.0, 1.3 * top)
-    placed: list[tuple[float, float]] = []
-    for place, size, label in named:
-        height = size + 0.03 * top
-        while any(abs(place - p) < 0.09 * highest and abs(height - h) < 0.065 * top for p, h in placed):
-            height += 0.066 * top
-        placed.append((place, height))
-        axes.annotate(
-            label,
-            (place, size),
-            (place, height),
-            fontsize=8.5,
-            ha="left" if place < 0.08 * highest else "center",
-            va="bottom",
-            bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 0.6},
-        )
+    label_lines(axes, named, frequency[shown], amplitude[shown], fontsize=8.5)
     axes.set_ylabel("amplitude  (m/s²)")
     save_fixed(figure, path)
 
 
-def draw_power(path: Path, response: TrainResponse, made: TrainSpectra, power: RadiatedPower, title: str) -> None:
+def draw_power(
+    path: Path, response: TrainResponse, made: TrainSpectra, power: RadiatedPower, title: str, band: Band = None
+) -> None:
     """Level of the equivalent radiated power of each line; the housing is elastic."""
-    found = peaks(power.frequency, power.power, 3)
-    highest = _highest(response, made, [1e-3 * p.frequency for p in found])
+    found = peaks(power.frequency, _inside(power.frequency, power.power, band), 3)
+    lowest, highest = _ends(response, made, [1e-3 * p.frequency for p in found], band)
     frequency, level = largest_lines(1e-3 * power.frequency, power.level, highest)
     figure = fixed(10.5, 4.6)
-    axes = _frequency_axes(figure, f"Equivalent radiated power of the housing\n{title}", response, made, highest)
+    axes = _frequency_axes(
+        figure, f"Equivalent radiated power of the housing\n{title}", response, made, (lowest, highest)
+    )
     _note(figure, f"mean power {power.mean_level:.1f} dB, resolution {made.spectrum.resolution:.1f} Hz")
-    shown = (frequency <= highest) & (frequency > 0.0) & np.isfinite(level)
+    shown = (frequency <= highest) & (frequency > lowest) & np.isfinite(level)
     top = float(level[shown].max(initial=-300.0)) if shown.any() else 0.0
     bottom = max(top - 60.0, float(level[shown].min(initial=300.0)) - 3.0) if shown.any() else -10.0
     width = 0.72 * float(np.median(np.diff(frequency)))
@@ -84,14 +79,16 @@ def draw_power(path: Path, response: TrainResponse, made: TrainSpectra, power: R
     save_fixed(figure, path)
 
 
-def _frequency_axes(figure: Any, title: str, response: TrainResponse, made: TrainSpectra, highest: float) -> Any:
-    """Axes up to `highest` (kHz) with the meshes' lines and their multiples, and orders of the first shaft on top."""
+def _frequency_axes(
+    figure: Any, title: str, response: TrainResponse, made: TrainSpectra, ends: tuple[float, float]
+) -> Any:
+    """Axes between two frequencies (kHz) with the meshes' lines and multiples, and orders of the first shaft on top."""
     axes = figure.add_axes((0.062, 0.175, 0.925, 0.615))
     panel(axes, "", "", "")
     head, _, scene = title.partition("\n")
     figure.text(0.062, 0.945, head, fontsize=11)
     figure.text(0.062, 0.9, scene, fontsize=8.5, color="#374151")
-    axes.set_xlim(0.0, highest)
+    axes.set_xlim(*ends)
     axes.set_xlabel("frequency  (kHz)")
     first = {f"mesh {i + 1}": f for i, f in enumerate(response.mesh_frequencies_Hz)}
     lines = lines_of(response, float(made.spectrum.frequency[-1]))
@@ -99,7 +96,7 @@ def _frequency_axes(figure: Any, title: str, response: TrainResponse, made: Trai
     named: set[str] = set()
     for line in sorted(lines, key=lambda line: (groups[line.name], str(line.order), line.frequency)):
         place = 1e-3 * line.frequency
-        if place > highest:
+        if not ends[0] <= place <= ends[1]:
             continue
         number = list(groups).index(line.name)
         colour, dash = (ORANGE, GREEN, RED, GREY)[number % 4], _DASHES[number % len(_DASHES)]
@@ -147,8 +144,15 @@ def largest_lines(frequency: Array, value: Array, highest: float) -> tuple[Array
     return np.append(frequency[0], middle), np.append(value[0], np.maximum.reduceat(value[:count], starts))
 
 
-def _highest(response: TrainResponse, made: TrainSpectra, lines: list[float]) -> float:
-    """End of the frequency axis (kHz)."""
+def _inside(frequency: Array, values: Array, band: Band) -> Array:
+    """Values of a spectrum, 0 outside of a band (Hz)."""
+    return values if band is None else np.where((frequency >= band[0]) & (frequency <= band[1]), values, 0.0)
+
+
+def _ends(response: TrainResponse, made: TrainSpectra, lines: list[float], band: Band) -> tuple[float, float]:
+    """Ends of the frequency axis (kHz)."""
+    if band is not None:
+        return 1e-3 * band[0], 1e-3 * band[1]
     top = 1e-3 * float(made.spectrum.frequency[-1])
     meshes = 1e-3 * float(np.max(np.abs(response.mesh_frequencies_Hz), initial=0.0))
-    return min(top, max([_MESH_MULTIPLES * meshes, *(1.08 * f for f in lines)]) or top)
+    return 0.0, min(top, max([_MESH_MULTIPLES * meshes, *(1.08 * f for f in lines)]) or top)

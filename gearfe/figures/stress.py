@@ -47,14 +47,16 @@ def _cut_out(field: GearField, zoom: tuple[float, float, float]) -> Part:
     return points[used], local.reshape(-1, 3), 1e-6 * field.von_mises[used]
 
 
-def stress_figure(folder: Path, pair: GearPair, position: Positions, fields: Sequence[GearField]) -> None:
-    """``stress_<angle>deg.png``: von Mises stress in the meshing zone on the deformed gears."""
+def stress_figure(
+    folder: Path, pair: GearPair, position: Positions, fields: Sequence[GearField], most: float | None = None
+) -> None:
+    """``stress_<angle>deg.png``: von Mises stress in the meshing zone, deformed; colours up to `most` (MPa)."""
     from matplotlib.ticker import MaxNLocator
 
     zoom = zone(pair, modules=1.5)
     shown = [_cut_out(field, zoom) for field in fields]
     largest = max(float(stress[triangles].max(initial=0.0)) for _, triangles, stress in shown)
-    top = color_limit(shown)
+    top = color_limit(shown) if most is None else most
     figure = new_figure(8.0, 7.0)
     axes = figure.add_subplot()
     drawn = _draw_zone(axes, shown, zoom, top)

@@ -29,9 +29,21 @@ Spans = Sequence[tuple[float, float]]
 
 @dataclass(frozen=True)
 class TrainPictures:
-    """Pictures of a run, as `gearfe.vibration.files.write_run` takes them; all have the same title."""
+    """Pictures of a run, as `gearfe.vibration.files.write_run` takes them.
+
+    Attributes
+    ----------
+    title
+        Of all.
+    band
+        Frequencies (Hz) from and to which spectra are drawn; None: from 0 to where large lines end.
+    most
+        End of the colours of the housing's acceleration (m/s2), see `gearfe.figures.train_scene.draw_scene`.
+    """
 
     title: str
+    band: tuple[float, float] | None = None
+    most: float | None = None
 
     def curves(self, folder: Path, scene: TrainScene, made: Followed, spectra: TrainSpectra, attachment: str) -> None:
         """``response.png``, ``spectrum.png``, and where there are such things the other two."""
@@ -39,9 +51,9 @@ class TrainPictures:
         draw_response(folder / "response.png", response, attachment, self.title, made.mean_force)
         if scene.drive is not None and any(mesh.stiffness is not None for mesh in scene.meshes):
             draw_transmission(folder / "transmission_error.png", scene, response, self.title)
-        draw_spectrum(folder / "spectrum.png", response, spectra, attachment, self.title)
+        draw_spectrum(folder / "spectrum.png", response, spectra, attachment, self.title, self.band)
         if spectra.power is not None:
-            draw_power(folder / "radiated_power.png", response, spectra, spectra.power, self.title)
+            draw_power(folder / "radiated_power.png", response, spectra, spectra.power, self.title, self.band)
 
     def analysis(self, folder: Path, made: Analysed, spectra: TrainSpectra | None, attachment: str) -> None:
         """``spectrogram.png``, ``order_tracks.png``, ``measured.png``, those that there is something for."""
@@ -54,7 +66,7 @@ class TrainPictures:
 
     def fields(self, path: Path, scene: TrainScene, response: TrainResponse, steps: IntArray) -> str:
         """Fields at some output times; returns an empty text, or why nothing was drawn."""
-        return draw_scene(path, frames(scene, response, steps), self.title)
+        return draw_scene(path, frames(scene, response, steps), self.title, self.most)
 
 
 def draw_response(path: Path, response: TrainResponse, attachment: str, title: str, mean: Array) -> None:

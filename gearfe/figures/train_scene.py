@@ -6,6 +6,7 @@ a picture and a message, not the results. The animation is a GIF, put together b
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,19 +23,27 @@ from .offscreen import draw_apart
 _SECONDS = 300.0
 #: Milliseconds a frame.
 _FRAME = 80
+#: Parts of the window's half width and half height that the body fills: texts stand above, bars below.
+_ACROSS, _TOP, _LOW = 0.93, 0.83, -0.70
 #: Pixels of a still (before it is reduced) and of a film.
 _STILL, _FILM = (2000, 1440), (720, 520)
 
 
-def draw_scene(path: str | Path, arrays: Mapping[str, Array], title: str) -> str:
+def draw_scene(path: str | Path, arrays: Mapping[str, Array], title: str, most: float | None = None) -> str:
     """Draw what `gearfe.vibration.fields.frames` gives: one step into a ``.png``, several into an animated ``.gif``.
+
+    Parameters
+    ----------
+    most
+        End of the housing's colours (m/s2); by default what 97 % of its values are below.
 
     Returns
     -------
     str
         Empty when it was drawn, else why not.
     """
-    return draw_apart(__name__, path, {**arrays, "title": np.array(title)}, seconds=_SECONDS)
+    chosen = {} if most is None else {"range": np.array(most)}
+    return draw_apart(__name__, path, {**arrays, **chosen, "title": np.array(title)}, seconds=_SECONDS)
 
 
 def _draw(job: Path, target: Path) -> None:
@@ -53,20 +62,21 @@ def _draw(job: Path, target: Path) -> None:
     if "housing_points" in stored:
         values, name = stored["housing_values"], "normal acceleration (m/s2)"
         most = float(np.quantile(np.abs(values[values != 0.0]), 0.97)) if values.any() else 1.0
+        most = float(stored.get("range", most))
         faces = _flat(stored["housing_faces"]) if count == 1 else stored["housing_faces"][:, :3]
         housing = pyvista.PolyData(stored["housing_points"][0], _cells(faces))
         housing[name] = values[0]
         outline = pyvista.PolyData(stored["housing_points"][0], lines=_cells(sharp_edges(housing.points, faces)))
-        near = bar | {"title": "housing: normal acceleration (m/s2)\n", "position_x": 0.06}
+        near = bar | {"title": "housing: normal acceleration (m/s²)\n", "position_x": 0.06}
         look = {"cmap": "RdBu_r", "clim": (-most, most), "opacity": 0.62, "ambient": 0.3, "scalar_bar_args": near}
         plotter.add_mesh(housing, smooth_shading=False, **look)
         plotter.add_mesh(outline, color="#374151", line_width=1.3 * large)
         surfaces += [(housing, stored["housing_points"], values, name), (outline, stored["housing_points"], None, "")]
     cells = np.concatenate([_cells(stored["gear_quads"]), _cells(stored["gear_triangles"])])
-    values, name = stored["gear_values"], "displacement (mm)"
+    values, name = stored["gear_values"], "vibration (um)"
     gears = pyvista.PolyData(stored["gear_points"][0], cells)
     gears[name] = values[0]
-    far = bar | {"title": "gears: displacement (mm)\n", "position_x": 0.58}
+    far = bar | {"title": "gears: vibration beside smooth rolling (µm)\n", "position_x": 0.58}
     look = {"cmap": "viridis", "clim": (0.0, float(values.max()) or 1.0), "ambient": 0.2, "scalar_bar_args": far}
     plotter.add_mesh(gears, smooth_shading=False, **look)
     surfaces.append((gears, stored["gear_points"], values, name))
@@ -85,10 +95,23 @@ def _draw(job: Path, target: Path) -> None:
 
 
 def _aim(plotter: Any, points: Array) -> None:
-    """Look from the front, above and left; the body in the upper part of the window."""
-    centre, size = 0.5 * (points.min(axis=0) + points.max(axis=0)), float(np.ptp(points, axis=0).max())
-    focus = centre - size * np.array([0.0, 0.0, 0.1])
-    plotter.camera_position = [focus + size * np.array([-0.8, -1.25, 1.25]), focus, (0.0, 0.0, 1.0)]
+    """Look from the front, above and left, from where the body fills the window between the texts and the bars."""
+    back = np.array([-0.8, -1.25, 1.25]) / np.linalg.norm([-0.8, -1.25, 1.25])
+    right = np.cross([0.0, 0.0, 1.0], back) / np.linalg.norm(back[:2])
+    upward = np.cross(back, right)
+    middle, size = 0.5 * (points.min(axis=0) + points.max(axis=0)), float(np.ptp(points, axis=0).max())
+    arms = (points - middle).astype(float)
+    half = math.tan(math.radians(0.5 * plotter.camera.view_angle))
+    wide = half * plotter.window_size[0] / plotter.window_size[1]
+    for distance in size * 1.03 ** np.arange(200):
+        depth = np.maximum(distance - arms @ back, 1e-3 * size)
+        across, along = arms @ right / depth, arms @ upward / depth
+        if np.ptp(across) < 2.0 * _ACROSS * wide and np.ptp(along) < (_TOP - _LOW) * half:
+            break
+    aside = 0.5 * (across.min() + across.max())
+    above = 0.5 * (along.min() + along.max()) - 0.5 * (_TOP + _LOW) * half
+    focus = middle + distance * (aside * right + above * upward)
+    plotter.camera_position = [focus + distance * back, focus, (0.0, 0.0, 1.0)]
 
 
 def sharp_edges(points: Array, triangles: IntArray, angle_deg: float = 35.0) -> IntArray:

@@ -134,11 +134,11 @@ def _nested_or_list(value: Any) -> bool:
 
 def _value(value: Any) -> str:
     if isinstance(value, list):
-        more = f", ... ({len(value)})" if len(value) > ENTRIES else ""
+        more = f", ... ({len(value)})" if len(value) > ENTRIES else "" if value else "-"
         return ", ".join(map(_value, value[:ENTRIES])) + more
     if isinstance(value, float):
         return f"{value:.6g}"
-    return "-" if value is None else html.escape(str(value))
+    return "-" if value in (None, "") else html.escape(str(value))
 
 
 def _table(name: str, columns: Mapping[str, Array]) -> str:

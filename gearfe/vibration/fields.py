@@ -20,7 +20,7 @@ from ..gear.drawing import gear_outline
 from ..gear.spur_gear import Gear
 from ..output.vtkhdf import VtkHdfSeries
 from ..reduction.modal_body import ModalBody
-from ..train.kinematics import driving_senses
+from ..train.kinematics import driving_senses, rolling
 from ..train.phases import tooth_places
 from ..train.response import TrainResponse
 from ..train.scene import ShaftGear, TrainScene
@@ -113,14 +113,28 @@ def moved(solid: Solid, response: TrainResponse, frame: Array, step: int, exagge
     pose, centre = response.gear_pose[step, solid.gear], response.gear_centres[solid.gear]
     angle = float(pose[3:] @ frame[2])
     tilt = exaggeration * (pose[3:] - angle * frame[2])
-    arm = solid.points - centre
-    along = np.outer(arm @ frame[2], frame[2])
-    turned = along + np.cos(angle) * (arm - along) + np.sin(angle) * np.cross(frame[2], arm)
+    turned = _turned(solid.points - centre, frame[2], angle)
     return np.asarray(centre + exaggeration * pose[:3] + turned + np.cross(tilt, turned))
 
 
+def rolled(solid: Solid, scene: TrainScene, response: TrainResponse, step: int) -> Array:
+    """(n, 3) points of a surface at an output step, had all shafts only rolled with the drive: no vibration."""
+    shafts = [shaft.name for shaft in scene.shafts]
+    ratio = float(rolling(scene).ratios[shafts.index(scene.gears[solid.gear].shaft)])
+    centre = response.gear_centres[solid.gear]
+    return np.asarray(
+        centre + _turned(solid.points - centre, scene.frame[2], ratio * float(response.drive_angle[step]))
+    )
+
+
+def _turned(arm: Array, axis: Array, angle: float) -> Array:
+    """(n, 3) vectors turned about a unit axis."""
+    along = np.outer(arm @ axis, axis)
+    return np.asarray(along + np.cos(angle) * (arm - along) + np.sin(angle) * np.cross(axis, arm))
+
+
 def write_gears(path: Path, scene: TrainScene, response: TrainResponse, steps: Sequence[int] | Ints) -> None:
-    """VTKHDF series of the gears and shafts: places, displacement from the start (m), number of the gear."""
+    """VTKHDF series of the gears and shafts: places, displacement from the start and from rolling (m), number."""
     parts, frame = solids(scene, response), scene.frame
     starts = np.cumsum([0, *(len(part.points) for part in parts)])
     cells = {
@@ -132,7 +146,9 @@ def write_gears(path: Path, scene: TrainScene, response: TrainResponse, steps: S
     with VtkHdfSeries(path) as series:
         for count, step in enumerate(steps):
             points = np.concatenate([moved(part, response, frame, int(step)) for part in parts])
-            data = {"displacement_m": (points - rest).astype(np.float32), "gear": number}
+            smooth = np.concatenate([rolled(part, scene, response, int(step)) for part in parts])
+            moves = {"displacement_m": points - rest, "vibration_m": points - smooth}
+            data = {"gear": number} | {name: values.astype(np.float32) for name, values in moves.items()}
             series.add(float(response.time[step]), points, None if count else cells, point_data=data)
 
 
@@ -197,7 +213,7 @@ def frames(
             "housing_values": np.einsum("snk,nk->sn", normal, body.normals[used]).astype(np.float32),
         }
     parts, frame = solids(scene, response, per_segment=4), scene.frame
-    rest = np.concatenate([part.points for part in parts])
+    smooth = [np.concatenate([rolled(part, scene, response, int(s)) for part in parts]) for s in chosen]
     true = [np.concatenate([moved(part, response, frame, int(s)) for part in parts]) for s in chosen]
     shown = [np.concatenate([moved(part, response, frame, int(s), factor) for part in parts]) for s in chosen]
     starts = np.cumsum([0, *(len(part.points) for part in parts)])
@@ -205,7 +221,9 @@ def frames(
         "gear_quads": np.concatenate([part.quads + s for part, s in zip(parts, starts, strict=False)]),
         "gear_triangles": np.concatenate([part.triangles + s for part, s in zip(parts, starts, strict=False)]),
         "gear_points": np.array(shown, dtype=np.float32),
-        "gear_values": np.array([1e3 * np.linalg.norm(p - rest, axis=1) for p in true], dtype=np.float32),
+        "gear_values": np.array(
+            [1e6 * np.linalg.norm(p - q, axis=1) for p, q in zip(true, smooth, strict=True)], dtype=np.float32
+        ),
         "exaggeration": np.array(factor),
     }
     return arrays

@@ -1,0 +1,33 @@
+"""Labels of lines: none covers another or a line, none leaves the frame."""
+
+import numpy as np
+import pytest
+from matplotlib.text import Text
+
+from gearfe.figures.labels import label_lines
+from gearfe.figures.style import fixed
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_labels_keep_apart(seed):
+    rng = np.random.default_rng(seed)
+    x = np.sort(rng.uniform(0.0, 10.0, 60))
+    y = rng.exponential(1.0, 60)
+    chosen = np.argsort(-y)[:6]
+    figure = fixed(8.0, 4.0)
+    axes = figure.add_axes((0.1, 0.1, 0.85, 0.8))
+    axes.set_xlim(0.0, 10.0)
+    axes.set_ylim(0.0, 1.3 * y.max())
+    label_lines(axes, [(x[i], y[i], f"{x[i]:.4f} Hz\nmesh 1 × 2") for i in chosen], x, y, fontsize=8.5)
+    figure.canvas.draw()
+    frame = axes.get_window_extent()
+    texts = [text.get_text() for text in axes.texts]
+    assert len(set(texts)) == len(texts) >= 5
+    tips = axes.transData.transform(np.column_stack([x, y]))
+    for number, text in enumerate(axes.texts):
+        own = Text.get_window_extent(text)  # the text without its line
+        assert frame.x0 - 1 <= own.x0 <= own.x1 <= frame.x1 + 1
+        assert own.y1 <= frame.y1
+        assert not ((tips[:, 0] > own.x0) & (tips[:, 0] < own.x1) & (tips[:, 1] > own.y0)).any()
+        for other in axes.texts[:number]:
+            assert not own.overlaps(Text.get_window_extent(other))
