@@ -1,0 +1,104 @@
+"""Steady states by harmonic balance against periodic orbits by shooting with the transient's own integrator."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gearfe.rigid import constant, integrate
+from gearfe.rigid.compiled import available
+from gearfe.runup.condensed import condense
+from gearfe.runup.results import SteadyState
+from gearfe.runup.run_up import run_up, steady_state
+from gearfe.train import TrainModel, build_train
+from gearfe.train.motion import motion
+
+from .mesh_laws import hertzian_law
+from .test_runup_train import loaded, smooth
+
+Array = NDArray[np.float64]
+pytestmark = pytest.mark.skipif(not available(), reason="numba is not installed")
+
+
+def at_speed(model: TrainModel, speed: float) -> TrainModel:
+    return build_train(
+        dataclasses.replace(model.scene, drive=dataclasses.replace(model.scene.driven, speed=constant(speed)))
+    )
+
+
+def start_of(model: TrainModel, state: SteadyState) -> Array:
+    """Modal coordinates and their rates at the begin of the period."""
+    omega = 2.0 * np.pi * state.frequency
+    y = condense(model).system.linear.modal(omega, state.speed, state.orbit.forces)
+    return np.concatenate([y.sum(axis=0).real, (1j * omega[:, None] * y).sum(axis=0).real])
+
+
+def shot(model: TrainModel, start: Array, period: float, samples: int = 2) -> tuple[Array, Array]:
+    """State after a period, and the contact forces on the way."""
+    core, n = model.core, len(start) // 2
+    begin = dataclasses.replace(model.start, q=core.origin + core.T @ start[:n], v=core.T @ start[n:])
+    times = np.linspace(0.0, period, samples)
+    run = integrate(model.system, times, method="taylor", tolerance=1e-10, start=begin)
+    moved = motion(model, run)
+    return np.concatenate(core.reduce(moved.q[-1], moved.v[-1])), moved.contact_force
+
+
+def orbit(model: TrainModel, start: Array, period: float) -> tuple[Array, Array]:
+    """The start of a periodic motion by Newton's method, and the monodromy matrix by central differences."""
+    n = len(start) // 2
+    size = np.repeat([np.abs(start[:n]).max(), np.abs(start[n:]).max()], n)
+
+    def away(x: Array) -> Array:
+        return shot(model, x, period)[0] - x
+
+    for _ in range(8):
+        steps = 1e-5 * size * np.eye(2 * n)
+        round_ = np.array([(away(start + h) - away(start - h)) / (2.0 * h.max()) for h in steps]).T
+        change = np.linalg.solve(round_, -away(start))
+        start = start + change
+        if (np.abs(change) < 1e-8 * size).all():
+            return start, round_ + np.eye(2 * n)
+    raise AssertionError("no periodic motion by shooting")
+
+
+def compared(model: TrainModel, state: SteadyState, bound: float) -> None:
+    """Start, forces over the period, and multipliers of a state against the orbit."""
+    model = at_speed(model, state.speed)
+    guess = start_of(model, state)
+    exact, monodromy = orbit(model, guess, state.period)
+    n = len(guess) // 2
+    for part in (slice(None, n), slice(n, None)):
+        assert np.abs(guess[part] - exact[part]).max() < bound * np.abs(exact[part]).max()
+    samples = len(state.force)
+    _, force = shot(model, exact, state.period, samples + 1)
+    assert np.abs(state.force - force[:-1]).max() < bound * np.abs(force).max()
+    largest = np.abs(np.linalg.eigvals(monodromy)).max()
+    assert state.multipliers is not None
+    assert abs(state.multipliers[0]) == pytest.approx(largest, rel=20 * bound)
+    assert bool(largest > 1.0) is not state.stable
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "speed", "backlash"),
+    [(smooth, 600.0, None), (lambda teeth: hertzian_law(relief=4e-6), 700.0, 30e-6)],
+)
+def test_an_elastic_train(stiffness: Callable[[int], object], speed: float, backlash: float | None) -> None:
+    model = build_train(loaded([(20, 30)], stiffness, speed=speed, backlash=backlash))
+    compared(model, steady_state(model, speed, tolerance=1e-4), 1e-3)
+
+
+def test_all_three_motions_at_one_speed() -> None:
+    """Teeth part in the resonance: two stable motions and the unstable one between them."""
+    law = hertzian_law(relief=6e-6)
+    model = build_train(loaded([(20, 30)], lambda teeth: law, speed=1500.0, torque=15.0, ratio=0.05, flexible=False))
+    run = run_up(model, np.linspace(700.0, 900.0, 21), tolerance=1e-3)
+    assert len(run.turning_speeds) == 2
+    speeds = [s.speed for s in run.states if s.branch == 1 and s.speed in run.speeds.tolist()]
+    three = [s for s in run.states if s.speed == speeds[len(speeds) // 2]]
+    assert [s.stable for s in three] == [True, False, True]
+    for state in three:
+        compared(model, steady_state(model, state.speed, state, tolerance=2e-4), 2e-3)
