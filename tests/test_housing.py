@@ -13,7 +13,8 @@ import pytest
 
 from gearfe.config import build, load_job
 from gearfe.errors import InputError
-from gearfe.housing.build import bores, housing_from_table, inside_faces, reduced_housing
+from gearfe.housing.body import reduced_housing
+from gearfe.housing.build import bores, housing_from_table, inside_faces
 from gearfe.housing.meshes import Prisms
 from gearfe.housing.surface import surface_area
 from gearfe.prisms import volume_ratios

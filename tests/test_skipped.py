@@ -172,7 +172,7 @@ def test_a_cached_reduced_housing_loads_no_finite_elements(tmp_path):
     table = """
 from dataclasses import replace
 from tests.benchmarks.subject import shipped_housing
-from gearfe.housing.build import reduced_housing
+from gearfe.housing.body import reduced_housing
 table = shipped_housing()
 small = replace(table, mesh=replace(table.mesh, size_mm=40.0), reduction=replace(table.reduction, modes=5))
 print(repr(reduced_housing(small).coupled.frequencies_hz[:8].tolist()))

@@ -14,7 +14,8 @@ from scipy.sparse import coo_array
 from gearfe.cli import main
 from gearfe.config import build
 from gearfe.errors import InputError
-from gearfe.housing.build import housing_from_job, reduced_housing
+from gearfe.housing.body import reduced_housing
+from gearfe.housing.build import housing_from_job
 from gearfe.housing.superelement import read_matrix, superelement
 from gearfe.reduction.error import accelerances
 from gearfe.reduction.modal_body import ModalBody

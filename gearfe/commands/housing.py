@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
 
     import numpy as np
 
-    from ..housing.build import reduced_housing
+    from ..housing.body import reduced_housing
     from ..output.files import output_folder, whole_set
     from ..reduction.error import mesh_error, reduction_error
 

@@ -1,27 +1,22 @@
-"""From a ``[housing]`` table to a housing, and to its reduced body through the cache."""
+"""From a ``[housing]`` table to a housing with its mesh, and to its reduction."""
 
 from __future__ import annotations
 
-import dataclasses
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
-from .. import __version__
-from ..cache import cache_key, kept
 from ..config import load_job
 from ..errors import InputError
-from ..meshing.housing_mesh import RECIPE, bore_ranges, housing_mesh
+from ..meshing.housing_mesh import bore_ranges, housing_mesh
 from ..progress import stage
-from ..reduction.modal_body import FORMAT, ModalBody
+from ..reduction.modal_body import ModalBody
 from ..solid import SolidMaterial
-from ..tables.housing import HousingDampingTable, HousingReductionTable, HousingTable
+from ..tables.housing import HousingReductionTable, HousingTable
 from .attachments import PLACE_TOLERANCE, Bore
 from .meshes import Prisms
 from .model import Housing
-from .own_mesh import fingerprint, own_housing
-from .superelement import superelement
+from .own_mesh import own_housing
 
 
 def housing_from_job(path: str | Path) -> Housing:
@@ -37,7 +32,7 @@ def housing_from_table(table: HousingTable, folder: str | Path = ".") -> Housing
     """
     table.check("housing")
     if table.reduced:
-        cure = "take gearfe.housing.build.reduced_housing"
+        cure = "take gearfe.housing.body.reduced_housing"
         raise InputError("housing", None, "is reduced: it has no mesh any more", cure)
     if table.mesh.file is not None:
         return own_housing(table, Path(folder), material(table))
@@ -88,43 +83,6 @@ def inside_faces(table: HousingTable, centres: np.ndarray) -> np.ndarray:
     return np.asarray(np.all((place >= low) & (place <= high), axis=1))
 
 
-def reduced_housing(table: HousingTable, folder: str | Path = ".") -> ModalBody:
-    """Reduced body of a ``[housing]`` table with its damping: from the cache when it was made before.
-
-    A second run then starts neither gmsh nor the finite elements. Files that it names are looked for in `folder`.
-    """
-    table.check("housing")
-    if table.body is not None:
-        return damped(_loaded(Path(folder) / table.body), table)
-    if table.superelement is not None:
-        return damped(superelement(table.superelement, folder), table)
-    recipe: list[object] = [dataclasses.replace(table, damping=HousingDampingTable()), RECIPE, FORMAT, __version__]
-    if table.mesh.file is not None:
-        recipe.append(fingerprint(Path(folder) / table.mesh.file, "housing.mesh"))
-
-    def read(path: Path) -> ModalBody | None:
-        with suppress(InputError):
-            return ModalBody.load(path, verify=True)
-        return None
-
-    body = kept(
-        "body",
-        cache_key("body", recipe),
-        read=read,
-        make=lambda: reduced(housing_from_table(table, folder), table.reduction),
-        write=lambda body, path: body.save(path),
-    )
-    return damped(body, table)
-
-
-def _loaded(path: Path) -> ModalBody:
-    try:
-        return ModalBody.load(path, verify=True)
-    except InputError as error:
-        cure = "give housing.npz of gearfe housing, beside the job file"
-        raise InputError("housing.body", str(path), error.problem, cure) from None
-
-
 def reduced(housing: Housing, table: HousingReductionTable) -> ModalBody:
     """Reduced body with what a ``[housing.reduction]`` table asks for."""
     with stage("reducing the housing"):
@@ -135,20 +93,3 @@ def reduced(housing: Housing, table: HousingReductionTable) -> ModalBody:
             quasi_static=table.quasi_static_levels,
             solver=table.solver,
         )
-
-
-def damped(body: ModalBody, table: HousingTable) -> ModalBody:
-    """The body with the damping of its ``[housing.damping]`` table."""
-    given = table.damping
-    ratio = given.ratio if isinstance(given.ratio, float) else np.array(given.ratio or (0.0,))
-    return body.with_damping(ratio=ratio, alpha=given.rayleigh_alpha_per_s, beta=given.rayleigh_beta_s)
-
-
-def bore_points(table: HousingTable, folder: str | Path) -> dict[str, tuple[float, float, float]]:
-    """Name -> reference point (m) of the attachments of a mesh file or a reduced body."""
-    if table.reduced:
-        body = reduced_housing(table, folder)
-        rows = zip(body.attachment_names, body.attachment_points, strict=True)
-        return {name: (float(x), float(y), float(z)) for name, (x, y, z) in rows}
-    made = housing_from_table(table, folder).attachments
-    return {a.name: (float(a.point[0]), float(a.point[1]), float(a.point[2])) for a in made}

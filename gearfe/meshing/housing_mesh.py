@@ -21,13 +21,12 @@ from ..errors import InputError
 from ..prisms import ORDER, volume_ratios
 from ..progress import stage
 from ..tables.housing import HousingTable, ShaftAxisTable
+from .housing_recipe import RECIPE
 from .session import gmsh_session
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Raise when anything below changes the meshes that come out.
-RECIPE = 3
 #: gmsh's type of triangles of order 3; its anisotropic mesher, and the one that adds no points within a face.
 _TRIANGLE, _BAMG, _NO_POINTS_INSIDE = 21, 7.0, 3
 #: Edges round a bore at least; rings thinner than this many times `Sizes.across` take one element across.

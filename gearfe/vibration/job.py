@@ -94,7 +94,7 @@ def train_body(job: TrainJob) -> ModalBody | None:
     """Reduced housing of the job, from the cache when it was made before; None for a rigid one."""
     if job.table.housing == "rigid":
         return None
-    from ..housing.build import reduced_housing
+    from ..housing.body import reduced_housing
 
     return reduced_housing(given(job.housing, "housing"), job.path.parent)
 
@@ -268,7 +268,7 @@ def bore_places(table: HousingTable, folder: Path = Path()) -> dict[str, tuple[f
     Files that the table names are looked for in `folder`.
     """
     if table.reduced or table.mesh.file is not None:
-        from ..housing.build import bore_points
+        from ..housing.body import bore_points
 
         return bore_points(table, folder)
     places, number = {}, 0

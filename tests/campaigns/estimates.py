@@ -178,7 +178,7 @@ def _draw_body(random: np.random.Generator, number: int, kind: str) -> Case:
 
 def _run_frequencies(case: Case, job_path: Path) -> Found:
     """Of the first ten natural frequencies that whose error is largest against its estimate."""
-    from gearfe.housing.build import reduced_housing
+    from gearfe.housing.body import reduced_housing
     from gearfe.reduction.error import mesh_error, reduction_error
 
     del case
