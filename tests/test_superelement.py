@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import runpy
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,7 @@ from gearfe.config import build
 from gearfe.errors import InputError
 from gearfe.housing.body import reduced_housing
 from gearfe.housing.build import housing_from_job
-from gearfe.housing.superelement import read_matrix, superelement
+from gearfe.housing.superelement import read_matrix, superelement, write_matrix
 from gearfe.reduction.error import accelerances
 from gearfe.reduction.modal_body import ModalBody
 from gearfe.tables.housing import HousingTable, SuperelementTable
@@ -269,3 +271,43 @@ def test_dmig_that_cannot_be_taken(text, part, tmp_path) -> None:
     (tmp_path / "K.pch").write_text(text)
     with pytest.raises(InputError, match=part):
         read_matrix(tmp_path / "K.pch", "housing.superelement.stiffness")
+
+
+@pytest.mark.parametrize("binary", [False, True], ids=["text", "binary"])
+def test_output4_with_both_matrices(binary: bool, bodies, tmp_path) -> None:
+    op4 = pytest.importorskip("pyNastran.op4.op4", reason="pip install 'gearfe[exchange]'")
+
+    def write_op4(name: str, **matrices: np.ndarray) -> None:
+        if not binary:
+            with (tmp_path / name).open("w") as stream:
+                squares = {title: (6, values) for title, values in matrices.items()}  # 6: symmetric
+                op4.OP4(log=None).write_op4(stream, squares, is_binary=False)
+            return
+        records = []
+        for title, values in matrices.items():  # type 2: double; each column with its first row and number of words
+            n = len(values)
+            records.append(struct.pack("<4i8s", n, n, 6, 2, title.ljust(8).encode()))
+            records += [struct.pack(f"<3i{n}d", j + 1, 1, 2 * n, *column) for j, column in enumerate(values.T)]
+            records.append(struct.pack("<3id", n + 1, 1, 2, 1.0))
+        framed = [struct.pack("<i", len(one)) + one + struct.pack("<i", len(one)) for one in records]
+        (tmp_path / name).write_bytes(b"".join(framed))
+
+    body = bodies["held"]
+    write_op4("box.op4", MAAX=body.mass, KAAX=body.stiffness)
+    same(body, superelement(table(stiffness="box.op4", mass="box.op4"), tmp_path))
+    write_op4("x.op4", X=body.mass, Y=body.mass)
+    with pytest.raises(InputError, match=r"begins with K: there are X, Y"):
+        read_matrix(tmp_path / "x.op4", "housing.superelement.stiffness")
+    (tmp_path / "broken.op4").write_text("nothing of the kind\n")
+    with pytest.raises(InputError, match="cannot be read as OUTPUT4"):
+        read_matrix(tmp_path / "broken.op4", "housing.superelement.stiffness")
+
+
+def test_exudyn_reads_the_matrices(bodies, tmp_path) -> None:
+    pytest.importorskip("exudyn", reason="pip install 'gearfe[peers]'")
+    path = Path(__file__).parent.parent / "scripts" / "housing_in_exudyn.py"
+    script = runpy.run_path(str(path))
+    body = bodies["held"]
+    for name, matrix in (("stiffness", body.stiffness), ("mass", body.mass)):
+        write_matrix(tmp_path / f"housing_{name}.mtx", matrix)
+    assert script["frequencies"](tmp_path) == pytest.approx(body.coupled.frequencies_hz, rel=1e-9)

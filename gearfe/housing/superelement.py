@@ -4,8 +4,8 @@ With the attachments' six coordinates :math:`q_b` each and whatever the program 
 the attachments held, :math:`K_{ii}\Phi = M_{ii}\Phi\Lambda`, and the constraint modes :math:`\Psi = -K_{ii}^{-1}K_{ib}`
 turn the coordinates to those of `gearfe.ModalBody`, all of them kept: frequencies and response stay the matrices'.
 
-Matrices are in Matrix Market format, Abaqus' matrix input (lines of node, freedom, node, freedom, value), or DMIG
-entries of Nastran.
+Matrices are in Matrix Market format, Abaqus' matrix input (lines of node, freedom, node, freedom, value), DMIG
+entries of Nastran, or its files of the kind OUTPUT4.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, MissingLibraryError
 from ..output.files import whole_file
 from ..reduction.modal_body import ModalBody
 from ..tables.housing import FORCES, UNITS, AttachmentTable, SuperelementTable
@@ -91,10 +91,12 @@ def _with_rows_of(stiffness: Matrix, mass: Matrix) -> Matrix:
 
 
 def read_matrix(path: Path, field: str, initial: str = "K") -> Matrix:
-    """A matrix of Matrix Market format, Abaqus' matrix input or DMIG; where it is half a symmetric one, the whole.
+    """A matrix of Matrix Market format, Abaqus' matrix input, DMIG, OUTPUT4; where it is half of one, the whole.
 
-    Of several matrices in a DMIG file that one is taken whose name begins with `initial`.
+    Of several matrices in a file of Nastran that one is taken whose name begins with `initial`.
     """
+    if path.suffix.lower() == ".op4":
+        return Matrix(_output4(path, field, initial), [])
     text = read_text(path, field)
     if text.lstrip().lower().startswith("%%matrixmarket"):
         return Matrix(_market(path, field), [])
@@ -142,6 +144,31 @@ def _market(path: Path, field: str) -> Array:
     if np.iscomplexobj(values):
         raise InputError(field, path.name, "is complex", "bring a real matrix; damping is [housing.damping]")
     return _whole(_checked(np.asarray(values, dtype=float), field, path))
+
+
+def _output4(path: Path, field: str, initial: str) -> Array:
+    """A matrix of Nastran's OUTPUT4, text or binary, by pyNastran."""
+    from scipy.sparse import issparse
+
+    if not path.is_file():
+        raise InputError(field, str(path), "there is no such file", "check the path")
+    try:
+        from pyNastran.op4.op4 import read_op4
+    except ImportError:
+        raise MissingLibraryError("OUTPUT4 files need pyNastran: pip install 'gearfe[exchange]'") from None
+    try:
+        found = {name.upper(): made[1] for name, made in read_op4(str(path), debug=None).items()}
+    except Exception as error:
+        raise InputError(field, path.name, f"cannot be read as OUTPUT4 ({error})", "is it whole?") from None
+    chosen = [name for name in found if len(found) == 1 or name.startswith(initial)]
+    if len(chosen) != 1:
+        problem = f"has no single matrix whose name begins with {initial}: there are {', '.join(found) or 'none'}"
+        raise InputError(field, path.name, problem, "leave one of them in the file")
+    values = found[chosen[0]]
+    values = np.asarray(values.toarray() if issparse(values) else values)
+    if np.iscomplexobj(values):
+        raise InputError(field, path.name, "is complex", "bring a real matrix; damping is [housing.damping]")
+    return _whole(_checked(values.astype(float), field, path))
 
 
 def _checked(values: Array, field: str, path: Path) -> Array:
