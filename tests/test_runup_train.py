@@ -20,7 +20,6 @@ from gearfe.runup.modes import coupled_modes, crossings
 from gearfe.runup.run_up import run_up, steady_state
 from gearfe.runup.swinging import mesh_modes, swinging, write_modes
 from gearfe.train import Damping, Load, build_train, simulate
-from gearfe.train.arrays import law_arrays
 from gearfe.train.friction import Lubrication
 
 from .mesh_laws import hertzian_law
@@ -121,18 +120,17 @@ def test_the_work_of_the_mesh_goes_into_damping():
 
 @needs_numba
 def test_the_jets_of_a_law_are_its_derivatives():
-    from gearfe.runup.law_kernel import RESULTS, ROWS, jets
+    from gearfe.runup.law_kernel import RESULTS, ROWS, jets, law_tables
 
     law = hertzian_law(relief=3e-6)
-    tables = law_arrays([law])
+    tables = law_tables(law)
     rng = np.random.default_rng(5)
     phase, approach = rng.uniform(-2.0, 2.0, 300), rng.uniform(-2e-6, 5e-5, 300)
 
     def made(phase):  # type: ignore[no-untyped-def]
         out = np.zeros((300, RESULTS))
         work, pairs = np.zeros((ROWS + 2 * law.slots, law.slots)), np.zeros((300, law.slots))
-        arrays = (tables.nodes[0], tables.forces[0], tables.touch[0], tables.energies[0], tables.coupling[0])
-        jets()(*arrays, law.reach, phase, approach, pairs, np.zeros((2, *pairs.shape)), work, out)
+        jets()(tables, phase, approach, pairs, np.zeros((2, *pairs.shape)), work, out)
         return out
 
     out, true, h = made(phase), law(phase, approach), 1e-8

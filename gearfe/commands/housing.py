@@ -223,12 +223,12 @@ def _draw(folder: Path, body: ModalBody, fields: Any) -> str:
     titles = [f"mode {k + 1}: {body.coupled.frequencies_hz[k]:.1f} Hz" for k in chosen]
     bores = np.flatnonzero(np.any(body.shapes[::3, : 6 * len(body.attachment_names) : 6] == 1.0, axis=1))
     still = np.zeros((1, len(body.nodes), 3))
-    held = np.flatnonzero(~np.any(body.shapes.reshape(len(body.nodes), -1), axis=1)) if body.held else None
+    marked = {"crimson": bores}
+    if body.held:
+        marked["seagreen"] = np.flatnonzero(~np.any(body.shapes.reshape(len(body.nodes), -1), axis=1))
     named = {f"bore {name}": place for name, place in zip(body.attachment_names, body.attachment_points, strict=True)}
     title = f"bores (red){', held (green)' if body.held else ''}; mass {body.rigid_mass[0, 0]:.3g} kg"
-    problem = draw_modes(
-        folder / "housing.png", body.nodes, faces, still, [title], marked=bores, held=held, labels=named
-    )
+    problem = draw_modes(folder / "housing.png", body.nodes, faces, still, [title], marked=marked, labels=named)
     if problem or not titles:
         return problem
     return draw_modes(folder / "modes.png", body.nodes, faces, fields[list(chosen)], titles)

@@ -33,8 +33,7 @@ def draw_modes(
     fields: Array,
     titles: Sequence[str],
     *,
-    marked: IntArray | None = None,
-    held: IntArray | None = None,
+    marked: Mapping[str, IntArray] | None = None,
     labels: Mapping[str, Array] | None = None,
 ) -> str:
     """Draw deformed surfaces side by side into one picture.
@@ -52,9 +51,7 @@ def draw_modes(
     titles
         One a picture.
     marked
-        Numbers of points to mark in red (the attachments' nodes).
-    held
-        Numbers of points to mark in green (those that are held).
+        Colour -> numbers of points to mark with it.
     labels
         Name -> place (m), for the attachments.
 
@@ -70,8 +67,8 @@ def draw_modes(
         "faces": renumbered.reshape(faces.shape),
         "fields": fields[:, used],
         "titles": np.array(list(titles)),
-        "marked": points[np.zeros(0, dtype=int) if marked is None else marked],
-        "held": points[np.zeros(0, dtype=int) if held is None else held],
+        "colours": np.array(list(marked or {})),
+        **{f"marked {colour}": points[numbers] for colour, numbers in (marked or {}).items()},
         "names": np.array(list(named)),
         "places": np.array(list(named.values())).reshape(-1, 3),
     }
@@ -116,9 +113,9 @@ def _draw(job: Path, target: Path) -> None:
             plotter.add_mesh(surface, color="#c9d3e0", smooth_shading=False, ambient=0.35, diffuse=0.75)
             edges = surface.extract_feature_edges(feature_angle=30.0)
             plotter.add_mesh(edges, color="black", line_width=1.5)
-            for key, colour in (("marked", "crimson"), ("held", "seagreen")):
-                if len(stored[key]):
-                    plotter.add_points(stored[key], color=colour, point_size=5, render_points_as_spheres=True)
+            for colour in stored["colours"]:
+                if len(marked := stored[f"marked {colour}"]):
+                    plotter.add_points(marked, color=str(colour), point_size=5, render_points_as_spheres=True)
             if len(stored["names"]):
                 plotter.add_point_labels(
                     stored["places"], [str(name) for name in stored["names"]], font_size=16, bold=True,

@@ -1,4 +1,3 @@
-# mypy: ignore-errors
 r"""A mesh law with the derivatives that Newton's method needs, sample by sample; compiled where numba is installed.
 
 With :math:`g_k = t'(\psi_k) + \Lambda_\psi(\psi_k, F_k) + \sum_l C'_{kl}F_l` and J as in `gearfe.meshlaw.law`,
@@ -13,9 +12,15 @@ With :math:`g_k = t'(\psi_k) + \Lambda_\psi(\psi_k, F_k) + \sum_l C'_{kl}F_l` an
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
+from typing import NamedTuple
 
+from ..meshlaw.law import MeshLaw
 from ..rigid import compiled
+from ..rigid.packed import Packed
+from ..train.arrays import law_arrays
+from ..typing import Array
 
 #: Newton steps for the pair forces, their relative change in the last one.
 MOST, SETTLED = 60, 1e-11
@@ -28,10 +33,31 @@ GAPS, TOUCH1, TOUCH2, LAMBDA, GIVES, TURN, TURN2, SHIFT, BEARS, RIGHT1, RIGHT2, 
 ROWS = PART + 5
 
 
-def law_jets(nodes, forces, touch, energies, coupling, reach, phase, approach, pairs, slopes, work, out):
+class LawTables(NamedTuple):
+    """A mesh law, see `gearfe.train.arrays.Laws`, and its reach (m)."""
+
+    nodes: Array
+    forces: Array
+    touch: Array
+    energies: Array
+    coupling: Array
+    reach: float
+
+
+def law_tables(law: MeshLaw) -> LawTables | Packed:
+    """What `law_jets` gets of a law, compiled or not."""
+    laws = law_arrays([law])
+    made = LawTables(laws.nodes[0], laws.forces[0], laws.touch[0], laws.energies[0], laws.coupling[0], law.reach)
+    return Packed(made) if compiled.available() else made
+
+
+def law_jets(
+    law: LawTables, phase: Array, approach: Array, pairs: Array, slopes: Array, work: Array, out: Array
+) -> None:
     """Results (n, RESULTS) at phases and approaches (n,); `pairs` (n, s) are pair forces to begin with, then found, and
     `slopes` (2, n, s) their derivatives with approach and phase.
     """
+    nodes, forces, touch, energies, coupling = law.nodes, law.forces, law.touch, law.energies, law.coupling
     slots = touch.shape[0]
     cells = nodes.shape[0] - 1
     cycle = nodes[cells] - nodes[0]
@@ -54,7 +80,7 @@ def law_jets(nodes, forces, touch, energies, coupling, reach, phase, approach, p
             work[GAPS, k] = approach[i] - t
             work[TOUCH1, k] = c[1] + z * (2.0 * c[2] + 3.0 * z * c[3])
             work[TOUCH2, k] = 2.0 * c[2] + 6.0 * z * c[3]
-        out[i, BEYOND] = 1.0 if approach[i] - least > reach else 0.0
+        out[i, BEYOND] = 1.0 if approach[i] - least > law.reach else 0.0
         for k in range(slots):
             work[PART, k] = -1.0
             for j in range(slots):
@@ -130,7 +156,7 @@ def law_jets(nodes, forces, touch, energies, coupling, reach, phase, approach, p
         out[i, BEND] = bend
 
 
-def compliances(forces, energies, cell, z, pairs, work):
+def compliances(forces: Array, energies: Array, cell: int, z: float, pairs: Array, work: Array) -> None:
     """Lambda and its derivative with the force, from the polynomials of the pairs' cells."""
     parts = forces.shape[0] - 1
     for k in range(pairs.shape[0]):
@@ -148,7 +174,7 @@ def compliances(forces, energies, cell, z, pairs, work):
         work[GIVES, k] = e2 + f * (2.0 * e3 + 3.0 * f * e4)
 
 
-def turning(forces, energies, cell, z, pairs, work):
+def turning(forces: Array, energies: Array, cell: int, z: float, pairs: Array, work: Array) -> None:
     """Phi's first and second derivative with the angle, and Lambda's."""
     for k in range(pairs.shape[0]):
         part = int(work[PART, k])
@@ -166,7 +192,7 @@ def turning(forces, energies, cell, z, pairs, work):
         work[TURN2, k] = turn2
 
 
-def coupled(coupling, k, j, slots, cell, z, order):
+def coupled(coupling: Array, k: int, j: int, slots: int, cell: int, z: float, order: int) -> float:
     """C between two slots, its slope or its second derivative with the angle."""
     c = coupling[min(k, j) * slots + max(k, j), cell]
     if order == 0:
@@ -176,7 +202,7 @@ def coupled(coupling, k, j, slots, cell, z, order):
     return 2.0 * c[2] + 6.0 * z * c[3]
 
 
-def matrix(slots, work):
+def matrix(slots: int, work: Array) -> None:
     """J of the pairs that bear; ones on the diagonal for the others."""
     for k in range(slots):
         for j in range(slots):
@@ -187,7 +213,7 @@ def matrix(slots, work):
                 work[ROWS + k, j] = work[ROWS + slots + k, j] if both else 0.0
 
 
-def solved(slots, work):
+def solved(slots: int, work: Array) -> None:
     """Both right sides over the matrix, by elimination in place: it is positive definite."""
     for k in range(slots):
         for i in range(k + 1, slots):
@@ -216,7 +242,8 @@ NAMES = {
 
 
 @lru_cache(maxsize=1)
-def jets():
+def jets() -> Callable[..., None]:
     """`law_jets`, compiled where numba is installed."""
     made = compiled.bind(FUNCTIONS, NAMES, compiled=compiled.available(), entries=("law_jets",))
-    return made.law_jets
+    found: Callable[..., None] = made.law_jets
+    return found

@@ -15,12 +15,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..train.arrays import cubics, law_arrays
+from ..train.arrays import cubics
 from ..train.forces import CurveFlank, LawFlank
 from ..train.friction import Sliding, smooth_sign
 from ..typing import Array, BoolArray, IntArray
 from .balance import Pushes
-from .law_kernel import BEND, BEYOND, CROSS, FORCE, MOMENT, RESULTS, ROWS, TANGENT, jets
+from .law_kernel import BEND, BEYOND, CROSS, FORCE, MOMENT, RESULTS, ROWS, TANGENT, jets, law_tables
 
 
 class Drag(NamedTuple):
@@ -130,7 +130,7 @@ class MeshForces:
         if pairs is None:
             pairs = self._pairs[number, count] = np.zeros((count, slots))
         out, slopes, work = np.zeros((count, RESULTS)), np.zeros((2, count, slots)), np.zeros((ROWS + 2 * slots, slots))
-        jets()(*tables, flank.law.reach, phase, np.ascontiguousarray(approach), pairs, slopes, work, out)
+        jets()(tables, phase, np.ascontiguousarray(approach), pairs, slopes, work, out)
         push = 1.0 + flank.damping * rates[:, 0]
         acts = push > 0.0
         push = np.where(acts, push, 0.0)
@@ -151,8 +151,7 @@ class MeshForces:
             if isinstance(flank, CurveFlank):
                 made.append(cubics(flank.curve))
                 continue
-            laws = law_arrays([flank.law])
-            made.append((laws.nodes[0], laws.forces[0], laws.touch[0], laws.energies[0], laws.coupling[0]))
+            made.append(law_tables(flank.law))
         return made
 
     def __call__(self, theta: Array, speed: float, u: Array, du: Array) -> Pushes:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..typing import Array, ComplexArray
-from ..vibration.radiation import AIR_DENSITY, AIR_SPEED
+from ..vibration.radiation import AIR_IMPEDANCE
 from .balance import Orbit, analysis, rates, samples_of, synthesis
 from .condensed import CondensedTrain
 from .mesh_forces import sampled
@@ -115,7 +115,7 @@ def steady_result(
     power = None
     if train.radiation_of_modes is not None:
         square = (modal.conj() * (modal @ train.radiation_of_modes)).sum(axis=1).real
-        power = 0.5 * AIR_DENSITY * AIR_SPEED * omega**2 * np.maximum(square, 0.0)
+        power = 0.5 * AIR_IMPEDANCE * omega**2 * np.maximum(square, 0.0)
     frequency = omega / (2.0 * math.pi)
     return SteadyState(
         orbit.speed, branch, orbit, 2.0 * math.pi / omega0, frequency, np.arange(count + 1) / system.turns, force,

@@ -1,4 +1,3 @@
-# mypy: ignore-errors
 """Where a step of a train's series ends: phases and pair forces that leave their cells, flanks that meet or part,
 flanks that slide fast enough for full friction.
 
@@ -7,7 +6,8 @@ The functions see each other and their constants by name, in plain Python and co
 
 from __future__ import annotations
 
-from .program import BEFORE, GAP, PAIR, PER_FLANK, PHASE, SLIDE, TOUCH, UNKNOWN, F
+from ..typing import Array, IntArray
+from .program import BEFORE, GAP, PAIR, PER_FLANK, PHASE, SLIDE, TOUCH, UNKNOWN, F, Program
 
 #: Part of a cell's width by which a corner is passed in its prediction, so that the step contains it.
 PAST = 2e-3
@@ -17,7 +17,7 @@ SAME, SMALL = 1e-9, 1e-7
 LOOKS = 6
 
 
-def train_corner(last, limit, p, memory, pieces, ahead):
+def train_corner(last: int, limit: float, p: Program, memory: Array, pieces: IntArray, ahead: bool) -> float:
     """Where x, up to `limit`, first takes something off its cell; 2 when nothing does.
 
     `ahead`: a little past the place to which the phases go at their present rate; pieces stay. Otherwise what is off
@@ -38,7 +38,7 @@ def train_corner(last, limit, p, memory, pieces, ahead):
     return nearest
 
 
-def watched(w, p, pieces):
+def watched(w: int, p: Program, pieces: IntArray) -> int:
     """Row of what is watched: of a pair its force, or its gap."""
     k = p.watches[w, 1]
     row = p.watches[w, 2]
@@ -48,7 +48,7 @@ def watched(w, p, pieces):
     return row
 
 
-def bounds(w, p, pieces):
+def bounds(w: int, p: Program, pieces: IntArray) -> tuple[float, float, float]:
     """Cell of what is watched, and how much beyond it counts as none."""
     kind = p.watches[w, 0]
     k = p.watches[w, 1]
@@ -76,7 +76,7 @@ def bounds(w, p, pieces):
     return (0.0, 1e300, slack) if pieces[at + 2] >= 0 else (-1e300, 0.0, slack)
 
 
-def go_on(w, last, x, corner, p, memory, pieces):
+def go_on(w: int, last: int, x: float, corner: bool, p: Program, memory: Array, pieces: IntArray) -> None:
     """Keep the pair forces at x for the next step; where x is a corner, go on to the cell beyond it."""
     kind = p.watches[w, 0]
     k = p.watches[w, 1]
@@ -122,7 +122,7 @@ def go_on(w, last, x, corner, p, memory, pieces):
                     pieces[at + PER_FLANK + slots + to] = UNKNOWN
 
 
-def leaves(memory, row, last, low, high, slack, limit):
+def leaves(memory: Array, row: int, last: int, low: float, high: float, slack: float, limit: float) -> float:
     """Where x, up to `limit`, first takes the series in a row of the memory out of [low, high]; 2 when it stays.
 
     It is looked at in a few places; between two of them at its turning point, where tangents allow it to pass there.
@@ -147,14 +147,14 @@ def leaves(memory, row, last, low, high, slack, limit):
             x, found = turning(memory, row, last, before, end, above)
         if found > high + slack or found < low - slack:
             over = found > high + slack
-            return crossing(memory, row, last, before, x, high if over else low, over, 1e-3 * slack)
+            return crossing(memory, row, last, (before, x), high if over else low, over, 1e-3 * slack)
         before = end
         value = there
         slope = rate
     return 2.0
 
 
-def turning(memory, row, last, begin, end, rises):
+def turning(memory: Array, row: int, last: int, begin: float, end: float, rises: bool) -> tuple[float, float]:
     """Place and value where the slope of a series changes its sign."""
     x = 0.5 * (begin + end)
     value = 0.0
@@ -168,8 +168,11 @@ def turning(memory, row, last, begin, end, rises):
     return x, value
 
 
-def crossing(memory, row, last, begin, end, goal, rises, close):
+def crossing(
+    memory: Array, row: int, last: int, between: tuple[float, float], goal: float, rises: bool, close: float
+) -> float:
     """Where a series passes `goal` between two places: Newton's method, kept between them by halving."""
+    begin, end = between
     x = end
     for _ in range(80):
         value, slope = polynomial(memory, row, last, x)
@@ -185,7 +188,7 @@ def crossing(memory, row, last, begin, end, goal, rises, close):
     return x
 
 
-def polynomial(memory, row, last, x):
+def polynomial(memory: Array, row: int, last: int, x: float) -> tuple[float, float]:
     """Value and slope at x of the series in a row of the memory."""
     value = 0.0
     slope = 0.0

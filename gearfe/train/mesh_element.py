@@ -174,13 +174,44 @@ class MeshLine:
         return tuple(made)
 
 
-def mesh_line(
-    scene: TrainScene, mesh: GearMesh, shafts: Sequence[RigidShaft], first: IntArray, ratios: Sequence[float],
-    size: int, sense: float, phase: float, force: float, speed: float, shifts: tuple[Array, Array],
-) -> MeshLine:  # fmt: skip
-    """Line of action of a mesh in a train whose shafts' coordinates begin at `first` of `size`; `force` (N) is that of
-    steady running, `speed` the largest of the drive (rad/s), `shifts` what `pair_shifts` says.
+@dataclass(frozen=True)
+class Shafts:
+    """Shafts of a train, and where their coordinates stand in those of the system.
+
+    Attributes
+    ----------
+    bodies
+        The shafts.
+    first : ndarray, shape (shafts,)
+        Number of the first coordinate of each.
+    ratios
+        Their speeds over that of the drive.
+    size
+        Number of the system's coordinates.
     """
+
+    bodies: tuple[RigidShaft, ...]
+    first: IntArray
+    ratios: tuple[float, ...]
+    size: int
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """Of a mesh: driving sense of its driver, phase of its teeth (rad), force in steady running (N), largest speed of
+    the drive (rad/s), and what `pair_shifts` says.
+    """
+
+    sense: float
+    phase: float
+    force: float
+    speed: float
+    shifts: tuple[Array, Array]
+
+
+def mesh_line(scene: TrainScene, mesh: GearMesh, shafts: Shafts, running: OperatingPoint) -> MeshLine:
+    """Line of action of a mesh in a train."""
+    first, size, ratios, sense, force = shafts.first, shafts.size, shafts.ratios, running.sense, running.force
     names = [s.name for s in scene.shafts]
     one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
     i, j = names.index(one.shaft), names.index(two.shaft)
@@ -200,8 +231,8 @@ def mesh_line(
 
     def relative(line: Array, on_one: Array, on_two: Array) -> Array:
         row = np.zeros(size)
-        row[first[i] : first[i] + 6] += line @ shafts[i].point_rows(on_one, scene.frame)
-        row[first[j] : first[j] + 6] -= line @ shafts[j].point_rows(on_two, scene.frame)
+        row[first[i] : first[i] + 6] += line @ shafts.bodies[i].point_rows(on_one, scene.frame)
+        row[first[j] : first[j] + 6] -= line @ shafts.bodies[j].point_rows(on_two, scene.frame)
         return row
 
     line = math.cos(alpha) * sense * along + math.sin(alpha) * across
@@ -224,11 +255,11 @@ def mesh_line(
     spin = np.zeros(size)
     spin[first[i] + 5], spin[first[j] + 5] = 1.0, -1.0
     slides = np.array([*(relative(np.cross(a, n), point, point) for n in (line, back)), spin])
-    sliding = _sliding(mesh, pair, force, (ratios[i], ratios[j]), speed)
+    sliding = _sliding(mesh, pair, force, (ratios[i], ratios[j]), running.speed)
     return MeshLine(
         mesh.name, relative(line, point, point), relative(back, point, point), turn, line, point, curve, law, backlash,
-        mean, mesh.damping + rayleigh, rayleigh, reference, i, ratios[i], sense, phase, one.gear.module, slides,
-        sliding, shifts,
+        mean, mesh.damping + rayleigh, rayleigh, reference, i, ratios[i], sense, running.phase, one.gear.module, slides,
+        sliding, running.shifts,
     )  # fmt: skip
 
 

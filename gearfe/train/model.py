@@ -23,7 +23,7 @@ from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge
 from .forces import Flank, Gyro, TrainForces, derivative
 from .inertia import rotor
 from .kinematics import Rolling, driving_senses, fastest, load_end, rolling, steady_forces
-from .mesh_element import MeshLine, mesh_line
+from .mesh_element import MeshLine, OperatingPoint, Shafts, mesh_line
 from .phases import pair_shifts, tooth_places
 from .scene import Drive, TrainScene
 from .series import train_series
@@ -136,15 +136,14 @@ def build_train(scene: TrainScene) -> TrainModel:
     size = sum(b.size for b in bodies)
     senses = driving_senses(scene)
     places, speed = tooth_places(scene, senses), fastest(scene.driven.speed)
-    lines = tuple(
-        mesh_line(
-            scene, mesh, shafts, first, ratios, size, sense, phase, float(force), speed,
-            pair_shifts(scene, mesh, sense, places),
-        )
+    placed = Shafts(shafts, first, tuple(ratios), size)
+    points = (
+        OperatingPoint(sense, phase, float(force), speed, pair_shifts(scene, mesh, sense, places))
         for mesh, sense, phase, force in zip(scene.meshes, senses, places.phases, steady_forces(scene), strict=True)
-    )  # fmt: skip
-    torques = _torques(scene, shafts, first, ratios, angle, size)
-    forces, directions = _forces(scene, lines, torques, angle, first, ratios, shafts, size)
+    )
+    lines = tuple(mesh_line(scene, mesh, placed, point) for mesh, point in zip(scene.meshes, points, strict=True))
+    torques = _torques(scene, placed, angle)
+    forces, directions = _forces(scene, lines, torques, angle, placed)
     series = train_series(forces)
     changing = LocalForce(
         tuple(bodies), directions, forces.at_one_time, series, forces.breaks, name="forces of the train"
@@ -171,14 +170,11 @@ def build_train(scene: TrainScene) -> TrainModel:
     )
 
 
-def _torques(
-    scene: TrainScene, shafts: tuple[RigidShaft, ...], first: IntArray, ratios: list[float],
-    angle: TimeFunction, size: int,
-) -> tuple[tuple[Array, TimeFunction], ...]:  # fmt: skip
+def _torques(scene: TrainScene, shafts: Shafts, angle: TimeFunction) -> tuple[tuple[Array, TimeFunction], ...]:
     """Directions in the system with torques over time: loads, and the shafts' inertia when the drive changes speed."""
-    made = []
+    made, first, size = [], shafts.first, shafts.size
     change = derivative(derivative(angle))
-    for i, (shaft, ratio) in enumerate(zip(shafts, ratios, strict=True)):
+    for i, (shaft, ratio) in enumerate(zip(shafts.bodies, shafts.ratios, strict=True)):
         if change.sines or any(any(row) for row in change.coefficients):
             direction = np.zeros(size)
             direction[first[i] + 5] = 1.0
@@ -195,14 +191,16 @@ def _torques(
 
 def _forces(
     scene: TrainScene, lines: tuple[MeshLine, ...], torques: tuple[tuple[Array, TimeFunction], ...],
-    angle: TimeFunction, first: IntArray, ratios: list[float], shafts: tuple[RigidShaft, ...], size: int,
+    angle: TimeFunction, shafts: Shafts,
 ) -> tuple[TrainForces, Array]:  # fmt: skip
     """All that is not constant: three directions a shaft (tilts, spin), up to six a mesh, one a torque."""
-    unit = np.eye(size)
-    columns = [column for i in first for column in unit[i + 3 : i + 6]]
+    unit = np.eye(shafts.size)
+    columns = [column for i in shafts.first for column in unit[i + 3 : i + 6]]
     gyros: tuple[Gyro, ...] = ()
     if scene.damping.gyroscopic:
-        gyros = tuple(Gyro(3 * i, g, s.rotor.polar) for i, (g, s) in enumerate(zip(ratios, shafts, strict=True)))
+        gyros = tuple(
+            Gyro(3 * i, g, s.rotor.polar) for i, (g, s) in enumerate(zip(shafts.ratios, shafts.bodies, strict=True))
+        )
     flanks: list[Flank] = []
     for line in lines:
         flanks += line.flanks(len(columns))

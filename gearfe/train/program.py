@@ -107,8 +107,8 @@ class Tables:
     rows: int
     pieces: int = 0
     inputs: list[Row] = field(default_factory=list)
-    before: list[Row] = field(default_factory=list)
-    after: list[Row] = field(default_factory=list)
+    before: list[Operation] = field(default_factory=list)
+    after: list[Operation] = field(default_factory=list)
     outputs: list[Row] = field(default_factory=list)
     watches: list[tuple[int, ...]] = field(default_factory=list)
 
@@ -129,12 +129,27 @@ class Tables:
         self.outputs.append(((direction, row), (factor,)))
 
 
-def operation(
-    row: int, *, A: int = -1, B: int = -1, kind: int = NOTHING, z: int = 0, cell: int = 0, column: int = 0,
-    factor: float = 1.0, sign: float = 1.0, keep: float = 0.0, needs: tuple[int, int] = (ALWAYS, ALWAYS),
-) -> Row:  # fmt: skip
+@dataclass(frozen=True)
+class Operation:
     """An entry of `Operations`."""
-    return (row, A, B, kind, z, cell, column, *needs), (factor, sign, keep)
+
+    row: int
+    A: int = -1
+    B: int = -1
+    kind: int = NOTHING
+    z: int = 0
+    cell: int = 0
+    column: int = 0
+    factor: float = 1.0
+    sign: float = 1.0
+    keep: float = 0.0
+    needs: tuple[int, int] = (ALWAYS, ALWAYS)
+
+    @property
+    def numbers(self) -> Row:
+        """Whole numbers and reals of the entry."""
+        places = self.row, self.A, self.B, self.kind, self.z, self.cell, self.column
+        return (*places, *self.needs), (self.factor, self.sign, self.keep)
 
 
 def train_program(forces: TrainForces) -> tuple[Program, int, int]:
@@ -147,7 +162,7 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
         momentum = made.read(made.take(), d + 2, 1, gyro.polar * gyro.ratio, gyro.polar)
         for tilt, other, sign in ((d, d + 1, -1.0), (d + 1, d, 1.0)):
             rate, row = made.read(made.take(), other, 1, 0.0, 1.0), made.take()
-            made.after.append(operation(row, A=momentum, B=rate))
+            made.after.append(Operation(row, A=momentum, B=rate))
             made.force(tilt, row, sign)
     laws = {id(flank.law): flank.law for flank in forces.contacts}
     tables = law_arrays(list(laws.values()))
@@ -169,7 +184,7 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
     program = Program(
         time_arrays([forces.angle, *(torque for _, torque in forces.torques)]),
         Inputs(*_two(made.inputs, 4, 3)),
-        Operations(*_two(made.before + made.after, 9, 3)),
+        Operations(*_two([one.numbers for one in made.before + made.after], 9, 3)),
         Outputs(*_two(made.outputs, 2, 1)),
         Flanks(
             _ints([*range(count), *(-1 for _ in numbers)]),
@@ -194,7 +209,7 @@ def _place(made: Tables, flank: Flank, rows: int) -> int:
     row = made.take(rows)
     made.read(row + Z, flank.turn, 0, flank.sense * flank.ratio, flank.sense, flank.phase, row + CELL)
     made.read(row + DELTA, flank.direction, 0, 0.0, 1.0, -flank.gap)
-    made.before += [operation(row + Z2, A=row + Z, B=row + Z), operation(row + Z3, A=row + Z2, B=row + Z)]
+    made.before += [Operation(row + Z2, A=row + Z, B=row + Z), Operation(row + Z3, A=row + Z2, B=row + Z)]
     made.force(flank.direction, -1, flank.mean)
     return row
 
@@ -203,9 +218,9 @@ def _curve(made: Tables, number: int, flank: CurveFlank) -> None:
     row = _place(made, flank, CELL + 1)
     bears = (made.pieces + 2, ALWAYS)
     stiffness, force = made.take(), made.take()
-    made.after.append(operation(stiffness, kind=CUBIC, z=row, cell=row + CELL))
-    made.after.append(operation(force))
-    made.after.append(operation(force, A=stiffness, B=row + DELTA, needs=bears))
+    made.after.append(Operation(stiffness, kind=CUBIC, z=row, cell=row + CELL))
+    made.after.append(Operation(force))
+    made.after.append(Operation(force, A=stiffness, B=row + DELTA, needs=bears))
     made.force(flank.direction, force, -1.0)
     made.watches.append((PHASE, number, row + Z, 0))
     if flank.parts:
@@ -220,39 +235,39 @@ def _contact(made: Tables, number: int, flank: LawFlank, slots: int) -> int:
     if flank.rayleigh > 0.0:
         made.force(flank.direction, made.read(made.take(), flank.direction, 1, 0.0, flank.rayleigh), 1.0)
     pull, moment = made.take(), made.take()
-    made.after += [operation(pull), operation(moment)]
+    made.after += [Operation(pull), Operation(moment)]
     cells = made.pieces + PER_FLANK
     for slot in range(slots):
         own, need = row + SLOTS + PER_SLOT * slot, (cells + slot, ALWAYS)
         _pair(made, row, own, need)
         slope = made.take()
-        made.after.append(operation(slope, kind=SLOPE, z=row, cell=own + TOUCHES, needs=need))
-        made.after.append(operation(moment, A=own + FULL, B=slope, sign=-1.0, keep=1.0, needs=need))
+        made.after.append(Operation(slope, kind=SLOPE, z=row, cell=own + TOUCHES, needs=need))
+        made.after.append(Operation(moment, A=own + FULL, B=slope, sign=-1.0, keep=1.0, needs=need))
         below = -1
         for power in range(4, -1, -1):  # Horner over f of the energy's slope
             inner, last = made.take(), power == 0
             made.after.append(
-                operation(
+                Operation(
                     moment if last else inner, A=below, B=own + F, kind=SLOPE, z=row, cell=own + ENERGIES,
                     column=4 * power, sign=-1.0 if last else 1.0, keep=float(last), needs=need,
                 )
             )  # fmt: skip
             below = inner
         acts = (cells + slot, made.pieces + 2)
-        made.after.append(operation(pull, A=own + FULL, B=row + DAMPED, keep=1.0, needs=acts))
+        made.after.append(Operation(pull, A=own + FULL, B=row + DAMPED, keep=1.0, needs=acts))
         made.watches.append((PAIR, number, own, slot))
     couple = row + SLOTS + PER_SLOT * slots
     for low in range(slots):
         for up in range(low + 1, slots):
             one_pair, other = (row + SLOTS + PER_SLOT * k for k in (low, up))
-            made.before.append(operation(couple, kind=CUBIC, z=row, cell=couple + NUMBERS))
+            made.before.append(Operation(couple, kind=CUBIC, z=row, cell=couple + NUMBERS))
             for here, there, k in ((one_pair, other, up), (other, one_pair, low)):
                 need = (cells + k, ALWAYS)
-                made.before.append(operation(here + GAP, A=couple, B=there + FULL, sign=-1.0, keep=1.0, needs=need))
+                made.before.append(Operation(here + GAP, A=couple, B=there + FULL, sign=-1.0, keep=1.0, needs=need))
             slope, both, product = made.take(), (cells + low, cells + up), made.take()
-            made.after.append(operation(slope, kind=SLOPE, z=row, cell=couple + NUMBERS, needs=both))
-            made.after.append(operation(product, A=one_pair + FULL, B=other + FULL, needs=both))
-            made.after.append(operation(moment, A=slope, B=product, sign=-1.0, keep=1.0, needs=both))
+            made.after.append(Operation(slope, kind=SLOPE, z=row, cell=couple + NUMBERS, needs=both))
+            made.after.append(Operation(product, A=one_pair + FULL, B=other + FULL, needs=both))
+            made.after.append(Operation(moment, A=slope, B=product, sign=-1.0, keep=1.0, needs=both))
             couple += PER_COUPLE
     made.force(flank.direction, pull, -1.0)
     made.force(flank.turn, moment, -flank.sense)
@@ -281,7 +296,7 @@ def _friction(made: Tables, number: int, flank: LawFlank, row: int, slots: int) 
     first, scale = made.take(PER_SLIDE * slots), 1.0 / sliding.speed
     spin = made.read(made.take(), sliding.spin, 1, sliding.ratio * scale, scale)
     across, turning = made.take(), made.take()
-    made.after += [operation(across), operation(turning)]
+    made.after += [Operation(across), Operation(turning)]
     for slot in range(slots):
         own, pair = first + PER_SLIDE * slot, row + SLOTS + PER_SLOT * slot
         need = (made.pieces + PER_FLANK + slot, ALWAYS)
@@ -289,13 +304,13 @@ def _friction(made: Tables, number: int, flank: LawFlank, row: int, slots: int) 
         made.watches.append((SLIDE, number, own + SPEED, slot))
         made.read(own + SPEED, sliding.across, 1, 0.0, scale)
         made.after += [
-            operation(own + ARM, kind=CUBIC, z=row, cell=own + LEVER, needs=need),
-            operation(own + SPEED, A=own + ARM, B=spin, keep=1.0, needs=need),
-            operation(own + SIGN, kind=SMOOTH, z=own + SPEED, cell=need[0] + slots, needs=need),
-            operation(own + TURNS, A=own + ARM, B=own + SIGN, needs=need),
-            operation(own + NORMAL, A=pair + FULL, B=row + DAMPED, needs=need),
-            operation(across, A=own + NORMAL, B=own + SIGN, keep=1.0, needs=acts),
-            operation(turning, A=own + NORMAL, B=own + TURNS, keep=1.0, needs=acts),
+            Operation(own + ARM, kind=CUBIC, z=row, cell=own + LEVER, needs=need),
+            Operation(own + SPEED, A=own + ARM, B=spin, keep=1.0, needs=need),
+            Operation(own + SIGN, kind=SMOOTH, z=own + SPEED, cell=need[0] + slots, needs=need),
+            Operation(own + TURNS, A=own + ARM, B=own + SIGN, needs=need),
+            Operation(own + NORMAL, A=pair + FULL, B=row + DAMPED, needs=need),
+            Operation(across, A=own + NORMAL, B=own + SIGN, keep=1.0, needs=acts),
+            Operation(turning, A=own + NORMAL, B=own + TURNS, keep=1.0, needs=acts),
         ]
     made.force(sliding.across, across, -sliding.coefficient)
     made.force(sliding.spin, turning, -sliding.coefficient)
@@ -304,13 +319,13 @@ def _friction(made: Tables, number: int, flank: LawFlank, row: int, slots: int) 
 
 def _pair(made: Tables, row: int, own: int, need: tuple[int, int]) -> None:
     """Gap of a slot less Lambda, by Horner over f: H3, H2, H1."""
-    touch = operation(own + GAP, kind=CUBIC, z=row, cell=own + TOUCHES, sign=-1.0, keep=1.0)
+    touch = Operation(own + GAP, kind=CUBIC, z=row, cell=own + TOUCHES, sign=-1.0, keep=1.0)
     made.before.append(touch)
     below = -1
     for power in range(4, 0, -1):
         last = power == 1
         made.before.append(
-            operation(
+            Operation(
                 own + (GAP if last else H1 + power - 2), kind=CUBIC, z=row, cell=own + ENERGIES, column=4 * power,
                 A=below, B=own + F, factor=float(power), sign=-1.0 if last else 1.0, keep=float(last), needs=need,
             )

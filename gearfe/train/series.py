@@ -1,4 +1,3 @@
-# mypy: ignore-errors
 r"""The forces of a train by the orders of their Taylor series: those of `gearfe.train.forces`, as recurrences.
 
 Over x, time :math:`t + s x`, all forces follow order by order from Cauchy's rule for products
@@ -16,7 +15,7 @@ from ..typing import Array, IntArray
 from . import corners
 from . import program as tables
 from .corners import SAME, train_corner
-from .forces import TrainForces
+from .forces import CurveFlank, LawFlank, TrainForces
 from .program import (
     BEFORE,
     CELL,
@@ -40,6 +39,8 @@ from .program import (
     TOUCHES,
     UNKNOWN,
     F,
+    Operations,
+    Program,
     train_program,
 )
 
@@ -47,7 +48,7 @@ from .program import (
 NEWTON, CHANGED = 50, 1e-9
 
 
-def train_order(j, t, s, u, p, memory, pieces, out):
+def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array, pieces: IntArray, out: Array) -> None:
     """Order j of the forces over x, time t + s x, from the orders up to j + 1 of u; see the module's docstring."""
     if j == 0:
         step_begins(t, s, p, memory, pieces)
@@ -97,7 +98,7 @@ def train_order(j, t, s, u, p, memory, pieces, out):
         out[d] += p.outputs.reals[i, 0] * (memory[row, j] if row >= 0 else u[d, j])
 
 
-def step_begins(t, s, p, memory, pieces):
+def step_begins(t: float, s: float, p: Program, memory: Array, pieces: IntArray) -> None:
     """Functions of time, and the numbers of the cells that the flanks are on, for a step."""
     time_series(p.times, t, s > 0.0, memory.shape[1], memory)
     for k in range(p.times.first.shape[0] - 1):
@@ -147,7 +148,7 @@ def step_begins(t, s, p, memory, pieces):
                 memory[lever, 1] = p.flanks.slide[k, 0]
 
 
-def operate(j, operations, first, end, memory, pieces):
+def operate(j: int, operations: Operations, first: int, end: int, memory: Array, pieces: IntArray) -> None:
     """Order j of the rows that the operations change."""
     for i in range(first, end):
         one = operations.ints[i, 7]
@@ -182,7 +183,7 @@ def operate(j, operations, first, end, memory, pieces):
         memory[row, j] = operations.reals[i, 2] * memory[row, j] + operations.reals[i, 1] * value
 
 
-def smoothed_sign(j, x, row, piece, memory, pieces):
+def smoothed_sign(j: int, x: int, row: int, piece: int, memory: Array, pieces: IntArray) -> None:
     """Order j of s(x) in a row, of x2 and of s / x in the next ones; a range that is not known follows from x."""
     if j == 0 and pieces[piece] == UNKNOWN:
         pieces[piece] = 1 if memory[x, 0] > 1.0 else -1 if memory[x, 0] < -1.0 else 0
@@ -203,7 +204,7 @@ def smoothed_sign(j, x, row, piece, memory, pieces):
     memory[row, j] = value
 
 
-def pair_forces(j, slots, memory, row, pieces, at):
+def pair_forces(j: int, slots: int, memory: Array, row: int, pieces: IntArray, at: int) -> float:
     """Order j of the pair forces from what their gaps lack, J f = gap; for j = 0 a step of Newton's method.
 
     Returns the largest change, relative to the largest force.
@@ -258,15 +259,18 @@ def pair_forces(j, slots, memory, row, pieces, at):
     return 0.0
 
 
-def train_begin(t, sign, u, du, p, forces, memory, pieces):
+def train_begin(
+    t: float, sign: float, u: Array, du: Array, p: Program, forces: TrainForces, memory: Array, pieces: IntArray
+) -> None:
     """Cells of all flanks at a start, at a node the one that lies ahead, and the pair forces there; not compiled."""
     angle, rate = float(forces.angle(t)), float(forces.angle(t, 1))
     slots = p.laws.touch.shape[1]
-    for k, flank in enumerate((*forces.curves, *forces.contacts)):
+    flanks: tuple[CurveFlank | LawFlank, ...] = (*forces.curves, *forces.contacts)
+    for k, flank in enumerate(flanks):
         at, row = p.flanks.piece[k], p.flanks.row[k]
         phase, approach = (float(x[0]) for x in flank.place(np.array([angle]), u[None]))
         speed = sign * flank.sense * (flank.ratio * rate + du[flank.turn])
-        if k < len(forces.curves):
+        if isinstance(flank, CurveFlank):
             pieces[at : at + 2] = ahead_of(flank.curve.nodes, phase, speed)
             bears = approach > 0.0 or (approach == 0.0 and sign * du[flank.direction] > 0.0)
             pieces[at + 2] = 0 if bears or not flank.parts else -1
@@ -274,7 +278,7 @@ def train_begin(t, sign, u, du, p, forces, memory, pieces):
         turn, cell = ahead_of(flank.law.nodes, phase, speed)
         pieces[at : at + 3] = turn, cell, 0 if 1.0 + flank.damping * du[flank.direction] > 0.0 else -1
         force = np.zeros(slots)
-        made = flank.law([phase], [approach], flank.shifts_at(np.array([phase]))).pair_forces[0]
+        made = flank.law(np.array([phase]), np.array([approach]), flank.shifts_at(np.array([phase]))).pair_forces[0]
         shift = turn - int(flank.law.place(np.array([phase]))[0][0])  # a node at which a cycle ends lies behind
         for slot in range(flank.law.slots):
             if 0 <= slot + shift < slots:
@@ -286,7 +290,7 @@ def train_begin(t, sign, u, du, p, forces, memory, pieces):
         memory[row + BEFORE, :slots] = force
 
 
-def ahead_of(nodes, phase, speed):
+def ahead_of(nodes: Array, phase: float, speed: float) -> tuple[int, int]:
     """Cycle and cell that a phase is in, at a node those that lie ahead."""
     cells, period = len(nodes) - 1, nodes[-1] - nodes[0]
     turn = int(np.floor((phase - nodes[0]) / period))

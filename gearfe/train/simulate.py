@@ -140,7 +140,15 @@ def _pieces(
         if last:
             if begin:
                 count(0, 0)  # what follows is no part of the count
-            yield _whole(model, response, so_far, finer, float(t[-1]), why, floquet, band_hz)
+            yield _whole(
+                model,
+                response,
+                so_far,
+                finer,
+                f"of {1e3 * float(t[-1]):.6g} ms: {response.status}{why}",
+                floquet,
+                band_hz,
+            )
             return
         yield response
         begin, start = end, replace(start, time=float(t[end]), q=moved.q[-1].copy(), v=moved.v[-1].copy())
@@ -274,16 +282,14 @@ def _whole(
     response: TrainResponse,
     so_far: _SoFar,
     finer: _Finer | None,
-    asked: float,
-    why: str,
+    ended: str,
     floquet: bool,
     band_hz: float | None,
 ) -> TrainResponse:
     """The last piece with what holds for the whole run."""
     warnings = so_far.pulls(model) + _loose(model)
     if response.status != "done":
-        reached = response.time_reached
-        warnings.append(f"the run ended at {1e3 * reached:.6g} ms of {1e3 * asked:.6g} ms: {response.status}{why}")
+        warnings.append(f"the run ended at {1e3 * response.time_reached:.6g} ms {ended}")
     estimates: dict[str, float] = {}
     if finer is not None and band_hz is not None:
         estimates["integration"] = finer.error

@@ -25,8 +25,8 @@ from ..errors import InputError
 from ..spectrum import Spectrum, amplitude_spectrum
 from ..typing import Array
 
-#: Density (kg/m3) and speed of sound (m/s) of air at 20 degrees Celsius, 101325 Pa.
-AIR_DENSITY, AIR_SPEED = 1.2041, 343.21
+#: Impedance of air (Pa s/m) at 20 degrees Celsius, 101325 Pa: density (kg/m3) times speed of sound (m/s).
+AIR_IMPEDANCE = 1.2041 * 343.21
 #: Power of 0 dB (W), ISO 3744.
 REFERENCE_POWER = 1e-12
 
@@ -66,12 +66,10 @@ def power_level(power: ArrayLike) -> Array:
         return np.asarray(10.0 * np.log10(np.asarray(power, dtype=float) / REFERENCE_POWER))
 
 
-def instantaneous_power(
-    radiation: Array, velocity: ArrayLike, *, density: float = AIR_DENSITY, speed: float = AIR_SPEED
-) -> Array:
+def instantaneous_power(radiation: Array, velocity: ArrayLike) -> Array:
     """Power (W) at each time: () or (n,); see `radiated_power` for the arguments."""
-    matrix, v = _checked(radiation, velocity, density, speed)
-    return np.asarray(density * speed * np.einsum("...i,...i->...", v @ matrix, v))
+    matrix, v = _checked(radiation, velocity)
+    return np.asarray(AIR_IMPEDANCE * np.einsum("...i,...i->...", v @ matrix, v))
 
 
 def radiated_power(
@@ -82,8 +80,6 @@ def radiated_power(
     window: str = "none",
     start: int = 0,
     length: int | None = None,
-    density: float = AIR_DENSITY,
-    speed: float = AIR_SPEED,
 ) -> RadiatedPower:
     """Spectrum of the equivalent radiated power.
 
@@ -95,32 +91,25 @@ def radiated_power(
         Rates of the body's coordinates at equally spaced times.
     step, window, start, length
         See `gearfe.spectrum.amplitude_spectrum`.
-    density, speed
-        Of the air: kg/m3 and m/s.
     """
-    matrix, v = _checked(radiation, velocity, density, speed)
+    matrix, v = _checked(radiation, velocity)
     spectrum = amplitude_spectrum(v, step, window=window, start=start, length=length)
     taken = v[start : start + spectrum.samples]
-    mean = float(instantaneous_power(matrix, taken, density=density, speed=speed).mean())
-    return RadiatedPower(spectrum.frequency, power_of_lines(matrix, spectrum, density=density, speed=speed), mean)
+    mean = float(instantaneous_power(matrix, taken).mean())
+    return RadiatedPower(spectrum.frequency, power_of_lines(matrix, spectrum), mean)
 
 
-def power_of_lines(
-    radiation: Array, spectrum: Spectrum, *, density: float = AIR_DENSITY, speed: float = AIR_SPEED
-) -> Array:
+def power_of_lines(radiation: Array, spectrum: Spectrum) -> Array:
     """(m,) power (W) of the lines of a velocity spectrum of all N coordinates."""
     v = spectrum.value
     square = np.einsum("ki,ki->k", v.conj(), v @ radiation).real
-    return np.asarray(density * speed * spectrum.weight * np.maximum(square, 0.0))
+    return np.asarray(AIR_IMPEDANCE * spectrum.weight * np.maximum(square, 0.0))
 
 
-def _checked(radiation: Array, velocity: ArrayLike, density: float, speed: float) -> tuple[Array, Array]:
+def _checked(radiation: Array, velocity: ArrayLike) -> tuple[Array, Array]:
     matrix, v = np.asarray(radiation, dtype=float), np.asarray(velocity, dtype=float)
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
         raise InputError("radiation", matrix.shape, "must be a square matrix", "take ModalBody.radiation")
     if v.shape[-1:] != matrix.shape[:1]:
         raise InputError("velocity", v.shape, f"must have {len(matrix)} coordinates in its last axis", "")
-    for field, value in (("density", density), ("speed", speed)):
-        if not value > 0.0:
-            raise InputError(field, value, "must be > 0", "air at 20 degrees: 1.2041 kg/m3, 343.21 m/s")
     return matrix, v

@@ -12,7 +12,7 @@ from ..record_spectrum import FASTEST, RecordSpectrum
 from ..spectrum import Spectrum, uniform_step
 from ..train.response import TrainResponse
 from ..typing import Array, ComplexArray
-from .radiation import AIR_DENSITY, AIR_SPEED, RadiatedPower, instantaneous_power
+from .radiation import AIR_IMPEDANCE, RadiatedPower, instantaneous_power
 
 #: Columns of response.csv that are no signals of the spectrum.
 NO_SIGNALS = ("time_s", "drive_angle_deg", "instantaneous_radiated_power_W", "band_limited")
@@ -157,13 +157,13 @@ class TrainRecord:
         """The spectra, when all samples have arrived."""
         if self._made is None:
             raise InputError("record", None, "no sample has arrived", "add the response")
-        signals, impedance = len(self._names), AIR_DENSITY * AIR_SPEED
+        signals = len(self._names)
         spectrum = self._made.spectrum(signals)
         power = None
         if self._made.signals > signals:
             square = sum(np.abs(self._made.column(i)) ** 2 for i in range(signals, self._made.signals))
-            mean = impedance * self._square / (self.count * self.every)
-            power = RadiatedPower(spectrum.frequency, impedance * spectrum.weight * square, mean)
+            mean = AIR_IMPEDANCE * self._square / (self.count * self.every)
+            power = RadiatedPower(spectrum.frequency, AIR_IMPEDANCE * spectrum.weight * square, mean)
         return TrainSpectra(self._names, spectrum, power, self.start, self.step, self.every)
 
 
