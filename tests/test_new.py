@@ -13,7 +13,7 @@ from gearfe.tables.examples import JOBS, job_file
 from gearfe.tables.mechanism import BodyTable, MechanismFile, RunTable, read_mechanism_file
 from gearfe.tables.microgeometry import GearMicrogeometryTable, VariableTable
 from gearfe.tables.text import table_text
-from gearfe.tables.train import TrainShaftTable
+from gearfe.tables.train import TrainShaftTable, read_train_tables
 
 ROOT = Path(__file__).parents[1]
 SHIPPED = sorted((Path(__file__).parents[1] / "geometry").glob("*.toml"))
@@ -151,6 +151,16 @@ def test_shipped_jobs_come_with_their_files(tmp_path, monkeypatch, capsys):
     assert not (tmp_path / "mine.toml").exists()
     assert main(["new", "andrew.toml"]) == 2
     assert "did you mean 'andrews.toml'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("path", [*SHIPPED, ROOT / "meshes" / "box.toml"], ids=lambda path: path.stem)
+def test_shipped_trains_are_read(path):
+    """All rules of their tables hold, of each variant."""
+    tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    if "train" not in tables:
+        pytest.skip("no train")
+    for variant in (None, *tables["train"].get("variants", {})):
+        assert read_train_tables(path, variant)["train"].shafts
 
 
 def test_every_shipped_file_is_in_the_wheel():
