@@ -28,6 +28,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_job(parser, "file", "mechanism file (TOML, see docs/mechanisms.md)")
     add_folder(parser)
     add_keys(parser, RunTable, *KEYS, until="end_s")
+    parser.add_argument(
+        "--sensitivity",
+        action="append",
+        metavar="KEY",
+        help="write the slopes of all outputs by this key, as bodies.rod.mass_kg; may stand several times",
+    )
     parser.add_argument("--no-pictures", action="store_true", help="tables and summary only")
     parser.add_argument("--no-estimate", action="store_true", help="leave out the finer runs that estimate the error")
     parser.add_argument("--animation", action="store_true", help="write animation.gif")
@@ -38,17 +44,24 @@ def run(args: argparse.Namespace) -> int:
     # a mistake in the file is told before NumPy and SciPy load
     file = read_mechanism_file(args.file)
     file = replace(file, run=with_keys(args, file.run, *KEYS, until="end_s"))
+    if args.sensitivity:
+        file = replace(file, run=replace(file.run, sensitivities=tuple(args.sensitivity)))
     file.run.check("run")
 
     from ..mechanisms.job import run_mechanism
     from ..mechanisms.model import make_mechanism
 
     mechanism = make_mechanism(file, Path(args.file))
-    folder = args.out
+    folder, slopes = args.out, None
+    if file.run.sensitivities:
+        from ..mechanisms.sensitivity import sensitivities
+
+        slopes = sensitivities(args.file, file.run.sensitivities, run=file.run)
     if file.run.analysis in ("equilibrium", "modes"):
         from ..mechanisms.rest import run_rest
 
-        outcome = run_rest(mechanism, folder, draw=None if args.no_pictures else partial(_draw_rest, mechanism))
+        draw = None if args.no_pictures else partial(_draw_rest, mechanism)
+        outcome = run_rest(mechanism, folder, draw=draw, slopes=slopes)
         print(outcome.text)
         return 0 if outcome.complete else 1
     outcome = run_mechanism(
@@ -56,6 +69,7 @@ def run(args: argparse.Namespace) -> int:
         folder,
         estimate=not args.no_estimate,
         draw=partial(_draw, mechanism, args) if args.animation or not args.no_pictures else None,
+        slopes=slopes,
     )
     print(outcome.text)
     return 0 if outcome.complete else 1

@@ -1,6 +1,20 @@
-"""Mechanism files: TOML to a rigid system, named outputs, energies, joint reactions."""
+"""Mechanism files: TOML to a rigid system, named outputs, energies, joint reactions, sweeps and sensitivities."""
 
 from .model import Mechanism, load_mechanism
 from .results import Results, evaluate
+from .sensitivity import Sensitivities, sensitivities
+from .solve import Solution, solve
+from .sweep import Case, sweep
 
-__all__ = ["Mechanism", "Results", "evaluate", "load_mechanism"]
+__all__ = [
+    "Case",
+    "Mechanism",
+    "Results",
+    "Sensitivities",
+    "Solution",
+    "evaluate",
+    "load_mechanism",
+    "sensitivities",
+    "solve",
+    "sweep",
+]

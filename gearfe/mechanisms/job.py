@@ -7,7 +7,7 @@ import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,11 +20,14 @@ from .error_estimate import RUNS, TrajectoryError, trajectory_error
 from .model import Mechanism
 from .results import Results, evaluate, reactions, reference_table
 
+if TYPE_CHECKING:
+    from .sensitivity import Sensitivities
+
 #: Files that depend on the options: what is left of them from an earlier run is removed.
 MAY_WRITE = (
     "trajectory.csv", "energy.csv", "equilibrium.csv", "bodies.csv", "modes.csv", "shapes.csv", "modes.png",
     "reactions.csv", "curves.png", "energy.png", "picture.png", "animation.gif", "links.csv", "links.vtkhdf",
-    "links.png",
+    "links.png", "sensitivities.csv",
 )  # fmt: skip
 
 
@@ -47,11 +50,12 @@ def run_mechanism(
     until: float | None = None,
     estimate: bool = True,
     draw: Callable[[Path, Results], None] | None = None,
+    slopes: Sensitivities | None = None,
 ) -> Outcome:
     """Integrate, write ``trajectory.csv``, ``energy.csv``, ``summary.json`` and what else is asked.
 
     All files appear together, or none. With `estimate` two finer runs tell how far off it is; `draw` adds pictures to
-    the folder.
+    the folder, `slopes` sensitivities.csv.
     """
     began = clock.perf_counter()
     run = mechanism.file.run
@@ -97,6 +101,8 @@ def run_mechanism(
             from .link_files import write_links
 
             write_links(made, mechanism, trajectory)
+        if slopes is not None:
+            write_csv(made / "sensitivities.csv", slopes.table())
         written = clock.perf_counter()
         if draw is not None:
             draw(made, results)

@@ -6,7 +6,7 @@ import time as clock
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,14 +21,22 @@ from .job import MAY_WRITE, Outcome
 from .model import Mechanism
 from .results import Results, evaluate, reactions
 
+if TYPE_CHECKING:
+    from .sensitivity import Sensitivities
+
 
 def run_rest(
-    mechanism: Mechanism, out: str | Path, *, draw: Callable[[Path, Results, Modes | None], None] | None = None
+    mechanism: Mechanism,
+    out: str | Path,
+    *,
+    draw: Callable[[Path, Results, Modes | None], None] | None = None,
+    slopes: Sensitivities | None = None,
 ) -> Outcome:
     """Find the equilibrium downhill from the start, and modes where the file asks for them; all files, or none.
 
     ``equilibrium.csv`` has the outputs, ``bodies.csv`` the poses, ``reactions.csv`` the forces of the joints,
-    ``modes.csv`` frequencies and damping, ``shapes.csv`` the motions; `draw` adds pictures to the folder.
+    ``modes.csv`` frequencies and damping, ``shapes.csv`` the motions; `draw` adds pictures to the folder, `slopes`
+    sensitivities.csv.
     """
     began = clock.perf_counter()
     folder = output_folder(out)
@@ -48,9 +56,11 @@ def run_rest(
             from .link_files import write_links
 
             write_links(made, mechanism, results.trajectory)
+        if slopes is not None:
+            write_csv(made / "sensitivities.csv", slopes.table())
         if draw is not None:
             draw(made, results, found)
-        summary = _summary(mechanism, start, rest, results, found)
+        summary = summarise_rest(mechanism, start, rest, results, found)
         summary["timings"] = {"whole_s": clock.perf_counter() - began}
         summary["warnings"] = list(told)
         write_json(made / "summary.json", summary)
@@ -77,16 +87,20 @@ def _poses(mechanism: Mechanism, q: Array) -> dict[str, Any]:
     return {"body": names, "x_m": np.array(x), "y_m": np.array(y), "angle_rad": np.array(angle)}
 
 
-def _write_modes(folder: Path, mechanism: Mechanism, found: Modes) -> None:
-    count = len(found.rates)
-    number = np.arange(1, count + 1)
-    columns: dict[str, Any] = {
-        "mode": number,
+def mode_columns(found: Modes) -> dict[str, Any]:
+    """Columns of modes.csv."""
+    return {
+        "mode": np.arange(1, len(found.rates) + 1),
         "frequency_Hz": found.frequencies,
         "damping_ratio": found.damping_ratios,
         "damped_frequency_Hz": found.rates.imag / (2 * np.pi),
         "decay_per_s": -found.rates.real,
     }
+
+
+def _write_modes(folder: Path, mechanism: Mechanism, found: Modes) -> None:
+    columns = mode_columns(found)
+    number, count = columns["mode"], len(found.rates)
     write_csv(folder / "modes.csv", columns)
     bodies = [body.name for body in mechanism.scene.bodies]
     shapes = found.shapes.reshape(count, -1, 3)
@@ -97,9 +111,10 @@ def _write_modes(folder: Path, mechanism: Mechanism, found: Modes) -> None:
     write_csv(folder / "shapes.csv", rows)
 
 
-def _summary(
+def summarise_rest(
     mechanism: Mechanism, start: Start, rest: Equilibrium, results: Results, found: Modes | None
 ) -> dict[str, Any]:
+    """Content of summary.json."""
     made: dict[str, Any] = {
         "title": mechanism.file.title,
         "analysis": mechanism.file.run.analysis,

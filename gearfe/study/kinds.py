@@ -169,27 +169,19 @@ def _runup(raw: Raw, path: Path, _shared: Shared, _estimate: bool) -> Answer:
 
 def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
     from ..mechanisms.error_estimate import trajectory_error
-    from ..mechanisms.job import output_times, summarise
+    from ..mechanisms.job import summarise
     from ..mechanisms.model import make_mechanism
-    from ..mechanisms.results import evaluate
-    from ..rigid import integrate
-    from ..rigid.integrate import use_compiled
+    from ..mechanisms.rest import summarise_rest
+    from ..mechanisms.solve import solve
     from ..tables.mechanism import MechanismFile
 
     mechanism = make_mechanism(build(MechanismFile, raw, ""), path)
-    run, start = mechanism.file.run, mechanism.start()
-    stiff = any(element.stiff for element in mechanism.system.elements)
-    method = ("implicit" if stiff else "taylor") if run.method == "auto" else run.method
-    options: dict[str, Any] = {"method": method, "backend": "compiled" if use_compiled("auto") else "plain"}
-    times, tolerance = output_times(run.end_s, run.step_s), mechanism.tolerance
-    system = mechanism.system
-    trajectory = integrate(system, times, start=start, tolerance=tolerance, raise_on_failure=False, **options)
-    results = evaluate(mechanism, trajectory)
-    error = trajectory_error(mechanism, start, results, tolerance) if estimate else None
-    time = {"time_s": trajectory.time}
-    rows = {"trajectory": {**time, **results.outputs}, "energy": {**time, **results.energy}}
-    problem = "" if trajectory.status == 0 else trajectory.message
-    return Answer(rows, summarise(mechanism, start, results, tolerance, {}, error), problem)
+    made, tolerance = solve(mechanism), mechanism.tolerance
+    if made.rest is not None:
+        return Answer(made.tables(), summarise_rest(mechanism, made.start, made.rest, made.results, made.modes))
+    integrated = mechanism.file.run.analysis == "transient"
+    error = trajectory_error(mechanism, made.start, made.results, tolerance) if estimate and integrated else None
+    return Answer(made.tables(), summarise(mechanism, made.start, made.results, tolerance, {}, error), made.problem)
 
 
 def _pair_job(tables: dict[str, Any], path: Path) -> Any:

@@ -221,6 +221,9 @@ class RunTable:
     )
     modes: int = quantity(10, low=1, high=1000, doc="number of modes")
     reactions: bool = quantity(False, doc="write reactions.csv")
+    sensitivities: tuple[str, ...] = quantity(
+        (), doc="keys of the file, such as bodies.rod.mass_kg, by which the slopes of all outputs are written"
+    )
     picture_s: float | None = quantity(None, low=0.0, doc="time of the picture in s (default: the end)")
     frames: int = quantity(100, low=2, high=10000, doc="frames of the animation")
 
