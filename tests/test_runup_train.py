@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import pickle
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -18,6 +20,7 @@ from gearfe.runup.condensed import condense
 from gearfe.runup.law_kernel import BEND, CROSS, FORCE, MOMENT, TANGENT
 from gearfe.runup.modes import coupled_modes, crossings
 from gearfe.runup.run_up import run_up, steady_state
+from gearfe.runup.stability import multipliers
 from gearfe.runup.swinging import mesh_modes, swinging, write_modes
 from gearfe.train import Damping, Load, build_train, simulate
 from gearfe.train.friction import Lubrication
@@ -99,6 +102,14 @@ def test_all_speeds_of_a_range_in_order_and_from_both_ends():
     assert not up.notes
     for one, two in zip(up.sweep(), down.sweep(up=False), strict=True):
         assert one.force.max() == pytest.approx(two.force.max(), rel=1e-3)
+
+
+def test_multipliers_by_an_executor_are_the_same():
+    model, speeds = build_train(loaded([(20, 30)], smooth)), np.linspace(300.0, 900.0, 5)
+    with ThreadPoolExecutor(2) as executor:
+        beside = run_up(model, speeds, executor=executor)
+    for one, two in zip(run_up(model, speeds).states, beside.states, strict=True):
+        assert np.array_equal(one.multipliers, two.multipliers)
 
 
 def test_the_work_of_the_mesh_goes_into_damping():
@@ -359,6 +370,9 @@ def test_friction_of_an_oil_follows_the_speed():
         scene = dataclasses.replace(scene, meshes=(dataclasses.replace(scene.meshes[0], friction=oil),))
         made.append(steady_state(build_train(scene), 600.0))
     assert made[0].force == pytest.approx(made[1].force, rel=1e-6)
+    system = condense(build_train(scene)).system  # processes of an executor get it, too
+    again = pickle.loads(pickle.dumps(system))
+    assert np.array_equal(multipliers(again, made[1].orbit), multipliers(system, made[1].orbit))
 
 
 @needs_numba

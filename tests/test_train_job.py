@@ -168,6 +168,8 @@ def built(path: Path) -> None:
         ("stiffness_N_per_m = 2e8", "[train.curves]\npositions = 36", "curves.positions = 36: is of stiffness curves"),
         ("2e8", "2e8\nfriction = 0.6", "friction = 0.6: must be"),
         ("2e8", "2e8\nfriction = 0.06", "needs a mesh law"),
+        ("2e8", "2e8\nlaw = 'map'", "contradicts stiffness_N_per_m"),
+        ("2e8", "2e8\nbacklash_um = -1.0", "wedged mesh"),
         ("stiffness_N_per_m = 2e8", "friction = 0.06\n[train.curves]\nlaw = 'curve'", "needs a mesh law, but"),
         ("stiffness_N_per_m = 2e8", "roughness_um = 0.5", "oil_viscosity_mPa_s: is required beside roughness_um"),
         (

@@ -6,7 +6,7 @@ import itertools
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -115,12 +115,14 @@ def _rubbing(model: TrainModel, flank: CurveFlank | LawFlank, mesh: int, force: 
     coefficient = None
     if isinstance(given, Lubrication):
         one, two = (scene.gear(name).gear for name in (scene.meshes[mesh].driver, scene.meshes[mesh].driven))
-        pair, oil, ratio = MeshGeometry(one, two, scene.meshes[mesh].centre_distance), given, flank.ratio
-
-        def coefficient(speed: float) -> float:
-            return oil.coefficient(pair, force, ratio * speed)
-
+        pair = MeshGeometry(one, two, scene.meshes[mesh].centre_distance)
+        coefficient = partial(_of_drive, given, pair, force, flank.ratio)
     return Rubbing(flank.sliding, fastest(scene.driven.speed), coefficient)
+
+
+def _of_drive(oil: Lubrication, pair: MeshGeometry, force: float, ratio: float, speed: float) -> float:
+    """Coefficient of friction at a speed of the drive (rad/s)."""
+    return oil.coefficient(pair, force, ratio * speed)
 
 
 def _directions(flank: CurveFlank | LawFlank) -> tuple[int, int, int, int]:
