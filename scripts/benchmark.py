@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Run time against error of every job, beside other programs: docs/development/accuracy.md.
 
-Usage: python scripts/benchmark.py [sweep|mechanism|housing|transient|skipped|references|cold|all] [--out DIR] ...
+Usage: python scripts/benchmark.py [sweep|mechanism|housing|transient|runup|skipped|references|cold|all] [--out DIR] ...
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import time
 HELP = "run time against error of all jobs, beside other programs; the accuracy page"
 
 #: Jobs by name; `all` is all of them.
-JOBS = ("sweep", "mechanism", "housing", "transient", "skipped", "references", "cold")
+JOBS = ("sweep", "mechanism", "housing", "transient", "runup", "skipped", "references", "cold")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -21,6 +21,8 @@ PEERS: tuple[tuple[str, str, dict[str, str], str, dict[str, int]], ...] = (
     ("Andrews' mechanism", "mechanism_tolerance", {"mechanism": "andrews"}, "cpu_s", {"sundials": 15, "exudyn": 100}),
     ("housing to reduced body", "housing_peers", {}, "cpu_s", {"exudyn": 4, "calculix": 4}),
     ("gear train, 7 ms", "transient_tolerance", {"variant": "operating"}, "cpu_s", {"exudyn": 10}),
+    ("gear train, steady running", "runup_peers", {"variant": "operating"}, "cpu_s", {}),
+    ("gear train, steady running, teeth part", "runup_peers", {"variant": "parting"}, "cpu_s", {}),
     ("gear train, teeth part", "transient_tolerance", {"variant": "parting"}, "cpu_s", {"exudyn": 10, "scipy_ivp": 10}),
 )
 HEAD = """# Accuracy and time

@@ -173,5 +173,6 @@ PICTURES: Mapping[str, Draw] = {
     "transient_tolerance": time_error(
         ("variant", "program", "method"), "gear train, 7 ms: largest error of all signals"
     ),
+    "runup_peers": time_error(("variant", "program", "method"), "gear train in steady running, one speed"),
     "transient_modes": over("modes", "acceleration_error", ("modes", "error below 5 kHz"), "modes of the housing"),
 }

@@ -17,6 +17,7 @@ JOBS = {
     "mechanism": "mechanism_study",
     "housing": "housing_study",
     "transient": "transient_study",
+    "runup": "runup_study",
     "skipped": "skipped_study",
     "references": "reference_study",
     "cold": "cold_study",

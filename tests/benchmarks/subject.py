@@ -80,7 +80,7 @@ def housing_of(size_mm: float) -> Housing:
     return housing_from_table(replace(table, mesh=replace(table.mesh, size_mm=size_mm)))
 
 
-def train_model(variant: str, *, quick: bool = False, modes: int | None = None) -> Any:
+def train_model(variant: str, *, quick: bool = False, modes: int | None = None, speed: float | None = None) -> Any:
     """The shipped gear train ready to be simulated; quick: in a rigid housing with constant mesh stiffness.
 
     Parameters
@@ -89,6 +89,8 @@ def train_model(variant: str, *, quick: bool = False, modes: int | None = None) 
         ``tutorial`` or ``operating``; ``parting``: the latter at a resonance, with backlash, so that teeth part.
     modes
         Of the housing with held bores, in place of the job's choice by frequency.
+    speed
+        Of the drive (rad/s), in place of the variant's.
     """
     from gearfe.rigid import constant
     from gearfe.train import build_train
@@ -100,9 +102,10 @@ def train_model(variant: str, *, quick: bool = False, modes: int | None = None) 
 
     def built(scene: TrainScene) -> Any:
         if parting:
-            meshes = tuple(replace(mesh, backlash=PARTING_BACKLASH) for mesh in scene.meshes)
-            drive = replace(scene.driven, speed=constant(PARTING_SPEED))
-            scene = replace(scene, meshes=meshes, drive=drive)
+            scene = replace(scene, meshes=tuple(replace(mesh, backlash=PARTING_BACKLASH) for mesh in scene.meshes))
+        turning = PARTING_SPEED if parting and speed is None else speed
+        if turning is not None:
+            scene = replace(scene, drive=replace(scene.driven, speed=constant(turning)))
         return build_train(scene)
 
     if quick:

@@ -368,6 +368,26 @@ SECTIONS: tuple[Section, ...] = (
         "transient",
     ),
     Section(
+        "runup_peers",
+        "Gear train: steady running",
+        "One speed of the shipped train in steady running: largest error of the contact forces over a period, from a "
+        "transient of 0.8 s at 1e-10. Harmonic balance from rest, or one of 201 speeds of a run-up; the others "
+        "integrate the same right-hand side, compiled, from rest over the span and are looked at over its last period.",
+        {
+            "variant": ("variant", PLAIN),
+            "speed": ("speed (rad/s)", digits),
+            "program": ("program", PLAIN),
+            "method": ("method", PLAIN),
+            "tolerance": ("tolerance", digits),
+            "span_s": ("span (s)", digits),
+            "error": ("error", digits),
+            "cpu_s": ("CPU min (ms)", milliseconds),
+            "cpu_median_s": ("median (ms)", milliseconds),
+            "status": ("status", lambda v: v[:60] if isinstance(v, str) else ""),
+        },
+        "runup",
+    ),
+    Section(
         "cold",
         "Whole commands",
         "What a user waits for: fresh processes, one thread, the smallest of three runs; compiled kernels, meshes, "

@@ -172,7 +172,7 @@ def test_meshes_for_other_programs_have_fine_teeth_where_they_touch():
         assert np.abs(flank[:, 0] - pair.pinion.base_radius).max() < 6 * gear.module
 
 
-@pytest.mark.parametrize("job", ["sweep", "mechanism", "housing", "transient"])
+@pytest.mark.parametrize("job", ["sweep", "mechanism", "housing", "transient", "runup"])
 def test_smoke_of_every_job(tmp_path, job, capsys):
     """Small settings, no peers: every row is made, every table and picture written; the second run makes nothing."""
     assert benchmark(job, "--out", str(tmp_path), *QUICK) == 0

@@ -30,8 +30,16 @@ States = tuple[np.ndarray, np.ndarray]
 
 
 def answer(task: dict[str, Any]) -> dict[str, Any]:
-    """Integrate and measure; making the solver counts, the model and compiling do not."""
-    model, times = train_model(task["variant"], quick=task["quick"]), train_times(task["quick"])
+    """Integrate and measure; making the solver counts, the model and compiling do not.
+
+    With ``speed`` and ``times``, a step and their number, another speed and other times; ``last``: so many of them
+    come back.
+    """
+    model = train_model(task["variant"], quick=task["quick"], speed=task.get("speed"))
+    times = train_times(task["quick"])
+    if "times" in task:
+        step, count = task["times"]
+        times = step * np.arange(count)
     core = model.core
     start = np.concatenate(core.reduce(model.start.q, model.start.v))
     rhs = plain_rhs(core) if task["quick"] else compiled_rhs(core, model.forces)
@@ -42,6 +50,7 @@ def answer(task: dict[str, Any]) -> dict[str, Any]:
         "exudyn": _exudyn,
     }
     (at, states), cost = measured(lambda: runs[task["peer"]](task, core, rhs, start, times), runs=3, most_s=30.0)
+    at, states = at[-task.get("last", 0) :], states[-task.get("last", 0) :]
     return {"times": at.tolist(), "states": states.tolist(), **cost.columns, "unknowns": len(core.squares)}
 
 
