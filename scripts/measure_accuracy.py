@@ -3,7 +3,7 @@
 
 The error of each setting is taken against the curve on a far finer mesh (Nitsche); seconds are those of one process in
 which meshes are read from the cache, from gears to curve, and the mesher's own seconds stand beside. With --write the
-table in README.md is replaced.
+table in docs/stiffness.md is replaced.
 
 Usage: python scripts/measure_accuracy.py [--job JOB.toml] [--write]
 """
@@ -54,7 +54,7 @@ def main() -> None:
     """Measure and print (or write) the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--job", default=str(ROOT / "geometry" / "gear_train.toml"))
-    parser.add_argument("--write", action="store_true", help="put the table into README.md")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/stiffness.md")
     args = parser.parse_args()
     job = read_stiffness_job(args.job)
     pair = job.pair
@@ -96,10 +96,10 @@ def main() -> None:
     if not args.write:
         print("\n" + table)
         return
-    readme = ROOT / "README.md"
-    before, _, rest = readme.read_text(encoding="utf-8").partition(START)
+    page = ROOT / "docs" / "stiffness.md"
+    before, _, rest = page.read_text(encoding="utf-8").partition(START)
     _, _, after = rest.partition(END)
-    readme.write_text(f"{before}{START}\n{table}\n{END}{after}", encoding="utf-8")
+    page.write_text(f"{before}{START}\n{table}\n{END}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":
