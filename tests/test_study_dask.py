@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -81,3 +84,28 @@ def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch, capsys):
     assert "does not answer" in capsys.readouterr().err
     assert main([*run, "nonsense"]) == 2
     assert "--dask = 'nonsense'" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_dask_worker_that_is_killed_loses_nothing(cluster, tmp_path):
+    """Its nanny starts another one; every case is a row, once, with the value of its parameters."""
+    from dask.distributed import Client
+
+    path = written(tmp_path, cases=3000)
+    command = [sys.executable, "-m", "gearfe", "study", str(path), "--out", str(tmp_path / "out"), "--no-pictures"]
+    run = subprocess.Popen([*command, "--dask", cluster[1]], stdout=subprocess.DEVNULL)
+    table = tmp_path / "out" / "study.csv"
+    limit = time.monotonic() + 60.0
+    while not (table.exists() and table.stat().st_size > 2000) and time.monotonic() < limit:
+        time.sleep(0.02)
+    with Client(cluster[1], timeout=30) as client:
+        victim = next(iter(client.run(os.getpid).values()))
+    os.kill(victim, signal.SIGKILL)
+    assert run.wait(timeout=180.0) == 0
+    rows = rows_of(tmp_path / "out")[1:]
+    assert [row[0] for row in rows] == [str(n) for n in range(3000)]
+    assert {row[5] for row in rows} == {"done"}
+    for row in rows:
+        x1, x2, x3, y = map(float, row[1:5])
+        known = math.sin(x1) + 7 * math.sin(x2) ** 2 + 0.1 * x3**4 * math.sin(x1)
+        assert y == pytest.approx(known, rel=1e-12, abs=1e-12)

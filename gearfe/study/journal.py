@@ -55,6 +55,16 @@ def only_writer(folder: Path) -> Iterator[None]:
         os.close(handle)
 
 
+@contextmanager
+def _kept(path: Path) -> Iterator[None]:
+    """A disk that is full, say: rows that stand stay."""
+    try:
+        yield
+    except OSError as error:
+        cure = "the rows are kept: make room, and give the same command"
+        raise InputError("--out", str(path), f"cannot be written ({error.strerror})", cure) from None
+
+
 class Journal:
     """Rows of a study in a folder; the only writer, see `only_writer`.
 
@@ -132,8 +142,8 @@ class Journal:
             _line((row.case, *values[row.case], *row.outputs, row.status, row.message, float(f"{row.seconds:.4g}")))
             for row in fresh
         )
-        with self.path.open("ab", buffering=0) as stream:  # one write: no half rows beside other programs' reading
-            stream.write(text.encode("utf-8"))
+        with _kept(self.path), self.path.open("ab", buffering=0) as stream:
+            stream.write(text.encode("utf-8"))  # one write: no half rows beside other programs' reading
         self.done.update(row.case for row in fresh)
 
     def finish(self) -> dict[str, list[str]]:
@@ -141,7 +151,7 @@ class Journal:
         with self.path.open(encoding="utf-8", newline="") as stream:
             rows = list(csv.reader(stream))
         header, body = rows[0], sorted((row for row in rows[1:] if row), key=lambda row: int(row[0]))
-        with whole_file(self.path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
+        with _kept(self.path), whole_file(self.path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
             csv.writer(stream, lineterminator="\n").writerows([header, *body])
         return {name: [row[i] for row in body] for i, name in enumerate(header)}
 
