@@ -151,7 +151,7 @@ class Journal:
         with self.path.open(encoding="utf-8", newline="") as stream:
             rows = list(csv.reader(stream))
         header, body = rows[0], sorted((row for row in rows[1:] if row), key=lambda row: int(row[0]))
-        with _kept(self.path), whole_file(self.path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
+        with _kept(self.path), whole_file(self.path) as made, made.open("w", encoding="utf-8", newline="") as stream:
             csv.writer(stream, lineterminator="\n").writerows([header, *body])
         return {name: [row[i] for row in body] for i, name in enumerate(header)}
 
