@@ -8,7 +8,7 @@ import json
 import shlex
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any, TextIO
@@ -76,6 +76,19 @@ def run_and_keep(run: Callable[[argparse.Namespace], int], parsed: argparse.Name
         told = {"folder": str(folders[-1][0]), **_summary(*folders[-1])} if folders else {}
         print(json.dumps({"exit_code": code, **told}, indent=2))
     return code
+
+
+def tell(
+    lines: Iterable[str], folder: Path, names: Iterable[str], seconds: Mapping[str, float], warnings: Iterable[str]
+) -> None:
+    """Print what a command found, the names of its files, the seconds of its stages; warnings to standard error."""
+    for line in lines:
+        print(line)
+    print(f"written to {folder}: " + ", ".join(names))
+    if seconds:
+        print("seconds: " + ", ".join(f"{name} {value:.2f}" for name, value in seconds.items()))
+    for sentence in warnings:
+        print(f"gearfe: warning: {sentence}", file=sys.stderr)
 
 
 class _Both(io.TextIOBase):

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..progress import stage
 from .arguments import add_job, check_option
-from .common import add_folder
+from .common import add_folder, tell
 
 if TYPE_CHECKING:
     from ..gear.pair import Gear
@@ -73,9 +72,7 @@ def run(args: argparse.Namespace) -> int:
         names = sorted(path.name for path in made.iterdir())
     _show(geometry)
     _show({"iso_6336": iso})
-    print(f"written to {folder}: " + ", ".join(names))
-    for sentence in pair.warnings:
-        print(f"gearfe: warning: {sentence}", file=sys.stderr)
+    tell((), folder, names, {}, pair.warnings)
     return 0
 
 

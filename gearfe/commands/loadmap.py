@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from ..tables.laws import check_law
 from ..tables.loadmap import LoadMapTable
 from ..tables.stiffness import StiffnessTable
 from .arguments import add_job, add_keys, add_removed, check_option, with_keys
-from .common import add_folder
+from .common import add_folder, tell
 
 HELP = "stiffness, transmission error, load share, pressure, root stress over pinion angle and torque"
 
@@ -86,12 +85,7 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(made / "loadmap.json", summary(job, table, made_map, watch.seconds))
         names = sorted(path.name for path in made.iterdir())
-    for line in [*report_lines(made_map), *deviation_lines(job)]:
-        print(line)
-    print(f"written to {folder}: " + ", ".join(names))
-    print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
-    for sentence in warnings(job, made_map):
-        print(f"gearfe: warning: {sentence}", file=sys.stderr)
+    tell([*report_lines(made_map), *deviation_lines(job)], folder, names, watch.seconds, warnings(job, made_map))
     return 1 if made_map.failed.any() else 0
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from ..progress import count
 from ..tables.microgeometry import MicrogeometryTable
 from ..tables.stiffness import StiffnessTable
 from .arguments import add_job, add_keys, with_keys
-from .common import add_folder
+from .common import add_folder, tell
 from .loadmap import add_loads, with_loads
 
 HELP = "reliefs, pitch errors, measured flanks: transmission error, orders, load sharing, pressure against torque"
@@ -104,10 +103,5 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "microgeometry.json", summary(job, table, made, deviations, watch.seconds))
         names = sorted(path.name for path in place.iterdir())
-    for line in [*report_lines(made), *law_remarks(job)]:
-        print(line)
-    print(f"written to {folder}: " + ", ".join(names))
-    print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
-    for sentence in warnings(pair, made):
-        print(f"gearfe: warning: {sentence}", file=sys.stderr)
+    tell([*report_lines(made), *law_remarks(job)], folder, names, watch.seconds, warnings(pair, made))
     return 1 if made.failed.any() else 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from contextlib import ExitStack
 from pathlib import Path
@@ -12,7 +11,7 @@ from ..progress import count
 from ..tables.microgeometry import MicrogeometryTable, ReliefTable
 from ..tables.stiffness import StiffnessTable
 from .arguments import add_job, add_keys, with_keys
-from .common import add_folder
+from .common import add_folder, tell
 
 HELP = "tip and root relief, crowning, slope: search for the best at some torques, with its tolerances"
 
@@ -111,10 +110,5 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "relief.json", summary(job, base, table, made, errors, watch.seconds))
         names = sorted(path.name for path in place.iterdir())
-    for line in [*report_lines(table, made, errors), *law_remarks(job)]:
-        print(line)
-    print(f"written to {folder}: " + ", ".join(names))
-    print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
-    for sentence in pair.warnings:
-        print(f"gearfe: warning: {sentence}", file=sys.stderr)
+    tell([*report_lines(table, made, errors), *law_remarks(job)], folder, names, watch.seconds, pair.warnings)
     return 0

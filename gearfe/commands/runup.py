@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from dataclasses import replace
 from typing import Any
 
 from ..tables.runup import RunUpTable
 from .arguments import add_job, add_keys, with_keys
-from .common import add_folder
+from .common import add_folder, tell
 
 #: Keys of [runup] that options stand for.
 KEYS = ("speed_start_rad_per_s", "speed_stop_rad_per_s", "speeds", "tolerance", "band_Hz", "multiples")
@@ -71,12 +70,7 @@ def run(args: argparse.Namespace) -> int:
         draw=None if args.no_pictures else RunUpPictures(", ".join(parts)), watch=watch, further=described(job, table),
         unstable=unstable, fields=args.fields,
     )  # fmt: skip
-    for line in _told(summary):
-        print(line)
-    print(f"written to {folder}: " + ", ".join(names))
-    print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
-    for sentence in summary["warnings"]:
-        print(f"gearfe: warning: {sentence}", file=sys.stderr)
+    tell(_told(summary), folder, names, watch.seconds, summary["warnings"])
     return 0 if summary["speeds_reached"] == summary["speeds"] else 1
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from ..progress import announce, count
 from ..tables.laws import check_law
 from ..tables.stiffness import StiffnessTable
 from .arguments import add_job, add_keys, add_removed, check_option, number, with_keys
-from .common import add_folder
+from .common import add_folder, tell
 
 if TYPE_CHECKING:
     from ..stiffness.job import StiffnessJob
@@ -131,12 +130,7 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(made / "summary.json", summary(job, curve, watch.seconds))
         names = sorted(path.name for path in made.iterdir())
-    for line in report_lines(job, curve):
-        print(line)
-    print(f"written to {folder}: " + ", ".join(names))
-    print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
-    for sentence in warnings(job, curve):
-        print(f"gearfe: warning: {sentence}", file=sys.stderr)
+    tell(report_lines(job, curve), folder, names, watch.seconds, warnings(job, curve))
     return 1 if curve.failed.any() else 0
 
 

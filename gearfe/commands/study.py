@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import logging
-import sys
 import time
 from contextlib import ExitStack
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 
 from ..progress import count
 from .arguments import add_job
-from .common import add_folder
+from .common import add_folder, tell
 
 #: How long a scheduler has to answer.
 PATIENCE_S = 20
@@ -71,15 +70,12 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "summary.json", {**summary, "timings_s": dict(watch.seconds)})
         names = sorted(["study.csv", "study.json", *(path.name for path in place.iterdir())])
-    for line in report_lines(summary):
-        print(line)
-    print(f"written to {folder}: " + ", ".join(names))
-    print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
-    bad = int((~made.done).sum())
+    bad, warnings = int((~made.done).sum()), []
     if bad:
         first = next(i for i, good in enumerate(made.done) if not good)
         told_first = f"case {made.columns['case'][first]}: {made.columns['message'][first]}"
-        print(f"gearfe: warning: {bad} of {len(made.done)} cases are not solved wholly; {told_first}", file=sys.stderr)
+        warnings.append(f"{bad} of {len(made.done)} cases are not solved wholly; {told_first}")
+    tell(report_lines(summary), folder, names, watch.seconds, warnings)
     return 1 if bad else 0
 
 

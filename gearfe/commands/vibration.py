@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING
 from ..progress import count
 from ..tables.train import TrainTable, told
 from .arguments import add_job, add_keys, with_keys
-from .common import add_folder
+from .common import add_folder, tell
 
 if TYPE_CHECKING:
     from ..train.response import TrainResponse
@@ -115,12 +114,13 @@ def run(args: argparse.Namespace) -> int:
         progress=count,
     )
     response = written.response
-    for line in report_lines(response, scene, written, choice):
-        print(line)
-    print(f"written to {folder}: " + ", ".join(written.names))
-    print("seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in watch.seconds.items()))
-    for sentence in (*written.summary["warnings"], *written.problems):
-        print(f"gearfe: warning: {sentence}", file=sys.stderr)
+    tell(
+        report_lines(response, scene, written, choice),
+        folder,
+        written.names,
+        watch.seconds,
+        (*written.summary["warnings"], *written.problems),
+    )
     return 0 if response.status == "done" and not written.problems else 1
 
 
