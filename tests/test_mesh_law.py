@@ -14,7 +14,7 @@ from gearfe.contact.laws import law_named
 from gearfe.elasticity import Material
 from gearfe.errors import InputError
 from gearfe.meshlaw.law import MeshLaw
-from gearfe.meshlaw.make import mesh_law
+from gearfe.meshlaw.make import coupling_curve, mesh_law
 from gearfe.meshlaw.store import load_law, save_law, write_law_csv
 from gearfe.stiffness.sweep import elastic_pair
 
@@ -61,6 +61,22 @@ def test_law_meets_contact_solutions_that_it_was_not_made_from(law, solver):
     moment = solved.torque_pinion - solved.torque_wheel / PAIR.gear_ratio
     assert np.abs(found.moment - moment).max() < 2e-3 * solved.torque_pinion.max()
     assert np.corrcoef(found.moment, moment)[0, 1] > 0.999
+
+
+def test_pairs_that_touch_together_at_a_single_place_are_coupled_there(solver):
+    """The first reach at which pairs two teeth apart touch at once: C is what that place tells, everywhere."""
+    cycle = PAIR.mesh_cycle
+    phases = cycle * np.linspace(-2.0, 2.0, 33)
+    low, high = 1e-6, 600e-6
+    while high - low > 1e-9:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if len(coupling_curve(solver, phases, middle)) > 1 else (middle, high)
+    two = coupling_curve(solver, phases, high)[1]
+    assert len(two.angle) == 3
+    everywhere = two(np.linspace(-1.0, 1.0, 50))
+    assert everywhere == pytest.approx(two.compliance[1], rel=1e-12)
+    assert 0.0 < everywhere[0] < coupling_curve(solver, phases, high)[0].compliance.max()
+    assert two(phases, 1) == pytest.approx(0.0, abs=1e-20)
 
 
 def test_force_and_moment_are_the_derivatives_of_the_energy(law):

@@ -204,7 +204,7 @@ def report_lines(response: TrainResponse, scene: TrainScene, written: Written, c
         attachment = attachment_to_draw(response, choice.attachment, loaded)
         found = summary["dominant_lines"][f"attachment_{attachment}_acceleration_m_per_s2"][:4]
         texts = [f"{x['frequency_Hz']:.0f} Hz {x['amplitude']:.3g}{with_error(x.get('error_estimate'))}" for x in found]
-        lines.append(f"normal acceleration at attachment {attachment} (m/s2): " + ", ".join(texts))
+        lines += [f"normal acceleration at attachment {attachment} (m/s2): " + ", ".join(texts)] if texts else []
         if made.power is not None:
             part = errors.get("radiated_power_mean_W")
             decibels = None if part is None else 10.0 * math.log10(1.0 + float(part) / max(made.power.mean, 1e-300))

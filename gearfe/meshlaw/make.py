@@ -108,7 +108,10 @@ def coupling_curve(pair: HalfPlanePair, phases: Array, reach: float) -> list[Cou
     for number in range(1, int(apart.max(initial=0)) + 1):
         here = apart == number
         order = np.argsort(angle[here])
-        made.append(Couple(angle[here][order], compliance[here][order]))
+        own, beside = angle[here][order], cycle / len(angles)
+        # level at its ends: pairs far apart may touch at a single place
+        places = np.concatenate([[own[0] - beside], own, [own[-1] + beside]])
+        made.append(Couple(places, np.pad(compliance[here][order], 1, mode="edge")))
     return made
 
 
