@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.gear.interference import tip_penetration
 from gearfe.gear.mesh_geometry import MeshGeometry
 from gearfe.gear.pair import Gear, GearPair, TipRelief
+from gearfe.gear.pair_checks import tip_penetration
 
 NM = 1e-12  # 1e-9 mm (m)
 

@@ -14,8 +14,7 @@ import numpy as np
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .compliance import MeshingPair
 from .element_batch import Batch, FirstContacts, batch_of, windows_of
-from .element_newton import Outcome, solve, turned
-from .element_rows import State, seen
+from .element_newton import Outcome, State, seen, solve, turned
 from .flank import edge_shapes
 from .flank_compliance import FlankCompliance
 from .half_plane_result import PairContacts

@@ -42,7 +42,7 @@ from ..stiffness.positions import (
     position_solver,
     standard_stiffness,
 )
-from ..stiffness.sweep import assembled_curve, distinct_angles, elastic_pair
+from ..stiffness.sweep import asked_positions, assembled_curve, distinct_angles, elastic_pair
 from ..stopwatch import Stopwatch
 from ..threads import one_thread
 from ..typing import Array, IntArray
@@ -99,19 +99,14 @@ def sweep_loads(
     InputError
         For torques or angles out of range.
     """
-    if kinematics not in ("small", "finite"):
-        raise InputError("kinematics", kinematics, "must be small or finite")
+    asked, finite = asked_positions(pair, angles, ANGLES, kinematics)
     goals = np.unique(np.atleast_1d(np.asarray(torques, dtype=float)))
     if goals.ndim != 1 or len(goals) == 0 or not (np.isfinite(goals).all() and goals[0] > 0):
         raise InputError("torques", torques, "must be finite and > 0 N m", "give torques at the wheel's hub")
-    cycle = pair.mesh_cycle
-    asked = np.arange(ANGLES) * cycle / ANGLES if angles is None else np.atleast_1d(np.asarray(angles, dtype=float))
-    if asked.ndim != 1 or len(asked) == 0 or not np.isfinite(asked).all():
-        raise InputError("angles", angles, "must be a list of finite angles (rad)", "give at least one angle")
     watch = Stopwatch()
     if elastic is None:
         elastic = elastic_pair(pair, model, watch=watch, **changes)
-    solved_angles, source = distinct_angles(asked, cycle)
+    solved_angles, source = distinct_angles(asked, pair.mesh_cycle)
     if len(goals) * len(solved_angles) > MOST_CELLS:
         problem = f"makes more than {MOST_CELLS} cells with {len(solved_angles)} angles"
         raise InputError("torques", len(goals), problem, "use fewer torques or angles")
@@ -125,7 +120,7 @@ def sweep_loads(
         with watch.stage("root meshes"), one_thread():
             roots = pair_roots(pair, elastic)
     with watch.stage("cells"), one_thread():
-        found, at_roots = _cells(solver, solved_angles, goals, touching, roots, progress, finite=kinematics == "finite")
+        found, at_roots = _cells(solver, solved_angles, goals, touching, roots, progress, finite=finite)
     n = len(solved_angles)
     levels = [found.take(slice(row * n, (row + 1) * n)) for row in range(len(goals))]
     curves = tuple(

@@ -48,6 +48,10 @@ from .positions import (
 __all__ = ["ErrorEstimate", "StiffnessCurve", "elastic_pair", "sweep_stiffness"]
 
 
+#: Positions in one mesh cycle where no angles are given.
+ANGLES = 20
+
+
 def elastic_pair(
     pair: GearPair, model: PairModel = DEFAULT_MODEL, *, watch: Stopwatch | None = None, **changes: Any
 ) -> MeshingPair:
@@ -136,17 +140,11 @@ def sweep_stiffness(
     InputError
         For neither or both of twist and torque, or values out of range.
     """
-    if kinematics not in ("small", "finite"):
-        raise InputError("kinematics", kinematics, "must be small or finite")
-    load = _checked_load(pair, twist, torque, twist_from)
-    cycle = pair.mesh_cycle
-    asked = np.arange(20) * cycle / 20 if angles is None else np.atleast_1d(np.asarray(angles, dtype=float))
-    if asked.ndim != 1 or len(asked) == 0 or not np.isfinite(asked).all():
-        raise InputError("angles", angles, "must be a list of finite angles (rad)", "give at least one angle")
-    watch, finite = Stopwatch(), kinematics == "finite"
+    load, watch = _checked_load(pair, twist, torque, twist_from), Stopwatch()
+    asked, finite = asked_positions(pair, angles, ANGLES, kinematics)
     if elastic is None:
         elastic = elastic_pair(pair, model, watch=watch, **changes)
-    solved_angles, source = (asked, np.arange(len(asked))) if solve_all else distinct_angles(asked, cycle)
+    solved_angles, source = (asked, np.arange(len(asked))) if solve_all else distinct_angles(asked, pair.mesh_cycle)
     solver = position_solver(pair, elastic)
     if torque is not None:
         check_torque(solver, load)
@@ -164,6 +162,16 @@ def sweep_stiffness(
             error = curve_error(solver, coarser(pair, elastic), solved, finite=finite)
     curve = assembled_curve(solver, asked, source, solved, touching, searched=torque is not None)
     return replace(curve, timings=dict(watch.seconds), error=error)
+
+
+def asked_positions(pair: GearPair, angles: ArrayLike | None, count: int, kinematics: str) -> tuple[Array, bool]:
+    """Pinion angles (rad), by default `count` over one mesh cycle, and whether finite strain counts."""
+    if kinematics not in ("small", "finite"):
+        raise InputError("kinematics", kinematics, "must be small or finite")
+    asked = np.arange(count) * pair.mesh_cycle / count if angles is None else np.atleast_1d(np.asarray(angles, float))
+    if asked.ndim != 1 or len(asked) == 0 or not np.isfinite(asked).all():
+        raise InputError("angles", angles, "must be a list of finite angles (rad)", "give at least one angle")
+    return asked, kinematics == "finite"
 
 
 def _checked_load(pair: GearPair, twist: float | None, torque: float | None, twist_from: str) -> float:
