@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[1]
 PAGES = sorted([*(ROOT / "docs").rglob("*.md"), ROOT / "README.md"])
 #: Pages whose Python runs, block by block. The others need a cluster, an optimiser, or minutes.
 RUN = ("exchange.md", "fields.md", "housing.md", "howto.md", "loadmap.md", "mesh_law.md")
-RUN += ("microgeometry.md", "runup.md", "start.md")
+RUN += ("mechanisms.md", "microgeometry.md", "runup.md", "start.md")
 PLACES = {"angles": np.zeros(3), "approaches": np.full(3, 1e-5)}
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
@@ -50,6 +50,8 @@ def test_python_runs(page: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
         (tmp_path / folder).symlink_to(ROOT / folder)
     monkeypatch.chdir(tmp_path)
     names = known()
+    for text in blocks(ROOT / "docs" / page, "toml")[:1]:  # the file that a page begins with
+        (tmp_path / "rod.toml").write_text(text, encoding="utf-8")
     for text in blocks(ROOT / "docs" / page, "python"):
         exec(compile(text, page, "exec"), names)
 
