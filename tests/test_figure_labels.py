@@ -1,10 +1,11 @@
-"""Labels of lines: none covers another or a line, none leaves the frame."""
+"""Labels of lines: none covers another or a line, none leaves the frame; ellipses beside pressures."""
 
 import numpy as np
 import pytest
 from matplotlib.text import Text
 
 from gearfe.figures.labels import label_lines
+from gearfe.figures.stiffness import ellipse
 from gearfe.figures.style import fixed
 
 
@@ -31,3 +32,10 @@ def test_labels_keep_apart(seed):
         assert not ((tips[:, 0] > own.x0) & (tips[:, 0] < own.x1) & (tips[:, 1] > own.y0)).any()
         for other in axes.texts[:number]:
             assert not own.overlaps(Text.get_window_extent(other))
+
+
+def test_the_ellipse_of_a_hertzian_pressure_is_itself():
+    x = np.linspace(3.0, 5.0, 4001)
+    found, peak = ellipse(x, 7.0 * np.sqrt(np.maximum(1.0 - ((x - 4.0) / 0.8) ** 2, 0.0)))
+    assert found[[0, -1]] == pytest.approx([3.2, 4.8], rel=1e-4)
+    assert peak.max() == pytest.approx(7.0, rel=1e-4)

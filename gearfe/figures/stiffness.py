@@ -116,7 +116,7 @@ def _shares(curve: StiffnessCurve, angles: Array, pick: IntArray) -> list[tuple[
 
 
 def pressure_figure(path: str | Path, pair: GearPair, pressures: Sequence[tuple[float, list[FlankPressure]]]) -> None:
-    """Pressure against the diameter, one line per loaded flank, coloured by the pinion angle.
+    """Pressure against the diameter, coloured by the pinion angle: points, and Hertz's ellipses beside them.
 
     Parameters
     ----------
@@ -140,14 +140,39 @@ def pressure_figure(path: str | Path, pair: GearPair, pressures: Sequence[tuple[
         axes.set_title(name, loc="left", fontsize=10)
         axes.set_xlabel("diameter (mm)")
     for angle, flank in lines:
-        k = flank.shown
         color = colors(0.95 * norm(angle))
-        both[flank.gear].plot(2e3 * flank.radius[k], 1e-6 * flank.pressure[k], linewidth=1.5, color=color)
+        for run in _contacts(flank):
+            diameter, pressure = 2e3 * flank.radius[run], 1e-6 * flank.pressure[run]
+            both[flank.gear].plot(diameter, pressure, ".", markersize=3.0, color=color)
+            both[flank.gear].plot(*ellipse(diameter, pressure), linewidth=1.3, color=color)
     both[0].set_ylim(bottom=0.0)  # shared, and only now that both are drawn
     both[0].set_ylabel("contact pressure (MPa)")
-    title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, pressure along the flanks"
+    teeth = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}"
+    title = f"{teeth}, pressure along the flanks (points; lines: ellipses of the same force and width)"
     figure.suptitle(title + ("" if several else f" at {angles[0]:g}°"), x=0.01, ha="left", fontsize=11)
     if several:
         bar = figure.colorbar(ScalarMappable(norm, colors), ax=list(both), pad=0.015, aspect=30)
         bar.set_label("pinion angle (deg)")
     save(figure, path, dpi=120)
+
+
+def _contacts(flank: FlankPressure) -> list[IntArray]:
+    """Points with pressure, those without a gap between them together, from the root to the tip."""
+    order = np.argsort(flank.radius, kind="stable")
+    carries = order[flank.pressure[order] > 0.0]
+    gaps = np.flatnonzero(np.diff(np.flatnonzero(flank.pressure[order] > 0.0)) > 2) + 1
+    return [run for run in np.split(carries, gaps) if len(run) > 3]
+
+
+def ellipse(place: Array, pressure: Array) -> tuple[Array, Array]:
+    """Hertz's semi-ellipse with the force and the second moment of a pressure at rising places, as points of a line.
+
+    With the mean m and the variance v of the places under p it reaches from m - b to m + b, b = 2 sqrt(v), and its peak
+    is 2 int p / (pi b) (Johnson, *Contact Mechanics*, 1985, eqs. 4.43 to 4.45).
+    """
+    load = pressure * np.gradient(place)
+    force = load.sum()
+    mean = (load * place).sum() / force
+    half = 2.0 * np.sqrt((load * (place - mean) ** 2).sum() / force)
+    angle = np.linspace(0.0, np.pi, 61)
+    return mean - half * np.cos(angle), 2.0 * force / (np.pi * half) * np.sin(angle)
