@@ -117,6 +117,14 @@ def test_a_file_that_the_job_names_is_a_part_of_the_study(tmp_path, capsys):
     assert "files.pitch.csv differs" in capsys.readouterr().err
 
 
+def test_texts_of_a_job_need_not_be_names_of_files(tmp_path):
+    """An expression longer than any file's name."""
+    path, base = written(tmp_path, cases=2), tmp_path / "base.toml"
+    base.write_text(base.read_text().replace('"x(a)"', '"x(a)' + " + 0.0" * 60 + '"'))
+    made = run_study(read_study(path), tmp_path / "out", jobs=1)
+    assert list(made.columns["status"]) == ["done", "done"]
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="locks of a folder are POSIX")
 def test_a_folder_has_one_writer(tmp_path, capsys):
     path, out = written(tmp_path, cases=100_000), tmp_path / "out"

@@ -103,6 +103,24 @@ def test_a_worker_that_dies_is_replaced(tmp_path):
     assert all(value == math.sin(case) for case, _, value in rows if case != 13)
 
 
+def test_a_script_that_starts_a_study_wherever_it_is_read_is_told(tmp_path):
+    """Processes read the script again, and would start the study, too."""
+    script = tmp_path / "script.py"
+    written(tmp_path)
+    script.write_text("from gearfe import read_study, run_study\nrun_study(read_study('study.toml'), 'out', jobs=2)\n")
+    done = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, check=False, cwd=tmp_path, timeout=120.0,
+        env={**os.environ, "PYTHONPATH": str(JOBS.parent)},
+    )  # fmt: skip
+    assert done.returncode != 0
+    assert "jobs = 2: makes processes that end as they begin" in done.stderr
+    script.write_text(script.read_text().replace("run_study(read", "if __name__ == '__main__': run_study(read"))
+    subprocess.run(
+        [sys.executable, str(script)], check=True, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(JOBS.parent)}
+    )
+    assert len(rows_of(tmp_path / "out")) == 9
+
+
 def test_workers_end_with_their_driver(tmp_path):
     path = written(tmp_path, cases=100000)
     command = [sys.executable, "-m", "gearfe", "study", str(path), "--out", str(tmp_path / "out"), "--jobs", "2"]

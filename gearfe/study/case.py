@@ -104,7 +104,12 @@ def solve_case(task: Task, number: int, values: Sequence[Any], shared: Shared) -
 
 
 def _names_file(text: Any, folder: Path) -> bool:
-    return isinstance(text, str) and bool(Path(text).suffix) and (folder / text).is_file()
+    if not isinstance(text, str) or not Path(text).suffix:
+        return False
+    try:
+        return (folder / text).is_file()
+    except OSError:  # an expression, too long for a name
+        return False
 
 
 def job_beside(raw: Any, folder: Path, place: Path) -> Any:

@@ -17,6 +17,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from multiprocessing import connection, get_context, parent_process
 from typing import Any
 
+from ..errors import InputError
 from ..threads import one_thread
 from .case import DIED, HERE, Row, Task, solve_case, solve_group
 
@@ -55,8 +56,13 @@ def side_by_side(
         Where the cases run; it stays open. None: on processes of our own, and one that dies is replaced.
     check
         Called now and then while cases run; raises when the executor will not answer any more.
+
+    Raises
+    ------
+    InputError
+        When processes of our own end before they work, as those of a script do that starts a study wherever it is read.
     """
-    pool = executor or processes(workers)
+    pool, begun = (executor, None) if executor is not None else _begun(workers)
     ahead = iter(cases)
     running: dict[Future[list[Row]], list[Case]] = {}
     suspects: deque[Case] = deque()
@@ -91,11 +97,14 @@ def side_by_side(
                 spent = sum(row.seconds for row in rows) / len(rows)
                 size = max(1, min(LARGEST, 2 * size, int(GROUP_SECONDS / max(spent, 1e-9))))
                 yield rows
-            if lost and executor is None:
+            if lost and begun is not None:
+                if begun.exception() is not None:
+                    cure = 'a script, which processes read again, calls it under `if __name__ == "__main__":`'
+                    raise InputError("jobs", workers, "makes processes that end as they begin", cure)
                 lost += [(group, lost[0][1]) for group in running.values()]
                 running.clear()
                 pool.shutdown(wait=False, cancel_futures=True)
-                pool = processes(workers)
+                pool, begun = _begun(workers)
             for group, reason in lost:
                 for case in group:
                     deaths[case[0]] += alone
@@ -111,6 +120,12 @@ def side_by_side(
 def processes(workers: int) -> Executor:
     """Fresh processes, whatever this one has loaded."""
     return ProcessPoolExecutor(workers, get_context("spawn"), _begin)
+
+
+def _begun(workers: int) -> tuple[Executor, Future[int] | None]:
+    """Fresh processes, and what tells whether they begin."""
+    pool = processes(workers)
+    return pool, pool.submit(os.getpid)
 
 
 def _begin() -> None:
