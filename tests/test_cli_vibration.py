@@ -166,6 +166,34 @@ def test_a_mesh_law_with_friction(job, tmp_path, capsys):
     assert (out / "transmission_error.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_teeth_that_part_are_told(job, tmp_path, capsys):
+    """Contacts lost, share of the time and K_v of the summary are those of the table, whose damper acts when teeth are
+    apart, too; the flanks that bear are named.
+    """
+    text = SMALL.replace("2000.0", "100.0\nbacklash_um = 30.0").replace("= 75.0", "= 20.0")
+    job.write_text(text.replace("speed_rad_per_s = 600.0", 'speed_rad_per_s = "600 + 20*sin(9000*time)"'))
+    out = tmp_path / "out"
+    assert main(["vibration", str(job), "--out", str(out), "--no-estimate"]) == 0
+    names, values = table(out / "response.csv")
+    by_name = dict(zip(names, values.T, strict=True))
+    force, time = by_name["contact_force_1_N"], by_name["time_s"]
+    error = by_name["transmission_error_1_um"]
+    apart = (error <= 0.0) & (error >= -30.0)
+    contact = json.loads((out / "summary.json").read_text())["contact"]
+    lost = int((apart[1:] & ~apart[:-1]).sum())
+    assert lost > 2
+    assert contact["contacts_lost"] == [lost]
+    assert contact["share_without_contact"][0] == pytest.approx(np.trapezoid(1.0 * apart, time) / time[-1])
+    steady = 20.0 / (37.5e-3 * math.cos(math.radians(25.0)))
+    assert contact["dynamic_factors"][0] == pytest.approx(np.abs(force).max() / steady, rel=1e-9)
+    assert contact["flanks"] == ["both flanks, 30 um of normal backlash"]
+    job.write_text(SMALL.replace("stiffness_N_per_m = 1e8", "law_torque_Nm = 200.0").replace("= 75.0", "= 0.0"))
+    assert main(["vibration", str(job), "--out", str(out), "--no-estimate", "--no-pictures"]) == 0
+    assert "no load keeps the teeth of mesh pinion-wheel in contact" in capsys.readouterr().err
+    (flanks,) = json.loads((out / "summary.json").read_text())["contact"]["flanks"]
+    assert flanks.startswith("driving flanks only: the gears have no backlash")
+
+
 def test_window_and_record(job, tmp_path):
     options = ["--window", "hann", "--spectrum-from-ms", "1", "--spectrum-ms", "0.8", "--no-pictures"]
     assert main(["vibration", str(job), "--out", str(tmp_path), *options]) == 0

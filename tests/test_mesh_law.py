@@ -11,8 +11,10 @@ import pytest
 from gearfe import Gear, GearPair
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.contact.laws import law_named
+from gearfe.contact.model import PairModel
 from gearfe.elasticity import Material
 from gearfe.errors import InputError
+from gearfe.meshlaw.cached import cached_law
 from gearfe.meshlaw.law import MeshLaw
 from gearfe.meshlaw.make import coupling_curve, mesh_law
 from gearfe.meshlaw.store import load_law, save_law, write_law_csv
@@ -127,6 +129,18 @@ def test_approach_carries_the_force(law):
         assert law(angle, law.approach(angle, force)).force == pytest.approx(np.full(40, force), rel=1e-9)
     with pytest.raises(InputError, match="larger torques"):
         law.approach(angle, 7 * DESIGN)
+
+
+def test_a_law_is_made_once(monkeypatch):
+    """The second time it comes from disk, the same to the last bit; larger forces are another law."""
+    model = PairModel(materials=(STEEL, STEEL), coarsen=3.0)
+    made = cached_law(PAIR, model, DESIGN)
+    monkeypatch.setattr("gearfe.meshlaw.make.mesh_law", lambda *_: pytest.fail("made again"))
+    again = cached_law(PAIR, model, DESIGN)
+    assert np.array_equal(again.energies, made.energies)
+    assert made.largest_force >= DESIGN
+    with pytest.raises(pytest.fail.Exception):
+        cached_law(PAIR, model, 1.2345 * DESIGN)
 
 
 def test_files(law, tmp_path):

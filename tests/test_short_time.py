@@ -127,7 +127,8 @@ def piece(time, force) -> TrainResponse:
 
     given = {
         "time": time, "drive_angle": 40.0 * time, "contact_force": force[:, None], "attachment_names": ("a",),
-        "transmission_error": 1e-6 * force[:, None], "attachment_acceleration": -force[:, None],
+        "transmission_error": 1e-6 * force[:, None], "apart": force[:, None] == 0.0,
+        "attachment_acceleration": -force[:, None],
     }  # fmt: skip
     return TrainResponse(**{f.name: given.get(f.name) for f in fields(TrainResponse)})
 

@@ -166,6 +166,7 @@ def test_a_run_that_ended_early_is_written(tmp_path, scene):
             "drive_angle",
             "drive_torque",
             "mesh_power",
+            "apart",
             "friction_power",
             "contact_force",
             "speed",

@@ -51,6 +51,7 @@ def made_up(**changes: Any) -> TrainResponse:
         "mesh_names": ("gear1-gear2", "gear3-gear4"),
         "transmission_error": np.column_stack([2e-5 + tone(time, 13, 1e-6), 3e-5 + tone(time, 9, 1e-6)]),
         "contact_force": np.column_stack([2000 + tone(time, 13, 150.0), 3000 + tone(time, 9, 200.0)]),
+        "apart": np.zeros((COUNT, 2), dtype=bool),
         "shaft_names": ("drive", "intermediate", "output"),
         "speed": speed,
         "speed_absolute": speed + 1e-3,

@@ -158,16 +158,16 @@ def draw_transmission(path: Path, scene: TrainScene, response: TrainResponse, ti
 def _apart(response: TrainResponse, sense: float) -> list[Spans]:
     """Rotations of the drive (deg) between which the teeth of each mesh are apart; none for meshes that do not part.
 
-    Where curves are the extremes of parts of the run, all of a part in which the least force is 0. Before the load
+    Where curves are the extremes of parts of the run, all of a part in which they are once. Before the load
     comes teeth only just touch: that is not told.
     """
     angle = np.degrees(response.drive_angle) * sense
     lost = response.statistics.get("contacts_lost", [None] * len(response.mesh_names))
     found: list[Spans] = []
     loaded = response.time[:-1] >= response.load_end_s
-    for number, force in zip(lost, response.contact_force.T, strict=True):
+    for number, apart in zip(lost, response.apart.T, strict=True):
         open_ = (
-            np.concatenate([[False], (force[:-1] == 0.0) & loaded, [False]])
+            np.concatenate([[False], (apart[:-1] > 0) & loaded, [False]])
             if number is not None
             else np.zeros(2, dtype=bool)
         )

@@ -48,7 +48,7 @@ def swinging(model: TrainModel, modes: Sequence[int], frames: int = FRAMES) -> T
     a = np.concatenate([-(rate**2) * np.cos(angle) * shape for rate, shape in zip(rates, shapes, strict=True)])
     approach = q @ np.array([line.row for line in model.meshes]).T
     none = np.zeros_like(approach)
-    moved = Motion(time, q, v, a, none, approach, np.zeros(len(time)), none, none)
+    moved = Motion(time, q, v, a, none, approach, none > 0.0, np.zeros(len(time)), none, none)
     return response_of(replace(model, angle=constant(0.0)), moved, "done", float(time[-1]), {})
 
 

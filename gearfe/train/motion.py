@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..rigid import Trajectory
-from ..typing import Array
+from ..typing import Array, BoolArray
 from .forces import FlankForces
 from .model import TrainModel
 
@@ -25,6 +25,8 @@ class Motion:
         N.
     approach : (n, meshes)
         Along the lines of action (m).
+    apart : (n, meshes)
+        Whether no flank bears; a damper that acts nevertheless makes a force.
     drive_torque : (n,)
         Torque of the drive on its shaft (N m).
     mesh_power, friction_power : (n, meshes)
@@ -37,6 +39,7 @@ class Motion:
     a: Array
     contact_force: Array
     approach: Array
+    apart: BoolArray
     drive_torque: Array
     mesh_power: Array
     friction_power: Array
@@ -66,35 +69,38 @@ def motion(model: TrainModel, trajectory: Trajectory) -> Motion:
         row = model.spin_reference[[s.name for s in model.scene.shafts].index(drive.shaft)]
         push = -drive.stiffness * (q @ row) - drive.damping * (v @ row)
     rows = np.array([line.row for line in model.meshes]).reshape(-1, q.shape[1])
-    force, drag, loss = contact_forces(model, v, flanks, multipliers)
+    force, drag, loss, apart = contact_forces(model, v, flanks, multipliers)
     drivers = [line.driver for line in model.meshes]
     spin = [int(model.first[i]) + 5 for i in drivers]
     speed = model.angle(t, 1)[:, None] * model.ratios[drivers] + v[:, spin]
     arms = rows[np.arange(len(rows)), spin]
-    return Motion(t, q, v, a, force, q @ rows.T, push, speed * (arms * force + drag), loss)
+    return Motion(t, q, v, a, force, q @ rows.T, apart, push, speed * (arms * force + drag), loss)
 
 
 def contact_forces(
     model: TrainModel, v: Array, flanks: list[FlankForces], multipliers: dict[str, Array]
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, Array, BoolArray]:
     """Of each mesh F (N): spring and damper, or the multiplier of a rigid mesh; of back flanks negative. Then of its
-    friction the torque against the driver (N m) and the power that it takes (W).
+    friction the torque against the driver (N m) and the power that it takes (W), and whether its teeth are apart.
     """
     out, torque, power = np.zeros((3, len(v), len(model.meshes)))
+    apart = np.zeros(out.shape, dtype=bool)
     found = iter(flanks)
     for i, line in enumerate(model.meshes):
         if line.rigid:
             out[:, i] = multipliers[f"mesh {line.name}"][:, 0]
             continue
+        apart[:, i] = not line.pulls
         for side in (1.0,) if line.backlash is None else (1.0, -1.0):
             made = next(found)
             out[:, i] += side * made.force
+            apart[:, i] &= made.force == 0.0
             if line.sliding is not None and made.drag is not None:
                 torque[:, i] += line.sliding.arm * made.drag.across + made.drag.turning
                 power[:, i] += made.drag.power
         if line.law is None:
             out[:, i] += line.damping * (v @ line.row)
-    return out, torque, power
+    return out, torque, power, apart
 
 
 def joint_multipliers(model: TrainModel, q: Array, v: Array, a: Array, acting: Array) -> dict[str, Array]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..shown import Shown
-from ..typing import Array, ComplexArray, IntArray
+from ..typing import Array, BoolArray, ComplexArray, IntArray
 
 #: What has a row for each output time.
 SAMPLED = (
@@ -17,6 +17,7 @@ SAMPLED = (
     "drive_angle",
     "contact_force",
     "transmission_error",
+    "apart",
     "drive_torque",
     "mesh_power",
     "friction_power",
@@ -52,6 +53,8 @@ class TrainResponse(Shown):
     transmission_error : (n, m)
         Approach of both gears along the line of action (m), by turns, tilts and displacements: the dynamic transmission
         error. 0 where unmodified driving flanks touch.
+    apart : (n, m)
+        Whether the teeth of each mesh are apart.
     mesh_power, friction_power : (n, m)
         What the driver of each mesh gives to it, without what its elastic energy takes and returns, and what friction
         takes of it (W).
@@ -104,6 +107,7 @@ class TrainResponse(Shown):
     mesh_names: tuple[str, ...]
     contact_force: Array
     transmission_error: Array
+    apart: BoolArray
     drive_torque: Array
     mesh_power: Array
     friction_power: Array

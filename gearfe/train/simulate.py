@@ -206,8 +206,8 @@ class _SoFar:
             self.least, self.most = np.full(force.shape[1], np.inf), np.zeros(force.shape[1])
             self.least_at = np.zeros(force.shape[1])
             self.parting = [Parting() for _ in range(force.shape[1])]
-        for one, values in zip(self.parting, force.T, strict=True):
-            one.add(moved.time, values == 0.0)
+        for one, apart in zip(self.parting, moved.apart.T, strict=True):
+            one.add(moved.time, apart)
         if len(force):
             self.reached = float(moved.time[-1])
             low = force.min(axis=0)
@@ -369,6 +369,7 @@ def response_of(
         mesh_names=tuple(line.name for line in model.meshes),
         contact_force=moved.contact_force,
         transmission_error=moved.approach,
+        apart=moved.apart,
         drive_torque=moved.drive_torque,
         mesh_power=moved.mesh_power,
         friction_power=moved.friction_power,

@@ -299,7 +299,9 @@ class Envelope:
 
 
 #: What the pictures draw.
-_CURVES = ("drive_angle", "contact_force", "transmission_error", "speed", "acceleration", "attachment_acceleration")
+_CURVES = (
+    "drive_angle", "contact_force", "transmission_error", "apart", "speed", "acceleration", "attachment_acceleration",
+)  # fmt: skip
 
 
 def _drawn(piece: TrainResponse) -> Array:
