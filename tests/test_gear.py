@@ -193,7 +193,7 @@ def test_iso_6336_dynamic_factor():
     sub, top = 0.32 * p + 0.34 * f + 0.23 * k, 1 + 0.32 * p + 0.34 * f + 0.90 * k
     end = 0.47 * p + 0.47 * f + 0.75
     by_hand = [1 + 0.5 * sub, 1 + 0.85 * sub, top, top, 0.5 * (top + end), end, end]
-    found = iso6336.dynamic_factor(SHIPPED, speed * (1 - 1e-12), **given, relief=5e-6, pitch=2e-6, profile=1.5e-6)
+    found = iso6336.dynamic_factor(SHIPPED, speed * (1 - 1e-12), **given, relief=5e-6, deviations=(2e-6, 1.5e-6))
     assert found == pytest.approx(by_hand, rel=1e-9)
     light = iso6336.dynamic_factor(SHIPPED, speed[:2], **{**given, "force": 500.0 / math.cos(math.radians(25))})
     assert light == pytest.approx([1 + 0.5 * 0.23, 1.9], rel=1e-9)  # N_S = 0.5 + 0.35 sqrt(0.5) = 0.75

@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..figures.runup import RunUpPictures
     from ..output.files import output_folder
-    from ..runup.files import write_runup
+    from ..runup.files import RunUpChoice, write_runup
     from ..runup.job import described, solved
     from ..stopwatch import Stopwatch
     from ..vibration.job import train_job
@@ -66,9 +66,9 @@ def run(args: argparse.Namespace) -> int:
     parts += [f"load {told(x.torque_Nm, 'N m')} on {x.shaft}".replace("-", "−", 1) for x in job.table.loads[:1]]
     parts += [f"variant {job.table.variant}"] if job.table.variant else []
     summary, names = write_runup(
-        folder, made, multiples=table.multiples, attachment=args.attachment,
+        folder, made, RunUpChoice(table.multiples, args.attachment, args.fields),
         draw=None if args.no_pictures else RunUpPictures(", ".join(parts)), watch=watch, further=described(job, table),
-        unstable=unstable, fields=args.fields,
+        unstable=unstable,
     )  # fmt: skip
     tell(_told(summary), folder, names, watch.seconds, summary["warnings"])
     return 0 if summary["speeds_reached"] == summary["speeds"] else 1

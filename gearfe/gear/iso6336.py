@@ -87,7 +87,7 @@ def mesh_stiffness(pair: MeshGeometry, pinion_modulus: float, wheel_modulus: flo
 
 def dynamic_factor(
     pair: MeshGeometry, speeds: ArrayLike, *, stiffness: float, mass: float, force: float, relief: float = 0.0,
-    pitch: float = 0.0, profile: float = 0.0,
+    deviations: tuple[float, float] = (0.0, 0.0),
 ) -> Array:  # fmt: skip
     """K_v of a spur pair at speeds of its pinion.
 
@@ -101,9 +101,10 @@ def dynamic_factor(
         Reduced mass of pinion and wheel, and of what turns with them, on the line of action (kg).
     force
         Along the line of action, K_A included (N).
-    relief, pitch, profile
-        C_a; effective deviations f_pb,eff and f_falpha,eff (m).
+    relief, deviations
+        C_a; effective deviations of pitch and profile, f_pb,eff and f_falpha,eff (m).
     """
+    pitch, profile = deviations
     N = np.abs(np.asarray(speeds, dtype=float)) * pair.pinion.teeth / math.sqrt(stiffness / mass)
     ratio, width = pair.contact_ratio, min(pair.pinion.face_width, pair.wheel.face_width)
     load = force * math.cos(pair.pinion.pressure_angle) / width

@@ -86,10 +86,9 @@ def fit_law(
     cells: int,
     hertz: float,
     base_radii: tuple[float, float],
-    backlash: float,
     reach: float,
 ) -> MeshLaw:
-    """Law through the pair forces found.
+    """Law through the pair forces found, without backlash.
 
     Parameters
     ----------
@@ -137,7 +136,7 @@ def fit_law(
         energies=_by_slots(_energies(phase, parts, approach, slope), cells),
         coupling=_couplings(touch.angle, couples, cells),
         base_radii=base_radii,
-        backlash=backlash,
+        backlash=0.0,
         reach=reach,
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -54,16 +55,16 @@ def mesh_law(pair: HalfPlanePair, force: float) -> MeshLaw:
     twists = first[:, None] + deep / radius
     solved = solve_half_plane(pair, np.repeat(angles, len(deep)), twists.ravel())
     C = coupling_curve(pair, phases, reach)
-    return fit_law(
+    law = fit_law(
         pair_forces(pair, solved, met, C),
         touch_curve(pair, phases),
         C,
         cells=len(nodes) - 1,
         hertz=0.5 * pair.compliance / pair.width,
         base_radii=(geometry.pinion.base_radius, radius),
-        backlash=geometry.normal_backlash,
         reach=reach,
     )
+    return replace(law, backlash=geometry.normal_backlash)
 
 
 def pair_forces(pair: HalfPlanePair, solved: Positions, met: Touching, coupling: Sequence[Couple]) -> PairForces:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -34,9 +35,20 @@ class Pictures(Protocol):
         """Draw the map of parametric instability."""
 
 
+@dataclass(frozen=True)
+class RunUpChoice:
+    """What is told of a run-up: highest multiple of the mesh frequencies, attachment whose acceleration is drawn, and
+    whether modes that the meshes swing in are written as fields.
+    """
+
+    multiples: int
+    attachment: str | None = None
+    fields: bool = False
+
+
 def write_runup(
-    folder: Path, run: RunUp, *, multiples: int, attachment: str | None, draw: Pictures | None, watch: Any,
-    further: Mapping[str, Any], unstable: InstabilityMap | None = None, fields: bool = False,
+    folder: Path, run: RunUp, choice: RunUpChoice, *, draw: Pictures | None, watch: Any,
+    further: Mapping[str, Any], unstable: InstabilityMap | None = None,
 ) -> tuple[dict[str, Any], list[str]]:  # fmt: skip
     """Write tables, pictures and the summary; returns the summary and the names of the files.
 
@@ -46,10 +58,8 @@ def write_runup(
         Entries of the summary that tell what was computed.
     unstable
         Map of parametric instability, where one was asked for.
-    fields
-        Whether modes that the meshes swing in are written as fields.
     """
-    bore = report.attachment_to_draw(run, attachment)
+    multiples, bore = choice.multiples, report.attachment_to_draw(run, choice.attachment)
     with watch.stage("modes"):
         modes, met = report.campbell(run, multiples)
     with whole_set(folder, may_write=FILES) as target:
@@ -62,7 +72,7 @@ def write_runup(
                 draw(target, run, modes, met, multiples, bore)
                 if unstable is not None:
                     draw.instability(target / "instability.png", unstable)
-        if fields:
+        if choice.fields:
             with watch.stage("fields"):
                 model = run.train.model
                 write_modes(target, model, mesh_modes(modes, len(model.meshes), STRONG))

@@ -138,7 +138,7 @@ class MeshForces:
         F = out[:, FORCE]
         rubs, drag = self.rubbing[number], None
         if rubs is not None:
-            drag = _drag(flank, rubs.at(speed), phase, pairs, slopes, push, more, speed, rates)
+            drag = _drag(flank, rubs.at(speed), phase, (pairs, slopes), (push, more), speed, rates)
         return FlankForces(
             F * push, out[:, TANGENT] * push, out[:, CROSS] * push, F <= 0.0, out[:, BEYOND] > 0.0,
             F * more if flank.damping > 0.0 else None, out[:, MOMENT], out[:, CROSS], out[:, BEND], drag,
@@ -184,10 +184,11 @@ class MeshForces:
 
 
 def _drag(
-    flank: LawFlank, one: Sliding, phase: Array, pairs: Array, slopes: Array, push: Array, more: Array, speed: float,
+    flank: LawFlank, one: Sliding, phase: Array, found: tuple[Array, Array], pushes: tuple[Array, Array], speed: float,
     rates: Array,
 ) -> Drag:  # fmt: skip
-    """Friction of `gearfe.train.friction` with its derivatives."""
+    """Friction of `gearfe.train.friction` with its derivatives; `found` and `pushes` are values with theirs."""
+    (pairs, slopes), (push, more) = found, pushes
     arm = one.radius * (flank.law.pair_phases(phase) - one.pitch_phase)
     turning = one.ratio * speed + rates[:, 2, None]
     share, slope = smooth_sign((rates[:, 1, None] + arm * turning) / one.speed)

@@ -260,9 +260,13 @@ def pair_forces(j: int, slots: int, memory: Array, row: int, pieces: IntArray, a
 
 
 def train_begin(
-    t: float, sign: float, u: Array, du: Array, p: Program, forces: TrainForces, memory: Array, pieces: IntArray
+    t: float, sign: float, motion: tuple[Array, Array], p: Program, forces: TrainForces, memory: Array, pieces: IntArray
 ) -> None:
-    """Cells of all flanks at a start, at a node the one that lies ahead, and the pair forces there; not compiled."""
+    """Cells of all flanks at a start, at a node the one that lies ahead, and the pair forces there; not compiled.
+
+    `motion` are values and rates along the directions of the forces.
+    """
+    u, du = motion
     angle, rate = float(forces.angle(t)), float(forces.angle(t, 1))
     slots = p.laws.touch.shape[1]
     flanks: tuple[CurveFlank | LawFlank, ...] = (*forces.curves, *forces.contacts)
@@ -312,7 +316,7 @@ def train_series(forces: TrainForces) -> SeriesLaw:
         t: float, sign: float, u: Array, du: Array, memory: Array,
         numbers: IntArray,
     ) -> None:  # fmt: skip
-        train_begin(t, sign, u, du, program, forces, memory, numbers)
+        train_begin(t, sign, (u, du), program, forces, memory, numbers)
 
     constants: dict[str, float] = {"NEWTON": NEWTON, "CHANGED": CHANGED}
     for module in (tables, corners):
