@@ -149,9 +149,16 @@ JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]]]] = {
         {"pair": PAIR, "microgeometry": MICROGEOMETRY_OF_STUDY, "study": STUDY},
     ),
     "vibration": (
-        "A gear train in its housing: two shafts with one gear pair. Run it: gearfe vibration FILE --out DIR. Shafts "
-        "run along y; speeds and torques count positive about +y. " + OPTIONAL_KEYS,
-        {"pair": PAIR, "stiffness": {"twist_deg": 0.05}, "train": TRAIN, "housing": HOUSING, "spectrum": {}},
+        "A gear train in its housing: two shafts with one gear pair. Run it: gearfe vibration FILE --out DIR, gearfe "
+        "runup FILE. Shafts run along y; speeds and torques count positive about +y. " + OPTIONAL_KEYS,
+        {
+            "pair": PAIR,
+            "stiffness": {"twist_deg": 0.05},
+            "train": TRAIN,
+            "housing": HOUSING,
+            "spectrum": {},
+            "runup": RUNUP,
+        },
     ),
     "runup": (
         "Steady states of a gear train over the speed of its drive: waterfall, orders, critical speeds. Run it: gearfe "
