@@ -16,6 +16,12 @@ from .record import Row, read_rows
 Draw = Callable[[Any, list[Row]], None]
 #: Curves above which a legend stands below the axes, where it covers none.
 MANY = 6
+#: Colours of programs, by their names in tables; marks and dashes of the lines of one program.
+COLOURS = {
+    "gearfe": "#1f5a99", "exudyn": "#d9730d", "scipy_ivp": "#3a8c5c", "sundials": "#b3261e", "calculix": "#6d4c9f",
+    "getfem": "#0f766e",
+}  # fmt: skip
+MARKERS, STYLES = "os^vDP*X<>", ("-", "--", ":", "-.")
 NAMES = {"scipy_ivp": "scipy", "sundials": "SUNDIALS", "calculix": "CalculiX", "getfem": "GetFEM"}
 
 
@@ -51,26 +57,44 @@ def groups(rows: Iterable[Row], *names: str) -> dict[str, list[Row]]:
     return found
 
 
-def curves(axes: Any, rows: dict[str, list[Row]], x: str, y: str, **marked: Any) -> None:
-    """A line a group, in the order of x."""
-    styles = ["-", "--", ":", "-."]
+def curves(axes: Any, rows: dict[str, list[Row]], x: str, y: str, parameter: str = "") -> None:
+    """A line a group, in the order of x; a program has one colour everywhere, its lines differ by dashes and marks.
+
+    Parameters
+    ----------
+    parameter
+        Column whose value stands beside each point; without it, none.
+    """
+    taken: dict[str, int] = {}
     for number, (label, own) in enumerate(rows.items()):
-        points = [(r[x], r[y]) for r in own if _positive(r.get(x)) and _positive(r.get(y))]
-        if points:
-            a, b = zip(*sorted(points), strict=True)
-            axes.loglog(a, b, styles[number // 10 % 4], marker="o", ms=4, label=label, **marked)
+        points = [(r[x], r[y], r.get(parameter)) for r in own if _positive(r.get(x)) and _positive(r.get(y))]
+        if not points:
+            continue
+        program = str(own[0].get("program", ""))
+        nth = taken[program] = taken.get(program, -1) + 1
+        colour, look = (COLOURS[program], nth) if program in COLOURS else (f"C{number % 10}", number // 10)
+        a, b, told = zip(*sorted(points, key=lambda point: point[:2]), strict=True)
+        marker, dashes = MARKERS[look % len(MARKERS)], STYLES[look % len(STYLES)]
+        axes.loglog(a, b, dashes, color=colour, marker=marker, ms=4, lw=1.2, label=label)
+        for place, height, value in zip(a, b, told, strict=True):
+            if isinstance(value, (int, float)):
+                axes.annotate(
+                    f"{value:g}", (place, height), (3, 3), textcoords="offset points", fontsize=5.5, color=colour
+                )
 
 
 def _positive(value: Any) -> bool:
     return isinstance(value, (int, float)) and math.isfinite(value) and value > 0
 
 
-def time_error(by: tuple[str, ...], title: str, *, time: str = "cpu_s", error: str = "error") -> Draw:
-    """Processor time over error."""
+def time_error(
+    by: tuple[str, ...], title: str, *, time: str = "cpu_s", error: str = "error", parameter: str = ""
+) -> Draw:
+    """Processor time over error, each point with its parameter."""
 
     def draw(figure: Any, rows: list[Row]) -> None:
         axes = figure.subplots()
-        curves(axes, groups(rows, *by), error, time)
+        curves(axes, groups(rows, *by), error, time, parameter)
         axes.set(xlabel="relative error", ylabel="processor time (s)", title=title)
         _finish(axes)
 
@@ -114,7 +138,7 @@ def _finish(axes: Any) -> None:
 def _mechanisms(figure: Any, rows: list[Row]) -> None:
     for axes, name in zip(figure.subplots(1, 2), ("andrews", "slider_crank"), strict=True):
         own = [r for r in rows if r["mechanism"] == name]
-        curves(axes, groups(own, "program", "method"), "error", "cpu_s")
+        curves(axes, groups(own, "program", "method"), "error", "cpu_s", "tolerance")
         axes.set(xlabel="largest error (rad)", ylabel="processor time (s)", title=name.replace("_", " "))
         _finish(axes)
 
@@ -123,7 +147,7 @@ def _sweep_peers(figure: Any, rows: list[Row]) -> None:
     from .sweep_peers import own_errors
 
     axes = figure.subplots()
-    curves(axes, groups(own_errors(rows), "program"), "error", "sweep_cpu_s")
+    curves(axes, groups(own_errors(rows), "program"), "error", "sweep_cpu_s", "coarsen")
     axes.set(xlabel="difference from its own finest mesh", ylabel="processor time (s)", title="sweep of 40 positions")
     _finish(axes)
 
@@ -157,7 +181,9 @@ def bars(label: str, value: str, axis: str, title: str) -> Draw:
 
 
 PICTURES: Mapping[str, Draw] = {
-    "sweep_sizes": time_error(("law",), "stiffness, 40 positions at 0.05 deg: element size and law"),
+    "sweep_sizes": time_error(
+        ("law",), "stiffness, 40 positions at 0.05 deg: element size (coarsen) and law", parameter="coarsen"
+    ),
     "sweep_verification": time_error(("model",), "one position: condensed and whole gears", time="position_cpu_s"),
     "sweep_peers": _sweep_peers,
     "sweep_stages": bars("stage", "wall_s", "seconds", "stages of a default sweep of 40 positions"),
@@ -171,8 +197,10 @@ PICTURES: Mapping[str, Draw] = {
         "unknowns", "cpu_s", ("unknowns", "processor time (s)"), "sparse solvers", ("solver",), fit=True
     ),
     "transient_tolerance": time_error(
-        ("variant", "program", "method"), "gear train, 7 ms: largest error of all signals"
+        ("variant", "program", "method"), "gear train, 7 ms: largest error of all signals", parameter="tolerance"
     ),
-    "runup_peers": time_error(("variant", "program", "method"), "gear train in steady running, one speed"),
+    "runup_peers": time_error(
+        ("variant", "program", "method"), "gear train in steady running, one speed", parameter="tolerance"
+    ),
     "transient_modes": over("modes", "acceleration_error", ("modes", "error below 5 kHz"), "modes of the housing"),
 }
