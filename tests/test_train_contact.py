@@ -178,6 +178,23 @@ def test_mistakes():
 
 
 @needs_numba
+def test_when_teeth_part_does_not_depend_on_the_output_times():
+    """Number, share and longest time without contact: from 21 times as from 20,001, whose samples agree."""
+    mesh = {"torque": constant(20.0), "backlash": 30e-6, "speed": 600.0}
+    scene = pair(hertzian_law(relief=3e-6), **mesh, damping=Damping(ratio=0.01))
+    swing = constant(600.0) + TimeFunction(sines=((20.0, 9e3, 0.0),))
+    model = build_train(dataclasses.replace(scene, drive=dataclasses.replace(scene.drive, speed=swing)))
+    few, many = (simulate(model, np.linspace(0.0, 5e-3, n), tolerance=1e-8) for n in (21, 20_001))
+    names = ("contacts_lost", "contacts_regained", "share_without_contact", "longest_without_contact_s")
+    for name in names:
+        assert few.statistics[name] == pytest.approx(many.statistics[name], rel=1e-9)
+    apart = many.apart[:, 0]
+    assert many.statistics["contacts_lost"][0] == int((apart[1:] & ~apart[:-1]).sum()) > 5
+    assert many.statistics["share_without_contact"][0] == pytest.approx(apart.mean(), abs=2e-3)
+    assert 0.0 < many.statistics["longest_without_contact_s"][0] < 1e-3
+
+
+@needs_numba
 def test_a_load_that_keeps_no_flank_in_contact_runs_with_a_remark():
     """Nothing brakes, or what swings about nothing: the pair runs on, apart or not, and says so."""
     for load in (constant(0.0), constant(0.0) + TimeFunction(sines=((5.0, 6e3, 0.2),))):

@@ -32,7 +32,7 @@ import numpy as np
 from ..meshlaw.law import MeshLaw
 from ..rigid.timefunctions import TimeFunction
 from ..stiffness.periodic import PeriodicInterpolant
-from ..typing import Array
+from ..typing import Array, BoolArray
 from .arrays import cubics
 from .friction import Sliding, smooth_sign
 
@@ -83,6 +83,10 @@ class Flank(ABC):
     def forces(self, angle: Array, rate: Array, u: Array, du: Array) -> FlankForces:
         """Forces at rotations of the drive (rad) and their rates, (n,), u and du of shape (n, directions)."""
 
+    @abstractmethod
+    def bears(self, phase: Array, approach: Array) -> BoolArray:
+        """Whether its teeth touch at phases (rad) and approaches beyond the gap (m), (n,)."""
+
     def place(self, angle: Array, u: Array) -> tuple[Array, Array]:
         """Phase (rad) and approach beyond the gap (m), u of shape (n, directions)."""
         return self.sense * (self.ratio * angle + u[:, self.turn]) + self.phase, u[:, self.direction] - self.gap
@@ -105,6 +109,10 @@ class CurveFlank(Flank):
         force = (c[0] + x * (c[1] + x * (c[2] + x * c[3]))) * approach
         return FlankForces(np.maximum(force, 0.0) if self.parts else force)
 
+    def bears(self, phase: Array, approach: Array) -> BoolArray:  # noqa: ARG002
+        """Whether its teeth touch at phases (rad) and approaches beyond the gap (m), (n,)."""
+        return np.asarray((approach > 0.0) | (not self.parts))
+
     @cached_property
     def _cubics(self) -> Array:
         return cubics(self.curve)
@@ -123,6 +131,10 @@ class LawFlank(Flank):
     sliding: Sliding | None = None
     shifts: Array = field(default_factory=lambda: np.zeros(1))
     rayleigh: float = 0.0
+
+    def bears(self, phase: Array, approach: Array) -> BoolArray:
+        """Whether its teeth touch at phases (rad) and approaches beyond the gap (m), (n,)."""
+        return np.asarray(approach > self.law.touching(phase, self.shifts_at(phase)))
 
     def shifts_at(self, phase: Array) -> Array:
         """Shifts (m) of the pairs in the law's slots at phases (n,), shape (n, slots)."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..rigid import Trajectory
 from ..typing import Array, BoolArray
 from .forces import LawFlank
 from .model import TrainModel
@@ -15,32 +16,55 @@ from .motion import Motion
 
 @dataclass
 class Parting:
-    """When the teeth of a mesh are apart, from samples."""
+    """When the teeth of a mesh are apart, from the steps of the integration, which end where they part and meet."""
 
     lost: int = 0
     regained: int = 0
     open_time: float = 0.0
     whole_time: float = 0.0
     longest: float = 0.0
-    since: float | None = None
-    before: tuple[float, bool] | None = None
+    since: float = 0.0
+    open_: bool | None = None
     touched: bool = False
 
-    def add(self, time: Array, apart: BoolArray) -> None:
-        """Further samples; before the first contact nothing is lost."""
-        for t, open_ in zip(time.tolist(), apart.tolist(), strict=True):
-            last, was = self.before if self.before is not None else (t, open_)
-            self.whole_time += t - last
-            self.open_time += 0.5 * (open_ + was) * (t - last)
-            if open_ and not was:
-                self.lost, self.since = self.lost + 1, t
-            elif was and not open_:
+    def add(self, ends: Array, apart: BoolArray) -> None:
+        """Further steps between their ends (s + 1,); before the first contact nothing is lost."""
+        for begin, end, open_ in zip(ends[:-1].tolist(), ends[1:].tolist(), apart.tolist(), strict=True):
+            self.whole_time += end - begin
+            if open_ and not self.open_:
+                self.lost, self.since = self.lost + self.touched, begin
+            if self.open_ and not open_:
                 self.regained += self.touched
-                self.since = None
-            self.touched = self.touched or not open_
-            if self.since is not None:
-                self.longest = max(self.longest, t - self.since)
-            self.before = t, open_
+            if open_:
+                self.open_time += end - begin
+                self.longest = max(self.longest, (end - self.since) * self.touched)
+            self.open_, self.touched = open_, self.touched or not open_
+
+
+def apart_in_steps(model: TrainModel, trajectory: Trajectory, until: float) -> tuple[Array, BoolArray]:
+    """Ends of the steps up to a time (s + 1,), and whether the teeth of each mesh are apart in the middle of each step,
+    (s, meshes): there, approaches and phases follow from both ends by cubics.
+    """
+    dense, n = trajectory.dense, model.core.T.shape[1]
+    ends = dense.times
+    count = int(np.searchsorted(ends, until, side="right"))
+    ends = ends[:count]
+    states = getattr(dense, "states", None)
+    if states is None:
+        q, v = dense(ends), dense(ends, 1)
+    else:
+        q, v = model.core.origin + states[:count, :n] @ model.core.T.T, states[:count, n:] @ model.core.T.T
+    u, du = q @ model.directions, v @ model.directions
+    h = np.diff(ends)[:, None]
+    middle = 0.5 * (u[:-1] + u[1:]) + 0.125 * h * (du[:-1] - du[1:])
+    angle = model.angle(0.5 * (ends[:-1] + ends[1:]))
+    apart = np.zeros((len(angle), len(model.meshes)), dtype=bool)
+    flanks = iter(model.forces.flanks)
+    for i, line in enumerate(model.meshes):
+        sides = [] if line.rigid else [next(flanks)] + ([] if line.backlash is None else [next(flanks)])
+        if sides:
+            apart[:, i] = ~np.any([flank.bears(*flank.place(angle, middle)) for flank in sides], axis=0)
+    return ends, apart
 
 
 def parted(parting: Sequence[Parting], never: Sequence[bool]) -> dict[str, list[float | None]]:

@@ -21,7 +21,7 @@ from .floquet import train_multipliers
 from .kinematics import steady_forces
 from .model import TrainModel
 from .motion import Motion, motion
-from .parting import Parting, beyond_law, parted
+from .parting import Parting, apart_in_steps, beyond_law, parted
 from .response import TrainResponse, joined
 
 #: The finer run shares a little of the error; with this factor the estimate covers it.
@@ -132,7 +132,7 @@ def _pieces(
             trajectory, moved = _run(model, t[begin : end + 1], tolerance, method, backend, start)
             status, keep, why = _ended(model, trajectory, moved)
         kept = _cut(moved, min(1, begin), keep)
-        so_far.add(trajectory, kept, clock.perf_counter() - clocked)
+        so_far.add(model, trajectory, kept, clock.perf_counter() - clocked)
         last = status != "done" or end == len(t) - 1
         if finer is not None:
             finer.compare(model, t[begin : end + 1], kept, int(trajectory.statistics["steps"]))
@@ -195,7 +195,7 @@ class _SoFar:
     most: Array = field(default_factory=lambda: np.zeros(0))
     parting: list[Parting] = field(default_factory=list)
 
-    def add(self, trajectory: Trajectory, moved: Motion, seconds: float) -> None:
+    def add(self, model: TrainModel, trajectory: Trajectory, moved: Motion, seconds: float) -> None:
         """Count steps and seconds, keep each mesh's least force, its time, the largest size, and when teeth part."""
         self.seconds += seconds - float(trajectory.statistics.get("compile_seconds", 0.0))
         for name in COUNTED:
@@ -206,9 +206,10 @@ class _SoFar:
             self.least, self.most = np.full(force.shape[1], np.inf), np.zeros(force.shape[1])
             self.least_at = np.zeros(force.shape[1])
             self.parting = [Parting() for _ in range(force.shape[1])]
-        for one, apart in zip(self.parting, moved.apart.T, strict=True):
-            one.add(moved.time, apart)
         if len(force):
+            ends, apart = apart_in_steps(model, trajectory, float(moved.time[-1]))
+            for one, values in zip(self.parting, apart.T, strict=True):
+                one.add(ends, values)
             self.reached = float(moved.time[-1])
             low = force.min(axis=0)
             self.least_at = np.where(low < self.least, moved.time[force.argmin(axis=0)], self.least_at)
