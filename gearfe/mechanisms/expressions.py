@@ -8,7 +8,7 @@ atom := number | name | name "(" expression ("," expression)* ")" | quantity "("
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,8 +60,10 @@ class Node:
     parts: tuple[Node, ...] = ()
 
 
-def parse(text: str, label: str, tables: Mapping[str, Table] | None = None) -> Node:
+def parse(text: str, label: str, tables: Mapping[str, Table] | None = None, *, plain: Sequence[str] = PLAIN) -> Node:
     """Syntax tree of `text`; `label` names it in messages, `tables` are functions of one number by name.
+
+    `plain` are the quantities that stand without a body.
 
     Raises
     ------
@@ -81,7 +83,7 @@ def parse(text: str, label: str, tables: Mapping[str, Table] | None = None) -> N
         number, name, operator = match.groups()
         tokens.append(("number", number) if number else ("name", name) if name else ("operator", operator))
         at = match.end()
-    reader = _Reader(tokens, text, label, tables or {})
+    reader = _Reader(tokens, text, label, tables or {}, plain)
     node = reader.sum(0)
     if reader.at != len(tokens):
         raise _wrong(label, text, f"did not expect {tokens[reader.at][1]!r}")
@@ -117,9 +119,11 @@ def compute(node: Node, values: Mapping[tuple[str, str | None], Any]) -> Any:
 class _Reader:
     """Recursive descent over the tokens."""
 
-    def __init__(self, tokens: list[tuple[str, str]], text: str, label: str, tables: Mapping[str, Table]) -> None:
+    def __init__(
+        self, tokens: list[tuple[str, str]], text: str, label: str, tables: Mapping[str, Table], plain: Sequence[str]
+    ) -> None:
         self.tokens, self.text, self.label, self.at = tokens, text, label, 0
-        self.tables = tables
+        self.tables, self.plain = tables, plain
 
     def _next(self) -> tuple[str, str]:
         return self.tokens[self.at] if self.at < len(self.tokens) else ("end", "")
@@ -203,8 +207,8 @@ class _Reader:
     def _plain(self, name: str) -> Node:
         if name == "pi":
             return Node("number", float(np.pi))
-        if name not in PLAIN:
-            known = [*PLAIN, "pi", *(f"{q}(...)" for q in NAMED)]
+        if name not in self.plain:
+            known = [*self.plain, "pi", *(f"{q}(...)" for q in NAMED)]
             raise unknown_name(f"{self.label} = {self.text!r}", name, known)
         return Node("quantity", (name, None))
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError, given
-from ..rigid import StateFunction
+from ..rigid import SpanFunction, StateFunction
 from ..typing import Array
 from .expressions import OF_POINT, Node, quantities
 from .tables import ValueTable
@@ -23,6 +23,8 @@ Dual = tuple[float, Array]
 Evaluate = Callable[[Sequence[float]], Dual]
 #: What a load may depend on.
 ALLOWED = ("time", "angle", "rate", "x", "y", "vx", "vy")
+#: What the tension of a spring may depend on.
+OF_SPAN = ("time", "length", "length_rate")
 
 
 @dataclass(frozen=True)
@@ -211,3 +213,32 @@ class ExpressionLoad(StateFunction):
                 w = float(v[k + 2])
                 total += {"x": q[k] + rx, "y": q[k + 1] + ry, "vx": v[k] - w * ry, "vy": v[k + 1] + w * rx}[kind]
         return float(total)
+
+
+class ExpressionTension(SpanFunction):
+    """The tension of a spring given by an expression; text, label and node as of `ExpressionLoad`."""
+
+    def __init__(self, text: str, label: str, node: Node) -> None:
+        self.text, self.label = text, label
+        names = [(name, None) for name in OF_SPAN]
+        for kind, _ in quantities(node):
+            if kind not in OF_SPAN:
+                problem = f"uses {kind}; a tension may depend on {', '.join(OF_SPAN)}"
+                raise InputError(label, text, problem, "use one of these")
+        self.evaluate = compiled(node, names)
+
+    def value(self, t: float, length: float, rate: float) -> float:
+        """Tension (N)."""
+        try:
+            return float(self.evaluate([t, length, rate])[0])
+        except (Trouble, OverflowError, ZeroDivisionError, ValueError) as error:
+            self.complaint = f"{self.label} = {self.text!r} at {t:.6g} s: {error}"
+            return math.nan
+
+    def slopes(self, t: float, length: float, rate: float) -> tuple[float, float]:
+        """Slopes by length and rate."""
+        try:
+            _, by_length, by_rate = self.evaluate([t, length, rate])[1]
+        except (Trouble, OverflowError, ZeroDivisionError, ValueError):
+            return 0.0, 0.0  # the value says so
+        return float(by_length), float(by_rate)

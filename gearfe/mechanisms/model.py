@@ -201,6 +201,10 @@ class Mechanism:
         for _, load in self.planar.assembly.state_loads:
             if not math.isfinite(load.value(start.time, start.q, start.v)):
                 raise InputError("forces", None, f"have no value at the start: {load.complaint}", "mend the expression")
+        force = self.planar.force(start.time, start.q, start.v)
+        for _, law in self.planar.assembly.tension_laws:
+            if law.complaint and not np.isfinite(force).all():
+                raise InputError("forces", None, f"have no value at the start: {law.complaint}", "mend the expression")
 
     def _forced(self, text: str, target: float, level: int) -> Forced:
         label = f"start.{('positions', 'velocities')[level]} {text!r}"

@@ -14,7 +14,7 @@ from ..tables.kinds import Kind
 from ..tables.mechanism import BodyTable, ForceTable, FunctionTable, JointTable, MechanismFile
 from .expressions import parse
 from .links import link_of
-from .loads import ExpressionLoad
+from .loads import OF_SPAN, ExpressionLoad, ExpressionTension
 from .tables import ValueTable
 
 Point = tuple[float, float]
@@ -83,6 +83,9 @@ def part_of(
         elif isinstance(value, str) and key in LOADS:
             node = parse(value, f"{label}.{key}", tables)
             value = ExpressionLoad(value, f"{label}.{key}", node)
+        elif key == "tension_N" and value is not None:
+            node = parse(value, f"{label}.{key}", tables, plain=OF_SPAN)
+            value = ExpressionTension(value, f"{label}.{key}", node)
         elif key.endswith("_deg") and value is not None:
             value = math.radians(value)
         if value is not None:

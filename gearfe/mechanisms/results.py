@@ -104,7 +104,8 @@ def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
                         angle = trajectory.q[:, 3 * index[body] + 2]
                         work += sign * row[0] * (angle - angle[0])
                 continue
-        if isinstance(force, Moment | PointForce) or (isinstance(force, Spring | CoordinateSpring) and force.damping):
+        loses = isinstance(force, Spring | CoordinateSpring) and force.damping
+        if isinstance(force, Moment | PointForce) or loses or (isinstance(force, Spring) and force.law is not None):
             varying = True
     planar = mechanism.planar
     damped = [link.beam for link in mechanism.links.values() if link.beam.link.damping]

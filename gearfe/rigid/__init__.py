@@ -12,7 +12,7 @@ from .joints import Fixed, Hinge, Prescribed, Prismatic, Slot
 from .planar import Body, Scene
 from .scene import PlanarScene
 from .start import Forced, Freedoms, Start, consistent_start, count_freedoms
-from .statefunctions import StateFunction
+from .statefunctions import SpanFunction, StateFunction
 from .status import Status
 from .system import System
 from .timefunctions import TimeFunction, constant, polynomial, sine, smoothed_step
@@ -41,6 +41,7 @@ __all__ = [
     "Scene",
     "SeriesLaw",
     "Slot",
+    "SpanFunction",
     "Spring",
     "Start",
     "StateFunction",

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from ..errors import InputError
 from .forms import GROUND, Form, Frames, Point, Vector
-from .statefunctions import StateFunction
+from .statefunctions import SpanFunction, StateFunction
 from .timefunctions import TimeFunction, constant
 
 
@@ -26,12 +26,13 @@ class Along(NamedTuple):
 
 
 class Tension(NamedTuple):
-    """Tension ``stiffness (L - L0) + damping L'`` along a vector of the length L."""
+    """Tension ``stiffness (L - L0) + damping L' + law(t, L, L')`` along a vector of the length L."""
 
     vector: Vector
     stiffness: float
     damping: float
     free_length: float
+    law: SpanFunction | None = None
 
 
 class Weight(NamedTuple):
@@ -71,7 +72,8 @@ class Gravity(Force):
 class Spring(Force):
     """Spring-damper between two points: tension ``k (L - L0) + c L'`` along the line that joins them.
 
-    With neither free length nor damping the force is k times the span, so the points may coincide.
+    With neither free length nor damping the force is k times the span, so the points may coincide. `law` adds any other
+    tension by length and rate.
     """
 
     a: str
@@ -81,12 +83,13 @@ class Spring(Force):
     stiffness: float = 0.0
     damping: float = 0.0
     free_length: float = 0.0
+    law: SpanFunction | None = None
     name: str = ""
 
     def parts(self, frames: Frames) -> list[Along | Tension | Weight]:
         """A tension along the span."""
         span = frames.point(self.b, self.point_b) - frames.point(self.a, self.point_a)
-        return [Tension(span, self.stiffness, self.damping, self.free_length)]
+        return [Tension(span, self.stiffness, self.damping, self.free_length, self.law)]
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from .elimination import is_linear, modal_coordinates
 from .modal import series_force
 from .scene import PlanarScene
 from .start import Start, consistent_start
+from .statefunctions import SpanFunction, StateFunction
 from .status import Status
 from .steps import Watch
 from .system import System
@@ -137,7 +138,11 @@ def integrate(
 def _complaint(system: System) -> str:
     """What the first load without a value says."""
     scenes = [e for e in system.elements if isinstance(e, PlanarScene)]
-    return next((f.complaint for s in scenes for _, f in s.assembly.state_loads if f.complaint), "")
+    laws: list[StateFunction | SpanFunction] = []
+    for scene in scenes:
+        laws += [load for _, load in scene.assembly.state_loads]
+        laws += [law for _, law in scene.assembly.tension_laws]
+    return next((law.complaint for law in laws if law.complaint), "")
 
 
 def _counted(begin: float, end: float, t: float, steps: int, state: Any) -> bool:  # noqa: ARG001 - a `choice.Watch`

@@ -56,6 +56,7 @@ class PlanarScene(Element):
         #: Constraints with a profile: row, which of its bodies, number of that, profile.
         self._profiles = [(r, k, int(self._forms.bodies[r, k]), p) for r, k, p in self.assembly.profiles]
         self._loaded = bool(len(self._forces.spring) or len(self._forces.along))
+        self._lawful = np.isin(np.arange(len(self._forces.spring)), [i for i, _ in self.assembly.tension_laws])
         self._known: tuple[Array, Pose] | None = None
 
     def mass(self) -> Array:
@@ -74,7 +75,7 @@ class PlanarScene(Element):
     @property
     def has_series(self) -> bool:
         """Whether the Taylor kernels can run it: no load depends on the state, no constraint has a profile."""
-        return not (self.assembly.state_loads or self.assembly.profiles)
+        return not (self.assembly.state_loads or self.assembly.tension_laws or self.assembly.profiles)
 
     @property
     def driven(self) -> bool:
@@ -217,7 +218,7 @@ class PlanarScene(Element):
         pose = self.pose(q)
         motion = self._motion(pose, v)
         total = self._forces.weight.copy()
-        springs = self._springs(pose, motion)
+        springs = self._springs(t, pose, motion)
         J = self._vector_jacobian(pose)[: len(springs.length)]
         places = self._places(np.arange(len(J)))
         np.add.at(total, places, -np.einsum("scbk,sc->sbk", J, springs.pull[:, None] * springs.span).reshape(-1, 6))
@@ -233,10 +234,14 @@ class PlanarScene(Element):
             return by_q[:n, :n], by_v[:n, :n]
         pose = self.pose(q)
         motion = self._motion(pose, v)
-        springs = self._springs(pose, motion)
+        springs = self._springs(t, pose, motion)
         J = self._vector_jacobian(pose)[: len(springs.length)].reshape(-1, 2, 6)
         unit, pull = springs.unit, springs.pull
-        k, damping = self._forces.spring[:, :2].T
+        k, damping = self._forces.spring[:, :2].T.copy()
+        for i, law in self.assembly.tension_laws:
+            by_length, by_rate = law.slopes(t, float(springs.length[i]), float(springs.rate[i]))
+            k[i] += by_length
+            damping[i] += by_rate
         across = np.eye(2) - unit[:, :, None] * unit[:, None, :]
         drift = np.zeros_like(J)  # d(rate of the span)/d(poses)
         drift[:, :, [2, 5]] = -np.swapaxes(motion.spin[: len(J), :, None] * pose.arm[: len(J)], 1, 2)
@@ -277,9 +282,9 @@ class PlanarScene(Element):
         """Power of applied moments and point forces less the loss in dampers (W)."""
         pose = self.pose(q)
         motion = self._motion(pose, v)
-        springs, along = self._springs(pose, motion), self._along(t, pose, motion)
+        springs, along = self._springs(t, pose, motion), self._along(t, pose, motion)
         losses = self._forces.spring[:, 1] @ springs.rate**2 + self._forces.along[:, 1] @ along.rate**2
-        return float(along.given @ along.rate - losses)
+        return float(along.given @ along.rate - springs.given @ springs.rate - losses)
 
     def potential(self, q: Array) -> float:
         """Energy of gravity (datum x = y = 0) and of all springs (J)."""
@@ -304,12 +309,12 @@ class PlanarScene(Element):
         value = -stiffness * self._affine(pose)[self.rows :] - damping * rate
         return _Along(gradient, places, rate, value, given)
 
-    def _springs(self, pose: Pose, motion: Motion) -> _Springs:
+    def _springs(self, t: float, pose: Pose, motion: Motion) -> _Springs:
         """Spans, lengths, directions, rates of the lengths, and tensions over lengths."""
         stiffness, damping, free = self._forces.spring.T
         span, speed = pose.vector[: len(free)], motion.vector[: len(free)]
         length = np.hypot(*span.T)
-        pointless = (length == 0.0) & ((damping > 0.0) | (free > 0.0))
+        pointless = (length == 0.0) & ((damping > 0.0) | (free > 0.0) | self._lawful)
         if pointless.any():
             problem = "joins two points that coincide, so its force has no direction"
             cure = "move its points apart, or give it neither a free length nor damping"
@@ -317,8 +322,11 @@ class PlanarScene(Element):
         over = np.where(length > 0.0, length, 1.0)
         unit = span / over[:, None]
         rate = (unit * speed).sum(axis=1)
-        pull = stiffness * (1.0 - np.where(free > 0.0, free / over, 0.0)) + damping * rate / over
-        return _Springs(span, length, unit, rate, pull)
+        given = np.zeros(len(free))
+        for i, law in self.assembly.tension_laws:
+            given[i] = law.value(t, float(length[i]), float(rate[i]))
+        pull = stiffness * (1.0 - np.where(free > 0.0, free / over, 0.0)) + (damping * rate + given) / over
+        return _Springs(span, length, unit, rate, given, pull)
 
 
 class _Along(NamedTuple):
@@ -334,6 +342,7 @@ class _Springs(NamedTuple):
     length: Array
     unit: Array  # (s, 2), zero where the points coincide
     rate: Array  # of the length
+    given: Array  # tension of the laws
     pull: Array  # tension / length
 
 

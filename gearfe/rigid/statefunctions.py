@@ -24,3 +24,17 @@ class StateFunction(ABC):
     @abstractmethod
     def slopes(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
         """(df/dq, df/dv)."""
+
+
+class SpanFunction(ABC):
+    """A tension T(t, L, L') between two points by their distance L (m) and its rate L' (m/s); as `StateFunction`."""
+
+    complaint: str = ""
+
+    @abstractmethod
+    def value(self, t: float, length: float, rate: float) -> float:
+        """T (N), positive where it pulls."""
+
+    @abstractmethod
+    def slopes(self, t: float, length: float, rate: float) -> tuple[float, float]:
+        """(dT/dL, dT/dL')."""

@@ -22,7 +22,7 @@ from .forms import End, Form, Frames, Terms, Vector
 from .joints import Profile
 from .ordering import Factor, elimination_plan
 from .planar import Body, Scene
-from .statefunctions import StateFunction
+from .statefunctions import SpanFunction, StateFunction
 from .timefunctions import TimeFunction, constant
 
 
@@ -85,6 +85,7 @@ class Assembly(NamedTuple):
     row_holds_length: BoolArray  # (m,) whether it holds lengths, not angles and directions alone
     profiles: tuple[tuple[int, int, Profile], ...]  # constraint, which of its bodies, profile of that one's angle
     spring_label: tuple[str, ...]
+    tension_laws: tuple[tuple[int, SpanFunction], ...]  # number among the springs, and the law
     functions: tuple[TimeFunction, ...]  # in the order of the tables
     state_loads: tuple[tuple[int, StateFunction], ...]  # number among the forces along forms, and the load
     start_q: Array  # (3n,) start coordinates of the mass centres
@@ -161,6 +162,7 @@ def assemble(scene: Scene) -> Assembly:
         row_label=tuple(r.label for r in rows),
         row_holds_length=lengths,
         spring_label=tuple(label for label, _ in tensions),
+        tension_laws=tuple((k, t.law) for k, (_, t) in enumerate(tensions) if t.law is not None),
         profiles=tuple((i, *row.profile) for i, row in enumerate(rows) if row.profile is not None),
         functions=tuple(functions),
         state_loads=tuple((k, a.load) for k, a in enumerate(along) if isinstance(a.load, StateFunction)),

@@ -76,7 +76,7 @@ FORCES: dict[str, Kind] = {
         "gearfe.rigid.forces:Spring",
         {
             "body": "a", "to": "b", "point": "point_a", "to_point": "point_b", "stiffness": "stiffness",
-            "damping": "damping", "free_length_m": "free_length",
+            "damping": "damping", "free_length_m": "free_length", "tension_N": "law",
         },
         ("body",),
     ),

@@ -155,6 +155,7 @@ class ForceTable:
     stiffness: float = quantity(0.0, low=0.0, doc="stiffness in N/m, or N m/rad on an angle, >= 0")
     damping: float = quantity(0.0, low=0.0, doc="damping in N s/m, or N m s/rad on an angle, >= 0")
     free_length_m: float = quantity(0.0, low=0.0, doc="length of the spring without force in m, >= 0")
+    tension_N: str | None = quantity(None, doc="further tension of a spring in N, by length and length_rate (m, m/s)")
     coordinate: str | None = quantity(None, choices=("angle", "x", "y"), doc="coordinate that the spring acts on")
     reference: float = quantity(0.0, doc="coordinate at which the spring is free, in m or rad")
     rate_rad_per_s: float | None = quantity(None, doc="rate of a turning frame about the ground's origin in rad/s")
