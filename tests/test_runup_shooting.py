@@ -1,4 +1,6 @@
-"""Steady states by harmonic balance against periodic orbits by shooting with the transient's own integrator."""
+"""Steady states by harmonic balance against periodic orbits by shooting with the transient's own integrator, and
+their error estimate against finer ones.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,9 @@ from numpy.typing import NDArray
 
 from gearfe.rigid import constant, integrate
 from gearfe.rigid.compiled import available
+from gearfe.runup.balance import size_of, widened
 from gearfe.runup.condensed import condense
+from gearfe.runup.report import warnings
 from gearfe.runup.results import SteadyState
 from gearfe.runup.run_up import run_up, steady_state
 from gearfe.train import TrainModel, build_train
@@ -19,6 +23,7 @@ from gearfe.train.motion import motion
 
 from .mesh_laws import hertzian_law
 from .test_runup_train import loaded, smooth
+from .trains import curve
 
 Array = NDArray[np.float64]
 pytestmark = pytest.mark.skipif(not available(), reason="numba is not installed")
@@ -102,3 +107,47 @@ def test_all_three_motions_at_one_speed() -> None:
     assert [s.stable for s in three] == [True, False, True]
     for state in three:
         compared(model, steady_state(model, state.speed, state, tolerance=2e-4), 2e-3)
+
+
+def random_train(rng: np.random.Generator) -> TrainModel:
+    """One or two stages, laws and curves, with parting teeth or back flanks, in stiff or soft bores."""
+    stages = [(int(rng.integers(18, 30)), int(rng.integers(20, 40)))] if rng.random() < 0.6 else [(20, 30), (20, 30)]
+    relief, swing, law = rng.uniform(0.0, 8e-6), rng.uniform(0.05, 0.3), rng.random() < 0.6
+
+    def stiffness(teeth: int) -> object:
+        return hertzian_law(2 * np.pi / teeth, relief=relief) if law else curve(teeth, mean=1e8, swing=swing)
+
+    return build_train(
+        loaded(
+            stages,
+            stiffness,
+            speed=rng.uniform(300.0, 1600.0),
+            torque=rng.uniform(10.0, 90.0),
+            ratio=rng.uniform(0.02, 0.08),
+            backlash=30e-6 if rng.random() < 0.5 else None,
+            flexible=rng.random() < 0.5,
+        )
+    )
+
+
+def test_the_estimate_covers_the_error_of_random_trains() -> None:
+    """A thousandth of the tolerance as truth; the estimate is twice the error in the median."""
+    rng, factors = np.random.default_rng(8), []
+    for _ in range(20):
+        model, tolerance = random_train(rng), 10.0 ** rng.uniform(-3.0, -1.5)
+        state = steady_state(model, model.steady_speed, tolerance=tolerance, stability=False)
+        fine = steady_state(model, model.steady_speed, state, tolerance=1e-3 * tolerance, stability=False)
+        off = fine.orbit.places - widened(state.orbit.places, fine.orbit.harmonics)
+        factors.append(state.error / size_of(off, condense(model).system.scale))
+    assert (np.array(factors) > 1.0).sum() >= 19
+    assert np.median(factors) < 10.0
+
+
+def test_too_few_harmonics_for_the_asked_error_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The state says its error, and the run a warning."""
+    monkeypatch.setattr("gearfe.runup.balance.MOST_HARMONICS", 32)
+    law = hertzian_law(relief=6e-6)
+    model = build_train(loaded([(20, 30)], lambda teeth: law, torque=15.0, flexible=False))
+    run = run_up(model, np.array([300.0, 310.0]), tolerance=1e-6, stability=False)
+    assert all(state.error > 1e-6 for state in run.states)
+    assert any("of 2 states miss the tolerance" in sentence for sentence in warnings(run))
