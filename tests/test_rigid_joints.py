@@ -368,3 +368,16 @@ def test_a_prescribed_motion_holds_between_the_steps_of_the_implicit_method():
     made = integrate(system, times, method="implicit", tolerance=1e-6)
     circle = 0.5 * np.stack([np.cos(30.0 * times), np.sin(30.0 * times)], axis=1)
     np.testing.assert_allclose(made.q[:, :2], circle, atol=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("links", [1, 2])
+def test_energy_over_a_thousand_periods(links):
+    """A rod and a double pendulum swing 2,000 s without damping (a period is 1.6 to 2 s): the drift is below 1e-8."""
+    bodies = [Body("a", 1.0, 1 / 12, (0.5, 0.0), rate=1.0), Body("b", 1.0, 1 / 12, (0.5, 0.0), (1.0, 0.0))][:links]
+    joints = [Hinge("a", "ground"), Hinge("a", "b", (1.0, 0.0), (0.0, 0.0))][:links]
+    system = System([PlanarScene(Scene(tuple(bodies), tuple(joints), (Gravity(),)))])
+    run = integrate(system, np.linspace(0.0, 2000.0, 201), tolerance=1e-12, method="taylor")
+    energy = np.array([system.energy(q, v) for q, v in zip(run.q, run.v, strict=True)])
+    total = energy.sum(axis=1)
+    assert np.abs(total - total[0]).max() < 1e-8 * energy[:, 0].max()
