@@ -124,3 +124,14 @@ def test_steps_that_open_all_gaps_go_on_from_the_points_that_bear() -> None:
     load = {"twist": math.radians(0.1212), "angles": [2.19 * gears.mesh_cycle / 6], "kinematics": "small"}
     found = sweep_stiffness(gears, law="penalty", flank_coarsen=0.35, **load)
     assert found.torque_wheel == pytest.approx(sweep_stiffness(gears, **load).torque_wheel, rel=1e-3)
+
+
+def test_flanks_of_a_few_points_have_an_answer() -> None:
+    """Five edges with two points each: fewer than may bear beside those that do."""
+    gears = gear_pair(20, 30)
+    elastic = elastic_pair(gears, law="penalty", coarsen=5.0, flank_coarsen=10.0, points_per_edge=2)
+    assert [body.flank.edges for body in elastic.bodies] == [5, 5]
+    twists, angles = np.full(12, math.radians(0.3)), gears.mesh_cycle * np.arange(12) / 12
+    found = ElementSolver(gears, elastic, resolved_only=False).solve(angles, twists)
+    assert set(found.status) == {"converged"}
+    assert (found.torque_wheel > 0.0).all()

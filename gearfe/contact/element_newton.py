@@ -306,7 +306,7 @@ def solve(batch: Batch, state: State, tolerance: float) -> Outcome:
         for b in np.flatnonzero(live).tolist():
             mine = slice(*np.searchsorted(at, [b, b + 1]).tolist())
             if b not in equations or not np.isin(found.points[mine][asks[mine]], equations[b].points).all():
-                beside = np.convolve(asks[mine], np.ones(2 * BESIDE + 1), mode="same") > 0
+                beside = np.convolve(asks[mine], np.ones(2 * BESIDE + 1))[BESIDE:-BESIDE] > 0
                 may = mine.start + np.flatnonzero(beside & found.reached[mine])
                 equations[b] = equations_of(batch, b, taken(found, may), asks[may])
         state = step(batch, old, taken(found, live[at]), equations)

@@ -74,8 +74,6 @@ HELD_STEPS, TOLERANCE = 3, 1e-6
 AHEAD, LEAST_AHEAD = 1e-3, 1e-10
 #: Force per width (N/m) below which there is none.
 TINY = 1e-300
-#: Rigid clearance (rad) up to which a tooth pair is looked at.
-CLEAR = 1e-7
 
 
 def solve_half_plane(
@@ -95,7 +93,7 @@ def solve_half_plane(
     angles = np.atleast_1d(np.asarray(pinion_angles, dtype=float))
     twist = np.broadcast_to(np.asarray(twists, dtype=float), angles.shape)
     met = law.teeth.touching(angles) if touching is None else touching
-    met = met.take(np.flatnonzero(met.twist < twist[met.position] + CLEAR))
+    met = met.take(np.flatnonzero(met.twist < twist[met.position]))
     made = []
     for start in range(0, max(1, len(angles)), BATCH):
         part = slice(start, start + BATCH)
