@@ -24,7 +24,7 @@ from .subject import DATA, given_file, housing_of
 from .timing import measured
 
 #: Thicknesses of the elements at inner edges (mm), coarse to fine; the last one is the truth of all others.
-SIZES, QUICK_SIZES = (20.0, 12.0, 9.0, 6.0, 4.5, 3.0, 2.0, 1.2), (40.0, 24.0)
+SIZES, QUICK_SIZES = (12.0, 6.0, 4.5, 3.0, 2.0, 1.2), (40.0, 24.0)
 #: (modes, correction levels) of the reduction.
 REDUCTIONS = (
     (10, 0),
