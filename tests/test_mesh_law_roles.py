@@ -177,7 +177,7 @@ def test_a_torque_that_ramps_through_zero() -> None:
 
 
 @needs_numba
-@pytest.mark.parametrize("force", [800.0])
+@pytest.mark.parametrize("force", [800.0, 2000.0])
 def test_a_free_pair_of_gears_keeps_its_energy_over_a_thousand_cycles(
     laws: tuple[MeshLaw, MeshLaw], force: float
 ) -> None:

@@ -34,6 +34,8 @@ from .system import System
 ORDER = 30
 #: Asked tolerance -> that of the plain Runge-Kutta steps: accelerations weigh the fast modes more than the state does.
 PLAIN_SHARE = 0.03
+#: That of the terms that a series leaves out: the energy of a free pair of gears then keeps to ten times the tolerance.
+SERIES_SHARE = 0.1
 _FULL = int(Status.MOST_STEPS)
 
 
@@ -78,7 +80,8 @@ def run_modal_taylor(
     def told(t: float, steps: int, y: Array) -> bool:
         return watch is None or watch(t, steps, lambda: (core.origin + core.T @ y[:n], core.T @ y[n:]))
 
-    run = SeriesRun(core, *found, tolerance, longest, modal_problem(core).expand)
+    local = max(SERIES_SHARE * tolerance, 1e-14)
+    run = SeriesRun(core, *found, local, longest, modal_problem(core).expand)
     compiling = run.load()
     y0 = np.concatenate(core.reduce(start.q, start.v))
     ends, states, at_times, status, orders = run.steps(start.time, y0, float(times[-1]), times, most, told)
