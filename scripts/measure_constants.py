@@ -70,6 +70,12 @@ def answers(found: list[StiffnessJob], elastic: list[Any]) -> list[Any]:
     return made
 
 
+def holders_of(constant: str, value: float) -> list[Any]:
+    """Modules that hold a constant: its own, and those that import it."""
+    loaded = [module for name, module in sys.modules.items() if name.startswith("gearfe.")]
+    return [module for module in loaded if getattr(module, constant, None) is value]
+
+
 def main(count: int = 24) -> int:
     """Print the table."""
     found = jobs(count)
@@ -81,15 +87,18 @@ def main(count: int = 24) -> int:
         module = importlib.import_module(f"gearfe.{name}")
         for constant, values in constants.items():
             own, worst, other = getattr(module, constant), 0.0, 0
+            holders = [module] if isinstance(own, int) else holders_of(constant, own)
             for value in values:
-                setattr(module, constant, value)
+                for holder in holders:
+                    setattr(holder, constant, value)
                 gears = [elastic_pair(job.pair, job.model) for job in found] if name in OF_GEARS else elastic
                 for (k, status), (k_now, status_now) in zip(before, answers(found, gears), strict=True):
                     with np.errstate(divide="ignore", invalid="ignore"):
                         off = np.abs(k_now / k - 1)
                     worst = max(worst, float(off[np.isfinite(off)].max(initial=0.0)))
                     other += int((status != status_now).sum())
-            setattr(module, constant, own)
+            for holder in holders:
+                setattr(holder, constant, own)
             told = ", ".join(f"{value:g}" for value in values)
             print(f"| `{name}.{constant}` | {own:g} | {told} | {worst:.1e} | {other} |", flush=True)
     return 0

@@ -101,7 +101,7 @@ class _Tree:
     children: list[list[int]]
 
 
-def multifrontal(matrix: Any, graph: Any, order: IntArray) -> MultifrontalFactor:
+def multifrontal(matrix: Any, graph: Any, order: IntArray, *, leaf_nodes: int = LEAF_NODES) -> MultifrontalFactor:
     """Factorise a symmetric positive definite matrix.
 
     Parameters
@@ -112,6 +112,8 @@ def multifrontal(matrix: Any, graph: Any, order: IntArray) -> MultifrontalFactor
         Which nodes, of b unknowns each, are coupled; no diagonal.
     order : (n / b,)
         Numbers of the nodes in an order with little fill.
+    leaf_nodes
+        Nodes in a subtree that becomes one front.
 
     Raises
     ------
@@ -119,7 +121,7 @@ def multifrontal(matrix: Any, graph: Any, order: IntArray) -> MultifrontalFactor
     """
     nodes = graph.shape[0]
     width = matrix.shape[0] // nodes
-    tree = _fronts(graph, order)
+    tree = _fronts(graph, order, leaf_nodes)
     number = np.empty(nodes, dtype=np.int64)
     number[tree.order] = np.arange(nodes)
     blocks = sparse.bsr_array(matrix, blocksize=(width, width))
@@ -176,15 +178,15 @@ def _add(target: Array, rows: IntArray, columns: IntArray, values: Array) -> Non
         target[rows[first:last]] += part
 
 
-def _fronts(graph: Any, order: IntArray) -> _Tree:
-    """Elimination tree, its postorder, and its runs: subtrees of `LEAF_NODES`, and chains without larger branches."""
+def _fronts(graph: Any, order: IntArray, leaf_nodes: int) -> _Tree:
+    """Elimination tree, its postorder, and its runs: subtrees of `leaf_nodes`, and chains without larger branches."""
     parent = _elimination_tree(graph[order][:, order])
     nodes = len(parent)
     size = [1] * nodes
     for j, p in enumerate(parent):
         if p >= 0:
             size[p] += size[j]
-    large, above = np.array(size) > LEAF_NODES, np.array(parent)
+    large, above = np.array(size) > leaf_nodes, np.array(parent)
     branches = np.bincount(above[large & (above >= 0)], minlength=nodes)
     # the last node of a front: top of a small subtree, or a large one whose parent has several large children, or none
     goes_on = (above >= 0) & np.where(large, branches[above] == 1, ~large[above])
