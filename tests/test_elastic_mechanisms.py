@@ -58,6 +58,14 @@ def test_slider_crank_with_an_elastic_rod() -> None:
     assert deflection < 0.0025 * largest
 
 
+def test_a_beam_spins_up_within_a_hundred_thousandth_of_its_length() -> None:
+    """To 6 rad/s within 15 s; the tip (m) over 20 s, of a length of 10 m: exudyn's steps leave 1e-5 m."""
+    errors = [off("spin_up", tolerance)[:2] for tolerance in (1e-4, 1e-5)]
+    assert errors[0][0] < 1e-4 * 10.0
+    assert errors[1][0] < 2.5e-5 * 10.0
+    assert errors[1][1] < 3e-5
+
+
 def test_two_elements_do() -> None:
     """They bend as exudyn's eight within 0.2 %."""
     raw: dict[str, Any] = tables("elastic_andrews")
