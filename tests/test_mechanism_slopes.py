@@ -16,6 +16,7 @@ from gearfe.mechanisms import sensitivities, sweep
 from gearfe.mechanisms.sensitivity import extrapolated
 from gearfe.study.answer import Answer
 from gearfe.study.kinds import Shared, solve
+from gearfe.tables.mechanism import RunTable
 
 MASS, STIFFNESS, GRAVITY = 2.0, 50.0, 9.81
 #: A mass on a vertical spring, let go where the spring is free.
@@ -63,17 +64,23 @@ def fall(t: np.ndarray, mass: float, stiffness: float) -> np.ndarray:
     return -mass * GRAVITY / stiffness * (1.0 - np.cos(np.sqrt(stiffness / mass) * t))
 
 
-def test_slopes_of_a_motion_and_their_errors(file: Path) -> None:
-    made = sensitivities(file, KEYS)
+@pytest.mark.parametrize(
+    ("tolerance", "method", "allowed"),
+    [(1e-11, "taylor", 1e-6), (1e-4, "taylor", 0.05), (1e-5, "implicit", 0.05), (1e-7, "explicit", 0.01)],
+)
+def test_slopes_of_a_motion_and_their_errors(file: Path, tolerance: float, method: str, allowed: float) -> None:
+    """The estimate holds the integrator's part: runs that take the same steps make the same error."""
+    run = RunTable(end_s=1.5, step_s=0.05, tolerance=tolerance, method=method)
+    made = sensitivities(file, KEYS, run=run)
     t = made.at["y_m"]
     w = math.sqrt(STIFFNESS / MASS)
-    np.testing.assert_allclose(made.outputs["y_m"], fall(t, MASS, STIFFNESS), atol=1e-9)
+    np.testing.assert_allclose(made.outputs["y_m"], fall(t, MASS, STIFFNESS), atol=100 * tolerance)
     drop = MASS * GRAVITY / STIFFNESS
     by_mass = fall(t, MASS, STIFFNESS) / MASS + drop * np.sin(w * t) * w * t / (2 * MASS)
     by_stiffness = -fall(t, MASS, STIFFNESS) / STIFFNESS - drop * np.sin(w * t) * w * t / (2 * STIFFNESS)
     for key, exact in zip(KEYS, (by_mass, by_stiffness), strict=True):
         off = float(np.abs(made.slopes[key, "y_m"] - exact).max())
-        assert off <= made.errors[key, "y_m"] <= 1e-6 * float(np.abs(exact).max())
+        assert off <= made.errors[key, "y_m"] <= allowed * float(np.abs(exact).max())
 
 
 def test_slopes_of_rest_and_of_frequencies(file: Path) -> None:
