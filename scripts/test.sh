@@ -8,4 +8,4 @@ export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 .venv/bin/ruff format --check .
 .venv/bin/mypy
 .venv/bin/lint-imports --no-cache
-.venv/bin/python -m pytest -n 2 -m "not slow" "$@"
+.venv/bin/python -m pytest -n 2 -m "not slow" --durations=10 "$@"
