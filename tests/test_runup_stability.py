@@ -105,6 +105,15 @@ def test_a_train_has_the_multipliers_of_its_own_transient():
     assert np.abs(state.multipliers[:10]) == pytest.approx(np.abs(own[:10]), rel=1e-3)
 
 
+def test_constant_stiffness_leaves_the_modes_to_themselves():
+    """No mode is changed over the period: all multipliers are exp(-zeta omega T)."""
+    model = build_train(loaded([(20, 30)], lambda teeth: smooth_of(teeth, 0.0), ratio=0.02, flexible=False))
+    state = steady_state(model, 600.0)
+    period = 2 * math.pi / (20 * 600.0)
+    decays = np.exp(-0.02 * 2 * math.pi * model.coupled_frequencies_hz * period)
+    assert np.abs(state.multipliers).max() == pytest.approx(decays.max(), rel=1e-9)
+
+
 def test_an_undamped_train_is_unstable_at_twice_its_frequency():
     """Parametric resonance of a pair in a rigid housing: mesh frequency twice the natural frequency."""
     model = build_train(loaded([(20, 30)], smooth, ratio=1e-3, flexible=False))

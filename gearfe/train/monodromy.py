@@ -72,12 +72,18 @@ def flow(squares: Array, damping: Array, period: float) -> Flow:
     scale = np.maximum(np.sqrt(np.abs(squares)), 1.0 / period)
     A = np.block([[np.zeros((n, n)), np.diag(scale)], [np.diag(-squares / scale), -damping]])
     values, V = np.linalg.eig(A)
-    if np.isfinite(V).all() and np.linalg.cond(V) < WORST_CONDITION:
+    if np.isfinite(V).all() and _well_conditioned(V):
         kept = values.imag >= 0.0
         twice = np.where(values[kept].imag > 0.0, 2.0, 1.0)
         return Flow(scale, values[kept].astype(complex), A, np.linalg.inv(V)[kept], V[:, kept] * twice)
     whole = np.eye(2 * n, dtype=complex)
     return Flow(scale, None, A, whole, whole)
+
+
+def _well_conditioned(V: ComplexArray) -> bool:
+    """Whether `V` may be inverted; with no rows it may."""
+    sizes = np.linalg.svd(V, compute_uv=False)
+    return bool(sizes.max(initial=0.0) < WORST_CONDITION * sizes.min(initial=np.inf))
 
 
 def walk(
