@@ -174,3 +174,17 @@ def test_error_of_a_known_orbit_is_round_off():
     system: Oscillator = duffing(0.05, 0.03, 0.2).oscillator
     orbit = found(system, 0.5, 1e-9, 64)
     assert error_of(system, orbit, None)[0] < 1e-6
+
+
+def test_a_curve_passes_each_speed_once_between_two_turning_points():
+    """Random springs that part: the walk comes to an end, and what it keeps belongs to branches of one direction."""
+    rng = np.random.default_rng(3)
+    speeds = np.linspace(0.15, 2.6, 60)
+    ended = 0
+    for _ in range(10):
+        ripple, damping, gap = rng.uniform(0.05, 0.4), 10 ** rng.uniform(-1.7, -1.0), rng.choice([math.inf, 2.0])
+        made = curve(meshing(ripple, damping, 1.0, gap=gap).oscillator, speeds, 1e-3)
+        ended += not made.note
+        passed = [(b, o.speed) for b, o in zip(made.branch, made.orbits, strict=True) if o.speed in speeds]
+        assert len(passed) == len(set(passed))
+    assert ended > 5  # others say why they stop

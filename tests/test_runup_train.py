@@ -385,3 +385,18 @@ def test_rayleigh_damping_of_a_law_as_in_a_transient():
     assert np.count_nonzero(model.core.damping - np.diag(np.diag(model.core.damping))) == 0
     assert np.ptp(state.force, axis=0) == pytest.approx(np.ptp(force, axis=0), rel=2e-3)
     assert np.ptp(state.transmission_error) == pytest.approx(np.ptp(error), rel=1e-3)
+
+
+@pytest.mark.slow
+def test_a_step_along_the_curve_does_not_end_on_another_one(tmp_path):
+    """The template from 100 rad/s up: a long step went from 325 to 346 rad/s, and the walk to and fro without end."""
+    job = tmp_path / "runup.toml"
+    assert main(["new", "runup", str(job)]) == 0
+    options = ["--set", "runup.speed_start_rad_per_s=100.0", "--no-pictures", "--out", str(tmp_path / "out")]
+    assert main(["runup", str(job), *options]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["speeds_reached"] == 100
+    turning = summary["turning_speeds_rad_per_s"]
+    assert len(turning) % 2 == 0
+    for low, high in ((310.0, 330.0), (330.0, 340.0)):
+        assert sum(low < speed < high for speed in turning) == 1

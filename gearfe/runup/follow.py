@@ -48,6 +48,9 @@ CORRECTIONS, CLOSE = 20, 0.35
 NEAR = 0.2
 #: Steps along the curve, in parts of the scale: first, least, largest; growth from one to the next.
 FIRST, LEAST, LARGEST, GROWTH = 0.05, 1e-5, 0.4, 1.6
+#: Cosine of the largest angle (60 degrees) between tangents a step apart, and how far an arc of that angle ends beside
+#: its first tangent, in parts of the step: tan 30 degrees.
+ALIGNED, BENT = 0.5, 1.0 / math.sqrt(3.0)
 #: A tangent has all harmonics of which this part of a change comes back through the forces: it sees no others.
 ALONG = 0.05
 #: A step this long at most leads round a turning point.
@@ -139,7 +142,12 @@ class _Walk:
 
     def run(self, start: Orbit, progress: Callable[[int, int], None] | None) -> Curve:
         orbit, note = self._kept(start), ""
+        passed: set[tuple[int, int]] = set()
         while 0 <= self.number + self.heading < len(self.speeds):
+            if (len(self.turns), self.number) in passed:  # between two turns each speed is passed once
+                note = f"the direction of the curve is lost at {orbit.speed:.6g} rad/s"
+                break
+            passed.add((len(self.turns), self.number))
             if progress is not None:
                 progress(self.number, len(self.speeds) - 1)
             target = float(self.speeds[self.number + self.heading])
@@ -309,7 +317,10 @@ class _Walk:
         if made is None or made.steps > CORRECTIONS:
             return None, False
         new = self._tangent(made, place, 1.0)
-        if new is None or _moved(place, new.waves, system.linear.size) @ new.along + new.rising * place.rising < 0.5:
+        if new is None:
+            return None, False
+        aligned = _moved(place, new.waves, system.linear.size) @ new.along + new.rising * place.rising
+        if aligned < ALIGNED or abs(made.speed - speed) > BENT * step * self.unit:  # round a bend, or on another curve
             return None, False
         return new, made.steps <= 8
 
