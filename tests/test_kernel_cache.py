@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -91,3 +92,19 @@ def test_another_compiler_or_processor_needs_kernels_of_its_own(
     here = compiled.cache_folder((compiled.available,))
     monkeypatch.setenv("NUMBA_CPU_NAME", "generic")
     assert compiled.cache_folder((compiled.available,)) != here
+
+
+@needs_numba
+@pytest.mark.slow
+def test_a_command_compiles_them(tmp_path: Path) -> None:
+    """Then a single run, too short for compiling to pay, takes the compiled kernels."""
+    env = {**os.environ, "PYTHONPATH": str(ROOT), "GEARFE_CACHE": str(tmp_path / "cache")}
+    andrews = ["mechanism", str(ROOT / "geometry" / "andrews.toml"), "--no-pictures", "--out", str(tmp_path / "out")]
+
+    def backend() -> str:
+        subprocess.run([sys.executable, "-m", "gearfe", *andrews], env=env, check=True, capture_output=True)
+        return str(json.loads((tmp_path / "out" / "summary.json").read_text())["backend"])
+
+    assert backend() == "plain"
+    subprocess.run([sys.executable, "-m", "gearfe", "cache", "--compile"], env=env, check=True, capture_output=True)
+    assert backend() == "compiled"

@@ -16,6 +16,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="KIND",
         help="remove all entries, or those of a kind",
     )
+    parser.add_argument(
+        "--compile",
+        action="store_true",
+        help="compile the kernels of mechanisms now, a quarter of a minute: single runs are over before that pays",
+    )
     parser.add_argument("--trim", action="store_true", help="remove the entries not used for longest beyond the limit")
 
 
@@ -38,6 +43,8 @@ def run(args: argparse.Namespace) -> int:
         gone = [entry for entry in chosen if remove(entry)]
         failed = len(chosen) - len(gone)
         print(f"removed: {len(gone)} entries, {_size(sum(entry.size for entry in gone))}")
+    elif args.compile:
+        _compile()
     elif args.trim:
         gone = trim(folder, limit())
         print(f"removed: {len(gone)} entries, {_size(sum(entry.size for entry in gone))}")
@@ -48,6 +55,14 @@ def run(args: argparse.Namespace) -> int:
     total = _size(sum(entry.size for entry in there))
     print(f"{folder}: {len(there)} entries, {total}; limit {_size(limit())} ({LIMIT_VARIABLE})")
     return 1 if failed else 0
+
+
+def _compile() -> None:
+    """Any compiled run leaves the kernels in the cache."""
+    from ..rigid import Body, Hinge, PlanarScene, Scene, System, integrate
+
+    rod = Scene((Body("rod", 1.0, 1.0, (1.0, 0.0)),), (Hinge("rod", "ground"),), ())
+    integrate(System([PlanarScene(rod)]), [0.0, 1e-3], method="taylor", backend="compiled")
 
 
 def _size(count: int) -> str:
