@@ -275,7 +275,7 @@ def test_dmig_that_cannot_be_taken(text, part, tmp_path) -> None:
 
 @pytest.mark.parametrize("binary", [False, True], ids=["text", "binary"])
 def test_output4_with_both_matrices(binary: bool, bodies, tmp_path) -> None:
-    op4 = pytest.importorskip("pyNastran.op4.op4", reason="pip install 'gearfe[exchange]'")
+    op4 = pytest.importorskip("pyNastran.op4.op4", reason="pip install 'gearfe[nastran]'")
 
     def write_op4(name: str, **matrices: np.ndarray) -> None:
         if not binary:

@@ -155,7 +155,7 @@ def _output4(path: Path, field: str, initial: str) -> Array:
     try:
         from pyNastran.op4.op4 import read_op4
     except ImportError:
-        raise MissingLibraryError("OUTPUT4 files need pyNastran: pip install 'gearfe[exchange]'") from None
+        raise MissingLibraryError("OUTPUT4 files need pyNastran: pip install 'gearfe[nastran]'") from None
     try:
         found = {name.upper(): made[1] for name, made in read_op4(str(path), debug=None).items()}
     except Exception as error:
