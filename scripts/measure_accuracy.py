@@ -3,7 +3,7 @@
 
 The error of each setting is taken against the curve on a far finer mesh (Nitsche); seconds are those of one process in
 which meshes are read from the cache, from gears to curve, and the mesher's own seconds stand beside. With --write the
-table in docs/stiffness.md is replaced.
+table in docs/stiffness.md is replaced, and the rows of the default meshes in README.md.
 
 Usage: python scripts/measure_accuracy.py [--job JOB.toml] [--write]
 """
@@ -50,11 +50,18 @@ def on_path(pair: GearPair, angles: np.ndarray, margin: float) -> np.ndarray:
     return np.min(apart, axis=0) > margin
 
 
+def replace(page: Path, lines: list[str]) -> None:
+    """Put lines between the marks of a page."""
+    before, _, rest = page.read_text(encoding="utf-8").partition(START)
+    _, _, after = rest.partition(END)
+    page.write_text("\n".join([f"{before}{START}", *lines, f"{END}{after}"]), encoding="utf-8")
+
+
 def main() -> None:
     """Measure and print (or write) the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--job", default=str(ROOT / "geometry" / "gear_train.toml"))
-    parser.add_argument("--write", action="store_true", help="put the table into docs/stiffness.md")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/stiffness.md and README.md")
     args = parser.parse_args()
     job = read_stiffness_job(args.job)
     pair = job.pair
@@ -92,14 +99,15 @@ def main() -> None:
         f"20/30 teeth at 0.05 deg, 40 positions; error against `coarsen` = {FINEST:g}; best of three runs on "
         f"{os.cpu_count()} cores, {platform.system()} {platform.machine()}, Python {platform.python_version()}."
     )
-    table = "\n".join([*lines, "", note])
+    table = [*lines, "", note]
     if not args.write:
-        print("\n" + table)
+        print("\n" + "\n".join(table))
         return
-    page = ROOT / "docs" / "stiffness.md"
-    before, _, rest = page.read_text(encoding="utf-8").partition(START)
-    _, _, after = rest.partition(END)
-    page.write_text(f"{before}{START}\n{table}\n{END}{after}", encoding="utf-8")
+    replace(ROOT / "docs" / "stiffness.md", table)
+    replace(
+        ROOT / "README.md",
+        [line for line in table if not line.startswith("|") or " | 1 | " in line or line in lines[:2]],
+    )
 
 
 if __name__ == "__main__":
