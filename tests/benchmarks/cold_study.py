@@ -91,7 +91,8 @@ def _measured(case: Case, trees: Mapping[str, Path], runs: int) -> Mapping[str, 
         folders = {prefix: Path(name) / (prefix or "now") for prefix in trees}
         for prefix, tree in trees.items():
             folders[prefix].mkdir()
-            _run(COMPILE, tree, folders[prefix])
+            if case.arguments[0] == "mechanism":
+                _run(COMPILE, tree, folders[prefix])
             _run(case, tree, folders[prefix])  # fills the caches, and Python's own of compiled sources
         for _ in range(runs):
             for prefix, tree in trees.items():
