@@ -129,6 +129,8 @@ def test_command_tells_and_cleans(
     assert "2 entries" in capsys.readouterr().out
     assert main(["cache", "--clean", "thng"]) == 2
     assert "did you mean 'thing'" in capsys.readouterr().err
+    assert main(["cache", "--clean", "--compile"]) == 2
+    assert "not allowed with" in capsys.readouterr().err
     assert main(["cache", "--clean", "thing"]) == 0
     assert [entry.kind for entry in entries(tmp_path)] == ["other"]
     assert main(["cache", "--clean"]) == 0

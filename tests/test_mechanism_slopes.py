@@ -140,6 +140,10 @@ def test_a_case_without_an_answer_says_why_and_stops_nothing(file: Path) -> None
         (["forces.gravity.acceleration_m_per_s2.0"], "is 0"),
         (["forces.gravity.acceleration_m_per_s2.2"], "2 entries"),
         ({KEYS[0]: 5.0}, "has no answer"),
+        ({KEYS[0]: 0.0}, "must be a step > 0"),
+        ({KEYS[0]: -1e-3}, "must be a step > 0"),
+        ({KEYS[0]: math.inf}, "must be a step > 0"),
+        ({KEYS[0]: math.nan}, "must be a step > 0"),
     ],
 )
 def test_wrong_parameters(file: Path, names: list[str] | dict[str, float], told: str) -> None:

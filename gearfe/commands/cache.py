@@ -9,19 +9,20 @@ HELP = "what is kept on disk (meshes, curves, housings, compiled kernels), its s
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument(
+    one = parser.add_mutually_exclusive_group()
+    one.add_argument(
         "--clean",
         nargs="?",
         const="all",
         metavar="KIND",
         help="remove all entries, or those of a kind",
     )
-    parser.add_argument(
+    one.add_argument(
         "--compile",
         action="store_true",
         help="compile the kernels of mechanisms now, a quarter of a minute: single runs are over before that pays",
     )
-    parser.add_argument("--trim", action="store_true", help="remove the entries not used for longest beyond the limit")
+    one.add_argument("--trim", action="store_true", help="remove the entries not used for longest beyond the limit")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -196,7 +196,12 @@ def _keys(place: Any) -> Sequence[str]:
 
 def _step(parameters: Sequence[str] | Mapping[str, float], name: str, value: float) -> float:
     if isinstance(parameters, Mapping):
-        return float(parameters[name])
+        step = float(parameters[name])
+        if not 0.0 < step < np.inf:
+            raise InputError(
+                f"sensitivities.{name}", step, "must be a step > 0", "give a hundredth of the key's usual size"
+            )
+        return step
     if value == 0.0:
         problem = "is 0, of which no step is a share"
         raise InputError(

@@ -22,7 +22,7 @@ ROUND_OFF = 1e-14
 
 @dataclass(frozen=True)
 class ModalCoordinates:
-    """ModalCoordinates (modal) coordinates of a system.
+    """Modal coordinates of a system: minimal ones in which mass and stiffness are diagonal.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class ModalCoordinates:
     constant: Array
 
     def reduce(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """ModalCoordinates coordinates and velocities of a state on the constraints."""
+        """Modal coordinates and velocities of a state on the constraints."""
         back = self.T.T @ self.system.mass
         return back @ (q - self.origin), back @ v
 
@@ -67,7 +67,7 @@ def is_linear(system: System) -> bool:
 
 
 def modal_coordinates(system: System) -> ModalCoordinates:
-    """ModalCoordinates coordinates of a system whose joints are all linear and constant; redundant rows do no harm.
+    """Modal coordinates of a system whose joints are all linear and constant; redundant rows do no harm.
 
     They are made once and stay with the system.
     """
