@@ -150,8 +150,9 @@ class Linear:
         Those of the last speed are kept: its first frequencies are asked for again and again.
         """
         m, count = self.size, len(omega)
-        if speed in self._last and np.array_equal(self._last[speed][0][:count], omega):
-            return self._last[speed][1][:count], self._last[speed][2][:count]
+        kept = self._last.get(speed)  # once: other threads may be at another speed
+        if kept is not None and np.array_equal(kept[0][:count], omega):
+            return kept[1][:count], kept[2][:count]
         p = m + self.tilts.shape[1]
         whole = self._own(omega)
         react = 1j * speed * omega[:, None, None] * self._swap
@@ -159,6 +160,8 @@ class Linear:
         moments = np.asarray(np.linalg.solve(left, react @ whole[:, m:, :m]), dtype=complex)
         made = np.asarray(whole[:, :m, :m] + whole[:, :m, m:] @ moments)
         made[omega == 0.0] = self.statics
+        for values in (made, moments):
+            values.setflags(write=False)
         self._last.clear()
         self._last[speed] = omega, made, moments
         return made, moments
