@@ -14,8 +14,8 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from .elasticity import Material
     from .errors import InputError
     from .gear import Gear, GearPair
-    from .housing import Housing
     from .housing.build import housing_from_job
+    from .housing.model import Housing
     from .loadmap.load_map import LoadMap
     from .loadmap.sweep import sweep_loads
     from .microgeometry.loaded_mesh import LoadedMesh
@@ -36,14 +36,14 @@ __version__ = "0.1.0"
 _PUBLIC: dict[str, str] = {
     "Gear": "gear",
     "GearPair": "gear",
-    "Housing": "housing",
+    "Housing": "housing.model",
     "InputError": "errors",
     "LoadMap": "loadmap.load_map",
     "LoadedMesh": "microgeometry.loaded_mesh",
     "Material": "elasticity",
     "ModalBody": "reduction.modal_body",
     "Search": "study.search",
-    "StiffnessCurve": "stiffness",
+    "StiffnessCurve": "stiffness.curve",
     "TrainModel": "train",
     "TrainResponse": "train",
     "TrainScene": "train",
@@ -57,7 +57,7 @@ _PUBLIC: dict[str, str] = {
     "simulate": "train",
     "steady_state": "runup.run_up",
     "sweep_loads": "loadmap.sweep",
-    "sweep_stiffness": "stiffness",
+    "sweep_stiffness": "stiffness.sweep",
 }
 
 # written out for type checkers; a test holds it against the names above

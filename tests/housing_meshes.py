@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from gearfe.housing.surface import surface_quadrature
 from gearfe.solid import EDGES
 
 #: Six tetrahedra that fill a cube, positive volume; corner k has the coordinates of k's three bits (x, y, z).
@@ -43,3 +44,8 @@ def second_order(nodes: np.ndarray, tets: np.ndarray) -> tuple[np.ndarray, np.nd
     unique, place = np.unique(edges, axis=0, return_inverse=True)
     middles = nodes[unique].mean(axis=1)
     return np.concatenate([nodes, middles]), np.concatenate([tets, len(nodes) + place.reshape(-1, 6)], axis=1)
+
+
+def surface_area(nodes: np.ndarray, faces: np.ndarray) -> float:
+    """Area of faces (m2)."""
+    return float(np.linalg.norm(surface_quadrature(nodes, faces).areas, axis=2).sum())

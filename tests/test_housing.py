@@ -16,9 +16,10 @@ from gearfe.errors import InputError
 from gearfe.housing.body import reduced_housing
 from gearfe.housing.build import bores, housing_from_table, inside_faces
 from gearfe.housing.meshes import Prisms
-from gearfe.housing.surface import surface_area
 from gearfe.prisms import volume_ratios
 from gearfe.tables.housing import HousingTable
+
+from .housing_meshes import surface_area
 
 SHIPPED = Path(__file__).parent.parent / "geometry" / "housing.toml"
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.housing import Attachment, Bore, Housing, Plane
-from gearfe.housing.attachments import interface_matrix
+from gearfe.housing.attachments import Attachment, Bore, Plane, interface_matrix
+from gearfe.housing.model import Housing
 from gearfe.meshing.session import gmsh_session
 from gearfe.solid import SolidMaterial, curved_elements, jacobian_determinants
 from tests.housing_meshes import box, second_order

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.housing import Housing
+from gearfe.housing.model import Housing
 from gearfe.solid import SolidMaterial
 
 from .newmark import newmark, smooth_ramp

@@ -15,7 +15,7 @@ from skfem.helpers import ddot, div, sym_grad
 from gearfe.errors import InputError
 from gearfe.housing.mesh_checks import boundary_faces
 from gearfe.housing.meshes import Tetrahedra
-from gearfe.housing.surface import nodal_normals, surface_area, surface_quadrature
+from gearfe.housing.surface import nodal_normals, surface_quadrature
 from gearfe.reduction.lanczos import lowest_modes
 from gearfe.reduction.sparse_solver import factorize
 from gearfe.solid import (
@@ -25,7 +25,7 @@ from gearfe.solid import (
     curved_elements,
     jacobian_determinants,
 )
-from tests.housing_meshes import box
+from tests.housing_meshes import box, surface_area
 
 STEEL = SolidMaterial()
 RNG = np.random.default_rng(7)

@@ -189,7 +189,7 @@ def test_roll_lengths_and_parameters():
     assert profile.relief_roll == pytest.approx(profile.tip_roll - 2e-3, rel=1e-14)
     s = np.linspace(profile.form_roll, profile.round_roll, 9)
     t = profile.parameter_of_roll(s)
-    np.testing.assert_allclose(profile.roll_of_parameter(t), s, rtol=1e-14)
+    np.testing.assert_allclose(profile.flank.roll(t), s, rtol=1e-14)
     np.testing.assert_allclose(flank.points(t), profile.points_of_roll(s), atol=NM)
     assert flank.breaks == pytest.approx([float(profile.parameter_of_roll(profile.relief_roll))])
 

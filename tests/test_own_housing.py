@@ -16,9 +16,10 @@ import pytest
 from gearfe.cli import main
 from gearfe.config import build
 from gearfe.errors import InputError
-from gearfe.housing import Bore, Housing
+from gearfe.housing.attachments import Bore
 from gearfe.housing.body import reduced_housing
 from gearfe.housing.build import housing_from_job, housing_from_table
+from gearfe.housing.model import Housing
 from gearfe.housing.own_mesh import fitted_cylinder
 from gearfe.meshing.mesh_file import read_mesh_file
 from gearfe.meshing.session import gmsh_session

@@ -12,7 +12,7 @@ from gearfe.housing.build import housing_from_table, inside_faces
 from gearfe.housing.mesh_checks import boundary_faces
 from gearfe.housing.meshes import Prisms
 from gearfe.housing.model import rigid_motions
-from gearfe.housing.surface import nodal_normals, surface_area
+from gearfe.housing.surface import nodal_normals
 from gearfe.meshing.housing_mesh import Extrusion, housing_mesh
 from gearfe.prisms import LATTICE, ORDER
 from gearfe.reduction.error import mesh_error
@@ -20,6 +20,8 @@ from gearfe.reduction.lanczos import lowest_modes
 from gearfe.reduction.sparse_solver import factorize
 from gearfe.solid import SolidMaterial
 from gearfe.tables.housing import FeetTable, HousingMeshTable, HousingReductionTable, HousingTable, ShaftAxisTable
+
+from .housing_meshes import surface_area
 
 STEEL = SolidMaterial()
 #: Errors of frequencies fall with the elements' thickness at inner right angles to this power (Williams 1952).

@@ -12,7 +12,8 @@ import pytest
 from scipy.linalg import eigh
 
 from gearfe.errors import InputError
-from gearfe.housing import Attachment, Housing, Plane
+from gearfe.housing.attachments import Attachment, Plane
+from gearfe.housing.model import Housing
 from gearfe.reduction.craig_bampton import reduce_model
 from gearfe.reduction.error import reduction_error
 from gearfe.reduction.modal_body import ModalBody

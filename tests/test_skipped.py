@@ -12,7 +12,7 @@ import pytest
 
 from gearfe import sweep_stiffness
 from gearfe.cli import main
-from gearfe.housing import Housing
+from gearfe.housing.model import Housing
 from gearfe.meshing import tooth_sector
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh

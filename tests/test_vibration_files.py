@@ -13,7 +13,8 @@ import pytest
 from gearfe.errors import InputError, NotFiniteWarning
 from gearfe.figures.train import TrainPictures
 from gearfe.figures.train_scene import draw_scene, sharp_edges
-from gearfe.housing import Attachment, Housing
+from gearfe.housing.attachments import Attachment
+from gearfe.housing.model import Housing
 from gearfe.rigid import constant
 from gearfe.stopwatch import Stopwatch
 from gearfe.train import Drive, GearMesh, Shaft, ShaftGear, TrainScene

@@ -66,10 +66,6 @@ class ToothProfile:
         """Parameter t on the involute segment at roll lengths s (m)."""
         return (np.asarray(s, dtype=float) - self.form_roll) / (self.round_roll - self.form_roll)
 
-    def roll_of_parameter(self, t: Array) -> Array:
-        """Roll length s (m) at parameters t of the involute segment."""
-        return self.flank.roll(np.asarray(t, dtype=float))
-
     def points_of_roll(self, s: Array) -> Array:
         """Flank points (m) at roll lengths s (m), shape (n, 2)."""
         return self.flank.at(np.asarray(s, dtype=float))

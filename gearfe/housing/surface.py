@@ -39,11 +39,6 @@ def surface_quadrature(nodes: Floats, faces: Ints) -> SurfaceQuadrature:
     return SurfaceQuadrature(values, np.cross(first, second) * weights[:, None])
 
 
-def surface_area(nodes: Floats, faces: Ints) -> float:
-    """Area of faces (m2)."""
-    return float(np.linalg.norm(surface_quadrature(nodes, faces).areas, axis=2).sum())
-
-
 def nodal_normals(nodes: Floats, faces: Ints) -> Floats:
     """(n, 3) outward unit normals at the nodes of the faces, weighted by area; zero at all other nodes."""
     quadrature = surface_quadrature(nodes, faces)

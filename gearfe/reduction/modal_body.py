@@ -178,14 +178,6 @@ class ModalBody(Shown):
         """Nodal field's component along the outward normal: (n,) or (steps, n), zero off the outer surface."""
         return np.asarray(np.einsum("...nk,nk->...n", self.reconstruct(q), self.normals))
 
-    def surface_integral(self, rates: Floats) -> Floats:
-        """Integral over the outer surface of the squared normal component of a field: () or (steps,).
-
-        Complex amplitudes are allowed: the integral of the squared magnitude is returned.
-        """
-        rates = np.asarray(rates)
-        return np.asarray(np.einsum("...i,ij,...j->...", rates.conj(), self.radiation, rates, optimize=True).real)
-
     def with_damping(self, *, ratio: float | Floats | None = None, alpha: float = 0.0, beta: float = 0.0) -> ModalBody:
         """The same body with another damping block.
 

@@ -21,8 +21,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError
-from ..spectrum import Spectrum, amplitude_spectrum
 from ..typing import Array
 
 #: Impedance of air (Pa s/m) at 20 degrees Celsius, 101325 Pa: density (kg/m3) times speed of sound (m/s).
@@ -67,49 +65,14 @@ def power_level(power: ArrayLike) -> Array:
 
 
 def instantaneous_power(radiation: Array, velocity: ArrayLike) -> Array:
-    """Power (W) at each time: () or (n,); see `radiated_power` for the arguments."""
-    matrix, v = _checked(radiation, velocity)
-    return np.asarray(AIR_IMPEDANCE * np.einsum("...i,...i->...", v @ matrix, v))
-
-
-def radiated_power(
-    radiation: Array,
-    velocity: ArrayLike,
-    step: float,
-    *,
-    window: str = "none",
-    start: int = 0,
-    length: int | None = None,
-) -> RadiatedPower:
-    """Spectrum of the equivalent radiated power.
+    """Power (W) at each time: () or (n,).
 
     Parameters
     ----------
     radiation : (N, N)
         Surface matrix R (m4/s2 for unit rates): ``qdot^T R qdot`` is the integral of the squared normal velocity.
-    velocity : (n, N)
-        Rates of the body's coordinates at equally spaced times.
-    step, window, start, length
-        See `gearfe.spectrum.amplitude_spectrum`.
+    velocity : (..., N)
+        Rates of the body's coordinates.
     """
-    matrix, v = _checked(radiation, velocity)
-    spectrum = amplitude_spectrum(v, step, window=window, start=start, length=length)
-    taken = v[start : start + spectrum.samples]
-    mean = float(instantaneous_power(matrix, taken).mean())
-    return RadiatedPower(spectrum.frequency, power_of_lines(matrix, spectrum), mean)
-
-
-def power_of_lines(radiation: Array, spectrum: Spectrum) -> Array:
-    """(m,) power (W) of the lines of a velocity spectrum of all N coordinates."""
-    v = spectrum.value
-    square = np.einsum("ki,ki->k", v.conj(), v @ radiation).real
-    return np.asarray(AIR_IMPEDANCE * spectrum.weight * np.maximum(square, 0.0))
-
-
-def _checked(radiation: Array, velocity: ArrayLike) -> tuple[Array, Array]:
-    matrix, v = np.asarray(radiation, dtype=float), np.asarray(velocity, dtype=float)
-    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
-        raise InputError("radiation", matrix.shape, "must be a square matrix", "take ModalBody.radiation")
-    if v.shape[-1:] != matrix.shape[:1]:
-        raise InputError("velocity", v.shape, f"must have {len(matrix)} coordinates in its last axis", "")
-    return matrix, v
+    v = np.asarray(velocity, dtype=float)
+    return np.asarray(AIR_IMPEDANCE * np.einsum("...i,...i->...", v @ radiation, v))

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.housing import Housing
+from gearfe.housing.model import Housing
 from gearfe.reduction.craig_bampton import Partition, reduce_model
 from gearfe.reduction.sparse_solver import installed_solvers
 

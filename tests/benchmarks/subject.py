@@ -12,7 +12,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from gearfe.gear.pair import GearPair
-    from gearfe.housing import Housing
+    from gearfe.housing.model import Housing
     from gearfe.tables.housing import HousingTable
     from gearfe.train import TrainScene
 

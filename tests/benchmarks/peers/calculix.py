@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.housing import Housing
+from gearfe.housing.model import Housing
 
 from .contact_mesh import ContactTask
 from .process import PeerError, Spent, run_process
