@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from .stiffness.sweep import sweep_stiffness
     from .study.job import read_study, run_study
     from .study.search import Search
-    from .train import TrainModel, TrainResponse, TrainScene, build_train
+    from .train import GearTrain, TrainModel, TrainResponse, build_train
     from .train.simulate import simulate
 
 __version__ = "0.1.0"
@@ -46,7 +46,7 @@ _PUBLIC: dict[str, str] = {
     "StiffnessCurve": "stiffness.curve",
     "TrainModel": "train",
     "TrainResponse": "train",
-    "TrainScene": "train",
+    "GearTrain": "train",
     "build_train": "train",
     "housing_from_job": "housing.build",
     "load_mesh": "microgeometry.solve",
@@ -64,6 +64,7 @@ _PUBLIC: dict[str, str] = {
 __all__ = [
     "Gear",
     "GearPair",
+    "GearTrain",
     "Housing",
     "InputError",
     "LoadMap",
@@ -74,7 +75,6 @@ __all__ = [
     "StiffnessCurve",
     "TrainModel",
     "TrainResponse",
-    "TrainScene",
     "__version__",
     "build_train",
     "housing_from_job",

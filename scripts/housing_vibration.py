@@ -11,7 +11,7 @@ import sys
 from gearfe.output.files import output_folder, write_csv
 from gearfe.record_spectrum import finer
 from gearfe.train import build_train, simulate
-from gearfe.vibration.job import job_scene, read_train_job, train_body
+from gearfe.vibration.job import job_train, read_train_job, train_body
 from gearfe.vibration.mesh_stiffness import train_curves
 from gearfe.vibration.report import mean_over_periods
 from gearfe.vibration.spectra import response_columns, spectra
@@ -20,11 +20,11 @@ from gearfe.vibration.spectra import response_columns, spectra
 def main(job_file: str = "geometry/gear_train.toml", out: str = "out/vibration", variant: str | None = None) -> int:
     """Simulate, write response.csv and spectrum.csv, print the mean contact forces."""
     job = read_train_job(job_file, variant)
-    scene = job_scene(job, train_curves(job), train_body(job))
-    model = build_train(scene)
+    train = job_train(job, train_curves(job), train_body(job))
+    model = build_train(train)
     times, every = finer(job.times, model.coupled_frequencies_hz.max())  # what the fastest mode needs
     response = simulate(model, times, tolerance=job.table.tolerance)
-    radiation = None if scene.housing is None else scene.housing.radiation
+    radiation = None if train.housing is None else train.housing.radiation
     folder = output_folder(out)
     write_csv(folder / "response.csv", response_columns(response.every(every), radiation))
     write_csv(folder / "spectrum.csv", spectra(response, radiation, every=every).columns())

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from gearfe.train.train import Bearing, Damping
 
 from gearfe.mechanisms import load_mechanism
 from gearfe.rigid import Body, CoordinateSpring, Gravity, Hinge, ModalBlocks, PlanarScene, Scene, Slot, Spring, System
@@ -27,8 +28,7 @@ from gearfe.rigid.modal import series_force
 from gearfe.rigid.start import Start, consistent_start
 from gearfe.stiffness.periodic import periodic_interpolant
 from gearfe.train import build_train
-from gearfe.train.scene import Bearing, Damping
-from gearfe.vibration.job import job_scene, read_train_job, train_body
+from gearfe.vibration.job import job_train, read_train_job, train_body
 
 GEOMETRY = Path(__file__).resolve().parents[1] / "geometry"
 GRAVITY = Gravity((0.0, -9.81))
@@ -136,12 +136,12 @@ def trains() -> Iterator[Callable[[], Case]]:
         name: str, end: float, *, elastic: bool = False, bearing: Any = None, tolerance: float = 1e-6, **more: Any
     ) -> Case:
         own = job if elastic else replace(job, table=replace(job.table, housing="rigid"))
-        scene = job_scene(own, (1.1e8, 1.1e8), train_body(own) if elastic else None)
-        scene = replace(scene, meshes=tuple(replace(m, stiffness=curve) for m in scene.meshes), **more)
+        train = job_train(own, (1.1e8, 1.1e8), train_body(own) if elastic else None)
+        train = replace(train, meshes=tuple(replace(m, stiffness=curve) for m in train.meshes), **more)
         if bearing is not None:
-            bores = [b for s in scene.shafts for b in s.bores]
-            scene = replace(scene, bearings=tuple(Bearing(b, *bearing) for b in bores))
-        model = build_train(scene)
+            bores = [b for s in train.shafts for b in s.bores]
+            train = replace(train, bearings=tuple(Bearing(b, *bearing) for b in bores))
+        model = build_train(train)
         return Case(name, model.system, model.start, end, tolerance)
 
     def springs(k: float, c: float) -> Any:

@@ -24,7 +24,7 @@ from gearfe.microgeometry.solve import load_mesh
 from gearfe.rigid import constant
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 from gearfe.train.static_error import static_errors
-from gearfe.vibration.job import job_scene, read_train_job
+from gearfe.vibration.job import job_train, read_train_job
 from gearfe.vibration.mesh_stiffness import train_curves
 
 from .gears import pair as gear_pair
@@ -201,14 +201,14 @@ def test_a_train_takes_the_pitch_errors_of_its_teeth(sign, tmp_path) -> None:
     path = tmp_path / "job.toml"
     path.write_text(text.replace("torque_Nm = -30.0", f"torque_Nm = {sign * torque}"))
     job = read_train_job(path)
-    scene = job_scene(job, train_curves(job))
+    train = job_train(job, train_curves(job))
     assert job.microgeometry is not None
     side = "left" if sign > 0 else "right"
     law = half_plane_pair(PAIR, elastic_pair(PAIR, coarsen=2.0))
     law = law.deviated(deviations_of(job.microgeometry, PAIR, tmp_path, flank=side))
     found = load_mesh(law, [torque], positions=5)
     assert len(found.pinion_angle) == 5 * 60
-    (static,) = static_errors(scene, sign * found.pinion_angle)
+    (static,) = static_errors(train, sign * found.pinion_angle)
     expected = found.transmission_error[0]
     assert np.ptp(expected) > 8e-6
     # an error turns its tooth by up to 2.4e-4 rad, too, which a shift of the touching curve leaves out: it shows where
@@ -226,17 +226,17 @@ def test_back_flanks_have_their_own_microgeometry(tmp_path) -> None:
     path = tmp_path / "job.toml"
     path.write_text(text.replace("tip_round_mm = 0.1", thin))
     job = read_train_job(path)
-    scene = job_scene(job, train_curves(job))
+    train = job_train(job, train_curves(job))
     pair = replace(
         PAIR, pinion=replace(PAIR.pinion, tooth_thinning=50e-6), wheel=replace(PAIR.wheel, tooth_thinning=50e-6)
     )
     law = half_plane_pair(pair, elastic_pair(pair, coarsen=2.0))
     for load, side, sign in ((-torque, "right", 1.0), (torque, "left", -1.0)):  # drive and so load turn against y
-        (one,) = scene.loads
+        (one,) = train.loads
         assert job.microgeometry is not None
         own = law.deviated(deviations_of(job.microgeometry, pair, tmp_path, flank=side))
         found = load_mesh(own, [torque], positions=12)
-        now = replace(scene, loads=(replace(one, torque=constant(load)),))
+        now = replace(train, loads=(replace(one, torque=constant(load)),))
         (static,) = static_errors(now, -sign * found.pinion_angle)
         expected = found.transmission_error[0]
         assert np.ptp(expected) > 1e-6

@@ -111,8 +111,8 @@ def test_multipliers_are_those_of_the_train_that_is_integrated(method: str, damp
     circle; without load it makes no difference.
     """
     shape = train(SHIPPED, stiffness=lambda z: curve(z, swing=0.3, method=method, count=18), damping=damping)
-    scene = elastic(changed(shape, loads=(Load("s2", "s2+", constant(load)),)), skew=0.3)
-    model = build_train(scene)
+    gear_train = elastic(changed(shape, loads=(Load("s2", "s2+", constant(load)),)), skew=0.3)
+    model = build_train(gear_train)
     found, note = train_multipliers(model)
     assert (note, found is None) == ("", False)
     period = 0.15 * 2 * math.pi / 600.0
@@ -159,20 +159,20 @@ def test_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_no_common_period_says_why() -> None:
-    scene = train([(23, 41), (29, 37), (31, 43)], stiffness=curve, ys=[0.012, 0.0, -0.012])
-    found, note = train_multipliers(build_train(scene))
+    gear_train = train([(23, 41), (29, 37), (31, 43)], stiffness=curve, ys=[0.012, 0.0, -0.012])
+    found, note = train_multipliers(build_train(gear_train))
     assert found is None
     assert "none within reason" in note
 
 
 def test_undamped_rigid_train_can_be_unstable() -> None:
     """One mesh, tuned so that twice its natural frequency is the mesh frequency: the principal Mathieu tongue."""
-    scene = train([(20, 30)], stiffness=lambda z: curve(z, 1e8, 0.4))
-    frequency = build_train(scene).coupled_frequencies_hz[-1]
+    gear_train = train([(20, 30)], stiffness=lambda z: curve(z, 1e8, 0.4))
+    frequency = build_train(gear_train).coupled_frequencies_hz[-1]
     from gearfe.train import Drive
 
     speed = 2 * frequency * 2 * math.pi / 20
-    unstable = build_train(changed(scene, drive=Drive("s0", "s0+", constant(speed))))
+    unstable = build_train(changed(gear_train, drive=Drive("s0", "s0+", constant(speed))))
     found, _ = train_multipliers(unstable)
     assert found is not None
     # y'' + w^2 (1 + e cos 2 w t) y: growth exp(e w T/4) per period T of the stiffness, to first order in e

@@ -73,10 +73,12 @@ def test_either_gear_may_drive(laws: tuple[MeshLaw, MeshLaw], force: float) -> N
 def test_a_train_moves_alike_whichever_gear_is_called_the_driver(laws: tuple[MeshLaw, MeshLaw]) -> None:
     """Without backlash, under a load that changes its sign: the driving flank of one law is the other's back."""
     load = constant(10.0) + TimeFunction(sines=((25.0, 6e3, 0.2),))
-    scene = pair(laws[0], torque=load, backlash=0.0, damping=Damping(ratio=0.01), speed=1500.0)
-    model, times = build_train(scene), np.linspace(0.0, 3e-3, 301)
+    gear_train = pair(laws[0], torque=load, backlash=0.0, damping=Damping(ratio=0.01), speed=1500.0)
+    model, times = build_train(gear_train), np.linspace(0.0, 3e-3, 301)
     phase = -float(exchanged(np.array(model.meshes[0].phase))) % laws[1].cycle
-    other = build_train(dataclasses.replace(scene, meshes=(GearMesh("g0", "d0", laws[1], backlash=0.0, phase=phase),)))
+    other = build_train(
+        dataclasses.replace(gear_train, meshes=(GearMesh("g0", "d0", laws[1], backlash=0.0, phase=phase),))
+    )
     one, two = (simulate(m, times, tolerance=1e-8) for m in (model, other))
     assert (one.contact_force > 100.0).any()
     assert (one.contact_force < -100.0).any()
@@ -97,8 +99,8 @@ def test_the_grid_of_the_cells_does_not_matter() -> None:
     assert (np.divide(off[:-1], off[1:]) > 12.0).all()
     forces = []
     for cells in counts:
-        scene = pair(made[cells], torque=smoothed_step(1e-4, 2e-4, 40.0), backlash=10e-6, speed=700.0)
-        model = build_train(dataclasses.replace(scene, damping=Damping(ratio=0.01)))
+        gear_train = pair(made[cells], torque=smoothed_step(1e-4, 2e-4, 40.0), backlash=10e-6, speed=700.0)
+        model = build_train(dataclasses.replace(gear_train, damping=Damping(ratio=0.01)))
         forces.append(simulate(model, np.linspace(0.0, 2e-3, 401), tolerance=1e-9).contact_force)
     assert (forces[0] == 0.0).any()
     away = [np.abs(force - forces[-1]).max() / np.abs(forces[-1]).max() for force in forces[:-1]]
@@ -118,9 +120,9 @@ def test_small_motions_are_those_of_the_linear_law() -> None:
         tangent = float(law([phase], [rest]).tangent[0])
         found = []
         for stiffness, begin in ((law, rest), (tangent, torque / R2 / tangent)):
-            scene = pair(stiffness, torque=load, speed=1e-6)
-            mesh = dataclasses.replace(scene.meshes[0], phase=phase if stiffness is law else None)
-            model = build_train(dataclasses.replace(scene, meshes=(mesh,)))
+            gear_train = pair(stiffness, torque=load, speed=1e-6)
+            mesh = dataclasses.replace(gear_train.meshes[0], phase=phase if stiffness is law else None)
+            model = build_train(dataclasses.replace(gear_train, meshes=(mesh,)))
             start = dataclasses.replace(model.start, q=model.start.q.copy())
             start.q[model.first[1] + 5] = begin / model.meshes[0].row[model.first[1] + 5]
             run = integrate(model.system, np.linspace(0.0, 2e-3, 101), method="taylor", tolerance=1e-11, start=start)
@@ -135,7 +137,7 @@ def test_each_mesh_of_an_idler_has_its_own_phase() -> None:
     """A loaded idler: at slow speed each mesh has the error of its own phase, the first under F2 + (T + M2)/r_b."""
     one, two = hertzian_law(relief=5e-6), hertzian_law(2 * math.pi / 30, relief=3e-6)
     line = train([(20, 30), (30, 24)], ys=[0.0, 0.0])
-    scene = dataclasses.replace(
+    gear_train = dataclasses.replace(
         line,
         gears=tuple(g for g in line.gears if g.name != "d1"),
         meshes=(GearMesh("d0", "g0", one), GearMesh("g0", "g1", two)),
@@ -143,7 +145,7 @@ def test_each_mesh_of_an_idler_has_its_own_phase() -> None:
         loads=(Load("s2", None, smoothed_step(0.01, 0.02, -20.0)), Load("s1", None, smoothed_step(0.01, 0.02, 30.0))),
         damping=Damping(ratio=0.05),
     )
-    model = build_train(scene)
+    model = build_train(gear_train)
     last = 20.0 / base_radius(24)
     times = np.linspace(0.0, 1.1, 301)
     run = integrate(model.system, times, method="taylor", tolerance=1e-7, start=model.start)
@@ -163,8 +165,8 @@ def test_a_torque_that_ramps_through_zero() -> None:
     """From the driving to the back flanks, through the backlash and to and fro once: statics before and after."""
     law, j = hertzian_law(relief=5e-6), 20e-6
     torque = smoothed_step(0.01, 0.02, 60.0) + smoothed_step(0.3, 0.2, -100.0) + smoothed_step(0.7, 0.2, 100.0)
-    scene = pair(law, speed=1.0, torque=torque, backlash=j, damping=Damping(ratio=0.05))
-    model = build_train(scene)
+    gear_train = pair(law, speed=1.0, torque=torque, backlash=j, damping=Damping(ratio=0.05))
+    model = build_train(gear_train)
     made = simulate(model, np.linspace(0.0, 1.0, 1001), tolerance=1e-6)
     phase = model.angle(made.time) + model.meshes[0].phase
     for begin, end, force in ((0.08, 0.2, 60.0), (0.45, 0.6, -40.0), (0.85, 1.0, 60.0)):

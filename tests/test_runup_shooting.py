@@ -31,7 +31,7 @@ pytestmark = pytest.mark.skipif(not available(), reason="numba is not installed"
 
 def at_speed(model: TrainModel, speed: float) -> TrainModel:
     return build_train(
-        dataclasses.replace(model.scene, drive=dataclasses.replace(model.scene.driven, speed=constant(speed)))
+        dataclasses.replace(model.train, drive=dataclasses.replace(model.train.driven, speed=constant(speed)))
     )
 
 

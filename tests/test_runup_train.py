@@ -34,14 +34,14 @@ needs_numba = pytest.mark.skipif(not available(), reason="numba is not installed
 
 def loaded(stages, stiffness, *, speed=600.0, torque=60.0, ratio=0.05, backlash=None, flexible=True, **options):  # type: ignore[no-untyped-def]
     """A train with a constant load from the begin on, all modes damped."""
-    scene = train(stages, stiffness=stiffness, damping=Damping(ratio=ratio), **options)
+    gear_train = train(stages, stiffness=stiffness, damping=Damping(ratio=ratio), **options)
     last = f"s{len(stages)}"
     load = Load(last, f"{last}+", constant(-torque * (-1) ** len(stages) * math.copysign(1.0, speed)))
-    scene = dataclasses.replace(
-        scene, loads=(load,), drive=dataclasses.replace(scene.drive, speed=constant(speed)),
-        meshes=tuple(dataclasses.replace(m, backlash=backlash) for m in scene.meshes),
+    gear_train = dataclasses.replace(
+        gear_train, loads=(load,), drive=dataclasses.replace(gear_train.drive, speed=constant(speed)),
+        meshes=tuple(dataclasses.replace(m, backlash=backlash) for m in gear_train.meshes),
     )  # fmt: skip
-    return elastic(scene, uneven=0.2, skew=0.5) if flexible else scene
+    return elastic(gear_train, uneven=0.2, skew=0.5) if flexible else gear_train
 
 
 def settled_transient(model, state, periods, samples=256, tolerance=1e-7):  # type: ignore[no-untyped-def]
@@ -87,8 +87,10 @@ def test_teeth_that_part_as_in_a_transient():
     peak = max(run_up(model, np.linspace(1100.0, 2200.0, 60), tolerance=1e-2).states, key=lambda s: s.apart[0])
     assert peak.apart[0] > 0.05
     state = steady_state(model, peak.speed, peak, tolerance=1e-3)
-    scene = dataclasses.replace(model.scene, drive=dataclasses.replace(model.scene.drive, speed=constant(peak.speed)))
-    force, error, _ = settled_transient(build_train(scene), state, 160)
+    gear_train = dataclasses.replace(
+        model.train, drive=dataclasses.replace(model.train.drive, speed=constant(peak.speed))
+    )
+    force, error, _ = settled_transient(build_train(gear_train), state, 160)
     assert (force == 0.0).mean() == pytest.approx(state.apart[0], abs=0.01)
     assert np.ptp(state.transmission_error) == pytest.approx(np.ptp(error), rel=5e-3)
     assert state.force.max() == pytest.approx(force.max(), rel=5e-3)
@@ -184,7 +186,7 @@ def test_modes_swing_as_fields(tmp_path):
     assert (modes.strain[chosen, 0] >= 0.5).all()
     made = swinging(model, [0, chosen[0]], 8)
     assert made.time == pytest.approx(np.concatenate([1 + np.arange(8) / 8, chosen[0] + 1 + np.arange(8) / 8]))
-    turn = made.gear_pose[:, :, 3:] @ model.scene.frame[2]
+    turn = made.gear_pose[:, :, 3:] @ model.train.frame[2]
     assert made.gear_pose[4] == pytest.approx(-made.gear_pose[0], abs=1e-12)
     assert made.gear_pose[9] == pytest.approx(made.gear_pose[8] / math.sqrt(2.0), abs=1e-12)
     rates = np.repeat(2 * math.pi * model.coupled_frequencies_hz[[0, chosen[0]]], 8)
@@ -320,9 +322,11 @@ def test_mistakes_in_a_job_are_told(job, capsys, extra, words):
 def test_derivatives_of_the_forces(friction, backlash, torque):
     """Differences of the forces at random places, friction and both flanks included."""
     law = dataclasses.replace(hertzian_law(relief=4e-6), back=hertzian_law(relief=1e-6, cells=10))
-    scene = loaded([(20, 30)], lambda teeth: law, torque=torque, backlash=backlash)
-    scene = dataclasses.replace(scene, meshes=(dataclasses.replace(scene.meshes[0], friction=friction, damping=500.0),))
-    system = condense(build_train(scene)).system
+    gear_train = loaded([(20, 30)], lambda teeth: law, torque=torque, backlash=backlash)
+    gear_train = dataclasses.replace(
+        gear_train, meshes=(dataclasses.replace(gear_train.meshes[0], friction=friction, damping=500.0),)
+    )
+    system = condense(build_train(gear_train)).system
     m, rng = system.linear.size, np.random.default_rng(2)
     assert m == (4 if backlash is None else 6)
     theta = np.linspace(0.0, 2 * math.pi, 200, endpoint=False)
@@ -344,10 +348,10 @@ def test_derivatives_of_the_forces(friction, backlash, torque):
 
 @needs_numba
 def test_friction_as_in_a_transient():
-    scene = loaded([(20, 30)], lambda teeth: hertzian_law(relief=4e-6), speed=700.0)
-    scene = dataclasses.replace(scene, meshes=(dataclasses.replace(scene.meshes[0], friction=0.08),))
+    gear_train = loaded([(20, 30)], lambda teeth: hertzian_law(relief=4e-6), speed=700.0)
+    gear_train = dataclasses.replace(gear_train, meshes=(dataclasses.replace(gear_train.meshes[0], friction=0.08),))
     model, free = (
-        build_train(scene),
+        build_train(gear_train),
         build_train(loaded([(20, 30)], lambda teeth: hertzian_law(relief=4e-6), speed=700.0)),
     )
     state, without = (steady_state(m, 700.0, tolerance=3e-4) for m in (model, free))
@@ -366,11 +370,11 @@ def test_friction_of_an_oil_follows_the_speed():
     oil = Lubrication(viscosity=0.04, roughness=0.4e-6)
     made = []
     for built in (400.0, 800.0):
-        scene = loaded([(20, 30)], lambda teeth: hertzian_law(), speed=built, flexible=False)
-        scene = dataclasses.replace(scene, meshes=(dataclasses.replace(scene.meshes[0], friction=oil),))
-        made.append(steady_state(build_train(scene), 600.0))
+        gear_train = loaded([(20, 30)], lambda teeth: hertzian_law(), speed=built, flexible=False)
+        gear_train = dataclasses.replace(gear_train, meshes=(dataclasses.replace(gear_train.meshes[0], friction=oil),))
+        made.append(steady_state(build_train(gear_train), 600.0))
     assert made[0].force == pytest.approx(made[1].force, rel=1e-6)
-    system = condense(build_train(scene)).system  # processes of an executor get it, too
+    system = condense(build_train(gear_train)).system  # processes of an executor get it, too
     again = pickle.loads(pickle.dumps(system))
     assert np.array_equal(multipliers(again, made[1].orbit), multipliers(system, made[1].orbit))
 
@@ -378,8 +382,8 @@ def test_friction_of_an_oil_follows_the_speed():
 @needs_numba
 def test_rayleigh_damping_of_a_law_as_in_a_transient():
     """It acts in contact only; the constant damper that keeps the modes apart is taken off by the forces."""
-    scene = loaded([(20, 30)], lambda teeth: hertzian_law(relief=4e-6), speed=700.0, flexible=False)
-    model = build_train(dataclasses.replace(scene, damping=Damping(beta=3e-6)))
+    gear_train = loaded([(20, 30)], lambda teeth: hertzian_law(relief=4e-6), speed=700.0, flexible=False)
+    model = build_train(dataclasses.replace(gear_train, damping=Damping(beta=3e-6)))
     state = steady_state(model, 700.0, tolerance=1e-4)
     force, error, _ = settled_transient(model, state, 60)
     assert np.count_nonzero(model.core.damping - np.diag(np.diag(model.core.damping))) == 0

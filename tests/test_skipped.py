@@ -134,12 +134,12 @@ def test_a_rigid_housing_loads_no_finite_elements():
     assert said.split()[1] == "plain"
     # the same train in a frame that is a million times stiffer than it could be
 
-    scene = train(SHIPPED)
-    body = frame_body(scene)
+    gear_train = train(SHIPPED)
+    body = frame_body(gear_train)
     stiff = dataclasses.replace(body, stiffness=1e6 * body.stiffness)
     times = np.linspace(0.0, 1e-3, 11)
-    rigid = simulate(build_train(scene), times, tolerance=1e-6, backend="plain")
-    frame = build_train(dataclasses.replace(in_frame(scene), housing=stiff))
+    rigid = simulate(build_train(gear_train), times, tolerance=1e-6, backend="plain")
+    frame = build_train(dataclasses.replace(in_frame(gear_train), housing=stiff))
     held = simulate(frame, times, tolerance=1e-4, method="implicit")
     size = np.abs(rigid.contact_force).max()
     assert np.abs(held.contact_force - rigid.contact_force).max() < 2e-3 * size

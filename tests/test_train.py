@@ -38,11 +38,11 @@ def test_mean_forces_and_their_ratio_over_whole_periods(stages: list[tuple[int, 
         torque *= one / two
     periodic = len(stages) < 3
     stiffness = (lambda z: curve(z, swing=0.15)) if periodic else 1e8
-    scene = elastic(
+    gear_train = elastic(
         train(stages, stiffness=stiffness, damping=Damping(ratio=0.03), ys=[0.012, -0.0, -0.012][: len(stages)])
     )
-    model = build_train(scene)
-    assert steady_forces(scene) == pytest.approx(expected, rel=1e-12)
+    model = build_train(gear_train)
+    assert steady_forces(gear_train) == pytest.approx(expected, rel=1e-12)
     cycles = model.rolling.common_turns
     assert cycles is not None or not periodic
     period = float(cycles) * 2 * math.pi / SPEED if cycles is not None and periodic else 1e-3
@@ -91,10 +91,10 @@ def test_law_for_one_state_equals_law_for_whole_arrays() -> None:
     """The compiled law, called in Python, against the vectorised forces: speed ramp, curves, gyroscopic moments."""
     speed = constant(600.0) + smoothed_step(1e-3, 1e-3, 50.0)
     for method in ("cubic", "linear"):
-        scene = elastic(
+        gear_train = elastic(
             train(SHIPPED, stiffness=lambda z, m=method: curve(z, method=m), drive=Drive("s0", "s0+", speed))
         )
-        system = (model := build_train(scene)).system
+        system = (model := build_train(gear_train)).system
         rng = np.random.default_rng(1)
         t = rng.uniform(0, 0.01, 7)
         q, v = 1e-3 * rng.standard_normal((2, 7, system.size))
@@ -173,9 +173,11 @@ def test_drive_of_changing_speed() -> None:
 def test_static_deflection_with_bearings() -> None:
     """One stage on bearings: spin, shift and tilt of the driven shaft under the static force, by hand."""
     k, kb, kt = 1e8, 5e7, 3e3
-    scene = train([(20, 30)], stiffness=k, ys=[0.012], damping=Damping(ratio=0.3))
-    scene = changed(scene, bearings=tuple(Bearing(b, (kb, 2 * kb, 1.5 * kb, kt, 2 * kt)) for b in ("s1+", "s1-")))
-    model = build_train(scene)
+    gear_train = train([(20, 30)], stiffness=k, ys=[0.012], damping=Damping(ratio=0.3))
+    gear_train = changed(
+        gear_train, bearings=tuple(Bearing(b, (kb, 2 * kb, 1.5 * kb, kt, 2 * kt)) for b in ("s1+", "s1-"))
+    )
+    model = build_train(gear_train)
     moved = motion(
         model, integrate(model.system, [0.0, 0.05, 0.08], method="taylor", tolerance=1e-10, start=model.start)
     )
@@ -190,7 +192,7 @@ def test_static_deflection_with_bearings() -> None:
         K += kb * np.outer(arm, arm) + np.diag([0.0, 2 * kt])
     shift, tilt = np.linalg.solve(K, F * n[0] * np.array([1.0, -(0.012 - y0)]))
     assert q[0] == pytest.approx(shift, rel=1e-6)
-    frame = model.scene.frame
+    frame = model.train.frame
     assert frame == pytest.approx(np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]))  # e2 = a x e1 = -z
     assert -q[4] == pytest.approx(tilt, rel=1e-6)  # the tilt coordinate about e2 = -z
     assert q[1] == pytest.approx(0.0, abs=1e-12)
@@ -201,12 +203,12 @@ def test_static_deflection_with_bearings() -> None:
 
 def test_stiff_bearings_are_hinges() -> None:
     """In an elastic housing: the coupled frequencies approach those with hinges from below, as 1/stiffness."""
-    scene = elastic(train(SHIPPED), skew=0.3)
-    hinged = build_train(scene).coupled_frequencies_hz[:12]
+    gear_train = elastic(train(SHIPPED), skew=0.3)
+    hinged = build_train(gear_train).coupled_frequencies_hz[:12]
     off = []
     for k in (1e11, 2e11):
-        bearings = tuple(Bearing(b, (k, k, k, 1e-2 * k, 1e-2 * k)) for b in scene.bore_points)
-        off.append(hinged - build_train(changed(scene, bearings=bearings)).coupled_frequencies_hz[:12])
+        bearings = tuple(Bearing(b, (k, k, k, 1e-2 * k, 1e-2 * k)) for b in gear_train.bore_points)
+        off.append(hinged - build_train(changed(gear_train, bearings=bearings)).coupled_frequencies_hz[:12])
     assert (off[1] > 0.0).all()
     assert (off[1] < 5e-3 * hinged).all()
     assert off[0] / off[1] == pytest.approx(2.0, rel=0.02)
@@ -232,40 +234,40 @@ def test_speeds_are_relative_to_the_bore() -> None:
 
 def test_what_is_left_out_shows() -> None:
     """Removing a bore, the gyroscopic moments or the reaction torque changes the result; a fixed number each."""
-    scene = elastic(train(SHIPPED, stiffness=curve), skew=0.3, uneven=0.3)
+    gear_train = elastic(train(SHIPPED, stiffness=curve), skew=0.3, uneven=0.3)
     times = uniform(4e-3, 81)
-    whole = simulate(build_train(scene), times)
+    whole = simulate(build_train(gear_train), times)
     size = np.abs(whole.attachment_acceleration).max()
-    shafts = (*scene.shafts[:2], dataclasses.replace(scene.shafts[2], bores=("s2+",)))
-    bore = simulate(build_train(changed(scene, shafts=shafts)), times)
+    shafts = (*gear_train.shafts[:2], dataclasses.replace(gear_train.shafts[2], bores=("s2+",)))
+    bore = simulate(build_train(changed(gear_train, shafts=shafts)), times)
     assert np.abs(bore.contact_force - whole.contact_force).max() > 0.01 * whole.contact_force.max()
     assert bore.attachment_names == ("s0+", "s0-", "s1+", "s1-", "s2+")
-    still = simulate(build_train(changed(scene, damping=Damping(gyroscopic=False))), times)
+    still = simulate(build_train(changed(gear_train, damping=Damping(gyroscopic=False))), times)
     assert np.abs(still.attachment_acceleration - whole.attachment_acceleration).max() > 1e-4 * size
-    outside = changed(scene, loads=(Load("s2", None, scene.loads[0].torque),))
+    outside = changed(gear_train, loads=(Load("s2", None, gear_train.loads[0].torque),))
     free = simulate(build_train(outside), times)
     assert np.abs(free.attachment_acceleration - whole.attachment_acceleration).max() > 1e-3 * size
     # the reaction is the whole torque on the bore: statics of its rotation about y
     slow = Damping(ratio=0.5)
     turned = []
-    for loads in (scene.loads, outside.loads):
-        model = build_train(changed(scene, damping=slow, loads=loads, meshes=train(SHIPPED).meshes))
+    for loads in (gear_train.loads, outside.loads):
+        model = build_train(changed(gear_train, damping=slow, loads=loads, meshes=train(SHIPPED).meshes))
         end = motion(
             model, integrate(model.system, [0.0, 0.05, 0.06], method="taylor", tolerance=1e-9, start=model.start)
         )
-        turned.append(end.q[-1, : scene.housing.size])  # type: ignore[union-attr]
-    push = np.zeros(scene.housing.size)  # type: ignore[union-attr]
+        turned.append(end.q[-1, : gear_train.housing.size])  # type: ignore[union-attr]
+    push = np.zeros(gear_train.housing.size)  # type: ignore[union-attr]
     push[6 * 4 + 4] = -TORQUE
-    response = build_train(changed(scene, loads=scene.loads)).core
+    response = build_train(changed(gear_train, loads=gear_train.loads)).core
     T, squares = response.T, response.squares
     direction = T[: len(push)].T @ push
     assert turned[0] - turned[1] == pytest.approx((T @ (direction / squares))[: len(push)], rel=1e-5, abs=1e-12)
 
 
 def test_instability_ends_with_a_status() -> None:
-    scene = train([(20, 30)], stiffness=lambda z: curve(z, 1e8, 0.6))
-    frequency = build_train(scene).coupled_frequencies_hz[-1]
-    fast = changed(scene, drive=Drive("s0", "s0+", constant(2 * frequency * 2 * math.pi / 20)))
+    gear_train = train([(20, 30)], stiffness=lambda z: curve(z, 1e8, 0.6))
+    frequency = build_train(gear_train).coupled_frequencies_hz[-1]
+    fast = changed(gear_train, drive=Drive("s0", "s0+", constant(2 * frequency * 2 * math.pi / 20)))
     times = uniform(0.05, 1001)
     with pytest.raises(IntegrationError, match=r"of 0.05 s: diverged") as raised:
         simulate(build_train(fast), times)
@@ -302,11 +304,11 @@ def test_reduced_against_full_housing_in_the_coupled_transient() -> None:
         dataclasses.replace(s, point=(float(p[0]), 0.0, float(p[2])), bores=tuple(names[b] for b in s.bores))
         for s, p in zip(base.shafts, body.attachment_points[::2], strict=True)
     )
-    scene = changed(
+    gear_train = changed(
         base, shafts=shafts, housing=body, rigid_bores={}, drive=Drive("s0", "1", constant(SPEED)),
         loads=(Load("s2", "5", braking(2)),), damping=Damping(beta=1.6e-6, gyroscopic=False),
     )  # fmt: skip
-    model, full, step = build_train(scene), housing.full_model(), 5e-6
+    model, full, step = build_train(gear_train), housing.full_model(), 5e-6
     options = {"beta": 1.6e-6, "step": step, "steps": 1400}
     _, force, acceleration = coupled_transient(model, full.mass, full.stiffness, **options)
     _, less_force, less = coupled_transient(model, body.mass, body.stiffness, **options)

@@ -25,20 +25,22 @@ needs_numba = pytest.mark.skipif(not available(), reason="numba is not installed
 
 def pair(law, *, speed=600.0, torque=None, backlash=None, **changes):  # type: ignore[no-untyped-def]
     """One stage with a law; `torque` brakes the driven shaft."""
-    scene = train([(20, 30)], **changes)
-    mesh = dataclasses.replace(scene.meshes[0], stiffness=law, backlash=backlash)
-    scene = dataclasses.replace(scene, meshes=(mesh,), drive=dataclasses.replace(scene.drive, speed=constant(speed)))
+    gear_train = train([(20, 30)], **changes)
+    mesh = dataclasses.replace(gear_train.meshes[0], stiffness=law, backlash=backlash)
+    gear_train = dataclasses.replace(
+        gear_train, meshes=(mesh,), drive=dataclasses.replace(gear_train.drive, speed=constant(speed))
+    )
     if torque is not None:
-        scene = dataclasses.replace(scene, loads=(Load("s1", None, torque),))
-    return scene
+        gear_train = dataclasses.replace(gear_train, loads=(Load("s1", None, torque),))
+    return gear_train
 
 
 def free_pair(law, force):  # type: ignore[no-untyped-def]
     """Both shafts free but for balanced torques, the drive a spring of no consequence."""
-    scene = pair(law)
+    gear_train = pair(law)
     drive = Drive("s0", "s0+", constant(600.0), stiffness=1e-9)
     loads = (Load("s0", None, constant(force * R1)), Load("s1", None, constant(force * R2)))
-    return build_train(dataclasses.replace(scene, drive=drive, loads=loads))
+    return build_train(dataclasses.replace(gear_train, drive=drive, loads=loads))
 
 
 def free_energy(model, law, times, tolerance):  # type: ignore[no-untyped-def]
@@ -73,15 +75,15 @@ def test_a_free_pair_keeps_its_energy(cycles):
 def test_slow_running_is_the_static_transmission_error():
     law = hertzian_law(relief=5e-6)
     torque, period = smoothed_step(0.01, 0.02, 60.0), 2 * math.pi / 20 / 0.3
-    scene = pair(law, speed=0.3, torque=torque, damping=Damping(ratio=0.05))
-    model = build_train(scene)
+    gear_train = pair(law, speed=0.3, torque=torque, damping=Damping(ratio=0.05))
+    model = build_train(gear_train)
     made = simulate(model, np.linspace(0.0, period + 0.05, 401), tolerance=1e-6)
     late = made.time > 0.05
     line = model.meshes[0]
     run = made.transmission_error[late, 0]
     static = law.approach(line.sense * line.ratio * model.angle(made.time[late]) + line.phase, 60.0 / R2)
     assert np.abs(run - static).max() < 1e-3 * np.ptp(static)
-    assert static_errors(scene, made.drive_angle[late])[0] == pytest.approx(static, abs=1e-14)
+    assert static_errors(gear_train, made.drive_angle[late])[0] == pytest.approx(static, abs=1e-14)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -104,17 +106,17 @@ def test_static_errors_beside_laws_and_springs(sign):
 def test_a_load_that_drives_bears_on_the_back_flanks(back):
     """Behind the backlash j, the mirrored law or their own: the approach is -(j + that of the mirrored phase)."""
     law, j = dataclasses.replace(hertzian_law(relief=5e-6), back=back), 20e-6
-    scene = pair(law, speed=1.0, torque=smoothed_step(0.01, 0.02, -60.0), backlash=j, damping=Damping(ratio=0.02))
+    gear_train = pair(law, speed=1.0, torque=smoothed_step(0.01, 0.02, -60.0), backlash=j, damping=Damping(ratio=0.02))
     with pytest.raises(InputError, match="back flanks"):
         build_train(pair(law, speed=1.0, torque=constant(-60.0)))
-    model = build_train(scene)
+    model = build_train(gear_train)
     made = simulate(model, np.linspace(0.0, 0.2, 201), tolerance=1e-6)
     late = made.time > 0.1
     phase = model.meshes[0].sense * model.angle(made.time[late]) + model.meshes[0].phase
     static = -j - law.sides[1].approach(-phase, 60.0 / R2)
     assert made.contact_force[late, 0] == pytest.approx(np.full(late.sum(), -60.0 / R2), rel=1e-3)
     assert np.abs(made.transmission_error[late, 0] - static).max() < 1e-3 * np.ptp(static)
-    assert static_errors(scene, made.drive_angle[late])[0] == pytest.approx(static, abs=1e-14)
+    assert static_errors(gear_train, made.drive_angle[late])[0] == pytest.approx(static, abs=1e-14)
 
 
 @needs_numba
@@ -142,9 +144,9 @@ def test_an_oscillator_with_backlash_against_events_by_scipy(damping):
     """
     j, swing, torque = 3e-6, 0.25, constant(2.0) + TimeFunction(sines=((30.0, 9e3, 0.2),))
     shape = curve(20, mean=1e8, swing=swing, method="cubic", count=40)
-    scene = pair(shape, torque=torque, backlash=j)
-    mesh = dataclasses.replace(scene.meshes[0], damping=damping)
-    model = build_train(dataclasses.replace(scene, meshes=(mesh,)))
+    gear_train = pair(shape, torque=torque, backlash=j)
+    mesh = dataclasses.replace(gear_train.meshes[0], damping=damping)
+    model = build_train(dataclasses.replace(gear_train, meshes=(mesh,)))
     times = np.linspace(0.0, 2e-3, 101)
     made = simulate(model, times, tolerance=1e-9)
     inertia = model.shafts[1].rotor.polar
@@ -181,9 +183,9 @@ def test_mistakes():
 def test_when_teeth_part_does_not_depend_on_the_output_times():
     """Number, share and longest time without contact: from 21 times as from 20,001, whose samples agree."""
     mesh = {"torque": constant(20.0), "backlash": 30e-6, "speed": 600.0}
-    scene = pair(hertzian_law(relief=3e-6), **mesh, damping=Damping(ratio=0.01))
+    gear_train = pair(hertzian_law(relief=3e-6), **mesh, damping=Damping(ratio=0.01))
     swing = constant(600.0) + TimeFunction(sines=((20.0, 9e3, 0.0),))
-    model = build_train(dataclasses.replace(scene, drive=dataclasses.replace(scene.drive, speed=swing)))
+    model = build_train(dataclasses.replace(gear_train, drive=dataclasses.replace(gear_train.drive, speed=swing)))
     few, many = (simulate(model, np.linspace(0.0, 5e-3, n), tolerance=1e-8) for n in (21, 20_001))
     names = ("contacts_lost", "contacts_regained", "share_without_contact", "longest_without_contact_s")
     for name in names:
@@ -208,8 +210,8 @@ def test_a_load_that_keeps_no_flank_in_contact_runs_with_a_remark():
 @needs_numba
 def test_a_law_that_does_not_reach_says_what_to_ask_for():
     law = hertzian_law()
-    scene = pair(law, torque=smoothed_step(0.5e-3, 1e-3, 3.0 * law.largest_force * R2))
-    made = simulate(build_train(scene), np.linspace(0.0, 2e-3, 101), raise_on_failure=False)
+    gear_train = pair(law, torque=smoothed_step(0.5e-3, 1e-3, 3.0 * law.largest_force * R2))
+    made = simulate(build_train(gear_train), np.linspace(0.0, 2e-3, 101), raise_on_failure=False)
     assert made.status == "beyond the mesh law"
     assert made.time_reached < 1.2e-3
     assert any("N m" in warning and "law_torque_Nm" in warning for warning in made.warnings)
@@ -239,9 +241,9 @@ def test_parting_and_back_flanks_against_runge_kutta():
     """
     law = dataclasses.replace(hertzian_law(relief=3e-6), back=hertzian_law(relief=1e-6, cells=10))
     torque = constant(10.0) + TimeFunction(sines=((25.0, 6e3, 3.2),))
-    scene = pair(law, torque=torque, backlash=8e-6, damping=Damping(ratio=0.005))
-    mesh = dataclasses.replace(scene.meshes[0], damping=300.0, friction=0.05)
-    model, times = build_train(dataclasses.replace(scene, meshes=(mesh,))), np.linspace(0.0, 0.7e-3, 71)
+    gear_train = pair(law, torque=torque, backlash=8e-6, damping=Damping(ratio=0.005))
+    mesh = dataclasses.replace(gear_train.meshes[0], damping=300.0, friction=0.05)
+    model, times = build_train(dataclasses.replace(gear_train, meshes=(mesh,))), np.linspace(0.0, 0.7e-3, 71)
     force, approach = runge_kutta(model, times, 1e-10)
     assert (force[1:10] > 0.0).all()
     assert (force[-10:] > 0.0).all()

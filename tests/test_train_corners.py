@@ -159,8 +159,8 @@ def test_free_response_of_modal_coordinates_in_closed_form(tolerance):
 @pytest.mark.parametrize("method", ["linear", "cubic"])
 def test_compiled_series_against_plain_runge_kutta(method):
     """Another formulation: steps of order 8 that know no corners, short enough for them."""
-    scene = train(SHIPPED, stiffness=lambda z: curve(z, swing=0.2, method=method, count=12))
-    model, times = build_train(scene), np.linspace(0.0, 4e-3, 41)
+    gear_train = train(SHIPPED, stiffness=lambda z: curve(z, swing=0.2, method=method, count=12))
+    model, times = build_train(gear_train), np.linspace(0.0, 4e-3, 41)
     made = simulate(model, times, tolerance=1e-8)
     truth = simulate(model, times, tolerance=1e-11, backend="plain").contact_force
     assert made.statistics["backend"] == "compiled"

@@ -14,25 +14,25 @@ from gearfe.errors import InputError
 from gearfe.rigid import constant
 from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.stiffness.periodic import periodic_interpolant
-from gearfe.train import Bearing, Damping, Drive, GearMesh, Load, TrainScene, build_train, simulate
+from gearfe.train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, build_train, simulate
 
 from .trains import SHIPPED, changed, curve, elastic, gear, train
 
 
-def gears(scene: TrainScene, number: int, **changes: Any) -> TrainScene:
-    made = list(scene.gears)
+def gears(gear_train: GearTrain, number: int, **changes: Any) -> GearTrain:
+    made = list(gear_train.gears)
     made[number] = dataclasses.replace(made[number], **changes)
-    return changed(scene, gears=tuple(made))
+    return changed(gear_train, gears=tuple(made))
 
 
-def shafts(scene: TrainScene, number: int, **changes: Any) -> TrainScene:
-    made = list(scene.shafts)
+def shafts(gear_train: GearTrain, number: int, **changes: Any) -> GearTrain:
+    made = list(gear_train.shafts)
     made[number] = dataclasses.replace(made[number], **changes)
-    return changed(scene, shafts=tuple(made))
+    return changed(gear_train, shafts=tuple(made))
 
 
-def meshes(scene: TrainScene, **changes: Any) -> TrainScene:
-    return changed(scene, meshes=(dataclasses.replace(scene.meshes[0], **changes), *scene.meshes[1:]))
+def meshes(gear_train: GearTrain, **changes: Any) -> GearTrain:
+    return changed(gear_train, meshes=(dataclasses.replace(gear_train.meshes[0], **changes), *gear_train.meshes[1:]))
 
 
 BASE = train(SHIPPED)
@@ -81,25 +81,25 @@ def test_mistakes_are_named(made: Any, words: str) -> None:
 
 
 def test_axes_of_an_elastic_housing_must_fit() -> None:
-    scene = elastic(BASE)
-    body = dataclasses.replace(scene.housing, attachment_axes=np.tile([0.0, 0.8, 0.6], (6, 1)))  # type: ignore[type-var]
+    gear_train = elastic(BASE)
+    body = dataclasses.replace(gear_train.housing, attachment_axes=np.tile([0.0, 0.8, 0.6], (6, 1)))  # type: ignore[type-var]
     with pytest.raises(InputError, match="not parallel"):
-        build_train(changed(scene, housing=body))
+        build_train(changed(gear_train, housing=body))
 
 
 def test_a_gear_must_not_cut_another_shaft() -> None:
     # the wheel on the middle shaft reaches the third shaft when that one is long and thick
-    scene = train([(20, 60), (17, 20)])
+    gear_train = train([(20, 60), (17, 20)])
     with pytest.raises(InputError, match=r"cuts .* mm into shaft 's2'"):
-        build_train(scene)
+        build_train(gear_train)
 
 
 def test_loops_of_gears_must_agree() -> None:
     """A third mesh between two shafts with another ratio would lock them."""
     extra = tuple(dataclasses.replace(g, name=g.name + "b", along=-0.02, gear=gear(25)) for g in BASE.gears[:2])
-    scene = changed(BASE, gears=(*BASE.gears, *extra), meshes=(*BASE.meshes, GearMesh("d0b", "g0b", 1e8)))
+    gear_train = changed(BASE, gears=(*BASE.gears, *extra), meshes=(*BASE.meshes, GearMesh("d0b", "g0b", 1e8)))
     with pytest.raises(InputError, match="loop that cannot turn"):
-        build_train(scene)
+        build_train(gear_train)
 
 
 def table(path: Path, degrees: list[float], values: list[float], cycle: float | None = 18.0) -> StiffnessCurve:

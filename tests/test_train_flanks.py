@@ -13,7 +13,7 @@ from gearfe.errors import InputError
 from gearfe.rigid import TimeFunction, constant, smoothed_step
 from gearfe.train import Drive, GearMesh, Load, build_train, simulate
 from gearfe.train.kinematics import steady_forces
-from gearfe.vibration.job import job_scene, read_train_job
+from gearfe.vibration.job import job_train, read_train_job
 from gearfe.vibration.mesh_stiffness import train_curves
 
 from .test_train_job import BORES, SMALL, written
@@ -38,7 +38,7 @@ def test_a_load_of_the_wrong_sign_says_so(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=words):
         train_curves(job)
     with pytest.raises(InputError, match="drives the train"):
-        build_train(job_scene(job, [1e8], None))
+        build_train(job_train(job, [1e8], None))
 
 
 @pytest.mark.parametrize("speed", [600.0, -600.0])

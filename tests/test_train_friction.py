@@ -27,8 +27,8 @@ GEOMETRY = MeshGeometry(gear(20), gear(30))
 
 
 def rubbing(law, friction, **options):  # type: ignore[no-untyped-def]
-    scene = pair(law, **options)
-    return dataclasses.replace(scene, meshes=(dataclasses.replace(scene.meshes[0], friction=friction),))
+    train = pair(law, **options)
+    return dataclasses.replace(train, meshes=(dataclasses.replace(train.meshes[0], friction=friction),))
 
 
 def sliding(**changes):  # type: ignore[no-untyped-def]
@@ -73,8 +73,8 @@ def loss_factor(law, force):  # type: ignore[no-untyped-def]
 
 def slow(law, mu, torque):  # type: ignore[no-untyped-def]
     """Two mesh cycles at 1 rad/s under a torque, after its ramp, much damped."""
-    scene = rubbing(law, mu, speed=1.0, torque=smoothed_step(0.01, 0.02, torque), damping=Damping(ratio=0.3))
-    model = build_train(scene)
+    train = rubbing(law, mu, speed=1.0, torque=smoothed_step(0.01, 0.02, torque), damping=Damping(ratio=0.3))
+    model = build_train(train)
     made = simulate(model, np.linspace(0.0, 0.05 + 4 * math.pi / 20, 3001), tolerance=1e-6)
     return model, made.at(np.flatnonzero(made.time > 0.05))
 
@@ -118,8 +118,8 @@ def test_forces_of_slow_running_are_those_of_statics():
 def test_energy_balance_with_friction_in_fast_running(backlash):
     """Drive + load = change of kinetic and elastic energy + loss, without other damping; teeth part, and meet."""
     law, torque = hertzian_law(relief=3e-6), constant(40.0)
-    scene = rubbing(law, 0.06, speed=700.0, torque=torque, backlash=backlash)
-    model = build_train(scene)
+    train = rubbing(law, 0.06, speed=700.0, torque=torque, backlash=backlash)
+    model = build_train(train)
     times = np.linspace(0.0, 2e-3, 40_001)
     made = simulate(model, times, tolerance=1e-10)
     line = model.meshes[0]
@@ -143,17 +143,17 @@ def test_friction_pushes_the_bores_across_the_line_of_action():
     """Bearings as springs: their forces on the driven shaft balance that of the mesh, friction included."""
     law, mu, torque = hertzian_law(), 0.1, 60.0
     torque_at = smoothed_step(0.01, 0.02, torque)
-    scene = rubbing(law, mu, speed=3.0, torque=torque_at, damping=Damping(ratio=0.3), ys=[0.0])
+    train = rubbing(law, mu, speed=3.0, torque=torque_at, damping=Damping(ratio=0.3), ys=[0.0])
     stiff = (1e8, 1e8, 1e8, 1e6, 1e6)
-    scene = dataclasses.replace(scene, bearings=tuple(Bearing(bore, stiff) for bore in ("s1+", "s1-")))
-    model = build_train(scene)
+    train = dataclasses.replace(train, bearings=tuple(Bearing(bore, stiff) for bore in ("s1+", "s1-")))
+    model = build_train(train)
     made = simulate(model, np.linspace(0.0, 0.1, 401), tolerance=1e-6).at(np.arange(240, 401))
     line = model.meshes[0]
     phase = line.sense * made.drive_angle + line.phase
     shares = law(phase, made.transmission_error[:, 0]).pair_forces
     e = R1 * (law.pair_phases(phase) + math.pi / 40)
     drag = mu * (shares * smooth_sign(5.0 * e / line.sliding.speed)[0]).sum(axis=1)
-    across = np.cross(scene.frame[2], line.direction)
+    across = np.cross(train.frame[2], line.direction)
     mesh = np.outer(made.contact_force[:, 0], line.direction) + np.outer(drag, across)
     away = np.abs(e).min(axis=1) > 3e-4
     assert (made.gear_pose[:, 1, :3] * 2e8)[away] == pytest.approx(mesh[away], abs=5e-3 * np.abs(mesh).max())
@@ -165,9 +165,9 @@ def test_a_drive_that_reverses_is_braked_both_ways():
     law = hertzian_law()
     turn = smoothed_step(0.03, 0.04, -40.0) + constant(20.0)
     torque = smoothed_step(1e-3, 2e-3, 30.0)
-    scene = rubbing(law, 0.1, torque=torque, backlash=30e-6, damping=Damping(ratio=0.05))
-    scene = dataclasses.replace(scene, drive=Drive("s0", "s0+", turn))
-    made = simulate(build_train(scene), np.linspace(0.0, 0.06, 1201), tolerance=1e-6)
+    train = rubbing(law, 0.1, torque=torque, backlash=30e-6, damping=Damping(ratio=0.05))
+    train = dataclasses.replace(train, drive=Drive("s0", "s0+", turn))
+    made = simulate(build_train(train), np.linspace(0.0, 0.06, 1201), tolerance=1e-6)
     assert made.speed[0, 0] * made.speed[-1, 0] < 0.0
     assert (made.friction_power >= 0.0).all()
     first, last = made.mesh_power[60:200, 0].mean(), made.mesh_power[-200:, 0].mean()

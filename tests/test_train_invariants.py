@@ -24,10 +24,10 @@ def thrown(law, rate, **changes):  # type: ignore[no-untyped-def]
     """Both shafts free (the drive a spring that does no work to speak of), the driver faster than rolling asks for by
     `rate` (m/s) on the line of action.
     """
-    scene = pair(law, **changes)
-    shafts = (dataclasses.replace(scene.shafts[0], initial_speed=600.0 + rate / R1), scene.shafts[1])
+    train = pair(law, **changes)
+    shafts = (dataclasses.replace(train.shafts[0], initial_speed=600.0 + rate / R1), train.shafts[1])
     drive = Drive("s0", "s0+", constant(600.0), stiffness=1e-15)
-    return build_train(dataclasses.replace(scene, shafts=shafts, drive=drive, loads=()))
+    return build_train(dataclasses.replace(train, shafts=shafts, drive=drive, loads=()))
 
 
 def test_rattle_keeps_momentum_and_energy() -> None:
@@ -83,8 +83,8 @@ def test_without_damping_time_runs_back() -> None:
     assert (forces < 0.0).any()
     assert (forces == 0.0).any()
     line, angle = model.meshes[0], float(model.angle(np.array([end]))[0])
-    mesh = dataclasses.replace(model.scene.meshes[0], phase=(line.phase + angle) % (2 * math.pi / 20))
-    again = build_train(dataclasses.replace(model.scene, meshes=(mesh,)))
+    mesh = dataclasses.replace(model.train.meshes[0], phase=(line.phase + angle) % (2 * math.pi / 20))
+    again = build_train(dataclasses.replace(model.train, meshes=(mesh,)))
     # rounding grows with each impact: 1e-11 in a step is 1e-4 of the forces after there and back
     speeds = np.zeros(model.system.size)
     speeds[[int(i) + 5 for i in model.first]] = 600.0 * np.array(model.ratios, dtype=float)
@@ -101,11 +101,11 @@ def test_driven_rattle_balances_momentum_and_energy(friction: float) -> None:
     load, damping and friction: forces by their plain formulas, integrated by Gauss' rule over each step.
     """
     law, torque, backlash = hertzian_law(relief=3e-6), 0.2, 30e-6
-    scene = pair(law, torque=constant(torque), backlash=backlash)
-    mesh = dataclasses.replace(scene.meshes[0], damping=3000.0, friction=friction)
+    train = pair(law, torque=constant(torque), backlash=backlash)
+    mesh = dataclasses.replace(train.meshes[0], damping=3000.0, friction=friction)
     speed = constant(2000.0) + TimeFunction(sines=((20.0, 400.0, 0.3),))
-    drive = dataclasses.replace(scene.drive, speed=speed)
-    model = build_train(dataclasses.replace(scene, meshes=(mesh,), drive=drive))
+    drive = dataclasses.replace(train.drive, speed=speed)
+    model = build_train(dataclasses.replace(train, meshes=(mesh,), drive=drive))
 
     def run(times):  # type: ignore[no-untyped-def]
         return integrate(model.system, times, method="taylor", tolerance=1e-6, start=model.start)

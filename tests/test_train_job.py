@@ -15,7 +15,7 @@ from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.tables.train import TrainCurvesTable
 from gearfe.train import build_train, simulate
 from gearfe.train.kinematics import steady_forces
-from gearfe.vibration.job import bore_places, job_scene, read_train_job
+from gearfe.vibration.job import bore_places, job_train, read_train_job
 from gearfe.vibration.mesh_stiffness import train_curves
 
 SHIPPED = Path(__file__).parent.parent / "geometry" / "gear_train.toml"
@@ -87,10 +87,10 @@ def test_the_shipped_job_is_what_it_says() -> None:
     assert job.table.variant == "standard"
     assert len(job.times) == 201
     assert job.times[-1] == pytest.approx(7e-3)
-    scene = job_scene(job)
-    assert steady_forces(scene) == pytest.approx([1961.56, 2942.34], rel=1e-5)  # 100 N m/33.987 mm, and 2/3 of it
-    assert [g.along for g in scene.gears] == [0.010, 0.010, -0.002, -0.002]
-    model = build_train(scene)
+    train = job_train(job)
+    assert steady_forces(train) == pytest.approx([1961.56, 2942.34], rel=1e-5)  # 100 N m/33.987 mm, and 2/3 of it
+    assert [g.along for g in train.gears] == [0.010, 0.010, -0.002, -0.002]
+    model = build_train(train)
     assert model.rolling.common_turns == pytest.approx(0.15)
     assert simulate(model, job.times).speed[0] == pytest.approx([600.0, -400.0, 266.6667], rel=1e-6)
 
@@ -117,7 +117,7 @@ def test_the_other_commands_read_the_same_file() -> None:
 
 def test_a_train_with_its_own_gears_runs(tmp_path: Path) -> None:
     job = read_train_job(written(tmp_path, SMALL + BORES))
-    model = build_train(job_scene(job, train_curves(job), None))
+    model = build_train(job_train(job, train_curves(job), None))
     response = simulate(model, job.times, tolerance=job.table.tolerance)
     assert response.status == "done"
     # driven by -300 rad/s, the second shaft turns with +200 and is braked by -30 N m
@@ -143,7 +143,7 @@ def test_files_for_curves(tmp_path: Path) -> None:
 
 def built(path: Path) -> None:
     job = read_train_job(path)
-    build_train(job_scene(job, train_curves(job), None))
+    build_train(job_train(job, train_curves(job), None))
 
 
 @pytest.mark.parametrize(

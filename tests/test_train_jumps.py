@@ -29,11 +29,11 @@ needs_numba = pytest.mark.skipif(not available(), reason="numba is not installed
 
 def model_at(speed: TimeFunction) -> TrainModel:
     """The pair, its driver on a stiff drive, a damper that always acts; `speed` in units of the resonance."""
-    scene = pair(curve(20, mean=K, swing=SWING, count=40), torque=constant(TORQUE), backlash=BACKLASH)
-    mass = build_train(scene).shafts[1].rotor.polar / R2**2
-    mesh = dataclasses.replace(scene.meshes[0], damping=2.0 * ZETA * math.sqrt(K * mass))
-    drive = dataclasses.replace(scene.drive, speed=math.sqrt(K / mass) / 20.0 * speed)
-    return build_train(dataclasses.replace(scene, meshes=(mesh,), drive=drive))
+    train = pair(curve(20, mean=K, swing=SWING, count=40), torque=constant(TORQUE), backlash=BACKLASH)
+    mass = build_train(train).shafts[1].rotor.polar / R2**2
+    mesh = dataclasses.replace(train.meshes[0], damping=2.0 * ZETA * math.sqrt(K * mass))
+    drive = dataclasses.replace(train.drive, speed=math.sqrt(K / mass) / 20.0 * speed)
+    return build_train(dataclasses.replace(train, meshes=(mesh,), drive=drive))
 
 
 def round_once(start: Array, speed: float, tolerance: float = 1e-9) -> tuple[Array, Array, tuple[float, float]]:
@@ -109,7 +109,7 @@ def settled(speeds: tuple[float, ...]) -> Array:
 
 def sweep(speeds: list[float]) -> list[tuple[float, float]]:
     """Least and largest approach at each of the speeds that gearfe's train takes in turn, 200 mesh cycles long each."""
-    rate = float(model_at(constant(1.0)).scene.driven.speed(0.0))
+    rate = float(model_at(constant(1.0)).train.driven.speed(0.0))
     cycle = [2 * math.pi / (20 * s * rate) for s in speeds]
     speed, at, ends = constant(speeds[0]), 200 * cycle[0], [200 * cycle[0]]
     for (one, two), c in zip(itertools.pairwise(speeds), cycle[1:], strict=True):
@@ -143,7 +143,7 @@ def test_both_branches_and_both_jumps(up: bool) -> None:
 def test_the_jumps_of_a_run_up() -> None:
     """Turning points of the steady states by harmonic balance: the same two."""
     model = model_at(constant(1.0))
-    unit = float(model.scene.driven.speed(0.0))
+    unit = float(model.train.driven.speed(0.0))
     turns = run_up(model, unit * np.linspace(0.8, 1.0, 9), tolerance=1e-4, stability=False).turning_speeds / unit
     one = jump(0.905, orbit(0.9, settled((0.7, 0.8, 0.9)))[0])
     two = jump(0.835, orbit(0.84, settled((1.05, 0.95, 0.9, 0.86, 0.84)))[0])

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import cumulative_simpson, solve_ivp
 
 from gearfe.rigid import constant, integrate
-from gearfe.train import Bearing, Damping, Drive, GearMesh, Load, Shaft, TrainScene, build_train, simulate
+from gearfe.train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, Shaft, build_train, simulate
 from gearfe.train.motion import motion
 
 from .trains import ALPHA, SHIPPED, SPEED, base_radius, braking, changed, curve, elastic, gear, train
@@ -29,8 +29,8 @@ def energies(model, moved) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[no-
     v[:, spin] += model.angle(moved.time, 1)[:, None] * model.ratios
     kinetic = 0.5 * np.einsum("ni,ij,nj->n", v, model.system.mass, v)
     potential = 0.5 * np.einsum("ni,ij,nj->n", moved.q, model.system.stiffness, moved.q)
-    drive = model.scene.drive
-    row = [s.name for s in model.scene.shafts].index(drive.shaft)
+    drive = model.train.drive
+    row = [s.name for s in model.train.shafts].index(drive.shaft)
     relative = v @ model.spin_reference[row]
     power = moved.drive_torque * relative
     for direction, function in model.torques:
@@ -49,17 +49,17 @@ def test_energy_balance_of_the_undamped_train() -> None:
     assert np.abs(energy - energy[0] - work).max() < 1e-8 * np.abs(through).max()
 
 
-def lone_rotor(**changes: object) -> TrainScene:
+def lone_rotor(**changes: object) -> GearTrain:
     """One driven shaft with a disc in the middle, both bores isotropic bearings."""
     from gearfe.train import ShaftGear
 
     shaft = Shaft("rotor", (0.0, 0.0, 0.0), 0.2, 0.01, ("a", "b"))
-    scene = TrainScene(
+    gear_train = GearTrain(
         (shaft,), (ShaftGear("disc", "rotor", 0.0, gear(60, 0.02)),), (), Drive("rotor", "a", constant(4000.0)),
         rigid_bores={"a": (0.0, 0.09, 0.0), "b": (0.0, -0.09, 0.0)},
         bearings=tuple(Bearing(b, (2e6, 1e7, 2e6, 0.0, 0.0)) for b in "ab"),
     )  # fmt: skip
-    return dataclasses.replace(scene, **changes)  # type: ignore[arg-type]
+    return dataclasses.replace(gear_train, **changes)  # type: ignore[arg-type]
 
 
 def test_gyroscopic_splitting() -> None:
@@ -102,7 +102,7 @@ def test_modal_damping_decays_as_it_should() -> None:
     assert np.abs(moved.q[:, 11] - expected).max() < 1e-8 * 1e-3 / omega
 
 
-def pair_scene() -> TrainScene:
+def pair_scene() -> GearTrain:
     """Two spins, one bearing translation, a torsional spring at the drive, mesh damping, periodic stiffness."""
     one = Shaft("s0", (0.0, 0.0, 0.0), 0.06, 0.01, ("a",))
     two = Shaft("s1", (0.0625, 0.0, 0.0), 0.06, 0.01, ("b",))
@@ -155,8 +155,8 @@ def test_single_pair_against_a_high_precision_solution() -> None:
 
 def test_phase_follows_the_state_not_the_nominal_angle() -> None:
     """A soft coupling lets the driver lag behind: the stiffness is that of its actual rotation."""
-    scene = changed(pair_scene(), drive=Drive("s0", "a", constant(SPEED), 5e2, 0.3))
-    model = build_train(scene)
+    gear_train = changed(pair_scene(), drive=Drive("s0", "a", constant(SPEED), 5e2, 0.3))
+    model = build_train(gear_train)
     times = uniform(4e-3, 81)
     moved = motion(model, integrate(model.system, times, method="taylor", tolerance=1e-9, start=model.start))
     line = model.meshes[0]
@@ -168,10 +168,10 @@ def test_phase_follows_the_state_not_the_nominal_angle() -> None:
 
 
 def test_tolerance_one_millionth() -> None:
-    scene = elastic(
+    gear_train = elastic(
         train(SHIPPED, stiffness=lambda z: curve(z, swing=0.12), damping=Damping(ratio=0.01)), skew=0.3, uneven=0.2
     )
-    model = build_train(scene)
+    model = build_train(gear_train)
     coarse, fine = (simulate(model, uniform(7e-3, 201), tolerance=tol) for tol in (1e-6, 1e-12))
     for name in ("contact_force", "speed", "acceleration", "attachment_acceleration"):
         one, two = getattr(coarse, name), getattr(fine, name)
@@ -181,8 +181,8 @@ def test_tolerance_one_millionth() -> None:
 
 
 def test_explicit_and_implicit_agree() -> None:
-    scene = elastic(train([(20, 30)], stiffness=lambda z: curve(z, swing=0.1), damping=Damping(beta=1e-6)))
-    model = build_train(scene)
+    gear_train = elastic(train([(20, 30)], stiffness=lambda z: curve(z, swing=0.1), damping=Damping(beta=1e-6)))
+    model = build_train(gear_train)
     one = simulate(model, uniform(1e-3, 21), method="taylor", tolerance=1e-9)
     two = simulate(model, uniform(1e-3, 21), method="implicit", tolerance=1e-6)
     assert np.abs(one.contact_force - two.contact_force).max() < 1e-3 * np.abs(one.contact_force).max()
@@ -190,7 +190,7 @@ def test_explicit_and_implicit_agree() -> None:
 
 
 def test_symmetric_scene_has_no_axial_motion() -> None:
-    scene = elastic(train(SHIPPED, stiffness=curve, ys=[0.0, 0.0], gears=()))
+    gear_train = elastic(train(SHIPPED, stiffness=curve, ys=[0.0, 0.0], gears=()))
     base = train(SHIPPED, stiffness=curve)
     # both gears of the middle shaft straddle its middle symmetrically: two equal halves of each at +-y
     halves, meshes = [], []
@@ -202,8 +202,8 @@ def test_symmetric_scene_has_no_axial_motion() -> None:
             )
     for mesh in base.meshes:
         meshes += [GearMesh(mesh.driver + s, mesh.driven + s, mesh.stiffness) for s in "+-"]
-    scene = changed(scene, gears=tuple(halves), meshes=tuple(meshes))
-    response = simulate(build_train(scene), uniform(5e-3, 101))
+    gear_train = changed(gear_train, gears=tuple(halves), meshes=tuple(meshes))
+    response = simulate(build_train(gear_train), uniform(5e-3, 101))
     across = np.abs(response.modal_acceleration[:, [6 * i for i in range(6)]]).max()  # type: ignore[index]
     assert across > 10.0
     assert np.abs(response.attachment_acceleration).max() < 1e-9 * across
@@ -213,9 +213,11 @@ def test_symmetric_scene_has_no_axial_motion() -> None:
 
 def test_reversing_speeds_and_torques_mirrors_the_result() -> None:
     """The mirror is the plane of the axes: forces equal, rotations opposite, z opposite, x and y equal."""
-    scene = elastic(train(SHIPPED, stiffness=curve), uneven=0.3)
-    model = build_train(scene)
-    back = changed(scene, drive=Drive("s0", "s0+", constant(-SPEED)), loads=(Load("s2", "s2+", -1.0 * braking(2)),))
+    gear_train = elastic(train(SHIPPED, stiffness=curve), uneven=0.3)
+    model = build_train(gear_train)
+    back = changed(
+        gear_train, drive=Drive("s0", "s0+", constant(-SPEED)), loads=(Load("s2", "s2+", -1.0 * braking(2)),)
+    )
     one, two = (simulate(m, uniform(5e-3, 101), tolerance=1e-9) for m in (model, build_train(back)))
     assert np.abs(one.contact_force - two.contact_force).max() < 1e-7 * one.contact_force.max()
     assert np.abs(one.speed + two.speed).max() < 1e-7 * 600

@@ -12,7 +12,7 @@ from matplotlib.path import Path as Outline
 from gearfe.errors import InputError
 from gearfe.gear.drawing import gear_outline
 from gearfe.rigid import constant
-from gearfe.train import Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene, build_train, simulate
+from gearfe.train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear, build_train, simulate
 from gearfe.train.kinematics import driving_senses
 from gearfe.train.phases import tooth_places
 
@@ -24,7 +24,7 @@ Place = tuple[float, float]
 def placed(
     teeth: list[int], places: list[Place], pairs: list[tuple[int, int]], *, speed: float = 600.0, driven: int = 0,
     distances: tuple[float | None, ...] = (), stiffness: object = curve, load: float | None = None,
-) -> TrainScene:  # fmt: skip
+) -> GearTrain:  # fmt: skip
     """One gear a shaft at (x, z), meshes between the pairs, the last shaft of the last pair braked with 100 N m."""
     names = [f"s{i}" for i in range(len(teeth))]
     shafts = tuple(
@@ -38,22 +38,22 @@ def placed(
     )
     bores = {n + s: (x, y, z) for n, (x, z) in zip(names, places, strict=True) for s, y in (("+", 0.04), ("-", -0.04))}
     drive = Drive(names[driven], names[driven] + "+", constant(speed))
-    scene = TrainScene(shafts, gears, meshes, drive, rigid_bores=bores)
-    ratios = build_train(scene).ratios
+    gear_train = GearTrain(shafts, gears, meshes, drive, rigid_bores=bores)
+    ratios = build_train(gear_train).ratios
     brake = -100.0 * math.copysign(1.0, ratios[pairs[-1][1]] * speed) if load is None else load
-    return changed(scene, loads=(Load(names[pairs[-1][1]], None, constant(brake)),))
+    return changed(gear_train, loads=(Load(names[pairs[-1][1]], None, constant(brake)),))
 
 
 def apart(one: int, two: int, more: float = 0.0) -> float:
     return 0.5 * MODULE * (one + two) + more
 
 
-def meets(scene: TrainScene, number: int, turned: float) -> bool:
+def meets(gear_train: GearTrain, number: int, turned: float) -> bool:
     """Whether the teeth of a mesh overlap with the driver turned by so much in its driving sense."""
-    senses = driving_senses(scene)
-    angles, mesh = tooth_places(scene, senses).angles, scene.meshes[number]
-    items = [scene.gear(name) for name in (mesh.driver, mesh.driven)]
-    centres = [1e3 * scene.frame[:2] @ np.array(scene.shaft(item.shaft).point) for item in items]
+    senses = driving_senses(gear_train)
+    angles, mesh = tooth_places(gear_train, senses).angles, gear_train.meshes[number]
+    items = [gear_train.gear(name) for name in (mesh.driver, mesh.driven)]
+    centres = [1e3 * gear_train.frame[:2] @ np.array(gear_train.shaft(item.shaft).point) for item in items]
     sectors = []
     for item, more, own, other in zip(items, (senses[number] * turned, 0.0), centres, centres[::-1], strict=True):
         # the drawing has a tooth on its first axis at angle 0
@@ -77,11 +77,11 @@ def test_drawn_teeth_touch_on_their_driving_flanks(speed: float, turn_deg: float
     a, b = math.radians(turn_deg), math.radians(turn_deg + 75.0)
     places = [(0.0, 0.0), (first * math.cos(a), first * math.sin(a))]
     places.append((places[1][0] + second * math.cos(b), places[1][1] + second * math.sin(b)))
-    scene = placed([20, middle, 24], places, [(0, 1), (1, 2)], speed=speed, distances=(first, second))
-    for number, mesh in enumerate(scene.meshes):
-        micrometre = 1e-6 / scene.gear(mesh.driver).gear.base_radius
-        assert meets(scene, number, micrometre)
-        assert not meets(scene, number, -micrometre)
+    gear_train = placed([20, middle, 24], places, [(0, 1), (1, 2)], speed=speed, distances=(first, second))
+    for number, mesh in enumerate(gear_train.meshes):
+        micrometre = 1e-6 / gear_train.gear(mesh.driver).gear.base_radius
+        assert meets(gear_train, number, micrometre)
+        assert not meets(gear_train, number, -micrometre)
 
 
 @pytest.mark.parametrize(("teeth", "degrees"), [(30, 6.0), (25, 7.2), (20, 9.0), (31, 0.0)])
@@ -91,17 +91,19 @@ def test_the_phase_behind_an_idler_in_line(teeth: int, degrees: float) -> None:
     An idler of odd z has a tooth facing the second gear when a space faces the first.
     """
     one, two = apart(20, teeth), apart(20, teeth) + apart(teeth, 28)
-    scene = placed([20, teeth, 28], [(0.0, 0.0), (one, 0.0), (two, 0.0)], [(0, 1), (1, 2)])
+    gear_train = placed([20, teeth, 28], [(0.0, 0.0), (one, 0.0), (two, 0.0)], [(0, 1), (1, 2)])
     expected = degrees if teeth % 2 == 0 else 0.0
-    assert np.degrees([line.phase for line in build_train(scene).meshes]) == pytest.approx([0.0, expected], abs=1e-9)
+    assert np.degrees([line.phase for line in build_train(gear_train).meshes]) == pytest.approx(
+        [0.0, expected], abs=1e-9
+    )
 
 
-def in_line(**changes: float) -> TrainScene:
-    scene = placed([20, 30, 20], [(0.0, 0.0), (0.0625, 0.0), (0.125, 0.0)], [(0, 1), (1, 2)])
-    meshes = list(scene.meshes)
+def in_line(**changes: float) -> GearTrain:
+    gear_train = placed([20, 30, 20], [(0.0, 0.0), (0.0625, 0.0), (0.125, 0.0)], [(0, 1), (1, 2)])
+    meshes = list(gear_train.meshes)
     for key, phase in changes.items():
         meshes[int(key[-1])] = dataclasses.replace(meshes[int(key[-1])], phase=math.radians(phase))
-    return changed(scene, meshes=tuple(meshes))
+    return changed(gear_train, meshes=tuple(meshes))
 
 
 def test_a_given_phase_turns_all_gears_that_hang_together() -> None:
@@ -126,13 +128,13 @@ def test_gears_on_one_shaft_are_keyed_freely() -> None:
     """Without a shared gear every mesh starts at 0 or where it is told, whatever the others do."""
     from .trains import SHIPPED, train
 
-    scene = train(SHIPPED, stiffness=curve)
-    assert [line.phase for line in build_train(scene).meshes] == [0.0, 0.0]
-    keyed = (scene.meshes[0], dataclasses.replace(scene.meshes[1], phase=0.1))
-    assert [line.phase for line in build_train(changed(scene, meshes=keyed)).meshes] == pytest.approx([0.0, 0.1])
+    gear_train = train(SHIPPED, stiffness=curve)
+    assert [line.phase for line in build_train(gear_train).meshes] == [0.0, 0.0]
+    keyed = (gear_train.meshes[0], dataclasses.replace(gear_train.meshes[1], phase=0.1))
+    assert [line.phase for line in build_train(changed(gear_train, meshes=keyed)).meshes] == pytest.approx([0.0, 0.1])
 
 
-def rhombus(degrees: float) -> TrainScene:
+def rhombus(degrees: float) -> GearTrain:
     """Two idlers between the first and the last gear, all of 20 teeth."""
     side, angle = apart(20, 20), math.radians(degrees)
     ends = [(side, 0.0), (side * math.cos(angle), side * math.sin(angle))]

@@ -15,7 +15,7 @@ from gearfe.cli import main
 from gearfe.record_spectrum import finer
 from gearfe.rigid import constant
 from gearfe.stiffness.curve import ErrorEstimate, StiffnessCurve
-from gearfe.train import TrainScene, build_train, simulate
+from gearfe.train import GearTrain, build_train, simulate
 from gearfe.vibration.errors import FORCES, PEAKS, STARTS, Run, with_errors
 from gearfe.vibration.follow import follow
 from gearfe.vibration.report import train_summary
@@ -26,27 +26,27 @@ from tests.trains import SHIPPED, curve, elastic, train
 TIMES = 20e-6 * np.arange(301)
 
 
-def ran(scene: TrainScene, times: np.ndarray, every: int, **options: Any) -> Run:
+def ran(gear_train: GearTrain, times: np.ndarray, every: int, **options: Any) -> Run:
     """Summary and spectra of a train."""
-    response = simulate(build_train(scene), times, tolerance=1e-8, **options)
+    response = simulate(build_train(gear_train), times, tolerance=1e-8, **options)
     made = follow([response], TIMES, every, record=TrainRecord(TIMES, every))
     return Run(train_summary(made, {}), made.spectra)
 
 
-def estimated(scene: TrainScene) -> tuple[Run, dict[str, Any], Any]:
+def estimated(gear_train: GearTrain) -> tuple[Run, dict[str, Any], Any]:
     """A run, its summary with errors, and how to repeat it."""
-    highest = float(build_train(scene).coupled_frequencies_hz.max())
+    highest = float(build_train(gear_train).coupled_frequencies_hz.max())
     times, every = finer(TIMES, 1.2 * highest)
-    run = ran(scene, times, every, estimate=True)
-    return run, with_errors(run, scene, lambda one: ran(one, times, every)), lambda one: ran(one, times, every)
+    run = ran(gear_train, times, every, estimate=True)
+    return run, with_errors(run, gear_train, lambda one: ran(one, times, every)), lambda one: ran(one, times, every)
 
 
-def softened(scene: TrainScene, part: float | None, seed: int = 0) -> TrainScene:
+def softened(gear_train: GearTrain, part: float | None, seed: int = 0) -> GearTrain:
     """In a housing whose mesh is known to err by 6 % of its stiffness, or what part of that; None: of each mode one."""
-    assert scene.housing is not None
-    body = dataclasses.replace(scene.housing, softening=0.06 * scene.housing.stiffness)
+    assert gear_train.housing is not None
+    body = dataclasses.replace(gear_train.housing, softening=0.06 * gear_train.housing.stiffness)
     parts = np.random.default_rng(seed).uniform(size=body.size) if part is None else part
-    return dataclasses.replace(scene, housing=body if part == 0.0 else body.softened(parts))
+    return dataclasses.replace(gear_train, housing=body if part == 0.0 else body.softened(parts))
 
 
 def lines(summary: dict[str, Any], key: str) -> np.ndarray:
@@ -55,9 +55,9 @@ def lines(summary: dict[str, Any], key: str) -> np.ndarray:
 
 @pytest.mark.parametrize("part", [0.35, 0.6])
 def test_truth_within_the_softening_is_covered(part: float) -> None:
-    scene = elastic(train(SHIPPED, stiffness=curve), uneven=0.2, skew=0.3)
-    run, summary, again = estimated(softened(scene, 0.0))
-    truth = again(softened(scene, part))
+    gear_train = elastic(train(SHIPPED, stiffness=curve), uneven=0.2, skew=0.3)
+    run, summary, again = estimated(softened(gear_train, 0.0))
+    truth = again(softened(gear_train, part))
     parts = summary["headline_error_parts"]
     assert set(parts) == {"mesh", "reduction", "start", "integration"}
     ratios = []
@@ -76,29 +76,31 @@ def test_truth_within_the_softening_is_covered(part: float) -> None:
     known = np.isfinite(told) & (true > 1e-9 * there.max())
     assert np.mean(true[known] <= told[known]) >= 0.95
     # above the highest mode of the body the mesh's error is not known, and is not none
-    assert np.array_equal(np.isfinite(told), lines(summary, "frequency_Hz") <= scene.housing.highest_hz)
+    assert np.array_equal(np.isfinite(told), lines(summary, "frequency_Hz") <= gear_train.housing.highest_hz)
     # the whole softening is 1 / part of the true one
     assert np.median(np.concatenate([*ratios, told[known] / true[known]])) < 4.0 / part
 
 
-def alternating(scene: TrainScene) -> Run:
+def alternating(gear_train: GearTrain) -> Run:
     """A made-up run whose numbers feel the modes of the housing with alternating signs, so that all together cancel."""
-    assert scene.housing is not None
-    logarithms = np.log(scene.housing.coupled.frequencies_hz)
+    assert gear_train.housing is not None
+    logarithms = np.log(gear_train.housing.coupled.frequencies_hz)
     number = [1000.0 + 100.0 * float(np.sum(logarithms[::2] - logarithms[1::2]))]
     summary: dict[str, Any] = {"status": "done", **dict.fromkeys(FORCES, number)}
-    summary |= {name: dict.fromkeys(scene.housing.attachment_names, number[0]) for name in (PEAKS, STARTS)}
-    summary["coupled_frequencies_Hz"] = build_train(scene).coupled_frequencies_hz
+    summary |= {name: dict.fromkeys(gear_train.housing.attachment_names, number[0]) for name in (PEAKS, STARTS)}
+    summary["coupled_frequencies_Hz"] = build_train(gear_train).coupled_frequencies_hz
     summary["error_estimates"] = {"integration": 0.0, "reduction": 0.0}
     return Run(summary, None)
 
 
 def test_modes_that_cancel_while_they_soften_together_are_covered() -> None:
-    scene = softened(elastic(train([(20, 30)]), uneven=0.2, skew=0.3), 0.0)
-    run = alternating(scene)
-    told = with_errors(run, scene, alternating)["headline_errors"]["largest_contact_forces_N"][0]
-    together = alternating(softened(scene, 1.0)).summary[FORCES[2]][0] - run.summary[FORCES[2]][0]
-    true = [alternating(softened(scene, None, k)).summary[FORCES[2]][0] - run.summary[FORCES[2]][0] for k in range(40)]
+    gear_train = softened(elastic(train([(20, 30)]), uneven=0.2, skew=0.3), 0.0)
+    run = alternating(gear_train)
+    told = with_errors(run, gear_train, alternating)["headline_errors"]["largest_contact_forces_N"][0]
+    together = alternating(softened(gear_train, 1.0)).summary[FORCES[2]][0] - run.summary[FORCES[2]][0]
+    true = [
+        alternating(softened(gear_train, None, k)).summary[FORCES[2]][0] - run.summary[FORCES[2]][0] for k in range(40)
+    ]
     assert abs(together) < 0.01 * np.median(np.abs(true))  # what a run in the softest housing says
     assert np.mean(np.abs(true) <= told) >= 0.95
     assert told < 5.0 * np.max(np.abs(true))
@@ -106,19 +108,21 @@ def test_modes_that_cancel_while_they_soften_together_are_covered() -> None:
 
 def test_a_load_that_is_there_at_once_leaves_peaks_unknown() -> None:
     """The acceleration of the first instant depends on the finest element: a lighter bore doubles it."""
-    scene = elastic(train(SHIPPED, stiffness=curve), uneven=0.2, skew=0.3)
-    assert scene.housing is not None
-    mass = scene.housing.mass.copy()  # a bore that turns about its axis also moves along it, by inertia
-    axial, about = 6 * np.arange(len(scene.housing.attachment_names)) + np.array([[1], [4]])
+    gear_train = elastic(train(SHIPPED, stiffness=curve), uneven=0.2, skew=0.3)
+    assert gear_train.housing is not None
+    mass = gear_train.housing.mass.copy()  # a bore that turns about its axis also moves along it, by inertia
+    axial, about = 6 * np.arange(len(gear_train.housing.attachment_names)) + np.array([[1], [4]])
     mass[axial, about] = mass[about, axial] = 0.005
-    scene = dataclasses.replace(scene, housing=dataclasses.replace(scene.housing, mass=mass))
-    loads = tuple(dataclasses.replace(load, bore=f"{load.shaft}+", torque=constant(-100.0)) for load in scene.loads)
-    run, summary, _ = estimated(dataclasses.replace(scene, loads=loads))
+    gear_train = dataclasses.replace(gear_train, housing=dataclasses.replace(gear_train.housing, mass=mass))
+    loads = tuple(
+        dataclasses.replace(load, bore=f"{load.shaft}+", torque=constant(-100.0)) for load in gear_train.loads
+    )
+    run, summary, _ = estimated(dataclasses.replace(gear_train, loads=loads))
     first = np.array(list(run.summary[STARTS].values()))
     assert max(run.summary[PEAKS].values()) > 1.0  # m/s2: no round-off
     assert first.max() > 0.1 * max(run.summary[PEAKS].values())
     assert list(summary["headline_error_parts"]["start"][PEAKS].values()) == first.tolist()
-    _, summary, _ = estimated(scene)
+    _, summary, _ = estimated(gear_train)
     assert max(summary["headline_error_parts"]["start"][PEAKS].values()) < 1e-6 * max(summary[PEAKS].values())
 
 
@@ -144,15 +148,15 @@ def known_curve(error: float) -> StiffnessCurve:
 
 
 def test_error_of_the_curve_is_that_of_a_stiffer_one() -> None:
-    scene = train([(20, 30)])
+    gear_train = train([(20, 30)])
     given = known_curve(0.01)
     assert given.error is not None
     assert given.error.worst == pytest.approx(0.01)
-    scene = dataclasses.replace(scene, meshes=(dataclasses.replace(scene.meshes[0], stiffness=given),))
-    run, summary, again = estimated(scene)
+    gear_train = dataclasses.replace(gear_train, meshes=(dataclasses.replace(gear_train.meshes[0], stiffness=given),))
+    run, summary, again = estimated(gear_train)
     assert set(summary["headline_error_parts"]) == {"curve", "integration"}
     other = dataclasses.replace(given, k_mesh=0.995 * given.k_mesh)
-    truth = again(dataclasses.replace(scene, meshes=(dataclasses.replace(scene.meshes[0], stiffness=other),)))
+    truth = again(dataclasses.replace(gear_train, meshes=(dataclasses.replace(gear_train.meshes[0], stiffness=other),)))
     for name in ("largest_contact_forces_N", "coupled_frequencies_Hz"):
         true = np.abs(truth.summary[name] - run.summary[name])
         assert np.all(true <= np.array(summary["headline_errors"][name]) + 1e-9)

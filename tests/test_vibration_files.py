@@ -17,7 +17,7 @@ from gearfe.housing.attachments import Attachment
 from gearfe.housing.model import Housing
 from gearfe.rigid import constant
 from gearfe.stopwatch import Stopwatch
-from gearfe.train import Drive, GearMesh, Shaft, ShaftGear, TrainScene
+from gearfe.train import Drive, GearMesh, GearTrain, Shaft, ShaftGear
 from gearfe.train.kinematics import rolling
 from gearfe.vibration.fields import (
     frames,
@@ -41,7 +41,7 @@ JOB = ROOT / "geometry" / "gear_train.toml"
 
 
 @pytest.fixture
-def scene():
+def train():
     gears = pair(20, 30)
     shafts = tuple(
         Shaft(name, (1e-3 * x, 0.0, 0.0), 82e-3, 10e-3, bores)
@@ -58,23 +58,23 @@ def scene():
         ShaftGear("gear4", "output", -2e-3, gears.wheel),
     )
     meshes = (GearMesh("gear1", "gear2", 1e8), GearMesh("gear3", "gear4", 1e8, phase=0.1))
-    return TrainScene(shafts, on, meshes, Drive("drive", "1", constant(600.0)))
+    return GearTrain(shafts, on, meshes, Drive("drive", "1", constant(600.0)))
 
 
 # ---- files of a known response ---------------------------------------------------------------------------------------
 
 
-def write_all(folder, scene, response, choice, **options):
+def write_all(folder, train, response, choice, **options):
     """The files of a response at hand."""
     if response.status != "done":
         choice = replace(choice, spectrum_start=0.0, spectrum_length=None)
-    planned = TrainRun(scene, response.time, lambda _: [response])
+    planned = TrainRun(train, response.time, lambda _: [response])
     return write_run(folder, planned, choice, watch=Stopwatch(), **options)
 
 
-def test_columns_and_digits(tmp_path, scene):
+def test_columns_and_digits(tmp_path, train):
     response = made_up()
-    written = write_all(tmp_path, scene, response, OutputChoice(), draw=TrainPictures("made up"))
+    written = write_all(tmp_path, train, response, OutputChoice(), draw=TrainPictures("made up"))
     names, values = table(tmp_path / "response.csv")
     assert names[: len(COLUMNS)] == COLUMNS
     assert values.shape == (COUNT, len(names))
@@ -93,15 +93,15 @@ def test_columns_and_digits(tmp_path, scene):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_response_with_numbers_that_are_none_is_told(tmp_path, scene):
+def test_a_response_with_numbers_that_are_none_is_told(tmp_path, train):
     made = made_up()
     made.drive_angle[7] = math.nan
     with pytest.warns(NotFiniteWarning, match=r"response.csv: column drive_angle_deg: 1 of .* the first in row 8"):
-        write_all(tmp_path, scene, made, OutputChoice())
+        write_all(tmp_path, train, made, OutputChoice())
 
 
-def test_spectrum_of_known_lines(tmp_path, scene):
-    write_all(tmp_path, scene, made_up(), OutputChoice())
+def test_spectrum_of_known_lines(tmp_path, train):
+    write_all(tmp_path, train, made_up(), OutputChoice())
     names, values = table(tmp_path / "spectrum.csv")
     by_name = dict(zip(names, values.T, strict=True))
     assert by_name["frequency_Hz"] == pytest.approx(np.arange(101) / 7e-3, rel=1e-13)
@@ -118,8 +118,8 @@ def test_spectrum_of_known_lines(tmp_path, scene):
     assert summary["spectrum"]["resolution_Hz"] == pytest.approx(142.857, abs=1e-3)
 
 
-def test_summary_of_a_known_response(tmp_path, scene):
-    write_all(tmp_path, scene, made_up(), OutputChoice())
+def test_summary_of_a_known_response(tmp_path, train):
+    write_all(tmp_path, train, made_up(), OutputChoice())
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["mean_over_common_periods"] == 3
     # bins 13 and 9 of 7 ms leave a known rest over 3 periods of 1.5708 ms at the end
@@ -144,7 +144,7 @@ def test_a_mean_without_a_period():
     assert mean == pytest.approx([(1 - 0.2**3) / 3 / 0.8], rel=1e-12)
 
 
-def test_the_radiated_power_of_one_coordinate(tmp_path, scene):
+def test_the_radiated_power_of_one_coordinate(tmp_path, train):
     """Housing with one coordinate and R = 2e-3 m4/s2: P = rho c R v^2/2 on its line."""
     time = STEP * np.arange(COUNT)
     rate = tone(time, 14, 0.01)[:, None]
@@ -159,7 +159,7 @@ def test_the_radiated_power_of_one_coordinate(tmp_path, scene):
     )
 
 
-def test_a_run_that_ended_early_is_written(tmp_path, scene):
+def test_a_run_that_ended_early_is_written(tmp_path, train):
     short = {
         name: getattr(made_up(), name)[:40]
         for name in (
@@ -181,7 +181,7 @@ def test_a_run_that_ended_early_is_written(tmp_path, scene):
     }
     response = made_up(**short, status="diverged", time_reached=39 * STEP)
     choice = OutputChoice(spectrum_start=5e-3)  # beyond what was reached
-    written = write_all(tmp_path, scene, response, choice)
+    written = write_all(tmp_path, train, response, choice)
     assert {"response.csv", "spectrum.csv", "summary.json"} <= set(written.names)
     assert len(table(tmp_path / "response.csv")[1]) == 40
     summary = json.loads((tmp_path / "summary.json").read_text())
@@ -226,44 +226,44 @@ def test_a_gear_is_a_closed_solid():
     assert tip == pytest.approx(gear.tip_radius, rel=1e-9)
 
 
-def test_gears_turn_and_move_as_told(scene):
+def test_gears_turn_and_move_as_told(train):
     """A quarter turn about y takes z to x; tilt and displacement add to it."""
     response = made_up()
     pose = np.zeros((COUNT, 4, 6))
     pose[1, :, 4] = 0.5 * math.pi
     pose[2] = [1e-4, 2e-4, 3e-4, 1e-3, 0.5 * math.pi, -2e-3]
     response = made_up(gear_pose=pose)
-    part, centre = solids(scene, response)[0], response.gear_centres[0]
+    part, centre = solids(train, response)[0], response.gear_centres[0]
     before = part.points - centre
-    after = moved(part, response, scene.frame, 1) - centre
+    after = moved(part, response, train.frame, 1) - centre
     assert after == pytest.approx(np.column_stack([before[:, 2], before[:, 1], -before[:, 0]]), abs=1e-15)
-    both = moved(part, response, scene.frame, 2) - centre
+    both = moved(part, response, train.frame, 2) - centre
     assert both == pytest.approx(np.array([1e-4, 2e-4, 3e-4]) + after + np.cross([1e-3, 0.0, -2e-3], after), abs=1e-15)
 
 
-def test_smooth_rolling_is_no_vibration(scene):
+def test_smooth_rolling_is_no_vibration(train):
     """What is left is the displacement, and the radius times what a gear turns further than the drive makes it."""
     angle = np.zeros(COUNT)
     angle[3] = 0.7
     pose = np.zeros((COUNT, 4, 6))
-    ratios = rolling(scene).ratios
-    shafts = [shaft.name for shaft in scene.shafts]
-    for g, gear in enumerate(scene.gears):
-        pose[:, g, 3:] = np.outer(float(ratios[shafts.index(gear.shaft)]) * angle, scene.frame[2])
+    ratios = rolling(train).ratios
+    shafts = [shaft.name for shaft in train.shafts]
+    for g, gear in enumerate(train.gears):
+        pose[:, g, 3:] = np.outer(float(ratios[shafts.index(gear.shaft)]) * angle, train.frame[2])
     pose[3, :, :3] = [1e-6, 2e-6, 2e-6]
-    shown = frames(scene, made_up(gear_pose=pose, drive_angle=angle), [3], exaggeration=1.0)
+    shown = frames(train, made_up(gear_pose=pose, drive_angle=angle), [3], exaggeration=1.0)
     assert shown["gear_values"] == pytest.approx(3.0, rel=1e-5)  # um
     pose[3, :, :3] = 0.0
-    pose[3, 0, 3:] += 1e-6 * scene.frame[2]
-    turned = frames(scene, made_up(gear_pose=pose, drive_angle=angle), [3], exaggeration=1.0)["gear_values"]
-    assert turned.max() == pytest.approx(1e3 * 1e3 * scene.gears[0].gear.tip_radius * 1e-6, rel=1e-4)
+    pose[3, 0, 3:] += 1e-6 * train.frame[2]
+    turned = frames(train, made_up(gear_pose=pose, drive_angle=angle), [3], exaggeration=1.0)["gear_values"]
+    assert turned.max() == pytest.approx(1e3 * 1e3 * train.gears[0].gear.tip_radius * 1e-6, rel=1e-4)
 
 
-def test_the_series_of_the_gears(tmp_path, scene):
+def test_the_series_of_the_gears(tmp_path, train):
     import h5py
 
     response = made_up()
-    write_gears(tmp_path / "gears.vtkhdf", scene, response, [0, 100, 200])
+    write_gears(tmp_path / "gears.vtkhdf", train, response, [0, 100, 200])
     with h5py.File(tmp_path / "gears.vtkhdf") as file:
         assert list(file["VTKHDF/Steps/Values"]) == pytest.approx(response.time[[0, 100, 200]])
         count = int(file["VTKHDF/NumberOfPoints"][0])
@@ -309,13 +309,13 @@ def test_the_series_of_the_housing(tmp_path, block):
             assert normal[i][there] == pytest.approx(sign * push[there, 2], rel=1e-5, abs=1e-6 * np.abs(push).max())
 
 
-def test_a_picture_and_a_film(tmp_path, scene, block):
+def test_a_picture_and_a_film(tmp_path, train, block):
     from PIL import Image
 
     rng = np.random.default_rng(2)
     q, a = (1e-6 * rng.standard_normal((COUNT, block.size)) for _ in range(2))
     response = made_up(modal=q, modal_velocity=q, modal_acceleration=a)
-    housed = replace(scene, housing=block)
+    housed = replace(train, housing=block)
     assert draw_scene(tmp_path / "one.png", frames(housed, response, [130]), "a block") == ""
     assert draw_scene(tmp_path / "film.gif", frames(housed, response, [0, 50, 100]), "a block") == ""
     with Image.open(tmp_path / "one.png") as picture:

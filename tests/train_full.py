@@ -26,8 +26,8 @@ def coupled_transient(
 
     `mass` and `stiffness` are those of the housing over [attachments | internal], of any number of internal unknowns.
     """
-    system, n = model.system, 6 * len(model.scene.housing.attachment_names)  # type: ignore[union-attr]
-    own = model.scene.housing.size  # type: ignore[union-attr]
+    system, n = model.system, 6 * len(model.train.housing.attachment_names)  # type: ignore[union-attr]
+    own = model.train.housing.size  # type: ignore[union-attr]
     outer = np.concatenate([np.arange(n), np.arange(own, system.size)])  # attachments and shafts
     N = null_space(system.jacobian(0.0, np.zeros(system.size))[:, outer])
     bores, shafts = sparse.csr_array(N[:n]), N[n:]

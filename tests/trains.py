@@ -12,7 +12,7 @@ from gearfe.gear.pair import Gear
 from gearfe.reduction.modal_body import ModalBody
 from gearfe.rigid import TimeFunction, constant, smoothed_step
 from gearfe.stiffness.periodic import PeriodicInterpolant, periodic_interpolant
-from gearfe.train import Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
+from gearfe.train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
 
 MODULE, ALPHA = 2.5e-3, math.radians(25.0)
 SPEED, TORQUE = 600.0, -100.0
@@ -43,7 +43,7 @@ def braking(stages: int) -> TimeFunction:
 
 def train(
     stages: list[tuple[int, int]], *, stiffness: Any = 1e8, ys: list[float] | None = None, **changes: Any
-) -> TrainScene:
+) -> GearTrain:
     """Shafts in an x row; stage i joins shaft i and i + 1 by (driver teeth, driven teeth).
 
     `stiffness` is a constant, None (rigid), or a function of the driver's teeth.
@@ -61,7 +61,7 @@ def train(
     bores = {
         f"{n}{s}": (x, y, 0.0) for n, x in zip(names, places, strict=True) for s, y in (("+", 0.033), ("-", -0.033))
     }
-    scene = TrainScene(
+    gear_train = GearTrain(
         shafts=tuple(shafts),
         gears=tuple(gears),
         meshes=tuple(meshes),
@@ -69,18 +69,18 @@ def train(
         loads=(Load(names[-1], f"{names[-1]}+", braking(len(stages))),),
         rigid_bores=bores,
     )
-    return dataclasses.replace(scene, **changes)
+    return dataclasses.replace(gear_train, **changes)
 
 
 SHIPPED = [(20, 30), (20, 30)]
 
 
-def frame_body(scene: TrainScene, *, uneven: float = 0.0, skew: float = 0.0) -> ModalBody:
-    """An elastic frame in place of the scene's rigid housing: each bore on springs to ground and to its neighbours.
+def frame_body(gear_train: GearTrain, *, uneven: float = 0.0, skew: float = 0.0) -> ModalBody:
+    """An elastic frame in place of the train's rigid housing: each bore on springs to ground and to its neighbours.
 
     It is mirror-symmetric about y = 0 and z = 0; `uneven` stiffens the bores at +y, `skew` couples x, y, z of a bore.
     """
-    names, points = tuple(scene.rigid_bores), np.array(list(scene.rigid_bores.values()))
+    names, points = tuple(gear_train.rigid_bores), np.array(list(gear_train.rigid_bores.values()))
     n = len(names)
     local = np.diag([6e7, 2.5e7, 8e7, 4e4, 9e4, 5e4])
     if skew:
@@ -115,10 +115,10 @@ def frame_body(scene: TrainScene, *, uneven: float = 0.0, skew: float = 0.0) -> 
     )  # fmt: skip
 
 
-def elastic(scene: TrainScene, **options: Any) -> TrainScene:
+def elastic(gear_train: GearTrain, **options: Any) -> GearTrain:
     """The same train in the elastic frame."""
-    return dataclasses.replace(scene, housing=frame_body(scene, **options), rigid_bores={})
+    return dataclasses.replace(gear_train, housing=frame_body(gear_train, **options), rigid_bores={})
 
 
-def changed(scene: TrainScene, **changes: Any) -> TrainScene:
-    return dataclasses.replace(scene, **changes)
+def changed(gear_train: GearTrain, **changes: Any) -> GearTrain:
+    return dataclasses.replace(gear_train, **changes)

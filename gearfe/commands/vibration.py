@@ -14,8 +14,8 @@ from .arguments import add_job, add_keys, with_keys
 from .common import add_folder, tell
 
 if TYPE_CHECKING:
+    from ..train.gear_train import GearTrain
     from ..train.response import TrainResponse
-    from ..train.scene import TrainScene
     from ..vibration.files import OutputChoice, Written
     from ..vibration.job import TrainJob
 
@@ -100,8 +100,8 @@ def run(args: argparse.Namespace) -> int:
         folder = output_folder(args.out)
     chosen = {"floquet": not args.no_floquet, "estimate": not args.no_estimate}
     planned = simulated(job, args.curve, watch=watch, progress=count, **chosen)
-    scene, every = planned.scene, planned.every
-    start = record_start(job, scene, every, args.spectrum_from_ms, watch.stage)
+    train, every = planned.train, planned.every
+    start = record_start(job, train, every, args.spectrum_from_ms, watch.stage)
     choice = replace(choice, spectrum_start=start)
     check_choice(choice, job.times, bores)
     written = write_run(
@@ -110,12 +110,12 @@ def run(args: argparse.Namespace) -> int:
         choice,
         watch=watch,
         draw=None if args.no_pictures else TrainPictures(title(job), args.band and tuple(args.band), args.range),
-        beside=Analysis(job, scene, every, start),
+        beside=Analysis(job, train, every, start),
         progress=count,
     )
     response = written.response
     tell(
-        report_lines(response, scene, written, choice),
+        report_lines(response, train, written, choice),
         folder,
         written.names,
         watch.seconds,
@@ -136,7 +136,7 @@ def title(job: TrainJob) -> str:
     return ", ".join(parts)
 
 
-def report_lines(response: TrainResponse, scene: TrainScene, written: Written, choice: OutputChoice) -> list[str]:
+def report_lines(response: TrainResponse, train: GearTrain, written: Written, choice: OutputChoice) -> list[str]:
     """Lines for the terminal."""
     from ..vibration.errors import with_error
     from ..vibration.report import attachment_to_draw
@@ -158,7 +158,7 @@ def report_lines(response: TrainResponse, scene: TrainScene, written: Written, c
             if mean is None or not math.isfinite(mean[i])
             else f", mean contact force {mean[i]:.1f}{off('mean_contact_forces_N', i)} N"
         )
-        lines.append(f"mesh {i + 1} ({name}): {_frequency(scene, response, float(frequency))}, {k}{force}")
+        lines.append(f"mesh {i + 1} ({name}): {_frequency(train, response, float(frequency))}, {k}{force}")
     contact = summary.get("contact", {})
     for i, share in enumerate(contact.get("share_without_contact", ())):
         if share is not None:
@@ -200,7 +200,7 @@ def report_lines(response: TrainResponse, scene: TrainScene, written: Written, c
             f"spectrum: resolution {made.spectrum.resolution:.4g} Hz, up to {made.spectrum.frequency[-1]:.6g} Hz, "
             f"from samples every {1e6 * made.step / made.every:.3g} us"
         )
-        loaded = next((load.bore for load in scene.loads if load.bore is not None), None)
+        loaded = next((load.bore for load in train.loads if load.bore is not None), None)
         attachment = attachment_to_draw(response, choice.attachment, loaded)
         found = summary["dominant_lines"][f"attachment_{attachment}_acceleration_m_per_s2"][:4]
         texts = [f"{x['frequency_Hz']:.0f} Hz {x['amplitude']:.3g}{with_error(x.get('error_estimate'))}" for x in found]
@@ -212,9 +212,9 @@ def report_lines(response: TrainResponse, scene: TrainScene, written: Written, c
     return lines
 
 
-def _frequency(scene: TrainScene, response: TrainResponse, frequency: float) -> str:
+def _frequency(train: GearTrain, response: TrainResponse, frequency: float) -> str:
     """A mesh frequency; that of the first and the last moment where the speed never rests."""
-    speed = scene.driven.speed
+    speed = train.driven.speed
     nominal = float(speed(max(speed.breaks, default=0.0)))
     if speed.ends or nominal == 0.0:
         return f"{frequency:.1f} Hz"

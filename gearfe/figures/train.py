@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ..train.gear_train import GearTrain
 from ..train.response import TrainResponse
-from ..train.scene import TrainScene
 from ..train.static_error import static_errors
 from ..typing import Array, IntArray
 from ..vibration.analysis import Analysed
@@ -45,12 +45,12 @@ class TrainPictures:
     band: tuple[float, float] | None = None
     most: float | None = None
 
-    def curves(self, folder: Path, scene: TrainScene, made: Followed, spectra: TrainSpectra, attachment: str) -> None:
+    def curves(self, folder: Path, train: GearTrain, made: Followed, spectra: TrainSpectra, attachment: str) -> None:
         """``response.png``, ``spectrum.png``, and where there are such things the other two."""
         response = made.curves
         draw_response(folder / "response.png", response, attachment, self.title, made.mean_force)
-        if scene.drive is not None and any(mesh.stiffness is not None for mesh in scene.meshes):
-            draw_transmission(folder / "transmission_error.png", scene, response, self.title)
+        if train.drive is not None and any(mesh.stiffness is not None for mesh in train.meshes):
+            draw_transmission(folder / "transmission_error.png", train, response, self.title)
         draw_spectrum(folder / "spectrum.png", response, spectra, attachment, self.title, self.band)
         if spectra.power is not None:
             draw_power(folder / "radiated_power.png", response, spectra, spectra.power, self.title, self.band)
@@ -64,9 +64,9 @@ class TrainPictures:
         if made.measured:
             draw_measured(folder / "measured.png", made, spectra, self.title)
 
-    def fields(self, path: Path, scene: TrainScene, response: TrainResponse, steps: IntArray) -> str:
+    def fields(self, path: Path, train: GearTrain, response: TrainResponse, steps: IntArray) -> str:
         """Fields at some output times; returns an empty text, or why nothing was drawn."""
-        return draw_scene(path, frames(scene, response, steps), self.title, self.most)
+        return draw_scene(path, frames(train, response, steps), self.title, self.most)
 
 
 def draw_response(path: Path, response: TrainResponse, attachment: str, title: str, mean: Array) -> None:
@@ -127,12 +127,12 @@ def draw_response(path: Path, response: TrainResponse, attachment: str, title: s
     save_fixed(figure, path)
 
 
-def draw_transmission(path: Path, scene: TrainScene, response: TrainResponse, title: str) -> None:
+def draw_transmission(path: Path, train: GearTrain, response: TrainResponse, title: str) -> None:
     """Dynamic beside static transmission error over the drive's rotation, a panel for each mesh that yields."""
     sense = float(np.sign(response.drive_angle[-1])) or 1.0
-    angle, static = np.degrees(response.drive_angle) * sense, static_errors(scene, response.drive_angle)
+    angle, static = np.degrees(response.drive_angle) * sense, static_errors(train, response.drive_angle)
     apart = _apart(response, sense)
-    elastic = [i for i, mesh in enumerate(scene.meshes) if mesh.stiffness is not None]
+    elastic = [i for i, mesh in enumerate(train.meshes) if mesh.stiffness is not None]
     tall = 1.3 + 2.7 * len(elastic)
     figure = fixed(11.5, tall)
     head = f"Transmission error along the line of action\n{title}"

@@ -55,7 +55,7 @@ class CondensedTrain:
     @cached_property
     def radiation_of_modes(self) -> Array | None:
         """(n, n) surface matrix of the housing in modal coordinates; None where the housing has no surface."""
-        housing = self.model.scene.housing
+        housing = self.model.train.housing
         if housing is None or not housing.has_mesh:
             return None
         shapes = self.model.core.T[: housing.size]
@@ -88,8 +88,8 @@ def condense(model: TrainModel) -> CondensedTrain:
         core.squares, _damping(model), to_modes[:, used], push, to_modes[:, tilts],
         np.array([g.polar * g.ratio for g in gyros]),
     )  # fmt: skip
-    sense = drive_sense(model.scene.driven.speed) or 1.0
-    steady = steady_forces(model.scene)
+    sense = drive_sense(model.train.driven.speed) or 1.0
+    steady = steady_forces(model.train)
     of_mesh = _of_meshes(model)
     mesh_of = {number: mesh for mesh, numbers in enumerate(of_mesh) for number in numbers}
     rubbing = [_rubbing(model, flank, mesh_of[i], float(steady[mesh_of[i]])) for i, flank in enumerate(flanks)]
@@ -111,13 +111,13 @@ def _rubbing(model: TrainModel, flank: CurveFlank | LawFlank, mesh: int, force: 
     """Friction of a flank of a mesh, whose coefficient may follow from the speed."""
     if not isinstance(flank, LawFlank) or flank.sliding is None:
         return None
-    scene, given = model.scene, model.scene.meshes[mesh].friction
+    train, given = model.train, model.train.meshes[mesh].friction
     coefficient = None
     if isinstance(given, Lubrication):
-        one, two = (scene.gear(name).gear for name in (scene.meshes[mesh].driver, scene.meshes[mesh].driven))
-        pair = MeshGeometry(one, two, scene.meshes[mesh].centre_distance)
+        one, two = (train.gear(name).gear for name in (train.meshes[mesh].driver, train.meshes[mesh].driven))
+        pair = MeshGeometry(one, two, train.meshes[mesh].centre_distance)
         coefficient = partial(_of_drive, given, pair, force, flank.ratio)
-    return Rubbing(flank.sliding, fastest(scene.driven.speed), coefficient)
+    return Rubbing(flank.sliding, fastest(train.driven.speed), coefficient)
 
 
 def _of_drive(oil: Lubrication, pair: MeshGeometry, force: float, ratio: float, speed: float) -> float:
@@ -141,11 +141,11 @@ def _check(model: TrainModel) -> None:
     if model.rolling.common_turns is None:
         problem = "have no common period to repeat with: " + model.rolling.note
         raise InputError("train.meshes", None, problem, "look at it with gearfe vibration")
-    for gear in model.scene.gears:
+    for gear in model.train.gears:
         if any(gear.pitch_errors):
             problem = "has pitch errors: its motion repeats with the full period of the teeth, not with the meshes"
             raise InputError(f"gear {gear.name!r}", None, problem, "look at it with gearfe vibration")
-    for load in model.scene.loads:
+    for load in model.train.loads:
         if load.torque.sines:
             problem = "oscillates: no motion repeats with the meshes"
             raise InputError(f"load on {load.shaft!r}", None, problem, "look at it with gearfe vibration")

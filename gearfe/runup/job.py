@@ -13,7 +13,7 @@ from ..progress import count, stage
 from ..rigid import constant
 from ..tables.runup import RunUpTable
 from ..train import build_train
-from ..vibration.job import TrainJob, job_scene, train_body
+from ..vibration.job import TrainJob, job_train, train_body
 from ..vibration.mesh_stiffness import train_curves
 from .instability import InstabilityMap, instability_map
 from .run_up import RunUp, run_up
@@ -34,9 +34,9 @@ def solved(
     with watch.stage("housing"):
         body = train_body(job)
     with watch.stage("model"):
-        scene = job_scene(job, stiffness, body)
+        train = job_train(job, stiffness, body)
         speeds = np.linspace(table.speed_start_rad_per_s, table.speed_stop_rad_per_s, table.speeds)
-        model = build_train(replace(scene, drive=replace(scene.driven, speed=constant(float(speeds[0])))))
+        model = build_train(replace(train, drive=replace(train.driven, speed=constant(float(speeds[0])))))
     band = table.band_Hz or (5000.0 if job.housing is None else job.housing.reduction.band_Hz)
     with watch.stage("steady states"), stage("steady states"):
         options: dict[str, Any] = {"tolerance": table.tolerance, "band_hz": band, "stability": table.stability}

@@ -97,7 +97,7 @@ def coupled_modes(train: CondensedTrain, speeds: Array, highest_hz: float) -> Co
 
 def _shares(train: CondensedTrain, count: int) -> tuple[Array, Array, tuple[str, ...]]:
     model = train.model
-    core, housing = model.core, model.scene.housing
+    core, housing = model.core, model.train.housing
     shapes = core.T[:, :count]
     whole = np.maximum(core.squares[:count], 1e-300)
     rows = [line.mean * (line.row @ shapes) ** 2 / whole for line in model.meshes]

@@ -70,7 +70,7 @@ def runup_columns(run: RunUp) -> dict[str, Any]:
     rms = np.array([s.rms(run.band_hz) for s in states]).reshape(len(states), -1)
     for j, name in enumerate(model.bores):
         made[f"acceleration_rms_{name}_m_per_s2"] = rms[:, j]
-    if model.scene.housing is not None:
+    if model.train.housing is not None:
         made["radiated_power_level_dB"] = np.array([power_level(power_in_band(s, run.band_hz)) for s in states])
     return made
 
@@ -99,9 +99,9 @@ def iso_dynamic_factors(run: RunUp, mesh: int) -> Array:
     with the mesh's own mean stiffness, and all that turns with its gears.
     """
     model = run.train.model
-    line, given = model.meshes[mesh], model.scene.meshes[mesh]
-    one, two = (model.scene.gear(name) for name in (given.driver, given.driven))
-    names = [shaft.name for shaft in model.scene.shafts]
+    line, given = model.meshes[mesh], model.train.meshes[mesh]
+    one, two = (model.train.gear(name) for name in (given.driver, given.driven))
+    names = [shaft.name for shaft in model.train.shafts]
     inertia = [model.shafts[names.index(gear.shaft)].rotor.polar for gear in (one, two)]
     mass = 1.0 / sum(gear.gear.base_radius**2 / polar for gear, polar in zip((one, two), inertia, strict=True))
     relief = min(0.0 if g.gear.tip_relief is None else g.gear.tip_relief.amount for g in (one, two))
@@ -145,7 +145,7 @@ def order_columns(run: RunUp, multiples: int) -> dict[str, Any]:
     made |= {f"contact_force_{i + 1}_N": forces[:, i] for i in range(len(model.meshes))}
     made |= {f"transmission_error_{i + 1}_um": 1e6 * errors[:, i] for i in range(len(model.meshes))}
     made |= {f"acceleration_{name}_m_per_s2": moved[:, j] for j, name in enumerate(model.bores)}
-    if model.scene.housing is not None:
+    if model.train.housing is not None:
         made["radiated_power_W"] = np.array([s.power[k] for s, k in rows if s.power is not None])
     return made
 
@@ -367,5 +367,5 @@ def attachment_to_draw(run: RunUp, asked: str | None) -> int:
         if asked not in names:
             raise unknown_name("--attachment", asked, names)
         return names.index(asked)
-    loaded = [load.bore for load in run.train.model.scene.loads if load.bore in names]
+    loaded = [load.bore for load in run.train.model.train.loads if load.bore in names]
     return names.index(loaded[0]) if loaded and loaded[0] is not None else len(names) - 1

@@ -237,7 +237,7 @@ def _checked(model: TrainModel, speeds: ArrayLike | Sequence[float]) -> Array:
         raise InputError("speeds", None, problem, "ask for speeds of one sense; a train at rest has no orders")
     if len(asked) > 1 and not ((np.diff(sizes) > 0.0).all() or (np.diff(sizes) < 0.0).all()):
         raise InputError("speeds", None, "do not rise or fall all the way", "sort them, each once")
-    sense = drive_sense(model.scene.driven.speed)
+    sense = drive_sense(model.train.driven.speed)
     if sense * asked[0] < 0.0:
         problem = "turns against the drive of the model, whose driving flanks are others"
         raise InputError("speeds", float(asked[0]), problem, "build the model with a drive of this sense")

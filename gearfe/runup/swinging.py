@@ -56,21 +56,21 @@ def write_modes(folder: Path, model: TrainModel, modes: Sequence[int]) -> None:
     """``mode_gears.vtkhdf`` and, of an elastic housing, ``mode_housing.vtkhdf``."""
     made = swinging(model, modes)
     steps = np.arange(len(made.time))
-    write_gears(folder / "mode_gears.vtkhdf", model.scene, made, steps)
-    if model.scene.housing is not None and model.scene.housing.has_mesh:
-        write_housing(folder / "mode_housing.vtkhdf", model.scene.housing, made, steps)
+    write_gears(folder / "mode_gears.vtkhdf", model.train, made, steps)
+    if model.train.housing is not None and model.train.housing.has_mesh:
+        write_housing(folder / "mode_housing.vtkhdf", model.train.housing, made, steps)
 
 
 def _sized(model: TrainModel, shape: Array) -> Array:
     """A shape whose largest displacement can be seen."""
-    scene, body = model.scene, model.scene.housing
-    most, places = 0.0, [np.array([scene.shaft(gear.shaft).point for gear in scene.gears])]
-    for gear in scene.gears:
-        first = model.first[[s.name for s in scene.shafts].index(gear.shaft)]
+    train, body = model.train, model.train.housing
+    most, places = 0.0, [np.array([train.shaft(gear.shaft).point for gear in train.gears])]
+    for gear in train.gears:
+        first = model.first[[s.name for s in train.shafts].index(gear.shaft)]
         own = shape[first : first + 6]
         most = max(most, float(np.linalg.norm(own[:3]) + gear.gear.tip_radius * np.linalg.norm(own[3:])))
     if body is not None and body.has_mesh:
         most = max(most, float(np.abs(body.reconstruct(shape[None, : body.size])).max()))
         places.append(body.nodes)
-    size = float(np.ptp(np.concatenate(places), axis=0).max()) + 2.0 * max(g.gear.tip_radius for g in scene.gears)
+    size = float(np.ptp(np.concatenate(places), axis=0).max()) + 2.0 * max(g.gear.tip_radius for g in train.gears)
     return np.asarray(shape * (SHOWN * size / most))

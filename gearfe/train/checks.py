@@ -14,9 +14,9 @@ from ..stiffness.curve import StiffnessCurve
 from ..stiffness.periodic import PeriodicInterpolant
 from .flanks import check_flanks
 from .friction import check_friction
+from .gear_train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
 from .kinematics import driving_senses
 from .phases import tooth_places
-from .scene import Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
 
 #: Agreement of lengths and angles that count as equal (relative).
 SAME = 1e-6
@@ -24,22 +24,22 @@ SAME = 1e-6
 WIDEST_GAP = 0.15
 
 
-def check_scene(scene: TrainScene) -> None:
+def check_scene(train: GearTrain) -> None:
     """Raise `InputError` for the first mistake."""
-    _names("shaft", [s.name for s in scene.shafts])
-    _names("gear", [g.name for g in scene.gears])
-    _names("mesh", [m.name for m in scene.meshes])
-    _check_shafts(scene)
-    _check_ends(scene)
-    for gear in scene.gears:
-        _known("gear " + repr(gear.name), "shaft", gear.shaft, [s.name for s in scene.shafts])
-        _check_on_shaft(scene, gear)
-    for mesh in scene.meshes:
-        _check_mesh(scene, mesh)
-    _check_room(scene)
-    _check_damping(scene)
-    check_flanks(scene)
-    tooth_places(scene, driving_senses(scene))
+    _names("shaft", [s.name for s in train.shafts])
+    _names("gear", [g.name for g in train.gears])
+    _names("mesh", [m.name for m in train.meshes])
+    _check_shafts(train)
+    _check_ends(train)
+    for gear in train.gears:
+        _known("gear " + repr(gear.name), "shaft", gear.shaft, [s.name for s in train.shafts])
+        _check_on_shaft(train, gear)
+    for mesh in train.meshes:
+        _check_mesh(train, mesh)
+    _check_room(train)
+    _check_damping(train)
+    check_flanks(train)
+    tooth_places(train, driving_senses(train))
 
 
 def _names(kind: str, names: list[str]) -> None:
@@ -57,10 +57,10 @@ def _known(field: str, what: str, name: str, names: Iterable[str]) -> None:
         raise InputError(field, None, f"names an unknown {what} {name!r}", made.cure)
 
 
-def _check_shafts(scene: TrainScene) -> None:
-    points, a = scene.bore_points, scene.frame[2]
+def _check_shafts(train: GearTrain) -> None:
+    points, a = train.bore_points, train.frame[2]
     taken: dict[str, str] = {}
-    for shaft in scene.shafts:
+    for shaft in train.shafts:
         label = f"shaft {shaft.name!r}"
         for key in ("length", "radius", "density", "mass", "polar_inertia", "transverse_inertia"):
             value = getattr(shaft, key)
@@ -74,8 +74,8 @@ def _check_shafts(scene: TrainScene) -> None:
                 problem = f"holds shaft {taken[bore]!r} and shaft {shaft.name!r}"
                 raise InputError(f"attachment {bore!r}", None, problem, "a bore carries one shaft")
             taken[bore] = shaft.name
-            _check_bore(scene, shaft, bore, a)
-    for bearing in scene.bearings:
+            _check_bore(train, shaft, bore, a)
+    for bearing in train.bearings:
         if bearing.bore not in taken:
             raise unknown_name("bearing", bearing.bore, taken)
         for key in ("stiffness", "damping"):
@@ -87,53 +87,53 @@ def _check_shafts(scene: TrainScene) -> None:
                 )
 
 
-def _check_bore(scene: TrainScene, shaft: Shaft, bore: str, a: np.ndarray) -> None:
-    arm = scene.bore_points[bore] - np.array(shaft.point)
+def _check_bore(train: GearTrain, shaft: Shaft, bore: str, a: np.ndarray) -> None:
+    arm = train.bore_points[bore] - np.array(shaft.point)
     off = float(np.linalg.norm(arm - (arm @ a) * a))
     if off > SAME * max(shaft.length, 1e-3):
         problem = f"lies {1e3 * off:.6g} mm off the axis of shaft {shaft.name!r}"
         raise InputError(f"attachment {bore!r}", None, problem, "name the bores on that axis, or move the shaft")
-    if scene.housing is not None:
-        own = scene.housing.attachment_axes[scene.housing.attachment_names.index(bore)]
+    if train.housing is not None:
+        own = train.housing.attachment_axes[train.housing.attachment_names.index(bore)]
         if abs(abs(float(own @ a)) - 1.0) > SAME:
             problem = "its bore is not parallel to the train's axis"
             raise InputError(f"attachment {bore!r}", list(map(float, own)), problem, "all shafts must be parallel")
 
 
-def _check_ends(scene: TrainScene) -> None:
-    drive = scene.driven
+def _check_ends(train: GearTrain) -> None:
+    drive = train.driven
     if drive.stiffness is not None and not (math.isfinite(drive.stiffness) and drive.stiffness > 0.0):
         raise InputError("drive stiffness", drive.stiffness, "must be finite and > 0 N m/rad", "None for a rigid drive")
     if not (math.isfinite(drive.damping) and drive.damping >= 0.0):
         raise InputError("drive damping", drive.damping, "must be finite and >= 0", "negative damping feeds energy in")
-    shafts = {s.name: s for s in scene.shafts}
+    shafts = {s.name: s for s in train.shafts}
     parts: list[tuple[str, Drive | Load]] = [("drive", drive)]
-    parts += [(f"load on {x.shaft!r}", x) for x in scene.loads]
+    parts += [(f"load on {x.shaft!r}", x) for x in train.loads]
     for label, part in parts:
         _known(label, "shaft", part.shaft, shafts)
         if part.bore is not None:
-            _known(label, "attachment", part.bore, scene.bore_points)
+            _known(label, "attachment", part.bore, train.bore_points)
             if part.bore not in shafts[part.shaft].bores:
                 problem = f"attachment {part.bore!r} does not carry shaft {part.shaft!r}"
                 raise InputError(label, part.bore, problem, f"choose one of {', '.join(shafts[part.shaft].bores)}")
-    if not scene.meshes and len(scene.shafts) > 1:
+    if not train.meshes and len(train.shafts) > 1:
         raise InputError("train.meshes", None, "no gear is driven: the train has no mesh", "add a mesh")
 
 
-def _check_on_shaft(scene: TrainScene, item: ShaftGear) -> None:
-    shaft = scene.shaft(item.shaft)
-    middle = float(np.array(shaft.point) @ scene.frame[2])
+def _check_on_shaft(train: GearTrain, item: ShaftGear) -> None:
+    shaft = train.shaft(item.shaft)
+    middle = float(np.array(shaft.point) @ train.frame[2])
     reach = abs(item.along - middle) + 0.5 * item.gear.face_width
     if reach > 0.5 * shaft.length * (1 + SAME):
         problem = f"reaches {1e3 * (reach - 0.5 * shaft.length):.6g} mm beyond the end of shaft {shaft.name!r}"
         raise InputError(f"gear {item.name!r}", None, problem, "move the gear, or lengthen the shaft")
 
 
-def _check_mesh(scene: TrainScene, mesh: GearMesh) -> None:
+def _check_mesh(train: GearTrain, mesh: GearMesh) -> None:
     label = f"mesh {mesh.name!r}"
     for name in (mesh.driver, mesh.driven):
-        _known(label, "gear", name, [g.name for g in scene.gears])
-    one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
+        _known(label, "gear", name, [g.name for g in train.gears])
+    one, two = train.gear(mesh.driver), train.gear(mesh.driven)
     if one.shaft == two.shaft:
         raise InputError(label, None, f"both gears are on shaft {one.shaft!r}", "mesh gears of two shafts")
     for name, unit, symbol in (("module", 1e3, "mm"), ("pressure_angle", 180.0 / math.pi, "deg")):
@@ -146,7 +146,7 @@ def _check_mesh(scene: TrainScene, mesh: GearMesh) -> None:
         wanted = GearPair(one.gear, two.gear, mesh.centre_distance).working_centre_distance
     except InputError as error:
         raise InputError(label, error.value, f"{error.field}: {error.problem}", error.cure) from None
-    distance = shaft_distance(scene, one.shaft, two.shaft)
+    distance = shaft_distance(train, one.shaft, two.shaft)
     if abs(distance - wanted) > SAME * wanted:
         apart = f"shafts {one.shaft!r} and {two.shaft!r} are {1e3 * distance:.9g} mm apart"
         problem = f"{apart}, the gears need {1e3 * wanted:.9g} mm"
@@ -241,10 +241,10 @@ def interpolant(mesh: GearMesh) -> PeriodicInterpolant:
     )
 
 
-def shaft_distance(scene: TrainScene, one: str, two: str) -> float:
+def shaft_distance(train: GearTrain, one: str, two: str) -> float:
     """Distance of two shafts' axes (m)."""
-    a = scene.frame[2]
-    arm = np.array(scene.shaft(two).point) - np.array(scene.shaft(one).point)
+    a = train.frame[2]
+    arm = np.array(train.shaft(two).point) - np.array(train.shaft(one).point)
     return float(np.linalg.norm(arm - (arm @ a) * a))
 
 
@@ -254,34 +254,34 @@ def overlap(one: ShaftGear, two: ShaftGear) -> float:
     return high - max(one.along - 0.5 * one.gear.face_width, two.along - 0.5 * two.gear.face_width)
 
 
-def _check_room(scene: TrainScene) -> None:
+def _check_room(train: GearTrain) -> None:
     """No two gears in one place, and no gear in another shaft."""
-    meshing = {frozenset((m.driver, m.driven)) for m in scene.meshes}
-    for i, one in enumerate(scene.gears):
-        for two in scene.gears[i + 1 :]:
+    meshing = {frozenset((m.driver, m.driven)) for m in train.meshes}
+    for i, one in enumerate(train.gears):
+        for two in train.gears[i + 1 :]:
             if overlap(one, two) <= SAME * one.gear.face_width or frozenset((one.name, two.name)) in meshing:
                 continue
-            room = 0.0 if one.shaft == two.shaft else shaft_distance(scene, one.shaft, two.shaft)
+            room = 0.0 if one.shaft == two.shaft else shaft_distance(train, one.shaft, two.shaft)
             if one.shaft == two.shaft or room < one.gear.tip_radius + two.gear.tip_radius:
                 problem = f"overlaps gear {two.name!r} over {1e3 * overlap(one, two):.6g} mm along the axis"
                 raise InputError(f"gear {one.name!r}", None, problem, "move one along its shaft, or let them mesh")
-        for shaft in scene.shafts:
-            middle = float(np.array(shaft.point) @ scene.frame[2])
+        for shaft in train.shafts:
+            middle = float(np.array(shaft.point) @ train.frame[2])
             beside = abs(one.along - middle) - 0.5 * (shaft.length + one.gear.face_width) >= 0.0
             if shaft.name == one.shaft or beside:
                 continue
-            room = shaft_distance(scene, one.shaft, shaft.name) - shaft.radius
+            room = shaft_distance(train, one.shaft, shaft.name) - shaft.radius
             if one.gear.tip_radius > room:
                 problem = f"its tip cuts {1e3 * (one.gear.tip_radius - room):.4g} mm into shaft {shaft.name!r}"
                 raise InputError(f"gear {one.name!r}", None, problem, "thinner shaft, smaller gear, or a shorter shaft")
 
 
-def _check_damping(scene: TrainScene) -> None:
-    ratios = np.atleast_1d(np.asarray(scene.damping.ratio, dtype=float))
+def _check_damping(train: GearTrain) -> None:
+    ratios = np.atleast_1d(np.asarray(train.damping.ratio, dtype=float))
     for name, value in (
         ("ratio", ratios.min(initial=0.0)),
-        ("alpha", scene.damping.alpha),
-        ("beta", scene.damping.beta),
+        ("alpha", train.damping.alpha),
+        ("beta", train.damping.beta),
     ):
         if not (np.isfinite(value) and value >= 0.0):
             raise InputError(

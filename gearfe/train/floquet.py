@@ -54,11 +54,11 @@ def train_multipliers(model: TrainModel) -> tuple[ComplexArray | None, str]:
 
 def why_not(model: TrainModel) -> str:
     """Why a train has no multipliers, or nothing."""
-    drive = model.scene.driven
+    drive = model.train.driven
     reasons = (
         (not drive.speed.ends or model.steady_speed == 0.0, "the drive has no steady speed"),
         (
-            not all(load.torque.ends for load in model.scene.loads),
+            not all(load.torque.ends for load in model.train.loads),
             "a load changes all the time: no motion repeats with the meshes",
         ),
         (model.rolling.common_turns is None, model.rolling.note),
@@ -102,7 +102,7 @@ class Linearised:
         self.lines = [line for line in model.meshes if line.curve is not None]
         self.approach = np.array([line.row @ core.T for line in self.lines]).reshape(-1, n).T
         self.spin = np.array([core.T[model.first[line.driver] + 5] for line in self.lines]).reshape(-1, n).T
-        turning = zip(model.shafts, model.first, strict=True) if model.scene.damping.gyroscopic else ()
+        turning = zip(model.shafts, model.first, strict=True) if model.train.damping.gyroscopic else ()
         rotors = [(body.rotor.polar, first) for body, first in turning]
         self.polar = np.array([polar for polar, _ in rotors])
         self.tilts = [np.array([core.T[i + j] for _, i in rotors]).reshape(-1, n).T for j in (3, 4, 5)]

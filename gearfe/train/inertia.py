@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..gear.drawing import gear_outline
 from ..gear.pair import Gear
 from ..typing import Array
-from .scene import Shaft, ShaftGear
+from .gear_train import Shaft, ShaftGear
 
 #: Points on each piece of a tooth's outline: area good to 1e-7.
 POINTS = 200

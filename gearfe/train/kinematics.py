@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import InputError
 from ..rigid.timefunctions import TimeFunction
 from ..typing import Array
-from .scene import TrainScene
+from .gear_train import GearTrain
 
 #: A common period of more cycles of the fastest mesh than this is of no practical use.
 MOST_CYCLES = 200
@@ -46,7 +46,7 @@ class Rolling:
     note: str = ""
 
 
-def rolling(scene: TrainScene) -> Rolling:
+def rolling(train: GearTrain) -> Rolling:
     """Ratios and common period.
 
     Raises
@@ -54,12 +54,12 @@ def rolling(scene: TrainScene) -> Rolling:
     InputError
         For shafts that neither drive nor mesh hold, and for loops of gears whose ratios contradict each other.
     """
-    known = {scene.driven.shaft: Fraction(1)}
+    known = {train.driven.shaft: Fraction(1)}
     links = []
-    for mesh in scene.meshes:
-        one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
+    for mesh in train.meshes:
+        one, two = train.gear(mesh.driver), train.gear(mesh.driven)
         links.append((mesh.name, one.shaft, two.shaft, Fraction(-one.gear.teeth, two.gear.teeth)))
-    for _ in scene.shafts:
+    for _ in train.shafts:
         for name, driver, driven, ratio in links:
             for first, second, factor in ((driver, driven, ratio), (driven, driver, 1 / ratio)):
                 if first not in known:
@@ -70,16 +70,16 @@ def rolling(scene: TrainScene) -> Rolling:
                     raise InputError(
                         f"mesh {name!r}", None, problem, "take a gear out of the loop, or change its teeth"
                     )
-    for shaft in scene.shafts:
+    for shaft in train.shafts:
         if shaft.name not in known:
             problem = "is held by nothing: neither the drive nor a mesh connects it to the train"
             raise InputError(f"shaft {shaft.name!r}", None, problem, "add a mesh between its gears and the train's")
     cycles = tuple(
-        abs(known[scene.gear(mesh.driver).shaft]) * scene.gear(mesh.driver).gear.teeth for mesh in scene.meshes
+        abs(known[train.gear(mesh.driver).shaft]) * train.gear(mesh.driver).gear.teeth for mesh in train.meshes
     )
-    uneven = [g.shaft for g in scene.gears if any(g.pitch_errors)]
+    uneven = [g.shaft for g in train.gears if any(g.pitch_errors)]
     common, note = _common((*cycles, *(abs(known[shaft]) for shaft in uneven)))
-    return Rolling(tuple(known[s.name] for s in scene.shafts), cycles, common, note)
+    return Rolling(tuple(known[s.name] for s in train.shafts), cycles, common, note)
 
 
 def _common(cycles: tuple[Fraction, ...]) -> tuple[Fraction | None, str]:
@@ -96,50 +96,50 @@ def _common(cycles: tuple[Fraction, ...]) -> tuple[Fraction | None, str]:
     return turns, ""
 
 
-def steady_forces(scene: TrainScene) -> Array:
+def steady_forces(train: GearTrain) -> Array:
     """Force of each mesh (N) under the final torques of the loads, without inertia; shape (meshes,).
 
     At every shaft that is not driven the moments about the axis balance, base radius times force at each mesh. In a
     loop of gears the forces of least squares are returned: statics alone do not tell them.
     """
-    return balanced_forces(scene, driving_senses(scene), load_torques(scene, [load_end(scene)]))[:, 0]
+    return balanced_forces(train, driving_senses(train), load_torques(train, [load_end(train)]))[:, 0]
 
 
-def load_end(scene: TrainScene) -> float:
+def load_end(train: GearTrain) -> float:
     """Time at which all load ramps have ended (s)."""
-    return max((b for load in scene.loads for b in load.torque.breaks), default=0.0)
+    return max((b for load in train.loads for b in load.torque.breaks), default=0.0)
 
 
-def load_torques(scene: TrainScene, times: Sequence[float] | Array) -> Array:
+def load_torques(train: GearTrain, times: Sequence[float] | Array) -> Array:
     """Torque of the loads on each shaft without its oscillating part (N m), shape (shafts, times)."""
-    names = [s.name for s in scene.shafts]
+    names = [s.name for s in train.shafts]
     found = np.zeros((len(names), len(times)))
-    for load in scene.loads:
+    for load in train.loads:
         found[names.index(load.shaft)] += replace(load.torque, sines=())(times)
     return found
 
 
-def balanced_forces(scene: TrainScene, senses: Sequence[float], torques: Array) -> Array:
+def balanced_forces(train: GearTrain, senses: Sequence[float], torques: Array) -> Array:
     """Mesh forces (N), shape (meshes, n), that balance the torques (N m) on the shafts, shape (shafts, n)."""
-    names = [s.name for s in scene.shafts]
-    arms = np.zeros((len(names), len(scene.meshes)))
-    for column, (mesh, sense) in enumerate(zip(scene.meshes, senses, strict=True)):
-        for gear in (scene.gear(mesh.driver), scene.gear(mesh.driven)):
+    names = [s.name for s in train.shafts]
+    arms = np.zeros((len(names), len(train.meshes)))
+    for column, (mesh, sense) in enumerate(zip(train.meshes, senses, strict=True)):
+        for gear in (train.gear(mesh.driver), train.gear(mesh.driven)):
             arms[names.index(gear.shaft), column] += sense * gear.gear.base_radius
-    free = [k for k, name in enumerate(names) if name != scene.driven.shaft]
+    free = [k for k, name in enumerate(names) if name != train.driven.shaft]
     return np.asarray(np.linalg.lstsq(arms[free], torques[free], rcond=None)[0])
 
 
-def driving_senses(scene: TrainScene) -> tuple[float, ...]:
+def driving_senses(train: GearTrain) -> tuple[float, ...]:
     """For each mesh, +1 or -1: sense about the axis in which the driver pushes, that of its rotation.
 
     Where the drive stands still, the loads tell it.
     """
-    ratios = dict(zip((s.name for s in scene.shafts), rolling(scene).ratios, strict=True))
-    made = tuple(math.copysign(1.0, ratios[scene.gear(mesh.driver).shaft]) for mesh in scene.meshes)
-    sense = drive_sense(scene.driven.speed)
+    ratios = dict(zip((s.name for s in train.shafts), rolling(train).ratios, strict=True))
+    made = tuple(math.copysign(1.0, ratios[train.gear(mesh.driver).shaft]) for mesh in train.meshes)
+    sense = drive_sense(train.driven.speed)
     if sense == 0.0:
-        pressing = balanced_forces(scene, made, load_torques(scene, [load_end(scene)])).sum()
+        pressing = balanced_forces(train, made, load_torques(train, [load_end(train)])).sum()
         sense = math.copysign(1.0, pressing)
     return tuple(sense * s for s in made)
 

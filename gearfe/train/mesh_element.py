@@ -37,7 +37,7 @@ from .checks import interpolant
 from .elements import LinearForce, RigidShaft
 from .forces import CurveFlank, Flank, LawFlank
 from .friction import CREEP, NEAR, Lubrication, Sliding
-from .scene import GearMesh, TrainScene
+from .gear_train import GearMesh, GearTrain
 
 #: Least force F0 of a mesh's damping, in parts of the largest that its law is known for.
 LEAST_REFERENCE = 0.01
@@ -209,17 +209,17 @@ class OperatingPoint:
     shifts: tuple[Array, Array]
 
 
-def mesh_line(scene: TrainScene, mesh: GearMesh, shafts: Shafts, running: OperatingPoint) -> MeshLine:
+def mesh_line(train: GearTrain, mesh: GearMesh, shafts: Shafts, running: OperatingPoint) -> MeshLine:
     """Line of action of a mesh in a train."""
     first, size, ratios, sense, force = shafts.first, shafts.size, shafts.ratios, running.sense, running.force
-    names = [s.name for s in scene.shafts]
-    one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
+    names = [s.name for s in train.shafts]
+    one, two = train.gear(mesh.driver), train.gear(mesh.driven)
     i, j = names.index(one.shaft), names.index(two.shaft)
-    a = scene.frame[2]
+    a = train.frame[2]
     pair = GearPair(one.gear, two.gear, mesh.centre_distance)
     alpha = pair.working_pressure_angle
-    base = np.array(scene.shaft(one.shaft).point)
-    arm = np.array(scene.shaft(two.shaft).point) - base
+    base = np.array(train.shaft(one.shaft).point)
+    arm = np.array(train.shaft(two.shaft).point) - base
     arm = arm - (arm @ a) * a
     distance = float(np.linalg.norm(arm))
     across = arm / distance
@@ -231,8 +231,8 @@ def mesh_line(scene: TrainScene, mesh: GearMesh, shafts: Shafts, running: Operat
 
     def relative(line: Array, on_one: Array, on_two: Array) -> Array:
         row = np.zeros(size)
-        row[first[i] : first[i] + 6] += line @ shafts.bodies[i].point_rows(on_one, scene.frame)
-        row[first[j] : first[j] + 6] -= line @ shafts.bodies[j].point_rows(on_two, scene.frame)
+        row[first[i] : first[i] + 6] += line @ shafts.bodies[i].point_rows(on_one, train.frame)
+        row[first[j] : first[j] + 6] -= line @ shafts.bodies[j].point_rows(on_two, train.frame)
         return row
 
     line = math.cos(alpha) * sense * along + math.sin(alpha) * across
@@ -251,7 +251,7 @@ def mesh_line(scene: TrainScene, mesh: GearMesh, shafts: Shafts, running: Operat
         mean = mean_value(curve)
     turn[first[i] + 5] += 1.0
     if mesh.stiffness is not None:
-        rayleigh = scene.damping.beta * mean
+        rayleigh = train.damping.beta * mean
     spin = np.zeros(size)
     spin[first[i] + 5], spin[first[j] + 5] = 1.0, -1.0
     slides = np.array([*(relative(np.cross(a, n), point, point) for n in (line, back)), spin])

@@ -1,4 +1,4 @@
-r"""From a `TrainScene` to a system of the rigid core, with all hinges eliminated at set-up.
+r"""From a `GearTrain` to a system of the rigid core, with all hinges eliminated at set-up.
 
 The rotation of shaft i is :math:`\varphi_i = g_i\psi(t) + u_i`: rolling with the drive, :math:`\psi = \int\Omega\,dt`,
 and a small coordinate. So every constraint is linear and constant, the drive's too: :math:`u_d - a\cdot\theta_b = 0`
@@ -21,11 +21,11 @@ from ..typing import Array, IntArray
 from .checks import check_scene
 from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge
 from .forces import Flank, Gyro, TrainForces, derivative
+from .gear_train import Drive, GearTrain
 from .inertia import rotor
 from .kinematics import Rolling, driving_senses, fastest, load_end, rolling, steady_forces
 from .mesh_element import MeshLine, OperatingPoint, Shafts, mesh_line
 from .phases import pair_shifts, tooth_places
-from .scene import Drive, TrainScene
 from .series import train_series
 
 
@@ -35,7 +35,7 @@ class TrainModel:
 
     Attributes
     ----------
-    scene, rolling
+    train, rolling
         What it was made from; its kinematics.
     system, core, start
         System of the rigid core, its minimal coordinates, its start.
@@ -59,7 +59,7 @@ class TrainModel:
         Names of the bores that carry shafts, in the housing's order.
     """
 
-    scene: TrainScene
+    train: GearTrain
     rolling: Rolling
     system: System
     core: ModalCoordinates
@@ -84,8 +84,8 @@ class TrainModel:
     @property
     def steady_speed(self) -> float:
         """Speed of the drive once its function of time has ended (rad/s)."""
-        breaks = self.scene.driven.speed.breaks
-        return float(self.scene.driven.speed(max(breaks, default=0.0)))
+        breaks = self.train.driven.speed.breaks
+        return float(self.train.driven.speed(max(breaks, default=0.0)))
 
     @property
     def torque_end(self) -> float:
@@ -95,7 +95,7 @@ class TrainModel:
     @property
     def load_end(self) -> float:
         """Time at which all load ramps have ended (s)."""
-        return load_end(self.scene)
+        return load_end(self.train)
 
     @property
     def coupled_frequencies_hz(self) -> Array:
@@ -108,54 +108,54 @@ class TrainModel:
         return np.asarray(np.linalg.pinv(self.system.jacobian(0.0, np.zeros(self.system.size))))
 
 
-def build_train(scene: TrainScene) -> TrainModel:
-    """Check a scene and set up its system.
+def build_train(train: GearTrain) -> TrainModel:
+    """Check a gear train and set up its system.
 
     Raises
     ------
     InputError
-        For the first thing in the scene that does not fit, with the cure.
+        For the first thing in the train that does not fit, with the cure.
     """
-    check_scene(scene)
-    kinematics = rolling(scene)
-    frame = scene.frame
-    angle = scene.driven.speed.integral(0.0, 0.0)
-    housing = _housing(scene)
+    check_scene(train)
+    kinematics = rolling(train)
+    frame = train.frame
+    angle = train.driven.speed.integral(0.0, 0.0)
+    housing = _housing(train)
     ratios = [float(r) for r in kinematics.ratios]
-    begin = float(scene.driven.speed(0.0))
+    begin = float(train.driven.speed(0.0))
     shafts = tuple(
         RigidShaft(
-            rotor(shaft, tuple(g for g in scene.gears if g.shaft == shaft.name), frame[2]),
+            rotor(shaft, tuple(g for g in train.gears if g.shaft == shaft.name), frame[2]),
             0.0 if shaft.initial_speed is None else shaft.initial_speed - g * begin,
             name=f"shaft {shaft.name}",
         )
-        for shaft, g in zip(scene.shafts, ratios, strict=True)
+        for shaft, g in zip(train.shafts, ratios, strict=True)
     )
     bodies: list[Element] = [*shafts] if housing is None else [housing, *shafts]
     first = np.array([0 if housing is None else housing.size] + [6] * (len(shafts) - 1)).cumsum()
     size = sum(b.size for b in bodies)
-    senses = driving_senses(scene)
-    places, speed = tooth_places(scene, senses), fastest(scene.driven.speed)
+    senses = driving_senses(train)
+    places, speed = tooth_places(train, senses), fastest(train.driven.speed)
     placed = Shafts(shafts, first, tuple(ratios), size)
     points = (
-        OperatingPoint(sense, phase, float(force), speed, pair_shifts(scene, mesh, sense, places))
-        for mesh, sense, phase, force in zip(scene.meshes, senses, places.phases, steady_forces(scene), strict=True)
+        OperatingPoint(sense, phase, float(force), speed, pair_shifts(train, mesh, sense, places))
+        for mesh, sense, phase, force in zip(train.meshes, senses, places.phases, steady_forces(train), strict=True)
     )
-    lines = tuple(mesh_line(scene, mesh, placed, point) for mesh, point in zip(scene.meshes, points, strict=True))
-    torques = _torques(scene, placed, angle)
-    forces, directions = _forces(scene, lines, torques, angle, placed)
+    lines = tuple(mesh_line(train, mesh, placed, point) for mesh, point in zip(train.meshes, points, strict=True))
+    torques = _torques(train, placed, angle)
+    forces, directions = _forces(train, lines, torques, angle, placed)
     series = train_series(forces)
     changing = LocalForce(
         tuple(bodies), directions, forces.at_one_time, series, forces.breaks, name="forces of the train"
     )
-    elements = [*bodies, *_supports(scene, shafts, housing), *(line.element(bodies) for line in lines), changing]
-    system, core = _damped(scene, elements, bodies)
+    elements = [*bodies, *_supports(train, shafts, housing), *(line.element(bodies) for line in lines), changing]
+    system, core = _damped(train, elements, bodies)
     return TrainModel(
-        scene=scene,
+        train=train,
         rolling=kinematics,
         system=system,
         core=core,
-        start=_start(scene, system, shafts, first),
+        start=_start(train, system, shafts, first),
         angle=angle,
         shafts=shafts,
         housing=housing,
@@ -164,13 +164,13 @@ def build_train(scene: TrainScene) -> TrainModel:
         forces=forces,
         directions=directions,
         first=first,
-        spin_reference=_spin_reference(scene, size, first),
-        axial=_axial(scene, size),
-        bores=_used_bores(scene),
+        spin_reference=_spin_reference(train, size, first),
+        axial=_axial(train, size),
+        bores=_used_bores(train),
     )
 
 
-def _torques(scene: TrainScene, shafts: Shafts, angle: TimeFunction) -> tuple[tuple[Array, TimeFunction], ...]:
+def _torques(train: GearTrain, shafts: Shafts, angle: TimeFunction) -> tuple[tuple[Array, TimeFunction], ...]:
     """Directions in the system with torques over time: loads, and the shafts' inertia when the drive changes speed."""
     made, first, size = [], shafts.first, shafts.size
     change = derivative(derivative(angle))
@@ -179,25 +179,25 @@ def _torques(scene: TrainScene, shafts: Shafts, angle: TimeFunction) -> tuple[tu
             direction = np.zeros(size)
             direction[first[i] + 5] = 1.0
             made.append((direction, -ratio * shaft.rotor.polar * change))
-    for load in scene.loads:
-        i = [s.name for s in scene.shafts].index(load.shaft)
+    for load in train.loads:
+        i = [s.name for s in train.shafts].index(load.shaft)
         direction = np.zeros(size)
         direction[first[i] + 5] = 1.0
-        if scene.housing is not None and load.bore is not None:
-            direction[: scene.housing.size] -= bore_selector(scene, load.bore)[:, 3:] @ scene.frame[2]
+        if train.housing is not None and load.bore is not None:
+            direction[: train.housing.size] -= bore_selector(train, load.bore)[:, 3:] @ train.frame[2]
         made.append((direction, load.torque))
     return tuple(made)
 
 
 def _forces(
-    scene: TrainScene, lines: tuple[MeshLine, ...], torques: tuple[tuple[Array, TimeFunction], ...],
+    train: GearTrain, lines: tuple[MeshLine, ...], torques: tuple[tuple[Array, TimeFunction], ...],
     angle: TimeFunction, shafts: Shafts,
 ) -> tuple[TrainForces, Array]:  # fmt: skip
     """All that is not constant: three directions a shaft (tilts, spin), up to six a mesh, one a torque."""
     unit = np.eye(shafts.size)
     columns = [column for i in shafts.first for column in unit[i + 3 : i + 6]]
     gyros: tuple[Gyro, ...] = ()
-    if scene.damping.gyroscopic:
+    if train.damping.gyroscopic:
         gyros = tuple(
             Gyro(3 * i, g, s.rotor.polar) for i, (g, s) in enumerate(zip(shafts.ratios, shafts.bodies, strict=True))
         )
@@ -212,47 +212,47 @@ def _forces(
     return made, np.array(columns).T
 
 
-def bore_selector(scene: TrainScene, bore: str) -> Array:
+def bore_selector(train: GearTrain, bore: str) -> Array:
     """Columns that pick a bore's six coordinates from the housing's, shape (N, 6)."""
-    assert scene.housing is not None
-    return np.eye(scene.housing.size)[:, scene.housing.attachment(bore)]
+    assert train.housing is not None
+    return np.eye(train.housing.size)[:, train.housing.attachment(bore)]
 
 
-def _housing(scene: TrainScene) -> ModalBlocks | None:
-    body = scene.housing
+def _housing(train: GearTrain) -> ModalBlocks | None:
+    body = train.housing
     if body is None:
         return None
-    damping = body.damping + scene.damping.alpha * body.mass + scene.damping.beta * body.stiffness
+    damping = body.damping + train.damping.alpha * body.mass + train.damping.beta * body.stiffness
     return ModalBlocks(body.mass, damping, body.stiffness, name="housing")
 
 
-def _supports(scene: TrainScene, shafts: tuple[RigidShaft, ...], housing: ModalBlocks | None) -> list[Element]:
+def _supports(train: GearTrain, shafts: tuple[RigidShaft, ...], housing: ModalBlocks | None) -> list[Element]:
     """Hinges or bearings of all bores, and the drive."""
     made: list[Element] = []
-    bearings = {b.bore: b for b in scene.bearings}
-    for shaft, body in zip(scene.shafts, shafts, strict=True):
+    bearings = {b.bore: b for b in train.bearings}
+    for shaft, body in zip(train.shafts, shafts, strict=True):
         for bore in shaft.bores:
-            chosen = None if housing is None else bore_selector(scene, bore)
-            rows = bore_rows(body, scene.bore_points[bore], scene.frame, chosen)
+            chosen = None if housing is None else bore_selector(train, bore)
+            rows = bore_rows(body, train.bore_points[bore], train.frame, chosen)
             if bore in bearings:
                 stiffness, damping = (
                     np.array(x, dtype=float) for x in (bearings[bore].stiffness, bearings[bore].damping)
                 )
-                damping = damping + scene.damping.beta * stiffness
+                damping = damping + train.damping.beta * stiffness
                 made.append(bearing(body, housing, rows, stiffness, damping, f"bearing {bore}"))
             else:
                 made.append(hinge(body, housing, rows, f"hinge {bore}"))
-        if scene.damping.alpha > 0.0:
+        if train.damping.alpha > 0.0:
             made.append(
-                LinearForce((body,), scene.damping.alpha * body.mass(), np.zeros((6, 6)), f"damping of {body.name}")
+                LinearForce((body,), train.damping.alpha * body.mass(), np.zeros((6, 6)), f"damping of {body.name}")
             )
-        if shaft.name == scene.driven.shaft:
+        if shaft.name == train.driven.shaft:
             row = np.eye(6)[5:]
             touches: tuple[Element, ...] = (body,)
             if housing is not None:
-                row = np.hstack([row, -(bore_selector(scene, scene.driven.bore)[:, 3:] @ scene.frame[2])[None, :]])
+                row = np.hstack([row, -(bore_selector(train, train.driven.bore)[:, 3:] @ train.frame[2])[None, :]])
                 touches = (body, housing)
-            made.append(_drive(scene.driven, touches, row))
+            made.append(_drive(train.driven, touches, row))
     return made
 
 
@@ -264,11 +264,11 @@ def _drive(drive: Drive, touches: tuple[Element, ...], row: Array) -> Element:
     return LinearForce(touches, drive.damping * square, drive.stiffness * square, "drive")
 
 
-def _damped(scene: TrainScene, elements: list[Element], bodies: list[Element]) -> tuple[System, ModalCoordinates]:
+def _damped(train: GearTrain, elements: list[Element], bodies: list[Element]) -> tuple[System, ModalCoordinates]:
     """System and minimal coordinates; modal damping is written in the modes of the coupled system itself."""
     system = System(elements)
     core = modal_coordinates(system)
-    ratios = np.atleast_1d(np.asarray(scene.damping.ratio, dtype=float))
+    ratios = np.atleast_1d(np.asarray(train.damping.ratio, dtype=float))
     if not ratios.any():
         return system, core
     count = len(core.squares)
@@ -284,17 +284,17 @@ def _damped(scene: TrainScene, elements: list[Element], bodies: list[Element]) -
     return damped, made
 
 
-def _start(scene: TrainScene, system: System, shafts: tuple[RigidShaft, ...], first: IntArray) -> Start:
+def _start(train: GearTrain, system: System, shafts: tuple[RigidShaft, ...], first: IntArray) -> Start:
     """At rest beside rolling but for the asked speeds, which the constraints must allow."""
     start = consistent_start(system, 0.0)
     open_rows = {system.row_names()[i] for i in start.freedoms.redundant}
-    for mesh in scene.meshes:
+    for mesh in train.meshes:
         if f"mesh {mesh.name} (0)" in open_rows:
             problem = (
                 "leaves the forces open: rigid meshes close a loop in a rigid housing, and statics do not share it"
             )
             raise InputError(f"mesh {mesh.name!r} rigid", True, problem, "give the meshes of the loop a stiffness")
-    for shaft, body, i in zip(scene.shafts, shafts, first, strict=True):
+    for shaft, body, i in zip(train.shafts, shafts, first, strict=True):
         off = float(start.v[i + 5]) - body.start_rate
         if shaft.initial_speed is not None and abs(off) > 1e-6 * max(1.0, abs(shaft.initial_speed)):
             problem = f"contradicts the drive and the rigid parts, which make it {shaft.initial_speed + off:.9g} rad/s"
@@ -303,32 +303,32 @@ def _start(scene: TrainScene, system: System, shafts: tuple[RigidShaft, ...], fi
     return start
 
 
-def _used_bores(scene: TrainScene) -> tuple[str, ...]:
-    used = {b for s in scene.shafts for b in s.bores}
-    return tuple(name for name in scene.bore_points if name in used)
+def _used_bores(train: GearTrain) -> tuple[str, ...]:
+    used = {b for s in train.shafts for b in s.bores}
+    return tuple(name for name in train.bore_points if name in used)
 
 
-def _measured_against(scene: TrainScene, name: str) -> str:
+def _measured_against(train: GearTrain, name: str) -> str:
     """Bore against which a shaft's rotation is measured: the drive's, the load's, or its first."""
-    ends = [(scene.driven.shaft, scene.driven.bore), *((x.shaft, x.bore) for x in scene.loads)]
-    return next((bore for shaft, bore in ends if shaft == name and bore is not None), scene.shaft(name).bores[0])
+    ends = [(train.driven.shaft, train.driven.bore), *((x.shaft, x.bore) for x in train.loads)]
+    return next((bore for shaft, bore in ends if shaft == name and bore is not None), train.shaft(name).bores[0])
 
 
-def _spin_reference(scene: TrainScene, size: int, first: IntArray) -> Array:
-    rows = np.zeros((len(scene.shafts), size))
-    for i, shaft in enumerate(scene.shafts):
+def _spin_reference(train: GearTrain, size: int, first: IntArray) -> Array:
+    rows = np.zeros((len(train.shafts), size))
+    for i, shaft in enumerate(train.shafts):
         rows[i, first[i] + 5] = 1.0
-        if scene.housing is not None:
-            bore = bore_selector(scene, _measured_against(scene, shaft.name))
-            rows[i, : len(bore)] -= bore[:, 3:] @ scene.frame[2]
+        if train.housing is not None:
+            bore = bore_selector(train, _measured_against(train, shaft.name))
+            rows[i, : len(bore)] -= bore[:, 3:] @ train.frame[2]
     return rows
 
 
-def _axial(scene: TrainScene, size: int) -> Array:
-    bores = _used_bores(scene)
+def _axial(train: GearTrain, size: int) -> Array:
+    bores = _used_bores(train)
     rows = np.zeros((len(bores), size))
-    if scene.housing is not None:
+    if train.housing is not None:
         for i, bore in enumerate(bores):
-            selector = bore_selector(scene, bore)
-            rows[i, : len(selector)] = selector[:, :3] @ scene.frame[2]
+            selector = bore_selector(train, bore)
+            rows[i, : len(selector)] = selector[:, :3] @ train.frame[2]
     return rows

@@ -62,11 +62,11 @@ def motion(model: TrainModel, trajectory: Trajectory) -> Motion:
     if by_modes:
         a = (core.constant - y * core.squares - dy @ core.damping.T + acting @ core.T) @ core.T.T
     multipliers = joint_multipliers(model, q, v, a, acting)
-    drive = model.scene.driven
+    drive = model.train.driven
     if drive.stiffness is None:
         push = -multipliers["drive"][:, 0]
     else:
-        row = model.spin_reference[[s.name for s in model.scene.shafts].index(drive.shaft)]
+        row = model.spin_reference[[s.name for s in model.train.shafts].index(drive.shaft)]
         push = -drive.stiffness * (q @ row) - drive.damping * (v @ row)
     rows = np.array([line.row for line in model.meshes]).reshape(-1, q.shape[1])
     force, drag, loss, apart = contact_forces(model, v, flanks, multipliers)

@@ -23,7 +23,7 @@ import numpy as np
 from ..errors import InputError
 from ..gear.mesh_geometry import MeshGeometry
 from ..typing import Array
-from .scene import GearMesh, TrainScene
+from .gear_train import GearMesh, GearTrain
 
 #: Agreement of the shafts' places that a check asks for, relative to the centre distance.
 SAME = 1e-6
@@ -83,7 +83,7 @@ class _Join:
         return math.remainder(sides - self.rest, 2.0 * math.pi) / self.teeth[0]
 
 
-def tooth_places(scene: TrainScene, senses: Sequence[float]) -> ToothPlaces:
+def tooth_places(train: GearTrain, senses: Sequence[float]) -> ToothPlaces:
     """Places of all teeth and phases of all meshes.
 
     The first mesh of gears that hang together has the phase 0, unless one of them is given a phase.
@@ -99,7 +99,7 @@ def tooth_places(scene: TrainScene, senses: Sequence[float]) -> ToothPlaces:
         For a closed chain of gears whose driving flanks cannot all touch, and for a given phase that the teeth of
         shared gears contradict.
     """
-    joins = [_join(scene, mesh, sense) for mesh, sense in zip(scene.meshes, senses, strict=True)]
+    joins = [_join(train, mesh, sense) for mesh, sense in zip(train.meshes, senses, strict=True)]
     found: dict[str, float] = {}
     for join in sorted(joins, key=lambda j: j.mesh.phase is None):
         if join.mesh.driver not in found and join.mesh.driven not in found:
@@ -109,12 +109,12 @@ def tooth_places(scene: TrainScene, senses: Sequence[float]) -> ToothPlaces:
     for join in joins:
         _check(join, found, room)
     phases = tuple(join.phase(found[join.mesh.driver]) for join in joins)
-    return ToothPlaces({gear.name: found.get(gear.name, 0.0) for gear in scene.gears}, phases)
+    return ToothPlaces({gear.name: found.get(gear.name, 0.0) for gear in train.gears}, phases)
 
 
-def _join(scene: TrainScene, mesh: GearMesh, sense: float) -> _Join:
-    one, two = scene.gear(mesh.driver), scene.gear(mesh.driven)
-    arm = scene.frame[:2] @ (np.array(scene.shaft(two.shaft).point) - np.array(scene.shaft(one.shaft).point))
+def _join(train: GearTrain, mesh: GearMesh, sense: float) -> _Join:
+    one, two = train.gear(mesh.driver), train.gear(mesh.driven)
+    arm = train.frame[:2] @ (np.array(train.shaft(two.shaft).point) - np.array(train.shaft(one.shaft).point))
     pair = MeshGeometry(one.gear, two.gear, mesh.centre_distance)
     return _Join(
         mesh,
@@ -162,7 +162,7 @@ def _check(join: _Join, found: dict[str, float], room: float) -> None:
         raise InputError(f"mesh {mesh.name!r} phase_deg", math.degrees(mesh.phase), problem, cure)
 
 
-def pair_shifts(scene: TrainScene, mesh: GearMesh, sense: float, places: ToothPlaces) -> tuple[Array, Array]:
+def pair_shifts(train: GearTrain, mesh: GearMesh, sense: float, places: ToothPlaces) -> tuple[Array, Array]:
     r"""How much later the tooth pairs of a mesh touch by the pitch errors of its gears (m): driving and back flanks.
 
     Pair k is the k-th tooth of the driver behind the one whose place is the phase. It meets the driver's tooth
@@ -173,12 +173,12 @@ def pair_shifts(scene: TrainScene, mesh: GearMesh, sense: float, places: ToothPl
     -------
     Arrays of the length of a period, the least common multiple of the numbers of teeth, or (1,) without errors.
     """
-    join = _join(scene, mesh, sense)
-    return _shifts(scene, join, places, join.sense), _shifts(scene, join, places, -join.sense)
+    join = _join(train, mesh, sense)
+    return _shifts(train, join, places, join.sense), _shifts(train, join, places, -join.sense)
 
 
-def _shifts(scene: TrainScene, join: _Join, places: ToothPlaces, sense: float) -> Array:
-    one, two = scene.gear(join.mesh.driver), scene.gear(join.mesh.driven)
+def _shifts(train: GearTrain, join: _Join, places: ToothPlaces, sense: float) -> Array:
+    one, two = train.gear(join.mesh.driver), train.gear(join.mesh.driven)
     errors = [np.array(g.pitch_errors[0 if sense > 0.0 else 1] or (0.0,)) for g in (one, two)]
     if not any(e.any() for e in errors):
         return np.zeros(1)

@@ -226,7 +226,7 @@ class _SoFar:
             "free_coordinates": model.core.T.shape[1],
             "redundant_constraints": redundant_names(model),
             "smallest_contact_force_N": self.least.tolist(),
-            "steady_forces_N": steady_forces(model.scene).tolist(),
+            "steady_forces_N": steady_forces(model.train).tolist(),
             "flanks": [line.told for line in model.meshes],
             "friction_coefficients": [0.0 if x.sliding is None else x.sliding.coefficient for x in model.meshes],
             **parted(self.parting, [line.rigid or line.pulls for line in model.meshes]),
@@ -294,10 +294,10 @@ def _whole(
     estimates: dict[str, float] = {}
     if finer is not None and band_hz is not None:
         estimates["integration"] = finer.error
-        if model.scene.housing is not None:
+        if model.train.housing is not None:
             from ..reduction.error import reduction_error
 
-            estimates["reduction"] = reduction_error(model.scene.housing, band_hz).response
+            estimates["reduction"] = reduction_error(model.train.housing, band_hz).response
     multipliers, note = (None, "not computed") if not floquet else train_multipliers(model)
     if multipliers is not None and abs(multipliers[0]) > STABLE:
         growth, period = abs(multipliers[0]) - 1.0, float(response.common_period_s or 0.0)
@@ -310,7 +310,7 @@ def _whole(
 
 def _loose(model: TrainModel) -> list[str]:
     """Sentences about meshes whose teeth may part and that nothing presses together in steady running."""
-    forces = np.abs(steady_forces(model.scene))
+    forces = np.abs(steady_forces(model.train))
     return [
         f"no load keeps the teeth of mesh {line.name} in contact: what they do depends on how they begin, and without "
         "damping it does not settle"
@@ -342,7 +342,7 @@ def _too_far(model: TrainModel, reach: Array, shafts: Array, limit: float) -> st
     if reach.max() > limit:
         what, size = f"mesh {model.meshes[int(reach.argmax())].name} yields", reach.max()
     else:
-        what, size = f"shaft {model.scene.shafts[int(shafts.argmax()) // 3].name} moves", shafts.max()
+        what, size = f"shaft {model.train.shafts[int(shafts.argmax()) // 3].name} moves", shafts.max()
     return (
         f"; {what} by {1e3 * size:.3g} mm, more than {DIVERGED:g} module ({1e3 * limit:.3g} mm), where the gears' "
         "geometry no longer holds: lower the load, ramp it up more slowly, or stiffen or damp meshes and bearings"
@@ -357,13 +357,13 @@ def response_of(
     model: TrainModel, moved: Motion, status: str, reached: float, statistics: dict[str, Any]
 ) -> TrainResponse:
     """A motion as a response, without multipliers and estimates."""
-    scene, t = model.scene, moved.time
+    train, t = model.train, moved.time
     spin = [int(i) + 5 for i in model.first]
     rate, push = (model.angle(t, k)[:, None] * model.ratios for k in (1, 2))
     bodies = 0 if model.housing is None else model.housing.size
     poses, centres = _gear_poses(model, moved)
     speed, common = abs(model.steady_speed), model.rolling.common_turns
-    steady = scene.drive.speed.ends if scene.drive else False
+    steady = train.drive.speed.ends if train.drive else False
     return TrainResponse(
         time=t,
         drive_angle=model.angle(t),
@@ -374,14 +374,14 @@ def response_of(
         drive_torque=moved.drive_torque,
         mesh_power=moved.mesh_power,
         friction_power=moved.friction_power,
-        shaft_names=tuple(s.name for s in scene.shafts),
+        shaft_names=tuple(s.name for s in train.shafts),
         speed=rate + moved.v @ model.spin_reference.T,
         speed_absolute=rate + moved.v[:, spin],
         acceleration=push + moved.a @ model.spin_reference.T,
         acceleration_absolute=push + moved.a[:, spin],
         attachment_names=model.bores,
         attachment_acceleration=moved.a @ model.axial.T,
-        gear_names=tuple(g.name for g in scene.gears),
+        gear_names=tuple(g.name for g in train.gears),
         gear_pose=poses,
         gear_centres=centres,
         modal=moved.q[:, :bodies] if bodies else None,
@@ -401,13 +401,13 @@ def response_of(
 
 
 def _gear_poses(model: TrainModel, moved: Motion) -> tuple[Array, Array]:
-    scene, frame = model.scene, model.scene.frame
-    names = [s.name for s in scene.shafts]
-    poses = np.zeros((len(moved.time), len(scene.gears), 6))
-    centres = np.zeros((len(scene.gears), 3))
-    for i, item in enumerate(scene.gears):
+    train, frame = model.train, model.train.frame
+    names = [s.name for s in train.shafts]
+    poses = np.zeros((len(moved.time), len(train.gears), 6))
+    centres = np.zeros((len(train.gears), 3))
+    for i, item in enumerate(train.gears):
         k = names.index(item.shaft)
-        base = np.array(scene.shafts[k].point)
+        base = np.array(train.shafts[k].point)
         centres[i] = base + (item.along - float(base @ frame[2])) * frame[2]
         own = moved.q[:, model.first[k] : model.first[k] + 6]
         turn = own[:, 3:].copy()

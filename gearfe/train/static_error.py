@@ -9,26 +9,26 @@ import numpy as np
 from ..meshlaw.law import MeshLaw
 from ..typing import Array
 from .checks import interpolant
+from .gear_train import GearMesh, GearTrain
 from .kinematics import driving_senses, rolling, steady_forces
 from .phases import pair_shifts, tooth_places
-from .scene import GearMesh, TrainScene
 
 
-def static_errors(scene: TrainScene, angle: Array) -> tuple[Array | None, ...]:
+def static_errors(train: GearTrain, angle: Array) -> tuple[Array | None, ...]:
     """Approach of each mesh (m) at rotations of the drive (rad), bodies rolling rigidly; None where nothing yields.
 
     A force that presses the back flanks makes the mirrored approach behind the backlash. None also where a force is
     beyond what a law is known for, or presses flanks of which nothing is known.
     """
-    senses = driving_senses(scene)
-    places, ratios = tooth_places(scene, senses), rolling(scene).ratios
-    shafts = [shaft.name for shaft in scene.shafts]
+    senses = driving_senses(train)
+    places, ratios = tooth_places(train, senses), rolling(train).ratios
+    shafts = [shaft.name for shaft in train.shafts]
     made: list[Array | None] = []
     for mesh, sense, phase, force in zip(
-        scene.meshes, senses, places.phases, steady_forces(scene).tolist(), strict=True
+        train.meshes, senses, places.phases, steady_forces(train).tolist(), strict=True
     ):
-        ratio = float(ratios[shafts.index(scene.gear(mesh.driver).shaft)])
-        shifts = pair_shifts(scene, mesh, sense, places)
+        ratio = float(ratios[shafts.index(train.gear(mesh.driver).shaft)])
+        shifts = pair_shifts(train, mesh, sense, places)
         made.append(_approach(mesh, force, sense * ratio * angle + phase, shifts))
     return tuple(made)
 

@@ -13,9 +13,9 @@ import numpy as np
 from ..output.files import write_csv
 from ..spectrum import Waterfall
 from ..tables.spectrum import STEADY, SpectrumTable
+from ..train.gear_train import GearTrain
 from ..train.kinematics import rolling
 from ..train.response import TrainResponse
-from ..train.scene import TrainScene
 from ..typing import Array
 from .job import TrainJob
 from .measured import Measured, read_measured
@@ -75,7 +75,7 @@ class Analysis:
 
     Parameters
     ----------
-    job, scene
+    job, train
         The job and its train.
     every
         Samples of the response in an output step.
@@ -89,20 +89,20 @@ class Analysis:
         are longer than the run.
     """
 
-    def __init__(self, job: TrainJob, scene: TrainScene, every: int, start: float) -> None:
-        self.table, self.scene, self.every, self.start = job.spectrum, scene, every, start
+    def __init__(self, job: TrainJob, train: GearTrain, every: int, start: float) -> None:
+        self.table, self.train, self.every, self.start = job.spectrum, train, every, start
         self._step = 1e-6 * job.table.step_us
         self.measured = read_measured(job)
-        ratios = dict(zip((s.name for s in scene.shafts), rolling(scene).ratios, strict=True))
+        ratios = dict(zip((s.name for s in train.shafts), rolling(train).ratios, strict=True))
         #: turns of the first shaft for one of the drive
-        self.ratio = float(ratios[scene.shafts[0].name])
-        cycles = [abs(ratios[scene.gear(m.driver).shaft]) * scene.gear(m.driver).gear.teeth for m in scene.meshes]
+        self.ratio = float(ratios[train.shafts[0].name])
+        cycles = [abs(ratios[train.gear(m.driver).shaft]) * train.gear(m.driver).gear.teeth for m in train.meshes]
         self.mesh_orders = np.array([float(c) for c in cycles]) / abs(self.ratio)
         self._tracked: Tracked | None = None
         if self.table.short_time_ms is not None:  # told before the long computation
             check_part(1e-3 * self.table.short_time_ms, self._step, float(job.times[-1]))
         if self.table.order_turns is not None:
-            check_turns(self.ratio * scene.driven.speed.integral()(job.times), self.table.order_turns)
+            check_turns(self.ratio * train.driven.speed.integral()(job.times), self.table.order_turns)
 
     @property
     def wanted(self) -> bool:
@@ -189,7 +189,7 @@ def _rms(amplitude: Array) -> float:
     return math.sqrt(0.5 * float((np.asarray(amplitude) ** 2).sum()))
 
 
-def steady_start(job: TrainJob, scene: TrainScene, every: int) -> float:
+def steady_start(job: TrainJob, train: GearTrain, every: int) -> float:
     """Time (s) from which a run is steady, from a rough one; see `gearfe.vibration.short_time.steady_from`.
 
     Raises
@@ -198,7 +198,7 @@ def steady_start(job: TrainJob, scene: TrainScene, every: int) -> float:
         When it is not steady for its last quarter.
     """
     tracked, period = Tracked(every, 1e-6 * job.table.step_us), None
-    for piece in repeater(job, every)(scene, job.table.method)(job.times):
+    for piece in repeater(job, every)(train, job.table.method)(job.times):
         tracked.add(piece)
         period = piece.common_period_s
     time, _, values = tracked.finished()
@@ -210,7 +210,7 @@ def steady_start(job: TrainJob, scene: TrainScene, every: int) -> float:
 
 
 def record_start(
-    job: TrainJob, scene: TrainScene, every: int, asked_ms: float | None, watch: Callable[[str], Any]
+    job: TrainJob, train: GearTrain, every: int, asked_ms: float | None, watch: Callable[[str], Any]
 ) -> float:
     """Begin of the spectrum's record (s): the option's, or that of [spectrum]; "steady" is looked for."""
     if asked_ms is not None:
@@ -219,7 +219,7 @@ def record_start(
     if given != STEADY:
         return 1e-3 * float(given)
     with watch("steady part"):
-        return steady_start(job, scene, every)
+        return steady_start(job, train, every)
 
 
 def spectrogram_columns(made: Analysed) -> dict[str, Any]:

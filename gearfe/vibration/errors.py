@@ -30,7 +30,7 @@ from ..meshlaw.law import MeshLaw
 from ..reduction.modal_body import ModalBody
 from ..stiffness.curve import StiffnessCurve
 from ..train import build_train
-from ..train.scene import TrainScene
+from ..train.gear_train import GearTrain
 from ..typing import Array
 from .spectra import TrainSpectra
 
@@ -52,7 +52,7 @@ class Run:
 
 
 def with_errors(
-    run: Run, scene: TrainScene, again: Callable[[TrainScene], Run], *, band_hz: float = 5000.0
+    run: Run, train: GearTrain, again: Callable[[GearTrain], Run], *, band_hz: float = 5000.0
 ) -> dict[str, Any]:
     """The summary of a run with an estimate of the error beside each number that it is read for.
 
@@ -60,7 +60,7 @@ def with_errors(
     ----------
     run
         The run; its summary holds the estimates of integration and reduction.
-    scene
+    train
         Its train.
     again
         Repeats it with a changed train.
@@ -77,7 +77,7 @@ def with_errors(
     if summary.get("status") != "done" or FORCES[0] not in summary:
         return summary
     base = _numbers(run, run)
-    parts = _parts(run, scene, again, base, band_hz)
+    parts = _parts(run, train, again, base, band_hz)
     total = {name: np.sum([part[name] for part in parts.values()], axis=0) for name in base}
     summary["headline_errors"] = _named(total, summary)
     summary["headline_error_parts"] = {source: _named(part, summary) for source, part in parts.items()}
@@ -91,18 +91,18 @@ def with_errors(
 
 
 def _parts(
-    run: Run, scene: TrainScene, again: Callable[[TrainScene], Run], base: dict[str, Array], band_hz: float
+    run: Run, train: GearTrain, again: Callable[[GearTrain], Run], base: dict[str, Array], band_hz: float
 ) -> dict[str, dict[str, Array]]:
     """Source -> number -> its share of the error."""
     estimates = run.summary["error_estimates"]
-    body = scene.housing
+    body = train.housing
     parts = {}
     if body is not None:
-        softer = [_numbers(again(replace(scene, housing=half)), run) for half in _halves(body)]
+        softer = [_numbers(again(replace(train, housing=half)), run) for half in _halves(body)]
         parts["mesh"] = {
             name: 2.0 * np.max([abs(abs(x[name]) - abs(base[name])) for x in softer], axis=0) for name in base
         }
-        softest = build_train(replace(scene, housing=body.softened())).coupled_frequencies_hz  # these fall all the way
+        softest = build_train(replace(train, housing=body.softened())).coupled_frequencies_hz  # these fall all the way
         parts["mesh"]["coupled_frequencies_Hz"] = base["coupled_frequencies_Hz"] - softest
         _forget(parts["mesh"], run, body.highest_hz)
         if not body.softening.any():  # no estimate is not no error
@@ -110,7 +110,7 @@ def _parts(
         parts["reduction"] = _reduction(run, body, base, band_hz)
         parts["start"] = {name: np.zeros(values.shape) for name, values in base.items()}
         parts["start"][PEAKS] = np.array(list(run.summary[STARTS].values()), dtype=float)
-    stiffer = _stiffer(scene)
+    stiffer = _stiffer(train)
     if stiffer is not None:
         changed = _numbers(again(stiffer), run)
         parts["curve"] = {name: np.abs(changed[name] - base[name]) for name in base}
@@ -202,10 +202,10 @@ def _forget(part: dict[str, Array], run: Run, highest: float) -> None:
         part["lines"] = np.where(_line_frequencies(run) > highest, math.nan, part["lines"])
 
 
-def _stiffer(scene: TrainScene) -> TrainScene | None:
+def _stiffer(train: GearTrain) -> GearTrain | None:
     """The train with each computed stiffness larger by its error; None where no stiffness has an estimate."""
     meshes, changed = [], False
-    for mesh in scene.meshes:
+    for mesh in train.meshes:
         curve = mesh.stiffness
         if isinstance(curve, MeshLaw) and math.isfinite(curve.error):
             meshes.append(replace(mesh, stiffness=curve.stiffer(curve.error)))
@@ -216,7 +216,7 @@ def _stiffer(scene: TrainScene) -> TrainScene | None:
             changed = True
         else:
             meshes.append(mesh)
-    return replace(scene, meshes=tuple(meshes)) if changed else None
+    return replace(train, meshes=tuple(meshes)) if changed else None
 
 
 def _named(values: Mapping[str, Array], summary: Mapping[str, Any]) -> dict[str, Any]:

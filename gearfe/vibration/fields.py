@@ -20,10 +20,10 @@ from ..gear.drawing import gear_outline
 from ..gear.spur_gear import Gear
 from ..output.vtkhdf import VtkHdfSeries
 from ..reduction.modal_body import ModalBody
+from ..train.gear_train import GearTrain, ShaftGear
 from ..train.kinematics import driving_senses, rolling
 from ..train.phases import tooth_places
 from ..train.response import TrainResponse
-from ..train.scene import ShaftGear, TrainScene
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -90,21 +90,21 @@ def cylinder_surface(radius: float, low: float, high: float) -> tuple[Array, Int
     return points, quads, np.concatenate([bottom, top])
 
 
-def solids(scene: TrainScene, response: TrainResponse, *, per_segment: int = 2) -> tuple[Solid, ...]:
+def solids(train: GearTrain, response: TrainResponse, *, per_segment: int = 2) -> tuple[Solid, ...]:
     """Surfaces of all gears and of the shafts that carry them, where they stand at the start."""
-    frame = scene.frame
-    senses = driving_senses(scene) if scene.drive is not None else (1.0,) * len(scene.meshes)
-    angles = tooth_places(scene, senses).angles
+    frame = train.frame
+    senses = driving_senses(train) if train.drive is not None else (1.0,) * len(train.meshes)
+    angles = tooth_places(train, senses).angles
     found = []
     carried: set[str] = set()
-    for gear in scene.gears:
+    for gear in train.gears:
         number = response.gear_names.index(gear.name)
         points, quads = gear_surface(gear.gear, angles[gear.name], per_segment=per_segment)
         none = np.zeros((0, 3), dtype=np.int64)
         found.append(Solid(number, response.gear_centres[number] + points @ frame, quads, none))
         if gear.shaft not in carried:
             carried.add(gear.shaft)
-            found.append(_shaft(scene, gear, number))
+            found.append(_shaft(train, gear, number))
     return tuple(found)
 
 
@@ -117,13 +117,13 @@ def moved(solid: Solid, response: TrainResponse, frame: Array, step: int, exagge
     return np.asarray(centre + exaggeration * pose[:3] + turned + np.cross(tilt, turned))
 
 
-def rolled(solid: Solid, scene: TrainScene, response: TrainResponse, step: int) -> Array:
+def rolled(solid: Solid, train: GearTrain, response: TrainResponse, step: int) -> Array:
     """(n, 3) points of a surface at an output step, had all shafts only rolled with the drive: no vibration."""
-    shafts = [shaft.name for shaft in scene.shafts]
-    ratio = float(rolling(scene).ratios[shafts.index(scene.gears[solid.gear].shaft)])
+    shafts = [shaft.name for shaft in train.shafts]
+    ratio = float(rolling(train).ratios[shafts.index(train.gears[solid.gear].shaft)])
     centre = response.gear_centres[solid.gear]
     return np.asarray(
-        centre + _turned(solid.points - centre, scene.frame[2], ratio * float(response.drive_angle[step]))
+        centre + _turned(solid.points - centre, train.frame[2], ratio * float(response.drive_angle[step]))
     )
 
 
@@ -133,9 +133,9 @@ def _turned(arm: Array, axis: Array, angle: float) -> Array:
     return np.asarray(along + np.cos(angle) * (arm - along) + np.sin(angle) * np.cross(axis, arm))
 
 
-def write_gears(path: Path, scene: TrainScene, response: TrainResponse, steps: Sequence[int] | Ints) -> None:
+def write_gears(path: Path, train: GearTrain, response: TrainResponse, steps: Sequence[int] | Ints) -> None:
     """VTKHDF series of the gears and shafts: places, displacement from the start and from rolling (m), number."""
-    parts, frame = solids(scene, response), scene.frame
+    parts, frame = solids(train, response), train.frame
     starts = np.cumsum([0, *(len(part.points) for part in parts)])
     cells = {
         "quad": np.concatenate([part.quads + s for part, s in zip(parts, starts, strict=False)]),
@@ -146,7 +146,7 @@ def write_gears(path: Path, scene: TrainScene, response: TrainResponse, steps: S
     with VtkHdfSeries(path) as series:
         for count, step in enumerate(steps):
             points = np.concatenate([moved(part, response, frame, int(step)) for part in parts])
-            smooth = np.concatenate([rolled(part, scene, response, int(step)) for part in parts])
+            smooth = np.concatenate([rolled(part, train, response, int(step)) for part in parts])
             moves = {"displacement_m": points - rest, "vibration_m": points - smooth}
             data = {"gear": number} | {name: values.astype(np.float32) for name, values in moves.items()}
             series.add(float(response.time[step]), points, None if count else cells, point_data=data)
@@ -182,7 +182,7 @@ def write_housing(
 
 
 def frames(
-    scene: TrainScene, response: TrainResponse, steps: Sequence[int] | Ints, *, exaggeration: float | None = None
+    train: GearTrain, response: TrainResponse, steps: Sequence[int] | Ints, *, exaggeration: float | None = None
 ) -> dict[str, NDArray[np.generic]]:
     """Arrays that `gearfe.figures.train_scene` draws: surfaces in all `steps`, in m, and their colours.
 
@@ -191,7 +191,7 @@ def frames(
     exaggeration
         Factor on displacement and tilt; by default such that the housing's largest one is seen.
     """
-    body, chosen = scene.housing, np.asarray(steps, dtype=np.int64)
+    body, chosen = train.housing, np.asarray(steps, dtype=np.int64)
     arrays: dict[str, NDArray[np.generic]] = {"time": response.time[chosen]}
     factor = 1.0 if exaggeration is None else exaggeration
     if body is not None and body.has_mesh:
@@ -212,8 +212,8 @@ def frames(
             "housing_points": (body.nodes[used] + factor * shift).astype(np.float32),
             "housing_values": np.einsum("snk,nk->sn", normal, body.normals[used]).astype(np.float32),
         }
-    parts, frame = solids(scene, response, per_segment=4), scene.frame
-    smooth = [np.concatenate([rolled(part, scene, response, int(s)) for part in parts]) for s in chosen]
+    parts, frame = solids(train, response, per_segment=4), train.frame
+    smooth = [np.concatenate([rolled(part, train, response, int(s)) for part in parts]) for s in chosen]
     true = [np.concatenate([moved(part, response, frame, int(s)) for part in parts]) for s in chosen]
     shown = [np.concatenate([moved(part, response, frame, int(s), factor) for part in parts]) for s in chosen]
     starts = np.cumsum([0, *(len(part.points) for part in parts)])
@@ -235,10 +235,10 @@ def _coordinates(response: TrainResponse) -> tuple[Array, Array]:
     return response.modal, response.modal_acceleration
 
 
-def _shaft(scene: TrainScene, gear: ShaftGear, number: int) -> Solid:
-    shaft = scene.shaft(gear.shaft)
+def _shaft(train: GearTrain, gear: ShaftGear, number: int) -> Solid:
+    shaft = train.shaft(gear.shaft)
     points, quads, triangles = cylinder_surface(shaft.radius, -0.5 * shaft.length, 0.5 * shaft.length)
-    return Solid(number, np.array(shaft.point) + points @ scene.frame, quads, triangles)
+    return Solid(number, np.array(shaft.point) + points @ train.frame, quads, triangles)
 
 
 def _rounded(factor: float) -> float:

@@ -13,8 +13,8 @@ import numpy as np
 from ..errors import InputError, given
 from ..output.files import whole_set, write_csv, write_json
 from ..stopwatch import Stopwatch
+from ..train.gear_train import GearTrain
 from ..train.response import TrainResponse
-from ..train.scene import TrainScene
 from ..typing import Array, IntArray
 from . import analysis
 from .errors import Run, with_errors
@@ -67,13 +67,13 @@ class OutputChoice:
 class Pictures(Protocol):
     """Who draws a run: `gearfe.figures.train.TrainPictures`. Pictures stand above the results that they draw."""
 
-    def curves(self, folder: Path, scene: TrainScene, made: Followed, spectra: TrainSpectra, attachment: str) -> None:
+    def curves(self, folder: Path, train: GearTrain, made: Followed, spectra: TrainSpectra, attachment: str) -> None:
         """Draw curves and spectra into a folder."""
 
     def analysis(self, folder: Path, made: analysis.Analysed, spectra: TrainSpectra | None, attachment: str) -> None:
         """Draw what [spectrum] asks for beside the spectrum."""
 
-    def fields(self, path: Path, scene: TrainScene, response: TrainResponse, steps: IntArray) -> str:
+    def fields(self, path: Path, train: GearTrain, response: TrainResponse, steps: IntArray) -> str:
         """Draw the fields at some output times; an empty text, or why nothing was drawn."""
 
 
@@ -131,8 +131,8 @@ def write_run(
     beside
         What [spectrum] asks for beside the spectrum.
     """
-    scene, times, every = planned.scene, planned.times, planned.every
-    radiation = scene.housing.radiation if scene.housing is not None and scene.housing.has_mesh else None
+    train, times, every = planned.train, planned.times, planned.every
+    radiation = train.housing.radiation if train.housing is not None and train.housing.has_mesh else None
     problems: list[str] = []
     with whole_set(folder, MAY_WRITE) as target:
 
@@ -148,7 +148,7 @@ def write_run(
             options: dict[str, Any] = {"window": choice.window, "start": first, "length": duration, "folder": folder}
             return TrainRecord(times, every, radiation, **options) if len(times) > 2 else None
 
-        def repeated(changed: TrainScene) -> Run:
+        def repeated(changed: GearTrain) -> Run:
             again = given(planned.again, "again")
             method = str(response.statistics["method"])
             found = follow(again(changed, method)(times), times, every, record=recorded(times, choice))
@@ -167,15 +167,15 @@ def write_run(
         run = Run(train_summary(made, {}, **planned.further), spectra)
         if planned.again is not None:
             with watch.stage("error estimates"):
-                run = Run(with_errors(run, scene, repeated, band_hz=planned.band_hz), spectra)
+                run = Run(with_errors(run, train, repeated, band_hz=planned.band_hz), spectra)
         with watch.stage("tables"):
             if spectra is not None:
                 write_csv(target / "spectrum.csv", spectra.columns())
-        loaded = next((load.bore for load in scene.loads if load.bore is not None), None)
+        loaded = next((load.bore for load in train.loads if load.bore is not None), None)
         if draw is not None and spectra is not None:
             with watch.stage("pictures"):
                 attachment = attachment_to_draw(made.curves, choice.attachment, loaded)
-                draw.curves(target, scene, made, spectra, attachment)
+                draw.curves(target, train, made, spectra, attachment)
         if beside is not None and beside.wanted and response.status != "done":
             problems.append("spectra over time and measured ones are left out: the run ended early")
         elif beside is not None and beside.wanted:
@@ -185,7 +185,7 @@ def write_run(
             run = Run({**run.summary, **analysed}, spectra)
         if choice.fields and made.outputs:
             with watch.stage("fields"):
-                problems += _fields(target, scene, made.kept, times[: made.outputs], choice, draw, progress)
+                problems += _fields(target, train, made.kept, times[: made.outputs], choice, draw, progress)
         watch.seconds["total"] = time.perf_counter() - watch.begun
         summary = {**run.summary, "timings_s": dict(watch.seconds)}
         write_json(target / "summary.json", summary)
@@ -220,7 +220,7 @@ def _shown(times: Array, choice: OutputChoice) -> tuple[IntArray, int, IntArray]
 
 def _fields(
     target: Path,
-    scene: TrainScene,
+    train: GearTrain,
     kept: TrainResponse,
     times: Array,
     choice: OutputChoice,
@@ -232,12 +232,12 @@ def _fields(
 
     steps = field_steps(times, choice)
     series, still, film = (np.searchsorted(steps, some) for some in _shown(times, choice))
-    write_gears(target / "gears.vtkhdf", scene, kept, series)
-    if scene.housing is not None and scene.housing.has_mesh:
-        write_housing(target / "housing.vtkhdf", scene.housing, kept, series, progress=progress)
+    write_gears(target / "gears.vtkhdf", train, kept, series)
+    if train.housing is not None and train.housing.has_mesh:
+        write_housing(target / "housing.vtkhdf", train.housing, kept, series, progress=progress)
     if draw is None:
         return []
-    problem = draw.fields(target / "fields.png", scene, kept, still[None])
+    problem = draw.fields(target / "fields.png", train, kept, still[None])
     if choice.animation and not problem:
-        problem = draw.fields(target / "fields.gif", scene, kept, film)
+        problem = draw.fields(target / "fields.gif", train, kept, film)
     return [f"fields were not drawn: {problem}"] if problem else []

@@ -12,8 +12,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..output.files import csv_table
+from ..train.gear_train import GearTrain
 from ..train.response import TrainResponse, joined
-from ..train.scene import TrainScene
 from ..typing import Array, IntArray
 from .spectra import TrainRecord, TrainSpectra, response_columns
 
@@ -29,7 +29,7 @@ class TrainRun:
 
     Attributes
     ----------
-    scene
+    train
         The train.
     times : (n,)
         Output times (s).
@@ -44,12 +44,12 @@ class TrainRun:
         Upper end of the band (Hz) in which the reduction's error is told.
     """
 
-    scene: TrainScene
+    train: GearTrain
     times: Array
     pieces: Callable[[Array], Iterable[TrainResponse]]
     every: int = 1
     further: Mapping[str, Any] = field(default_factory=dict)
-    again: Callable[[TrainScene, str], Callable[[Array], Iterable[TrainResponse]]] | None = None
+    again: Callable[[GearTrain, str], Callable[[Array], Iterable[TrainResponse]]] | None = None
     band_hz: float = 5000.0
 
 

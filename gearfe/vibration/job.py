@@ -29,7 +29,7 @@ from ..tables.stiffness import StiffnessTable
 from ..tables.timefunction import TrainFunctionTable
 from ..tables.train import TrainGearTable, TrainMeshTable, TrainTable, read_train_tables
 from ..train.friction import Lubrication
-from ..train.scene import Bearing, Damping, Drive, GearMesh, Load, Shaft, ShaftGear, TrainScene
+from ..train.gear_train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
 from ..typing import Array
 from .timefunctions import time_function
 
@@ -99,7 +99,7 @@ def train_body(job: TrainJob) -> ModalBody | None:
     return reduced_housing(given(job.housing, "housing"), job.path.parent)
 
 
-def job_scene(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: ModalBody | None = None) -> TrainScene:
+def job_train(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: ModalBody | None = None) -> GearTrain:
     """The train of a job with the stiffness of each mesh and its reduced housing.
 
     Without `curves` its meshes are rigid and rub nothing: enough for kinematics and statics.
@@ -145,7 +145,7 @@ def job_scene(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: Mo
         for i, x in enumerate(t.loads)
     )
     damping = Damping(t.damping.ratio, t.damping.rayleigh_alpha_per_s, t.damping.rayleigh_beta_s, t.damping.gyroscopic)
-    scene = TrainScene(
+    train = GearTrain(
         shafts,
         gears,
         meshes,
@@ -159,8 +159,8 @@ def job_scene(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: Mo
     if curves is None:
         from ..train.checks import check_scene
 
-        check_scene(replace(scene, meshes=tuple(replace(mesh, backlash=None, damping=0.0) for mesh in meshes)))
-    return scene
+        check_scene(replace(train, meshes=tuple(replace(mesh, backlash=None, damping=0.0) for mesh in meshes)))
+    return train
 
 
 def train_gear(job: TrainJob, table: TrainGearTable, where: str) -> Gear:

@@ -17,10 +17,10 @@ from ..gear.pair import GearPair
 from ..meshlaw.law import MeshLaw
 from ..progress import stage
 from ..stiffness.curve import StiffnessCurve
+from ..train.gear_train import GearMesh, GearTrain
 from ..train.kinematics import driving_senses, steady_forces
 from ..train.mesh_element import mean_value
-from ..train.scene import GearMesh, TrainScene
-from .job import Stiffness, TrainJob, job_scene
+from .job import Stiffness, TrainJob, job_train
 
 if TYPE_CHECKING:
     from ..contact.laws import ContactLaw
@@ -56,10 +56,10 @@ def train_curves(
     if files and len(files) not in (1, len(meshes)):
         problem = f"{len(files)} files for {len(meshes)} meshes"
         raise InputError("curve", [str(f) for f in files], problem, "give one for all, or one a mesh")
-    scene = job_scene(job)
+    train = job_train(job)
     found: list[Stiffness] = []
-    for number, (mesh, made) in enumerate(zip(meshes, scene.meshes, strict=True)):
-        teeth = scene.gear(made.driver).gear.teeth
+    for number, (mesh, made) in enumerate(zip(meshes, train.meshes, strict=True)):
+        teeth = train.gear(made.driver).gear.teeth
         if files:
             found.append(_read_curve(Path(files[number if len(files) > 1 else 0]), teeth))
         elif mesh.rigid:
@@ -69,11 +69,11 @@ def train_curves(
         elif mesh.curve is not None:
             found.append(_read_curve(job.path.parent / mesh.curve, teeth))
         elif mesh.load_map is not None:
-            found.append(_mapped_curve(job.path.parent / mesh.load_map, scene, number))
+            found.append(_mapped_curve(job.path.parent / mesh.load_map, train, number))
         elif (mesh.law or job.table.curves.law) == "map":
-            found.append(_computed_law(job, scene, number, estimate))
+            found.append(_computed_law(job, train, number, estimate))
         else:
-            curve = _computed_curve(job, scene, number, watch, progress, estimate)
+            curve = _computed_curve(job, train, number, watch, progress, estimate)
             linear = (mesh.law or job.table.curves.law) == "linear"
             found.append(mean_value(curve.interpolant("k_mesh", method="cubic")) if linear else curve)
     return tuple(found)
@@ -89,19 +89,19 @@ def _read_curve(path: Path, teeth: int) -> StiffnessCurve:
     return StiffnessCurve.from_csv(path, mesh_cycle=2.0 * math.pi / teeth)
 
 
-def _carried_torque(scene: TrainScene, number: int) -> float:
+def _carried_torque(train: GearTrain, number: int) -> float:
     """Torque (N m) at the driven gear of a mesh in steady running, without sign."""
-    driven = scene.gear(scene.meshes[number].driven).gear
-    return abs(float(steady_forces(scene)[number])) * driven.base_radius
+    driven = train.gear(train.meshes[number].driven).gear
+    return abs(float(steady_forces(train)[number])) * driven.base_radius
 
 
-def _mapped_curve(path: Path, scene: TrainScene, number: int) -> StiffnessCurve:
+def _mapped_curve(path: Path, train: GearTrain, number: int) -> StiffnessCurve:
     """The curve of a load map at the torque that a mesh carries; the map's pinion is the driver."""
     from ..loadmap.load_map import LoadMap
 
-    mesh = scene.meshes[number]
-    made, torque = LoadMap.from_csv(path), _carried_torque(scene, number)
-    driver, driven = scene.gear(mesh.driver).gear, scene.gear(mesh.driven).gear
+    mesh = train.meshes[number]
+    made, torque = LoadMap.from_csv(path), _carried_torque(train, number)
+    driver, driven = train.gear(mesh.driver).gear, train.gear(mesh.driven).gear
     cycle, radius = 2.0 * math.pi / driver.teeth, driven.base_radius
     fits = math.isclose(made.mesh_cycle, cycle, rel_tol=1e-9)
     if not (fits and math.isclose(made.curves[0].base_radius, radius, rel_tol=1e-9)):
@@ -118,25 +118,25 @@ def _mapped_curve(path: Path, scene: TrainScene, number: int) -> StiffnessCurve:
 
 
 def _computed_curve(
-    job: TrainJob, scene: TrainScene, number: int, watch: Any, progress: Any, estimate: bool
+    job: TrainJob, train: GearTrain, number: int, watch: Any, progress: Any, estimate: bool
 ) -> StiffnessCurve:
     """Curve of a mesh with the driver as pinion, by [stiffness] or at the torque that the mesh carries."""
     from ..stiffness.curve_cache import cached_curve
     from ..stiffness.job import StiffnessJob
 
-    mesh = scene.meshes[number]
-    one, two = scene.gear(mesh.driver).gear, scene.gear(mesh.driven).gear
+    mesh = train.meshes[number]
+    one, two = train.gear(mesh.driver).gear, train.gear(mesh.driven).gear
     pair = GearPair(one, two, mesh.centre_distance)
     if job.pair is None:
         problem = "has no stiffness: there is no table [pair] to compute it with"
         raise InputError(f"mesh {mesh.name!r}", None, problem, "add curve, stiffness_N_per_m or rigid to it, or [pair]")
     tables = StiffnessJob(job.pair, job.stiffness, pair)
-    deviations, _ = _deviations(job, scene, number, pair, tables.law)
+    deviations, _ = _deviations(job, train, number, pair, tables.law)
     model = replace(tables.model, materials=_materials(job, mesh), deviations=deviations)
     if job.table.curves.load in (None, "stiffness"):
         with stage(mesh.name):
             return cached_curve(pair, model, tables.sweep, watch=watch, progress=progress, estimate_error=estimate)
-    torque = _carried_torque(scene, number)
+    torque = _carried_torque(train, number)
     if not torque > 0.0:
         problem = 'carries no torque, so train.curves.load = "torque" has no load to compute its curve with'
         raise InputError(f"mesh {mesh.name!r}", None, problem, 'add a load, or write load = "stiffness"')
@@ -150,7 +150,7 @@ def _computed_curve(
         return cached_curve(pair, model, sweep, watch=watch, progress=progress, estimate_error=estimate)
 
 
-def _computed_law(job: TrainJob, scene: TrainScene, number: int, estimate: bool) -> MeshLaw:
+def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) -> MeshLaw:
     """Mesh law of a mesh with the driver as pinion; meshes of the same gears share the one for the largest torque."""
     from ..contact.laws import HalfPlane
     from ..meshlaw.cached import cached_law
@@ -159,14 +159,14 @@ def _computed_law(job: TrainJob, scene: TrainScene, number: int, estimate: bool)
 
     def gears(mesh: GearMesh) -> tuple[Any, ...]:
         materials = None if job.pair is None else _materials(job, mesh)
-        return scene.gear(mesh.driver).gear, scene.gear(mesh.driven).gear, mesh.centre_distance, materials
+        return train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance, materials
 
-    mesh, table = scene.meshes[number], job.table.meshes[number]
+    mesh, table = train.meshes[number], job.table.meshes[number]
     if job.pair is None:
         problem = "has no stiffness: there is no table [pair] to compute it with"
         raise InputError(f"mesh {mesh.name!r}", None, problem, "add curve, stiffness_N_per_m or rigid to it, or [pair]")
-    alike = [i for i, other in enumerate(scene.meshes) if gears(other) == gears(mesh)]
-    steady = max(_carried_torque(scene, i) for i in alike)
+    alike = [i for i, other in enumerate(train.meshes) if gears(other) == gears(mesh)]
+    steady = max(_carried_torque(train, i) for i in alike)
     most = table.law_torque_Nm or ROOM * steady
     if not most > 0.0:
         problem = "carries no torque in steady running, so nothing tells for which torques to make its law"
@@ -174,7 +174,7 @@ def _computed_law(job: TrainJob, scene: TrainScene, number: int, estimate: bool)
     one, two, distance, materials = gears(mesh)
     pair = GearPair(one, two, distance)
     tables = StiffnessJob(job.pair, job.stiffness, pair)
-    deviations, back = _deviations(job, scene, number, pair, HalfPlane())
+    deviations, back = _deviations(job, train, number, pair, HalfPlane())
     model = replace(tables.model, materials=materials, law=HalfPlane(), deviations=deviations)
     with stage(mesh.name):
         law = cached_law(pair, model, most / pair.wheel.base_radius)
@@ -189,7 +189,7 @@ def _computed_law(job: TrainJob, scene: TrainScene, number: int, estimate: bool)
 
 
 def _deviations(
-    job: TrainJob, scene: TrainScene, number: int, pair: GearPair, law: ContactLaw
+    job: TrainJob, train: GearTrain, number: int, pair: GearPair, law: ContactLaw
 ) -> tuple[tuple[ToothDeviations, ToothDeviations], tuple[ToothDeviations, ToothDeviations]]:
     """Deviations of the driving flanks of a mesh, the left ones where the driver turns about the axis of the shafts,
     and of its back flanks, those of the driving ones where these never bear. A mesh law's have no pitch errors.
@@ -201,9 +201,9 @@ def _deviations(
     """
     if job.microgeometry is None:
         return NOMINAL, NOMINAL
-    mesh, sides = scene.meshes[number], {g.name: g.gear for g in job.table.gears}
+    mesh, sides = train.meshes[number], {g.name: g.gear for g in job.table.gears}
     gears = (sides[mesh.driver], sides[mesh.driven])
-    flanks = ("left", "right") if driving_senses(scene)[number] > 0.0 else ("right", "left")
+    flanks = ("left", "right") if driving_senses(train)[number] > 0.0 else ("right", "left")
     driving, back = (
         deviations_of(job.microgeometry, pair, job.path.parent, flank=flank, gears=gears) for flank in flanks
     )

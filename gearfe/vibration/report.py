@@ -11,10 +11,10 @@ from ..errors import unknown_name
 from ..meshlaw.law import MeshLaw
 from ..spectrum import OrderLine, nearest_line, order_lines, peaks
 from ..stiffness.curve import StiffnessCurve
+from ..train.gear_train import GearTrain
 from ..train.kinematics import steady_forces
 from ..train.mesh_element import LEAST_REFERENCE, PHASES
 from ..train.response import TrainResponse
-from ..train.scene import TrainScene
 from ..typing import Array
 from .follow import Followed, RunningMean
 from .spectra import TrainSpectra
@@ -175,12 +175,12 @@ def friction_summary(followed: Followed) -> dict[str, Any]:
     }
 
 
-def stiffness_ranges(scene: TrainScene) -> dict[str, tuple[float | None, float | None]]:
+def stiffness_ranges(train: GearTrain) -> dict[str, tuple[float | None, float | None]]:
     """Mesh -> smallest and largest stiffness (N/m), of a mesh law its tangent under the steady force; None for a rigid
     mesh.
     """
     found: dict[str, tuple[float | None, float | None]] = {}
-    for mesh, steady in zip(scene.meshes, steady_forces(scene), strict=True):
+    for mesh, steady in zip(train.meshes, steady_forces(train), strict=True):
         given = mesh.stiffness
         if given is None or isinstance(given, float | int):
             found[mesh.name] = (given, given)

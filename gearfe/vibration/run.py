@@ -9,14 +9,14 @@ from typing import Any
 
 from ..record_spectrum import finer, subdivided
 from ..train import build_train
+from ..train.gear_train import GearTrain
 from ..train.kinematics import driving_senses
 from ..train.phases import tooth_places
 from ..train.response import TrainResponse
-from ..train.scene import TrainScene
 from ..train.simulate import simulate_in_pieces
 from ..versions import versions
 from .follow import TrainRun
-from .job import TrainJob, job_scene, train_body
+from .job import TrainJob, job_train, train_body
 from .mesh_stiffness import train_curves
 from .report import stiffness_ranges
 
@@ -33,8 +33,8 @@ def simulated(
     with watch.stage("housing"):
         body = train_body(job)
     with watch.stage("model"):
-        scene = job_scene(job, stiffness, body)
-        model = build_train(scene)
+        train = job_train(job, stiffness, body)
+        model = build_train(train)
         highest = float(model.coupled_frequencies_hz.max(initial=0.0))
     options: dict[str, Any] = {"tolerance": job.table.tolerance, "method": job.table.method, "band_hz": band(job)}
 
@@ -43,7 +43,7 @@ def simulated(
 
     every = finer(job.times, highest)[1]
     again = repeater(job, every) if estimate else None
-    return TrainRun(scene, job.times, pieces, every, described(job, scene), again, band(job))
+    return TrainRun(train, job.times, pieces, every, described(job, train), again, band(job))
 
 
 def band(job: TrainJob) -> float:
@@ -51,22 +51,22 @@ def band(job: TrainJob) -> float:
     return 5000.0 if job.housing is None else job.housing.reduction.band_Hz
 
 
-def repeater(job: TrainJob, every: int) -> Callable[[TrainScene, str], Callable[[Any], Iterator[TrainResponse]]]:
+def repeater(job: TrainJob, every: int) -> Callable[[GearTrain, str], Callable[[Any], Iterator[TrainResponse]]]:
     """The same run with another train by a method, as many samples in an output step; differences of runs need fewer
     digits.
     """
 
-    def again(scene: TrainScene, method: str) -> Callable[[Any], Iterator[TrainResponse]]:
-        model = build_train(scene)
+    def again(train: GearTrain, method: str) -> Callable[[Any], Iterator[TrainResponse]]:
+        model = build_train(train)
         options: dict[str, Any] = {"tolerance": max(job.table.tolerance, ROUGH), "method": method}
         return lambda times: simulate_in_pieces(model, subdivided(times, every), **options)
 
     return again
 
 
-def described(job: TrainJob, scene: TrainScene) -> dict[str, Any]:
+def described(job: TrainJob, train: GearTrain) -> dict[str, Any]:
     """What was computed: entries of the summary."""
-    body = scene.housing
+    body = train.housing
     housing = None
     if body is not None:
         housing = {
@@ -79,10 +79,10 @@ def described(job: TrainJob, scene: TrainScene) -> dict[str, Any]:
     return {
         "variant": job.table.variant,
         "housing": housing or "rigid",
-        "mesh_stiffness_N_per_m": stiffness_ranges(scene),
+        "mesh_stiffness_N_per_m": stiffness_ranges(train),
         "mesh_phases_deg": {
             mesh.name: math.degrees(phase)
-            for mesh, phase in zip(scene.meshes, tooth_places(scene, driving_senses(scene)).phases, strict=True)
+            for mesh, phase in zip(train.meshes, tooth_places(train, driving_senses(train)).phases, strict=True)
         },
         "job": {"train": asdict(job.table), "stiffness": asdict(job.stiffness)},
         "versions": versions(),

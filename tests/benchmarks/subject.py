@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gearfe.gear.pair import GearPair
     from gearfe.housing.model import Housing
     from gearfe.tables.housing import HousingTable
-    from gearfe.train import TrainScene
+    from gearfe.train import GearTrain
 
 ROOT = Path(__file__).resolve().parents[2]
 GEOMETRY = ROOT / "geometry"
@@ -94,28 +94,28 @@ def train_model(variant: str, *, quick: bool = False, modes: int | None = None, 
     """
     from gearfe.rigid import constant
     from gearfe.train import build_train
-    from gearfe.vibration.job import job_scene, read_train_job, train_body
+    from gearfe.vibration.job import job_train, read_train_job, train_body
     from gearfe.vibration.mesh_stiffness import train_curves
 
     parting = variant == "parting"
     job = read_train_job(given_file(GEOMETRY / "gear_train.toml"), "operating" if parting else variant)
 
-    def built(scene: TrainScene) -> Any:
+    def built(train: GearTrain) -> Any:
         if parting:
-            scene = replace(scene, meshes=tuple(replace(mesh, backlash=PARTING_BACKLASH) for mesh in scene.meshes))
+            train = replace(train, meshes=tuple(replace(mesh, backlash=PARTING_BACKLASH) for mesh in train.meshes))
         turning = PARTING_SPEED if parting and speed is None else speed
         if turning is not None:
-            scene = replace(scene, drive=replace(scene.driven, speed=constant(turning)))
-        return build_train(scene)
+            train = replace(train, drive=replace(train.driven, speed=constant(turning)))
+        return build_train(train)
 
     if quick:
         job = replace(job, table=replace(job.table, housing="rigid"))
-        return built(job_scene(job, (1.1e8, 1.1e8), None))
+        return built(job_train(job, (1.1e8, 1.1e8), None))
     if modes is not None:
         assert job.housing is not None
         reduction = replace(job.housing.reduction, modes=modes)
         job = replace(job, housing=replace(job.housing, reduction=reduction))
-    return built(job_scene(job, train_curves(job), train_body(job)))
+    return built(job_train(job, train_curves(job), train_body(job)))
 
 
 def train_times(quick: bool) -> np.ndarray:

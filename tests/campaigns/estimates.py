@@ -155,12 +155,12 @@ def _draw_response(random: np.random.Generator, number: int, kind: str) -> Case:
 def _run_response(case: Case, job_path: Path) -> Found:
     """Worst error of a contact force over the run, relative to its largest value."""
     from gearfe.train import build_train, simulate
-    from gearfe.vibration.job import job_scene, read_train_job
+    from gearfe.vibration.job import job_train, read_train_job
     from gearfe.vibration.mesh_stiffness import train_curves
 
     del case
     job = read_train_job(job_path)
-    model = build_train(job_scene(job, train_curves(job), None))
+    model = build_train(job_train(job, train_curves(job), None))
     options: dict[str, Any] = {"tolerance": job.table.tolerance, "method": job.table.method, "raise_on_failure": False}
     made = simulate(model, job.times, estimate=True, **options)
     truth = simulate(model, job.times, tolerance=1e-11, raise_on_failure=False)

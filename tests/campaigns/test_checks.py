@@ -35,15 +35,15 @@ def test_a_symmetric_frame_is_its_own_mirror_image() -> None:
 
 @pytest.mark.parametrize(("bore", "symmetric"), [("s{} middle", True), ("s{}+", False)])
 def test_only_symmetric_loads_leave_a_symmetric_train_in_its_plane(bore: str, symmetric: bool) -> None:
-    scene = train([(20, 30)], ys=[0.0])
-    bores = {**scene.rigid_bores, **{f"{s.name} middle": s.point for s in scene.shafts}}
+    gear_train = train([(20, 30)], ys=[0.0])
+    bores = {**gear_train.rigid_bores, **{f"{s.name} middle": s.point for s in gear_train.shafts}}
     names = tuple(bores)
     body, reflect = symmetric_frame(np.random.default_rng(5), names, np.array(list(bores.values())))
-    shafts = tuple(replace(s, bores=(*s.bores, f"{s.name} middle")) for s in scene.shafts)
-    assert scene.drive is not None
-    drive = replace(scene.drive, bore=bore.format(0))
-    loads = tuple(replace(load, bore=bore.format(1)) for load in scene.loads)
-    made = changed(scene, shafts=shafts, drive=drive, loads=loads, housing=body, rigid_bores={})
+    shafts = tuple(replace(s, bores=(*s.bores, f"{s.name} middle")) for s in gear_train.shafts)
+    assert gear_train.drive is not None
+    drive = replace(gear_train.drive, bore=bore.format(0))
+    loads = tuple(replace(load, bore=bore.format(1)) for load in gear_train.loads)
+    made = changed(gear_train, shafts=shafts, drive=drive, loads=loads, housing=body, rigid_bores={})
     response = simulate(build_train(made), np.linspace(0.0, 2e-3, 41), tolerance=1e-8)
     checks = _symmetry(response, reflect)
     assert [check.name for check in checks] == ["axial", "tilt", "mirror"]

@@ -28,7 +28,7 @@ from gearfe.train import TrainModel, TrainResponse, build_train, simulate
 from gearfe.train.floquet import train_multipliers
 from gearfe.train.kinematics import steady_forces
 from gearfe.train.motion import motion
-from gearfe.vibration.job import job_scene, read_train_job, train_body
+from gearfe.vibration.job import job_train, read_train_job, train_body
 from gearfe.vibration.mesh_stiffness import train_curves
 
 from .campaign import Campaign, Case
@@ -65,9 +65,9 @@ def run(case: Case, folder: Path) -> Finding:
         points = 1e-3 * np.array([[b.x_mm, b.y_mm, b.z_mm] for b in bores])
         random = np.random.default_rng(int(case.data["frame"]))
         body, reflect = symmetric_frame(random, tuple(str(b.attachment) for b in bores), points)
-    scene = job_scene(job, curves, body)
-    model = build_train(scene)
-    measures: dict[str, Any] = {"frequencies": len(model.coupled_frequencies_hz), "shafts": len(scene.shafts)}
+    train = job_train(job, curves, body)
+    model = build_train(train)
+    measures: dict[str, Any] = {"frequencies": len(model.coupled_frequencies_hz), "shafts": len(train.shafts)}
     if case.kind == "floquet":
         return _floquet(model, measures)
     table = job.table
@@ -87,7 +87,7 @@ def run(case: Case, folder: Path) -> Finding:
     else:
         checks += _against_truth(model, job.times, made, measures, smooth=bool(case.data["smooth"]))
     if case.kind == "resonance":
-        checks += _mean_force(scene, made)
+        checks += _mean_force(train, made)
     if case.kind == "symmetric":
         checks += _symmetry(made, reflect)
     return Finding("done", "; ".join(made.warnings)[:200], checks, measures)
@@ -131,15 +131,15 @@ def _order(model: TrainModel, times: Any, method: str, truth: Any) -> list[Check
 def _settled(model: TrainModel, made: TrainResponse, measures: dict[str, Any]) -> list[Check]:
     """Contact forces at the end against statics; notes how far a step goes in the fastest vibration (rad)."""
     own = 2.0 * math.pi * model.coupled_frequencies_hz
-    half, end = 0.5 * model.scene.damping.alpha, float(made.time[-1])
+    half, end = 0.5 * model.train.damping.alpha, float(made.time[-1])
     measures["step_rad"] = float(f"{own.max(initial=0.0) * end / max(1, int(made.statistics['steps'])):.3g}")
     slowest = half - math.sqrt(max(half**2 - float(own.min(initial=half)) ** 2, 0.0))  # less when it creeps
-    off = np.abs(np.abs(made.contact_force[-1]) / np.abs(steady_forces(model.scene)) - 1.0)
+    off = np.abs(np.abs(made.contact_force[-1]) / np.abs(steady_forces(model.train)) - 1.0)
     left = 100.0 * math.exp(-slowest * end) + 30.0 * float(measures["tolerance"])
     return [Check("settled", float(off.max()), 1e-8 + left)]
 
 
-def _mean_force(scene: Any, made: Any) -> list[Check]:
+def _mean_force(train: Any, made: Any) -> list[Check]:
     """Mean contact force over the last whole common periods against statics: accelerations have no mean."""
     period = made.common_period_s
     if not period:
@@ -148,7 +148,7 @@ def _mean_force(scene: Any, made: Any) -> list[Check]:
     count = int(0.25 * made.time[-1] / period) * round(period / step)
     if count < 50 or abs(period / step - round(period / step)) > 1e-6:
         return []
-    wanted = np.abs(steady_forces(scene))
+    wanted = np.abs(steady_forces(train))
     mean = np.abs(made.contact_force[-count:].mean(axis=0))
     swing = np.ptp(made.contact_force[-count:], axis=0)
     # what is left of the start after the run, and the mean of a sampled swing

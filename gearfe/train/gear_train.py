@@ -198,7 +198,7 @@ class Damping:
 
 
 @dataclass(frozen=True, eq=False)
-class TrainScene:
+class GearTrain:
     """A whole gear train.
 
     Parameters
