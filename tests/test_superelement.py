@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import runpy
-import struct
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,8 @@ from gearfe.tables.housing import HousingTable, SuperelementTable
 from gearfe.train import build_train
 from gearfe.vibration.job import bore_places, job_scene, read_train_job, train_body
 from gearfe.vibration.mesh_stiffness import train_curves
+
+from .nastran import Output2, output4_binary, output4_text
 
 MESHES = Path(__file__).parent.parent / "meshes"
 POINTS = [(0.0, 31.0, 0.0), (0.0, -31.0, 0.0), (62.5, 31.0, 0.0), (62.5, -31.0, 0.0)]
@@ -273,34 +274,22 @@ def test_dmig_that_cannot_be_taken(text, part, tmp_path) -> None:
         read_matrix(tmp_path / "K.pch", "housing.superelement.stiffness")
 
 
-@pytest.mark.parametrize("binary", [False, True], ids=["text", "binary"])
-def test_output4_with_both_matrices(binary: bool, bodies, tmp_path) -> None:
-    op4 = pytest.importorskip("pyNastran.op4.op4", reason="pip install 'gearfe[nastran]'")
-
-    def write_op4(name: str, **matrices: np.ndarray) -> None:
-        if not binary:
-            with (tmp_path / name).open("w") as stream:
-                squares = {title: (6, values) for title, values in matrices.items()}  # 6: symmetric
-                op4.OP4(log=None).write_op4(stream, squares, is_binary=False)
-            return
-        records = []
-        for title, values in matrices.items():  # type 2: double; each column with its first row and number of words
-            n = len(values)
-            records.append(struct.pack("<4i8s", n, n, 6, 2, title.ljust(8).encode()))
-            records += [struct.pack(f"<3i{n}d", j + 1, 1, 2 * n, *column) for j, column in enumerate(values.T)]
-            records.append(struct.pack("<3id", n + 1, 1, 2, 1.0))
-        framed = [struct.pack("<i", len(one)) + one + struct.pack("<i", len(one)) for one in records]
-        (tmp_path / name).write_bytes(b"".join(framed))
-
+def test_nastran_files_with_both_matrices(bodies, tmp_path) -> None:
+    """OUTPUT4 and OUTPUT2, whose rows have no names, and DMIG entries in OUTPUT2, where they have."""
     body = bodies["held"]
-    write_op4("box.op4", MAAX=body.mass, KAAX=body.stiffness)
-    same(body, superelement(table(stiffness="box.op4", mass="box.op4"), tmp_path))
-    write_op4("x.op4", X=body.mass, Y=body.mass)
-    with pytest.raises(InputError, match=r"begins with K: there are X, Y"):
-        read_matrix(tmp_path / "x.op4", "housing.superelement.stiffness")
-    (tmp_path / "broken.op4").write_text("nothing of the kind\n")
-    with pytest.raises(InputError, match="cannot be read as OUTPUT4"):
-        read_matrix(tmp_path / "broken.op4", "housing.superelement.stiffness")
+    both = {"MAAX": body.mass, "KAAX": body.stiffness}
+    (tmp_path / "text.op4").write_text(output4_text(both, "packed"))
+    (tmp_path / "binary.op4").write_bytes(output4_binary(both, "full"))
+    columns, pool = Output2(), Output2()
+    for name, values in both.items():
+        columns.matrix(name, values)
+    (tmp_path / "columns.op2").write_bytes(columns.bytes())
+    for name in ("text.op4", "binary.op4", "columns.op2"):
+        same(body, superelement(table(stiffness=name, mass=name), tmp_path))
+    pool.pool(both, [(101 + i // 6, 1 + i % 6) if i < B else (501 + i, 0) for i in range(len(body.mass))])
+    (tmp_path / "pool.op2").write_bytes(pool.bytes())
+    points = [{"point_mm": list(point), "node": 101 + i} for i, point in enumerate(POINTS)]
+    same(body, superelement(table(stiffness="pool.op2", mass="pool.op2", attachments=points), tmp_path))
 
 
 def test_exudyn_reads_the_matrices(bodies, tmp_path) -> None:

@@ -19,16 +19,16 @@ Entries = dict[tuple[Label, Label], float]
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]?([+-]\d+)|[eEdD](\d+))?$")
 
 
-def read_dmig(text: str, path: Path, field: str, wanted: str) -> Entries:
-    """Entries of the matrix whose name begins with `wanted` (K, M), or of the only one.
+def read_dmig(text: str, path: Path, field: str) -> dict[str, Entries]:
+    """Entries of all matrices, by name.
 
     Raises
     ------
     InputError
-        Without such a matrix, for complex ones, and for lines that cannot be read.
+        For complex matrices, and for lines that cannot be read.
     """
     matrices: dict[str, Entries] = {}
-    for number, card in _cards(text):
+    for line, card in _cards(text):
         name = card[1].upper()
         try:
             if card[2] == "0":
@@ -42,22 +42,18 @@ def read_dmig(text: str, path: Path, field: str, wanted: str) -> Entries:
             for at in range(5, len(card), 4):
                 row = card[at : at + 4]
                 if row[0]:
-                    made[(int(row[0]), int(row[1] or 0)), column] = _number(row[2])
+                    made[(int(row[0]), int(row[1] or 0)), column] = number(row[2])
         except InputError:
             raise
         except (ValueError, IndexError):
-            problem = f"the DMIG entry of line {number} cannot be read"
+            problem = f"the DMIG entry of line {line} cannot be read"
             raise InputError(
                 field, path.name, problem, "write node, freedom, and rows of node, freedom, value"
             ) from None
-    chosen = [name for name in matrices if len(matrices) == 1 or name.startswith(wanted)]
-    if len(chosen) != 1 or not matrices[chosen[0]]:
-        problem = f"has no single matrix whose name begins with {wanted}: there are {', '.join(matrices) or 'none'}"
-        raise InputError(field, path.name, problem, "leave one of them in the file")
-    return matrices[chosen[0]]
+    return matrices
 
 
-def _number(text: str) -> float:
+def number(text: str) -> float:
     """A real of Nastran: 2.5, 2.5E+3, 2.5D+3 or 2.5+3."""
     found = _REAL.match(text)
     if found is None:

@@ -5,25 +5,27 @@ the attachments held, :math:`K_{ii}\Phi = M_{ii}\Phi\Lambda`, and the constraint
 turn the coordinates to those of `gearfe.ModalBody`, all of them kept: frequencies and response stay the matrices'.
 
 Matrices are in Matrix Market format, Abaqus' matrix input (lines of node, freedom, node, freedom, value), DMIG
-entries of Nastran, or its files of the kind OUTPUT4.
+entries of Nastran, or its files of the kinds OUTPUT2 and OUTPUT4.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, MissingLibraryError
+from ..errors import InputError
 from ..output.files import whole_file
 from ..reduction.modal_body import ModalBody
 from ..tables.housing import FORCES, UNITS, AttachmentTable, SuperelementTable
 from ..textfile import read_text
 from ..typing import Array, IntArray
 from .dmig import Entries, Label, read_dmig
+from .nastran_files import read_nastran
 
 #: Parts of the largest entry up to which matrices are symmetric; energy, against the largest, that is none; masses,
 #: relative to each other, that are the same in all directions.
@@ -91,17 +93,17 @@ def _with_rows_of(stiffness: Matrix, mass: Matrix) -> Matrix:
 
 
 def read_matrix(path: Path, field: str, initial: str = "K") -> Matrix:
-    """A matrix of Matrix Market format, Abaqus' matrix input, DMIG, OUTPUT4; where it is half of one, the whole.
+    """A matrix of Matrix Market format, Abaqus' matrix input or Nastran's files; where it is half of one, the whole.
 
     Of several matrices in a file of Nastran that one is taken whose name begins with `initial`.
     """
-    if path.suffix.lower() == ".op4":
-        return Matrix(_output4(path, field, initial), [])
+    if path.suffix.lower() in (".op2", ".op4"):
+        return _made(_chosen(read_nastran(path, field), path, field, initial), field, path)
     text = read_text(path, field)
     if text.lstrip().lower().startswith("%%matrixmarket"):
         return Matrix(_market(path, field), [])
     if re.search(r"^DMIG[ *,]", text, re.MULTILINE | re.IGNORECASE):
-        return _assembled(read_dmig(text, path, field, initial), field, path)
+        return _made(_chosen(read_dmig(text, path, field), path, field, initial), field, path)
     made: dict[tuple[Label, Label], float] = {}
     for number, line in enumerate(text.splitlines(), start=1):
         if not line.strip() or line.lstrip().startswith("*"):
@@ -117,11 +119,13 @@ def read_matrix(path: Path, field: str, initial: str = "K") -> Matrix:
             cure = "begin it with %%MatrixMarket, or write lines of node, freedom, node, freedom, value"
             raise InputError(field, path.name, problem, cure) from None
         made[(a, b), (c, d)] = value
-    return _assembled(made, field, path)
+    return _made(made, field, path)
 
 
-def _assembled(made: Entries, field: str, path: Path) -> Matrix:
-    """The matrix of single entries."""
+def _made(made: Array | Entries, field: str, path: Path) -> Matrix:
+    """The whole matrix, of values or of single entries."""
+    if not isinstance(made, dict):  # rows without names
+        return Matrix(_whole(_checked(made, field, path)), [])
     labels = sorted({label for both in made for label in both})
     place = {label: i for i, label in enumerate(labels)}
     values = np.zeros((len(labels), len(labels)))
@@ -146,29 +150,23 @@ def _market(path: Path, field: str) -> Array:
     return _whole(_checked(np.asarray(values, dtype=float), field, path))
 
 
-def _output4(path: Path, field: str, initial: str) -> Array:
-    """A matrix of Nastran's OUTPUT4, text or binary, by pyNastran."""
-    from scipy.sparse import issparse
+def _chosen(found: Mapping[str, Array | Entries], path: Path, field: str, initial: str) -> Array | Entries:
+    """The matrix of a file of Nastran whose name begins with `initial`, or the only one.
 
-    if not path.is_file():
-        raise InputError(field, str(path), "there is no such file", "check the path")
-    try:
-        from pyNastran.op4.op4 import read_op4
-    except ImportError:
-        raise MissingLibraryError("OUTPUT4 files need pyNastran: pip install 'gearfe[nastran]'") from None
-    try:
-        found = {name.upper(): made[1] for name, made in read_op4(str(path), debug=None).items()}
-    except Exception as error:
-        raise InputError(field, path.name, f"cannot be read as OUTPUT4 ({error})", "is it whole?") from None
-    chosen = [name for name in found if len(found) == 1 or name.startswith(initial)]
-    if len(chosen) != 1:
-        problem = f"has no single matrix whose name begins with {initial}: there are {', '.join(found) or 'none'}"
-        raise InputError(field, path.name, problem, "leave one of them in the file")
-    values = found[chosen[0]]
-    values = np.asarray(values.toarray() if issparse(values) else values)
-    if np.iscomplexobj(values):
-        raise InputError(field, path.name, "is complex", "bring a real matrix; damping is [housing.damping]")
-    return _whole(_checked(values.astype(float), field, path))
+    Files of external superelements hold others beside it: vectors, rows for recovery, fillers of one row, and
+    structural damping, K4.
+    """
+    square = {name: one for name, one in found.items() if _usable(one)}
+    names = [n for n in square if len(square) == 1 or (n.startswith(initial) and not n.startswith("K4"))]
+    if len(names) != 1:
+        problem = f"has no single matrix whose name begins with {initial}: there are {', '.join(square) or 'none'}"
+        raise InputError(field, path.name, problem, "leave one of them in the file, real and square")
+    return square[names[0]]
+
+
+def _usable(one: Array | Entries) -> bool:
+    """Whether a matrix has entries; of one without names, whether it is square and more than a filler of one row."""
+    return bool(one) if isinstance(one, dict) else 1 < len(one) == one.shape[1]
 
 
 def _checked(values: Array, field: str, path: Path) -> Array:

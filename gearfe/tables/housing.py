@@ -144,7 +144,7 @@ class SuperelementTable:
     """Matrices of another program in place of a mesh."""
 
     stiffness: str = quantity(
-        doc="file of the stiffness matrix: Matrix Market, Abaqus' matrix input, or Nastran's DMIG"
+        doc="file of the stiffness matrix: Matrix Market, Abaqus' matrix input, Nastran's DMIG, OUTPUT2 or OUTPUT4"
     )
     mass: str = quantity(doc="file of the mass matrix")
     unit: str = quantity(
