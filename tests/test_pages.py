@@ -133,3 +133,7 @@ def test_the_site_builds(tmp_path: Path) -> None:
     pages = [(path, path.read_text(encoding="utf-8")) for path in tmp_path.rglob("*.html")]
     fetched = r"<(?:script|link|img)[^>]*(?:src|href)=\"?https?://"
     assert not [path.name for path, text in pages if re.search(fetched, text)]  # it opens offline
+    for name, least in (("theory", 20), ("mesh_law", 6)):  # equations are MathML, none is left as LaTeX
+        text = (tmp_path / f"{name}.html").read_text(encoding="utf-8")
+        assert text.count("<math") >= least
+        assert not re.findall(r"arithmatex|\\(?:frac|qquad|sum|partial)\b", text)
