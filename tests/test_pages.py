@@ -23,9 +23,16 @@ from . import gears, trains
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*(ROOT / "docs").rglob("*.md"), ROOT / "README.md"])
-#: Pages whose Python runs, block by block. The others need a cluster, an optimiser, or minutes.
+#: Pages whose Python runs, block by block.
 RUN = ("exchange.md", "fields.md", "housing.md", "howto.md", "loadmap.md", "mesh_law.md")
 RUN += ("mechanisms.md", "microgeometry.md", "runup.md", "start.md")
+#: What pages and the jobs that they name do in a minute: fewer cases, rounds and positions here.
+SHORTER = {
+    "cases = 128": "cases = 8",
+    "positions = 12": "positions = 4",
+    "rounds=40": "rounds=2",
+    "range(10)": "range(2)",
+}
 PLACES = {"angles": np.zeros(3), "approaches": np.full(3, 1e-5)}
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
@@ -56,9 +63,36 @@ def test_python_runs(page: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
         exec(compile(text, page, "exec"), names)
 
 
+def shorter(text: str) -> str:
+    for long, short in SHORTER.items():
+        text = text.replace(long, short)
+    return text
+
+
+def test_python_of_studies_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    pytest.importorskip("optuna")
+    pytest.importorskip("xarray")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "geometry").mkdir()
+    for name in ("relief_study.toml", "relief_search.toml"):
+        text = (ROOT / "geometry" / name).read_text(encoding="utf-8")
+        (tmp_path / "geometry" / name).write_text(shorter(text), encoding="utf-8")
+    names = known()
+    code = blocks(ROOT / "docs" / "study.md", "python")
+    assert set(SHORTER) == {long for long in SHORTER if long in "".join(code) + "cases = 128 positions = 12"}
+    for text in code:
+        exec(compile(shorter(text), "study.md", "exec"), names)
+    assert names["best"].outputs["error_um"] > 0
+
+
+def test_no_page_is_left_out() -> None:
+    """README.md and clusters.md have tests of their own."""
+    assert {page.name for page in PAGES if blocks(page, "python")} == {*RUN, "study.md", "clusters.md", "README.md"}
+
+
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_python_imports_what_there_is(page: Path) -> None:
-    """Blocks that need a cluster or an optimiser are at least Python, and what they import of this package is there."""
+    """All blocks are Python, and what they import of this package is there."""
     for text in blocks(page, "python"):
         compile(text, str(page), "exec")
         for line in re.findall(r"^from gearfe[\w.]* import [\w, ]+$", text, re.MULTILINE):

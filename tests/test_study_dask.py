@@ -5,10 +5,14 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
+import types
+from pathlib import Path
 
 import pytest
 
@@ -50,6 +54,30 @@ def test_rows_on_dask_are_those_of_one_process(cluster, tmp_path):
     command = ["study", str(path), "--out", str(tmp_path / "dask"), "--dask", cluster[1], "--no-pictures"]
     assert main(command) == 0
     assert rows_of(tmp_path / "dask") == rows_of(tmp_path / "one")
+
+
+class Cluster(str):
+    """A cluster that is there already, by its address, in place of one that Slurm or Kubernetes starts."""
+
+    def scale(self, jobs: int) -> None:
+        assert jobs > 0
+
+
+def test_the_page_on_clusters_runs(cluster, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, cases=8)
+    for name, kind in (("dask_jobqueue", "SLURMCluster"), ("dask_kubernetes.operator", "KubeCluster")):
+        module = types.ModuleType(name)
+        setattr(module, kind, lambda **_: Cluster(cluster[1]))
+        monkeypatch.setitem(sys.modules, name.partition(".")[0], module)
+        monkeypatch.setitem(sys.modules, name, module)
+    page = (Path(__file__).parents[1] / "docs" / "clusters.md").read_text(encoding="utf-8")
+    codes = re.findall(r"^```python\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)
+    assert len(codes) == 2
+    for code in codes:
+        exec(compile(code, "clusters.md", "exec"), {})
+        assert sum("done" in row for row in rows_of(tmp_path / "out" / "study")) == 8
+        shutil.rmtree(tmp_path / "out")
 
 
 def test_a_scheduler_that_goes_away_is_told_and_rows_are_kept(cluster, tmp_path):
