@@ -25,7 +25,7 @@ from gearfe.meshing.mesh_file import read_mesh_file
 from gearfe.meshing.session import gmsh_session
 from gearfe.tables.housing import HousingTable
 from gearfe.train import build_train
-from gearfe.vibration.job import bore_places, job_scene, read_train_job, train_body
+from gearfe.vibration.job import bore_places, job_train, read_train_job, train_body
 from gearfe.vibration.mesh_stiffness import train_curves
 
 MESHES = Path(__file__).parent.parent / "meshes"
@@ -267,7 +267,7 @@ def test_commands_with_mesh_and_with_body(tmp_path, capsys) -> None:
         assert main(["housing", str(job), "--out", str(tmp_path / name), "--modes", "5", "--no-pictures"]) == 0
         summary = json.loads((tmp_path / name / "summary.json").read_text())
         train = read_train_job(job)
-        model = build_train(job_scene(train, train_curves(train), train_body(train)))
+        model = build_train(job_train(train, train_curves(train), train_body(train)))
         found[name] = summary["frequencies_free_attachments_Hz"], model.coupled_frequencies_hz.tolist()
         assert bore_places(train.housing, tmp_path)["3"] == pytest.approx((0.0625, 0.031, 0))
     assert found["first"] == found["second"]

@@ -1,7 +1,7 @@
 """From the tables of a job file to a gear train: ``[train]`` with ``[pair]``, ``[stiffness]`` and ``[housing]``.
 
 job = read_train_job("geometry/gear_train.toml", variant="operating")
-model = build_train(job_scene(job, train_curves(job), train_body(job)))
+model = build_train(job_train(job, train_curves(job), train_body(job)))
 response = simulate(model, job.times, tolerance=job.table.tolerance)
 """
 
