@@ -22,7 +22,7 @@ import numpy as np
 from gearfe.train.train import Bearing, Damping
 
 from gearfe.mechanisms import load_mechanism
-from gearfe.rigid import Body, CoordinateSpring, Gravity, Hinge, ModalBlocks, PlanarScene, Scene, Slot, Spring, System
+from gearfe.rigid import Body, CoordinateSpring, Gravity, Hinge, Linkage, ModalBlocks, Slot, Spring, System
 from gearfe.rigid.integrate import integrate, ways_of
 from gearfe.rigid.modal import series_force
 from gearfe.rigid.start import Start, consistent_start
@@ -49,7 +49,7 @@ class Case(NamedTuple):
 
 def planar(name: str, bodies: Any, joints: Any, forces: Any, end: float, tolerance: float = 1e-9) -> Case:
     """A planar mechanism."""
-    system = System([PlanarScene(Scene(tuple(bodies), tuple(joints), tuple(forces)))])
+    system = System([Linkage(tuple(bodies), tuple(joints), tuple(forces))])
     return Case(name, system, consistent_start(system), end, tolerance)
 
 
@@ -173,7 +173,7 @@ def others() -> Iterator[Callable[[], Case]]:
 
 def alone(case: Case, times: np.ndarray, method: str, patience: float) -> tuple[float, bool]:
     """(seconds, whether it came to the end) of one method by itself."""
-    backend = "auto" if case.system.planar is None or method == "implicit" else "compiled"
+    backend = "auto" if case.system.linkage is None or method == "implicit" else "compiled"
     options = {"tolerance": case.tolerance, "longest": math.inf}
     way = ways_of(case.system, case.start, times, method, backend, options)[0]
     began = time.process_time()
@@ -217,7 +217,7 @@ def main() -> None:
         times = np.linspace(0.0, case.end, 51)
         auto, made = least(lambda case=case, times=times: chosen(case, times))
         patience = max(args.patience * auto, LEAST_PATIENCE)
-        quick = "taylor" if case.system.planar is not None or series_force(case.system) is not None else "explicit"
+        quick = "taylor" if case.system.linkage is not None or series_force(case.system) is not None else "explicit"
         found = [least(lambda m=m: alone(case, times, m, patience)) for m in (quick, "implicit")]  # noqa: B023
         best = min((s for s, done in found if done), default=auto)
         worst = max(worst, auto / min(best, auto))

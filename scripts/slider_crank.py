@@ -6,7 +6,7 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from gearfe.rigid import Body, Forced, Gravity, Hinge, PlanarScene, Scene, Slot, System, consistent_start, integrate
+from gearfe.rigid import Body, Forced, Gravity, Hinge, Linkage, Slot, System, consistent_start, integrate
 
 
 def slider_crank(angle: float) -> System:
@@ -18,7 +18,7 @@ def slider_crank(angle: float) -> System:
         Hinge("rod", "crank", (0.0, 0.0), (1.0, 0.0), name="A"),
         Slot("rod", "ground", (1.0, 0.0), name="B"),
     )
-    return System([PlanarScene(Scene((crank, rod), joints, (Gravity((0.0, -9.81)),)))])
+    return System([Linkage((crank, rod), joints, (Gravity((0.0, -9.81)),))])
 
 
 def slider_speed(q: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from gearfe.rigid import Body, Gravity, Hinge, PlanarScene, Scene, Slot, System
+from gearfe.rigid import Body, Gravity, Hinge, Linkage, Slot, System
 
 DATA = Path(__file__).parent / "data"
 G = 9.81
@@ -33,7 +33,7 @@ def folding_links(theta: float = pi / 4, omega: float = 4 / (2 * sin(pi / 4)), r
         Hinge("crank", "rod", (1.0, 0.0), (0.0, 0.0), name="A"),
         Slot("rod", "ground", (rod, 0.0), name="B"),
     )
-    return System([PlanarScene(Scene(bodies, joints, (Gravity((0.0, -G)),)))])
+    return System([Linkage(bodies, joints, (Gravity((0.0, -G)),))])
 
 
 def folding_angle(theta: float, omega: float, times: np.ndarray) -> np.ndarray:
@@ -50,7 +50,7 @@ def folding_angle(theta: float, omega: float, times: np.ndarray) -> np.ndarray:
 def pendulum(angle: float = 1.0, length: float = 0.8, rate: float = 0.0) -> System:
     """Uniform rod of 2 kg hinged at its end."""
     body = Body("rod", 2.0, 2.0 * length**2 / 12, (length / 2, 0.0), (0.0, 0.0), angle, (0.0, 0.0), rate)
-    return System([PlanarScene(Scene((body,), (Hinge("rod", "ground"),), (Gravity((0.0, -G)),)))])
+    return System([Linkage((body,), (Hinge("rod", "ground"),), (Gravity((0.0, -G)),))])
 
 
 def chain(count: int, seed: int = 1) -> System:
@@ -65,7 +65,7 @@ def chain(count: int, seed: int = 1) -> System:
         joints.append(Hinge(f"b{i}", before, (0.0, 0.0), end))
         before, end = f"b{i}", (length, 0.0)
         x, y = x + length * cos(angle), y + length * sin(angle)
-    return System([PlanarScene(Scene(tuple(bodies), tuple(joints), (Gravity((0.0, -G)),)))])
+    return System([Linkage(tuple(bodies), tuple(joints), (Gravity((0.0, -G)),))])
 
 
 def total_energy(trajectory) -> np.ndarray:  # type: ignore[no-untyped-def]

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from gearfe.progress import shown
-from gearfe.rigid import Body, CoordinateSpring, Gravity, Hinge, ModalBlocks, PlanarScene, Scene, System
+from gearfe.rigid import Body, CoordinateSpring, Gravity, Hinge, Linkage, ModalBlocks, System
 from gearfe.rigid.choice import Choice, Leg, Way, joined, joined_statistics
 from gearfe.rigid.contract import Array
 from gearfe.rigid.integrate import _dropped_rows_hold, integrate, ways_of
@@ -189,7 +189,7 @@ def rotor() -> tuple[System, Callable[[Array], Array]]:
     def exact(t: Array) -> Array:
         return np.asarray(0.3 * np.exp(-zeta * omega * t) * (np.cos(fast * t) + zeta * omega / fast * np.sin(fast * t)))
 
-    return System([PlanarScene(Scene((rod,), *parts))]), exact
+    return System([Linkage((rod,), *parts)]), exact
 
 
 @pytest.mark.parametrize("first", ["taylor", "implicit"])
@@ -232,12 +232,12 @@ def test_a_change_over_of_modal_coordinates_keeps_the_motion() -> None:
 
 def test_only_series_pass_singular_positions_so_springs_must_set_the_steps() -> None:
     """Without springs and dampers nothing is stiff: Radau's method is not tried, however slow the series are."""
-    soft = Scene(
+    soft = Linkage(
         (Body("rod", 1.0, 0.1, (0.5, 0.0), (0.0, 0.0), 1.0),),
         (Hinge("rod", "ground"),),
         (Gravity((0.0, -9.81)), CoordinateSpring("rod", "angle", 0.1, 0.0)),
     )
-    for system in (pendulum(), System([PlanarScene(soft)])):
+    for system in (pendulum(), System([soft])):
         start, times, clock = consistent_start(system), np.array([0.0, 40.0]), Clock()
         ways = ways_of(system, start, times, "auto", "plain", {"tolerance": 1e-6, "longest": np.inf})
         assert [w.method for w in ways] == ["taylor", "implicit"]

@@ -15,10 +15,9 @@ from gearfe.rigid import (
     Body,
     Gravity,
     Hinge,
+    Linkage,
     Moment,
-    PlanarScene,
     Prismatic,
-    Scene,
     System,
     consistent_start,
     constant,
@@ -34,7 +33,7 @@ METHODS = [("taylor", 1e-11), ("explicit", 1e-10), ("implicit", 1e-6)]
 
 
 def run(bodies, joints, forces, method: str, tolerance: float):  # type: ignore[no-untyped-def]
-    system = System([PlanarScene(Scene(tuple(bodies), tuple(joints), tuple(forces)))])
+    system = System([Linkage(tuple(bodies), tuple(joints), tuple(forces))])
     return integrate(system, TIMES, method=method, tolerance=tolerance, backend="plain")
 
 
@@ -195,5 +194,5 @@ def test_wrong_radii() -> None:
 def test_starts_close(tmp_path: Path) -> None:
     """A wheel that starts off its line is put on it."""
     wheel = Body("wheel", 1.0, 0.1, position=(0.3, 0.25))
-    system = System([PlanarScene(Scene((wheel,), (Rolling("wheel", "ground", 0.2),), ()))])
+    system = System([Linkage((wheel,), (Rolling("wheel", "ground", 0.2),), ())])
     assert consistent_start(system).q[1] == pytest.approx(0.2, abs=1e-12)

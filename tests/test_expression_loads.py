@@ -89,7 +89,7 @@ def test_slopes_are_those_of_the_value(tmp_path: Path) -> None:
     mechanism = load_mechanism(
         write(tmp_path, ROD + MOMENT.format(text + " + atan2(vx(rod.tip), 3)**3 + log(2 + time)"))
     )
-    ((_, load),) = mechanism.planar.assembly.state_loads
+    ((_, load),) = mechanism.linkage.assembly.state_loads
     assert isinstance(load, ExpressionLoad)
     rng = np.random.default_rng(0)
     q, v = rng.standard_normal((2, 3))
@@ -111,7 +111,7 @@ def test_a_table_holds_its_points_and_is_monotone(tmp_path: Path) -> None:
     assert (np.diff(torque) <= 1e-9).all()
     np.testing.assert_allclose(run.a[:, 2] * 0.5, torque, atol=1e-6)
     linear = load_mechanism(write(tmp_path, ROD + MOMENT.format("motor(3)") + table + 'interpolation = "linear"\n'))
-    assert linear.planar.assembly.state_loads[0][1].value(0.0, np.zeros(3), np.zeros(3)) == pytest.approx(4.5)
+    assert linear.linkage.assembly.state_loads[0][1].value(0.0, np.zeros(3), np.zeros(3)) == pytest.approx(4.5)
 
 
 def test_a_run_out_of_the_table_tells_where(tmp_path: Path) -> None:

@@ -104,7 +104,7 @@ def test_reactions_of_the_running_slider_crank_are_newtons_second_law() -> None:
     mechanism = load_mechanism(ROOT / "geometry" / "elastic_slider_crank.toml")
     times = np.linspace(0.0, 0.04, 41)
     run = integrate(mechanism.system, times, start=mechanism.start(), tolerance=1e-6)
-    index = mechanism.scene.body_index["slider"]
+    index = mechanism.linkage.body_index["slider"]
     force = reactions(mechanism, run)["B_x_N"]
     pull = mechanism.file.bodies["slider"].mass_kg * run.a[:, 3 * index]
     assert np.abs(force - pull).max() < 0.01 * np.abs(pull).max()
@@ -119,7 +119,7 @@ def test_flexible_false_is_the_rigid_link(tmp_path: Path) -> None:
     text = text.split("[[outputs]]")[0]
     mechanism = load_mechanism(write(tmp_path, text))
     assert not mechanism.links
-    body = mechanism.scene.bodies[0]
+    body = mechanism.linkage.bodies[0]
     assert body.mass == pytest.approx(0.4)
     assert body.inertia == pytest.approx(0.4 * (1.0 + 0.02**2) / 12)
     assert body.centre == (0.5, 0.0)

@@ -20,9 +20,8 @@ from gearfe.rigid import (
     Fixed,
     Gravity,
     Hinge,
+    Linkage,
     Moment,
-    PlanarScene,
-    Scene,
     System,
     consistent_start,
     constant,
@@ -105,7 +104,7 @@ def test_equilibrium_is_the_least_energy() -> None:
     bodies = [Body(n, 1.0, 0.1, (0.5, 0.0), (x, 0.0), 0.1) for n, x in (("a", 0.0), ("b", 1.0))]
     joints = [Hinge("a", "ground"), Hinge("b", "a", (0.0, 0.0), (1.0, 0.0))]
     forces = [Gravity(), CoordinateSpring("a", "angle", 8.0), CoordinateSpring("b", "angle", 5.0, relative_to="a")]
-    system = System([PlanarScene(Scene(tuple(bodies), tuple(joints), tuple(forces)))])
+    system = System([Linkage(tuple(bodies), tuple(joints), tuple(forces))])
     found = equilibrium(system, consistent_start(system))
     least = system.energy(found.q, 0.0 * found.q)[1]
     rng = np.random.default_rng(4)
@@ -120,7 +119,7 @@ def test_two_masses_on_springs_have_the_modes_of_the_book() -> None:
     bodies = tuple(Body(n, 1.0, 0.2) for n in "ab")
     joints = (Hinge("a", "ground"), Hinge("b", "ground"))
     forces = (CoordinateSpring("a", "angle", 5.0), CoordinateSpring("b", "angle", 5.0, relative_to="a"))
-    system = System([PlanarScene(Scene(bodies, joints, forces))])
+    system = System([Linkage(bodies, joints, forces)])
     start = consistent_start(system)
     found = modes(system, start, equilibrium(system, start), 5)
     expected = np.sqrt(25.0 * (3.0 + np.array([-1.0, 1.0]) * math.sqrt(5.0)) / 2.0)
@@ -141,8 +140,8 @@ def test_a_rotating_beam_stiffens(speed: float, out_of_plane: tuple[float, float
     link = BeamLink(
         "rod", 1.0, section, 1.0 / second, 100.0, poisson_ratio=-0.5, elements=6
     )  # EI = rho A = 1, EA = 1e6
-    scene = PlanarScene(Scene(link.nodes(), (Fixed("rod"),), (TurningFrame(speed),)))
-    system = System([scene, Beam(scene, link)])
+    linkage = Linkage(link.nodes(), (Fixed("rod"),), (TurningFrame(speed),))
+    system = System([linkage, Beam(linkage, link)])
     start = consistent_start(system)
     found = modes(system, start, equilibrium(system, start), 2)
     expected = np.sqrt(np.array(out_of_plane) ** 2 - speed**2)
@@ -153,8 +152,8 @@ def test_extension_in_a_turning_frame() -> None:
     """E A u'' + rho A w^2 (s + u) = 0 with u(0) = 0, u'(L) = 0: s + u = sin(k s)/(k cos(k L)), k^2 = rho w^2/E."""
     link = BeamLink("rod", 1.0, Section.rectangle(0.01, 0.01), 2e9, 7850.0, elements=3)
     omega = 100.0
-    scene = PlanarScene(Scene(link.nodes(), (Fixed("rod"),), (TurningFrame(omega),)))
-    system = System([scene, Beam(scene, link)])
+    linkage = Linkage(link.nodes(), (Fixed("rod"),), (TurningFrame(omega),))
+    system = System([linkage, Beam(linkage, link)])
     found = equilibrium(system, consistent_start(system))
     k = math.sqrt(7850.0 / 2e9) * omega
     assert found.q[-3] == pytest.approx(math.tan(k) / k, rel=1e-9)
@@ -165,7 +164,7 @@ def test_a_free_body_in_a_turning_frame_moves_straight() -> None:
     """Seen from the frame: x + i y = (x0 + v0 t) exp(-i w t)."""
     w = 2.0
     body = Body("b", 3.0, 1.0, position=(1.0, 0.0), velocity=(0.0, -w))  # at rest in space
-    system = System([PlanarScene(Scene((body,), (), (TurningFrame(w),)))])
+    system = System([Linkage((body,), (), (TurningFrame(w),))])
     run = integrate(system, np.linspace(0.0, 1.0, 5), tolerance=1e-11)
     np.testing.assert_allclose(run.q[:, 0] + 1j * run.q[:, 1], np.exp(-1j * w * run.time), atol=1e-9)
 
@@ -191,18 +190,18 @@ def test_inverse_is_forward_dynamics_of_a_four_bar() -> None:
     mechanism = load_mechanism(root)
     times = np.linspace(0.0, 0.01, 6)
     free = integrate(mechanism.system, times, start=mechanism.start(), tolerance=1e-11, backend="plain")
-    drive = mechanism.scene.forces
-    scene = mechanism.scene
+    drive = mechanism.linkage.forces
+    linkage = mechanism.linkage
     crank = next(f.body for f in drive if isinstance(f, Moment))
-    k = 3 * scene.body_index[crank] + 2
+    k = 3 * linkage.body_index[crank] + 2
     # the angle of the free run as a polynomial of high degree, prescribed instead of the moment
     from gearfe.rigid import Prescribed, polynomial
 
     fine = np.linspace(0.0, 0.01, 200)
     fit = np.polynomial.Chebyshev.fit(fine, free.dense(fine)[:, k], 24).convert(kind=np.polynomial.Polynomial)
-    joints = (*scene.joints, Prescribed(crank, "angle", polynomial(tuple(fit.coef))))
+    joints = (*linkage.joints, Prescribed(crank, "angle", polynomial(tuple(fit.coef))))
     loads = tuple(f for f in drive if not isinstance(f, Moment))
-    driven = System([PlanarScene(Scene(scene.bodies, joints, loads))])
+    driven = System([Linkage(linkage.bodies, joints, loads)])
     made = prescribed_motion(driven, consistent_start(driven, q=free.q[0], v=free.v[0]), times)
     np.testing.assert_allclose(made.q, free.q, atol=1e-7)
     row = next(i for i, n in enumerate(driven.row_names()) if n.startswith("prescribed"))
@@ -234,5 +233,5 @@ def test_a_motion_that_is_not_prescribed_whole_has_no_inverse(tmp_path: Path, ca
 
 def test_a_constant_load_bends_the_equilibrium() -> None:
     forces = (CoordinateSpring("a", "angle", 4.0), Moment("a", constant(1.0)))
-    system = System([PlanarScene(Scene((Body("a", 1.0, 0.1),), (Hinge("a", "ground"),), forces))])
+    system = System([Linkage((Body("a", 1.0, 0.1),), (Hinge("a", "ground"),), forces)])
     assert equilibrium(system, consistent_start(system)).q[2] == pytest.approx(0.25, rel=1e-12)

@@ -16,11 +16,10 @@ from gearfe.rigid import (
     Fixed,
     Gravity,
     Hinge,
+    Linkage,
     Moment,
-    PlanarScene,
     PointForce,
     Prescribed,
-    Scene,
     Slot,
     System,
     consistent_start,
@@ -42,8 +41,8 @@ def slender(elements: int, length: float = 1.0, EA: float = 1e9, EI: float = 1.0
 
 
 def made(link: BeamLink, joints=(), forces=(), bodies=()) -> System:  # type: ignore[no-untyped-def]
-    scene = PlanarScene(Scene((*link.nodes(), *bodies), tuple(joints), tuple(forces)))
-    return System([scene, Beam(scene, link)])
+    linkage = Linkage((*link.nodes(), *bodies), tuple(joints), tuple(forces))
+    return System([linkage, Beam(linkage, link)])
 
 
 def beam_of(system: System) -> Beam:
@@ -210,7 +209,7 @@ def test_a_stiff_pendulum_is_the_rigid_one_with_a_rate() -> None:
     times = np.linspace(0.0, 0.3, 4)
     section = Section.rectangle(0.02, 0.02)
     rigid_link = BeamLink("rod", 1.0, section, 1e9, 1000.0)
-    rigid = System([PlanarScene(Scene((rigid_link.rigid(),), (Hinge("rod", "ground"),), (Gravity(),)))])
+    rigid = System([Linkage((rigid_link.rigid(),), (Hinge("rod", "ground"),), (Gravity(),))])
     true = integrate(rigid, times, tolerance=1e-11, backend="plain", method="taylor")
     tip = true.q[:, :2] + 0.5 * np.stack([np.cos(true.q[:, 2]), np.sin(true.q[:, 2])], axis=1)
     off = []
@@ -245,4 +244,4 @@ def test_rigid_bodies_springs_and_nodes_work_together() -> None:
     forces = [PointForce("mass", y=constant(1e-4)), CoordinateSpring("mass", "y", stiffness=5.0)]
     system = made(link, [Fixed("rod"), Fixed("mass", tip)], forces, [mass])
     found = equilibrium(system, consistent_start(system)).q.reshape(-1, 3)
-    assert found[system.elements[0].scene.body_index["mass"], 1] == pytest.approx(1e-4 / (3.0 + 5.0), rel=1e-6)
+    assert found[system.elements[0].body_index["mass"], 1] == pytest.approx(1e-4 / (3.0 + 5.0), rel=1e-6)

@@ -14,10 +14,9 @@ from gearfe.rigid import (
     Element,
     Gravity,
     LinearJoint,
+    Linkage,
     LocalForce,
     ModalBlocks,
-    PlanarScene,
-    Scene,
     SeriesLaw,
     System,
     consistent_start,
@@ -41,8 +40,8 @@ class HingeToModalBody(Element):
 
     rows = 2
 
-    def __init__(self, scene: PlanarScene, modal: ModalBlocks, point, place, Phi) -> None:  # type: ignore[no-untyped-def]
-        self.touches = (scene, modal)
+    def __init__(self, linkage: Linkage, modal: ModalBlocks, point, place, Phi) -> None:  # type: ignore[no-untyped-def]
+        self.touches = (linkage, modal)
         self.point, self.place, self.Phi = np.array(point), np.array(place), Phi
 
     def _arm(self, q):  # type: ignore[no-untyped-def]
@@ -61,10 +60,10 @@ class HingeToModalBody(Element):
 
 
 def rod_on_a_modal_body() -> System:
-    scene = PlanarScene(Scene((Body("rod", 1.0, 0.1, (0.5, 0.0), (0.0, 0.0), 0.3),), (), (Gravity((0.0, -9.81)),)))
+    linkage = Linkage((Body("rod", 1.0, 0.1, (0.5, 0.0), (0.0, 0.0), 0.3),), (), (Gravity((0.0, -9.81)),))
     modal = ModalBlocks(M, C * 0, K)
     Phi = np.array([[1.0, 0.2, 0.0], [0.0, 0.5, 1.0]])
-    return System([scene, modal, HingeToModalBody(scene, modal, (-0.5, 0.0), (0.0, 0.0), Phi)])
+    return System([linkage, modal, HingeToModalBody(linkage, modal, (-0.5, 0.0), (0.0, 0.0), Phi)])
 
 
 @pytest.mark.parametrize(("method", "allowed"), [("explicit", 1e-8), ("implicit", 1e-4)])
@@ -197,7 +196,7 @@ def test_convergence_order_of_the_series():
     fine = integrate(system, [0.0, 1.0], tolerance=1e-13, start=start, backend="plain").q[-1, 2]
     steps, errors = [], []
     for count in (30, 45, 67, 100):
-        prepared = taylor.prepare(system.planar.assembly, 8, jit=False)
+        prepared = taylor.prepare(system.linkage.assembly, 8, jit=False)
         made = taylor.integrate_scene(prepared, start, 1.0, tolerance=1e3, longest=1.0 / count)
         steps.append(len(made.dense.coefficients))
         errors.append(abs(made.dense(np.array([1.0]))[0, 2] - fine))

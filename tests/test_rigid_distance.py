@@ -12,13 +12,13 @@ from scipy.special import ellipk
 from gearfe.errors import InputError
 from gearfe.mechanisms import load_mechanism
 from gearfe.mechanisms.results import reactions
-from gearfe.rigid import Body, Distance, Gravity, Hinge, PlanarScene, Scene, Slot, System, consistent_start, integrate
+from gearfe.rigid import Body, Distance, Gravity, Hinge, Linkage, Slot, System, consistent_start, integrate
 
 from .rigid_cases import G, residuals, total_energy
 
 
 def system(bodies, joints) -> System:  # type: ignore[no-untyped-def]
-    return System([PlanarScene(Scene(tuple(bodies), tuple(joints), (Gravity((0.0, -G)),)))])
+    return System([Linkage(tuple(bodies), tuple(joints), (Gravity((0.0, -G)),))])
 
 
 def bob(angle: float, length: float) -> System:
@@ -98,7 +98,7 @@ def test_forces_and_slopes_of_a_distance_are_derivatives():
     rate = (made.jacobian(0.0, q + step * v) - made.jacobian(0.0, q - step * v)) / (2 * step)
     np.testing.assert_allclose(made.velocity_terms(0.0, q, v), rate @ v, atol=1e-8)
     bend = [(made.jacobian(0.0, q + d) - made.jacobian(0.0, q - d)).T @ [1.7] / (2 * step) for d in step * np.eye(6)]
-    np.testing.assert_allclose(made.planar.curvature(q, np.array([1.7])), np.array(bend).T, atol=1e-8)
+    np.testing.assert_allclose(made.linkage.curvature(q, np.array([1.7])), np.array(bend).T, atol=1e-8)
 
 
 def test_no_distance_at_all_is_refused():

@@ -17,12 +17,11 @@ from gearfe.rigid import (
     Gravity,
     Hinge,
     IntegrationError,
+    Linkage,
     Moment,
-    PlanarScene,
     PointForce,
     Prescribed,
     Prismatic,
-    Scene,
     Slot,
     Spring,
     Status,
@@ -40,8 +39,8 @@ from .rigid_cases import G, chain, pendulum, residuals, total_energy
 GRAVITY = Gravity((0.0, -G))
 
 
-def run(scene: Scene, times, **options):  # type: ignore[no-untyped-def]
-    made = integrate(System([PlanarScene(scene)]), times, **{"tolerance": 1e-11, "backend": "plain", **options})
+def run(linkage: Linkage, times, **options):  # type: ignore[no-untyped-def]
+    made = integrate(System([linkage]), times, **{"tolerance": 1e-11, "backend": "plain", **options})
     assert made.status == 0
     return made
 
@@ -98,7 +97,7 @@ def test_double_pendulum_against_the_textbook_equations():
         return [dp, dq, *np.linalg.solve(M, f)]
 
     exact = solve_ivp(rhs, (0, 2), [a1, a2, 0, 0], "DOP853", t_eval=times, rtol=1e-13, atol=1e-13).y
-    made = run(Scene(bodies, joints, (GRAVITY,)), times)
+    made = run(Linkage(bodies, joints, (GRAVITY,)), times)
     assert np.abs(made.q[:, [2, 5]] - exact[:2].T).max() <= 1e-9
 
 
@@ -106,13 +105,13 @@ def test_damped_spring_between_points():
     """m x'' + c x' + k x = 0 along the line of a prismatic joint, with the free length as its place of rest."""
     m, k, c, x0 = 2.0, 50.0, 3.0, 0.3
     body = Body("m", m, 1.0, position=(1.0 + x0, 0.0))
-    scene = Scene(
+    linkage = Linkage(
         (body,),
         (Prismatic("m", "ground"),),
         (Spring("ground", "m", stiffness=k, damping=c, free_length=1.0),),
     )
     times = np.linspace(0, 3, 31)
-    made = run(scene, times)
+    made = run(linkage, times)
     decay, omega = c / (2 * m), sqrt(k / m - (c / (2 * m)) ** 2)
     exact = 1.0 + x0 * np.exp(-decay * times) * (np.cos(omega * times) + decay / omega * np.sin(omega * times))
     assert np.abs(made.q[:, 0] - exact).max() <= 1e-9
@@ -122,14 +121,14 @@ def test_springs_to_ground_on_every_coordinate():
     body = Body("m", 2.0, 0.5, position=(0.1, -0.2), angle=0.3)
     forces = tuple(CoordinateSpring("m", c, stiffness=k) for c, k in (("x", 8.0), ("y", 18.0), ("angle", 8.0)))
     times = np.linspace(0, 4, 41)
-    made = run(Scene((body,), (), forces), times)
+    made = run(Linkage((body,), (), forces), times)
     for column, (start, omega) in enumerate(((0.1, 2.0), (-0.2, 3.0), (0.3, 4.0))):
         assert np.abs(made.q[:, column] - start * np.cos(omega * times)).max() <= 1e-9
 
 
 def test_torsion_between_two_bodies_conserves_momentum():
     bodies = (Body("a", 1.0, 1.0, angle=0.5), Body("b", 1.0, 3.0))
-    made = run(Scene(bodies, (), (CoordinateSpring("a", "angle", 12.0, relative_to="b"),)), np.linspace(0, 2, 21))
+    made = run(Linkage(bodies, (), (CoordinateSpring("a", "angle", 12.0, relative_to="b"),)), np.linspace(0, 2, 21))
     omega = sqrt(12.0 * (1 / 1.0 + 1 / 3.0))
     assert np.abs(made.q[:, 2] - made.q[:, 5] - 0.5 * np.cos(omega * made.time)).max() <= 1e-9
     assert np.abs(made.v[:, 2] + 3.0 * made.v[:, 5]).max() <= 1e-9
@@ -143,7 +142,7 @@ def test_point_force_and_moment_with_time_functions():
         PointForce("m", (0.0, 0.0), sine(4.0, 3.0), polynomial((1.0, 2.0))),
     )
     times = np.linspace(0, 3, 31)
-    made = run(Scene((body,), (), forces), times)
+    made = run(Linkage((body,), (), forces), times)
     x = np.clip((times - 1.0 + 0.25) / 0.5, 0, 1)
     rise = 0.5 * (2.5 * x**4 - 3 * x**5 + x**6)  # integral of 10x^3-15x^4+6x^5 over time
     exact = 3.0 / 0.5 * (rise + np.maximum(times - 1.25, 0.0))
@@ -156,7 +155,7 @@ def test_eccentric_force_turns_a_body():
     """Constant force at a point of a hinged body: I theta'' = F_y r cos - F_x r sin, energy F . r."""
     body = Body("m", 1.0, 0.2, (0.0, 0.0))
     force = PointForce("m", (0.4, 0.0), constant(0.0), constant(5.0))
-    made = run(Scene((body,), (Hinge("m", "ground"),), (force,)), np.linspace(0, 1, 11))
+    made = run(Linkage((body,), (Hinge("m", "ground"),), (force,)), np.linspace(0, 1, 11))
     work = 5.0 * 0.4 * np.sin(made.q[:, 2])
     assert np.abs(0.5 * 0.2 * made.v[:, 2] ** 2 - work).max() <= 1e-9
 
@@ -174,7 +173,7 @@ def test_crank_with_prescribed_speed():
         Slot("rod", "ground", (length, 0.0)),
         Prescribed("crank", "rate", constant(w)),
     )
-    system = System([PlanarScene(Scene(bodies, joints, (GRAVITY,)))])
+    system = System([Linkage(bodies, joints, (GRAVITY,))])
     start = consistent_start(system)
     assert start.freedoms.net == 0
     times = np.linspace(0, 2, 21)
@@ -186,7 +185,7 @@ def test_crank_with_prescribed_speed():
 def test_prescribed_place_of_a_point():
     body = Body("m", 1.0, 0.3, position=(0.0, 0.0))
     joints = (Prescribed("m", "x", sine(0.2, 5.0)), Slot("m", "ground"))
-    made = run(Scene((body,), joints), np.linspace(0, 1, 11))
+    made = run(Linkage((body,), joints), np.linspace(0, 1, 11))
     assert np.abs(made.q[:, 0] - 0.2 * np.sin(5 * made.time)).max() <= 1e-11
 
 
@@ -195,7 +194,7 @@ def test_slot_on_a_turning_line():
     w, r0 = 2.0, 0.3
     bodies = (Body("arm", 1.0, 1.0, rate=w), Body("bead", 0.5, 1e-3, position=(r0, 0.0), velocity=(0.0, r0 * w)))
     joints = (Hinge("arm", "ground"), Slot("bead", "arm"), Prescribed("arm", "rate", constant(w)))
-    made = run(Scene(bodies, joints), np.linspace(0, 1.5, 16))
+    made = run(Linkage(bodies, joints), np.linspace(0, 1.5, 16))
     assert np.abs(np.hypot(made.q[:, 3], made.q[:, 4]) - r0 * np.cosh(w * made.time)).max() <= 1e-10
 
 
@@ -217,7 +216,7 @@ def test_prismatic_joint_between_two_moving_bodies(method):
     times = np.linspace(0, 1, 11)
     exact = solve_ivp(rhs, (0, 1), [0, s0, 0.4, 0], "DOP853", t_eval=times, rtol=1e-13, atol=1e-13).y
     tolerance = 1e-9 if method == "implicit" else 1e-10
-    made = run(Scene(bodies, joints, forces), times, method=method, tolerance=tolerance)
+    made = run(Linkage(bodies, joints, forces), times, method=method, tolerance=tolerance)
     assert np.abs(made.q[:, 2] - exact[0]).max() <= 1e-7
     assert np.abs(np.hypot(made.q[:, 3], made.q[:, 4]) - exact[1]).max() <= 1e-7
 
@@ -228,7 +227,7 @@ def test_fixed_joint_makes_one_body_of_two():
         Body("a", 1.0, 0.1, (0.5, 0.0), angle=-1.0),
         Body("b", 2.0, 0.2, (0.0, 0.3), (cos(-1.0), sin(-1.0)), 0.4),
     )
-    made = run(Scene(bodies, (Hinge("a", "ground"), Fixed("b", "a")), (GRAVITY,)), np.linspace(0, 1, 11))
+    made = run(Linkage(bodies, (Hinge("a", "ground"), Fixed("b", "a")), (GRAVITY,)), np.linspace(0, 1, 11))
     assert np.abs(made.q[:, 5] - made.q[:, 2] - 1.4).max() <= 1e-12
     centre = np.array([cos(-1.0) - 0.3 * sin(0.4), sin(-1.0) + 0.3 * cos(0.4)])
     inertia = 0.1 + 0.25 + 0.2 + 2.0 * centre @ centre
@@ -250,7 +249,7 @@ def test_random_linkages_keep_energy_and_close():
             Hinge("l2", "l1", (0.0, 0.0), (ends[1], 0.0)),
             Hinge("l2", "ground", (ends[2], 0.0), tuple(d)),
         )
-        system = System([PlanarScene(Scene(bodies, joints, (GRAVITY,)))])
+        system = System([Linkage(bodies, joints, (GRAVITY,))])
         times = np.linspace(0, 1.0, 11)
         made = integrate(system, times, tolerance=1e-11, backend="plain")
         assert made.status == 0
@@ -276,16 +275,16 @@ def test_loop_that_cannot_close_is_named():
         Hinge("a", "b", (1.0, 0.0), (-1.0, 0.0), name="gap"),
     )
     with pytest.raises(InputError, match=r"cannot close: a residual of 0\.333"):
-        consistent_start(System([PlanarScene(Scene(bodies, joints))]))
+        consistent_start(System([Linkage(bodies, joints)]))
 
 
 @pytest.mark.parametrize(
     ("make", "text"),
     [
         (lambda: Body("a", -1.0, 1.0), "mass = -1.0: must be finite and >= 0"),
-        (lambda: Scene((Body("a", 1, 1),), (Hinge("a", "a"),)), "joins a body to itself"),
-        (lambda: Scene((Body("rod", 1, 1),), (Hinge("rod", "grund"),)), "did you mean 'ground'"),
-        (lambda: Scene((Body("a", 1, 1), Body("a", 1, 1))), "used twice"),
+        (lambda: Linkage((Body("a", 1, 1),), (Hinge("a", "a"),)), "joins a body to itself"),
+        (lambda: Linkage((Body("rod", 1, 1),), (Hinge("rod", "grund"),)), "did you mean 'ground'"),
+        (lambda: Linkage((Body("a", 1, 1), Body("a", 1, 1))), "used twice"),
         (lambda: Prescribed("a", "z", constant(0.0)), "must be one of angle, rate, x, y"),
         (lambda: integrate(pendulum(), [0.0, 1.0], tolerance=1.0), "tolerance = 1.0: must be from 1e-13 to 0.1"),
         (lambda: integrate(pendulum(), [0.0, 0.0]), "must rise"),
@@ -311,9 +310,9 @@ def test_a_run_that_cannot_go_on_is_an_exception_that_holds_what_it_has():
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: Scene((Body("a", 1.0, 0.1),), (Slot("a", "ground", direction=(0, 0)),)),
-        lambda: Scene((Body("a", 1.0, 0.1),), (), (CoordinateSpring("a", "x", stiffness=float("nan")),)),
-        lambda: Scene((Body("a", 1.0, 0.1),), (), (Moment("a", sin),)),  # type: ignore[arg-type]
+        lambda: Linkage((Body("a", 1.0, 0.1),), (Slot("a", "ground", direction=(0, 0)),)),
+        lambda: Linkage((Body("a", 1.0, 0.1),), (), (CoordinateSpring("a", "x", stiffness=float("nan")),)),
+        lambda: Linkage((Body("a", 1.0, 0.1),), (), (Moment("a", sin),)),  # type: ignore[arg-type]
         lambda: System([]),
     ],
 )
@@ -324,25 +323,25 @@ def test_what_cannot_be_a_mechanism(make):
 
 def test_a_number_is_a_constant_moment():
     """Angle M t^2 / (2 I)."""
-    made = run(Scene((Body("a", 1.0, 0.1),), (), (Moment("a", 0.5),)), [0.0, 1.0])  # type: ignore[arg-type]
+    made = run(Linkage((Body("a", 1.0, 0.1),), (), (Moment("a", 0.5),)), [0.0, 1.0])  # type: ignore[arg-type]
     assert made.q[-1, 2] == pytest.approx(2.5, abs=1e-12)
 
 
 def test_arguments_in_another_order_are_told():
     """Moment(body, function, reaction): a function where a body's name belongs is named, with the order."""
     with pytest.raises(InputError, match=r"no name of a body; its arguments are body, function, reaction"):
-        Scene((Body("a", 1.0, 0.1),), (), (Moment("a", "ground", constant(1.0)),))  # type: ignore[arg-type]
+        Linkage((Body("a", 1.0, 0.1),), (), (Moment("a", "ground", constant(1.0)),))  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"3.0 is no name of a body; its arguments are a, b, point_a"):
-        Scene((Body("a", 1.0, 0.1),), (Hinge("a", 3.0),))  # type: ignore[arg-type]
+        Linkage((Body("a", 1.0, 0.1),), (Hinge("a", 3.0),))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("given", [{"free_length": 1.0}, {"damping": 2.0}])
 def test_a_spring_between_coincident_points_is_named(given):
     """Its force has no direction: said so, instead of a division by zero somewhere below."""
     springs = (Spring("ground", "m", point_a=(1.0, 0.0), stiffness=5.0), Spring("ground", "m", name="rope", **given))
-    scene = Scene((Body("m", 2.0, 0.1),), (), springs)
+    linkage = Linkage((Body("m", 2.0, 0.1),), (), springs)
     with pytest.raises(InputError, match=r"spring 'rope': joins two points that coincide.*neither a free length"):
-        integrate(System((PlanarScene(scene),)), [0.0, 1.0], backend="plain")
+        integrate(System((linkage,)), [0.0, 1.0], backend="plain")
 
 
 @pytest.mark.parametrize("method", ["taylor", "explicit", "implicit"])
@@ -350,9 +349,9 @@ def test_a_spring_between_coincident_points_is_named(given):
 def test_a_spring_without_free_length_passes_through_zero(method, start):
     """The force is k times the span: q = q0 cos wt + v0/w sin wt, also from and through coinciding points."""
     body = Body("m", 2.0, 0.1, position=start, velocity=(0.5, 0.0))
-    scene = Scene((body,), (), (Spring("ground", "m", stiffness=18.0),))
+    linkage = Linkage((body,), (), (Spring("ground", "m", stiffness=18.0),))
     times = np.linspace(0.0, 5.0, 41)
-    made = integrate(System((PlanarScene(scene),)), times, method=method, backend="plain", tolerance=1e-9)
+    made = integrate(System((linkage,)), times, method=method, backend="plain", tolerance=1e-9)
     assert made.status == 0
     exact = start[0] * np.cos(3.0 * times) + 0.5 / 3.0 * np.sin(3.0 * times)
     np.testing.assert_allclose(made.q[:, 0], exact, atol=1e-7)
@@ -363,7 +362,7 @@ def test_a_prescribed_motion_holds_between_the_steps_of_the_implicit_method():
     """Where nothing is free the error of the free motion is zero; the curve between the steps must hold."""
     turning = Prescribed("rod", "angle", polynomial((0.0, 30.0)))
     rod = Body("rod", 1.0, 0.1, (0.5, 0.0))
-    system = System([PlanarScene(Scene((rod,), (Hinge("rod", "ground"), turning)))])
+    system = System([Linkage((rod,), (Hinge("rod", "ground"), turning))])
     times = np.linspace(0.0, 1.0, 201)
     made = integrate(system, times, method="implicit", tolerance=1e-6)
     circle = 0.5 * np.stack([np.cos(30.0 * times), np.sin(30.0 * times)], axis=1)
@@ -376,7 +375,7 @@ def test_energy_over_a_thousand_periods(links):
     """A rod and a double pendulum swing 2,000 s without damping (a period is 1.6 to 2 s): the drift is below 1e-8."""
     bodies = [Body("a", 1.0, 1 / 12, (0.5, 0.0), rate=1.0), Body("b", 1.0, 1 / 12, (0.5, 0.0), (1.0, 0.0))][:links]
     joints = [Hinge("a", "ground"), Hinge("a", "b", (1.0, 0.0), (0.0, 0.0))][:links]
-    system = System([PlanarScene(Scene(tuple(bodies), tuple(joints), (Gravity(),)))])
+    system = System([Linkage(tuple(bodies), tuple(joints), (Gravity(),))])
     run = integrate(system, np.linspace(0.0, 2000.0, 201), tolerance=1e-12, method="taylor")
     energy = np.array([system.energy(q, v) for q, v in zip(run.q, run.v, strict=True)])
     total = energy.sum(axis=1)

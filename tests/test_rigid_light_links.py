@@ -15,7 +15,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from gearfe.errors import InputError
-from gearfe.rigid import Body, Gravity, Hinge, PlanarScene, Prescribed, Prismatic, Scene, System, constant, integrate
+from gearfe.rigid import Body, Gravity, Hinge, Linkage, Prescribed, Prismatic, System, constant, integrate
 
 from .rigid_cases import G, folding_links, total_energy
 
@@ -65,7 +65,7 @@ def four_bar(mass: float, share: float) -> System:
         Hinge("rocker", "ground", (0.0, 0.0), (GROUND, 0.0), name="C"),
         Hinge("coupler", "rocker", (COUPLER, 0.0), (ROCKER, 0.0), name="B"),
     )
-    return System([PlanarScene(Scene(bodies, joints, (Gravity((0.0, -G)),)))])
+    return System([Linkage(bodies, joints, (Gravity((0.0, -G)),))])
 
 
 def accelerations(phi: float, rate: float, mass: float, share: float) -> tuple[float, np.ndarray, float, float]:
@@ -142,9 +142,9 @@ def test_auto_takes_the_series_with_a_light_coupler():
 
 def with_rod(mass: float, inertia: float, theta: float, omega: float) -> System:
     """Folding links whose rod has another mass."""
-    scene = folding_links(theta, omega).planar.scene
-    bodies = (scene.bodies[0], replace(scene.bodies[1], mass=mass, inertia=inertia / 12))
-    return System([PlanarScene(Scene(bodies, scene.joints, scene.forces))])
+    linkage = folding_links(theta, omega).linkage
+    bodies = (linkage.bodies[0], replace(linkage.bodies[1], mass=mass, inertia=inertia / 12))
+    return System([Linkage(bodies, linkage.joints, linkage.forces)])
 
 
 @pytest.mark.parametrize("theta", [pi / 4, pi / 2])
@@ -179,9 +179,9 @@ def test_a_light_pendulum_on_a_light_coupler_keeps_its_own_mass(share):
     exact = solve_ivp(rhs, (0.0, 1.0), [PHI, RATE, -0.3, 0.0], "DOP853", t_eval=times, rtol=3e-14, atol=1e-14).y
     place, speed = tuple(CRANK * unit(PHI)), tuple(RATE * CRANK * normal(PHI))
     rod = Body("pendulum", share, share * length**2 / 12, (length / 2, 0.0), place, -0.3, speed)
-    scene = four_bar(0.0, 0.0).planar.scene
-    system = System([PlanarScene(Scene((*scene.bodies, rod), (*scene.joints, Hinge("pendulum", "coupler")),
-                                       scene.forces))])  # fmt: skip
+    linkage = four_bar(0.0, 0.0).linkage
+    system = System([Linkage((*linkage.bodies, rod), (*linkage.joints, Hinge("pendulum", "coupler")),
+                                       linkage.forces)])  # fmt: skip
     run = integrate(system, times, method="taylor", tolerance=1e-12, backend="plain")
     assert np.abs(run.q[:, 2] - exact[0]).max() <= 10 * share + 1e-12
     assert np.abs(run.q[:, 11] - exact[2]).max() <= 100 * share + 2e-11
@@ -189,11 +189,11 @@ def test_a_light_pendulum_on_a_light_coupler_keeps_its_own_mass(share):
 
 def test_driven_links_without_mass():
     """Only the rocker has mass: the crank's moment is the power of the rocker over the crank's rate."""
-    scene = four_bar(0.0, 0.0).planar.scene
-    bodies = (replace(scene.bodies[0], mass=0.0, inertia=0.0), *scene.bodies[1:])
-    joints = (*scene.joints, Prescribed("crank", "rate", constant(RATE), name="motor"))
+    linkage = four_bar(0.0, 0.0).linkage
+    bodies = (replace(linkage.bodies[0], mass=0.0, inertia=0.0), *linkage.bodies[1:])
+    joints = (*linkage.joints, Prescribed("crank", "rate", constant(RATE), name="motor"))
     times = np.linspace(0.0, 0.4, 5)
-    run = integrate(System([PlanarScene(Scene(bodies, joints, scene.forces))]), times, backend="plain")
+    run = integrate(System([Linkage(bodies, joints, linkage.forces)]), times, backend="plain")
     motor = run.system.row_names().index("prescribed motor (angle)")
     for i, t in enumerate(times):
         _, rocker, first, second = closure(PHI + RATE * t)
@@ -218,7 +218,7 @@ def slider_crank(mass: float, phi: float = 1.0) -> System:
         Hinge("rod", "block", (2.0, 0.0)),
         Prismatic("block", "ground"),
     )
-    return System([PlanarScene(Scene(bodies, joints, (Gravity((0.0, -G)),)))])
+    return System([Linkage(bodies, joints, (Gravity((0.0, -G)),))])
 
 
 def test_through_dead_centres_on_a_light_crank():
@@ -239,14 +239,14 @@ def without(*names: str) -> Callable[[], System]:
     """The four-bar without these joints and with a coupler without mass."""
 
     def make() -> System:
-        scene = four_bar(0.0, 0.0).planar.scene
-        return System([PlanarScene(Scene(scene.bodies, tuple(j for j in scene.joints if j.name not in names)))])
+        linkage = four_bar(0.0, 0.0).linkage
+        return System([Linkage(linkage.bodies, tuple(j for j in linkage.joints if j.name not in names))])
 
     return make
 
 
 def alone() -> System:
-    return System([PlanarScene(Scene((Body("coupler", 0.0, 0.0),), (Hinge("coupler", "ground"),)))])
+    return System([Linkage((Body("coupler", 0.0, 0.0),), (Hinge("coupler", "ground"),))])
 
 
 @pytest.mark.parametrize("make", [without("B"), without("A", "B"), alone])

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from gearfe.rigid import Body, Forced, Gravity, Hinge, PlanarScene, Scene, Start, System, consistent_start, integrate
+from gearfe.rigid import Body, Forced, Gravity, Hinge, Linkage, Start, System, consistent_start, integrate
 
 from .rigid_cases import G, folding_angle, folding_links, total_energy
 
@@ -26,7 +26,7 @@ def n_four_bar(count: int) -> System:
     joints = [Hinge(f"b{i}", "ground", (0.0, 0.0), (float(i), 0.0)) for i in range(count + 1)]
     for i in range(count):
         joints += [Hinge(f"c{i}", f"b{i + k}", (float(k), 0.0), (1.0, 0.0)) for k in range(2)]
-    return System([PlanarScene(Scene((*bars, *couplers), tuple(joints), (Gravity((0.0, -G)),)))])
+    return System([Linkage((*bars, *couplers), tuple(joints), (Gravity((0.0, -G)),))])
 
 
 def n_four_bar_angle(count: int, times: np.ndarray) -> np.ndarray:
@@ -89,7 +89,7 @@ def peaucellier(phi: float, rate: float) -> tuple[System, Start]:
     pairs = ("OA ground O", "OB ground O", "CQ ground C", "AP OA A", "AQ OA A", "BP OB B", "BQ OB B", "AP BP P",
              "AQ CQ Q", "BQ CQ Q")  # fmt: skip
     joints = tuple(hinge(*pair.split()) for pair in pairs)
-    system = System([PlanarScene(Scene(bodies, joints, (Gravity((0.0, -G)),)))])
+    system = System([Linkage(bodies, joints, (Gravity((0.0, -G)),))])
     turn_crank = Forced("rate", rate, lambda _q: 0.0, lambda _q: np.eye(21)[20])
     return system, consistent_start(system, velocities=[turn_crank])
 
@@ -109,15 +109,15 @@ def test_peaucellier_straight_line(tolerance):
 
 
 def two_linkages(apart: float) -> System:
-    """Two uncoupled folding linkages in one scene, the second one `apart` (rad) ahead."""
-    one, other = (folding_links(angle, 3.0).planar.scene for angle in (1.0, 1.0 + apart))
+    """Two uncoupled folding linkages in one linkage, the second one `apart` (rad) ahead."""
+    one, other = (folding_links(angle, 3.0).linkage for angle in (1.0, 1.0 + apart))
     name = {"crank": "crank2", "rod": "rod2"}
     bodies = one.bodies + tuple(replace(b, name=name[b.name]) for b in other.bodies)
     joints = one.joints
     for joint in other.joints:
         keys = {k: name[getattr(joint, k)] for k in ("a", "b", "body") if getattr(joint, k, "") in name}
         joints += (replace(joint, **keys),)
-    return System([PlanarScene(Scene(bodies, joints, one.forces))])
+    return System([Linkage(bodies, joints, one.forces)])
 
 
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-9])

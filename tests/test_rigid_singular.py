@@ -14,9 +14,8 @@ from gearfe.rigid import (
     Forced,
     Gravity,
     Hinge,
-    PlanarScene,
+    Linkage,
     Prescribed,
-    Scene,
     Start,
     Status,
     System,
@@ -84,7 +83,7 @@ def parallel_cranks(count: int, angle: float = 0.4, rate: float = 3.0) -> System
     bodies.append(Body("coupler", 2.0, 0.5, (1.0, 0.0), (cos(angle), sin(angle)), 0.0, speed, 0.0))
     joints = [Hinge(f"c{i}", "ground", (0.0, 0.0), (float(i), 0.0)) for i in range(count)]
     joints += [Hinge(f"c{i}", "coupler", (1.0, 0.0), (float(i), 0.0)) for i in range(count)]
-    return System([PlanarScene(Scene(tuple(bodies), tuple(joints), (Gravity((0.0, -G)),)))])
+    return System([Linkage(tuple(bodies), tuple(joints), (Gravity((0.0, -G)),))])
 
 
 def test_redundant_constraint_is_found_and_harmless():
@@ -111,8 +110,8 @@ def test_passing_singularity_at_the_start_is_not_called_redundant():
 
 
 def test_two_folds_at_the_same_moment():
-    """Two uncoupled linkages in one scene that fold together."""
-    one = folding_links(1.0, 3.0).planar.scene
+    """Two uncoupled linkages in one linkage that fold together."""
+    one = folding_links(1.0, 3.0).linkage
     rename = {"crank": "crank2", "rod": "rod2"}
     from dataclasses import replace
 
@@ -121,7 +120,7 @@ def test_two_folds_at_the_same_moment():
     for joint in one.joints:
         keys = {k: rename[getattr(joint, k)] for k in ("a", "b", "body") if getattr(joint, k, "") in rename}
         joints += (replace(joint, **keys),)
-    system = System([PlanarScene(Scene(bodies, joints, one.forces))])
+    system = System([Linkage(bodies, joints, one.forces)])
     times = np.linspace(0.0, 2.0, 21)
     made = integrate(system, times, tolerance=1e-9, backend="plain")
     assert made.status == 0
@@ -205,7 +204,7 @@ class FourBar:
         bodies = tuple(Body(n, m, m * r * r / 12, (r / 2, 0.0), place, angle) for n, m, r, angle, place in rods)
         joints = (Hinge("a", "ground"), Hinge("b", "a", (0.0, 0.0), (a, 0.0)),
                   Hinge("c", "ground", (0.0, 0.0), (d, 0.0)), Hinge("b", "c", (b, 0.0), (c, 0.0)))  # fmt: skip
-        system = System([PlanarScene(Scene(bodies, joints, (Gravity((0.0, -G)),)))])
+        system = System([Linkage(bodies, joints, (Gravity((0.0, -G)),))])
         turn = Forced("rate", rate, lambda _q: 0.0, lambda _q: np.eye(9)[2])
         return system, consistent_start(system, velocities=[turn])
 
@@ -243,7 +242,7 @@ def test_prescribed_motions_that_contradict_each_other_later():
     """Both hold x = 0 at the start; the second moves away by t^2 / 2: no status "done"."""
     body = Body("a", 1.0, 0.1)
     motions = (Prescribed("a", "x", polynomial((0.0,))), Prescribed("a", "x", polynomial((0.0, 0.0, 0.5))))
-    system = System([PlanarScene(Scene((body,), motions, ()))])
+    system = System([Linkage((body,), motions, ())])
     try:
         made = integrate(system, [0.0, 1.0], backend="plain", raise_on_failure=False)
     except InputError:
@@ -255,7 +254,7 @@ def test_a_state_that_overflows_ends_the_run_with_its_status() -> None:
     """Joints that stand twice ask for least squares, which LAPACK refuses for infinite numbers: 1e150^2 overflows."""
     rod = Body("rod", 1.0, 0.1, (0.4, 0.0))
     spun = Prescribed("rod", "angle", polynomial((0.0, 0.0, 1e150)))
-    system = System([PlanarScene(Scene((rod,), (Hinge("rod", "ground"), Hinge("rod", "ground"), spun), ()))])
+    system = System([Linkage((rod,), (Hinge("rod", "ground"), Hinge("rod", "ground"), spun), ())])
     options = {"method": "explicit", "tolerance": 1e-3, "backend": "plain", "raise_on_failure": False}
     made = integrate(system, np.linspace(0.0, 10.0, 11), **options)
     assert made.status is Status.NOT_FINITE

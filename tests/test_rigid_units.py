@@ -14,9 +14,8 @@ from gearfe.rigid import (
     Body,
     Gravity,
     Hinge,
-    PlanarScene,
+    Linkage,
     Prescribed,
-    Scene,
     Slot,
     System,
     consistent_start,
@@ -39,19 +38,19 @@ def scaled(system: System, length: float, mass: float, time: float, change: Chan
     def p(point):  # type: ignore[no-untyped-def]
         return (point[0] * length, point[1] * length)
 
-    scene = system.planar.scene
+    linkage = system.linkage
     bodies = tuple(
         replace(b, mass=b.mass * mass, inertia=b.inertia * mass * length**2, centre=p(b.centre), position=p(b.position),
                 velocity=(b.velocity[0] * length / time, b.velocity[1] * length / time), rate=b.rate / time)
-        for b in map(change, scene.bodies)
+        for b in map(change, linkage.bodies)
     )  # fmt: skip
     joints = []
-    for j in scene.joints:
+    for j in linkage.joints:
         if isinstance(j, Hinge):
             joints.append(replace(j, point_a=p(j.point_a), point_b=p(j.point_b)))
         else:
             joints.append(replace(j, point=p(j.point), origin=p(j.origin)))
-    return System([PlanarScene(Scene(bodies, tuple(joints), (Gravity((0.0, -G * length / time**2)),)))])
+    return System([Linkage(bodies, tuple(joints), (Gravity((0.0, -G * length / time**2)),))])
 
 
 def fourbar() -> System:
@@ -71,14 +70,14 @@ def fourbar() -> System:
         Hinge("c", "ground", (0.0, 0.0), (2.0, 0.0)),
         Hinge("b", "c", (two, 0.0), (three, 0.0), name="last"),
     )
-    return System([PlanarScene(Scene(tuple(bodies), joints, (Gravity((0.0, -G)),)))])
+    return System([Linkage(tuple(bodies), joints, (Gravity((0.0, -G)),))])
 
 
 def light_fourbar() -> System:
     """The middle link has next to no mass."""
-    scene = fourbar().planar.scene
-    bodies = tuple(replace(b, mass=1e-12, inertia=1e-12) if b.name == "b" else b for b in scene.bodies)
-    return System([PlanarScene(replace(scene, bodies=bodies))])
+    linkage = fourbar().linkage
+    bodies = tuple(replace(b, mass=1e-12, inertia=1e-12) if b.name == "b" else b for b in linkage.bodies)
+    return System([Linkage(bodies, linkage.joints, linkage.forces)])
 
 
 def slider_crank() -> System:
@@ -108,7 +107,7 @@ def test_the_motion_does_not_depend_on_the_units(make, method, tolerance):
         assert run.status == 0
         assert run.statistics["steps"] == made.statistics["steps"]
         np.testing.assert_allclose(run.q[-1] / other.units, made.q[-1] / system.units, atol=1e-2 * tolerance)
-        force = mass * length / time**2 * np.where(other.planar.assembly.row_holds_length, 1.0, length)
+        force = mass * length / time**2 * np.where(other.linkage.assembly.row_holds_length, 1.0, length)
         np.testing.assert_allclose(
             run.multipliers[-1] / force, made.multipliers[-1], rtol=10 * tolerance, atol=10 * tolerance
         )
@@ -156,27 +155,27 @@ def test_what_cannot_close_says_by_how_much_and_where(length):
     size = f"{length:.3g}".replace("+", r"\+")
     text = rf"^hinge (left|right|gap) \(x\).*residual of {much} m \(0.33 of the mechanism's length, {size} m\)"
     with pytest.raises(InputError, match=text):
-        consistent_start(System([PlanarScene(Scene(bodies, joints))]))
+        consistent_start(System([Linkage(bodies, joints)]))
 
 
 @pytest.mark.parametrize("time", [1e-9, 1.0, 1e9])
 def test_a_row_that_is_dependent_until_the_motion_begins_is_no_redundant_one(time):
     """Two links of equal length, folded; the slot at the end is dependent until the prescribed crank turns."""
-    scene = folding_links(0.0, 0.0).planar.scene
+    linkage = folding_links(0.0, 0.0).linkage
     rise = Prescribed("crank", "angle", smoothed_step(5.0 * time, 2.0 * time, 0.5))
-    start = consistent_start(System([PlanarScene(Scene(scene.bodies, (*scene.joints, rise)))]))
+    start = consistent_start(System([Linkage(linkage.bodies, (*linkage.joints, rise))]))
     assert start.freedoms.redundant == ()
 
 
 def test_far_from_the_origin_the_rounding_of_coordinates_is_no_gap():
     shift = 1e7
     system = fourbar()
-    scene = system.planar.scene
-    bodies = tuple(replace(b, position=(b.position[0] + shift, b.position[1])) for b in scene.bodies)
+    linkage = system.linkage
+    bodies = tuple(replace(b, position=(b.position[0] + shift, b.position[1])) for b in linkage.bodies)
     joints = tuple(
-        replace(j, point_b=(j.point_b[0] + shift, j.point_b[1])) if j.b == "ground" else j for j in scene.joints
+        replace(j, point_b=(j.point_b[0] + shift, j.point_b[1])) if j.b == "ground" else j for j in linkage.joints
     )
-    start = consistent_start(System([PlanarScene(Scene(bodies, joints))]))
+    start = consistent_start(System([Linkage(bodies, joints)]))
     np.testing.assert_allclose(start.q[2::3], consistent_start(system).q[2::3], atol=1e-7)
 
 
@@ -188,5 +187,5 @@ def test_slot_of_an_offset_line_scales():
             Slot("rod", "ground", direction=(0.0, 1.0)),
             Slot("rod", "ground", (length, 0.0)),
         )
-        q = consistent_start(System([PlanarScene(Scene((body,), joints))])).q
+        q = consistent_start(System([Linkage((body,), joints)])).q
         assert math.hypot(q[0], q[1]) == pytest.approx(length / 2, rel=1e-12)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.rigid import Body, Gravity, Hinge, PlanarScene, Scene, System, Trajectory, integrate
+from gearfe.rigid import Body, Gravity, Hinge, Linkage, System, Trajectory, integrate
 
 
 def made() -> Trajectory:
     body = Body("rod", 1.0, 0.1, (0.5, 0.0))
-    system = System([PlanarScene(Scene((body,), (Hinge("rod", "ground", name="O"),), (Gravity(),)))])
+    system = System([Linkage((body,), (Hinge("rod", "ground", name="O"),), (Gravity(),))])
     return integrate(system, np.linspace(0.0, 0.1, 3), backend="plain")
 
 

@@ -60,10 +60,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _compile() -> None:
     """Any compiled run leaves the kernels in the cache."""
-    from ..rigid import Body, Hinge, PlanarScene, Scene, System, integrate
+    from ..rigid import Body, Hinge, Linkage, System, integrate
 
-    rod = Scene((Body("rod", 1.0, 1.0, (1.0, 0.0)),), (Hinge("rod", "ground"),), ())
-    integrate(System([PlanarScene(rod)]), [0.0, 1e-3], method="taylor", backend="compiled")
+    rod = Linkage((Body("rod", 1.0, 1.0, (1.0, 0.0)),), (Hinge("rod", "ground"),), ())
+    integrate(System([rod]), [0.0, 1e-3], method="taylor", backend="compiled")
 
 
 def _size(count: int) -> str:

@@ -45,7 +45,7 @@ def draw_modes(folder: Path, mechanism: Mechanism, q: np.ndarray, modes: Modes) 
     columns = min(3, count)
     figure = new_figure(4 * columns, 3.4 * -(-count // columns))
     axes = figure.subplots(-(-count // columns), columns)
-    size = 0.15 * mechanism.planar.assembly.length / mechanism.system.units
+    size = 0.15 * mechanism.linkage.assembly.length / mechanism.system.units
     for k, ax in enumerate(np.ravel(axes)):
         if k >= count:
             ax.axis("off")

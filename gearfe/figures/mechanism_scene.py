@@ -58,8 +58,8 @@ def draw_state(axes: Any, mechanism: Mechanism, q: Array, *, alpha: float = 1.0,
 def draw_paths(axes: Any, mechanism: Mechanism, q: Array) -> None:
     """Paths of points over the run, q of shape (n, k)."""
     for path in mechanism.file.paths:
-        body = mechanism.scene.body_index[path.body]
-        if body == len(mechanism.scene.bodies):
+        body = mechanism.linkage.body_index[path.body]
+        if body == len(mechanism.linkage.bodies):
             continue
         if isinstance(path.point, str):
             label = f"{path.body}.{path.point}"
@@ -102,7 +102,7 @@ def _points(mechanism: Mechanism) -> list[tuple[str, int, dict[str, Point]]]:
     return [
         (
             name,
-            mechanism.scene.body_index[name],
+            mechanism.linkage.body_index[name],
             {p: mechanism.point(f"{name}.{p}")[1] for p in table.points_m},
         )
         for name, table in mechanism.file.bodies.items()
@@ -130,17 +130,17 @@ def _size(mechanism: Mechanism, q: Array) -> float:
 
 def _couplings(axes: Any, mechanism: Mechanism, q: Array, size: float, alpha: float) -> None:
     """Springs as zigzags, rods of constant length as thin lines, slots and guides as dashed ones."""
-    scene = mechanism.scene
-    turned = np.append(q[:, : 3 * len(scene.bodies)], np.zeros((len(q), 3)), axis=1)  # the ground stands still
+    linkage = mechanism.linkage
+    turned = np.append(q[:, : 3 * len(linkage.bodies)], np.zeros((len(q), 3)), axis=1)  # the ground stands still
 
     def seen(body: str, at: Point) -> Array:
-        return _at(turned, scene.body_index[body], scene.frames.arm(body, at))
+        return _at(turned, linkage.body_index[body], linkage.frames.arm(body, at))
 
-    for force in scene.forces:
+    for force in linkage.forces:
         if isinstance(force, Spring):
             line = _coil(seen(force.a, force.point_a), seen(force.b, force.point_b), COIL_WIDTH * size)
             axes.plot(*line.T, color=GREY, lw=1.1, alpha=alpha, zorder=1.5)
-    for joint in scene.joints:
+    for joint in linkage.joints:
         if isinstance(joint, Distance):
             ends = np.array([seen(joint.a, joint.point_a), seen(joint.b, joint.point_b)])
             axes.plot(*ends.T, color=GREY, lw=1.1, alpha=alpha, zorder=1.5)

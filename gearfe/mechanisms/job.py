@@ -153,11 +153,11 @@ def summarise(
     error: TrajectoryError | None = None,
 ) -> dict[str, Any]:
     """Content of summary.json."""
-    planar = mechanism.planar
+    linkage = mechanism.linkage
     trajectory = results.trajectory
     freedoms = start.freedoms
-    label = planar.assembly.row_label
-    owner = np.array(planar.assembly.row_joint)
+    label = linkage.assembly.row_label
+    owner = np.array(linkage.assembly.row_joint)
     joints = [
         {
             "name": name,

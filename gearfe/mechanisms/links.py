@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError, given, unknown_name
 from ..rigid.beam import Beam
 from ..rigid.beam_link import BeamLink, Section
-from ..rigid.scene import PlanarScene
+from ..rigid.linkage import Linkage
 from ..tables.beam import BeamTable
 from ..tables.mechanism import BodyTable, ForceTable, JointTable, MechanismFile
 from ..typing import Array
@@ -128,8 +128,8 @@ class FlexibleLink:
         return np.unique(np.concatenate([np.linspace(a, b, 9) for a, b in itertools.pairwise(ends)]))
 
 
-def flexible_links(file: MechanismFile, planar: PlanarScene, links: dict[str, BeamLink]) -> dict[str, FlexibleLink]:
-    """Links with their beams, which are elements of the system beside the scene."""
+def flexible_links(file: MechanismFile, planar: Linkage, links: dict[str, BeamLink]) -> dict[str, FlexibleLink]:
+    """Links with their beams, which are elements of the system beside the linkage."""
     made = {}
     for name, link in links.items():
         table = file.bodies[name]
@@ -138,11 +138,11 @@ def flexible_links(file: MechanismFile, planar: PlanarScene, links: dict[str, Be
     return made
 
 
-def bent_start(links: dict[str, FlexibleLink], planar: PlanarScene, rigid: PlanarScene, state: Array) -> Array:
+def bent_start(links: dict[str, FlexibleLink], planar: Linkage, rigid: Linkage, state: Array) -> Array:
     """Coordinates (of all bodies, shape (2, size): q and v) in which the links move as rigid ones do."""
     out = np.zeros((2, planar.size))
-    index, other = planar.scene.body_index, rigid.scene.body_index
-    for body in rigid.scene.bodies:
+    index, other = planar.body_index, rigid.body_index
+    for body in rigid.bodies:
         k = 3 * other[body.name]
         (x, y, angle), (vx, vy, w) = state[:, k : k + 3]
         if body.name not in links:

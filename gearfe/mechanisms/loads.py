@@ -148,7 +148,7 @@ class ExpressionLoad(StateFunction):
 
     def bind(self, mechanism: Mechanism) -> None:
         """Look up bodies and points."""
-        self.size = mechanism.planar.size
+        self.size = mechanism.linkage.size
         self.places: list[tuple[str, list[tuple[int, float, float, float]]]] = []
         for kind, what in self.names:
             where: list[tuple[int, float, float, float]] = []  # body, sign, place in its frame

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, given, unknown_name
-from ..rigid import GROUND, Forced, PlanarScene, Scene, Start, System, consistent_start
+from ..rigid import GROUND, Forced, Linkage, Start, System, consistent_start
 from ..tables.kinds import FORCES, JOINTS
 from ..tables.mechanism import FigureTable, MechanismFile, read_mechanism_file
 from ..typing import Array
@@ -33,7 +33,7 @@ class Mechanism:
     file : MechanismFile
         The tables as read.
     system : System
-        One planar scene, and a beam for each flexible link.
+        One linkage, and a beam for each flexible link.
     outputs : dict
         Column name -> parsed expression.
     links : dict
@@ -49,10 +49,10 @@ class Mechanism:
     unbent: bool = False  # made for the start of one with flexible links: nothing in it need be free to move
 
     @property
-    def planar(self) -> PlanarScene:
+    def linkage(self) -> Linkage:
         """Bodies, joints and forces: the first element of the system."""
         element = self.system.elements[0]
-        assert isinstance(element, PlanarScene)
+        assert isinstance(element, Linkage)
         return element
 
     @property
@@ -61,15 +61,10 @@ class Mechanism:
         asked = self.file.run.tolerance
         return asked if asked is not None else (1e-5 if self.links else 1e-9)
 
-    @property
-    def scene(self) -> Scene:
-        """Bodies, joints and forces."""
-        return self.planar.scene
-
     def point(self, where: str, label: str = "point") -> tuple[int, Point]:
         """Body number and coordinates relative to the mass centre of ``body.point``, ``body.centre`` or ``body``."""
         body, _, name = where.partition(".")
-        index = self.scene.body_index
+        index = self.linkage.body_index
         if body not in self.file.bodies and body != GROUND:
             raise unknown_name(label, body, [*self.file.bodies, GROUND])
         if body in self.links:
@@ -77,7 +72,7 @@ class Mechanism:
             node = link.node(name, label)
             return index[link.beam.link.node_names[node]], (0.0, link.points[name][1] if name in link.points else 0.0)
         at = (0.0, 0.0) if name in ("", "origin") else None
-        centre = self.planar.assembly.centre[index[body]]
+        centre = self.linkage.assembly.centre[index[body]]
         if name == "centre":
             return index[body], (0.0, 0.0)
         if at is None:
@@ -117,7 +112,7 @@ class Mechanism:
 
     def angle_of(self, what: str, label: str) -> list[tuple[int, float]]:
         """Moving bodies, with signs, whose angles add up to that of a body, a point's section, or a joint."""
-        ground = len(self.scene.bodies)
+        ground = len(self.linkage.bodies)
         if what in self.file.joints:
             joint = self.file.joints[what]
             pair = [(joint.body, 1.0), (joint.to, -1.0)]
@@ -150,7 +145,7 @@ class Mechanism:
 
     def _point_values(self, kind: str, where: str, q: Any, v: Any, a: Any) -> tuple[Array, Array]:
         body, (lx, ly) = self.point(where, "expression")
-        if body == len(self.scene.bodies):
+        if body == len(self.linkage.bodies):
             zero = np.zeros(len(q))
             return (zero + lx, zero + ly) if kind in ("x", "y") else (zero, zero)
         k = 3 * body
@@ -180,7 +175,7 @@ class Mechanism:
         if self.unbent:
             return made
         self._check_loads(made)
-        if made.freedoms.net <= 0 and not self.planar.driven:
+        if made.freedoms.net <= 0 and not self.linkage.driven:
             count = f"{made.freedoms.coordinates} coordinates, {made.freedoms.constraints} constraints"
             cure = "remove a joint, or prescribe a motion"
             raise InputError("joints", None, f"nothing is free to move ({count})", cure)
@@ -192,17 +187,17 @@ class Mechanism:
         file = replace(self.file, bodies=bodies, forces={}, outputs=(), figure=FigureTable())
         rigid = replace(make_mechanism(file, self.path), unbent=True)
         known = rigid.start(time)
-        q, v = bent_start(dict(self.links), self.planar, rigid.planar, np.stack([known.q, known.v]))
+        q, v = bent_start(dict(self.links), self.linkage, rigid.linkage, np.stack([known.q, known.v]))
         made = consistent_start(self.system, time, q=q, v=v)
         self._check_loads(made)
         return made
 
     def _check_loads(self, start: Start) -> None:
-        for _, load in self.planar.assembly.state_loads:
+        for _, load in self.linkage.assembly.state_loads:
             if not math.isfinite(load.value(start.time, start.q, start.v)):
                 raise InputError("forces", None, f"have no value at the start: {load.complaint}", "mend the expression")
-        force = self.planar.force(start.time, start.q, start.v)
-        for _, law in self.planar.assembly.tension_laws:
+        force = self.linkage.force(start.time, start.q, start.v)
+        for _, law in self.linkage.assembly.tension_laws:
             if law.complaint and not np.isfinite(force).all():
                 raise InputError("forces", None, f"have no value at the start: {law.complaint}", "mend the expression")
 
@@ -285,7 +280,7 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
     forces = tuple(
         part_of(file, links, tables, f"forces.{n}", n, table, FORCES[table.type]) for n, table in file.forces.items()
     )
-    planar = PlanarScene(Scene(tuple(bodies), joints, forces))
+    planar = Linkage(tuple(bodies), joints, forces)
     flexible = flexible_links(file, planar, links)
     system = System([planar, *(link.beam for link in flexible.values())])
     outputs: dict[str, Node] = {}

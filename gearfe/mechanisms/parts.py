@@ -33,7 +33,7 @@ def body_of(file: MechanismFile, name: str, t: BodyTable) -> Body:
 def _place(
     file: MechanismFile, links: Mapping[str, BeamLink], where: str, point: str | Point | None, label: str
 ) -> tuple[str, Point]:
-    """Body of the scene, and the place in its frame, of a point of `where`: a body, or a point of a flexible link."""
+    """Body of the linkage, and the place in its frame, of a point of `where`: a body, or a point of a flexible link."""
     body, _, at = where.partition(".")
     place = (0.0, 0.0)
     if at:

@@ -102,7 +102,7 @@ def _write_modes(folder: Path, mechanism: Mechanism, found: Modes) -> None:
     columns = mode_columns(found)
     number, count = columns["mode"], len(found.rates)
     write_csv(folder / "modes.csv", columns)
-    bodies = [body.name for body in mechanism.scene.bodies]
+    bodies = [body.name for body in mechanism.linkage.bodies]
     shapes = found.shapes.reshape(count, -1, 3)
     rows: dict[str, Any] = {"mode": np.repeat(number, len(bodies)), "body": bodies * count}
     for k, name in enumerate(("x_m", "y_m", "angle_rad")):

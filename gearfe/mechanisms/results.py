@@ -90,37 +90,36 @@ def energies(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
 
 def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
     """Work since the start: closed form for constant moments, else Gauss quadrature of the power on every interval."""
-    scene = mechanism.scene
+    linkage = mechanism.linkage
     time = trajectory.time
     work = np.zeros(len(time))
-    index = scene.body_index
+    index = linkage.body_index
     varying = False
-    for force in scene.forces:
+    for force in linkage.forces:
         if isinstance(force, Moment) and _is_polynomial(force.function):
             row = force.function.coefficients[0]
             if len(row) == 1:
                 for body, sign in ((force.body, 1.0), (force.reaction, -1.0)):
-                    if index[body] < len(scene.bodies):
+                    if index[body] < len(linkage.bodies):
                         angle = trajectory.q[:, 3 * index[body] + 2]
                         work += sign * row[0] * (angle - angle[0])
                 continue
         loses = isinstance(force, Spring | CoordinateSpring) and force.damping
         if isinstance(force, Moment | PointForce) or loses or (isinstance(force, Spring) and force.law is not None):
             varying = True
-    planar = mechanism.planar
     damped = [link.beam for link in mechanism.links.values() if link.beam.link.damping]
-    if not (varying or damped or planar.driven) or len(time) < 2:
+    if not (varying or damped or linkage.driven) or len(time) < 2:
         return work
     nodes, weights = np.polynomial.legendre.leggauss(8)
     half = 0.5 * np.diff(time)
     at = (0.5 * (time[1:] + time[:-1])[:, None] + half[:, None] * nodes).ravel()
     states = trajectory.dense(at, 0), trajectory.dense(at, 1)
-    power = np.array([planar.power(t, q, v) for t, q, v in zip(at, *states, strict=True)])
+    power = np.array([linkage.power(t, q, v) for t, q, v in zip(at, *states, strict=True)])
     for beam in damped:
         power = power - np.array([beam.loss(q, v) for q, v in zip(*states, strict=True)])
-    if planar.driven:
+    if linkage.driven:
         multipliers = trajectory.multipliers_at(at)
-        rates = np.array([planar.rate(t, q) for t, q in zip(at, states[0], strict=True)])
+        rates = np.array([linkage.rate(t, q) for t, q in zip(at, states[0], strict=True)])
         power = power + (multipliers * rates).sum(axis=1)
     steady = _steady_power(mechanism, states[1])
     gained = ((power - steady).reshape(len(half), -1) @ weights) * half
@@ -134,15 +133,15 @@ def _is_polynomial(load: TimeFunction | StateFunction) -> TypeGuard[TimeFunction
 
 def _steady_power(mechanism: Mechanism, v: Array) -> Array:
     """Power of the constant moments, which have a closed form."""
-    scene = mechanism.scene
-    index = scene.body_index
+    linkage = mechanism.linkage
+    index = linkage.body_index
     power = np.zeros(len(v))
-    for force in scene.forces:
+    for force in linkage.forces:
         if isinstance(force, Moment) and _is_polynomial(force.function):
             row = force.function.coefficients[0]
             if len(row) == 1:
                 for body, sign in ((force.body, 1.0), (force.reaction, -1.0)):
-                    if index[body] < len(scene.bodies):
+                    if index[body] < len(linkage.bodies):
                         power += sign * row[0] * v[:, 3 * index[body] + 2]
     return power
 
@@ -154,25 +153,24 @@ def reactions(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
     the share of
     the joints is not unique.
     """
-    planar = mechanism.planar
-    scene = mechanism.scene
+    linkage = mechanism.linkage
     names = list(mechanism.file.joints)
-    bodies = planar.assembly.tables.forms.bodies
-    owner = np.array(planar.assembly.row_joint)
+    bodies = linkage.assembly.tables.forms.bodies
+    owner = np.array(linkage.assembly.row_joint)
     out = {f"{n}_{c}": np.zeros(len(trajectory.time)) for n in names for c in ("x_N", "y_N", "moment_N_m")}
     q = trajectory.q
     for i, multipliers in enumerate(trajectory.multipliers):
-        G = planar.gradients(q[i])
+        G = linkage.gradients(q[i])
         for j, name in enumerate(names):
-            joint = scene.joints[j]
-            body = scene.body_index[getattr(joint, "a", "") or getattr(joint, "body", "")]
+            joint = linkage.joints[j]
+            body = linkage.body_index[getattr(joint, "a", "") or getattr(joint, "body", "")]
             wrench = np.zeros(3)
             for r in np.flatnonzero(owner == j):
                 side = 0 if bodies[r, 0] == body else 1
                 wrench -= multipliers[r] * G[r, side]
             at = getattr(joint, "point_a", getattr(joint, "point", (0.0, 0.0)))
-            centre = planar.assembly.centre[body]
-            angle = q[i, 3 * body + 2] if body < len(scene.bodies) else 0.0
+            centre = linkage.assembly.centre[body]
+            angle = q[i, 3 * body + 2] if body < len(linkage.bodies) else 0.0
             c, s = np.cos(angle), np.sin(angle)
             dx, dy = at[0] - centre[0], at[1] - centre[1]
             arm = c * dx - s * dy, s * dx + c * dy

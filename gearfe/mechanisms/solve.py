@@ -72,7 +72,7 @@ def _moved(mechanism: Mechanism, start: Start) -> Trajectory:
     method, backend = run.method, "compiled" if use_compiled("auto") else "plain"
     if method == "auto":
         stiff = any(element.stiff for element in system.elements)
-        method = "implicit" if stiff else "explicit" if system.planar is None else "taylor"
+        method = "implicit" if stiff else "explicit" if system.linkage is None else "taylor"
     if method != "taylor":
         backend = "plain"
     options: dict[str, Any] = {"method": method, "backend": backend, "raise_on_failure": False}

@@ -9,8 +9,8 @@ from .forces import CoordinateSpring, Gravity, Moment, PointForce, Spring
 from .forms import GROUND
 from .integrate import integrate
 from .joints import Fixed, Hinge, Prescribed, Prismatic, Slot
-from .planar import Body, Scene
-from .scene import PlanarScene
+from .linkage import Linkage
+from .planar import Body
 from .start import Forced, Freedoms, Start, consistent_start, count_freedoms
 from .statefunctions import SpanFunction, StateFunction
 from .status import Status
@@ -31,14 +31,13 @@ __all__ = [
     "Hinge",
     "IntegrationError",
     "LinearJoint",
+    "Linkage",
     "LocalForce",
     "ModalBlocks",
     "Moment",
-    "PlanarScene",
     "PointForce",
     "Prescribed",
     "Prismatic",
-    "Scene",
     "SeriesLaw",
     "Slot",
     "SpanFunction",

@@ -1,4 +1,4 @@
-"""Flexible links: geometrically exact (Reissner) planar beams whose nodes are bodies of the planar scene.
+"""Flexible links: geometrically exact (Reissner) planar beams whose nodes are bodies of the linkage.
 
 A section at the arc length s of the straight, unloaded axis has the place r(s) = (x, y) and the angle theta(s). With
 t = (cos theta, sin theta) and n a quarter turn ahead, the strains of axis, shear and bending, and the energy, are
@@ -12,7 +12,7 @@ points an element, which leaves thin beams free of locking. Damping is Kelvin's 
 e + tau e'.
 
 Every node is a body without mass of its own; what mass it has is in the mass matrix of the beam. Joints and forces of
-the scene so hold at any node. At a Gauss point z = (x', y', theta, theta') = P q is linear in the coordinates: forces
+the linkage so hold at any node. At a Gauss point z = (x', y', theta, theta') = P q is linear in the coordinates: forces
 are -P^T s(P q, P q'), tangents P^T k P, with the law of one point in closed form.
 """
 
@@ -28,7 +28,7 @@ from ..typing import Array, IntArray
 from .beam_link import NODES, BeamLink
 from .contract import Element
 from .forces import Weight
-from .scene import PlanarScene
+from .linkage import Linkage
 from .turning import TurningFrame
 
 #: Gauss points of an element on -1..1 with their weights.
@@ -44,11 +44,11 @@ class Strains(NamedTuple):
 
 
 class Beam(Element):
-    """Mass, elasticity, damping and weight of a flexible link on the bodies of a scene that are its nodes.
+    """Mass, elasticity, damping and weight of a flexible link on the bodies of a linkage that are its nodes.
 
     Parameters
     ----------
-    scene : PlanarScene
+    linkage : Linkage
         Has the link's `BeamLink.nodes` among its bodies.
     link : BeamLink
         What it is.
@@ -56,10 +56,10 @@ class Beam(Element):
 
     stiff = True
 
-    def __init__(self, scene: PlanarScene, link: BeamLink) -> None:
-        self.link, self.name, self.touches = link, f"flexible link {link.name!r}", (scene,)
-        self.places: IntArray = np.array([3 * scene.scene.body_index[n] + k for n in link.node_names for k in range(3)])
-        self._size = scene.size
+    def __init__(self, linkage: Linkage, link: BeamLink) -> None:
+        self.link, self.name, self.touches = link, f"flexible link {link.name!r}", (linkage,)
+        self.places: IntArray = np.array([3 * linkage.body_index[n] + k for n in link.node_names for k in range(3)])
+        self._size = linkage.size
         shear = link.young_modulus / (2.0 * (1.0 + link.poisson_ratio)) * link.section.shear_factor
         area, second = link.section.area, link.section.second_moment
         self.stiffness = np.array([link.young_modulus * area, shear * area, link.young_modulus * second])
@@ -72,11 +72,11 @@ class Beam(Element):
         own = self._own_mass()
         self._mass = np.zeros((self._size, self._size))
         self._mass[np.ix_(self.places, self.places)] = own
-        frames = scene.scene.frames
-        parts = [part for force in scene.scene.forces for part in force.parts(frames) if isinstance(part, Weight)]
+        frames = linkage.frames
+        parts = [part for force in linkage.forces for part in force.parts(frames) if isinstance(part, Weight)]
         field = np.sum([part.acceleration for part in parts], axis=0) if parts else np.zeros(2)
         self._weight = own @ np.tile([*field, 0.0], len(link.stations))
-        rate = sum(f.rate for f in scene.scene.forces if isinstance(f, TurningFrame))
+        rate = sum(f.rate for f in linkage.forces if isinstance(f, TurningFrame))
         places = own * np.tile([1.0, 1.0, 0.0], len(link.stations))
         quarter = np.kron(np.eye(len(link.stations)), np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
         #: Centrifugal and Coriolis forces by coordinates and velocities.
@@ -105,7 +105,7 @@ class Beam(Element):
         return np.kron(shared, np.diag([section.area, section.area, section.second_moment]))
 
     def shared_mass(self) -> Array:
-        """Mass on the coordinates of the scene, constant."""
+        """Mass on the coordinates of the linkage, constant."""
         return self._mass
 
     def strains(self, z: Array) -> Strains:
@@ -204,7 +204,7 @@ class Beam(Element):
         return (self._to_points.reshape(-1, len(self.places)) @ q[self.places]).reshape(-1, 4)
 
     def _spread(self, blocks: Array) -> Array:
-        """P^T blocks P on the coordinates of the scene."""
+        """P^T blocks P on the coordinates of the linkage."""
         P = self._to_points
         n = len(self.places)
         out = np.zeros((self._size, self._size))

@@ -152,7 +152,7 @@ class BeamLink:
         return (self.name, *(f"{self.name}.{k}" for k in range(1, len(self.stations))))
 
     def nodes(self) -> tuple[Body, ...]:
-        """Bodies for the scene, which start as those of a straight rigid link."""
+        """Bodies for the linkage, which start as those of a straight rigid link."""
         c, s = math.cos(self.angle), math.sin(self.angle)
         (x, y), (vx, vy), w = self.position, self.velocity, self.rate
         return tuple(

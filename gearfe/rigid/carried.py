@@ -20,7 +20,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..typing import Array
-from .scene import PlanarScene
+from .linkage import Linkage
 from .system import System
 
 if TYPE_CHECKING:
@@ -55,13 +55,13 @@ def mass_excess(system: System, time: float, q: Array, v: Array, active: np.ndar
         For a link without mass that nothing with mass holds: its acceleration is undetermined.
     """
     excess = np.zeros(system.size)
-    scenes = _scenes(system)
+    linkages = _linkages(system)
     bodies, own = _own_masses(system)
     if own.size == 0 or 0.0 < own.max() <= LIGHT * own.min():
         return excess
     G = _gradients_ahead(system, time, q, v, active)
     if own.min() == 0.0:
-        _check_determined(system, scenes, G)
+        _check_determined(system, linkages, G)
     carried = _carried(system, G)
     light = carried[:, None] > LIGHT * own
     excess[bodies] = np.where(light, carried[:, None] - own, 0.0) / system.units[bodies] ** 2
@@ -78,17 +78,17 @@ def loose_link(system: System, times: Array, q: Array, v: Array, start: Start) -
     share = _carried(system, _gradients_ahead(system, times[at], q[at], v[at], start.active))[:, None]
     raised = (start.excess * system.units**2)[bodies]
     found = np.where(raised > 0.0, share / np.where(raised > 0.0, raised, 1.0), np.inf).min(axis=1)
-    names = [body.name for scene in _scenes(system) for body in scene.scene.bodies]
+    names = [body.name for linkage in _linkages(system) for body in linkage.bodies]
     return names[int(found.argmin())] if found.min() < LOOSE else None
 
 
-def _scenes(system: System) -> list[PlanarScene]:
-    return [e for e in system.elements if isinstance(e, PlanarScene)]
+def _linkages(system: System) -> list[Linkage]:
+    return [e for e in system.elements if isinstance(e, Linkage)]
 
 
 def _own_masses(system: System) -> tuple[np.ndarray, Array]:
     """Coordinates of the planar bodies and their masses in units that compare, both of shape (bodies, 3)."""
-    numbers = [np.zeros(0, dtype=int), *(system.coordinates(e) for e in _scenes(system))]
+    numbers = [np.zeros(0, dtype=int), *(system.coordinates(e) for e in _linkages(system))]
     bodies = np.concatenate(numbers).reshape(-1, 3)
     return bodies, (np.diagonal(system.mass) * system.units**2)[bodies]
 
@@ -122,17 +122,17 @@ def _gradients_ahead(system: System, time: float, q: Array, v: Array, active: np
     return np.vstack([G, lost.T @ (gradients(q + step) - gradients(q - step)) / 2e-5])
 
 
-def _check_determined(system: System, scenes: list[PlanarScene], G: Array) -> None:
+def _check_determined(system: System, linkages: list[Linkage], G: Array) -> None:
     """Every motion moves some mass; otherwise the link that moves most of what does not is named."""
     held = np.diagonal(system.mass) > 0.0
     rest = free_motions(np.vstack([G, np.eye(system.size)[held]]))
     if rest.shape[1] == 0:
         return
     size = np.abs(rest).max(axis=1)
-    for scene in scenes:
-        own = size[system.coordinates(scene)].reshape(-1, 3).max(axis=1)
+    for linkage in linkages:
+        own = size[system.coordinates(linkage)].reshape(-1, 3).max(axis=1)
         if own.max() == size.max():
-            body = scene.scene.bodies[int(own.argmax())]
+            body = linkage.bodies[int(own.argmax())]
             key = "mass" if body.mass == 0.0 else "inertia"
             problem = "leaves its motion undetermined: it can move while nothing with mass does"
             cure = "give it mass and inertia, or joints that hold it to links with mass"

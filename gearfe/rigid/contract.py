@@ -29,8 +29,8 @@ elastic body in
 7. ``constant_jacobian = True`` when g is linear in q with constant coefficients and no time: such rows are
 eliminated at
    set-up by `gearfe.rigid.elimination` where an integrator profits. Absent: treated as any constraint.
-8. ``scene`` (a `Scene` and its tables): the Taylor recurrences of planar bodies known to the compiled kernels.
-   The Taylor method runs when every element has one; ``method="auto"`` takes it or else the explicit method, or the
+8. Being a `gearfe.rigid.Linkage`: planar bodies, whose Taylor recurrences the compiled kernels know.
+   The Taylor method runs when it is the only element; ``method="auto"`` takes it or else the explicit method, or the
    implicit one, whichever is predicted to take the fewest seconds.
 9. ``energy(q, v)``: (kinetic, potential) of the element. Absent: 1/2 v M v of its own coordinates, and zero.
 10. Being a `LocalForce`: a force along few directions, ``f = W phi(t, W^T q, W^T v)``, with a law that can be compiled.
@@ -38,7 +38,7 @@ eliminated at
 11. ``units()``: sizes of the own coordinates and of the rows that count as much as 1 rad, so that bounds do not depend
     on the unit of length. Absent: ones.
 12. ``shared_mass()``: constant mass on the local coordinates (k, k), for what gives mass to the coordinates of
-    others: a beam whose nodes are bodies of a scene. Absent: none.
+    others: a beam whose nodes are bodies of a linkage. Absent: none.
 13. ``stiff = True``: its fast motions leave steps of series or Runge-Kutta next to no length; ``method="auto"`` then is
     the implicit method. Absent: not stiff.
 14. ``breaks``: times at which a force or joint is not smooth. Steps of all integrators end there. Absent: none.

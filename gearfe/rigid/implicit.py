@@ -266,7 +266,7 @@ def radau_step(
 
 
 def joint_stiffness(system: System, t: float, q: Array, multipliers: Array) -> Array:
-    """d(G^T lambda)/dq; closed form for the planar scene, central differences otherwise."""
+    """d(G^T lambda)/dq; closed form for the linkage, central differences otherwise."""
     full = np.zeros((system.size, system.size))
     at = 0
     for element, index in system.joints:

@@ -19,8 +19,8 @@ from .carried import loose_link
 from .choice import Choice, Way, joined, joined_statistics
 from .dense import Dense
 from .elimination import is_linear, modal_coordinates
+from .linkage import Linkage
 from .modal import series_force
-from .scene import PlanarScene
 from .start import Start, consistent_start
 from .statefunctions import SpanFunction, StateFunction
 from .status import Status
@@ -65,7 +65,7 @@ def integrate(
     times : array_like
         Times at which results are wanted (s), rising or falling; the first is the start.
     method : {"auto", "taylor", "explicit", "implicit"}
-        "taylor": Taylor series, of the index-3 equations for planar scenes, in modal coordinates (compiled) where the
+        "taylor": Taylor series, of the index-3 equations for planar linkages, in modal coordinates (compiled) where the
         constraints are linear and the only force has a law with a series: gear trains. "explicit": any smooth system,
         Runge-Kutta of order 8, with projection where constraints are not linear. "implicit": Radau IIA of order 5,
         index 3, for stiff ones. "auto" takes the one of "taylor" (else "explicit") and "implicit" that is
@@ -137,11 +137,11 @@ def integrate(
 
 def _complaint(system: System) -> str:
     """What the first load without a value says."""
-    scenes = [e for e in system.elements if isinstance(e, PlanarScene)]
+    linkages = [e for e in system.elements if isinstance(e, Linkage)]
     laws: list[StateFunction | SpanFunction] = []
-    for scene in scenes:
-        laws += [load for _, load in scene.assembly.state_loads]
-        laws += [law for _, law in scene.assembly.tension_laws]
+    for linkage in linkages:
+        laws += [load for _, load in linkage.assembly.state_loads]
+        laws += [law for _, law in linkage.assembly.tension_laws]
     return next((law.complaint for law in laws if law.complaint), "")
 
 
@@ -160,7 +160,7 @@ def _dropped_rows_hold(system: System, start: Start, dense: Dense, tolerance: fl
     times = np.append(times, dense.times[-1])
     states = dense(times, 0)
     gaps = [np.abs(system.residual(t, q) / system.row_units).max() for t, q in zip(times, states, strict=True)]
-    scale = 1.0 if system.planar is not None else max(1.0, float(np.abs(states / system.units).max()))
+    scale = 1.0 if system.linkage is not None else max(1.0, float(np.abs(states / system.units).max()))
     return bool(max(gaps) <= max(1e-8, 1e3 * tolerance) * scale)
 
 
@@ -168,7 +168,7 @@ def ways_of(
     system: System, start: Start, times: Array, method: str, backend: str, options: dict[str, Any], runs: float = 1.0
 ) -> list[Way]:
     """Ways to integrate that `method` and `backend` leave open, the one to begin with first."""
-    planar = system.planar is not None
+    planar = system.linkage is not None
     trial = IMPLICIT_TRIAL + (0.0 if "scipy.linalg" in sys.modules else LOADING_LINALG)
     rate = partial(_rate, system) if planar else None  # it does not see singular positions
     implicit = Way("implicit", "", partial(_implicit, system, options), trial, rate=rate)
@@ -228,7 +228,7 @@ def _modal_taylor(
     from .modal import run_modal_taylor
 
     if series_force(system) is None:
-        problem = "needs a planar scene, or linear constraints and one force whose law has a series"
+        problem = "needs a linkage, or linear constraints and one force whose law has a series"
         raise InputError("method", "taylor", problem, "use method='explicit' or 'implicit'")
     if not use_compiled(backend):
         raise InputError("backend", backend, "has no series in modal coordinates", "use method='explicit', or numba")
@@ -246,14 +246,14 @@ def _implicit(
 def _taylor(
     system: System, jit: bool, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
 ) -> Run:
-    scene = system.planar
-    assert scene is not None  # `ways_of` asks before
+    linkage = system.linkage
+    assert linkage is not None  # `ways_of` asks before
     local = max(LOCAL_SHARE * options["tolerance"], 5e-16)
     order = taylor.order_for(local)
     if jit and not compiled_is_ready():
         announce(COMPILING)
-    assembly = carrying(scene.assembly, start.excess)
-    known = scene.__dict__.setdefault("_prepared", {})
+    assembly = carrying(linkage.assembly, start.excess)
+    known = linkage.__dict__.setdefault("_prepared", {})
     prepared = known.get((order, jit))
     if prepared is None or prepared.assembly.tables is not assembly.tables:
         prepared = known[order, jit] = taylor.prepare(assembly, order, jit)

@@ -32,7 +32,7 @@ class Profile(Protocol):
 class Row(NamedTuple):
     """One constraint: ``form = motion(t)``, ``form = 0``, or with a profile s of a body's angle ``form = s(theta)``.
 
-    A scene with a profile has no Taylor series.
+    A linkage with a profile has no Taylor series.
     """
 
     what: str  # it holds, for messages

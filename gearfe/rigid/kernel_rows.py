@@ -1,4 +1,4 @@
-"""Constraint rows of a planar scene: residuals, gradients, S = G M^-1 G^T = L D L^T. Plain loops, compiled
+"""Constraint rows of a linkage: residuals, gradients, S = G M^-1 G^T = L D L^T. Plain loops, compiled
 when numba is.
 
 The functions here are written in the subset of Python that numba compiles; `gearfe.rigid.compiled` binds them together.

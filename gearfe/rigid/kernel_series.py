@@ -1,4 +1,4 @@
-"""Taylor series of the index-3 equations of a planar scene about one point.
+"""Taylor series of the index-3 equations of a linkage about one point.
 
 With q(t) = sum_j q_j (t - t0)^j and the multipliers likewise, order k of the motion and order k + 2 of the
 constraints read

@@ -1,4 +1,4 @@
-"""Planar bodies and scenes as plain data: what a mechanism consists of, nothing about how it is solved.
+"""Planar bodies as plain data, and what joints and forces may name of them.
 
 A body carries a frame: points, the mass centre and joint directions are written in that frame (m); the start pose is
 the position of the frame's origin and its angle. The ground is the body named ``"ground"`` with its frame at rest.
@@ -7,12 +7,11 @@ the position of the frame's origin and its angle. The ground is the body named `
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from ..errors import InputError, shown, unknown_name
 from .forces import Force
-from .forms import GROUND, Frames, Point
+from .forms import GROUND, Point
 from .joints import Joint
 from .statefunctions import StateFunction
 from .timefunctions import TimeFunction, constant
@@ -62,51 +61,42 @@ class Body:
                 raise InputError(f"body {self.name!r} {key}", value, "must be finite and >= 0", cure)
 
 
-@dataclass(frozen=True)
-class Scene:
-    """A planar mechanism: bodies, joints and forces, with every name checked."""
+def body_numbers(bodies: tuple[Body, ...], joints: tuple[Joint, ...], forces: tuple[Force, ...]) -> dict[str, int]:
+    """Number of each body, the ground last.
 
-    bodies: tuple[Body, ...]
-    joints: tuple[Joint, ...] = ()
-    forces: tuple[Force, ...] = ()
-    body_index: Mapping[str, int] = field(init=False, repr=False, compare=False)
-
-    @property
-    def frames(self) -> Frames:
-        """The bodies' frames."""
-        return Frames(self.bodies, self.body_index)
-
-    def __post_init__(self) -> None:
-        index: dict[str, int] = {GROUND: len(self.bodies)}
-        for i, body in enumerate(self.bodies):
-            if body.name in index:
-                raise InputError("body name", body.name, "is used twice", "give every body a name of its own")
-            index[body.name] = i
-        object.__setattr__(self, "body_index", index)
-        for k, part in enumerate((*self.joints, *self.forces)):
-            label = f"{type(part).__name__.lower()} {getattr(part, 'name', '') or k}"
-            used = [
-                getattr(part, key)
-                for key in ("a", "b", "body", "line", "relative_to", "reaction")
-                if hasattr(part, key)
-            ]
-            for name in used:
-                if not isinstance(name, str):
-                    order = ", ".join(vars(part))
-                    raise InputError(label, None, f"{shown(name)} is no name of a body", f"its arguments are {order}")
-                if name not in index:
-                    raise unknown_name(label, name, index)
-            for key, value in vars(part).items():
-                values = value if isinstance(value, tuple) else (value,)
-                if any(isinstance(x, float) and not math.isfinite(x) for x in values):
-                    raise InputError(f"{label} {key}", value, "must be finite", "give a number")
-                if key in ("function", "x", "y") and not isinstance(value, TimeFunction | StateFunction):
-                    if not isinstance(value, int | float):
-                        cure = "use constant, polynomial, sine or smoothed_step"
-                        raise InputError(f"{label} {key}", None, "must be a function of time", cure)
-                    object.__setattr__(part, key, constant(float(value)))
-            if getattr(part, "direction", None) == (0, 0):
-                raise InputError(f"{label} direction", (0, 0), "must not be zero", "give the direction of the line")
-            if len(used) == 2 and used[0] == used[1]:
-                cure = "name two different bodies (or the ground)"
-                raise InputError(label, used[0], "joins a body to itself", cure)
+    Raises
+    ------
+    InputError
+        For names of bodies that are used twice or not there, and arguments that are not finite.
+    """
+    index: dict[str, int] = {GROUND: len(bodies)}
+    for i, body in enumerate(bodies):
+        if body.name in index:
+            raise InputError("body name", body.name, "is used twice", "give every body a name of its own")
+        index[body.name] = i
+    for k, part in enumerate((*joints, *forces)):
+        label = f"{type(part).__name__.lower()} {getattr(part, 'name', '') or k}"
+        used = [
+            getattr(part, key) for key in ("a", "b", "body", "line", "relative_to", "reaction") if hasattr(part, key)
+        ]
+        for name in used:
+            if not isinstance(name, str):
+                order = ", ".join(vars(part))
+                raise InputError(label, None, f"{shown(name)} is no name of a body", f"its arguments are {order}")
+            if name not in index:
+                raise unknown_name(label, name, index)
+        for key, value in vars(part).items():
+            values = value if isinstance(value, tuple) else (value,)
+            if any(isinstance(x, float) and not math.isfinite(x) for x in values):
+                raise InputError(f"{label} {key}", value, "must be finite", "give a number")
+            if key in ("function", "x", "y") and not isinstance(value, TimeFunction | StateFunction):
+                if not isinstance(value, int | float):
+                    cure = "use constant, polynomial, sine or smoothed_step"
+                    raise InputError(f"{label} {key}", None, "must be a function of time", cure)
+                object.__setattr__(part, key, constant(float(value)))
+        if getattr(part, "direction", None) == (0, 0):
+            raise InputError(f"{label} direction", (0, 0), "must not be zero", "give the direction of the line")
+        if len(used) == 2 and used[0] == used[1]:
+            cure = "name two different bodies (or the ground)"
+            raise InputError(label, used[0], "joins a body to itself", cure)
+    return index

@@ -281,7 +281,7 @@ def _worst_gap(system: System, time: float, q: Array) -> tuple[str, str]:
     if not len(gap):
         return "", "nothing"
     worst = int((gap / system.row_units).argmax())
-    name, much, planar = system.row_names()[worst], float(gap[worst]), system.planar
+    name, much, planar = system.row_names()[worst], float(gap[worst]), system.linkage
     if planar is None:
         return name, f"{much:.3g}"
     joint, lengths = planar.assembly.row_joint, planar.assembly.row_holds_length

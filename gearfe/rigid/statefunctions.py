@@ -8,9 +8,9 @@ from ..typing import Array
 
 
 class StateFunction(ABC):
-    """A load f(t, q, v) with its slopes, of the coordinates and velocities of a whole planar scene.
+    """A load f(t, q, v) with its slopes, of the coordinates and velocities of a whole linkage.
 
-    A scene with one has no Taylor series: the explicit or the implicit method integrates it. Where it has no value,
+    A linkage with one has no Taylor series: the explicit or the implicit method integrates it. Where it has no value,
     `value` is not-a-number, which shortens the step and at last ends the run, and `complaint` says why.
     """
 

@@ -29,8 +29,8 @@ def fastest_rate(system: System, start: Start) -> tuple[float, float]:
 
 
 def _has_springs(system: System) -> bool:
-    scene = system.planar
-    if scene is None:
+    linkage = system.linkage
+    if linkage is None:
         return bool(system.forces)
-    forces = scene.assembly.tables.forces
+    forces = linkage.assembly.tables.forces
     return bool(forces.spring.size or forces.along.any())

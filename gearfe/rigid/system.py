@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..typing import Array
 from .contract import Element
-from .scene import PlanarScene
+from .linkage import Linkage
 
 
 class System:
@@ -75,7 +75,7 @@ class System:
         #: Which coordinates are angles of bodies.
         self.turns = np.zeros(total, dtype=bool)
         for element in self.elements:
-            if isinstance(element, PlanarScene):
+            if isinstance(element, Linkage):
                 self.turns[place[id(element)][2::3]] = True
         breaks = [getattr(e, "breaks", ()) for e in self.elements]
         self.breaks = np.unique(np.concatenate([np.asarray(b, dtype=float) for b in breaks])) if breaks else np.zeros(0)
@@ -102,10 +102,10 @@ class System:
         return root
 
     @property
-    def planar(self) -> PlanarScene | None:
-        """The planar scene when the system is nothing else: the Taylor kernels can run it."""
+    def linkage(self) -> Linkage | None:
+        """The linkage when the system is nothing else: the Taylor kernels can run it."""
         one = self.elements[0] if len(self.elements) == 1 else None
-        return one if isinstance(one, PlanarScene) and one.has_series else None
+        return one if isinstance(one, Linkage) and one.has_series else None
 
     def coordinates(self, element: Element) -> np.ndarray:
         """Numbers of the coordinates that `element` owns."""
@@ -155,8 +155,8 @@ class System:
         names: list[str] = []
         for element in self.elements:
             label = element.name or type(element).__name__
-            if isinstance(element, PlanarScene):
-                names += [f"{b.name}_{c}" for b in element.scene.bodies for c in ("x_m", "y_m", "angle_rad")]
+            if isinstance(element, Linkage):
+                names += [f"{b.name}_{c}" for b in element.bodies for c in ("x_m", "y_m", "angle_rad")]
             else:
                 names += [f"{label}_{k}" for k in range(element.size)]
         return names

@@ -1,4 +1,4 @@
-"""A planar scene as arrays: forms, vectors and time functions, and the elimination plan of G M^-1 G^T.
+"""A planar linkage as arrays: forms, vectors and time functions, and the elimination plan of G M^-1 G^T.
 
 Body b has the coordinates (x, y) of its mass centre and its angle theta, in this order; the ground is body
 number n with inverse mass zero, so loops need no special case. All arms are relative to the mass centre.
@@ -17,11 +17,11 @@ import numpy as np
 
 from ..errors import InputError
 from ..typing import Array, BoolArray, IntArray
-from .forces import Along, Tension, Weight
+from .forces import Along, Force, Tension, Weight
 from .forms import End, Form, Frames, Terms, Vector
-from .joints import Profile
+from .joints import Joint, Profile
 from .ordering import Factor, elimination_plan
-from .planar import Body, Scene
+from .planar import Body
 from .statefunctions import SpanFunction, StateFunction
 from .timefunctions import TimeFunction, constant
 
@@ -77,7 +77,7 @@ class Tables(NamedTuple):
 
 
 class Assembly(NamedTuple):
-    """Tables of a scene with the bookkeeping that people need."""
+    """Tables of a linkage with the bookkeeping that people need."""
 
     tables: Tables
     row_joint: tuple[int, ...]  # joint number of each constraint
@@ -106,10 +106,9 @@ class _Row(NamedTuple):
     profile: tuple[int, Profile] | None = None  # which of its bodies turns it
 
 
-def assemble(scene: Scene) -> Assembly:
-    """Arrays of `scene`; constraints are numbered in the order of elimination that fills G M^-1 G^T least."""
-    n = len(scene.bodies)
-    frames = scene.frames
+def assemble(joints: tuple[Joint, ...], forces: tuple[Force, ...], frames: Frames) -> Assembly:
+    """Arrays of joints and forces; constraints are numbered in the order of elimination that fills G M^-1 G^T least."""
+    n = len(frames.bodies)
     functions: list[TimeFunction] = []
 
     def numbered(function: TimeFunction | StateFunction | None) -> int:
@@ -119,20 +118,20 @@ def assemble(scene: Scene) -> Assembly:
         return len(functions) - 1
 
     rows: list[_Row] = []
-    for number, joint in enumerate(scene.joints):
+    for number, joint in enumerate(joints):
         label = f"{type(joint).__name__.lower()} {joint.name or number}"
         for what, form, motion, profile in joint.rows(frames):
             bodies = _two(form.bodies, n, label)
-            held = None if profile is None else (bodies.index(scene.body_index[profile[0]]), profile[1])
+            held = None if profile is None else (bodies.index(frames.number[profile[0]]), profile[1])
             rows.append(_Row(number, f"{label} ({what})", form, bodies, numbered(motion), held))
     plan = elimination_plan([(r.joint, r.bodies) for r in rows], n)
     rows = [rows[i] for i in plan.order]
     weight = np.zeros((n + 1, 3))
-    masses = np.array([b.mass for b in scene.bodies], dtype=float)
+    masses = np.array([b.mass for b in frames.bodies], dtype=float)
     tensions: list[tuple[str, Tension]] = []
     along: list[Along] = []
     loads: list[_Row] = []
-    for force in scene.forces:
+    for force in forces:
         label = f"{type(force).__name__.lower()} {force.name!r}"
         for part in force.parts(frames):
             if isinstance(part, Weight):
@@ -143,19 +142,19 @@ def assemble(scene: Scene) -> Assembly:
                 along.append(part)
                 loads.append(_Row(-1, label, part.form, _two(part.form.bodies, n, label), numbered(part.load)))
     spans = [(part.vector, _two(tuple(part.vector.ends), n, label)) for label, part in tensions]
-    q0, v0 = _start(scene.bodies, frames)
+    q0, v0 = _start(frames.bodies, frames)
     length = _length(rows, [part for _, part in tensions], q0, n)
     lengths = np.array([_holds_length(r.form) for r in rows], dtype=bool)
     forms, vectors = _form_arrays(rows, loads, spans, np.where(lengths, length, 1.0))
     inverse = np.zeros(3 * (n + 1))
     with np.errstate(divide="ignore"):  # a link may be without mass: see `carrying`
-        inverse[:-3] = 1.0 / np.array([(b.mass, b.mass, b.inertia) for b in scene.bodies], dtype=float).ravel()
-    forces = Forces(
+        inverse[:-3] = 1.0 / np.array([(b.mass, b.mass, b.inertia) for b in frames.bodies], dtype=float).ravel()
+    acting = Forces(
         weight.ravel(),
         _floats([(t.stiffness, t.damping, t.free_length) for _, t in tensions], 3),
         _floats([(a.stiffness, a.damping) for a in along], 2),
     )
-    tables = Tables(inverse, *_NONE, forms, vectors, plan.factor, forces, time_arrays(functions))
+    tables = Tables(inverse, *_NONE, forms, vectors, plan.factor, acting, time_arrays(functions))
     return Assembly(
         tables,
         row_joint=tuple(r.joint for r in rows),
@@ -170,7 +169,7 @@ def assemble(scene: Scene) -> Assembly:
         start_v=v0,
         breaks=np.unique([t for f in functions for t in f.breaks if math.isfinite(t)]).astype(float),
         length=length,
-        centre=np.array([*(b.centre for b in scene.bodies), (0.0, 0.0)], dtype=float),
+        centre=np.array([*(b.centre for b in frames.bodies), (0.0, 0.0)], dtype=float),
     )
 
 

@@ -1,4 +1,4 @@
-"""Taylor integration of planar scenes: orders, work space, backend; the loops are in the kernel modules."""
+"""Taylor integration of planar linkages: orders, work space, backend; the loops are in the kernel modules."""
 
 from __future__ import annotations
 
@@ -182,7 +182,7 @@ def work_space(tables: Tables, order: int) -> Work:
 
 
 class Prepared(NamedTuple):
-    """Tables and work space of a scene at one order, and what kernels get of them: the same, or both as blocks."""
+    """Tables and work space of a linkage at one order, and what kernels get of them: the same, or both as blocks."""
 
     assembly: Assembly
     order: int
@@ -192,7 +192,7 @@ class Prepared(NamedTuple):
 
 
 def prepare(assembly: Assembly, order: int, jit: bool) -> Prepared:
-    """What runs of one scene at one order share."""
+    """What runs of one linkage at one order share."""
     tables = assembly.tables
     work = work_space(tables, order)
     return Prepared(assembly, order, jit, work, (Packed(tables), Packed(work)) if jit else (tables, work))
@@ -273,7 +273,7 @@ def integrate_scene(
     most: int = 1_000_000,
     watch: Watch | None = None,
 ) -> TaylorRun:
-    """Integrate the scene from its consistent start to the time `end`; `tolerance` is that of the last terms."""
+    """Integrate the linkage from its consistent start to the time `end`; `tolerance` is that of the last terms."""
     assembly, order, jit, w, both = shared
     t0 = start.time
     w.q[:-3], w.v[:-3], w.base[:] = start.q, start.v, ~start.active

@@ -18,7 +18,7 @@ class TurningFrame(Force):
 
         m (w^2 x + 2 w y'),    m (w^2 y - 2 w x').
 
-    The flexible links of the scene take theirs from here, too. An equilibrium is a steady rotation then, and modes are
+    Flexible links take theirs from here, too. An equilibrium is a steady rotation then, and modes are
     the vibrations about it. Energies are those of the frame; the potential has the centrifugal forces in it.
     """
 

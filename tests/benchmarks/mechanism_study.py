@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gearfe.mechanisms import load_mechanism
-from gearfe.rigid import Body, Gravity, Hinge, PlanarScene, Scene, Start, System, integrate
+from gearfe.rigid import Body, Gravity, Hinge, Linkage, Start, System, integrate
 
 from .peers.process import PeerError, missing, run_python
 from .record import Record
@@ -159,7 +159,7 @@ def folding_links(theta: float, omega: float) -> System:
         Hinge("crank", "rod", (1.0, 0.0), (0.0, 0.0), name="A"),
         Slot("rod", "ground", (1.0, 0.0), name="B"),
     )
-    return System([PlanarScene(Scene(bodies, joints, (Gravity((0.0, -9.81)),)))])
+    return System([Linkage(bodies, joints, (Gravity((0.0, -9.81)),))])
 
 
 def folding_angle(theta: float, omega: float, times: np.ndarray) -> np.ndarray:
@@ -234,7 +234,7 @@ def chain(count: int, seed: int = 1) -> System:
         joints.append(Hinge(f"b{i}", before, (0.0, 0.0), end))
         before, end = f"b{i}", (length, 0.0)
         x, y = x + length * math.cos(angle), y + length * math.sin(angle)
-    return System([PlanarScene(Scene(tuple(bodies), tuple(joints), (Gravity((0.0, -9.81)),)))])
+    return System([Linkage(tuple(bodies), tuple(joints), (Gravity((0.0, -9.81)),))])
 
 
 def chains(record: Record) -> None:

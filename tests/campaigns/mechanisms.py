@@ -58,7 +58,7 @@ def run(case: Case, folder: Path) -> Finding:
         "steps": made.statistics["steps"],
         "reached_s": made.reached,
         "redundant": len(start.freedoms.redundant),
-        "bodies": len(mechanism.scene.bodies),
+        "bodies": len(mechanism.linkage.bodies),
     }
     if len(made.dense.times) < 2:
         return Finding("stopped", made.message, (), measures)
@@ -75,12 +75,12 @@ def _checks(case: Case, mechanism: Mechanism, start: Start, made: Trajectory) ->
     energy = evaluate(mechanism, made).energy
     total = energy["total_J"]
     scale = max(float(energy["kinetic_J"].max()), float(np.ptp(energy["potential_J"])), 1e-12)
-    planar = mechanism.system.planar
-    assert planar is not None
+    linkage = mechanism.system.linkage
+    assert linkage is not None
     few = np.linspace(0, len(made.time) - 1, min(50, len(made.time))).astype(int)
     gap = max(float(np.abs(mechanism.system.residual(made.time[i], made.q[i])).max(initial=0.0)) for i in few)
     checks = [Check("energy", float(np.ptp(total)) / scale, turns * allowed)]
-    checks.append(Check("closed", gap / planar.assembly.length, max(100 * tolerance, 1e-9)))
+    checks.append(Check("closed", gap / linkage.assembly.length, max(100 * tolerance, 1e-9)))
     if case.kind == "folding":
         exact = folding_angle(float(case.data["theta"]), float(case.data["omega"]), made.time)
         limit = max(40.0 * tolerance, 2e-10)

@@ -47,12 +47,12 @@ def run_case(campaign: Campaign, seed: int, number: int) -> Outcome:
 
 def compile_series() -> None:
     """Compile the series of mechanisms with a pendulum: short runs do without, long ones would within a limit."""
-    from gearfe.rigid import Body, Gravity, Hinge, PlanarScene, Scene, System, compiled, integrate
+    from gearfe.rigid import Body, Gravity, Hinge, Linkage, System, compiled, integrate
 
     if compiled.available():
         rod = Body("rod", 1.0, 0.1, (0.5, 0.0), (0.0, 0.0), 1.0)
-        scene = PlanarScene(Scene((rod,), (Hinge("rod", "ground"),), (Gravity((0.0, -9.81)),)))
-        integrate(System([scene]), [0.0, 0.1], method="taylor", backend="compiled")
+        linkage = Linkage((rod,), (Hinge("rod", "ground"),), (Gravity((0.0, -9.81)),))
+        integrate(System([linkage]), [0.0, 0.1], method="taylor", backend="compiled")
 
 
 def work(pipe: Any, name: str, seed: int) -> None:

@@ -1,4 +1,4 @@
-"""The planar scene as one element of the contract: forms and vectors of all joints and forces, on whole arrays.
+"""Planar bodies with joints and forces as one element of the contract: all forms and vectors, on whole arrays.
 
 With the vectors V = sum w (x, y) + R(theta) p of the tables, a product U . V has the gradient J_U^T V + J_V^T U, and
 the generalised force of g on a vector is J_V^T g, where J_V = dV/dq holds w and the arms R p, a quarter turn ahead.
@@ -13,7 +13,10 @@ import numpy as np
 from ..errors import InputError
 from ..typing import Array, IntArray
 from .contract import Element
-from .planar import Scene
+from .forces import Force
+from .forms import Frames
+from .joints import Joint
+from .planar import Body, body_numbers
 from .tables import Assembly, assemble
 
 
@@ -25,7 +28,7 @@ class Pose(NamedTuple):
     arm: Array  # (v, 2, 2) arms of both ends, in the ground's axes
 
 
-class Motion(NamedTuple):
+class Rates(NamedTuple):
     """How fast they move."""
 
     row: Array  # (n + 1, 3)
@@ -33,20 +36,29 @@ class Motion(NamedTuple):
     spin: Array  # (v, 2) angular velocities of both ends
 
 
-class PlanarScene(Element):
+class Linkage(Element):
     """Planar bodies with their joints and forces; the coordinates are (x, y, theta) of every mass centre.
 
     Parameters
     ----------
-    scene : Scene
-        What the mechanism consists of.
+    bodies, joints, forces
+        What it consists of; joints and forces name bodies, or the ground.
+
+    Raises
+    ------
+    InputError
+        For names of bodies that are used twice or not there, and arguments that are not finite.
     """
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
-        self.name = "planar scene"
-        self.assembly: Assembly = assemble(scene)
-        self.size = 3 * len(scene.bodies)
+    def __init__(
+        self, bodies: tuple[Body, ...], joints: tuple[Joint, ...] = (), forces: tuple[Force, ...] = ()
+    ) -> None:
+        self.bodies, self.joints, self.forces = bodies, joints, forces
+        self.frames = Frames(bodies, body_numbers(bodies, joints, forces))
+        self.body_index = self.frames.number
+        self.name = "linkage"
+        self.assembly: Assembly = assemble(joints, forces, self.frames)
+        self.size = 3 * len(bodies)
         self.rows = len(self.assembly.row_label)
         self.row_names = self.assembly.row_label
         self.breaks = self.assembly.breaks
@@ -61,7 +73,7 @@ class PlanarScene(Element):
 
     def mass(self) -> Array:
         """Diagonal of masses and inertias."""
-        return np.diag([m for b in self.scene.bodies for m in (b.mass, b.mass, b.inertia)])
+        return np.diag([m for b in self.bodies for m in (b.mass, b.mass, b.inertia)])
 
     def start(self) -> tuple[Array, Array]:
         """Start state of the mass centres."""
@@ -96,12 +108,12 @@ class PlanarScene(Element):
         arm = np.stack([c * ends[:, :, 1] - s * ends[:, :, 2], s * ends[:, :, 1] + c * ends[:, :, 2]], axis=-1)
         return Pose(row, (ends[:, :, :1] * at[:, :, :2] + arm).sum(axis=1), arm)
 
-    def _motion(self, pose: Pose, v: Array) -> Motion:
+    def _motion(self, pose: Pose, v: Array) -> Rates:
         row = np.append(v, np.zeros(3)).reshape(-1, 3)
         at = row[self._vectors.bodies]
         spin = at[:, :, 2]
         ends = self._vectors.end[:, :, :1] * at[:, :, :2] + spin[:, :, None] * turned(pose.arm)
-        return Motion(row, ends.sum(axis=1), spin)
+        return Rates(row, ends.sum(axis=1), spin)
 
     def _vector_jacobian(self, pose: Pose) -> Array:
         """J_V = dV/d(x, y, theta) of both bodies, shape (v, 2 components, 2 bodies, 3)."""
@@ -212,7 +224,7 @@ class PlanarScene(Element):
 
     # forces -----------------------------------------------------------------------------------------------------
     def force(self, t: float, q: Array, v: Array) -> Array:
-        """All applied forces on the scene."""
+        """All applied forces on the bodies."""
         if not self._loaded:
             return self._forces.weight[: self.size].copy()
         pose = self.pose(q)
@@ -295,7 +307,7 @@ class PlanarScene(Element):
         elastic = 0.5 * (self._forces.spring[:, 0] @ stretch**2 + self._forces.along[:, 0] @ moved**2)
         return float(elastic - self._forces.weight[: self.size] @ q)
 
-    def _along(self, t: float, pose: Pose, motion: Motion) -> _Along:
+    def _along(self, t: float, pose: Pose, motion: Rates) -> _Along:
         """Forces along forms."""
         bodies = self._forms.bodies[self.rows :]
         gradient = self._affine_gradients(pose)[self.rows :].reshape(-1, 6)
@@ -309,7 +321,7 @@ class PlanarScene(Element):
         value = -stiffness * self._affine(pose)[self.rows :] - damping * rate
         return _Along(gradient, places, rate, value, given)
 
-    def _springs(self, t: float, pose: Pose, motion: Motion) -> _Springs:
+    def _springs(self, t: float, pose: Pose, motion: Rates) -> _Springs:
         """Spans, lengths, directions, rates of the lengths, and tensions over lengths."""
         stiffness, damping, free = self._forces.spring.T
         span, speed = pose.vector[: len(free)], motion.vector[: len(free)]
