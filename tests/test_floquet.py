@@ -76,22 +76,22 @@ def test_order_four() -> None:
 
 def test_constant_system_with_gyroscopic_damping() -> None:
     """Without a periodic part the multipliers are exponentials; a mode without stiffness does no harm."""
-    squares, D = np.array([0.0, 4.0, 30.0]), np.array([[0.1, 0.4, 0.0], [-0.4, 0.2, 0.1], [0.0, 0.0, 0.05]])
-    found = multipliers(squares, D, np.zeros((3, 0)), lambda t: np.zeros((len(t), 0)), 1.7)
-    A = np.block([[np.zeros((3, 3)), np.eye(3)], [-np.diag(squares), -D]])
+    eigenvalues, D = np.array([0.0, 4.0, 30.0]), np.array([[0.1, 0.4, 0.0], [-0.4, 0.2, 0.1], [0.0, 0.0, 0.05]])
+    found = multipliers(eigenvalues, D, np.zeros((3, 0)), lambda t: np.zeros((len(t), 0)), 1.7)
+    A = np.block([[np.zeros((3, 3)), np.eye(3)], [-np.diag(eigenvalues), -D]])
     expected = np.linalg.eigvals(expm(1.7 * A))
     assert np.sort(np.abs(found)) == pytest.approx(np.sort(np.abs(expected)), abs=1e-9)
 
 
 def by_differences(model: TrainModel, at: np.ndarray, period: float) -> np.ndarray:
     """Eigenvalues of the map over a period by central differences of the integrator about a state (y, v)."""
-    core, n = model.core, len(model.core.squares)
-    unit = np.concatenate([np.maximum(np.sqrt(core.squares), 1.0 / period), np.ones(n)])
+    modal, n = model.modal, len(model.modal.eigenvalues)
+    unit = np.concatenate([np.maximum(np.sqrt(modal.eigenvalues), 1.0 / period), np.ones(n)])
 
     def after(state: np.ndarray) -> np.ndarray:
-        start = dataclasses.replace(model.start, q=core.origin + core.T @ state[:n], v=core.T @ state[n:])
+        start = dataclasses.replace(model.start, q=modal.origin + modal.T @ state[:n], v=modal.T @ state[n:])
         run = integrate(model.system, [0.0, period], method="taylor", tolerance=1e-12, start=start)
-        return np.concatenate(core.reduce(run.q[-1], run.v[-1]))
+        return np.concatenate(modal.reduce(run.q[-1], run.v[-1]))
 
     step = 3e-4 * float(np.abs(unit * at).max())
     columns = [(after(at + d) - after(at - d)) / (2 * step) for d in np.diag(step / unit)]

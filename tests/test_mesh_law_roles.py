@@ -17,7 +17,7 @@ from gearfe.rigid import TimeFunction, constant, integrate, smoothed_step
 from gearfe.rigid.compiled import available
 from gearfe.stiffness.sweep import elastic_pair
 from gearfe.train import Damping, GearMesh, Load, build_train, simulate
-from gearfe.train.motion import motion
+from gearfe.train.states import train_states
 
 from .mesh_laws import CYCLE, hertzian_law
 from .test_mesh_law import DESIGN, PAIR, STEEL
@@ -126,7 +126,7 @@ def test_small_motions_are_those_of_the_linear_law() -> None:
             start = dataclasses.replace(model.start, q=model.start.q.copy())
             start.q[model.first[1] + 5] = begin / model.meshes[0].row[model.first[1] + 5]
             run = integrate(model.system, np.linspace(0.0, 2e-3, 101), method="taylor", tolerance=1e-11, start=start)
-            found.append(motion(model, run).contact_force[:, 0] - torque / R2)
+            found.append(train_states(model, run).contact_force[:, 0] - torque / R2)
         off.append(np.abs(found[0] - found[1]).max())
         assert off[-1] < 0.5 * amplitude * np.abs(found[1]).max()
     assert np.divide(off[:-1], off[1:]) == pytest.approx([4.0, 4.0], rel=0.15)
@@ -149,7 +149,7 @@ def test_each_mesh_of_an_idler_has_its_own_phase() -> None:
     last = 20.0 / base_radius(24)
     times = np.linspace(0.0, 1.1, 301)
     run = integrate(model.system, times, method="taylor", tolerance=1e-7, start=model.start)
-    moved = motion(model, run)
+    moved = train_states(model, run)
     late = times > 0.06
     force: float | np.ndarray = last
     for number, law in ((1, two), (0, one)):

@@ -19,7 +19,7 @@ from gearfe.runup.report import warnings
 from gearfe.runup.results import SteadyState
 from gearfe.runup.run_up import run_up, steady_state
 from gearfe.train import TrainModel, build_train
-from gearfe.train.motion import motion
+from gearfe.train.states import train_states
 
 from .mesh_laws import hertzian_law
 from .test_runup_train import loaded, smooth
@@ -44,12 +44,12 @@ def start_of(model: TrainModel, state: SteadyState) -> Array:
 
 def shot(model: TrainModel, start: Array, period: float, samples: int = 2) -> tuple[Array, Array]:
     """State after a period, and the contact forces on the way."""
-    core, n = model.core, len(start) // 2
-    begin = dataclasses.replace(model.start, q=core.origin + core.T @ start[:n], v=core.T @ start[n:])
+    modal, n = model.modal, len(start) // 2
+    begin = dataclasses.replace(model.start, q=modal.origin + modal.T @ start[:n], v=modal.T @ start[n:])
     times = np.linspace(0.0, period, samples)
     run = integrate(model.system, times, method="taylor", tolerance=1e-10, start=begin)
-    moved = motion(model, run)
-    return np.concatenate(core.reduce(moved.q[-1], moved.v[-1])), moved.contact_force
+    moved = train_states(model, run)
+    return np.concatenate(modal.reduce(moved.q[-1], moved.v[-1])), moved.contact_force
 
 
 def orbit(model: TrainModel, start: Array, period: float) -> tuple[Array, Array]:

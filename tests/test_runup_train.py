@@ -161,15 +161,15 @@ def test_campbell_frequencies_are_those_of_the_whole_train():
     """Against the eigenvalues of the train with its gyroscopic matrix, written down body by body."""
     model = build_train(loaded([(20, 30)], smooth))
     modes = coupled_modes(condense(model), np.array([200.0, 5000.0]), 6000.0)
-    core = model.core
-    n = len(core.squares)
+    modal = model.modal
+    n = len(modal.eigenvalues)
     for speed, frequency in zip((200.0, 5000.0), modes.frequency, strict=True):
-        gyro = np.zeros((len(core.T), len(core.T)))
+        gyro = np.zeros((len(modal.T), len(modal.T)))
         for first, ratio, shaft in zip(model.first, model.ratios, model.shafts, strict=True):
             gyro[first + 3, first + 4] = shaft.rotor.polar * ratio * speed
             gyro[first + 4, first + 3] = -shaft.rotor.polar * ratio * speed
         A = np.block(
-            [[np.zeros((n, n)), np.eye(n)], [-np.diag(core.squares), -core.damping - core.T.T @ gyro @ core.T]]
+            [[np.zeros((n, n)), np.eye(n)], [-np.diag(modal.eigenvalues), -modal.damping - modal.T.T @ gyro @ modal.T]]
         )
         exact = np.sort(np.abs(np.linalg.eigvals(A))[::1]) / (2 * math.pi)
         assert frequency == pytest.approx(exact[::2][: len(frequency)], rel=1e-6)
@@ -386,7 +386,7 @@ def test_rayleigh_damping_of_a_law_as_in_a_transient():
     model = build_train(dataclasses.replace(gear_train, damping=Damping(beta=3e-6)))
     state = steady_state(model, 700.0, tolerance=1e-4)
     force, error, _ = settled_transient(model, state, 60)
-    assert np.count_nonzero(model.core.damping - np.diag(np.diag(model.core.damping))) == 0
+    assert np.count_nonzero(model.modal.damping - np.diag(np.diag(model.modal.damping))) == 0
     assert np.ptp(state.force, axis=0) == pytest.approx(np.ptp(force, axis=0), rel=2e-3)
     assert np.ptp(state.transmission_error) == pytest.approx(np.ptp(error), rel=1e-3)
 

@@ -15,7 +15,7 @@ from gearfe.rigid import IntegrationError, constant, integrate, smoothed_step
 from gearfe.train import Bearing, Damping, Drive, GearMesh, Load, build_train, simulate
 from gearfe.train.inertia import outline_moments
 from gearfe.train.kinematics import rolling, steady_forces
-from gearfe.train.motion import motion
+from gearfe.train.states import train_states
 
 from .trains import ALPHA, SHIPPED, SPEED, TORQUE, base_radius, braking, changed, curve, elastic, gear, train
 
@@ -178,7 +178,7 @@ def test_static_deflection_with_bearings() -> None:
         gear_train, bearings=tuple(Bearing(b, (kb, 2 * kb, 1.5 * kb, kt, 2 * kt)) for b in ("s1+", "s1-"))
     )
     model = build_train(gear_train)
-    moved = motion(
+    moved = train_states(
         model, integrate(model.system, [0.0, 0.05, 0.08], method="taylor", tolerance=1e-10, start=model.start)
     )
     q = moved.q[-1, model.first[1] : model.first[1] + 6]
@@ -252,16 +252,16 @@ def test_what_is_left_out_shows() -> None:
     turned = []
     for loads in (gear_train.loads, outside.loads):
         model = build_train(changed(gear_train, damping=slow, loads=loads, meshes=train(SHIPPED).meshes))
-        end = motion(
+        end = train_states(
             model, integrate(model.system, [0.0, 0.05, 0.06], method="taylor", tolerance=1e-9, start=model.start)
         )
         turned.append(end.q[-1, : gear_train.housing.size])  # type: ignore[union-attr]
     push = np.zeros(gear_train.housing.size)  # type: ignore[union-attr]
     push[6 * 4 + 4] = -TORQUE
-    response = build_train(changed(gear_train, loads=gear_train.loads)).core
-    T, squares = response.T, response.squares
+    response = build_train(changed(gear_train, loads=gear_train.loads)).modal
+    T, eigenvalues = response.T, response.eigenvalues
     direction = T[: len(push)].T @ push
-    assert turned[0] - turned[1] == pytest.approx((T @ (direction / squares))[: len(push)], rel=1e-5, abs=1e-12)
+    assert turned[0] - turned[1] == pytest.approx((T @ (direction / eigenvalues))[: len(push)], rel=1e-5, abs=1e-12)
 
 
 def test_instability_ends_with_a_status() -> None:

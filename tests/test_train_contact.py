@@ -13,7 +13,7 @@ from gearfe.errors import InputError
 from gearfe.rigid import TimeFunction, constant, integrate, smoothed_step
 from gearfe.rigid.compiled import available
 from gearfe.train import Damping, Drive, Load, build_train, simulate
-from gearfe.train.motion import motion
+from gearfe.train.states import train_states
 from gearfe.train.static_error import static_errors
 
 from .mesh_laws import hertzian_law
@@ -46,7 +46,7 @@ def free_pair(law, force):  # type: ignore[no-untyped-def]
 def free_energy(model, law, times, tolerance):  # type: ignore[no-untyped-def]
     """Kinetic and elastic energy less the work of the torques (J), and the elastic part."""
     run = integrate(model.system, times, method="taylor", tolerance=tolerance, start=model.start)
-    moved = motion(model, run)
+    moved = train_states(model, run)
     line = model.meshes[0]
     spins = moved.q[:, [int(i) + 5 for i in model.first]]
     rates = moved.v[:, [int(i) + 5 for i in model.first]] + model.angle(moved.time, 1)[:, None] * model.ratios
@@ -219,16 +219,16 @@ def test_a_law_that_does_not_reach_says_what_to_ask_for():
 
 def runge_kutta(model, times, tolerance):  # type: ignore[no-untyped-def]
     """Forces and approaches of a train of one mesh by scipy's DOP853, from the forces' plain formulas."""
-    core, W = model.core, model.directions
-    n = len(core.squares)
+    modal, W = model.modal, model.directions
+    n = len(modal.eigenvalues)
 
     def rhs(t, y):  # type: ignore[no-untyped-def]
-        q, v = core.origin + core.T @ y[:n], core.T @ y[n:]
+        q, v = modal.origin + modal.T @ y[:n], modal.T @ y[n:]
         force = W @ model.forces.at_one_time(t, q @ W, v @ W)
-        return np.r_[y[n:], core.constant - core.squares * y[:n] - core.damping @ y[n:] + core.T.T @ force]
+        return np.r_[y[n:], modal.constant - modal.eigenvalues * y[:n] - modal.damping @ y[n:] + modal.T.T @ force]
 
     y = solve_ivp(rhs, (0.0, times[-1]), np.zeros(2 * n), "DOP853", t_eval=times, rtol=tolerance, atol=1e-20).y
-    u, du = (core.origin + y[:n].T @ core.T.T) @ W, y[n:].T @ core.T.T @ W
+    u, du = (modal.origin + y[:n].T @ modal.T.T) @ W, y[n:].T @ modal.T.T @ W
     pushes = [made.force for made in model.forces.of_flanks(times, u, du)]
     return pushes[0] - pushes[1], u[:, model.forces.flanks[0].direction]
 

@@ -129,10 +129,10 @@ def oscillators(tolerance):
     names = {"np": np, "math": math, "LEAST": kernel_modal.LEAST}
     alias = {"order": "law_order", "corner": "law_corner"}
     kernels = compiled.bind((*kernel_modal.FUNCTIONS, order, corner), names, compiled=False, alias=alias)
-    squares, diagonal = np.array([0.0, 4.0, 900.0]), np.array([0.0, 0.0, 1.2])
+    eigenvalues, diagonal = np.array([0.0, 4.0, 900.0]), np.array([0.0, 0.0, 1.2])
     state, asked = np.array([0.1, 1.0, 1e-3, 0.5, 0.0, 1.0]), np.linspace(0.25, 4.0, 16)
     equations = kernel_modal.Equations(
-        squares, np.diag(diagonal), diagonal, False, np.zeros(3), np.zeros((1, 3)), np.zeros(1), np.zeros(1),
+        eigenvalues, np.diag(diagonal), diagonal, False, np.zeros(3), np.zeros((1, 3)), np.zeros(1), np.zeros(1),
         np.array([0.7]), tolerance, np.inf,
     )  # fmt: skip
     work = kernel_modal.work_space((np.zeros((1, 21)), np.zeros(1, dtype=np.int64)), state, 1)

@@ -12,7 +12,7 @@ from gearfe.rigid import TimeFunction, constant, integrate
 from gearfe.rigid.compiled import available
 from gearfe.train import Drive, build_train
 from gearfe.train.forces import LawFlank
-from gearfe.train.motion import motion
+from gearfe.train.states import train_states
 
 from .mesh_laws import hertzian_law
 from .test_train_contact import R1, R2, pair
@@ -37,7 +37,7 @@ def test_rattle_keeps_momentum_and_energy() -> None:
     """
     model = thrown(1e8, 0.02, backlash=20e-6)
     run = integrate(model.system, np.linspace(0.0, 0.2, 4001), method="taylor", tolerance=1e-11, start=model.start)
-    moved = motion(model, run)
+    moved = train_states(model, run)
     inertia = np.array([s.rotor.polar for s in model.shafts])
     rates = moved.v[:, [int(i) + 5 for i in model.first]] + model.angle(moved.time, 1)[:, None] * model.ratios
     momentum = rates @ (inertia / [R1, -R2])
@@ -58,7 +58,7 @@ def test_rattle_of_a_law_keeps_its_energy() -> None:
     model = thrown(law, 0.02, backlash=20e-6)
     line = model.meshes[0]
     run = integrate(model.system, np.linspace(0.0, 0.05, 4001), method="taylor", tolerance=1e-11, start=model.start)
-    moved = motion(model, run)
+    moved = train_states(model, run)
     spins = moved.q[:, [int(i) + 5 for i in model.first]]
     rates = moved.v[:, [int(i) + 5 for i in model.first]] + model.angle(moved.time, 1)[:, None] * model.ratios
     phase = line.sense * (line.ratio * model.angle(moved.time) + spins[:, 0]) + line.phase
@@ -78,7 +78,7 @@ def test_without_damping_time_runs_back() -> None:
     model = thrown(law, 0.05, backlash=20e-6)
     times = np.linspace(0.0, end, 401)
     there = integrate(model.system, times, method="taylor", tolerance=1e-11, start=model.start)
-    forces = motion(model, there).contact_force[:, 0]
+    forces = train_states(model, there).contact_force[:, 0]
     assert (forces > 0.0).any()
     assert (forces < 0.0).any()
     assert (forces == 0.0).any()
@@ -90,7 +90,7 @@ def test_without_damping_time_runs_back() -> None:
     speeds[[int(i) + 5 for i in model.first]] = 600.0 * np.array(model.ratios, dtype=float)
     start = dataclasses.replace(again.start, q=there.q[-1], v=-there.v[-1] - 2.0 * speeds)
     back = integrate(again.system, times, method="taylor", tolerance=1e-11, start=start)
-    assert motion(again, back).contact_force[::-1, 0] == pytest.approx(forces, abs=3e-4 * np.abs(forces).max())
+    assert train_states(again, back).contact_force[::-1, 0] == pytest.approx(forces, abs=3e-4 * np.abs(forces).max())
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.06])
@@ -117,7 +117,7 @@ def test_driven_rattle_balances_momentum_and_energy(friction: float) -> None:
     share = np.append(np.hstack([0.0 * ends[:-1, None], 0.5 * np.diff(ends)[:, None] * weights]).ravel(), 0.0)
     again = run(times)
     assert np.array_equal(again.dense.times, ends)  # the same steps
-    moved = motion(model, again)
+    moved = train_states(model, again)
     line, spin = model.meshes[0], [int(i) + 5 for i in model.first]
     rates = moved.v[:, spin] + model.angle(times, 1)[:, None] * model.ratios
     force, approach = moved.contact_force[:, 0], moved.approach[:, 0]

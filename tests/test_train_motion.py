@@ -11,7 +11,7 @@ from scipy.integrate import cumulative_simpson, solve_ivp
 
 from gearfe.rigid import constant, integrate
 from gearfe.train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, Shaft, build_train, simulate
-from gearfe.train.motion import motion
+from gearfe.train.states import train_states
 
 from .trains import ALPHA, SHIPPED, SPEED, base_radius, braking, changed, curve, elastic, gear, train
 
@@ -42,7 +42,7 @@ def test_energy_balance_of_the_undamped_train() -> None:
     """Constant stiffness, no damping: what drive and load put in is kinetic and elastic energy."""
     model = build_train(elastic(train(SHIPPED), skew=0.4, uneven=0.2))
     trajectory = integrate(model.system, uniform(0.006, 6001), method="taylor", tolerance=1e-11, start=model.start)
-    moved = motion(model, trajectory)
+    moved = train_states(model, trajectory)
     energy, power = energies(model, moved)
     work = cumulative_simpson(power, x=moved.time, initial=0.0)
     through = cumulative_simpson(moved.drive_torque * SPEED, x=moved.time, initial=0.0)
@@ -158,7 +158,7 @@ def test_phase_follows_the_state_not_the_nominal_angle() -> None:
     gear_train = changed(pair_scene(), drive=Drive("s0", "a", constant(SPEED), 5e2, 0.3))
     model = build_train(gear_train)
     times = uniform(4e-3, 81)
-    moved = motion(model, integrate(model.system, times, method="taylor", tolerance=1e-9, start=model.start))
+    moved = train_states(model, integrate(model.system, times, method="taylor", tolerance=1e-9, start=model.start))
     line = model.meshes[0]
     lag = moved.q[:, 5]
     assert np.abs(lag).max() > 0.02

@@ -48,7 +48,7 @@ _CHUNK = 1000
 
 
 def energy_lost(
-    nodes: Array, tets: IntArray, material: SolidMaterial, fields: Array, squares: Array, rigid: list[IntArray]
+    nodes: Array, tets: IntArray, material: SolidMaterial, fields: Array, eigenvalues: Array, rigid: list[IntArray]
 ) -> Array:
     """Estimated energy that the mesh keeps fields from giving up, a quadratic form over them: (k, k), N m.
 
@@ -58,7 +58,7 @@ def energy_lost(
         The mesh (m).
     fields : (3 n, k)
         Nodal displacements, each in equilibrium with the inertia of its own frequency.
-    squares : (k,)
+    eigenvalues : (k,)
         Squares of these circular frequencies (rad^2/s^2); 0 for a static field.
     rigid
         Sets of nodes that are held or move as a rigid thing: no function acts within one.
@@ -79,7 +79,7 @@ def energy_lost(
             sound = det.min(axis=1) > _SOUND * np.abs(det).mean(axis=1)
             det = np.where(sound[:, None], det, 0.0)
             own = _residual if bent else _straight_residual
-            found, block = own(made, material, det, inverse, field[tets[part]], squares)
+            found, block = own(made, material, det, inverse, field[tets[part]], eigenvalues)
             found *= numbers.signs[part][:, :, None, None]
             place, column = np.unique(numbers.place[part], return_inverse=True)
             entries = (np.ones(column.size), (column.ravel(), np.arange(column.size)))
@@ -172,7 +172,7 @@ def _number(nodes: Array, tets: IntArray, rigid: list[IntArray]) -> _Numbers:
 
 
 def _straight_residual(
-    made: _Functions, material: SolidMaterial, det: Array, inverse: Array, field: Array, squares: Array
+    made: _Functions, material: SolidMaterial, det: Array, inverse: Array, field: Array, eigenvalues: Array
 ) -> tuple[Array, Array]:
     """(m, s, 3, k) residuals and (m, s, 3, 3) stiffnesses of straight elements, one map each."""
     weight, inverse = det[:, 0], inverse[:, 0]
@@ -182,7 +182,7 @@ def _straight_residual(
     blocks = _stiffness(material, (pairs.reshape(-1, 9) @ mixed).reshape(m, 3, 3, s, a))
     loads = np.matmul(blocks.transpose(0, 3, 1, 4, 2).reshape(m, 3 * s, 3 * a), field.reshape(m, 3 * a, k))
     mass = (made.added * made.weights) @ made.values.T
-    inertia = np.matmul(mass[None], field.reshape(m, a, 3 * k)).reshape(m, s, 3, k) * squares
+    inertia = np.matmul(mass[None], field.reshape(m, a, 3 * k)).reshape(m, s, 3, k) * eigenvalues
     own = np.einsum("smp,snp,p->mns", made.added_slopes, made.added_slopes, made.weights).reshape(9, s)
     stiffness = _stiffness(material, (pairs.reshape(-1, 9) @ own).reshape(m, 3, 3, s))
     residual = material.density * weight[:, None, None, None] * inertia - loads.reshape(m, s, 3, k)
@@ -190,7 +190,7 @@ def _straight_residual(
 
 
 def _residual(
-    made: _Functions, material: SolidMaterial, det: Array, inverse: Array, field: Array, squares: Array
+    made: _Functions, material: SolidMaterial, det: Array, inverse: Array, field: Array, eigenvalues: Array
 ) -> tuple[Array, Array]:
     """The same of curved elements, point by point."""
     lam, mu = material.lame_lambda, material.shear_modulus
@@ -205,7 +205,7 @@ def _residual(
     weighted = added * volume[:, :, None, None]
     residual = -np.einsum("epsj,epijk->esik", weighted, stress, optimize=True)
     moved = np.einsum("ap,eaik->epik", made.values, field, optimize=True)
-    residual += material.density * squares * np.einsum("sp,epik,ep->esik", made.added, moved, volume, optimize=True)
+    residual += material.density * eigenvalues * np.einsum("sp,epik,ep->esik", made.added, moved, volume, optimize=True)
     stiffness = _stiffness(material, np.einsum("epsi,epsj->eijs", weighted, added, optimize=True))
     return residual, stiffness.transpose(0, 3, 1, 2)
 

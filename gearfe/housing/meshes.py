@@ -58,9 +58,9 @@ class Tetrahedra:
         faces = faces[_chosen(self.nodes, faces, faces[:, :3], without, outer)]
         return Surface(faces, normal_velocity(surface_quadrature(self.nodes, faces), faces, len(self.nodes)))
 
-    def energy_lost(self, material: SolidMaterial, fields: Floats, squares: Floats, rigid: list[Ints]) -> Floats:
+    def energy_lost(self, material: SolidMaterial, fields: Floats, eigenvalues: Floats, rigid: list[Ints]) -> Floats:
         """See `gearfe.housing.mesh_error.energy_lost`."""
-        return energy_lost(self.nodes, self.cells, material, fields, squares, rigid)
+        return energy_lost(self.nodes, self.cells, material, fields, eigenvalues, rigid)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,9 +113,9 @@ class Prisms:
             velocities.append(normal_velocity(quadrature(self.nodes[faces]), faces, len(self.nodes)))
         return Surface(np.concatenate(triangles), sparse.csr_array(sparse.vstack(velocities)))
 
-    def energy_lost(self, material: SolidMaterial, fields: Floats, squares: Floats, rigid: list[Ints]) -> Floats:
+    def energy_lost(self, material: SolidMaterial, fields: Floats, eigenvalues: Floats, rigid: list[Ints]) -> Floats:
         """See `gearfe.housing.prism_error.prism_energy_lost`."""
-        return prism_energy_lost(self.extrusion, self.used, material, fields, squares, rigid)
+        return prism_energy_lost(self.extrusion, self.used, material, fields, eigenvalues, rigid)
 
     @cached_property
     def _numbers(self) -> Ints:

@@ -270,16 +270,16 @@ class Housing:
         constraint modes, and the modes with free attachments. What else there is in the body counts as without error.
         """
         kept = body.coupled.frequencies_hz <= body.highest_hz
-        squares = (2.0 * np.pi * body.coupled.frequencies_hz[kept]) ** 2
+        eigenvalues = (2.0 * np.pi * body.coupled.frequencies_hz[kept]) ** 2
         static = np.eye(body.size, 6 * len(self.attachments))
         fields = np.hstack([static, body.coupled.vectors[:, kept]])
-        squares = np.concatenate([np.zeros(static.shape[1]), squares])
+        eigenvalues = np.concatenate([np.zeros(static.shape[1]), eigenvalues])
         rigid = [self.fixed, *(attachment.nodes for attachment in self.attachments)]
         with stage("estimating the mesh's error"):
-            lost = self.mesh.energy_lost(self.material, body.shapes @ fields, squares, rigid)
+            lost = self.mesh.energy_lost(self.material, body.shapes @ fields, eigenvalues, rigid)
         # weights of the fields in any motion, orthogonal in energy to the rest; a free body's energy needs some mass
         highest = (2.0 * np.pi * body.highest_hz) ** 2
-        slow = np.min(squares[squares > ROUNDING * highest], initial=highest)  # rigid motions are round-off
+        slow = np.min(eigenvalues[eigenvalues > ROUNDING * highest], initial=highest)  # rigid motions are round-off
         metric = body.stiffness + (body.mass * slow if len(self.fixed) == 0 else 0.0)
         share = np.linalg.pinv(fields.T @ metric @ fields, rcond=DEPENDENT, hermitian=True) @ (fields.T @ metric)
         return replace(body, softening=np.asarray(share.T @ lost @ share))

@@ -38,7 +38,7 @@ _ALL, _FOURTH = slice(0, 5), slice(4, 5)
 
 
 def prism_energy_lost(
-    mesh: Extrusion, used: Ints, material: SolidMaterial, fields: Floats, squares: Floats, rigid: list[Ints]
+    mesh: Extrusion, used: Ints, material: SolidMaterial, fields: Floats, eigenvalues: Floats, rigid: list[Ints]
 ) -> Floats:
     """Estimated energy that the mesh keeps fields from giving up, a quadratic form over them: (k, k), N m.
 
@@ -50,7 +50,7 @@ def prism_energy_lost(
         Number ``point * levels + level`` of each node.
     fields : (3 n, k)
         Nodal displacements, each in equilibrium with the inertia of its own frequency.
-    squares : (k,)
+    eigenvalues : (k,)
         Squares of these circular frequencies (rad^2/s^2); 0 for a static field.
     rigid
         Sets of nodes that are held or move as a rigid thing: no function acts within one.
@@ -76,7 +76,7 @@ def prism_energy_lost(
             for first in range(0, len(chosen), ELEMENTS):
                 part = slice(first, first + ELEMENTS)
                 elements = _elements(plane, line, group, chosen[part], half, material)
-                found = elements.residual(field[own[part]], squares)
+                found = elements.residual(field[own[part]], eigenvalues)
                 place, signs = group.numbers.place[chosen[part]], group.numbers.signs[chosen[part]]
                 found *= signs[:, :, None, None, None]
                 rows, inverse = np.unique(place, return_inverse=True)
@@ -230,12 +230,12 @@ class _Elements(NamedTuple):
     #: (m, s, j, 3, 3) stiffness of each added function with itself
     own: Floats
 
-    def residual(self, values: Floats, squares: Floats) -> Floats:
+    def residual(self, values: Floats, eigenvalues: Floats) -> Floats:
         """(m, s, j, 3, k) forces that nodal displacements (m, 10, 4, 3, k) leave unbalanced."""
-        m, count = len(values), len(squares)
+        m, count = len(values), len(eigenvalues)
         shape = (*self.own.shape[:4], count)
         left = np.matmul(self.mass, values.reshape(m, -1, 3 * count)).reshape(shape)
-        left *= squares
+        left *= eigenvalues
         left -= np.matmul(self.stiffness, values.reshape(m, -1, count)).reshape(shape)
         return np.asarray(left)
 

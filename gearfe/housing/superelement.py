@@ -235,11 +235,11 @@ def _body(k: Array, m: Array, points: Array, table: SuperelementTable, field: st
     if len(periods) and periods[0] < -SYMMETRIC * periods[-1]:
         raise InputError(f"{field}.mass", table.mass, "is not positive: a motion has negative energy", "check its sign")
     kept = np.flatnonzero(periods > MASSLESS * periods.max(initial=0.0))[::-1]
-    squares, modes = 1.0 / periods[kept], modes[:, kept] / np.sqrt(periods[kept])
+    eigenvalues, modes = 1.0 / periods[kept], modes[:, kept] / np.sqrt(periods[kept])
     static = -np.linalg.solve(stiff, k[b:, :b]) if size > b else np.zeros((0, b))
     change = np.block([[np.eye(b), np.zeros((b, len(kept)))], [static, modes]])
     K, M = (0.5 * (made + made.T) for made in (change.T @ one @ change for one in (k, m)))
-    K[:b, b:], K[b:, :b], K[b:, b:], M[b:, b:] = 0.0, 0.0, np.diag(squares), np.eye(len(kept))
+    K[:b, b:], K[b:, :b], K[b:, b:], M[b:, b:] = 0.0, 0.0, np.diag(eigenvalues), np.eye(len(kept))
     rigid = np.vstack([rigid_shapes(points), np.zeros((len(kept), 6))])
     free = _is_free(K[:b, :b], rigid[:b], points, table, field)
     momentum, whole = np.full((6, len(K)), math.nan), np.full((6, 6), math.nan)
@@ -262,7 +262,7 @@ def _body(k: Array, m: Array, points: Array, table: SuperelementTable, field: st
         attachment_names=tuple(one.name or str(i + 1) for i, one in enumerate(table.attachments)),
         attachment_points=points,
         attachment_axes=axes / np.linalg.norm(axes, axis=1, keepdims=True),
-        internal_hz=np.sqrt(squares) / (2 * math.pi),
+        internal_hz=np.sqrt(eigenvalues) / (2 * math.pi),
         modes=len(kept),
         nodes=points,
         elements=np.zeros((0, 4), dtype=np.int64),

@@ -209,9 +209,9 @@ class ModalBody(Shown):
         L - part S where that is small, and never negative. A `part` may be given for each mode, N of them: parts that
         add up to one then share the softening out. Rigid-body motions stay free, the damping stays.
         """
-        squares = (2.0 * math.pi * self.coupled.frequencies_hz) ** 2
-        elastic = squares > 0.0
-        vectors, root = self.coupled.vectors[:, elastic], np.sqrt(squares[elastic])
+        eigenvalues = (2.0 * math.pi * self.coupled.frequencies_hz) ** 2
+        elastic = eigenvalues > 0.0
+        vectors, root = self.coupled.vectors[:, elastic], np.sqrt(eigenvalues[elastic])
         values, axes = np.linalg.eigh((vectors.T @ self.softening @ vectors) / np.outer(root, root))
         half = (axes * np.sqrt(np.maximum(values, 0.0))) @ axes.T
         lost = (half * np.broadcast_to(part, elastic.shape)[elastic]) @ half

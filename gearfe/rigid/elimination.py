@@ -30,7 +30,7 @@ class ModalCoordinates:
         Columns that the constraints leave free.
     origin : ndarray, shape (size,)
         A state on the constraints.
-    squares : ndarray, shape (free,)
+    eigenvalues : ndarray, shape (free,)
         omega^2 (rad2/s2).
     damping : ndarray, shape (free, free)
         T^T C T.
@@ -41,7 +41,7 @@ class ModalCoordinates:
     system: System
     T: Array
     origin: Array
-    squares: Array
+    eigenvalues: Array
     damping: Array
     constant: Array
 
@@ -89,9 +89,9 @@ def _modal_coordinates(system: System) -> ModalCoordinates:
         T = root @ right[rank:].T
     else:
         origin, T = zero, root
-    squares, turn = np.linalg.eigh(T.T @ system.stiffness @ T)
+    eigenvalues, turn = np.linalg.eigh(T.T @ system.stiffness @ T)
     T = T @ turn
     damping = T.T @ system.damping @ T
     least = ROUND_OFF * float(np.abs(damping).max(initial=0.0))
     damping = np.where((np.abs(damping) > least) | np.eye(len(damping), dtype=bool), damping, 0.0)
-    return ModalCoordinates(system, T, origin, squares, damping, -T.T @ (system.stiffness @ origin))
+    return ModalCoordinates(system, T, origin, eigenvalues, damping, -T.T @ (system.stiffness @ origin))

@@ -71,16 +71,16 @@ def run_implicit(
     """Integrate; returns (dense output, status, statistics). Linear constant constraints are eliminated before."""
     options: dict[str, Any] = {"longest": longest, "most": most}
     if system.joints and is_linear(system) and all(isinstance(e, LocalForce) for e, _ in system.forces):
-        core = modal_coordinates(system)
-        inner, begin = in_modes(core, start)
+        modal = modal_coordinates(system)
+        inner, begin = in_modes(modal, start)
         local = max(MODES_SHARE * tolerance, 1e-13)
 
         def told(t: float, steps: int, state: Callable[[], tuple[Array, Array]]) -> bool:
-            return watch is None or watch(t, steps, lambda: (core.origin + core.T @ state()[0], core.T @ state()[1]))
+            return watch is None or watch(t, steps, lambda: (modal.origin + modal.T @ state()[0], modal.T @ state()[1]))
 
         within, status, statistics = run_implicit(inner, begin, times, tolerance=local, watch=told, **options)
-        coefficients = within.coefficients @ core.T.T
-        coefficients[:, 0] += core.origin
+        coefficients = within.coefficients @ modal.T.T
+        coefficients[:, 0] += modal.origin
         return Polynomials(within.times, coefficients), status, {**statistics, "free_coordinates": inner.size}
     active, units = start.active, system.units
     pair = system.acceleration(start.time, start.q, start.v, active, start.excess)
@@ -137,20 +137,20 @@ def _gap_between(system: System, here: State, h: float, made: Step, active: np.n
     return float(np.abs(gap).max())
 
 
-def in_modes(core: ModalCoordinates, start: Start) -> tuple[System, Start]:
+def in_modes(modal: ModalCoordinates, start: Start) -> tuple[System, Start]:
     """The system in its minimal coordinates, which no joint holds, and its start there."""
-    body = ModalBlocks(np.eye(len(core.squares)), core.damping, np.diag(core.squares))
+    body = ModalBlocks(np.eye(len(modal.eigenvalues)), modal.damping, np.diag(modal.eigenvalues))
     elements: list[Element] = [body]
-    for force, index in core.system.forces:
+    for force, index in modal.system.forces:
         assert isinstance(force, LocalForce)
-        offset = core.origin[index] @ force.W
+        offset = modal.origin[index] @ force.W
 
         def law(t: float, u: Array, du: Array, own: Any = force.law, offset: Array = offset) -> Array:
             return np.asarray(own(t, u + offset, du))
 
-        elements.append(LocalForce((body,), core.T[index].T @ force.W, law, breaks=force.breaks))
-    elements.append(LocalForce((body,), core.constant[:, None], lambda *_: np.ones(1)))
-    q, v = core.reduce(start.q, start.v)
+        elements.append(LocalForce((body,), modal.T[index].T @ force.W, law, breaks=force.breaks))
+    elements.append(LocalForce((body,), modal.constant[:, None], lambda *_: np.ones(1)))
+    q, v = modal.reduce(start.q, start.v)
     return System(elements), replace(start, q=q, v=v, active=np.zeros(0, dtype=bool), excess=np.zeros(0))
 
 

@@ -27,7 +27,7 @@ LEAST = 8
 class Equations(NamedTuple):
     """What holds for a whole run, for n coordinates and p directions."""
 
-    squares: Array  # (n,) w^2 (rad2/s2)
+    eigenvalues: Array  # (n,) w^2 (rad2/s2)
     damping: Array  # (n, n) D
     diagonal: Array  # (n,) of D
     full: bool  # whether D has more than its diagonal
@@ -122,13 +122,13 @@ def add_forces(W: Array, force: Array, factor: float, y: Array, row: int) -> Non
 
 def next_order(run: Equations, force: Array, s: float, y: Array, j: int) -> None:
     """Order j + 2 of the coordinates."""
-    squares, diagonal, constant, damping = run.squares, run.diagonal, run.constant, run.damping
-    n = squares.shape[0]
+    eigenvalues, diagonal, constant, damping = run.eigenvalues, run.diagonal, run.constant, run.damping
+    n = eigenvalues.shape[0]
     below = 1.0 / ((j + 2.0) * (j + 1.0))
     square = s * s * below
     slope = s * (j + 1.0) * below
     for i in range(n):
-        y[j + 2, i] = -square * squares[i] * y[j, i] - slope * diagonal[i] * y[j + 1, i]
+        y[j + 2, i] = -square * eigenvalues[i] * y[j, i] - slope * diagonal[i] * y[j + 1, i]
     if j == 0:
         for i in range(n):
             y[2, i] += square * constant[i]
@@ -164,9 +164,9 @@ def widen(w: Work, step: float) -> None:
         pull[i] = max(pull[i], abs(rate[i] - state[n + i]) / step)
 
 
-def set_weights(squares: Array, reach: Array, pull: Array, tolerance: float, weight: Array) -> None:
+def set_weights(eigenvalues: Array, reach: Array, pull: Array, tolerance: float, weight: Array) -> None:
     """1 / limit of each coordinate: `tolerance` of its largest value, and of what its largest acceleration makes."""
-    n = squares.shape[0]
+    n = eigenvalues.shape[0]
     far = 0.0
     strong = 0.0
     for i in range(n):
@@ -174,8 +174,8 @@ def set_weights(squares: Array, reach: Array, pull: Array, tolerance: float, wei
         strong = max(strong, pull[i])
     for i in range(n):
         limit = max(reach[i], 1e-6 * far)
-        if squares[i] > 0.0:
-            limit = min(limit, max(pull[i], 1e-3 * strong) / squares[i])
+        if eigenvalues[i] > 0.0:
+            limit = min(limit, max(pull[i], 1e-3 * strong) / eigenvalues[i])
         weight[i] = 1.0 / (tolerance * limit + 1e-100)
 
 
@@ -203,13 +203,13 @@ def modal_steps(
     A coordinate's limit is `tolerance` of its reach, and of what its pull makes of it: accelerations then hold as well
     as coordinates. Returns (status, steps, time, h, orders computed, number of asked times passed).
     """
-    squares, offset, W, breaks, tolerance, longest = (
-        run.squares, run.offset, run.W, run.breaks, run.tolerance, run.longest,
+    eigenvalues, offset, W, breaks, tolerance, longest = (
+        run.eigenvalues, run.offset, run.W, run.breaks, run.tolerance, run.longest,
     )  # fmt: skip
     law, memory, pieces, state, reach, pull = run.law, w.memory, w.pieces, w.state, w.reach, w.pull
     y, u, force, weight, value, rate = w.y, w.u, w.force, w.weight, w.value, w.rate
     asked, found, T, Y = out.asked, out.found, out.ends, out.states
-    n = squares.shape[0]
+    n = eigenvalues.shape[0]
     most = memory.shape[1] - 1
     sign = 1.0 if t1 >= t else -1.0
     begin = t
@@ -237,7 +237,7 @@ def modal_steps(
         project(W, y, 0, u)
         for p in range(W.shape[0]):
             u[p, 0] += offset[p]
-        set_weights(squares, reach, pull, tolerance, weight)
+        set_weights(eigenvalues, reach, pull, tolerance, weight)
         end = 1.0
         power = 1.0
         last = most
@@ -272,7 +272,7 @@ def modal_steps(
         if 1.0 <= size < 1e-3 * largest:  # the sum holds: the motion itself tells its size, as at a start from rest
             evaluate(y, last, end, s, value, rate)
             widen(w, end * step)
-            set_weights(squares, reach, pull, tolerance, weight)
+            set_weights(eigenvalues, reach, pull, tolerance, weight)
             size = last_size(y, last, end, weight)
         if size > 1.0:  # too long: as far as the last term allows
             x = end * size ** (-1.0 / last)

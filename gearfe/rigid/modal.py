@@ -39,51 +39,51 @@ SERIES_SHARE = 0.1
 _FULL = int(Status.MOST_STEPS)
 
 
-def modal_problem(core: ModalCoordinates) -> Problem:
+def modal_problem(modal: ModalCoordinates) -> Problem:
     """The equations of motion in modal coordinates."""
-    n = core.T.shape[1]
+    n = modal.T.shape[1]
 
     def acceleration(t: float, y: Array) -> Array:
-        stiff = core.constant - core.squares * y[:n] - core.damping @ y[n:]
-        return stiff + core.force(t, y[:n], y[n:])
+        stiff = modal.constant - modal.eigenvalues * y[:n] - modal.damping @ y[n:]
+        return stiff + modal.force(t, y[:n], y[n:])
 
     def rhs(t: float, y: Array) -> Array:
         return np.concatenate([y[n:], acceleration(t, y)])
 
     def expand(t: float, y: Array) -> tuple[Array, Array, Array]:
-        return core.origin + core.T @ y[:n], core.T @ y[n:], core.T @ acceleration(t, y)
+        return modal.origin + modal.T @ y[:n], modal.T @ y[n:], modal.T @ acceleration(t, y)
 
     return Problem(rhs, lambda _, y: y, expand, np.ones(2 * n))
 
 
 def run_modal_explicit(
-    core: ModalCoordinates, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
+    modal: ModalCoordinates, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
     watch: Watch | None = None,
 ) -> tuple[Dense, Status, dict[str, Any]]:  # fmt: skip
     """Integrate by Runge-Kutta; returns (dense output, status, statistics)."""
-    y0 = np.concatenate(core.reduce(start.q, start.v))
-    options: dict[str, Any] = {"breaks": core.system.breaks, "longest": longest, "most": most, "watch": watch}
+    y0 = np.concatenate(modal.reduce(start.q, start.v))
+    options: dict[str, Any] = {"breaks": modal.system.breaks, "longest": longest, "most": most, "watch": watch}
     local = max(PLAIN_SHARE * tolerance, 1e-14)
-    dense, status, statistics = run_problem(modal_problem(core), (start.time, float(times[-1])), y0, local, **options)
-    return dense, status, {**statistics, "backend": "plain", "free_coordinates": core.T.shape[1]}
+    dense, status, statistics = run_problem(modal_problem(modal), (start.time, float(times[-1])), y0, local, **options)
+    return dense, status, {**statistics, "backend": "plain", "free_coordinates": modal.T.shape[1]}
 
 
 def run_modal_taylor(
-    core: ModalCoordinates, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
+    modal: ModalCoordinates, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
     watch: Watch | None = None,
 ) -> tuple[Dense, Status, dict[str, Any]]:  # fmt: skip
     """Integrate by Taylor series in compiled code; returns (dense output, status, statistics)."""
-    found = series_force(core.system)
+    found = series_force(modal.system)
     assert found is not None  # the caller asks before
-    n = core.T.shape[1]
+    n = modal.T.shape[1]
 
     def told(t: float, steps: int, y: Array) -> bool:
-        return watch is None or watch(t, steps, lambda: (core.origin + core.T @ y[:n], core.T @ y[n:]))
+        return watch is None or watch(t, steps, lambda: (modal.origin + modal.T @ y[:n], modal.T @ y[n:]))
 
     local = max(SERIES_SHARE * tolerance, 1e-14)
-    run = SeriesRun(core, *found, local, longest, modal_problem(core).expand)
+    run = SeriesRun(modal, *found, local, longest, modal_problem(modal).expand)
     compiling = run.load()
-    y0 = np.concatenate(core.reduce(start.q, start.v))
+    y0 = np.concatenate(modal.reduce(start.q, start.v))
     ends, states, at_times, status, orders = run.steps(start.time, y0, float(times[-1]), times, most, told)
     statistics = {
         "scheme": "Taylor series",
@@ -118,7 +118,7 @@ def _kernels(order: Any, corner: Any, helpers: tuple[Any, ...], constants: tuple
 class SeriesRun:
     """Compiled integration of a system by Taylor series, from any state."""
 
-    core: ModalCoordinates
+    modal: ModalCoordinates
     force: LocalForce
     index: np.ndarray
     series: SeriesLaw
@@ -138,7 +138,7 @@ class SeriesRun:
             return 0.0
         began = time.perf_counter()
         with stage("compiling the kernels"), uncollected():
-            self.steps(0.0, np.zeros(2 * self.core.T.shape[1]), 0.0, np.zeros(1), 1)
+            self.steps(0.0, np.zeros(2 * self.modal.T.shape[1]), 0.0, np.zeros(1), 1)
         kernels.loaded = True
         return time.perf_counter() - began
 
@@ -147,21 +147,21 @@ class SeriesRun:
         watch: Callable[[float, int, Array], bool] | None = None,
     ) -> tuple[Array, Array, Array, Status, int]:  # fmt: skip
         """(step ends, states there, states at the asked times passed, status, orders computed)."""
-        core, series = self.core, self.series
-        n = core.T.shape[1]
-        W = np.ascontiguousarray((core.T[self.index].T @ self.force.W).T)
-        offset = np.atleast_1d(core.origin[self.index] @ self.force.W)
-        diagonal = np.diagonal(core.damping).copy()
-        full = not np.array_equal(core.damping, np.diag(diagonal))
+        modal, series = self.modal, self.series
+        n = modal.T.shape[1]
+        W = np.ascontiguousarray((modal.T[self.index].T @ self.force.W).T)
+        offset = np.atleast_1d(modal.origin[self.index] @ self.force.W)
+        diagonal = np.diagonal(modal.damping).copy()
+        full = not np.array_equal(modal.damping, np.diag(diagonal))
         equations = kernel_modal.Equations(
-            core.squares, np.ascontiguousarray(core.damping), diagonal, full, core.constant, W, offset,
-            series.parameters, np.asarray(core.system.breaks, dtype=float), self.tolerance, self.longest,
+            modal.eigenvalues, np.ascontiguousarray(modal.damping), diagonal, full, modal.constant, W, offset,
+            series.parameters, np.asarray(modal.system.breaks, dtype=float), self.tolerance, self.longest,
         )  # fmt: skip
         memory, pieces = np.zeros((series.rows, ORDER + 1)), np.zeros(series.pieces, dtype=np.int64)
         series.begin(t0, 1.0 if t1 >= t0 else -1.0, W @ y0[:n] + offset, W @ y0[n:], memory, pieces)
         work = kernel_modal.work_space((memory, pieces), y0, len(W))
         found = np.empty((len(asked), 2 * n))
-        rates = np.sqrt(np.abs(core.squares).max(initial=0.0)) + np.abs(diagonal).max(initial=0.0)
+        rates = np.sqrt(np.abs(modal.eigenvalues).max(initial=0.0)) + np.abs(diagonal).max(initial=0.0)
         t, h, status, at, orders = t0, 5.0 / max(rates, 1.0 / max(abs(t1 - t0), 1e-300)), _FULL, 0, 0
         ends, states, room = [np.array([t0])], [y0[None, :]], 512
         run, scratch, kernels = Packed(equations), Packed(work), self._bound

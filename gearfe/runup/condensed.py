@@ -50,7 +50,7 @@ class CondensedTrain:
     @cached_property
     def bores_of_modes(self) -> Array:
         """(bores, n) displacement along the shafts at each bore for unit modal coordinates."""
-        return np.asarray(self.model.axial @ self.model.core.T)
+        return np.asarray(self.model.axial @ self.model.modal.T)
 
     @cached_property
     def radiation_of_modes(self) -> Array | None:
@@ -58,7 +58,7 @@ class CondensedTrain:
         housing = self.model.train.housing
         if housing is None or not housing.has_mesh:
             return None
-        shapes = self.model.core.T[: housing.size]
+        shapes = self.model.modal.T[: housing.size]
         return np.asarray(shapes.T @ housing.radiation @ shapes)
 
 
@@ -72,20 +72,20 @@ def condense(model: TrainModel) -> CondensedTrain:
         oscillate, and parts that nothing holds.
     """
     _check(model)
-    core, turns = model.core, model.rolling.common_turns
+    modal, turns = model.modal, model.rolling.common_turns
     assert turns is not None
     flanks = [f for f in model.forces.flanks if isinstance(f, CurveFlank | LawFlank)]
     reads = [_directions(f) for f in flanks]
     used = sorted({x for four in reads for x in four if x >= 0})
     freedoms = np.array([[used.index(x) if x >= 0 else -1 for x in four] for four in reads])
-    to_modes = core.T.T @ model.directions
-    push = core.constant + core.T.T @ sum(
-        (d * float(f(model.torque_end)) for d, f in model.torques), start=np.zeros(len(core.T))
+    to_modes = modal.T.T @ model.directions
+    push = modal.constant + modal.T.T @ sum(
+        (d * float(f(model.torque_end)) for d, f in model.torques), start=np.zeros(len(modal.T))
     )
     gyros = model.forces.gyros
     tilts = [column for g in gyros for column in (g.direction, g.direction + 1)]
     linear = Linear(
-        core.squares, _damping(model), to_modes[:, used], push, to_modes[:, tilts],
+        modal.eigenvalues, _damping(model), to_modes[:, used], push, to_modes[:, tilts],
         np.array([g.polar * g.ratio for g in gyros]),
     )  # fmt: skip
     sense = drive_sense(model.train.driven.speed) or 1.0
@@ -153,10 +153,10 @@ def _check(model: TrainModel) -> None:
 
 def _damping(model: TrainModel) -> Array:
     """Of the coordinates, without what the forces of mesh laws take off."""
-    made = model.core.damping.copy()
+    made = model.modal.damping.copy()
     for line in model.meshes:
         if line.law is not None:
-            along = model.core.T.T @ line.row
+            along = model.modal.T.T @ line.row
             made -= line.rayleigh * np.outer(along, along)
     return made
 

@@ -71,12 +71,12 @@ class Crossing:
 def coupled_modes(train: CondensedTrain, speeds: Array, highest_hz: float) -> CoupledModes:
     """Modes with natural frequencies up to `highest_hz` at rest, followed over the speeds in the order of frequency."""
     model, linear = train.model, train.system.linear
-    core = model.core
-    count = int((core.squares <= (2.0 * math.pi * highest_hz) ** 2).sum())
+    modal = model.modal
+    count = int((modal.eigenvalues <= (2.0 * math.pi * highest_hz) ** 2).sum())
     damping = linear.damping.copy()
     for line in model.meshes:
         if line.law is not None:
-            along = core.T.T @ line.row
+            along = modal.T.T @ line.row
             damping += line.damping * np.outer(along, along)
     swap = np.kron(np.diag(linear.momenta), np.array([[0.0, -1.0], [1.0, 0.0]]))
     gyro = linear.tilts @ swap @ linear.tilts.T
@@ -97,9 +97,9 @@ def coupled_modes(train: CondensedTrain, speeds: Array, highest_hz: float) -> Co
 
 def _shares(train: CondensedTrain, count: int) -> tuple[Array, Array, tuple[str, ...]]:
     model = train.model
-    core, housing = model.core, model.train.housing
-    shapes = core.T[:, :count]
-    whole = np.maximum(core.squares[:count], 1e-300)
+    modal, housing = model.modal, model.train.housing
+    shapes = modal.T[:, :count]
+    whole = np.maximum(modal.eigenvalues[:count], 1e-300)
     rows = [line.mean * (line.row @ shapes) ** 2 / whole for line in model.meshes]
     size = 0 if housing is None else housing.size
     body = np.zeros(count) if housing is None else _quadratic(housing.stiffness, shapes[:size]) / whole

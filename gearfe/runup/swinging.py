@@ -11,9 +11,9 @@ import numpy as np
 
 from ..rigid import constant
 from ..train.model import TrainModel
-from ..train.motion import Motion
 from ..train.response import TrainResponse
 from ..train.simulate import response_of
+from ..train.states import TrainStates
 from ..typing import Array
 from ..vibration.fields import write_gears, write_housing
 from .modes import CoupledModes
@@ -41,14 +41,14 @@ def swinging(model: TrainModel, modes: Sequence[int], frames: int = FRAMES) -> T
     part = np.arange(frames) / frames
     time = np.concatenate([mode + 1 + part for mode in modes])
     angle = 2.0 * math.pi * part[:, None]
-    shapes = [_sized(model, model.core.T[:, mode]) for mode in modes]
-    rates = [math.sqrt(max(float(model.core.squares[mode]), 0.0)) for mode in modes]
+    shapes = [_sized(model, model.modal.T[:, mode]) for mode in modes]
+    rates = [math.sqrt(max(float(model.modal.eigenvalues[mode]), 0.0)) for mode in modes]
     q = np.concatenate([np.cos(angle) * shape for shape in shapes])
     v = np.concatenate([-rate * np.sin(angle) * shape for rate, shape in zip(rates, shapes, strict=True)])
     a = np.concatenate([-(rate**2) * np.cos(angle) * shape for rate, shape in zip(rates, shapes, strict=True)])
     approach = q @ np.array([line.row for line in model.meshes]).T
     none = np.zeros_like(approach)
-    moved = Motion(time, q, v, a, none, approach, none > 0.0, np.zeros(len(time)), none, none)
+    moved = TrainStates(time, q, v, a, none, approach, none > 0.0, np.zeros(len(time)), none, none)
     return response_of(replace(model, angle=constant(0.0)), moved, "done", float(time[-1]), {})
 
 

@@ -62,7 +62,7 @@ def why_not(model: TrainModel) -> str:
             "a load changes all the time: no motion repeats with the meshes",
         ),
         (model.rolling.common_turns is None, model.rolling.note),
-        (not len(model.core.squares), "nothing can vibrate: rigid meshes in a rigid housing follow the drive"),
+        (not len(model.modal.eigenvalues), "nothing can vibrate: rigid meshes in a rigid housing follow the drive"),
         (
             any(not (line.rigid or line.pulls) for line in model.meshes),
             "the teeth may part, and which motion they settle to is open: `gearfe runup` finds the periodic motions "
@@ -91,32 +91,32 @@ class Linearised:
     period: float
 
     def __post_init__(self) -> None:
-        core, model = self.model.core, self.model
-        n = len(core.squares)
-        torque = core.constant + core.T.T @ sum(
-            (d * float(f(model.torque_end)) for d, f in model.torques), start=np.zeros(len(core.T))
+        modal, model = self.model.modal, self.model
+        n = len(modal.eigenvalues)
+        torque = modal.constant + modal.T.T @ sum(
+            (d * float(f(model.torque_end)) for d, f in model.torques), start=np.zeros(len(modal.T))
         )
-        held = core.squares > ROUND_OFF * core.squares.max(initial=0.0)
-        self.static = np.where(held, torque / np.where(held, core.squares, 1.0), 0.0)
+        held = modal.eigenvalues > ROUND_OFF * modal.eigenvalues.max(initial=0.0)
+        self.static = np.where(held, torque / np.where(held, modal.eigenvalues, 1.0), 0.0)
         self.rest = np.where(held, 0.0, torque)
         self.lines = [line for line in model.meshes if line.curve is not None]
-        self.approach = np.array([line.row @ core.T for line in self.lines]).reshape(-1, n).T
-        self.spin = np.array([core.T[model.first[line.driver] + 5] for line in self.lines]).reshape(-1, n).T
+        self.approach = np.array([line.row @ modal.T for line in self.lines]).reshape(-1, n).T
+        self.spin = np.array([modal.T[model.first[line.driver] + 5] for line in self.lines]).reshape(-1, n).T
         turning = zip(model.shafts, model.first, strict=True) if model.train.damping.gyroscopic else ()
         rotors = [(body.rotor.polar, first) for body, first in turning]
         self.polar = np.array([polar for polar, _ in rotors])
-        self.tilts = [np.array([core.T[i + j] for _, i in rotors]).reshape(-1, n).T for j in (3, 4, 5)]
+        self.tilts = [np.array([modal.T[i + j] for _, i in rotors]).reshape(-1, n).T for j in (3, 4, 5)]
         self.state = np.zeros(2 * n)
 
     @cached_property
     def constant(self) -> Flow:
         """Mean stiffnesses, damping and the gyroscopic moments of steady spins."""
-        core, model = self.model.core, self.model
-        damping = core.damping.copy()
+        modal, model = self.model.modal, self.model
+        damping = modal.damping.copy()
         for k, polar in enumerate(self.polar):
             one, two = self.tilts[0][:, k], self.tilts[1][:, k]
             damping += polar * model.ratios[k] * self.speed * (np.outer(one, two) - np.outer(two, one))
-        return flow(core.squares, damping, self.period)
+        return flow(modal.eigenvalues, damping, self.period)
 
     @property
     def directions(self) -> Array:

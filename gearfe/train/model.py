@@ -37,7 +37,7 @@ class TrainModel:
     ----------
     train, rolling
         What it was made from; its kinematics.
-    system, core, start
+    system, modal, start
         System of the rigid core, its minimal coordinates, its start.
     angle
         psi(t), rotation of the drive (rad).
@@ -62,7 +62,7 @@ class TrainModel:
     train: GearTrain
     rolling: Rolling
     system: System
-    core: ModalCoordinates
+    modal: ModalCoordinates
     start: Start
     angle: TimeFunction
     shafts: tuple[RigidShaft, ...]
@@ -100,7 +100,7 @@ class TrainModel:
     @property
     def coupled_frequencies_hz(self) -> Array:
         """Natural frequencies with mean mesh stiffness (Hz)."""
-        return np.sqrt(np.maximum(self.core.squares, 0.0)) / (2.0 * math.pi)
+        return np.sqrt(np.maximum(self.modal.eigenvalues, 0.0)) / (2.0 * math.pi)
 
     @cached_property
     def multipliers_of_forces(self) -> Array:
@@ -149,12 +149,12 @@ def build_train(train: GearTrain) -> TrainModel:
         tuple(bodies), directions, forces.at_one_time, series, forces.breaks, name="forces of the train"
     )
     elements = [*bodies, *_supports(train, shafts, housing), *(line.element(bodies) for line in lines), changing]
-    system, core = _damped(train, elements, bodies)
+    system, modal = _damped(train, elements, bodies)
     return TrainModel(
         train=train,
         rolling=kinematics,
         system=system,
-        core=core,
+        modal=modal,
         start=_start(train, system, shafts, first),
         angle=angle,
         shafts=shafts,
@@ -267,17 +267,17 @@ def _drive(drive: Drive, touches: tuple[Element, ...], row: Array) -> Element:
 def _damped(train: GearTrain, elements: list[Element], bodies: list[Element]) -> tuple[System, ModalCoordinates]:
     """System and minimal coordinates; modal damping is written in the modes of the coupled system itself."""
     system = System(elements)
-    core = modal_coordinates(system)
+    modal = modal_coordinates(system)
     ratios = np.atleast_1d(np.asarray(train.damping.ratio, dtype=float))
     if not ratios.any():
-        return system, core
-    count = len(core.squares)
+        return system, modal
+    count = len(modal.eigenvalues)
     per_mode = np.append(ratios, np.full(max(0, count - len(ratios)), ratios[-1]))[:count]
-    factors = 2.0 * per_mode * np.sqrt(np.maximum(core.squares, 0.0))
-    back = core.T.T @ system.mass
+    factors = 2.0 * per_mode * np.sqrt(np.maximum(modal.eigenvalues, 0.0))
+    back = modal.T.T @ system.mass
     whole = LinearForce(tuple(bodies), back.T @ (factors[:, None] * back), np.zeros_like(system.mass), "modal damping")
     damped = System([*elements, whole])
-    made = replace(core, system=damped, damping=core.damping + np.diag(factors))
+    made = replace(modal, system=damped, damping=modal.damping + np.diag(factors))
     damped.__dict__["_modal_coordinates"] = (
         made  # the modes are those without damping, and its matrix stays exactly diagonal
     )

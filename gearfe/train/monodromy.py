@@ -66,11 +66,11 @@ class Flow:
         return lambda x: matrix @ x
 
 
-def flow(squares: Array, damping: Array, period: float) -> Flow:
-    """Flow of ``y'' = -squares y - damping y'``."""
-    n = len(squares)
-    scale = np.maximum(np.sqrt(np.abs(squares)), 1.0 / period)
-    A = np.block([[np.zeros((n, n)), np.diag(scale)], [np.diag(-squares / scale), -damping]])
+def flow(eigenvalues: Array, damping: Array, period: float) -> Flow:
+    """Flow of ``y'' = -eigenvalues y - damping y'``."""
+    n = len(eigenvalues)
+    scale = np.maximum(np.sqrt(np.abs(eigenvalues)), 1.0 / period)
+    A = np.block([[np.zeros((n, n)), np.diag(scale)], [np.diag(-eigenvalues / scale), -damping]])
     values, V = np.linalg.eig(A)
     if np.isfinite(V).all() and _well_conditioned(V):
         kept = values.imag >= 0.0
@@ -138,14 +138,14 @@ def monodromy(constant: Flow, edges: Array, directions: Array, reads: Array, str
 
 
 def multipliers(
-    squares: Array, damping: Array, directions: Array, gains: Callable[[Array], Array], period: float, *,
+    eigenvalues: Array, damping: Array, directions: Array, gains: Callable[[Array], Array], period: float, *,
     tolerance: float = 1e-6, first: int = 64,
 ) -> ComplexArray | None:  # fmt: skip
     """Floquet multipliers, largest modulus first; None when numbers overflow even with the shortest steps.
 
     Parameters
     ----------
-    squares : (n,)
+    eigenvalues : (n,)
         Omega^2 (rad2/s2); negative ones are allowed.
     damping : (n, n)
         D (1/s), gyroscopic terms included.
@@ -163,7 +163,7 @@ def multipliers(
     ndarray of complex, shape (2n,)
     """
     with one_thread():
-        constant = flow(squares, damping, period)
+        constant = flow(eigenvalues, damping, period)
         reads = np.vstack([directions, np.zeros_like(directions)])
 
         def found(steps: int) -> Array:

@@ -11,7 +11,7 @@ from ..rigid import Trajectory
 from ..typing import Array, BoolArray
 from .forces import LawFlank
 from .model import TrainModel
-from .motion import Motion
+from .states import TrainStates
 
 
 @dataclass
@@ -45,7 +45,7 @@ def apart_in_steps(model: TrainModel, trajectory: Trajectory, until: float) -> t
     """Ends of the steps up to a time (s + 1,), and whether the teeth of each mesh are apart in the middle of each step,
     (s, meshes): there, approaches and phases follow from both ends by cubics.
     """
-    dense, n = trajectory.dense, model.core.T.shape[1]
+    dense, n = trajectory.dense, model.modal.T.shape[1]
     ends = dense.times
     count = int(np.searchsorted(ends, until, side="right"))
     ends = ends[:count]
@@ -53,7 +53,7 @@ def apart_in_steps(model: TrainModel, trajectory: Trajectory, until: float) -> t
     if states is None:
         q, v = dense(ends), dense(ends, 1)
     else:
-        q, v = model.core.origin + states[:count, :n] @ model.core.T.T, states[:count, n:] @ model.core.T.T
+        q, v = model.modal.origin + states[:count, :n] @ model.modal.T.T, states[:count, n:] @ model.modal.T.T
     u, du = q @ model.directions, v @ model.directions
     h = np.diff(ends)[:, None]
     middle = 0.5 * (u[:-1] + u[1:]) + 0.125 * h * (du[:-1] - du[1:])
@@ -81,7 +81,7 @@ def parted(parting: Sequence[Parting], never: Sequence[bool]) -> dict[str, list[
     }
 
 
-def beyond_law(model: TrainModel, moved: Motion) -> tuple[int, str] | None:
+def beyond_law(model: TrainModel, moved: TrainStates) -> tuple[int, str] | None:
     """The first sample at which a mesh goes beyond what its law is known for, and what to ask for."""
     first: tuple[int, str] | None = None
     flanks, u = iter(model.forces.flanks), moved.q @ model.directions

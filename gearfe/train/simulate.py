@@ -20,9 +20,9 @@ from .flanks import NONE
 from .floquet import train_multipliers
 from .kinematics import steady_forces
 from .model import TrainModel
-from .motion import Motion, motion
 from .parting import Parting, apart_in_steps, beyond_law, parted
 from .response import TrainResponse, joined
+from .states import TrainStates, train_states
 
 #: The finer run shares a little of the error; with this factor the estimate covers it.
 SAFETY = 1.5
@@ -174,13 +174,13 @@ def _ends(model: TrainModel, t: Array) -> Iterator[int]:
 
 def _run(
     model: TrainModel, t: Array, tolerance: float, method: str, backend: str, start: Start, longest: float = np.inf
-) -> tuple[Trajectory, Motion]:
-    if not len(model.core.squares):
+) -> tuple[Trajectory, TrainStates]:
+    if not len(model.modal.eigenvalues):
         method = "explicit"  # nothing is left to integrate
     options: dict[str, Any] = {"tolerance": tolerance, "start": start, "backend": backend, "longest": longest}
     options["raise_on_failure"] = False  # a response has a status of its own
     trajectory = integrate(model.system, t, method=method, **options)
-    return trajectory, motion(model, trajectory)
+    return trajectory, train_states(model, trajectory)
 
 
 @dataclass
@@ -195,7 +195,7 @@ class _SoFar:
     most: Array = field(default_factory=lambda: np.zeros(0))
     parting: list[Parting] = field(default_factory=list)
 
-    def add(self, model: TrainModel, trajectory: Trajectory, moved: Motion, seconds: float) -> None:
+    def add(self, model: TrainModel, trajectory: Trajectory, moved: TrainStates, seconds: float) -> None:
         """Count steps and seconds, keep each mesh's least force, its time, the largest size, and when teeth part."""
         self.seconds += seconds - float(trajectory.statistics.get("compile_seconds", 0.0))
         for name in COUNTED:
@@ -223,7 +223,7 @@ class _SoFar:
             **self.counted,
             "method": trajectory.method,
             "seconds": self.seconds,
-            "free_coordinates": model.core.T.shape[1],
+            "free_coordinates": model.modal.T.shape[1],
             "redundant_constraints": redundant_names(model),
             "smallest_contact_force_N": self.least.tolist(),
             "steady_forces_N": steady_forces(model.train).tolist(),
@@ -253,7 +253,7 @@ class _Finer:
     size: Array = field(default_factory=lambda: np.zeros(0))
 
     @stage("error estimates")
-    def compare(self, model: TrainModel, t: Array, kept: Motion, steps: int) -> None:
+    def compare(self, model: TrainModel, t: Array, kept: TrainStates, steps: int) -> None:
         """Go on to the end of the piece `t` and compare forces and accelerations where both runs hold."""
         # where the corners of the curves set the steps, a tolerance alone would repeat them
         longest = 0.5 * float(t[-1] - t[0]) / max(1, steps)
@@ -319,7 +319,7 @@ def _loose(model: TrainModel) -> list[str]:
     ]
 
 
-def _ended(model: TrainModel, trajectory: Trajectory, moved: Motion) -> tuple[str, int, str]:
+def _ended(model: TrainModel, trajectory: Trajectory, moved: TrainStates) -> tuple[str, int, str]:
     """Status, the number of output times up to which the results hold, and what moved too far."""
     limit = DIVERGED * min((line.module for line in model.meshes), default=1e-3)
     reach = np.abs(moved.approach) if model.meshes else np.zeros((len(moved.q), 1))
@@ -349,12 +349,12 @@ def _too_far(model: TrainModel, reach: Array, shafts: Array, limit: float) -> st
     )
 
 
-def _cut(moved: Motion, first: int, keep: int) -> Motion:
-    return Motion(*(getattr(moved, name)[first:keep] for name in Motion.__dataclass_fields__))
+def _cut(moved: TrainStates, first: int, keep: int) -> TrainStates:
+    return TrainStates(*(getattr(moved, name)[first:keep] for name in TrainStates.__dataclass_fields__))
 
 
 def response_of(
-    model: TrainModel, moved: Motion, status: str, reached: float, statistics: dict[str, Any]
+    model: TrainModel, moved: TrainStates, status: str, reached: float, statistics: dict[str, Any]
 ) -> TrainResponse:
     """A motion as a response, without multipliers and estimates."""
     train, t = model.train, moved.time
@@ -400,7 +400,7 @@ def response_of(
     )
 
 
-def _gear_poses(model: TrainModel, moved: Motion) -> tuple[Array, Array]:
+def _gear_poses(model: TrainModel, moved: TrainStates) -> tuple[Array, Array]:
     train, frame = model.train, model.train.frame
     names = [s.name for s in train.shafts]
     poses = np.zeros((len(moved.time), len(train.gears), 6))

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from gearfe.train import simulate
-from gearfe.train.motion import motion
+from gearfe.train.states import train_states
 
 from .peers.process import PeerError, missing, run_python
 from .record import Record
@@ -100,7 +100,7 @@ def _ours(variant: str, method: str, tolerance: float, quick: bool) -> Mapping[s
 
     fast = method != "implicit" and not quick
     made, cost = measured(run, runs=5 if fast else 1, least_s=0.2 if fast else 0.0)
-    found, free = errors_of(signals_of(made), truth, model), model.core.T.shape[1]
+    found, free = errors_of(signals_of(made), truth, model), model.modal.T.shape[1]
     return {**found, **cost.columns, "steps": made.statistics["steps"], "unknowns": free}
 
 
@@ -152,10 +152,10 @@ def _settings(peer: str, variant: str, quick: bool) -> list[tuple[str, float]]:
 
 def states_signals(model: Any, times: np.ndarray, states: np.ndarray) -> np.ndarray:
     """The compared signals of states (coordinates, rates) at the output times."""
-    if states.shape != (len(times), 2 * model.core.T.shape[1]):
+    if states.shape != (len(times), 2 * model.modal.T.shape[1]):
         return np.zeros((0, 0))
     trajectory: Any = SimpleNamespace(time=times, method="explicit", dense=SimpleNamespace(state=lambda _: states))
-    moved = motion(model, trajectory)
+    moved = train_states(model, trajectory)
     push = model.angle(times, 2)[:, None] * model.ratios
     return np.hstack([moved.contact_force, push + moved.a @ model.spin_reference.T, moved.a @ model.axial.T])
 
@@ -178,7 +178,7 @@ def modes(record: Record) -> None:
         _, cost = measured(lambda: simulate(model, train_times(False), tolerance=1e-6), runs=5, least_s=0.2)
         made = simulate(model, times, tolerance=1e-8)
         forces = np.abs(made.contact_force - right.contact_force).max(axis=0) / right.contact_force.max(axis=0)
-        found = {"unknowns": model.core.T.shape[1], "force_error": float(forces.max())}
+        found = {"unknowns": model.modal.T.shape[1], "force_error": float(forces.max())}
         for name, limit in (("acceleration_error", 5e3), ("wide_error", 14e3)):
             low, true = (lines_below(x.attachment_acceleration, FINE_STEP, limit) for x in (made, right))
             found[name] = float((np.linalg.norm(low - true, axis=0) / np.linalg.norm(true, axis=0)).max())

@@ -27,7 +27,7 @@ from gearfe.rigid import integrate
 from gearfe.train import TrainModel, TrainResponse, build_train, simulate
 from gearfe.train.floquet import train_multipliers
 from gearfe.train.kinematics import steady_forces
-from gearfe.train.motion import motion
+from gearfe.train.states import train_states
 from gearfe.vibration.job import job_train, read_train_job, train_body
 from gearfe.vibration.mesh_stiffness import train_curves
 
@@ -121,7 +121,7 @@ def _order(model: TrainModel, times: Any, method: str, truth: Any) -> list[Check
         made = integrate(model.system, times, longest=longest, **options)
         if made.status != 0:
             return [Check("order", math.inf, 1.0)]
-        errors.append(float(np.abs(motion(model, made).contact_force - truth).max() / np.abs(truth).max()))
+        errors.append(float(np.abs(train_states(model, made).contact_force - truth).max() / np.abs(truth).max()))
     if errors[1] < 1e-12:  # rounding
         return []
     missing = LEAST_ORDER[method] - math.log2(errors[0] / errors[1])
@@ -191,7 +191,7 @@ def _floquet(model: TrainModel, measures: dict[str, Any]) -> Finding:
     trajectory = integrate(model.system, times, **options)
     if trajectory.status != 0:
         return Finding("stopped", trajectory.message, (), measures)
-    moved = motion(model, trajectory)
+    moved = train_states(model, trajectory)
     size = np.abs(model.coupled_frequencies_hz[model.coupled_frequencies_hz > 0]).max(initial=1.0) * 2 * math.pi
     state = np.hstack([moved.q * size, moved.v])
     steps = np.linalg.norm(np.diff(state, axis=0), axis=1)

@@ -40,46 +40,46 @@ def answer(task: dict[str, Any]) -> dict[str, Any]:
     if "times" in task:
         step, count = task["times"]
         times = step * np.arange(count)
-    core = model.core
-    start = np.concatenate(core.reduce(model.start.q, model.start.v))
-    rhs = plain_rhs(core) if task["quick"] else compiled_rhs(core, model.forces)
+    modal = model.modal
+    start = np.concatenate(modal.reduce(model.start.q, model.start.v))
+    rhs = plain_rhs(modal) if task["quick"] else compiled_rhs(modal, model.forces)
     rhs(0.0, start, np.empty_like(start))
     runs: dict[str, Callable[..., States]] = {
         "sundials": _sundials,
         "scipy_ivp": partial(_scipy, _approaches(model)),
         "exudyn": _exudyn,
     }
-    (at, states), cost = measured(lambda: runs[task["peer"]](task, core, rhs, start, times), runs=3, most_s=30.0)
+    (at, states), cost = measured(lambda: runs[task["peer"]](task, modal, rhs, start, times), runs=3, most_s=30.0)
     at, states = at[-task.get("last", 0) :], states[-task.get("last", 0) :]
-    return {"times": at.tolist(), "states": states.tolist(), **cost.columns, "unknowns": len(core.squares)}
+    return {"times": at.tolist(), "states": states.tolist(), **cost.columns, "unknowns": len(modal.eigenvalues)}
 
 
-def plain_rhs(core: Any) -> Rhs:
+def plain_rhs(modal: Any) -> Rhs:
     """Right-hand side in NumPy."""
-    n = len(core.squares)
+    n = len(modal.eigenvalues)
 
     def rhs(t: float, y: Any, dy: Any) -> None:
         dy[:n] = y[n:]
-        dy[n:] = core.constant - core.squares * y[:n] - core.damping @ y[n:] + core.force(t, y[:n], y[n:])
+        dy[n:] = modal.constant - modal.eigenvalues * y[:n] - modal.damping @ y[n:] + modal.force(t, y[:n], y[n:])
 
     return rhs
 
 
-def compiled_rhs(core: Any, forces: Any) -> Rhs:
+def compiled_rhs(modal: Any, forces: Any) -> Rhs:
     """The same in compiled code; `forces` are those of a train whose meshes have stiffness curves."""
     from gearfe.rigid import compiled
 
-    [(force, index)] = core.system.forces
+    [(force, index)] = modal.system.forces
     names = {"np": np, "math": math}
     functions = (modal_rhs, time_series, train_law)
     kernels = compiled.bind(functions, names, compiled=True, entries=("modal_rhs",))
-    W = np.ascontiguousarray((core.T[index].T @ force.W).T)
-    offset = np.atleast_1d(core.origin[index] @ force.W)
-    diagonal = np.diagonal(core.damping).copy()
-    if not np.array_equal(core.damping, np.diag(diagonal)):
+    W = np.ascontiguousarray((modal.T[index].T @ force.W).T)
+    offset = np.atleast_1d(modal.origin[index] @ force.W)
+    diagonal = np.diagonal(modal.damping).copy()
+    if not np.array_equal(modal.damping, np.diag(diagonal)):
         raise PeerError("the damping of the shipped train is modal")
     u, du, out = (np.zeros(len(W)) for _ in range(3))
-    fixed = (core.squares, diagonal, core.constant, W, offset, law_parameters(forces))
+    fixed = (modal.eigenvalues, diagonal, modal.constant, W, offset, law_parameters(forces))
 
     def rhs(t: float, y: Any, dy: Any) -> None:
         kernels.modal_rhs(*fixed, t, np.asarray(y), np.asarray(dy), u, du, out)
@@ -134,9 +134,9 @@ def train_law(t, u, du, parameters, out):  # type: ignore[no-untyped-def]
         out[d + 1] += momentum * du[d]
 
 
-def modal_rhs(squares, diagonal, constant, W, offset, parameters, t, y, dy, u, du, out):  # type: ignore[no-untyped-def]
+def modal_rhs(eigenvalues, diagonal, constant, W, offset, parameters, t, y, dy, u, du, out):  # type: ignore[no-untyped-def]
     """dy of the state y = (coordinates, velocities); four directions at a time, so that y is read once for all."""
-    n = squares.shape[0]
+    n = eigenvalues.shape[0]
     rows = W.shape[0]
     p = 0
     while p < rows:
@@ -161,7 +161,7 @@ def modal_rhs(squares, diagonal, constant, W, offset, parameters, t, y, dy, u, d
     train_law(t, u, du, parameters, out)
     for i in range(n):
         dy[i] = y[n + i]
-        dy[n + i] = constant[i] - squares[i] * y[i] - diagonal[i] * y[n + i]
+        dy[n + i] = constant[i] - eigenvalues[i] * y[i] - diagonal[i] * y[n + i]
     p = 0
     while p < rows:
         f0 = out[p]
@@ -174,10 +174,10 @@ def modal_rhs(squares, diagonal, constant, W, offset, parameters, t, y, dy, u, d
         p += 4
 
 
-def _sundials(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray) -> States:
+def _sundials(task: dict[str, Any], modal: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray) -> States:
     from sksundae.cvode import CVODE
 
-    scale = _scale(core)
+    scale = _scale(modal)
     solver = CVODE(
         lambda t, y, dy: rhs(t, y.copy(), dy),
         method=task["method"].split("-")[1],
@@ -189,15 +189,15 @@ def _sundials(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, time
     return times, np.asarray(made.y)
 
 
-def _scale(core: Any) -> np.ndarray:
+def _scale(modal: Any) -> np.ndarray:
     """Sizes of coordinates and rates (the absolute tolerance's unit): a displacement of a micrometre of unit mass."""
-    omega = np.sqrt(np.maximum(core.squares, 1.0))
+    omega = np.sqrt(np.maximum(modal.eigenvalues, 1.0))
     rate = 1e-2
     return np.concatenate([rate / omega, np.full(len(omega), rate)])
 
 
 def _scipy(
-    approaches: list[Any], task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray
+    approaches: list[Any], task: dict[str, Any], modal: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray
 ) -> States:
     from scipy.integrate import solve_ivp
 
@@ -217,7 +217,7 @@ def _scipy(
         asked = (times >= t) if t == times[0] else (times > t)
         made = solve_ivp(
             right, (t, times[-1]), y, method, t_eval=times[asked], rtol=task["tolerance"],
-            atol=task["tolerance"] * _scale(core), events=flanks or None,
+            atol=task["tolerance"] * _scale(modal), events=flanks or None,
         )  # fmt: skip
         if not made.success:
             raise PeerError(made.message)
@@ -231,21 +231,21 @@ def _scipy(
 
 def _approaches(model: Any) -> list[Any]:
     """For each flank that may part a function of time and state whose zeros are where it meets and parts."""
-    core, made = model.core, []
+    modal, made = model.modal, []
     for flank in model.forces.curves:
-        row = core.T.T @ model.directions[:, flank.direction]
-        rest = float(core.origin @ model.directions[:, flank.direction]) - flank.gap
+        row = modal.T.T @ model.directions[:, flank.direction]
+        rest = float(modal.origin @ model.directions[:, flank.direction]) - flank.gap
         if flank.parts:
             made.append(lambda _, y, row=row, rest=rest: row @ y[: len(row)] + rest)
     return made
 
 
-def _exudyn(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray) -> States:
+def _exudyn(task: dict[str, Any], modal: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray) -> States:
     """Its explicit solvers choose their own steps and do not meet the output times: theirs come back."""
     import exudyn
     import exudyn.itemInterface as items
 
-    n = len(core.squares)
+    n = len(modal.eigenvalues)
     y, dy = np.zeros(2 * n), np.zeros(2 * n)
     container = exudyn.SystemContainer()
     system: Any = container.AddSystem()
@@ -257,7 +257,7 @@ def _exudyn(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times:
             numberOfODE2Coordinates=n,
         )
     )
-    stiffness, damping = core.squares, core.damping
+    stiffness, damping = modal.eigenvalues, modal.damping
 
     def forces(_system: Any, t: float, _number: int, q: Any, v: Any) -> Any:
         y[:n], y[n:] = q, v
@@ -293,7 +293,7 @@ def _exudyn(task: dict[str, Any], core: Any, rhs: Rhs, start: np.ndarray, times:
         kind = getattr(exudyn.DynamicSolverType, task["method"])
         time.numberOfSteps = intervals
         time.relativeTolerance = task["tolerance"]
-        time.absoluteTolerance = task["tolerance"] * float(np.median(_scale(core)))
+        time.absoluteTolerance = task["tolerance"] * float(np.median(_scale(modal)))
         time.minimumStepSize = 1e-12
     system.SolveDynamic(settings, solverType=kind)
     data = [np.asarray(system.GetSensorStoredData(s)) for s in sensors]

@@ -1,4 +1,4 @@
-r"""Motion of a train at many times at once: system coordinates, contact forces, and the accelerations behind them."""
+r"""States of a train at many times at once: system coordinates, contact forces, and the accelerations behind them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .model import TrainModel
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class TrainStates:
     """Coordinates of the system beside rolling, n times.
 
     Attributes
@@ -45,22 +45,22 @@ class Motion:
     friction_power: Array
 
 
-def motion(model: TrainModel, trajectory: Trajectory) -> Motion:
-    """Motion at the trajectory's times."""
-    core, t, W = model.core, trajectory.time, model.directions
+def train_states(model: TrainModel, trajectory: Trajectory) -> TrainStates:
+    """States at the trajectory's times."""
+    modal, t, W = model.modal, trajectory.time, model.directions
     by_modes = trajectory.method in ("taylor", "explicit")
     if by_modes:
         state = trajectory.dense.state(t)  # type: ignore[attr-defined]
-        n = core.T.shape[1]
+        n = modal.T.shape[1]
         y, dy = state[:, :n], state[:, n:]
-        q, v = core.origin + y @ core.T.T, dy @ core.T.T
+        q, v = modal.origin + y @ modal.T.T, dy @ modal.T.T
     else:
         q, v, a = trajectory.q, trajectory.v, trajectory.a
     u, du = q @ W, v @ W
     flanks = model.forces.of_flanks(t, u, du)
     acting = model.forces(t, u, du, flanks) @ W.T
     if by_modes:
-        a = (core.constant - y * core.squares - dy @ core.damping.T + acting @ core.T) @ core.T.T
+        a = (modal.constant - y * modal.eigenvalues - dy @ modal.damping.T + acting @ modal.T) @ modal.T.T
     multipliers = joint_multipliers(model, q, v, a, acting)
     drive = model.train.driven
     if drive.stiffness is None:
@@ -74,7 +74,7 @@ def motion(model: TrainModel, trajectory: Trajectory) -> Motion:
     spin = [int(model.first[i]) + 5 for i in drivers]
     speed = model.angle(t, 1)[:, None] * model.ratios[drivers] + v[:, spin]
     arms = rows[np.arange(len(rows)), spin]
-    return Motion(t, q, v, a, force, q @ rows.T, apart, push, speed * (arms * force + drag), loss)
+    return TrainStates(t, q, v, a, force, q @ rows.T, apart, push, speed * (arms * force + drag), loss)
 
 
 def contact_forces(
