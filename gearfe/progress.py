@@ -41,11 +41,11 @@ class _Stage:
         what = self.what if self.what and self.what != self.name else ""
         far = f"{self.done} of {self.total}" if whole else f"{100.0 * share:.0f} %"
         parts = [f"{what} {far}".strip()]
-        spent = now - self.counted
+        elapsed = now - self.counted
         made = self.done - self.first
-        if spent >= SETTLED and made > 0.0 and share < 1.0:
-            parts += [f"{made / spent:.3g}/s"] if whole else []
-            parts.append(f"{_duration(spent * (self.total - self.done) / made)} left")
+        if elapsed >= SETTLED and made > 0.0 and share < 1.0:
+            parts += [f"{made / elapsed:.3g}/s"] if whole else []
+            parts.append(f"{_duration(elapsed * (self.total - self.done) / made)} left")
         return f"{self.name}: {', '.join(parts)}"
 
 

@@ -133,8 +133,8 @@ def add_keys(parser: Any, table: type, *keys: str, **renamed: str) -> None:
     hints = type_hints(table)
     for name, key in ({k: k for k in keys} | renamed).items():
         known = fields_of(table)[key].metadata
-        told = known["doc"].removeprefix("true: ") + _default_of(fields_of(table)[key])
-        options: dict[str, Any] = {"dest": name, "help": told.replace("%", "%%")}
+        instead = known["doc"].removeprefix("true: ") + _default_of(fields_of(table)[key])
+        options: dict[str, Any] = {"dest": name, "help": instead.replace("%", "%%")}
         kinds = [kind for kind in typing.get_args(hints[key]) or (hints[key],) if kind is not type(None)]
         if kinds == [bool]:
             options |= {"action": "store_const", "const": True}
@@ -189,18 +189,18 @@ def _option(name: str) -> str:
 class _Removed(argparse.Action):
     """Option of a key that is gone: what to write instead."""
 
-    def __init__(self, option_strings: Sequence[str], dest: str, told: tuple[str, str]) -> None:
+    def __init__(self, option_strings: Sequence[str], dest: str, instead: tuple[str, str]) -> None:
         super().__init__(option_strings, dest, nargs="?", help=argparse.SUPPRESS)
-        self.told = told
+        self.instead = instead
 
     def __call__(self, _parser: Any, _namespace: Any, values: Any, option_string: str | None = None) -> None:
-        raise InputError(str(option_string), values, *self.told)
+        raise InputError(str(option_string), values, *self.instead)
 
 
 def add_removed(parser: argparse.ArgumentParser, removed: Mapping[str, tuple[str, str]]) -> None:
     """Options of keys that are gone, which the help does not show; see ``REMOVED`` in `gearfe.config.build`."""
-    for key, told in removed.items():
-        parser.add_argument("--" + key.replace("_", "-"), action=_Removed, told=told)
+    for key, instead in removed.items():
+        parser.add_argument("--" + key.replace("_", "-"), action=_Removed, instead=instead)
 
 
 def number(option: str, text: str) -> float:

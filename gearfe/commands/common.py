@@ -73,8 +73,8 @@ def run_and_keep(run: Callable[[argparse.Namespace], int], parsed: argparse.Name
             if kept:
                 print(f"also written: {', '.join(kept)}")
     if as_json:
-        told = {"folder": str(folders[-1][0]), **_summary(*folders[-1])} if folders else {}
-        print(json.dumps({"exit_code": code, **told}, indent=2))
+        entries = {"folder": str(folders[-1][0]), **_summary(*folders[-1])} if folders else {}
+        print(json.dumps({"exit_code": code, **entries}, indent=2))
     return code
 
 

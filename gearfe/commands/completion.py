@@ -88,8 +88,8 @@ def _bash(*, zsh: bool) -> str:
 
 def _fish() -> str:
     lines = []
-    for name, (told, actions) in _commands().items():
-        lines.append(f"complete -c gearfe -n __fish_use_subcommand -a {name} -d {shlex.quote(told)}")
+    for name, (help_text, actions) in _commands().items():
+        lines.append(f"complete -c gearfe -n __fish_use_subcommand -a {name} -d {shlex.quote(help_text)}")
         for action in actions:
             long = action.option_strings[-1].removeprefix("--")
             words = _choices(action)

@@ -129,10 +129,10 @@ def _report(body: ModalBody, errors: dict[str, Any], mesh: MeshError, left_out: 
         print(f"  {number + 1:3d} {frequency:10.2f} Hz   {said}")
     bound = mesh.response + left_out.response
     why = "keep more modes" if body.has_mesh else _UNTOLD
-    told = f"{100.0 * bound:.2g} % rms" if math.isfinite(bound) else f"unknown: {why}"
+    text = f"{100.0 * bound:.2g} % rms" if math.isfinite(bound) else f"unknown: {why}"
     part = f" (mesh {100.0 * mesh.response:.2g} %, reduction {100.0 * left_out.response:.2g} %)"
-    told += part if math.isfinite(bound) else ""
-    print(f"response of the bores up to {left_out.band_hz:.0f} Hz (1 % damping): estimated error <= {told}")
+    text += part if math.isfinite(bound) else ""
+    print(f"response of the bores up to {left_out.band_hz:.0f} Hz (1 % damping): estimated error <= {text}")
 
 
 def _compare(folder: Path, made: Comparison, args: argparse.Namespace) -> None:
@@ -153,8 +153,8 @@ def _compare(folder: Path, made: Comparison, args: argparse.Namespace) -> None:
     for i in range(len(made.pairs)):
         hz, other = columns["test_frequency_Hz"][i], columns["frequency_Hz"][i]
         off, mac = columns["frequency_difference_percent"][i], columns["mac"][i]
-        told = "no partner" if made.pairs[i] < 0 else f"{other:10.2f} Hz  {off:+6.2f} %   MAC {mac:.3f}"
-        print(f"  {i + 1:3d} {hz:10.2f} Hz   {told}")
+        text = "no partner" if made.pairs[i] < 0 else f"{other:10.2f} Hz  {off:+6.2f} %   MAC {mac:.3f}"
+        print(f"  {i + 1:3d} {hz:10.2f} Hz   {text}")
     ratios = made.damping_ratios()
     if ratios:
         print(

@@ -45,8 +45,8 @@ def run(args: argparse.Namespace) -> int:
 
     shipped = {path.name: path for folder in _folders() for path in sorted(folder.glob("*.toml"))}
     if args.list or args.kind is None:
-        for name, told in KINDS.items():
-            print(f"  {name:<26} {told}")
+        for name, description in KINDS.items():
+            print(f"  {name:<26} {description}")
         for name, path in shipped.items():
             print(f"  {name:<26} {_first_line(path)}")
         return 0

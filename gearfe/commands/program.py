@@ -87,9 +87,9 @@ def run_command(module: Any, name: str, arguments: list[str]) -> int:
     """Run a command module (its contract is in `gearfe.commands`), called by `name`, with these arguments."""
     parser = parser_of(module, name)
     parsed = with_folder(with_changes(parser.parse_args(arguments)))
-    with _tables_watched() as told:
+    with _tables_watched() as messages:
         code = run_and_keep(module.run, parsed, [*name.split()[1:], *arguments])
-        return code or int(bool(told))
+        return code or int(bool(messages))
 
 
 def parser_of(module: Any, name: str) -> CommandParser:
@@ -104,7 +104,7 @@ def parser_of(module: Any, name: str) -> CommandParser:
 @contextmanager
 def _tables_watched() -> Iterator[list[str]]:
     """Print what the writer of tables warns of, and yield these sentences: such a table is no success."""
-    told: list[str] = []
+    messages: list[str] = []
     with warnings.catch_warnings():
         other = warnings.showwarning
 
@@ -119,12 +119,12 @@ def _tables_watched() -> Iterator[list[str]]:
             if not issubclass(category, NotFiniteWarning):
                 other(message, category, filename, lineno, file, line)
                 return
-            told.append(str(message))
+            messages.append(str(message))
             print(f"gearfe: warning: {message}", file=sys.stderr)
 
         warnings.simplefilter("always", NotFiniteWarning)
         warnings.showwarning = show
-        yield told
+        yield messages
 
 
 def _drop_output() -> None:

@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     """Compute and write; 1 when the range was not covered."""
     started = time.perf_counter()
     from ..errors import unknown_name
-    from ..tables.train import read_train_tables, told
+    from ..tables.train import read_train_tables, value_text
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
     tables = read_train_tables(args.job, args.variant)
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         folder = output_folder(args.out)
     made, unstable = solved(job, table, args.curve, watch=watch)
     parts = [f"{len(job.table.shafts)} shafts, {len(job.table.meshes)} gear mesh{'es' * (len(job.table.meshes) != 1)}"]
-    parts += [f"load {told(x.torque_Nm, 'N m')} on {x.shaft}".replace("-", "−", 1) for x in job.table.loads[:1]]
+    parts += [f"load {value_text(x.torque_Nm, 'N m')} on {x.shaft}".replace("-", "−", 1) for x in job.table.loads[:1]]
     parts += [f"variant {job.table.variant}"] if job.table.variant else []
     summary, names = write_runup(
         folder, made, RunUpChoice(table.multiples, args.attachment, args.fields),

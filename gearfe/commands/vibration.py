@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..progress import count
-from ..tables.train import TrainTable, told
+from ..tables.train import TrainTable, value_text
 from .arguments import add_job, add_keys, with_keys
 from .common import add_folder, tell
 
@@ -129,8 +129,8 @@ def title(job: TrainJob) -> str:
     table = job.table
     parts = [f"{len(table.shafts)} shafts, {len(table.meshes)} gear mesh{'es' * (len(table.meshes) != 1)}"]
     if table.drive is not None:
-        parts.append("drive " + told(table.drive.speed_rad_per_s, "rad/s"))
-    parts += [f"load {told(x.torque_Nm, 'N m')} on {x.shaft}".replace("-", "−", 1) for x in table.loads[:1]]
+        parts.append("drive " + value_text(table.drive.speed_rad_per_s, "rad/s"))
+    parts += [f"load {value_text(x.torque_Nm, 'N m')} on {x.shaft}".replace("-", "−", 1) for x in table.loads[:1]]
     if table.variant:
         parts.append(f"variant {table.variant}")
     return ", ".join(parts)
@@ -172,8 +172,10 @@ def report_lines(response: TrainResponse, train: GearTrain, written: Written, ch
     for i, coefficient in enumerate(friction.get("coefficients", ())):
         if coefficient > 0.0:
             share = friction["efficiency"][i]
-            told = "" if share is None else f", efficiency {100 * share:.4g} %"
-            lines.append(f"mesh {i + 1}: friction {coefficient:.4g}, loss {friction['mean_loss_W'][i]:.4g} W{told}")
+            efficiency = "" if share is None else f", efficiency {100 * share:.4g} %"
+            lines.append(
+                f"mesh {i + 1}: friction {coefficient:.4g}, loss {friction['mean_loss_W'][i]:.4g} W{efficiency}"
+            )
     if response.common_period_s:
         count = summary.get("mean_over_common_periods", 0)
         means = f"over the last {count} of them" if count else "over all times under load, which are fewer"

@@ -23,8 +23,8 @@ def draw_figures(folder: Path, mechanism: Mechanism, results: Results) -> None:
     if len(trajectory.time) > 1:
         _curves(folder / "curves.png", mechanism, results)
         _energy(folder / "energy.png", results)
-    asked = mechanism.file.run.picture_s
-    time = trajectory.time[-1] if asked is None else min(asked, trajectory.time[-1])
+    picture_time = mechanism.file.run.picture_s
+    time = trajectory.time[-1] if picture_time is None else min(picture_time, trajectory.time[-1])
     figure = new_figure(7, 6)
     axes = figure.subplots()
     draw_paths(axes, mechanism, trajectory.q)

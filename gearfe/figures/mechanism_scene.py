@@ -182,10 +182,10 @@ def _name(axes: Any, text: str, place: Array, colour: str, weight: str = "normal
 def _point_names(axes: Any, mechanism: Mechanism, q: Array) -> None:
     """Names of the bodies' points, one for those that meet in a joint and have the same name."""
     near = 1e-3 * max(_size(mechanism, q), 1e-12)
-    told = [(name, np.array(place)) for name, place in mechanism.file.ground.points_m.items()]
+    labelled = [(name, np.array(place)) for name, place in mechanism.file.ground.points_m.items()]
     for _, body, points in _points(mechanism):
         for name, point in points.items():
             place = _at(q, body, point)
-            if not any(name == other and np.abs(place - there).max() < near for other, there in told):
-                told.append((name, place))
+            if not any(name == other and np.abs(place - there).max() < near for other, there in labelled):
+                labelled.append((name, place))
                 _name(axes, name, place, "#374151")

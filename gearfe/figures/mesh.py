@@ -38,8 +38,8 @@ def mesh_figure(path: str | Path, parts: Mapping[str, MeshPart], pair: GearPair 
         views[1].set_ylim(y - half, y + half)
         views[1].set_title("meshing zone", loc="left", fontsize=11)
     handles, labels = views[-1].get_legend_handles_labels()
-    told = dict(zip(labels, handles, strict=True))
-    views[-1].legend(told.values(), told.keys(), loc="upper right", fontsize=9, framealpha=0.9)
+    entries = dict(zip(labels, handles, strict=True))
+    views[-1].legend(entries.values(), entries.keys(), loc="upper right", fontsize=9, framealpha=0.9)
     save(figure, path)
 
 

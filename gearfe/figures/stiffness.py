@@ -86,8 +86,8 @@ def stiffness_figure(path: str | Path, job: StiffnessJob, curve: StiffnessCurve)
 def _twist(twist_deg: float, curve: StiffnessCurve) -> str:
     """A twist, and the torques that it takes."""
     torques = curve.torque_wheel[np.isfinite(curve.torque_wheel)]
-    told = f" (wheel torque {torques.min():.4g} to {torques.max():.4g} N m)" if len(torques) else ""
-    return f"twist {twist_deg:g}°{told}"
+    load_text = f" (wheel torque {torques.min():.4g} to {torques.max():.4g} N m)" if len(torques) else ""
+    return f"twist {twist_deg:g}°{load_text}"
 
 
 def _levels(job: StiffnessJob, curve: StiffnessCurve) -> dict[str, float]:

@@ -78,8 +78,8 @@ def draw_response(path: Path, response: TrainResponse, attachment: str, title: s
     signs = np.where(np.sign(response.speed.mean(axis=0)) * sense < 0.0, -1.0, 1.0)
     drive = sense if len(signs) else 1.0
     labels = [n if s > 0.0 else f"{n} (sign reversed)" for n, s in zip(response.shaft_names, signs, strict=True)]
-    told = [f", mean {m / 1e3:.4g} kN" if np.isfinite(m) else "" for m in mean]
-    names = [f"mesh {i + 1}{text}" for i, text in enumerate(told)]
+    means = [f", mean {m / 1e3:.4g} kN" if np.isfinite(m) else "" for m in mean]
+    names = [f"mesh {i + 1}{text}" for i, text in enumerate(means)]
     angle, forces = np.degrees(response.drive_angle) * drive, 1e-3 * response.contact_force.T
     speeds, accelerations = (response.speed * signs).T, 1e-3 * (response.acceleration * signs).T
     figure = fixed(11.5, 7.6)

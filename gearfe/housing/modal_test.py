@@ -131,8 +131,8 @@ def compare(body: ModalBody, test: TestModes, modes: int = 20) -> Comparison:
     size = float(np.linalg.norm(np.ptp(body.nodes, axis=0)))
     if nearest.max() > APART * size:
         far = int(nearest.argmax())
-        told = ", ".join(f"{1e3 * x:.4g}" for x in test.points[far])
-        problem = f"the measured point ({told}) mm is {1e3 * nearest[far]:.4g} mm from the nearest node"
+        coordinates = ", ".join(f"{1e3 * x:.4g}" for x in test.points[far])
+        problem = f"the measured point ({coordinates}) mm is {1e3 * nearest[far]:.4g} mm from the nearest node"
         cure = "coordinates of test and housing must be the same, in the units that the file tells"
         raise InputError("--compare", None, problem, cure)
     fields = body.reconstruct(body.coupled.vectors[:, numbers].T)[:, place]

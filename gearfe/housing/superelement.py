@@ -247,8 +247,8 @@ def _body(k: Array, m: Array, points: Array, table: SuperelementTable, field: st
         momentum, whole = rigid.T @ M, rigid.T @ M @ rigid
         masses = np.diag(whole)[:3]
         if not np.ptp(masses) <= SAME_MASS * masses.max():
-            told = ", ".join(f"{mass:.6g}" for mass in masses)
-            problem = f"differs by direction: {told} kg along x, y, z"
+            listed = ", ".join(f"{mass:.6g}" for mass in masses)
+            problem = f"differs by direction: {listed} kg along x, y, z"
             raise InputError(f"{field}.mass", table.mass, problem, "check the order of rows and the unit")
     a = len(points)
     shapes = np.zeros((3 * a, len(K)))
@@ -304,8 +304,8 @@ def _is_free(stiffness: Array, rigid: Array, points: Array, table: SuperelementT
     if idle == 6 and not costs.any():
         return True
     if idle == 6:
-        told = ", ".join(name for name, one in zip(MOTIONS, costs, strict=True) if one)
-        problem = f"the matrices have six motions without energy, but these cost some: {told}"
+        listed = ", ".join(name for name, one in zip(MOTIONS, costs, strict=True) if one)
+        problem = f"the matrices have six motions without energy, but these cost some: {listed}"
         cure = "check point_mm, the unit, and the order of rows (u_x, u_y, u_z, rotations in rad about x, y, z)"
         raise InputError(f"{field}.attachments", None, problem, cure)
     problem = f"has {idle} motions of the attachments without energy: a free body has 6, a held one none"

@@ -99,12 +99,12 @@ def read_mesh_file(path: str | Path, field: str, size: float) -> MeshFile:
     others = [
         kind for kind in kinds if kind not in TETRAHEDRA and kind.startswith(("hexa", "wedge", "pyramid", "poly"))
     ]
-    told = ", ".join(f"{count} {kind}" for kind, count in kinds.items()) or "no elements"
+    listed = ", ".join(f"{count} {kind}" for kind, count in kinds.items()) or "no elements"
     if others or len(found) > 1:
-        problem = f"must have tetrahedra of one order only, but it has {told}"
+        problem = f"must have tetrahedra of one order only, but it has {listed}"
         raise InputError(field, path.name, problem, "mesh it with tetrahedra, of the second order if you can")
     if not found:
-        problem = f"has no tetrahedra, but {told}"
+        problem = f"has no tetrahedra, but {listed}"
         raise InputError(field, path.name, problem, INSIDE)
     tets = np.concatenate([block.data for block in mesh.cells if block.type == found[0]]).astype(np.int64)
     a, b, c, d = (points[tets[:, k]] for k in range(4))

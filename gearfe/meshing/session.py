@@ -92,16 +92,16 @@ def gmsh_session(
         if ours:
             with _pipes_as_before():
                 gmsh.initialize(interruptible=False, readConfigFiles=False)
-        wanted = {
+        settings = {
             "General.Terminal": 0.0,
             "General.Verbosity": 1.0,
             "General.NumThreads": float(threads),
             "Mesh.RandomSeed": 1.0,
             **(options or {}),
         }
-        before = {} if ours else {key: gmsh.option.getNumber(key) for key in wanted}
+        before = {} if ours else {key: gmsh.option.getNumber(key) for key in settings}
         try:
-            for key, value in wanted.items():
+            for key, value in settings.items():
                 gmsh.option.setNumber(key, value)
             gmsh.model.add(name)
             yield gmsh

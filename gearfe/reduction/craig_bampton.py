@@ -218,7 +218,7 @@ def reduce_model(
 
 
 def _corrections(
-    factor: Factorization, m_ii: Any, modes: Array, coupling: Array, wanted: int
+    factor: Factorization, m_ii: Any, modes: Array, coupling: Array, levels: int
 ) -> tuple[Array, Array, int]:
     """M-orthonormal correction vectors, ``V^T M K^-1 M V`` of the last level's, and the number of right-hand sides.
 
@@ -233,7 +233,7 @@ def _corrections(
 
     x = solved(coupling)
     columns, left = coupling.shape[1], _symmetric(x.T @ coupling)
-    for number in range(1, wanted + 1):
+    for number in range(1, levels + 1):
         mx = np.asarray(m_ii @ x)
         if number > 1:
             x = solved(mx)
@@ -248,7 +248,7 @@ def _corrections(
             new = new @ (directions[:, keep] / np.sqrt(size[keep]))
             m_new = m_ii @ new if again else m_new
         found.append(new)
-        if number == wanted:
+        if number == levels:
             m_new = np.asarray(m_ii @ new)
             left = _symmetric(solved(m_new).T @ m_new)
             columns += m_new.shape[1]

@@ -80,11 +80,11 @@ def lowest_modes(
         Columns a step.
     """
     n = mass.shape[0]
-    wanted = n if count is None else min(count, n)
-    if wanted == 0 or n == 0:
+    needed = n if count is None else min(count, n)
+    if needed == 0 or n == 0:
         return Modes(np.zeros(0), np.zeros((n, 0)), math.inf, 0)
     p = max(1, min(block, n))
-    basis = _Basis(n, mass, capacity=min(n, 4 * min(wanted, 60) + 4 * p), width=p)
+    basis = _Basis(n, mass, capacity=min(n, 4 * min(needed, 60) + 4 * p), width=p)
     start = solve(np.asarray(mass @ np.random.default_rng(SEED).standard_normal((n, p))))
     columns = p
     basis.append(start)
@@ -109,7 +109,7 @@ def lowest_modes(
         eigenvalues = 1.0 / np.maximum(theta, 1e-300) - shift
         found = residual <= TOLERANCE * np.abs(theta)
         near = residual <= NEAR * np.abs(theta)
-        inside = min(wanted, max(at_least, int(np.searchsorted(eigenvalues, limit, side="right"))))
+        inside = min(needed, max(at_least, int(np.searchsorted(eigenvalues, limit, side="right"))))
         exhausted = basis.size == done or done >= n
         inside = min(inside, n)
         if exhausted or (inside < done and bool(np.all(found[:inside])) and bool(near[inside])):

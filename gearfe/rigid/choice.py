@@ -100,29 +100,29 @@ class Pace:
 
     def __init__(self, end: float, clock: Callable[[], float]) -> None:
         self.end, self.clock = end, clock
-        self.told: list[tuple[float, float]] = []
+        self.reports: list[tuple[float, float]] = []
         self.away = 0.0  # seconds that others took meanwhile
 
     def at(self, t: float) -> tuple[float, float]:
         """(seconds spent, seconds left) at the time t of the motion."""
         now = self.clock() - self.away
-        if not self.told or t != self.told[-1][1]:  # else the step was not accepted
-            self.told.append((now, t))
-        then = self.told[-1 - min(len(self.told) - 1, max(1, len(self.told) // RECENT))]
+        if not self.reports or t != self.reports[-1][1]:  # else the step was not accepted
+            self.reports.append((now, t))
+        then = self.reports[-1 - min(len(self.reports) - 1, max(1, len(self.reports) // RECENT))]
         passed = abs(t - then[1])
         left = (now - then[0]) * abs(self.end - t) / passed if passed > 0.0 else math.inf
-        return now - self.told[0][0], left
+        return now - self.reports[0][0], left
 
     @property
     def shortest(self) -> float:
         """Seconds of the shortest run: twice the steps after which a pace counts (the first may have loaded things)."""
-        steps = len(self.told) - 2
-        return 2 * LEAST_STEPS * (self.told[-1][0] - self.told[1][0]) / steps if steps > 0 else 0.0
+        steps = len(self.reports) - 2
+        return 2 * LEAST_STEPS * (self.reports[-1][0] - self.reports[1][0]) / steps if steps > 0 else 0.0
 
     @property
     def grows(self) -> bool:
         """Whether the second half of the progress told came further than the first."""
-        times = [t for _, t in self.told]
+        times = [t for _, t in self.reports]
         first, middle, last = times[0], times[len(times) // 2], times[-1]
         return len(times) < 2 * LEAST_STEPS or abs(last - middle) > GROWTH * abs(middle - first)
 
@@ -171,19 +171,19 @@ class Choice:
 
         def watch(t: float, steps: int, state: Callable[[], tuple[Array, Array]]) -> bool:
             nonlocal trial, lost, predicted, rest, whole
-            spent, left = pace.at(t)
+            elapsed, left = pace.at(t)
             count(abs(t - self.start.time), abs(float(self.times[-1]) - self.start.time), way.method)
             if trial is not None:
                 if left * FASTER < trial:
-                    trial, predicted = None, spent + left
+                    trial, predicted = None, elapsed + left
                     self._say(way, left, start.time)
                     return True
-                lost = max(spent, pace.shortest) > SHARE * trial or (spent > EARLY * trial and not pace.grows)
+                lost = max(elapsed, pace.shortest) > SHARE * trial or (elapsed > EARLY * trial and not pace.grows)
                 return not lost
-            if steps < LEAST_STEPS or (predicted is not None and spent + left <= WRONG * predicted):
+            if steps < LEAST_STEPS or (predicted is not None and elapsed + left <= WRONG * predicted):
                 return True
             whole = predicted is None and start is self.start
-            predicted = spent + left
+            predicted = elapsed + left
             before = self.clock()
             q, v = state()
             here = start if whole else replace(start, time=float(t), q=q.copy(), v=v.copy())
@@ -196,7 +196,7 @@ class Choice:
         dense, status, statistics = way.run(start, ahead, self.most - used, watch)
         if trial is not None and (lost or status != Status.DONE):
             return None
-        began = pace.told[0][0] if pace.told else self.clock()
+        began = pace.reports[0][0] if pace.reports else self.clock()
         own = Leg(way, dense, status, statistics, predicted, self.clock() - pace.away - began)
         if rest is None:
             return [own]
@@ -246,7 +246,7 @@ def joined_statistics(legs: Sequence[Leg], said: Sequence[str]) -> dict[str, Any
                 made[key] = np.concatenate([value, made.get(key, np.zeros(0))])
             elif key in SUMS:
                 made[key] = made.get(key, 0) + value
-    told = [
+    reports = [
         {
             "method": leg.way.name,
             "until_s": float(leg.dense.times[-1]),
@@ -255,4 +255,4 @@ def joined_statistics(legs: Sequence[Leg], said: Sequence[str]) -> dict[str, Any
         }
         for leg in legs
     ]
-    return {**made, "choice": told, "predictions": list(said)}
+    return {**made, "choice": reports, "predictions": list(said)}

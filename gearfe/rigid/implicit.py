@@ -75,10 +75,10 @@ def run_implicit(
         inner, begin = in_modes(modal, start)
         local = max(MODES_SHARE * tolerance, 1e-13)
 
-        def told(t: float, steps: int, state: Callable[[], tuple[Array, Array]]) -> bool:
+        def watch_modes(t: float, steps: int, state: Callable[[], tuple[Array, Array]]) -> bool:
             return watch is None or watch(t, steps, lambda: (modal.origin + modal.T @ state()[0], modal.T @ state()[1]))
 
-        within, status, statistics = run_implicit(inner, begin, times, tolerance=local, watch=told, **options)
+        within, status, statistics = run_implicit(inner, begin, times, tolerance=local, watch=watch_modes, **options)
         coefficients = within.coefficients @ modal.T.T
         coefficients[:, 0] += modal.origin
         return Polynomials(within.times, coefficients), status, {**statistics, "free_coordinates": inner.size}

@@ -101,26 +101,28 @@ def integrate(
     InputError
         For values out of range, and starts that cannot be made consistent.
     """
-    asked = np.atleast_1d(np.asarray(times, dtype=float))
-    _check(asked, method, tolerance, backend)
+    output_times = np.atleast_1d(np.asarray(times, dtype=float))
+    _check(output_times, method, tolerance, backend)
     if start is None:
-        start = _default_start(system, float(asked[0]))
-    ways = ways_of(system, start, asked, method, backend, {"tolerance": tolerance, "longest": longest}, runs)
+        start = _default_start(system, float(output_times[0]))
+    ways = ways_of(system, start, output_times, method, backend, {"tolerance": tolerance, "longest": longest}, runs)
     with np.errstate(over="ignore", invalid="ignore"):  # a state that is not finite has a status of its own
         if len(ways) == 1:
-            dense, status, statistics = ways[0].run(start, asked, most_steps, partial(_counted, start.time, asked[-1]))
+            dense, status, statistics = ways[0].run(
+                start, output_times, most_steps, partial(_counted, start.time, output_times[-1])
+            )
             chosen = ways[0].method
         else:
-            choice = Choice(ways, start, asked, most=most_steps)
+            choice = Choice(ways, start, output_times, most=most_steps)
             legs = choice.run()
             spend_plain_seconds(sum(leg.seconds for leg in legs if leg.way.backend == "plain"))
             statistics = joined_statistics(legs, choice.said)
             used = {leg.way.method for leg in legs}
             chosen, status = used.pop() if len(used) == 1 else "auto", legs[-1].status
             dense = joined(legs)
-    sign = 1.0 if asked[-1] >= asked[0] else -1.0
-    reached = sign * dense.times[-1] + 1e-12 * max(abs(asked[0]), abs(asked[-1]))
-    kept = asked if status is Status.DONE else asked[sign * asked <= reached]
+    sign = 1.0 if output_times[-1] >= output_times[0] else -1.0
+    reached = sign * dense.times[-1] + 1e-12 * max(abs(output_times[0]), abs(output_times[-1]))
+    kept = output_times if status is Status.DONE else output_times[sign * output_times <= reached]
     if status is Status.DONE and not _dropped_rows_hold(system, start, dense, tolerance):
         status = Status.REDUNDANT_NOT_MET
     if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE, Status.NOT_SOLVED) and len(dense.times) > 1:
@@ -131,7 +133,7 @@ def integrate(
         statistics = {**statistics, "complaint": why}
     made = Trajectory(system, start, kept, status, chosen, statistics, dense)
     if raise_on_failure and made.status is not Status.DONE:
-        raise IntegrationError(made, made.message, made.reached, float(asked[-1]))
+        raise IntegrationError(made, made.message, made.reached, float(output_times[-1]))
     return made
 
 

@@ -59,7 +59,7 @@ class Work(NamedTuple):
 class Output(NamedTuple):
     """What a run fills."""
 
-    asked: Array  # (a,) times (s)
+    output_times: Array  # (a,) times (s)
     found: Array  # (a, 2n) states there
     ends: Array  # (room,) of the steps (s)
     states: Array  # (room, 2n) there
@@ -208,7 +208,7 @@ def modal_steps(
     )  # fmt: skip
     law, memory, pieces, state, reach, pull = run.law, w.memory, w.pieces, w.state, w.reach, w.pull
     y, u, force, weight, value, rate = w.y, w.u, w.force, w.weight, w.value, w.rate
-    asked, found, T, Y = out.asked, out.found, out.ends, out.states
+    output_times, found, T, Y = out.output_times, out.found, out.ends, out.states
     n = eigenvalues.shape[0]
     most = memory.shape[1] - 1
     sign = 1.0 if t1 >= t else -1.0
@@ -289,8 +289,8 @@ def modal_steps(
         ends = t + x * s
         if (fixed and x == 1.0) or abs(goal - ends) <= 1e-13 * max(abs(goal), abs(t1 - begin)):
             ends = goal
-        while at < asked.shape[0] and sign * (asked[at] - ends) <= 0.0:
-            evaluate(y, last, (asked[at] - t) / s, s, value, rate)
+        while at < output_times.shape[0] and sign * (output_times[at] - ends) <= 0.0:
+            evaluate(y, last, (output_times[at] - t) / s, s, value, rate)
             for i in range(n):
                 found[at, i] = value[i]
                 found[at, n + i] = rate[i]

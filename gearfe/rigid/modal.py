@@ -77,14 +77,14 @@ def run_modal_taylor(
     assert found is not None  # the caller asks before
     n = modal.T.shape[1]
 
-    def told(t: float, steps: int, y: Array) -> bool:
+    def watch_modes(t: float, steps: int, y: Array) -> bool:
         return watch is None or watch(t, steps, lambda: (modal.origin + modal.T @ y[:n], modal.T @ y[n:]))
 
     local = max(SERIES_SHARE * tolerance, 1e-14)
     run = SeriesRun(modal, *found, local, longest, modal_problem(modal).expand)
     compiling = run.load()
     y0 = np.concatenate(modal.reduce(start.q, start.v))
-    ends, states, at_times, status, orders = run.steps(start.time, y0, float(times[-1]), times, most, told)
+    ends, states, at_times, status, orders = run.steps(start.time, y0, float(times[-1]), times, most, watch_modes)
     statistics = {
         "scheme": "Taylor series",
         "steps": len(ends) - 1,
@@ -143,7 +143,7 @@ class SeriesRun:
         return time.perf_counter() - began
 
     def steps(
-        self, t0: float, y0: Array, t1: float, asked: Array, most: int,
+        self, t0: float, y0: Array, t1: float, output_times: Array, most: int,
         watch: Callable[[float, int, Array], bool] | None = None,
     ) -> tuple[Array, Array, Array, Status, int]:  # fmt: skip
         """(step ends, states there, states at the asked times passed, status, orders computed)."""
@@ -160,7 +160,7 @@ class SeriesRun:
         memory, pieces = np.zeros((series.rows, ORDER + 1)), np.zeros(series.pieces, dtype=np.int64)
         series.begin(t0, 1.0 if t1 >= t0 else -1.0, W @ y0[:n] + offset, W @ y0[n:], memory, pieces)
         work = kernel_modal.work_space((memory, pieces), y0, len(W))
-        found = np.empty((len(asked), 2 * n))
+        found = np.empty((len(output_times), 2 * n))
         rates = np.sqrt(np.abs(modal.eigenvalues).max(initial=0.0)) + np.abs(diagonal).max(initial=0.0)
         t, h, status, at, orders = t0, 5.0 / max(rates, 1.0 / max(abs(t1 - t0), 1e-300)), _FULL, 0, 0
         ends, states, room = [np.array([t0])], [y0[None, :]], 512
@@ -169,7 +169,9 @@ class SeriesRun:
             watch(t, 0, work.state)
         while status == _FULL and sum(map(len, ends)) - 1 < most:
             room = min(room, most + 1 - sum(map(len, ends)))
-            out = kernel_modal.Output(np.ascontiguousarray(asked), found, np.empty(room), np.empty((room, 2 * n)))
+            out = kernel_modal.Output(
+                np.ascontiguousarray(output_times), found, np.empty(room), np.empty((room, 2 * n))
+            )
             status, count, t, h, further, at = kernels.modal_steps(run, scratch, Packed(out), t, t1, h, at)
             orders += further
             ends.append(out.ends[:count])
@@ -186,13 +188,13 @@ class SeriesPieces:
 
     times: Array
     states: Array
-    asked: Array
+    output_times: Array
     found: Array
     run: SeriesRun
 
     def state(self, t: Array) -> Array:
         """Integrated state at the times t, (times, 2n)."""
-        if np.array_equal(t, self.asked):
+        if np.array_equal(t, self.output_times):
             return self.found
         sign = 1.0 if self.times[-1] >= self.times[0] else -1.0
         order = np.argsort(sign * t, kind="stable")

@@ -312,7 +312,7 @@ def summary(run: RunUp, modes: CoupledModes, multiples: int) -> dict[str, Any]:
         "tolerance": run.tolerance,
         "band_Hz": run.band_hz,
         "mesh_names": [line.name for line in model.meshes],
-        "flanks": [line.told for line in model.meshes],
+        "flanks": [line.description for line in model.meshes],
         "steady_forces_N": run.train.steady.tolist(),
         "largest_dynamic_factor": [most(f) for f in factors],
         "largest_share_without_contact": [most(x) for x in open_],

@@ -160,11 +160,11 @@ def _runup(raw: Raw, path: Path, _shared: Shared, _estimate: bool) -> Answer:
     table, job = job_tables(raw, path, ("runup",))["runup"], train_job(path, train_tables(raw, path))
     run, unstable = solved(job, table, watch=Stopwatch())
     modes, met = report.campbell(run, table.multiples)
-    told = report.warnings(run)
-    made = {**described(job, table), **report.summary(run, modes, table.multiples), "warnings": told}
+    notes = report.warnings(run)
+    made = {**described(job, table), **report.summary(run, modes, table.multiples), "warnings": notes}
     whole = made["speeds_reached"] == made["speeds"]
     rows = report.tables(run, modes, met, table.multiples, unstable)
-    return Answer(rows, made, "" if whole else "; ".join(told) or "not all speeds were reached")
+    return Answer(rows, made, "" if whole else "; ".join(notes) or "not all speeds were reached")
 
 
 def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:

@@ -94,8 +94,8 @@ def side_by_side(
                 except Exception as error:  # cases tell theirs in their rows: this one is the executor's
                     lost.append((group, f"{type(error).__name__}: {error}"))
                     continue
-                spent = sum(row.seconds for row in rows) / len(rows)
-                size = max(1, min(LARGEST, 2 * size, int(GROUP_SECONDS / max(spent, 1e-9))))
+                mean = sum(row.seconds for row in rows) / len(rows)
+                size = max(1, min(LARGEST, 2 * size, int(GROUP_SECONDS / max(mean, 1e-9))))
                 yield rows
             if lost and begun is not None:
                 if begun.exception() is not None:

@@ -132,20 +132,20 @@ class Search:
         InputError
             Points that do not name every parameter of the study, and no others.
         """
-        names, asked, fresh = self.study.task.names, [], {}
+        names, keys, fresh = self.study.task.names, [], {}
         for point in points:
             if set(point) != set(names):
                 wrong = sorted(set(point) ^ set(names))
                 raise InputError("points", wrong[0], "stands in a point or in the study alone", f"name {names}")
             values = tuple(_plain(point[name]) for name in names)
             key = tuple(map(cell_text, values))
-            asked.append(key)
+            keys.append(key)
             if key not in self._case and key not in fresh:
                 fresh[key] = values
         if fresh:
             self._solve(fresh)
         outputs = self.study.task.outputs
-        return [dict(zip(outputs, self._rows[self._case[key]].outputs, strict=True)) for key in asked]
+        return [dict(zip(outputs, self._rows[self._case[key]].outputs, strict=True)) for key in keys]
 
     def _solve(self, fresh: Mapping[tuple[str, ...], tuple[Any, ...]]) -> None:
         first = max((row.case for row in self._rows), default=-1) + 1
@@ -204,10 +204,10 @@ class Search:
         name, sign = self.aim
         outputs, found, least = tuple(self.study.table.outputs), None, math.inf
         for row, values in zip(self._rows, self._points, strict=True):
-            told = dict(zip(outputs, row.outputs, strict=True))
-            if row.status == DONE and sign * told[name] < least and self._excess(told) <= 0.0:
-                least = sign * told[name]
-                found = Solution(row.case, dict(zip(self.study.task.names, values, strict=True)), told)
+            found_outputs = dict(zip(outputs, row.outputs, strict=True))
+            if row.status == DONE and sign * found_outputs[name] < least and self._excess(found_outputs) <= 0.0:
+                least = sign * found_outputs[name]
+                found = Solution(row.case, dict(zip(self.study.task.names, values, strict=True)), found_outputs)
         return found
 
     def _excess(self, outputs: Mapping[str, float]) -> float:

@@ -151,7 +151,7 @@ class StudyResult:
         n = len(values) // (d + 2)
         parts = {"f_A": values[None, :n], "f_B": values[None, n : 2 * n], "f_AB": values[2 * n :].reshape(d, 1, n)}
         found = sobol_indices(func=parts, n=n)
-        told: dict[str, Any] = {
+        entries: dict[str, Any] = {
             "first_order": dict(zip(self.parameters, found.first_order.ravel().tolist(), strict=True)),
             "total_order": dict(zip(self.parameters, found.total_order.ravel().tolist(), strict=True)),
         }
@@ -159,8 +159,8 @@ class StudyResult:
         for key in ("first_order", "total_order"):
             ends = getattr(boot, key).confidence_interval
             low, high = np.ravel(ends.low).tolist(), np.ravel(ends.high).tolist()
-            told[f"{key}_interval"] = dict(zip(self.parameters, map(list, zip(low, high, strict=True)), strict=True))
-        return told
+            entries[f"{key}_interval"] = dict(zip(self.parameters, map(list, zip(low, high, strict=True)), strict=True))
+        return entries
 
     def morris(self, name: str) -> dict[str, Any] | None:
         """Elementary effects of an output: parameter -> mean, mean size, deviation; None where a case has no value.
@@ -177,16 +177,16 @@ class StudyResult:
         moved = cells[:, 1:] != cells[:, :-1]  # (trajectories, steps, parameters): one each
         numbers = [_number(cell) for cell in cells.ravel()]
         rising = np.diff(np.array(numbers).reshape(cells.shape), axis=1) >= 0.0
-        told = {}
+        entries = {}
         for i, parameter in enumerate(self.parameters):
             own = moved[:, :, i]
             effects = np.where(rising[:, :, i], changes, -changes)[own] / 0.5
-            told[parameter] = {
+            entries[parameter] = {
                 "mean": float(effects.mean()) if len(effects) else 0.0,
                 "mean_size": float(np.abs(effects).mean()) if len(effects) else 0.0,
                 "deviation": float(effects.std(ddof=1)) if len(effects) > 1 else 0.0,
             }
-        return told
+        return entries
 
     def to_pandas(self) -> Any:
         """The rows as a `pandas.DataFrame`: numbers where all cells of a column are."""

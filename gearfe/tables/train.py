@@ -196,7 +196,7 @@ def _check_ramp(where: str, key: str, value: float | TrainFunctionTable, width: 
         raise InputError(f"{where}.ramp_width_ms", width, problem, "write the ramp in steps of the function")
 
 
-def told(value: float | TrainFunctionTable, unit: str) -> str:
+def value_text(value: float | TrainFunctionTable, unit: str) -> str:
     """A number with its unit, or that it changes."""
     return "changing" if isinstance(value, TrainFunctionTable) else f"{value:g} {unit}"
 

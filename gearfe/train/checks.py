@@ -143,13 +143,13 @@ def _check_mesh(train: GearTrain, mesh: GearMesh) -> None:
             problem = f"the gears do not mesh: {what} {unit * first:.9g} and {unit * second:.9g} {symbol}"
             raise InputError(label, None, problem, f"give both the same {what}")
     try:
-        wanted = GearPair(one.gear, two.gear, mesh.centre_distance).working_centre_distance
+        expected = GearPair(one.gear, two.gear, mesh.centre_distance).working_centre_distance
     except InputError as error:
         raise InputError(label, error.value, f"{error.field}: {error.problem}", error.cure) from None
     distance = shaft_distance(train, one.shaft, two.shaft)
-    if abs(distance - wanted) > SAME * wanted:
+    if abs(distance - expected) > SAME * expected:
         apart = f"shafts {one.shaft!r} and {two.shaft!r} are {1e3 * distance:.9g} mm apart"
-        problem = f"{apart}, the gears need {1e3 * wanted:.9g} mm"
+        problem = f"{apart}, the gears need {1e3 * expected:.9g} mm"
         cure = "move a shaft, change the gears, or give the gears another centre distance (with backlash)"
         raise InputError(label, None, problem, cure)
     if overlap(one, two) <= 0.0:
@@ -200,13 +200,13 @@ def check_curve(mesh: GearMesh, teeth: int) -> None:
         if isinstance(curve, MeshLaw)
         else curve.mesh_cycle
     )
-    wanted = 2.0 * math.pi / teeth
-    if abs(period - wanted) > SAME * wanted:
-        needs = f"the driver of {teeth} teeth needs {math.degrees(wanted):.9g} deg"
+    expected = 2.0 * math.pi / teeth
+    if abs(period - expected) > SAME * expected:
+        needs = f"the driver of {teeth} teeth needs {math.degrees(expected):.9g} deg"
         problem = f"has a period of {math.degrees(period):.9g} deg, {needs}"
         raise InputError(label, None, problem, "take the curve of these gears, the driver as pinion")
     if isinstance(curve, MeshLaw):
-        if abs(curve.sides[1].cycle - wanted) > SAME * wanted:
+        if abs(curve.sides[1].cycle - expected) > SAME * expected:
             problem = f"has a law of the back flanks with a period of {math.degrees(curve.sides[1].cycle):.9g} deg"
             raise InputError(label, None, problem, "take that of the same gears, seen from behind")
         return

@@ -132,7 +132,7 @@ class MeshLine:
         return self.curve is not None and self.backlash is None
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """Which flanks bear, in words."""
         if self.rigid:
             return "rigid"

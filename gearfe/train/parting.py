@@ -70,14 +70,14 @@ def apart_in_steps(model: TrainModel, trajectory: Trajectory, until: float) -> t
 def parted(parting: Sequence[Parting], never: Sequence[bool]) -> dict[str, list[float | None]]:
     """Statistics of all meshes; None for those that do not part."""
 
-    def told(value: Callable[[Parting], float]) -> list[float | None]:
+    def each_mesh(value: Callable[[Parting], float]) -> list[float | None]:
         return [None if whole else value(one) for one, whole in zip(parting, never, strict=True)]
 
     return {
-        "contacts_lost": told(lambda one: one.lost),
-        "contacts_regained": told(lambda one: one.regained),
-        "share_without_contact": told(lambda one: one.open_time / max(one.whole_time, 1e-300)),
-        "longest_without_contact_s": told(lambda one: one.longest),
+        "contacts_lost": each_mesh(lambda one: one.lost),
+        "contacts_regained": each_mesh(lambda one: one.regained),
+        "share_without_contact": each_mesh(lambda one: one.open_time / max(one.whole_time, 1e-300)),
+        "longest_without_contact_s": each_mesh(lambda one: one.longest),
     }
 
 

@@ -141,14 +141,14 @@ class TrainResponse(Shown):
 
     def facts(self) -> dict[str, str]:
         """How far the run came, and its largest numbers."""
-        told = {
+        entries = {
             "status": f"{self.status} at {1e3 * self.time_reached:.4g} ms, {len(self.time)} times",
             "shafts": ", ".join(self.shaft_names),
             "attachments": ", ".join(self.attachment_names),
         }
         for name, force in zip(self.mesh_names, self.contact_force.T, strict=True):
-            told[f"mesh {name}"] = f"{force.min():.4g} to {force.max():.4g} N" if len(force) else "no times"
-        return told
+            entries[f"mesh {name}"] = f"{force.min():.4g} to {force.max():.4g} N" if len(force) else "no times"
+        return entries
 
     def columns(self) -> dict[str, Array]:
         """Forces, speeds, accelerations and transmission errors over time, each with its unit."""

@@ -227,7 +227,7 @@ class _SoFar:
             "redundant_constraints": redundant_names(model),
             "smallest_contact_force_N": self.least.tolist(),
             "steady_forces_N": steady_forces(model.train).tolist(),
-            "flanks": [line.told for line in model.meshes],
+            "flanks": [line.description for line in model.meshes],
             "friction_coefficients": [0.0 if x.sliding is None else x.sliding.coefficient for x in model.meshes],
             **parted(self.parting, [line.rigid or line.pulls for line in model.meshes]),
         }

@@ -105,7 +105,7 @@ class Analysis:
             check_turns(self.ratio * train.driven.speed.integral()(job.times), self.table.order_turns)
 
     @property
-    def wanted(self) -> bool:
+    def requested(self) -> bool:
         """Whether anything is asked for."""
         return bool(self.measured) or self._over_time
 
@@ -155,22 +155,22 @@ class Analysis:
     ) -> dict[str, Any]:
         """Write tables and pictures into a folder; entries of the summary."""
         made = self.made()
-        told: dict[str, Any] = {}
+        entries: dict[str, Any] = {}
         if made.falls:
             write_csv(folder / "spectrogram.csv", spectrogram_columns(made))
             names = [f"{name}_rms_amplitude" for name in made.names]
             columns = {"frequency_Hz": made.falls[0].frequency, **dict(zip(names, made.average.T, strict=True))}
             write_csv(folder / "spectrum_averaged.csv", columns)
-            told["spectrogram"] = {"parts": len(made.falls[0].time), "averaged_parts": made.parts}
+            entries["spectrogram"] = {"parts": len(made.falls[0].time), "averaged_parts": made.parts}
         if made.tracks is not None:
             write_csv(folder / "order_tracks.csv", track_columns(made))
-            told["order_tracks"] = {"parts": len(made.tracks.time), "orders": made.tracks.orders.tolist()}
+            entries["order_tracks"] = {"parts": len(made.tracks.time), "orders": made.tracks.orders.tolist()}
         if made.measured:
             write_csv(folder / "measured.csv", measured_columns(made))
-            told["measured"] = [self._compared(one, spectra) for one in made.measured]
-        if draw is not None and told:
+            entries["measured"] = [self._compared(one, spectra) for one in made.measured]
+        if draw is not None and entries:
             draw(folder, made, spectra, attachment)
-        return told
+        return entries
 
     def _compared(self, one: Measured, spectra: TrainSpectra | None) -> dict[str, Any]:
         """Rms of a measured spectrum, and of the computed one in the same band."""

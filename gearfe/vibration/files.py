@@ -176,9 +176,9 @@ def write_run(
             with watch.stage("pictures"):
                 attachment = attachment_to_draw(made.curves, choice.attachment, loaded)
                 draw.curves(target, train, made, spectra, attachment)
-        if beside is not None and beside.wanted and response.status != "done":
+        if beside is not None and beside.requested and response.status != "done":
             problems.append("spectra over time and measured ones are left out: the run ended early")
-        elif beside is not None and beside.wanted:
+        elif beside is not None and beside.requested:
             with watch.stage("spectra over time"):
                 attachment = attachment_to_draw(made.curves, choice.attachment, loaded)
                 analysed = beside.write(target, spectra, attachment, None if draw is None else draw.analysis)
@@ -198,9 +198,9 @@ def _timed(pieces: Iterable[TrainResponse], watch: Stopwatch) -> Iterator[TrainR
     for piece in pieces:
         handed = time.perf_counter()
         yield piece
-        spent = time.perf_counter() - handed
-        watch.seconds["tables"] = watch.seconds.get("tables", 0.0) + spent
-        watch.seconds["transient"] = watch.seconds.get("transient", 0.0) - spent
+        elapsed = time.perf_counter() - handed
+        watch.seconds["tables"] = watch.seconds.get("tables", 0.0) + elapsed
+        watch.seconds["transient"] = watch.seconds.get("transient", 0.0) - elapsed
 
 
 def field_steps(times: Array, choice: OutputChoice) -> IntArray:
@@ -213,9 +213,9 @@ def _shown(times: Array, choice: OutputChoice) -> tuple[IntArray, int, IntArray]
     """Output times of the series, of the picture, and of the animation."""
     last = len(times) - 1
     series = np.arange(0, last + 1, max(1, -(-last // (FIELD_STEPS - 1))))
-    wanted = 4.55e-3 if choice.picture_time is None else choice.picture_time
+    requested = 4.55e-3 if choice.picture_time is None else choice.picture_time
     film = np.unique(np.linspace(0, last, min(FRAMES, last + 1)).round().astype(np.int64))
-    return series, int(np.abs(times - wanted).argmin()), film
+    return series, int(np.abs(times - requested).argmin()), film
 
 
 def _fields(

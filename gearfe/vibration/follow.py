@@ -127,7 +127,7 @@ def follow(
     InputError
         When there is no piece.
     """
-    wanted = np.zeros(0, dtype=np.int64) if keep is None else every * keep
+    numbers = np.zeros(0, dtype=np.int64) if keep is None else every * keep
     envelope = Envelope(every * (len(times) - 1) + 1)
     extremes: _Extremes | None = None
     kept: list[TrainResponse] = []
@@ -145,7 +145,7 @@ def follow(
             envelope.add(passed, _drawn(piece))
             mean.add(piece.time, np.hstack([piece.contact_force, piece.mesh_power, piece.friction_power]))
             extremes.add(piece)
-            inside = wanted[(wanted >= passed) & (wanted < passed + count)]
+            inside = numbers[(numbers >= passed) & (numbers < passed + count)]
             kept.append(piece.at(inside - passed))
             passed += count
     if extremes is None:

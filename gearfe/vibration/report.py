@@ -153,8 +153,8 @@ def contact_summary(followed: Followed) -> dict[str, Any]:
     largest = np.maximum(np.abs(followed.largest_force), np.abs(followed.least_force))
     factors = [float(most / one) if one > 0.0 else None for most, one in zip(largest, steady, strict=True)]
     names = ("flanks", "contacts_lost", "contacts_regained", "share_without_contact", "longest_without_contact_s")
-    told = {name: statistics[name] for name in names if name in statistics}
-    return {**told, "dynamic_factors": factors}
+    shared = {name: statistics[name] for name in names if name in statistics}
+    return {**shared, "dynamic_factors": factors}
 
 
 def friction_summary(followed: Followed) -> dict[str, Any]:
@@ -195,13 +195,13 @@ def stiffness_ranges(train: GearTrain) -> dict[str, tuple[float | None, float | 
     return found
 
 
-def attachment_to_draw(response: TrainResponse, asked: str | None, loaded: str | None) -> str:
+def attachment_to_draw(response: TrainResponse, chosen: str | None, loaded: str | None) -> str:
     """Name of the attachment in the pictures: the asked one, else the bore that carries the load's reaction."""
     names = response.attachment_names
-    if asked is not None and asked not in names:
-        raise unknown_name("--attachment", asked, names)
-    if asked is not None:
-        return asked
+    if chosen is not None and chosen not in names:
+        raise unknown_name("--attachment", chosen, names)
+    if chosen is not None:
+        return chosen
     return loaded if loaded is not None and loaded in names else names[-1]
 
 
