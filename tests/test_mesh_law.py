@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gearfe import Gear, GearPair
+from gearfe.cache import entries
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.contact.laws import law_named
 from gearfe.contact.model import PairModel
@@ -131,16 +132,22 @@ def test_approach_carries_the_force(law):
         law.approach(angle, 7 * DESIGN)
 
 
-def test_a_law_is_made_once(monkeypatch):
+def test_a_law_is_made_once(monkeypatch, tmp_path):
     """The second time it comes from disk, the same to the last bit; larger forces are another law."""
+    monkeypatch.setenv("GEARFE_CACHE", str(tmp_path))
     model = PairModel(materials=(STEEL, STEEL), coarsen=3.0)
+
+    def laws():
+        return {entry.path for entry in entries(tmp_path) if entry.kind == "mesh-law"}
+
     made = cached_law(PAIR, model, DESIGN)
-    monkeypatch.setattr("gearfe.meshlaw.make.mesh_law", lambda *_: pytest.fail("made again"))
+    assert len(kept := laws()) == 1
     again = cached_law(PAIR, model, DESIGN)
+    assert laws() == kept
     assert np.array_equal(again.energies, made.energies)
     assert made.largest_force >= DESIGN
-    with pytest.raises(pytest.fail.Exception):
-        cached_law(PAIR, model, 1.2345 * DESIGN)
+    assert cached_law(PAIR, model, 1.2345 * DESIGN).largest_force > made.largest_force
+    assert len(laws()) == 2
 
 
 def test_files(law, tmp_path):

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import math
 import sys
-import types
-from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 
 import numpy as np
@@ -43,20 +41,22 @@ class Springs:
 """
 
 
+def installed(folder: Path, name: str, law: str) -> None:
+    """What pip leaves of a package that names a law: its metadata."""
+    info = folder / f"package_of_{name}-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: package_of_{name}\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[gearfe.laws]\n{name} = {law}\n")
+
+
 @pytest.fixture
 def springs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> type:
-    """A module outside of the package, and an entry point that names its law."""
+    """A package outside of this one, with an entry point that names its law."""
     (tmp_path / "package_of_springs.py").write_text(ELSEWHERE)
+    installed(tmp_path, "springs", "package_of_springs:Springs")
     monkeypatch.syspath_prepend(str(tmp_path))
-    point = metadata.EntryPoint("springs", "package_of_springs:Springs", "gearfe.laws")
-    found = metadata.entry_points
-
-    def with_springs(**options: str) -> object:
-        return [point] if options.get("group") == "gearfe.laws" else found(**options)
-
-    monkeypatch.setattr(metadata, "entry_points", with_springs)
     monkeypatch.delitem(sys.modules, "package_of_springs", raising=False)
-    return point.load()
+    return importlib.import_module("package_of_springs").Springs
 
 
 def test_in_python(springs: type) -> None:
@@ -99,21 +99,14 @@ def test_mistakes_are_told(springs: type, capsys: pytest.CaptureFixture[str]) ->
         law_named("half_plane", bed=1.0)
 
 
-def test_a_law_whose_package_is_broken_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    point = metadata.EntryPoint("lost", "no_such_module:Law", "gearfe.laws")
-    monkeypatch.setattr(metadata, "entry_points", lambda **_: [point])
+def test_a_law_whose_package_is_broken_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    installed(tmp_path, "lost", "no_such_module:Law")
+    monkeypatch.syspath_prepend(str(tmp_path))
     with pytest.raises(InputError, match=r"law = 'lost': cannot be loaded from no_such_module:Law"):
         law_named("lost")
 
 
-def test_no_package_takes_a_name_of_ours(monkeypatch: pytest.MonkeyPatch) -> None:
-    @dataclass(frozen=True)
-    class Other:
-        pass
-
-    module = types.ModuleType("other_package")
-    module.Other = Other  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "other_package", module)
-    point = metadata.EntryPoint("penalty", "other_package:Other", "gearfe.laws")
-    monkeypatch.setattr(metadata, "entry_points", lambda **_: [point])
+def test_no_package_takes_a_name_of_ours(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    installed(tmp_path, "penalty", "no_such_module:Penalty")
+    monkeypatch.syspath_prepend(str(tmp_path))
     assert isinstance(law_named("penalty"), Penalty)

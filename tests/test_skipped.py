@@ -1,4 +1,4 @@
-"""What is skipped is not touched, and the result is the same without it."""
+"""What is skipped is not touched, and the result is the same without it (positions that repeat: test_stiffness.py)."""
 
 import dataclasses
 import math
@@ -13,9 +13,6 @@ import pytest
 from gearfe import sweep_stiffness
 from gearfe.cli import main
 from gearfe.housing.model import Housing
-from gearfe.meshing import tooth_sector
-from gearfe.meshing.recipe import sector_recipes
-from gearfe.meshing.tooth_sector import sector_mesh
 from gearfe.stiffness.sweep import elastic_pair
 from gearfe.train import build_train, simulate
 
@@ -64,26 +61,6 @@ def test_one_sector_instead_of_the_gears(gears, monkeypatch):
     for body in elastic.bodies:  # what was meshed is one tooth
         angles = np.arctan2(body.mesh.points[:, 1], body.mesh.points[:, 0])
         assert np.ptp(angles) < 2.0 * 2.0 * math.pi / body.teeth
-
-
-def test_one_mesh_cycle_instead_of_two(gears, elastic, monkeypatch):
-    """Positions that differ by whole cycles are solved once, with the result of solving them all."""
-    from gearfe.stiffness import sweep as stiffness
-
-    solved = []
-    real = stiffness.at_twists
-
-    def counted(elastic, angles, *rest, **options):
-        solved.append(len(angles))
-        return real(elastic, angles, *rest, **options)
-
-    monkeypatch.setattr(stiffness, "at_twists", counted)
-    angles = np.radians([2.0, 11.0, 20.0, 29.0, 38.0])  # two of them differ by less than a cycle of 18 deg
-    given = {"twist": TWIST, "angles": angles, "elastic": elastic}
-    once = sweep_stiffness(gears, **given)
-    every = sweep_stiffness(gears, **given, solve_all=True)
-    assert solved == [2, 5]
-    np.testing.assert_allclose(once.k_mesh, every.k_mesh, rtol=1e-9)
 
 
 def test_neighbour_teeth_only(gears, elastic):
@@ -156,16 +133,20 @@ def test_modes_above_the_band_are_not_sought(monkeypatch):
     np.testing.assert_allclose(few.internal_hz[: few.modes], many.internal_hz[: few.modes], rtol=1e-8)
 
 
-def test_cached_meshes_start_no_mesher(gears, tmp_path, monkeypatch):
-    monkeypatch.setenv("GEARFE_CACHE", str(tmp_path))
-    recipe = sector_recipes(gears, coarsen=COARSE)[0]
-    first = sector_mesh(gears.pinion, recipe)
-    monkeypatch.setattr(tooth_sector, "gmsh_session", touched)
-    second = sector_mesh(gears.pinion, recipe)
-    np.testing.assert_array_equal(first.points, second.points)
-    np.testing.assert_array_equal(first.triangles, second.triangles)
-    with pytest.raises(AssertionError, match="touched"):
-        sector_mesh(gears.pinion, recipe, cache=False)
+def test_cached_meshes_start_no_mesher(tmp_path):
+    """Nor do they load it; the second mesh is the first one."""
+    sector = f"""
+from gearfe.meshing.recipe import sector_recipes
+from gearfe.meshing.tooth_sector import sector_mesh
+from tests.benchmarks.subject import shipped_pair
+pair = shipped_pair()
+made = sector_mesh(pair.pinion, sector_recipes(pair, coarsen={COARSE})[0])
+print(hash((made.points.tobytes(), made.triangles.tobytes())))
+"""
+    (first, made), (again, same) = (loaded_after(sector, GEARFE_CACHE=str(tmp_path), PYTHONHASHSEED="0") for _ in "12")
+    assert "gmsh" in first
+    assert "gmsh" not in again
+    assert made == same
 
 
 def test_a_cached_reduced_housing_loads_no_finite_elements(tmp_path):
