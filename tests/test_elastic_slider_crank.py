@@ -12,13 +12,14 @@ the published state at 0.1 s, recomputed independently of this project (see the 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from gearfe.rigid import Element, ModalBlocks, System, consistent_start, integrate
+from gearfe.rigid import Element, ModalBlocks, QuadraticJoint, System, compiled, consistent_start, integrate, polynomial
 
+needs_numba = pytest.mark.skipif(not compiled.available(), reason="numba is not installed")
 DATA = json.loads((Path(__file__).parent / "data" / "elastic_slider_crank.json").read_text())
 SI = DATA["data_SI"]
 L1, L2, PI = SI["l1"], SI["l2"], SI["pi"]
@@ -45,54 +46,21 @@ def rod_blocks() -> tuple[np.ndarray, np.ndarray]:
     return np.kron(mass, np.eye(2)), np.kron(stiffness, np.eye(2))
 
 
-#: Rows of the pin, of the slider, and of the drive, by columns (phi1, x3, x0, a, p_k).
-CONSTANT = np.zeros((10, 14))
-CONSTANT[:2, 2:4] = np.eye(2)
-CONSTANT[2, 1] = CONSTANT[9, 0] = 1.0
-CONSTANT[2:4, 2:4] = CONSTANT[2:4, 12:14] = -np.eye(2)
-CONSTANT[2:4, 4:6] = -L2 * np.eye(2)
-
-
-@dataclass(frozen=True, eq=False)
-class Frame(Element):
-    """Crank pin, frame of the rod, slider, drive; coordinates phi1, x3, then those of the rod."""
-
-    touches: tuple[Element, ...] = field()
-    name: str = "frame"
-    rows = 10
-
-    def _parts(self, q):  # type: ignore[no-untyped-def]
-        """a, the vector across it, p_k."""
-        a, p = q[4:6], q[6:].reshape(4, 2)
-        n = np.array([-a[1], a[0]])
-        return a, n, p
-
-    def residual(self, t, q):  # type: ignore[no-untyped-def]
-        a, n, p = self._parts(q)
-        pin = q[2:4] - L1 * np.array([np.cos(q[0]), np.sin(q[0])])
-        tip = q[2:4] + L2 * a + p[3]
-        slider = np.array([q[1] - tip[0], -tip[1]])
-        frame = [0.5 * (a @ a - 1.0), p[0] @ a, p[1] @ a, p[2] @ n, p[3] @ n]
-        return np.concatenate([pin, slider, frame, [q[0] - 150.0 * t]])
-
-    def rate(self, t, q):  # type: ignore[no-untyped-def]
-        return np.append(np.zeros(9), -150.0)
-
-    def jacobian(self, t, q):  # type: ignore[no-untyped-def]
-        a, n, p = self._parts(q)
-        G = CONSTANT.copy()
-        G[:2, 0] = L1 * np.sin(q[0]), -L1 * np.cos(q[0])
-        G[4, 4:6] = a
-        for k, along in enumerate((a, a, n, n)):
-            G[5 + k, 6 + 2 * k : 8 + 2 * k] = along
-            G[5 + k, 4:6] = p[k] if k < 2 else (p[k][1], -p[k][0])
-        return G
-
-    def velocity_terms(self, t, q, v):  # type: ignore[no-untyped-def]
-        out = np.zeros(10)
-        out[:2] = L1 * v[0] ** 2 * np.array([np.cos(q[0]), np.sin(q[0])])
-        out[4:9] = self.jacobian(t, v)[4:9, 4:] @ v[4:]  # these rows are quadratic: G(v) v
-        return out
+def frame(rod: Element) -> QuadraticJoint:
+    """Crank pin, slider, frame of the rod, drive; variables phi1, x3, x0, a, p_k, cos phi1, sin phi1."""
+    linear, constant = np.zeros((10, 16)), np.zeros(10)
+    linear[:2, 2:4] = np.eye(2)  # x0 = l1 (cos phi1, sin phi1)
+    linear[:2, 14:] = -L1 * np.eye(2)
+    linear[2, 1] = linear[9, 0] = 1.0  # (x3, 0) = x0 + l2 a + p4
+    linear[2:4, 2:4] = linear[2:4, 12:14] = -np.eye(2)
+    linear[2:4, 4:6] = -L2 * np.eye(2)
+    products = [(4, 4, 4, 0.5), (4, 5, 5, 0.5)]  # a . a = 1
+    constant[4] = -0.5
+    for k in range(4):  # p_1, p_2 across, p_3, p_4 along
+        across = [(5 + k, 6 + 2 * k, 4, 1.0), (5 + k, 7 + 2 * k, 5, 1.0)]
+        along = [(5 + k, 7 + 2 * k, 4, 1.0), (5 + k, 6 + 2 * k, 5, -1.0)]
+        products += across if k < 2 else along
+    return QuadraticJoint((rod,), linear, products, constant, (0,), {9: polynomial((0.0, 150.0))}, name="frame")
 
 
 def state(p, q):  # type: ignore[no-untyped-def]
@@ -120,17 +88,25 @@ class Sized(ModalBlocks):
         return np.array([1.0, 1.0, *4 * [1.0], *4 * [1e-4], *4 * [1e-5]]), np.ones(0)
 
 
-def test_state_at_the_end_and_forces() -> None:
+def crank() -> tuple[System, Element, QuadraticJoint, np.ndarray]:
+    """The system, its parts, and the source's start."""
     mass, stiffness = np.zeros((2, 14, 14))
     mass[0, 0], mass[1, 1] = SI["J1_about_bearing"], SI["m3"]
     mass[2:, 2:], stiffness[2:, 2:] = rod_blocks()
-    begin, end = DATA["start"], DATA["at_0.1_s"]
+    begin = DATA["start"]
     first = state(begin["p"], begin["q"]), rates(begin["p"], begin["q"], begin["v"], begin["qd"])
     body = Sized(mass, np.zeros((14, 14)), stiffness, "crank, rod and slider", *first)
-    system = System([body, Frame((body,))])
+    joint = frame(body)
+    return System([body, joint]), body, joint, first[0]
+
+
+@pytest.mark.parametrize("method", [pytest.param("taylor", marks=needs_numba), "explicit"])
+def test_state_at_the_end_and_forces(method: str) -> None:
+    system, _, _, first = crank()
+    end = DATA["at_0.1_s"]
     start = consistent_start(system)
-    assert np.abs(start.q - first[0]).max() < 1e-8
-    run = integrate(system, [0.0, 0.1], start=start, method="explicit", tolerance=1e-8)
+    assert np.abs(start.q - first).max() < 1e-8
+    run = integrate(system, [0.0, 0.1], start=start, method=method, tolerance=1e-8)
     q = run.q[-1]
     a, p = q[4:6], q[6:].reshape(4, 2)
     n = np.array([-a[1], a[0]])
@@ -141,3 +117,23 @@ def test_state_at_the_end_and_forces() -> None:
     # forces of the source: on the slider across and along the guide, and the moment of the drive
     x, y, drive = (run.multipliers[-1][k] for k in (2, 3, 9))
     np.testing.assert_allclose(np.abs([y, x, drive]), np.abs(end["lambda"]), rtol=1e-6)
+
+
+def test_derivatives_of_quadratic_rows_are_those_of_their_values() -> None:
+    """By central differences, which are exact for the quadratic part; G' v and d(G^T lambda)/dq from G."""
+    _, _, joint, _ = crank()
+    rng = np.random.default_rng(1)
+    q, v, multipliers, h = rng.standard_normal(14), rng.standard_normal(14), rng.standard_normal(10), 1e-5
+
+    def slope(f, along):  # type: ignore[no-untyped-def]
+        return (f(q + h * along) - f(q - h * along)) / (2 * h)
+
+    units = np.eye(14)
+    G = np.column_stack([slope(lambda x: joint.residual(0.3, x), e) for e in units])
+    np.testing.assert_allclose(joint.jacobian(0.3, q), G, atol=1e-9)
+    np.testing.assert_allclose(
+        joint.velocity_terms(0.3, q, v), slope(lambda x: joint.jacobian(0.3, x), v) @ v, atol=1e-9
+    )
+    bend = np.column_stack([slope(lambda x: joint.jacobian(0.3, x).T @ multipliers, e) for e in units])
+    np.testing.assert_allclose(joint.curvature(q, multipliers), bend, atol=1e-9)
+    assert joint.rate(0.3, q)[9] == -150.0

@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     one.add_argument(
         "--compile",
         action="store_true",
-        help="compile the kernels of mechanisms now, a quarter of a minute: single runs are over before that pays",
+        help="compile the kernels of mechanisms now, half a minute: single runs are over before that pays",
     )
     one.add_argument("--trim", action="store_true", help="remove the entries not used for longest beyond the limit")
 
@@ -61,9 +61,12 @@ def run(args: argparse.Namespace) -> int:
 def _compile() -> None:
     """Any compiled run leaves the kernels in the cache."""
     from ..rigid import Body, Hinge, Linkage, System, integrate
+    from ..rigid.turning import TurningFrame
 
-    rod = Linkage((Body("rod", 1.0, 1.0, (1.0, 0.0)),), (Hinge("rod", "ground"),), ())
-    integrate(System([rod]), [0.0, 1e-3], method="taylor", backend="compiled")
+    rod, hinge = Body("rod", 1.0, 1.0, (1.0, 0.0)), Hinge("rod", "ground")
+    for forces in ((), (TurningFrame(1.0),)):  # the second with a load that depends on the state
+        system = System([Linkage((rod,), (hinge,), forces)])
+        integrate(system, [0.0, 1e-3], method="taylor", backend="compiled")
 
 
 def _size(count: int) -> str:

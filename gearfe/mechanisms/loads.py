@@ -11,8 +11,11 @@ import numpy as np
 
 from ..errors import InputError, given
 from ..rigid import SpanFunction, StateFunction
+from ..rigid.linkage_tape import BodyVariables
+from ..rigid.tape import Tape
 from ..typing import Array
 from .expressions import OF_POINT, Node, quantities
+from .load_series import clock, quantity, write_expression
 from .tables import ValueTable
 
 if TYPE_CHECKING:
@@ -138,7 +141,7 @@ class ExpressionLoad(StateFunction):
     """
 
     def __init__(self, text: str, label: str, node: Node) -> None:
-        self.text, self.label = text, label
+        self.text, self.label, self.node = text, label, node
         self.names = sorted(quantities(node), key=str)
         for kind, _ in self.names:
             if kind not in ALLOWED:
@@ -197,6 +200,11 @@ class ExpressionLoad(StateFunction):
                         by_q[k + 2] -= slope * v[k + 2] * arm[along]
         return by_q, by_v
 
+    def write(self, bodies: BodyVariables) -> int:
+        """Its register on a tape."""
+        places = dict(zip(self.names, self.places, strict=True))
+        return write_expression(self.node, bodies.tape, lambda name: quantity(bodies, *places[name]))
+
     def _quantity(self, kind: str, where: list[tuple[int, float, float, float]], t: float, q: Array, v: Array) -> float:
         if kind == "time":
             return t
@@ -219,7 +227,7 @@ class ExpressionTension(SpanFunction):
     """The tension of a spring given by an expression; text, label and node as of `ExpressionLoad`."""
 
     def __init__(self, text: str, label: str, node: Node) -> None:
-        self.text, self.label = text, label
+        self.text, self.label, self.node = text, label, node
         names = [(name, None) for name in OF_SPAN]
         for kind, _ in quantities(node):
             if kind not in OF_SPAN:
@@ -242,3 +250,8 @@ class ExpressionTension(SpanFunction):
         except (Trouble, OverflowError, ZeroDivisionError, ValueError):
             return 0.0, 0.0  # the value says so
         return float(by_length), float(by_rate)
+
+    def write(self, tape: Tape, length: int, rate: int) -> int:
+        """Its register on a tape."""
+        known = {"length": length, "length_rate": rate}
+        return write_expression(self.node, tape, lambda name: known[name[0]] if name[0] in known else clock(tape))

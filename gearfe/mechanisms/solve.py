@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from ..rigid import Start, Trajectory, integrate
+from ..rigid.choice import STUCK
 from ..rigid.equilibrium import Equilibrium, equilibrium
 from ..rigid.integrate import use_compiled
 from ..rigid.inverse import prescribed_motion
 from ..rigid.modes import Modes, modes
+from ..rigid.series import tape_program
 from .job import output_times
 from .model import Mechanism
 from .rest import at_rest, mode_columns
@@ -72,9 +74,13 @@ def _moved(mechanism: Mechanism, start: Start) -> Trajectory:
     method, backend = run.method, "compiled" if use_compiled("auto") else "plain"
     if method == "auto":
         stiff = any(element.stiff for element in system.elements)
-        method = "implicit" if stiff else "explicit" if system.linkage is None else "taylor"
+        series = system.linkage is not None or (backend == "compiled" and tape_program(system) is not None)
+        method = "implicit" if stiff else "taylor" if series else "explicit"
     if method != "taylor":
         backend = "plain"
-    options: dict[str, Any] = {"method": method, "backend": backend, "raise_on_failure": False}
+    options: dict[str, Any] = {"start": start, "tolerance": mechanism.tolerance, "raise_on_failure": False}
     with np.errstate(over="ignore", invalid="ignore"):
-        return integrate(system, times, start=start, tolerance=mechanism.tolerance, **options)
+        made = integrate(system, times, method=method, backend=backend, **options)
+        if made.status in STUCK and run.method == "auto" and method == "taylor" and system.linkage is None:
+            return integrate(system, times, method="explicit", **options)
+        return made

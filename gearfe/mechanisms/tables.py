@@ -51,6 +51,16 @@ class ValueTable:
         zero = np.zeros_like(slopes)
         return np.stack([zero, zero, slopes, self.y[:-1]])
 
+    @property
+    def pieces(self) -> Array:
+        """Coefficients of powers of x - x_k, highest first, shape (n - 1, 4)."""
+        return self._pieces.T
+
+    @property
+    def period(self) -> float:
+        """Its period, 0 for none."""
+        return float(self.x[-1] - self.x[0]) if self.kind == "periodic" else 0.0
+
     def over_time(self) -> TimeFunction:
         """The table as a function of time: pieces that every method differentiates exactly, and that end steps."""
         starts = (-math.inf, *(float(t) for t in self.x[1:-1]))

@@ -11,6 +11,7 @@ from .integrate import integrate
 from .joints import Fixed, Hinge, Prescribed, Prismatic, Slot
 from .linkage import Linkage
 from .planar import Body
+from .quadratic import QuadraticJoint
 from .start import Forced, Freedoms, Start, consistent_start, count_freedoms
 from .statefunctions import SpanFunction, StateFunction
 from .status import Status
@@ -38,6 +39,7 @@ __all__ = [
     "PointForce",
     "Prescribed",
     "Prismatic",
+    "QuadraticJoint",
     "SeriesLaw",
     "Slot",
     "SpanFunction",

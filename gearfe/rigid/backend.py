@@ -7,6 +7,8 @@ from . import compiled, taylor
 #: Measured (processor seconds): compiling the kernels, loading numba with those of an earlier run; and how many times
 #: as fast as plain steps compiled ones are (170 with one body, 200 with seven).
 COMPILE_SECONDS, LOAD_SECONDS = 15.0, 0.5
+#: Seconds of compiling the kernels of general systems.
+GENERAL_SECONDS = 10.0
 COMPILED_FASTER = 180.0
 
 _SPENT = [0.0]

@@ -8,7 +8,8 @@ The first way begins. As soon as its pace is known, others are tried by real ste
 when it has clearly less left than the first, and then is the run. It is lost when it has spent `SHARE` of what the
 first has left, or from `EARLY` on when its pace is slower and its steps do not grow: those of an implicit method grow
 as fast motions decay, so that its pace at first says too little. When a run takes `WRONG` times what was predicted,
-others are tried again from the state reached. The whole so costs at most about twice what the best way takes.
+others are tried again from the state reached. A way that is stuck may have one that goes on. The whole so costs at most
+about twice what the best way takes.
 """
 
 from __future__ import annotations
@@ -43,6 +44,8 @@ RECENT = 8
 #: A motion exp(-r t) gives a series steps r h = (tolerance n!)^(1/n) = 3 or so, with orders n of 18 to 26; steps of
 #: half of that are set by it, shorter ones by the motion of the mechanism.
 STIFF = 1.5
+#: A way that ends so may be followed by another.
+STUCK = (Status.STEP_TOO_SMALL, Status.NOT_FINITE)
 #: Statistics that add up.
 SUMS = ("steps", "evaluations", "orders", "newton_iterations", "rejected")
 #: ``run(start, times, most, watch)`` -> dense output, status, statistics.
@@ -76,6 +79,7 @@ class Way:
     loading: float = 0.0
     ratio: float = 1.0
     rate: Callable[[Start], float] | None = None
+    instead: Way | None = None
 
     @property
     def name(self) -> str:
@@ -198,6 +202,10 @@ class Choice:
             return None
         began = pace.reports[0][0] if pace.reports else self.clock()
         own = Leg(way, dense, status, statistics, predicted, self.clock() - pace.away - began)
+        if rest is None and status in STUCK and way.instead is not None:
+            t = np.array([dense.times[-1]])
+            here = start if len(dense.times) < 2 else replace(start, time=t[0], q=dense(t, 0)[0], v=dense(t, 1)[0])
+            return [own, *(self._legs(way.instead, here, used + len(dense.times) - 1) or [])]
         if rest is None:
             return [own]
         return rest if whole else [own, *rest]

@@ -41,7 +41,10 @@ eliminated at
     others: a beam whose nodes are bodies of a linkage. Absent: none.
 13. ``stiff = True``: its fast motions leave steps of series or Runge-Kutta next to no length; ``method="auto"`` then is
     the implicit method. Absent: not stiff.
-14. ``breaks``: times at which a force or joint is not smooth. Steps of all integrators end there. Absent: none.
+14. ``write(tape, places)``: its rows and forces on a `gearfe.rigid.tape.Tape`, `places` being the numbers of the local
+    coordinates; False where they cannot be written. Rows are quadratic in coordinates, cosines and sines. The Taylor
+    method then runs any system compiled. Not needed by what has neither rows nor ``force``.
+15. ``breaks``: times at which a force or joint is not smooth. Steps of all integrators end there. Absent: none.
 
 An element has no state of its own that changes during a run: integrators call it at trial points in any order.
 """
@@ -50,11 +53,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..typing import Array
+from ..typing import Array, IntArray
+
+if TYPE_CHECKING:
+    from .tape import Tape
 
 
 class Element:
@@ -154,6 +160,12 @@ class LinearJoint(Element):
     def jacobian(self, t: float, q: Array) -> Array:  # noqa: ARG002
         """A."""
         return self.A
+
+    def write(self, tape: Tape, places: IntArray) -> bool:
+        """A q - b."""
+        for row, value in zip(self.A, self.b, strict=True):
+            tape.row({int(i): float(f) for i, f in zip(places, row, strict=True) if f}, constant=-float(value))
+        return True
 
 
 @dataclass(frozen=True, eq=False)

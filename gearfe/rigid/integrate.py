@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -13,14 +14,23 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..progress import announce, count, stage
 from ..typing import Array
-from . import compiled, taylor
-from .backend import COMPILED_FASTER, compiled_is_ready, loading_seconds, plain_seconds_spent, spend_plain_seconds
+from . import compiled, series, taylor
+from .backend import (
+    COMPILED_FASTER,
+    GENERAL_SECONDS,
+    LOAD_SECONDS,
+    compiled_is_ready,
+    loading_seconds,
+    plain_seconds_spent,
+    spend_plain_seconds,
+)
 from .carried import loose_link
 from .choice import Choice, Way, joined, joined_statistics
 from .dense import Dense
 from .elimination import is_linear, modal_coordinates
 from .linkage import Linkage
 from .modal import series_force
+from .series import tape_program
 from .start import Start, consistent_start
 from .statefunctions import SpanFunction, StateFunction
 from .status import Status
@@ -66,7 +76,8 @@ def integrate(
         Times at which results are wanted (s), rising or falling; the first is the start.
     method : {"auto", "taylor", "explicit", "implicit"}
         "taylor": Taylor series, of the index-3 equations for planar linkages, in modal coordinates (compiled) where the
-        constraints are linear and the only force has a law with a series: gear trains. "explicit": any smooth system,
+        constraints are linear and the only force has a law with a series: gear trains; else on a tape (compiled) where
+        rows and forces can be written on one: loads by expression, frames in vectors. "explicit": any smooth system,
         Runge-Kutta of order 8, with projection where constraints are not linear. "implicit": Radau IIA of order 5,
         index 3, for stiff ones. "auto" takes the one of "taylor" (else "explicit") and "implicit" that is
         predicted to take the fewest seconds, and changes over when that proves wrong (`gearfe.rigid.choice`).
@@ -175,17 +186,13 @@ def ways_of(
     rate = partial(_rate, system) if planar else None  # it does not see singular positions
     implicit = Way("implicit", "", partial(_implicit, system, options), trial, rate=rate)
     auto = method == "auto"
-    if auto and (any(e.stiff for e in system.elements) or _hopeless(system, start, times)):
-        return [implicit]
-    if method == "implicit":
-        return [implicit]
-    if method == "explicit" or not planar:
-        name = method
-        if auto:
-            name = "taylor" if series_force(system) is not None and use_compiled(backend) else "explicit"
-        run = _explicit if name == "explicit" else _modal_taylor
-        way = Way(name, "", partial(run, system, backend, options), PLAIN_TRIAL)
-        return [way, implicit] if auto else [way]
+    stuck = auto and (any(e.stiff for e in system.elements) or _hopeless(system, start, times))
+    explicit = Way("explicit", "", partial(_explicit, system, backend, options), PLAIN_TRIAL)
+    if stuck or method in ("implicit", "explicit"):
+        return [explicit] if method == "explicit" else [implicit]
+    if not planar:
+        ways = _other_ways(system, auto, backend, options, explicit, runs)
+        return [*ways, implicit] if auto else ways
     plain = Way("taylor", "plain", partial(_taylor, system, False, options), PLAIN_TRIAL)
     if not use_compiled(backend):
         return [plain, implicit] if auto else [plain]
@@ -194,6 +201,36 @@ def ways_of(
     if backend == "compiled" or loading <= plain_seconds_spent():
         return [quick, implicit] if auto else [quick]
     return [plain, quick, implicit] if auto else [plain, quick]
+
+
+def _other_ways(
+    system: System, auto: bool, backend: str, options: dict[str, Any], explicit: Way, runs: float
+) -> list[Way]:
+    """Series in modal coordinates, or of what can be written on a tape, where the kernels are worth it; Runge-Kutta."""
+    if is_linear(system):
+        modal = Way("taylor", "", partial(_modal_taylor, system, backend, options), PLAIN_TRIAL)
+        return [explicit] if auto and (series_force(system) is None or not use_compiled(backend)) else [modal]
+    explicit = replace(explicit, backend="plain")
+    loading = 0.0 if series.kernels_loaded() else LOAD_SECONDS if series.kernels_ready() else GENERAL_SECONDS
+    run, trial = partial(_tape_taylor, system, backend, options), PLAIN_TRIAL + loading / runs
+    way = Way("taylor", "compiled", run, trial, instead=explicit if auto else None)
+    if not auto:
+        return [way]
+    if not use_compiled(backend) or tape_program(system) is None:
+        return [explicit]
+    return [way] if backend == "compiled" or loading / runs <= plain_seconds_spent() else [explicit, way]
+
+
+def _tape_taylor(
+    system: System, backend: str, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
+) -> Run:
+    if tape_program(system) is None:
+        problem = "needs rows and forces that can be written on a tape (gearfe.rigid.contract)"
+        raise InputError("method", "taylor", problem, "use method='explicit' or 'implicit'")
+    if not use_compiled(backend):
+        raise InputError("backend", backend, "has no series for such a system", "use method='explicit', or numba")
+    local = max(LOCAL_SHARE * options["tolerance"], 5e-16)
+    return series.run_series(system, start, times, local=local, longest=options["longest"], most=most, watch=watch)
 
 
 def _hopeless(system: System, start: Start, times: Array) -> bool:

@@ -6,7 +6,7 @@ the generalised force of g on a vector is J_V^T g, where J_V = dV/dq holds w and
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from .forms import Frames
 from .joints import Joint
 from .planar import Body, body_numbers
 from .tables import Assembly, assemble
+
+if TYPE_CHECKING:
+    from .tape import Tape
 
 
 class Pose(NamedTuple):
@@ -88,6 +91,12 @@ class Linkage(Element):
     def has_series(self) -> bool:
         """Whether the Taylor kernels can run it: no load depends on the state, no constraint has a profile."""
         return not (self.assembly.state_loads or self.assembly.tension_laws or self.assembly.profiles)
+
+    def write(self, tape: Tape, places: IntArray) -> bool:
+        """The linkage on a tape, see `gearfe.rigid.contract`."""
+        from .linkage_tape import write_linkage
+
+        return write_linkage(self, tape, places)
 
     @property
     def driven(self) -> bool:

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING
 
 from ..typing import Array
+
+if TYPE_CHECKING:
+    from .linkage_tape import BodyVariables
+    from .tape import Tape
 
 
 class StateFunction(ABC):
     """A load f(t, q, v) with its slopes, of the coordinates and velocities of a whole linkage.
 
-    A linkage with one has no Taylor series: the explicit or the implicit method integrates it. Where it has no value,
-    `value` is not-a-number, which shortens the step and at last ends the run, and `complaint` says why.
+    Where it has no value, `value` is not-a-number, which shortens the step and at last ends the run, and `complaint`
+    says why.
     """
 
     breaks: tuple[float, ...] = ()
@@ -24,6 +29,10 @@ class StateFunction(ABC):
     @abstractmethod
     def slopes(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
         """(df/dq, df/dv)."""
+
+    def write(self, bodies: BodyVariables) -> int | None:  # noqa: ARG002
+        """Its register on the tape of the bodies' variables; None where it cannot be written."""
+        return None
 
 
 class SpanFunction(ABC):
@@ -38,3 +47,7 @@ class SpanFunction(ABC):
     @abstractmethod
     def slopes(self, t: float, length: float, rate: float) -> tuple[float, float]:
         """(dT/dL, dT/dL')."""
+
+    def write(self, tape: Tape, length: int, rate: int) -> int | None:  # noqa: ARG002
+        """Its register by those of length and rate; None where it cannot be written."""
+        return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from ..typing import Array
 from .forces import Along, Force, Tension, Weight
 from .forms import Frames
 from .statefunctions import StateFunction
+
+if TYPE_CHECKING:
+    from .linkage_tape import BodyVariables
 
 
 @dataclass(frozen=True)
@@ -51,3 +55,7 @@ class Coriolis(StateFunction):
         by_v = np.zeros(len(v))
         by_v[self.place] = self.factor
         return np.zeros(len(q)), by_v
+
+    def write(self, bodies: BodyVariables) -> int:
+        """A rate."""
+        return bodies.tape.rate({bodies.places[self.place]: self.factor})

@@ -1,0 +1,205 @@
+"""Taylor integration of systems that can be written on a tape: constant mass, quadratic rows, analytic forces."""
+
+from __future__ import annotations
+
+import time
+from functools import lru_cache
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..progress import stage
+from ..typing import Array, IntArray
+from . import compiled, kernel_quadratic, kernel_rows, kernel_tape, kernel_tape_run
+from .dense import Polynomials
+from .packed import Packed
+from .parts import uncollected
+from .start import Start
+from .status import Status
+from .steps import Watch
+from .system import System
+from .tape import Program, Tape
+from .taylor import order_for
+
+FUNCTIONS = (
+    kernel_rows.fill,
+    kernel_rows.copy,
+    kernel_rows.time_series,
+    *kernel_tape.FUNCTIONS,
+    *kernel_quadratic.FUNCTIONS,
+    *kernel_tape_run.FUNCTIONS,
+)
+NAMES = {**kernel_rows.GLOBALS, **kernel_tape.NAMES, **kernel_tape_run.NAMES}
+HOT = ("fill", "copy", "cauchy", "weighted", "horner", "largest", "margin", "lower_knot", "own_piece")
+ENTRY = "quadratic_steps"
+#: Steps between two looks at the clock, and at most coefficients in one piece of the output.
+FIRST, MOST_NUMBERS = 16, 2_000_000
+
+
+class Run(NamedTuple):
+    """What holds for a whole run."""
+
+    begin: float  # (s)
+    end: float
+    sign: float  # of time
+    order: int
+    tolerance: float  # of the last terms
+    longest: float  # step (s)
+    breaks: Array  # times at which steps end (s)
+
+
+class Work(NamedTuple):
+    """State and scratch arrays; n coordinates, m rows, K orders, z variables."""
+
+    q: Array  # (n,) state reached
+    v: Array
+    pieces: IntArray  # of the switches
+    qn: Array  # (n,) state at the end of a step
+    vn: Array
+    Z: Array  # (z, K) series of the variables
+    H: Array  # (z, K) forces along them
+    L: Array  # (m, K) multipliers
+    R: Array  # (registers, K)
+    TF: Array  # (functions, K)
+    P: Array  # (z, 2) one state
+    R0: Array  # (registers, 1) there
+    H0: Array  # (z,)
+    D: Array  # (m, z) rows by variables
+    G: Array  # (m, n)
+    A: Array  # (n + m, n + m) factor
+    pivot: IntArray  # (n + m,)
+    scale: Array  # (1,) of the masses in the factor
+    x: Array  # (n + m,)
+    F: Array  # (n,)
+    gap: Array  # (m,)
+
+
+def tape_program(system: System) -> Program | None:
+    """The system on a tape; None where an element cannot be written."""
+    known: dict[str, Program | None] = system.__dict__
+    if "_program" not in known:
+        known["_program"] = _program(system)
+    return known["_program"]
+
+
+def _program(system: System) -> Program | None:
+    tape = Tape(system.size)
+    for element, places in zip(system.elements, system.index, strict=True):
+        write: Any = getattr(element, "write", None)
+        if write is None:
+            if element.rows or hasattr(element, "force"):
+                return None
+        elif not write(tape, places):
+            return None
+    return tape.program(system.mass, system.damping, system.stiffness, system.units)
+
+
+def _active(program: Program, active: np.ndarray) -> Program:
+    """Without the rows that are redundant."""
+    if active.all():
+        return program
+    rows, number = program.rows, np.cumsum(active) - 1
+    held, pairs = active[rows.place[:, 0]], active[rows.pair[:, 0]]
+    place, pair = rows.place[held], rows.pair[pairs]
+    place[:, 0], pair[:, 0] = number[place[:, 0]], number[pair[:, 0]]
+    kept = rows._replace(
+        place=place, factor=rows.factor[held], pair=pair, weight=rows.weight[pairs],
+        constant=rows.constant[active], motion=rows.motion[active], unit=rows.unit[active],
+    )  # fmt: skip
+    return program._replace(rows=kept)
+
+
+def _work(program: Program, order: int) -> Work:
+    n, m, z = len(program.mass), len(program.rows.constant), len(program.mass) + 2 * len(program.angle)
+    K, registers, functions = order + 2, len(program.code.op), len(program.times.first) - 1
+    shapes: list[tuple[int, ...]] = [(z, K), (z, K), (m, K), (registers, K), (functions, K)]
+    shapes += [(z, 2), (registers, 1), (z,), (m, z), (m, n), (n + m, n + m)]
+    vectors = [np.zeros(n) for _ in range(4)]
+    pieces, pivot = (np.zeros(k, dtype=np.int64) for k in (len(program.switches.register), n + m))
+    last = [np.zeros(1), np.zeros(n + m), np.zeros(n), np.zeros(m)]
+    arrays: list[Any] = [*vectors[:2], pieces, *vectors[2:], *(np.zeros(shape) for shape in shapes), pivot, *last]
+    return Work._make(arrays)
+
+
+@lru_cache(maxsize=2)
+def kernels(jit: bool) -> SimpleNamespace:
+    """The bound kernels, compiled or plain."""
+    return compiled.bind(FUNCTIONS, NAMES, compiled=jit, entries=(ENTRY,), inline=HOT)
+
+
+def kernels_loaded() -> bool:
+    """Whether the compiled kernels are in this process."""
+    return bool(_LOADED)
+
+
+def kernels_ready() -> bool:
+    """Whether they wait in the cache."""
+    return compiled.is_cached(FUNCTIONS, ENTRY)
+
+
+_LOADED: list[bool] = []
+
+
+def first_pieces(program: Program, w: Work, t: float, forward: bool) -> bool:
+    """Pieces of all switches at the state in w; whether every table has a value there."""
+    plain, n = kernels(False), len(w.q)
+    w.Z[:n, 0], w.Z[:n, 1] = w.q, w.v
+    plain.time_series(program.times, t, forward, 2, w.TF)
+    for k in (0, 1):
+        plain.trigonometry_order(program, w.Z, k)
+    for s, register in enumerate(program.switches.register):
+        plain.tape_order(program, w.Z, w.R, w.TF, w.pieces, 0)
+        w.pieces[s] = piece = plain.piece_at(program.switches, s, w.R[register, 0])
+        knots = program.switches.first[s + 1] - program.switches.first[s]
+        if knots and piece < 0 and not program.switches.period[s]:
+            return False
+    return True
+
+
+def run_series(
+    system: System, start: Start, times: Array, *, local: float, longest: float, most: int, watch: Watch | None = None
+) -> tuple[Polynomials, Status, dict[str, Any]]:
+    """Integrate; returns (dense output, status, statistics). `local` is the tolerance of the last terms."""
+    program = tape_program(system)
+    assert program is not None  # the caller asks before
+    program = _active(program, start.active)
+    order, end, t = order_for(local), float(times[-1]), start.time
+    sign = 1.0 if end >= t else -1.0
+    run = Run(t, end, sign, order, local, float(longest), system.breaks)
+    w = _work(program, order)
+    w.q[:], w.v[:] = start.q, start.v
+    with np.errstate(all="ignore"):
+        covered = first_pieces(program, w, t, sign > 0.0)
+    n, done, room = system.size, 0, min(FIRST, most)
+    handed = Packed(program), Packed(w), Packed(run)
+    began = time.perf_counter()
+    advance = kernels(True).quadratic_steps
+    if not kernels_loaded():
+        with stage("compiling the kernels"), uncollected():
+            advance(*handed[:2], Packed(run._replace(end=t)), t, np.zeros(1), np.zeros((0, order + 1, n)))
+        _LOADED.append(True)
+    compiling = time.perf_counter() - began
+    if watch is not None:
+        watch(t, 0, lambda: (w.q, w.v))
+    ends, series = [np.array([t])], [np.zeros((0, order + 1, n))]
+    status = Status.MOST_STEPS if covered else Status.NOT_FINITE
+    while status == Status.MOST_STEPS and done < most:
+        T, C = np.empty(room + 1), np.empty((room, order + 1, n))
+        number, count, t = advance(*handed, t, T, C)
+        status = Status(number)
+        ends.append(T[1 : count + 1])
+        series.append(C[:count])
+        done += count
+        if status == Status.MOST_STEPS and watch is not None and not watch(t, done, lambda: (w.q, w.v)):
+            status = Status.STOPPED
+        room = min(2 * room, max(FIRST, MOST_NUMBERS // C[0].size if room else FIRST), most - done)
+    if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE):  # loads without a value there or just beyond say why
+        for ahead in (0.0, 1e-9, 1e-6):
+            d = sign * ahead * abs(end - start.time)
+            with np.errstate(all="ignore"):
+                system.force(t + d, w.q + d * w.v, w.v + 2.0 * d * w.Z[:n, 2])
+    statistics = {
+        "scheme": "Taylor series", "steps": done, "order": order, "backend": "compiled", "compile_seconds": compiling,
+    }  # fmt: skip
+    return Polynomials(np.concatenate(ends), np.concatenate(series)), status, statistics

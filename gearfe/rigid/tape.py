@@ -1,0 +1,282 @@
+"""Equations of motion as a tape: a list of elementary operations whose Taylor series follow from one another.
+
+The variables are z = (q, cos q_a, sin q_a for some angles q_a). Rows of constraints are quadratic in them,
+
+    g_r = c_r + sum_i L_ri z_i + sum B_rij z_i z_j - motion_r(t),
+
+forces are registers of the tape along variables: a register f along z_i with the factor w gives the coordinates the
+force w f dz_i/dq. Registers are sums, products, quotients, powers and other functions of registers before them, of
+variables, their rates and time. What `min`, `max`, `abs` and tables do changes at places of their own: they hold the
+piece that they are on, and steps end where it ends. (Moore's recurrences: Hairer, Norsett & Wanner I, Sec. I.8; Jorba &
+Zou, Exp. Math. 14 (2005) 99-117.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..typing import Array, IntArray
+from .tables import Times, time_arrays
+from .timefunctions import TimeFunction
+
+#: Operations: f a + g b + c; of the variables, of their rates; of time; products and so on, see `kernel_tape`.
+SUM, LINEAR, RATE, FUNCTION, MUL, DIV, POWER, EXP, LOG, SIN, COS, TANH, ANGLE, SIDE, SHIFT, ENTRY = range(16)
+#: Factors of variables by their numbers.
+Terms = Mapping[int, float]
+
+
+class Rows(NamedTuple):
+    """Constraints: p linear terms, b products."""
+
+    place: IntArray  # (p, 2) row, variable
+    factor: Array  # (p,)
+    pair: IntArray  # (b, 3) row, variable, variable
+    weight: Array  # (b,)
+    constant: Array  # (m,)
+    motion: IntArray  # (m,) function of time, -1 for none
+    unit: Array  # (m,) sizes that count as much as 1 rad
+
+
+class Code(NamedTuple):
+    """The registers."""
+
+    op: IntArray  # (registers, 4) operation and operands
+    factor: Array  # (registers, 3)
+    first: IntArray  # (leaves + 1,) terms of the linear forms of variables
+    variable: IntArray  # (terms,)
+    weight: Array  # (terms,)
+    push: IntArray  # (pushes, 2) register, variable that it acts along
+    share: Array  # (pushes,)
+
+
+class Switches(NamedTuple):
+    """Registers that choose among pieces: by their sign, or by the knots of a table."""
+
+    register: IntArray  # (s,)
+    first: IntArray  # (s + 1,) knots, of a table two or more
+    knot: Array
+    entry: Array  # (knots, 4) coefficients from a knot on, highest first
+    period: Array  # (s,) 0 for none
+
+
+class Program(NamedTuple):
+    """Everything that the kernels need, for n coordinates and m rows."""
+
+    mass: Array  # (n, n)
+    block: IntArray  # (e, 2) entries of damping and stiffness
+    damping: Array  # (e,)
+    stiffness: Array  # (e,)
+    constant: Array  # (n,) forces
+    unit: Array  # (n,) sizes of the coordinates
+    angle: IntArray  # (a,) coordinates whose cosine and sine are the variables n + 2a, n + 2a + 1
+    rows: Rows
+    code: Code
+    switches: Switches
+    times: Times
+
+
+class Tape:
+    """Writes the equations of a system; operations give the number of a register.
+
+    Parameters
+    ----------
+    size : int
+        Number of coordinates.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+        self.angles: dict[int, int] = {}
+        self.constant = np.zeros(size)
+        self._functions: list[TimeFunction] = []
+        self._rows: list[tuple[Terms, Sequence[tuple[int, int, float]], float, int, float]] = []
+        self._ops: list[tuple[int, int, int, int]] = []
+        self._factors: list[tuple[float, float, float]] = []
+        self._leaves: list[Terms] = []
+        self._pushes: list[tuple[int, int, float]] = []
+        self._switches: list[tuple[int, Array, Array, float]] = []
+        self._known: dict[tuple[object, ...], int] = {}
+
+    def turn(self, angle: int) -> tuple[int, int]:
+        """Variables that are cosine and sine of the coordinate `angle`."""
+        at = self.size + 2 * self.angles.setdefault(angle, len(self.angles))
+        return at, at + 1
+
+    def row(
+        self, terms: Terms, products: Sequence[tuple[int, int, float]] = (), constant: float = 0.0,
+        motion: TimeFunction | None = None, unit: float = 1.0,
+    ) -> None:  # fmt: skip
+        """A constraint."""
+        self._rows.append((terms, products, constant, -1 if motion is None else self._numbered(motion), unit))
+
+    def push(self, register: int, terms: Terms) -> None:
+        """The force of a register along a form of the variables."""
+        self._pushes += [(register, variable, factor) for variable, factor in terms.items()]
+
+    # leaves ---------------------------------------------------------------------------------------------------
+    def number(self, value: float) -> int:
+        """A constant."""
+        return self._register(SUM, factors=(0.0, 0.0, float(value)))
+
+    def linear(self, terms: Terms, constant: float = 0.0) -> int:
+        """A form of the variables."""
+        return self._leaf(LINEAR, terms, constant)
+
+    def rate(self, terms: Terms) -> int:
+        """Its rate."""
+        return self._leaf(RATE, terms, 0.0)
+
+    def function(self, function: TimeFunction) -> int:
+        """A function of time."""
+        return self._register(FUNCTION, self._numbered(function))
+
+    # operations -----------------------------------------------------------------------------------------------
+    def sum(self, a: int, b: int = -1, *, f: float = 1.0, g: float = 1.0, c: float = 0.0) -> int:
+        """f a + g b + c."""
+        return self._register(SUM, a, b, factors=(f, g if b >= 0 else 0.0, c))
+
+    def mul(self, a: int, b: int) -> int:
+        """a b."""
+        return self._register(MUL, a, b)
+
+    def div(self, a: int, b: int) -> int:
+        """a / b."""
+        return self._register(DIV, a, b)
+
+    def power(self, a: int, exponent: float) -> int:
+        """a to a constant power; small whole ones by products, which have values at zero, too."""
+        whole = int(exponent)
+        if whole != exponent or abs(whole) > 64:
+            return self._register(POWER, a, factors=(exponent, 0.0, 0.0))
+        if whole < 0:
+            return self.div(self.number(1.0), self.power(a, float(-whole)))
+        if whole < 2:
+            return a if whole else self.number(1.0)
+        half = self.power(a, float(whole // 2))
+        square = self.mul(half, half)
+        return self.mul(square, a) if whole % 2 else square
+
+    def exp(self, a: int) -> int:
+        """e to a."""
+        return self._register(EXP, a)
+
+    def log(self, a: int) -> int:
+        """Natural logarithm."""
+        return self._register(LOG, a)
+
+    def sincos(self, a: int) -> tuple[int, int]:
+        """Sine and cosine."""
+        if (SIN, a) not in self._known:
+            at = len(self._ops)
+            self._known[SIN, a] = self._append(SIN, a, at + 1)
+            self._append(COS, a, at)
+        at = self._known[SIN, a]
+        return at, at + 1
+
+    def tanh(self, a: int) -> int:
+        """Hyperbolic tangent y: y' = (1 - y^2) a'."""
+        if (TANH, a) not in self._known:
+            at = self._known[TANH, a] = self._append(TANH, a, len(self._ops) + 2)
+            self._append(MUL, at, at)
+            self._append(SUM, at + 1, -1, factors=(-1.0, 0.0, 1.0))
+        return self._known[TANH, a]
+
+    def angle(self, y: int, x: int) -> int:
+        """atan2(y, x)."""
+        square = self.sum(self.mul(x, x), self.mul(y, y))
+        return self._register(ANGLE, y, x, square)
+
+    def magnitude(self, a: int) -> int:
+        """|a|."""
+        if (SIDE, a) not in self._known:
+            self._known[SIDE, a] = self._append(SIDE, a, self._switch(a, np.zeros(0), np.zeros((0, 4)), 0.0))
+        return self._known[SIDE, a]
+
+    def larger(self, a: int, b: int, sign: float = 1.0) -> int:
+        """max(a, b); min(a, b) with the sign -1."""
+        gap = self.magnitude(self.sum(a, b, g=-1.0))
+        return self.sum(self.sum(a, b, f=0.5, g=0.5), gap, g=0.5 * sign)
+
+    def table(self, a: int, knots: Array, entries: Array, period: float = 0.0) -> int:
+        """Piecewise cubic in a with those coefficients (knots - 1, 4) of powers of a - knot, highest first."""
+        number = self._switch(a, knots, np.vstack([entries, np.zeros(4)]), period)
+        shifted = self._append(SHIFT, a, number)
+        made = self._append(ENTRY, number, 0)
+        for k in range(1, 4):
+            made = self.sum(self.mul(made, shifted), self._append(ENTRY, number, k))
+        return made
+
+    # ----------------------------------------------------------------------------------------------------------
+    def _numbered(self, function: TimeFunction) -> int:
+        self._functions.append(function)
+        return len(self._functions) - 1
+
+    def _leaf(self, kind: int, terms: Terms, constant: float) -> int:
+        key = (kind, tuple(sorted(terms.items())), constant)
+        if key not in self._known:
+            self._leaves.append(terms)
+            self._known[key] = self._append(kind, len(self._leaves) - 1, factors=(0.0, 0.0, constant))
+        return self._known[key]
+
+    def _register(
+        self, op: int, a: int = -1, b: int = -1, c: int = -1, factors: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    ) -> int:
+        key = (op, a, b, c, factors)
+        if key not in self._known:
+            self._known[key] = self._append(op, a, b, c, factors)
+        return self._known[key]
+
+    def _append(
+        self, op: int, a: int = -1, b: int = -1, c: int = -1, factors: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    ) -> int:
+        self._ops.append((op, a, b, c))
+        self._factors.append(factors)
+        return len(self._ops) - 1
+
+    def _switch(self, register: int, knots: Array, entries: Array, period: float) -> int:
+        self._switches.append((register, knots, entries, period))
+        return len(self._switches) - 1
+
+    def program(self, mass: Array, damping: Array, stiffness: Array, unit: Array) -> Program:
+        """Everything written, with the constant matrices of the system."""
+        linear = [(r, i, f) for r, row in enumerate(self._rows) for i, f in row[0].items() if f != 0.0]
+        products = [(r, i, j, f) for r, row in enumerate(self._rows) for i, j, f in row[1] if f != 0.0]
+        rows = Rows(
+            _ints([p[:2] for p in linear], 2),
+            np.array([p[2] for p in linear], dtype=float),
+            _ints([p[:3] for p in products], 3),
+            np.array([p[3] for p in products], dtype=float),
+            np.array([row[2] for row in self._rows], dtype=float),
+            np.array([row[3] for row in self._rows], dtype=np.int64),
+            np.array([row[4] for row in self._rows], dtype=float),
+        )
+        terms = [term for leaf in self._leaves for term in leaf.items()]
+        code = Code(
+            _ints(self._ops, 4),
+            np.array(self._factors, dtype=float).reshape(-1, 3),
+            np.cumsum([0, *(len(leaf) for leaf in self._leaves)]).astype(np.int64),
+            np.array([i for i, _ in terms], dtype=np.int64),
+            np.array([f for _, f in terms], dtype=float),
+            _ints([p[:2] for p in self._pushes], 2),
+            np.array([p[2] for p in self._pushes], dtype=float),
+        )
+        switches = Switches(
+            np.array([s[0] for s in self._switches], dtype=np.int64),
+            np.cumsum([0, *(len(s[1]) for s in self._switches)]).astype(np.int64),
+            np.concatenate([np.zeros(0), *(s[1] for s in self._switches)]),
+            np.concatenate([np.zeros((0, 4)), *(s[2] for s in self._switches)]),
+            np.array([s[3] for s in self._switches], dtype=float),
+        )
+        block = np.argwhere((damping != 0.0) | (stiffness != 0.0)).astype(np.int64)
+        at = tuple(block.T)
+        return Program(
+            np.ascontiguousarray(mass), np.ascontiguousarray(block), damping[at], stiffness[at], self.constant, unit,
+            np.array(list(self.angles), dtype=np.int64), rows, code, switches, time_arrays(self._functions),
+        )  # fmt: skip
+
+
+def _ints(values: Sequence[Sequence[int]], width: int) -> IntArray:
+    return np.array(values, dtype=np.int64).reshape(-1, width)
