@@ -17,6 +17,26 @@ from gearfe.runup.balance import Oscillator, Pushes
 from gearfe.runup.linear import Linear
 
 
+def synthesis(amplitudes: np.ndarray, samples: int) -> np.ndarray:
+    """Values of ``Re sum a_k exp(i k theta)`` at even places of one phase."""
+    spectrum = np.zeros((samples // 2 + 1, amplitudes.shape[1]), dtype=complex)
+    spectrum[: len(amplitudes)] = 0.5 * samples * amplitudes
+    spectrum[0] *= 2.0
+    return np.asarray(np.fft.irfft(spectrum, samples, axis=0))
+
+
+def analysis(values: np.ndarray) -> np.ndarray:
+    """Complex amplitudes of values at even places of one phase."""
+    made = np.fft.rfft(values, axis=0) * (2.0 / len(values))
+    made[0] *= 0.5
+    return np.asarray(made)
+
+
+def rates(amplitudes: np.ndarray, omega0: float) -> np.ndarray:
+    """Amplitudes of the time derivative."""
+    return np.asarray(1j * omega0 * np.arange(len(amplitudes))[:, None] * amplitudes)
+
+
 @dataclass(frozen=True)
 class Single:
     """``x'' + 2 z x' + force(theta, x) = load + swing cos(theta)``, natural frequency 1 where the force is x."""
@@ -29,7 +49,7 @@ class Single:
     phase: float = 0.0
 
     def __call__(self, theta, speed, u, du):  # type: ignore[no-untyped-def]
-        x = u[:, 0]
+        x, theta = u[:, 0], theta[:, 0]
         push = self.swing * np.cos(theta + self.phase) + x - self.force(theta + self.phase, x)
         return Pushes(push[:, None], (1.0 - self.slope(theta + self.phase, x))[:, None, None], None)
 
@@ -37,7 +57,7 @@ class Single:
     def oscillator(self) -> Oscillator:
         one = np.ones((1, 1))
         linear = Linear(np.ones(1), 2.0 * self.damping * one, one, self.load * np.ones(1))
-        return Oscillator(linear, self, 1.0, np.ones(1))
+        return Oscillator(linear, self, (1.0,), np.ones(1))
 
     def rhs(self, speed):  # type: ignore[no-untyped-def]
         def made(t, y):  # type: ignore[no-untyped-def]

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.runup.balance import Oscillator, error_of, rates, settled, solve, synthesis
+from gearfe.runup.balance import Oscillator, error_of, settled, solve
 from gearfe.runup.follow import follow
 from gearfe.runup.linear import Linear
 
-from .oscillators import around, duffing, meshing, shooting, turning_speed
+from .oscillators import around, duffing, meshing, rates, shooting, synthesis, turning_speed
 
 
 def start_of(orbit, samples=64):  # type: ignore[no-untyped-def]

@@ -72,10 +72,10 @@ def test_a_sum_resonance_of_two_modes():
     damping = np.diag([0.01, 0.02])
 
     def forces(theta, speed, u, du):  # type: ignore[no-untyped-def]
-        k = e * np.cos(theta)
+        k = e * np.cos(theta[:, 0])
         return Pushes(-k[:, None] * u, -k[:, None, None], None)
 
-    system = Oscillator(Linear(squares, damping, places, np.zeros(2)), forces, 1.0, np.ones(1))
+    system = Oscillator(Linear(squares, damping, places, np.zeros(2)), forces, (1.0,), np.ones(1))
     speed = 3.3
     orbit, _ = settled(system, *solve(system, speed, np.zeros((9, 1), dtype=complex), 1e-6), 1e-6)
 

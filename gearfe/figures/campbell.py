@@ -10,7 +10,7 @@ import numpy as np
 
 from ..runup.instability import InstabilityMap
 from ..runup.modes import STRONG, CoupledModes, Crossing
-from ..runup.report import orders
+from ..runup.report import orders, waterfall
 from ..runup.run_up import RunUp
 from .style import BLUE, COLOURS, GREY, RED, new_figure, save, tidy
 
@@ -31,13 +31,10 @@ def draw_waterfall(path: Path, run: RunUp, multiples: int, bore: int, title: str
     from matplotlib.collections import LineCollection
 
     swept = sorted(run.sweep(), key=lambda s: s.speed)
-    lines = max(int((s.frequency <= run.band_hz).sum()) for s in swept)
-    frequency, level = np.full((len(swept), lines), np.nan), np.full((len(swept), lines), np.nan)
-    for row, s in enumerate(swept):
-        count = int((s.frequency <= run.band_hz).sum())
-        frequency[row, :count] = 1e-3 * s.frequency[:count]
-        size = np.maximum(np.abs(s.acceleration[:count, bore]), 1e-12)
-        level[row, :count] = 20.0 * np.log10(size / math.sqrt(2.0) / REFERENCE)
+    made = waterfall(run, swept)
+    frequency = 1e-3 * made["frequency_Hz"]
+    size = np.maximum(made["acceleration_m_per_s2"][..., bore], 1e-12)  # not-a-number stays
+    level = 20.0 * np.log10(size / math.sqrt(2.0) / REFERENCE)
     speed, highest = np.array([s.speed for s in swept]), 1e-3 * run.band_hz
     name = run.train.model.bores[bore]
     figure = new_figure(10.5, 6.4)
@@ -125,11 +122,11 @@ def draw_instability(path: Path, made: InstabilityMap, title: str) -> None:
 
 
 def order_lines(run: RunUp, multiples: int) -> list[OrderLine]:
-    """Lines of the meshes' orders, one for those that agree."""
+    """Lines of the multiples of the meshes' frequencies, one for those that agree."""
     made = []
-    for k, names in orders(run, multiples).items():
-        slope = 1e-3 * k / run.train.system.turns / (2.0 * math.pi)
-        made.append(OrderLine(names[0].replace(" x mesh ", "×m"), slope, int(names[0].rsplit(" ", 1)[1]) - 1))
+    for cut in orders(run, multiples):
+        if cut.mesh is not None:
+            made.append(OrderLine(cut.names[0].replace(" x mesh ", "×m"), 1e-3 * cut.order / (2.0 * math.pi), cut.mesh))
     return made
 
 

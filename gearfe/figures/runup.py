@@ -56,9 +56,9 @@ def draw_orders(path: Path, run: RunUp, multiples: int, bore: int, title: str) -
     """Order cuts of one attachment and its rms, on all branches."""
     cut = orders(run, multiples)
     size: dict[str, Pieces] = {}
-    for k, names in cut.items():
-        values = [_line(s, k, bore) for s in run.states]
-        size[f"{k / run.train.system.turns:.4g} ({names[0]})"] = _pieces(run, values)
+    for one in cut:
+        values = [_line(s, one.waves, bore) for s in run.states]
+        size[f"{one.order:.4g} ({one.names[0]})"] = _pieces(run, values)
     top = {name: float(np.nanmax(np.where(p.branch % 2 == 0, p.value, np.nan))) for name, p in size.items()}
     loudest = sorted(size, key=lambda name: -top[name])[:4]
     name = run.train.model.bores[bore]
@@ -149,8 +149,9 @@ def _curves(
     return figure
 
 
-def _line(state: SteadyState, harmonic: int, bore: int) -> float:
-    return float(np.abs(state.acceleration[harmonic, bore])) if harmonic < len(state.order) else math.nan
+def _line(state: SteadyState, waves: tuple[int, ...], bore: int) -> float:
+    number = state.numbers.get(waves)
+    return math.nan if number is None else float(np.abs(state.acceleration[number, bore]))
 
 
 def _pieces(run: RunUp, values: Sequence[float] | Array) -> Pieces:

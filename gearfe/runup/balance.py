@@ -1,17 +1,21 @@
-r"""Periodic motions by harmonic balance: linear behind a few freedoms, everything else evaluated in time.
+r"""Steady motions by harmonic balance: linear behind a few freedoms, everything else evaluated in time.
 
-With the harmonics :math:`u(\theta) = \mathrm{Re}\sum_k \hat u_k e^{ik\theta}`, :math:`\theta = \omega_0 t`, of the
-freedoms and the forces :math:`f(\theta, u, \dot u)`,
+With the harmonics :math:`u(\theta) = \mathrm{Re}\sum_k \hat u_k e^{ik\cdot\theta}`, :math:`\theta = \omega t`, of the
+freedoms and the forces :math:`f(\theta, u, \dot u)` over one phase (a periodic motion) or several (a quasi-periodic
+one; Schilder, Vogt, Schreiber & Osinga, Int. J. Numer. Meth. Eng. 67, 2006; Guskov & Thouverez, J. Vib. Acoust. 134,
+2012; Krack & Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019),
 
 .. math::
-    r_k = \hat u_k - \hat u^0_k - H(ik\omega_0)\,\hat f_k(\hat u) = 0 ,\qquad k = 0 \dots K .
+    r_k = \hat u_k - \hat u^0_k - H(ik\cdot\omega)\,\hat f_k(\hat u) = 0
 
-Forces are sampled over the period and transformed (alternating frequency/time; Cameron & Griffin, J. Appl. Mech. 56,
+for the first K harmonics of `gearfe.runup.torus`.
+
+Forces are sampled over the phases and transformed (alternating frequency/time; Cameron & Griffin, J. Appl. Mech. 56,
 1989). Newton's method takes their derivatives from the same samples: with the Fourier coefficients g of df/du,
 
 .. math:: \delta\hat f_k = \sum_l g_{k-l}\,\delta\hat u_l + g_{k+l}\,\overline{\delta\hat u_l} .
 
-Harmonics at which the forces' changes move the freedoms little are no unknowns of Newton's method but follow by
+Amplitudes whose change comes back little through the forces are no unknowns of Newton's method but follow by
 substitution, which converges there by itself. The error is estimated from what is left of the equations with twice the
 harmonics and four times the samples.
 """
@@ -20,13 +24,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
-from ..typing import Array, BoolArray, ComplexArray, IntArray
+from ..typing import Array, ComplexArray, IntArray
+from . import torus
 from .linear import Linear
+from .torus import Lattice
 
 #: Newton steps, and halvings of one of them.
 STEPS, HALVINGS = 60, 8
@@ -37,32 +44,30 @@ FOUND = 3e-2
 IDLE, LEFT = 8, 1e-4
 #: A step that leaves more than this of the residual asks for a new Jacobian.
 SLOW = 0.2
-#: Harmonics are unknowns of Newton's method where a change of them comes back larger than this through the forces, and
-#: they are larger than this part of the scale.
+#: Amplitudes are unknowns of Newton's method where a change of them comes back larger than this through the forces, and
+#: their harmonic is larger than this part of the scale.
 COMES_BACK, PRESENT = 0.1, 1e-7
-#: Samples of the period for each harmonic of the highest.
-SAMPLES = 4
 #: The error estimate is multiplied by this.
 SAFETY = 2.0
 #: Where the estimate misses the tolerance, harmonics grow by this factor.
 GROWTH = 1.5
-#: Most harmonics, and most unknown ones.
-MOST_HARMONICS, MOST_UNKNOWN = 4096, 400
+#: Most harmonics, and most unknown amplitudes.
+MOST_HARMONICS, MOST_UNKNOWN = 4096, 800
 
 
 class Pushes(NamedTuple):
-    """Forces at S places of the period, and their derivatives."""
+    """Forces at S places of the phases, and their derivatives."""
 
     value: Array  # (S, m)
     by_place: Array  # (S, m, m): of force i with freedom j
     by_rate: Array | None  # (S, m, m)
 
 
-class PeriodicForces(Protocol):
+class SteadyForces(Protocol):
     """What is not linear, or not constant."""
 
     def __call__(self, theta: Array, speed: float, u: Array, du: Array) -> Pushes:
-        """Forces at theta (S,), the freedoms and their rates (1/s) being u and du, (S, m)."""
+        """Forces at phases theta (S, n), the freedoms and their rates (1/s) being u and du, (S, m)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,46 +78,57 @@ class Oscillator:
     ----------
     linear, forces
         Its parts.
-    turns
-        Turns of the drive in one period: ``omega0 = |speed| / turns``.
+    turns : (n,)
+        Turns of the drive in one period of each phase: ``omega = |speed| / turns``.
     scale : (m,)
         Size of each freedom, by which errors are measured.
-    orders
-        Harmonics of the period that excite: mesh cycles in a period.
+    orders : (meshes, n)
+        Harmonics that excite, one for each mesh: its cycles in a period of its phase.
     limit
         Largest motion that means something, in parts of the scale.
     """
 
     linear: Linear
-    forces: PeriodicForces
-    turns: float
+    forces: SteadyForces
+    turns: tuple[float, ...]
     scale: Array
-    orders: tuple[int, ...] = (1,)
+    orders: tuple[tuple[int, ...], ...] = ((1,),)
     limit: float = math.inf
 
-    def omega0(self, speed: float) -> float:
-        """Angular frequency of the period (rad/s)."""
-        return abs(speed) / self.turns
+    @cached_property
+    def periods(self) -> tuple[float, ...]:
+        """Of the phases, in parts of that of the first."""
+        return tuple(turns / self.turns[0] for turns in self.turns)
+
+    def omega(self, speed: float, count: int) -> Array:
+        """Angular frequencies (rad/s) of the harmonics 0 to `count`, none negative."""
+        waves, _ = torus.harmonics(self.periods, count)
+        return np.asarray((waves * (abs(speed) / np.array(self.turns))).sum(axis=1))
+
+    def lattice(self, count: int) -> Lattice:
+        """Places at which so many harmonics are sampled."""
+        return torus.lattice(self.periods, count)
 
     def harmonics(self, speed: float, highest: float) -> int:
-        """Harmonics up to an angular frequency (rad/s), and eight of each order at least."""
-        return rounded(max(8 * max(self.orders), highest / self.omega0(speed)))
+        """Number of harmonics with the multiples up to an angular frequency (rad/s), eight of each mesh at least."""
+        least = (8 * cycles / b for mesh in self.orders for cycles, b in zip(mesh, self.periods, strict=True))
+        return rounded(torus.count_below(self.periods, max(*least, highest * self.turns[0] / abs(speed))))
 
     def flexibility(self, speed: float, count: int) -> ComplexArray:
         """H at harmonics 0 to `count`, (count + 1, m, m)."""
-        return self.linear.flexibility(np.arange(count + 1) * self.omega0(speed), speed)
+        return self.linear.flexibility(self.omega(speed, count), speed)
 
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """A periodic motion.
+    """A periodic or quasi-periodic motion.
 
     Attributes
     ----------
     speed
         Of the drive (rad/s).
     places : (K + 1, m)
-        Complex amplitudes of the freedoms at the harmonics 0 to K of the period.
+        Complex amplitudes of the freedoms at the harmonics 0 to K.
     forces : (K + 1, m)
         Of the forces on them.
     error
@@ -140,15 +156,37 @@ class Orbit:
         return widened(self.places, count)
 
 
-class Newton(NamedTuple):
-    """The Jacobian of some unknown harmonics, factorised."""
+class Unknowns(NamedTuple):
+    """Amplitudes that Newton's method finds: (u,) numbers of harmonics, rising, and of freedoms."""
 
-    waves: IntArray
+    lines: IntArray
+    freedoms: IntArray
+
+    def packed(self, amplitudes: ComplexArray, scale: Array) -> Array:
+        """Real unknowns in parts of the scale: all real parts, then the imaginary ones but those of the constant."""
+        a = amplitudes[self.lines, self.freedoms] / scale[self.freedoms]
+        return np.concatenate([a.real, a[self.lines > 0].imag])
+
+    def unpacked(self, x: Array, scale: Array) -> ComplexArray:
+        """(u,) amplitudes: the reverse of `packed`."""
+        u = len(self.lines)
+        made = x[:u].astype(complex)
+        made[self.lines > 0] += 1j * x[u:]
+        return np.asarray(made * scale[self.freedoms])
+
+
+class Newton(NamedTuple):
+    """The Jacobian of some unknowns, factorised."""
+
+    unknowns: Unknowns
     factors: tuple[Array, Array]
 
-    def __call__(self, residual: Array) -> Array:
-        """Jacobian's inverse times a vector."""
-        return np.asarray(lu_solve(self.factors, residual, check_finite=False))
+    def step(self, residual: ComplexArray, scale: Array) -> ComplexArray:
+        """Change of all amplitudes: that of Newton's method, and by substitution where they are no unknowns."""
+        made, at = -residual, self.unknowns
+        found = lu_solve(self.factors, at.packed(residual, scale), check_finite=False)
+        made[at.lines, at.freedoms] = -at.unpacked(found, scale)
+        return made
 
 
 class Evaluated(NamedTuple):
@@ -157,6 +195,7 @@ class Evaluated(NamedTuple):
     residual: ComplexArray  # (K + 1, m)
     forces: ComplexArray  # (K + 1, m)
     pushes: Pushes
+    lattice: Lattice
 
 
 def widened(amplitudes: ComplexArray, count: int) -> ComplexArray:
@@ -167,46 +206,20 @@ def widened(amplitudes: ComplexArray, count: int) -> ComplexArray:
     return made
 
 
-def synthesis(amplitudes: ComplexArray, samples: int) -> Array:
-    """(samples, m) values of ``Re sum a_k exp(i k theta)`` at even places."""
-    spectrum = np.zeros((samples // 2 + 1, amplitudes.shape[1]), dtype=complex)
-    spectrum[: len(amplitudes)] = 0.5 * samples * amplitudes
-    spectrum[0] *= 2.0
-    return np.asarray(np.fft.irfft(spectrum, samples, axis=0))
-
-
-def analysis(values: Array) -> ComplexArray:
-    """(samples // 2 + 1, ...) complex amplitudes of values at even places."""
-    made = np.fft.rfft(values, axis=0) * (2.0 / len(values))
-    made[0] *= 0.5
-    return np.asarray(made)
-
-
 def rounded(harmonics: float) -> int:
     """Number of harmonics whose samples transform quickly, at least as many as asked for but for the most."""
     return min(8 * math.ceil(harmonics / 8), MOST_HARMONICS)
 
 
-def samples_of(harmonics: int) -> int:
-    """Even number of samples of a period."""
-    return 2 * math.ceil(0.5 * SAMPLES * max(harmonics, 16))
-
-
-def rates(amplitudes: ComplexArray, omega0: float) -> ComplexArray:
-    """Amplitudes of the time derivative."""
-    made: ComplexArray = 1j * omega0 * np.arange(len(amplitudes))[:, None] * amplitudes
-    return made
-
-
 def evaluate(
-    system: Oscillator, speed: float, places: ComplexArray, samples: int, flexibility: ComplexArray
+    system: Oscillator, speed: float, places: ComplexArray, lattice: Lattice, flexibility: ComplexArray
 ) -> Evaluated:
     """What is left of the equations."""
-    theta = 2.0 * math.pi * np.arange(samples) / samples
-    u, du = synthesis(places, samples), synthesis(rates(places, system.omega0(speed)), samples)
-    pushes = system.forces(theta, speed, u, du)
-    forces = analysis(pushes.value)[: len(places)]
-    return Evaluated(places - moved(system, flexibility, forces), forces, pushes)
+    turning = 1j * system.omega(speed, len(places) - 1)[:, None]
+    u, du = lattice.synthesis(places), lattice.synthesis(turning * places)
+    pushes = system.forces(lattice.theta, speed, u, du)
+    forces = lattice.analysis(pushes.value)[: len(places)]
+    return Evaluated(places - moved(system, flexibility, forces), forces, pushes, lattice)
 
 
 def moved(system: Oscillator, flexibility: ComplexArray, forces: ComplexArray) -> ComplexArray:
@@ -216,41 +229,35 @@ def moved(system: Oscillator, flexibility: ComplexArray, forces: ComplexArray) -
     return np.asarray(made)
 
 
-def jacobian(system: Oscillator, speed: float, waves: IntArray, pushes: Pushes, flexibility: ComplexArray) -> Array:
-    """Derivative of the residual of some harmonics with these, in parts of the scale, over `packed` unknowns."""
-    samples, k, m = len(pushes.value), len(waves), system.linear.size
-    near, far = (waves[:, None] - waves[None, :]) % samples, (waves[:, None] + waves[None, :]) % samples
-    ratio = system.scale[None, :] / system.scale[:, None]
-    g = np.fft.fft(pushes.by_place, axis=0) / samples
-    A, B = g[near], g[far]  # (k, l, m, m)
-    if pushes.by_rate is not None:
-        g, turning = np.fft.fft(pushes.by_rate, axis=0) / samples, 1j * system.omega0(speed) * waves
-        A = A + g[near] * turning[None, :, None, None]
-        B = B - g[far] * turning[None, :, None, None]
-    A[0] *= 0.5
-    B[0] *= 0.5
-    H = flexibility[waves] * ratio
-    A, B = (H @ (x * ratio).transpose(0, 2, 1, 3).reshape(k, m, k * m) for x in (A, B))
-    A, B = (x.reshape(k * m, k * m) for x in (A, B))
-    plus, minus = A + B, 1j * (A - B)
-    made = -np.block([[plus.real, minus[:, m:].real], [plus[m:].imag, minus[m:, m:].imag]])
+def jacobian(system: Oscillator, speed: float, unknowns: Unknowns, at: Evaluated, flexibility: ComplexArray) -> Array:
+    """Derivative of the residual of the unknowns with these, in parts of the scale, over `packed` ones."""
+    pushes, samples, scale = at.pushes, len(at.pushes.value), system.scale
+    lines, freedoms, u = unknowns.lines, unknowns.freedoms, len(unknowns.lines)
+    residue, turning = at.lattice.residue[lines], 1j * system.omega(speed, int(lines.max()))[lines]
+    half = np.where(lines == 0, 0.5, 1.0)
+    plus, minus = np.empty((u, u), dtype=complex), np.empty((u, u), dtype=complex)
+    for j in np.unique(freedoms):
+        by = np.flatnonzero(freedoms == j)
+        near, far = (residue[:, None] - residue[by]) % samples, (residue[:, None] + residue[by]) % samples
+        A, B = np.zeros(near.shape, dtype=complex), np.zeros(near.shape, dtype=complex)
+        for i in range(len(scale)):
+            H = (half * flexibility[lines, freedoms, i] * scale[j] / scale[freedoms])[:, None]
+            place, rate = pushes.by_place[:, i, j], None if pushes.by_rate is None else pushes.by_rate[:, i, j]
+            if place.any():
+                g = np.fft.fft(place) / samples
+                A += H * g[near]
+                B += H * g[far]
+            if rate is not None and rate.any():
+                g = np.fft.fft(rate) / samples
+                A += H * g[near] * turning[by]
+                B -= H * g[far] * turning[by]
+        plus[:, by], minus[:, by] = A + B, A - B
+    wave = lines > 0
+    made = np.empty((u + wave.sum(), u + wave.sum()))
+    made[:u, :u], made[:u, u:] = -plus.real, minus[:, wave].imag
+    made[u:, :u], made[u:, u:] = -plus[wave].imag, -minus[np.ix_(wave, wave)].real
     made[np.diag_indices(len(made))] += 1.0
-    return np.asarray(made)
-
-
-def packed(amplitudes: ComplexArray, scale: Array) -> Array:
-    """Real unknowns in parts of the scale: all real parts, then the imaginary ones but that of the mean."""
-    a = amplitudes / scale
-    return np.concatenate([a.real.ravel(), a[1:].imag.ravel()])
-
-
-def unpacked(x: Array, scale: Array) -> ComplexArray:
-    """The reverse of `packed`."""
-    m = len(scale)
-    count = (len(x) // m + 1) // 2
-    made = x[: count * m].reshape(count, m).astype(complex)
-    made[1:] += 1j * x[count * m :].reshape(count - 1, m)
-    return np.asarray(made * scale)
+    return made
 
 
 def flexibility_of(system: Oscillator, speed: float, count: int) -> ComplexArray:
@@ -258,29 +265,34 @@ def flexibility_of(system: Oscillator, speed: float, count: int) -> ComplexArray
     return system.flexibility(speed, 2 * count)[: count + 1]
 
 
-def unknown_waves(
-    system: Oscillator, places: ComplexArray, pushes: Pushes, flexibility: ComplexArray, least: float = COMES_BACK
-) -> IntArray:
-    """Harmonics that need Newton's method: where this part of a change comes back through the forces, and which are
-    there.
+def unknowns_of(
+    system: Oscillator, speed: float, places: ComplexArray, at: Evaluated, flexibility: ComplexArray,
+    least: float = COMES_BACK,
+) -> Unknowns:  # fmt: skip
+    """Amplitudes that need Newton's method: where this part of a change comes back through the forces, of harmonics
+    that are there; and the constant of all freedoms.
     """
     ratio = system.scale[None, :] / system.scale[:, None]
-    strength = np.abs(pushes.by_place).mean(axis=0) * ratio
-    back = ((np.abs(flexibility) * ratio) @ strength).sum(axis=2).max(axis=1)
-    there: BoolArray = np.abs(places / system.scale).max(axis=1) > PRESENT
-    taken = there & (back > least)
+    strength = np.abs(at.pushes.by_place).mean(axis=0) * ratio
+    if at.pushes.by_rate is not None:
+        omega = system.omega(speed, len(places) - 1)[:, None, None]
+        strength = strength + omega * np.abs(at.pushes.by_rate).mean(axis=0) * ratio
+    back = (np.abs(flexibility) * ratio) @ strength  # (K + 1, m, m)
+    acts = (back.sum(axis=1) > least).any(axis=0)
+    size = np.abs(places / system.scale).max(axis=1, keepdims=True)
+    gain = back[:, acts].sum(axis=1) * (size > PRESENT)
+    taken = gain > least
+    if taken.sum() > MOST_UNKNOWN:
+        taken = taken & (gain * size >= np.sort((gain * size)[taken])[-MOST_UNKNOWN])
     taken[0] = True
-    found = np.flatnonzero(taken)
-    if len(found) > MOST_UNKNOWN:
-        strongest = np.argsort(-(back * np.abs(places / system.scale).max(axis=1))[found], kind="stable")
-        found = np.union1d([0], found[strongest[:MOST_UNKNOWN]])
-    return found
+    lines, freedoms = np.nonzero(taken)
+    return Unknowns(lines, freedoms)
 
 
-def newton(system: Oscillator, speed: float, waves: IntArray, pushes: Pushes, flexibility: ComplexArray) -> Newton:
+def newton(system: Oscillator, speed: float, unknowns: Unknowns, at: Evaluated, flexibility: ComplexArray) -> Newton:
     """Factorised Jacobian."""
-    J = jacobian(system, speed, waves, pushes, flexibility)
-    return Newton(waves, lu_factor(J, check_finite=False))
+    J = jacobian(system, speed, unknowns, at, flexibility)
+    return Newton(unknowns, lu_factor(J, overwrite_a=True, check_finite=False))
 
 
 def size_of(amplitudes: ComplexArray, scale: Array) -> float:
@@ -309,25 +321,24 @@ def solve(
         A Jacobian to begin with, such as that of a neighbouring speed; a new one is made where it is too slow.
     """
     count = len(guess) - 1
-    H, samples, scale = flexibility_of(system, speed, count), samples_of(count), system.scale
+    H, lattice, scale = flexibility_of(system, speed, count), system.lattice(count), system.scale
     places = guess.copy()
     places[0] = places[0].real
-    at = evaluate(system, speed, places, samples, H)
+    at = evaluate(system, speed, places, lattice, H)
     size, fresh, taken = size_of(at.residual, scale), False, 0
     best, idle = (size, places, at.forces), 0
-    if before is not None and before.waves[-1] > count:
+    if before is not None and before.unknowns.lines[-1] > count:
         before = None
     enough = FOUND * tolerance
     while size >= enough and taken < steps and idle < IDLE and math.isfinite(size):
         if before is None:
-            waves = unknown_waves(system, places, at.pushes, H)
-            before, fresh = newton(system, speed, waves, at.pushes, H), True
+            before = newton(system, speed, unknowns_of(system, speed, places, at, H), at, H)
+            fresh = True
         taken += 1
-        step = -at.residual
-        step[before.waves] = unpacked(-before(packed(at.residual[before.waves], scale)), scale)
+        step = before.step(at.residual, scale)
         part = 1.0
         for _ in range(HALVINGS if fresh else 1):
-            new = evaluate(system, speed, places + part * step, samples, H)
+            new = evaluate(system, speed, places + part * step, lattice, H)
             left = size_of(new.residual, scale)
             if left <= (1.0 - 0.1 * part) * size:
                 break
@@ -355,11 +366,10 @@ def error_of(system: Oscillator, orbit: Orbit, before: Newton | None) -> tuple[f
     count = 2 * orbit.harmonics
     H = system.flexibility(orbit.speed, count)
     places = orbit.with_harmonics(count)
-    left = evaluate(system, orbit.speed, places, samples_of(2 * count), H)
+    left = evaluate(system, orbit.speed, places, system.lattice(2 * count), H)
     if before is None:
-        before = newton(system, orbit.speed, unknown_waves(system, places, left.pushes, H), left.pushes, H)
-    step = -left.residual
-    step[before.waves] = unpacked(-before(packed(left.residual[before.waves], system.scale)), system.scale)
+        before = newton(system, orbit.speed, unknowns_of(system, orbit.speed, places, left, H), left, H)
+    step = before.step(left.residual, system.scale)
     return SAFETY * size_of(step, system.scale), places + step
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cached_property, partial
 
 import numpy as np
@@ -14,13 +13,18 @@ from ..errors import InputError
 from ..gear.mesh_geometry import MeshGeometry
 from ..train.forces import CurveFlank, LawFlank
 from ..train.friction import Lubrication
-from ..train.kinematics import drive_sense, fastest, steady_forces
+from ..train.kinematics import drive_sense, fastest, mesh_phases, steady_forces
 from ..train.model import TrainModel
 from ..train.simulate import DIVERGED
 from ..typing import Array
 from .balance import Oscillator
 from .linear import Linear
 from .mesh_forces import MeshForces, Rubbing
+
+#: Meshes whose common period is of no more cycles share a phase: two phases then cost more than the longer period.
+SHARED = 12
+#: Most phases: harmonics and samples grow with their number.
+MOST_PHASES = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,18 +66,25 @@ class CondensedTrain:
         return np.asarray(shapes.T @ housing.radiation @ shapes)
 
 
-def condense(model: TrainModel) -> CondensedTrain:
+def condense(model: TrainModel, shared: int = SHARED) -> CondensedTrain:
     """The few freedoms of a train's meshes, at the loads that it has in the end.
+
+    Parameters
+    ----------
+    shared
+        Meshes that are in phase again after so many cycles at most share a phase.
 
     Raises
     ------
     InputError
-        For meshes that share no common period within the bound of `gearfe.train.kinematics`, rigid meshes, loads that
-        oscillate, and parts that nothing holds.
+        For meshes of more than `MOST_PHASES` phases, rigid meshes, loads that oscillate, and parts that nothing holds.
     """
     _check(model)
-    modal, turns = model.modal, model.rolling.common_turns
-    assert turns is not None
+    modal, phases = model.modal, mesh_phases(model.rolling.cycles, shared)
+    if len(phases) > MOST_PHASES:
+        problem = f"need {len(phases)} phases of their own, more than {MOST_PHASES}: {model.rolling.note}"
+        raise InputError("train.meshes", None, problem, "look at it with gearfe vibration")
+    turns = [turns for turns, _ in phases]
     flanks = [f for f in model.forces.flanks if isinstance(f, CurveFlank | LawFlank)]
     reads = [_directions(f) for f in flanks]
     used = sorted({x for four in reads for x in four if x >= 0})
@@ -93,11 +104,13 @@ def condense(model: TrainModel) -> CondensedTrain:
     of_mesh = _of_meshes(model)
     mesh_of = {number: mesh for mesh, numbers in enumerate(of_mesh) for number in numbers}
     rubbing = [_rubbing(model, flank, mesh_of[i], float(steady[mesh_of[i]])) for i, flank in enumerate(flanks)]
-    forces = MeshForces(flanks, freedoms, sense * float(turns), rubbing)
-    orders = tuple(int(Fraction(c) * turns) for c in model.rolling.cycles)
+    orders = np.array([[int(c * t) * (i in at) for t, at in phases] for i, c in enumerate(model.rolling.cycles)])
+    of_flank = np.array([np.where(orders[mesh_of[i]] > 0, [float(t) for t in turns], 0.0) for i in range(len(flanks))])
+    forces = MeshForces(flanks, freedoms, sense * of_flank, rubbing)
     scale = _scale(model, linear, freedoms, flanks)
     limit = DIVERGED * min(line.module for line in model.meshes) / float(scale[freedoms[:, 0]].max())
-    system = Oscillator(linear, forces, float(turns), scale, orders, limit)
+    many = tuple(tuple(row) for row in orders.tolist())
+    system = Oscillator(linear, forces, tuple(float(t) for t in turns), scale, many, limit)
     return CondensedTrain(model, system, forces, of_mesh, steady)
 
 
@@ -138,9 +151,6 @@ def _check(model: TrainModel) -> None:
         if line.rigid:
             problem = "is a constraint without a stiffness, which excites nothing"
             raise InputError(f"mesh {line.name!r} rigid", True, problem, "give it a stiffness, a curve or a law")
-    if model.rolling.common_turns is None:
-        problem = "have no common period to repeat with: " + model.rolling.note
-        raise InputError("train.meshes", None, problem, "look at it with gearfe vibration")
     for gear in model.train.gears:
         if any(gear.pitch_errors):
             problem = "has pitch errors: its motion repeats with the full period of the teeth, not with the meshes"

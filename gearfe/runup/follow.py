@@ -20,25 +20,23 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
-from ..typing import Array, ComplexArray, IntArray
+from ..typing import Array, ComplexArray
 from .balance import (
     FOUND,
     Evaluated,
     Newton,
     Orbit,
     Oscillator,
+    Unknowns,
     evaluate,
     flexibility_of,
     jacobian,
     moved,
-    packed,
     rounded,
-    samples_of,
     settled,
     size_of,
     solve,
-    unknown_waves,
-    unpacked,
+    unknowns_of,
     widened,
 )
 
@@ -99,8 +97,8 @@ class _Place(NamedTuple):
     """A point of the curve with its tangent."""
 
     orbit: Orbit
-    waves: IntArray
-    along: Array  # t_x, packed over the waves
+    unknowns: Unknowns
+    along: Array  # t_x, packed
     rising: float  # t_sigma
 
 
@@ -236,7 +234,7 @@ class _Walk:
                 nearest = min(place, new, key=lambda p: abs(p.rising)).orbit
                 self.orbits.append(nearest)
                 self.branch.append(len(self.turns))
-                speed = _turning(place, new, step, self.unit, self.system.linear.size)
+                speed = _turning(place, new, step, self.unit)
                 self.turns.append(Turn(speed, len(self.orbits) - 1))
                 self.heading = -self.heading
             off = self._left(b) or self._beyond(new.orbit)
@@ -278,16 +276,16 @@ class _Walk:
 
     def _equations(self, orbit: Orbit) -> tuple[Evaluated, ComplexArray]:
         H = self.system.flexibility(orbit.speed, orbit.harmonics)
-        return evaluate(self.system, orbit.speed, orbit.places, samples_of(orbit.harmonics), H), H
+        return evaluate(self.system, orbit.speed, orbit.places, self.system.lattice(orbit.harmonics), H), H
 
     def _tangent(self, orbit: Orbit, last: _Place | None, sign: float) -> _Place | None:
         at, H = self._equations(orbit)
-        waves = unknown_waves(self.system, orbit.places, at.pushes, H, ALONG)
-        M = self._bordered(orbit, waves, at, H)
+        unknowns = unknowns_of(self.system, orbit.speed, orbit.places, at, H, ALONG)
+        M = self._bordered(orbit, unknowns, at, H)
         if last is None:
             M[-1, -1] = sign
         else:
-            M[-1, :-1], M[-1, -1] = _moved(last, waves, self.system.linear.size), last.rising
+            M[-1, :-1], M[-1, -1] = _moved(last, unknowns), last.rising
         right = np.zeros(len(M))
         right[-1] = 1.0
         try:
@@ -295,44 +293,44 @@ class _Walk:
         except np.linalg.LinAlgError:
             return None
         t /= np.linalg.norm(t)
-        return _Place(orbit, waves, t[:-1], float(t[-1]))
+        return _Place(orbit, unknowns, t[:-1], float(t[-1]))
 
-    def _bordered(self, orbit: Orbit, waves: IntArray, at: Evaluated, H: ComplexArray) -> Array:
+    def _bordered(self, orbit: Orbit, unknowns: Unknowns, at: Evaluated, H: ComplexArray) -> Array:
         """[r_x r_sigma] with an empty last row."""
-        J = jacobian(self.system, orbit.speed, waves, at.pushes, H)
+        J = jacobian(self.system, orbit.speed, unknowns, at, H)
         M = np.zeros((len(J) + 1, len(J) + 1))
         M[:-1, :-1] = J
         other = replace(orbit, speed=orbit.speed * (1.0 + NUDGE))
-        change = (self._equations(other)[0].residual - at.residual)[waves] / (NUDGE * orbit.speed / self.unit)
-        M[:-1, -1] = packed(change, self.system.scale)
+        change = (self._equations(other)[0].residual - at.residual) / (NUDGE * orbit.speed / self.unit)
+        M[:-1, -1] = unknowns.packed(change, self.system.scale)
         return M
 
     def _corrected(self, place: _Place, step: float) -> tuple[_Place | None, bool]:
         """Next point of the curve, and whether it was found easily."""
-        system, waves = self.system, place.waves
+        system, unknowns = self.system, place.unknowns
         speed = place.orbit.speed + step * place.rising * self.unit
-        guess = place.orbit.with_harmonics(max(self._count(speed, place.orbit), int(waves[-1])))
-        guess[waves] += unpacked(step * place.along, system.scale)
+        guess = place.orbit.with_harmonics(max(self._count(speed, place.orbit), int(unknowns.lines[-1])))
+        guess[unknowns.lines, unknowns.freedoms] += unknowns.unpacked(step * place.along, system.scale)
         made = self._newton(Orbit(speed, guess, np.zeros_like(guess), math.nan, False, 0), place, step)
         if made is None or made.steps > CORRECTIONS:
             return None, False
         new = self._tangent(made, place, 1.0)
         if new is None:
             return None, False
-        aligned = _moved(place, new.waves, system.linear.size) @ new.along + new.rising * place.rising
+        aligned = _moved(place, new.unknowns) @ new.along + new.rising * place.rising
         if aligned < ALIGNED or abs(made.speed - speed) > BENT * step * self.unit:  # round a bend, or on another curve
             return None, False
         return new, made.steps <= 8
 
     def _newton(self, orbit: Orbit, place: _Place, step: float) -> Orbit | None:
-        waves, scale = place.waves, self.system.scale
-        begin = packed(place.orbit.places[waves], scale)
+        unknowns, scale = place.unknowns, self.system.scale
+        begin = unknowns.packed(place.orbit.places, scale)
         factors = None
         size = math.inf
         for taken in range(1, CORRECTIONS + 1):
             at, H = self._equations(orbit)
             last = (
-                place.along @ (packed(orbit.places[waves], scale) - begin)
+                place.along @ (unknowns.packed(orbit.places, scale) - begin)
                 + place.rising * (orbit.speed - place.orbit.speed) / self.unit
                 - step
             )
@@ -342,13 +340,14 @@ class _Walk:
             if not math.isfinite(found) or found > 10.0 * size:
                 return None
             if factors is None or found > 0.2 * size:
-                M = self._bordered(orbit, waves, at, H)
+                M = self._bordered(orbit, unknowns, at, H)
                 M[-1, :-1], M[-1, -1] = place.along, place.rising
                 factors = lu_factor(M, check_finite=False)
             size = found
-            change = lu_solve(factors, np.append(packed(at.residual[waves], scale), last), check_finite=False)
+            change = lu_solve(factors, np.append(unknowns.packed(at.residual, scale), last), check_finite=False)
             places = orbit.places - at.residual
-            places[waves] = orbit.places[waves] - unpacked(change[:-1], scale)
+            where = unknowns.lines, unknowns.freedoms
+            places[where] = orbit.places[where] - unknowns.unpacked(change[:-1], scale)
             orbit = replace(orbit, speed=orbit.speed - change[-1] * self.unit, places=places)
         return None
 
@@ -365,14 +364,12 @@ class _Walk:
         return orbit if orbit.found else None
 
 
-def _moved(place: _Place, waves: IntArray, m: int) -> Array:
-    """A tangent over other waves, 0 where it had none."""
-    k = len(place.waves)
-    real, imaginary = np.zeros((int(max(waves.max(), place.waves.max())) + 1, m)), None
-    imaginary = np.zeros_like(real)
-    real[place.waves] = place.along[: k * m].reshape(k, m)
-    imaginary[place.waves[1:]] = place.along[k * m :].reshape(k - 1, m)
-    return np.concatenate([real[waves].ravel(), imaginary[waves[1:]].ravel()])
+def _moved(place: _Place, unknowns: Unknowns) -> Array:
+    """A tangent over other unknowns, 0 where it had none."""
+    one = np.ones(int(max(unknowns.freedoms.max(), place.unknowns.freedoms.max())) + 1)
+    made = np.zeros((int(max(unknowns.lines[-1], place.unknowns.lines[-1])) + 1, len(one)), dtype=complex)
+    made[place.unknowns.lines, place.unknowns.freedoms] = place.unknowns.unpacked(place.along, one)
+    return unknowns.packed(made, one)
 
 
 def _lagrange(x: Array, values: ComplexArray, at: float) -> ComplexArray:
@@ -381,11 +378,11 @@ def _lagrange(x: Array, values: ComplexArray, at: float) -> ComplexArray:
     return np.asarray(np.tensordot(np.array(weights), values, axes=1))
 
 
-def _turning(a: _Place, b: _Place, step: float, unit: float, m: int) -> float:
+def _turning(a: _Place, b: _Place, step: float, unit: float) -> float:
     """Speed (rad/s) at which the cubic turns that has the speeds and rises of two points, a step along the first's
     tangent apart.
     """
-    turned = _moved(a, b.waves, m) @ b.along + a.rising * b.rising
+    turned = _moved(a, b.unknowns) @ b.along + a.rising * b.rising
     one, two, rise = step * unit * a.rising, step * unit * b.rising / turned, b.orbit.speed - a.orbit.speed
     cubic = np.polynomial.Polynomial([a.orbit.speed, one, 3.0 * rise - 2.0 * one - two, one + two - 2.0 * rise])
     ends = np.real(cubic.deriv().roots())

@@ -4,8 +4,8 @@ Under a constant force a mesh changes its stiffness with the phase. Small motion
 
 .. math:: \ddot y + \Lambda y = P\,A(t)\,P^T y + \Omega\,G\dot y
 
-with the tangents A of the meshes under their steady forces. Where a multiplier of the period T has a modulus above 1,
-vibration grows by :math:`e^{\sigma t}`, :math:`\sigma = \ln|\mu|/T`: so much damping (1/s) holds it.
+with the tangents A of the meshes under their steady forces. Where a multiplier of the common period T has a modulus
+above 1, vibration grows by :math:`e^{\sigma t}`, :math:`\sigma = \ln|\mu|/T`: so much damping (1/s) holds it.
 """
 
 from __future__ import annotations
@@ -21,12 +21,10 @@ from ..threads import one_thread
 from ..train.forces import CurveFlank
 from ..typing import Array, ComplexArray
 from .condensed import CondensedTrain
-from .stability import around, kicks, strengths
+from .stability import LONGEST, around, kicks, steps_of, strengths, window
 
 #: Modes whose stiffness the meshes change by more than this part are integrated.
 REACHED = 1e-3
-#: Steps of the period, of seven kicks each.
-STEPS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +56,7 @@ def instability_map(
     Raises
     ------
     InputError
-        For factors that are not positive, and meshes that carry no force.
+        For factors that are not positive, meshes that carry no force, and those that share no period within `LONGEST`.
     """
     asked, factors = np.asarray(speeds, dtype=float), np.asarray(loads, dtype=float)
     if not (factors > 0.0).all():
@@ -68,16 +66,20 @@ def instability_map(
         name = train.model.meshes[int(np.argmin(train.steady))].name
         raise InputError(f"mesh {name!r}", None, problem, "give the train a load that presses them")
     made = np.zeros((len(factors), len(asked)), dtype=complex)
-    theta, system = kicks(STEPS), train.system
+    system, span = train.system, window(train.system)
+    if span.half is not None:
+        problem = f"are asked for, but the meshes share no period of up to {LONGEST} mesh cycles"
+        raise InputError("instability_loads", factors.tolist(), problem, "leave them out")
+    theta = kicks(system, span.turns, steps_of(span))
     with one_thread():
         for i, factor in enumerate(factors):
             A = _tangents(train, theta, float(factor))
             kept = strengths(system.linear, A) > REACHED
             for j, speed in enumerate(asked):
-                made[i, j] = around(system, float(speed), A, None, kept, damped=False)[0]
+                made[i, j] = around(system, float(speed), A, None, kept, span, damped=False)[0]
                 if progress is not None:
                     progress(i * len(asked) + j + 1, made.size)
-    periods = 2.0 * math.pi / np.array([system.omega0(float(s)) for s in asked])
+    periods = 2.0 * math.pi * span.turns / np.abs(asked)
     return InstabilityMap(asked, factors, made, np.log(np.abs(made)) / periods)
 
 
@@ -86,7 +88,7 @@ def _tangents(train: CondensedTrain, theta: Array, factor: float) -> Array:
     u = np.tile(train.system.linear.rest, (len(theta), 1))
     for numbers, steady in zip(train.flanks_of_mesh, train.steady, strict=True):
         flank, (along, turn) = train.forces.flanks[numbers[0]], train.forces.freedoms[numbers[0], :2]
-        phase = flank.sense * (flank.ratio * train.forces.turns * theta + u[:, turn]) + flank.phase
+        phase = flank.sense * (flank.ratio * (theta @ train.forces.turns[numbers[0]]) + u[:, turn]) + flank.phase
         if isinstance(flank, CurveFlank):
             u[:, along] = flank.gap + factor * steady / flank.curve(phase).value
         else:

@@ -1,13 +1,13 @@
-r"""Forces of all flanks of a train at the freedoms of its meshes, with their derivatives, over one period.
+r"""Forces of all flanks of a train at the freedoms of its meshes, with their derivatives, over the phases.
 
-The same forces as `gearfe.train.forces`, with :math:`\psi = \Omega t`: the phase of a flank is
-:math:`s(g\psi + u_r) + \varphi_0`, so the rotation's feedback on the phase is kept. What stands in the linear part
-already, the mean stiffness along the approach, is taken off.
+The same forces as `gearfe.train.forces`: with the turns n of the drive in a period of each phase :math:`\theta`, the
+phase of a flank is :math:`s(g\,n\cdot\theta + u_r) + \varphi_0`, but for whole cycles of the mesh, so the rotation's
+feedback on the phase is kept. What stands in the linear part already, the mean stiffness along the approach, is taken
+off.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -37,7 +37,7 @@ class Drag(NamedTuple):
 
 
 class FlankForces(NamedTuple):
-    """A flank over S places of the period."""
+    """A flank at S places of the phases."""
 
     force: Array  # (S,) N along its approach, damping included
     tangent: Array  # (S,) N/m
@@ -86,23 +86,24 @@ class MeshForces:
     freedoms : (f, 4)
         For each flank the numbers of its approach and of its driver's rotation among the freedoms, and of the
         displacement and turn that its friction acts on (-1 without).
-    turns
-        Turns of the drive in a period, negative where it turns backwards.
+    turns : (f, n)
+        For each flank the turns of the drive in a period of the phase that its mesh follows, negative where it turns
+        backwards; 0 of other phases.
     rubbing
         Friction of each flank, or None.
     """
 
     flanks: Sequence[CurveFlank | LawFlank]
     freedoms: IntArray
-    turns: float
+    turns: Array
     rubbing: Sequence[Rubbing | None]
     _pairs: dict[tuple[int, int], Array] = field(default_factory=dict, repr=False)
 
     def flank(self, number: int, theta: Array, speed: float, u: Array, du: Array) -> FlankForces:
-        """One flank at theta (S,) and a speed of the drive (rad/s), freedoms and rates (S, m)."""
+        """One flank at phases theta (S, n) and a speed of the drive (rad/s), freedoms and rates (S, m)."""
         flank = self.flanks[number]
         along, turn, across, spin = self.freedoms[number]
-        phase = flank.sense * (flank.ratio * self.turns * theta + u[:, turn]) + flank.phase
+        phase = flank.sense * (flank.ratio * (theta @ self.turns[number]) + u[:, turn]) + flank.phase
         approach = u[:, along] - flank.gap
         if isinstance(flank, CurveFlank):
             return self._curve(number, flank, phase, approach)
@@ -206,8 +207,3 @@ def _drag(
         summed(drag), summed(pulls * slopes[0] * push[:, None]), by_phase, summed(pulls * pairs * more[:, None]),
         summed(steep), summed(steep * arm),
     )  # fmt: skip
-
-
-def sampled(samples: int) -> Array:
-    """(samples,) even places of the period (rad)."""
-    return 2.0 * math.pi * np.arange(samples) / samples

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,6 +14,7 @@ from ..gear.iso6336 import dynamic_factor
 from ..gear.mesh_geometry import MeshGeometry
 from ..typing import Array
 from ..vibration.radiation import power_level
+from . import torus
 from .instability import InstabilityMap
 from .modes import CoupledModes, Crossing, coupled_modes, crossings
 from .results import SteadyState
@@ -76,14 +79,16 @@ def runup_columns(run: RunUp) -> dict[str, Any]:
 
 
 def stability_columns(run: RunUp) -> dict[str, Array]:
-    """Columns of the largest multiplier; none where they were not asked for."""
+    """Columns of the largest multiplier; none where they were not asked for, not-a-number where they do not tell."""
     if any(s.multipliers is None for s in run.states):
         return {}
     largest = np.array([s.multipliers[0] for s in run.states if s.multipliers is not None])
     return {
-        "stable": np.array([bool(s.stable) for s in run.states], dtype=int),
+        "stable": [math.nan if s.stable is None else int(s.stable) for s in run.states],
+        "growth_per_s": np.array([s.growth for s in run.states]),
         "largest_multiplier": np.abs(largest),
         "largest_multiplier_angle_deg": np.degrees(np.abs(np.angle(largest))),
+        "multiplier_over_s": np.array([s.span for s in run.states]),
     }
 
 
@@ -118,58 +123,95 @@ def power_in_band(state: SteadyState, band_hz: float) -> float:
     return float(state.power[(state.frequency > 0.0) & (state.frequency <= band_hz)].sum())
 
 
-def orders(run: RunUp, multiples: int) -> dict[int, list[str]]:
-    """Harmonics of the period that are multiples of mesh frequencies -> what they are called."""
-    found: dict[int, list[str]] = {}
-    for multiple in range(1, multiples + 1):
-        for mesh, order in enumerate(run.train.system.orders):
-            found.setdefault(multiple * order, []).append(f"{multiple} x mesh {mesh + 1}")
-    return dict(sorted(found.items()))
+class OrderCut(NamedTuple):
+    """A harmonic that is a multiple of a mesh frequency, or a combination of those of meshes of different phases."""
+
+    waves: tuple[int, ...]  # k
+    order: float  # of the drive's turns
+    names: tuple[str, ...]  # such as "2 x mesh 1", "1 x mesh 1 + 1 x mesh 2"
+    mesh: int | None  # the first of which it is a multiple; None for a combination
+
+
+def orders(run: RunUp, multiples: int) -> list[OrderCut]:
+    """Multiples of the mesh frequencies and their combinations, of so many multiples in all, by rising frequency."""
+    system = run.train.system
+    ways: list[list[tuple[int, int]]] = [[(0, 0)] for _ in system.turns]
+    for mesh, cycles in enumerate(system.orders):
+        ways[int(np.argmax(cycles))] += [(sign * a, mesh) for a in range(1, multiples + 1) for sign in (1, -1)]
+    found: dict[tuple[int, ...], list[tuple[int, str, int | None]]] = {}
+    for taken in itertools.product(*ways):
+        parts = [(a, mesh) for a, mesh in taken if a]
+        waves = np.sum([a * np.array(system.orders[mesh]) for a, mesh in parts], axis=0, dtype=int)
+        size = sum(abs(a) for a, _ in parts)
+        if parts and size <= multiples and waves @ (1.0 / np.array(system.turns)) > 0.0:
+            alone = parts[0][1] if len(parts) == 1 else None
+            found.setdefault(tuple(waves.tolist()), []).append((size, _combined(parts), alone))
+    made = []
+    for k, met in found.items():
+        rising = sorted(met, key=lambda x: x[0])
+        order = float(np.sum(np.array(k) / np.array(system.turns)))
+        made.append(OrderCut(k, order, tuple(name for _, name, _ in rising), rising[0][2]))
+    return sorted(made, key=lambda cut: cut.order)
+
+
+def _combined(parts: Sequence[tuple[int, int]]) -> str:
+    """``2 x mesh 1 - 1 x mesh 2``; what is added stands first."""
+    said = ""
+    for a, mesh in sorted(parts, key=lambda part: part[0] < 0):
+        said += (" - " if a < 0 else " + " if said else "") + f"{abs(a)} x mesh {mesh + 1}"
+    return said
 
 
 def order_columns(run: RunUp, multiples: int) -> dict[str, Any]:
     """Columns of orders.csv: each order of each steady state with the amplitudes of all signals."""
     states, model = run.states, run.train.model
-    cut = orders(run, multiples)
-    rows = [(s, k) for k in cut for s in states if k < len(s.frequency)]
+    spectra = [(np.abs(s.lines(s.force)), np.abs(s.lines(s.transmission_error))) for s in states]
+    rows = [
+        (cut, i, k) for cut in orders(run, multiples) for i, s in enumerate(states)
+        if (k := s.numbers.get(cut.waves)) is not None
+    ]  # fmt: skip
     made: dict[str, Any] = {
-        "order": np.array([s.order[k] for s, k in rows]),
-        "meets": [" = ".join(cut[k]) for _, k in rows],
-        "speed_rad_per_s": np.array([s.speed for s, _ in rows]),
-        "branch": np.array([s.branch for s, _ in rows], dtype=int),
-        "frequency_Hz": np.array([s.frequency[k] for s, k in rows]),
+        "order": np.array([states[i].order[k] for _, i, k in rows]),
+        "meets": [" = ".join(cut.names) for cut, _, _ in rows],
+        "speed_rad_per_s": np.array([states[i].speed for _, i, _ in rows]),
+        "branch": np.array([states[i].branch for _, i, _ in rows], dtype=int),
+        "frequency_Hz": np.array([states[i].frequency[k] for _, i, k in rows]),
     }
-    forces = np.abs([s.at_harmonic(s.force, k) for s, k in rows])
-    errors = np.abs([s.at_harmonic(s.transmission_error, k) for s, k in rows])
-    moved = np.abs([s.acceleration[k] for s, k in rows])
+    forces, errors = (np.array([spectra[i][which][k] for _, i, k in rows]) for which in (0, 1))
+    moved = np.abs([states[i].acceleration[k] for _, i, k in rows])
     made |= {f"contact_force_{i + 1}_N": forces[:, i] for i in range(len(model.meshes))}
     made |= {f"transmission_error_{i + 1}_um": 1e6 * errors[:, i] for i in range(len(model.meshes))}
     made |= {f"acceleration_{name}_m_per_s2": moved[:, j] for j, name in enumerate(model.bores)}
     if model.train.housing is not None:
-        made["radiated_power_W"] = np.array([s.power[k] for s, k in rows if s.power is not None])
+        power = [states[i].power for _, i, _ in rows]
+        made["radiated_power_W"] = np.array([p[k] for p, (_, _, k) in zip(power, rows, strict=True) if p is not None])
     return made
 
 
-def waterfall(run: RunUp) -> dict[str, Array]:
-    """Arrays of waterfall.npz: lines of all steady states up to the band; not-a-number beyond it.
+def waterfall(run: RunUp, states: Sequence[SteadyState] | None = None) -> dict[str, Array]:
+    """Arrays of waterfall.npz: lines of all steady states up to the band by rising order; not-a-number beyond it.
 
-    ``speed_rad_per_s`` and ``branch`` (states,), ``frequency_Hz`` (states, lines), ``order`` (lines,),
-    ``acceleration_m_per_s2`` (states, lines, attachments).
+    ``speed_rad_per_s`` and ``branch`` (states,), ``frequency_Hz`` (states, lines), ``order`` (lines,), ``harmonic``
+    (lines, phases): multiples of the frequency of each phase, ``acceleration_m_per_s2`` (states, lines, attachments).
     """
-    states = run.states
-    lines = max((int((s.frequency <= run.band_hz).sum()) for s in states), default=0)
-    bores = len(run.train.model.bores)
-    frequency = np.full((len(states), lines), np.nan)
-    moved = np.full((len(states), lines, bores), np.nan)
+    states = run.states if states is None else states
+    count = max((len(s.frequency) for s in states), default=0)
+    frequency = np.full((len(states), count), np.nan)
+    moved = np.full((len(states), count, len(run.train.model.bores)), np.nan)
     for row, s in enumerate(states):
-        count = int((s.frequency <= run.band_hz).sum())
-        frequency[row, :count], moved[row, :count] = s.frequency[:count], np.abs(s.acceleration[:count])
+        inside = np.flatnonzero(s.frequency <= run.band_hz)
+        frequency[row, inside], moved[row, inside] = s.frequency[inside], np.abs(s.acceleration[inside])
+    waves = torus.harmonics(run.train.system.periods, max(count - 1, 0)).waves[:count]
+    order = (waves / np.array(run.train.system.turns)).sum(axis=1)
+    kept = np.flatnonzero(np.isfinite(frequency).any(axis=0))
+    kept = kept[np.argsort(order[kept], kind="stable")]
     return {
         "speed_rad_per_s": np.array([s.speed for s in states]),
         "branch": np.array([s.branch for s in states], dtype=np.int64),
-        "order": np.arange(lines) / run.train.system.turns,
-        "frequency_Hz": frequency,
-        "acceleration_m_per_s2": moved,
+        "order": order[kept],
+        "harmonic": waves[kept],
+        "frequency_Hz": frequency[:, kept],
+        "acceleration_m_per_s2": moved[:, kept],
     }
 
 
@@ -183,6 +225,8 @@ def waterfall_columns(run: RunUp) -> dict[str, Any]:
         "frequency_Hz": made["frequency_Hz"][state, line],
         "order": made["order"][line],
     }
+    if made["harmonic"].shape[1] > 1:
+        columns |= {f"times_phase_{p + 1}": k[line] for p, k in enumerate(made["harmonic"].T)}
     for j, name in enumerate(run.train.model.bores):
         columns[f"acceleration_{name}_m_per_s2"] = made["acceleration_m_per_s2"][state, line, j]
     return columns
@@ -247,9 +291,9 @@ def peaks_of(run: RunUp, modes: CoupledModes, multiples: int) -> list[dict[str, 
         values = np.array([np.abs(s.force[:, mesh]).max() for s in swept]) / max(steady, 1e-300)
         for at in _tops(values):
             state = swept[at]
-            lines = {k: float(np.abs(state.at_harmonic(state.force[:, mesh], k))) for k in cut if k < len(state.order)}
-            order = max(lines, key=lambda k: lines[k])
-            frequency = float(state.frequency[order])
+            size, there = np.abs(state.lines(state.force[:, mesh])), [c for c in cut if c.waves in state.numbers]
+            loudest = max(there, key=lambda c: float(size[state.numbers[c.waves]]))
+            frequency = float(state.frequency[state.numbers[loudest.waves]])
             row = int(np.argmin(np.abs(modes.speeds - state.speed)))
             mode = _answering(modes, row, frequency, modes.strain_in.index(line.name))
             found.append(
@@ -257,7 +301,7 @@ def peaks_of(run: RunUp, modes: CoupledModes, multiples: int) -> list[dict[str, 
                     "speed_rad_per_s": state.speed,
                     "mesh": line.name,
                     "dynamic_factor": float(values[at]),
-                    "order": " = ".join(cut[order]),
+                    "order": " = ".join(loudest.names),
                     "frequency_Hz": frequency,
                     "mode": modes.names[mode],
                     "mode_frequency_Hz": float(modes.frequency[row, mode]),
@@ -309,6 +353,7 @@ def summary(run: RunUp, modes: CoupledModes, multiples: int) -> dict[str, Any]:
         "turning_speeds_rad_per_s": run.turning_speeds.tolist(),
         "bifurcations": [{"speed_rad_per_s": b.speed, "kind": b.kind, "branch": b.branch} for b in run.bifurcations],
         "largest_error_estimate": max((s.error for s in states if s.error == s.error), default=None),
+        "phases": phases(run),
         "tolerance": run.tolerance,
         "band_Hz": run.band_hz,
         "mesh_names": [line.name for line in model.meshes],
@@ -323,6 +368,15 @@ def summary(run: RunUp, modes: CoupledModes, multiples: int) -> dict[str, Any]:
         ],
         "notes": list(run.notes),
     }
+
+
+def phases(run: RunUp) -> list[dict[str, Any]]:
+    """Phases of the motion: after how many turns of the drive each repeats, and the meshes that follow it."""
+    system, names = run.train.system, [line.name for line in run.train.model.meshes]
+    return [
+        {"turns": turns, "meshes": [n for n, cycles in zip(names, system.orders, strict=True) if cycles[p]]}
+        for p, turns in enumerate(system.turns)
+    ]
 
 
 def warnings(run: RunUp) -> list[str]:
@@ -349,6 +403,12 @@ def warnings(run: RunUp) -> list[str]:
         found.append(
             f"at {len(lost)} speeds, {lost[0]:.6g} to {lost[-1]:.6g} rad/s, no motion with the period of the meshes is "
             "stable: what runs there repeats after several periods or not at all; look at a transient"
+        )
+    open_ = [s for s in run.states if s.multipliers is not None and s.stable is None]
+    if open_:
+        found.append(
+            f"at {len(open_)} of {len(run.states)} states, the first at {open_[0].speed:.6g} rad/s, it is not known "
+            "whether the motion is stable: the phases of the meshes come back too late to tell; look at a transient"
         )
     late = [s for s in run.states if s.error > run.tolerance]
     if late:

@@ -1,4 +1,4 @@
-r"""What a periodic motion of a train means: forces, transmission errors, vibration, power.
+r"""What a steady motion of a train means: forces, transmission errors, vibration, power.
 
 All accelerations come from the forces of the motion and the flexibility of the whole train at once, so harmonics far
 above those of Newton's method are there too.
@@ -7,21 +7,23 @@ above those of Newton's method are there too.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..typing import Array, ComplexArray
+from ..typing import Array, ComplexArray, IntArray
 from ..vibration.radiation import AIR_IMPEDANCE
-from .balance import Orbit, analysis, rates, samples_of, synthesis
+from . import torus
+from .balance import Orbit
 from .condensed import CondensedTrain
-from .mesh_forces import sampled
-from .stability import STABLE
+from .stability import STABLE, window
+from .torus import Lattice
 
 
 @dataclass(frozen=True, eq=False)
 class SteadyState:
-    """Steady running at one speed; S samples of the period, K + 1 harmonics of it, the constant first.
+    """Steady running at one speed: S places of its n phases, K + 1 harmonics, the constant first.
 
     Attributes
     ----------
@@ -32,45 +34,66 @@ class SteadyState:
     orbit
         The motion at the freedoms of the meshes.
     period
-        s.
+        Of the motion (s); infinite where it has several phases.
+    waves : (K + 1, n)
+        k: a harmonic has the phase k . theta. With one phase k = 0, 1, 2, ...
+    numbers
+        Number of a harmonic by its k.
     frequency : (K + 1,)
         Hz.
     order : (K + 1,)
         Frequency over that of the drive's turns.
+    lattice
+        Places S: ``lattice.theta`` (S, n), of one phase even over the period.
     force : (S, meshes)
         Contact force (N), of back flanks negative.
     transmission_error : (S, meshes)
         Approach along the line of action (m).
     apart : (meshes,)
-        Share of the period without contact.
+        Share of the time without contact.
     beyond
         Whether a mesh goes beyond what its law is known for.
     acceleration : (K + 1, bores)
         Complex amplitudes along the shafts at the attachments (m/s2).
     power : (K + 1,) or None
         Equivalent radiated power of each line (W); None for a rigid housing.
+    span
+        Time over which multipliers are made (s): the period, or after which all phases are back.
     multipliers : (2 modes,) or None
-        Floquet multipliers of the motion, largest modulus first; None where they were not asked for.
+        Floquet multipliers of the motion, largest modulus first; None where they were not asked for, one not-a-number
+        where they do not tell whether the motion is stable.
     """
 
     speed: float
     branch: int
     orbit: Orbit
     period: float
+    waves: IntArray
+    numbers: Mapping[tuple[int, ...], int]
     frequency: Array
     order: Array
+    lattice: Lattice
     force: Array
     transmission_error: Array
     apart: Array
     beyond: bool
     acceleration: ComplexArray
     power: Array | None
+    span: float
     multipliers: ComplexArray | None = None
 
     @property
     def stable(self) -> bool | None:
-        """Whether small disturbances die out; None where multipliers were not asked for."""
-        return None if self.multipliers is None else bool(abs(self.multipliers[0]) <= STABLE)
+        """Whether small disturbances die out; None where that was not asked for or is not known."""
+        largest = math.nan if self.multipliers is None else abs(self.multipliers[0])
+        return None if math.isnan(largest) else bool(largest <= STABLE)
+
+    @property
+    def growth(self) -> float:
+        """Rate (1/s) by which the slowest disturbance grows; not-a-number where it is not known."""
+        if self.multipliers is None or not abs(self.multipliers[0]) > 0.0:
+            return math.nan
+        return math.log(abs(self.multipliers[0])) / self.span
 
     @property
     def error(self) -> float:
@@ -82,9 +105,9 @@ class SteadyState:
         inside = (self.frequency > 0.0) & (self.frequency <= band_hz)
         return np.asarray(np.sqrt(0.5 * (np.abs(self.acceleration[inside]) ** 2).sum(axis=0)))
 
-    def at_harmonic(self, values: Array, harmonic: int) -> ComplexArray:
-        """Complex amplitude of samples at a harmonic of the period."""
-        return np.asarray(analysis(values)[harmonic])
+    def lines(self, values: Array) -> ComplexArray:
+        """(K + 1, ...) complex amplitudes of samples (S, ...) at the harmonics."""
+        return self.lattice.analysis(values)[: len(self.frequency)]
 
 
 def steady_result(
@@ -92,10 +115,10 @@ def steady_result(
 ) -> SteadyState:
     """Evaluate an orbit."""
     system, model = train.system, train.model
-    omega0, count = system.omega0(orbit.speed), orbit.harmonics
-    samples = samples_of(count)
-    theta = sampled(samples)
-    u, du = synthesis(orbit.places, samples), synthesis(rates(orbit.places, omega0), samples)
+    count = orbit.harmonics
+    omega, lattice = system.omega(orbit.speed, count), system.lattice(count)
+    theta, samples = lattice.theta, len(lattice.theta)
+    u, du = lattice.synthesis(orbit.places), lattice.synthesis(1j * omega[:, None] * orbit.places)
     force, approach = np.zeros((samples, len(model.meshes))), np.zeros((samples, len(model.meshes)))
     apart, beyond = np.zeros(len(model.meshes)), False
     for i, (line, numbers) in enumerate(zip(model.meshes, train.flanks_of_mesh, strict=True)):
@@ -109,15 +132,17 @@ def steady_result(
         approach[:, i], apart[i] = u[:, along], open_.mean()
         if line.law is None:
             force[:, i] += line.damping * du[:, along]
-    omega = omega0 * np.arange(count + 1)
     modal = system.linear.modal(omega, orbit.speed, orbit.forces)
     acceleration = -(omega**2)[:, None] * (modal @ train.bores_of_modes.T)
     power = None
     if train.radiation_of_modes is not None:
         square = (modal.conj() * (modal @ train.radiation_of_modes)).sum(axis=1).real
         power = 0.5 * AIR_IMPEDANCE * omega**2 * np.maximum(square, 0.0)
-    frequency = omega / (2.0 * math.pi)
+    second = 2.0 * math.pi / abs(orbit.speed)  # of one turn
+    waves, _ = torus.harmonics(system.periods, count)
+    period = second * system.turns[0] if len(system.turns) == 1 else math.inf
     return SteadyState(
-        orbit.speed, branch, orbit, 2.0 * math.pi / omega0, frequency, np.arange(count + 1) / system.turns, force,
-        approach, apart, beyond, acceleration, power, multipliers,
+        orbit.speed, branch, orbit, period, waves,
+        torus.numbers(system.periods, count), omega / (2.0 * math.pi), omega / abs(orbit.speed), lattice, force,
+        approach, apart, beyond, acceleration, power, second * window(system).turns, multipliers,
     )  # fmt: skip

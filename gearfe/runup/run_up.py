@@ -194,13 +194,14 @@ def _bifurcations(states: Sequence[SteadyState], turns: Sequence[float]) -> tupl
     """Turning points, and where a branch's largest multiplier passes the unit circle."""
     found = [Bifurcation(speed, "turning point", branch) for branch, speed in enumerate(turns)]
     for one, two in itertools.pairwise(s for s in states if not math.isnan(s.error)):  # without those at turning points
-        if one.branch != two.branch or one.stable == two.stable:
+        if one.branch != two.branch or None in (one.stable, two.stable) or one.stable == two.stable:
             continue
         assert one.multipliers is not None
         assert two.multipliers is not None
         a, b = abs(one.multipliers[0]) - 1.0, abs(two.multipliers[0]) - 1.0
         speed = one.speed + (two.speed - one.speed) * a / (a - b)
-        found.append(Bifurcation(float(speed), kind_of(one.multipliers, two.multipliers), one.branch))
+        kind = kind_of(one.multipliers, two.multipliers) if math.isfinite(one.period) else "loss of stability"
+        found.append(Bifurcation(float(speed), kind, one.branch))
     return tuple(sorted(found, key=lambda b: b.branch))
 
 

@@ -1,13 +1,18 @@
-r"""Stability of a periodic motion: Floquet multipliers of the motion itself.
+r"""Stability of a steady motion: Floquet multipliers of the motion itself.
 
-Small motions beside the orbit feel the forces' derivatives along it,
+Small motions beside it feel the forces' derivatives along it,
 
 .. math:: \ddot y + D\dot y + \Lambda y = P\,[A(t)\,P^T y + B(t)\,P^T\dot y] + \Omega\,G\dot y ,
 
-so the orbit is stable where all multipliers, eigenvalues of the map of (y, y') over a period, have a modulus below 1
-(Nayfeh & Balachandran, Applied Nonlinear Dynamics, Sec. 3.2). `gearfe.train.monodromy` integrates the map. Modes that
-the forces reach little are not in it: they yield as they do at rest, and have the multipliers of free decay. A mode
-counts where its share in the forces' change, beside its damping, is more than `REACHED`.
+so it is stable where all multipliers, eigenvalues of the map of (y, y') over a time T after which A and B repeat, have
+a modulus below 1 (Nayfeh & Balachandran, Applied Nonlinear Dynamics, Sec. 3.2). `gearfe.train.monodromy` integrates the
+map. Modes that the forces reach little are not in it: they yield as they do at rest, and have the multipliers of free
+decay. A mode counts where its share in the forces' change, beside its damping, is more than `REACHED`.
+
+T is the period of the one phase. Several phases share one, too, as long as hunting teeth need to meet all others; up to
+`LONGEST` mesh cycles T is that one. Beyond, T is a time after which all phases are nearly back: the growth
+:math:`\ln|\mu|/T` then is a Lyapunov exponent but for a rest that falls with T. Where it differs from that over about
+half the time by as much as its own size, there are no multipliers but not-a-number.
 """
 
 from __future__ import annotations
@@ -17,60 +22,115 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..train.monodromy import KICKS, flow, kick_times, monodromy
+from ..train.monodromy import KICKS, PLACES, flow, kick_times, monodromy
 from ..typing import Array, BoolArray, ComplexArray
-from .balance import Orbit, Oscillator, rates
+from . import torus
+from .balance import Orbit, Oscillator
 from .linear import Linear
 
 #: Least strength of the forces on a mode, in parts of its damping.
 REACHED = 0.01
-#: Steps of the period, of seven kicks each: first, most. Where the forces' derivatives jump they are doubled until the
-#: largest modulus stands still to this part.
-STEPS, MOST, SETTLED = 64, 256, 3e-3
+#: Steps, of seven kicks each: of a period at least, and of a mesh cycle; most in parts of the first number. Where the
+#: forces' derivatives jump they are doubled until the largest modulus stands still to this part.
+STEPS, OF_CYCLE, MOST, SETTLED = 64, 16, 4, 3e-3
 #: Change of a stiffness from one kick to the next, in parts of that of the whole system, that is a jump.
 JUMP = 0.5
 #: Imaginary part of a multiplier, in parts of its modulus, that is none.
 REAL = 1e-6
 #: A multiplier beyond this is an instability, not round-off.
 STABLE = 1.0 + 1e-6
+#: Cycles of the fastest mesh in the longest time of which multipliers are made: after which all phases are back, and
+#: nearly so.
+LONGEST, NEARLY = 200, 64
+#: Phases are back where they miss less than this part of a period.
+BACK = 1e-9
 
 
 class Bifurcation(NamedTuple):
     """Where a branch changes its stability."""
 
     speed: float  # rad/s
-    kind: str  # turning point, period doubling, Neimark-Sacker
+    kind: str  # turning point, period doubling, Neimark-Sacker; of several phases: loss of stability
     branch: int  # before it
 
 
-def multipliers(system: Oscillator, orbit: Orbit, *, reached: float = REACHED, steps: int = STEPS) -> ComplexArray:
-    """Floquet multipliers of an orbit, largest modulus first, (2 n,)."""
-    made, jumps = _multipliers(system, orbit, reached, steps)
-    while jumps and steps < MOST:
+class Window(NamedTuple):
+    """Time after which all phases are back, or nearly so."""
+
+    turns: float  # of the drive
+    half: float | None  # another such time, about half as long; None where all are back exactly
+    cycles: float  # of the fastest mesh in all of it
+
+
+def window(system: Oscillator) -> Window:
+    """Time over which multipliers are made."""
+    turns = np.array(system.turns)
+    most = max(c / t for mesh in system.orders for c, t in zip(mesh, system.turns, strict=True))  # mesh cycles a turn
+    if len(turns) == 1:
+        return Window(float(turns[0]), None, float(most * turns[0]))
+    tried = turns.min() * np.arange(1, math.floor(LONGEST / (most * turns.min())) + 1)
+    off = np.abs(tried[:, None] / turns - np.round(tried[:, None] / turns)).max(axis=1)
+    if (off < BACK).any():
+        found = float(tried[np.argmax(off < BACK)])
+        return Window(found, None, float(most * found))
+    ends = [np.where((low < most * tried) & (most * tried <= high), off, math.inf)
+            for low, high in ((0.25 * NEARLY, 0.5 * NEARLY), (0.75 * NEARLY, NEARLY))]  # fmt: skip
+    half, whole = (float(tried[np.argmin(x)]) for x in ends)
+    return Window(whole, half, float(most * whole))
+
+
+def multipliers(
+    system: Oscillator, orbit: Orbit, *, reached: float = REACHED, steps: int | None = None
+) -> ComplexArray:
+    """Floquet multipliers of an orbit over `window`, largest modulus first, (2 n,); (1,) not-a-number where they do not
+    tell whether it is stable.
+    """
+    span = window(system)
+    first = steps = steps or steps_of(span)
+    made, jumps = _multipliers(system, orbit, span, reached, steps)
+    while jumps and steps < MOST * first:
         steps *= 2
         before = abs(made[0])
-        made, _ = _multipliers(system, orbit, reached, steps)
+        made, _ = _multipliers(system, orbit, span, reached, steps)
         if abs(abs(made[0]) - before) <= SETTLED * abs(made[0]):
             break
     return made
 
 
-def _multipliers(system: Oscillator, orbit: Orbit, reached: float, steps: int) -> tuple[ComplexArray, bool]:
+def steps_of(span: Window) -> int:
+    """Steps to begin with."""
+    return max(STEPS, math.ceil(OF_CYCLE * span.cycles - 1e-6))
+
+
+def _multipliers(
+    system: Oscillator, orbit: Orbit, span: Window, reached: float, steps: int
+) -> tuple[ComplexArray, bool]:
     """Multipliers with so many steps, and whether derivatives jump."""
-    theta = kicks(steps)
-    turns = np.exp(1j * theta[:, None] * np.arange(orbit.harmonics + 1))
-    u, du = ((turns @ x).real for x in (orbit.places, rates(orbit.places, system.omega0(orbit.speed))))
+    theta, u, du = along(system, orbit, span.turns, steps)
     _, A, B = system.forces(theta, orbit.speed, u, du)
-    order = np.argsort(theta, kind="stable")  # kicks step back, too
+    order = np.argsort(kick_times(np.linspace(0.0, 1.0, steps + 1)).ravel(), kind="stable")  # kicks step back, too
     changes = np.abs(np.diff(A[order], axis=0)).max(axis=0)
     jumps = bool((np.diag(changes) * np.diag(system.linear.statics) > JUMP).any())
     kept = strengths(system.linear, A) > reached * np.diag(system.linear.damping) / np.sqrt(system.linear.squares)
-    return around(system, orbit.speed, A, B, kept), jumps
+    made = around(system, orbit.speed, A, B, kept, span)
+    return made, jumps
 
 
-def kicks(steps: int) -> Array:
-    """(steps stages,) places of the period (rad) at which `around` takes derivatives."""
-    return kick_times(np.linspace(0.0, 2.0 * math.pi, steps + 1)).ravel()
+def along(system: Oscillator, orbit: Orbit, turns: float, steps: int) -> tuple[Array, Array, Array]:
+    """Phases (S, n), freedoms and their rates (S, m) at the kicks of so many steps over some turns of the drive."""
+    waves, _ = torus.harmonics(system.periods, orbit.harmonics)
+    speeds = 2.0 * math.pi * turns / steps / np.array(system.turns)  # of the phases, in a step
+    line = waves @ speeds
+    both = np.hstack([orbit.places, 1j * system.omega(orbit.speed, orbit.harmonics)[:, None] * orbit.places])
+    begin = np.exp(1j * np.arange(steps)[:, None] * line)
+    found = np.stack([(begin @ (np.exp(1j * place * line)[:, None] * both)).real for place in PLACES], axis=1)
+    u, du = np.split(found.reshape(steps * len(PLACES), -1), 2, axis=1)
+    return kicks(system, turns, steps), u, du
+
+
+def kicks(system: Oscillator, turns: float, steps: int) -> Array:
+    """(steps stages, n) phases at which `around` takes derivatives, over some turns of the drive."""
+    return 2.0 * math.pi * kick_times(np.linspace(0.0, turns, steps + 1)).reshape(-1, 1) / np.array(system.turns)
 
 
 def strengths(linear: Linear, A: Array) -> Array:
@@ -80,9 +140,9 @@ def strengths(linear: Linear, A: Array) -> Array:
 
 
 def around(
-    system: Oscillator, speed: float, A: Array, B: Array | None, kept: BoolArray, *, damped: bool = True
+    system: Oscillator, speed: float, A: Array, B: Array | None, kept: BoolArray, span: Window, *, damped: bool = True
 ) -> ComplexArray:
-    """Multipliers for the derivatives A, B of the forces at `kicks`, the largest modulus first.
+    """Multipliers for the derivatives A, B of the forces at `kicks` over a time, the largest modulus first.
 
     Parameters
     ----------
@@ -92,9 +152,9 @@ def around(
         False: without the damping of the linear part.
     """
     linear, m = system.linear, system.linear.size
-    period = 2.0 * math.pi / system.omega0(speed)
+    second = 2.0 * math.pi / abs(speed)  # of one turn
     stages = len(KICKS)
-    edges = np.linspace(0.0, period, len(A) // stages + 1)
+    edges = np.linspace(0.0, span.turns * second, len(A) // stages + 1)
     places, tilts = linear.places[kept], linear.tilts[kept]
     swap = np.kron(np.diag(linear.momenta), np.array([[0.0, -1.0], [1.0, 0.0]])) * speed
     D = linear.damping if damped else np.zeros_like(linear.damping)
@@ -103,11 +163,27 @@ def around(
     A = A @ np.linalg.inv(np.eye(m) - rest @ A)
     both = np.concatenate([A, np.zeros_like(A) if B is None else B], axis=2).reshape(-1, stages, m, 2 * m)
     none = np.zeros_like(places)
+    reads = np.block([[places, none], [none, places]])
+    free = linear.squares[~kept], np.diag(D)[~kept]
     with np.errstate(over="ignore", invalid="ignore"):
-        constant = flow(linear.squares[kept], D[np.ix_(kept, kept)] - tilts @ swap @ tilts.T, period)
-        X = monodromy(constant, edges, places, np.block([[places, none], [none, places]]), both)
+        constant = flow(linear.squares[kept], D[np.ix_(kept, kept)] - tilts @ swap @ tilts.T, edges[-1])
+
+        def found(first: int, last: int) -> Array:
+            return monodromy(constant, edges[first : last + 1], places, reads, both[first:last])
+
+        if span.half is None:
+            return _sorted(found(0, len(edges) - 1), free, edges[-1])
+        middle = round(span.half / span.turns * (len(edges) - 1))
+        X = found(0, middle)
+        one, two = _sorted(X, free, edges[middle]), _sorted(found(middle, len(edges) - 1) @ X, free, edges[-1])
+    growth, before = math.log(abs(two[0])) / edges[-1], math.log(abs(one[0])) / edges[middle]
+    return two if abs(growth) > abs(growth - before) else np.array([math.nan + 0j])
+
+
+def _sorted(X: Array, free: tuple[Array, Array], time: float) -> ComplexArray:
+    """Eigenvalues of a map over a time (s), and multipliers of modes that are free, largest modulus first."""
     made = np.linalg.eigvals(X) if np.isfinite(X).all() else np.array([np.inf])
-    made = np.concatenate([made, _free(linear.squares[~kept], np.diag(D)[~kept], period)]).astype(complex)
+    made = np.concatenate([made, _free(*free, time)]).astype(complex)
     return np.asarray(made[np.argsort(-np.abs(made), kind="stable")])
 
 

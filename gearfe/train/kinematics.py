@@ -82,15 +82,44 @@ def rolling(train: GearTrain) -> Rolling:
     return Rolling(tuple(known[s.name] for s in train.shafts), cycles, common, note)
 
 
+def mesh_phases(cycles: Sequence[Fraction], most: int) -> list[tuple[Fraction, list[int]]]:
+    """Meshes in groups that are each in phase again after no more than `most` cycles of their fastest.
+
+    Parameters
+    ----------
+    cycles
+        Mesh cycles in one turn of the drive, one a mesh.
+
+    Returns
+    -------
+    For each group the turns of the drive after which it repeats, and the numbers of its meshes.
+    """
+    made: list[tuple[Fraction, list[int]]] = []
+    for mesh, own in enumerate(cycles):
+        for number, (_, others) in enumerate(made):
+            together = [*(cycles[i] for i in others), own]
+            turns = _repeating(together)
+            if turns * max(together) <= most:
+                made[number] = turns, [*others, mesh]
+                break
+        else:
+            made.append((1 / own, [mesh]))
+    return made
+
+
+def _repeating(cycles: Sequence[Fraction]) -> Fraction:
+    """Turns after which what repeats so often in a turn is in phase again."""
+    periods = [1 / c for c in cycles]
+    return Fraction(math.lcm(*(p.numerator for p in periods)), math.gcd(*(p.denominator for p in periods)))
+
+
 def _common(cycles: tuple[Fraction, ...]) -> tuple[Fraction | None, str]:
-    """Turns after which what repeats so often in a turn is in phase again, or why there are none."""
+    """Turns after which all meshes are in phase again, or why there are none."""
     if not cycles:
         return None, "the train has no meshes"
-    periods = [1 / c for c in cycles]
-    top = math.lcm(*(p.numerator for p in periods))
-    turns = Fraction(top, math.gcd(*(p.denominator for p in periods)))
-    if turns / min(periods) > MOST_CYCLES:
-        count = int(turns / min(periods))
+    turns = _repeating(cycles)
+    if turns * max(cycles) > MOST_CYCLES:
+        count = int(turns * max(cycles))
         note = f"the meshes share a period of {count} mesh cycles only, more than {MOST_CYCLES}: none within reason"
         return None, note
     return turns, ""
