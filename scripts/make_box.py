@@ -66,8 +66,9 @@ def write_box(folder: Path) -> None:
     tets = np.concatenate([block.data for block in mesh.cells if block.type == "tetra10"])
     made = meshio.Mesh(mesh.points, [("tetra10", tets)], point_sets=sets)
     meshio.write(folder / "box.inp", made, float_fmt=".12g")
-    text = (folder / "box.inp").read_text()
-    (folder / "box.inp").write_text(text.replace("C3D10MH", "C3D10"))  # the same nodes; every solver knows this name
+    text = (folder / "box.inp").read_text(encoding="utf-8")
+    text = text.replace("C3D10MH", "C3D10")  # the same nodes; every solver knows this name
+    (folder / "box.inp").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from gearfe.train.train import Bearing, Damping
 
 from gearfe.mechanisms import load_mechanism
 from gearfe.rigid import Body, CoordinateSpring, Gravity, Hinge, Linkage, ModalBlocks, Slot, Spring, System
@@ -27,7 +26,7 @@ from gearfe.rigid.integrate import integrate, ways_of
 from gearfe.rigid.modal import series_force
 from gearfe.rigid.start import Start, consistent_start
 from gearfe.stiffness.periodic import periodic_interpolant
-from gearfe.train import build_train
+from gearfe.train import Bearing, Damping, build_train
 from gearfe.vibration.job import job_train, read_train_job, train_body
 
 GEOMETRY = Path(__file__).resolve().parents[1] / "geometry"

@@ -54,7 +54,7 @@ def main(verbose: bool = False) -> int:
         served = (
             key for key, patterns in CAPABILITIES.items() if any(fnmatch(name, pattern) for pattern in patterns.split())
         )
-        found[next(served, "")][name] = path.read_text().count("\n")
+        found[next(served, "")][name] = path.read_text(encoding="utf-8").count("\n")
     print("| what | lines | modules |\n|---|---|---|")
     for key in (*CAPABILITIES, ""):
         print(f"| {key or 'the rest'} | {sum(found[key].values()):,} | {len(found[key])} |")

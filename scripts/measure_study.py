@@ -37,7 +37,7 @@ def seconds(study: Study, **where: Any) -> tuple[float, float, list[list[str]]]:
         began, used = time.perf_counter(), processor_seconds()
         run_study(study, folder, **where)
         elapsed, used = time.perf_counter() - began, processor_seconds() - used
-        with (Path(folder) / "study.csv").open(newline="") as stream:
+        with (Path(folder) / "study.csv").open(newline="", encoding="utf-8") as stream:
             return elapsed, used, [row[:-1] for row in csv.reader(stream)]
 
 

@@ -107,6 +107,16 @@ def test_steps_that_grow_are_given_time() -> None:
     assert clock.now < 2 * 1.3
 
 
+def test_a_first_step_guessed_with_care_says_nothing_of_the_pace() -> None:
+    """Steps from 1e-12 s on, six times as long each, up to those of a run of 10 s; the other way takes 20 s."""
+    clock = Clock()
+    one = stub("one", clock, lambda _: 1e-2, lambda t: min(1e-3, 1e-12 + 5.0 * t))
+    two = stub("two", clock, lambda _: 0.1, lambda _: 5e-3)
+    legs, _ = chosen(one, two, clock=clock)
+    assert names(legs) == ["one"]
+    assert clock.now < 1.3 * 10.0
+
+
 def test_steps_that_do_not_grow_are_given_up_early() -> None:
     clock = Clock()
     one = stub("one", clock, lambda _: 2e-3, lambda _: 1e-3)
@@ -222,7 +232,8 @@ def test_a_change_over_of_modal_coordinates_keeps_the_motion() -> None:
     start, times, clock = consistent_start(system), np.linspace(0.0, 2.0, 21), Clock()
     one, two = ways_of(system, start, times, "auto", "plain", {"tolerance": 1e-8, "longest": np.inf})
     one = slowed(one, clock, lambda t: 1e-3 if t < 1.0 else 1e3)
-    legs = Choice([one, slowed(two, clock, lambda _: 1.0)], start, times, clock=clock).run()
+    two = replace(slowed(two, clock, lambda _: 1.0), rate=None)
+    legs = Choice([one, two], start, times, clock=clock).run()
     assert [leg.way.method for leg in legs] == ["explicit", "implicit"]
     for i, (c, k, q) in enumerate(((0.4, 100.0, 1.0), (1.0, 900.0, -1.0))):
         fast = np.sqrt(k - c * c / 4)
@@ -246,13 +257,15 @@ def test_only_series_pass_singular_positions_so_springs_must_set_the_steps() -> 
 
 
 def test_the_choice_and_its_prediction_are_told_before_the_end() -> None:
-    """On the stream of a program that shows progress, when the run is long; in the statistics always."""
+    """On the stream of a program that shows progress, when a run is long; in the statistics always."""
     stream, clock = io.StringIO(), Clock()
-    one = stub("one", clock, lambda _: 1e-2 if not stream.getvalue() else 1e-3, lambda _: 1e-3)
+    one = stub(
+        "one", clock, lambda _: 1e-2 if not stream.getvalue() else 1e-3, lambda _: 1e-3, cure="others are faster"
+    )
     with shown(stream):
         legs, said = chosen(one, clock=clock)
-        assert stream.getvalue() == f"gearfe: {said[0]}\n" == "gearfe: method one: about 9.9 s\n"
-        assert joined_statistics(legs, said)["predictions"] == said
+    assert stream.getvalue() == "gearfe: method one: about 8 s left; others are faster\n"  # after 2 of 10 s
+    assert joined_statistics(legs, said)["predictions"] == said == ["method one: about 9.8 s"]  # after 16 steps
     made = integrate(pendulum(), [0.0, 20.0], tolerance=1e-6, backend="auto")
     assert made.method == "taylor"
     assert [leg["method"].split()[0] for leg in made.statistics["choice"]] == ["taylor"]
@@ -292,7 +305,8 @@ def test_a_train_that_changes_over_keeps_its_forces(monkeypatch: pytest.MonkeyPa
 
     def slow(*arguments: Any) -> list[Way]:
         one, two = ways_of(*arguments)
-        return [slowed(one, clock, lambda t: 1e-3 if t < 5e-4 else 1e3), slowed(two, clock, lambda _: 1.0)]
+        late: Cost = lambda t: 1e-3 if t < 5e-4 else 1e3  # noqa: E731
+        return [slowed(one, clock, late), replace(slowed(two, clock, lambda _: 1.0), rate=None)]
 
     module = importlib.import_module("gearfe.rigid.integrate")
     monkeypatch.setattr(module, "ways_of", slow)

@@ -148,7 +148,9 @@ def _keep(
                 pictures=[folder / name for name in names if Path(name).suffix in PICTURES],
                 job=("", "") if job is None else (str(job), Path(job).read_text(encoding="utf-8-sig")),
             )
-            (made / REPORT).write_text(report_page(page, time.strftime("%Y-%m-%d %H:%M")), encoding="utf-8")
+            (made / REPORT).write_text(
+                report_page(page, time.strftime("%Y-%m-%d %H:%M")), encoding="utf-8", errors="backslashreplace"
+            )
         return sorted(path.name for path in made.iterdir())
 
 

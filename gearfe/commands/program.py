@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import io
 import os
 import sys
 import warnings
@@ -31,6 +32,8 @@ CLOSED = 141
 
 def answer(arguments: list[str], run: Callable[[list[str]], int] | None = None) -> int:
     """Run one command, or `run`; return its exit code: that of `gearfe.cli.main`, which tells of an interruption."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a code page that lacks a letter of a name; stderr does so by itself
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         code = _answered(arguments, run or _run)
         for stream in (sys.stdout, sys.stderr):

@@ -79,12 +79,9 @@ def run(args: argparse.Namespace) -> int:
     with watch.stage("search"), ExitStack() as stack:
         executor = None
         if args.workers > 1:
-            import multiprocessing
-            from concurrent.futures import ProcessPoolExecutor
+            from ..study.run import processes
 
-            # forking would copy the thread that shows the progress
-            context = multiprocessing.get_context("spawn")
-            executor = stack.enter_context(ProcessPoolExecutor(args.workers, mp_context=context))
+            executor = stack.enter_context(processes(args.workers))
         try:
             made = optimise_relief(
                 problem,

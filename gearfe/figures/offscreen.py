@@ -43,7 +43,7 @@ def draw_apart(module: str, path: str | Path, arrays: Mapping[str, Array], *, se
         command = [sys.executable, "-m", module, str(job), str(path)]
         try:
             done = subprocess.run(
-                command, env=environment, capture_output=True, text=True, timeout=seconds, check=False
+                command, env=environment, capture_output=True, text=True, errors="replace", timeout=seconds, check=False
             )
         except subprocess.TimeoutExpired:
             return f"drawing took longer than {seconds:g} s"

@@ -46,11 +46,19 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         umask = os.umask(0)
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)
-        temporary.replace(target)
+        _move(temporary, target)
     except BaseException:
         with suppress(OSError):
             temporary.unlink()
         raise
+
+
+def _move(made: Path, target: Path) -> None:
+    """Put a file where it is wanted; Windows refuses that where another program has the old one open."""
+    try:
+        made.replace(target)
+    except PermissionError as error:
+        raise PermissionError(error.errno, f"{error.strerror} (is it open in a program?)", str(target)) from None
 
 
 def output_folder(path: str | Path) -> Path:
@@ -99,7 +107,7 @@ def csv_table(path: str | Path, *, gaps: bool = True) -> Iterator[Table]:
     """
     found: dict[str, list[int]] = {}  # column -> how many, and the first row
     rows = 0
-    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8") as stream:
+    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as stream:
         begun = False
 
         def write(columns: Columns) -> None:
@@ -201,7 +209,7 @@ def whole_set(folder: Path, may_write: Sequence[str] = (), beside: Sequence[str]
         if SUMMARY in new:
             may_write = (*may_write, *KEPT_LATER)
         for path in sorted(made.iterdir()):
-            path.replace(folder / path.name)
+            _move(path, folder / path.name)
         for old in {old for pattern in may_write for old in folder.glob(pattern)}:
             if old.name not in new and old.is_file():
                 old.unlink()

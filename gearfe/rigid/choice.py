@@ -4,7 +4,8 @@ A way to integrate tells its progress after every few steps. What it has left ta
 
     seconds left = (end - t) * (processor seconds) / (time passed in the motion).
 
-The first way begins. As soon as its pace is known, others are tried by real steps from the same start. A trial is won
+The first way begins. As soon as its pace is known (its steps no longer grow from the first one, or have cost `EARLY` of
+what they have left), others are tried by real steps from the same start. A trial is won
 when it has clearly less left than the first, and then is the run. It is lost when it has spent `SHARE` of what the
 first has left, or from `EARLY` on when its pace is slower and its steps do not grow: those of an implicit method grow
 as fast motions decay, so that its pace at first says too little. When a run takes `WRONG` times what was predicted,
@@ -15,6 +16,7 @@ about twice what the best way takes.
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -48,6 +50,8 @@ STIFF = 1.5
 STUCK = (Status.STEP_TOO_SMALL, Status.NOT_FINITE)
 #: Statistics that add up.
 SUMS = ("steps", "evaluations", "orders", "newton_iterations", "rejected")
+#: Processor seconds; Windows counts those of a thread by sixty-fourths of a second, so there it is the time elapsed.
+SECONDS = time.perf_counter if sys.platform == "win32" else time.thread_time
 #: ``run(start, times, most, watch)`` -> dense output, status, statistics.
 Run = Callable[[Start, Array, int, Watch | None], tuple[Dense, Status, dict[str, Any]]]
 
@@ -70,6 +74,8 @@ class Way:
     rate
         Fastest rate (1/s) of springs and dampers in a state, for a way that follows the motion less well: it is tried
         only where this rate sets the steps of the running one (`STIFF`).
+    cure
+        What would make it faster, told beside its prediction.
     """
 
     method: str
@@ -80,6 +86,7 @@ class Way:
     ratio: float = 1.0
     rate: Callable[[Start], float] | None = None
     instead: Way | None = None
+    cure: str = ""
 
     @property
     def name(self) -> str:
@@ -153,7 +160,7 @@ class Choice:
         times: Array,
         *,
         most: int = 1_000_000,
-        clock: Callable[[], float] = time.thread_time,
+        clock: Callable[[], float] = SECONDS,
     ) -> None:
         self.ways, self.start, self.times, self.most = tuple(ways), start, times, most
         self.clock = clock
@@ -170,13 +177,16 @@ class Choice:
     ) -> list[Leg] | None:
         """Legs from `start` on, the first by `way`; None for a trial lost against a way with `trial` seconds left."""
         pace = Pace(float(self.times[-1]), self.clock)
-        lost = whole = False  # whole: others did all of it
+        lost = whole = shown = False  # whole: others did all of it
         rest: list[Leg] | None = None
 
         def watch(t: float, steps: int, state: Callable[[], tuple[Array, Array]]) -> bool:
-            nonlocal trial, lost, predicted, rest, whole
+            nonlocal trial, lost, predicted, rest, whole, shown
             elapsed, left = pace.at(t)
             count(abs(t - self.start.time), abs(float(self.times[-1]) - self.start.time), way.method)
+            if trial is None and not shown and min(elapsed, left) > SILENT:
+                shown = True
+                say(f"method {way.name}: about {left:.2g} s left{way.cure and '; '}{way.cure}")
             if trial is not None:
                 if left * FASTER < trial:
                     trial, predicted = None, elapsed + left
@@ -186,6 +196,8 @@ class Choice:
                 return not lost
             if steps < LEAST_STEPS or (predicted is not None and elapsed + left <= WRONG * predicted):
                 return True
+            if predicted is None and pace.grows and elapsed < EARLY * left:
+                return True  # a first step guessed with care says too little
             whole = predicted is None and start is self.start
             predicted = elapsed + left
             before = self.clock()
@@ -223,7 +235,8 @@ class Choice:
                 if made is not None:
                     return made
         if best == left:
-            self._say(way, left, here.time)
+            if here is self.start:
+                self._say(way, left, here.time)
             return None
         other = known[seconds.index(best)]
         self._say(other, best, here.time)
@@ -232,8 +245,6 @@ class Choice:
     def _say(self, way: Way, seconds: float, t: float) -> None:
         where = "" if t == self.start.time else f" from {t:.6g} s on"
         self.said.append(f"method {way.name}{where}: about {seconds:.2g} s")
-        if seconds > SILENT:
-            say(self.said[-1])
 
 
 def joined(legs: Sequence[Leg]) -> Dense:

@@ -50,6 +50,7 @@ IMPLICIT_TRIAL, LOADING_LINALG, PLAIN_TRIAL = 0.02, 0.25, 0.01
 #: Rates from which on steps of a series or of Runge-Kutta are below the rounding of the run's time.
 HOPELESS = 1e12
 COMPILING = "compiling the kernels once, about a quarter of a minute; backend='plain' does without"
+MISSING_NUMBA = "numba would make it some hundred times as fast: pip install 'gearfe[fast]'"
 
 
 @stage("integrating")
@@ -102,8 +103,7 @@ def integrate(
     -------
     Trajectory
         With a status. Where there was a choice, ``statistics["choice"]`` lists what each method did, with predicted and
-        real seconds; a program that shows progress (`gearfe.progress`) tells predictions of more than two seconds
-        beforehand.
+        real seconds; a program that shows progress (`gearfe.progress`) tells after two seconds what is left.
 
     Raises
     ------
@@ -183,17 +183,18 @@ def ways_of(
     """Ways to integrate that `method` and `backend` leave open, the one to begin with first."""
     planar = system.linkage is not None
     trial = IMPLICIT_TRIAL + (0.0 if "scipy.linalg" in sys.modules else LOADING_LINALG)
-    rate = partial(_rate, system) if planar else None  # it does not see singular positions
+    rate = partial(_rate, system) if planar or is_linear(system) else None  # it does not see all other elements
     implicit = Way("implicit", "", partial(_implicit, system, options), trial, rate=rate)
     auto = method == "auto"
     stuck = auto and (any(e.stiff for e in system.elements) or _hopeless(system, start, times))
-    explicit = Way("explicit", "", partial(_explicit, system, backend, options), PLAIN_TRIAL)
+    cure = _cure(system, backend)
+    explicit = Way("explicit", "", partial(_explicit, system, backend, options), PLAIN_TRIAL, cure=cure)
     if stuck or method in ("implicit", "explicit"):
         return [explicit] if method == "explicit" else [implicit]
     if not planar:
         ways = _other_ways(system, auto, backend, options, explicit, runs)
         return [*ways, implicit] if auto else ways
-    plain = Way("taylor", "plain", partial(_taylor, system, False, options), PLAIN_TRIAL)
+    plain = Way("taylor", "plain", partial(_taylor, system, False, options), PLAIN_TRIAL, cure=cure)
     if not use_compiled(backend):
         return [plain, implicit] if auto else [plain]
     loading = loading_seconds() / runs
@@ -231,6 +232,14 @@ def _tape_taylor(
         raise InputError("backend", backend, "has no series for such a system", "use method='explicit', or numba")
     local = max(LOCAL_SHARE * options["tolerance"], 5e-16)
     return series.run_series(system, start, times, local=local, longest=options["longest"], most=most, watch=watch)
+
+
+def _cure(system: System, backend: str) -> str:
+    """What to tell where compiled series could run, were numba there."""
+    if backend != "auto" or compiled.available():
+        return ""
+    able = system.linkage is not None or series_force(system) is not None or tape_program(system) is not None
+    return MISSING_NUMBA if able else ""
 
 
 def _hopeless(system: System, start: Start, times: Array) -> bool:

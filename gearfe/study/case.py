@@ -138,7 +138,7 @@ def _keep_memory() -> None:
     a third of its time.
     """
     if os.environ.get("MALLOC_TRIM_THRESHOLD_"):
-        with suppress(OSError, AttributeError):  # of glibc alone
+        with suppress(OSError, AttributeError, TypeError):  # of glibc alone
             mallopt = ctypes.CDLL(None).mallopt
             mallopt(_TRIM_THRESHOLD, 256 << 20)
             mallopt(_MMAP_THRESHOLD, 32 << 20)

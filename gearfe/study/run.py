@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import os
 import signal
+import sys
 import threading
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
@@ -118,7 +119,8 @@ def side_by_side(
 
 
 def processes(workers: int) -> Executor:
-    """Fresh processes, whatever this one has loaded."""
+    """Fresh processes, whatever this one has loaded; on Windows no pool has more than 61 (`concurrent.futures`)."""
+    workers = min(workers, 61) if sys.platform == "win32" else workers
     return ProcessPoolExecutor(workers, get_context("spawn"), _begin)
 
 
