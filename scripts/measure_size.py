@@ -33,13 +33,13 @@ CAPABILITIES = {
     """,
     "extruded housing meshes, compiled kernels kept": """
         prisms.py housing/prism_error.py housing/meshes.py rigid/packed* rigid/parts.py versions.py meshing/*recipe.py
-        housing/body.py meshlaw/cached.py
+        housing/body.py
     """,
     "own housings, exchange, reports, analyses of records": """
         housing/own_mesh.py housing/superelement.py housing/dmig.py housing/modal_test.py meshing/mesh_file.py
-        meshing/deck.py meshing/gear_solid.py meshing/mixed_gear.py gear/outline.py output/formats.py
-        output/report_page.py output/dxf.py shown.py figures/results.py figures/mac.py figures/mesh.py
-        figures/labels.py */short_time.py commands/completion.py vibration/analysis.py vibration/tracked.py
+        meshing/deck.py meshing/gear_solid.py gear/outline.py output/formats.py
+        output/report_page.py output/dxf.py shown.py figures/results.py
+        */short_time.py commands/completion.py vibration/analysis.py
         vibration/measured.py vibration/timefunctions.py tables/spectrum.py tables/timefunction.py
     """,
     "studies": "study/* */study.py",

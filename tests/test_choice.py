@@ -19,8 +19,7 @@ from gearfe.rigid.choice import Choice, Leg, Way, joined, joined_statistics
 from gearfe.rigid.contract import Array
 from gearfe.rigid.integrate import _dropped_rows_hold, integrate, ways_of
 from gearfe.rigid.start import Freedoms, Start, consistent_start
-from gearfe.rigid.status import Status
-from gearfe.rigid.steps import Watch
+from gearfe.rigid.steps import Status, Watch
 from gearfe.train import build_train, simulate
 
 from .rigid_cases import pendulum

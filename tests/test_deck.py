@@ -14,8 +14,8 @@ import pytest
 
 from gearfe.cli import main
 from gearfe.meshing.deck import deck_torque
-from gearfe.meshing.mixed_gear import mixed_gear, teeth_in_mesh
 from gearfe.meshing.recipe import sector_recipes
+from gearfe.meshing.whole_gear import mixed_gear, teeth_in_mesh
 from gearfe.tables.examples import job_file
 
 from .gears import pair

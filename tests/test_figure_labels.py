@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
-from gearfe.figures.labels import label_lines
+from gearfe.figures.spectra import label_lines
 from gearfe.figures.stiffness import ellipse
 from gearfe.figures.style import fixed
 

@@ -15,10 +15,9 @@ from gearfe.contact.laws import law_named
 from gearfe.contact.model import PairModel
 from gearfe.elasticity import Material
 from gearfe.errors import InputError
-from gearfe.meshlaw.cached import cached_law
 from gearfe.meshlaw.law import MeshLaw
 from gearfe.meshlaw.make import coupling_curve, mesh_law
-from gearfe.meshlaw.store import load_law, save_law, write_law_csv
+from gearfe.meshlaw.store import cached_law, load_law, save_law, write_law_csv
 from gearfe.stiffness.sweep import elastic_pair
 
 FORM = {"module": 2.5e-3, "pressure_angle": math.radians(25), "face_width": 10e-3, "tip_round": 0.1e-3}

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from gearfe.column_store import IN_MEMORY, ColumnStore
 from gearfe.errors import InputError
-from gearfe.record_spectrum import RecordSpectrum, finer, low_pass, samples_per_step
+from gearfe.record_spectrum import IN_MEMORY, ColumnStore, RecordSpectrum, finer, low_pass, samples_per_step
 from gearfe.train import build_train, simulate
 from gearfe.vibration.spectra import TrainRecord, spectra
 

@@ -13,8 +13,7 @@ from gearfe.cli import main
 from gearfe.errors import InputError
 from gearfe.train.response import TrainResponse
 from gearfe.vibration.measured import read_universal
-from gearfe.vibration.short_time import averaged, order_tracks, short_time, steady_from
-from gearfe.vibration.tracked import Tracked
+from gearfe.vibration.short_time import Tracked, averaged, order_tracks, short_time, steady_from
 
 from .test_cli_vibration import SMALL
 

@@ -146,7 +146,7 @@ def _compare(folder: Path, made: Comparison, args: argparse.Namespace) -> None:
         folder / "mac.csv", {"test_frequency_Hz": made.test.frequencies, **dict(zip(names, made.mac.T, strict=True))}
     )
     if not args.no_pictures:
-        from ..figures.mac import mac_figure
+        from ..figures.housing import mac_figure
 
         mac_figure(folder / "mac.png", made, Path(args.compare).name)
     print(f"compared with {args.compare}: points within {1e3 * made.distance:.3g} mm of a node")

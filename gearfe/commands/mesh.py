@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
         with stage("writing"):
             counts = export_mesh(args.out, parts, plane=job.table.plane)
     if not args.no_pictures:
-        from ..figures.mesh import mesh_figure
+        from ..figures.gears import mesh_figure
 
         with stage("picture"):
             mesh_figure(Path(args.out).with_suffix(".png"), parts, None if args.sector else pair)
@@ -121,7 +121,7 @@ def _parts(args: argparse.Namespace, job: StiffnessJob, wheel_angle: float) -> d
                 if args.teeth is None:
                     made = _uniform(sector_mesh(gear, recipes[number]), sector=args.sector)
                 else:
-                    from ..meshing.mixed_gear import mixed_gear, teeth_in_mesh
+                    from ..meshing.whole_gear import mixed_gear, teeth_in_mesh
 
                     fine = teeth_in_mesh(gear, turned[number], math.pi * number, min(args.teeth, gear.teeth))
                     made = mixed_gear(gear, recipes[number], fine)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..progress import count
 from ..tables.microgeometry import MicrogeometryTable
@@ -12,6 +13,12 @@ from ..tables.stiffness import StiffnessTable
 from .arguments import add_job, add_keys, with_keys
 from .common import add_folder, tell
 from .loadmap import add_loads, with_loads
+
+if TYPE_CHECKING:
+    from ..contact.compliance import MeshingPair
+    from ..loadmap.root_stress import PairRoots
+    from ..stiffness.job import StiffnessJob
+    from ..stopwatch import Stopwatch
 
 HELP = "reliefs, pitch errors, measured flanks: transmission error, orders, load sharing, pressure against torque"
 
@@ -30,6 +37,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-pictures", action="store_true", help="leave out the pictures")
 
 
+def condensed(job: StiffnessJob, root_stress: bool, watch: Stopwatch) -> tuple[MeshingPair, PairRoots | None]:
+    """Both gears of a job condensed for the half-plane law, and the meshes of their roots where stresses are wanted."""
+    from ..loadmap.root_stress import pair_roots
+    from ..stiffness.sweep import elastic_pair
+    from ..threads import one_thread
+
+    elastic = elastic_pair(job.pair, job.model, law="half_plane", watch=watch)
+    if not root_stress:
+        return elastic, None
+    with watch.stage("root meshes"), one_thread():
+        return elastic, pair_roots(job.pair, elastic)
+
+
 def run(args: argparse.Namespace) -> int:
     """Solve the pair and write the files; 1 when a position failed."""
     started = time.perf_counter()
@@ -46,7 +66,6 @@ def run(args: argparse.Namespace) -> int:
 
     from ..contact.half_plane import half_plane_pair
     from ..gear.deviation_job import deviations_of
-    from ..loadmap.root_stress import pair_roots
     from ..microgeometry.report import (
         cell_table,
         law_remarks,
@@ -60,9 +79,7 @@ def run(args: argparse.Namespace) -> int:
     from ..microgeometry.solve import load_mesh
     from ..output.files import output_folder, whole_set, write_csv, write_json
     from ..stiffness.job import StiffnessJob
-    from ..stiffness.sweep import elastic_pair
     from ..stopwatch import Stopwatch
-    from ..threads import one_thread
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     job = StiffnessJob(tables["pair"], with_keys(args, tables.get("stiffness", StiffnessTable()), "coarsen"), pair)
@@ -72,11 +89,7 @@ def run(args: argparse.Namespace) -> int:
         other = {"left": "right", "right": "left"}[table.flank]
         back = deviations_of(table, pair, beside, flank=other)
     folder = output_folder(args.out)
-    elastic = elastic_pair(pair, job.model, law="half_plane", watch=watch)
-    roots = None
-    if table.root_stress:
-        with watch.stage("root meshes"), one_thread():
-            roots = pair_roots(pair, elastic)
+    elastic, roots = condensed(job, table.root_stress, watch)
     with watch.stage("positions"):
         law = half_plane_pair(pair, elastic, deviations=deviations)
         made = load_mesh(

@@ -12,6 +12,7 @@ from ..tables.microgeometry import MicrogeometryTable, ReliefTable
 from ..tables.stiffness import StiffnessTable
 from .arguments import add_job, add_keys, with_keys
 from .common import add_folder, tell
+from .microgeometry import condensed
 
 HELP = "tip and root relief, crowning, slope: search for the best at some torques, with its tolerances"
 
@@ -48,7 +49,6 @@ def run(args: argparse.Namespace) -> int:
     pair = GearPair.from_table(tables["pair"])
 
     from ..contact.half_plane import half_plane_pair
-    from ..loadmap.root_stress import pair_roots
     from ..microgeometry.relief import optimise_relief
     from ..microgeometry.relief_job import (
         comparison,
@@ -62,18 +62,12 @@ def run(args: argparse.Namespace) -> int:
     from ..microgeometry.report import law_remarks
     from ..output.files import output_folder, whole_set, write_csv, write_json
     from ..stiffness.job import StiffnessJob
-    from ..stiffness.sweep import elastic_pair
     from ..stopwatch import Stopwatch
-    from ..threads import one_thread
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     job = StiffnessJob(tables["pair"], with_keys(args, tables.get("stiffness", StiffnessTable()), "coarsen"), pair)
     folder = output_folder(args.out)
-    elastic = elastic_pair(pair, job.model, law="half_plane", watch=watch)
-    roots = None
-    if table.root_stress_weight:
-        with watch.stage("root meshes"), one_thread():
-            roots = pair_roots(pair, elastic)
+    elastic, roots = condensed(job, bool(table.root_stress_weight), watch)
     law = half_plane_pair(pair, elastic)
     problem = relief_problem(table, base, pair, Path(args.job).parent, law, roots)
     with watch.stage("search"), ExitStack() as stack:

@@ -8,8 +8,9 @@ from dataclasses import replace
 from typing import Any
 
 from ..tables.runup import RunUpTable
-from .arguments import add_job, add_keys, with_keys
-from .common import add_folder, tell
+from .arguments import with_keys
+from .common import tell
+from .vibration import add_train, title
 
 #: Keys of [runup] that options stand for.
 KEYS = ("speed_start_rad_per_s", "speed_stop_rad_per_s", "speeds", "tolerance", "band_Hz", "multiples")
@@ -19,14 +20,7 @@ HELP = "gear train over its speed: steady states on all branches, waterfall, ord
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    add_job(parser, "job", "job file with the tables [train] and [runup]")
-    add_folder(parser)
-    parser.add_argument("--variant", metavar="NAME", help="a variant that the job file describes")
-    parser.add_argument(
-        "--curve", nargs="+", metavar="FILE", default=(), help="stiffness curves (CSV): one, or one a mesh"
-    )
-    add_keys(parser, RunUpTable, *KEYS)
-    parser.add_argument("--attachment", metavar="NAME", help="attachment in the pictures (default: that of the load)")
+    add_train(parser, "job file with the tables [train] and [runup]", RunUpTable, *KEYS)
     parser.add_argument("--no-stability", action="store_true", help="leave out the Floquet multipliers")
     parser.add_argument(
         "--fields", action="store_true", help="the modes that the meshes swing in, for ParaView (VTKHDF series)"
@@ -38,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     """Compute and write; 1 when the range was not covered."""
     started = time.perf_counter()
     from ..errors import unknown_name
-    from ..tables.train import read_train_tables, value_text
+    from ..tables.train import read_train_tables
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
     tables = read_train_tables(args.job, args.variant)
@@ -62,14 +56,9 @@ def run(args: argparse.Namespace) -> int:
             raise unknown_name("--attachment", args.attachment, bores)
         folder = output_folder(args.out)
     made, unstable = solved(job, table, args.curve, watch=watch)
-    parts = [f"{len(job.table.shafts)} shafts, {len(job.table.meshes)} gear mesh{'es' * (len(job.table.meshes) != 1)}"]
-    parts += [f"load {value_text(x.torque_Nm, 'N m')} on {x.shaft}".replace("-", "−", 1) for x in job.table.loads[:1]]
-    parts += [f"variant {job.table.variant}"] if job.table.variant else []
-    summary, names = write_runup(
-        folder, made, RunUpChoice(table.multiples, args.attachment, args.fields),
-        draw=None if args.no_pictures else RunUpPictures(", ".join(parts)), watch=watch, further=described(job, table),
-        unstable=unstable,
-    )  # fmt: skip
+    draw = None if args.no_pictures else RunUpPictures(title(job.table, driven=False))
+    choice, further = RunUpChoice(table.multiples, args.attachment, args.fields), described(job, table)
+    summary, names = write_runup(folder, made, choice, draw=draw, watch=watch, further=further, unstable=unstable)
     tell(_told(summary), folder, names, watch.seconds, summary["warnings"])
     return 0 if summary["speeds_reached"] == summary["speeds"] else 1
 

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from ..train.gear_train import GearTrain
     from ..train.response import TrainResponse
     from ..vibration.files import OutputChoice, Written
-    from ..vibration.job import TrainJob
 
 #: Keys of [train] that options stand for.
 KEYS = ("tolerance", "method")
@@ -27,19 +26,12 @@ HELP = "gear train in its housing: contact forces, speeds, vibration, spectrum, 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    add_job(parser, "job", "job file with the table [train]")
-    add_folder(parser)
-    parser.add_argument("--variant", metavar="NAME", help="a variant that the job file describes")
-    parser.add_argument(
-        "--curve", nargs="+", metavar="FILE", default=(), help="stiffness curves (CSV): one, or one a mesh"
-    )
-    add_keys(parser, TrainTable, *KEYS)
+    add_train(parser, "job file with the table [train]", TrainTable, *KEYS)
     parser.add_argument("--window", metavar="NAME", help="none, hann, hamming, blackman or flattop")
     parser.add_argument(
         "--spectrum-from-ms", type=float, metavar="T", help="begin of the spectrum's record (default: [spectrum], or 0)"
     )
     parser.add_argument("--spectrum-ms", type=float, metavar="T", help="its duration (default: to the end)")
-    parser.add_argument("--attachment", metavar="NAME", help="attachment in the pictures (default: that of the load)")
     parser.add_argument(
         "--band", nargs=2, type=float, metavar=("LOW", "HIGH"), help="frequencies of the pictures' spectra (Hz)"
     )
@@ -54,6 +46,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--picture-ms", type=float, metavar="T", help="time of the fields' picture (default: 4.55)")
     parser.add_argument("--no-animation", action="store_true", help="leave out the animation of --fields")
+
+
+def add_train(parser: argparse.ArgumentParser, help_: str, table: type, *keys: str) -> None:
+    """Options of a train's job: file, folder, variant, curves, keys of its table, attachment in the pictures."""
+    add_job(parser, "job", help_)
+    add_folder(parser)
+    parser.add_argument("--variant", metavar="NAME", help="a variant that the job file describes")
+    parser.add_argument(
+        "--curve", nargs="+", metavar="FILE", default=(), help="stiffness curves (CSV): one, or one a mesh"
+    )
+    add_keys(parser, table, *keys)
+    parser.add_argument("--attachment", metavar="NAME", help="attachment in the pictures (default: that of the load)")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -109,7 +113,7 @@ def run(args: argparse.Namespace) -> int:
         planned,
         choice,
         watch=watch,
-        draw=None if args.no_pictures else TrainPictures(title(job), args.band and tuple(args.band), args.range),
+        draw=None if args.no_pictures else TrainPictures(title(job.table), args.band and tuple(args.band), args.range),
         beside=Analysis(job, train, every, start),
         progress=count,
     )
@@ -124,11 +128,10 @@ def run(args: argparse.Namespace) -> int:
     return 0 if response.status == "done" and not written.problems else 1
 
 
-def title(job: TrainJob) -> str:
-    """Line above the pictures."""
-    table = job.table
+def title(table: TrainTable, *, driven: bool = True) -> str:
+    """Line above the pictures, with the drive's speed or without."""
     parts = [f"{len(table.shafts)} shafts, {len(table.meshes)} gear mesh{'es' * (len(table.meshes) != 1)}"]
-    if table.drive is not None:
+    if driven and table.drive is not None:
         parts.append("drive " + value_text(table.drive.speed_rad_per_s, "rad/s"))
     parts += [f"load {value_text(x.torque_Nm, 'N m')} on {x.shaft}".replace("-", "−", 1) for x in table.loads[:1]]
     if table.variant:

@@ -14,7 +14,7 @@ from .planar import Body
 from .quadratic import QuadraticJoint
 from .start import Forced, Freedoms, Start, consistent_start, count_freedoms
 from .statefunctions import SpanFunction, StateFunction
-from .status import Status
+from .steps import Status
 from .system import System
 from .timefunctions import TimeFunction, constant, polynomial, sine, smoothed_step
 from .trajectory import IntegrationError, Trajectory

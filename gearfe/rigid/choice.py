@@ -28,8 +28,7 @@ from ..progress import SILENT, count, say
 from ..typing import Array
 from .dense import Dense, Joined
 from .start import Start
-from .status import Status
-from .steps import Watch
+from .steps import Status, Watch
 
 #: A trial may cost this part of what the running way has left: with less, one that is lost might have been the best.
 SHARE, EARLY = 0.75, 0.1

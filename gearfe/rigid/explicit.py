@@ -19,8 +19,7 @@ from ..typing import Array
 from .carried import RANK
 from .dense import Polynomials, within_run
 from .start import Start
-from .status import Status
-from .steps import StepControl, StepLaw, Watch, first_step
+from .steps import Status, StepControl, StepLaw, Watch, first_step
 from .system import System, own_motion
 
 SCHEME = "Runge-Kutta of order 8"

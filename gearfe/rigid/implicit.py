@@ -26,8 +26,7 @@ from .dense import Polynomials, hermite
 from .elimination import ModalCoordinates, is_linear, modal_coordinates
 from .explicit import on_constraints
 from .start import Start
-from .status import Status
-from .steps import StepControl, StepLaw, Watch, first_step
+from .steps import Status, StepControl, StepLaw, Watch, first_step
 from .system import System
 
 ROOT6 = math.sqrt(6.0)

@@ -33,8 +33,7 @@ from .modal import series_force
 from .series import tape_program
 from .start import Start, consistent_start
 from .statefunctions import SpanFunction, StateFunction
-from .status import Status
-from .steps import Watch
+from .steps import Status, Watch
 from .system import System
 from .tables import carrying
 from .trajectory import IntegrationError, Trajectory

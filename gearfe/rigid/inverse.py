@@ -13,7 +13,7 @@ from ..typing import Array
 from .carried import RANK
 from .dense import hermite
 from .start import Start, close, closes
-from .status import Status
+from .steps import Status
 from .system import System
 from .trajectory import Trajectory
 

@@ -19,7 +19,7 @@ from .kernel_names import AHEAD, BEGUN, LAST_STEP, ROW, SINGULAR, TIME
 from .kernel_rows import copy, fill
 from .kernel_series import expand
 from .kernel_singular import evaluate, factor_at, next_singular, project
-from .status import Status
+from .steps import Status
 
 if TYPE_CHECKING:
     from .tables import Tables

@@ -14,7 +14,7 @@ from ..typing import Array, IntArray
 from .kernel_quadratic import expand, factorise, gradients, row_orders, solve, trigonometry_order
 from .kernel_rows import copy, fill, time_series
 from .kernel_tape import horner, largest, leaves, margin, next_piece, tape_order
-from .status import Status
+from .steps import Status
 
 if TYPE_CHECKING:
     from .series import Run, Work

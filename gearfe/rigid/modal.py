@@ -26,8 +26,7 @@ from .explicit import Problem, run_problem
 from .packed import Packed
 from .parts import uncollected
 from .start import Start
-from .status import Status
-from .steps import Watch
+from .steps import Status, Watch
 from .system import System
 
 #: Highest order of the series; 24 to 36 cost the same within a tenth.

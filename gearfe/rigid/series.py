@@ -16,8 +16,7 @@ from .dense import Polynomials
 from .packed import Packed
 from .parts import uncollected
 from .start import Start
-from .status import Status
-from .steps import Watch
+from .steps import Status, Watch
 from .system import System
 from .tape import Program, Tape
 from .taylor import order_for

@@ -28,8 +28,7 @@ from .dense import Polynomials
 from .packed import Packed
 from .parts import uncollected
 from .start import Start
-from .status import Status
-from .steps import Watch
+from .steps import Status, Watch
 from .tables import Assembly, Tables
 
 FUNCTIONS = (

@@ -16,7 +16,7 @@ from ..typing import Array
 from .contract import Element
 from .dense import Dense
 from .start import Start
-from .status import Status
+from .steps import Status
 from .system import System, least_norm_solution
 
 

@@ -20,9 +20,8 @@ from ..typing import Array
 from .job import TrainJob
 from .measured import Measured, read_measured
 from .run import repeater
-from .short_time import OrderTracks, averaged, check_part, check_turns, order_tracks, short_time, steady_from
+from .short_time import OrderTracks, Tracked, averaged, check_part, check_turns, order_tracks, short_time, steady_from
 from .spectra import TrainSpectra
-from .tracked import Tracked
 
 #: Multiples of the meshes' orders that are tracked where none are named.
 MULTIPLES = 3

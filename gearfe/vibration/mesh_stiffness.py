@@ -153,7 +153,7 @@ def _computed_curve(
 def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) -> MeshLaw:
     """Mesh law of a mesh with the driver as pinion; meshes of the same gears share the one for the largest torque."""
     from ..contact.laws import HalfPlane
-    from ..meshlaw.cached import cached_law
+    from ..meshlaw.store import cached_law
     from ..stiffness.curve_cache import cached_curve
     from ..stiffness.job import StiffnessJob
 
