@@ -84,6 +84,23 @@ def test_work_of_an_expression_balances_the_energy(tmp_path: Path) -> None:
     assert abs(energy["work_J"]).max() > 0.1
 
 
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-7])
+@pytest.mark.parametrize("kind", ["corner", "jump", "pulses"])
+def test_steps_of_the_implicit_method_end_at_corners_and_jumps(tmp_path: Path, kind: str, tolerance: float) -> None:
+    """A stop with a spring, or a constant load, gives back the speed; half waves of a sine add 2 M/w each."""
+    k, inertia, rod = 800.0, 0.5, ROD.replace("angle_deg = 30.0", "angle_deg = 0.0")
+    load, end, speed = {
+        "corner": (f"-{k}*max(0, angle(rod) - 0.4)", 0.7 + math.pi * math.sqrt(inertia / k), -1.0),
+        "jump": ("-2*(1 + abs(angle(rod) - 0.4)/(angle(rod) - 0.4))", 0.95, -1.0),
+        "pulses": ("3*max(0, sin(30*time))", 7 * math.pi / 15, 1.0 + 7 * 2 * 3 / 30 / inertia),
+    }[kind]
+    _, run = ran(tmp_path, rod + MOMENT.format(load), end, method="implicit", tolerance=tolerance)
+    assert run.v[-1, 2] == pytest.approx(speed, abs=5 * tolerance)
+    assert run.statistics["rejected"] < 60
+    if kind != "pulses":
+        assert run.q[-1, 2] == pytest.approx(0.1, abs=5 * tolerance)
+
+
 def test_slopes_are_those_of_the_value(tmp_path: Path) -> None:
     text = "min(10, 2*(1 - angle(rod))) * hypot(x(rod.tip), 1 + vy(rod.tip)**2) / (2 + cos(rate(O))) + exp(-y(rod.tip))"
     mechanism = load_mechanism(

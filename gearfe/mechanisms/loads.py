@@ -129,6 +129,27 @@ def compiled(node: Node, names: Sequence[tuple[str, str | None]]) -> Evaluate:
     return applied
 
 
+def corners(node: Node, names: Sequence[tuple[str, str | None]]) -> list[Callable[[Sequence[float]], int]]:
+    """Numbers of the pieces that `abs`, `min`, `max` and tables are on, as functions of the quantities."""
+    found = [corner for part in node.parts for corner in corners(part, names)]
+    parts = [compiled(part, names) for part in node.parts]
+    if node.kind == "table":
+        table: ValueTable = node.value[1]
+        found.append(lambda values: table.piece(parts[0](values)[0]))
+    elif node.kind == "call" and node.value == "abs":
+        found.append(lambda values: int(parts[0](values)[0] >= 0.0))
+    elif node.kind == "call" and node.value in ("min", "max"):
+        found.append(lambda values: int(parts[0](values)[0] >= parts[1](values)[0]))
+    return found
+
+
+def _pieces(found: list[Callable[[Sequence[float]], int]], values: Sequence[float]) -> tuple[int, ...]:
+    try:
+        return tuple(corner(values) for corner in found)
+    except (Trouble, OverflowError, ZeroDivisionError, ValueError):
+        return ()
+
+
 class ExpressionLoad(StateFunction):
     """A load given by an expression; `bind` tells it the mechanism whose quantities it names.
 
@@ -147,7 +168,7 @@ class ExpressionLoad(StateFunction):
             if kind not in ALLOWED:
                 problem = f"uses {kind}; a load may depend on {', '.join(ALLOWED)}"
                 raise InputError(label, text, problem, "use one of these")
-        self.evaluate = compiled(node, self.names)
+        self.evaluate, self.corners = compiled(node, self.names), corners(node, self.names)
 
     def bind(self, mechanism: Mechanism) -> None:
         """Look up bodies and points."""
@@ -200,6 +221,11 @@ class ExpressionLoad(StateFunction):
                         by_q[k + 2] -= slope * v[k + 2] * arm[along]
         return by_q, by_v
 
+    def pieces(self, t: float, q: Array, v: Array) -> tuple[int, ...]:
+        """Pieces of all corners; none where there is no value."""
+        values = [self._quantity(k, w, t, q, v) for k, w in self.places] if self.corners else []
+        return _pieces(self.corners, values)
+
     def write(self, bodies: BodyVariables) -> int:
         """Its register on a tape."""
         places = dict(zip(self.names, self.places, strict=True))
@@ -233,7 +259,7 @@ class ExpressionTension(SpanFunction):
             if kind not in OF_SPAN:
                 problem = f"uses {kind}; a tension may depend on {', '.join(OF_SPAN)}"
                 raise InputError(label, text, problem, "use one of these")
-        self.evaluate = compiled(node, names)
+        self.evaluate, self.corners = compiled(node, names), corners(node, names)
 
     def value(self, t: float, length: float, rate: float) -> float:
         """Tension (N)."""
@@ -250,6 +276,10 @@ class ExpressionTension(SpanFunction):
         except (Trouble, OverflowError, ZeroDivisionError, ValueError):
             return 0.0, 0.0  # the value says so
         return float(by_length), float(by_rate)
+
+    def pieces(self, t: float, length: float, rate: float) -> tuple[int, ...]:
+        """Pieces of all corners; none where there is no value."""
+        return _pieces(self.corners, [t, length, rate])
 
     def write(self, tape: Tape, length: int, rate: int) -> int:
         """Its register on a tape."""

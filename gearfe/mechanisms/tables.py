@@ -67,10 +67,16 @@ class ValueTable:
         rows = tuple(tuple(float(c) for c in row[::-1]) for row in self._pieces.T)
         return TimeFunction(starts, tuple(float(t) for t in self.x[:-1]), rows)
 
-    def _at(self, x: float) -> tuple[float, Array]:
+    def piece(self, x: float) -> int:
+        """Number of the piece that holds x."""
         if self.kind == "periodic":
             x = float(self.x[0] + (x - self.x[0]) % (self.x[-1] - self.x[0]))
-        k = min(max(int(np.searchsorted(self.x, x, side="right")) - 1, 0), len(self.x) - 2)
+        return min(max(int(np.searchsorted(self.x, x, side="right")) - 1, 0), len(self.x) - 2)
+
+    def _at(self, x: float) -> tuple[float, Array]:
+        k = self.piece(x)
+        if self.kind == "periodic":
+            x = float(self.x[0] + (x - self.x[0]) % (self.x[-1] - self.x[0]))
         return x - float(self.x[k]), self._pieces[:, k]
 
     def __call__(self, x: Array) -> Array:

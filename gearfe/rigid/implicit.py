@@ -22,6 +22,7 @@ import numpy as np
 from ..typing import Array
 from .collocated import MIDDLE, C, collocated
 from .contract import Element, LocalForce, ModalBlocks
+from .corners import Corners
 from .dense import Polynomials, hermite
 from .elimination import ModalCoordinates, is_linear, modal_coordinates
 from .explicit import on_constraints
@@ -87,6 +88,7 @@ def run_implicit(
     span = (start.time, float(times[-1]))
     first = first_step(here.q / units, here.v / units, here.a / units, abs(span[1] - span[0]))
     control = StepControl(LAW, span, first, breaks=system.breaks, watch=watch, **options)
+    corners = Corners(system, control, tolerance)
     reach = np.maximum(np.abs(here.q), 1e-300)
     record: list[State] = [here]
     stages, forces = [], []
@@ -104,6 +106,10 @@ def run_implicit(
         if not made.converged:
             control.fail(Status.NOT_SOLVED, NOT_SOLVED_SHARE)
             continue
+        assert made.stages is not None
+        assert made.speeds is not None
+        if corners.cut(here.t, h, (here.q, here.v, *made.stages, made.q, made.v), made.speeds):
+            continue
         error = max(made.error, _gap_between(system, here, h, made, active) / tolerance)
         if error > 1.0:
             control.reject(error)
@@ -111,7 +117,7 @@ def run_implicit(
         t = control.accept(error)
         q, v = np.split(on_constraints(system, t, made.q, made.v, active, start.excess), 2)
         here = State(t, q, v, *system.acceleration(t, q, v, active, start.excess))
-        reach, last = np.maximum(reach, np.abs(q)), made.speeds
+        reach, last = np.maximum(reach, np.abs(q)), None if corners.passing(h) else made.speeds
         record.append(here)
         stages.append(made.stages)
         forces.append(made.forces)

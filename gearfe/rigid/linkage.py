@@ -92,6 +92,18 @@ class Linkage(Element):
         """Whether the Taylor kernels can run it: no load depends on the state, no constraint has a profile."""
         return not (self.assembly.state_loads or self.assembly.tension_laws or self.assembly.profiles)
 
+    def pieces(self, t: float, q: Array, v: Array) -> tuple[int, ...]:
+        """Numbers of the smooth pieces that loads and laws of springs are on."""
+        found = [piece for _, load in self.assembly.state_loads for piece in load.pieces(t, q, v)]
+        if self.assembly.tension_laws:
+            pose = self.pose(q)
+            rates = self._motion(pose, v)
+            for i, law in self.assembly.tension_laws:
+                span, speed = pose.vector[i], rates.vector[i]
+                length = float(np.hypot(*span))
+                found += law.pieces(t, length, float(span @ speed) / length if length > 0.0 else 0.0)
+        return tuple(found)
+
     def write(self, tape: Tape, places: IntArray) -> bool:
         """The linkage on a tape, see `gearfe.rigid.contract`."""
         from .linkage_tape import write_linkage

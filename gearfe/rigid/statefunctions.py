@@ -30,6 +30,10 @@ class StateFunction(ABC):
     def slopes(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
         """(df/dq, df/dv)."""
 
+    def pieces(self, t: float, q: Array, v: Array) -> tuple[int, ...]:  # noqa: ARG002
+        """Numbers of the smooth pieces that it is on."""
+        return ()
+
     def write(self, bodies: BodyVariables) -> int | None:  # noqa: ARG002
         """Its register on the tape of the bodies' variables; None where it cannot be written."""
         return None
@@ -47,6 +51,10 @@ class SpanFunction(ABC):
     @abstractmethod
     def slopes(self, t: float, length: float, rate: float) -> tuple[float, float]:
         """(dT/dL, dT/dL')."""
+
+    def pieces(self, t: float, length: float, rate: float) -> tuple[int, ...]:  # noqa: ARG002
+        """Numbers of the smooth pieces that it is on."""
+        return ()
 
     def write(self, tape: Tape, length: int, rate: int) -> int | None:  # noqa: ARG002
         """Its register by those of length and rate; None where it cannot be written."""

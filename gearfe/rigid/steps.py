@@ -94,6 +94,7 @@ class StepControl:
         self.status = Status.DONE
         self.accepted = self.rejected = 0
         self._step, self._cut, self._before = 0.0, False, 0.0
+        self._added = False  # whether the first goal is one of `end_at`
 
     def next_step(self, state: Callable[[], tuple[Array, Array]]) -> float | None:
         """The next step to try, with the sign of time; None when the run has ended, `status` then says why."""
@@ -108,6 +109,7 @@ class StepControl:
         rounding = ROUNDING * max(abs(self.t), self.span)
         while self.sign * (self.goals[0] - self.t) <= rounding:
             self.goals.pop(0)
+            self._added = False
         left = abs(self.goals[0] - self.t)
         self._step = min(self.trial, self.longest, left)
         self._cut = self._step == left
@@ -133,6 +135,14 @@ class StepControl:
         """The step is not made: its error is above 1."""
         self.rejected += 1
         self.trial = self._step * max(LEAST, SAFETY * error**-self.law.exponent)
+
+    def end_at(self, t: float) -> None:
+        """The step is not made: one that ends at the time t, within it, is next."""
+        self.rejected += 1
+        if self._added:
+            self.goals.pop(0)
+        self.goals.insert(0, t)
+        self._added, self.trial = True, self._step
 
     def fail(self, status: Status, share: float = LEAST) -> None:
         """The step is not made, and its error has no size: `share` of it is next, or the run ends with `status`."""

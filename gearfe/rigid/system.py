@@ -128,6 +128,11 @@ class System:
             np.add.at(by_v, np.ix_(index, index), local[1])
         return by_q, by_v
 
+    def pieces(self, t: float, q: Array, v: Array) -> tuple[int, ...]:
+        """Numbers of the smooth pieces that the forces are on."""
+        parts = [(e, i) for e, i in zip(self.elements, self.index, strict=True) if hasattr(e, "pieces")]
+        return tuple(piece for e, i in parts for piece in e.pieces(t, q[i], v[i]))
+
     def residual(self, t: float, q: Array) -> Array:
         """g, shape (rows,)."""
         return self._stack("residual", t, q)
