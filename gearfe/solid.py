@@ -161,11 +161,11 @@ class Unfolded(NamedTuple):
     changed: int
 
 
-def unfolded(nodes: Array, tets: IntArray, *, least: float = 0.0) -> Unfolded:
+def unfolded(nodes: Array, tets: IntArray) -> Unfolded:
     """Straighten the edges of second-order elements that their curved edges fold.
 
-    An element counts as folded when its volume ratio at a quadrature point is not above `least` times its mean. Meshers
-    leave a few of these at coarsely meshed bores.
+    An element counts as folded when its volume ratio at a quadrature point is not positive. Meshers leave a few
+    such at coarsely meshed bores.
     """
     if tets.shape[1] == 4:
         return Unfolded(nodes, 0)
@@ -174,7 +174,7 @@ def unfolded(nodes: Array, tets: IntArray, *, least: float = 0.0) -> Unfolded:
     for _ in range(10):
         chosen = np.flatnonzero(suspects)
         ratio = jacobian_determinants(nodes, tets[chosen], inside=True)
-        folded = chosen[ratio.min(axis=1) <= least * np.abs(ratio).mean(axis=1)]
+        folded = chosen[ratio.min(axis=1) <= 0.0]
         if not len(folded):
             break
         changed[folded] = True

@@ -215,21 +215,19 @@ def peaks(frequency: ArrayLike, amplitude: ArrayLike, count: int = 5, *, above: 
     return tuple(Peak(int(k), float(f[k]), float(a[k])) for k in found[:count])
 
 
-def order_lines(fundamentals: Mapping[str, float], highest: float, *, orders: int = 1000) -> tuple[OrderLine, ...]:
+def order_lines(fundamentals: Mapping[str, float], highest: float) -> tuple[OrderLine, ...]:
     """Multiples of named frequencies (Hz) up to `highest` (Hz), ascending; of equal ones the lower order first.
 
     Parameters
     ----------
     fundamentals
         Name -> frequency, for example those of the shafts and of the meshes.
-    orders
-        Largest order.
     """
     lines = [
         OrderLine(name, k, k * abs(f))
         for name, f in fundamentals.items()
         if f != 0.0
-        for k in range(1, int(min(orders, highest / abs(f) * (1.0 + 1e-12))) + 1)
+        for k in range(1, int(min(1000, highest / abs(f) * (1.0 + 1e-12))) + 1)
     ]
     return tuple(sorted(lines, key=lambda line: (float(f"{line.frequency:.9g}"), line.order)))
 

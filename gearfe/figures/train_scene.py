@@ -114,8 +114,8 @@ def _aim(plotter: Any, points: Array) -> None:
     plotter.camera_position = [focus + distance * back, focus, (0.0, 0.0, 1.0)]
 
 
-def sharp_edges(points: Array, triangles: IntArray, angle_deg: float = 35.0) -> IntArray:
-    """(k, 2) edges at which two triangles meet at more than an angle, and edges of one triangle only."""
+def sharp_edges(points: Array, triangles: IntArray) -> IntArray:
+    """(k, 2) edges at which two triangles meet at more than 35 deg, and edges of one triangle only."""
     a, b, c = (points[triangles[:, i]].astype(float) for i in range(3))
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
@@ -124,7 +124,7 @@ def sharp_edges(points: Array, triangles: IntArray, angle_deg: float = 35.0) -> 
     order = np.lexsort((edges[:, 1], edges[:, 0]))
     edges, owner = edges[order], owner[order]
     twin = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
-    bent = (normal[owner[twin]] * normal[owner[twin + 1]]).sum(axis=1) < np.cos(np.radians(angle_deg))
+    bent = (normal[owner[twin]] * normal[owner[twin + 1]]).sum(axis=1) < np.cos(np.radians(35.0))
     alone = np.ones(len(edges), dtype=bool)
     alone[twin] = alone[twin + 1] = False
     return np.concatenate([edges[twin[bent]], edges[alone]])

@@ -150,9 +150,11 @@ def pair_warnings(pair: MeshGeometry) -> tuple[str, ...]:
 
 #: Penetrations below this many modules are taken for the discretisation of the outlines.
 TOLERANCE = 1e-4
+#: Rotations through the engagement of one tooth at which tips are looked at.
+POSITIONS = 241
 
 
-def tip_penetration(gear: Gear, mate: Gear, centre_distance: float, twist: float, *, positions: int = 241) -> float:
+def tip_penetration(gear: Gear, mate: Gear, centre_distance: float, twist: float) -> float:
     """Largest depth (m) by which tips of `mate` enter `gear` while the pair rolls with its left flanks in contact.
 
     The mate's outline from the middle of its addendum outwards is followed through the space of the gear. In the
@@ -165,15 +167,13 @@ def tip_penetration(gear: Gear, mate: Gear, centre_distance: float, twist: float
         Distance (m) between the axes; the gear is at the origin, the mate on +x.
     twist
         Turn (rad) of the mate that closes the backlash on the left flanks.
-    positions
-        Number of rotations through the engagement of one tooth.
     """
     outline, tip = _outline(gear), _tip_outline(mate)
     reach = (centre_distance**2 + mate.tip_radius**2 - gear.tip_radius**2) / (2.0 * centre_distance * mate.tip_radius)
     if reach >= 1.0:
         return 0.0
     widest = math.acos(max(reach, 0.0)) + mate.profile.tip_half_angle
-    swing = np.linspace(-widest, widest, positions)
+    swing = np.linspace(-widest, widest, POSITIONS)
     gear_angle = -(swing - math.pi / mate.teeth - twist) * mate.teeth / gear.teeth
     turn = np.exp(1j * (math.pi + swing))[:, None]
     placed = (centre_distance + turn * tip) * np.exp(-1j * gear_angle)[:, None]

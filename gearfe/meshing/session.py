@@ -63,10 +63,11 @@ def _pipes_as_before() -> Iterator[None]:
 
 
 @contextmanager
-def gmsh_session(
-    name: str = "gearfe", *, threads: int = 1, options: Mapping[str, float] | None = None
-) -> Iterator[Any]:
+def gmsh_session(name: str = "gearfe", *, options: Mapping[str, float] | None = None) -> Iterator[Any]:
     """Yield the gmsh module with a fresh model called `name`; quiet, on one thread, closed again on the way out.
+
+    With one thread meshes are the same on every run, but for those of its anisotropic mesher (the housing's), which
+    depend on where its vertices lie in memory.
 
     Where the caller's own program has gmsh open already, only the model is added and removed again, and that
     session's options are left as they were found.
@@ -75,9 +76,6 @@ def gmsh_session(
     ----------
     name
         Name of the model.
-    threads
-        Threads gmsh may use. One is the default: meshes are then the same on every run, but for those of its
-        anisotropic mesher (the housing's), which depend on where its vertices lie in memory.
     options
         gmsh's numeric options for this session.
 
@@ -95,7 +93,7 @@ def gmsh_session(
         settings = {
             "General.Terminal": 0.0,
             "General.Verbosity": 1.0,
-            "General.NumThreads": float(threads),
+            "General.NumThreads": 1.0,
             "Mesh.RandomSeed": 1.0,
             **(options or {}),
         }

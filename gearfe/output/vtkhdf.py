@@ -226,8 +226,7 @@ def write_vtkhdf(
     cells: Mapping[str, NDArray[Any]],
     *,
     point_data: Fields | None = None,
-    cell_data: Fields | None = None,
 ) -> None:
     """Write one grid without times; see `VtkHdfSeries.add`."""
     with VtkHdfSeries(path, series=False) as file:
-        file.add(0.0, points, cells, point_data=point_data, cell_data=cell_data)
+        file.add(0.0, points, cells, point_data=point_data)

@@ -30,6 +30,8 @@ from .modal_body import ModalBody
 SAFETY = 1.5
 #: What the eigensolver leaves of the modes that are kept; it matters where next to nothing is left out.
 EIGENSOLVER = 1e-6
+#: Modal damping ratio of the responses.
+RATIO = 0.01
 #: Parts of the way to the softest body, all of it last.
 PARTS = (0.25, 0.5, 1.0)
 
@@ -56,7 +58,7 @@ class ReductionError:
     frequency_errors: Array
 
 
-def reduction_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, points: int = 200) -> ReductionError:
+def reduction_error(body: ModalBody, band_hz: float, *, points: int = 200) -> ReductionError:
     """Bound the error of a reduced body up to `band_hz`.
 
     Parameters
@@ -65,8 +67,6 @@ def reduction_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, poi
         The reduced body; its own damping is not used.
     band_hz
         Upper end of the band (Hz); it must lie below the first frequency that was left out.
-    ratio
-        Modal damping ratio for the response.
     points
         Number of frequencies, evenly spaced in the band.
     """
@@ -88,7 +88,7 @@ def reduction_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, poi
     lost = total = 0.0
     all_omega = 2.0 * math.pi * coupled.frequencies_hz
     for w in 2.0 * math.pi * band_hz * (np.arange(points) + 0.5) / points:
-        gain = w**2 / (all_omega**2 - w**2 + 2j * ratio * all_omega * w)
+        gain = w**2 / (all_omega**2 - w**2 + 2j * RATIO * all_omega * w)
         response = (shapes * gain) @ forces.T
         direct = (forces * gain) @ forces.T
         change = (response.T @ lost_stiffness(body, float(w)) @ response) / w**2
@@ -119,7 +119,7 @@ class MeshError:
     frequency_errors: Array
 
 
-def mesh_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, points: int = 200) -> MeshError:
+def mesh_error(body: ModalBody, band_hz: float) -> MeshError:
     """Estimate the mesh's error of a reduced body up to `band_hz`; arguments as those of `reduction_error`."""
     if not band_hz > 0.0:
         raise InputError("band_hz", band_hz, "must be > 0", "give a frequency in Hz")
@@ -132,20 +132,20 @@ def mesh_error(body: ModalBody, band_hz: float, *, ratio: float = 0.01, points: 
     errors = np.where(unknown, math.inf, np.where(own > 0.0, own / soft - 1.0, 0.0))
     if np.any(unknown & (own <= band_hz)):
         return MeshError(band_hz, math.inf, errors)
-    direct, *softer = (accelerances(b, band_hz, ratio=ratio, points=points) for b in bodies)
+    direct, *softer = (accelerances(b, band_hz) for b in bodies)
     size = float(np.linalg.norm(direct))
     response = max(float(np.linalg.norm(h - direct)) for h in softer) / size if size else 0.0
     return MeshError(band_hz, response, errors)
 
 
-def accelerances(body: ModalBody, band_hz: float, *, ratio: float = 0.01, points: int = 200) -> ComplexArray:
+def accelerances(body: ModalBody, band_hz: float, *, points: int = 200) -> ComplexArray:
     """Accelerations of all attachments' points for forces on them, (points, 3 a, 3 a) over a band (1/kg)."""
     m = 6 * len(body.attachment_names)
     coupled = body.coupled
     shapes = coupled.vectors[:m].reshape(-1, 6, body.size)[:, :3].reshape(-1, body.size)
     own = 2.0 * math.pi * coupled.frequencies_hz
     omega = 2.0 * math.pi * band_hz * (np.arange(points) + 0.5) / points
-    gains = omega[:, None] ** 2 / (own**2 - omega[:, None] ** 2 + 2j * ratio * own * omega[:, None])
+    gains = omega[:, None] ** 2 / (own**2 - omega[:, None] ** 2 + 2j * RATIO * own * omega[:, None])
     return np.asarray((shapes * gains[:, None, :]) @ shapes.T)
 
 

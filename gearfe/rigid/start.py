@@ -95,12 +95,12 @@ def consistent_start(
     return Start(float(time), q, v, freedoms, active, mass_excess(system, time, q, v, active))
 
 
-def count_freedoms(system: System, time: float, q: Array, seed: int = 5) -> Freedoms:
+def count_freedoms(system: System, time: float, q: Array) -> Freedoms:
     """Redundant rows: dependent at the start and at neighbours on the constraint manifold."""
     here = dependent_rows(system, time, q)
     if not here:
         return Freedoms(system.size, system.rows)
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(5)
     fewest = here
     G = system.jacobian(time, q) * system.units / system.row_units[:, None]
     _, sizes, right = np.linalg.svd(G, full_matrices=True)

@@ -37,7 +37,6 @@ def train_curves(
     job: TrainJob,
     files: Sequence[str | Path] = (),
     *,
-    watch: Any = None,
     progress: Any = None,
     estimate: bool = False,
 ) -> tuple[Stiffness, ...]:
@@ -47,7 +46,7 @@ def train_curves(
     ----------
     files
         CSV files, one for all meshes or one a mesh; they win over the job's.
-    watch, progress
+    progress
         See `gearfe.stiffness.sweep.sweep_stiffness`.
     estimate
         Whether computed curves carry an estimate of their error.
@@ -73,7 +72,7 @@ def train_curves(
         elif (mesh.law or job.table.curves.law) == "map":
             found.append(_computed_law(job, train, number, estimate))
         else:
-            curve = _computed_curve(job, train, number, watch, progress, estimate)
+            curve = _computed_curve(job, train, number, progress, estimate)
             linear = (mesh.law or job.table.curves.law) == "linear"
             found.append(mean_value(curve.interpolant("k_mesh", method="cubic")) if linear else curve)
     return tuple(found)
@@ -117,9 +116,7 @@ def _mapped_curve(path: Path, train: GearTrain, number: int) -> StiffnessCurve:
     return made.curve_at(torque)
 
 
-def _computed_curve(
-    job: TrainJob, train: GearTrain, number: int, watch: Any, progress: Any, estimate: bool
-) -> StiffnessCurve:
+def _computed_curve(job: TrainJob, train: GearTrain, number: int, progress: Any, estimate: bool) -> StiffnessCurve:
     """Curve of a mesh with the driver as pinion, by [stiffness] or at the torque that the mesh carries."""
     from ..stiffness.curve_cache import cached_curve
     from ..stiffness.job import StiffnessJob
@@ -135,7 +132,7 @@ def _computed_curve(
     model = replace(tables.model, materials=_materials(job, mesh), deviations=deviations)
     if job.table.curves.load in (None, "stiffness"):
         with stage(mesh.name):
-            return cached_curve(pair, model, tables.sweep, watch=watch, progress=progress, estimate_error=estimate)
+            return cached_curve(pair, model, tables.sweep, progress=progress, estimate_error=estimate)
     torque = _carried_torque(train, number)
     if not torque > 0.0:
         problem = 'carries no torque, so train.curves.load = "torque" has no load to compute its curve with'
@@ -147,7 +144,7 @@ def _computed_curve(
         "kinematics": job.stiffness.kinematics,
     }
     with stage(mesh.name):
-        return cached_curve(pair, model, sweep, watch=watch, progress=progress, estimate_error=estimate)
+        return cached_curve(pair, model, sweep, progress=progress, estimate_error=estimate)
 
 
 def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) -> MeshLaw:

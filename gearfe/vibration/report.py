@@ -55,13 +55,13 @@ def lines_of(response: TrainResponse, highest: float) -> tuple[OrderLine, ...]:
     return order_lines(fundamentals(response), highest)
 
 
-def dominant(spectra: TrainSpectra, response: TrainResponse, name: str, count: int = NAMED) -> list[dict[str, Any]]:
+def dominant(spectra: TrainSpectra, response: TrainResponse, name: str) -> list[dict[str, Any]]:
     """Largest lines of a signal, each with the multiple of a mesh frequency within one bin of it, if there is one."""
     spectrum = spectra.spectrum
     lines = lines_of(response, float(spectrum.frequency[-1]))
     drive = float(abs(response.shaft_frequencies_Hz[0]))
     found = []
-    for peak in peaks(spectrum.frequency, spectra.amplitude(name), count, above=LEAST):
+    for peak in peaks(spectrum.frequency, spectra.amplitude(name), NAMED, above=LEAST):
         line = nearest_line(peak.frequency, lines, spectrum.resolution)
         found.append(
             {

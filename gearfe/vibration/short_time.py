@@ -53,7 +53,7 @@ class OrderTracks:
     amplitude: ComplexArray
 
 
-def short_time(values: Array, step: float, length: float, window: str = "hann") -> list[Waterfall]:
+def short_time(values: Array, step: float, length: float) -> list[Waterfall]:
     """Spectra over parts of `length` (s), one `Waterfall` a signal; `values` (n, s) are `step` (s) apart.
 
     Raises
@@ -63,7 +63,7 @@ def short_time(values: Array, step: float, length: float, window: str = "hann") 
     """
     check_part(length, step, (len(values) - 1) * step)
     count = round(length / step)
-    return [waterfall(one, step, count, hop=max(1, round(HOP * count)), window=window) for one in values.T]
+    return [waterfall(one, step, count, hop=max(1, round(HOP * count))) for one in values.T]
 
 
 def check_part(length: float, step: float, duration: float) -> None:
