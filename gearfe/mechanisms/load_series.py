@@ -24,7 +24,7 @@ CALLS: Mapping[str, Callable[..., int]] = {
     "sqrt": lambda tape, a: tape.power(a, 0.5),
     "sin": lambda tape, a: tape.sincos(a)[0],
     "cos": lambda tape, a: tape.sincos(a)[1],
-    "tan": lambda tape, a: tape.div(*tape.sincos(a)),
+    "tan": lambda tape, a: tape.quotient(*tape.sincos(a)),
     "asin": lambda tape, a: tape.angle(a, _cosine_of_sine(tape, a)),
     "acos": lambda tape, a: tape.angle(_cosine_of_sine(tape, a), a),
     "atan": lambda tape, a: tape.angle(a, tape.number(1.0)),
@@ -39,7 +39,7 @@ CALLS: Mapping[str, Callable[..., int]] = {
     "+": lambda tape, a, b: tape.sum(a, b),
     "-": lambda tape, a, b: tape.sum(a, b, g=-1.0),
     "*": lambda tape, a, b: tape.mul(a, b),
-    "/": lambda tape, a, b: tape.div(a, b),
+    "/": lambda tape, a, b: tape.quotient(a, b),
     "negative": lambda tape, a: tape.sum(a, f=-1.0),
     "**": lambda tape, a, b: tape.exp(tape.mul(b, tape.log(a))),
 }

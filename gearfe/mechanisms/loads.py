@@ -130,7 +130,7 @@ def compiled(node: Node, names: Sequence[tuple[str, str | None]]) -> Evaluate:
 
 
 def corners(node: Node, names: Sequence[tuple[str, str | None]]) -> list[Callable[[Sequence[float]], int]]:
-    """Numbers of the pieces that `abs`, `min`, `max` and tables are on, as functions of the quantities."""
+    """Numbers of the pieces that `abs`, `min`, `max` and tables are on, and sides of poles, by the quantities."""
     found = [corner for part in node.parts for corner in corners(part, names)]
     parts = [compiled(part, names) for part in node.parts]
     if node.kind == "table":
@@ -140,7 +140,22 @@ def corners(node: Node, names: Sequence[tuple[str, str | None]]) -> list[Callabl
         found.append(lambda values: int(parts[0](values)[0] >= 0.0))
     elif node.kind == "call" and node.value in ("min", "max"):
         found.append(lambda values: int(parts[0](values)[0] >= parts[1](values)[0]))
+    elif node.kind == "call" and node.value == "tan":
+        found.append(lambda values: math.floor(parts[0](values)[0] / math.pi + 0.5))
+    elif (base := _may_vanish(node)) is not None:
+        below = compiled(base, names)
+        found.append(lambda values: int(below(values)[0] >= 0.0))
     return found
+
+
+def _may_vanish(node: Node) -> Node | None:
+    """What must not pass zero: the root of a denominator, the base of a negative power."""
+    base = (
+        node.parts[1] if node.kind == "/" else node if node.kind == "**" and node.parts[1].kind == "negative" else None
+    )
+    while base is not None and base.kind in ("**", "negative"):
+        base = base.parts[0]
+    return base if base is not None and quantities(base) else None
 
 
 def _pieces(found: list[Callable[[Sequence[float]], int]], values: Sequence[float]) -> tuple[int, ...]:
@@ -221,6 +236,10 @@ class ExpressionLoad(StateFunction):
                         by_q[k + 2] -= slope * v[k + 2] * arm[along]
         return by_q, by_v
 
+    def pole(self, t: float, value: float) -> str:
+        """Expression, time and value."""
+        return f"{self.label} = {self.text!r} at {t:.6g} s: grows beyond {value:.0e} (a division by zero)"
+
     def pieces(self, t: float, q: Array, v: Array) -> tuple[int, ...]:
         """Pieces of all corners; none where there is no value."""
         values = [self._quantity(k, w, t, q, v) for k, w in self.places] if self.corners else []
@@ -233,7 +252,7 @@ class ExpressionLoad(StateFunction):
 
     def _quantity(self, kind: str, where: list[tuple[int, float, float, float]], t: float, q: Array, v: Array) -> float:
         if kind == "time":
-            return t
+            return float(t)  # Python's division tells of zeros
         total = 0.0
         for body, sign, x, y in where:
             k = 3 * body
@@ -264,7 +283,7 @@ class ExpressionTension(SpanFunction):
     def value(self, t: float, length: float, rate: float) -> float:
         """Tension (N)."""
         try:
-            return float(self.evaluate([t, length, rate])[0])
+            return float(self.evaluate([float(t), length, rate])[0])
         except (Trouble, OverflowError, ZeroDivisionError, ValueError) as error:
             self.complaint = f"{self.label} = {self.text!r} at {t:.6g} s: {error}"
             return math.nan
@@ -272,14 +291,14 @@ class ExpressionTension(SpanFunction):
     def slopes(self, t: float, length: float, rate: float) -> tuple[float, float]:
         """Slopes by length and rate."""
         try:
-            _, by_length, by_rate = self.evaluate([t, length, rate])[1]
+            _, by_length, by_rate = self.evaluate([float(t), length, rate])[1]
         except (Trouble, OverflowError, ZeroDivisionError, ValueError):
             return 0.0, 0.0  # the value says so
         return float(by_length), float(by_rate)
 
     def pieces(self, t: float, length: float, rate: float) -> tuple[int, ...]:
         """Pieces of all corners; none where there is no value."""
-        return _pieces(self.corners, [t, length, rate])
+        return _pieces(self.corners, [float(t), length, rate])
 
     def write(self, tape: Tape, length: int, rate: int) -> int:
         """Its register on a tape."""

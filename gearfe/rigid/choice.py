@@ -46,7 +46,7 @@ RECENT = 8
 #: half of that are set by it, shorter ones by the motion of the mechanism.
 STIFF = 1.5
 #: A way that ends so may be followed by another.
-STUCK = (Status.STEP_TOO_SMALL, Status.NOT_FINITE)
+STUCK = (Status.STEP_TOO_SMALL,)
 #: Statistics that add up.
 SUMS = ("steps", "evaluations", "orders", "newton_iterations", "rejected")
 #: Processor seconds; Windows counts those of a thread by sixty-fourths of a second, so there it is the time elapsed.

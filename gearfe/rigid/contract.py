@@ -44,8 +44,8 @@ eliminated at
 14. ``write(tape, places)``: its rows and forces on a `gearfe.rigid.tape.Tape`, `places` being the numbers of the local
     coordinates; False where they cannot be written. Rows are quadratic in coordinates, cosines and sines. The Taylor
     method then runs any system compiled. Not needed by what has neither rows nor ``force``.
-15. ``pieces(t, q, v)``: whole numbers that change where its force has a corner or jumps. Steps of the implicit method
-    end there. Absent: smooth.
+15. ``pieced = True`` and ``pieces(t, q, v)``: whole numbers that change where its force has a corner, a jump or a pole.
+    Steps of Runge-Kutta and of the implicit method end there. Absent: smooth.
 16. ``breaks``: times at which a force or joint is not smooth. Steps of all integrators end there. Absent: none.
 
 An element has no state of its own that changes during a run: integrators call it at trial points in any order.

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..typing import Array
 from .carried import RANK
+from .corners import TRUSTED, Corners, Path
 from .dense import Polynomials, within_run
 from .start import Start
 from .steps import Status, StepControl, StepLaw, Watch, first_step
@@ -58,6 +59,7 @@ class Problem(NamedTuple):
     project: Rhs  # onto the constraints
     expand: Callable[[float, Array], tuple[Array, Array, Array]]  # y -> (q, v, a) of the system
     sizes: Array  # of the components of y that compare
+    system: System | None = None  # whose forces may have corners; y then are its (q, v)
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ def run_explicit(
     def expand(t: float, y: Array) -> tuple[Array, Array, Array]:
         return y[:n], y[n:], system.acceleration(t, y[:n], y[n:], active, excess)[0]
 
-    problem = Problem(rhs, project, expand, np.tile(system.units, 2))
+    problem = Problem(rhs, project, expand, np.tile(system.units, 2), system)
     y0 = np.concatenate([start.q, start.v])
     options: dict[str, Any] = {"breaks": system.breaks, "longest": longest, "most": most, "watch": watch}
     return run_problem(problem, (start.time, float(times[-1])), y0, tolerance, **options)
@@ -153,6 +155,7 @@ def run_problem(
     relative = y / sizes, K[0] / sizes
     first = first_step(relative[0][:n], relative[1][:n], relative[1][n:], abs(span[1] - span[0]))
     control = StepControl(LAW, span, first, **options)
+    corners = Corners(problem.system, control, tolerance)
     ends, coefficients = [t], []
     evaluations = 1
 
@@ -174,17 +177,24 @@ def run_problem(
         if not np.isfinite(error):
             control.fail(Status.NOT_FINITE)
             continue
-        if error > 1.0:
+        if error > (1.0 if corners.system is None else TRUSTED):
             control.reject(error)
             continue
         for s in range(13, 16):
             K[s] = problem.rhs(t + tab.C[s] * d, y + d * (tab.A[s, :s] @ K[:s]))
-        coefficients.append(_polynomial(tab, K, d, y, new))
+        evaluations += 3
+        polynomial = _polynomial(tab, K, d, y, new)
+        if corners.cut(t, d, _path(polynomial, d)):
+            continue
+        if error > 1.0:
+            control.reject(error)
+            continue
+        coefficients.append(polynomial)
         t = control.accept(error)
         y = problem.project(t, new)
         scale = np.maximum(scale, np.abs(y))
         K[0] = problem.rhs(t, y)
-        evaluations += 4
+        evaluations += 1
         ends.append(t)
     dense = Polynomials(np.array(ends), np.array(coefficients).reshape(len(coefficients), 8, y.size))
     statistics = {"scheme": SCHEME, "steps": control.accepted, "evaluations": evaluations}
@@ -200,6 +210,17 @@ def _error(tab: Tableau, K: Array, d: float, reach: Array, sizes: Array, toleran
     five, three = (tab.E5 @ K[:13]) / limit, (tab.E3 @ K[:13]) / limit
     big, small = float(five @ five), float(three @ three)
     return 0.0 if big == 0.0 else abs(d) * big / math.sqrt((big + 0.01 * small) * len(reach))
+
+
+def _path(polynomial: Array, d: float) -> Path:
+    """(q, v) at a share of the step."""
+    n = polynomial.shape[1] // 2
+
+    def path(x: float) -> tuple[Array, Array]:
+        y = (x * d) ** np.arange(8.0) @ polynomial
+        return y[:n], y[n:]
+
+    return path
 
 
 def _polynomial(tab: Tableau, K: Array, d: float, y: Array, new: Array) -> Array:

@@ -22,7 +22,7 @@ import numpy as np
 from ..typing import Array
 from .collocated import MIDDLE, C, collocated
 from .contract import Element, LocalForce, ModalBlocks
-from .corners import Corners
+from .corners import TRUSTED, Corners, collocated_path
 from .dense import Polynomials, hermite
 from .elimination import ModalCoordinates, is_linear, modal_coordinates
 from .explicit import on_constraints
@@ -108,9 +108,10 @@ def run_implicit(
             continue
         assert made.stages is not None
         assert made.speeds is not None
-        if corners.cut(here.t, h, (here.q, here.v, *made.stages, made.q, made.v), made.speeds):
-            continue
         error = max(made.error, _gap_between(system, here, h, made, active) / tolerance)
+        path = collocated_path(h, (here.q, here.v, *made.stages, made.q, made.v), made.speeds)
+        if error <= TRUSTED and corners.cut(here.t, h, path):
+            continue
         if error > 1.0:
             control.reject(error)
             continue

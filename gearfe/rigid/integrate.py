@@ -28,11 +28,9 @@ from .carried import loose_link
 from .choice import Choice, Way, joined, joined_statistics
 from .dense import Dense
 from .elimination import is_linear, modal_coordinates
-from .linkage import Linkage
 from .modal import series_force
 from .series import tape_program
 from .start import Start, consistent_start
-from .statefunctions import SpanFunction, StateFunction
 from .steps import Status, Watch
 from .system import System
 from .tables import carrying
@@ -137,24 +135,15 @@ def integrate(
         status = Status.REDUNDANT_NOT_MET
     if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE, Status.NOT_SOLVED) and len(dense.times) > 1:
         last = dense.times[-6:]  # the very last ones may be beyond all numbers
+        system.blame(float(last[-1]), dense(last[-1:], 0)[0], dense(last[-1:], 1)[0])
         link = loose_link(system, last, dense(last, 0), dense(last, 1), start)
         statistics = statistics if link is None else {**statistics, "loose_link": link}
-    if status is not Status.DONE and (why := _complaint(system)):
+    if status is not Status.DONE and (why := system.complaint):
         statistics = {**statistics, "complaint": why}
     made = Trajectory(system, start, kept, status, chosen, statistics, dense)
     if raise_on_failure and made.status is not Status.DONE:
         raise IntegrationError(made, made.message, made.reached, float(output_times[-1]))
     return made
-
-
-def _complaint(system: System) -> str:
-    """What the first load without a value says."""
-    linkages = [e for e in system.elements if isinstance(e, Linkage)]
-    laws: list[StateFunction | SpanFunction] = []
-    for linkage in linkages:
-        laws += [load for _, load in linkage.assembly.state_loads]
-        laws += [law for _, law in linkage.assembly.tension_laws]
-    return next((law.complaint for law in laws if law.complaint), "")
 
 
 def _counted(begin: float, end: float, t: float, steps: int, state: Any) -> bool:  # noqa: ARG001 - a `choice.Watch`

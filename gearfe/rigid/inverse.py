@@ -27,7 +27,7 @@ def prescribed_motion(system: System, start: Start, times: Array) -> Trajectory:
     Raises
     ------
     InputError
-        When something is free to move: that needs integration.
+        When something is free to move, which needs integration, or a load has no value at one of the times.
     """
     if start.freedoms.net > 0:
         problem = f"leave {start.freedoms.net} freedoms: forces follow from a motion only where it is prescribed whole"
@@ -40,6 +40,10 @@ def prescribed_motion(system: System, start: Start, times: Array) -> Trajectory:
         if not reached:
             status = Status.NOT_SOLVED
             break
+    for t, (q, v, _) in zip(done, states, strict=True):
+        if not np.isfinite(system.force(t, q, v)).all():
+            why = system.complaint or f"at {t:.6g} s"
+            raise InputError("forces", None, f"have no value on the way: {why}", "mend the expression")
     kept = np.asarray(times[: np.searchsorted(times, done[-1], side="right")])
     q, v, a = (np.array([s[k] for s in states]) for k in range(3))
     dense = hermite(np.array(done), q, v, a)

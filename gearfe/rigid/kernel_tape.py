@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 LOOKS, AT_ONCE = 24, 1e-5
 #: Register values that are rounding, as parts of the largest terms of their series.
 NOISE = 1e-12
+#: How far a register may lie outside of its piece, or is no zero, of the largest terms of its series.
+OUTSIDE = 1e-6
 
 
 def cauchy(a: Array, i: int, b: Array, j: int, k: int) -> float:
@@ -243,11 +245,22 @@ def next_piece(switches: Switches, s: int, piece: int, x: float) -> int:
     return other
 
 
+def is_pole(switches: Switches, R: Array, s: int, last: int, h: float, size: float) -> bool:
+    """Whether the switch is a denominator at whose zero, the time h ahead, what is above it is none of its own.
+
+    Zero beside its terms over the step `size`.
+    """
+    above = switches.above[s]
+    return above >= 0 and abs(horner(R, above, last, h)) > OUTSIDE * largest(R, above, last, size)
+
+
 FUNCTIONS = (
+    is_pole,
     cauchy, weighted, tape_order, own_piece, lower_knot, piece_at, margin, horner, largest, leaves, next_piece,
 )  # fmt: skip
 NAMES = {
     "SUM": SUM, "LINEAR": LINEAR, "RATE": RATE, "FUNCTION": FUNCTION, "MUL": MUL, "DIV": DIV, "POWER": POWER,
     "EXP": EXP, "LOG": LOG, "SIN": SIN, "COS": COS, "TANH": TANH, "ANGLE": ANGLE, "SIDE": SIDE, "SHIFT": SHIFT,
     "ENTRY": ENTRY, "LOOKS": LOOKS, "AT_ONCE": AT_ONCE, "NOISE": NOISE,
+    "OUTSIDE": OUTSIDE,
 }  # fmt: skip

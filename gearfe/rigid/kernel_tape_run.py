@@ -13,7 +13,7 @@ import numpy as np
 from ..typing import Array, IntArray
 from .kernel_quadratic import expand, factorise, gradients, row_orders, solve, trigonometry_order
 from .kernel_rows import copy, fill, time_series
-from .kernel_tape import horner, largest, leaves, margin, next_piece, tape_order
+from .kernel_tape import OUTSIDE, horner, is_pole, largest, leaves, margin, next_piece, tape_order
 from .steps import Status
 
 if TYPE_CHECKING:
@@ -27,8 +27,6 @@ LEAST_PIVOT, MOST_CHANGES = 1e-13, 50
 #: Places within a step at which forces are compared with their series; rounding of what they find; share of a step that
 #: is tried after one that was off.
 LOOKS_WITHIN, ROUNDING, SHORTER = 4, 1e-11, 0.6
-#: How far a register may lie outside of its piece, of the largest terms of its series.
-OUTSIDE = 1e-6
 
 
 def step_length(tb: Program, w: Work, run: Run) -> float:
@@ -186,6 +184,9 @@ def quadratic_steps(tb: Program, w: Work, run: Run, t: float, T: Array, C: Array
         elif size > 0.5 * remains:
             size = 0.5 * remains
         h, where = leaves(tb, w.R, pieces, run.order - 1, sign * size)
+        if where >= 0 and is_pole(tb.switches, w.R, where, run.order - 1, h, size):
+            status = NOT_FINITE
+            break
         if h == 0.0:
             changes += 1
             other = next_piece(tb.switches, where, pieces[where], w.R[tb.switches.register[where], 0])
@@ -235,5 +236,4 @@ NAMES = {
     "DONE": DONE, "STEP_TOO_SMALL": STEP_TOO_SMALL, "MOST_STEPS": MOST_STEPS, "NOT_FINITE": NOT_FINITE,
     "LEAST_PIVOT": LEAST_PIVOT, "MOST_CHANGES": MOST_CHANGES,
     "LOOKS_WITHIN": LOOKS_WITHIN, "ROUNDING": ROUNDING, "SHORTER": SHORTER,
-    "OUTSIDE": OUTSIDE,
 }  # fmt: skip

@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from .tape import Tape
 
 
+#: A load beyond this value (N, N m) where a run ends has a pole there.
+POLE = 1e7
+
+
 class Pose(NamedTuple):
     """Where all bodies and, last, the ground stand: shapes (n + 1,) and of vectors (v, 2) and (v, 2, 2)."""
 
@@ -91,6 +95,18 @@ class Linkage(Element):
     def has_series(self) -> bool:
         """Whether the Taylor kernels can run it: no load depends on the state, no constraint has a profile."""
         return not (self.assembly.state_loads or self.assembly.tension_laws or self.assembly.profiles)
+
+    @property
+    def pieced(self) -> bool:
+        """Whether loads may have corners."""
+        return bool(self.assembly.state_loads or self.assembly.tension_laws)
+
+    def blame(self, t: float, q: Array, v: Array) -> None:
+        """Let the largest load say that it has a pole there."""
+        loads = [(abs(load.value(t, q, v)), load) for _, load in self.assembly.state_loads]
+        value, largest = max(loads, key=lambda pair: pair[0], default=(0.0, None))
+        if largest is not None and value > POLE:
+            largest.complaint = largest.complaint or largest.pole(t, value)
 
     def pieces(self, t: float, q: Array, v: Array) -> tuple[int, ...]:
         """Numbers of the smooth pieces that loads and laws of springs are on."""

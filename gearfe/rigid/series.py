@@ -193,12 +193,21 @@ def run_series(
         if status == Status.MOST_STEPS and watch is not None and not watch(t, done, lambda: (w.q, w.v)):
             status = Status.STOPPED
         room = min(2 * room, max(FIRST, MOST_NUMBERS // C[0].size if room else FIRST), most - done)
-    if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE):  # loads without a value there or just beyond say why
-        for ahead in (0.0, 1e-9, 1e-6):
-            d = sign * ahead * abs(end - start.time)
-            with np.errstate(all="ignore"):
-                system.force(t + d, w.q + d * w.v, w.v + 2.0 * d * w.Z[:n, 2])
+    if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE):
+        status = _because_of_loads(system, w, t, sign * abs(end - start.time), status)
     statistics = {
         "scheme": "Taylor series", "steps": done, "order": order, "backend": "compiled", "compile_seconds": compiling,
     }  # fmt: skip
     return Polynomials(np.concatenate(ends), np.concatenate(series)), status, statistics
+
+
+def _because_of_loads(system: System, w: Work, t: float, span: float, status: Status) -> Status:
+    """Why a run ended at the state in w: not finite where loads have no value there, or just beyond; they say so."""
+    system.forget_complaints()
+    for ahead in (0.0, 1e-9, 1e-6):
+        d = ahead * span
+        with np.errstate(all="ignore"):
+            system.blame(t + d, w.q + d * w.v, w.v + 2.0 * d * w.Z[: len(w.q), 2])
+        if system.complaint:
+            return Status.NOT_FINITE
+    return status

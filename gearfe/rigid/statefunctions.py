@@ -30,6 +30,10 @@ class StateFunction(ABC):
     def slopes(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
         """(df/dq, df/dv)."""
 
+    def pole(self, t: float, value: float) -> str:
+        """What is to be said where it grows beyond all bounds."""
+        return f"a load grows beyond {value:.1g} at {t:.6g} s"
+
     def pieces(self, t: float, q: Array, v: Array) -> tuple[int, ...]:  # noqa: ARG002
         """Numbers of the smooth pieces that it is on."""
         return ()

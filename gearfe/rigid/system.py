@@ -128,10 +128,37 @@ class System:
             np.add.at(by_v, np.ix_(index, index), local[1])
         return by_q, by_v
 
+    @property
+    def complaint(self) -> str:
+        """What the first load without a value says."""
+        return next((law.complaint for law in self._laws if law.complaint), "")
+
+    @cached_property
+    def _laws(self) -> list[Any]:
+        parts = [e.assembly for e in self.elements if isinstance(e, Linkage)]
+        return [law for part in parts for _, law in (*part.state_loads, *part.tension_laws)]
+
+    def forget_complaints(self) -> None:
+        """Before a state is tried of which they shall speak."""
+        for law in self._laws:
+            law.complaint = ""
+
+    def blame(self, t: float, q: Array, v: Array) -> None:
+        """Let loads that are not finite there, or have a pole, say so."""
+        for element, index in self.forces:
+            if isinstance(element, Linkage):
+                element.force(t, q[index], v[index])
+                element.blame(t, q[index], v[index])
+
+    @cached_property
+    def pieced(self) -> bool:
+        """Whether forces may have corners."""
+        return any(getattr(element, "pieced", False) for element in self.elements)
+
     def pieces(self, t: float, q: Array, v: Array) -> tuple[int, ...]:
         """Numbers of the smooth pieces that the forces are on."""
-        parts = [(e, i) for e, i in zip(self.elements, self.index, strict=True) if hasattr(e, "pieces")]
-        return tuple(piece for e, i in parts for piece in e.pieces(t, q[i], v[i]))
+        parts = [(e, i) for e, i in zip(self.elements, self.index, strict=True) if getattr(e, "pieced", False)]
+        return tuple(piece for e, i in parts for piece in e.pieces(t, q[i], v[i]))  # type: ignore[attr-defined]
 
     def residual(self, t: float, q: Array) -> Array:
         """g, shape (rows,)."""

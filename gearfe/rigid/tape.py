@@ -60,6 +60,7 @@ class Switches(NamedTuple):
     knot: Array
     entry: Array  # (knots, 4) coefficients from a knot on, highest first
     period: Array  # (s,) 0 for none
+    above: IntArray  # (s,) for a denominator the register above it, -1 for none
 
 
 class Program(NamedTuple):
@@ -97,7 +98,7 @@ class Tape:
         self._factors: list[tuple[float, float, float]] = []
         self._leaves: list[Terms] = []
         self._pushes: list[tuple[int, int, float]] = []
-        self._switches: list[tuple[int, Array, Array, float]] = []
+        self._switches: list[tuple[int, Array, Array, float, int]] = []
         self._known: dict[tuple[object, ...], int] = {}
 
     def turn(self, angle: int) -> tuple[int, int]:
@@ -146,13 +147,22 @@ class Tape:
         """a / b."""
         return self._register(DIV, a, b)
 
+    def quotient(self, a: int, b: int) -> int:
+        """a / b where b may come to zero: a pole, unless a does, too."""
+        root = b
+        while self._ops[root][0] == MUL and self._ops[root][1] == self._ops[root][2]:
+            root = self._ops[root][1]
+        if self._ops[root][:2] != (SUM, -1):
+            self._switch(root, np.zeros(0), np.zeros((0, 4)), 0.0, a)
+        return self.div(a, b)
+
     def power(self, a: int, exponent: float) -> int:
         """a to a constant power; small whole ones by products, which have values at zero, too."""
         whole = int(exponent)
         if whole != exponent or abs(whole) > 64:
             return self._register(POWER, a, factors=(exponent, 0.0, 0.0))
         if whole < 0:
-            return self.div(self.number(1.0), self.power(a, float(-whole)))
+            return self.quotient(self.number(1.0), self.power(a, float(-whole)))
         if whole < 2:
             return a if whole else self.number(1.0)
         half = self.power(a, float(whole // 2))
@@ -236,8 +246,8 @@ class Tape:
         self._factors.append(factors)
         return len(self._ops) - 1
 
-    def _switch(self, register: int, knots: Array, entries: Array, period: float) -> int:
-        self._switches.append((register, knots, entries, period))
+    def _switch(self, register: int, knots: Array, entries: Array, period: float, above: int = -1) -> int:
+        self._switches.append((register, knots, entries, period, above))
         return len(self._switches) - 1
 
     def program(self, mass: Array, damping: Array, stiffness: Array, unit: Array) -> Program:
@@ -269,6 +279,7 @@ class Tape:
             np.concatenate([np.zeros(0), *(s[1] for s in self._switches)]),
             np.concatenate([np.zeros((0, 4)), *(s[2] for s in self._switches)]),
             np.array([s[3] for s in self._switches], dtype=float),
+            np.array([s[4] for s in self._switches], dtype=np.int64),
         )
         block = np.argwhere((damping != 0.0) | (stiffness != 0.0)).astype(np.int64)
         at = tuple(block.T)
