@@ -51,7 +51,9 @@ COMES_BACK, PRESENT = 0.1, 1e-7
 SAFETY = 2.0
 #: Where the estimate misses the tolerance, harmonics grow by this factor.
 GROWTH = 1.5
-#: Most harmonics, and most unknown amplitudes.
+#: Harmonics to begin with, at most, where there are several phases.
+PLENTY = 256
+#: Most harmonics (half as many with two phases, a quarter with three: these take more samples), and unknown amplitudes.
 MOST_HARMONICS, MOST_UNKNOWN = 4096, 800
 
 
@@ -110,9 +112,18 @@ class Oscillator:
         return torus.lattice(self.periods, count)
 
     def harmonics(self, speed: float, highest: float) -> int:
-        """Number of harmonics with the multiples up to an angular frequency (rad/s), eight of each mesh at least."""
-        least = (8 * cycles / b for mesh in self.orders for cycles, b in zip(mesh, self.periods, strict=True))
-        return rounded(torus.count_below(self.periods, max(*least, highest * self.turns[0] / abs(speed))))
+        """Number of harmonics: multiples up to an angular frequency (rad/s), eight of each mesh at least.
+
+        With several phases they reach less far where that would be more than `PLENTY`: the error estimate adds to them.
+        """
+        order = max(8 * cycles / b for mesh in self.orders for cycles, b in zip(mesh, self.periods, strict=True))
+        least = torus.count_below(self.periods, order)
+        count = torus.count_below(self.periods, max(order, highest * self.turns[0] / abs(speed)))
+        return self.rounded(count if len(self.turns) == 1 else max(least, min(count, PLENTY)))
+
+    def rounded(self, harmonics: float) -> int:
+        """Number whose samples transform quickly, at least as many as asked for but for the most."""
+        return min(8 * math.ceil(harmonics / 8), MOST_HARMONICS >> len(self.turns) - 1)
 
     def flexibility(self, speed: float, count: int) -> ComplexArray:
         """H at harmonics 0 to `count`, (count + 1, m, m)."""
@@ -204,11 +215,6 @@ def widened(amplitudes: ComplexArray, count: int) -> ComplexArray:
     shared = min(count + 1, len(amplitudes))
     made[:shared] = amplitudes[:shared]
     return made
-
-
-def rounded(harmonics: float) -> int:
-    """Number of harmonics whose samples transform quickly, at least as many as asked for but for the most."""
-    return min(8 * math.ceil(harmonics / 8), MOST_HARMONICS)
 
 
 def evaluate(
@@ -378,7 +384,7 @@ def settled(system: Oscillator, orbit: Orbit, before: Newton | None, tolerance: 
     while orbit.found:
         error, guess = error_of(system, orbit, before)
         orbit = replace(orbit, error=error)
-        more = rounded(GROWTH * orbit.harmonics)
+        more = system.rounded(GROWTH * orbit.harmonics)
         if error <= tolerance or more <= orbit.harmonics:
             break
         guess = guess[: more + 1]

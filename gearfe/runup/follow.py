@@ -32,7 +32,6 @@ from .balance import (
     flexibility_of,
     jacobian,
     moved,
-    rounded,
     settled,
     size_of,
     solve,
@@ -177,7 +176,8 @@ class _Walk:
         """Harmonics at a speed: what is asked for, and as many more as the orbit before needed."""
         fewer = orbit.error < EASY * self.tolerance
         return max(
-            self.system.harmonics(speed, self.highest), rounded(FEWER * orbit.harmonics if fewer else orbit.harmonics)
+            self.system.harmonics(speed, self.highest),
+            self.system.rounded(FEWER * orbit.harmonics if fewer else orbit.harmonics),
         )
 
     def _onward(self, speed: float, halvings: int = HALVINGS) -> Orbit | None:

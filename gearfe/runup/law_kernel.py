@@ -81,6 +81,14 @@ def law_jets(
             work[TOUCH1, k] = c[1] + z * (2.0 * c[2] + 3.0 * z * c[3])
             work[TOUCH2, k] = 2.0 * c[2] + 6.0 * z * c[3]
         out[i, BEYOND] = 1.0 if approach[i] - least > law.reach else 0.0
+        if approach[i] <= least:  # all pairs are apart
+            for k in range(slots):
+                pairs[i, k] = 0.0
+                slopes[0, i, k] = 0.0
+                slopes[1, i, k] = 0.0
+            for k in range(BEYOND):
+                out[i, k] = 0.0
+            continue
         for k in range(slots):
             work[PART, k] = -1.0
             for j in range(slots):
