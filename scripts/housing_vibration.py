@@ -11,9 +11,9 @@ import sys
 from gearfe.output.files import output_folder, write_csv
 from gearfe.record_spectrum import finer
 from gearfe.train import build_train, simulate
+from gearfe.vibration.follow import RunningMean
 from gearfe.vibration.job import job_train, read_train_job, train_body
 from gearfe.vibration.mesh_stiffness import train_curves
-from gearfe.vibration.report import mean_over_periods
 from gearfe.vibration.spectra import response_columns, spectra
 
 
@@ -28,11 +28,10 @@ def main(job_file: str = "geometry/gear_train.toml", out: str = "out/vibration",
     folder = output_folder(out)
     write_csv(folder / "response.csv", response_columns(response.every(every), radiation))
     write_csv(folder / "spectrum.csv", spectra(response, radiation, every=every).columns())
-    force, periods = mean_over_periods(
-        response.time, response.contact_force, response.load_end_s, response.common_period_s
-    )
-    for name, mean in zip(response.mesh_names, force, strict=True):
-        print(f"mean contact force {name}: {mean:.6g} N over {periods} common mesh periods")
+    force = RunningMean(response.time, response.load_end_s, response.common_period_s)
+    force.add(response.time, response.contact_force)
+    for name, mean in zip(response.mesh_names, force.value, strict=True):
+        print(f"mean contact force {name}: {mean:.6g} N over {force.periods} common mesh periods")
     print(f"written to {folder}: response.csv, spectrum.csv")
     return int(response.status != "done")
 

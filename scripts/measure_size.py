@@ -28,6 +28,7 @@ CAPABILITIES = {
     "flexible links, couplings, loads, analyses of mechanisms": """
         rigid/beam* rigid/belt.py rigid/cam.py rigid/gear_ratio.py rigid/rack.py rigid/rolling.py rigid/turning.py
         rigid/equilibrium.py rigid/inverse.py rigid/modes.py rigid/statefunctions.py rigid/collocated.py
+        rigid/*tape* rigid/*quadratic* rigid/series.py rigid/corners.py mechanisms/load_series.py
         mechanisms/link* mechanisms/loads.py mechanisms/rest.py mechanisms/sensitivity.py mechanisms/solve.py
         mechanisms/sweep.py mechanisms/tables.py tables/beam.py
     """,
@@ -36,8 +37,8 @@ CAPABILITIES = {
         housing/body.py
     """,
     "own housings, exchange, reports, analyses of records": """
-        housing/own_mesh.py housing/superelement.py housing/dmig.py housing/modal_test.py meshing/mesh_file.py
-        meshing/deck.py meshing/gear_solid.py gear/outline.py output/formats.py
+        housing/own_mesh.py housing/nastran_files.py housing/superelement.py housing/dmig.py housing/modal_test.py
+        meshing/mesh_file.py meshing/deck.py meshing/gear_solid.py gear/outline.py output/formats.py
         output/report_page.py output/dxf.py shown.py figures/results.py
         */short_time.py commands/completion.py vibration/analysis.py
         vibration/measured.py vibration/timefunctions.py tables/spectrum.py tables/timefunction.py

@@ -28,8 +28,7 @@ from gearfe.vibration.fields import (
     write_housing,
 )
 from gearfe.vibration.files import OutputChoice, write_run
-from gearfe.vibration.follow import TrainRun
-from gearfe.vibration.report import mean_over_periods
+from gearfe.vibration.follow import RunningMean, TrainRun
 from gearfe.vibration.spectra import response_columns, spectra
 
 from .gears import pair
@@ -136,12 +135,14 @@ def test_summary_of_a_known_response(tmp_path, train):
 
 def test_a_mean_without_a_period():
     time = np.linspace(0.0, 1.0, 201)
-    mean, count = mean_over_periods(time, np.column_stack([time, 3 + 0 * time]), 0.5, None)
-    assert count == 0
-    assert mean == pytest.approx([0.75, 3.0], rel=1e-12)
-    mean, count = mean_over_periods(time, (time**2)[:, None], 0.1, 0.4)
-    assert count == 2
-    assert mean == pytest.approx([(1 - 0.2**3) / 3 / 0.8], rel=1e-12)
+    mean = RunningMean(time, 0.5, None)
+    mean.add(time, np.column_stack([time, 3 + 0 * time]))
+    assert mean.periods == 0
+    assert mean.value == pytest.approx([0.75, 3.0], rel=1e-12)
+    mean = RunningMean(time, 0.1, 0.4)
+    mean.add(time, (time**2)[:, None])
+    assert mean.periods == 2
+    assert mean.value == pytest.approx([(1 - 0.2**3) / 3 / 0.8], rel=1e-12)
 
 
 def test_the_radiated_power_of_one_coordinate(tmp_path, train):

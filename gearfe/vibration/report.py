@@ -16,33 +16,13 @@ from ..train.kinematics import steady_forces
 from ..train.mesh_element import LEAST_REFERENCE, PHASES
 from ..train.response import TrainResponse
 from ..typing import Array
-from .follow import Followed, RunningMean
+from .follow import Followed
 from .spectra import TrainSpectra
 
 #: Lines that the summary names for each signal.
 NAMED = 5
 #: Lines smaller than this part of the largest one are round-off.
 LEAST = 1e-6
-
-
-def mean_over_periods(time: Array, values: Array, begin: float, period: float | None) -> tuple[Array, int]:
-    """Mean over the last whole periods after `begin`, and how many these are.
-
-    The integral is that of a cubic spline through the samples, so its ends need not lie on them. Without a whole period
-    (or without any) the mean is that of all times after `begin`, and the number 0.
-
-    Parameters
-    ----------
-    time : (n,)
-    values : (n, k)
-    begin
-        Where the start-up ends (s).
-    period
-        Common period (s) or None.
-    """
-    mean = RunningMean(time, begin, period)
-    mean.add(time, values)
-    return mean.value, mean.periods
 
 
 def fundamentals(response: TrainResponse) -> dict[str, float]:
