@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..gear.drawing import gear_outline, path_place, zone
 from ..gear.pair import GearPair
-from ..meshing.export import MeshPart
 from ..typing import Array
 from .style import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save
+
+if TYPE_CHECKING:
+    from ..meshing.export import MeshPart
 
 PINION_FILL, WHEEL_FILL = "#dbe7f3", "#f3e6d8"
 

@@ -10,16 +10,18 @@ import math
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..housing.modal_test import Comparison
 from ..output.arrays import load_arrays
 from ..output.files import whole_file
 from ..typing import Array, IntArray
 from .offscreen import draw_apart
 from .style import new_figure, save
+
+if TYPE_CHECKING:
+    from ..housing.modal_test import Comparison
 
 #: Largest displacement in a picture of a mode, in parts of the body's size.
 EXAGGERATION = 0.06
@@ -134,10 +136,6 @@ def _draw(job: Path, target: Path) -> None:
     plotter.close()
 
 
-if __name__ == "__main__":
-    _draw(Path(sys.argv[1]), Path(sys.argv[2]))
-
-
 def mac_figure(path: str | Path, made: Comparison, name: str) -> None:
     """A table of squares, test modes upwards, those of the housing to the right; partners are framed.
 
@@ -171,3 +169,7 @@ def mac_figure(path: str | Path, made: Comparison, name: str) -> None:
     axes.set_title("Modal assurance criterion", loc="left", fontsize=11)
     figure.colorbar(image, ax=axes, pad=0.02, label="MAC (-)")
     save(figure, path)
+
+
+if __name__ == "__main__":
+    _draw(Path(sys.argv[1]), Path(sys.argv[2]))
