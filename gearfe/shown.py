@@ -12,16 +12,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Shown:
-    """A result that shows itself: `facts` are a class's own, and `columns` where the result is a table."""
+class Facts:
+    """What tells of itself in a few words: `facts` are a class's own."""
 
     def facts(self) -> Mapping[str, str]:
         """What the result is, in a few words: name -> value with its unit."""
         raise NotImplementedError
-
-    def columns(self) -> Mapping[str, Iterable[Any]]:
-        """The result as a table: name with unit -> values, all of one length."""
-        raise NotImplementedError(f"{type(self).__name__} is no table")
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}: " + ", ".join(f"{name} {value}" for name, value in self.facts().items())
@@ -37,14 +33,26 @@ class Shown:
         )
         return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
 
+
+class Shown(Facts):
+    """A result that has a picture, too."""
+
     def plot(self) -> Figure:
         """A picture of the result, which a notebook shows; ``.savefig("name.png")`` keeps it."""
         # pictures stand above all results, so they are looked up where one is asked for
         figure: Figure = importlib.import_module(".figures.results", __package__).picture(self)
         return figure
 
-    #: Columns that number the rows: the dimensions of `to_xarray`.
+
+class ShownTable(Shown):
+    """A result that is a table, too: `columns` are a class's own."""
+
+    #: Columns that number the rows: the dimensions of `to_xarray`; without any these are ``row``.
     AXES: ClassVar[tuple[str, ...]] = ()
+
+    def columns(self) -> Mapping[str, Iterable[Any]]:
+        """The result as a table: name with unit -> values, all of one length."""
+        raise NotImplementedError
 
     def to_pandas(self) -> Any:
         """The table as a `pandas.DataFrame`: numbers where all cells of a column are.
@@ -59,7 +67,8 @@ class Shown:
     def to_xarray(self) -> Any:
         """The table as an `xarray.Dataset` over `AXES`; needs pandas, too."""
         library("xarray")
-        return self.to_pandas().set_index(list(self.AXES)).to_xarray()
+        frame = self.to_pandas()
+        return (frame.set_index(list(self.AXES)) if self.AXES else frame.rename_axis("row")).to_xarray()
 
 
 def numbers(cells: Iterable[Any]) -> list[Any]:

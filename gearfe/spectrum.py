@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .errors import InputError
+from .shown import ShownTable
 from .typing import Array, ComplexArray
 
 #: Window -> coefficients a_j of ``w_n = sum_j (-1)^j a_j cos(2 pi j n/N)``; periodic (no repeated end sample).
@@ -37,8 +38,8 @@ WINDOWS: dict[str, tuple[float, ...]] = {
 UNEVEN = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class Spectrum:
+@dataclass(frozen=True, eq=False, repr=False)
+class Spectrum(ShownTable):
     """One-sided amplitude spectrum of one or several signals.
 
     Attributes
@@ -60,6 +61,23 @@ class Spectrum:
     samples: int
     window: str
     noise_bandwidth: float
+
+    AXES = ("frequency_Hz",)
+
+    def facts(self) -> dict[str, str]:
+        """Lines, signals and window."""
+        highest = float(np.max(np.abs(self.value[1:]), initial=0.0))
+        return {
+            "lines": f"{len(self.frequency)}, 0 to {self.frequency[-1]:.6g} Hz, each {self.resolution:.4g} Hz",
+            "signals": str(1 if self.value.ndim == 1 else self.value.shape[1]),
+            "window": self.window,
+            "largest amplitude": f"{highest:.4g} in the unit of the signal, beside the constant",
+        }
+
+    def columns(self) -> dict[str, Array]:
+        """Frequencies, and the amplitude of each signal in its unit."""
+        signals = self.amplitude.reshape(len(self.frequency), -1).T
+        return {"frequency_Hz": self.frequency, **{f"amplitude_{i + 1}": a for i, a in enumerate(signals)}}
 
     @property
     def amplitude(self) -> Array:

@@ -10,23 +10,25 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe import build_train, load_mesh, run_up, simulate, sweep_loads
+from gearfe import build_train, housing_from_job, load_mesh, read_study, run_study, run_up, simulate, sweep_loads
 from gearfe.contact.half_plane import half_plane_pair
 from gearfe.errors import MissingLibraryError
 from gearfe.figures.results import PICTURES
 from gearfe.mechanisms import load_mechanism
 from gearfe.rigid import constant, integrate
 from gearfe.shown import Shown, numbers
+from gearfe.spectrum import amplitude_spectrum
 from gearfe.stiffness.sweep import elastic_pair
 from gearfe.train import Damping, Load
 
 from . import gears, trains
+from .studies import written
 
 ROOT = Path(__file__).parents[1]
 
 
 @pytest.fixture(scope="module")
-def results() -> dict[str, Any]:
+def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """One result of each class that has a picture."""
     pair = gears.pair(tip_round=1e-4)
     elastic = elastic_pair(pair, coarsen=4.0)
@@ -39,7 +41,9 @@ def results() -> dict[str, Any]:
         loads=(Load("s1", "s1+", constant(60.0)),),
     )
     model = build_train(steady)
+    trial = tmp_path_factory.mktemp("study")
     crank = load_mechanism(str(ROOT / "geometry" / "slider_crank.toml"))
+    tone = np.sin(2 * np.pi * 125.0 * 1e-3 * np.arange(64))
     made: list[Any] = [
         pair,
         loads.curves[0],
@@ -49,6 +53,8 @@ def results() -> dict[str, Any]:
         steady.housing,
         run_up(model, [500.0, 510.0, 520.0], tolerance=1e-2),
         integrate(crank.system, np.linspace(0.0, 0.01, 3)),
+        run_study(read_study(written(trial, cases=8)), trial / "out", jobs=1),
+        amplitude_spectrum(np.column_stack([tone, 2.0 * tone]), 1e-3),
     ]
     return {type(one).__name__: one for one in made}
 
@@ -67,6 +73,16 @@ def test_prompt_notebook_and_picture(name: str, results: dict[str, Any]) -> None
     assert len(kept.getvalue()) > 5000
 
 
+def test_models_tell_what_they_are() -> None:
+    train = build_train(trains.train([(20, 30)]))
+    housing = housing_from_job(str(ROOT / "meshes" / "box.toml"))
+    assert repr(train).startswith("TrainModel: shafts s0, s1, ")
+    assert f"held nodes {len(housing.fixed)}" in repr(housing)
+    for one in (train, housing):
+        assert len(repr(one)) < 300
+        assert one._repr_html_().count("<tr>") == len(one.facts())
+
+
 def test_tables(results: dict[str, Any]) -> None:
     pytest.importorskip("pandas")
     pytest.importorskip("xarray")
@@ -78,6 +94,20 @@ def test_tables(results: dict[str, Any]) -> None:
     assert data["k_mesh_N_per_m"].dims == ("torque_Nm", "pinion_angle_deg")
     np.testing.assert_array_equal(data["k_mesh_N_per_m"], loads.quantity("k_mesh"))
     np.testing.assert_array_equal(response.to_xarray()["contact_force_1_N"], response.contact_force[:, 0])
+
+
+def test_tables_of_run_ups_studies_and_spectra(results: dict[str, Any]) -> None:
+    pytest.importorskip("pandas")
+    pytest.importorskip("xarray")
+    run, study, lines = (results[name] for name in ("RunUp", "StudyResult", "Spectrum"))
+    frame = run.to_pandas()
+    assert frame["speed_rad_per_s"].tolist() == [state.speed for state in run.states]
+    assert run.to_xarray()["dynamic_factor_1"].dims == ("row",)
+    np.testing.assert_array_equal(study.to_pandas()["y"], study.output("y"))
+    assert study.to_xarray()["y"].dims == ("case",)
+    data = lines.to_xarray()  # sines of 125 Hz with the amplitudes 1 and 2, on a line
+    assert float(data["amplitude_1"].sel(frequency_Hz=125.0)) == pytest.approx(1.0)
+    assert float(data["amplitude_2"].sel(frequency_Hz=125.0)) == pytest.approx(2.0)
 
 
 def test_columns_of_numbers_and_of_words() -> None:

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from ..reduction.modal_body import ModalBody
     from ..rigid.trajectory import Trajectory
     from ..runup.run_up import RunUp
+    from ..spectrum import Spectrum
     from ..stiffness.curve import StiffnessCurve
+    from ..study.statistics import StudyResult
     from ..train.response import TrainResponse
 
 #: Faces of a body that are drawn at most.
@@ -139,6 +141,28 @@ def body_plot(body: ModalBody) -> Any:
     return figure
 
 
+def study_plot(result: StudyResult) -> Any:
+    """Every output against every parameter."""
+    from .study import study_picture
+
+    return study_picture(result)
+
+
+def spectrum_plot(made: Spectrum) -> Any:
+    """Amplitudes of all signals over the frequency, as lines."""
+    figure = new_figure(8.5, 3.6)
+    axes = figure.subplots()
+    tidy(axes)
+    signals = made.amplitude.reshape(len(made.frequency), -1).T
+    for number, (colour, values) in enumerate(zip(COLOURS * 8, signals, strict=False), start=1):
+        axes.plot(1e-3 * made.frequency, values, color=colour, linewidth=1.2, label=f"signal {number}")
+    if made.value.ndim > 1:
+        axes.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    axes.set(xlabel="frequency  (kHz)", ylabel="amplitude")
+    axes.margins(x=0.0)
+    return figure
+
+
 #: Class of a result -> its picture. Names, so that one picture loads none of the other results.
 PICTURES: dict[str, Callable[[Any], Any]] = {
     "GearPair": pair_plot,
@@ -146,7 +170,9 @@ PICTURES: dict[str, Callable[[Any], Any]] = {
     "LoadedMesh": mesh_plot,
     "ModalBody": body_plot,
     "RunUp": runup_plot,
+    "Spectrum": spectrum_plot,
     "StiffnessCurve": curve_plot,
+    "StudyResult": study_plot,
     "TrainResponse": response_plot,
     "Trajectory": trajectory_plot,
 }

@@ -26,14 +26,11 @@ def study_figures(folder: Path, result: StudyResult, summary: Mapping[str, Any],
     summary
         What its `summary` says.
     """
-    table, numbers = result.table, result.numbers()
-    outputs = {name: np.where(result.done, result.output(name), np.nan) for name in table.outputs}
-    outputs = {name: values for name, values in outputs.items() if np.isfinite(values).any()}
+    table, numbers, outputs = result.table, result.numbers(), _outputs(result)
     if not outputs:
         return
     if numbers:
-        limits = {name: (limit.low, limit.high) for name, limit in table.limits.items()}
-        scatter_figure(folder / "study.png", title=title, parameters=numbers, outputs=outputs, limits=limits)
+        save(study_picture(result, title), folder / "study.png")
         columns = {**numbers, **outputs}
         parallel_figure(folder / "study_lines.png", title=title, columns=columns, colour=next(iter(outputs)))
         sobol = {name: (summary["outputs"][name].get("sobol") or {}).get("total_order", {}) for name in outputs}
@@ -53,18 +50,30 @@ def study_figures(folder: Path, result: StudyResult, summary: Mapping[str, Any],
         pareto_figure(folder / "study_pareto.png", title=title, first=pair[0], second=pair[1], best=best, good=good)
 
 
+def _outputs(result: StudyResult) -> dict[str, Array]:
+    """Outputs that some case has: values of the solved cases."""
+    made = {name: np.where(result.done, result.output(name), np.nan) for name in result.table.outputs}
+    return {name: values for name, values in made.items() if np.isfinite(values).any()}
+
+
+def study_picture(result: StudyResult, title: str = "") -> Any:
+    """Every output against every parameter; against the number of the case where no parameter is a number."""
+    numbers = result.numbers() or {"case": np.array([float(cell) for cell in result.columns["case"]])}
+    limits = {name: (limit.low, limit.high) for name, limit in result.table.limits.items()}
+    return scatter_figure(title=title, parameters=numbers, outputs=_outputs(result), limits=limits)
+
+
 def _sizes(effects: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
     return {name: one["mean_size"] for name, one in effects.items()}
 
 
 def scatter_figure(
-    path: str | Path,
     *,
     title: str,
     parameters: Mapping[str, Array],
     outputs: Mapping[str, Array],
     limits: Mapping[str, tuple[float | None, float | None]],
-) -> None:
+) -> Any:
     """Every output against every parameter, a point for each case.
 
     Parameters
@@ -90,7 +99,7 @@ def scatter_figure(
                 part.set_xlabel(_short(name), fontsize=8.5)
         axes[i, 0].set_ylabel(row, fontsize=8.5)
     figure.suptitle(title, fontsize=11, x=0.01, ha="left")
-    save(figure, path)
+    return figure
 
 
 def parallel_figure(path: str | Path, *, title: str, columns: Mapping[str, Array], colour: str) -> None:

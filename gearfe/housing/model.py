@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..progress import stage
 from ..reduction.craig_bampton import Partition, partition, reduce_model
 from ..reduction.modal_body import ModalBody
+from ..shown import Facts
 from ..solid import MassRule, SolidMaterial, SolidMatrices
 from .attachments import (
     Attachment,
@@ -44,8 +45,8 @@ DEPENDENT = 1e-10
 ROUNDING = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class Housing:
+@dataclass(frozen=True, eq=False, repr=False)
+class Housing(Facts):
     """An elastic body with rigid attachments.
 
     Attributes
@@ -73,6 +74,15 @@ class Housing:
     surface: Surface
     original: Ints
     notes: tuple[str, ...] = ()
+
+    def facts(self) -> dict[str, str]:
+        """Size, attachments, mass."""
+        return {
+            "unknowns": str(self.unknowns),
+            "attachments": ", ".join(one.name for one in self.attachments) or "none",
+            "held nodes": str(len(self.fixed)),
+            "mass": f"{self.mass_kg:.4g} kg",
+        }
 
     @classmethod
     def from_arrays(

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..output.files import write_csv
-from ..shown import Shown
+from ..shown import ShownTable
 from ..stiffness import curve_csv
 from ..stiffness.curve import COLUMNS, WHOLE, StiffnessCurve
 from ..stiffness.torque_control import ANGLE_ROUNDING
@@ -38,7 +38,7 @@ TOLERANCE = 1e-2
 
 
 @dataclass(frozen=True, repr=False)
-class LoadMap(Shown):
+class LoadMap(ShownTable):
     """A gear pair's behaviour over torque and angle.
 
     Attributes

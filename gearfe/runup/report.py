@@ -73,7 +73,7 @@ def runup_columns(run: RunUp) -> dict[str, Any]:
     rms = np.array([s.rms(run.band_hz) for s in states]).reshape(len(states), -1)
     for j, name in enumerate(model.bores):
         made[f"acceleration_rms_{name}_m_per_s2"] = rms[:, j]
-    if model.train.housing is not None:
+    if all(s.power is not None for s in states):
         made["radiated_power_level_dB"] = np.array([power_level(power_in_band(s, run.band_hz)) for s in states])
     return made
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import importlib
 import itertools
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..shown import Shown
+from ..shown import ShownTable
 from ..threads import one_thread
 from ..train.kinematics import drive_sense
 from ..train.model import TrainModel
@@ -29,7 +31,7 @@ TRIES, AWAY = 6, 0.01
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RunUp(Shown):
+class RunUp(ShownTable):
     """Steady states along a range of speeds.
 
     Attributes
@@ -71,6 +73,12 @@ class RunUp(Shown):
             "turning points": ", ".join(f"{speed:.5g}" for speed in self.turning_speeds) or "none",
             "teeth apart": f"at {sum(bool(state.apart.any()) for state in self.states)} states",
         }
+
+    def columns(self) -> dict[str, Any]:
+        """The table runup.csv: a row for each steady state, along the curve."""
+        # tables stand above the run-up, so they are looked up where one is asked for
+        made: dict[str, Any] = importlib.import_module(".report", __package__).runup_columns(self)
+        return made
 
     def sweep(self, *, up: bool = True) -> tuple[SteadyState, ...]:
         """One state at each speed that was reached: what a slow run-up, or a slow run-down, meets there.

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, unknown_name
 from ..output.files import write_csv
-from ..shown import Shown
+from ..shown import ShownTable
 from ..typing import Array, BoolArray, IntArray
 from . import curve_csv
 from .periodic import PeriodicInterpolant, ValueAndSlope, periodic_interpolant
@@ -101,7 +101,7 @@ class ErrorEstimate:
 
 
 @dataclass(frozen=True, repr=False)
-class StiffnessCurve(Shown):
+class StiffnessCurve(ShownTable):
     """Mesh stiffness of a gear pair over the pinion's rotation; all arrays have one entry per position, shape (n,).
 
     Attributes

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import MissingLibraryError
 from ..output.files import whole_file
+from ..shown import Shown, library
 from ..tables.study import LimitTable, StudyTable
 from ..typing import Array, BoolArray, IntArray
 from .case import DONE
@@ -21,8 +22,8 @@ from .case import DONE
 QUANTILES, CONFIDENCE = (0.05, 0.25, 0.5, 0.75, 0.95), 0.95
 
 
-@dataclass(frozen=True)
-class StudyResult:
+@dataclass(frozen=True, repr=False)
+class StudyResult(Shown):
     """Rows of a study, sorted by case.
 
     Attributes
@@ -38,6 +39,16 @@ class StudyResult:
     table: StudyTable
     columns: Mapping[str, Sequence[str]]
     base: Mapping[str, float]
+
+    def facts(self) -> dict[str, str]:
+        """Cases, and what they say of each output."""
+        made = {"cases": f"{len(self.columns['case'])}, {int(self.done.sum())} solved"}
+        made["parameters"] = ", ".join(self.parameters)
+        for name in self.table.outputs:
+            found = self.output(name)[self.done]
+            if len(found):
+                made[name] = f"{np.median(found):.5g} in the median, {found.min():.5g} to {found.max():.5g}"
+        return made
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -190,20 +201,12 @@ class StudyResult:
 
     def to_pandas(self) -> Any:
         """The rows as a `pandas.DataFrame`: numbers where all cells of a column are."""
-        try:
-            import pandas
-        except ImportError:
-            raise MissingLibraryError("pandas is not installed: pip install gearfe[study]") from None
-        return pandas.DataFrame({name: _numbers(cells) for name, cells in self.columns.items()})
+        return library("pandas").DataFrame({name: _numbers(cells) for name, cells in self.columns.items()})
 
     def to_xarray(self) -> Any:
         """The rows as an `xarray.Dataset` over the dimension ``case``."""
-        try:
-            import xarray
-        except ImportError:
-            raise MissingLibraryError("xarray is not installed: pip install gearfe[study]") from None
         made = {name: ("case", _numbers(cells)) for name, cells in self.columns.items() if name != "case"}
-        return xarray.Dataset(made, coords={"case": _numbers(self.columns["case"])})
+        return library("xarray").Dataset(made, coords={"case": _numbers(self.columns["case"])})
 
     def to_parquet(self, path: str | Path) -> None:
         """Write the rows as an Apache Parquet file, whole or not at all."""

@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import InputError
 from ..rigid import Element, LinearJoint, LocalForce, ModalBlocks, Start, System, TimeFunction, consistent_start
 from ..rigid.elimination import ModalCoordinates, modal_coordinates
+from ..shown import Facts
 from ..typing import Array, IntArray
 from .checks import check_scene
 from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge
@@ -29,8 +30,8 @@ from .phases import pair_shifts, tooth_places
 from .series import train_series
 
 
-@dataclass(frozen=True, eq=False)
-class TrainModel:
+@dataclass(frozen=True, eq=False, repr=False)
+class TrainModel(Facts):
     """A train ready to be simulated.
 
     Attributes
@@ -75,6 +76,17 @@ class TrainModel:
     spin_reference: Array
     axial: Array
     bores: tuple[str, ...]
+
+    def facts(self) -> dict[str, str]:
+        """Shafts, meshes, housing, unknowns."""
+        frequencies = self.coupled_frequencies_hz
+        return {
+            "shafts": ", ".join(shaft.name for shaft in self.train.shafts),
+            "meshes": ", ".join(line.name for line in self.meshes) or "none",
+            "housing": "elastic" if self.housing is not None else "rigid",
+            "unknowns": str(len(frequencies)),
+            "lowest frequencies": ", ".join(f"{f:.4g}" for f in frequencies[:6]) + " Hz",
+        }
 
     @property
     def ratios(self) -> Array:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..shown import Shown
+from ..shown import ShownTable
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 
 #: What has a row for each output time.
@@ -34,7 +34,7 @@ SAMPLED = (
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TrainResponse(Shown):
+class TrainResponse(ShownTable):
     """Response of a gear train at n output times; SI units.
 
     Attributes
