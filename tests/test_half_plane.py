@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearfe.contact.half_plane import NEAR, _first, half_plane_pair, solve_half_plane
+from gearfe.contact.half_plane import NEAR, change, half_plane_pair, solve_half_plane
+from gearfe.contact.half_plane_start import first_state
 from gearfe.contact.half_plane_step import step
 from gearfe.elasticity import Material
 from gearfe.gear.pair import GearPair
@@ -218,11 +219,10 @@ def test_no_jump_at_the_last_station() -> None:
 def test_forces_that_stand_still_by_chance_are_no_solution() -> None:
     """Places and widths count too: the first step moves the contacts by micrometres."""
     law, twist = law_of("rounded"), np.array([math.radians(0.05)])
-    open_ = _first(law, twist, law.flanks.touching(np.array([0.1])).take([0]))
-    made = step(law, open_.state, open_.couples)
-    still = replace(open_, state=replace(open_.state, force=made.solution.force))
+    setting, state = first_state(law, twist, law.flanks.touching(np.array([0.1])).take([0]))
+    made = step(setting, state)
     assert np.abs(made.place).max() > 1e-6
-    assert still.change(made).min() > NEAR
+    assert change(setting, replace(state, force=made.solution.force), made).min() > NEAR
 
 
 def test_an_undercuts_edge_on_a_nearly_flat_mate() -> None:

@@ -29,9 +29,8 @@ add :math:`(\langle x^2\rangle - a^2/4)\,H_{ss}`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,9 +46,8 @@ from .half_plane_result import (
     no_contacts,
     pair_sums,
 )
-from .half_plane_start import BATCH, first_state, unloaded_state
-from .half_plane_step import State, Step, moved_on, smooth_influence, step
-from .panels import Couplings, couplings
+from .half_plane_start import BATCH, first_state, unloaded
+from .half_plane_step import Setting, State, Step, moved_on, smooth_influence, step
 from .position import STATUS, Positions, joined, taken, together
 from .zones import completed
 
@@ -102,55 +100,38 @@ def solve_half_plane(
     return together(made)
 
 
-@dataclass(frozen=True)
-class _Open:
-    """Positions on the way to their solution, with their p tooth pairs, sorted by position.
+def _kept(setting: Setting, state: State, positions: BoolArray) -> tuple[Setting, State]:
+    """Only some of the positions, shape (m,)."""
+    if positions.all():
+        return setting, state
+    index = np.flatnonzero(positions[setting.couples.position])
+    return setting.take(index, setting.numbers[positions]), taken(state, index)
 
-    Attributes
-    ----------
-    numbers : ndarray, shape (m,)
-        Of the positions in the batch, in rising order.
-    found
-        Where the rigid flanks of the contacts' tooth pairs first touch.
-    state
-        What the next `half_plane_step.step` starts from.
+
+def _joined(parts: Sequence[tuple[Setting, State]]) -> tuple[Setting, State]:
+    """One after the other, in rising order."""
+    if len(parts) == 1:
+        return parts[0]
+    settings, states = zip(*parts, strict=True)
+    whole = replace(
+        settings[0],
+        numbers=np.sort(np.concatenate([one.numbers for one in settings])),
+        found=joined([one.found for one in settings]),
+        turn=np.concatenate([one.turn for one in settings]),
+    )
+    order = np.lexsort((whole.found.pair, whole.found.position))
+    return whole.take(order), taken(joined(states), order)
+
+
+def change(setting: Setting, state: State, made: Step) -> Array:
+    """What a step changed, shape (m,): the forces in units of their sum, and weighted by them the places and widths of
+    the contacts, in units of these.
     """
-
-    numbers: IntArray
-    found: Touching
-    state: State
-
-    @cached_property
-    def couples(self) -> Couplings:
-        """Which pairs share a position."""
-        return couplings(np.searchsorted(self.numbers, self.found.position), self.found.pair, len(self.numbers))
-
-    def kept(self, positions: BoolArray) -> _Open:
-        """Only some of the positions, shape (m,)."""
-        if positions.all():
-            return self
-        index = np.flatnonzero(positions[self.couples.position])
-        return _Open(self.numbers[positions], taken(self.found, index), taken(self.state, index))
-
-    def change(self, made: Step) -> Array:
-        """What a step changed, shape (m,): the forces in units of their sum, and weighted by them the places and widths
-        of the contacts, in units of these.
-        """
-        new, old, spread = made.solution.force, self.state, made.spread
-        safe = np.where(spread > 0, spread, 1.0)
-        moved = (spread > 0) * (0.5 * np.abs(made.place) / np.sqrt(safe) + np.abs(1 - old.spread / safe))
-        all_ = np.abs(new - old.force) + MOVED * new * moved
-        return self.couples.total(all_) / np.maximum(self.couples.total(new), TINY)
-
-    def moved_on(self, law: HalfPlanePair, made: Step, *, near: BoolArray | bool = False) -> _Open:
-        """What the next step starts from."""
-        return replace(self, state=moved_on(law, self.state, made, near=near))
-
-
-def _first(law: HalfPlanePair, twists: Array, found: Touching) -> _Open:
-    numbers = np.unique(found.position)
-    couples = couplings(np.searchsorted(numbers, found.position), found.pair, len(numbers))
-    return _Open(numbers, found, first_state(law, twists, found, couples))
+    new, spread, couples = made.solution.force, made.spread, setting.couples
+    safe = np.where(spread > 0, spread, 1.0)
+    moved = (spread > 0) * (0.5 * np.abs(made.place) / np.sqrt(safe) + np.abs(1 - state.spread / safe))
+    all_ = np.abs(new - state.force) + MOVED * new * moved
+    return couples.total(all_) / np.maximum(couples.total(new), TINY)
 
 
 def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) -> Positions:
@@ -158,42 +139,40 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
     names = (*SUMS, "tangent")
     numbers: dict[str, Any] = {name: np.zeros(len(angles)) for name in names}
     contacts: list[PairContacts] = []
-    open_ = _first(law, twists, found)
+    setting, state = first_state(law, twists, found)
     number, began, rounds = 0, 0, 0
-    while len(open_.numbers) and number - began < STEPS and rounds < ROUNDS:  # again for what is not settled
-        done: list[_Open] = []
-        while len(open_.numbers) and number - began < STEPS:
+    while len(setting.numbers) and number - began < STEPS and rounds < ROUNDS:  # again for what is not settled
+        done: list[tuple[Setting, State]] = []
+        while len(setting.numbers) and number - began < STEPS:
             number += 1
-            couples = open_.couples
-            made = step(law, open_.state, couples, search=number - began <= SEARCHES)
-            iterations[open_.numbers] += 1
+            couples = setting.couples
+            made = step(setting, state, search=number - began <= SEARCHES)
+            iterations[setting.numbers] += 1
             unsettled = couples.total(~made.solution.settled | made.outgrown) > 0
-            change = open_.change(made)
-            near = (change <= NEAR) & ~unsettled & (number - began > 1)
+            changed = change(setting, state, made)
+            near = (changed <= NEAR) & ~unsettled & (number - began > 1)
             bears = couples.total(made.solution.force) > 0
-            open_ = open_.moved_on(law, made, near=(change <= WIDENED_BELOW)[couples.position])
+            state = moved_on(setting, state, made, near=(changed <= WIDENED_BELOW)[couples.position])
             if (near & bears).any():
-                done.append(open_.kept(near & bears))
+                done.append(_kept(setting, state, near & bears))
             if near.any():
-                open_ = open_.kept(~near)
+                setting, state = _kept(setting, state, ~near)
         if not done:
             break
-        all_ = _joined(done)
-        ended = _finished(law, all_, twists)
-        iterations[all_.numbers] += HELD_STEPS
+        ended = _finished(*_joined(done), twists)
+        iterations[ended.numbers] += HELD_STEPS
         number += HELD_STEPS
-        solved = all_.numbers[ended.settled]
+        solved = ended.numbers[ended.settled]
         status[solved] = "converged"
         for name in names:
             numbers[name][solved] = ended.sums[name][ended.settled]
         contacts.append(ended.contacts)
         if not ended.settled.all():
             contacts[-1] = taken(ended.contacts, status[ended.contacts.position] == "converged")
+            setting, state = _joined([(setting, state), _kept(*ended.now, ~ended.settled)])
         if ended.more:
             began, rounds = number, rounds + 1
-        if not ended.settled.all():
-            open_ = _joined([open_, ended.now.kept(~ended.settled)])
-    failed = open_.numbers
+    failed = setting.numbers
     status[failed] = "not_converged"
     for name in names:
         numbers[name][failed] = np.nan
@@ -205,22 +184,13 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
     )
 
 
-def _joined(parts: Sequence[_Open]) -> _Open:
-    """One after the other, in rising order."""
-    if len(parts) == 1:
-        return parts[0]
-    numbers = np.sort(np.concatenate([part.numbers for part in parts]))
-    found, state = joined([part.found for part in parts]), joined([part.state for part in parts])
-    order = np.lexsort((found.pair, found.position))
-    return _Open(numbers, taken(found, order), taken(state, order))
-
-
-@dataclass(frozen=True)
-class _Ended:
+class _Ended(NamedTuple):
     """Positions after their last steps.
 
     Attributes
     ----------
+    numbers : ndarray, shape (m,)
+        Theirs.
     settled : ndarray of bool, shape (m,)
         Whether that is their solution.
     sums : dict of str to ndarray, shape (m,)
@@ -233,51 +203,52 @@ class _Ended:
         Whether tooth pairs have more contacts there.
     """
 
+    numbers: IntArray
     settled: BoolArray
     sums: dict[str, Array]
     contacts: PairContacts
-    now: _Open
+    now: tuple[Setting, State]
     more: bool
 
 
-def _finished(law: HalfPlanePair, open_: _Open, twists: Array) -> _Ended:
+def _finished(setting: Setting, start: State, twists: Array) -> _Ended:
     """Last steps of positions that are near their solution, there and at a slightly larger twist.
 
     Windows and bearing panels are held, so that the differences are derivatives.
     """
-    found, couples, count = open_.found, open_.couples, len(open_.numbers)
-    touch = np.full(count, np.inf)
+    found, couples, numbers = setting.found, setting.couples, setting.numbers
+    touch = np.full(len(numbers), np.inf)
     np.minimum.at(touch, couples.position, found.twist)
-    ahead = np.maximum(AHEAD * (twists[open_.numbers] - touch), LEAST_AHEAD)
-    turn = open_.state.turn.copy()
-    turn[:, 1] *= np.exp(1j * ahead[couples.position])
-    both = _Open(
-        np.concatenate([open_.numbers, open_.numbers + len(twists)]),
-        joined([found, replace(found, position=found.position + len(twists))]),
-        joined([open_.state, replace(open_.state, turn=turn)]),
+    ahead = np.maximum(AHEAD * (twists[numbers] - touch), LEAST_AHEAD)
+    further = setting.turn * np.exp(1j * ahead[couples.position, None] * np.arange(2))
+    both = replace(
+        setting,
+        numbers=np.concatenate([numbers, numbers + len(twists)]),
+        found=joined([found, replace(found, position=found.position + len(twists))]),
+        turn=np.concatenate([setting.turn, further]),
     )
-    made = step(law, both.state, both.couples, search=False, held=True)
+    state = joined([start, start])
+    made = step(both, state, search=False, held=True)
     for _ in range(HELD_STEPS - 1):
-        both = both.moved_on(law, made)
-        made = step(law, both.state, both.couples, search=False, held=True)
-    here, on = slice(0, len(couples.position)), slice(len(couples.position), None)
-    change, state = both.change(made)[:count], both.state
-    now = replace(open_, state=taken(both.moved_on(law, made).state, here))
-    one, two = (taken(state, here), taken(made, here)), (taken(state, on), taken(made, on))
-    of_both = pair_sums(law, state, made)
+        state = moved_on(both, state, made)
+        made = step(both, state, search=False, held=True)
+    here, on = slice(0, len(found)), slice(len(found), None)
+    changed, of_both = change(both, state, made)[: len(numbers)], pair_sums(both, state, made)
+    after = taken(moved_on(both, state, made), here)
+    one, two = ((taken(state, part), taken(made, part)) for part in (here, on))
     of_pairs = {name: values[here] for name, values in of_both.items()}
     sums = {name: couples.total(of_pairs[name]) for name in SUMS}
     sums["tangent"] = couples.total(of_both["torque_wheel"][on] - of_pairs["torque_wheel"]) / ahead
     right = couples.total(~one[1].solution.settled) == 0
-    settled = right & (change <= TOLERANCE) & (sums["tangent"] > 0)
-    torques = {name: of_pairs[name] for name in ("torque_wheel", "torque_pinion")}
-    known = torques | contact_rates(law, one, two, ahead[couples.position])
-    contacts = contacts_of(law, found, one, known)
-    whole = completed(law, found, one, couples)
+    settled = right & (changed <= TOLERANCE) & (sums["tangent"] > 0)
+    known = {name: of_pairs[name] for name in ("torque_wheel", "torque_pinion")}
+    known |= contact_rates(setting.law, one, two, ahead[couples.position])
+    contacts = contacts_of(setting, *one, known)
+    whole = completed(setting, *one)
     if whole is None:
-        return _Ended(settled, sums, contacts, now, False)
-    again = _Open(open_.numbers, *whole[:2]).kept(whole[2])
-    return _Ended(settled & ~whole[2], sums, contacts, _joined([now.kept(~whole[2]), again]), True)
+        return _Ended(numbers, settled, sums, contacts, (setting, after), False)
+    now = _joined([_kept(setting, after, ~whole[2]), _kept(*whole)])
+    return _Ended(numbers, settled & ~whole[2], sums, contacts, now, True)
 
 
 def coupling_compliances(law: HalfPlanePair, pinion_angles: Array, twists: Array) -> tuple[Array, IntArray, Array]:
@@ -291,10 +262,10 @@ def coupling_compliances(law: HalfPlanePair, pinion_angles: Array, twists: Array
     """
     met = law.teeth.touching(pinion_angles)
     met = met.take(np.flatnonzero(met.twist < twists[met.position]))
-    couples = couplings(met.position, met.pair, len(twists))
-    state = unloaded_state(law, twists, met)
+    setting, state = unloaded(law, np.arange(len(twists)), twists, met)
+    couples, normal = setting.couples, state.normal[:, None] / setting.turn
     arm = met.arm[:, 1] / law.pair.wheel.base_radius
-    found = smooth_influence(law, state.seen, state.arc, couples).compliance / law.width
+    found = smooth_influence(law, normal, state.arc, couples).compliance / law.width
     found = found / (arm[couples.first] * arm[couples.second])
     upper, own = couples.step > 0, met.angle + met.pair * law.pair.mesh_cycle
     return own[couples.second[upper]], couples.step[upper], found[upper]

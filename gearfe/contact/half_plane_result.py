@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gear.touching import Touching
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .compliance import MeshingPair
 from .flank import Flank, edge_shapes
 from .flank_compliance import FlankCompliance
 from .half_plane_pair import HalfPlanePair
-from .half_plane_step import State, Step, cross
+from .half_plane_step import Setting, State, Step, cross
 from .moved_faces import WAY
 from .panels import PANELS
 from .position import FlankLoads, taken
@@ -103,11 +102,11 @@ def no_contacts() -> PairContacts:
     return PairContacts(**{name: np.zeros(shapes.get(name, (0,)), kinds.get(name, float)) for name in names})
 
 
-def pair_sums(law: HalfPlanePair, state: State, made: Step) -> dict[str, Array]:
+def pair_sums(setting: Setting, state: State, made: Step) -> dict[str, Array]:
     """What each contact adds to the sums over its position (N m, N m, N m, J)."""
-    force, normal = made.solution.force * law.width, state.normal
-    centre = _centres(state, made)
-    wheel = law.tables.of(state.flank).at(_material(made)[:, :, None])[0][:, 1, 0] * state.turn[:, 1]
+    law, normal, centre = setting.law, state.normal, _centres(state, made)
+    force = made.solution.force * law.width
+    wheel = setting.tables.at(_material(made)[:, :, None])[0][:, 1, 0] * setting.turn[:, 1]
     return {
         "torque_wheel": -force * cross(centre - law.hub[1], normal),
         "torque_pinion": force * cross(centre, normal),
@@ -126,30 +125,30 @@ def _material(made: Step) -> Array:
     return made.arc + made.place[:, None] * WAY
 
 
-def contacts_of(
-    law: HalfPlanePair, found: Touching, solved: tuple[State, Step], known: dict[str, Array]
-) -> PairContacts:
+def contacts_of(setting: Setting, state: State, made: Step, known: dict[str, Array]) -> PairContacts:
     """The contacts of a step that carry load; `known` are the torques of all, and what `contact_rates` gives."""
-    index = np.flatnonzero(solved[1].solution.force > 0)
-    state, made = taken(solved[0], index), taken(solved[1], index)
+    law, index = setting.law, np.flatnonzero(made.solution.force > 0)
+    if len(index) < len(setting.found):
+        setting, state, made = setting.take(index), taken(state, index), taken(made, index)
+    found = setting.found
     force, pressure, width = made.solution.force, made.solution.pressure, made.width
     arc, half_width = _material(made), 2 * np.sqrt(made.spread)
     return PairContacts(
-        position=found.position[index],
-        pair=found.pair[index],
+        position=found.position,
+        pair=found.pair,
         force=force * law.width,
         point=_centres(state, made),
         normal=state.normal,
         arc=arc,
-        parameter=law.parameter_at(state.flank, arc),
+        parameter=law.parameter_at(found.flank, arc),
         half_width=half_width,
         hertz_pressure=2 * force / (np.pi * half_width),
-        mark=_reached(law, state.flank, made.arcs, pressure, width),
+        mark=_reached(law, found.flank, made.arcs, pressure, width),
         x=made.x - made.place[:, None],
         width=width,
         pressure=pressure,
         panel_arc=made.arcs,
-        panel_radius=np.abs(law.tables.of(state.flank).at(made.arcs)[0]),
+        panel_radius=np.abs(setting.tables.at(made.arcs)[0]),
         **{name: values[index] for name, values in known.items()},
     )
 

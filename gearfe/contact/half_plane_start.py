@@ -19,10 +19,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..gear.touching import Touching
-from ..typing import Array, ComplexArray
+from ..typing import Array, IntArray
 from .half_plane_pair import HalfPlanePair
-from .half_plane_step import WINDOW, State, reference_approach, smooth_influence
-from .panels import PANELS, Couplings, couplings, forces_of_overlaps
+from .half_plane_step import WINDOW, Setting, State, reference_approach, smooth_influence
+from .panels import PANELS, forces_of_overlaps
 
 #: Positions solved side by side.
 BATCH = 128
@@ -32,18 +32,25 @@ STEPS, ROUNDS, SHARPEST = 10, 2, 0.02
 TINY = 1e-6
 
 
-def unloaded_state(law: HalfPlanePair, twists: Array, found: Touching) -> State:
-    """Tooth pairs where their rigid flanks touch, at twists (rad) of the positions, without forces."""
+def unloaded(law: HalfPlanePair, numbers: IntArray, twists: Array, found: Touching) -> tuple[Setting, State]:
+    """Tooth pairs where their rigid flanks touch, at twists (rad) of their positions, without forces.
+
+    Parameters
+    ----------
+    numbers : ndarray, shape (m,)
+        Of the positions, in rising order.
+    twists : ndarray, shape (n,)
+        Of all positions that are numbered.
+    """
     turn = [
         found.angle + found.pair * law.pair.mesh_cycle + found.turn[:, 0],
         law.flanks.wheel_frame(found.angle, found.pair) + twists[found.position] + found.turn[:, 1],
     ]
+    setting = Setting(law, numbers, found, np.exp(1j * np.stack(turn, axis=1)))
     nothing, count = np.zeros(len(found)), len(found)
-    return State(
+    return setting, State(
         centre=found.point,
         normal=found.normal,
-        turn=np.exp(1j * np.stack(turn, axis=1)),
-        flank=found.flank,
         arc=law.arc_at(found.flank, found.place),
         ends=law.tables.ends[found.flank],
         force=nothing,
@@ -75,25 +82,26 @@ class _Yield:
         return np.asarray(self.compliance * (0.5 - np.log(0.5 * b)) - wedge)
 
 
-def _yield(law: HalfPlanePair, state: State, normal: ComplexArray, curvature: Array) -> _Yield:
+def _yields(setting: Setting, state: State) -> tuple[_Yield, Array]:
+    """How contacts yield by themselves, and T by couple."""
+    law, normal = setting.law, state.normal[:, None] / setting.turn
     tension, shear = law.wedge
     along = law.inverse_modulus * (tension + (shear * normal.conj() ** 2).real)
-    points = law.tables.of(state.flank).at(state.arc[:, :, None])[0][:, :, 0]
-    blunt = np.minimum(curvature, 1 / (SHARPEST * law.pair.pinion.module))
-    return _Yield(law.compliance, blunt, along, np.abs(points - law.corner[state.flank]))
+    points = setting.tables.at(state.arc[:, :, None])[0][:, :, 0]
+    blunt = np.minimum(setting.found.curvature, 1 / (SHARPEST * law.pair.pinion.module))
+    T = smooth_influence(law, normal, state.arc, setting.couples).compliance
+    return _Yield(law.compliance, blunt, along, np.abs(points - setting.corner)), T
 
 
-def first_state(law: HalfPlanePair, twists: Array, found: Touching, couples: Couplings) -> State:
+def first_state(law: HalfPlanePair, twists: Array, found: Touching) -> tuple[Setting, State]:
     """What the iteration for all tooth pairs begins with at twists (rad) of the positions."""
-    state = unloaded_state(law, twists, found)
-    normal = state.seen
-    T = smooth_influence(law, normal, state.arc, couples).compliance
-    yields = _yield(law, state, normal, found.curvature)
+    setting, state = unloaded(law, np.unique(found.position), twists, found)
+    yields, T = _yields(setting, state)
     overlap = found.arm[:, 1] * (twists[found.position] - found.twist)
     force = np.maximum(overlap, 0.0) / reference_approach(law)
     for _ in range(ROUNDS):
-        force = forces_of_overlaps(overlap, yields.at(force), T, couples)
-    return replace(state, force=force, spread=0.25 * yields.half_width(force) ** 2)
+        force = forces_of_overlaps(overlap, yields.at(force), T, setting.couples)
+    return setting, replace(state, force=force, spread=0.25 * yields.half_width(force) ** 2)
 
 
 def expected_twists(law: HalfPlanePair, torques: Array, touching: Touching) -> Array:
@@ -119,11 +127,8 @@ def _batch(law: HalfPlanePair, torques: Array, found: Touching, start: int) -> A
     np.minimum.at(touch, position, found.twist)
     if not np.isfinite(touch).all():
         return np.where(np.isfinite(touch), np.nan, touch)
-    couples = couplings(position, found.pair, count)
-    state = unloaded_state(law, touch, replace(found, position=position))
-    normal = state.seen
-    T = smooth_influence(law, normal, state.arc, couples).compliance
-    yields = _yield(law, state, normal, found.curvature)
+    setting, state = unloaded(law, np.arange(count), touch, replace(found, position=position))
+    couples, (yields, T) = setting.couples, _yields(setting, state)
     force = torques[position] / (arm * law.width)
     twist = np.full(count, np.inf)
     alone = touch[position] + force * (yields.at(force) + T[couples.own]) / arm

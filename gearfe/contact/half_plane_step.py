@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from ..gear.flank_curve import FlankTables
+from ..gear.touching import Touching
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .half_plane_pair import HalfPlanePair, opened, panel_influence, sideways, widths_in_smooth
 from .moved_faces import LOOK, WAY, Faces, windows
-from .panels import MIDDLES, PANELS, WIDTHS, Couplings, Panels, Pressed, first_guess, influence, pressed
+from .panels import MIDDLES, PANELS, WIDTHS, Couplings, Panels, Pressed, couplings, first_guess, influence, pressed
+from .position import taken
 
 #: Gap at the window's ends in units of that at the ends of Hertz's contact of the same force, and what it grows by
 #: where the pressure reaches an end: beside edges contacts are wider.
@@ -29,6 +32,49 @@ _BETWEEN = np.diff(MIDDLES)
 
 
 @dataclass(frozen=True)
+class Setting:
+    """What no step changes: the teeth of p contacts in m positions; pinion and wheel in the second axis.
+
+    Attributes
+    ----------
+    law
+        The pair.
+    numbers : ndarray, shape (m,)
+        Of the positions, in rising order.
+    found
+        Where the rigid flanks of the contacts' tooth pairs first touch, sorted by position, pair and place.
+    turn : ndarray of complex, shape (p, 2)
+        Turn of the teeth: tooth axes to global ones.
+    """
+
+    law: HalfPlanePair
+    numbers: IntArray
+    found: Touching
+    turn: ComplexArray
+
+    @cached_property
+    def couples(self) -> Couplings:
+        """Which contacts share a position."""
+        return couplings(np.searchsorted(self.numbers, self.found.position), self.found.pair, len(self.numbers))
+
+    @cached_property
+    def tables(self) -> FlankTables:
+        """Both flanks of each contact."""
+        return self.law.tables.of(self.found.flank)
+
+    @cached_property
+    def corner(self) -> ComplexArray:
+        """Their corners (m), shape (p, 2)."""
+        return np.asarray(self.law.corner[self.found.flank])
+
+    def take(self, contacts: IntArray, numbers: IntArray | None = None) -> Setting:
+        """Only some of the contacts, in the positions `numbers` or in all."""
+        numbers = self.numbers if numbers is None else numbers
+        found = taken(self.found, contacts)
+        return replace(self, numbers=numbers, found=found, turn=self.turn[contacts])
+
+
+@dataclass(frozen=True)
 class State:
     """What a step for p contacts starts from; pinion and wheel in the second axis.
 
@@ -36,10 +82,6 @@ class State:
     ----------
     centre, normal : ndarray of complex, shape (p,)
         O (m) and n, global axes.
-    turn : ndarray of complex, shape (p, 2)
-        Turn of the teeth: tooth axes to global ones.
-    flank : ndarray, shape (p, 2)
-        Numbers of their flanks in `HalfPlanePair.curves`.
     arc : ndarray, shape (p, 2)
         The material at O (m).
     ends : ndarray, shape (p, 2, 2)
@@ -57,8 +99,6 @@ class State:
 
     centre: ComplexArray
     normal: ComplexArray
-    turn: ComplexArray
-    flank: IntArray
     arc: Array
     ends: Array
     force: Array
@@ -67,11 +107,6 @@ class State:
     high: Array
     bearing: BoolArray
     reach: Array
-
-    @property
-    def seen(self) -> ComplexArray:
-        """n in the teeth's axes, shape (p, 2)."""
-        return self.normal[:, None] / self.turn
 
 
 @dataclass(frozen=True)
@@ -184,7 +219,7 @@ def reference_width(law: HalfPlanePair, force: Array) -> Array:
     return np.asarray(np.sqrt(0.2 * law.compliance * law.pair.pinion.module * force))
 
 
-def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool = True, held: bool = False) -> Step:
+def step(setting: Setting, state: State, *, search: bool = True, held: bool = False) -> Step:
     """Solve the panels of all contacts with the faces displaced by the state's forces.
 
     Parameters
@@ -194,12 +229,12 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
     held
         Whether the bearing panels stay, so that the step is a smooth function of its state.
     """
-    normal, force = state.seen, state.force
+    law, couples, tables, corner = setting.law, setting.couples, setting.tables, setting.corner
+    normal, force = state.normal[:, None] / setting.turn, state.force
     smooth = smooth_influence(law, normal, state.arc, couples)
     tension, shear = law.wedge
     shear = shear * normal.conj() ** 2
-    tables, corner = law.tables.of(state.flank), law.corner[state.flank]
-    y, far = _distances(law, tables, corner, state.arc)
+    y, far = _distances(setting, state.arc)
     load = force[:, None] * SIGN
     displaced = np.add.reduceat(smooth.moved * (force.take(couples.second)[:, None] * SIGN)[..., None], couples.starts)
     # the contact's own width, and that of the bumps
@@ -214,7 +249,7 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
         np.add.at(edge, i, sideways(law, couples, normal, state.arc, y) * load[j])
         across = widths_in_smooth(couples, normal, smooth.moved[:, :, 2], excess)
         np.add.at(wider, i, across * load[j] * normal[i])
-    turn = state.turn / state.normal[:, None]
+    turn = setting.turn / state.normal[:, None]
     offset = (law.hub - state.centre[:, None]) / state.normal[:, None] + turn * (displaced[:, :, 0] + edge + wider)
     faces = Faces(turn, offset, displaced[:, :, 1], state.arc)
 
@@ -270,16 +305,16 @@ def step(law: HalfPlanePair, state: State, couples: Couplings, *, search: bool =
     return Step(solution, low, high, outgrown, x, width, arcs, arc, height, place, spread, slope, energy)
 
 
-def _distances(law: HalfPlanePair, tables: FlankTables, corner: ComplexArray, arc: Array) -> tuple[Array, Array]:
+def _distances(setting: Setting, arc: Array) -> tuple[Array, Array]:
     """Distances y (m) of the faces at arcs (m) from their corners, and shares of the faces by the square of their
     distance from all edges, both of shape (p, 2).
     """
-    y = np.maximum(np.abs(tables.at(arc[:, :, None])[0][:, :, 0] - corner), LEAST_DISTANCE)
-    near = 1 / y**2 + law.undercut / np.maximum(np.abs(arc), LEAST_DISTANCE) ** 2
+    y = np.maximum(np.abs(setting.tables.at(arc[:, :, None])[0][:, :, 0] - setting.corner), LEAST_DISTANCE)
+    near = 1 / y**2 + setting.law.undercut / np.maximum(np.abs(arc), LEAST_DISTANCE) ** 2
     return y, near[:, ::-1] / near.sum(axis=1, keepdims=True)
 
 
-def moved_on(law: HalfPlanePair, state: State, made: Step, *, near: BoolArray | bool) -> State:
+def moved_on(setting: Setting, state: State, made: Step, *, near: BoolArray | bool = False) -> State:
     """What the next step starts from: frames at the mean place of the pressure, along the mean normal under it.
 
     Windows grow only `near` the solution, so that they do not depend on the way to it.
@@ -290,9 +325,7 @@ def moved_on(law: HalfPlanePair, state: State, made: Step, *, near: BoolArray | 
     return State(
         centre=state.centre + state.normal * (made.height - 1j * place),
         normal=state.normal * turned / np.abs(turned),
-        turn=state.turn,
-        flank=state.flank,
-        arc=np.minimum(np.maximum(arc, law.tables.low[state.flank, 0]), law.tables.high[state.flank, 0]),
+        arc=np.minimum(np.maximum(arc, setting.tables.low[:, :, 0]), setting.tables.high[:, :, 0]),
         ends=state.ends,
         force=solution.force,
         spread=made.spread,

@@ -25,12 +25,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..gear.touching import Touching
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .half_plane_pair import HalfPlanePair
-from .half_plane_step import SIGN, WIDER, WINDOW, State, Step, answers, reference_approach
+from .half_plane_step import SIGN, WIDER, WINDOW, Setting, State, Step, answers, reference_approach
 from .moved_faces import WAY, Faces
-from .panels import EDGES, Couplings, log_integral, mean_log
+from .panels import EDGES, log_integral, mean_log
 from .position import joined, taken
 
 #: Force, in units of that of the position, up to which a missing contact is none.
@@ -50,15 +49,8 @@ class Seen(NamedTuple):
     gap: Array
 
 
-def completed(
-    law: HalfPlanePair, found: Touching, solved: tuple[State, Step], couples: Couplings
-) -> tuple[Touching, State, BoolArray] | None:
+def completed(setting: Setting, state: State, made: Step) -> tuple[Setting, State, BoolArray] | None:
     """Contacts of tooth pairs that bear in more places than they have contacts.
-
-    Parameters
-    ----------
-    found, solved
-        Solved contacts.
 
     Returns
     -------
@@ -66,18 +58,18 @@ def completed(
         All contacts again, sorted by position, pair and place, and for each position (shape (m,)) whether it has more
         of them now; None where no pair does.
     """
-    state, made = solved
+    couples, found = setting.couples, setting.found
     bearing = made.solution.pressure > 0
     cut = {int(i): _split(state, made, int(i)) for i in np.flatnonzero(_stretches(bearing) > 1)}
-    x, arcs, heights, gap = _gaps(law, state, couples)
+    x, arcs, heights, gap = _gaps(setting, state)
     total = couples.total(state.force)
     outside = _beyond(made, x)
     outside = outside[0] | outside[1]
     for i in np.flatnonzero((outside & (gap < 0)).any(axis=1)).tolist():
-        exact = gap[i] + _beside_ellipse(law, state, made, i, x[i])
-        bound = -MISSED * reference_approach(law) * total[couples.position[i]]
+        exact = gap[i] + _beside_ellipse(setting.law, state, made, i, x[i])
+        bound = -MISSED * reference_approach(setting.law) * total[couples.position[i]]
         if i not in cut and (outside[i] & (exact < bound)).any():
-            cut[i] = _added(law, state, made, i, Seen(x[i], arcs[i], heights[i], exact), bound)
+            cut[i] = _added(setting, state, made, i, Seen(x[i], arcs[i], heights[i], exact), bound)
     if not cut:
         return None
     rest = np.setdiff1d(np.arange(len(state.force)), list(cut))
@@ -86,7 +78,7 @@ def completed(
     order = np.lexsort((whole.arc[:, 0], found.pair[numbers], found.position[numbers]))
     changed = np.zeros(couples.positions, dtype=bool)
     changed[couples.position[list(cut)]] = True
-    return taken(found, numbers[order]), taken(whole, order), changed
+    return setting.take(numbers[order]), taken(whole, order), changed
 
 
 def _beyond(made: Step, x: Array) -> BoolArray:
@@ -125,22 +117,22 @@ def _copies(state: State, i: int, place: Array) -> State:
     )
 
 
-def _gaps(law: HalfPlanePair, state: State, couples: Couplings) -> tuple[Array, Array, Array, Array]:
+def _gaps(setting: Setting, state: State) -> tuple[Array, Array, Array, Array]:
     """Places x (m) over the stretches of flank of all contacts, shape (p, m), the faces' arcs and rigid heights there,
     shape (p, 2, m), and the gap of the deformed faces, shape (p, m) (m).
     """
-    tables = law.tables.of(state.flank)
-    turn = state.turn / state.normal[:, None]
+    law, couples, tables = setting.law, setting.couples, setting.tables
+    turn, seen_normal = setting.turn / state.normal[:, None], state.normal[:, None] / setting.turn
     rigid = (law.hub - state.centre[:, None]) / state.normal[:, None]
     faces = Faces(turn, rigid, np.zeros_like(turn), state.arc)
     low, high = faces.range(tables, state.ends)
     x = low[:, None] + (high - low)[:, None] * law.looked_at
     arcs = state.arc[:, :, None] + WAY[:, None] * x[:, None]  # nearly
     arcs = np.minimum(np.maximum(arcs, tables.low), tables.high)
-    moved, y = _smooth(law, state, couples, arcs)
-    at = np.maximum(np.abs(tables.at(state.arc[:, :, None])[0] - law.corner[state.flank][:, :, None]), LEAST_DISTANCE)
+    moved, y = _smooth(setting, state, seen_normal, arcs)
+    at = np.maximum(np.abs(tables.at(state.arc[:, :, None])[0] - setting.corner[:, :, None]), LEAST_DISTANCE)
     i, j = couples.first[couples.step == 0], couples.second[couples.step == 0]
-    load = state.force[:, None] * SIGN * state.seen
+    load = state.force[:, None] * SIGN * seen_normal
     tension, shear = law.wedge
     wedge = tension * load + shear * load.conj()
     half = _half_widths(state)[j, None, None]
@@ -167,11 +159,12 @@ def _beside_ellipse(law: HalfPlanePair, state: State, made: Step, i: int, x: Arr
     return np.asarray(law.compliance * (state.force[i] * mean_log(x, _half_widths(state)[i]) - logs))
 
 
-def _smooth(law: HalfPlanePair, state: State, couples: Couplings, arcs: Array) -> tuple[ComplexArray, Array]:
+def _smooth(setting: Setting, state: State, normal: ComplexArray, arcs: Array) -> tuple[ComplexArray, Array]:
     """Smooth displacements of the faces at arcs (m) of shape (p, 2, m), tooth axes (m), and the distances y (m) of the
     arcs from the corners: linear between even places.
     """
-    each = answers(law, law.shapes.at(state.arc)[:, :, 0], state.seen, couples)[..., 0]
+    law, couples = setting.law, setting.couples
+    each = answers(law, law.shapes.at(state.arc)[:, :, 0], normal, couples)[..., 0]
     load = state.force[couples.second][:, None] * SIGN
     at_stations = np.add.reduceat(each * load[:, :, None], couples.starts)
     fine = law.finely
@@ -184,10 +177,11 @@ def _smooth(law: HalfPlanePair, state: State, couples: Couplings, arcs: Array) -
     return lower + part * (upper - lower), near + part * (far - near)
 
 
-def _added(law: HalfPlanePair, state: State, made: Step, i: int, seen: Seen, bound: float) -> State:
+def _added(setting: Setting, state: State, made: Step, i: int, seen: Seen, bound: float) -> State:
     """The contact i, and others where the faces overlap most beyond either end of its window, if they are clear of
     each other in between; else its window is to be wider.
     """
+    law = setting.law
     own, ends, reach = taken(state, [i]), state.ends[[i]].copy(), state.reach[[i]]
     parts = []
     for way, side in enumerate(_beyond(taken(made, [i]), seen.x[None])[:, 0]):
@@ -200,7 +194,7 @@ def _added(law: HalfPlanePair, state: State, made: Step, i: int, seen: Seen, bou
             reach = WIDER * state.reach[[i]]
             continue
         cut = seen.arcs[0, between[np.argmax(seen.gap[between])]]
-        tangent = law.tables.of(state.flank[i]).at(seen.arcs[:, k, None])[1][:, 0] * state.turn[i]
+        tangent = law.tables.of(setting.found.flank[i]).at(seen.arcs[:, k, None])[1][:, 0] * setting.turn[i]
         along = 1j * (tangent[0] - tangent[1])
         new, limits, nothing = _copies(own, 0, seen.x[[k]]), state.ends[[i]].copy(), np.zeros(1)
         limits[0, 0, 1 - way] = ends[0, 0, way] = cut
