@@ -88,8 +88,8 @@ def solve_half_plane(
     touching
         What `law.teeth.touching` says of these angles, when it is there already.
     """
-    angles = np.atleast_1d(np.asarray(pinion_angles, dtype=float))
-    twist = np.broadcast_to(np.asarray(twists, dtype=float), angles.shape)
+    angles = np.array(pinion_angles, dtype=float, ndmin=1)
+    twist = np.array(np.broadcast_to(np.asarray(twists, dtype=float), angles.shape))
     met = law.teeth.touching(angles) if touching is None else touching
     met = met.take(np.flatnonzero(met.twist < twist[met.position]))
     made = []

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..gear.deviation import ToothDeviations
 from ..gear.flank_curve import FlankCurve, FlankTables, flank_curve, flank_tables
@@ -150,9 +151,11 @@ class HalfPlanePair:
         return np.array([float(side.curve.face.fall > 0.0) for side in self.sides])
 
     @cached_property
-    def marks(self) -> list[tuple[str, int, float]]:
-        """Name, flank and arc length (m) of the flanks' marks, see `half_plane_result.PairContacts`, by rising rank."""
-        found = []
+    def marks(self) -> tuple[NDArray[np.str_], IntArray, Array]:
+        """Names, flanks and arc lengths (m) of the flanks' marks, see `half_plane_result.PairContacts`, by rising rank;
+        first a mark of no flank without a name.
+        """
+        found = [("", -1, 0.0)]
         for name in ("undercut", "relief", "round", "tip"):
             for flank, curve in enumerate(self.curves):
                 face = curve.face
@@ -163,7 +166,8 @@ class HalfPlanePair:
                     "tip": [face.end] if face.sharp else [],
                 }[name]
                 found += [(name, flank, float(curve.arc_at(at))) for at in places]
-        return found
+        names, flanks, arcs = zip(*found, strict=True)
+        return np.array(names, dtype="<U8"), np.array(flanks), np.array(arcs)
 
     @cached_property
     def finely(self) -> Finely:

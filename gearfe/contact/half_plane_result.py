@@ -170,12 +170,11 @@ def contact_rates(
 def _reached(law: HalfPlanePair, flank: IntArray, arcs: Array, pressure: Array, width: Array) -> NDArray[np.str_]:
     """Mark that each pressure reaches, see `PairContacts`: it ends within a panel beside the middle of the last one."""
     bears = (pressure > 0)[:, None]
-    reached = np.zeros(len(arcs), dtype="<U8")
-    low = np.where(bears, arcs - width[:, None], np.inf).min(axis=2)
-    high = np.where(bears, arcs + width[:, None], -np.inf).max(axis=2)
-    for name, of, at in law.marks:  # what comes later wins
-        reached[((flank == of) & (low <= at) & (at <= high)).any(axis=1)] = name
-    return reached
+    low = np.where(bears, arcs - width[:, None], np.inf).min(axis=2, keepdims=True)
+    high = np.where(bears, arcs + width[:, None], -np.inf).max(axis=2, keepdims=True)
+    names, of, at = law.marks
+    met = ((flank[:, :, None] == of) & (low <= at) & (at <= high)).any(axis=1)
+    return np.asarray(names[(met * np.arange(len(names))).max(axis=1)])  # what comes later wins
 
 
 def flank_loads(

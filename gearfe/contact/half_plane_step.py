@@ -153,7 +153,7 @@ class Step:
     slope : ndarray, shape (p,)
         Mean slope of the deformed faces under the pressure (-).
     energy : ndarray, shape (p,)
-        Elastic energy of each contact per width (J/m).
+        Elastic energy of each contact per width (J/m); 0 while windows are searched for.
     """
 
     solution: Pressed
@@ -199,9 +199,10 @@ def answers(law: HalfPlanePair, values: Array, normal: ComplexArray, couples: Co
     """
     count, k = len(normal), values.shape[2]
     load = (values[..., None] * normal.view(float).reshape(count, 2, 1, 2)).reshape(count, 2, 2 * k)
-    most = int(np.abs(couples.step).max(initial=0))
-    answer = np.matmul(load.swapaxes(0, 1), law.influence(most)).reshape(2, count, 2 * most + 1, k, 2)
-    return answer[:, couples.second, couples.step + most].swapaxes(0, 1).view(complex)
+    wide = 2 * couples.furthest + 1
+    answer = np.matmul(load.swapaxes(0, 1), law.influence(couples.furthest)).reshape(2, count * wide, k, 2)
+    columns = couples.second * wide + couples.step + couples.furthest
+    return answer.take(columns, axis=1).swapaxes(0, 1).view(complex)
 
 
 def reference_approach(law: HalfPlanePair) -> float:
@@ -293,15 +294,16 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     middle = (far[:, :, None] * deformed).sum(axis=1)
     area = between @ _BETWEEN
     slope = (between * (middle[:, 1:] - middle[:, :-1])).sum(axis=1) / np.where(area > 0, half * area, 1.0)
-    outgrown: BoolArray = np.zeros(len(p), dtype=bool)
-    if found is not None:
+    outgrown, energy = np.zeros(len(p), dtype=bool), np.zeros(len(p))
+    if found is None:
+        energy = 0.5 * (
+            (p * width * solution.approach).sum(axis=1)
+            + solution.force * couples.times(smooth.compliance, solution.force)
+            + ((wider * normal.conj()).real * load).sum(axis=1)
+        )
+    else:
         place, slope = np.where(loaded, place, found.nearest), np.where(loaded, slope, found.mean_slope)
         outgrown = ((p[:, 0] > 0) & (low > reach[0])) | ((p[:, -1] > 0) & (high < reach[1]))
-    energy = 0.5 * (
-        (p * width * solution.approach).sum(axis=1)
-        + solution.force * couples.times(smooth.compliance, solution.force)
-        + ((wider * normal.conj()).real * load).sum(axis=1)
-    )
     return Step(solution, low, high, outgrown, x, width, arcs, arc, height, place, spread, slope, energy)
 
 
@@ -309,7 +311,7 @@ def _distances(setting: Setting, arc: Array) -> tuple[Array, Array]:
     """Distances y (m) of the faces at arcs (m) from their corners, and shares of the faces by the square of their
     distance from all edges, both of shape (p, 2).
     """
-    y = np.maximum(np.abs(setting.tables.at(arc[:, :, None])[0][:, :, 0] - setting.corner), LEAST_DISTANCE)
+    y = np.maximum(np.abs(setting.tables.points(arc[:, :, None])[:, :, 0] - setting.corner), LEAST_DISTANCE)
     near = 1 / y**2 + setting.law.undercut / np.maximum(np.abs(arc), LEAST_DISTANCE) ** 2
     return y, near[:, ::-1] / near.sum(axis=1, keepdims=True)
 

@@ -114,17 +114,22 @@ def windows(x: Array, h: Array, gap: Array, depth: Array) -> Windows:
     gap, depth : ndarray, shape (p, m), (p,)
         m.
     """
-    row, last, nearest = np.arange(len(x)), x.shape[1] - 1, np.argmin(gap, axis=1)
-    over = np.sqrt(gap - gap[row, nearest, None]) - np.sqrt(depth)[:, None]
-    # both ways at once: to the left everything reversed
-    over, places = np.stack([over[:, ::-1], over]), np.stack([x[:, ::-1], x])
-    beyond = (over > 0) & (np.arange(last + 1) > np.stack([last - nearest, nearest])[:, :, None])
-    first = np.argmax(beyond, axis=2)
-    first = np.where(first > 0, first, last)
-    inner, way = np.maximum(first - 1, 0), np.array([[0], [1]])
-    a, b, start = over[way, row, inner], over[way, row, first], places[way, row, inner]
-    share = np.where(b > np.maximum(a, 0), -a / np.where(b > a, b - a, 1.0), 1.0)
-    found = start + np.minimum(np.maximum(share, 0), 1) * (places[way, row, first] - start)
-    left, right = np.maximum(nearest - 1, 0), np.minimum(nearest + 1, last)
-    rise = 0.5 * (h[row, :, right] - h[row, :, left]).sum(axis=1)
-    return Windows(found[0], found[1], x[row, nearest], rise / np.maximum(1e-12, x[row, right] - x[row, left]))
+    count = x.shape[1]
+    row, number, last = count * np.arange(len(x)), np.arange(count), count - 1
+    nearest = np.argmin(gap, axis=1)
+    over = np.sqrt(gap - gap.take(row + nearest)[:, None]) - np.sqrt(depth)[:, None]
+    wide = over > 0
+    before, beyond = wide & (number < nearest[:, None]), wide & (number > nearest[:, None])
+    ends = []
+    for first, way in ((last - np.argmax(before[:, ::-1], axis=1), 1), (np.argmax(beyond, axis=1), -1)):
+        # the first place that is out of the window, and the one before it; there is none past the last place
+        outer = row + np.where(first * way < nearest * way, first, 0 if way > 0 else last)
+        inner = np.minimum(np.maximum(outer + way, row), row + last)
+        a, b, start = over.take(inner), over.take(outer), x.take(inner)
+        share = np.where(b > np.maximum(a, 0), -a / np.where(b > a, b - a, 1.0), 1.0)
+        ends.append(start + np.minimum(np.maximum(share, 0), 1) * (x.take(outer) - start))
+    left, right = row + np.maximum(nearest - 1, 0), row + np.minimum(nearest + 1, last)
+    middle = h[:, 0] + h[:, 1]
+    rise = 0.5 * (middle.take(right) - middle.take(left))
+    slope = rise / np.maximum(1e-12, x.take(right) - x.take(left))
+    return Windows(ends[0], ends[1], x.take(row + nearest), slope)

@@ -104,6 +104,11 @@ class Couplings:
     slots: int
 
     @cached_property
+    def furthest(self) -> int:
+        """Most teeth between two pairs of a position."""
+        return int(np.abs(self.step).max(initial=0))
+
+    @cached_property
     def starts(self) -> IntArray:
         """Where the couples of each first contact start, shape (p,)."""
         return np.searchsorted(self.first, np.arange(len(self.position)))
@@ -131,11 +136,11 @@ class Couplings:
 
     def couple(self, first: IntArray, second: IntArray) -> IntArray:
         """Numbers of couples of contacts."""
-        return np.asarray(self.starts[first] + self.slot[second])
+        return np.asarray(self.starts.take(first) + self.slot.take(second))
 
     def total(self, of_contacts: Array | BoolArray) -> Array:
         """Sums over the contacts of each position, shape (positions,)."""
-        return np.bincount(self.position, of_contacts, self.positions).astype(float)
+        return np.bincount(self.position, of_contacts, self.positions).astype(float, copy=False)
 
     def diagonal(self, of_contacts: Array) -> Array:
         """The diagonal matrix with these entries, by couple, shape (c,)."""
@@ -143,26 +148,22 @@ class Couplings:
 
     def times(self, matrix: Array, vector: Array) -> Array:
         """sum_j matrix_ij vector_j for each contact i; `matrix` has one entry a couple, shape (c,)."""
-        return np.bincount(self.first, matrix * vector[self.second], len(self.position)).astype(float)
+        return np.bincount(self.first, matrix * vector.take(self.second), len(self.position)).astype(float, copy=False)
 
     def solved(self, free: Array, stiffness: Array, matrix: Array) -> Array:
         """F with F + stiffness (matrix F) = free within each position, shape (p,); both matrices by couple."""
         if self.slots == 1:
             return np.asarray(free / (1.0 + stiffness * matrix))
-        row, entry, size = *self._places, self.slots
-        dense = np.zeros((2, self.positions * size * size))
-        dense[0, entry], dense[1, entry] = stiffness, matrix
-        right = np.zeros(self.positions * size)
-        right[row] = free
-        system = np.matmul(*dense.reshape(2, -1, size, size))
-        system[:, range(size), range(size)] += 1.0
-        return np.asarray(np.linalg.solve(system, right.reshape(-1, size, 1)).ravel()[row])
-
-    @cached_property
-    def _places(self) -> tuple[IntArray, IntArray]:
-        """Place of each contact, (p,), and of each couple, (c,), in arrays of all slots of all positions."""
-        row = self.position * self.slots + self.slot
-        return row, row[self.first] * self.slots + self.slot[self.second]
+        size = self.slots
+        row = self.position * size + self.slot
+        if len(self.first) == self.positions * size * size:  # no slot is empty
+            dense, right = np.stack([stiffness, matrix]), free
+        else:
+            dense, right = np.zeros((2, self.positions * size * size)), np.zeros(self.positions * size)
+            dense[:, row[self.first] * size + self.slot[self.second]] = stiffness, matrix
+            right[row] = free
+        system = np.matmul(*dense.reshape(2, -1, size, size)) + np.eye(size)
+        return np.linalg.solve(system, right.reshape(-1, size, 1)).ravel().take(row)
 
 
 def couplings(position: IntArray, number: IntArray, positions: int) -> Couplings:
@@ -212,22 +213,16 @@ class _Group:
     contacts: IntArray
     K: Array
 
-    def of(self, values: Array) -> Array:
-        """Values of all panels of each tooth pair, shape (P, z n), from those of the contacts, shape (p, n)."""
-        return np.asarray(values[self.contacts].reshape(len(self.contacts), -1))
-
-    def responses(self, rows: IntArray, on: BoolArray, gap: Array) -> Array:
-        """Pressures of some tooth pairs on the panels `on` for the gap and for an even approach in each contact, shape
-        (rows, z n, 1 + z).
-        """
-        z, size = self.contacts.shape[1], gap.shape[1]
-        right = np.zeros((len(rows), size, 1 + z))
-        right[..., 0] = -gap[rows]
+    def responses(self, on: BoolArray, gap: Array) -> Array:
+        """Pressures on the panels `on` for the gap and for an even approach in each contact, shape (P, z n, 1 + z)."""
+        (count, z), n, size = self.contacts.shape, gap.shape[1], self.K.shape[1]
+        right = np.zeros((count, size, 1 + z))
+        right[..., 0] = -gap.take(self.contacts, axis=0).reshape(count, size)
         for k in range(z):
-            right[:, k * (size // z) : (k + 1) * (size // z), 1 + k] = 1.0
-        on = on[rows]
-        system = np.where(on[:, :, None] & on[:, None, :], self.K[rows], np.eye(size))
-        return np.asarray(np.linalg.solve(system, right * on[:, :, None]))
+            right[:, k * n : (k + 1) * n, 1 + k] = 1.0
+        bears = on.take(self.contacts, axis=0).reshape(count, size, 1)
+        system = np.where(bears & bears.swapaxes(1, 2), self.K, np.eye(size))
+        return np.asarray(np.linalg.solve(system, right * bears))
 
 
 def _groups(K: Array, between: Array, couples: Couplings) -> list[_Group]:
@@ -284,26 +279,30 @@ def pressed(
         Whether that is no guess but what bears.
     """
     gap, widths, n = panels.gap, panels.widths, panels.gap.shape[1]
-    groups = _groups(panels.K, panels.between, couples)
-    gaps, on = [group.of(gap) for group in groups], bearing
-    responses = [np.empty((*own.shape, 1 + group.contacts.shape[1])) for group, own in zip(groups, gaps, strict=True)]
+    groups, on, responses = _groups(panels.K, panels.between, couples), bearing, []
     y0 = -couples.times(T, carried)
     pressure, approach, free, stiffness = np.empty_like(gap), np.empty_like(gap), np.empty(len(gap)), np.zeros(len(T))
-    changed = np.ones(len(gap), dtype=bool)
-    for _ in range(1 if held else CHANGES):
-        for group, own, both in zip(groups, gaps, responses, strict=True):
-            rows = np.flatnonzero(changed[group.contacts].any(axis=1))
-            if len(rows) == 0:
-                continue
-            both[rows] = group.responses(rows, group.of(on), own)
-            contacts, z = group.contacts[rows], group.contacts.shape[1]
-            forces = (widths[contacts][:, :, None, :] @ both[rows].reshape(len(rows), z, n, 1 + z))[:, :, 0]
+    changed: BoolArray = np.zeros(0, dtype=bool)
+    for number in range(1 if held else CHANGES):
+        for k, group in enumerate(groups):
+            part = group
+            if number == 0:
+                both = part.responses(on, gap)
+                responses.append(both)
+            else:
+                rows = np.flatnonzero(changed.take(group.contacts).any(axis=1))
+                if len(rows) == 0:
+                    continue
+                part = _Group(group.contacts[rows], group.K[rows])
+                responses[k][rows] = both = part.responses(on, gap)
+            (count, z), contacts = part.contacts.shape, part.contacts
+            forces = (widths.take(contacts, axis=0)[:, :, None] @ both.reshape(count, z, n, 1 + z))[:, :, 0]
             free[contacts] = forces[:, :, 0]
             stiffness[couples.couple(contacts[:, :, None], contacts[:, None])] = forces[:, :, 1:]
         force = couples.solved(free - couples.times(stiffness, y0), stiffness, T)
         y = couples.times(T, force) + y0
         for group, both in zip(groups, responses, strict=True):
-            p = both[:, :, 0] - (both[:, :, 1:] @ y[group.contacts][:, :, None])[:, :, 0]
+            p = both[:, :, 0] - (both[:, :, 1:] @ y.take(group.contacts)[:, :, None])[:, :, 0]
             pressure[group.contacts] = p.reshape(*group.contacts.shape, n)
             approach[group.contacts] = (group.K @ p[:, :, None]).reshape(*group.contacts.shape, n)
         bound = ROUNDING * np.abs(approach).max(axis=1, keepdims=True)

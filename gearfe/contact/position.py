@@ -227,6 +227,8 @@ def _among(record: Any, kept: BoolArray) -> Any:
 
 def together(parts: Sequence[Positions]) -> Positions:
     """Positions one after the other."""
+    if len(parts) == 1:
+        return parts[0]
     starts = np.cumsum([0, *(len(part) for part in parts)]).tolist()
 
     def moved(records: Sequence[Any]) -> Any:

@@ -135,6 +135,11 @@ class FlankTables:
         (a, b, c, d), t = self.pieces(s)
         return ((d * t + c) * t + b) * t + a, (3 * d * t + 2 * c) * t + b
 
+    def points(self, s: Array) -> ComplexArray:
+        """Points alone."""
+        (a, b, c, d), t = self.pieces(s)
+        return np.asarray(((d * t + c) * t + b) * t + a)
+
 
 def flank_tables(curves: Sequence[FlankCurve]) -> FlankTables:
     """One table of several flanks."""
