@@ -14,7 +14,7 @@ from gearfe.contact.compliance import MeshingPair
 from gearfe.gear.pair import TipRelief
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.meshing.recipe import sector_recipes
-from gearfe.stiffness.positions import ElementSolver, HalfPlaneSolver
+from gearfe.stiffness.positions import ElementSolver, position_solver
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 
 from .gears import pair as gear_pair
@@ -52,7 +52,7 @@ def test_elements_in_a_contact_are_hertzs_width_over_the_flanks_element() -> Non
 @pytest.mark.parametrize(("law", "bound"), [("nitsche", 6e-3), ("penalty", 1e-2)])
 def test_resolved_positions_are_near_the_half_plane_law(law: str, bound: float) -> None:
     """Beyond one element the error is below the documented bound, and falls as the contact gets wider."""
-    solver, known = ElementSolver(PAIR, elastic_of(law)), HalfPlaneSolver(PAIR, elastic_of("half_plane"))
+    solver, known = ElementSolver(PAIR, elastic_of(law)), position_solver(PAIR, elastic_of("half_plane"))
     worst = []
     for degrees in (ONE, TWO, WIDE):
         twists = np.full(len(EVERYWHERE), math.radians(degrees))

@@ -32,10 +32,10 @@ BLOCK = 40_000
 SAMPLES = 9
 
 
-def sample_numbers(angles: Array, cycle: float) -> IntArray:
-    """At most `SAMPLES` of the positions at `angles` (rad), spread evenly over the mesh cycle (rad): their numbers."""
+def sample_numbers(angles: Array, cycle: float, most: int = SAMPLES) -> IntArray:
+    """At most so many of the positions at `angles` (rad), spread evenly over the mesh cycle (rad): their numbers."""
     order = np.argsort(np.mod(angles, cycle), kind="stable")
-    return order[np.unique(np.linspace(0, len(order) - 1, min(SAMPLES, len(order))).round().astype(np.int64))]
+    return order[np.unique(np.linspace(0, len(order) - 1, min(most, len(order))).round().astype(np.int64))]
 
 
 def interpolated_shares(angles: Array, samples: Array, shares: Array, cycle: float) -> Array:
@@ -49,13 +49,15 @@ def interpolated_shares(angles: Array, samples: Array, shares: Array, cycle: flo
 def with_shares(found: Positions, share: Array) -> Positions:
     """Positions with their torques raised by the finite-strain shares c = Delta T / T, shape (n,).
 
-    Both hubs' torques take the same factor: the force changes, not its line. The share grows with the twist about as
-    the torque does, so the tangent takes 1 + 2 c.
+    Both hubs' torques and the loads take the same factor: the force changes, not its line. The share grows with the
+    twist about as the torque does, so the tangent takes 1 + 2 c.
     """
     made = {name: getattr(found, name) * (1 + share) for name in TORQUES} | {"tangent": found.tangent * (1 + 2 * share)}
     contacts = found.contacts
     raised = contacts.torque_wheel * (1 + share)[contacts.position]
-    return replace(found, contacts=replace(contacts, torque_wheel=raised), **made)
+    factors = [(1 + share)[one.position, None] for one in found.loads]
+    loads = tuple(replace(o, force=o.force * f, rate=o.rate * f) for o, f in zip(found.loads, factors, strict=True))
+    return replace(found, contacts=replace(contacts, torque_wheel=raised), loads=loads, **made)
 
 
 def finite_strain_shares(pair: MeshingPair, found: Positions, neighbours: int = NEIGHBOURS) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -85,6 +85,21 @@ class PairContacts:
 
     def __len__(self) -> int:
         return len(self.pair)
+
+    def moved(self, by: Array, factor: Array) -> PairContacts:  # noqa: ARG002 (laws on elements move by factors)
+        """These at twists larger by `by` (rad), one number a position: forces and widths."""
+        here = by[self.position]
+        force = np.maximum(self.force + self.force_rate * here, 0.0)
+        scale = np.divide(force, self.force, out=np.ones(len(force)), where=self.force > 0)
+        wider = np.exp(self.growth * here)
+        return replace(
+            self,
+            force=force,
+            torque_wheel=self.torque_wheel * scale,
+            torque_pinion=self.torque_pinion * scale,
+            half_width=self.half_width * wider,
+            hertz_pressure=self.hertz_pressure * scale / wider,
+        )
 
     @property
     def marked(self) -> BoolArray:

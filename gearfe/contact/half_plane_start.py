@@ -23,6 +23,7 @@ from ..typing import Array, IntArray
 from .half_plane_pair import HalfPlanePair
 from .half_plane_step import WINDOW, Setting, State, reference_approach, smooth_influence
 from .panels import PANELS, forces_of_overlaps
+from .position import of_positions
 
 #: Positions solved side by side.
 BATCH = 128
@@ -105,29 +106,26 @@ def first_state(law: HalfPlanePair, twists: Array, found: Touching) -> tuple[Set
 
 
 def expected_twists(law: HalfPlanePair, torques: Array, touching: Touching) -> Array:
-    """Twists (rad) at which n positions are expected to carry torques (N m) > 0, shape (n,).
+    """Twists (rad) at which n positions are expected to carry torques (N m) > 0, shape (n,); infinite where nothing can
+    touch.
 
     Parameters
     ----------
     touching
         What `law.teeth.touching` says of their angles.
     """
-    made = np.full(len(torques), np.nan)
-    for start in range(0, len(torques), BATCH):
-        part = slice(start, start + BATCH)
-        rows = slice(*np.searchsorted(touching.position, [start, start + BATCH]))
-        made[part] = _batch(law, torques[part], touching.take(rows), start)
+    made, touched = np.full(len(torques), np.inf), np.unique(touching.position)
+    for start in range(0, len(touched), BATCH):
+        chosen = touched[start : start + BATCH]
+        made[chosen] = _batch(law, torques[chosen], of_positions(touching, chosen))
     return made
 
 
-def _batch(law: HalfPlanePair, torques: Array, found: Touching, start: int) -> Array:
-    position = found.position - start
-    count, arm = len(torques), found.arm[:, 1]
+def _batch(law: HalfPlanePair, torques: Array, found: Touching) -> Array:
+    count, arm, position = len(torques), found.arm[:, 1], found.position
     touch = np.full(count, np.inf)
     np.minimum.at(touch, position, found.twist)
-    if not np.isfinite(touch).all():
-        return np.where(np.isfinite(touch), np.nan, touch)
-    setting, state = unloaded(law, np.arange(count), touch, replace(found, position=position))
+    setting, state = unloaded(law, np.arange(count), touch, found)
     couples, (yields, T) = setting.couples, _yields(setting, state)
     force = torques[position] / (arm * law.width)
     twist = np.full(count, np.inf)

@@ -76,6 +76,11 @@ class Contacts:
     torque_wheel: Array
     half_width: Array
 
+    def moved(self, by: Array, factor: Array) -> Contacts:  # noqa: ARG002 (the half-plane law's move by twists)
+        """These with torques larger by `factor`, one number a position: widths change with the root."""
+        own = factor[self.position]
+        return replace(self, torque_wheel=self.torque_wheel * own, half_width=self.half_width * np.sqrt(own))
+
 
 @dataclass(frozen=True)
 class FlankLoads:

@@ -1,33 +1,18 @@
 r"""A load map computed: the twist at which each pinion angle carries each torque.
 
-All cells of a few torques are solved side by side, then all others, whose twists are predicted from these (as in
-`gearfe.loadmap.load_map`: cubic in :math:`\ln\delta` over :math:`\ln T`). A cell is accepted when its torque lies
-within :math:`\epsilon` = 3e-4 of the goal; the twist then takes one step along the tangent of :math:`\ln\delta` over
-:math:`\ln T`, whose error is a few hundredths of :math:`\epsilon^2`, and what else there is moves with the torque
-(forces as T, pressures as :math:`\sqrt T`).
-
-Finite strain changes the torque by a share c. The energy that it adds is spent pair by pair, each with about the power
-:math:`2 + p` of its load, so that with the pairs' shares :math:`s_k` of the torque
-
-.. math:: c = \kappa\, T^p \sum_k s_k^{1+p}, \qquad p = 0.75,
-
-where :math:`\kappa` hardly depends on torque and angle, also where pairs come and go (c itself varies fivefold over a
-map and jumps there). It is evaluated at the torques that are solved first and interpolated, and directly in the cells
-where c may be off by more than 5e-5.
+The cells are solved by `gearfe.loadmap.cells`; each torque is a curve as `gearfe.stiffness.sweep` makes it.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..contact.compliance import MeshingPair
-from ..contact.finite_strain import with_shares
 from ..contact.model import DEFAULT_MODEL, PairModel
 from ..contact.position import Positions, joined, together
 from ..errors import InputError
@@ -36,27 +21,22 @@ from ..stiffness.positions import (
     PositionSolver,
     Progress,
     TorqueGoals,
-    at_torques,
     checked_contact,
-    closed,
     position_solver,
-    standard_stiffness,
 )
 from ..stiffness.sweep import asked_positions, assembled_curve, distinct_angles, elastic_pair
 from ..stopwatch import Stopwatch
 from ..threads import one_thread
-from ..typing import Array, IntArray
-from .cells import StrainShares, predicted
+from ..typing import Array
+from .cells import solve_cells
 from .load_map import LoadMap
 
 if TYPE_CHECKING:
     from .root_stress import PairRoots, ToothRoots
 
 
-#: Relative miss of the torque at which a cell is accepted.
-ACCEPTED = 3e-4
-#: Torques that are solved first, and cells that are in memory together from then on.
-LEVELS, TOGETHER = 5, 4000
+#: Cells that are in memory together.
+TOGETHER = 4000
 #: Largest number of cells.
 MOST_CELLS = 200_000
 #: Angles over one mesh cycle where none are given.
@@ -146,35 +126,16 @@ def _cells(
     finite: bool,
 ) -> tuple[Positions, ToothRoots | None]:
     """All cells of a map, torque by torque: their positions, and their root stresses where these are asked for."""
-    n, torque = len(angles), np.repeat(goals, len(angles))
-    angle, touch = np.tile(angles, len(goals)), np.tile(touching, len(goals))
-    known = np.unique(np.linspace(0, len(goals) - 1, LEVELS).round().astype(np.int64))
-    rest = np.setdiff1d(np.arange(len(goals)), known)
-    groups = [known, *np.array_split(rest, max(1, math.ceil(len(rest) * n / TOGETHER)))]
-    strain = StrainShares(solver.elastic, angles, goals, known) if finite else None
-    usual = touch + torque / standard_stiffness(solver)
-    parts: list[Positions] = []
-    at_roots: list[ToothRoots] = []
-    order: list[IntArray] = []
-    for rows in groups if len(rest) else [known]:
-        cells = (rows[:, None] * n + np.arange(n)).ravel()
-        ahead: dict[str, Any] = {}
-        if rows is not known:
-            twist, carried = predicted(parts[0], goals[known], touching, goals[rows])
-            expected = 0.0 if strain is None else strain.expected(rows, carried)
-            ahead["start"] = np.where(np.isfinite(twist), twist, usual[cells]), expected
-        shares_of = None if strain is None else partial(strain.at, rows)
-        ahead |= {"kept": np.arange(len(cells)), "tolerance": ACCEPTED}
-        own = TorqueGoals(angle[cells], torque[cells], touch[cells])
-        found, share = at_torques(solver, own, shares_of, **ahead)
+    n, parts, at_roots = len(angles), [], []
+    for rows in np.array_split(np.arange(len(goals)), max(1, math.ceil(len(goals) * n / TOGETHER))):
+        torque = np.repeat(goals[rows], n)
+        own = TorqueGoals(np.tile(angles, len(rows)), torque, np.tile(touching, len(rows)))
+        kept = np.arange(0 if roots is None else len(torque))
+        found = solve_cells(solver, own, kept, strain=n if finite else 0)
         if roots is not None:
             made = roots.at(found)
-            factor = own.torque[made.position] / found.torque_wheel[made.position]
-            at_roots.append(replace(made, position=cells[made.position], stress=made.stress * factor[:, None]))
-        found = closed(with_shares(found, share), own)
-        parts.append(found.with_loads(np.zeros(len(cells), dtype=bool)))
-        order.append(cells)
+            at_roots.append(replace(made, position=rows[0] * n + made.position))
+        parts.append(found.with_loads(np.zeros(len(torque), dtype=bool)))
         if progress is not None:
-            progress(sum(len(part) for part in order), len(torque), "cells")
-    whole = together(parts).take(np.argsort(np.concatenate(order)))
-    return whole, joined(at_roots) if at_roots else None
+            progress((int(rows[-1]) + 1) * n, len(goals) * n, "cells")
+    return together(parts), joined(at_roots) if at_roots else None

@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..contact.half_plane_result import PairContacts, flank_loads
+from ..contact.half_plane_result import PairContacts
 from ..contact.half_plane_step import HalfPlanePair
-from ..contact.position import Positions, joined, of_positions, taken
+from ..contact.position import Positions, taken
 from ..errors import InputError
 from ..gear.deviation import ToothDeviations
 from ..gear.iso6336 import mesh_stiffness
-from ..gear.tooth_flanks import ToothFlanks
-from ..gear.touching import Touching
 from ..gear.validity import MOST_YIELD
+from ..loadmap.cells import solve_cells
 from ..loadmap.root_stress import PairRoots
 from ..stiffness.contact_pressure import BLUNTING
-from ..stiffness.positions import Progress
+from ..stiffness.positions import HalfPlaneSolver, Progress, TorqueGoals
 from ..threads import one_thread
 from ..typing import Array, IntArray
-from .cells import solve_cells
 from .loaded_mesh import BACK, LoadedMesh, PairLoads, full_period
 
 #: Cells solved at once, and most in all.
@@ -91,13 +88,10 @@ def load_mesh(
         raise InputError("mesh_cycles", cycles, problem, "state a part of the period, fewer positions or torques")
     given = np.arange(n) * (pair.mesh_cycle / positions) if angles is None else angles
     place: Array = np.atleast_1d(np.asarray(given, dtype=np.float64))
-    met = _touching(law.teeth, place)
-    touch = np.full(n, np.inf)
-    np.minimum.at(touch, met.position, met.twist)
-    behind = None if back is None else np.full(n, np.inf)
-    if back is not None and behind is not None:  # seen from the other side the pinion turns the other way
-        other = _touching(ToothFlanks(pair, back), -place)
-        np.minimum.at(behind, other.position, other.twist)
+    solver = HalfPlaneSolver(law, None if roots is None else roots.pair)
+    touch, behind = solver.touching_twists(place), None
+    if back is not None:  # seen from the other side the pinion turns the other way
+        behind = HalfPlaneSolver(law.deviated(back)).touching_twists(-place)
     stress = None if roots is None else np.full((count, 2), np.nan)
     cells: list[dict[str, Array]] = []
     pairs: list[PairLoads] = []
@@ -105,9 +99,10 @@ def load_mesh(
         for start in range(0, count, AT_ONCE):
             numbers = np.arange(start, min(start + AT_ONCE, count))
             angle, goal = numbers % n, goals[numbers // n]
-            made = solve_cells(law, place[angle], goal, of_positions(met, angle))
+            own = TorqueGoals(place[angle], goal, touch[angle])
+            made = solve_cells(solver, own, np.arange(0 if roots is None else len(goal)))
             if stress is not None and roots is not None:
-                stress[numbers] = _root_stress(law, made, roots)
+                stress[numbers] = _root_stress(made, roots)
             pairs.append(_pair_loads(law, made, numbers, n))
             cells.append({name: getattr(made, name) for name in CELL})  # not the panels of the contacts
             if progress is not None:
@@ -138,17 +133,9 @@ def load_mesh(
         pair=pair,
         **whole,
     )
+    met = solver.touching(place)
     _check_contact(found, law, met.pair, met.position, met.twist - lost)
     return found
-
-
-def _touching(teeth: ToothFlanks, angles: Array) -> Touching:
-    """What `teeth.touching` says, in pieces: its search takes kilobytes for each angle."""
-    parts = []
-    for start in range(0, len(angles), AT_ONCE):
-        found = teeth.touching(angles[start : start + AT_ONCE])
-        parts.append(replace(found, position=found.position + start))
-    return joined(parts)
 
 
 def _pair_loads(law: HalfPlanePair, made: Positions, numbers: IntArray, n: int) -> PairLoads:
@@ -178,12 +165,9 @@ def _pair_loads(law: HalfPlanePair, made: Positions, numbers: IntArray, n: int) 
     )
 
 
-def _root_stress(law: HalfPlanePair, made: Positions, roots: PairRoots) -> Array:
+def _root_stress(made: Positions, roots: PairRoots) -> Array:
     """Largest tension (Pa) at the roots of pinion and wheel, shape (c, 2)."""
-    own = made.contacts
-    assert isinstance(own, PairContacts)
-    loads = flank_loads(law.sides, roots.pair, own, made.pinion_angle, made.twist)
-    found = roots.at(replace(made, loads=loads))
+    found = roots.at(made)
     stress = np.full((len(made), 2), -np.inf)
     np.maximum.at(stress, found.position, found.stress)
     return np.where(np.isfinite(stress), stress, np.nan)

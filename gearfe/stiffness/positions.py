@@ -11,8 +11,9 @@ import numpy as np
 from ..contact.compliance import MeshingPair
 from ..contact.elements import first_contacts, solve_elements
 from ..contact.finite_strain import finite_strain_shares, interpolated_shares, sample_numbers, with_shares
-from ..contact.half_plane import half_plane_pair, solve_half_plane
+from ..contact.half_plane import HalfPlanePair, half_plane_pair, solve_half_plane
 from ..contact.half_plane_result import flank_loads
+from ..contact.half_plane_start import expected_twists
 from ..contact.laws import HalfPlane
 from ..contact.position import TORQUES, Positions, joined, of_positions, taken, together
 from ..errors import InputError
@@ -30,30 +31,41 @@ NONE: IntArray = np.zeros(0, dtype=np.int64)
 def position_solver(pair: GearPair, elastic: MeshingPair, *, resolved_only: bool = True) -> PositionSolver:
     """The solver of the elastic pair's law; see `ElementSolver` for `resolved_only`."""
     if isinstance(elastic.law, HalfPlane):
-        return HalfPlaneSolver(pair, elastic)
+        return HalfPlaneSolver(half_plane_pair(pair, elastic), elastic)
     return ElementSolver(pair, elastic, resolved_only=resolved_only)
 
 
 #: Pinion angles of a mesh cycle at which flanks with deviations are looked at for their first touch.
 LOOKS = 24
+#: Angles whose first touch is searched for at once: that takes kilobytes for each.
+AT_ONCE = 512
 
 
 class HalfPlaneSolver:
-    """Positions of one pair by the half-plane law."""
+    """Positions of one pair by the half-plane law; without the elastic gears there are no loads on nodes."""
 
     #: Relative change of the forces from one step of the iteration to the next leaves this of the torque.
     torque_tolerance = 1e-7
+    #: Relative miss of a torque from which one step leads to it: contacts move with their own rates.
+    nearly = 1e-3
 
-    def __init__(self, pair: GearPair, elastic: MeshingPair) -> None:
-        self.pair, self.elastic = pair, elastic
-        self.law = half_plane_pair(pair, elastic)
+    def __init__(self, law: HalfPlanePair, elastic: MeshingPair | None = None) -> None:
+        self.pair, self._elastic, self.law = law.pair, elastic, law
         self.curves = [self.law.curves[flank] for flank in self.law.teeth.flank(np.zeros(1, dtype=np.int64))[0]]
         self._angles = np.zeros(0)
         self._known = self.law.teeth.touching(self._angles)
 
+    @property
+    def elastic(self) -> MeshingPair:
+        """The elastic gears."""
+        assert self._elastic is not None
+        return self._elastic
+
     def solve(self, angles: Array, twists: Array, kept: IntArray = NONE) -> Positions:
         """Positions at pinion angles and twists (rad), both of shape (n,); those numbered `kept` with loads."""
         found = solve_half_plane(self.law, angles, twists, touching=self.touching(angles))
+        if len(kept) == 0:
+            return found
         wanted = taken(found.contacts, np.isin(found.contacts.position, kept))
         loads = flank_loads(self.law.sides, self.elastic, wanted, found.pinion_angle, found.twist)
         return replace(found, loads=loads)
@@ -78,8 +90,9 @@ class HalfPlaneSolver:
 
     def touching(self, angles: Array) -> Touching:
         """Tooth pairs whose rigid flanks can meet at pinion angles (rad), by position; searched for once an angle."""
-        new = np.setdiff1d(angles, self._angles)
-        if len(new):
+        every = np.setdiff1d(angles, self._angles)
+        for start in range(0, len(every), AT_ONCE):
+            new = every[start : start + AT_ONCE]
             found = self.law.teeth.touching(new)
             found = replace(found, position=found.position + len(self._angles))
             self._known = joined([self._known, found])
@@ -107,10 +120,12 @@ class ElementSolver:
 
     #: Relative accuracy to which torques can be searched for.
     torque_tolerance = 1e-10
+    #: As above; contacts move with the torque.
+    nearly = 1e-4
 
     def __init__(self, pair: GearPair, elastic: MeshingPair, *, resolved_only: bool = True) -> None:
         self.pair, self.elastic, self.resolved_only = pair, elastic, resolved_only
-        self.half_plane = HalfPlaneSolver(pair, elastic)
+        self.half_plane = HalfPlaneSolver(half_plane_pair(pair, elastic), elastic)
         self.curves = self.half_plane.curves
         self.touching, self.touching_twists = self.half_plane.touching, self.half_plane.touching_twists
         self.first_touch = self.half_plane.first_touch
@@ -180,18 +195,13 @@ def at_twists(
 
 def check_torque(solver: PositionSolver, torque: float) -> None:
     """Raise `InputError` for a torque (N m) that small strain is not meant for."""
-    pair = solver.pair
-    most = MOST_YIELD * pair.pinion.module * standard_stiffness(solver) / pair.wheel.base_radius
+    pair, elastic = solver.pair, solver.elastic
+    moduli = [body.material.youngs_modulus for body in elastic.bodies]
+    stiffness = mesh_stiffness(pair, moduli[0], moduli[1]) * elastic.width
+    most = MOST_YIELD * pair.pinion.module * stiffness * pair.wheel.base_radius
     if torque > most:
         problem = f"must be <= {most:.3g} N m: the teeth would yield by more than {MOST_YIELD:g} modules"
         raise InputError("torque", torque, problem, "linear elasticity does not reach so far; give less")
-
-
-def standard_stiffness(solver: PositionSolver) -> float:
-    """Torque per twist by the standard's mesh stiffness (N m/rad)."""
-    pair, elastic = solver.pair, solver.elastic
-    moduli = [body.material.youngs_modulus for body in elastic.bodies]
-    return mesh_stiffness(pair, moduli[0], moduli[1]) * elastic.width * pair.wheel.base_radius**2
 
 
 @dataclass(frozen=True)
@@ -212,97 +222,92 @@ class TorqueGoals:
 def at_torques(
     solver: PositionSolver,
     goals: TorqueGoals,
-    shares_of: Callable[[Positions], Array] | None,
     *,
-    start: tuple[Array, Array | float] | None = None,
+    start: Array | None = None,
     kept: IntArray = NONE,
     tolerance: float | None = None,
     progress: Progress | None = None,
-) -> tuple[Positions, Array]:
-    """Small-strain positions whose torques make the goals with their shares of finite strain, and these shares.
-
-    Laws on elements start from the twists of the half-plane law, so that they are asked for loads near the goal.
+) -> Positions:
+    """Small-strain positions that carry torques; those numbered `kept` with loads.
 
     Parameters
     ----------
-    shares_of
-        Says the shares of positions; without it there are none.
     start
-        Twists to start from (rad), by default by the standard's stiffness, and shares expected there.
+        Twists to start from (rad), by default those expected by the half-plane law; laws on elements start from its
+        solution, so that they are asked for loads near the goal.
     tolerance
         Relative error of the torque, by default the solver's.
     """
     accepted = solver.torque_tolerance if tolerance is None else tolerance
-    angles, goal, touching = goals.angle, goals.torque, goals.touching
-    twist, share = (touching + goal / standard_stiffness(solver), 0.0) if start is None else start
-    share = np.broadcast_to(share, goal.shape)
-    if isinstance(solver, ElementSolver) and start is None:
-        twist = at_torques(solver.half_plane, goals, None)[0].twist
+    count, first = len(goals.torque), start
+    if first is None:
+        if isinstance(solver, ElementSolver):
+            first = at_torques(solver.half_plane, goals).twist
+        else:
+            first = expected_twists(solver.law, goals.torque, solver.touching(goals.angle))
 
-    def search(chosen: IntArray) -> Positions:
-        def solve(numbers: IntArray, twists: Array) -> Positions:
-            own = chosen[numbers]
-            if progress is not None:
-                progress(len(goal) - len(own), len(goal), "positions")
-            return in_batches(solver, angles[own], twists, np.flatnonzero(np.isin(own, kept)))
+    def solve(numbers: IntArray, twists: Array) -> Positions:
+        if progress is not None:
+            progress(count - len(numbers), count, "positions")
+        return in_batches(solver, goals.angle[numbers], twists, np.flatnonzero(np.isin(numbers, kept)))
 
-        most = math.pi / solver.pair.wheel.teeth
-        aim, at = (goal / (1 + share))[chosen], {"touching": touching[chosen], "first": twist[chosen]}
-        return twists_for_torque(solve, aim, most=most, tolerance=accepted, **at)
+    most = math.pi / solver.pair.wheel.teeth
+    return twists_for_torque(solve, goals.torque, touching=goals.touching, first=first, most=most, tolerance=accepted)
 
-    found = search(np.arange(len(goal)))
-    for _ in range(SHARE_PASSES):
-        if shares_of is None:
-            break
-        share = shares_of(found)
-        aim = goal / (1 + share)
-        with np.errstate(invalid="ignore"):
-            off = (found.status == "converged") & (np.abs(found.torque_wheel - aim) > accepted * goal)
-        again = np.flatnonzero(off)  # what was not reached is not asked for once more
-        if len(again) == 0:
-            break
-        twist = newton_twist(found.twist, touching, found.torque_wheel, found.tangent, aim)
-        more = search(again)
-        found = found.replaced(again, replace(more, iterations=more.iterations + found.iterations[again]))
-    if progress is not None:
-        progress(len(goal), len(goal), "positions")
-    return found, np.asarray(share)
+
+def moved_to(
+    solver: PositionSolver, found: Positions, goals: TorqueGoals, *, kept: IntArray, tolerance: float | None = None
+) -> Positions | None:
+    """Solved positions again at torques near theirs, where these differ; None where none does. See `at_torques`."""
+    accepted, goal = solver.torque_tolerance if tolerance is None else tolerance, goals.torque
+    with np.errstate(invalid="ignore"):
+        off = (found.status == "converged") & (np.abs(found.torque_wheel - goal) > accepted * goal)
+    again = np.flatnonzero(off)  # what was not reached is not asked for once more
+    if len(again) == 0:
+        return None
+    start = newton_twist(found.twist, goals.touching, found.torque_wheel, found.tangent, goal)[again]
+    few, mine = taken(goals, again), np.flatnonzero(np.isin(again, kept))
+    more = at_torques(solver, few, start=start, kept=mine, tolerance=tolerance)
+    return found.replaced(again, replace(more, iterations=more.iterations + found.iterations[again]))
 
 
 def at_torque(
     solver: PositionSolver, angles: Array, torque: float, touching: Array, progress: Progress | None, *, finite: bool
 ) -> Positions:
     """Positions at pinion angles (rad), shape (n,), that carry `torque` (N m); with or without finite strain."""
-    cycle, goals = solver.elastic.pitch_angle, TorqueGoals(angles, np.full(len(angles), torque), touching)
-    sampled = sample_numbers(angles, cycle)
-
-    def shares_of(found: Positions) -> Array:
-        return interpolated_shares(
-            angles, angles[sampled], finite_strain_shares(solver.elastic, found.take(sampled)), cycle
-        )
-
-    shares = shares_of if finite else None
-    found = with_shares(*at_torques(solver, goals, shares, kept=sampled, progress=progress))
-    return closed(found, goals)
+    goals, cycle = TorqueGoals(angles, np.full(len(angles), torque), touching), solver.pair.mesh_cycle
+    sampled = sample_numbers(angles, cycle) if finite else NONE
+    found, share = at_torques(solver, goals, kept=sampled, progress=progress), np.zeros(len(angles))
+    for _ in range(SHARE_PASSES if finite else 0):
+        shares = finite_strain_shares(solver.elastic, found.take(sampled))
+        share = interpolated_shares(angles, angles[sampled], shares, cycle)
+        more = moved_to(solver, found, replace(goals, torque=goals.torque / (1 + share)), kept=sampled)
+        if more is None:
+            break
+        found = more
+    if progress is not None:
+        progress(len(angles), len(angles), "positions")
+    return closed(with_shares(found, share), goals)
 
 
 def closed(found: Positions, goals: TorqueGoals) -> Positions:
     """Positions whose torques are nearly the goals, brought there by the last small step of their twists.
 
-    Moments change with the torque, widths of contacts with its root.
+    Moments change with the torque; loads and contacts of the half-plane law with their own rates.
     """
     goal, good = goals.torque, found.status == "converged"
     factor = np.where(good, goal / np.where(good, found.torque_wheel, 1.0), 1.0)
     moments = {name: getattr(found, name) * factor for name in TORQUES if name != "tangent"}
     moments["torque_wheel"] = np.where(good, goal, found.torque_wheel)
     twist = newton_twist(found.twist, goals.touching, found.torque_wheel, found.tangent, goal)
-    contacts, of_contacts = found.contacts, factor[found.contacts.position]
-    contacts = replace(
-        contacts,
-        torque_wheel=contacts.torque_wheel * of_contacts,
-        half_width=contacts.half_width * np.sqrt(of_contacts),
-    )
-    return replace(found, twist=np.where(good, twist, found.twist), contacts=contacts, **moments)
+    twist = np.where(good, twist, found.twist)
+    by = twist - found.twist
+    loads = tuple(replace(one, force=one.force + by[one.position, None] * one.rate) for one in found.loads)
+    contacts = found.contacts.moved(by, factor)
+    whole = np.bincount(contacts.position, contacts.torque_wheel, len(found))  # but for what the step errs
+    right = moments["torque_wheel"][contacts.position] / whole[contacts.position]
+    contacts = replace(contacts, torque_wheel=contacts.torque_wheel * right)
+    return replace(found, twist=twist, contacts=contacts, loads=loads, **moments)
 
 
 def checked_contact(found: Positions, touching: Array) -> Positions:
