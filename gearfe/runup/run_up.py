@@ -165,6 +165,8 @@ def run_up(
     left = asked
     with one_thread():
         while len(left):
+            if progress is not None:
+                progress(len(asked) - len(left), len(asked) - 1)
             start = _first(train, float(left[0]), None, tolerance, band_hz)
             if start is None:
                 notes.append(f"no periodic motion was found at {left[0]:.6g} rad/s")
