@@ -198,7 +198,7 @@ def constants(room: str, left_out: tuple[str, ...]) -> Iterator[tuple[str, str, 
     paths = sorted((PACKAGE / room).rglob("*.py")) or [(PACKAGE / room.replace(".", "/")).with_suffix(".py")]
     for path in paths:
         module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
-        for node in ast.parse(path.read_text()).body:
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
             target = node.targets[0] if isinstance(node, ast.Assign) else None
             names = target.elts if isinstance(target, ast.Tuple) else [target]
             if isinstance(node, ast.Assign) and any(isinstance(x, ast.Call) for x in ast.walk(node.value)):
@@ -214,7 +214,7 @@ def constants(room: str, left_out: tuple[str, ...]) -> Iterator[tuple[str, str, 
 def defined(module: str) -> frozenset[str]:
     """Names that a module assigns itself."""
     source = sys.modules[module].__file__ or ""
-    found = ast.walk(ast.parse(Path(source).read_text())) if source.endswith(".py") else ()
+    found = ast.walk(ast.parse(Path(source).read_text(encoding="utf-8"))) if source.endswith(".py") else ()
     return frozenset(n.id for n in found if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store))
 
 
