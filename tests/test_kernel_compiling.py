@@ -96,11 +96,11 @@ def test_code_in_the_cache_is_found_by_another_process(tmp_path, monkeypatch):
         ).stdout.split()
         for _ in range(2)
     ]  # fmt: skip
-    assert told == [["0", "1", "5"], ["1", "0", "5"]]
+    assert told == [["1", "5"], ["0", "5"]]
 
 
-def hits() -> tuple[int, int, int]:
-    """How often a kernel was found in the cache, and not; what it returned."""
+def hits() -> tuple[int, int]:
+    """Whether the compiler was needed; what the kernel returned."""
     names = compiled.bind((weighted, fill_out), {}, compiled=True, entries=("fill_out",))
     made = names.fill_out(Packed(sample()))
-    return sum(names.fill_out.stats.cache_hits.values()), sum(names.fill_out.stats.cache_misses.values()), made
+    return int("numba" in sys.modules), made

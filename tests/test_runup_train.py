@@ -133,7 +133,7 @@ def test_the_work_of_the_mesh_goes_into_damping():
 
 @needs_numba
 def test_the_jets_of_a_law_are_its_derivatives():
-    from gearfe.runup.law_kernel import RESULTS, ROWS, jets, law_tables
+    from gearfe.runup.law_kernel import RESULTS, ROWS, Jets, evaluate_law, law_tables
 
     law = hertzian_law(relief=3e-6)
     tables = law_tables(law)
@@ -143,7 +143,7 @@ def test_the_jets_of_a_law_are_its_derivatives():
     def made(phase):  # type: ignore[no-untyped-def]
         out = np.zeros((300, RESULTS))
         work, pairs = np.zeros((ROWS + 2 * law.slots, law.slots)), np.zeros((300, law.slots))
-        jets()(tables, phase, approach, pairs, np.zeros((2, *pairs.shape)), work, out)
+        evaluate_law(tables, Jets(phase, approach, pairs, np.zeros((2, *pairs.shape)), work, out))
         return out
 
     out, true, h = made(phase), law(phase, approach), 1e-8

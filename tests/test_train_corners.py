@@ -136,9 +136,9 @@ def oscillators(tolerance):
         np.array([0.7]), tolerance, np.inf,
     )  # fmt: skip
     work = kernel_modal.work_space((np.zeros((1, 21)), np.zeros(1, dtype=np.int64)), state, 1)
-    out = kernel_modal.Output(asked, np.zeros((16, 6)), np.zeros(999), np.zeros((999, 6)))
-    made = kernels.modal_steps(equations, work, out, 0.0, 4.0, 0.1, 0)
-    status, steps, _, _, _, passed = made
+    now, counts = np.array([0.0, 4.0, 0.1]), np.zeros(3, dtype=np.int64)
+    out = kernel_modal.Output(now, counts, asked, np.zeros((16, 6)), np.zeros(999), np.zeros((999, 6)))
+    status, (steps, passed, _) = kernels.modal_steps(equations, work, out), counts
     assert (status, passed) == (0, 16)
     assert 0.7 in out.ends[:steps]  # a step ends where a force may break
     return out.found, asked

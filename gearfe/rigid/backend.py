@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from . import compiled, taylor
 
-#: Measured (processor seconds): compiling the kernels, loading numba with those of an earlier run; and how many times
+#: Measured (processor seconds): compiling the kernels, loading those of an earlier run; and how many times
 #: as fast as plain steps compiled ones are (170 with one body, 200 with seven).
-COMPILE_SECONDS, LOAD_SECONDS = 15.0, 0.5
+COMPILE_SECONDS, LOAD_SECONDS = 15.0, 0.05
 #: Seconds of compiling the kernels of general systems.
 GENERAL_SECONDS = 10.0
 COMPILED_FASTER = 180.0

@@ -1,9 +1,9 @@
 """Binding of the kernels: compiled by numba with a cache of their own, or left as plain Python where that is quicker.
 
 The kernel modules hold plain functions that call one another by name. `bind` puts them into one namespace, either as
-compiled functions or as they are, so one text serves both. Compiled code is kept in the cache folder
-(`gearfe.cache`) below a hash of all that it was made from and for: no stale code after an upgrade, one form for all
-installations of the same sources, nothing written beside the installed package.
+compiled functions or as they are, so one text serves both. Compiled code (`gearfe.rigid.native`) is kept in the cache
+folder (`gearfe.cache`) below a hash of all that it was made from and for: no stale code after an upgrade, one form for
+all installations of the same sources, nothing written beside the installed package.
 """
 
 from __future__ import annotations
@@ -15,15 +15,17 @@ import platform
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
 from types import FunctionType, SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import cache
+from .native import Entry, ObjectCode
 from .parts import part_options
 
-#: One text of all sources in the folder of compiled code: numba files compiled code under the path of its source.
-SOURCE = "kernels.py"
+if TYPE_CHECKING:
+    from .packed import Layout
 
 
 def available() -> bool:
@@ -75,7 +77,7 @@ def _roots() -> list[Path]:
 def _made_by() -> Iterator[str]:
     """What decides compiled code beside its source: Python, the compiler, the processor."""
     yield sys.version
-    for maker in ("compiled.py", "packed.py", "packed_type.py", "parts.py"):
+    for maker in ("compiled.py", "native.py", "packed.py", "packed_type.py", "parts.py"):
         yield Path(__file__).with_name(maker).read_text(encoding="utf-8")
     for name in ("numba", "llvmlite"):
         found = importlib.util.find_spec(name)
@@ -97,7 +99,7 @@ def _made_by() -> Iterator[str]:
 def is_cached(functions: Iterable[Callable[..., Any]], entry: str) -> bool:
     """Whether a compiled form of the function named `entry` waits in the cache, for this machine and these sources."""
     folder = cache_folder(functions)
-    return folder is not None and any(folder.rglob(f"*.{entry}-*.nbc"))
+    return folder is not None and any(folder.glob(f"{entry}-*.o"))
 
 
 def bind(
@@ -109,7 +111,7 @@ def bind(
     inline: tuple[str, ...] = (),
     alias: Mapping[str, str] | None = None,
 ) -> SimpleNamespace:
-    """One namespace in which the `functions` see each other.
+    """The `functions` in one namespace in which they see each other; compiled, the entries alone.
 
     Parameters
     ----------
@@ -120,7 +122,8 @@ def bind(
     compiled
         Compile with numba; otherwise plain Python.
     entries
-        Names of the functions that are called from Python.
+        Names of the functions that are called from Python. They take named tuples, compiled their blocks
+        (`gearfe.rigid.packed.Packed`), and return an integer.
     inline
         Names of the functions that are copied into their callers: the small hot ones. A call costs compiled code some
         hundred nanoseconds here, for the reference counts of the many arrays it hands over.
@@ -132,53 +135,56 @@ def bind(
     for function in functions:
         assert isinstance(function, FunctionType)
         scope[function.__name__] = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
-    if compiled:
-        _compile(functions, scope, entries, inline)
     for name, other in (alias or {}).items():
         scope[other] = scope[name]
-    return SimpleNamespace(**{f.__name__: scope[f.__name__] for f in functions})
+    if not compiled:
+        return SimpleNamespace(**{f.__name__: scope[f.__name__] for f in functions})
+    parts = [f.__name__ for f in functions if f.__name__ not in entries]
+    folder = cache_folder(functions)
+
+    @lru_cache(maxsize=1)
+    def translated() -> None:
+        for name in parts:
+            scope[name] = _part(scope[name], name in inline)
+        for name, other in (alias or {}).items():
+            scope[other] = scope[name]
+
+    def made(name: str) -> Entry:
+        def make(layouts: tuple[Layout, ...]) -> ObjectCode:
+            translated()
+            return _entry(scope[name], layouts)
+
+        return Entry(name, folder, make)
+
+    return SimpleNamespace(**{name: made(name) for name in entries})
 
 
-def _compile(
-    functions: tuple[Callable[..., Any], ...], scope: dict[str, Any], entries: tuple[str, ...], inline: tuple[str, ...]
-) -> None:
-    """Only the entries get Python wrappers and a place in the cache: the others end up inside them.
+#: Without numba's reference counts, so kernels allocate nothing: they compile and run a sixth faster.
+OPTIONS: dict[str, Any] = {
+    "fastmath": {"contract", "reassoc", "nsz"}, "error_model": "numpy", "_nrt": False,
+    "no_cpython_wrapper": True, "no_cfunc_wrapper": True,
+}  # fmt: skip
 
-    Without numba's reference counts, so kernels allocate nothing: they compile and run a sixth faster.
-    """
+
+def _part(function: FunctionType, inline: bool) -> Any:
+    """A function that entries contain; it is translated when they are."""
     import numba
 
-    folder = cache_folder(functions)
-    source = None if folder is None else _source(folder, functions)
-    before = numba.config.CACHE_DIR
-    common = {"fastmath": {"contract", "reassoc", "nsz"}, "error_model": "numpy", "_nrt": False}
-    try:
-        numba.config.CACHE_DIR = str(folder or "")
-        for function in functions:
-            name = function.__name__
-            made = scope[name]
-            made.__module__ = function.__module__
-            if name in entries:
-                if source is not None:
-                    made.__code__ = made.__code__.replace(co_filename=str(source))
-                scope[name] = numba.njit(made, cache=source is not None, no_cfunc_wrapper=True, **common)
-            else:
-                inlined = {"forceinline": name in inline}
-                scope[name] = numba.njit(
-                    made, no_cpython_wrapper=True, no_cfunc_wrapper=True, **inlined, **part_options(), **common
-                )
-    finally:
-        numba.config.CACHE_DIR = before
+    return numba.njit(function, forceinline=inline, **part_options(), **OPTIONS)
 
 
-def _source(folder: Path, functions: tuple[Callable[..., Any], ...]) -> Path | None:
-    """File with the text of the functions in their folder; None where it cannot be written."""
-    path = folder / SOURCE
-    try:
-        if not path.exists():
-            with tempfile.NamedTemporaryFile("w", dir=folder, encoding="utf-8", delete=False) as file:
-                file.write(_text(functions))
-            os.replace(file.name, path)
-    except OSError:
-        return None
-    return path
+def _entry(function: FunctionType, layouts: tuple[Layout, ...]) -> ObjectCode:
+    """Machine code of a function of blocks: the object file that numba's own cache would keep."""
+    import numba
+    from llvmlite import binding
+
+    from .packed_type import PackedType
+
+    blocks = tuple(map(PackedType, layouts))
+    made = numba.njit(function, **OPTIONS)
+    made.compile(blocks)
+    result = made.overloads[blocks]
+    _, _, (code, _) = result.library.serialize_using_object_code()
+    module = binding.parse_bitcode(result.library.serialize_using_bitcode()[2])
+    calls = [f.name for f in module.functions if f.is_declaration and not f.name.startswith("llvm.")]
+    return ObjectCode(code, result.fndesc.llvm_func_name, tuple(calls))

@@ -57,8 +57,10 @@ class Work(NamedTuple):
 
 
 class Output(NamedTuple):
-    """What a run fills."""
+    """What a run fills, and where it stands."""
 
+    now: Array  # (3,) time, end, trial step (s)
+    counts: IntArray  # (3,) steps made, output times passed, orders computed
     output_times: Array  # (a,) times (s)
     found: Array  # (a, 2n) states there
     ends: Array  # (room,) of the steps (s)
@@ -195,14 +197,14 @@ def last_size(y: Array, last: int, end: float, weight: Array) -> float:
     return max(size, before ** (last / (last - 1.0)))
 
 
-def modal_steps(
-    run: Equations, w: Work, out: Output, t: float, t1: float, h: float, at: int
-) -> tuple[int, int, float, float, int, int]:
-    """Steps from t to t1, or until `out.ends` is full; h is the trial step, `at` the number of asked times passed.
+def modal_steps(run: Equations, w: Work, out: Output) -> int:
+    """Steps from `out.now` to its end, or until `out.ends` is full; returns the status.
 
     A coordinate's limit is `tolerance` of its reach, and of what its pull makes of it: accelerations then hold as well
-    as coordinates. Returns (status, steps, time, h, orders computed, number of asked times passed).
+    as coordinates.
     """
+    t, t1, h = out.now[0], out.now[1], out.now[2]
+    at = out.counts[1]
     eigenvalues, offset, W, breaks, tolerance, longest = (
         run.eigenvalues, run.offset, run.W, run.breaks, run.tolerance, run.longest,
     )  # fmt: skip
@@ -307,7 +309,9 @@ def modal_steps(
             h = 0.9 * step * end * size ** (-1.0 / last)
         else:
             h = max(h, 0.9 * step * end * most / last)
-    return status, count, t, h, orders, at
+    out.now[0], out.now[2] = t, h
+    out.counts[0], out.counts[1], out.counts[2] = count, at, orders
+    return status
 
 
 def work_space(law: tuple[Array, IntArray], state: Array, directions: int) -> Work:

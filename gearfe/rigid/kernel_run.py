@@ -9,7 +9,7 @@ it, so a step never crosses one: it ends there, and the next one is expanded the
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -184,23 +184,29 @@ def land(tb: Tables, w: Work, run: Run, state: Array, h: float, close: float) ->
     return h, 0, np.inf, -1, STEP_TOO_SMALL
 
 
-def integrate_series(
-    tb: Tables, w: Work, run: Run, state: Array, T: Array, C: Array, singular: IntArray
-) -> tuple[int, int]:
-    """Integrate from (w.q, w.v) to run.end, or until the arrays are full; call again with the same arguments to go on.
+class Output(NamedTuple):
+    """What a run fills, and where it stands."""
 
-    `state` holds time, singular rows, time to the singular position ahead, 1 once begun, last step, row of the one
-    ahead (`kernel_names`); T (room + 1,) receives step ends, C (room, order + 1, 3n) coefficients without the ground's,
-    singular (room,) the number of singular rows at the start of each.
+    state: Array  # (6,) time, singular rows, time to the singular position ahead ..., see `kernel_names`
+    times: Array  # (room + 1,) ends of the steps (s)
+    coefficients: Array  # (room, order + 1, 3n) of their series, without the ground's
+    singular: IntArray  # (room,) number of singular rows at the start of each
+    made: IntArray  # (1,) number of steps
 
-    Returns status, number of steps. SINGULAR_START asks for `begin` (rare, so it stays in Python) before the next call.
+
+def integrate_series(tb: Tables, w: Work, run: Run, out: Output) -> int:
+    """Integrate from (w.q, w.v) to run.end, or until the output is full; call again with the same state to go on.
+
+    Returns the status. SINGULAR_START asks for `begin` (rare, so it stays in Python) before the next call.
     """
+    state, T, C, singular = out.state, out.times, out.coefficients, out.singular
     sign = run.sign
     forward = sign > 0.0
     t1 = run.end
     t = state[TIME]
     status = DONE
     count = 0
+    out.made[0] = 0
     if state[BEGUN] == 0.0:
         copy(w.q, w.qn)
         copy(w.v, w.vn)
@@ -209,7 +215,7 @@ def integrate_series(
         if least < 1e-6 or not np.isfinite(first):
             copy(w.qn, w.q)
             copy(w.vn, w.v)
-            return SINGULAR_START, 0
+            return SINGULAR_START
         state[AHEAD], state[ROW] = next_singular(tb, w, run, w.q, w.v, 0.0, np.inf)
         state[BEGUN] = 1.0
     T[0] = t
@@ -258,11 +264,26 @@ def integrate_series(
     for i in range(w.q.shape[0]):
         if not (np.isfinite(w.q[i]) and np.isfinite(w.v[i])):
             status = NOT_FINITE
-    return status, count
+    out.made[0] = count
+    return status
 
 
-def sample(T: Array, C: Array, sign: float, times: Array, derivative: int, out: Array) -> None:
-    """Coordinates or a derivative of them at `times` (in order of travel) from the pieces of `integrate_series`."""
+class Samples(NamedTuple):
+    """Where the pieces of a run are asked for, and what is found."""
+
+    ends: Array  # (pieces + 1,) of the steps (s)
+    coefficients: Array  # (pieces, orders, c)
+    sign: float  # of time
+    times: Array  # (t,) in order of travel (s)
+    derivative: int
+    out: Array  # (t, c) coordinates, or that derivative of them
+
+
+def sample(asked: Samples) -> int:
+    """Coordinates or a derivative of them from the pieces of `integrate_series`; returns 0."""
+    T, C, sign, times, derivative, out = (
+        asked.ends, asked.coefficients, asked.sign, asked.times, asked.derivative, asked.out,
+    )  # fmt: skip
     piece = 0
     last = C.shape[0] - 1
     for i in range(times.shape[0]):
@@ -279,6 +300,7 @@ def sample(T: Array, C: Array, sign: float, times: Array, derivative: int, out: 
                 factor *= j - d
             for c in range(out.shape[1]):
                 out[i, c] = out[i, c] * h + factor * C[piece, j, c]
+    return 0
 
 
 FUNCTIONS = (sample, step_length, turned, singular_within, land, integrate_series)

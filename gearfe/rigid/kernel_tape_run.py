@@ -6,7 +6,7 @@ step against their series, the state at its end against the constraints.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -142,11 +142,19 @@ def defect(tb: Program, w: Work, run: Run, t: float, h: float, pieces: IntArray)
     return most
 
 
-def quadratic_steps(tb: Program, w: Work, run: Run, t: float, T: Array, C: Array) -> tuple[int, int, float]:
-    """Integrate from (w.q, w.v) at t to run.end, or until the arrays are full: (status, steps, time reached).
+class Output(NamedTuple):
+    """What a run fills, and where it stands."""
 
-    T (room + 1,) receives step ends, C (room, order + 1, n) coefficients.
-    """
+    now: Array  # (1,) time (s)
+    made: IntArray  # (1,) number of steps
+    times: Array  # (room + 1,) ends of the steps (s)
+    coefficients: Array  # (room, order + 1, n) of their series
+
+
+def quadratic_steps(tb: Program, w: Work, run: Run, out: Output) -> int:
+    """Integrate from (w.q, w.v) at `out.now` to run.end, or until the output is full; returns the status."""
+    t, T, C = out.now[0], out.times, out.coefficients
+    out.made[0] = 0
     sign, n, pieces = run.sign, w.q.shape[0], w.pieces
     status = DONE
     count = 0
@@ -158,7 +166,7 @@ def quadratic_steps(tb: Program, w: Work, run: Run, t: float, T: Array, C: Array
     copy(w.v, w.vn)
     off, _ = project(tb, w, run, t, 0.0)
     if not np.isfinite(off):
-        return STEP_TOO_SMALL, 0, t
+        return STEP_TOO_SMALL
     copy(w.qn, w.q)
     copy(w.vn, w.v)
     edge = 0 if sign > 0.0 else run.breaks.shape[0] - 1
@@ -228,7 +236,8 @@ def quadratic_steps(tb: Program, w: Work, run: Run, t: float, T: Array, C: Array
         T[count] = t
         copy(w.qn, w.q)
         copy(w.vn, w.v)
-    return status, count, t
+    out.now[0], out.made[0] = t, count
+    return status
 
 
 FUNCTIONS = (step_length, project, defect, quadratic_steps)

@@ -161,24 +161,25 @@ class SeriesRun:
         work = kernel_modal.work_space((memory, pieces), y0, len(W))
         found = np.empty((len(output_times), 2 * n))
         rates = np.sqrt(np.abs(modal.eigenvalues).max(initial=0.0)) + np.abs(diagonal).max(initial=0.0)
-        t, h, status, at, orders = t0, 5.0 / max(rates, 1.0 / max(abs(t1 - t0), 1e-300)), _FULL, 0, 0
+        now = np.array([t0, t1, 5.0 / max(rates, 1.0 / max(abs(t1 - t0), 1e-300))])
+        counts, status, orders = np.zeros(3, dtype=np.int64), int(_FULL), 0
         ends, states, room = [np.array([t0])], [y0[None, :]], 512
         run, scratch, kernels = Packed(equations), Packed(work), self._bound
         if watch is not None:
-            watch(t, 0, work.state)
+            watch(t0, 0, work.state)
         while status == _FULL and sum(map(len, ends)) - 1 < most:
             room = min(room, most + 1 - sum(map(len, ends)))
-            out = kernel_modal.Output(
-                np.ascontiguousarray(output_times), found, np.empty(room), np.empty((room, 2 * n))
-            )
-            status, count, t, h, further, at = kernels.modal_steps(run, scratch, Packed(out), t, t1, h, at)
-            orders += further
+            filled = np.ascontiguousarray(output_times), found, np.empty(room), np.empty((room, 2 * n))
+            out = kernel_modal.Output(now, counts, *filled)
+            status = kernels.modal_steps(run, scratch, Packed(out))
+            count = counts[0]
+            orders += int(counts[2])
             ends.append(out.ends[:count])
             states.append(out.states[:count])
-            if watch is not None and status == _FULL and not watch(t, sum(map(len, ends)) - 1, work.state):
+            if watch is not None and status == _FULL and not watch(now[0], sum(map(len, ends)) - 1, work.state):
                 status = Status.STOPPED
             room = min(4 * room, 20_000)
-        return np.concatenate(ends), np.vstack(states), found[:at], Status(status), orders
+        return np.concatenate(ends), np.vstack(states), found[: counts[1]], Status(status), orders
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,12 @@ was made from.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from .packed_type import Layout
-
+#: Each member: type and number of axes of an array ("d", 2), a number ("d", -1), or the members of a named tuple.
+Layout = tuple[tuple[str, Any], ...]
 #: Types of elements: float64, int64, uint64.
 ELEMENTS = "dlL"
 
@@ -34,10 +33,8 @@ class Packed:
     """
 
     def __init__(self, named: Any) -> None:
-        from .packed_type import PackedType  # numba
-
         words: list[int] = []
-        self._numba_type_ = PackedType(_lay_out(named, words))
+        self.layout = _lay_out(named, words)
         self._held = named, np.array(words, dtype=np.int64)
         self.address = _address(self._held[1])
 

@@ -11,11 +11,11 @@ from typing import Any
 from llvmlite import ir
 from numba.core import types
 from numba.core.typing.templates import AttributeTemplate
-from numba.extending import NativeValue, infer_getattr, lower_getattr_generic, models, register_model, unbox
+from numba.extending import infer_getattr, lower_getattr_generic, models, register_model
 from numba.np import arrayobj
 
-#: Each member: type and number of axes of an array ("d", 2), a number ("d", -1), or the members of a named tuple.
-Layout = tuple[tuple[str, Any], ...]
+from .packed import Layout
+
 NUMBERS = {"d": types.float64, "l": types.int64, "L": types.uint64}
 
 
@@ -88,11 +88,3 @@ def _get(context: Any, builder: Any, kind: Any, block: Any, name: str) -> Any:
     data = builder.inttoptr(load(0), context.get_value_type(array_type.dtype).as_pointer())
     arrayobj.populate_array(array, data=data, shape=shape, strides=strides, itemsize=word(8), meminfo=None)
     return array._getvalue()
-
-
-@unbox(PackedType)
-def _unbox(_: Any, value: Any, c: Any) -> Any:
-    number = c.pyapi.object_getattr_string(value, "address")
-    address = c.pyapi.long_as_longlong(number)
-    c.pyapi.decref(number)
-    return NativeValue(c.builder.inttoptr(address, ir.IntType(64).as_pointer()))

@@ -171,12 +171,13 @@ def run_series(
     with np.errstate(all="ignore"):
         covered = first_pieces(program, w, t, sign > 0.0)
     n, done, room = system.size, 0, min(FIRST, most)
-    handed = Packed(program), Packed(w), Packed(run)
+    handed, now, made = (Packed(program), Packed(w), Packed(run)), np.array([t]), np.zeros(1, dtype=np.int64)
     began = time.perf_counter()
     advance = kernels(True).quadratic_steps
     if not kernels_loaded():
         with stage("compiling the kernels"), uncollected():
-            advance(*handed[:2], Packed(run._replace(end=t)), t, np.zeros(1), np.zeros((0, order + 1, n)))
+            none = kernel_tape_run.Output(now, made, np.zeros(1), np.zeros((0, order + 1, n)))
+            advance(*handed[:2], Packed(run._replace(end=t)), Packed(none))
         _LOADED.append(True)
     compiling = time.perf_counter() - began
     if watch is not None:
@@ -185,8 +186,8 @@ def run_series(
     status = Status.MOST_STEPS if covered else Status.NOT_FINITE
     while status == Status.MOST_STEPS and done < most:
         T, C = np.empty(room + 1), np.empty((room, order + 1, n))
-        number, count, t = advance(*handed, t, T, C)
-        status = Status(number)
+        status = Status(advance(*handed, Packed(kernel_tape_run.Output(now, made, T, C))))
+        count, t = int(made[0]), float(now[0])
         ends.append(T[1 : count + 1])
         series.append(C[:count])
         done += count

@@ -245,9 +245,9 @@ def load_kernels(prepared: Prepared, run: Run) -> float:
     state = first_state(run.end)
     state[kernel_names.BEGUN] = 1.0
     with stage("compiling the kernels"), uncollected():
-        singular = np.zeros(1, dtype=np.int64)
-        kernels(True).integrate_series(*prepared.handed, Packed(run), state, times, coefficients, singular)
-        kernels(True).sample(times, coefficients, 1.0, np.zeros(1), 0, np.zeros((1, width)))
+        out = kernel_run.Output(state, times, coefficients, *np.zeros((2, 1), dtype=np.int64))
+        kernels(True).integrate_series(*prepared.handed, Packed(run), Packed(out))
+        sampler(times, coefficients, 1.0, np.zeros(1), 0, np.zeros((1, width)))
     _LOADED.append(True)
     return time.perf_counter() - began
 
@@ -282,7 +282,7 @@ def integrate_scene(
     compiling = load_kernels(shared, run) if jit else 0.0
     advance = kernels(jit).integrate_series
     handed = (*both, Packed(run) if jit else run)
-    parts = []
+    parts, made = [], np.zeros(1, dtype=np.int64)
     room, done = min(FIRST_COMPILED if jit else FIRST_STEPS, most), 0
 
     def moving() -> tuple[Array, Array]:
@@ -293,7 +293,9 @@ def integrate_scene(
     while True:
         times, coefficients = np.empty(room + 1), np.empty((room, order + 1, w.q.size - 3))
         singular = np.zeros(room, dtype=np.int64)
-        status, count = advance(*handed, state, times, coefficients, singular)
+        out = kernel_run.Output(state, times, coefficients, singular, made)
+        status = advance(*handed, Packed(out) if jit else out)
+        count = int(made[0])
         if status == Status.SINGULAR_START:
             rows, shift, ahead, row, status = kernels(False).begin(assembly.tables, w, run, t0)
             state[:] = t0 + shift, rows, ahead, 1.0, 0.0, row
@@ -317,4 +319,4 @@ def integrate_scene(
 
 def sampler(times: Array, coefficients: Array, sign: float, t: Array, derivative: int, out: Array) -> None:
     """Compiled sums of the polynomials, see `Polynomials`."""
-    kernels(True).sample(times, coefficients, sign, t, derivative, out)
+    kernels(True).sample(Packed(kernel_run.Samples(times, coefficients, sign, t, derivative, out)))

@@ -12,8 +12,8 @@ With :math:`g_k = t'(\psi_k) + \Lambda_\psi(\psi_k, F_k) + \sum_l C'_{kl}F_l` an
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import lru_cache
+from types import SimpleNamespace
 from typing import NamedTuple
 
 from ..meshlaw.law import MeshLaw
@@ -44,6 +44,17 @@ class LawTables(NamedTuple):
     reach: float
 
 
+class Jets(NamedTuple):
+    """Where a law is asked for, and what is found."""
+
+    phase: Array  # (n,) (rad)
+    approach: Array  # (n,) (m)
+    pairs: Array  # (n, s) pair forces to begin with, then found (N)
+    slopes: Array  # (2, n, s) their derivatives with approach and phase
+    work: Array  # scratch
+    out: Array  # (n, RESULTS)
+
+
 def law_tables(law: MeshLaw) -> LawTables | Packed:
     """What `law_jets` gets of a law, compiled or not."""
     laws = law_arrays([law])
@@ -51,12 +62,11 @@ def law_tables(law: MeshLaw) -> LawTables | Packed:
     return Packed(made) if compiled.available() else made
 
 
-def law_jets(
-    law: LawTables, phase: Array, approach: Array, pairs: Array, slopes: Array, work: Array, out: Array
-) -> None:
-    """Results (n, RESULTS) at phases and approaches (n,); `pairs` (n, s) are pair forces to begin with, then found, and
-    `slopes` (2, n, s) their derivatives with approach and phase.
-    """
+def law_jets(law: LawTables, at: Jets) -> int:
+    """Forces, moments and their derivatives at phases and approaches; returns 0."""
+    phase, approach, pairs, slopes, work, out = (
+        at.phase, at.approach, at.pairs, at.slopes, at.work, at.out,
+    )  # fmt: skip
     nodes, forces, touch, energies, coupling = law.nodes, law.forces, law.touch, law.energies, law.coupling
     slots = touch.shape[0]
     cells = nodes.shape[0] - 1
@@ -162,6 +172,7 @@ def law_jets(
         out[i, TANGENT] = tangent
         out[i, CROSS] = cross
         out[i, BEND] = bend
+    return 0
 
 
 def compliances(forces: Array, energies: Array, cell: int, z: float, pairs: Array, work: Array) -> None:
@@ -250,8 +261,10 @@ NAMES = {
 
 
 @lru_cache(maxsize=1)
-def jets() -> Callable[..., None]:
+def _bound() -> SimpleNamespace:
+    return compiled.bind(FUNCTIONS, NAMES, compiled=compiled.available(), entries=("law_jets",))
+
+
+def evaluate_law(tables: LawTables | Packed, at: Jets) -> None:
     """`law_jets`, compiled where numba is installed."""
-    made = compiled.bind(FUNCTIONS, NAMES, compiled=compiled.available(), entries=("law_jets",))
-    found: Callable[..., None] = made.law_jets
-    return found
+    _bound().law_jets(tables, Packed(at) if isinstance(tables, Packed) else at)

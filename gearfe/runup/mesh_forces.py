@@ -20,7 +20,7 @@ from ..train.forces import CurveFlank, LawFlank
 from ..train.friction import Sliding, smooth_sign
 from ..typing import Array, BoolArray, IntArray
 from .balance import Pushes
-from .law_kernel import BEND, BEYOND, CROSS, FORCE, MOMENT, RESULTS, ROWS, TANGENT, jets, law_tables
+from .law_kernel import BEND, BEYOND, CROSS, FORCE, MOMENT, RESULTS, ROWS, TANGENT, Jets, evaluate_law, law_tables
 
 
 class Drag(NamedTuple):
@@ -131,7 +131,7 @@ class MeshForces:
         if pairs is None:
             pairs = self._pairs[number, count] = np.zeros((count, slots))
         out, slopes, work = np.zeros((count, RESULTS)), np.zeros((2, count, slots)), np.zeros((ROWS + 2 * slots, slots))
-        jets()(tables, phase, np.ascontiguousarray(approach), pairs, slopes, work, out)
+        evaluate_law(tables, Jets(phase, np.ascontiguousarray(approach), pairs, slopes, work, out))
         push = 1.0 + flank.damping * rates[:, 0]
         acts = push > 0.0
         push = np.where(acts, push, 0.0)
