@@ -15,7 +15,7 @@ Forces are sampled over the phases and transformed (alternating frequency/time; 
 
 .. math:: \delta\hat f_k = \sum_l g_{k-l}\,\delta\hat u_l + g_{k+l}\,\overline{\delta\hat u_l} .
 
-Amplitudes whose change comes back little through the forces are no unknowns of Newton's method but follow by
+Amplitudes that change and follow others little through the forces are no unknowns of Newton's method but are found by
 substitution, which converges there by itself. The error is estimated from what is left of the equations with twice the
 harmonics and four times the samples.
 """
@@ -275,8 +275,10 @@ def unknowns_of(
     system: Oscillator, speed: float, places: ComplexArray, at: Evaluated, flexibility: ComplexArray,
     least: float = COMES_BACK,
 ) -> Unknowns:  # fmt: skip
-    """Amplitudes that need Newton's method: where this part of a change comes back through the forces, of harmonics
-    that are there; and the constant of all freedoms.
+    """Amplitudes that need Newton's method: those whose change comes back by more than this part through the forces,
+    those that follow others by more, of harmonics that are there; and the constant of all freedoms.
+
+    One that follows and is no unknown lags a step behind: what is left of the equations then grows in a good step.
     """
     ratio = system.scale[None, :] / system.scale[:, None]
     strength = np.abs(at.pushes.by_place).mean(axis=0) * ratio
@@ -287,7 +289,8 @@ def unknowns_of(
     acts = (back.sum(axis=1) > least).any(axis=0)
     size = np.abs(places / system.scale).max(axis=1, keepdims=True)
     gain = back[:, acts].sum(axis=1) * (size > PRESENT)
-    taken = gain > least
+    follows = back[:, :, acts].sum(axis=2) * (size > PRESENT)
+    taken = (gain > least) | (follows > least)
     if taken.sum() > MOST_UNKNOWN:
         taken = taken & (gain * size >= np.sort((gain * size)[taken])[-MOST_UNKNOWN])
     taken[0] = True
