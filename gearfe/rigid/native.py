@@ -2,8 +2,8 @@
 
 Numba's own cache of compiled code needs all of numba to be read: 0.6 s of imports and tables of types in every process.
 An entry takes the addresses of blocks (`gearfe.rigid.packed`) and returns an integer, so its code is a C function of
-pointers; llvmlite links its object file in 0.05 s. Numba's functions put two pointers before the arguments, to the
-result and to an exception, and return a status (numba/core/callconv.py).
+pointers; llvmlite links its object file in milliseconds after 0.04 s of import. Numba's functions put two pointers
+before the arguments, to the result and to an exception, and return a status (numba/core/callconv.py).
 """
 
 from __future__ import annotations
@@ -62,11 +62,11 @@ class Entry:
 
     def __call__(self, *blocks: Packed) -> int:
         layouts = tuple(block.layout for block in blocks)
-        function = self._linked.get(layouts)
-        if function is None:
+        if layouts not in self._linked:
             with _LINKING:
-                function = self._linked.setdefault(layouts, self._link(layouts))
-        return function(*(block.address for block in blocks))
+                if layouts not in self._linked:  # another thread was not first
+                    self._linked[layouts] = self._link(layouts)
+        return self._linked[layouts](*(block.address for block in blocks))
 
     def _link(self, layouts: tuple[Layout, ...]) -> Callable[..., int]:
         path = None if self.folder is None else self.folder / f"{self.name}-{_digest(repr(layouts).encode())[:16]}.o"
