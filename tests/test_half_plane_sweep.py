@@ -51,6 +51,19 @@ def test_curve_beside_nitsches(kinematics: str) -> None:
     assert found.transmission_error_unloaded == pytest.approx(expected.transmission_error_unloaded, abs=1e-15)
 
 
+@pytest.mark.parametrize("other", [0, 4])
+def test_positions_with_loads_take_one_that_is_solved_again_without(other: int) -> None:
+    """As where a torque changes a little at a position whose loads nobody asks for."""
+    solver, twists = position_solver(PAIR, elastic_of("half_plane")), np.full(5, math.radians(0.3))
+    kept = np.array([1, 3])
+    found, again = solver.solve(ANGLES, twists, kept), solver.solve(ANGLES[[other]], twists[[other]])
+    made = found.replaced(np.array([other]), again)
+    assert made.torque_wheel == pytest.approx(found.torque_wheel, rel=1e-12)
+    for one, before in zip(made.loads, found.loads, strict=True):
+        assert np.array_equal(one.position, before.position)
+        assert np.array_equal(one.force, before.force)
+
+
 def test_share_of_finite_strain() -> None:
     """From the forces and their rates on a coarse flank as from Nitsche's on a fine one."""
     twist = math.radians(0.4)

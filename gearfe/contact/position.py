@@ -6,6 +6,7 @@ its own, sorted by the number of the position that they are of.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -231,14 +232,14 @@ def _among(record: Any, kept: BoolArray) -> Any:
 
 
 def together(parts: Sequence[Positions]) -> Positions:
-    """Positions one after the other."""
+    """Positions one after the other; parts without loads join those that have them."""
     if len(parts) == 1:
         return parts[0]
     starts = np.cumsum([0, *(len(part) for part in parts)]).tolist()
 
     def moved(records: Sequence[Any]) -> Any:
-        own = zip(records, starts, strict=False)
-        return joined([replace(record, position=record.position + start) for record, start in own])
+        own = [(record, start) for record, start in zip(records, starts, strict=False) if record is not None]
+        return joined([replace(record, position=record.position + start) for record, start in own]) if own else None
 
     made: dict[str, Any] = {}
     for field in fields(Positions):
@@ -246,9 +247,9 @@ def together(parts: Sequence[Positions]) -> Positions:
         if isinstance(values[0], np.ndarray):
             made[field.name] = np.concatenate(values)
         elif isinstance(values[0], tuple):
-            made[field.name] = tuple(moved(one) for one in zip(*values, strict=True))
+            made[field.name] = tuple(moved(one) for one in itertools.zip_longest(*values))
         else:
-            made[field.name] = None if values[0] is None else moved(values)
+            made[field.name] = moved(values)
     return Positions(**made)
 
 
