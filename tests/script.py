@@ -13,7 +13,9 @@ from gearfe.commands.program import answer, run_command
 def answered(module: ModuleType, name: str, arguments: list[str] | None = None) -> int:
     """Exit code of a module with ``HELP``, ``add_arguments`` and ``run`` (see `gearfe.commands`), called by `name`."""
     try:
-        return answer(sys.argv[1:] if arguments is None else arguments, partial(run_command, module, name))
+        return answer(
+            sys.argv[1:] if arguments is None else arguments, partial(run_command, module, name, module.HELP, "")
+        )
     except KeyboardInterrupt:
         print(f"{name}: interrupted", file=sys.stderr)
         return INTERRUPTED

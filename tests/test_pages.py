@@ -16,7 +16,7 @@ import pytest
 import gearfe
 from gearfe import Material, build_train
 from gearfe.commands import COMMANDS
-from gearfe.commands.program import parser_of
+from gearfe.commands.program import command_module, parser_of
 from gearfe.errors import InputError
 
 from . import gears, trains
@@ -121,8 +121,7 @@ def test_commands_are_understood() -> None:
     for page in PAGES:
         for line in command_lines(page):
             _, command, *rest = shlex.split(line)
-            module = importlib.import_module(f"gearfe.commands.{COMMANDS[command]}")
-            parser = parser_of(module, f"gearfe {command}")
+            parser = parser_of(command_module(command), f"gearfe {command}", *COMMANDS[command])
             try:
                 parsed = parser.parse_args(rest)
             except InputError as error:

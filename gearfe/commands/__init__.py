@@ -1,41 +1,66 @@
-"""Commands of the ``gearfe`` program, one module each.
+"""Commands of the ``gearfe`` program, one module each, of the command's name.
 
-A command module provides ``HELP`` (one line), ``add_arguments(parser)`` and ``run(args) -> int`` (0 done, 1 done but
-some part failed and is marked as such in the output, 2 is kept for bad input). It imports what it needs inside ``run``.
+A command module provides ``add_arguments(parser)`` and ``run(args) -> int`` (0 done, 1 done but some part failed and is
+marked as such in the output, 2 is kept for bad input). It imports what it needs inside ``run``, and is itself imported
+only when that command runs or its help is asked.
 """
 
-#: Command -> module below ``gearfe.commands``; imported only when that command runs or its help is asked.
-COMMANDS: dict[str, str] = {
-    "stiffness": "stiffness",
-    "loadmap": "loadmap",
-    "microgeometry": "microgeometry",
-    "relief": "relief",
-    "gear": "gear",
-    "mesh": "mesh",
-    "mechanism": "mechanism",
-    "housing": "housing",
-    "vibration": "vibration",
-    "runup": "runup",
-    "study": "study",
-    "new": "new",
-    "cache": "cache",
-    "completion": "completion",
-}
-
-#: A line for the end of each command's help.
-EXAMPLES: dict[str, str] = {
-    "stiffness": "gearfe stiffness pair.toml --torque-Nm 100 --fields 5 --set pair.pinion.teeth=21",
-    "loadmap": "gearfe loadmap pair.toml --torques-Nm 20 50 100 200 --root-stress",
-    "microgeometry": "gearfe microgeometry geometry/microgeometry.toml --out out/micro",
-    "relief": "gearfe relief geometry/microgeometry.toml --out out/relief",
-    "gear": "gearfe gear pair.toml --angle-deg 5",
-    "mesh": "gearfe mesh pair.toml --out gears.msh",
-    "mechanism": "gearfe mechanism geometry/andrews.toml --out out/andrews --animation",
-    "housing": "gearfe housing meshes/box.toml --out out/box",
-    "vibration": "gearfe vibration geometry/gear_train.toml --report --format mat",
-    "runup": "gearfe runup geometry/gear_train.toml --out out/runup",
-    "study": "gearfe study geometry/relief_study.toml --jobs 2",
-    "new": "gearfe new vibration gearbox.toml",
-    "cache": "gearfe cache",
-    "completion": "gearfe completion bash > ~/.local/share/bash-completion/completions/gearfe",
+#: Command -> what it does in one line, and an example for the end of its help.
+COMMANDS: dict[str, tuple[str, str]] = {
+    "stiffness": (
+        "mesh stiffness of a gear pair over its rotation: table, picture, summary, fields",
+        "gearfe stiffness pair.toml --torque-Nm 100 --fields 5 --set pair.pinion.teeth=21",
+    ),
+    "loadmap": (
+        "stiffness, transmission error, load share, pressure, root stress over pinion angle and torque",
+        "gearfe loadmap pair.toml --torques-Nm 20 50 100 200 --root-stress",
+    ),
+    "microgeometry": (
+        "reliefs, pitch errors, measured flanks: transmission error, orders, load sharing, pressure against torque",
+        "gearfe microgeometry geometry/microgeometry.toml --out out/micro",
+    ),
+    "relief": (
+        "tip and root relief, crowning, slope: search for the best at some torques, with its tolerances",
+        "gearfe relief geometry/microgeometry.toml --out out/relief",
+    ),
+    "gear": (
+        "derived geometry of a gear pair, and a drawing of it in mesh",
+        "gearfe gear pair.toml --angle-deg 5",
+    ),
+    "mesh": (
+        "meshes of a gear pair with named boundaries, as .msh, .vtu or .inp, or a CalculiX deck of its contact",
+        "gearfe mesh pair.toml --out gears.msh",
+    ),
+    "mechanism": (
+        "trajectories, energies and reactions of a planar mechanism",
+        "gearfe mechanism geometry/andrews.toml --out out/andrews --animation",
+    ),
+    "housing": (
+        "reduce a housing to a small elastic body: mass, bores, frequencies, mode shapes",
+        "gearfe housing meshes/box.toml --out out/box",
+    ),
+    "vibration": (
+        "gear train in its housing: contact forces, speeds, vibration, spectrum, radiated power",
+        "gearfe vibration geometry/gear_train.toml --report --format mat",
+    ),
+    "runup": (
+        "gear train over its speed: steady states on all branches, waterfall, orders, critical speeds",
+        "gearfe runup geometry/gear_train.toml --out out/runup",
+    ),
+    "study": (
+        "one job in many cases: parameters, designs, statistics, sensitivities; goes on where it was interrupted",
+        "gearfe study geometry/relief_study.toml --jobs 2",
+    ),
+    "new": (
+        "write a commented job file to start from, or a shipped job: gearfe new --list",
+        "gearfe new vibration gearbox.toml",
+    ),
+    "cache": (
+        "what is kept on disk (meshes, curves, housings, compiled kernels), its size; remove it",
+        "gearfe cache",
+    ),
+    "completion": (
+        "print a script for the completion of commands and options: bash, zsh or fish",
+        "gearfe completion bash > ~/.local/share/bash-completion/completions/gearfe",
+    ),
 }

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-HELP = "what is kept on disk (meshes, curves, housings, compiled kernels), its size; remove it"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 import shlex
 from typing import Any
-
-HELP = "print a script for the completion of commands and options: bash, zsh or fish"
 
 #: Where a shell looks for it.
 WHERE = {
@@ -55,13 +52,12 @@ def run(args: argparse.Namespace) -> int:
 def _commands() -> dict[str, tuple[str, list[Any]]]:
     """Command -> its one line, and its options."""
     from . import COMMANDS
-    from .program import parser_of
+    from .program import command_module, parser_of
 
     found = {}
-    for name, place in COMMANDS.items():
-        module = importlib.import_module(f".{place}", __package__)
-        actions = parser_of(module, f"gearfe {name}")._actions  # argparse offers no other way to its options
-        found[name] = (module.HELP, [a for a in actions if a.option_strings and a.help != argparse.SUPPRESS])
+    for name, told in COMMANDS.items():
+        actions = parser_of(command_module(name), f"gearfe {name}", *told)._actions  # argparse offers no other way
+        found[name] = (told[0], [a for a in actions if a.option_strings and a.help != argparse.SUPPRESS])
     return found
 
 

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 #: Forms of ``--export``.
 EXPORTS = ("csv", "dxf", "step", "brep")
-HELP = "derived geometry of a gear pair, and a drawing of it in mesh"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

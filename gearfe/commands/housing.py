@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ..reduction.error import MeshError, ReductionError
     from ..reduction.modal_body import ModalBody
 
-HELP = "reduce a housing to a small elastic body: mass, bores, frequencies, mode shapes"
 
 #: Why a frequency has no estimate.
 _COARSE, _FEW = "the mesh is too coarse for one", "keep more modes (modes_below_Hz)"

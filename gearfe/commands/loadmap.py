@@ -15,8 +15,6 @@ from ..tables.stiffness import StiffnessTable
 from .arguments import add_job, add_keys, add_removed, check_option, with_keys
 from .common import add_folder, tell
 
-HELP = "stiffness, transmission error, load share, pressure, root stress over pinion angle and torque"
-
 Loads = TypeVar("Loads", bound=LoadMapTable)
 
 #: Keys of [stiffness] that options stand for.

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 #: Keys of [run] that options stand for, beside the end of the run.
 KEYS = ("analysis", "tolerance", "method", "reactions", "modes")
 
-HELP = "trajectories, energies and reactions of a planar mechanism"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from ..meshing.export import MeshPart
     from ..stiffness.job import StiffnessJob
 
-HELP = "meshes of a gear pair with named boundaries, as .msh, .vtu or .inp, or a CalculiX deck of its contact"
 
 #: Teeth of each gear whose flanks are fine in a deck, where --teeth does not tell.
 DECK_TEETH = 3

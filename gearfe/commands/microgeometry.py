@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from ..stiffness.job import StiffnessJob
     from ..stopwatch import Stopwatch
 
-HELP = "reliefs, pitch errors, measured flanks: transmission error, orders, load sharing, pressure against torque"
 
 #: Files that a run can leave.
 FILES = ("microgeometry*.csv", "microgeometry*.png", "microgeometry.json")

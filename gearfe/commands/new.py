@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-HELP = "write a commented job file to start from, or a shipped job: gearfe new --list"
-
 KINDS = {
     "stiffness": "mesh stiffness of a gear pair",
     "loadmap": "stiffness and root stress over angle and torque",

@@ -13,9 +13,11 @@ from typing import Any, TextIO
 
 from .. import __version__
 from ..errors import InputError, MissingLibraryError, NotFiniteWarning, unknown_name
-from . import COMMANDS, EXAMPLES
-from .arguments import CommandParser, with_changes
-from .common import add_telling, run_and_keep, with_folder
+from . import COMMANDS
+
+TYPE_CHECKING = False  # the program's help and version need neither argparse nor tables
+if TYPE_CHECKING:
+    from .arguments import CommandParser
 
 USAGE = "gearfe COMMAND ... ('gearfe COMMAND --help' tells a command's options)"
 
@@ -73,8 +75,8 @@ def _answered(arguments: list[str], run: Callable[[list[str]], int]) -> int:
 def _run(arguments: list[str]) -> int:
     if not arguments or arguments[0] in ("-h", "--help"):
         print(f"usage: {USAGE}\n")
-        for name in COMMANDS:
-            print(f"  {name:<12} {_module(name).HELP}")
+        for name, (summary, _) in COMMANDS.items():
+            print(f"  {name:<13} {summary}")
         return 0
     if arguments[0] in ("-V", "--version"):
         print(f"gearfe {__version__}")
@@ -83,22 +85,27 @@ def _run(arguments: list[str]) -> int:
         raise InputError("command", None, f"unknown name {arguments[0]!r}", MOVED[arguments[0]])
     if arguments[0] not in COMMANDS:
         raise unknown_name("command", arguments[0], COMMANDS)
-    return run_command(_module(arguments[0]), f"gearfe {arguments[0]}", arguments[1:])
+    return run_command(command_module(arguments[0]), f"gearfe {arguments[0]}", *COMMANDS[arguments[0]], arguments[1:])
 
 
-def run_command(module: Any, name: str, arguments: list[str]) -> int:
+def run_command(module: Any, name: str, summary: str, example: str, arguments: list[str]) -> int:
     """Run a command module (its contract is in `gearfe.commands`), called by `name`, with these arguments."""
-    parser = parser_of(module, name)
+    from .arguments import with_changes
+    from .common import run_and_keep, with_folder
+
+    parser = parser_of(module, name, summary, example)
     parsed = with_folder(with_changes(parser.parse_args(arguments)))
     with _tables_watched() as messages:
         code = run_and_keep(module.run, parsed, [*name.split()[1:], *arguments])
         return code or int(bool(messages))
 
 
-def parser_of(module: Any, name: str) -> CommandParser:
+def parser_of(module: Any, name: str, summary: str, example: str) -> CommandParser:
     """Parser of a command module, called by `name`, with the options that all commands have."""
-    example = EXAMPLES.get(name.rsplit(maxsplit=1)[-1], "")
-    parser = CommandParser(prog=name, description=module.HELP, epilog=example and f"example: {example}")
+    from .arguments import CommandParser
+    from .common import add_telling
+
+    parser = CommandParser(prog=name, description=summary, epilog=example and f"example: {example}")
     module.add_arguments(parser)
     add_telling(parser)
     return parser
@@ -141,5 +148,6 @@ def _drop_output() -> None:
             os.dup2(nowhere, stream.fileno())
 
 
-def _module(name: str) -> Any:
-    return importlib.import_module(f".{COMMANDS[name]}", __package__)
+def command_module(name: str) -> Any:
+    """Module of a command (its contract is in `gearfe.commands`)."""
+    return importlib.import_module(f".{name}", __package__)

@@ -14,8 +14,6 @@ from .arguments import add_job, add_keys, with_keys
 from .common import add_folder, tell
 from .microgeometry import condensed
 
-HELP = "tip and root relief, crowning, slope: search for the best at some torques, with its tolerances"
-
 #: Files that a run can leave.
 FILES = ("relief*.csv", "relief.png", "relief.json")
 

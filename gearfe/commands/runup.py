@@ -15,8 +15,6 @@ from .vibration import add_train, title
 #: Keys of [runup] that options stand for.
 KEYS = ("speed_start_rad_per_s", "speed_stop_rad_per_s", "speeds", "tolerance", "band_Hz", "multiples")
 
-HELP = "gear train over its speed: steady states on all branches, waterfall, orders, critical speeds"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""

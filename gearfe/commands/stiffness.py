@@ -18,7 +18,6 @@ from .common import add_folder, tell
 if TYPE_CHECKING:
     from ..stiffness.job import StiffnessJob
 
-HELP = "mesh stiffness of a gear pair over its rotation: table, picture, summary, fields"
 
 #: Keys of the [stiffness] table that options stand for, beside the load and the angles.
 KEYS = (

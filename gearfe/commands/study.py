@@ -15,7 +15,6 @@ from .common import add_folder, tell
 
 #: How long a scheduler has to answer.
 PATIENCE_S = 20
-HELP = "one job in many cases: parameters, designs, statistics, sensitivities; goes on where it was interrupted"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 #: Keys of [train] that options stand for.
 KEYS = ("tolerance", "method")
 
-HELP = "gear train in its housing: contact forces, speeds, vibration, spectrum, radiated power"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
