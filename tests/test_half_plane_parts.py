@@ -7,7 +7,9 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.interpolate import CubicSpline
 
+from gearfe.contact.flank_compliance import cubic_spline
 from gearfe.contact.panels import (
     ELLIPSE_W,
     ELLIPSE_X,
@@ -42,6 +44,15 @@ def test_curve_is_the_exact_flank(name: str) -> None:
         assert np.abs(curve.at(s)[0] - curve.face.points(u)).max() < 2e-12
         assert np.abs(np.abs(curve.at(s)[1]) - 1).max() < 1e-6
         assert s[:20] == pytest.approx(exact, abs=1e-11)
+
+
+@pytest.mark.parametrize("count", [4, 5, 40])
+def test_splines_are_those_of_scipy(count: int) -> None:
+    """Coefficients of the splines of unit vectors, at uneven stations (m), against SciPy's."""
+    at = 1e-3 * np.random.default_rng(count).uniform(0.2, 1.0, count).cumsum()
+    theirs = np.moveaxis(CubicSpline(at, np.eye(count)).c[::-1], 0, -1)
+    scale = np.abs(theirs).max(axis=(0, 1))
+    assert (np.abs(cubic_spline(at) - theirs).max(axis=(0, 1)) <= 1e-12 * scale).all()
 
 
 def test_a_half_plane_is_a_wedge_of_two_right_angles() -> None:

@@ -30,7 +30,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ..gear.flank_curve import FlankCurve, flank_curve
 from ..gear.pair import GearPair
@@ -122,15 +121,50 @@ def shapes_of(stations: Sequence[Array]) -> Shapes:
         k = len(at)
         padded[gear, :k] = at
         origin[gear, : k + 1] = at[[0, *range(k)]]
-        spline = CubicSpline(at, np.eye(k))
         value = np.zeros((k + 1, k, 4))
-        value[1:k] = np.moveaxis(spline.c[::-1], 0, -1)
-        for piece, end in ((0, at[0]), (k, at[-1])):
-            value[piece, :, :3] = np.stack([spline(end), spline(end, 1), 0.5 * spline(end, 2)], axis=-1)
+        value[1:k] = cubic_spline(at)
+        t = at[-1] - at[-2]
+        value[0, :, :3] = value[1, :, :3]
+        value[k, :, :3] = value[k - 1] @ [[1, 0, 0], [t, 1, 0], [t**2, 2 * t, 1], [t**3, 3 * t**2, 3 * t]]
         slope = value[..., 1:] * np.array([1, 2, 3])
         for order, made in enumerate((value, slope, slope[..., 1:] * np.array([1, 2]))):
             powers[gear, : k + 1, order, :k, : made.shape[-1]] = made
     return Shapes(padded, origin.ravel(), powers.reshape(2 * (most + 1), 3 * most, 4))
+
+
+def cubic_spline(at: Array) -> Array:
+    """Cubic splines of the unit vectors, their third derivative continuous at the last station but one at both ends.
+
+    Written out, since the interpolation of a library costs a third of a second to load: the slopes m of the pieces of
+    lengths h and divided differences d satisfy ``m[i-1]/h[i-1] + 2 m[i] (1/h[i-1] + 1/h[i]) + m[i+1]/h[i] =
+    3 (d[i-1]/h[i-1] + d[i]/h[i])``; at the ends the two pieces are one cubic (C. de Boor, A Practical Guide to Splines,
+    1978, chapter IV, "not a knot").
+
+    Parameters
+    ----------
+    at : ndarray, shape (k,)
+        Rising stations, four at least.
+
+    Returns
+    -------
+    ndarray, shape (k - 1, k, 4)
+        Coefficients of the rising powers of the distance from the beginning of the piece: piece, vector, power.
+    """
+    h, eye, k = np.diff(at)[:, None], np.eye(len(at)), len(at)
+    d, inverse = np.diff(eye, axis=0) / h, 1.0 / h[:, 0]
+    matrix, right = np.zeros((k, k)), np.zeros((k, k))
+    inside = np.arange(1, k - 1)
+    matrix[inside, inside - 1], matrix[inside, inside + 1] = inverse[:-1], inverse[1:]
+    matrix[inside, inside] = 2.0 * (inverse[:-1] + inverse[1:])
+    right[inside] = 3.0 * (d[:-1] / h[:-1] + d[1:] / h[1:])
+    for end, inner, first, second in ((0, 1, 0, 1), (k - 1, k - 2, k - 2, k - 3)):
+        a, b = h[first, 0], h[second, 0]
+        matrix[end, end], matrix[end, inner] = 1.0 / a, 1.0 / a + 1.0 / b  # as large as the rows inside
+        right[end] = ((3.0 + 2.0 * b / a) * d[first] + a / b * d[second]) / (a + b)
+    m = np.linalg.solve(matrix, right)
+    curved = (3.0 * d - 2.0 * m[:-1] - m[1:]) / h
+    twisted = (m[:-1] + m[1:] - 2.0 * d) / h**2
+    return np.stack([eye[:-1], m[:-1], curved, twisted], axis=-1)
 
 
 def flank_compliances(pair: GearPair, elastic: MeshingPair) -> tuple[FlankCompliance, FlankCompliance]:

@@ -130,9 +130,9 @@ class ModalBody(Shown):
     @cached_property
     def coupled(self) -> CoupledModes:
         """Modes of the body with its attachments free to move, bores rigid."""
-        from scipy.linalg import eigh
-
-        values, vectors = eigh(self.stiffness, self.mass)
+        inverse = np.linalg.inv(np.linalg.cholesky(self.mass))  # M = L L^T; SciPy would take longer to load
+        values, vectors = np.linalg.eigh(inverse @ self.stiffness @ inverse.T)
+        vectors = inverse.T @ vectors
         if not self.held:
             values[:6] = np.where(np.abs(values[:6]) < 1e-6 * abs(values[min(6, len(values) - 1)]), 0.0, values[:6])
         return CoupledModes(np.sqrt(np.maximum(values, 0.0)) / (2.0 * math.pi), vectors)

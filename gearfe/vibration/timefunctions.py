@@ -15,7 +15,6 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from ..errors import InputError
-from ..mechanisms.expressions import compute, parse, quantities
 from ..rigid import TimeFunction, constant, sine, smoothed_step
 from ..tables.timefunction import TrainFunctionTable, check_rising
 from ..textfile import read_csv
@@ -98,6 +97,8 @@ def _table(name: str, where: str, folder: Path) -> Array:
 
 def _of_expression(text: str, where: str, end: float) -> TimeFunction:
     """Pieces of polynomials that are the expression of `time` from 0 to the end."""
+    from ..mechanisms.expressions import compute, parse, quantities  # few jobs have expressions
+
     tree = parse(text, where)
     other = sorted(name for name, _ in quantities(tree) if name != "time")
     if other:
