@@ -69,18 +69,18 @@ def trains() -> Answers:
 
 
 def laws() -> Answers:
-    """The mesh law of a coarse pair: force and torque over phase and approach."""
+    """The mesh law of a coarse pair: force, torque and tangent over phase and approach."""
     from gearfe.contact.half_plane import half_plane_pair
     from gearfe.contact.laws import HalfPlane
     from gearfe.meshlaw.make import mesh_law
 
     law = mesh_law(half_plane_pair(coarse_pair(), coarse_gears(HalfPlane())), 2000.0)
-    angle = np.linspace(0.0, law.cycle, 40)
-    found = [law(angle, law.approach(angle, force)) for force in (50.0, 500.0, 2000.0)]
+    angle, depth = np.tile(law.cycle * np.linspace(0.0, 1.0, 40), 3), np.repeat([0.7e-6, 5e-6, 20e-6], 40)
+    found = law(angle, law.touching(angle) + depth)
     return {
-        "approach": (np.array([law.approach(angle, force) for force in (50.0, 500.0, 2000.0)]), 1e-3),
-        "moment": (np.array([one.moment for one in found]), 1e-2),
-        "tangent": (np.array([one.tangent for one in found]), 1e-2),
+        "force": (found.force, law.error),
+        "torque": (law.base_radii[0] * found.force + found.moment, law.error),
+        "tangent": (found.tangent[40:], 1e-2),
     }
 
 

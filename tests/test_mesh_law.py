@@ -65,6 +65,30 @@ def test_law_meets_contact_solutions_that_it_was_not_made_from(law, solver):
     assert np.corrcoef(found.moment, moment)[0, 1] > 0.999
 
 
+def misses(law, solver, solved):
+    """Of force and torque, in parts of them or of a tenth of the largest."""
+    r1, r2 = law.base_radii
+    found = law(solved.pinion_angle, r2 * (solved.twist - PAIR.contact_twist))
+    force, moment = solved.torque_wheel / r2, solved.torque_pinion - solved.torque_wheel / PAIR.gear_ratio
+    off = np.maximum(np.abs(found.force - force), np.abs(found.moment - moment) / r1)
+    return off / np.maximum(force, 0.5 * DESIGN)
+
+
+def test_error_tells_what_contact_solutions_tell_and_falls_with_the_tolerance(law, solver):
+    """At 150 random places 99 % are within the error, which the tolerance bounds: so no number of cells decides."""
+    angle, approach = places(law, 150, 1e-6)
+    solved = solve_half_plane(solver, angle, approach / PAIR.wheel.base_radius + PAIR.contact_twist)
+    worst = []
+    for tolerance in (1e-2, 1e-3):
+        one = law if tolerance == 1e-3 else mesh_law(solver, 5 * DESIGN, tolerance=tolerance)
+        off = misses(one, solver, solved)
+        assert 0.0 < one.error <= tolerance
+        assert np.quantile(off, 0.99) <= one.error
+        worst.append((len(one.nodes), off.max()))
+    assert worst[0][0] < worst[1][0]
+    assert worst[1][1] < 0.5 * worst[0][1]
+
+
 def test_pairs_that_touch_together_at_a_single_place_are_coupled_there(solver):
     """The first reach at which pairs two teeth apart touch at once: C is what that place tells, everywhere."""
     cycle = PAIR.mesh_cycle

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy import sparse
@@ -20,16 +20,17 @@ from scipy.sparse.linalg import spsolve
 from ..typing import Array
 from .law import NEVER, MeshLaw
 
-#: Weights of the second difference of b over the phase, and of the second and first over ln F (in nm/N): they decide
-#: where no pair force was found, such as below the smallest share.
+#: Weights of the second derivative of b over the phase (of `CELL` mesh cycles), and of the second and first over ln F (in
+#: nm/N), all squared and integrated, so that they mean the same on any nodes: they decide where no pair force was found.
+CELL = 1.0 / 24.0
 SMOOTH_PHASE, SMOOTH_FORCE, LEVEL_FORCE = 0.01, 0.05, 0.02
 #: Pairs with less than this share of the mesh force count less: what they yield is divided by their force.
 SHARE = 0.5
 #: Cells of the pair force end at these parts of the largest: Lambda's cubics err by 1e-4 of it in a cell of ratio 2.2,
 #: and by 1e-3 in those of small forces.
 PARTS = (0.0, 0.002, 0.01, 0.05, 0.2, 0.45, 1.0)
-#: Nodes of b over ln F.
-FORCE_NODES = 7
+#: Nodes of b over ln F; what is between the contact solutions' forces, more of them do not know.
+FORCE_NODES = 5
 NANO = 1e-9
 
 
@@ -53,6 +54,11 @@ class PairForces:
     force: Array
     share: Array
     approach: Array
+
+
+def joined(parts: Sequence[PairForces]) -> PairForces:
+    """All of them."""
+    return PairForces(*(np.concatenate([getattr(one, f.name) for one in parts]) for f in fields(PairForces)))
 
 
 @dataclass(frozen=True)
@@ -112,17 +118,15 @@ def fit_law(
     A = _rows_kron(P, 2 * Y[0] + Y[1])
     weight = sparse.diags_array(np.minimum(1.0, found.share / SHARE))
     n, m = P.shape[1], Y[0].shape[1]
-    second = [sparse.diags_array([1.0, -2.0, 1.0], offsets=[0, 1, 2], shape=(k - 2, k)) for k in (n, m)]
-    first = sparse.diags_array([-1.0, 1.0], offsets=[0, 1], shape=(m - 1, m))
-    rows = [
-        weight @ A,
-        SMOOTH_PHASE * sparse.kron(second[0], sparse.eye_array(m)),
-        SMOOTH_FORCE * sparse.kron(sparse.eye_array(n), second[1]),
-        LEVEL_FORCE * sparse.kron(sparse.eye_array(n), first),
-        1e-6 * sparse.eye_array(n * m),
-    ]
-    normal = sum((row.T @ row for row in rows[1:]), rows[0].T @ rows[0])
-    b = NANO * spsolve(sparse.csc_matrix(normal), rows[0].T @ (weight @ right)).reshape(n, m)
+    width = CELL * (touch.angle[cells] - touch.angle[0])
+    (whole, _, bent), (along, sloped, curved) = _grams(phase, width), _grams(force, 1.0)
+    penalty = (
+        SMOOTH_PHASE**2 * sparse.kron(bent, along)
+        + sparse.kron(whole, SMOOTH_FORCE**2 * curved + LEVEL_FORCE**2 * sloped)
+        + 1e-12 * sparse.eye_array(n * m)
+    )
+    rows = weight @ A
+    b = NANO * spsolve(sparse.csc_matrix(rows.T @ rows + penalty), rows.T @ (weight @ right)).reshape(n, m)
     # Lambda and its slope at the forces between the cells: splines over the phase
     at = np.log(parts[1:])
     values, slopes, bends = (_columns(force, at, order).T for order in (0, 1, 2))
@@ -149,6 +153,16 @@ def _columns(knots: Array, x: Array, order: int) -> Array:
     """All cubic B-splines, or a derivative, at x: (points, splines)."""
     made: Array = BSpline(knots, np.eye(len(knots) - 4), 3)(x, nu=order)
     return made
+
+
+def _grams(knots: Array, width: float) -> list[sparse.csr_array]:
+    """Integrals over x/width of the products of all cubic B-splines, of their first and of their second derivatives."""
+    x, w = np.polynomial.legendre.leggauss(4)
+    ends = np.unique(knots)
+    half = 0.5 * np.diff(ends)[:, None]
+    places, weights = (0.5 * (ends[:-1] + ends[1:])[:, None] + half * x).ravel(), (half * w).ravel() / width
+    made = [width**order * _columns(knots, places, order) for order in range(3)]
+    return [sparse.csr_array(B.T @ (weights[:, None] * B)) for B in made]
 
 
 def _rows_kron(A: sparse.csr_array, B: Array) -> sparse.csr_array:

@@ -95,7 +95,7 @@ class MeshLaw:
     reach
         Approach beyond the first touch (m) up to which the law is known.
     error
-        Estimate of the relative error of its stiffness; not-a-number where there is none.
+        Estimate of the relative error of its forces; not-a-number where there is none.
     back
         Law of the back flanks, of the pair seen from behind; None: they are the mirror image of the driving ones.
     """

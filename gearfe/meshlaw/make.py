@@ -17,15 +17,20 @@ from ..contact.position import Positions
 from ..errors import InputError
 from ..gear.touching import Touching
 from ..typing import Array, IntArray
-from .fit import Couple, PairForces, TouchCurve, fit_law, touch_cubics
+from .fit import Couple, PairForces, TouchCurve, fit_law, joined, touch_cubics
 from .law import NEVER, MeshLaw
 
-#: Cells of the phase in a mesh cycle, at least, and pinion angles in each at which contacts are solved.
-CELLS, SAMPLES = 24, 3
-#: Error (m) of the touching curve's cubics from which on a cell is halved, and how often.
-CLOSE, HALVINGS = 2e-9, 3
+#: Cells of the phase in a mesh cycle to begin with, and places in each (parts of its width) at which contacts are solved.
+CELLS, PLACES = 12, (0.25, 0.75)
 #: Approaches beyond the first touch, in parts of the largest: light ones tell how a pair comes into contact.
 DEPTHS = (0.0025, 0.008, 0.025, 0.06, 0.12, 0.2, 0.32, 0.5, 0.75, 1.0)
+#: Places and approaches at which the law is held against contacts: beside the nodes, where kinks stand, between `DEPTHS`.
+HELD_PLACES, HELD_DEPTHS = (0.1, 0.9), (0.0045, 0.039, 0.155, 0.4, 0.87)
+#: Error of force and torque there from which on a cell is halved, in parts of them or of this part of the largest force:
+#: a fifth of what the shipped pair's contact solutions err by (0.5 %).
+TOLERANCE, LIGHT = 1e-3, 0.1
+#: Error (m) of the touching curve's cubics from which on a cell is halved, and how often a cell is halved for either.
+CLOSE, HALVINGS = 2e-9, 3
 #: The law's tables go on to where pairs touch at this many times its reach, so that no pair bears at their ends.
 BEYOND = 1.1
 #: Pinion angles at which the approach is searched for that makes the largest force.
@@ -35,8 +40,10 @@ LOOKS = 6
 NEAR, SAME = 0.4, 0.02
 
 
-def mesh_law(pair: HalfPlanePair, force: float) -> MeshLaw:
-    """Law of a pair for mesh forces up to `force` (N).
+def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE) -> MeshLaw:
+    """Law of a pair for mesh forces up to `force` (N), its error from contact solutions that it was not made from.
+
+    Cells of the phase where that is more than `tolerance` are halved; the solutions that told it then count, too.
 
     Raises
     ------
@@ -44,27 +51,51 @@ def mesh_law(pair: HalfPlanePair, force: float) -> MeshLaw:
         For forces that contact solutions do not reach.
     """
     geometry = pair.pair
-    radius = geometry.wheel.base_radius
     reach = _reach(pair, force)
     nodes, slots = _nodes(pair, reach)
-    phases = _phases(nodes, slots)
-    places = (np.arange(SAMPLES) + 0.5) / SAMPLES
-    angles = (nodes[:-1, None] + np.diff(nodes)[:, None] * places).ravel()
-    met, first = _touching(pair, angles)
-    deep = reach * np.array(DEPTHS)
-    twists = first[:, None] + deep / radius
-    solved = solve_half_plane(pair, np.repeat(angles, len(deep)), twists.ravel())
-    C = coupling_curve(pair, phases, reach)
-    law = fit_law(
-        pair_forces(pair, solved, met, C),
-        touch_curve(pair, phases),
-        C,
-        cells=len(nodes) - 1,
-        hertz=0.5 * pair.compliance / pair.width,
-        base_radii=(geometry.pinion.base_radius, radius),
-        reach=reach,
-    )
-    return replace(law, backlash=geometry.normal_backlash)
+    C = coupling_curve(pair, _phases(nodes, slots), reach)
+    known: list[PairForces] = []
+
+    def solve(places: Sequence[float], depths: Sequence[float]) -> Positions:
+        """Contacts in all cells at parts of their width, and at parts of the reach; their pair forces become known."""
+        angles = (begin[:, None] + width[:, None] * np.array(places)).ravel()
+        met, first = _touching(pair, angles)
+        twists = first[:, None] + reach * np.array(depths) / geometry.wheel.base_radius
+        solved = solve_half_plane(pair, np.repeat(angles, len(depths)), twists.ravel())
+        known.append(pair_forces(pair, solved, met, C))
+        return solved
+
+    begin, width, error = nodes[:-1], np.diff(nodes), 0.0
+    for rest in range(HALVINGS, -1, -1):
+        solve(PLACES, DEPTHS)
+        law = fit_law(
+            joined(known),
+            touch_curve(pair, _phases(nodes, slots)),
+            C,
+            cells=len(nodes) - 1,
+            hertz=0.5 * pair.compliance / pair.width,
+            base_radii=(geometry.pinion.base_radius, geometry.wheel.base_radius),
+            reach=reach,
+        )
+        off = _misses(law, pair, solve(HELD_PLACES, HELD_DEPTHS), LIGHT * force).reshape(len(begin), -1).max(axis=1)
+        coarse = (off > tolerance) & (rest > 0)
+        error = max(error, float(off[~coarse].max(initial=0.0)))
+        if not coarse.any():
+            break
+        begin, width = np.append(begin[coarse], begin[coarse] + 0.5 * width[coarse]), np.tile(0.5 * width[coarse], 2)
+        nodes = np.union1d(nodes, begin)
+    return replace(law, backlash=geometry.normal_backlash, error=error)
+
+
+def _misses(law: MeshLaw, pair: HalfPlanePair, solved: Positions, least: float) -> Array:
+    """Error of the force, or of the driver's torque, in parts of what contact solutions tell, or of a least force (N)."""
+    r1, r2 = law.base_radii
+    found = law(solved.pinion_angle, r2 * (solved.twist - pair.pair.contact_twist))
+    force = solved.torque_wheel / r2
+    moment = solved.torque_pinion - r1 * force
+    off = np.maximum(np.abs(found.force - force), np.abs(found.moment - moment) / r1)
+    made: Array = off / np.maximum(force, least)
+    return made
 
 
 def pair_forces(pair: HalfPlanePair, solved: Positions, met: Touching, coupling: Sequence[Couple]) -> PairForces:

@@ -32,7 +32,7 @@ ARRAYS = {"nodes": 1, "forces": 1, "touch": 3, "energies": 5, "coupling": 4}
 
 def law_arrays(law: MeshLaw) -> dict[str, Array]:
     """A law as named arrays, those of a law of its own for the back flanks beginning with ``back_``."""
-    numbers = np.array([*law.base_radii, law.backlash, law.reach])
+    numbers = np.array([*law.base_radii, law.backlash, law.reach, law.error])
     made = {**{name: getattr(law, name) for name in ARRAYS}, "numbers": numbers}
     behind = {} if law.back is None else law_arrays(law.back)
     return {**made, **{f"back_{name}": values for name, values in behind.items()}}
@@ -40,11 +40,11 @@ def law_arrays(law: MeshLaw) -> dict[str, Array]:
 
 def law_of_arrays(arrays: Mapping[str, Array]) -> MeshLaw:
     """The law of `law_arrays`."""
-    pinion, wheel, backlash, reach = arrays["numbers"].tolist()
+    pinion, wheel, backlash, reach, error = arrays["numbers"].tolist()
     nodes, forces, touch, energies, coupling = (np.ascontiguousarray(arrays[name], dtype=float) for name in ARRAYS)
     behind = {name.removeprefix("back_"): values for name, values in arrays.items() if name.startswith("back_")}
     back = law_of_arrays(behind) if behind else None
-    return MeshLaw(nodes, forces, touch, energies, coupling, (pinion, wheel), backlash, reach, back=back)
+    return MeshLaw(nodes, forces, touch, energies, coupling, (pinion, wheel), backlash, reach, error, back)
 
 
 def save_law(law: MeshLaw, path: str | Path) -> None:
@@ -62,7 +62,7 @@ def load_law(path: str | Path) -> MeshLaw:
     """
     found = load_arrays(path)
     missing = [name for name, axes in ARRAYS.items() if name not in found or found[name].ndim != axes]
-    if missing or "numbers" not in found or found["numbers"].shape != (4,):
+    if missing or "numbers" not in found or found["numbers"].shape != (5,):
         problem = "holds no mesh law" + (f": no array {missing[0]!r} of {ARRAYS[missing[0]]} axes" if missing else "")
         raise InputError("mesh law", str(path), problem, "write it with gearfe.meshlaw.store.save_law")
     return law_of_arrays(found)

@@ -182,7 +182,8 @@ def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) 
         angles = pair.mesh_cycle * np.arange(ESTIMATED) / ESTIMATED
         sweep = {"torque": most / ROOM, "angles": angles, "kinematics": "small"}
         curve = cached_curve(pair, model, sweep, estimate_error=True)
-    return law if curve.error is None else replace(law, error=curve.error.worst)
+    fit = max(side.error for side in law.sides)
+    return replace(law, error=math.nan if curve.error is None else fit + curve.error.worst)
 
 
 def _deviations(
