@@ -20,10 +20,9 @@ from scipy.sparse.linalg import spsolve
 from ..typing import Array
 from .law import NEVER, MeshLaw
 
-#: Weights of the second derivative of b over the phase (of `CELL` mesh cycles), and of the second and first over ln F (in
-#: nm/N), all squared and integrated, so that they mean the same on any nodes: they decide where no pair force was found.
-CELL = 1.0 / 24.0
-SMOOTH_PHASE, SMOOTH_FORCE, LEVEL_FORCE = 0.01, 0.05, 0.02
+#: Weights of the second derivative of b over the phase (in mesh cycles), and of the second and first over ln F (nm/N).
+#: Squares are integrated, so that they mean the same on any nodes: they decide where no pair force was found.
+SMOOTH_PHASE, SMOOTH_FORCE, LEVEL_FORCE = 1e-4, 0.25, 0.1
 #: Pairs with less than this share of the mesh force count less: what they yield is divided by their force.
 SHARE = 0.5
 #: Cells of the pair force end at these parts of the largest: Lambda's cubics err by 1e-4 of it in a cell of ratio 2.2,
@@ -118,8 +117,8 @@ def fit_law(
     A = _rows_kron(P, 2 * Y[0] + Y[1])
     weight = sparse.diags_array(np.minimum(1.0, found.share / SHARE))
     n, m = P.shape[1], Y[0].shape[1]
-    width = CELL * (touch.angle[cells] - touch.angle[0])
-    (whole, _, bent), (along, sloped, curved) = _grams(phase, width), _grams(force, 1.0)
+    cycle = touch.angle[cells] - touch.angle[0]
+    (whole, _, bent), (along, sloped, curved) = _grams(phase, cycle), _grams(force, 1.0)
     penalty = (
         SMOOTH_PHASE**2 * sparse.kron(bent, along)
         + sparse.kron(whole, SMOOTH_FORCE**2 * curved + LEVEL_FORCE**2 * sloped)

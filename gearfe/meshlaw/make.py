@@ -20,14 +20,14 @@ from ..typing import Array, IntArray
 from .fit import Couple, PairForces, TouchCurve, fit_law, joined, touch_cubics
 from .law import NEVER, MeshLaw
 
-#: Cells of the phase in a mesh cycle to begin with, and places in each (parts of its width) at which contacts are solved.
+#: Cells of the phase in a mesh cycle to begin with, and places in each (parts of its width) where contacts are solved.
 CELLS, PLACES = 12, (0.25, 0.75)
 #: Approaches beyond the first touch, in parts of the largest: light ones tell how a pair comes into contact.
 DEPTHS = (0.0025, 0.008, 0.025, 0.06, 0.12, 0.2, 0.32, 0.5, 0.75, 1.0)
-#: Places and approaches at which the law is held against contacts: beside the nodes, where kinks stand, between `DEPTHS`.
+#: Places and approaches at which the law is held against contacts: beside the nodes, where kinks are; between `DEPTHS`.
 HELD_PLACES, HELD_DEPTHS = (0.1, 0.9), (0.0045, 0.039, 0.155, 0.4, 0.87)
-#: Error of force and torque there from which on a cell is halved, in parts of them or of this part of the largest force:
-#: a fifth of what the shipped pair's contact solutions err by (0.5 %).
+#: Error of force and torque there from which on a cell is halved, in parts of them, or of this part of the largest
+#: where that is more: what contacts on elements of the default sizes err by (0.11 % in the shipped pair).
 TOLERANCE, LIGHT = 1e-3, 0.1
 #: Error (m) of the touching curve's cubics from which on a cell is halved, and how often a cell is halved for either.
 CLOSE, HALVINGS = 2e-9, 3
@@ -88,7 +88,7 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
 
 
 def _misses(law: MeshLaw, pair: HalfPlanePair, solved: Positions, least: float) -> Array:
-    """Error of the force, or of the driver's torque, in parts of what contact solutions tell, or of a least force (N)."""
+    """Error of force, or of the driver's torque, in parts of what contact solutions tell, or of a least force (N)."""
     r1, r2 = law.base_radii
     found = law(solved.pinion_angle, r2 * (solved.twist - pair.pair.contact_twist))
     force = solved.torque_wheel / r2
