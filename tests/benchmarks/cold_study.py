@@ -124,7 +124,8 @@ def _run(case: Case, tree: Path, folder: Path) -> tuple[float, float]:
         For a command that ends otherwise than it should.
     """
     own = {"GEARFE_CACHE": str(folder / "cache"), "PYTHONPATH": str(tree), "OMP_NUM_THREADS": "1"}
-    environment = os.environ | own | {"OPENBLAS_NUM_THREADS": "1"}
+    own |= {"OPENBLAS_NUM_THREADS": "1", "PYTHONPYCACHEPREFIX": str(folder / "sources")}
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"} | own
     words = [sys.executable, *case.command]
     with (folder / "told").open("wb") as told, (folder / "said").open("wb") as said:
         process = subprocess.Popen(

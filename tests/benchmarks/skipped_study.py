@@ -126,7 +126,7 @@ simulate(train_model("tutorial", quick=True), train_times(True), backend="plain"
 def rigid_housing(quick: bool) -> tuple[float, float, str]:
     """A train in a rigid housing in a fresh process; the same and a housing meshed and reduced beside it."""
     short = _process(RIGID)
-    housing = housing_of(24.0 if quick else 9.0)
+    housing = housing_of(24.0 if quick else 9.0, small=quick)
     more = _cpu(lambda: housing.reduce(10 if quick else 40), 1)
     loaded = _process(RIGID + "\nimport skfem, gearfe.housing, gearfe.meshing.housing_mesh")
     return short, loaded + more, f"housing of {housing.unknowns} unknowns, assembled and reduced"
@@ -134,7 +134,7 @@ def rigid_housing(quick: bool) -> tuple[float, float, str]:
 
 def modes_above(quick: bool) -> tuple[float, float, str]:
     """Modes to twice the band of interest; three times as many."""
-    housing = housing_of(24.0 if quick else 9.0)
+    housing = housing_of(24.0 if quick else 9.0, small=quick)
     few, many = (10, 30) if quick else (60, 180)
     return _cpu(lambda: housing.reduce(few), 1), _cpu(lambda: housing.reduce(many), 1), f"{few} and {many} modes"
 
@@ -158,7 +158,7 @@ def cached_body(quick: bool) -> tuple[float, float, str]:
     """A reduced housing loaded, and made from its mesh."""
     from gearfe.reduction.modal_body import ModalBody
 
-    housing = housing_of(24.0) if quick else housing_of(shipped_housing().mesh.size_mm)
+    housing = housing_of(24.0, small=True) if quick else housing_of(shipped_housing().mesh.size_mm)
     made, cost = measured(lambda: housing.reduce(10 if quick else 60), runs=1)
     with tempfile.TemporaryDirectory() as name:
         made.save(Path(name) / "body.npz")

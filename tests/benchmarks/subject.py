@@ -72,11 +72,15 @@ def shipped_housing() -> HousingTable:
     return table
 
 
-def housing_of(size_mm: float) -> Housing:
-    """The shipped housing with elements `size_mm` thick at inner edges."""
+def housing_of(size_mm: float, *, small: bool = False) -> Housing:
+    """The shipped housing with elements `size_mm` thick at inner edges; small: about one of its shafts, and short."""
     from gearfe.housing.build import housing_from_table
 
     table = shipped_housing()
+    if small:
+        middle = 0.5 * sum(table.wall_x_mm)
+        shaft = replace(table.shafts[0], x_mm=middle)
+        table = replace(table, shafts=(shaft,), wall_x_mm=(middle - 30.0, middle + 30.0))
     return housing_from_table(replace(table, mesh=replace(table.mesh, size_mm=size_mm)))
 
 
