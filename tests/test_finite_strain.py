@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,8 @@ from gearfe.elasticity import Material, physical_gradients, triangle_shapes
 from gearfe.gear.pair import Gear, GearPair
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh
+from gearfe.stiffness.positions import at_torques, at_twists, position_solver
+from gearfe.stiffness.sweep import sweep_stiffness
 
 from .solving import solve_position, solve_positions
 
@@ -78,18 +81,33 @@ def test_few_neighbours_suffice() -> None:
     assert near == pytest.approx(finite_strain.finite_strain_shares(pair, found, neighbours=15), abs=5e-5)
 
 
-def test_sampled_shares_follow_the_curve() -> None:
-    """A sweep's shares, interpolated between few positions, differ from each position's own by little of the curve."""
+@pytest.mark.parametrize("law", ["half_plane", "nitsche"])
+def test_curves_take_the_share_of_every_position(law: str) -> None:
+    """At pair changes, too, where the share jumps with the load sharing: 0.5 deg, as the energy's rate has it there."""
     gears, pair = meshing_pair(coarsen=2.0)
-    angles = np.linspace(0, pair.pitch_angle, 25)[:-1]
-    small = solve_positions(gears, pair, angles, math.radians(0.05))
-    shares = finite_strain.finite_strain_shares(pair, small)
-    chosen = finite_strain.sample_numbers(angles, pair.pitch_angle)
-    assert len(chosen) == finite_strain.SAMPLES
-    applied = finite_strain.interpolated_shares(angles, angles[chosen], shares[chosen], pair.pitch_angle)
-    assert (applied < 0).all()
-    assert np.abs(applied - shares).max() < 3e-4
-    assert np.median(np.abs(applied - shares)) < 5e-5
+    if law == "half_plane":
+        pair = replace(pair, model=PairModel())
+    angles, twist = np.linspace(0, pair.pitch_angle, 25)[:-1], math.radians(0.5)
+    shares = finite_strain.finite_strain_shares(pair, solve_positions(gears, pair, angles, twist))
+    small, finite = (
+        sweep_stiffness(gears, elastic=pair, twist=twist, angles=angles, kinematics=kinematics)
+        for kinematics in ("small", "finite")
+    )
+    solved = small.status == "converged"
+    assert solved.sum() > 20
+    np.testing.assert_allclose((finite.torque_wheel / small.torque_wheel - 1)[solved], shares[solved], atol=1e-9)
+
+
+@pytest.mark.parametrize("torque", [100.0, 1000.0])
+def test_torques_with_finite_strain_are_met(torque: float) -> None:
+    """The twist found for a torque carries it, but for what is of the second order in the share."""
+    gears, pair = meshing_pair(coarsen=2.0)
+    pair = replace(pair, model=PairModel())
+    solver, angles = position_solver(gears, pair), np.linspace(0, pair.pitch_angle, 7)[:-1]
+    found = at_torques(solver, angles, np.full(6, torque), finite=True)
+    share = finite_strain.finite_strain_shares(pair, solve_positions(gears, pair, angles, found.twist))
+    again = at_twists(solver, angles, found.twist, finite=True)
+    assert np.abs(again.torque_wheel / torque - 1).max() < max(1e-7, float((share**2).max()))
 
 
 def test_against_a_finite_strain_program() -> None:

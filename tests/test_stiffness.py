@@ -232,12 +232,12 @@ def test_torque_mode_gives_its_torque(gears, elastic, torque):
     angles = np.radians([0.5, 4.0, 8.7, 12.0])
     curve = at(gears, angles, elastic, twist=None, torque=torque)
     assert set(curve.status) == {"converged"}
-    np.testing.assert_allclose(curve.torque_wheel, torque, rtol=HalfPlaneSolver.torque_tolerance)
+    np.testing.assert_allclose(curve.torque_wheel, torque, rtol=1e-12)
     np.testing.assert_allclose(
         curve.k_mesh * curve.transmission_error * curve.base_radius, curve.torque_wheel, rtol=1e-10
     )
     again = at(gears, angles[1:2], elastic, twist=float(curve.twist[1]))
-    assert again.torque_wheel[0] == pytest.approx(torque, rel=HalfPlaneSolver.torque_tolerance)
+    assert again.torque_wheel[0] == pytest.approx(torque, rel=1e-7)
 
 
 def test_more_torque_more_transmission_error(gears, elastic):

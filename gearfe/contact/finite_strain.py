@@ -8,8 +8,7 @@ linear one. The equilibrium minimises the whole energy, so by the envelope theor
 
 .. math::
     \Delta T = \frac{d}{d\varphi}\Delta W(u(\varphi))
-    = \int \sigma(\varepsilon'):\eta + \sigma(\varepsilon):\eta' + \eta:C:\eta',
-    \qquad \eta' = \mathrm{sym}(\nabla u^T\nabla u').
+    = \int \big(\tau + \nabla u\,(\sigma(\varepsilon) + \tau)\big) : \nabla u', \qquad \tau = C:\eta.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..elasticity import physical_gradients, triangle_shapes
-from ..typing import Array, IntArray
+from ..typing import Array
 from .compliance import GearBody, MeshingPair, sector_displacements
 from .position import TORQUES, Positions
 
@@ -28,22 +27,6 @@ NEIGHBOURS = 1
 #: Positions whose fields are in memory together, and numbers (of displacement gradients) worked on at a time.
 TOGETHER = 24
 BLOCK = 40_000
-#: Positions at which a sweep evaluates the share; over a mesh cycle it varies by about a third of itself.
-SAMPLES = 9
-
-
-def sample_numbers(angles: Array, cycle: float, most: int = SAMPLES) -> IntArray:
-    """At most so many of the positions at `angles` (rad), spread evenly over the mesh cycle (rad): their numbers."""
-    order = np.argsort(np.mod(angles, cycle), kind="stable")
-    return order[np.unique(np.linspace(0, len(order) - 1, min(most, len(order))).round().astype(np.int64))]
-
-
-def interpolated_shares(angles: Array, samples: Array, shares: Array, cycle: float) -> Array:
-    """Shares at `angles` from those at the angles `samples` (rad), linear in the phase; not-a-numbers are left out."""
-    good = np.isfinite(shares)
-    if not good.any():
-        return np.zeros(len(angles))
-    return np.interp(np.mod(angles, cycle), np.mod(samples[good], cycle), shares[good], period=cycle)
 
 
 def with_shares(found: Positions, share: Array) -> Positions:
@@ -61,11 +44,11 @@ def with_shares(found: Positions, share: Array) -> Positions:
 
 
 def finite_strain_shares(pair: MeshingPair, found: Positions, neighbours: int = NEIGHBOURS) -> Array:
-    """Delta T / T of each position, shape (n,), from its loads; not-a-number where there are none.
+    """Delta T / T of each position, shape (n,), from its loads; 0 where there are none.
 
     So many `neighbours` of a loaded tooth on either side take part.
     """
-    shares = np.full(len(found), np.nan)
+    shares = np.zeros(len(found))
     loaded = np.unique(found.loads[0].position)
     for first in range(0, len(loaded), TOGETHER):
         mine = loaded[first : first + TOGETHER]
@@ -105,31 +88,12 @@ def _energy_rates(body: GearBody, fields: Array) -> Array:
 
 
 def _density(lam: float, mu: float, state: Array, rate: Array) -> Array:
-    """d Delta W / d twist per volume."""
-    strain, strain_rate = _strain(state), _strain(rate)
-    curved, curved_rate = _curved(state, state), _curved(state, rate)
-    curved_rate = (2 * curved_rate[0], 2 * curved_rate[1], 2 * curved_rate[2])
-    both = (strain[0] + curved[0], strain[1] + curved[1], strain[2] + curved[2])
-    return _work(lam, mu, strain_rate, curved) + _work(lam, mu, both, curved_rate)
-
-
-#: Components 00, 11, 01 of a plane symmetric tensor.
-_Tensor = tuple[Array, Array, Array]
-
-
-def _curved(a: Array, b: Array) -> _Tensor:
-    """sym(grad a^T grad b) / 2."""
-
-    def product(i: int, j: int) -> Array:
-        return a[:, :, i, 0] * b[:, :, j, 0] + a[:, :, i, 1] * b[:, :, j, 1]
-
-    return 0.5 * product(0, 0), 0.5 * product(1, 1), 0.25 * (product(0, 1) + product(1, 0))
-
-
-def _strain(h: Array) -> _Tensor:
-    return h[:, :, 0, 0], h[:, :, 1, 1], 0.5 * (h[:, :, 0, 1] + h[:, :, 1, 0])
-
-
-def _work(lam: float, mu: float, a: _Tensor, b: _Tensor) -> Array:
-    """a : C : b = lam tr(a) tr(b) + 2 mu a : b."""
-    return lam * (a[0] + a[1]) * (b[0] + b[1]) + 2 * mu * (a[0] * b[0] + a[1] * b[1] + 2 * a[2] * b[2])
+    """d Delta W / d twist per volume: (tau + grad u (sigma + tau)) : grad u' with tau = C:eta."""
+    a, c, b, d = (state[:, :, j, i] for j in (0, 1) for i in (0, 1))  # grad u = (a b; c d)
+    xx, yy, xy = 0.5 * (a * a + c * c), 0.5 * (b * b + d * d), mu * (a * b + c * d)
+    mean, strain = lam * (xx + yy), lam * (a + d)
+    xx, yy = mean + 2 * mu * xx, mean + 2 * mu * yy
+    s_xx, s_yy, s_xy = xx + strain + 2 * mu * a, yy + strain + 2 * mu * d, xy + mu * (b + c)
+    first = (xx + a * s_xx + b * s_xy) * rate[:, :, 0, 0] + (xy + a * s_xy + b * s_yy) * rate[:, :, 1, 0]
+    second = (xy + c * s_xx + d * s_xy) * rate[:, :, 0, 1] + (yy + c * s_xy + d * s_yy) * rate[:, :, 1, 1]
+    return np.asarray(first + second)

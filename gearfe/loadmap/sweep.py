@@ -1,6 +1,6 @@
 r"""A load map computed: the twist at which each pinion angle carries each torque.
 
-The cells are solved by `gearfe.loadmap.cells`; each torque is a curve as `gearfe.stiffness.sweep` makes it.
+Each torque is a curve as `gearfe.stiffness.sweep` makes it; all cells are solved side by side.
 """
 
 from __future__ import annotations
@@ -17,18 +17,11 @@ from ..contact.model import DEFAULT_MODEL, PairModel
 from ..contact.position import Positions, joined, together
 from ..errors import InputError
 from ..gear.pair import GearPair
-from ..stiffness.positions import (
-    PositionSolver,
-    Progress,
-    TorqueGoals,
-    checked_contact,
-    position_solver,
-)
+from ..stiffness.positions import PositionSolver, Progress, at_torques, position_solver
 from ..stiffness.sweep import asked_positions, assembled_curve, distinct_angles, elastic_pair
 from ..stopwatch import Stopwatch
 from ..threads import one_thread
 from ..typing import Array
-from .cells import solve_cells
 from .load_map import LoadMap
 
 if TYPE_CHECKING:
@@ -92,7 +85,7 @@ def sweep_loads(
         raise InputError("torques", len(goals), problem, "use fewer torques or angles")
     solver = position_solver(pair, elastic)
     with watch.stage("unloaded flanks"):
-        touching = solver.touching_twists(solved_angles)
+        solver.touching(solved_angles)
     roots = None
     if root_stress:
         from .root_stress import pair_roots
@@ -100,13 +93,10 @@ def sweep_loads(
         with watch.stage("root meshes"), one_thread():
             roots = pair_roots(pair, elastic)
     with watch.stage("cells"), one_thread():
-        found, at_roots = _cells(solver, solved_angles, goals, touching, roots, progress, finite=finite)
+        found, at_roots = _cells(solver, solved_angles, goals, roots, progress, finite=finite)
     n = len(solved_angles)
     levels = [found.take(slice(row * n, (row + 1) * n)) for row in range(len(goals))]
-    curves = tuple(
-        assembled_curve(solver, asked, source, checked_contact(level, touching), touching, searched=True)
-        for level in levels
-    )
+    curves = tuple(assembled_curve(solver, asked, source, level, searched=True) for level in levels)
     root = None
     if at_roots is not None:
         from .root_stress import root_map
@@ -119,7 +109,6 @@ def _cells(
     solver: PositionSolver,
     angles: Array,
     goals: Array,
-    touching: Array,
     roots: PairRoots | None,
     progress: Progress | None,
     *,
@@ -129,9 +118,8 @@ def _cells(
     n, parts, at_roots = len(angles), [], []
     for rows in np.array_split(np.arange(len(goals)), max(1, math.ceil(len(goals) * n / TOGETHER))):
         torque = np.repeat(goals[rows], n)
-        own = TorqueGoals(np.tile(angles, len(rows)), torque, np.tile(touching, len(rows)))
         kept = np.arange(0 if roots is None else len(torque))
-        found = solve_cells(solver, own, kept, strain=n if finite else 0)
+        found = at_torques(solver, np.tile(angles, len(rows)), torque, kept=kept, finite=finite)
         if roots is not None:
             made = roots.at(found)
             at_roots.append(replace(made, position=rows[0] * n + made.position))

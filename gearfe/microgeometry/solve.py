@@ -14,10 +14,9 @@ from ..errors import InputError
 from ..gear.deviation import ToothDeviations
 from ..gear.iso6336 import mesh_stiffness
 from ..gear.validity import MOST_YIELD
-from ..loadmap.cells import solve_cells
 from ..loadmap.root_stress import PairRoots
 from ..stiffness.contact_pressure import BLUNTING
-from ..stiffness.positions import HalfPlaneSolver, Progress, TorqueGoals
+from ..stiffness.positions import HalfPlaneSolver, Progress, at_torques
 from ..threads import one_thread
 from ..typing import Array, IntArray
 from .loaded_mesh import BACK, LoadedMesh, PairLoads, full_period
@@ -99,8 +98,7 @@ def load_mesh(
         for start in range(0, count, AT_ONCE):
             numbers = np.arange(start, min(start + AT_ONCE, count))
             angle, goal = numbers % n, goals[numbers // n]
-            own = TorqueGoals(place[angle], goal, touch[angle])
-            made = solve_cells(solver, own, np.arange(0 if roots is None else len(goal)))
+            made = at_torques(solver, place[angle], goal, kept=np.arange(0 if roots is None else len(goal)))
             if stress is not None and roots is not None:
                 stress[numbers] = _root_stress(made, roots)
             pairs.append(_pair_loads(law, made, numbers, n))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ..contact.compliance import MeshingPair
 from ..contact.elements import first_contacts, solve_elements
-from ..contact.finite_strain import finite_strain_shares, interpolated_shares, sample_numbers, with_shares
+from ..contact.finite_strain import finite_strain_shares, with_shares
 from ..contact.half_plane import HalfPlanePair, half_plane_pair, solve_half_plane
 from ..contact.half_plane_result import flank_loads
 from ..contact.half_plane_start import expected_twists
@@ -44,11 +44,6 @@ AT_ONCE = 512
 class HalfPlaneSolver:
     """Positions of one pair by the half-plane law; without the elastic gears there are no loads on nodes."""
 
-    #: Relative change of the forces from one step of the iteration to the next leaves this of the torque.
-    torque_tolerance = 1e-7
-    #: Relative miss of a torque from which one step leads to it: contacts move with their own rates.
-    nearly = 1e-3
-
     def __init__(self, law: HalfPlanePair, elastic: MeshingPair | None = None) -> None:
         self.pair, self._elastic, self.law = law.pair, elastic, law
         self.curves = [self.law.curves[flank] for flank in self.law.teeth.flank(np.zeros(1, dtype=np.int64))[0]]
@@ -77,16 +72,16 @@ class HalfPlaneSolver:
         np.minimum.at(made, found.position, found.twist)
         return made
 
-    def first_touch(self, touching: Array) -> float:
+    def first_touch(self, angles: Array) -> float:
         """Twist (rad) that stiffness counts from: where unmodified flanks touch, or before, what stands out of them.
 
-        The first touch of the mesh cycle; those at some angles (rad), `touching`, are among it.
+        The first touch of the mesh cycle, these pinion angles (rad) among it.
         """
         free = self.pair.contact_twist
         if self.elastic.deviations == NOMINAL:
             return free
-        angles = self.pair.mesh_cycle * np.arange(LOOKS) / LOOKS
-        return float(min(free, touching.min(initial=free), self.touching_twists(angles).min()))
+        every = np.concatenate([angles, self.pair.mesh_cycle * np.arange(LOOKS) / LOOKS])
+        return float(min(free, self.touching_twists(every).min()))
 
     def touching(self, angles: Array) -> Touching:
         """Tooth pairs whose rigid flanks can meet at pinion angles (rad), by position; searched for once an angle."""
@@ -117,11 +112,6 @@ class ElementSolver:
     resolved_only
         False solves what the elements do not resolve, too: to measure the error that this makes.
     """
-
-    #: Relative accuracy to which torques can be searched for.
-    torque_tolerance = 1e-10
-    #: As above; contacts move with the torque.
-    nearly = 1e-4
 
     def __init__(self, pair: GearPair, elastic: MeshingPair, *, resolved_only: bool = True) -> None:
         self.pair, self.elastic, self.resolved_only = pair, elastic, resolved_only
@@ -163,8 +153,8 @@ Progress = Callable[[int, int, str], None]
 
 #: Positions handed to the solver at once: enough to work side by side, few enough to stay small in memory.
 BATCH = 128
-#: The finite-strain share changes with the twist that it moves, by about a hundredth of itself each pass.
-SHARE_PASSES = 6
+#: Relative miss of a torque from which one step leads to it.
+NEARLY = 1e-4
 
 
 def in_batches(
@@ -181,16 +171,11 @@ def in_batches(
 
 
 def at_twists(
-    solver: PositionSolver, angles: Array, twists: Array, progress: Progress | None, *, finite: bool = False
+    solver: PositionSolver, angles: Array, twists: Array, progress: Progress | None = None, *, finite: bool = False
 ) -> Positions:
     """Positions at pinion angles and twists, both of shape (n,) (rad); with or without finite strain."""
-    cycle = solver.elastic.pitch_angle
-    sampled = sample_numbers(angles, cycle) if finite else NONE
-    found = in_batches(solver, angles, twists, sampled, progress)
-    if not finite:
-        return found
-    shares = finite_strain_shares(solver.elastic, found.take(sampled))
-    return with_shares(found, interpolated_shares(angles, angles[sampled], shares, cycle))
+    found = in_batches(solver, angles, twists, np.arange(len(angles)) if finite else NONE, progress)
+    return with_shares(found, finite_strain_shares(solver.elastic, found)) if finite else found
 
 
 def check_torque(solver: PositionSolver, torque: float) -> None:
@@ -204,102 +189,74 @@ def check_torque(solver: PositionSolver, torque: float) -> None:
         raise InputError("torque", torque, problem, "linear elasticity does not reach so far; give less")
 
 
-@dataclass(frozen=True)
-class TorqueGoals:
-    """Positions that are to carry torques.
-
-    Attributes
-    ----------
-    angle, torque, touching : ndarray, shape (n,)
-        Pinion angles (rad), torques at the wheel's hub (N m), and twists at which the rigid flanks touch (rad).
-    """
-
-    angle: Array
-    torque: Array
-    touching: Array
-
-
 def at_torques(
     solver: PositionSolver,
-    goals: TorqueGoals,
+    angles: Array,
+    torques: Array,
     *,
-    start: Array | None = None,
     kept: IntArray = NONE,
-    tolerance: float | None = None,
+    finite: bool = False,
     progress: Progress | None = None,
 ) -> Positions:
-    """Small-strain positions that carry torques; those numbered `kept` with loads.
+    """Positions at pinion angles (rad) that carry torques (N m), both of shape (n,); with or without finite strain.
+
+    The twist is expected by the half-plane law (laws on elements start from its solution, so that they are asked for
+    loads near the goal) and searched for until the torque is off by no more than `NEARLY`; the last step is Newton's,
+    whose error is some hundredths of the square of the step. Finite strain changes the torque by a share c, which grows
+    about as the torque does: at the goal T of the whole, small strain carries T/(1 + c') with c' = c/(1 + c). What that
+    misses is of the second order in c, as is what the share itself leaves out.
 
     Parameters
     ----------
-    start
-        Twists to start from (rad), by default those expected by the half-plane law; laws on elements start from its
-        solution, so that they are asked for loads near the goal.
-    tolerance
-        Relative error of the torque, by default the solver's.
+    kept
+        Numbers of the positions with loads; all have them where finite strain counts.
     """
-    accepted = solver.torque_tolerance if tolerance is None else tolerance
-    count, first = len(goals.torque), start
-    if first is None:
-        if isinstance(solver, ElementSolver):
-            first = at_torques(solver.half_plane, goals).twist
-        else:
-            first = expected_twists(solver.law, goals.torque, solver.touching(goals.angle))
+    kept = np.arange(len(angles)) if finite else kept
+    touching = solver.touching_twists(angles)
 
-    def solve(numbers: IntArray, twists: Array) -> Positions:
-        if progress is not None:
-            progress(count - len(numbers), count, "positions")
-        return in_batches(solver, goals.angle[numbers], twists, np.flatnonzero(np.isin(numbers, kept)))
+    def search(goal: Array, first: Array, among: IntArray) -> Positions:
+        def solve(numbers: IntArray, twists: Array) -> Positions:
+            if progress is not None:
+                progress(len(angles) - len(numbers), len(angles), "positions")
+            of = among[numbers]
+            return in_batches(solver, angles[of], twists, np.flatnonzero(np.isin(of, kept)))
 
-    most = math.pi / solver.pair.wheel.teeth
-    return twists_for_torque(solve, goals.torque, touching=goals.touching, first=first, most=most, tolerance=accepted)
+        most = math.pi / solver.pair.wheel.teeth
+        own = touching[among]
+        return twists_for_torque(solve, goal, touching=own, first=first, most=most, tolerance=NEARLY)
 
-
-def moved_to(
-    solver: PositionSolver, found: Positions, goals: TorqueGoals, *, kept: IntArray, tolerance: float | None = None
-) -> Positions | None:
-    """Solved positions again at torques near theirs, where these differ; None where none does. See `at_torques`."""
-    accepted, goal = solver.torque_tolerance if tolerance is None else tolerance, goals.torque
-    with np.errstate(invalid="ignore"):
-        off = (found.status == "converged") & (np.abs(found.torque_wheel - goal) > accepted * goal)
-    again = np.flatnonzero(off)  # what was not reached is not asked for once more
-    if len(again) == 0:
-        return None
-    start = newton_twist(found.twist, goals.touching, found.torque_wheel, found.tangent, goal)[again]
-    few, mine = taken(goals, again), np.flatnonzero(np.isin(again, kept))
-    more = at_torques(solver, few, start=start, kept=mine, tolerance=tolerance)
-    return found.replaced(again, replace(more, iterations=more.iterations + found.iterations[again]))
-
-
-def at_torque(
-    solver: PositionSolver, angles: Array, torque: float, touching: Array, progress: Progress | None, *, finite: bool
-) -> Positions:
-    """Positions at pinion angles (rad), shape (n,), that carry `torque` (N m); with or without finite strain."""
-    goals, cycle = TorqueGoals(angles, np.full(len(angles), torque), touching), solver.pair.mesh_cycle
-    sampled = sample_numbers(angles, cycle) if finite else NONE
-    found, share = at_torques(solver, goals, kept=sampled, progress=progress), np.zeros(len(angles))
-    for _ in range(SHARE_PASSES if finite else 0):
-        shares = finite_strain_shares(solver.elastic, found.take(sampled))
-        share = interpolated_shares(angles, angles[sampled], shares, cycle)
-        more = moved_to(solver, found, replace(goals, torque=goals.torque / (1 + share)), kept=sampled)
-        if more is None:
-            break
-        found = more
+    if isinstance(solver, ElementSolver):
+        first = at_torques(solver.half_plane, angles, torques).twist
+    else:
+        first = expected_twists(solver.law, torques, solver.touching(angles))
+    found = search(torques, first, np.arange(len(angles)))
+    if finite:
+        share = finite_strain_shares(solver.elastic, found)
+        share = share / (1 + share)
+        small = torques / (1 + share)
+        start = newton_twist(found.twist, touching, found.torque_wheel, found.tangent, small)
+        with np.errstate(invalid="ignore"):
+            off = np.abs(found.torque_wheel - small) > NEARLY * small
+        again = np.flatnonzero((found.status == "converged") & off)  # what was not reached is not asked for once more
+        if len(again):
+            more = search(small[again], start[again], again)
+            found = found.replaced(again, replace(more, iterations=more.iterations + found.iterations[again]))
+        found = with_shares(found, share)
     if progress is not None:
         progress(len(angles), len(angles), "positions")
-    return closed(with_shares(found, share), goals)
+    return closed(found, torques, touching)
 
 
-def closed(found: Positions, goals: TorqueGoals) -> Positions:
+def closed(found: Positions, goal: Array, touching: Array) -> Positions:
     """Positions whose torques are nearly the goals, brought there by the last small step of their twists.
 
     Moments change with the torque; loads and contacts of the half-plane law with their own rates.
     """
-    goal, good = goals.torque, found.status == "converged"
+    good = found.status == "converged"
     factor = np.where(good, goal / np.where(good, found.torque_wheel, 1.0), 1.0)
     moments = {name: getattr(found, name) * factor for name in TORQUES if name != "tangent"}
     moments["torque_wheel"] = np.where(good, goal, found.torque_wheel)
-    twist = newton_twist(found.twist, goals.touching, found.torque_wheel, found.tangent, goal)
+    twist = newton_twist(found.twist, touching, found.torque_wheel, found.tangent, goal)
     twist = np.where(good, twist, found.twist)
     by = twist - found.twist
     loads = tuple(replace(one, force=one.force + by[one.position, None] * one.rate) for one in found.loads)
@@ -310,11 +267,9 @@ def closed(found: Positions, goals: TorqueGoals) -> Positions:
     return replace(found, twist=twist, contacts=contacts, loads=loads, **moments)
 
 
-def checked_contact(found: Positions, touching: Array) -> Positions:
-    """Mark positions without contact whose exact rigid flanks overlap, and take all numbers off failed ones.
-
-    `touching` are the twists (rad), shape (n,), at which the rigid flanks touch.
-    """
+def checked_contact(solver: PositionSolver, found: Positions) -> Positions:
+    """Mark positions without contact whose exact rigid flanks overlap, and take all numbers off failed ones."""
+    touching = solver.touching_twists(found.pinion_angle)
     overlap = (found.status == "no_contact") & (found.twist > touching + ANGLE_ROUNDING)
     return found.stated(np.where(overlap, "not_converged", found.status))
 

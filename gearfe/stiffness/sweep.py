@@ -37,7 +37,7 @@ from .periodic import wrapped_phase
 from .positions import (
     PositionSolver,
     Progress,
-    at_torque,
+    at_torques,
     at_twists,
     check_torque,
     checked_contact,
@@ -149,18 +149,18 @@ def sweep_stiffness(
     if torque is not None:
         check_torque(solver, load)
     with watch.stage("unloaded flanks"):
-        touching = solver.touching_twists(solved_angles)
+        solver.touching(solved_angles)
     with watch.stage("positions"), one_thread():
         if torque is None:
             solved = at_twists(solver, solved_angles, np.full(len(solved_angles), load), progress, finite=finite)
         else:
-            solved = at_torque(solver, solved_angles, load, touching, progress, finite=finite)
-    solved = checked_contact(solved, touching)
+            goals = np.full(len(solved_angles), load)
+            solved = at_torques(solver, solved_angles, goals, finite=finite, progress=progress)
     error = None
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
             error = curve_error(solver, coarser(pair, elastic), solved, finite=finite)
-    curve = assembled_curve(solver, asked, source, solved, touching, searched=torque is not None)
+    curve = assembled_curve(solver, asked, source, solved, searched=torque is not None)
     return replace(curve, timings=dict(watch.seconds), error=error)
 
 
@@ -205,7 +205,7 @@ def distinct_angles(angles: Array, cycle: float) -> tuple[Array, IntArray]:
 
 
 def assembled_curve(
-    solver: PositionSolver, asked: Array, source: IntArray, solved: Positions, touching: Array, *, searched: bool
+    solver: PositionSolver, asked: Array, source: IntArray, solved: Positions, *, searched: bool
 ) -> StiffnessCurve:
     """The curve at all asked angles.
 
@@ -213,17 +213,16 @@ def assembled_curve(
     ----------
     source
         Number of the position among those solved for each of the angles.
-    touching
-        Twists (rad), shape (n,), at which the rigid flanks of these touch.
     searched
         Whether the twist is a result, not given.
     """
     pair, law = solver.pair, solver.elastic.law
     radius, lost = pair.wheel.base_radius, pair.contact_twist
+    solved = checked_contact(solver, solved)
     failed = ~np.isin(solved.status, SOLVED)
     total = np.where(failed & searched, np.nan, solved.twist)
     twist, torque = total - lost, solved.torque_wheel
-    deflection = total - solver.first_touch(touching)
+    deflection = total - solver.first_touch(solved.pinion_angle)
     stiffness = np.divide(torque, deflection, out=np.zeros_like(torque), where=torque != 0.0)  # not-a-number stays
     cycles = np.round((asked - solved.pinion_angle[source]) / pair.mesh_cycle).astype(np.int64)
     leading, shares = load_shares(solved)
@@ -238,7 +237,7 @@ def assembled_curve(
         "k_mesh": stiffness / radius**2,
         "k_tangent": solved.tangent / radius**2,
         "transmission_error": twist * radius,
-        "transmission_error_unloaded": (touching - lost) * radius,
+        "transmission_error_unloaded": (solver.touching_twists(solved.pinion_angle) - lost) * radius,
         "load_share": shares,
         "teeth_in_contact": np.where(failed, -1, (shares > 0).sum(axis=1)),
         "edge": np.array(EDGES)[edge],
