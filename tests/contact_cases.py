@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
 from functools import cache
 
 from gearfe.contact.compliance import GearBody, MeshingPair, gear_body
@@ -13,7 +12,6 @@ from gearfe.elasticity import Material, Plane
 from gearfe.gear.pair import Gear, GearPair, TipRelief
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import SectorMesh, sector_mesh
-from gearfe.verification import laws as oracle
 from gearfe.verification.whole_pair import ElasticGear, WholePair
 
 WIDTH = 10e-3
@@ -74,9 +72,3 @@ def whole(name: str, coarsen: float, plane: Plane) -> WholePair:
         gears(name).working_centre_distance,
         WIDTH,
     )
-
-
-def oracle_law(law: ContactLaw) -> oracle.ContactLaw:
-    """A law of the sweep as the verification route's own."""
-    made = {"nitsche": oracle.Nitsche, "penalty": oracle.Penalty}[law.name]
-    return made(**asdict(law))  # type: ignore[call-overload]

@@ -11,7 +11,7 @@ from gearfe.elasticity import element_stiffness
 from gearfe.meshing.whole_gear import whole_gear
 from gearfe.verification.monolithic import solve_monolithic
 
-from .contact_cases import STEEL, WIDTH, condensed, gears, meshes, oracle_law, whole
+from .contact_cases import STEEL, WIDTH, condensed, gears, meshes, whole
 from .solving import peak_pressure, solve_position
 
 COARSE = 5.0
@@ -37,7 +37,7 @@ def test_both_routes_give_the_same_position(
 ) -> None:
     place = math.radians(angle), math.radians(twist)
     small = solve_position(gears(name), condensed(name, COARSE, plane, law), *place)  # type: ignore[arg-type]
-    full = solve_monolithic(whole(name, COARSE, plane), oracle_law(law), *place)  # type: ignore[arg-type]
+    full = solve_monolithic(whole(name, COARSE, plane), law, *place)
     assert small.status == full.status == "converged"
     assert np.count_nonzero(small.contacts.torque_wheel > 1e-3 * small.torque_wheel) == pairs
     assert full.peak_pressure == pytest.approx(peak_pressure(small), rel=1e-8)
@@ -50,7 +50,7 @@ def test_without_twist_nothing_touches_on_either_route() -> None:
     assert (
         solve_position(gears("sharp"), condensed("sharp", COARSE, "strain", Nitsche()), *apart).status == "no_contact"
     )
-    assert solve_monolithic(whole("sharp", COARSE, "strain"), oracle_law(Nitsche()), *apart).status == "no_contact"
+    assert solve_monolithic(whole("sharp", COARSE, "strain"), Nitsche(), *apart).status == "no_contact"
 
 
 def test_whole_gear_is_closed_and_made_of_turned_sectors() -> None:

@@ -23,9 +23,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gearfe.contact.laws import ElementLaw, Penalty
 from gearfe.elasticity import Material
 from gearfe.verification.bodies import Bodies, ElasticBody
-from gearfe.verification.laws import ContactLaw, Exact, Nitsche, Penalty
+from gearfe.verification.laws import Exact, Nitsche
 from gearfe.verification.newton import solve_contact
 from gearfe.verification.problem import ContactProblem, contact_problem
 
@@ -54,7 +55,7 @@ def exact(material: Material, x: Array, y: Array) -> tuple[Array, Array]:
     return u, np.stack([f.real - y * slope.imag, f.real + y * slope.imag, -y * slope.real])
 
 
-def hertz_problem(n: int, law: ContactLaw, quadrature: str) -> ContactProblem:
+def hertz_problem(n: int, law: ElementLaw, quadrature: str) -> ContactProblem:
     """Right halves of both bodies; the meshes' edges along the contact are in the ratio 2 to 3."""
 
     def spaced(k: int, fine: float, share: int) -> Array:
@@ -95,7 +96,7 @@ class HertzError:
 
 
 @cache
-def hertz_error(n: int, law: ContactLaw, quadrature: str) -> HertzError:
+def hertz_error(n: int, law: ElementLaw, quadrature: str) -> HertzError:
     problem = hertz_problem(n, law, quadrature)
     solution = solve_contact(problem, tolerance=1e-9)
     assert solution.status == "converged"
@@ -160,7 +161,7 @@ def scaled_penalty(n: int) -> Penalty:
 @pytest.mark.parametrize(
     ("law", "levels"), [(Nitsche(), (1, 2)), (None, (1, 2)), (Exact(), (1, 4))], ids=["nitsche", "penalty", "exact"]
 )
-def test_rates_under_refinement(law: ContactLaw | None, levels: tuple[int, ...]) -> None:
+def test_rates_under_refinement(law: ElementLaw | None, levels: tuple[int, ...]) -> None:
     rates, beyond = refined(law, levels)
     assert (rates > LEAST_RATES).all()
     assert (beyond < 0).all()
@@ -171,7 +172,7 @@ FINER = [Nitsche(), Nitsche(sides="pinion"), Nitsche(theta=-1), Nitsche(20.0, th
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", FINER, ids=lambda law: "penalty" if law is None else f"{law.theta}, {law.sides}")
-def test_rates_under_more_refinement(law: ContactLaw | None) -> None:
+def test_rates_under_more_refinement(law: ElementLaw | None) -> None:
     rates, beyond = refined(law, (1, 2, 4))
     assert (rates > LEAST_RATES).all()
     assert (beyond < 0).all()
@@ -181,7 +182,7 @@ def test_rates_under_more_refinement(law: ContactLaw | None) -> None:
 LEAST_RATES = np.array([1.5, 1.0, 1.0])
 
 
-def refined(law: ContactLaw | None, levels: tuple[int, ...]) -> tuple[Array, Array]:
+def refined(law: ElementLaw | None, levels: tuple[int, ...]) -> tuple[Array, Array]:
     """Rates of energy norm, peak pressure and half width; how far contact ends beyond one edge of the coarser side."""
     errors = [hertz_error(n, law or scaled_penalty(n), "segments") for n in levels]
     span = np.log2(levels[-1] / levels[0])

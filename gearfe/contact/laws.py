@@ -91,7 +91,8 @@ def law_text(law: ContactLaw) -> str:
     return " ".join([law.name, *(f"{name}={text}" for name, text in texts.items())])
 
 
-def _check_sides(sides: str, allowed: tuple[str, ...]) -> None:
+def check_sides(sides: str, allowed: tuple[str, ...]) -> None:
+    """Raise `InputError` for sides that a law cannot have."""
     if sides not in allowed:
         raise InputError("sides", sides, "must be one of " + ", ".join(allowed))
 
@@ -123,7 +124,7 @@ class Penalty:
     uses_stress: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        _check_sides(self.sides, get_args(Sides))
+        check_sides(self.sides, get_args(Sides))
         if self.stiffness is not None:
             _check_positive("stiffness", self.stiffness, "Pa/m, pressure for each metre of overlap")
 
@@ -151,7 +152,7 @@ class Nitsche:
     uses_stress: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        _check_sides(self.sides, ("both", "pinion", "wheel"))
+        check_sides(self.sides, ("both", "pinion", "wheel"))
         _check_positive("gamma0", self.gamma0, "gamma h/E")
 
     def parameter(self, youngs_modulus: float, sizes: Array) -> Array:

@@ -14,6 +14,7 @@ from ..contact.closest import Projection, nearest_places, project
 from ..typing import Array, ComplexArray, IntArray
 from . import forms
 from .bodies import edge_points, edge_tangents
+from .laws import theta_of
 from .problem import ContactProblem, Points
 
 PLANE = np.array([1.0, 1.0j])
@@ -133,7 +134,7 @@ def contact_at(
     }
     fields: dict[str, Any] = {name: value[..., on, None] for name, value in at_points.items()}
     fields["X_xi"] = edge_tangents(problem.mesh, mate, mate_xi)[:, :, None]
-    fields |= {"stress_rate": rate[:, :, on], "s": float(law.uses_stress), "theta": float(law.theta)}
+    fields |= {"stress_rate": rate[:, :, on], "s": float(law.uses_stress), "theta": float(theta_of(law))}
     contact, stress_loads = (f.assemble(pairs, **fields) for f in (forms.pressure_work, forms.stress_work))
     return ContactState(u, points, found, slave, pressure, share, on, pairs, fields, contact, stress_loads, multipliers)
 

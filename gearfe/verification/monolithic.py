@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..contact.laws import ElementLaw
 from ..typing import Array
 from .contact_state import contact_at
-from .laws import ContactLaw
 from .newton import TOLERANCE, ContactSolution, solve_contact
 from .problem import ContactProblem
 from .whole_pair import WholePair
@@ -59,7 +59,7 @@ FAILED = (float("nan"),) * 4
 
 
 def solve_monolithic(
-    pair: WholePair, law: ContactLaw, pinion_angle: float, twist: float, *, tolerance: float = TOLERANCE
+    pair: WholePair, law: ElementLaw, pinion_angle: float, twist: float, *, tolerance: float = TOLERANCE
 ) -> MonolithicPosition:
     """Solve the contact of two whole gears at one pinion angle (rad) and wheel twist (rad).
 
@@ -99,7 +99,7 @@ def solve_monolithic(
 
 
 def _raised(
-    pair: WholePair, law: ContactLaw, pinion_angle: float, twist: float, tolerance: float
+    pair: WholePair, law: ElementLaw, pinion_angle: float, twist: float, tolerance: float
 ) -> tuple[ContactSolution | None, int]:
     """Solution at the end of steps of the twist, and the iterations of all of them."""
     done, step, iterations, u = 0.0, 0.25, 0, None

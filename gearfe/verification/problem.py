@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from ..contact.closest import nearest_places, project
+from ..contact.laws import ElementLaw
 from ..errors import InputError
 from ..typing import Array, IntArray
 from .bodies import Bodies, Value, edge_lengths, edge_points, edge_tangents
 from .constitution import Kinematics, SaintVenantKirchhoff, SmallStrain, linear_stress_rate
 from .forms import stress_term
-from .laws import ContactLaw, side_share
+from .laws import shares_of, theta_of
 from .segments import Quadrature, segments, whole_edges
 
 
@@ -110,7 +111,7 @@ class ContactProblem:
     bodies: Bodies
     mesh: Any
     facing: tuple[tuple[Surface, Surface], ...]
-    law: ContactLaw
+    law: ElementLaw
     width: float
     fixed: IntArray
     values: Array
@@ -126,8 +127,9 @@ class ContactProblem:
         for name, allowed in (("quadrature", ("points", "segments")), ("kinematics", ("small", "finite"))):
             if getattr(self, name) not in allowed:
                 raise InputError(name, getattr(self, name), "must be one of " + ", ".join(allowed))
-        if self.kinematics == "finite" and self.law.theta != 0:
-            raise InputError("theta", self.law.theta, "must be 0 with finite strain", "take theta = 0 or small strain")
+        theta = theta_of(self.law)
+        if self.kinematics == "finite" and theta != 0:
+            raise InputError("theta", theta, "must be 0 with finite strain", "take theta = 0 or small strain")
 
     @cached_property
     def unknowns(self) -> IntArray:
@@ -141,13 +143,14 @@ class ContactProblem:
             return SaintVenantKirchhoff(self.bodies, self.mesh)
         stiffness = self.bodies.stiffness if self.stiffness is None else self.stiffness
         skins = self.skins or [(s.part, k, s.edges) for couple in self.facing for k, s in enumerate(couple)]
+        theta, shares = theta_of(self.law), shares_of(self.law, np.zeros((1, 2)))[0]
         for part, side, edges in skins:
-            if self.law.theta and side_share(self.law, side) > 0:
+            if theta and shares[side] > 0:
                 every = whole_edges(np.arange(len(edges)), self.points_per_edge)
-                points = self._points(part, edges, 0, side_share(self.law, side), *every)
+                points = self._points(part, edges, 0, shares[side], *every)
                 basis, surface = self.at(points)
                 fields = {"stress_rate": linear_stress_rate(**surface), "gamma": points.gamma[:, None]}
-                stiffness = stiffness - stress_term.assemble(basis, theta=self.law.theta, **fields)
+                stiffness = stiffness - stress_term.assemble(basis, theta=theta, **fields)
         return SmallStrain(stiffness)
 
     @cached_property
@@ -165,20 +168,18 @@ class ContactProblem:
         """Surfaces that carry contact points, with mate, number of the mate's chain and share of the pressure."""
         made = []
         for couple, pair in enumerate(self.facing):
-            shares = [side_share(self.law, side) for side in (0, 1)]
-            if self.law.sides == "tip":
-                shares = [1.0, 0.0] if self._ends_nearer(*pair) else [0.0, 1.0]
+            shares = shares_of(self.law, self._to_ends(*pair)[None])[0]
             made += [(pair[k], pair[1 - k], 2 * couple + 1 - k, shares[k]) for k in (0, 1) if shares[k] > 0]
         return made
 
-    def _ends_nearer(self, one: Surface, two: Surface) -> bool:
-        """Whether the first surface ends (in a tooth's tip) nearer to where the undeformed bodies overlap."""
+    def _to_ends(self, one: Surface, two: Surface) -> Array:
+        """How far (m) the surfaces go on to their ends (teeth's tips) from where the undeformed bodies overlap."""
         left = []
         for own, mate in ((one, two), (two, one)):
             inside = np.flatnonzero(self.node_gaps(own, mate)[::2] < 0)
             middle = int(inside.mean()) if len(inside) else len(own.edges)
             left.append(edge_lengths(self.mesh.doflocs.T[own.edges], self.points_per_edge)[middle:].sum())
-        return bool(left[0] <= left[1])
+        return np.array(left)
 
     def node_gaps(self, own: Surface, mate: Surface) -> Array:
         """Gaps (m) of a surface's nodes to its mate, undeformed."""
@@ -231,7 +232,7 @@ class ContactProblem:
 def contact_problem(
     bodies: Bodies,
     facing: tuple[tuple[tuple[int, str], tuple[int, str]], ...],
-    law: ContactLaw,
+    law: ElementLaw,
     *,
     prescribed: Mapping[tuple[int, str], tuple[Value | None, Value | None]],
     tractions: Mapping[tuple[int, str], tuple[Value, Value]] | None = None,

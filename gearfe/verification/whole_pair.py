@@ -9,13 +9,13 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.spatial import KDTree
 
+from ..contact.laws import ElementLaw
 from ..elasticity import Material, Plane
 from ..meshing.tooth_sector import SectorMesh
 from ..meshing.whole_gear import WholeGear, whole_gear
 from ..typing import Array
 from .bodies import Bodies, ElasticBody
 from .constitution import Kinematics
-from .laws import ContactLaw
 from .problem import ContactProblem, Surface
 from .segments import Quadrature
 
@@ -75,7 +75,7 @@ class WholePair:
         z1, z2 = self.pinion.mesh.teeth, self.wheel.mesh.teeth
         return pinion_angle, twist - pinion_angle * z1 / z2 + np.pi + np.pi / z2
 
-    def problem(self, law: ContactLaw, pinion_angle: float, twist: float) -> ContactProblem | None:
+    def problem(self, law: ElementLaw, pinion_angle: float, twist: float) -> ContactProblem | None:
         """Contact problem of all flanks that come near each other, or None when none do."""
         unknowns, nodes = self.bodies.unknowns, self.bodies.node_of
         turns = np.empty((len(unknowns), 2, 2))
