@@ -120,13 +120,13 @@ def test_fields(tmp_path):
 def test_animation(tmp_path, capsys):
     from PIL import Image
 
-    options = ["--twist-deg", "0.1", "--angles", "0", "3", "17", "--animate", "2", *QUICK, "--no-pictures"]
+    options = ["--twist-deg", "0.1", "--angles", "0", "3", "17", "--animation", "2", *QUICK, "--no-pictures"]
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *options]) == 0
     assert sorted(p.name for p in tmp_path.iterdir()) == ["stiffness.csv", "stress.gif", "summary.json"]
     with Image.open(tmp_path / "stress.gif") as made:
         assert made.n_frames == 2
-    assert main(["stiffness", str(JOB), "--out", str(tmp_path / "b"), "--animate", "1"]) == 2
-    assert "--animate" in capsys.readouterr().err
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path / "b"), "--animation", "1"]) == 2
+    assert "--animation" in capsys.readouterr().err
     assert not (tmp_path / "b").exists()
 
 

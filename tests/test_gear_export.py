@@ -79,10 +79,15 @@ def test_the_command_exports_both_gears(tmp_path, capfd):
     assert table["radius_mm"].min() == pytest.approx(0.5 * (75.0 - 2 * 1.25 * 2.5), abs=1e-9)
     assert set(table["piece"]) >= {"involute_left", "tip_right", "trochoid_left"}
     assert main([*line, "iges"]) == 2
-    assert "brep, csv, dxf, step" in capfd.readouterr().err
+    assert "csv, dxf, step, brep" in capfd.readouterr().err
     # a later export leaves no old solid of other gears
     assert main([*line, "csv"]) == 0
     assert not (tmp_path / "out" / "wheel.step").exists()
+    # one gear by its file's name, without a picture
+    assert main([*line, "pinion.csv", "--no-pictures"]) == 0
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"gear_pair.json", "pinion.csv"}
+    assert main([*line, "pinon.csv"]) == 2
+    assert "did you mean 'pinion.csv'" in capfd.readouterr().err
 
 
 def test_a_drawing_in_layers(tmp_path):

@@ -5,7 +5,7 @@ marked as such in the output, 2 is kept for bad input). It imports what it needs
 only when that command runs or its help is asked.
 """
 
-#: Command -> what it does in one line, and an example for the end of its help.
+#: Command -> what it does in one line, and an example for the end of its help (`gearfe new` writes the job files).
 COMMANDS: dict[str, tuple[str, str]] = {
     "stiffness": (
         "mesh stiffness of a gear pair over its rotation: table, picture, summary, fields",
@@ -17,39 +17,39 @@ COMMANDS: dict[str, tuple[str, str]] = {
     ),
     "microgeometry": (
         "reliefs, pitch errors, measured flanks: transmission error, orders, load sharing, pressure against torque",
-        "gearfe microgeometry geometry/microgeometry.toml --out out/micro",
+        "gearfe microgeometry microgeometry.toml --torques-Nm 50 100 --report",
     ),
     "relief": (
         "tip and root relief, crowning, slope: search for the best at some torques, with its tolerances",
-        "gearfe relief geometry/microgeometry.toml --out out/relief",
+        "gearfe relief microgeometry.toml --workers 2",
     ),
     "gear": (
         "derived geometry of a gear pair, and a drawing of it in mesh",
-        "gearfe gear pair.toml --angle-deg 5",
+        "gearfe gear pair.toml --angle-deg 5 --export dxf,step",
     ),
     "mesh": (
         "meshes of a gear pair with named boundaries, as .msh, .vtu or .inp, or a CalculiX deck of its contact",
-        "gearfe mesh pair.toml --out gears.msh",
+        "gearfe mesh pair.toml --teeth 3 --out gears.msh",
     ),
     "mechanism": (
         "trajectories, energies and reactions of a planar mechanism",
-        "gearfe mechanism geometry/andrews.toml --out out/andrews --animation",
+        "gearfe mechanism mechanism.toml --reactions --animation",
     ),
     "housing": (
         "reduce a housing to a small elastic body: mass, bores, frequencies, mode shapes",
-        "gearfe housing meshes/box.toml --out out/box",
+        "gearfe housing housing.toml --modes 40",
     ),
     "vibration": (
         "gear train in its housing: contact forces, speeds, vibration, spectrum, radiated power",
-        "gearfe vibration geometry/gear_train.toml --report --format mat",
+        "gearfe vibration gearbox.toml --report --format mat",
     ),
     "runup": (
         "gear train over its speed: steady states on all branches, waterfall, orders, critical speeds",
-        "gearfe runup geometry/gear_train.toml --out out/runup",
+        "gearfe runup gearbox.toml --speeds 100",
     ),
     "study": (
         "one job in many cases: parameters, designs, statistics, sensitivities; goes on where it was interrupted",
-        "gearfe study geometry/relief_study.toml --jobs 2",
+        "gearfe study study.toml --jobs 2",
     ),
     "new": (
         "write a commented job file to start from, or a shipped job: gearfe new --list",

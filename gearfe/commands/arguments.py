@@ -30,11 +30,16 @@ _NUMBER = re.compile(r"-(\d|\.\d|inf|nan)", re.IGNORECASE)
 
 
 class CommandParser(argparse.ArgumentParser):
-    """Parser of one command; mistakes are `InputError`."""
+    """Parser of one command; mistakes are `InputError`. The help ends with the `example`, a line that can be copied."""
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, *, example: str = "", **options: Any) -> None:
         super().__init__(**options, allow_abbrev=False)
+        self._example = example
         self._refused: dict[str, str] = {}  # word -> option that could not take it
+
+    def format_help(self) -> str:
+        """Text of the help; ``argparse`` itself would break the example's line."""
+        return super().format_help() + (self._example and f"\nexample: {self._example}\n")
 
     def print_help(self, file: Any = None) -> None:
         """Print the help; ``argparse`` itself keeps silent where it cannot be written."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from .common import add_json
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
@@ -21,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="compile the kernels of mechanisms now, half a minute: single runs are over before that pays",
     )
     one.add_argument("--trim", action="store_true", help="remove the entries not used for longest beyond the limit")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -48,8 +51,10 @@ def run(args: argparse.Namespace) -> int:
         gone = trim(folder, limit())
         print(f"removed: {len(gone)} entries, {_size(sum(entry.size for entry in gone))}")
     there = entries(folder)
+    args.summary = {"folder": str(folder), "limit_bytes": limit(), "kinds": {}}
     for kind in sorted({entry.kind for entry in there}):
         some = [entry.size for entry in there if entry.kind == kind]
+        args.summary["kinds"][kind] = {"entries": len(some), "bytes": sum(some)}
         print(f"  {kind:<14} {len(some):>6}  {_size(sum(some)):>10}")
     total = _size(sum(entry.size for entry in there))
     print(f"{folder}: {len(there)} entries, {total}; limit {_size(limit())} ({LIMIT_VARIABLE})")

@@ -36,6 +36,17 @@ def add_folder(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--report", action="store_true", help=f"pictures, figures, tables and job in one page, {REPORT}"
     )
+    add_json(parser)
+    add_pictures(parser)
+
+
+def add_pictures(parser: argparse.ArgumentParser) -> None:
+    """``--no-pictures``."""
+    parser.add_argument("--no-pictures", action="store_true", help="leave out the pictures")
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """``--json``: the summary in the output folder, or what a command that has none leaves in ``args.summary``."""
     parser.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
 
 
@@ -73,7 +84,9 @@ def run_and_keep(run: Callable[[argparse.Namespace], int], parsed: argparse.Name
             if kept:
                 print(f"also written: {', '.join(kept)}")
     if as_json:
-        entries = {"folder": str(folders[-1][0]), **_summary(*folders[-1])} if folders else {}
+        entries = getattr(parsed, "summary", {})
+        if folders and not entries:
+            entries = {"folder": str(folders[-1][0]), **_summary(*folders[-1])}
         print(json.dumps({"exit_code": code, **entries}, indent=2))
     return code
 

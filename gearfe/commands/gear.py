@@ -14,8 +14,9 @@ from .common import add_folder, tell
 if TYPE_CHECKING:
     from ..gear.pair import Gear
 
-#: Forms of ``--export``.
+#: Forms of ``--export``, and the files that they are.
 EXPORTS = ("csv", "dxf", "step", "brep")
+FILES = tuple(f"{side}.{form}" for side in ("pinion", "wheel") for form in EXPORTS)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,25 +27,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--export",
         metavar="NAME",
         default="",
-        help=f"each gear also as {', '.join(EXPORTS)}, or several, as dxf,step: outline of a tooth (csv), of the gear "
-        "(dxf), solid (step, brep); mm",
+        help=f"each gear also as {', '.join(EXPORTS)}, or several, as dxf,step, or one gear, as pinion.dxf: outline of "
+        "a tooth (csv), of the gear (dxf), solid (step, brep); mm",
     )
-    parser.add_argument("--angle-deg", type=float, default=0.0, metavar="X", help="pinion angle of the drawing (deg)")
+    parser.add_argument(
+        "--angle-deg", type=float, default=0.0, metavar="X", help="pinion angle of the drawing (deg, default: 0)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the geometry, write gear_pair.png and gear_pair.json."""
     from ..config import load_job
-    from ..errors import unknown_name
     from ..tables.stiffness import StiffnessTable
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness",))
     check_option("--angle-deg", args.angle_deg, StiffnessTable, "angle_start_deg")
-    exports = [name.strip() for name in args.export.split(",") if name.strip()]
-    for name in exports:
-        if name not in EXPORTS:
-            raise unknown_name("--export", name, EXPORTS)
+    exports = _exports(args.export)
 
     from ..gear.pair import GearPair
 
@@ -60,19 +59,32 @@ def run(args: argparse.Namespace) -> int:
     geometry = derived_geometry(pair)
     moduli = [material.youngs_modulus for material in job.materials]
     iso = iso_values(pair, moduli[0], moduli[1])
-    with whole_set(folder, tuple(f"{side}.{name}" for side in ("pinion", "wheel") for name in EXPORTS)) as made:
-        for side, gear in (("pinion", pair.pinion), ("wheel", pair.wheel)):
-            for name in exports:
-                with stage(f"writing {side}.{name}"):
-                    _export(made / f"{side}.{name}", gear)
-        with stage("drawing"):
-            pair_figure(made / "gear_pair.png", pair, math.radians(args.angle_deg), _notes(geometry))
+    with whole_set(folder, ("gear_pair.png", *FILES)) as made:
+        for name in exports:
+            with stage(f"writing {name}"):
+                _export(made / name, pair.pinion if name.startswith("pinion") else pair.wheel)
+        if not args.no_pictures:
+            with stage("drawing"):
+                pair_figure(made / "gear_pair.png", pair, math.radians(args.angle_deg), _notes(geometry))
         write_json(made / "gear_pair.json", {**geometry, "iso_6336": iso, "warnings": list(pair.warnings)})
         names = sorted(path.name for path in made.iterdir())
     _show(geometry)
     _show({"iso_6336": iso})
     tell((), folder, names, {}, pair.warnings)
     return 0
+
+
+def _exports(text: str) -> list[str]:
+    """Files that a value of ``--export`` names."""
+    from ..errors import InputError, nearest
+
+    made: list[str] = []
+    for name in (word.strip() for word in text.split(",") if word.strip()):
+        if name not in (*EXPORTS, *FILES):
+            problem = f"must be {', '.join(EXPORTS)}, or a file of one gear, as pinion.dxf"
+            raise InputError("--export", name, problem, nearest(name, FILES) or "--out tells the folder")
+        made += [file for file in FILES if name in (file, Path(file).suffix[1:])]
+    return sorted(set(made))
 
 
 def _export(path: Path, gear: Gear) -> None:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..progress import stage
 from .arguments import add_job
-from .common import add_folder
+from .common import add_folder, tell
 
 if TYPE_CHECKING:
     from ..housing.modal_test import Comparison
@@ -29,13 +28,14 @@ _DRAWN = 6
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_job(parser, "job", "job file with a table [housing]")
     add_folder(parser)
-    parser.add_argument("--modes", type=int, default=20, help="modes to list and to write (default: %(default)s)")
+    parser.add_argument(
+        "--modes", type=int, default=20, metavar="N", help="modes to list and to write (default: %(default)s)"
+    )
     parser.add_argument(
         "--compare",
         metavar="FILE",
         help="modes of a test (.csv, .uff) or another reduced body (.npz): frequencies, MAC, damping beside those here",
     )
-    parser.add_argument("--no-pictures", action="store_true", help="write no pictures")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -77,9 +77,8 @@ def run(args: argparse.Namespace) -> int:
             _compare(made, compared, args)
         with stage("pictures"):
             problem = "" if args.no_pictures or not body.has_mesh else _draw(made, body, fields)
-    if problem:
-        print(f"gearfe: warning: no pictures: {problem}", file=sys.stderr)
-    print(f"results in {folder}")
+        names = sorted(path.name for path in made.iterdir())
+    tell((), folder, names, {}, () if not problem else (f"no pictures: {problem}",))
     from ..figures.offscreen import MISSING
 
     drawn = not problem or problem == MISSING  # who installs no VTK wants no pictures of it
@@ -128,10 +127,10 @@ def _report(body: ModalBody, errors: dict[str, Any], mesh: MeshError, left_out: 
         print(f"  {number + 1:3d} {frequency:10.2f} Hz   {said}")
     bound = mesh.response + left_out.response
     why = "keep more modes" if body.has_mesh else _UNTOLD
-    text = f"{100.0 * bound:.2g} % rms" if math.isfinite(bound) else f"unknown: {why}"
+    text = f"<= {100.0 * bound:.2g} % rms" if math.isfinite(bound) else f"unknown: {why}"
     part = f" (mesh {100.0 * mesh.response:.2g} %, reduction {100.0 * left_out.response:.2g} %)"
     text += part if math.isfinite(bound) else ""
-    print(f"response of the bores up to {left_out.band_hz:.0f} Hz (1 % damping): estimated error <= {text}")
+    print(f"response of the bores up to {left_out.band_hz:.0f} Hz (1 % damping): estimated error {text}")
 
 
 def _compare(folder: Path, made: Comparison, args: argparse.Namespace) -> None:

@@ -28,7 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_loads(parser)
     add_keys(parser, StiffnessTable, *MODEL)
     add_removed(parser, StiffnessTable.REMOVED)
-    parser.add_argument("--no-pictures", action="store_true", help="leave out the picture")
 
 
 def run(args: argparse.Namespace) -> int:

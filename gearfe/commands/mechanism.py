@@ -32,7 +32,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="KEY",
         help="write the slopes of all outputs by this key, as bodies.rod.mass_kg; may stand several times",
     )
-    parser.add_argument("--no-pictures", action="store_true", help="tables and summary only")
     parser.add_argument("--no-estimate", action="store_true", help="leave out the finer runs that estimate the error")
     parser.add_argument("--animation", action="store_true", help="write animation.gif")
 

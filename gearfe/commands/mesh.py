@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..progress import stage
 from ..tables.stiffness import StiffnessTable
 from .arguments import add_job, add_keys, check_option, with_keys
+from .common import add_json, add_pictures
 
 if TYPE_CHECKING:
     from ..meshing.export import MeshPart
@@ -29,11 +30,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="file to write; its suffix chooses the format (default: out/JOB/mesh/gears.msh, .inp of a deck)",
     )
     parser.add_argument(
-        "--gear", choices=("both", "pinion", "wheel"), default="both", help="which gear (default: both)"
+        "--gear",
+        choices=("both", "pinion", "wheel"),
+        default="both",
+        metavar="both|pinion|wheel",
+        help="which gear (default: both)",
     )
     parser.add_argument("--sector", action="store_true", help="one tooth of each gear instead of whole gears")
     parser.add_argument(
-        "--teeth", type=int, metavar="N", help="fine flanks at the N teeth of each gear in mesh alone, as 3"
+        "--teeth",
+        type=int,
+        metavar="N",
+        help=f"fine flanks at the N teeth of each gear in mesh alone (default: all, of a deck {DECK_TEETH})",
     )
     parser.add_argument("--angle-deg", type=float, default=0.0, metavar="X", help="pinion angle (deg, default: 0)")
     parser.add_argument(
@@ -41,7 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="an input deck that CalculiX runs as it is: contact at the load of [stiffness] (.inp)",
     )
-    parser.add_argument("--no-pictures", action="store_true", help="no picture of the mesh beside it")
+    add_pictures(parser)
+    add_json(parser)
     add_keys(parser, StiffnessTable, "coarsen", "flank_coarsen")
 
 
@@ -68,8 +77,9 @@ def run(args: argparse.Namespace) -> int:
     format_of(args.out)
     job = StiffnessJob(tables["pair"], table, pair)
     output_folder(Path(args.out).parent)
+    found: dict[str, float] = {}
     if args.deck:
-        parts = _deck(args, job)
+        parts, found = _deck(args, job)
         counts = {
             f"{name}_{key}": len(part.boundaries[key]) for name, part in parts.items() for key in ("bore", "contact")
         }
@@ -87,6 +97,7 @@ def run(args: argparse.Namespace) -> int:
     print(f"written to {args.out}: {nodes} nodes, millimetres, groups with their elements or edges:")
     for name, count in counts.items():
         print(f"  {name:<24} {count}")
+    args.summary = {"file": args.out, "nodes": nodes, "groups": counts, **found}
     return 0
 
 
@@ -149,8 +160,8 @@ def _placed(part: MeshPart, angle: float, x: float) -> MeshPart:
     return replace(part, points=part.points @ np.array([[c, s], [-s, c]]) + np.array([x, 0.0]))
 
 
-def _deck(args: argparse.Namespace, job: StiffnessJob) -> dict[str, MeshPart]:
-    """Solve the position here, and write the deck of the same twist."""
+def _deck(args: argparse.Namespace, job: StiffnessJob) -> tuple[dict[str, MeshPart], dict[str, float]]:
+    """Solve the position here, and write the deck of the same twist; its parts, torque and twist."""
     import numpy as np
 
     from .. import __version__
@@ -178,4 +189,4 @@ def _deck(args: argparse.Namespace, job: StiffnessJob) -> dict[str, MeshPart]:
         write_deck(args.out, deck)
     print(f"run it: ccx {Path(args.out).stem}; torque at the wheel's hub by gearfe: {torque:.6g} N m")
     print(f"twist of the wheel: {twist:.9g} rad")
-    return parts
+    return parts, {"torque_wheel_Nm": torque, "twist_rad": twist}

@@ -33,7 +33,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_loads(parser)
     add_keys(parser, MicrogeometryTable, "mesh_cycles", "flank")
     add_keys(parser, StiffnessTable, "coarsen")
-    parser.add_argument("--no-pictures", action="store_true", help="leave out the pictures")
 
 
 def condensed(job: StiffnessJob, root_stress: bool, watch: Stopwatch) -> tuple[MeshingPair, PairRoots | None]:

@@ -105,7 +105,7 @@ def parser_of(module: Any, name: str, summary: str, example: str) -> CommandPars
     from .arguments import CommandParser
     from .common import add_telling
 
-    parser = CommandParser(prog=name, description=summary, epilog=example and f"example: {example}")
+    parser = CommandParser(prog=name, description=summary, example=example)
     module.add_arguments(parser)
     add_telling(parser)
     return parser

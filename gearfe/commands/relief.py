@@ -26,7 +26,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_keys(parser, ReliefTable, "positions", "map_points", "generations", "seed")
     add_keys(parser, StiffnessTable, "coarsen")
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes (default 1); no digit changes")
-    parser.add_argument("--no-pictures", action="store_true", help="leave out the picture")
 
 
 def run(args: argparse.Namespace) -> int:

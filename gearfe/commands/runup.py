@@ -23,7 +23,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fields", action="store_true", help="the modes that the meshes swing in, for ParaView (VTKHDF series)"
     )
-    parser.add_argument("--no-pictures", action="store_true", help="tables and summary only")
 
 
 def run(args: argparse.Namespace) -> int:

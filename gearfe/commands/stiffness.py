@@ -41,12 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar=("NAME", "X"),
         help="parameter of a law of another package; may stand several times",
     )
-    add_removed(parser, StiffnessTable.REMOVED)
+    add_removed(parser, {**StiffnessTable.REMOVED, "animate": ("has another name", "write --animation")})
     parser.add_argument("--no-estimate", action="store_true", help="leave out the error estimate")
     parser.add_argument(
         "--range", type=float, metavar="X", help="end of the colours in the pictures of --fields (MPa; default: chosen)"
     )
-    parser.add_argument("--no-pictures", action="store_true", help="leave out the picture")
     parser.add_argument(
         "--fields",
         nargs="*",
@@ -55,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write displacement and stress of whole gears: 'all' (also without a value), or pinion angles (deg)",
     )
     parser.add_argument(
-        "--animate",
+        "--animation",
         type=int,
         nargs="?",
         const=40,
@@ -76,8 +75,8 @@ def run(args: argparse.Namespace) -> int:
     tables = load_job(args.job, ("pair",), ("stiffness", "microgeometry"))
     tables["stiffness"] = overridden(tables.get("stiffness", StiffnessTable()), args)
     chosen = None if args.fields is None else _field_angles(args.fields)
-    if args.animate is not None and not 2 <= args.animate <= 1000:
-        raise InputError("--animate", args.animate, "must be >= 2 and <= 1000 frames", "40 are usual")
+    if args.animation is not None and not 2 <= args.animation <= 1000:
+        raise InputError("--animation", args.animation, "must be >= 2 and <= 1000 frames", "40 are usual")
 
     from ..gear.pair import GearPair
 
@@ -116,11 +115,11 @@ def run(args: argparse.Namespace) -> int:
         if chosen is not None:
             with watch.stage("fields"):
                 _fields(made, job, elastic, curve, None if isinstance(chosen, str) else chosen, args.range)
-        if args.animate is not None:
+        if args.animation is not None:
             with watch.stage("animation"):
                 from ..figures.stress import stress_animation
 
-                stress_animation(made / "stress.gif", job.pair, elastic, curve, args.animate, count)
+                stress_animation(made / "stress.gif", job.pair, elastic, curve, args.animation, count)
         if not args.no_pictures:
             with watch.stage("picture"):
                 from ..figures.stiffness import stiffness_figure

@@ -27,7 +27,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--row", type=int, metavar="CASE", help="write the job file of a case to --write, and stop")
     parser.add_argument("--write", metavar="FILE", help="where --row writes; files of the job stay and are found")
     parser.add_argument("--parquet", action="store_true", help="also the rows as study.parquet")
-    parser.add_argument("--no-pictures", action="store_true", help="leave out the pictures")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -25,7 +25,9 @@ KEYS = ("tolerance", "method")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_train(parser, "job file with the table [train]", TrainTable, *KEYS)
-    parser.add_argument("--window", metavar="NAME", help="none, hann, hamming, blackman or flattop")
+    parser.add_argument(
+        "--window", metavar="NAME", help="none, hann, hamming, blackman or flattop (default: [spectrum], or none)"
+    )
     parser.add_argument(
         "--spectrum-from-ms", type=float, metavar="T", help="begin of the spectrum's record (default: [spectrum], or 0)"
     )
@@ -36,7 +38,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--range", type=float, metavar="X", help="end of the colours in the picture of --fields (m/s2; default: chosen)"
     )
-    parser.add_argument("--no-pictures", action="store_true", help="tables and summary only")
     parser.add_argument("--no-floquet", action="store_true", help="leave out the stability analysis")
     parser.add_argument("--no-estimate", action="store_true", help="leave out the error estimates")
     parser.add_argument(
@@ -196,7 +197,7 @@ def report_lines(response: TrainResponse, train: GearTrain, written: Written, ch
     elif response.floquet_note:
         lines.append(f"Floquet multipliers: {response.floquet_note}")
     for name, value in response.estimates.items():
-        lines.append(f"error estimate, {name}: {value:.2g}")
+        lines.append(f"error estimate, {name}: " + (f"{value:.2g}" if math.isfinite(value) else "unknown"))
     if written.spectra is not None:
         made = written.spectra
         lines.append(

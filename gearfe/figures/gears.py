@@ -84,10 +84,11 @@ def pair_picture(pair: GearPair, pinion_angle: float, notes: str = "") -> Any:
     marks = np.array(list(path_points.values()))
     near.plot(marks[:, 0], marks[:, 1], color=RED, linewidth=2.4, label="path of contact A–E")
     near.plot(marks[:, 0], marks[:, 1], "o", color=RED, markersize=4)
-    for letter, (px, py) in path_points.items():
-        near.annotate(
-            letter, (px, py), xytext=(6, 5), textcoords="offset points", color=RED, weight="bold", fontsize=10
-        )
+    near_by = 0.06 * half  # letters of points closer than this go to both sides of the line
+    for number, (letter, (px, py)) in enumerate(path_points.items()):
+        close = any(math.dist((px, py), after) < near_by for after in marks[number + 1 : number + 2])
+        side = {"xytext": (-7, -6), "ha": "right", "va": "top"} if close else {"xytext": (6, 5)}
+        near.annotate(letter, (px, py), textcoords="offset points", color=RED, weight="bold", fontsize=10, **side)
     near.set_xlim(x - half, x + half)
     near.set_ylim(y - half, y + half)
     near.set_title("meshing zone", loc="left", fontsize=11)

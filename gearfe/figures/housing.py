@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 
 #: Largest displacement in a picture of a mode, in parts of the body's size.
 EXAGGERATION = 0.06
+#: Pixels of pictures of one body; each of several has 520 x 400.
+SIZES = {1: (900, 700)}
+#: How much of the light a body takes away whose bores are shown: those behind are to be seen.
+OPACITY = 0.5
 #: How much nearer the camera is than where the sphere round the body fits.
 ZOOM = 1.15
 _SECONDS = 120.0
@@ -94,8 +98,9 @@ def _draw(job: Path, target: Path) -> None:
     columns = min(3, len(fields))
     rows = math.ceil(len(fields) / columns)
     plotter = pyvista.Plotter(
-        off_screen=True, shape=(rows, columns), window_size=(520 * columns, 400 * rows), border=False
-    )
+        off_screen=True, shape=(rows, columns), window_size=SIZES.get(len(fields), (520 * columns, 400 * rows)),
+        border=False,
+    )  # fmt: skip
     plotter.set_background("white")
     for number, (field, title) in enumerate(zip(fields, stored["titles"], strict=True)):
         plotter.subplot(number // columns, number % columns)
@@ -114,7 +119,8 @@ def _draw(job: Path, target: Path) -> None:
             rest = pyvista.PolyData(points, cells).extract_feature_edges(feature_angle=30.0)
             plotter.add_mesh(rest, color="dimgray", line_width=1.0, opacity=0.7)
         else:
-            plotter.add_mesh(surface, color="#c9d3e0", smooth_shading=False, ambient=0.35, diffuse=0.75)
+            look = {"color": "#c9d3e0", "ambient": 0.35, "diffuse": 0.75, "opacity": OPACITY}
+            plotter.add_mesh(surface, smooth_shading=False, **look)
             edges = surface.extract_feature_edges(feature_angle=30.0)
             plotter.add_mesh(edges, color="black", line_width=1.5)
             for colour in stored["colours"]:

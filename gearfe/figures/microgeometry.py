@@ -14,8 +14,8 @@ from ..gear.deviation_job import GEARS, active_rolls, flank_deviations
 from ..gear.pair import GearPair
 from ..microgeometry.loaded_mesh import LoadedMesh
 from ..microgeometry.relief import ReliefResult
-from ..microgeometry.relief_job import in_units, names_of
-from ..tables.microgeometry import VARIABLES, MicrogeometryTable, ReliefTable
+from ..microgeometry.relief_job import in_units
+from ..tables.microgeometry import VARIABLES, MicrogeometryTable, ReliefTable, VariableTable
 from ..typing import Array
 from .style import BLUE, GREY, ORANGE, RED, new_figure, save, tidy
 
@@ -169,9 +169,16 @@ def microgeometry_picture(made: LoadedMesh) -> Any:
         axes.tick_params(labelsize=8.5)
     bar = figure.colorbar(ScalarMappable(norm, colors), ax=pressure, shrink=0.95, aspect=25, pad=0.02)
     bar.set_label("torque at the wheel (N m)")
-    title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, {made.mesh_cycles} mesh cycles"
+    title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, {made.span}"
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
     return figure
+
+
+def _in_words(one: VariableTable) -> str:
+    """A variable with its unit, as ``tip relief (µm), both gears``."""
+    name, _, unit = one.key.rpartition("_")
+    gear = "both gears" if one.gear == "both" else one.gear
+    return f"{name.replace('_', ' ')} ({unit.replace('um', 'µm')}), {gear}"
 
 
 def relief_figure(path: str | Path, table: ReliefTable, made: ReliefResult, compared: Mapping[str, Array]) -> None:
@@ -182,7 +189,7 @@ def relief_figure(path: str | Path, table: ReliefTable, made: ReliefResult, comp
     compared
         Of `gearfe.microgeometry.relief_job.comparison`.
     """
-    names, best, value = names_of(table), in_units(table, made.x), made.best.value
+    names, best, value = [_in_words(one) for one in table.variables], in_units(table, made.x), made.best.value
     places = [axis / VARIABLES[one.key][1] for axis, one in zip(made.axes, table.variables, strict=False)]
     objective = np.where(np.isfinite(made.map), made.map, np.nan)
     figure = new_figure(12.0, 4.2)
@@ -197,7 +204,8 @@ def relief_figure(path: str | Path, table: ReliefTable, made: ReliefResult, comp
         first.plot(places[0], objective, ".-", color=BLUE)
         first.axvline(best[0], color=GREY, linewidth=1)
     first.set_xlabel(names[0], fontsize=9)
-    first.set_title("objective", loc="left", fontsize=9.5)
+    weighed = table.pressure_weight or table.root_stress_weight or len(table.torques_Nm) > 1
+    first.set_title("objective" if weighed else "peak to peak (µm)", loc="left", fontsize=9.5)
     tidy(second)
     for label, color in (("without", GREY), ("best", BLUE)):
         values = compared[f"peak_to_peak_{label}_um"]
@@ -207,12 +215,18 @@ def relief_figure(path: str | Path, table: ReliefTable, made: ReliefResult, comp
     second.set_xlabel("torque at the wheel (N m)", fontsize=9)
     second.set_title("transmission error, peak to peak (µm)", loc="left", fontsize=9.5)
     tidy(third)
-    for i, (low, high) in enumerate(zip(made.low, made.high, strict=True)):
-        third.plot([value, low], [i - 0.06, i - 0.06], "-", color=ORANGE, linewidth=5, label="-" if i == 0 else None)
-        third.plot([value, high], [i + 0.06, i + 0.06], "-", color=BLUE, linewidth=5, label="+" if i == 0 else None)
+    wide = [i for i, one in enumerate(table.variables) if one.tolerance > 0.0]
+    for row, i in enumerate(wide):
+        for end, shift, color, name in ((made.low[i], -0.06, ORANGE, "less"), (made.high[i], 0.06, BLUE, "more")):
+            label = name if row == 0 else None
+            third.plot([value, end], [row + shift] * 2, "-", color=color, linewidth=5, label=label)
     third.axvline(value, color=GREY, linewidth=1)
-    third.set_ylim(-0.6, len(names) - 0.4)
-    third.legend(fontsize=8, frameon=False)
-    third.set_yticks(range(len(names)), [name.replace(" ", "\n", 1) for name in names], fontsize=8)
-    third.set_title("objective within tolerances", loc="left", fontsize=9.5)
+    third.set_ylim(-0.6, max(len(wide), 1) - 0.4)
+    allowed = [f"{names[i].replace(', ', chr(10))}\n± {table.variables[i].tolerance:g}" for i in wide]
+    third.set_yticks(range(len(wide)), allowed, fontsize=8)
+    third.set_title("the same within tolerances" if wide else "no tolerances given", loc="left", fontsize=9.5)
+    if wide:
+        third.legend(fontsize=8, frameon=False)
+    else:
+        third.set_xticks([])
     save(figure, path, dpi=110)

@@ -62,7 +62,7 @@ def _draw(job: Path, target: Path) -> None:
     if "housing_points" in stored:
         values, name = stored["housing_values"], "normal acceleration (m/s2)"
         most = float(np.quantile(np.abs(values[values != 0.0]), 0.97)) if values.any() else 1.0
-        most = float(stored.get("range", most))
+        most = float(stored.get("range", _round(most)))
         faces = _flat(stored["housing_faces"]) if count == 1 else stored["housing_faces"][:, :3]
         housing = pyvista.PolyData(stored["housing_points"][0], _cells(faces))
         housing[name] = values[0]
@@ -77,7 +77,12 @@ def _draw(job: Path, target: Path) -> None:
     gears = pyvista.PolyData(stored["gear_points"][0], cells)
     gears[name] = values[0]
     far = bar | {"title": "gears: vibration beside smooth rolling (µm)\n", "position_x": 0.58}
-    look = {"cmap": "viridis", "clim": (0.0, float(values.max()) or 1.0), "ambient": 0.2, "scalar_bar_args": far}
+    look = {
+        "cmap": "viridis",
+        "clim": (0.0, _round(float(values.max()) or 1.0)),
+        "ambient": 0.2,
+        "scalar_bar_args": far,
+    }
     plotter.add_mesh(gears, smooth_shading=False, **look)
     surfaces.append((gears, stored["gear_points"], values, name))
     _aim(plotter, surfaces[0][1][0])
@@ -92,6 +97,12 @@ def _draw(job: Path, target: Path) -> None:
         pictures.append(plotter.screenshot(return_img=True))
     plotter.close()
     _write(target, pictures)
+
+
+def _round(value: float) -> float:
+    """The next round number of two digits at most, whose quarters are short."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return power * next(step for step in (1.0, 1.2, 1.6, 2.0, 2.4, 3.2, 4.0, 6.0, 8.0, 10.0) if value <= step * power)
 
 
 def _aim(plotter: Any, points: Array) -> None:

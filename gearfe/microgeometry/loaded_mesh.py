@@ -109,9 +109,14 @@ class LoadedMesh(Shown):
         return {
             "gears": f"{self.pair.pinion.teeth}/{self.pair.wheel.teeth} teeth",
             "torques": f"{len(self.torque)}, {self.torque[0]:.4g} to {self.torque[-1]:.4g} N m at the wheel",
-            "pinion angles": f"{len(self.pinion_angle)} over {self.mesh_cycles} mesh cycles",
+            "pinion angles": f"{len(self.pinion_angle)} over {self.span}",
             "transmission error": f"peak to peak {error[0]:.3g} to {error[-1]:.3g} um",
         }
+
+    @property
+    def span(self) -> str:
+        """What the angles run over, in words."""
+        return "1 mesh cycle" if self.mesh_cycles == 1 else f"{self.mesh_cycles} mesh cycles"
 
     @property
     def transmission_error(self) -> Array:

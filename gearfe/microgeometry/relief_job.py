@@ -133,9 +133,11 @@ def report_lines(table: ReliefTable, made: ReliefResult, errors: PitchErrors | N
         line = f"at {torque:.4g} N m: transmission error {best:.3g} um peak to peak, without {without:.3g} um"
         lines.append(line + f", largest pressure {1e-6 * made.best.pressure[i]:.4g} MPa")
     lines.append(f"objective {made.best.value:.4g}, without {made.without.value:.4g}")
-    for name, low, high in zip(names_of(table), made.low, made.high, strict=True):
-        lines.append(f"  within the tolerance of {name}: {low:.4g} and {high:.4g}")
-    lines.append(f"  at the worst corner of all tolerances: {made.worst:.4g}")
+    for name, one, low, high in zip(names_of(table), table.variables, made.low, made.high, strict=True):
+        if one.tolerance > 0.0:
+            lines.append(f"  {one.tolerance:g} less and more of {name}: {low:.4g} and {high:.4g}")
+    if any(one.tolerance > 0.0 for one in table.variables):
+        lines.append(f"  at the worst corner of all tolerances: {made.worst:.4g}")
     if errors is not None:
         line = (
             f"  with the pitch errors of [microgeometry]: {errors.best.value:.4g}, without {errors.without.value:.4g}"

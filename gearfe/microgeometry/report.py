@@ -147,7 +147,7 @@ def report_lines(made: LoadedMesh) -> list[str]:
     """Lines to print."""
     m, n = made.twist.shape
     lines = [
-        f"{m} torques x {n} positions over {made.mesh_cycles} mesh cycles: "
+        f"{m} torques x {n} positions over {made.span}: "
         + ", ".join(f"{count} {status}" for status, count in made.statuses.items()),
         f"unloaded transmission error {1e6 * np.ptp(made.transmission_error_unloaded):.4g} um peak to peak",
     ]

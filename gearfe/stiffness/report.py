@@ -154,9 +154,9 @@ def pressure_lines(curve: StiffnessCurve) -> list[str]:
     ):
         if found[kind]:
             largest = 1e-6 * np.nanmax(curve.edge_pressure[curve.edge == kind])
-            edge = {"singular": "a sharp", "rounded": "a rounded"}[kind]
+            edge = {"singular": "a sharp edge or the kink of a linear relief", "rounded": "a rounded edge"}[kind]
             lines.append(
-                f"{found[kind]} positions with {edge} edge bearing: {why}; blunted by a hundredth of a module, up to "
+                f"{found[kind]} positions with {edge} bearing: {why}; blunted by a hundredth of a module, up to "
                 f"{largest:.4g} MPa (column edge_pressure_MPa)"
             )
     return lines
