@@ -6,8 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
-from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 from gearfe.errors import InputError
 from gearfe.rigid import (
@@ -32,6 +30,8 @@ from gearfe.rigid.beam_link import BeamLink, Section
 from gearfe.rigid.carried import free_motions
 from gearfe.rigid.equilibrium import equilibrium, stiffness_at
 
+from .elastica import elastica
+
 
 def slender(elements: int, length: float = 1.0, EA: float = 1e9, EI: float = 1.0, **more) -> BeamLink:  # type: ignore[no-untyped-def]
     """A beam of given EA and EI whose shear stiffness is EA, too."""
@@ -49,22 +49,6 @@ def beam_of(system: System) -> Beam:
     element = system.elements[1]
     assert isinstance(element, Beam)
     return element
-
-
-def elastica(load: float) -> tuple[float, float, float]:
-    """x, y and angle at the tip of a cantilever of unit length and EI under a force `load` across it.
-
-    Bisshopp & Drucker, Quart. Appl. Math. 3 (1945) 272-275, with elliptic integrals.
-    """
-
-    def integrals(slope: float) -> tuple[float, float]:
-        k2 = (1.0 + math.sin(slope)) / 2.0
-        phi = math.asin(1.0 / math.sqrt(2.0 * k2))
-        return ellipk(k2) - ellipkinc(phi, k2), ellipe(k2) - ellipeinc(phi, k2)
-
-    slope = brentq(lambda p: integrals(p)[0] - math.sqrt(load), 1e-9, math.pi / 2 - 1e-12, xtol=1e-15)
-    first, second = integrals(slope)
-    return math.sqrt(2.0 * math.sin(slope) / load), 1.0 - 2.0 * second / first, slope
 
 
 def test_end_force_bends_into_the_elastica_with_order_six() -> None:

@@ -37,6 +37,8 @@ def draw_figures(folder: Path, mechanism: Mechanism, results: Results) -> None:
     save_fixed(figure, folder / "picture.png")
     if mechanism.links:
         _links(folder / "links.png", mechanism, results)
+    if mechanism.plates:
+        _plates(folder / "plates.png", mechanism, results)
 
 
 def draw_modes(folder: Path, mechanism: Mechanism, q: np.ndarray, modes: Modes) -> None:
@@ -159,4 +161,34 @@ def _links(path: Path, mechanism: Mechanism, results: Results) -> None:
         axes[0].legend(fontsize=7)
     for ax in rows[-1]:
         ax.set_xlabel("s (m)")
+    save_fixed(figure, path)
+
+
+def _plates(path: Path, mechanism: Mechanism, results: Results) -> None:
+    """plates.png: von Mises' stress of every link of finite elements when it is largest, in the link's own frame."""
+    count = len(mechanism.plates)
+    shapes = [
+        np.ptp([link.part.plate.points.real, link.part.plate.points.imag], axis=1) for link in mechanism.plates.values()
+    ]
+    heights = [float(np.clip(8.0 * y / x, 1.2, 7.0)) for x, y in shapes]
+    figure = new_figure(9, sum(heights) + 0.8 * count)
+    rows = figure.subplots(count, 1, squeeze=False, height_ratios=heights)[:, 0]
+    for axes, (name, link) in zip(rows, mechanism.plates.items(), strict=True):
+        stresses = np.array([link.von_mises(stress) for stress in results.sections[name]])
+        when = int(stresses.max(axis=1).argmax())
+        factor = mechanism.file.figure.magnification
+        moved = factor * link.displacements(results.trajectory.q[when : when + 1])[0]
+        places = link.part.plate.points + moved
+        t = link.part.plate.triangles
+        small = np.concatenate([t[:, [0, 3, 5]], t[:, [3, 1, 4]], t[:, [5, 4, 2]], t[:, [3, 4, 5]]])
+        drawn = axes.tripcolor(
+            places.real, places.imag, small, 1e-6 * stresses[when], shading="gouraud", cmap="viridis"
+        )
+        axes.set_aspect("equal")
+        figure.colorbar(drawn, ax=axes, label="von Mises (MPa)", shrink=0.9)
+        told = "" if factor == 1.0 else f", displacements x {factor:g}"
+        time = results.trajectory.time[when]
+        axes.set_title(f"{name} at {time:.4g} s, when its stress is largest{told}", fontsize=9, loc="left")
+        axes.set_xlabel("x (m)")
+        axes.set_ylabel("y (m)")
     save_fixed(figure, path)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..mechanisms.model import Mechanism
+from ..mechanisms.plates import PlateLink
 from ..rigid import GROUND, Prismatic, Slot, Spring
 from ..rigid.distance import Distance
 from ..typing import Array
@@ -45,7 +46,15 @@ def draw_state(axes: Any, mechanism: Mechanism, q: Array, *, alpha: float = 1.0,
         axes.plot(*nodes.T, "o", ms=3, color=colour, alpha=alpha)
         if names:
             _name(axes, name, shape[len(shape) // 2], colour, weight="bold")
-    if mechanism.links and magnification != 1.0:
+    for number, (name, plate) in enumerate(
+        mechanism.plates.items(), start=len(_points(mechanism)) + len(mechanism.links)
+    ):
+        colour = COLOURS[number % len(COLOURS)]
+        places = plate.exaggerated(q, magnification)[0]
+        draw_plate(axes, plate, places, colour, alpha)
+        if names:
+            _name(axes, name, np.array([places.real.mean(), places.imag.mean()]), colour, weight="bold")
+    if mechanism.elastic and magnification != 1.0:
         axes.text(0.01, 0.01, f"deflections x {magnification:g}", transform=axes.transAxes, fontsize=8)
     for name, place in mechanism.file.ground.points_m.items():
         axes.plot(*place, "k^", ms=6, mfc="none", alpha=alpha)
@@ -53,6 +62,18 @@ def draw_state(axes: Any, mechanism: Mechanism, q: Array, *, alpha: float = 1.0,
             _name(axes, name, np.array(place), "black")
     if names:
         _point_names(axes, mechanism, q)
+
+
+def draw_plate(axes: Any, plate: PlateLink, places: np.ndarray, colour: str, alpha: float) -> None:
+    """A link of finite elements, filled, with its edge; `places` are those of its nodes as complex numbers."""
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    at = np.stack([places.real, places.imag], axis=1)
+    corners = plate.part.plate.triangles[:, [0, 3, 1, 4, 2, 5]]
+    axes.add_collection(
+        PolyCollection(list(at[corners]), facecolor=colour, alpha=0.18 * alpha, linewidth=0), autolim=False
+    )
+    axes.add_collection(LineCollection(list(at[plate.border]), colors=colour, lw=1.4, alpha=alpha), autolim=False)
 
 
 def draw_paths(axes: Any, mechanism: Mechanism, q: Array) -> None:
@@ -84,6 +105,10 @@ def frame(axes: Any, mechanism: Mechanism, q: Array) -> None:
         shapes = link.exaggerated(q, link.beam.link.ends, mechanism.file.figure.magnification)
         x += [shapes[:, :, 0].min(), shapes[:, :, 0].max()]
         y += [shapes[:, :, 1].min(), shapes[:, :, 1].max()]
+    for plate in mechanism.plates.values():
+        places = plate.exaggerated(q, mechanism.file.figure.magnification)
+        x += [places.real.min(), places.real.max()]
+        y += [places.imag.min(), places.imag.max()]
     ground = mechanism.file.ground.points_m.values()
     x += [place[0] for place in ground]
     y += [place[1] for place in ground]
@@ -106,7 +131,7 @@ def _points(mechanism: Mechanism) -> list[tuple[str, int, dict[str, Point]]]:
             {p: mechanism.point(f"{name}.{p}")[1] for p in table.points_m},
         )
         for name, table in mechanism.file.bodies.items()
-        if name not in mechanism.links
+        if name not in mechanism.elastic
     ]
 
 

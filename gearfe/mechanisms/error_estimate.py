@@ -81,8 +81,7 @@ def trajectory_error(mechanism: Mechanism, start: Start, results: Results, toler
 
 def rounding(mechanism: Mechanism, start: Start, made: Trajectory) -> tuple[Array, Array]:
     """What rounding adds to the coordinates and velocities over the steps of a run, with signs drawn once."""
-    linkage = mechanism.linkage
-    unit = np.where(np.arange(start.q.size) % 3 == 2, 1.0, linkage.assembly.length)
+    unit = mechanism.system.units
     walk = np.finfo(float).eps * math.sqrt(len(made.dense.times))
     signs = np.random.default_rng(0).choice([-1.0, 1.0], (2, start.q.size))
     with np.errstate(over="ignore", invalid="ignore"):

@@ -37,9 +37,10 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
 #: Quantities of a body or joint, and of a point.
 OF_BODY = ("angle", "rate", "angular_acceleration")
 OF_POINT = ("x", "y", "vx", "vy", "ax", "ay")
-#: Quantities of a point of a flexible link, and of a flexible link.
+#: Quantities of a point of a flexible link, of one of finite elements, and of a flexible link.
 OF_SECTION = ("deflection", "stretch", "axial_force", "shear_force", "bending_moment", "edge_stress")
-OF_LINK = ("elastic_energy", "largest_edge_stress")
+OF_PLATE = ("largest_von_mises",)
+OF_LINK = ("elastic_energy", "largest_edge_stress", *OF_PLATE)
 NAMED = (*OF_BODY, *OF_POINT, *OF_SECTION, *OF_LINK)
 #: Quantities of the whole mechanism.
 PLAIN = ("time", "kinetic", "potential", "work", "total")

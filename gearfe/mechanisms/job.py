@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InputError
 from ..output.files import output_folder, whole_set, write_csv, write_json
 from ..progress import stage
-from ..rigid import Start, integrate
+from ..rigid import Start, Trajectory, integrate
 from ..rigid.inverse import prescribed_motion
 from .error_estimate import RUNS, TrajectoryError, trajectory_error
 from .model import Mechanism
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 MAY_WRITE = (
     "trajectory.csv", "energy.csv", "equilibrium.csv", "bodies.csv", "modes.csv", "shapes.csv", "modes.png",
     "reactions.csv", "curves.png", "energy.png", "picture.png", "animation.gif", "links.csv", "links.vtkhdf",
-    "links.png", "sensitivities.csv",
+    "links.png", "plates.csv", "plates.vtkhdf", "plates.png", "sensitivities.csv",
 )  # fmt: skip
 
 
@@ -74,7 +74,7 @@ def run_mechanism(
     read = clock.perf_counter()
     times = output_times(end, run.step_s)
     method = run.method if method is None else method
-    if mechanism.links and method not in ("auto", "implicit"):
+    if mechanism.elastic and method not in ("auto", "implicit"):
         problem = "would follow the axial waves of flexible links with steps of next to no length"
         raise InputError("run.method", method, problem, "leave it out: they take the implicit method")
     if tolerance is None:
@@ -97,10 +97,7 @@ def run_mechanism(
     estimated = clock.perf_counter()
     with whole_set(folder, MAY_WRITE) as made:
         warnings = tuple(write_tables(made, mechanism, results, run.reactions))
-        if mechanism.links:
-            from .link_files import write_links
-
-            write_links(made, mechanism, trajectory)
+        write_elastic(made, mechanism, trajectory)
         if slopes is not None:
             write_csv(made / "sensitivities.csv", slopes.table())
         written = clock.perf_counter()
@@ -190,7 +187,8 @@ def summarise(
             "redundant_constraints": [label[r] for r in freedoms.redundant],
             "singular_at_start": [label[r] for r in freedoms.passing],
         },
-        "flexible_links": [_flexible(mechanism, results, name) for name in mechanism.links],
+        "flexible_links": [_flexible(mechanism, results, name) for name in mechanism.links]
+        + [_of_elements(mechanism, results, name) for name in mechanism.plates],
         "joints": joints,
         "singular_passages": {"count": len(inside), "first_times_s": inside[:100]},
         "constraint_residual": float(np.abs(residual).max(initial=0.0)),
@@ -222,6 +220,36 @@ def _flexible(mechanism: Mechanism, results: Results, name: str) -> dict[str, An
     return made
 
 
+def _of_elements(mechanism: Mechanism, results: Results, name: str) -> dict[str, Any]:
+    """What the summary says of a link of finite elements."""
+    link, q = mechanism.plates[name], results.trajectory.q
+    nodes, elements = link.mesh
+    plate = link.part.plate
+    peaks = [link.von_mises(stress).max() for stress in results.sections[name]]
+    return {
+        "name": name,
+        "nodes": nodes,
+        "elements": elements,
+        "modes": plate.body.modes,
+        "highest_frequency_Hz": float(plate.frequencies[-1]),
+        "mass_kg": plate.mass,
+        "largest_deflection_m": float(np.abs(link.displacements(q)).max()),
+        "largest_von_mises_Pa": float(max(peaks)),
+    }
+
+
+def write_elastic(folder: Path, mechanism: Mechanism, trajectory: Trajectory) -> None:
+    """Files of flexible links, where there are some."""
+    if mechanism.links:
+        from .link_files import write_links
+
+        write_links(folder, mechanism, trajectory)
+    if mechanism.plates:
+        from .plate_files import write_plates
+
+        write_plates(folder, mechanism, trajectory)
+
+
 def _told_error(error: dict[str, Any]) -> str:
     largest = error["coordinates_m_or_rad"]
     if not math.isfinite(largest):
@@ -230,9 +258,11 @@ def _told_error(error: dict[str, Any]) -> str:
 
 
 def _told_link(link: dict[str, Any]) -> str:
-    stress = link.get("largest_edge_stress_Pa")
     told = f"flexible link {link['name']}: deflection up to {link['largest_deflection_m']:.3g} m"
-    return told if stress is None else told + f", edge stress up to {1e-6 * stress:.3g} MPa"
+    for kind, key in (("edge stress", "largest_edge_stress_Pa"), ("von Mises' stress", "largest_von_mises_Pa")):
+        if key in link:
+            told += f", {kind} up to {1e-6 * link[key]:.3g} MPa"
+    return told
 
 
 def _text(summary: dict[str, Any], folder: Path) -> str:

@@ -21,7 +21,7 @@ FORCES = ("axial_force_N", "shear_force_N", "bending_moment_N_m")
 @stage("flexible links")
 def write_links(folder: Path, mechanism: Mechanism, trajectory: Trajectory) -> None:
     """links.csv and links.vtkhdf: shape, forces and edge stress of every node at the times of the frames."""
-    times = _times(mechanism, trajectory)
+    times = frame_times(mechanism, trajectory)
     q = trajectory.dense(times)
     forces = {n: link.beam.at_nodes(trajectory.stress_at(link.beam, times)) for n, link in mechanism.links.items()}
     with csv_table(folder / "links.csv") as table:
@@ -65,7 +65,8 @@ def write_links(folder: Path, mechanism: Mechanism, trajectory: Trajectory) -> N
             series.add(float(time), np.concatenate(points), grid, point_data=fields)
 
 
-def _times(mechanism: Mechanism, trajectory: Trajectory) -> Array:
+def frame_times(mechanism: Mechanism, trajectory: Trajectory) -> Array:
+    """Times of the frames; the one of a state of rest."""
     if len(trajectory.time) == 1:
         return np.asarray(trajectory.time, dtype=float)
     return np.linspace(trajectory.time[0], trajectory.time[-1], mechanism.file.run.frames)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,9 +14,11 @@ from ..errors import InputError, given, unknown_name
 from ..rigid.beam import Beam
 from ..rigid.beam_link import BeamLink, Section
 from ..rigid.linkage import Linkage
+from ..rigid.system import System
 from ..tables.beam import BeamTable
 from ..tables.mechanism import BodyTable, ForceTable, JointTable, MechanismFile
 from ..typing import Array
+from .plates import PlateLink
 
 Point = tuple[float, float]
 
@@ -73,6 +76,19 @@ class FlexibleLink:
     beam: Beam
     points: dict[str, Point]
     clamped: bool
+
+    @property
+    def damping(self) -> float:
+        """Kelvin and Voigt's time (s)."""
+        return self.beam.link.damping
+
+    def elastic_energy(self, q: Array) -> float:
+        """In a state of the system (J)."""
+        return self.beam.elastic_energy(q)
+
+    def loss(self, q: Array, v: Array) -> float:
+        """Power that damping takes (W)."""
+        return self.beam.loss(q, v)
 
     def node(self, point: str, label: str) -> int:
         """Number of the node of a named point."""
@@ -138,21 +154,30 @@ def flexible_links(file: MechanismFile, planar: Linkage, links: dict[str, BeamLi
     return made
 
 
-def bent_start(links: dict[str, FlexibleLink], planar: Linkage, rigid: Linkage, state: Array) -> Array:
-    """Coordinates (of all bodies, shape (2, size): q and v) in which the links move as rigid ones do."""
-    out = np.zeros((2, planar.size))
+def bent_start(links: Mapping[str, FlexibleLink | PlateLink], system: System, rigid: Linkage, state: Array) -> Array:
+    """Coordinates (of the system, shape (2, size): q and v) in which the links move as rigid ones do."""
+    planar = system.elements[0]
+    assert isinstance(planar, Linkage)
+    out = np.stack([system.start_q, system.start_v])
     index, other = planar.body_index, rigid.body_index
     for body in rigid.bodies:
         k = 3 * other[body.name]
         (x, y, angle), (vx, vy, w) = state[:, k : k + 3]
-        if body.name not in links:
+        link = links.get(body.name)
+        if link is None:
             at = 3 * index[body.name]
             out[:, at : at + 3] = state[:, k : k + 3]
             continue
-        beam = links[body.name].beam
-        arm = beam.link.stations - beam.link.length / 2.0
         c, s = math.cos(angle), math.sin(angle)
-        turn = np.full(len(arm), 1.0)
-        out[0, beam.places] = np.stack([x + c * arm, y + s * arm, angle * turn], axis=1).ravel()
-        out[1, beam.places] = np.stack([vx - w * s * arm, vy + w * c * arm, w * turn], axis=1).ravel()
+        arms = link.beam.link.stations + 0j if isinstance(link, FlexibleLink) else link.part.plate.body.centres
+        arms = arms - complex(*body.centre)
+        arm = arms * complex(c, s)
+        turn = np.ones(len(arm))
+        places = link.beam.places if isinstance(link, FlexibleLink) else link.nodes.ravel()
+        out[0, places] = np.stack([x + arm.real, y + arm.imag, angle * turn], axis=1).ravel()
+        out[1, places] = np.stack([vx - w * arm.imag, vy + w * arm.real, w * turn], axis=1).ravel()
+        if isinstance(link, PlateLink):
+            origin = -complex(*body.centre) * complex(c, s)
+            pose, speed = (x + origin.real, y + origin.imag, angle), (vx - w * origin.imag, vy + w * origin.real, w)
+            out[:, link.own] = link.element.moving(pose, speed)
     return out

@@ -15,10 +15,23 @@ from ..rigid import GROUND, Forced, Linkage, Start, System, consistent_start
 from ..tables.kinds import FORCES, JOINTS
 from ..tables.mechanism import FigureTable, MechanismFile, read_mechanism_file
 from ..typing import Array
-from .expressions import FUNCTIONS, NAMED, OF_LINK, OF_POINT, OF_SECTION, PLAIN, Node, compute, parse, quantities
+from .expressions import (
+    FUNCTIONS,
+    NAMED,
+    OF_LINK,
+    OF_PLATE,
+    OF_POINT,
+    OF_SECTION,
+    PLAIN,
+    Node,
+    compute,
+    parse,
+    quantities,
+)
 from .links import FlexibleLink, bent_start, flexible_links, link_of
 from .loads import ExpressionLoad
-from .parts import body_of, known_until, part_of
+from .parts import Links, body_of, known_until, part_of
+from .plates import PlateLink, part_of_plate, plate_links
 from .tables import read_table
 
 Point = tuple[float, float]
@@ -33,11 +46,11 @@ class Mechanism:
     file : MechanismFile
         The tables as read.
     system : System
-        One linkage, and a beam for each flexible link.
+        One linkage, a beam or an elastic body for each flexible link, and the frames of those bodies.
     outputs : dict
         Column name -> parsed expression.
-    links : dict
-        Flexible links by name.
+    links, plates : dict
+        Flexible links by name: beams, and plane finite elements.
     """
 
     file: MechanismFile
@@ -45,6 +58,7 @@ class Mechanism:
     outputs: Mapping[str, Node] = field(repr=False)
     path: Path = Path()
     links: Mapping[str, FlexibleLink] = field(default_factory=dict, repr=False)
+    plates: Mapping[str, PlateLink] = field(default_factory=dict, repr=False)
     known_until: float = math.inf  # end of the tables that are functions of time (s)
     unbent: bool = False  # made for the start of one with flexible links: nothing in it need be free to move
 
@@ -56,10 +70,15 @@ class Mechanism:
         return element
 
     @property
+    def elastic(self) -> dict[str, FlexibleLink | PlateLink]:
+        """All flexible links."""
+        return {**self.links, **self.plates}
+
+    @property
     def tolerance(self) -> float:
         """Tolerance of the run: asked for, or 1e-9, with flexible links 1e-5."""
         asked = self.file.run.tolerance
-        return asked if asked is not None else (1e-5 if self.links else 1e-9)
+        return asked if asked is not None else (1e-5 if self.elastic else 1e-9)
 
     def point(self, where: str, label: str = "point") -> tuple[int, Point]:
         """Body number and coordinates relative to the mass centre of ``body.point``, ``body.centre`` or ``body``."""
@@ -71,12 +90,15 @@ class Mechanism:
             link = self.links[body]
             node = link.node(name, label)
             return index[link.beam.link.node_names[node]], (0.0, link.points[name][1] if name in link.points else 0.0)
+        if body in self.plates:
+            node_name, place = self.plates[body].at(name, label)
+            return index[node_name], place
         at = (0.0, 0.0) if name in ("", "origin") else None
         centre = self.linkage.assembly.centre[index[body]]
         if name == "centre":
             return index[body], (0.0, 0.0)
         if at is None:
-            points = self.file.ground.points_m if body == GROUND else self.file.bodies[body].points_m
+            points = self.file.ground.points_m if body == GROUND else self.file.bodies[body].all_points
             if name not in points:
                 raise unknown_name(f"{label}: points of {body}", name, [*points, "origin", "centre"])
             at = points[name]
@@ -125,11 +147,16 @@ class Mechanism:
 
     def _of_link(self, kind: str, what: str, q: Any, v: Any, sections: Any) -> Any:
         name, _, point = what.partition(".")
-        if name not in self.links:
-            raise unknown_name(f"expression {kind}({what}): flexible links", name, self.links)
-        link = self.links[name]
+        if name not in self.elastic:
+            raise unknown_name(f"expression {kind}({what}): flexible links", name, self.elastic)
         if kind == "elastic_energy":
-            return np.array([link.beam.elastic_energy(state) for state in q])
+            return np.array([self.elastic[name].elastic_energy(state) for state in q])
+        if name in self.plates:
+            return self._of_plate(kind, what, q, v, sections)
+        if kind in OF_PLATE:
+            problem = f"link {name!r} is a beam"
+            raise InputError(f"expression {kind}({what})", None, problem, f"use largest_edge_stress({name})")
+        link = self.links[name]
         node = link.node(point, "expression")
         if kind in ("stretch", "deflection"):
             return link.offsets(q)[:, node, ("stretch", "deflection").index(kind)]
@@ -142,6 +169,18 @@ class Mechanism:
         if kind == "edge_stress":
             return link.edge_stress(forces, f"expression {kind}({what})")
         return forces[:, ("axial_force", "shear_force", "bending_moment").index(kind)]
+
+    def _of_plate(self, kind: str, what: str, q: Any, v: Any, sections: Any) -> Any:
+        name, _, point = what.partition(".")
+        link = self.plates[name]
+        if kind in ("stretch", "deflection"):
+            offset = link.offset(q, point, "expression")
+            return offset.real if kind == "stretch" else offset.imag
+        if kind not in OF_PLATE:
+            cure = f"use largest_von_mises({name}), or the reactions of its joints"
+            raise InputError(f"expression {kind}({what})", None, f"link {name!r} is no beam", cure)
+        stresses = link.stresses(q, v) if sections is None else sections[name]
+        return np.array([link.von_mises(stress).max() for stress in stresses])
 
     def _point_values(self, kind: str, where: str, q: Any, v: Any, a: Any) -> tuple[Array, Array]:
         body, (lx, ly) = self.point(where, "expression")
@@ -167,7 +206,7 @@ class Mechanism:
         InputError
             When a loop cannot close, forced values contradict the joints, or nothing is free to move.
         """
-        if self.links:
+        if self.elastic:
             return self._bent_start(time)
         positions = [self._forced(text, target, 0) for text, target in self.file.start.positions.items()]
         velocities = [self._forced(text, target, 1) for text, target in self.file.start.velocities.items()]
@@ -183,11 +222,11 @@ class Mechanism:
 
     def _bent_start(self, time: float) -> Start:
         """Flexible links start straight, with the velocities of the same mechanism with rigid ones."""
-        bodies = {n: replace(b, flexible=False) if b.beam is not None else b for n, b in self.file.bodies.items()}
+        bodies = {n: replace(b, flexible=False) if b.shape is not None else b for n, b in self.file.bodies.items()}
         file = replace(self.file, bodies=bodies, forces={}, outputs=(), figure=FigureTable())
         rigid = replace(make_mechanism(file, self.path), unbent=True)
         known = rigid.start(time)
-        q, v = bent_start(dict(self.links), self.linkage, rigid.linkage, np.stack([known.q, known.v]))
+        q, v = bent_start(self.elastic, self.system, rigid.linkage, np.stack([known.q, known.v]))
         made = consistent_start(self.system, time, q=q, v=v)
         self._check_loads(made)
         return made
@@ -270,21 +309,28 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
     for name in tables:
         if name in FUNCTIONS or name in (*NAMED, *PLAIN, "pi"):
             raise InputError("tables", name, "is the name of a function or a quantity", "rename the table")
-    links = {name: link_of(file, name, table) for name, table in file.bodies.items() if table.bends}
-    bodies = [b for n, t in file.bodies.items() for b in (links[n].nodes() if n in links else (body_of(file, n, t),))]
+    parts = {n: part_of_plate(n, table, path.parent) for n, table in file.bodies.items() if table.plate is not None}
+    links = {n: link_of(file, n, table) for n, table in file.bodies.items() if table.bends and table.beam is not None}
+    plates = {n: part for n, part in parts.items() if file.bodies[n].bends}
+    held: Links = {**links, **plates}
+    bodies = [
+        b for n, t in file.bodies.items() for b in (held[n].nodes() if n in held else (body_of(file, n, t, parts),))
+    ]
     if not bodies:
         raise InputError("bodies", None, "there is none", "add a table [bodies.NAME]")
     joints = tuple(
-        part_of(file, links, tables, f"joints.{n}", n, table, JOINTS[table.type]) for n, table in file.joints.items()
+        part_of(file, held, tables, f"joints.{n}", n, table, JOINTS[table.type]) for n, table in file.joints.items()
     )
     forces = tuple(
-        part_of(file, links, tables, f"forces.{n}", n, table, FORCES[table.type]) for n, table in file.forces.items()
+        part_of(file, held, tables, f"forces.{n}", n, table, FORCES[table.type]) for n, table in file.forces.items()
     )
     planar = Linkage(tuple(bodies), joints, forces)
     flexible = flexible_links(file, planar, links)
-    system = System([planar, *(link.beam for link in flexible.values())])
+    elastic = plate_links(file.bodies, planar, plates)
+    bending = [link.beam for link in flexible.values()], [link.element for link in elastic.values()]
+    system = System([planar, *bending[0], *bending[1], *(link.joint for link in elastic.values())])
     outputs: dict[str, Node] = {}
-    made = Mechanism(file, system, outputs, path, flexible, known_until(file, tables))
+    made = Mechanism(file, system, outputs, path, flexible, elastic, known_until(file, tables))
     for _, load in planar.assembly.state_loads:
         if isinstance(load, ExpressionLoad):
             load.bind(made)

@@ -15,6 +15,7 @@ from ..tables.mechanism import BodyTable, ForceTable, FunctionTable, JointTable,
 from .expressions import parse
 from .links import link_of
 from .loads import OF_SPAN, ExpressionLoad, ExpressionTension
+from .plates import PlatePart
 from .tables import ValueTable
 
 Point = tuple[float, float]
@@ -22,25 +23,34 @@ Point = tuple[float, float]
 LOADS = ("x_N", "y_N", "moment_N_m")
 
 
-def body_of(file: MechanismFile, name: str, t: BodyTable) -> Body:
+#: Flexible links by name: where joints and forces find the bodies that are their nodes.
+Links = Mapping[str, BeamLink | PlatePart]
+
+
+def body_of(file: MechanismFile, name: str, t: BodyTable, parts: Mapping[str, PlatePart]) -> Body:
     if t.beam is not None:
         return link_of(file, name, t).rigid()
+    if t.plate is not None:
+        return parts[name].rigid()
     mass, inertia = given(t.mass_kg, f"bodies.{name}.mass_kg"), given(t.inertia_kg_m2, f"bodies.{name}.inertia_kg_m2")
     angle = t.angle_rad if t.angle_rad is not None else math.radians(t.angle_deg or 0.0)
     return Body(name, mass, inertia, t.centre_m, t.position_m, angle, t.velocity_m_per_s, t.rate_rad_per_s)
 
 
 def _place(
-    file: MechanismFile, links: Mapping[str, BeamLink], where: str, point: str | Point | None, label: str
+    file: MechanismFile, links: Links, where: str, point: str | Point | None, label: str, *, pointed: bool
 ) -> tuple[str, Point]:
-    """Body of the linkage, and the place in its frame, of a point of `where`: a body, or a point of a flexible link."""
+    """Body of the linkage, and the place in its frame, of a point of `where`: a body, or a point of a flexible link.
+
+    What takes no point (not `pointed`) acts on the section where a flexible link begins.
+    """
     body, _, at = where.partition(".")
     place = (0.0, 0.0)
     if at:
-        place = file.bodies[body].points_m[at]
+        place = file.bodies[body].all_points[at]
     elif isinstance(point, str):
-        points = file.ground.points_m if body == GROUND else file.bodies[body].points_m
-        if point == "centre" and body != GROUND and file.bodies[body].beam is None:
+        points = file.ground.points_m if body == GROUND else file.bodies[body].all_points
+        if point == "centre" and body != GROUND and file.bodies[body].shape is None:
             place = file.bodies[body].centre_m
         elif point not in points:
             raise unknown_name(f"{label}: points of {body}", point, points)
@@ -51,12 +61,14 @@ def _place(
     if body not in links:
         return body, place
     link = links[body]
+    if isinstance(link, PlatePart):
+        return link.at(place, label) if pointed or at else (link.name, (0.0, 0.0))
     return link.node_names[link.node(place[0])], (0.0, place[1])
 
 
 def part_of(
     file: MechanismFile,
-    links: Mapping[str, BeamLink],
+    links: Links,
     tables: Mapping[str, ValueTable],
     label: str,
     name: str,
@@ -68,7 +80,14 @@ def part_of(
     values: dict[str, Any] = {}
     for body, point in (("body", "point"), ("to", "to_point")):
         if body in kind.fields and getattr(table, body) is not None:
-            made = _place(file, links, getattr(table, body), getattr(table, point), f"{label}.{point}")
+            made = _place(
+                file,
+                links,
+                getattr(table, body),
+                getattr(table, point),
+                f"{label}.{point}",
+                pointed=point in kind.fields,
+            )
             values[kind.fields[body]] = made[0]
             if point in kind.fields:
                 values[kind.fields[point]] = made[1]

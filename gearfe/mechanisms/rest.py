@@ -17,7 +17,7 @@ from ..rigid.dense import Polynomials
 from ..rigid.equilibrium import Equilibrium, equilibrium
 from ..rigid.modes import Modes, modes
 from ..typing import Array
-from .job import MAY_WRITE, Outcome
+from .job import MAY_WRITE, Outcome, write_elastic
 from .model import Mechanism
 from .results import Results, evaluate, reactions
 
@@ -52,10 +52,7 @@ def run_rest(
         write_csv(made / "reactions.csv", dict(reactions(mechanism, results.trajectory)))
         if found is not None:
             _write_modes(made, mechanism, found)
-        if mechanism.links:
-            from .link_files import write_links
-
-            write_links(made, mechanism, results.trajectory)
+        write_elastic(made, mechanism, results.trajectory)
         if slopes is not None:
             write_csv(made / "sensitivities.csv", slopes.table())
         if draw is not None:
@@ -103,7 +100,7 @@ def _write_modes(folder: Path, mechanism: Mechanism, found: Modes) -> None:
     number, count = columns["mode"], len(found.rates)
     write_csv(folder / "modes.csv", columns)
     bodies = [body.name for body in mechanism.linkage.bodies]
-    shapes = found.shapes.reshape(count, -1, 3)
+    shapes = found.shapes[:, : mechanism.linkage.size].reshape(count, -1, 3)
     rows: dict[str, Any] = {"mode": np.repeat(number, len(bodies)), "body": bodies * count}
     for k, name in enumerate(("x_m", "y_m", "angle_rad")):
         rows[name] = shapes[:, :, k].real.ravel()

@@ -32,7 +32,8 @@ class Results:
         prescribed motions, from the start), total_J = kinetic + potential - work; elastic_J of flexible links, a part
         of the potential energy.
     sections : dict
-        Flexible link -> axial force (N), shear force (N), bending moment (N m) at its nodes, shape (n, nodes, 3).
+        Flexible link -> axial force (N), shear force (N), bending moment (N m) at its nodes, shape (n, nodes, 3); of
+        finite elements the stresses of the core, shape (n, s), see `PlateLink.von_mises`.
     """
 
     trajectory: Trajectory
@@ -52,7 +53,7 @@ def evaluate(mechanism: Mechanism, trajectory: Trajectory) -> Results:
     sections = {
         name: link.beam.at_nodes(trajectory.stress_at(link.beam, trajectory.time))
         for name, link in mechanism.links.items()
-    }
+    } | {name: trajectory.stress_at(link.element, trajectory.time) for name, link in mechanism.plates.items()}
     values = mechanism.values(wanted, trajectory.q, v, a, sections)
     values["time", None] = trajectory.time
     for name in ("kinetic", "potential", "work", "total"):
@@ -77,8 +78,8 @@ def energies(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
     kinetic = 0.5 * ((v @ system.mass) * v).sum(axis=1)
     potential = np.array([system.energy(*state)[1] for state in zip(q, v, strict=True)])
     work = _work(mechanism, trajectory)
-    beams = [link.beam for link in mechanism.links.values()]
-    elastic = {"elastic_J": np.array([sum(b.elastic_energy(state) for b in beams) for state in q])} if beams else {}
+    links = mechanism.elastic.values()
+    elastic = {"elastic_J": np.array([sum(e.elastic_energy(state) for e in links) for state in q])} if links else {}
     return {
         **elastic,
         "kinetic_J": kinetic,
@@ -107,19 +108,20 @@ def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
         loses = isinstance(force, Spring | CoordinateSpring) and force.damping
         if isinstance(force, Moment | PointForce) or loses or (isinstance(force, Spring) and force.law is not None):
             varying = True
-    damped = [link.beam for link in mechanism.links.values() if link.beam.link.damping]
+    damped = [link for link in mechanism.elastic.values() if link.damping]
     if not (varying or damped or linkage.driven) or len(time) < 2:
         return work
     nodes, weights = np.polynomial.legendre.leggauss(8)
     half = 0.5 * np.diff(time)
     at = (0.5 * (time[1:] + time[:-1])[:, None] + half[:, None] * nodes).ravel()
     states = trajectory.dense(at, 0), trajectory.dense(at, 1)
-    power = np.array([linkage.power(t, q, v) for t, q, v in zip(at, *states, strict=True)])
-    for beam in damped:
-        power = power - np.array([beam.loss(q, v) for q, v in zip(*states, strict=True)])
+    planar = [state[:, : linkage.size] for state in states]
+    power = np.array([linkage.power(t, q, v) for t, q, v in zip(at, *planar, strict=True)])
+    for link in damped:
+        power = power - np.array([link.loss(q, v) for q, v in zip(*states, strict=True)])
     if linkage.driven:
-        multipliers = trajectory.multipliers_at(at)
-        rates = np.array([linkage.rate(t, q) for t, q in zip(at, states[0], strict=True)])
+        multipliers = trajectory.multipliers_at(at)[:, : linkage.rows]
+        rates = np.array([linkage.rate(t, q) for t, q in zip(at, planar[0], strict=True)])
         power = power + (multipliers * rates).sum(axis=1)
     steady = _steady_power(mechanism, states[1])
     gained = ((power - steady).reshape(len(half), -1) @ weights) * half
@@ -158,7 +160,7 @@ def reactions(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
     bodies = linkage.assembly.tables.forms.bodies
     owner = np.array(linkage.assembly.row_joint)
     out = {f"{n}_{c}": np.zeros(len(trajectory.time)) for n in names for c in ("x_N", "y_N", "moment_N_m")}
-    q = trajectory.q
+    q = trajectory.q[:, : linkage.size]
     for i, multipliers in enumerate(trajectory.multipliers):
         G = linkage.gradients(q[i])
         for j, name in enumerate(names):

@@ -156,7 +156,7 @@ class Trajectory(Shown):
             if one is not element:
                 before += here.size
             elif stages is None:  # not a single step was made
-                return np.tile(here, (len(times), 1, 1))
+                return np.broadcast_to(here, (len(times), *here.shape))
             else:
                 flat: Array = stages(times)[:, before : before + here.size]
                 return flat.reshape(len(times), *here.shape)

@@ -11,6 +11,7 @@ from ..config import TABLES, build, quantity, read_toml
 from ..errors import InputError, unknown_name
 from .beam import BeamTable, check_on_axis
 from .kinds import FORCES, JOINTS, Kind
+from .plate import PlateTable
 
 Pair = tuple[float, float]
 
@@ -32,30 +33,50 @@ class BodyTable:
     velocity_m_per_s: Pair = quantity((0.0, 0.0), doc="start velocity of the frame's origin, [x, y] in m/s")
     rate_rad_per_s: float = quantity(0.0, doc="start angular velocity in rad/s")
     points_m: dict[str, Pair] = quantity(dict, doc="named points in the body's frame, [x, y] in m")
-    flexible: bool | None = quantity(None, doc="false takes a link with a beam as rigid (default: flexible)")
+    flexible: bool | None = quantity(None, doc="false takes a link with beam or plate as rigid (default: flexible)")
     beam: BeamTable | None = quantity(None, doc="beam of a flexible link, in place of mass, inertia and centre")
+    plate: PlateTable | None = quantity(None, doc="plane finite elements of a flexible link, likewise")
+
+    @property
+    def shape(self) -> str | None:
+        """What its mass follows from: "beam" or "plate"; None for a rigid body."""
+        return "beam" if self.beam is not None else "plate" if self.plate is not None else None
 
     @property
     def bends(self) -> bool:
         """Whether it is a flexible link."""
-        return self.beam is not None and self.flexible is not False
+        return self.shape is not None and self.flexible is not False
+
+    @property
+    def all_points(self) -> dict[str, Pair]:
+        """Named points, the centres of interfaces among them."""
+        if self.plate is None:
+            return self.points_m
+        return {**{name: interface.centre for name, interface in self.plate.interfaces.items()}, **self.points_m}
 
     def check(self, where: str) -> None:
-        """Mass or beam, at most one of the two angles, points of a beam beside its axis."""
-        if self.beam is None:
+        """Mass, beam or plate, at most one of the two angles, points of a beam beside its axis."""
+        if self.beam is not None and self.plate is not None:
+            raise InputError(where, None, "has a beam and a plate", "keep one of them")
+        if self.shape is None:
             for key, unit in (("mass_kg", "kg"), ("inertia_kg_m2", "kg m2")):
                 if getattr(self, key) is None:
-                    raise InputError(f"{where}.{key}", None, "is required", f"give it in {unit}, or give a beam")
+                    raise InputError(f"{where}.{key}", None, "is required", f"give it in {unit}, or a beam or plate")
             if self.flexible:
                 cure = f"add a table [{where}.beam] with length_m, section, youngs_modulus_GPa, density_kg_per_m3"
-                raise InputError(f"{where}.flexible", True, "needs a beam", cure)
+                raise InputError(f"{where}.flexible", True, "needs a beam or a plate", cure)
         else:
             for key in ("mass_kg", "inertia_kg_m2", "centre_m"):
                 if getattr(self, key) not in (None, (0.0, 0.0)):
-                    problem = "follows from the beam's length, section and density"
-                    raise InputError(f"{where}.{key}", getattr(self, key), problem, "remove it, or the beam")
+                    problem = f"follows from the {self.shape}'s shape and density"
+                    raise InputError(f"{where}.{key}", getattr(self, key), problem, f"remove it, or the {self.shape}")
+        if self.beam is not None:
             for name, (x, _) in self.points_m.items():
                 check_on_axis(self.beam, x, f"{where}.points_m.{name}")
+        if self.plate is not None:
+            for name in self.points_m:
+                if name in self.plate.interfaces:
+                    raise InputError(f"{where}.points_m.{name}", None, "is the name of an interface", "rename it")
         if self.angle_deg is not None and self.angle_rad is not None:
             raise InputError(where, None, "has angle_deg and angle_rad", "keep one of them")
 
@@ -273,13 +294,13 @@ class MechanismFile:
             "tables": self.tables,
         }
         named["ground.points_m"] = self.ground.points_m
-        named |= {f"bodies.{name}.points_m": body.points_m for name, body in self.bodies.items()}
+        named |= {f"bodies.{name}.points_m": body.all_points for name, body in self.bodies.items()}
         for kind, names in named.items():
             for name in names:
                 if not name.isidentifier():
                     problem = "must be a word of letters, digits and _ (it is used in expressions and columns)"
                     raise InputError(kind, name, problem, "rename it")
-        known |= {f"{name}.{point}" for name, body in self.bodies.items() if body.beam for point in body.points_m}
+        known |= {f"{name}.{point}" for name, body in self.bodies.items() if body.shape for point in body.all_points}
         for name in self.joints:
             if name in known:
                 raise InputError("joints", name, "is the name of a body, too", "rename the joint")

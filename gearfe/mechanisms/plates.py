@@ -1,0 +1,284 @@
+"""Links of plane finite elements: from their tables to elastic bodies, from names to interfaces, and what is asked."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError, given, unknown_name
+from ..progress import stage
+from ..rigid.contract import Element
+from ..rigid.floating import Floating, frame_joint
+from ..rigid.linkage import Linkage
+from ..rigid.planar import Body
+from ..tables.mechanism import BodyTable
+from ..tables.plate import InterfaceTable, PlateTable
+from ..typing import Array, IntArray
+
+if TYPE_CHECKING:
+    from .plate_reduction import Interface, Plate
+
+Point = tuple[float, float]
+#: How far from an interface its nodes and points may lie, in parts of the link's size.
+NEAR = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class PlatePart:
+    """A reduced plane part that is a link: its name, interfaces and start.
+
+    Attributes
+    ----------
+    name, table, plate
+        As in the file, and what was made of it.
+    pose, speed
+        Start of the frame (x, y, angle), and how fast they change.
+    """
+
+    name: str
+    table: PlateTable
+    plate: Plate
+    pose: tuple[float, float, float]
+    speed: tuple[float, float, float]
+
+    @property
+    def node_names(self) -> tuple[str, ...]:
+        """Names of the bodies at the interfaces: that of the link, then with ``.1``, ``.2`` ..."""
+        return (self.name, *(f"{self.name}.{k}" for k in range(1, len(self.table.interfaces))))
+
+    def at(self, place: Point, label: str) -> tuple[str, Point]:
+        """Body of the interface on which a place of the frame lies, and the place as seen from its centre.
+
+        Raises
+        ------
+        InputError
+            Where it lies on none.
+        """
+        near = NEAR * self.plate.body.size
+        for name, interface in zip(self.node_names, self.table.interfaces.values(), strict=True):
+            if _distance(interface, np.array([place]))[0] <= near:
+                x, y = interface.centre
+                return name, (place[0] - x, place[1] - y)
+        problem = f"lies on no interface of {self.name}: {', '.join(self.table.interfaces)}"
+        cure = f"move it into one, or add [bodies.{self.name}.plate.interfaces.NAME] there"
+        raise InputError(label, list(place), problem, cure)
+
+    def nodes(self) -> tuple[Body, ...]:
+        """Bodies without mass at the interfaces, which start as those of a rigid link."""
+        c, s = math.cos(self.pose[2]), math.sin(self.pose[2])
+        made = []
+        for name, interface in zip(self.node_names, self.table.interfaces.values(), strict=True):
+            dx, dy = interface.centre
+            x, y = c * dx - s * dy, s * dx + c * dy
+            place = (self.pose[0] + x, self.pose[1] + y)
+            speed = (self.speed[0] - self.speed[2] * y, self.speed[1] + self.speed[2] * x)
+            made.append(Body(name, 0.0, 0.0, (0.0, 0.0), place, self.pose[2], speed, self.speed[2]))
+        return tuple(made)
+
+    def rigid(self) -> Body:
+        """The rigid link of the same mass and inertia."""
+        plate, (x, y, angle) = self.plate, self.pose
+        centre = (plate.centre.real, plate.centre.imag)
+        return Body(self.name, plate.mass, plate.inertia, centre, (x, y), angle, self.speed[:2], self.speed[2])
+
+
+@dataclass(frozen=True, eq=False)
+class PlateLink:
+    """A link of a mechanism with its elastic body; `own` are the body's coordinates in the system."""
+
+    part: PlatePart
+    element: Floating
+    joint: Element
+    points: dict[str, Point]
+    own: slice
+    nodes: IntArray  # (interfaces, 3) coordinates of the bodies at them
+
+    def at(self, point: str, label: str) -> tuple[str, Point]:
+        """Body and place of a named point."""
+        if point in ("", "origin"):
+            return self.part.at((0.0, 0.0), label)
+        if point not in self.points:
+            raise unknown_name(f"{label}: points of {self.part.name}", point, [*self.points, "origin"])
+        return self.part.at(self.points[point], label)
+
+    @property
+    def damping(self) -> float:
+        """Kelvin and Voigt's time (s)."""
+        return self.part.table.damping_s
+
+    def elastic_energy(self, q: Array) -> float:
+        """In a state of the system (J)."""
+        return self.element.elastic_energy(q[self.own])
+
+    def loss(self, q: Array, v: Array) -> float:
+        """Power that damping takes (W)."""
+        return self.element.loss(q[self.own], v[self.own])
+
+    def stresses(self, q: Array, v: Array) -> Array:
+        """Stresses of the core in states of the system, shape (times, s)."""
+        return np.array([self.element.stress(a[self.own], b[self.own]) for a, b in zip(q, v, strict=True)])
+
+    def von_mises(self, stress: Array) -> Array:
+        """Von Mises' stress at the nodes (Pa), shape (n,), by the stresses of the core, shape (s,)."""
+        x, y, shear = np.moveaxis(self.part.plate.stresses @ stress, -1, 0)
+        return np.asarray(np.sqrt(x**2 - x * y + y**2 + 3.0 * shear**2))
+
+    def places(self, q: Array) -> np.ndarray:
+        """Places of the nodes as complex numbers, shape (times, n)."""
+        plate = self.part.plate
+        vectors = q[:, self.own].reshape(len(q), -1, 2)
+        z = vectors[..., 0] + 1j * vectors[..., 1]
+        return np.asarray(z[:, :1] + z[:, 1:2] * plate.points + z[:, 2:] @ plate.modes.T)
+
+    def _frame(self, q: Array) -> tuple[np.ndarray, np.ndarray]:
+        """Place of the first interface and direction of the link's own frame, shape (times,)."""
+        at = q[:, self.nodes[:, 0]] + 1j * q[:, self.nodes[:, 1]]
+        if self.part.table.frame == "start" or len(self.nodes) < 2:
+            return at[:, 0], np.exp(1j * (q[:, self.nodes[0, 2]]))
+        chord = (at[:, 1] - at[:, 0]) / np.diff(self.part.plate.body.centres[:2])
+        return at[:, 0], np.exp(1j * np.angle(chord))
+
+    def displacements(self, q: Array) -> np.ndarray:
+        """Of the nodes in the link's own frame (m), complex, shape (times, n)."""
+        origin, direction = self._frame(q)
+        seen = (self.places(q) - origin[:, None]) / direction[:, None]
+        plate = self.part.plate
+        return np.asarray(seen - (plate.points - plate.body.centres[0]))
+
+    def offset(self, q: Array, point: str, label: str) -> np.ndarray:
+        """Displacement of a named point in the link's own frame (m), complex, shape (times,)."""
+        name, (x, y) = self.at(point, label)
+        which = self.part.node_names.index(name)
+        k, body = self.nodes[which], self.part.plate.body
+        origin, direction = self._frame(q)
+        place = q[:, k[0]] + 1j * q[:, k[1]] + np.exp(1j * q[:, k[2]]) * complex(x, y)
+        start = body.centres[which] + complex(x, y) - body.centres[0]
+        return np.asarray((place - origin) / direction - start)
+
+    def exaggerated(self, q: Array, factor: float) -> np.ndarray:
+        """Places with displacements in the link's own frame times a factor, complex, shape (times, n)."""
+        return np.asarray(self.places(q) + (factor - 1.0) * self.displacements(q) * self._frame(q)[1][:, None])
+
+    @cached_property
+    def border(self) -> IntArray:
+        """Sides of elements at the edge: ends and middle node, shape (sides, 3), ends in turn."""
+        t = self.part.plate.triangles
+        sides = np.concatenate([t[:, [0, 3, 1]], t[:, [1, 4, 2]], t[:, [2, 5, 0]]])
+        middle, count = np.unique(sides[:, 1], return_counts=True)
+        return np.asarray(sides[np.isin(sides[:, 1], middle[count == 1])], dtype=np.int64)
+
+    @property
+    def mesh(self) -> tuple[int, int]:
+        """Number of nodes and of elements."""
+        return len(self.part.plate.points), len(self.part.plate.triangles)
+
+
+def part_of_plate(name: str, table: BodyTable, folder: Path) -> PlatePart:
+    """A link from its tables; the finite elements are condensed once for all links of the same shape and material."""
+    plate = given(table.plate, f"bodies.{name}.plate")
+    source = None if plate.mesh is None else folder / plate.mesh
+    written = 0 if source is None or not source.is_file() else source.stat().st_mtime_ns
+    angle = table.angle_rad if table.angle_rad is not None else math.radians(table.angle_deg or 0.0)
+    reduced = _reduced(_Shape(plate, source, f"bodies.{name}.plate"), written)
+    speed = (*table.velocity_m_per_s, table.rate_rad_per_s)
+    return PlatePart(name, plate, reduced, (*table.position_m, angle), speed)
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """What decides a plate; equal by what its table says."""
+
+    table: PlateTable
+    source: Path | None
+    where: str
+
+    def __hash__(self) -> int:
+        return hash(repr(self.table))
+
+
+@lru_cache(maxsize=16)
+def _reduced(shape: _Shape, written: int) -> Plate:  # noqa: ARG001 - a mesh file that is written anew is another
+    from ..elasticity import Material
+    from .plate_reduction import reduce_plate
+
+    table = shape.table
+    with stage("elastic link"):
+        points, triangles = _mesh(shape)
+        interfaces = _interfaces(points, table, shape.where)
+        material = Material(1e9 * table.youngs_modulus_GPa, table.poisson_ratio, density=table.density_kg_per_m3)
+        return reduce_plate(points, triangles, table.thickness_m, material, table.damping_s, interfaces, table.modes)
+
+
+def _mesh(shape: _Shape) -> tuple[Array, IntArray]:
+    from ..meshing.plate_mesh import check_outline, mesh_outline, read_plate
+
+    table, where = shape.table, shape.where
+    if table.outline_m is None:
+        return read_plate(given(shape.source, f"{where}.mesh"), f"{where}.mesh", table.mesh_unit_m)
+    holes = [
+        (f"{where}.interfaces.{name}", *i.centre, i.radius_m)
+        for name, i in table.interfaces.items()
+        if i.radius_m is not None
+    ]
+    holes += [(f"{where}.holes_m[{k}]", *hole) for k, hole in enumerate(table.holes_m)]
+    check_outline(table.outline_m, holes, f"{where}.outline_m")
+    round_ = [hole[1:] for hole in holes]
+    size = table.element_size_m or _width(np.array(table.outline_m), [r for *_, r in round_])
+    return mesh_outline(table.outline_m, round_, size)
+
+
+def _width(corners: Array, radii: list[float]) -> float:
+    """Area over perimeter of a polygon with round holes (m): half the width of a thin strip."""
+    ends = np.roll(corners, -1, axis=0)
+    area = 0.5 * abs(float((corners[:, 0] * ends[:, 1] - corners[:, 1] * ends[:, 0]).sum()))
+    area -= sum(math.pi * r**2 for r in radii)
+    return area / (float(np.hypot(*(ends - corners).T).sum()) + sum(2 * math.pi * r for r in radii))
+
+
+def _distance(interface: InterfaceTable, places: Array) -> Array:
+    """Distance of places from an interface, inside a hole 0; shape (n,)."""
+    if interface.edge_m is None:
+        away = np.hypot(*(places - np.array(interface.centre)).T) - given(interface.radius_m, "radius_m")
+        return np.maximum(away, 0.0)
+    a, b = np.array(interface.edge_m)
+    share = np.clip((places - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+    return np.asarray(np.hypot(*(a + share[:, None] * (b - a) - places).T))
+
+
+def _interfaces(points: Array, table: PlateTable, where: str) -> list[Interface]:
+    """Nodes of every interface."""
+    from .plate_reduction import Interface
+
+    near = NEAR * float(np.hypot(*np.ptp(points, axis=0)))
+    made: list[Interface] = []
+    owner = np.full(len(points), "", dtype=object)
+    for name, interface in table.interfaces.items():
+        nodes = np.flatnonzero(_distance(interface, points) <= near)
+        label = f"{where}.interfaces.{name}"
+        if len(nodes) < 3:
+            problem = f"has {len(nodes)} nodes of the mesh on it, and needs three"
+            raise InputError(label, None, problem, "lay it on the edge of the part")
+        taken = next((other for other in owner[nodes] if other), None)
+        if taken is not None:
+            raise InputError(label, None, f"shares nodes with interface {taken}", "leave elements between them")
+        owner[nodes] = name
+        made.append(Interface(np.array(interface.centre), nodes))
+    return made
+
+
+def plate_links(bodies: dict[str, BodyTable], planar: Linkage, parts: dict[str, PlatePart]) -> dict[str, PlateLink]:
+    """Links with their elastic bodies, which stand in the system after the linkage and the beams, in their order."""
+    made, at = {}, planar.size
+    for name, part in parts.items():
+        element = Floating(part.plate.body, planar, name, part.pose, part.speed)
+        nodes = np.array([[3 * planar.body_index[n] + k for k in range(3)] for n in part.node_names])
+        joint = frame_joint(element, planar, part.node_names)
+        own = slice(at, at + element.size)
+        made[name] = PlateLink(part, element, joint, bodies[name].all_points, own, nodes)
+        at += element.size
+    return made
