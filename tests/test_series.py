@@ -51,7 +51,7 @@ def test_the_series_of_a_register_is_its_function(text: str) -> None:
     node = parse(text, "text")
     register = write_expression(node, tape, lambda name: leaf[name[0]])
     program = tape.program(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), np.ones(1))
-    kernels = route.kernels(False)
+    kernels = route.KERNELS.plain
     Z, R = np.zeros((1, ORDER + 2)), np.zeros((len(program.code.op), ORDER + 1))
     Z[0, :3] = 0.3, 0.4, -0.2
     pieces, TF = np.zeros(len(program.switches.register), dtype=np.int64), np.zeros((1, ORDER + 1))

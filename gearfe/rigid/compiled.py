@@ -14,18 +14,25 @@ import os
 import platform
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from pathlib import Path
 from types import FunctionType, SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from .. import cache
+from ..progress import stage
 from .native import Entry, ObjectCode
-from .parts import part_options
+from .parts import part_options, uncollected
 
 if TYPE_CHECKING:
     from .packed import Layout
+
+
+#: Seconds of loading kernels of an earlier run (measured).
+LOAD_SECONDS = 0.05
 
 
 def available() -> bool:
@@ -157,6 +164,59 @@ def bind(
         return Entry(name, folder, make)
 
     return SimpleNamespace(**{name: made(name) for name in entries})
+
+
+@dataclass(eq=False)
+class Kernels:
+    """The kernels of a loop, bound plain or compiled where they are first wanted.
+
+    Parameters
+    ----------
+    functions, names, entries, inline, alias
+        See `bind`.
+    making
+        Seconds that compiling them takes (measured).
+    """
+
+    functions: tuple[Callable[..., Any], ...]
+    names: Mapping[str, Any]
+    entries: tuple[str, ...]
+    inline: tuple[str, ...] = ()
+    alias: Mapping[str, str] | None = None
+    making: float = 10.0
+    loaded: bool = False  # whether the compiled ones are in this process
+
+    @cached_property
+    def plain(self) -> SimpleNamespace:
+        """As they are."""
+        return bind(self.functions, self.names, compiled=False, alias=self.alias)
+
+    @cached_property
+    def compiled(self) -> SimpleNamespace:
+        """Their entries, compiled or from the cache at their first call."""
+        return bind(
+            self.functions, self.names, compiled=True, entries=self.entries, inline=self.inline, alias=self.alias
+        )
+
+    @property
+    def ready(self) -> bool:
+        """Whether compiled ones are loaded already or wait in the cache."""
+        return self.loaded or (available() and is_cached(self.functions, self.entries[0]))
+
+    @property
+    def seconds(self) -> float:
+        """What there is to pay before the first compiled step."""
+        return 0.0 if self.loaded else LOAD_SECONDS if self.ready else self.making
+
+    def load(self, run: Callable[[], object]) -> float:
+        """Compile them, or load them, by a run of no length; seconds that this took."""
+        if self.loaded:
+            return 0.0
+        began = time.perf_counter()
+        with stage("compiling the kernels"), uncollected():
+            run()
+        self.loaded = True
+        return time.perf_counter() - began
 
 
 #: Without numba's reference counts, so kernels allocate nothing: they compile and run a sixth faster.

@@ -24,8 +24,9 @@ from .kernel_singular import (
 )
 
 if TYPE_CHECKING:
+    from .kernel_steps import Run
     from .tables import Forms, Tables
-    from .taylor import Border, Run, Work
+    from .taylor import Border, Work
 
 #: Pivot of another row at the singular position of one row below which it passes with it (eps^(2/3): at the distance d
 #: between two, rounding leaves eps / d^2 of the velocities, more than taking both for one does).

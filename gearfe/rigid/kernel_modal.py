@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..typing import Array, IntArray
+from .kernel_steps import next_goal
 
 #: Orders that are computed in any case: a force that sets in as a polynomial of degree 5 shows up to order 7.
 LEAST = 8
@@ -223,10 +224,7 @@ def modal_steps(run: Equations, w: Work, out: Output) -> int:
         if count >= T.shape[0]:
             status = 2
             break
-        goal = t1
-        for i in range(breaks.shape[0]):
-            if sign * (breaks[i] - t) > 1e-14 * max(1.0, abs(t)) and sign * (goal - breaks[i]) > 0.0:
-                goal = breaks[i]
+        goal = next_goal(breaks, t, t1, sign)
         step = min(h, longest, abs(goal - t))
         fixed = step == abs(goal - t)
         if step < 1e-14 * max(abs(t), abs(t1 - begin)):
@@ -321,4 +319,15 @@ def work_space(law: tuple[Array, IntArray], state: Array, directions: int) -> Wo
     return Work(*law, state.copy(), np.abs(state[:n]), np.zeros(n), *series, np.zeros(n), np.zeros(n), np.zeros(n))
 
 
-FUNCTIONS = (project, add_forces, next_order, evaluate, widen, set_weights, velocity_term, last_size, modal_steps)
+FUNCTIONS = (
+    next_goal,
+    project,
+    add_forces,
+    next_order,
+    evaluate,
+    widen,
+    set_weights,
+    velocity_term,
+    last_size,
+    modal_steps,
+)

@@ -21,7 +21,8 @@ from .kernel_rows import fill, time_series
 from .kernel_tape import cauchy, tape_order, weighted
 
 if TYPE_CHECKING:
-    from .series import Run, Work
+    from .kernel_steps import Run
+    from .series import Work
     from .tape import Program
 
 

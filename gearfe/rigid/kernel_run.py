@@ -1,10 +1,9 @@
 """The integration loop of the Taylor method: expand, choose the step, land, project; land on singular positions rather
 than jump them.
 
-Step length from the last two coefficients (Jorba & Zou, Exp. Math. 14 (2005) 99): |q_N| h^N <= tolerance in units of
-the length and 1 rad. A series started at the distance d from a singular position amplifies round-off by (h/d)^N beyond
-it, so a step never crosses one: it ends there, and the next one is expanded there with the bordered equations of
-`kernel_series`.
+Terms count in units of the length and 1 rad (`kernel_steps`). A series started at the distance d from a singular
+position amplifies round-off by (h/d)^N beyond it, so a step never crosses one: it ends there, and the next one is
+expanded there with the bordered equations of `kernel_series`.
 """
 
 from __future__ import annotations
@@ -19,11 +18,13 @@ from .kernel_names import AHEAD, BEGUN, LAST_STEP, ROW, SINGULAR, TIME
 from .kernel_rows import copy, fill
 from .kernel_series import expand
 from .kernel_singular import evaluate, factor_at, next_singular, project
+from .kernel_steps import even_step, next_goal, series_step
 from .steps import Status
 
 if TYPE_CHECKING:
+    from .kernel_steps import Run
     from .tables import Tables
-    from .taylor import Run, Work
+    from .taylor import Work
 
 DONE, STEP_TOO_SMALL, MOST_STEPS = int(Status.DONE), int(Status.STEP_TOO_SMALL), int(Status.MOST_STEPS)
 NO_BRANCH, NOT_FINITE, SINGULAR_START = int(Status.NO_BRANCH), int(Status.NOT_FINITE), int(Status.SINGULAR_START)
@@ -42,14 +43,7 @@ def step_length(QS: Array, run: Run) -> float:
         unit = 1.0 if i % 3 == 2 else run.length
         last = max(last, abs(QS[order, i]) / unit)
         before = max(before, abs(QS[order - 1, i]) / unit)
-    step = np.inf
-    if last > 0.0:
-        step = min(step, (run.tolerance / last) ** (1.0 / order))
-    if before > 0.0:
-        step = min(step, (run.tolerance / before) ** (1.0 / (order - 1)))
-    if not np.isfinite(both):
-        step = 0.0
-    return step
+    return series_step(last, before, run) if np.isfinite(both) else 0.0
 
 
 def clear_series(w: Work, order: int) -> None:
@@ -201,8 +195,6 @@ def integrate_series(tb: Tables, w: Work, run: Run, out: Output) -> int:
     """
     state, T, C, singular = out.state, out.times, out.coefficients, out.singular
     sign = run.sign
-    forward = sign > 0.0
-    t1 = run.end
     t = state[TIME]
     status = DONE
     count = 0
@@ -219,8 +211,7 @@ def integrate_series(tb: Tables, w: Work, run: Run, out: Output) -> int:
         state[AHEAD], state[ROW] = next_singular(tb, w, run, w.q, w.v, 0.0, np.inf)
         state[BEGUN] = 1.0
     T[0] = t
-    edge = 0 if forward else run.breaks.shape[0] - 1
-    while status == DONE and sign * (t1 - t) > 0.0:
+    while status == DONE and sign * (run.end - t) > 0.0:
         if count >= singular.shape[0]:
             status = MOST_STEPS
             break
@@ -229,19 +220,12 @@ def integrate_series(tb: Tables, w: Work, run: Run, out: Output) -> int:
         copy(w.v, w.QS[1])
         expand(tb, w, run, t, rows)
         size = min(step_length(w.QS, run), run.longest)
-        if not size > 1e-14 * max(abs(t), abs(t1 - run.begin)):
+        if not size > 1e-14 * max(abs(t), abs(run.end - run.begin)):
             status = STEP_TOO_SMALL
             break
-        while 0 <= edge < run.breaks.shape[0] and sign * (run.breaks[edge] - t) <= 1e-13 * abs(t):
-            edge += 1 if forward else -1
-        goal = t1
-        if 0 <= edge < run.breaks.shape[0] and sign * (t1 - run.breaks[edge]) > 0.0:
-            goal = run.breaks[edge]
+        goal = next_goal(run.breaks, t, run.end, sign)
         remains = sign * (goal - t)
-        if size >= remains:
-            size = remains
-        elif size > 0.5 * remains:
-            size = 0.5 * remains
+        size = even_step(size, remains)
         h, rows_there, ahead, row, status = land(tb, w, run, state, sign * size, min(0.7 * state[LAST_STEP], remains))
         if status != DONE:
             break

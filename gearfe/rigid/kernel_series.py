@@ -33,9 +33,10 @@ from .kernel_names import AS, BS, CS, DT, EW, EX, EY, KC, KS, SN, VX, VY
 from .kernel_rows import add_transposed, fill, solve, time_series, times_gradients, trigonometry
 
 if TYPE_CHECKING:
+    from .kernel_steps import Run
     from .ordering import Factor
     from .tables import Forms, Tables, Vectors
-    from .taylor import Border, Run, Work
+    from .taylor import Border, Work
 
 
 def angle_orders(bs: Array, j: int, known: int) -> None:

@@ -27,8 +27,9 @@ from .kernel_rows import (
 from .kernel_series import border_solve
 
 if TYPE_CHECKING:
+    from .kernel_steps import Run
     from .tables import Forms, Tables
-    from .taylor import Border, Run, Work
+    from .taylor import Border, Work
 
 #: Pivot of S relative to its diagonal below which a singular position is looked for.
 NEAR = 0.3

@@ -1,6 +1,6 @@
 """The integration loop of series on a tape: expand, choose the step, end it where a piece ends, project.
 
-Step length from the last two coefficients (Jorba & Zou, Exp. Math. 14 (2005) 99-117), then checked: forces within the
+The length of a step (`kernel_steps`) is checked: forces within the
 step against their series, the state at its end against the constraints.
 """
 
@@ -13,11 +13,13 @@ import numpy as np
 from ..typing import Array, IntArray
 from .kernel_quadratic import expand, factorise, gradients, row_orders, solve, trigonometry_order
 from .kernel_rows import copy, fill, time_series
+from .kernel_steps import even_step, next_goal, series_step
 from .kernel_tape import OUTSIDE, horner, is_pole, largest, leaves, margin, next_piece, tape_order
 from .steps import Status
 
 if TYPE_CHECKING:
-    from .series import Run, Work
+    from .kernel_steps import Run
+    from .series import Work
     from .tape import Program
 
 DONE, STEP_TOO_SMALL, MOST_STEPS = int(Status.DONE), int(Status.STEP_TOO_SMALL), int(Status.MOST_STEPS)
@@ -40,12 +42,7 @@ def step_length(tb: Program, w: Work, run: Run) -> float:
         both += one + two  # unlike a maximum, a sum keeps what is not a number
         last = max(last, one)
         before = max(before, two)
-    step = np.inf
-    if last > 0.0:
-        step = min(step, (run.tolerance / last) ** (1.0 / run.order))
-    if before > 0.0:
-        step = min(step, (run.tolerance / before) ** (1.0 / (run.order - 1)))
-    step = min(step, run.longest, abs(run.end - run.begin))
+    step = min(series_step(last, before, run), run.longest, abs(run.end - run.begin))
     for s in range(tb.switches.register.shape[0]):
         r = tb.switches.register[s]
         for _ in range(200):
@@ -169,7 +166,6 @@ def quadratic_steps(tb: Program, w: Work, run: Run, out: Output) -> int:
         return STEP_TOO_SMALL
     copy(w.qn, w.q)
     copy(w.vn, w.v)
-    edge = 0 if sign > 0.0 else run.breaks.shape[0] - 1
     while status == DONE and sign * (run.end - t) > 0.0:
         if count >= C.shape[0]:
             status = MOST_STEPS
@@ -181,16 +177,9 @@ def quadratic_steps(tb: Program, w: Work, run: Run, out: Output) -> int:
         if not size > 1e-14 * max(abs(t), abs(run.end - run.begin)):
             status = STEP_TOO_SMALL
             break
-        while 0 <= edge < run.breaks.shape[0] and sign * (run.breaks[edge] - t) <= 1e-13 * abs(t):
-            edge += 1 if sign > 0.0 else -1
-        goal = run.end
-        if 0 <= edge < run.breaks.shape[0] and sign * (run.end - run.breaks[edge]) > 0.0:
-            goal = run.breaks[edge]
+        goal = next_goal(run.breaks, t, run.end, sign)
         remains = sign * (goal - t)
-        if size >= remains:
-            size = remains
-        elif size > 0.5 * remains:
-            size = 0.5 * remains
+        size = even_step(size, remains)
         h, where = leaves(tb, w.R, pieces, run.order - 1, sign * size)
         if where >= 0 and is_pole(tb.switches, w.R, where, run.order - 1, h, size):
             status = NOT_FINITE

@@ -7,26 +7,23 @@ in a compiled loop; Runge-Kutta of order 8, each stage of which calls Python, ta
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from ..progress import stage
 from ..typing import Array
-from . import compiled, kernel_modal
+from . import kernel_modal
+from .compiled import Kernels
 from .contract import LocalForce, SeriesLaw
 from .dense import Dense, within_run
 from .elimination import ModalCoordinates, is_linear
 from .explicit import Problem, run_problem
 from .packed import Packed
-from .parts import uncollected
 from .start import Start
-from .steps import Status, Watch
+from .steps import Status, Watch, run_in_pieces
 from .system import System
 
 #: Highest order of the series; 24 to 36 cost the same within a tenth.
@@ -35,7 +32,6 @@ ORDER = 30
 PLAIN_SHARE = 0.03
 #: That of the terms that a series leaves out: the energy of a free pair of gears then keeps to ten times the tolerance.
 SERIES_SHARE = 0.1
-_FULL = int(Status.MOST_STEPS)
 
 
 def modal_problem(modal: ModalCoordinates) -> Problem:
@@ -76,14 +72,11 @@ def run_modal_taylor(
     assert found is not None  # the caller asks before
     n = modal.T.shape[1]
 
-    def watch_modes(t: float, steps: int, y: Array) -> bool:
-        return watch is None or watch(t, steps, lambda: (modal.origin + modal.T @ y[:n], modal.T @ y[n:]))
-
     local = max(SERIES_SHARE * tolerance, 1e-14)
     run = SeriesRun(modal, *found, local, longest, modal_problem(modal).expand)
     compiling = run.load()
     y0 = np.concatenate(modal.reduce(start.q, start.v))
-    ends, states, at_times, status, orders = run.steps(start.time, y0, float(times[-1]), times, most, watch_modes)
+    ends, states, at_times, status, orders = run.steps(start.time, y0, float(times[-1]), times, most, watch)
     statistics = {
         "scheme": "Taylor series",
         "steps": len(ends) - 1,
@@ -106,11 +99,11 @@ def series_force(system: System) -> tuple[LocalForce, np.ndarray, SeriesLaw] | N
 
 
 @lru_cache(maxsize=8)
-def _kernels(order: Any, corner: Any, helpers: tuple[Any, ...], constants: tuple[Any, ...]) -> SimpleNamespace:
+def _kernels(order: Any, corner: Any, helpers: tuple[Any, ...], constants: tuple[Any, ...]) -> Kernels:
     functions = (*kernel_modal.FUNCTIONS, *helpers, order, corner)
     names = {"np": np, "math": math, "LEAST": kernel_modal.LEAST, **dict(constants)}
     alias = {order.__name__: "law_order", corner.__name__: "law_corner"}
-    return compiled.bind(functions, names, compiled=True, entries=("modal_steps",), alias=alias)
+    return Kernels(functions, names, ("modal_steps",), alias=alias)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,24 +119,17 @@ class SeriesRun:
     expand: Callable[[float, Array], tuple[Array, Array, Array]]
 
     @property
-    def _bound(self) -> SimpleNamespace:
+    def _bound(self) -> Kernels:
         series = self.series
         return _kernels(series.order, series.corner, series.helpers, tuple(sorted(series.names.items())))
 
     def load(self) -> float:
         """Compile the kernels, or load them, by a run of no length; seconds that this took."""
-        kernels = self._bound
-        if "loaded" in vars(kernels):
-            return 0.0
-        began = time.perf_counter()
-        with stage("compiling the kernels"), uncollected():
-            self.steps(0.0, np.zeros(2 * self.modal.T.shape[1]), 0.0, np.zeros(1), 1)
-        kernels.loaded = True
-        return time.perf_counter() - began
+        return self._bound.load(lambda: self.steps(0.0, np.zeros(2 * self.modal.T.shape[1]), 0.0, np.zeros(1), 1))
 
     def steps(
         self, t0: float, y0: Array, t1: float, output_times: Array, most: int,
-        watch: Callable[[float, int, Array], bool] | None = None,
+        watch: Watch | None = None,
     ) -> tuple[Array, Array, Array, Status, int]:  # fmt: skip
         """(step ends, states there, states at the asked times passed, status, orders computed)."""
         modal, series = self.modal, self.series
@@ -162,24 +148,23 @@ class SeriesRun:
         found = np.empty((len(output_times), 2 * n))
         rates = np.sqrt(np.abs(modal.eigenvalues).max(initial=0.0)) + np.abs(diagonal).max(initial=0.0)
         now = np.array([t0, t1, 5.0 / max(rates, 1.0 / max(abs(t1 - t0), 1e-300))])
-        counts, status, orders = np.zeros(3, dtype=np.int64), int(_FULL), 0
-        ends, states, room = [np.array([t0])], [y0[None, :]], 512
-        run, scratch, kernels = Packed(equations), Packed(work), self._bound
-        if watch is not None:
-            watch(t0, 0, work.state)
-        while status == _FULL and sum(map(len, ends)) - 1 < most:
-            room = min(room, most + 1 - sum(map(len, ends)))
-            filled = np.ascontiguousarray(output_times), found, np.empty(room), np.empty((room, 2 * n))
-            out = kernel_modal.Output(now, counts, *filled)
-            status = kernels.modal_steps(run, scratch, Packed(out))
-            count = counts[0]
-            orders += int(counts[2])
+        counts, orders = np.zeros(3, dtype=np.int64), [0]
+        ends, states, asked = [np.array([t0])], [y0[None, :]], np.ascontiguousarray(output_times)
+        run, scratch, advance = Packed(equations), Packed(work), self._bound.compiled.modal_steps
+
+        def fill(room: int) -> tuple[int, float, int]:
+            out = kernel_modal.Output(now, counts, asked, found, np.empty(room), np.empty((room, 2 * n)))
+            status, count = advance(run, scratch, Packed(out)), int(counts[0])
+            orders[0] += int(counts[2])
             ends.append(out.ends[:count])
             states.append(out.states[:count])
-            if watch is not None and status == _FULL and not watch(now[0], sum(map(len, ends)) - 1, work.state):
-                status = Status.STOPPED
-            room = min(4 * room, 20_000)
-        return np.concatenate(ends), np.vstack(states), found[: counts[1]], Status(status), orders
+            return status, float(now[0]), count
+
+        def state() -> tuple[Array, Array]:
+            return modal.origin + modal.T @ work.state[:n], modal.T @ work.state[n:]
+
+        status, _ = run_in_pieces(fill, t0, state, room=512, largest=20_000, most=most, watch=watch)
+        return np.concatenate(ends), np.vstack(states), found[: counts[1]], status, orders[0]
 
 
 @dataclass(frozen=True)

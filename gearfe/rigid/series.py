@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import time
-from functools import lru_cache
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..progress import stage
 from ..typing import Array, IntArray
-from . import compiled, kernel_quadratic, kernel_rows, kernel_tape, kernel_tape_run
+from . import kernel_quadratic, kernel_rows, kernel_steps, kernel_tape, kernel_tape_run
+from .compiled import Kernels
 from .dense import Polynomials
 from .packed import Packed
-from .parts import uncollected
 from .start import Start
-from .steps import Status, Watch
+from .steps import Status, Watch, run_in_pieces
 from .system import System
 from .tape import Program, Tape
 from .taylor import order_for
@@ -27,25 +23,14 @@ FUNCTIONS = (
     kernel_rows.time_series,
     *kernel_tape.FUNCTIONS,
     *kernel_quadratic.FUNCTIONS,
+    *kernel_steps.FUNCTIONS,
     *kernel_tape_run.FUNCTIONS,
 )
 NAMES = {**kernel_rows.GLOBALS, **kernel_tape.NAMES, **kernel_tape_run.NAMES}
 HOT = ("fill", "copy", "cauchy", "weighted", "horner", "largest", "margin", "lower_knot", "own_piece")
-ENTRY = "quadratic_steps"
+KERNELS = Kernels(FUNCTIONS, NAMES, ("quadratic_steps",), HOT)
 #: Steps between two looks at the clock, and at most coefficients in one piece of the output.
 FIRST, MOST_NUMBERS = 16, 2_000_000
-
-
-class Run(NamedTuple):
-    """What holds for a whole run."""
-
-    begin: float  # (s)
-    end: float
-    sign: float  # of time
-    order: int
-    tolerance: float  # of the last terms
-    longest: float  # step (s)
-    breaks: Array  # times at which steps end (s)
 
 
 class Work(NamedTuple):
@@ -121,28 +106,9 @@ def _work(program: Program, order: int) -> Work:
     return Work._make(arrays)
 
 
-@lru_cache(maxsize=2)
-def kernels(jit: bool) -> SimpleNamespace:
-    """The bound kernels, compiled or plain."""
-    return compiled.bind(FUNCTIONS, NAMES, compiled=jit, entries=(ENTRY,), inline=HOT)
-
-
-def kernels_loaded() -> bool:
-    """Whether the compiled kernels are in this process."""
-    return bool(_LOADED)
-
-
-def kernels_ready() -> bool:
-    """Whether they wait in the cache."""
-    return compiled.is_cached(FUNCTIONS, ENTRY)
-
-
-_LOADED: list[bool] = []
-
-
 def first_pieces(program: Program, w: Work, t: float, forward: bool) -> bool:
     """Pieces of all switches at the state in w; whether every table has a value there."""
-    plain, n = kernels(False), len(w.q)
+    plain, n = KERNELS.plain, len(w.q)
     w.Z[:n, 0], w.Z[:n, 1] = w.q, w.v
     plain.time_series(program.times, t, forward, 2, w.TF)
     for k in (0, 1):
@@ -165,37 +131,33 @@ def run_series(
     program = _active(program, start.active)
     order, end, t = order_for(local), float(times[-1]), start.time
     sign = 1.0 if end >= t else -1.0
-    run = Run(t, end, sign, order, local, float(longest), system.breaks)
-    w = _work(program, order)
+    run = kernel_steps.Run(t, end, sign, order, local, float(longest), system.breaks)
+    w, n = _work(program, order), system.size
     w.q[:], w.v[:] = start.q, start.v
     with np.errstate(all="ignore"):
         covered = first_pieces(program, w, t, sign > 0.0)
-    n, done, room = system.size, 0, min(FIRST, most)
     handed, now, made = (Packed(program), Packed(w), Packed(run)), np.array([t]), np.zeros(1, dtype=np.int64)
-    began = time.perf_counter()
-    advance = kernels(True).quadratic_steps
-    if not kernels_loaded():
-        with stage("compiling the kernels"), uncollected():
-            none = kernel_tape_run.Output(now, made, np.zeros(1), np.zeros((0, order + 1, n)))
-            advance(*handed[:2], Packed(run._replace(end=t)), Packed(none))
-        _LOADED.append(True)
-    compiling = time.perf_counter() - began
-    if watch is not None:
-        watch(t, 0, lambda: (w.q, w.v))
+    advance = KERNELS.compiled.quadratic_steps
+    none = kernel_tape_run.Output(now, made, np.zeros(1), np.zeros((0, order + 1, n)))
+    compiling = KERNELS.load(lambda: advance(*handed[:2], Packed(run._replace(end=t)), Packed(none)))
     ends, series = [np.array([t])], [np.zeros((0, order + 1, n))]
-    status = Status.MOST_STEPS if covered else Status.NOT_FINITE
-    while status == Status.MOST_STEPS and done < most:
+
+    def fill(room: int) -> tuple[int, float, int]:
         T, C = np.empty(room + 1), np.empty((room, order + 1, n))
-        status = Status(advance(*handed, Packed(kernel_tape_run.Output(now, made, T, C))))
-        count, t = int(made[0]), float(now[0])
+        status = advance(*handed, Packed(kernel_tape_run.Output(now, made, T, C)))
+        count = int(made[0])
         ends.append(T[1 : count + 1])
         series.append(C[:count])
-        done += count
-        if status == Status.MOST_STEPS and watch is not None and not watch(t, done, lambda: (w.q, w.v)):
-            status = Status.STOPPED
-        room = min(2 * room, max(FIRST, MOST_NUMBERS // C[0].size if room else FIRST), most - done)
+        return status, float(now[0]), count
+
+    status, done = Status.NOT_FINITE, 0
+    if covered:
+        status, done = run_in_pieces(
+            fill, t, lambda: (w.q, w.v), room=FIRST, largest=max(FIRST, MOST_NUMBERS // max(1, (order + 1) * n)),
+            most=most, watch=watch,
+        )  # fmt: skip
     if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE):
-        status = _because_of_loads(system, w, t, sign * abs(end - start.time), status)
+        status = _because_of_loads(system, w, float(now[0]), sign * abs(end - start.time), status)
     statistics = {
         "scheme": "Taylor series", "steps": done, "order": order, "backend": "compiled", "compile_seconds": compiling,
     }  # fmt: skip

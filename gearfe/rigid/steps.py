@@ -152,6 +152,45 @@ class StepControl:
             self.status = status
 
 
+def run_in_pieces(
+    fill: Callable[[int], tuple[int, float, int]],
+    begin: float,
+    state: Callable[[], tuple[Array, Array]],
+    *,
+    room: int,
+    largest: int,
+    most: int,
+    watch: Watch | None,
+) -> tuple[Status, int]:
+    """A compiled loop by pieces of its output; (why it ended, number of steps).
+
+    Parameters
+    ----------
+    fill
+        Goes on by at most so many steps and keeps its output; (status, time reached, steps made).
+    begin, state
+        Time of the start (s), and the state reached.
+    room, largest
+        Steps of the first piece; the next ones have twice as many, up to this.
+    most
+        Steps in all.
+    watch
+        See `Watch`; it looks between two pieces.
+    """
+    done = 0
+    if watch is not None:
+        watch(begin, 0, state)
+    while done < most:
+        status, t, count = fill(min(room, most - done))
+        done += count
+        if status != Status.MOST_STEPS:
+            return Status(status), done
+        if done < most and watch is not None and not watch(t, done, state):
+            return Status.STOPPED, done
+        room = min(2 * room, max(largest, room))
+    return Status.MOST_STEPS, done
+
+
 def first_step(q: Array, v: Array, a: Array, span: float) -> float:
     """A careful first step from coordinates, velocities, accelerations in units that compare: a hundredth of the time
     in which the speeds change by themselves, or the one from rest in which the accelerations move the coordinates by

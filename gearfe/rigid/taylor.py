@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from collections import Counter
-from dataclasses import dataclass
-from functools import lru_cache
-from types import SimpleNamespace
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..progress import stage
 from ..typing import Array, IntArray
 from . import (
     compiled,
@@ -23,17 +19,19 @@ from . import (
     kernel_run,
     kernel_series,
     kernel_singular,
+    kernel_steps,
 )
 from .dense import Polynomials
 from .packed import Packed
-from .parts import uncollected
 from .start import Start
-from .steps import Status, Watch
+from .steps import Status, Watch, run_in_pieces
 from .tables import Assembly, Tables
 
+#: Seconds of compiling the kernels (measured).
+COMPILE_SECONDS = 15.0
 FUNCTIONS = (
     *kernel_rows.FUNCTIONS, *kernel_forces.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_singular.FUNCTIONS,
-    *kernel_locate.FUNCTIONS, *kernel_run.FUNCTIONS,
+    *kernel_locate.FUNCTIONS, *kernel_steps.FUNCTIONS, *kernel_run.FUNCTIONS,
 )  # fmt: skip
 NAMES = {
     **kernel_rows.GLOBALS,
@@ -42,7 +40,6 @@ NAMES = {
     **kernel_locate.NAMES,
     **kernel_run.NAMES,
 }
-ENTRIES = ("integrate_series", "sample")
 HOT = (
     "fill", "copy", "trigonometry", "vector_at", "arm_at", "vector_rate", "gradients", "residuals",
     "times_gradients", "add_transposed", "solve", "least_change",
@@ -52,21 +49,11 @@ HOT = (
 )  # fmt: skip
 
 
-#: Steps between two looks at the clock at first: plain ones, compiled ones.
-FIRST_STEPS, FIRST_COMPILED = 8, 64
-
-
-class Run(NamedTuple):
-    """What holds for a whole run."""
-
-    begin: float  # (s)
-    end: float
-    sign: float  # of time
-    order: int
-    tolerance: float  # of the last terms
-    length: float  # of the mechanism (m)
-    longest: float  # step (s)
-    breaks: Array  # times at which steps end (s)
+KERNELS = compiled.Kernels(
+    (*FUNCTIONS, *kernel_run.STARTERS), NAMES, ("integrate_series", "sample"), HOT, making=COMPILE_SECONDS
+)
+#: Steps between two looks at the clock at first: plain ones, compiled ones; at most coefficients in a piece.
+FIRST_STEPS, FIRST_COMPILED, MOST_NUMBERS = 8, 64, 2_000_000
 
 
 class Border(NamedTuple):
@@ -197,59 +184,19 @@ def prepare(assembly: Assembly, order: int, jit: bool) -> Prepared:
     return Prepared(assembly, order, jit, work, (Packed(tables), Packed(work)) if jit else (tables, work))
 
 
-@dataclass(frozen=True)
-class TaylorRun:
-    """Result of the loop.
-
-    Parameters
-    ----------
-    status : Status
-        Why it ended.
-    dense : Polynomials
-        Taylor series on every step, without the ground's coordinates.
-    singular : ndarray, shape (steps,)
-        Number of singular combinations of rows at the start of every step.
-    compiling : float
-        Seconds that compiling the kernels took, or loading those of an earlier run.
-    """
-
-    status: Status
-    dense: Polynomials
-    singular: IntArray
-    compiling: float = 0.0
-
-
-_LOADED: list[bool] = []
-
-
-def kernels_loaded() -> bool:
-    """Whether the compiled kernels are in this process."""
-    return bool(_LOADED)
-
-
-@lru_cache(maxsize=2)
-def kernels(jit: bool) -> SimpleNamespace:
-    """The bound kernels, compiled or plain."""
-    if jit:
-        return compiled.bind(FUNCTIONS, NAMES, compiled=True, entries=ENTRIES, inline=HOT)
-    return compiled.bind((*FUNCTIONS, *kernel_run.STARTERS), NAMES, compiled=False)
-
-
-def load_kernels(prepared: Prepared, run: Run) -> float:
+def load_kernels(prepared: Prepared, run: kernel_steps.Run) -> float:
     """Compile the kernels, or load them, by a run of no length; seconds that this took."""
-    if _LOADED:
-        return 0.0
-    began = time.perf_counter()
     width = prepared.work.q.size - 3
     times, coefficients = np.zeros(2), np.zeros((1, run.order + 1, width))
     state = first_state(run.end)
     state[kernel_names.BEGUN] = 1.0
-    with stage("compiling the kernels"), uncollected():
+
+    def nothing() -> None:
         out = kernel_run.Output(state, times, coefficients, *np.zeros((2, 1), dtype=np.int64))
-        kernels(True).integrate_series(*prepared.handed, Packed(run), Packed(out))
+        KERNELS.compiled.integrate_series(*prepared.handed, Packed(run), Packed(out))
         sampler(times, coefficients, 1.0, np.zeros(1), 0, np.zeros((1, width)))
-    _LOADED.append(True)
-    return time.perf_counter() - began
+
+    return KERNELS.load(nothing)
 
 
 def first_state(begin: float) -> Array:
@@ -262,7 +209,7 @@ def order_for(tolerance: float) -> int:
     return int(min(26, max(8, math.ceil(-0.62 * math.log(tolerance)) + 7)))
 
 
-def integrate_scene(
+def run_taylor(
     shared: Prepared,
     start: Start,
     end: float,
@@ -271,52 +218,60 @@ def integrate_scene(
     longest: float = math.inf,
     most: int = 1_000_000,
     watch: Watch | None = None,
-) -> TaylorRun:
-    """Integrate the linkage from its consistent start to the time `end`; `tolerance` is that of the last terms."""
+) -> tuple[Polynomials, Status, dict[str, Any]]:
+    """Integrate the linkage from its consistent start to the time `end`; (dense output, status, statistics).
+
+    `tolerance` is that of the last terms. The dense output is without the ground's coordinates.
+    """
     assembly, order, jit, w, both = shared
     t0 = start.time
     w.q[:-3], w.v[:-3], w.base[:] = start.q, start.v, ~start.active
     sign = 1.0 if end >= t0 else -1.0
-    run = Run(t0, end, sign, order, float(tolerance), assembly.length, float(longest), assembly.breaks)
-    state = first_state(t0)
+    run = kernel_steps.Run(t0, end, sign, order, float(tolerance), float(longest), assembly.breaks, assembly.length)
+    state, made = first_state(t0), np.zeros(1, dtype=np.int64)
     compiling = load_kernels(shared, run) if jit else 0.0
-    advance = kernels(jit).integrate_series
+    advance = (KERNELS.compiled if jit else KERNELS.plain).integrate_series
     handed = (*both, Packed(run) if jit else run)
-    parts, made = [], np.zeros(1, dtype=np.int64)
-    room, done = min(FIRST_COMPILED if jit else FIRST_STEPS, most), 0
+    width = w.q.size - 3
+    parts: list[tuple[Array, Array, IntArray]] = []
 
-    def moving() -> tuple[Array, Array]:
-        return w.q[:-3], w.v[:-3]
-
-    if watch is not None:
-        watch(t0, 0, moving)
-    while True:
-        times, coefficients = np.empty(room + 1), np.empty((room, order + 1, w.q.size - 3))
+    def fill(room: int) -> tuple[int, float, int]:
+        times, coefficients = np.empty(room + 1), np.empty((room, order + 1, width))
         singular = np.zeros(room, dtype=np.int64)
         out = kernel_run.Output(state, times, coefficients, singular, made)
         status = advance(*handed, Packed(out) if jit else out)
-        count = int(made[0])
         if status == Status.SINGULAR_START:
-            rows, shift, ahead, row, status = kernels(False).begin(assembly.tables, w, run, t0)
+            rows, shift, ahead, row, status = KERNELS.plain.begin(assembly.tables, w, run, t0)
             state[:] = t0 + shift, rows, ahead, 1.0, 0.0, row
             if status == Status.DONE:
-                continue
+                return fill(room)
             times[0] = t0
+        count = int(made[0])
         parts.append((times[: count + 1], coefficients[:count], singular[:count]))
-        done += count
-        if status != Status.MOST_STEPS or done >= most:
-            break
+        return status, float(state[kernel_names.TIME]), count
+
+    def look(t: float, steps: int, moving: Callable[[], tuple[Array, Array]]) -> bool:
         regular = state[kernel_names.SINGULAR] == 0.0
-        if watch is not None and regular and not watch(float(state[kernel_names.TIME]), done, moving):
-            status = Status.STOPPED
-            break
-        room = min(2 * room, max(FIRST_COMPILED, 2_000_000 // coefficients[0].size), most - done)
+        return watch is None or (steps > 0 and not regular) or watch(t, steps, moving)
+
+    status, done = run_in_pieces(
+        fill, t0, lambda: (w.q[:-3], w.v[:-3]), room=FIRST_COMPILED if jit else FIRST_STEPS,
+        largest=max(FIRST_COMPILED, MOST_NUMBERS // ((order + 1) * width)), most=most, watch=look,
+    )  # fmt: skip
     ends = np.concatenate([parts[0][0], *(p[0][1:] for p in parts[1:])])
     series = np.concatenate([p[1] for p in parts]) if len(parts) > 1 else parts[0][1]
     dense = Polynomials(ends, series, sampler if jit else None, t0)
-    return TaylorRun(Status(status), dense, np.concatenate([p[2] for p in parts]), compiling)
+    statistics = {
+        "scheme": "Taylor series",
+        "steps": done,
+        "order": order,
+        "backend": "compiled" if jit else "plain",
+        "compile_seconds": compiling,
+        "singular_passages": ends[np.flatnonzero(np.concatenate([p[2] for p in parts]))],
+    }
+    return dense, status, statistics
 
 
 def sampler(times: Array, coefficients: Array, sign: float, t: Array, derivative: int, out: Array) -> None:
     """Compiled sums of the polynomials, see `Polynomials`."""
-    kernels(True).sample(Packed(kernel_run.Samples(times, coefficients, sign, t, derivative, out)))
+    KERNELS.compiled.sample(Packed(kernel_run.Samples(times, coefficients, sign, t, derivative, out)))

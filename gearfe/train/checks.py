@@ -24,7 +24,7 @@ SAME = 1e-6
 WIDEST_GAP = 0.15
 
 
-def check_scene(train: GearTrain) -> None:
+def check_train(train: GearTrain) -> None:
     """Raise `InputError` for the first mistake."""
     _names("shaft", [s.name for s in train.shafts])
     _names("gear", [g.name for g in train.gears])

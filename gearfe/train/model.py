@@ -19,7 +19,7 @@ from ..rigid import Element, LinearJoint, LocalForce, ModalBlocks, Start, System
 from ..rigid.elimination import ModalCoordinates, modal_coordinates
 from ..shown import Facts
 from ..typing import Array, IntArray
-from .checks import check_scene
+from .checks import check_train
 from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge
 from .forces import Flank, Gyro, TrainForces, derivative
 from .gear_train import Drive, GearTrain
@@ -128,7 +128,7 @@ def build_train(train: GearTrain) -> TrainModel:
     InputError
         For the first thing in the train that does not fit, with the cure.
     """
-    check_scene(train)
+    check_train(train)
     kinematics = rolling(train)
     frame = train.frame
     angle = train.driven.speed.integral(0.0, 0.0)

@@ -157,9 +157,9 @@ def job_train(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: Mo
         damping,
     )
     if curves is None:
-        from ..train.checks import check_scene
+        from ..train.checks import check_train
 
-        check_scene(replace(train, meshes=tuple(replace(mesh, backlash=None, damping=0.0) for mesh in meshes)))
+        check_train(replace(train, meshes=tuple(replace(mesh, backlash=None, damping=0.0) for mesh in meshes)))
     return train
 
 

@@ -118,7 +118,7 @@ def _run_trajectory(case: Case, job_path: Path) -> Found:
     from gearfe.mechanisms.model import load_mechanism
     from gearfe.mechanisms.results import evaluate
     from gearfe.rigid import integrate
-    from gearfe.rigid.backend import compiled_is_ready
+    from gearfe.rigid.taylor import KERNELS
 
     del case
     mechanism = load_mechanism(job_path)
@@ -128,7 +128,7 @@ def _run_trajectory(case: Case, job_path: Path) -> Found:
     if made.status != 0:
         return made.message
     stated = trajectory_error(mechanism, start, evaluate(mechanism, made), mechanism.tolerance).coordinates
-    backend = "compiled" if compiled_is_ready() else "plain"
+    backend = "compiled" if KERNELS.ready else "plain"
     finest = 1e-12 if made.method == "taylor" else max(1e-11, 1e-5 * mechanism.tolerance)
     options: dict[str, Any] = {"method": made.method, "start": start, "backend": backend, "raise_on_failure": False}
     truth = integrate(mechanism.system, times, tolerance=finest, **options)
