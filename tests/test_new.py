@@ -146,9 +146,13 @@ def test_shipped_jobs_come_with_their_files(tmp_path, monkeypatch, capsys):
     assert "gearfe mechanism andrews.toml" in capsys.readouterr().out
     for name in ("andrews.toml", "andrews_reference.csv"):
         assert (tmp_path / name).read_bytes() == (ROOT / "geometry" / name).read_bytes()
-    assert main(["new", "andrews.toml", "mine.toml"]) == 2  # the table beside it would be replaced
+    assert main(["new", "andrews.toml", "same.toml"]) == 0  # the table beside it is the same
+    (tmp_path / "andrews_reference.csv").write_text("mine")
+    assert main(["new", "andrews.toml", "mine.toml"]) == 2  # now it would be replaced
     assert "andrews_reference.csv" in capsys.readouterr().err
     assert not (tmp_path / "mine.toml").exists()
+    # a name that ends another one is not named by it
+    assert main(["new", "elastic_slider_crank.toml"]) == main(["new", "slider_crank.toml"]) == 0
     assert main(["new", "andrew.toml"]) == 2
     assert "did you mean 'andrews.toml'" in capsys.readouterr().err
 

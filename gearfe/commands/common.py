@@ -10,11 +10,12 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import redirect_stdout
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TextIO
 
 from ..config import JobFile
-from ..errors import InputError
+from ..errors import InputError, MissingLibraryError
 from ..progress import shown
 
 #: Formats of ``--format`` beside CSV; their writers are in `gearfe.output.formats`.
@@ -128,6 +129,8 @@ def _formats(text: str) -> tuple[str, ...]:
     for name in names:
         if name not in ("csv", *FORMATS):
             raise InputError("--format", text, "must name formats of " + ", ".join(("csv", *FORMATS)), "as mat,h5")
+    if "uff" in names and find_spec("pyuff") is None:  # told before the work, not after it
+        raise MissingLibraryError("universal files need pyuff: pip install 'gearfe[exchange]'")
     return tuple(dict.fromkeys(name for name in names if name != "csv"))
 
 

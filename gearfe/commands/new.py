@@ -55,10 +55,10 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("file", str(target), "is a folder", f"name a file in it, as {target / args.kind}.toml")
     source = shipped.get(args.kind)
     text = job_file(args.kind) if source is None else source.read_text(encoding="utf-8")
-    named = [] if source is None else [p for p in source.parent.iterdir() if p != source and p.name in text]
+    named = [] if source is None else [p for p in source.parent.iterdir() if p != source and _names(text, p.name)]
     files = {target: text.encode(), **{target.parent / path.name: path.read_bytes() for path in named}}
-    for path in files:
-        if path.exists() and not args.force:
+    for path, content in files.items():
+        if path.exists() and not args.force and (path == target or path.read_bytes() != content):
             raise InputError("file", str(path), "exists", "choose another name, or give --force to replace it")
     for path, content in files.items():
         with whole_file(path) as temporary:
@@ -66,6 +66,13 @@ def run(args: argparse.Namespace) -> int:
     print("written: " + ", ".join(map(str, files)))
     print(f"run it:  gearfe {_command(args.kind, text)} {target}")
     return 0
+
+
+def _names(text: str, name: str) -> bool:
+    """Whether a job names a file: the whole of its name, not the end of another one's."""
+    import re
+
+    return re.search(rf"(?<![\w.-]){re.escape(name)}(?![\w-])", text) is not None
 
 
 def _command(kind: str, text: str) -> str:

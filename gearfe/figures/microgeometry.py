@@ -217,9 +217,9 @@ def relief_figure(path: str | Path, table: ReliefTable, made: ReliefResult, comp
     tidy(third)
     wide = [i for i, one in enumerate(table.variables) if one.tolerance > 0.0]
     for row, i in enumerate(wide):
-        for end, shift, color, name in ((made.low[i], -0.06, ORANGE, "less"), (made.high[i], 0.06, BLUE, "more")):
-            label = name if row == 0 else None
-            third.plot([value, end], [row + shift] * 2, "-", color=color, linewidth=5, label=label)
+        for end, shift, color, sign in ((made.low[i], -0.06, ORANGE, "less"), (made.high[i], 0.06, BLUE, "more")):
+            named = {"label": sign} if row == 0 else {}
+            third.plot([value, end], [row + shift] * 2, "-", color=color, linewidth=5, **named)
     third.axvline(value, color=GREY, linewidth=1)
     third.set_ylim(-0.6, max(len(wide), 1) - 0.4)
     allowed = [f"{names[i].replace(', ', chr(10))}\n± {table.variables[i].tolerance:g}" for i in wide]
