@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from gearfe.gear.pair import Gear, GearPair
 from gearfe.gear.spur_gear import TipRelief
+from gearfe.gear.touching import Flanks
 
 from .gears import pair
 from .unloaded import unloaded_twist
@@ -84,3 +86,40 @@ def test_it_repeats_with_the_mesh_cycle():
     gears = pair(17, 31, tip_relief=TipRelief(20e-6, 3e-3))
     angles = np.linspace(0.0, 1.0, 20) * gears.mesh_cycle
     np.testing.assert_allclose(error(gears, angles + 5 * gears.mesh_cycle), error(gears, angles), atol=1e-12)
+
+
+def outline(gear, names):
+    """Points (m) of some segments of a gear's left half profile as complex numbers, root to tip."""
+    t = np.linspace(0.0, 1.0, 20001)
+    points = np.concatenate([one.points(t) for one in gear.profile.segments if one.name in names])
+    return points[:, 0] + 1j * points[:, 1]
+
+
+@pytest.mark.parametrize("undercut", ["pinion", "wheel"])
+def test_an_undercut_root_is_touched_below_its_edge(undercut):
+    """19/85 teeth, contact ratio 1.4 instead of 2.2: the mate's tip round meets the root 0.05 mm below the edge of the
+    undercut. Against the dense outlines: the least turn of the wheel at which any of their points meet."""
+    sizes = {"module": 4.21e-3, "pressure_angle": math.radians(20.0), "face_width": 12e-3}
+    form = {"addendum": 1.11, "dedendum": 1.39, "rack_tip_radius": 0.308}
+    relief = TipRelief(17.8e-6, 1.57e-3, 1.0)
+    small = Gear(19, bore_diameter=27e-3, profile_shift=-0.438, tip_relief=relief, **sizes, **form)
+    large = Gear(85, bore_diameter=193e-3, profile_shift=-0.453, tip_round=0.253e-3, **sizes, **form)
+    gears = GearPair(small, large) if undercut == "pinion" else GearPair(large, small)
+    names = ("trochoid", "involute", "relief", "flank", "tip_round")
+    pinion, wheel = (outline(gear, names) for gear in (gears.pinion, gears.wheel))
+    order = np.argsort(np.abs(wheel), kind="stable")
+    angles, mates = np.linspace(0.0, gears.mesh_cycle, 60, endpoint=False), gears.wheel.teeth
+    expected = np.full(len(angles), np.inf)
+    for i, angle in enumerate(angles):
+        for k in range(-3, 4):
+            seen = pinion * np.exp(1j * (angle + k * gears.mesh_cycle)) - gears.working_centre_distance
+            frame = -angle / gears.gear_ratio + math.pi - (2 * k + 1) * math.pi / mates
+            at = np.interp(np.abs(seen), np.abs(wheel)[order], np.angle(wheel)[order], left=np.nan, right=np.nan)
+            apart = np.angle(seen * np.exp(-1j * (frame + at)))
+            expected[i] = min(expected[i], np.nanmin(np.where(np.isfinite(apart), apart, np.inf)))
+    found = Flanks(gears).touching(angles)
+    least = unloaded_twist(gears, angles)
+    first = found.twist == least[found.position]
+    gear = 0 if undercut == "pinion" else 1
+    assert (found.place[first, gear] < 0).any()
+    np.testing.assert_allclose(least * gears.wheel.base_radius, expected * gears.wheel.base_radius, atol=2 * NM)

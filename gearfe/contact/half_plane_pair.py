@@ -148,7 +148,7 @@ class HalfPlanePair:
     @cached_property
     def undercut(self) -> Array:
         """1 where the working flank starts with the edge of an undercut, shape (2,)."""
-        return np.array([float(side.curve.face.fall > 0.0) for side in self.sides])
+        return np.array([float(side.curve.face.undercut) for side in self.sides])
 
     @cached_property
     def marks(self) -> tuple[NDArray[np.str_], IntArray, Array]:
@@ -160,7 +160,7 @@ class HalfPlanePair:
             for flank, curve in enumerate(self.curves):
                 face = curve.face
                 places = {
-                    "undercut": [0.0] if face.fall > 0.0 else [],
+                    "undercut": [0.0] if face.undercut else [],
                     "relief": face.kinks.tolist(),
                     "round": [] if face.sharp else [1.0],
                     "tip": [face.end] if face.sharp else [],

@@ -10,13 +10,15 @@ the pair touches at :math:`\varphi_k = \min_u D`. The minimum is smooth on the p
 reliefs, where parabolas close in on it, a kink of D at the kink of a relief, and an end of the range where a sharp tip
 bears before or after the path.
 
-The working flank is the involute with its relief, then the tip round. Roots take no part, but where one is undercut the
-involute starts with an edge, which can bear as a sharp tip does.
+The working flank is the involute with its relief, then the tip round. Roots take no part, but where one is undercut:
+the involute then starts with an edge, which can bear as a sharp tip does, and the mate's tip passes so close below it
+that the root may be touched first.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
@@ -24,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from ..typing import Array, BoolArray, ComplexArray, IntArray
-from .curves import Arc, Flank
+from .curves import Arc, Flank, Trochoid
 from .deviation import Deviation
 from .involute import deviated
 from .mesh_geometry import MeshGeometry
@@ -45,7 +47,8 @@ BESIDE = 1e-5
 
 @dataclass(frozen=True)
 class Face:
-    """Working flank of a gear in the frame of its tooth: u in [0, 1] is the involute, in [1, 2] the tip round.
+    """Working flank of a gear in the frame of its tooth: u in [0, 1] is the involute, in [1, 2] the tip round, in
+    [-0.5, 0] the upper half of an undercut root.
 
     Attributes
     ----------
@@ -53,13 +56,23 @@ class Face:
         Involute with relief, parameter linear in the roll length.
     round_
         Tip round, or None.
-    fall
-        Angle (rad) between involute and root where the flank starts: > 0 on an undercut tooth.
+    root
+        The root of an undercut tooth, else None.
     """
 
     flank: Flank
     round_: Arc | None
-    fall: float = 0.0
+    root: Trochoid | None = None
+
+    @property
+    def undercut(self) -> bool:
+        """Whether the involute starts with an edge."""
+        return self.root is not None
+
+    @property
+    def start(self) -> float:
+        """First parameter."""
+        return -0.5 if self.undercut else 0.0
 
     @property
     def end(self) -> float:
@@ -77,11 +90,10 @@ class Face:
         s = flank.roll(np.minimum(np.maximum(u, 0.0), 1.0))
         beside = s - flank.relief(s)[0] if flank.modified else s
         made = np.exp(1j * (flank.base_angle - s / flank.base_radius)) * (flank.base_radius + 1j * beside)
-        if self.round_ is None:
-            return made
-        return np.where(
-            u > 1.0, complex(*self.round_.centre) + self.round_.radius * _round_normals(self.round_, u), made
-        )
+        if self.round_ is not None:
+            round_ = complex(*self.round_.centre) + self.round_.radius * _round_normals(self.round_, u)
+            made = np.where(u > 1.0, round_, made)
+        return self._with_root(u, made, lambda root, v: _complex(root.point(v)))
 
     def normals(self, u: Array) -> ComplexArray:
         """Outward unit normals as complex numbers."""
@@ -93,12 +105,22 @@ class Face:
             forward = (s - depth) / flank.base_radius
             size = np.hypot(forward, slope)
             made = made * np.where(size > 0.0, (forward - 1j * slope) / np.where(size > 0.0, size, 1.0), 1.0)
-        return made if self.round_ is None else np.where(u > 1.0, _round_normals(self.round_, u), made)
+        if self.round_ is not None:
+            made = np.where(u > 1.0, _round_normals(self.round_, u), made)
+        return self._with_root(u, made, lambda root, v: _complex(root.normal(v)))
 
     def speeds(self, u: Array) -> Array:
         """Arc length per unit of u (m)."""
         made: Array = self.flank.speed(np.clip(u, 0.0, 1.0))
-        return made if self.round_ is None else np.where(u > 1.0, self.round_.speed(u - 1.0), made)
+        if self.round_ is not None:
+            made = np.where(u > 1.0, self.round_.speed(u - 1.0), made)
+        return self._with_root(u, made, lambda root, v: root.speed(v))
+
+    def _with_root(self, u: Any, values: Any, of_root: Callable[[Trochoid, Array], Any]) -> Any:
+        """Values with those of the root's curve where u < 0."""
+        if self.root is None or not np.any(np.asarray(u) < 0.0):
+            return values
+        return np.where(np.asarray(u) < 0.0, of_root(self.root, 1.0 + np.minimum(u, 0.0)), values)
 
     def parameter(self, roll: Any) -> Any:
         """Parameter at a roll length (m)."""
@@ -117,6 +139,23 @@ class Face:
 
     def at_radius(self, radius: Array) -> Array:
         """Parameter u of the points at given radii (m) within the range."""
+        return self._with_root(
+            np.where(radius < self.radii[0], -1.0, 1.0),
+            self._above_root(radius),
+            lambda root, _: self._in_root(root, radius),
+        )
+
+    def _in_root(self, root: Trochoid, radius: Array) -> Array:
+        """Parameter u in the root by Newton's method from a table; the radius grows all along it."""
+        v = np.linspace(0.5, 1.0, 65)
+        v = np.interp(radius, np.abs(_complex(root.point(v))), v)
+        for _ in range(3):
+            point, along = _complex(root.point(v)), -1j * _complex(root.normal(v))
+            rate = (point.conj() * along).real / np.abs(point) * root.speed(v)
+            v = np.clip(v + (radius - np.abs(point)) / rate, 0.5, 1.0)
+        return v - 1.0
+
+    def _above_root(self, radius: Array) -> Array:
         flank = self.flank
         forward = np.sqrt(np.maximum(0.0, (radius - flank.base_radius) * (radius + flank.base_radius)))
         s = forward
@@ -145,18 +184,18 @@ class Face:
         Its normal may be any of a fan there, and without friction the force takes that of the smooth mate.
         """
         found = np.asarray((u >= self.end - AT_AN_END) & self.sharp)
-        if self.fall > 0.0:
-            found = found | (u < AT_AN_END)
+        if self.undercut:
+            found = found | (np.abs(u) < AT_AN_END)
         for kink in self.kinks:
             found = found | (np.abs(u - kink) <= AT_AN_END)
         return found
 
     def curvature(self, u: Any, most: float) -> Any:
         """Curvature (1/m) at u (a number or an array), at most `most`, which a corner has."""
-        at = np.clip(u, 0.0, 1.0)
-        before, after = np.maximum(at - BESIDE, 0.0), np.minimum(at + BESIDE, 1.0)
+        at = np.clip(u, self.start, 1.0)
+        before, after = np.maximum(at - BESIDE, self.start), np.minimum(at + BESIDE, 1.0)
         for mark in self.marks:  # not across it, beside which it is another
-            if 0.0 < mark < 1.0:
+            if self.start < mark < 1.0:
                 below = at <= mark
                 before = np.where(below, before, np.maximum(before, mark))
                 after = np.where(below, np.minimum(after, mark), after)
@@ -169,7 +208,7 @@ class Face:
 
     def bend(self, u: Array) -> Array:
         """How much the normal turns around u, per length (1/m): across marks too, infinite at corners."""
-        beside = np.clip(np.stack([u - BESIDE, u + BESIDE]), 0.0, self.end)
+        beside = np.clip(np.stack([u - BESIDE, u + BESIDE]), self.start, self.end)
         normals, points = self.normals(beside), self.points(beside)
         turned = np.abs(np.angle(normals[1] / normals[0]))
         return np.where(self.corners(u), math.inf, turned / np.abs(points[1] - points[0]))
@@ -177,7 +216,7 @@ class Face:
     @cached_property
     def marks(self) -> list[float]:
         """Parameters where the curvature jumps or the flank ends sharply."""
-        found = [0.0, 1.0] if self.fall > 0.0 else [1.0]
+        found = [0.0, 1.0] if self.undercut else [1.0]
         if self.flank.amount > 0.0:
             found.append(float(self.parameter(self.flank.relief_start)))
         return sorted({*found, *self.kinks.tolist()})
@@ -201,7 +240,7 @@ def face_of(gear: Gear, deviation: Deviation | None = None) -> Face:
     root = profile.segment("trochoid").curve
     # going up a convex flank its normal turns clockwise
     fall = np.angle(_complex(root.normal(np.array(1.0))) / _complex(flank.normal(np.array(0.0))))
-    return Face(flank, arc, max(0.0, float(fall)))
+    return Face(flank, arc, root if isinstance(root, Trochoid) and fall > 0.0 else None)
 
 
 @dataclass(frozen=True)
@@ -262,7 +301,8 @@ class Flanks:
         self.pair = pair
         self.faces = (face_of(pair.pinion), face_of(pair.wheel)) if faces is None else faces
         self.pinion, self.wheel = self.faces
-        self._radii = self.wheel.radii
+        low = np.abs(self.wheel.points(np.array(self.wheel.start)))
+        self._radii = float(low), self.wheel.radii[2]
 
     def wheel_frame(self, angle: Array, number: IntArray) -> Array:
         """Angle (rad) of the frame of the mating wheel tooth at zero twist."""
@@ -278,7 +318,7 @@ class Flanks:
         """D (rad) at parameters u of the pinion's flank, infinite where the wheel's flank has no such radius."""
         seen = self.placed(angle, number, u)
         radius = np.abs(seen)
-        inside = (radius >= self._radii[0]) & (radius <= self._radii[2] * (1 + 1e-15))
+        inside = (radius >= self._radii[0]) & (radius <= self._radii[1] * (1 + 1e-15))
         mate = self.wheel.points(self.wheel.at_radius(radius))
         apart = np.angle(seen * np.exp(-1j * self.wheel_frame(angle, number)) / mate)
         return np.where(inside, apart, np.inf)
@@ -291,9 +331,10 @@ class Flanks:
         """First touch of the tooth pairs `number` at pinion angles (rad), of those of them that meet, shape (n,)."""
         pieces = [len(face.flank.deviation.pieces) for face in self.faces if face.flank.deviation is not None]
         coarse = COARSE + PER_PIECE * max(pieces, default=0)
-        u = np.broadcast_to(np.linspace(0.0, self.pinion.end, coarse), (len(angle), coarse))
+        low, high = self.pinion.start, self.pinion.end
+        u = np.broadcast_to(np.linspace(low, high, coarse), (len(angle), coarse))
         best, least = np.zeros(len(angle)), np.full(len(angle), np.inf)
-        open_, step = np.arange(len(angle)), self.pinion.end / (coarse - 1)
+        open_, step = np.arange(len(angle)), (high - low) / (coarse - 1)
         for _ in range(LOOKS):
             found = self.twist(angle[open_, None], number[open_, None], u)
             place, value, known = _lowest(u, found, step)
@@ -303,10 +344,10 @@ class Flanks:
             best[open_], least[open_] = place, value[goes_on]
             if len(open_) == 0:
                 break
-            middle = np.clip(place, reach, self.pinion.end - reach)[:, None]
-            u = np.clip(middle + reach * np.linspace(-1.0, 1.0, CLOSER), 0.0, self.pinion.end)
+            middle = np.clip(place, low + reach, high - reach)[:, None]
+            u = np.clip(middle + reach * np.linspace(-1.0, 1.0, CLOSER), low, high)
             step = 2.0 * reach / (CLOSER - 1)
-        best = np.where(best < AT_AN_END, 0.0, best)
+        best = np.where(np.abs(best) < AT_AN_END, 0.0, best)
         meets = np.isfinite(least)
         return self._described(position[meets], angle[meets], number[meets], best[meets], least[meets])
 
@@ -314,7 +355,9 @@ class Flanks:
         seen = self.placed(angle, number, u)
         radius = np.abs(seen)
         mate = self.wheel.at_radius(radius)
-        mate = np.where(mate < AT_AN_END, 0.0, np.where(mate > self.wheel.end - AT_AN_END, self.wheel.end, mate))
+        mate = np.where(
+            np.abs(mate) < AT_AN_END, 0.0, np.where(mate > self.wheel.end - AT_AN_END, self.wheel.end, mate)
+        )
         turn = np.exp(1j * (angle + number * self.pair.mesh_cycle))
         normal = self.pinion.normals(u) * turn
         wheel_normal = -self.wheel.normals(mate) * np.exp(1j * (self.wheel_frame(angle, number) + twist))

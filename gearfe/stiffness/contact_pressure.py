@@ -97,7 +97,7 @@ def largest_pressures(curve: Any) -> dict[str, Any]:
 def _bearing(curve: FlankCurve, u: Array, half: Array) -> IntArray:
     """Places in `EDGES` of what contacts of the half widths `half` (m) about the parameters u of a flank reach."""
     face, s = curve.face, curve.arc_at(u)
-    sharp = curve.arc_at([*([0.0] if face.fall > 0.0 else []), *face.kinks, *([face.end] if face.sharp else [])])
+    sharp = curve.arc_at([*([0.0] if face.undercut else []), *face.kinks, *([face.end] if face.sharp else [])])
     reached = (np.abs(sharp - s[:, None]) <= half[:, None]).any(axis=1)
     rounded = ~np.array(face.sharp) & (s + half > curve.arc_at(1.0))
     return np.where(reached, _SINGULAR, np.where(rounded, _ROUNDED, 0))
