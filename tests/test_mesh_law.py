@@ -90,7 +90,7 @@ def test_error_tells_what_contact_solutions_tell_and_falls_with_the_tolerance(la
 
 
 def test_pairs_that_touch_together_at_a_single_place_are_coupled_there(solver):
-    """The first reach at which pairs two teeth apart touch at once: C is what that place tells, everywhere."""
+    """The first reach at which pairs two teeth apart touch at once: C is what that place tells; none farther away."""
     cycle = PAIR.mesh_cycle
     phases = cycle * np.linspace(-2.0, 2.0, 33)
     low, high = 1e-6, 600e-6
@@ -98,11 +98,27 @@ def test_pairs_that_touch_together_at_a_single_place_are_coupled_there(solver):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if len(coupling_curve(solver, phases, middle)) > 1 else (middle, high)
     two = coupling_curve(solver, phases, high)[1]
-    assert len(two.angle) == 3
-    everywhere = two(np.linspace(-1.0, 1.0, 50))
-    assert everywhere == pytest.approx(two.compliance[1], rel=1e-12)
-    assert 0.0 < everywhere[0] < coupling_curve(solver, phases, high)[0].compliance.max()
-    assert two(phases, 1) == pytest.approx(0.0, abs=1e-20)
+    assert len(two.angle) == 5
+    there = np.linspace(two.angle[1], two.angle[-2], 50)
+    assert two(there) == pytest.approx(two.compliance[2], rel=1e-12)
+    assert two(there, 1) == pytest.approx(0.0, abs=1e-20)
+    assert 0.0 < two.compliance[2] < coupling_curve(solver, phases, high)[0].compliance.max()
+    assert not two(np.array([two.angle[0] - 0.1, two.angle[-1] + 0.1])).any()
+
+
+def test_pairs_that_touch_beyond_the_reach_yield_where_they_are_pressed():
+    """Many teeth: at the ends of its tables a pair touches at several times the reach, and no contact solution tells
+    what it yields there; a negative compliance would let it bear where it is far from touching.
+    """
+    form = {"module": 2.5e-3, "pressure_angle": math.radians(20), "face_width": 15e-3}
+    pair = GearPair(Gear(29, bore_diameter=12e-3, **form), Gear(59, bore_diameter=12e-3, **form))
+    law = mesh_law(half_plane_pair(pair, elastic_pair(pair, law=law_named("half_plane"), coarsen=4.0)), 3000.0)
+    assert law.touch[..., 0].max() > 3.0 * law.reach
+    z = np.linspace(0.0, 1.0, 5)[:, None] * np.diff(law.nodes)
+    for part, width in enumerate(np.diff(law.forces)):
+        c = sum(law.energies[:, :, part, a, 2:] * z[:, None, :, None] ** a for a in range(4))
+        for f in (0.0, 0.5 * width, width):
+            assert (c @ [2.0, 6.0 * f, 12.0 * f**2] > 0.0).all()
 
 
 def test_force_and_moment_are_the_derivatives_of_the_energy(law):

@@ -28,6 +28,8 @@ SHARE = 0.5
 #: Cells of the pair force end at these parts of the largest: Lambda's cubics err by 1e-4 of it in a cell of ratio 2.2,
 #: and by 1e-3 in those of small forces.
 PARTS = (0.0, 0.002, 0.01, 0.05, 0.2, 0.45, 1.0)
+#: Data tell the coefficient of a cubic B-spline if they reach the node beside its middle, where it has this value.
+EDGE = 1.0 / 6.0
 #: Nodes of b over ln F; what is between the contact solutions' forces, more of them do not know.
 FORCE_NODES = 5
 NANO = 1e-9
@@ -110,6 +112,8 @@ def fit_law(
     knots = np.linspace(float(ends[0]), float(ends[1]), FORCE_NODES)
     phase, force = _clamped(touch.angle), _clamped(knots)
     P = BSpline.design_matrix(found.angle, phase, 3).tocsr()
+    tied = _level_beyond(P)
+    P = P @ tied
     at = np.clip(y, *ends)
     Y = [_columns(force, at, order) for order in (0, 1)]
     middle, level = float(y.mean()), float(np.average(found.approach / found.force, weights=found.share))
@@ -120,12 +124,13 @@ def fit_law(
     cycle = touch.angle[cells] - touch.angle[0]
     (whole, _, bent), (along, sloped, curved) = _grams(phase, cycle), _grams(force, 1.0)
     penalty = (
-        SMOOTH_PHASE**2 * sparse.kron(bent, along)
-        + sparse.kron(whole, SMOOTH_FORCE**2 * curved + LEVEL_FORCE**2 * sloped)
+        SMOOTH_PHASE**2 * sparse.kron(tied.T @ bent @ tied, along)
+        + sparse.kron(tied.T @ whole @ tied, SMOOTH_FORCE**2 * curved + LEVEL_FORCE**2 * sloped)
         + 1e-12 * sparse.eye_array(n * m)
     )
     rows = weight @ A
     b = NANO * spsolve(sparse.csc_matrix(rows.T @ rows + penalty), rows.T @ (weight @ right)).reshape(n, m)
+    b = tied @ b
     # Lambda and its slope at the forces between the cells: splines over the phase
     at = np.log(parts[1:])
     values, slopes, bends = (_columns(force, at, order).T for order in (0, 1, 2))
@@ -142,6 +147,19 @@ def fit_law(
         backlash=0.0,
         reach=reach,
     )
+
+
+def _level_beyond(P: sparse.csr_array) -> sparse.csr_array:
+    """Coefficients of all splines over the phase from those that data tell; P has the splines at the data's places.
+
+    Before the first and behind the last of these, where pairs touch beyond the reach, b is level: going on as it rises
+    at the ends of contact it would make compliances negative, and with these there is more than one set of pair forces.
+    """
+    n = P.shape[1]
+    known = np.flatnonzero(P.max(axis=0).toarray().ravel() >= EDGE)
+    low, high = int(known[0]), int(known[-1])
+    columns = np.clip(np.arange(n), low, high) - low
+    return sparse.csr_array((np.ones(n), (np.arange(n), columns)), shape=(n, high - low + 1))
 
 
 def _clamped(x: Array) -> Array:

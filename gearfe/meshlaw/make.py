@@ -131,7 +131,7 @@ def touch_curve(pair: HalfPlanePair, phases: Array) -> TouchCurve:
 
 
 def coupling_curve(pair: HalfPlanePair, phases: Array, reach: float) -> list[Couple]:
-    """C of pairs one, two, ... teeth apart over the angle of the lower pair's tooth; constant beyond its ends."""
+    """C of pairs one, two, ... teeth apart over the angle of the lower pair's tooth; 0 beyond its ends."""
     cycle, radius = pair.pair.mesh_cycle, pair.pair.wheel.base_radius
     angles = phases[phases < phases[0] + cycle * (1 - 1e-9)]
     _, first = _touching(pair, angles)
@@ -141,9 +141,10 @@ def coupling_curve(pair: HalfPlanePair, phases: Array, reach: float) -> list[Cou
         here = apart == number
         order = np.argsort(angle[here])
         own, beside = angle[here][order], cycle / len(angles)
-        # level at its ends: pairs far apart may touch at a single place
-        places = np.concatenate([[own[0] - beside], own, [own[-1] + beside]])
-        made.append(Couple(places, np.pad(compliance[here][order], 1, mode="edge")))
+        # level at its ends, since pairs far apart may touch at a single place; then none, since these do not touch
+        places = np.concatenate([own[0] - beside * np.array([2.0, 1.0]), own, own[-1] + beside * np.array([1.0, 2.0])])
+        level = np.pad(compliance[here][order], 1, mode="edge")
+        made.append(Couple(places, np.pad(level, 1)))
     return made
 
 
