@@ -80,8 +80,8 @@ def numbers(cells: Iterable[Any]) -> list[Any]:
         return cells
 
 
-def library(name: str) -> Any:
-    """A library of the extra ``study``.
+def library(name: str, extra: str = "study") -> Any:
+    """A library of an extra.
 
     Raises
     ------
@@ -91,4 +91,4 @@ def library(name: str) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError:
-        raise MissingLibraryError(f"{name} is not installed: pip install 'gearfe[study]'") from None
+        raise MissingLibraryError(f"{name} is not installed: pip install 'gearfe[{extra}]'") from None

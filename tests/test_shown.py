@@ -10,11 +10,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe import build_train, housing_from_job, load_mesh, read_study, run_study, run_up, simulate, sweep_loads
+from gearfe import (
+    Search,
+    build_train,
+    housing_from_job,
+    load_mesh,
+    optimise_relief,
+    read_study,
+    run_study,
+    run_up,
+    simulate,
+    sweep_loads,
+)
 from gearfe.contact.half_plane import half_plane_pair
 from gearfe.errors import MissingLibraryError
 from gearfe.figures.results import PICTURES
+from gearfe.gear.modifications import FlankModification
 from gearfe.mechanisms import load_mechanism
+from gearfe.microgeometry.relief_problem import ReliefProblem, Variable
 from gearfe.rigid import constant, integrate
 from gearfe.shown import Shown, numbers
 from gearfe.spectrum import amplitude_spectrum
@@ -55,6 +68,17 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         integrate(crank.system, np.linspace(0.0, 0.01, 3)),
         run_study(read_study(written(trial, cases=8)), trial / "out", jobs=1),
         amplitude_spectrum(np.column_stack([tone, 2.0 * tone]), 1e-3),
+        optimise_relief(
+            ReliefProblem(
+                half_plane_pair(pair, elastic),
+                (FlankModification(), FlankModification()),
+                (Variable("tip_relief.amount", 0.0, 3e-5, tolerance=2e-6),),
+                torques=(100.0,),
+                positions=4,
+            ),
+            map_points=2,
+            generations=1,
+        ),
     ]
     return {type(one).__name__: one for one in made}
 
@@ -73,12 +97,16 @@ def test_prompt_notebook_and_picture(name: str, results: dict[str, Any]) -> None
     assert len(kept.getvalue()) > 5000
 
 
-def test_models_tell_what_they_are() -> None:
+def test_models_tell_what_they_are(tmp_path: Path) -> None:
     train = build_train(trains.train([(20, 30)]))
+    with Search(read_study(written(tmp_path, cases=8))) as search:
+        search.solve([dict.fromkeys(search.study.task.names, 1.0)])
+    assert "points 1, 1 done" in repr(search)
+    assert repr(train.train).startswith("GearTrain: shafts s0, s1, gears ")
     housing = housing_from_job(str(ROOT / "meshes" / "box.toml"))
     assert repr(train).startswith("TrainModel: shafts s0, s1, ")
     assert f"held nodes {len(housing.fixed)}" in repr(housing)
-    for one in (train, housing):
+    for one in (train, train.train, search, housing):
         assert len(repr(one)) < 300
         assert one._repr_html_().count("<tr>") == len(one.facts())
 

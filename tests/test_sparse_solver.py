@@ -65,7 +65,7 @@ def test_scipy_alone_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sparse_solver.importlib.util, "find_spec", lambda name: None)
     assert installed_solvers() == ("superlu",)
     assert choose_solver() == "superlu"
-    with pytest.raises(MissingLibraryError, match="pip install pymetis"):
+    with pytest.raises(MissingLibraryError, match=r"pip install 'gearfe\[fast\]'"):
         choose_solver("multifrontal")
 
 

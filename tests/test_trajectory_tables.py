@@ -8,7 +8,7 @@ import types
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
+from gearfe.errors import MissingLibraryError
 from gearfe.rigid import Body, Gravity, Hinge, Linkage, System, Trajectory, integrate
 
 
@@ -28,7 +28,7 @@ def test_a_trajectory_says_what_it_is_in_a_line() -> None:
 def test_without_the_library_the_cure_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, call in (("pandas", Trajectory.to_pandas), ("xarray", Trajectory.to_xarray)):
         monkeypatch.setitem(sys.modules, name, None)
-        with pytest.raises(InputError, match=f"pip install {name}"):
+        with pytest.raises(MissingLibraryError, match=f"{name} is not installed: pip install"):
             call(made())
 
 

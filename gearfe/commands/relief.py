@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
             from ..figures.microgeometry import relief_figure
 
             with watch.stage("picture"):
-                relief_figure(place / "relief.png", table, made, compared)
+                relief_figure(place / "relief.png", made, compared)
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "relief.json", summary(job, base, table, made, errors, watch.seconds))
         names = sorted(path.name for path in place.iterdir())

@@ -33,12 +33,15 @@ def run(args: argparse.Namespace) -> int:
     """Solve the cases that are missing and write the files; 1 when a case has no answer."""
     started = time.perf_counter()
     from ..errors import InputError
+    from ..shown import library
     from ..study.job import read_study, run_study
 
     if args.jobs is not None and args.jobs < 1:
         raise InputError("--jobs", args.jobs, "must be >= 1", "the number of processors is the default")
     if (args.row is None) != (args.write is None):
         raise InputError("--row", args.row, "goes with --write", "give both: --row 17 --write best.toml")
+    if args.parquet:  # told before the work, not after it
+        library("pyarrow")
     study = read_study(args.study)
     if args.row is not None:
         return _write_case(study, args.row, Path(args.write))
@@ -84,7 +87,7 @@ def _cluster(address: str, stack: ExitStack) -> dict[str, Any]:
     try:
         from dask.distributed import Client
     except ImportError:
-        raise MissingLibraryError("--dask needs dask.distributed: pip install gearfe[cluster]") from None
+        raise MissingLibraryError("--dask needs dask.distributed: pip install 'gearfe[cluster]'") from None
     logging.disable(logging.CRITICAL)  # of a lost connection `check` tells
     stack.callback(logging.disable, logging.NOTSET)
     try:

@@ -14,8 +14,7 @@ from ..gear.deviation_job import GEARS, active_rolls, flank_deviations
 from ..gear.pair import GearPair
 from ..microgeometry.loaded_mesh import LoadedMesh
 from ..microgeometry.relief import ReliefResult
-from ..microgeometry.relief_job import in_units
-from ..tables.microgeometry import VARIABLES, MicrogeometryTable, ReliefTable, VariableTable
+from ..tables.microgeometry import VARIABLES, MicrogeometryTable
 from ..typing import Array
 from .style import BLUE, GREY, ORANGE, RED, new_figure, save, tidy
 
@@ -174,14 +173,12 @@ def microgeometry_picture(made: LoadedMesh) -> Any:
     return figure
 
 
-def _in_words(one: VariableTable) -> str:
-    """A variable with its unit, as ``tip relief (µm), both gears``."""
-    name, _, unit = one.key.rpartition("_")
-    gear = "both gears" if one.gear == "both" else one.gear
-    return f"{name.replace('_', ' ')} ({unit.replace('um', 'µm')}), {gear}"
+def relief_figure(path: str | Path, made: ReliefResult, compared: Mapping[str, Array]) -> None:
+    """Write `relief_picture`."""
+    save(relief_picture(made, compared), path, dpi=110)
 
 
-def relief_figure(path: str | Path, table: ReliefTable, made: ReliefResult, compared: Mapping[str, Array]) -> None:
+def relief_picture(made: ReliefResult, compared: Mapping[str, Array]) -> Any:
     """Map of the objective over one or two variables, error against torque of the best one, and its sensitivity.
 
     Parameters
@@ -189,8 +186,12 @@ def relief_figure(path: str | Path, table: ReliefTable, made: ReliefResult, comp
     compared
         Of `gearfe.microgeometry.relief_job.comparison`.
     """
-    names, best, value = [_in_words(one) for one in table.variables], in_units(table, made.x), made.best.value
-    places = [axis / VARIABLES[one.key][1] for axis, one in zip(made.axes, table.variables, strict=False)]
+    problem, value = made.problem, made.best.value
+    keys = {quantity: (key, factor) for key, (quantity, factor) in VARIABLES.items()}
+    names = [_in_words(keys[one.quantity][0], one.gear) for one in problem.variables]
+    units = [keys[one.quantity][1] for one in problem.variables]
+    best = [float(x / unit) for x, unit in zip(made.x, units, strict=True)]
+    places = [axis / unit for axis, unit in zip(made.axes, units, strict=False)]
     objective = np.where(np.isfinite(made.map), made.map, np.nan)
     figure = new_figure(12.0, 4.2)
     first, second, third = figure.subplots(1, 3, width_ratios=(1.3, 1.1, 1))
@@ -204,7 +205,7 @@ def relief_figure(path: str | Path, table: ReliefTable, made: ReliefResult, comp
         first.plot(places[0], objective, ".-", color=BLUE)
         first.axvline(best[0], color=GREY, linewidth=1)
     first.set_xlabel(names[0], fontsize=9)
-    weighed = table.pressure_weight or table.root_stress_weight or len(table.torques_Nm) > 1
+    weighed = problem.pressure_weight or problem.root_stress_weight or len(problem.torques) > 1
     first.set_title("objective" if weighed else "peak to peak (µm)", loc="left", fontsize=9.5)
     tidy(second)
     for label, color in (("without", GREY), ("best", BLUE)):
@@ -215,18 +216,24 @@ def relief_figure(path: str | Path, table: ReliefTable, made: ReliefResult, comp
     second.set_xlabel("torque at the wheel (N m)", fontsize=9)
     second.set_title("transmission error, peak to peak (µm)", loc="left", fontsize=9.5)
     tidy(third)
-    wide = [i for i, one in enumerate(table.variables) if one.tolerance > 0.0]
+    wide = [i for i, one in enumerate(problem.variables) if one.tolerance > 0.0]
     for row, i in enumerate(wide):
         for end, shift, color, sign in ((made.low[i], -0.06, ORANGE, "less"), (made.high[i], 0.06, BLUE, "more")):
             named = {"label": sign} if row == 0 else {}
             third.plot([value, end], [row + shift] * 2, "-", color=color, linewidth=5, **named)
     third.axvline(value, color=GREY, linewidth=1)
     third.set_ylim(-0.6, max(len(wide), 1) - 0.4)
-    allowed = [f"{names[i].replace(', ', chr(10))}\n± {table.variables[i].tolerance:g}" for i in wide]
+    allowed = [f"{names[i].replace(', ', chr(10))}\n± {problem.variables[i].tolerance / units[i]:g}" for i in wide]
     third.set_yticks(range(len(wide)), allowed, fontsize=8)
     third.set_title("the same within tolerances" if wide else "no tolerances given", loc="left", fontsize=9.5)
     if wide:
         third.legend(fontsize=8, frameon=False)
     else:
         third.set_xticks([])
-    save(figure, path, dpi=110)
+    return figure
+
+
+def _in_words(key: str, gear: str) -> str:
+    """A variable with its unit, as ``tip relief (µm), both gears``."""
+    name, _, unit = key.rpartition("_")
+    return f"{name.replace('_', ' ')} ({unit.replace('um', 'µm')}), {'both gears' if gear == 'both' else gear}"

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from ..gear.pair import GearPair
     from ..loadmap.load_map import LoadMap
     from ..microgeometry.loaded_mesh import LoadedMesh
+    from ..microgeometry.relief import ReliefResult
     from ..reduction.modal_body import ModalBody
     from ..rigid.trajectory import Trajectory
     from ..runup.run_up import RunUp
@@ -66,6 +67,14 @@ def mesh_plot(made: LoadedMesh) -> Any:
     from .microgeometry import microgeometry_picture
 
     return microgeometry_picture(made)
+
+
+def relief_plot(made: ReliefResult) -> Any:
+    """Map of the objective, error against torque, tolerances."""
+    from ..microgeometry.relief_job import comparison
+    from .microgeometry import relief_picture
+
+    return relief_picture(made, comparison(made))
 
 
 def response_plot(response: TrainResponse) -> Any:
@@ -169,6 +178,7 @@ PICTURES: dict[str, Callable[[Any], Any]] = {
     "LoadMap": map_plot,
     "LoadedMesh": mesh_plot,
     "ModalBody": body_plot,
+    "ReliefResult": relief_plot,
     "RunUp": runup_plot,
     "Spectrum": spectrum_plot,
     "StiffnessCurve": curve_plot,

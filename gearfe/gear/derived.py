@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from .drawing_values import span_size, span_teeth
 from .iso6336 import mesh_stiffness, single_stiffness
 from .pair import GearPair
 from .spur_gear import Gear
@@ -39,6 +40,7 @@ def derived_geometry(pair: GearPair) -> dict[str, Any]:
 
 
 def _of_gear(gear: Gear, working_radius: float) -> dict[str, Any]:
+    spanned = span_teeth(gear)
     return {
         "teeth": gear.teeth,
         "module_mm": 1e3 * gear.module,
@@ -51,6 +53,8 @@ def _of_gear(gear: Gear, working_radius: float) -> dict[str, Any]:
         "bore_diameter_mm": 1e3 * gear.bore_diameter,
         "tip_thickness_mm": 1e3 * gear.tip_thickness,
         "profile_shift": gear.profile_shift,
+        "span_teeth": spanned,
+        "span_mm": 1e3 * span_size(gear, spanned),
         "undercut": gear.undercut,
     }
 

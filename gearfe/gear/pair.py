@@ -12,7 +12,8 @@ from typing import Any
 
 from ..errors import InputError
 from ..shown import Shown
-from ..tables.pair import GearTable, PairTable
+from ..tables.pair import INSTEAD, GearTable, PairTable
+from .drawing_values import coefficients
 from .mesh_geometry import MeshGeometry, PathPoint
 from .pair_checks import check_pair, pair_warnings
 from .spur_gear import Gear, TipRelief
@@ -34,7 +35,7 @@ KEYS: dict[str, tuple[str, float]] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class GearPair(MeshGeometry, Shown):
     """Two external spur gears in mesh, checked when made.
 
@@ -86,6 +87,7 @@ class GearPair(MeshGeometry, Shown):
 def _gear_from_table(table: PairTable, side: str, where: str) -> Gear:
     own: GearTable = getattr(table, side)
     value = table.tooth_form(side)
+    value |= coefficients(own, table.module_mm_of(side), value, f"{where}.{side}")
     relief = None
     if value["tip_relief_amount_um"]:
         length = value["tip_relief_length_mm"]
@@ -114,6 +116,11 @@ def _renamed(error: InputError, table: PairTable, side: str, name: str, where: s
     """The same error in the words of the job file: its key where it was given, its unit."""
     key, factor = KEYS.get(name, (name, 1.0))
     own: Any = getattr(table, side) if side else None
+    for drawn, stands_for in INSTEAD.items():
+        if own is not None and key in stands_for and getattr(own, drawn) is not None:
+            number = error.value * factor if isinstance(error.value, float) else error.value
+            problem = f"makes {key} {number:.6g}: {error.problem}"
+            return InputError(f"{where}.{side}.{drawn}", getattr(own, drawn), problem, error.cure)
     if name == "module" and own.pitch_diameter_mm is not None:
         key, factor = "pitch_diameter_mm", 1e3 * own.teeth
     shared = side and getattr(own, key, None) is None and getattr(table, key, None) is not None

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..shown import Shown
 from ..typing import Array
 from .relief_problem import Evaluation, ReliefProblem
 
@@ -32,8 +33,8 @@ POPULATION, CORNERS = 8, 6
 LAST_STEP, LAST_CHANGE = 1e-4, 1e-5
 
 
-@dataclass(frozen=True)
-class ReliefResult:
+@dataclass(frozen=True, repr=False)
+class ReliefResult(Shown):
     """The best choice, and what is round it.
 
     Attributes
@@ -66,6 +67,16 @@ class ReliefResult:
     high: Array
     worst: float
     evaluations: int
+
+    def facts(self) -> dict[str, str]:
+        """Values of the variables, objective and peak-to-peak error beside those without, evaluations."""
+        peaks = [1e6 * float(max(one.peak_to_peak, default=math.nan)) for one in (self.best, self.without)]
+        return {
+            **{v.name: f"{1e6 * x:.4g} um" for v, x in zip(self.problem.variables, self.x, strict=True)},
+            "objective": f"{self.best.value:.4g}, without {self.without.value:.4g}",
+            "transmission error": f"peak to peak {peaks[0]:.3g} um, without {peaks[1]:.3g} um",
+            "evaluations": str(self.evaluations),
+        }
 
 
 def optimise_relief(

@@ -41,6 +41,8 @@ from scipy import sparse
 from ..errors import InputError, MissingLibraryError
 from ..typing import Array, IntArray
 
+#: Extra of the package that brings each solver.
+EXTRAS = {"multifrontal": "fast", "cholmod": "cholmod", "pardiso": "pardiso"}
 #: Names of the solvers, best first; each needs the package on the right (``None``: scipy alone).
 PACKAGES: dict[str, str | None] = {
     "multifrontal": "pymetis",
@@ -90,7 +92,7 @@ def choose_solver(solver: str = "auto") -> str:
         raise InputError("solver", solver, "must be auto, " + ", ".join(PACKAGES), "choose one of these")
     if solver not in here:
         raise MissingLibraryError(
-            f"the sparse solver {solver!r} needs the package {PACKAGES[solver]}: pip install {PACKAGES[solver]}"
+            f"the sparse solver {solver!r} needs the package {PACKAGES[solver]}: pip install 'gearfe[{EXTRAS[solver]}]'"
         )
     return solver
 

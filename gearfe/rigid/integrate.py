@@ -297,7 +297,7 @@ def use_compiled(backend: str) -> bool:
     if backend == "plain":
         return False
     if backend == "compiled" and not compiled.available():
-        raise InputError("backend", backend, "needs numba", "pip install numba, or use backend='plain'")
+        raise InputError("backend", backend, "needs numba", "pip install 'gearfe[fast]', or use backend='plain'")
     return compiled.available()
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..shown import Shown
+from ..shown import Shown, library
 from ..typing import Array
 from .contract import Element
 from .dense import Dense
@@ -80,13 +78,13 @@ class Trajectory(Shown):
 
         Raises
         ------
-        InputError
+        MissingLibraryError
             Where pandas is not installed.
         """
         names = self.system.coordinate_names()
         columns = [*names, *(f"rate of {name}" for name in names)]
-        frame = _library("pandas").DataFrame(np.hstack([self.q, self.v]), columns=columns)
-        return frame.set_index(_library("pandas").Index(self.time, name="time_s"))
+        frame = library("pandas").DataFrame(np.hstack([self.q, self.v]), columns=columns)
+        return frame.set_index(library("pandas").Index(self.time, name="time_s"))
 
     def to_xarray(self) -> Any:
         """Coordinates q, velocities v, accelerations a over (time_s, coordinate) and multipliers over (time_s, row).
@@ -97,14 +95,14 @@ class Trajectory(Shown):
 
         Raises
         ------
-        InputError
+        MissingLibraryError
             Where xarray is not installed.
         """
         states = {name: (("time_s", "coordinate"), getattr(self, name)) for name in "qva"}
         held = {"multipliers": (("time_s", "row"), self.multipliers)}
         labels = {"time_s": self.time, "coordinate": self.system.coordinate_names(), "row": self.system.row_names()}
         attributes = {"status": str(self.status), "method": self.method}
-        return _library("xarray").Dataset({**states, **held}, coords=labels, attrs=attributes)
+        return library("xarray").Dataset({**states, **held}, coords=labels, attrs=attributes)
 
     @property
     def message(self) -> str:
@@ -194,11 +192,3 @@ class Trajectory(Shown):
                 continue
             out[i, keep] = least_norm_solution(S, right, 1e-14)
         return out
-
-
-def _library(name: str) -> Any:
-    """A library that is not needed but for this."""
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        raise InputError(name, None, "is not installed", f"pip install {name}, or take the arrays q, v, a") from None

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack
@@ -19,6 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import InputError
+from ..shown import Facts
 from ..typing import Array
 from .case import DIED, DONE, Row
 from .job import Study, check_outputs, solved_rows
@@ -50,7 +52,7 @@ class Solution:
     outputs: dict[str, float]
 
 
-class Search:
+class Search(Facts):
     """Points of a study, solved when they are asked for the first time.
 
     Use it with ``with``: its processes stay between the points of one round and the next, and end with it.
@@ -111,6 +113,16 @@ class Search:
             self._rows.append(Row(int(case), found, status, message, float(seconds)))
             self._points.append(tuple(_cell(columns[name][i]) for name in names))
         return journal
+
+    def facts(self) -> dict[str, str]:
+        """Study, parameters, outputs, points that are solved."""
+        found = Counter(row.status for row in self._rows)
+        return {
+            "study": self.study.path.name,
+            "parameters": ", ".join(self.study.task.names),
+            "outputs": ", ".join(self.study.task.outputs),
+            "points": str(len(self)) + "".join(f", {count} {status}" for status, count in found.items()),
+        }
 
     def __enter__(self) -> Search:
         return self

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import MissingLibraryError
 from ..output.files import whole_file
 from ..shown import Shown, library
 from ..tables.study import LimitTable, StudyTable
@@ -210,11 +209,7 @@ class StudyResult(Shown):
 
     def to_parquet(self, path: str | Path) -> None:
         """Write the rows as an Apache Parquet file, whole or not at all."""
-        try:
-            import pyarrow
-            from pyarrow import parquet
-        except ImportError:
-            raise MissingLibraryError("pyarrow is not installed: pip install gearfe[study]") from None
+        pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
         with whole_file(path) as temporary:
             parquet.write_table(pyarrow.table({n: _numbers(cells) for n, cells in self.columns.items()}), temporary)
 

@@ -23,6 +23,12 @@ DEFAULTS: dict[str, float] = {
     "tip_relief_exponent": 1.0,
     "tooth_thinning_um": 0.0,
 }
+#: Keys of a gear's drawing -> those of the tooth form that they stand for.
+INSTEAD: dict[str, tuple[str, ...]] = {
+    "tip_diameter_mm": ("addendum", "tip_shortening"),
+    "root_diameter_mm": ("dedendum",),
+    "span_mm": ("tooth_thinning_um",),
+}
 REQUIRED = ("pressure_angle_deg", "face_width_mm")
 OPTIONAL = ("tip_relief_length_mm",)
 
@@ -72,6 +78,14 @@ class GearTable(ToothFormTable):
     teeth: int = quantity(doc="number of teeth", low=8, high=1000)
     bore_diameter_mm: float = quantity(doc="diameter of the rigid bore (mm); it decides the stiffness level", above=0.0)
     pitch_diameter_mm: float | None = quantity(None, doc="reference diameter (mm), instead of module_mm", above=0.0)
+    tip_diameter_mm: float | None = quantity(
+        None, doc="tip diameter (mm), instead of addendum and tip_shortening", above=0.0
+    )
+    root_diameter_mm: float | None = quantity(None, doc="root diameter (mm), instead of dedendum", above=0.0)
+    span_mm: float | None = quantity(
+        None, doc="span size over span_teeth teeth, W_k (mm), instead of tooth_thinning_um", above=0.0
+    )
+    span_teeth: int | None = quantity(None, doc="number of teeth k of span_mm", low=2)
     material: MaterialTable | None = quantity(None, doc="material of this gear, if not the shared one")  # noqa: RUF009
 
 
@@ -111,6 +125,14 @@ class PairTable(ToothFormTable):
         for side in ("pinion", "wheel"):
             own: GearTable = getattr(self, side)
             label = f"{where}.{side}"
+            for key, others in INSTEAD.items():
+                for other in others if getattr(own, key) is not None else ():
+                    if getattr(own, other) is not None:
+                        problem = f"says what {other} = {getattr(own, other):g} says"
+                        raise InputError(f"{label}.{key}", getattr(own, key), problem, "leave one out")
+            if (own.span_mm is None) != (own.span_teeth is None):
+                lacking = "span_mm" if own.span_mm is None else "span_teeth"
+                raise InputError(f"{label}.{lacking}", None, "is required with the other one", "give both, or neither")
             module = own.module_mm if own.module_mm is not None else self.module_mm
             if own.pitch_diameter_mm is None and module is None:
                 doc = "give the module (mm), here or in the shared table, or pitch_diameter_mm"

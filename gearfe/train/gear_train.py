@@ -14,6 +14,7 @@ from ..gear.pair import Gear
 from ..meshlaw.law import MeshLaw
 from ..reduction.modal_body import ModalBody
 from ..rigid.timefunctions import TimeFunction
+from ..shown import Facts
 from ..stiffness.curve import StiffnessCurve
 from ..stiffness.periodic import PeriodicInterpolant
 from ..typing import Array
@@ -197,8 +198,8 @@ class Damping:
     gyroscopic: bool = True
 
 
-@dataclass(frozen=True, eq=False)
-class GearTrain:
+@dataclass(frozen=True, eq=False, repr=False)
+class GearTrain(Facts):
     """A whole gear train.
 
     Parameters
@@ -227,6 +228,19 @@ class GearTrain:
     bearings: tuple[Bearing, ...] = ()
     damping: Damping = Damping()
     axis: Vector = (0.0, 1.0, 0.0)
+
+    def facts(self) -> dict[str, str]:
+        """Shafts, gears, meshes, drive, loads, housing."""
+        housing, drive = self.housing, self.drive
+        rigid = f"rigid, {len(self.rigid_bores)} bores"
+        return {
+            "shafts": ", ".join(shaft.name for shaft in self.shafts),
+            "gears": ", ".join(f"{one.name} on {one.shaft}" for one in self.gears) or "none",
+            "meshes": ", ".join(f"{one.driver}-{one.driven}" for one in self.meshes) or "none",
+            "drive": "none" if drive is None else f"{drive.shaft}, against bore {drive.bore}",
+            "loads": ", ".join(one.shaft for one in self.loads) or "none",
+            "housing": rigid if housing is None else f"elastic, {len(housing.attachment_names)} bores",
+        }
 
     @property
     def driven(self) -> Drive:
