@@ -12,6 +12,7 @@ import pytest
 from gearfe import ModalBody, housing_from_job
 from gearfe.cli import main
 from gearfe.errors import InputError
+from gearfe.housing.modal_points import point_columns, point_lines
 from gearfe.housing.modal_test import COLUMNS, TestModes, compare, mac_table, read_modes
 
 MESHES = Path(__file__).parents[1] / "meshes"
@@ -118,10 +119,38 @@ def test_a_universal_file(kind, body, tmp_path) -> None:
     assert found.distance < 1e-5 * np.ptp(body.nodes)
 
 
+def test_points_that_are_exchanged_or_reversed_are_named(body) -> None:
+    """A test with noise whose sixth and tenth points are exchanged, and whose third sensor is turned round."""
+    rng = np.random.default_rng(8)
+    chosen, modes = list(range(6)), body.coupled.vectors[:, :6].T
+    lively = np.argsort(-np.linalg.norm(body.reconstruct(modes), axis=(0, 2)))[::40][:12]
+    fields = body.reconstruct(modes)[:, lively]
+    fields += 0.02 * np.abs(fields).max() * rng.normal(size=fields.shape)
+    wrong = fields.copy()
+    wrong[:, [5, 9]] = fields[:, [9, 5]]
+    wrong[:, 2] *= -1.0
+    points, directions = np.repeat(body.nodes[lively], 3, axis=0), np.tile(np.eye(3), (12, 1))
+    hz, unknown = body.coupled.frequencies_hz[chosen], np.full(6, math.nan)
+    right, mixed = (
+        compare(body, TestModes(hz, unknown, points, directions, shapes.reshape(6, -1)), modes=6)
+        for shapes in (fields, wrong)
+    )
+    assert point_lines(right) == []
+    said = point_lines(mixed)
+    assert len(said) == 2
+    assert said[0].startswith("point 3 (")
+    assert "moves against the model" in said[0]
+    assert said[1].startswith("point 6 (")
+    assert "and point 10 (" in said[1]
+    agreement = point_columns(mixed)["agreement"].reshape(12, 3)[:, 0]
+    assert agreement[2] < -0.8
+    assert np.delete(agreement, [2, 5, 9]).min() > 0.8
+
+
 def test_mistakes(body, tmp_path) -> None:
     test = measured(body, [0, 1, 2])
     far = TestModes(test.frequencies, test.damping, 1e3 * test.points, test.directions, test.shapes)
-    with pytest.raises(InputError, match="from the nearest node"):
+    with pytest.raises(InputError, match="from the nearest node; times a thousandth all points fit: mend the unit"):
         compare(body, far)
     (tmp_path / "a.csv").write_text("frequency_Hz,x_mm\n1,2\n")
     for name, part in {"a.csv": "lacks the columns y_mm", "a.xls": "must end in", "no.csv": "no such file"}.items():

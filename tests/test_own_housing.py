@@ -190,6 +190,29 @@ def test_cylinders_are_found(seed) -> None:
 
 
 @pytest.mark.parametrize(
+    ("axes", "turned"),
+    [
+        (["x", "z", "-y"], lambda x, y, z: (x, -z, y)),  # shafts along z in the file
+        (["-y", "x", "z"], lambda x, y, z: (y, -x, z)),  # along x
+    ],
+)
+def test_a_file_in_other_axes(box, axes, turned, tmp_path) -> None:
+    """The box as a program with other axes and another origin writes it: the same body."""
+    found, shift = read_mesh_file(MESHES / "box.msh", "mesh", 1.0), np.array([100.0, -20.0, 7.0])
+    names = ["feet", *(b["group"] for b in BORES)]
+    marks = {name: np.isin(np.arange(len(found.nodes)), found.groups[name]).astype(np.int64) for name in names}
+    points = np.column_stack(turned(*found.nodes.T)) + shift
+    meshio.write(tmp_path / "turned.vtu", meshio.Mesh(points, [("tetra10", found.tets)], point_data=marks))
+    mesh = {"file": "turned.vtu", "axes": axes, "origin_mm": shift.tolist()}
+    same(housing_from_table(table(mesh=mesh), tmp_path), box)
+
+
+def test_groups_without_names_are_told_with_their_places(formats) -> None:
+    with pytest.raises(InputError, match=r"it has: .*\d+ \(about 62\.5, 31, 0 mm\)"):
+        housing_from_table(table(mesh="box.bdf"), formats)
+
+
+@pytest.mark.parametrize(
     ("keys", "told"),
     [
         ({"mesh": "none.msh"}, r"housing\.mesh = '.*none\.msh': there is no such file"),
@@ -201,7 +224,7 @@ def test_cylinders_are_found(seed) -> None:
         ({"mesh": "broken.unv"}, r"broken\.unv.*has no elements"),
         ({"mesh": "bricks.vtu"}, "must have tetrahedra of one order only, but it has 1 hexahedron"),
         ({"bores": [{"group": "bore_5"}]}, r"bores\[0\]\.group = 'bore_5': there is no such group.*feet.*bore_"),
-        ({"bores": [{"group": "feet"}]}, r"bores\[0\]\.group = 'feet': .*are no cylinder: .* mm off"),
+        ({"bores": [{"group": "feet"}]}, r"bores\[0\]\.group = 'feet': .*are no cylinder: they lie in a plane"),
         ({"bores": [{"point_mm": [0, 0, 0], "radius_mm": 5}]}, r"bores\[0\] = '1': no node lies within"),
         ({"held": [{"point_mm": [0, 0, -61]}]}, r"held\[0\] = \[0\.0, 0\.0, -61\.0\]: no node lies on this plane"),
         ({"held": [{"group": "foot"}]}, r"held\[0\]\.group = 'foot': there is no such group.*feet"),
@@ -232,6 +255,8 @@ def test_mistakes_in_files(keys, told, tmp_path) -> None:
         ({"body": "a.npz", "mesh": "a.msh"}, "mesh: stands beside body"),
         ({"body": "a.npz", "reduction": {"modes": 4}}, "reduction: a reduced body has its modes"),
         ({"mesh": {"file": "a.msh", "unit": "ft"}, "bores": BORES}, "must be one of mm, cm, m, in"),
+        ({"mesh": {"file": "a.msh", "axes": ["x", "z", "y"]}, "bores": BORES}, r'right-handed; shafts along z: \["x"'),
+        ({"mesh": {"file": "a.msh", "axes": ["x", "x", "z"]}, "bores": BORES}, "must name x, y and z once each"),
     ],
 )
 def test_mistakes_in_the_table(keys, told) -> None:

@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
         errors = _frequency_errors(body, shown, mesh)
     compared = None if test is None else compare(body, test, args.modes)
     _report(body, errors, mesh, left_out, seconds)
-    with whole_set(folder, ("housing.png", "modes.png", "comparison.csv", "mac.csv", "mac.png")) as made:
+    with whole_set(folder, ("housing.png", "modes.png", "comparison.csv", "points.csv", "mac.csv", "mac.png")) as made:
         with stage("tables"):
             _write(made, body, fields, errors, mesh, left_out)
         if compared is not None:
@@ -135,10 +135,12 @@ def _report(body: ModalBody, errors: dict[str, Any], mesh: MeshError, left_out: 
 
 def _compare(folder: Path, made: Comparison, args: argparse.Namespace) -> None:
     """Tell and write the modes of a test beside the body's."""
+    from ..housing.modal_points import point_columns, point_lines
     from ..output.files import write_csv
 
     columns = made.columns()
     write_csv(folder / "comparison.csv", columns)
+    write_csv(folder / "points.csv", point_columns(made))
     names = [f"mode_{n + 1}_{f:.1f}_Hz" for n, f in zip(made.numbers, made.frequencies, strict=True)]
     write_csv(
         folder / "mac.csv", {"test_frequency_Hz": made.test.frequencies, **dict(zip(names, made.mac.T, strict=True))}
@@ -153,6 +155,8 @@ def _compare(folder: Path, made: Comparison, args: argparse.Namespace) -> None:
         off, mac = columns["frequency_difference_percent"][i], columns["mac"][i]
         text = "no partner" if made.pairs[i] < 0 else f"{other:10.2f} Hz  {off:+6.2f} %   MAC {mac:.3f}"
         print(f"  {i + 1:3d} {hz:10.2f} Hz   {text}")
+    for line in point_lines(made):
+        print(line)
     ratios = made.damping_ratios()
     if ratios:
         print(

@@ -65,6 +65,8 @@ class Comparison:
         Modes of the body that move, from 0.
     frequencies : ndarray, shape (k,)
         Theirs (Hz).
+    shapes : ndarray, shape (k, d)
+        Their amplitudes at the measured points, along the measured directions.
     mac : ndarray, shape (m, k)
         Modal assurance criterion of test and body.
     pairs : ndarray, shape (m,)
@@ -77,6 +79,7 @@ class Comparison:
     test: TestModes
     numbers: IntArray
     frequencies: Array
+    shapes: Array
     mac: Array
     pairs: IntArray
     distance: float
@@ -127,20 +130,25 @@ def compare(body: ModalBody, test: TestModes, modes: int = 20) -> Comparison:
 
     hz = body.coupled.frequencies_hz
     numbers = np.flatnonzero(hz > 0.0)[:modes]
-    nearest, place = cKDTree(body.nodes).query(test.points)
+    tree = cKDTree(body.nodes)
+    nearest, place = tree.query(test.points)
     size = float(np.linalg.norm(np.ptp(body.nodes, axis=0)))
     if nearest.max() > APART * size:
         far = int(nearest.argmax())
         coordinates = ", ".join(f"{1e3 * x:.4g}" for x in test.points[far])
         problem = f"the measured point ({coordinates}) mm is {1e3 * nearest[far]:.4g} mm from the nearest node"
         cure = "coordinates of test and housing must be the same, in the units that the file tells"
+        for factor, unit in {1e-3: "a thousandth", 1e-2: "a hundredth", 25.4e-3: "0.0254", 1e3: "a thousand"}.items():
+            if tree.query(factor * test.points)[0].max() <= APART * size:
+                cure = f"times {unit} all points fit: mend the unit (universal files: dataset 164; without it, m)"
         raise InputError("--compare", None, problem, cure)
     fields = body.reconstruct(body.coupled.vectors[:, numbers].T)[:, place]
-    mac = mac_table(test.shapes, np.einsum("kdj,dj->kd", fields, test.directions))
+    shapes = np.einsum("kdj,dj->kd", fields, test.directions)
+    mac = mac_table(test.shapes, shapes)
     rows, found = linear_sum_assignment(-mac)
     pairs = np.full(len(test.shapes), -1)
     pairs[rows] = found
-    return Comparison(test, numbers, hz[numbers], mac, pairs, float(nearest.max()))
+    return Comparison(test, numbers, hz[numbers], shapes, mac, pairs, float(nearest.max()))
 
 
 def mac_table(one: Any, other: Any) -> Array:

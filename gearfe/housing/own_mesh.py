@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import InputError, given
 from ..meshing.mesh_file import MeshFile, read_mesh_file
 from ..solid import SolidMaterial
-from ..tables.housing import UNITS, HeldTable, HousingTable, MeshBoreTable
+from ..tables.housing import UNITS, HeldTable, HousingMeshTable, HousingTable, MeshBoreTable
 from ..typing import Array, BoolArray, IntArray
 from .attachments import RADIUS_TOLERANCE, Attachment, Bore, Plane, bore_attachment, plane_nodes
 from .model import Housing
@@ -32,7 +32,7 @@ def own_housing(table: HousingTable, folder: Path, material: SolidMaterial) -> H
     """
     field = "housing.mesh"
     found = read_mesh_file(folder / given(table.mesh.file, field), field, table.mesh.size_mm)
-    mesh = found._replace(nodes=UNITS[table.mesh.unit] * found.nodes)
+    mesh = found._replace(nodes=_turned(UNITS[table.mesh.unit] * found.nodes, table.mesh))
     used = np.unique(mesh.tets)
     notes = [told_size(mesh.nodes[used])]
     attachments = []
@@ -58,6 +58,13 @@ def own_housing(table: HousingTable, folder: Path, material: SolidMaterial) -> H
     except InputError as error:
         raise InputError(f"{field} {table.mesh.file}, {error.field}", error.value, error.problem, error.cure) from None
     return dataclasses.replace(housing, notes=(*notes, *housing.notes))
+
+
+def _turned(nodes: Array, table: HousingMeshTable) -> Array:
+    """Nodes (m) about the new origin, in the new axes."""
+    places = ["xyz".index(name[-1]) for name in table.axes]
+    signs = [-1.0 if name.startswith("-") else 1.0 for name in table.axes]
+    return np.asarray((nodes - 1e-3 * np.array(table.origin_mm))[:, places] * signs)
 
 
 def told_size(nodes: Array) -> str:
@@ -134,7 +141,10 @@ def _attachment(bore: MeshBoreTable, i: int, mesh: MeshFile, used: IntArray) -> 
     at = mesh.nodes[nodes]
     foot, axis, radius, off = fitted_cylinder(at) if len(at) >= 6 else (at[0], at[0], 0.0, np.inf)
     if not (off <= RADIUS_TOLERANCE * radius and radius <= np.linalg.norm(np.ptp(at, axis=0))):  # else a flat patch
-        problem = f"its {len(nodes)} nodes are no cylinder: they are up to {1e3 * off:.3g} mm off the nearest one"
+        flat = np.linalg.svd(at - at.mean(axis=0), compute_uv=False)[2] if len(at) > 3 else 0.0
+        off_told = f"they are up to {1e3 * off:.3g} mm off the nearest one"
+        off_told = "they lie in a plane" if flat < 1e-3 * np.linalg.norm(np.ptp(at, axis=0)) else off_told
+        problem = f"its {len(nodes)} nodes are no cylinder: {off_told}"
         cure = "give point_mm, the point that the attachment is referred to, beside the group"
         raise InputError(f"{field}.group", bore.group, problem, cure)
     height = (at - foot) @ axis

@@ -310,7 +310,10 @@ def _is_free(stiffness: Array, rigid: Array, points: Array, table: SuperelementT
         raise InputError(f"{field}.attachments", None, problem, cure)
     problem = f"has {idle} motions of the attachments without energy: a free body has 6, a held one none"
     raise InputError(
-        f"{field}.stiffness", table.stiffness, problem, "are all six coordinates of each attachment there?"
+        f"{field}.stiffness",
+        table.stiffness,
+        problem,
+        "check the unit, and that all six coordinates of each attachment are there, in the order that rows tell",
     )
 
 

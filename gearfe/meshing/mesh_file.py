@@ -28,6 +28,8 @@ INSIDE = "mesh its inside: give the CAD model (.step), or what gmsh FILE -3 -ord
 #: The same tetrahedron with its second and third corner exchanged.
 MIRRORED = [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]
 TETRAHEDRA = ("tetra10", "tetra")
+#: Groups that a message lists.
+LISTED = 20
 
 
 class MeshFile(NamedTuple):
@@ -36,7 +38,7 @@ class MeshFile(NamedTuple):
     Attributes
     ----------
     nodes : ndarray, shape (n, 3)
-        In the file's unit.
+        In the file's unit, as read; in m where groups are asked for.
     tets : ndarray, shape (m, 4) or (m, 10)
         Node numbers from 0.
     groups : dict
@@ -56,13 +58,23 @@ class MeshFile(NamedTuple):
             Where there is none of this name, or none of its nodes belongs to an element.
         """
         if name not in self.groups:
-            known = ", ".join(itertools.islice(self.groups, 20)) or "none"
-            problem = f"there is no such group in the mesh; it has: {known}"
-            raise InputError(field, name, problem, nearest(name, self.groups) or "name groups in the mesher")
+            listed = ", ".join(itertools.starmap(self._told, itertools.islice(self.groups.items(), LISTED))) or "none"
+            more = f" and {len(self.groups) - LISTED} more" if len(self.groups) > LISTED else ""
+            problem = f"there is no such group in the mesh; it has: {listed}{more}"
+            cure = "name groups in the mesher, or tell the place by point_mm in place of group"
+            raise InputError(field, name, problem, nearest(name, self.groups) or cure)
         nodes = np.intersect1d(self.groups[name], self.tets)
         if not len(nodes):
             raise InputError(field, name, "none of its nodes belongs to a tetrahedron", "take another group")
         return nodes
+
+    def _told(self, name: str, nodes: IntArray) -> str:
+        """A group; one that has a number in place of a name with its place."""
+        if not name.isdigit():
+            return name
+        low, high = self.nodes[nodes].min(axis=0), self.nodes[nodes].max(axis=0)
+        middle = ", ".join(f"{x:.4g}" for x in (500.0 * (low + high)).round(6) + 0.0)
+        return f"{name} (about {middle} mm)"
 
 
 def read_mesh_file(path: str | Path, field: str, size: float) -> MeshFile:

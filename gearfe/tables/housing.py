@@ -74,9 +74,27 @@ class HousingMeshTable:
         None, doc="mesh of the user's own: .msh, .vtu, .inp, .bdf, .med, ... (or .step), beside the job file"
     )
     unit: str = quantity("mm", choices=("mm", "cm", "m", "in"), doc="unit of the coordinates in that file")
+    axes: tuple[str, str, str] = quantity(
+        ("x", "y", "z"),
+        choices=("x", "y", "z", "-x", "-y", "-z"),
+        doc="axes of the file that become x, y and z: shafts run along y. All other keys are in the new axes",
+    )
+    origin_mm: tuple[float, float, float] = quantity(
+        (0.0, 0.0, 0.0), doc="point of the file, in its axes, that becomes the origin (mm)"
+    )
     inner_box_mm: tuple[tuple[float, float, float], tuple[float, float, float]] | None = quantity(
         None, doc="lowest and highest corner of a box (mm) in which faces bound the inside: they radiate no sound"
     )
+
+    def check(self, where: str) -> None:
+        """Raise `InputError` for axes that are no rotation."""
+        names = "".join(self.axes)
+        letters = names.replace("-", "")
+        even = letters in ("xyz", "yzx", "zxy")
+        if sorted(letters) != ["x", "y", "z"] or even != (names.count("-") % 2 == 0):
+            problem = "must name x, y and z once each, and be right-handed"
+            cure = 'shafts along z: ["x", "z", "-y"]; along x: ["-y", "x", "z"]'
+            raise InputError(f"{where}.axes", list(self.axes), problem, cure)
 
 
 #: Lengths in m.

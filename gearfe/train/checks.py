@@ -92,7 +92,8 @@ def _check_bore(train: GearTrain, shaft: Shaft, bore: str, a: np.ndarray) -> Non
     off = float(np.linalg.norm(arm - (arm @ a) * a))
     if off > SAME * max(shaft.length, 1e-3):
         problem = f"lies {1e3 * off:.6g} mm off the axis of shaft {shaft.name!r}"
-        raise InputError(f"attachment {bore!r}", None, problem, "name the bores on that axis, or move the shaft")
+        cure = "name the bores on that axis, or move the shaft (x_mm, z_mm): it runs along y"
+        raise InputError(f"attachment {bore!r}", None, problem, f"{cure} (housing.mesh.axes turns a mesh)")
     if train.housing is not None:
         own = train.housing.attachment_axes[train.housing.attachment_names.index(bore)]
         if abs(abs(float(own @ a)) - 1.0) > SAME:
