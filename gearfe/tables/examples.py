@@ -24,7 +24,7 @@ PAIR: dict[str, Any] = {
     "material": {"youngs_modulus_GPa": 200.0, "poisson_ratio": 0.3, "density_kg_per_m3": 7850.0},
 }
 
-STIFFNESS: dict[str, Any] = {"twist_deg": 0.5, "angle_start_deg": 1.0, "angle_step_deg": 1.0, "angle_stop_deg": 40.0}
+STIFFNESS: dict[str, Any] = {"torque_Nm": 100.0, "angle_start_deg": 1.0, "angle_step_deg": 1.0, "angle_stop_deg": 40.0}
 
 MICROGEOMETRY: dict[str, Any] = {
     "torques_Nm": [50.0, 100.0, 150.0],
