@@ -216,6 +216,7 @@ def test_inverse_is_forward_dynamics_of_a_four_bar() -> None:
         (("[0.0, -9.81]", "[0.0, 0.0]"), "equilibrium", "without force"),
         (("angle_deg = 30.0", "angle_deg = 90.0"), "equilibrium", "not stable"),
         (("[[outputs]]", DRIVE + "[[outputs]]"), "modes", "modes are those of a state of rest"),
+        (("[[outputs]]", DRIVE + "[[outputs]]"), "equilibrium", "moves at 0 s"),
     ],
 )
 def test_what_has_no_rest_is_told(tmp_path: Path, change: tuple[str, str], analysis: str, text: str) -> None:

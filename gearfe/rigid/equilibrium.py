@@ -54,8 +54,10 @@ def equilibrium(system: System, start: Start) -> Equilibrium:
     Raises
     ------
     InputError
-        When there is none, or the start rests where the energy is not least; the residual is told.
+        When there is none, or the start rests where the energy is not least; the residual is told. When joints
+        prescribe a motion that does not rest at that time.
     """
+    check_rests(system, start.time, start.q)
     t, active, units = start.time, start.active, system.units
     q, zero = start.q.copy(), np.zeros(system.size)
     before = np.inf
@@ -86,6 +88,21 @@ def equilibrium(system: System, start: Start) -> Equilibrium:
         problem = f"was not found in {step} steps: a force of {left:.3g} N is left"
         cure = "look for loads that nothing carries, or give a start that is nearer"
     raise InputError("equilibrium", None, problem, cure)
+
+
+def check_rests(system: System, t: float, q: Array) -> None:
+    """No joint prescribes a speed at the time t.
+
+    Raises
+    ------
+    InputError
+        Where one does; it is named.
+    """
+    moving = np.abs(system.rate(t, q) / system.row_units)
+    if moving.max(initial=0.0) > 0.0:
+        name = system.row_names()[int(moving.argmax())]
+        problem = f"moves at {t:g} s: equilibrium and modes are those of a state of rest"
+        raise InputError(name, None, problem, "prescribe a constant, or describe the mechanism in a turning frame")
 
 
 def stiffness_at(system: System, t: float, q: Array, multipliers: Array) -> Array:

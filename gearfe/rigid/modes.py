@@ -15,10 +15,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import InputError
 from ..typing import Array
 from .carried import free_motions
-from .equilibrium import Equilibrium, stiffness_at
+from .equilibrium import Equilibrium, check_rests, stiffness_at
 from .start import Start
 from .system import System
 
@@ -61,11 +60,7 @@ def modes(system: System, start: Start, rest: Equilibrium, count: int) -> Modes:
         When joints prescribe a motion: the state does not rest.
     """
     t, active, units = start.time, start.active, system.units
-    moving = np.abs(system.rate(t, rest.q) / system.row_units)
-    if system.rows and moving.max(initial=0.0) > 0.0:
-        name = system.row_names()[int(moving.argmax())]
-        problem = "moves: modes are those of a state of rest"
-        raise InputError(name, None, problem, "prescribe a constant, or describe the mechanism in a turning frame")
+    check_rests(system, t, rest.q)
     zero = np.zeros(system.size)
     G = system.jacobian(t, rest.q)[active] * units / system.row_units[active, None]
     T = units[:, None] * free_motions(G)
