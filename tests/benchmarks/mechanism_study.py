@@ -21,6 +21,7 @@ import numpy as np
 from gearfe.mechanisms import load_mechanism
 from gearfe.rigid import Body, Gravity, Hinge, Linkage, Start, System, integrate
 
+from .flexible_study import flexible
 from .peers.process import PeerError, missing, run_python
 from .record import Record
 from .subject import DATA, GEOMETRY, ROOT, given_file
@@ -71,6 +72,7 @@ def run_mechanism(record: Record) -> None:
     starts(record)
     if record.peers:
         others(record)
+    flexible(record)
     chains(record)
     calls(record)
 

@@ -237,6 +237,23 @@ SECTIONS: tuple[Section, ...] = (
         "mechanism",
     ),
     Section(
+        "mechanism_flexible",
+        "Mechanisms with a flexible link: tolerances, and exudyn's cables",
+        "Largest differences to exudyn's extrapolated references (tests/data); its own errors of elements and the shear "
+        "and rotary inertia that its cables lack are part of them. Position of the slider or tip (m) or of the "
+        "crank (rad), deflection in the middle as a part of its largest. CPU seconds after a first call.",
+        {
+            "mechanism": ("mechanism", PLAIN),
+            "program": ("program", PLAIN),
+            "setting": ("setting", PLAIN),
+            "steps": ("steps", digits),
+            "position_error": ("position off by", digits),
+            "deflection_error": ("deflection off by", percent),
+            "cpu_s": ("CPU min (s)", digits),
+        },
+        "mechanism",
+    ),
+    Section(
         "mechanism_starts",
         "Mechanisms: slider crank from random starts",
         "On the true branch, at least 0.5 rad/s at the fold, 0..10 s at tolerance 1e-9, against the exact equation.",
