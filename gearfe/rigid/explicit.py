@@ -52,12 +52,16 @@ def tableau() -> Tableau:
     return Tableau(A, DOP853.B, C, DOP853.E3, DOP853.E5, DOP853.D)
 
 
+#: ``expand(t, y, k)``: derivative k of the system's coordinates in the state y (k = 2 is dear).
+Expand = Callable[[float, Array, int], Array]
+
+
 class Problem(NamedTuple):
     """A first-order problem y' = f(t, y) of a system, y = (coordinates, velocities)."""
 
     rhs: Rhs
     project: Rhs  # onto the constraints
-    expand: Callable[[float, Array], tuple[Array, Array, Array]]  # y -> (q, v, a) of the system
+    expand: Expand
     sizes: Array  # of the components of y that compare
     system: System | None = None  # whose forces may have corners; y then are its (q, v)
 
@@ -67,7 +71,7 @@ class States:
     """Dense output: polynomials of degree 7 of the state, from which (q, v, a) follow at any time."""
 
     polynomials: Polynomials
-    expand: Callable[[float, Array], tuple[Array, Array, Array]]
+    expand: Expand
 
     @property
     def times(self) -> Array:
@@ -77,7 +81,7 @@ class States:
     def __call__(self, t: Array, derivative: int = 0) -> Array:
         """Coordinates, velocities or accelerations at the times t."""
         t = within_run(self.times, t)
-        return np.array([self.expand(ti, yi)[derivative] for ti, yi in zip(t, self.state(t), strict=True)])
+        return np.array([self.expand(ti, yi, derivative) for ti, yi in zip(t, self.state(t), strict=True)])
 
     def state(self, t: Array) -> Array:
         """Integrated state y at the times t, (times, 2n)."""
@@ -97,8 +101,8 @@ def run_explicit(
     def project(t: float, y: Array) -> Array:
         return on_constraints(system, t, y[:n], y[n:], active, excess)
 
-    def expand(t: float, y: Array) -> tuple[Array, Array, Array]:
-        return y[:n], y[n:], system.acceleration(t, y[:n], y[n:], active, excess)[0]
+    def expand(t: float, y: Array, derivative: int) -> Array:
+        return y[derivative * n : (derivative + 1) * n] if derivative < 2 else rhs(t, y)[n:]
 
     problem = Problem(rhs, project, expand, np.tile(system.units, 2), system)
     y0 = np.concatenate([start.q, start.v])
@@ -160,7 +164,7 @@ def run_problem(
     evaluations = 1
 
     def state() -> tuple[Array, Array]:
-        return problem.expand(t, y)[:2]
+        return problem.expand(t, y, 0), problem.expand(t, y, 1)
 
     while (d := control.next_step(state)) is not None:
         try:

@@ -7,7 +7,6 @@ in a compiled loop; Runge-Kutta of order 8, each stage of which calls Python, ta
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -20,7 +19,7 @@ from .compiled import Kernels
 from .contract import LocalForce, SeriesLaw
 from .dense import Dense, within_run
 from .elimination import ModalCoordinates, is_linear
-from .explicit import Problem, run_problem
+from .explicit import Expand, Problem, run_problem
 from .packed import Packed
 from .start import Start
 from .steps import Status, Watch, run_in_pieces
@@ -45,8 +44,10 @@ def modal_problem(modal: ModalCoordinates) -> Problem:
     def rhs(t: float, y: Array) -> Array:
         return np.concatenate([y[n:], acceleration(t, y)])
 
-    def expand(t: float, y: Array) -> tuple[Array, Array, Array]:
-        return modal.origin + modal.T @ y[:n], modal.T @ y[n:], modal.T @ acceleration(t, y)
+    def expand(t: float, y: Array, derivative: int) -> Array:
+        if derivative == 2:
+            return np.asarray(modal.T @ acceleration(t, y))
+        return np.asarray(modal.T @ y[n:] if derivative else modal.origin + modal.T @ y[:n])
 
     return Problem(rhs, lambda _, y: y, expand, np.ones(2 * n))
 
@@ -116,7 +117,7 @@ class SeriesRun:
     series: SeriesLaw
     tolerance: float
     longest: float
-    expand: Callable[[float, Array], tuple[Array, Array, Array]]
+    expand: Expand
 
     @property
     def _bound(self) -> Kernels:
@@ -194,4 +195,4 @@ class SeriesPieces:
     def __call__(self, t: Array, derivative: int = 0) -> Array:
         """Coordinates, velocities or accelerations at the times t."""
         t = within_run(self.times, t)
-        return np.array([self.run.expand(ti, yi)[derivative] for ti, yi in zip(t, self.state(t), strict=True)])
+        return np.array([self.run.expand(ti, yi, derivative) for ti, yi in zip(t, self.state(t), strict=True)])

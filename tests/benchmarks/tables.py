@@ -239,8 +239,8 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "mechanism_flexible",
         "Mechanisms with a flexible link: tolerances, and exudyn's cables",
-        "Largest differences to exudyn's extrapolated references (tests/data); its own errors of elements and the shear "
-        "and rotary inertia that its cables lack are part of them. Position of the slider or tip (m) or of the "
+        "Largest differences to exudyn's extrapolated references (tests/data); its own errors of elements and the "
+        "shear and rotary inertia that its cables lack are part of them. Position of the slider or tip (m) or of the "
         "crank (rad), deflection in the middle as a part of its largest. CPU seconds after a first call.",
         {
             "mechanism": ("mechanism", PLAIN),
