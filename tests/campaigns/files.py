@@ -66,4 +66,4 @@ def run(case: Case, folder: Path) -> Finding:
     return RUNS[case.kind](case, folder)
 
 
-CAMPAIGN = Campaign("files", 10_000, (0, 100, 200, 300, 400, 500, *range(1, 61)), 30.0, draw, run, long_is_bad=False)
+CAMPAIGN = Campaign("files", 10_000, (0, 100, 200, 300, 400, 5300, *range(1, 61)), 30.0, draw, run, long_is_bad=False)
