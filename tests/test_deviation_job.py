@@ -153,7 +153,7 @@ def test_the_command(tmp_path, capsys) -> None:
     out = ["--out", str(tmp_path / "more")]
     options = ["--torques-Nm", "70", "--positions", "4", "--mesh-cycles", "1", "--flank", "right", "--no-pictures"]
     assert main(["microgeometry", str(job), *out, *options]) == 0
-    assert "1 torques x 4 positions over 1 mesh cycles: 4 converged" in capsys.readouterr().out
+    assert "1 torques x 4 positions over 1 mesh cycle: 4 converged" in capsys.readouterr().out
     assert not list((tmp_path / "more").glob("*.png"))
     assert content["pitch"]["pinion"]["cumulative_pitch_deviation_um"] == pytest.approx(6.0, rel=1e-3)
 

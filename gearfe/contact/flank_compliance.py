@@ -138,20 +138,36 @@ def cubic_spline(at: Array) -> Array:
     Written out, since the interpolation of a library costs a third of a second to load: the slopes m of the pieces of
     lengths h and divided differences d satisfy ``m[i-1]/h[i-1] + 2 m[i] (1/h[i-1] + 1/h[i]) + m[i+1]/h[i] =
     3 (d[i-1]/h[i-1] + d[i]/h[i])``; at the ends the two pieces are one cubic (C. de Boor, A Practical Guide to Splines,
-    1978, chapter IV, "not a knot").
+    1978, chapter IV, "not a knot"). Through fewer than four stations runs their polynomial, which that leaves open.
 
     Parameters
     ----------
     at : ndarray, shape (k,)
-        Rising stations, four at least.
+        Rising stations, two at least.
 
     Returns
     -------
     ndarray, shape (k - 1, k, 4)
         Coefficients of the rising powers of the distance from the beginning of the piece: piece, vector, power.
     """
-    h, eye, k = np.diff(at)[:, None], np.eye(len(at)), len(at)
-    d, inverse = np.diff(eye, axis=0) / h, 1.0 / h[:, 0]
+    h, eye = np.diff(at)[:, None], np.eye(len(at))
+    d = np.diff(eye, axis=0) / h
+    m = _slopes(h, d) if len(at) > 3 else _polynomial_slopes(at)
+    curved = (3.0 * d - 2.0 * m[:-1] - m[1:]) / h
+    twisted = (m[:-1] + m[1:] - 2.0 * d) / h**2
+    return np.stack([eye[:-1], m[:-1], curved, twisted], axis=-1)
+
+
+def _polynomial_slopes(at: Array) -> Array:
+    """Slopes at the stations of the polynomials that are one at a station and zero at the others."""
+    powers, t = np.arange(len(at)), (at - at[0])[:, None] / at[-1]
+    slope = powers * t ** np.maximum(powers - 1, 0) / at[-1]
+    return np.asarray(slope @ np.linalg.inv(t**powers))
+
+
+def _slopes(h: Array, d: Array) -> Array:
+    """The slopes m of `cubic_spline` at all stations."""
+    k, inverse = len(h) + 1, 1.0 / h[:, 0]
     matrix, right = np.zeros((k, k)), np.zeros((k, k))
     inside = np.arange(1, k - 1)
     matrix[inside, inside - 1], matrix[inside, inside + 1] = inverse[:-1], inverse[1:]
@@ -161,10 +177,7 @@ def cubic_spline(at: Array) -> Array:
         a, b = h[first, 0], h[second, 0]
         matrix[end, end], matrix[end, inner] = 1.0 / a, 1.0 / a + 1.0 / b  # as large as the rows inside
         right[end] = ((3.0 + 2.0 * b / a) * d[first] + a / b * d[second]) / (a + b)
-    m = np.linalg.solve(matrix, right)
-    curved = (3.0 * d - 2.0 * m[:-1] - m[1:]) / h
-    twisted = (m[:-1] + m[1:] - 2.0 * d) / h**2
-    return np.stack([eye[:-1], m[:-1], curved, twisted], axis=-1)
+    return np.linalg.solve(matrix, right)
 
 
 def flank_compliances(pair: GearPair, elastic: MeshingPair) -> tuple[FlankCompliance, FlankCompliance]:
