@@ -140,8 +140,8 @@ def coupling_curve(pair: HalfPlanePair, phases: Array, reach: float) -> list[Cou
     for number in range(1, int(apart.max(initial=0)) + 1):
         here = apart == number
         order = np.argsort(angle[here])
-        own, beside = angle[here][order], cycle / len(angles)
-        # level at its ends, since pairs far apart may touch at a single place; then none, since these do not touch
+        own, beside = angle[here][order], float(np.diff(phases).max())
+        # level up to the next angle that was looked at, since pairs may touch till there; then none
         places = np.concatenate([own[0] - beside * np.array([2.0, 1.0]), own, own[-1] + beside * np.array([1.0, 2.0])])
         level = np.pad(compliance[here][order], 1, mode="edge")
         made.append(Couple(places, np.pad(level, 1)))
