@@ -17,7 +17,7 @@ from gearfe.meshing.session import gmsh_session
 from gearfe.output.formats import read_csv
 from gearfe.tables.examples import job_file
 
-from .gears import gear
+from .gears import gear, pair
 
 
 def area(wheel: Gear) -> float:
@@ -88,6 +88,27 @@ def test_the_command_exports_both_gears(tmp_path, capfd):
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"gear_pair.json", "pinion.csv"}
     assert main([*line, "pinon.csv"]) == 2
     assert "did you mean 'pinion.csv'" in capfd.readouterr().err
+
+
+def test_deviations_stand_in_the_table(tmp_path, capsys):
+    """Crowning of 4 um is 0 in the middle between form and tip circle and -4 um at both ends; the slope adds a line."""
+    (tmp_path / "pair.toml").write_text(
+        job_file("stiffness") + "\n[microgeometry]\ntorques_Nm = [100.0]\n[microgeometry.pinion]\ncrowning_um = 4.0\n"
+        "[microgeometry.pinion.right]\nslope_um = 6.0\n"
+    )
+    line = ["gear", str(tmp_path / "pair.toml"), "--out", str(tmp_path / "out"), "--no-pictures", "--export"]
+    assert main([*line, "csv"]) == 0
+    assert "without [microgeometry]" not in capsys.readouterr().err
+    table = read_csv(tmp_path / "out" / "pinion.csv")
+    pinion = pair(20, 30, tip_round=1e-4).pinion
+    low, high = pinion.form_roll, pinion.profile.tip_roll
+    for side, slope in (("left", 0.0), ("right", 6.0)):
+        there = table["piece"] == f"involute_{side}"
+        x = (np.sqrt((1e-3 * table["radius_mm"][there]) ** 2 - pinion.base_radius**2) - low) / (high - low) - 0.5
+        assert table["deviation_um"][there] == pytest.approx(-16.0 * x**2 + slope * x, abs=1e-6)
+    assert np.isnan(table["deviation_um"][table["piece"] == "tip_left"]).all()
+    assert main([*line, "step"]) == 0
+    assert "pinion.step, wheel.step: flanks of [pair] alone, without [microgeometry]" in capsys.readouterr().err
 
 
 def test_a_drawing_in_layers(tmp_path):

@@ -12,7 +12,8 @@ from .arguments import add_job, check_option
 from .common import add_folder, tell
 
 if TYPE_CHECKING:
-    from ..gear.pair import Gear
+    from ..gear.pair import GearPair
+    from ..tables.microgeometry import MicrogeometryTable
 
 #: Forms of ``--export``, and the files that they are.
 EXPORTS = ("csv", "dxf", "step", "brep")
@@ -41,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from ..tables.stiffness import StiffnessTable
 
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
-    tables = load_job(args.job, ("pair",), ("stiffness",))
+    tables = load_job(args.job, ("pair",), ("stiffness", "microgeometry"))
     check_option("--angle-deg", args.angle_deg, StiffnessTable, "angle_start_deg")
     exports = _exports(args.export)
 
@@ -62,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     with whole_set(folder, ("gear_pair.png", *FILES)) as made:
         for name in exports:
             with stage(f"writing {name}"):
-                _export(made / name, pair.pinion if name.startswith("pinion") else pair.wheel)
+                _export(made / name, pair, tables.get("microgeometry"), Path(args.job).parent)
         if not args.no_pictures:
             with stage("drawing"):
                 pair_figure(made / "gear_pair.png", pair, math.radians(args.angle_deg), _notes(geometry))
@@ -70,7 +71,10 @@ def run(args: argparse.Namespace) -> int:
         names = sorted(path.name for path in made.iterdir())
     _show(geometry)
     _show({"iso_6336": iso})
-    tell((), folder, names, {}, pair.warnings)
+    solid = [name for name in exports if not name.endswith(".csv")]
+    lacking = f"{', '.join(solid)}: flanks of [pair] alone, without [microgeometry]; csv has its deviations"
+    told = (lacking,) if solid and "microgeometry" in tables else ()
+    tell((), folder, names, {}, (*pair.warnings, *told))
     return 0
 
 
@@ -87,8 +91,8 @@ def _exports(text: str) -> list[str]:
     return sorted(set(made))
 
 
-def _export(path: Path, gear: Gear) -> None:
-    """A gear in the form that the suffix names."""
+def _export(path: Path, pair: GearPair, table: MicrogeometryTable | None, folder: Path) -> None:
+    """A gear in the form that the suffix names; its deviations are looked for in `folder`."""
     import numpy as np
 
     from ..gear.drawing import gear_outline
@@ -97,8 +101,10 @@ def _export(path: Path, gear: Gear) -> None:
     from ..output.dxf import write_dxf
     from ..output.files import write_csv
 
+    gear = pair.pinion if path.stem == "pinion" else pair.wheel
     if path.suffix == ".csv":
-        write_csv(path, outline_columns(gear))
+        columns = outline_columns(gear)
+        write_csv(path, columns if table is None else _with_deviations(columns, pair, path.stem, table, folder))
     elif path.suffix == ".dxf":
         circles = {"bore": gear.bore_diameter, "reference_circle": gear.pitch_diameter}
         radii = {name: 0.5e3 * diameter for name, diameter in circles.items()}
@@ -106,6 +112,26 @@ def _export(path: Path, gear: Gear) -> None:
         write_dxf(path, {"outline": np.asarray(gear_outline(gear, 0.0, (0.0, 0.0), per_segment=100))[:-1]}, radii)
     else:
         write_solid(path, gear)
+
+
+def _with_deviations(
+    columns: dict[str, Any], pair: GearPair, name: str, table: MicrogeometryTable, folder: Path
+) -> dict[str, Any]:
+    """The outline with the deviations of tooth 0 on its involutes, along the normals (um)."""
+    import numpy as np
+
+    from ..gear.deviation_job import GEARS, active_rolls, flank_deviations
+
+    number = GEARS.index(name)
+    gear, active = (pair.pinion, pair.wheel)[number], active_rolls(pair)[number]
+    roll = 1e-3 * np.sqrt(np.maximum(columns["radius_mm"] ** 2 - (1e3 * gear.base_radius) ** 2, 0.0))
+    made = np.full(len(roll), np.nan)
+    for side in ("left", "right"):
+        of = getattr(table, name).flank(side)
+        curve = flank_deviations(of, gear, active, f"microgeometry.{name}", folder, wheel=number == 1).profiles[0]
+        there = columns["piece"] == f"involute_{side}"
+        made[there] = 0.0 if curve is None else 1e6 * curve.at(roll[there])[0]
+    return {**columns, "deviation_um": made}
 
 
 def _notes(geometry: dict[str, Any]) -> str:

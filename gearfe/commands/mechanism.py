@@ -10,9 +10,12 @@ from typing import TYPE_CHECKING
 
 from ..tables.mechanism import RunTable, read_mechanism_file
 from .arguments import add_job, add_keys, with_keys
-from .common import add_folder
+from .common import add_folder, tell
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..mechanisms.job import Outcome
     from ..mechanisms.model import Mechanism
     from ..mechanisms.results import Results
     from ..rigid.modes import Modes
@@ -47,9 +50,11 @@ def run(args: argparse.Namespace) -> int:
 
     from ..mechanisms.job import run_mechanism
     from ..mechanisms.model import make_mechanism
+    from ..output.files import recorded
 
     mechanism = make_mechanism(file, Path(args.file))
-    folder, slopes = args.out, None
+    run: Callable[..., Outcome]
+    folder, slopes = Path(args.out), None
     if file.run.sensitivities:
         from ..mechanisms.sensitivity import sensitivities
 
@@ -58,17 +63,13 @@ def run(args: argparse.Namespace) -> int:
         from ..mechanisms.rest import run_rest
 
         draw = None if args.no_pictures else partial(_draw_rest, mechanism)
-        outcome = run_rest(mechanism, folder, draw=draw, slopes=slopes)
-        print(outcome.text)
-        return 0 if outcome.complete else 1
-    outcome = run_mechanism(
-        mechanism,
-        folder,
-        estimate=not args.no_estimate,
-        draw=partial(_draw, mechanism, args) if args.animation or not args.no_pictures else None,
-        slopes=slopes,
-    )
-    print(outcome.text)
+        run = partial(run_rest, draw=draw)
+    else:
+        drawn = partial(_draw, mechanism, args) if args.animation or not args.no_pictures else None
+        run = partial(run_mechanism, estimate=not args.no_estimate, draw=drawn)
+    with recorded() as written:
+        outcome = run(mechanism, folder, slopes=slopes)
+    tell(outcome.text.splitlines(), folder, sorted(name for _, names in written for name in names), {}, ())
     return 0 if outcome.complete else 1
 
 

@@ -114,7 +114,7 @@ def run_mechanism(
         summary = summarise(mechanism, start, results, tolerance, timings, error)
         summary["warnings"] = list(warnings)
         write_json(made / "summary.json", summary)
-    return Outcome(trajectory.status == 0 and not warnings, _text(summary, folder), summary, warnings)
+    return Outcome(trajectory.status == 0 and not warnings, _text(summary), summary, warnings)
 
 
 def output_times(end: float, step: float) -> np.ndarray:
@@ -265,7 +265,7 @@ def _told_link(link: dict[str, Any]) -> str:
     return told
 
 
-def _text(summary: dict[str, Any], folder: Path) -> str:
+def _text(summary: dict[str, Any]) -> str:
     f = summary["freedoms"]
     lines = [
         f"{f['bodies']} bodies, {f['coordinates']} coordinates - {f['constraints']} constraints"
@@ -275,6 +275,5 @@ def _text(summary: dict[str, Any], folder: Path) -> str:
         f"{summary['method']}: {summary['status']} at {summary['reached_s']:g} s in {summary['steps']} steps,"
         f" {summary['timings']['integrate_s']:.3f} s; singular passages: {summary['singular_passages']['count']}",
         *([_told_error(summary["error_estimate"])] if summary["error_estimate"] else []),
-        f"results in {folder}",
     ]
     return "\n".join(lines)

@@ -61,7 +61,7 @@ def run_rest(
         summary["timings"] = {"whole_s": clock.perf_counter() - began}
         summary["warnings"] = list(told)
         write_json(made / "summary.json", summary)
-    return Outcome(not told, _text(summary, folder), summary, tuple(told))
+    return Outcome(not told, _text(summary), summary, tuple(told))
 
 
 def at_rest(mechanism: Mechanism, start: Start, rest: Equilibrium) -> Trajectory:
@@ -127,9 +127,9 @@ def summarise_rest(
     return made
 
 
-def _text(summary: dict[str, Any], folder: Path) -> str:
+def _text(summary: dict[str, Any]) -> str:
     lines = [f"equilibrium in {summary['steps']} steps, {summary['residual_N']:.2g} N left"]
     lines += [f"{name} = {value:.9g}" for name, value in summary["outputs"].items()]
     for k, (f, d) in enumerate(zip(summary.get("frequencies_Hz", ()), summary.get("damping_ratios", ()), strict=True)):
         lines.append(f"mode {k + 1}: {f:.6g} Hz, damping {100 * d:.3g} %")
-    return "\n".join([*lines, f"results in {folder}"])
+    return "\n".join(lines)

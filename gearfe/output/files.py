@@ -186,7 +186,7 @@ def recorded() -> Iterator[list[tuple[Path, list[str]]]]:
     try:
         yield found
     finally:
-        _records.remove(found)
+        _records[:] = [one for one in _records if one is not found]  # equal ones may be another's
 
 
 @contextmanager
