@@ -351,6 +351,56 @@ def test_the_shipped_coupler_runs_and_writes_its_files(tmp_path: Path) -> None:
     assert tools[0]["tool_y_m"][-1] == pytest.approx(tools[1]["tool_y_m"][-1], abs=2e-6)
 
 
+def test_the_frame_may_go_with_any_interface(tmp_path: Path) -> None:
+    """The same motion whichever interface is the first: what is reduced differs, what it stands for does not."""
+    text = (ROOT / "geometry" / "elastic_coupler.toml").read_text(encoding="utf-8")
+    lines = text.splitlines()
+    first = next(k for k, line in enumerate(lines) if line.startswith("A = {"))
+    turned = [*lines[:first], lines[first + 2], lines[first + 1], lines[first], *lines[first + 3 :]]
+    found = []
+    for given in (lines, turned):
+        mechanism = load_mechanism(write(tmp_path, "\n".join(given)))
+        run = integrate(mechanism.system, [0.0, 0.03, 0.05], start=mechanism.start(), tolerance=1e-6)
+        found.append(evaluate(mechanism, run).outputs)
+    assert found[0]["largest_stress_MPa"].max() > 5.0
+    assert found[0]["tool_x_m"] == pytest.approx(found[1]["tool_x_m"], abs=1e-6)
+    assert found[0]["tool_y_m"] == pytest.approx(found[1]["tool_y_m"], abs=1e-6)
+    assert found[0]["largest_stress_MPa"][1:] == pytest.approx(found[1]["largest_stress_MPa"][1:], rel=0.01)
+
+
+def test_a_stiff_pendulum_on_one_interface_is_the_rigid_one(tmp_path: Path) -> None:
+    text = """
+[run]
+end_s = 0.3
+step_s = 0.01
+[bodies.arm]
+angle_deg = -30.0
+[bodies.arm.plate]
+outline_m = [[-0.02, -0.02], [0.5, -0.01], [0.5, 0.01], [-0.02, 0.02]]
+thickness_m = 0.01
+youngs_modulus_GPa = 200.0
+density_kg_per_m3 = 7850.0
+damping_s = 1e-4
+modes = 1
+interfaces = { O = { centre_m = [0.0, 0.0], radius_m = 0.008 } }
+[joints.O]
+type = "hinge"
+body = "arm"
+[forces.weight]
+type = "gravity"
+acceleration_m_per_s2 = [0.0, -9.81]
+[[outputs]]
+name = "angle_rad"
+value = "angle(arm)"
+"""
+    angles = []
+    for made_of in (text, text.replace("[bodies.arm]", "[bodies.arm]\nflexible = false")):
+        mechanism = load_mechanism(write(tmp_path, made_of))
+        run = integrate(mechanism.system, [0.0, 0.1, 0.3], start=mechanism.start(), tolerance=1e-6)
+        angles.append(evaluate(mechanism, run).outputs["angle_rad"])
+    assert angles[0] == pytest.approx(angles[1], abs=2e-5)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
@@ -370,6 +420,7 @@ def test_the_shipped_coupler_runs_and_writes_its_files(tmp_path: Path) -> None:
         ("edge_m = [[1.0, -0.01], [1.0, 0.01]]", "radius_m = 0.02", "centre_m"),
         ("modes = 2", "modes = 2\nholes_m = [[0.5, 0.0, 0.004], [0.505, 0.0, 0.004]]", "meets"),
         ("modes = 2", "modes = 0", "modes"),
+        ("modes = 2", "modes = 40\nelement_size_m = 0.3", "too many for a mesh"),
         ("[bodies.arm.plate]", "[bodies.arm.beam]\nlength_m = 1.0\n[bodies.arm.plate]", "youngs_modulus_GPa"),
         ("[bodies.arm]", "[bodies.arm]\nmass_kg = 1.0", "follows from the plate"),
         ("deflection(arm.tip)", "bending_moment(arm.tip)", "is no beam"),

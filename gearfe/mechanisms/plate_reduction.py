@@ -125,7 +125,8 @@ def reduce_plate(
         return out
 
     static = _static_shapes(Z, interfaces[1:], n)
-    static -= answer(stiff @ static)
+    if len(interfaces) > 1:
+        static -= answer(stiff @ static)
     mass = sparse.kron(M, sparse.identity(2)).tocsr()
     own = mass[free][:, free]
     inverse = LinearOperator(own.shape, matvec=inner.solve)
@@ -183,7 +184,7 @@ def _operators(points: Array, triangles: IntArray, thickness: float, material: M
 
 def _real(shapes: np.ndarray) -> Array:
     """Complex displacements (n, k) as (2 n, k), x and y in turn."""
-    return np.stack([shapes.real, shapes.imag], axis=1).reshape(-1, shapes.shape[1])
+    return np.stack([shapes.real, shapes.imag], axis=1).reshape(2 * len(shapes), shapes.shape[1])
 
 
 def _complex(shapes: Array) -> np.ndarray:

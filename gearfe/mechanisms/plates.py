@@ -210,6 +210,10 @@ def _reduced(shape: _Shape, written: int) -> Plate:  # noqa: ARG001 - a mesh fil
     with stage("elastic link"):
         points, triangles = _mesh(shape)
         interfaces = _interfaces(points, table, shape.where)
+        free = 2 * (len(points) - sum(len(interface.nodes) for interface in interfaces))
+        if table.modes > free // 4:
+            problem = f"are too many for a mesh with {free} displacements beside its interfaces"
+            raise InputError(f"{shape.where}.modes", table.modes, problem, f"take at most {free // 4}, or a finer mesh")
         material = Material(1e9 * table.youngs_modulus_GPa, table.poisson_ratio, density=table.density_kg_per_m3)
         return reduce_plate(points, triangles, table.thickness_m, material, table.damping_s, interfaces, table.modes)
 
