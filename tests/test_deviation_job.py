@@ -75,7 +75,10 @@ def test_a_k_chart_and_a_relief_are_the_same() -> None:
     [
         ({"tip_relief_um": 5.0}, r"tip_relief_length_mm: is required"),
         ({"tip_relief_length_mm": 2.0}, r"tip_relief_um: is required"),
-        ({"tip_relief_um": 5.0, "tip_relief_length_mm": 20.0}, r"tip_relief_length_mm = 20.*on the active flank"),
+        (
+            {"tip_relief_um": 5.0, "tip_relief_length_mm": 20.0},
+            r"tip_relief_length_mm = 20.*off the active flank: must be > 0.* mm",
+        ),
         ({"tip_relief_um": 5.0, "tip_relief_length_mm": 2.0, "tip_relief_start_mm": 9.0}, "stands beside"),
         ({"tip_relief_um": 5.0, "tip_relief_end_mm": 14.0, "tip_relief_end_diameter_mm": 54.0}, "stands beside"),
         ({"points": [[6.0, 0.0], [9.0, 1.0]]}, r"points: covers 6 to 9 mm.*must cover"),

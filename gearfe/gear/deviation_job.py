@@ -174,10 +174,13 @@ def _relief(table: FlankTable, gear: Gear, where: str, end: str) -> Relief | Non
         roll = gear.roll_length(0.5e-3 * diameter)
     ends = (gear.form_roll, min(gear.profile.round_roll, gear.profile.tip_roll))
     if not ends[0] < roll < ends[1]:
-        problem = (
-            f"starts at {1e3 * roll:.5g} mm of roll length: must be > {1e3 * ends[0]:.5g} and < {1e3 * ends[1]:.5g} "
-            "mm, on the active flank"
-        )
+        if length is not None:
+            zero = gear.profile.tip_roll if end == "tip" else gear.form_roll
+            limits = [1e3 * abs(one - zero) for one in ends]
+        else:
+            limits = [1e3 * one if start is not None else 2e3 * math.hypot(gear.base_radius, one) for one in ends]
+        low, high = sorted(limits)
+        problem = f"starts off the active flank: must be > {low:.5g} and < {high:.5g} mm"
         value = next(one for one in (length, start, diameter) if one is not None)
         raise InputError(f"{where}.{given}", value, problem, "start it between form point and tip round")
     last, across = (getattr(table, f"{name}_{key}") for key in ENDS)
