@@ -22,8 +22,8 @@ from ..rigid.packed import Packed
 from ..train.arrays import law_arrays
 from ..typing import Array
 
-#: Newton steps for the pair forces, their relative change in the last one.
-MOST, SETTLED = 60, 1e-11
+#: Newton steps for the pair forces, their relative change in the last one: what is left is of the order of its square.
+MOST, SETTLED = 60, 1e-7
 #: Columns of the results: F, M, dF/d approach, dF/d phase = dM/d approach, dM/d phase, 1 where beyond the reach.
 FORCE, MOMENT, TANGENT, CROSS, BEND, BEYOND, RESULTS = range(7)
 #: Rows of the work space, before those of the matrix and of C: gap, t', t'', Lambda and its derivative with the force,

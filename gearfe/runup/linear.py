@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..typing import Array, ComplexArray, IntArray
+from ..typing import Array, BoolArray, ComplexArray, IntArray
 
 #: Squares of frequencies below this part of the largest are round-off: such a mode moves freely.
 ROUND_OFF = 1e-12
@@ -30,6 +30,16 @@ class Poles(NamedTuple):
     values: ComplexArray  # (2n,) 1/s
     out: ComplexArray  # (n, 2n) eigenvectors, modal coordinates
     into: ComplexArray  # (2n, p) of unit forces along all p freedoms, tilts last
+
+
+class Pairs(NamedTuple):
+    """Poles in pairs, conjugate or both real."""
+
+    sums: Array  # (n, 2) sum and product
+    numerators: Array  # (n, 2 entries): a and b beside each other
+    one: IntArray  # (n,) numbers of the poles
+    two: IntArray
+    conjugate: BoolArray  # (n,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +97,8 @@ class Linear:
         return Poles(values.astype(complex), np.asarray(vectors[:n] / rates[:, None], dtype=complex), into)
 
     @cached_property
-    def _pairs(self) -> tuple[Array, Array]:
-        """Poles in pairs, conjugate or both real: sum and product (n, 2), and a and b, (n, entries) beside each other.
+    def _pairs(self) -> Pairs:
+        """Poles in pairs.
 
         A pair gives :math:`(a s + b)/(s^2 - (\\lambda_1 + \\lambda_2) s + \\lambda_1\\lambda_2)`. The flexibility is
         symmetric: entries are those of its upper half.
@@ -103,7 +113,7 @@ class Linear:
         first, second = poles.values[one, None], poles.values[two, None]
         a, b = residues[one] + residues[two], -(residues[one] * second + residues[two] * first)
         sums = np.hstack([(first + second).real, (first * second).real])
-        return sums, np.ascontiguousarray(np.hstack([a.real, b.real]))
+        return Pairs(sums, np.ascontiguousarray(np.hstack([a.real, b.real])), one, two, poles.values.imag[one] > 0.0)
 
     @cached_property
     def _entries(self) -> IntArray:
@@ -116,11 +126,9 @@ class Linear:
 
     def _own(self, omega: Array) -> ComplexArray:
         """Flexibility of all freedoms without gyroscopic moments, (k, p, p)."""
-        sums, numerators = self._pairs
-        with np.errstate(divide="ignore", invalid="ignore"):  # infinite at the resonance of an undamped mode
-            real, imaginary = sums[:, 1] - (omega**2)[:, None], -omega[:, None] * sums[:, 0]
-            size = 1.0 / (real**2 + imaginary**2)
-            real, imaginary = (real * size) @ numerators, (-imaginary * size) @ numerators
+        numerators = self._pairs.numerators
+        with np.errstate(invalid="ignore"):
+            real, imaginary = (part @ numerators for part in self._over(omega))
         k, p = len(omega), self.size + self.tilts.shape[1]
         count, w = numerators.shape[1] // 2, omega[:, None]
         values = np.empty((k, count), dtype=complex)
@@ -155,9 +163,11 @@ class Linear:
             return kept[1][:count], kept[2][:count]
         p = m + self.tilts.shape[1]
         whole = self._own(omega)
-        react = 1j * speed * omega[:, None, None] * self._swap
-        left = np.eye(p - m) - react @ whole[:, m:, m:]
-        moments = np.asarray(np.linalg.solve(left, react @ whole[:, m:, :m]), dtype=complex)
+        # gyroscopic moments that react on tilts: those of both tilts of a shaft change places
+        other = np.arange(p - m) ^ 1
+        react = (1j * speed * omega[:, None] * self._swap[np.arange(p - m), other])[..., None] * whole[:, m + other]
+        left = np.eye(p - m) - react[..., m:]
+        moments = np.asarray(np.linalg.solve(left, react[..., :m]), dtype=complex)
         made = np.asarray(whole[:, :m, :m] + whole[:, :m, m:] @ moments)
         made[omega == 0.0] = self.statics
         for values in (made, moments):
@@ -174,7 +184,45 @@ class Linear:
         """Modal coordinates (k, n) under forces (k, m) at the freedoms, the constant force included at omega = 0."""
         _, moments = self._turning(omega, speed)
         every = np.concatenate([forces, (moments @ forces[..., None])[..., 0]], axis=1)
-        made = ((every @ self.poles.into.T) / (1j * omega[:, None] - self.poles.values)) @ self.poles.out.T
+        into, shapes = self._excited
+        real, imaginary = self._over(omega)
+        rates, values = np.split(real_times(every, into), 2, axis=1)
+        parts = 1j * omega[:, None] * rates + values
+        parts *= np.tile(real + 1j * imaginary, 2)
+        made = real_times(parts, shapes)
         still = omega == 0.0
         made[still] = (forces[still] @ self.places.T + self.constant) / self.squares
-        return np.asarray(made)
+        return made
+
+    def _over(self, omega: Array) -> tuple[Array, Array]:
+        """Real and imaginary parts (k, n) of one over the denominators of all pairs."""
+        sums = self._pairs.sums
+        with np.errstate(divide="ignore", invalid="ignore"):  # infinite at the resonance of an undamped mode
+            real, imaginary = sums[:, 1] - (omega**2)[:, None], -omega[:, None] * sums[:, 0]
+            size = 1.0 / (real**2 + imaginary**2)
+            return real * size, -imaginary * size
+
+    @cached_property
+    def _excited(self) -> tuple[Array, Array]:
+        """Numerators (p, 4 n) of the parts of pairs, first what counts s times, and modal coordinates (2 n, n) for parts.
+
+        With the vectors i and o of a pole, conjugate ones have the parts of Re o and Im o, real ones those of each o.
+        """
+        pairs, poles = self._pairs, self.poles
+        (i1, i2), (o1, o2) = ((x[..., pairs.one], x[..., pairs.two]) for x in (poles.into.T, poles.out))
+        first, second, plane = poles.values[pairs.one], poles.values[pairs.two], pairs.conjugate
+        rates = np.where(plane, i1 + i2, i1), np.where(plane, 1j * (i1 - i2), i2)
+        values = np.where(plane, i1 * second + i2 * first, i1 * second), np.where(
+            plane, 1j * (i1 * second - i2 * first), i2 * first
+        )
+        into = np.hstack([*rates, *(-x for x in values)]).real
+        shapes = np.hstack([o1.real, np.where(plane, o1.imag, o2.real)]).T
+        return np.ascontiguousarray(into), np.ascontiguousarray(shapes)
+
+
+def real_times(values: ComplexArray, matrix: Array) -> ComplexArray:
+    """Product of complex rows (k, n) and a real matrix (n, p), which stays real."""
+    both = np.concatenate([values.real, values.imag]) @ matrix
+    made = np.empty((len(values), matrix.shape[1]), dtype=complex)
+    made.real, made.imag = both[: len(values)], both[len(values) :]
+    return made

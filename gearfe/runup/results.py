@@ -17,6 +17,7 @@ from ..vibration.radiation import AIR_IMPEDANCE
 from . import torus
 from .balance import Orbit
 from .condensed import CondensedTrain
+from .linear import real_times
 from .stability import STABLE, window
 from .torus import Lattice
 
@@ -133,10 +134,10 @@ def steady_result(
         if line.law is None:
             force[:, i] += line.damping * du[:, along]
     modal = system.linear.modal(omega, orbit.speed, orbit.forces)
-    acceleration = -(omega**2)[:, None] * (modal @ train.bores_of_modes.T)
+    acceleration = -(omega**2)[:, None] * real_times(modal, train.bores_of_modes.T)
     power = None
     if train.radiation_of_modes is not None:
-        square = (modal.conj() * (modal @ train.radiation_of_modes)).sum(axis=1).real
+        square = (modal.conj() * real_times(modal, train.radiation_of_modes)).sum(axis=1).real
         power = 0.5 * AIR_IMPEDANCE * omega**2 * np.maximum(square, 0.0)
     second = 2.0 * math.pi / abs(orbit.speed)  # of one turn
     waves, _ = torus.harmonics(system.periods, count)

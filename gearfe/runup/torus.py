@@ -76,9 +76,10 @@ class Lattice(NamedTuple):
 
 def below(periods: tuple[float, ...], order: float) -> Harmonics:
     """All harmonics of less than an order, the constant included."""
-    axes = [np.arange(-math.floor(order * b), math.floor(order * b) + 1) for b in periods]
     if len(periods) == 1:
-        axes[0] = axes[0][axes[0] >= 0]
+        rising = np.arange(math.ceil(order * (1.0 - ROUND_OFF)))
+        return Harmonics(rising[:, None], rising.astype(float))
+    axes = [np.arange(-math.floor(order * b), math.floor(order * b) + 1) for b in periods]
     waves = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(periods))
     w = np.sqrt(np.abs(waves) / np.array(periods)).sum(axis=1) ** 2
     frequency, first = (waves / np.array(periods)).sum(axis=1), np.argmax(waves != 0, axis=1)
