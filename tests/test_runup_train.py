@@ -13,6 +13,7 @@ import pytest
 
 from gearfe.cli import main
 from gearfe.errors import InputError
+from gearfe.figures.campbell import signal_of
 from gearfe.rigid import constant
 from gearfe.rigid.compiled import available
 from gearfe.runup.condensed import condense
@@ -104,6 +105,20 @@ def test_all_speeds_of_a_range_in_order_and_from_both_ends():
     assert not up.notes
     for one, two in zip(up.sweep(), down.sweep(up=False), strict=True):
         assert one.force.max() == pytest.approx(two.force.max(), rel=1e-3)
+
+
+def test_pictures_of_a_housing_that_does_not_move_show_the_contact_force():
+    """All its lines together are the rms of the force."""
+    speeds = np.linspace(300.0, 900.0, 3)
+    stiff, moving = (
+        run_up(build_train(loaded([(20, 30)], smooth, flexible=x)), speeds, stability=False) for x in (False, True)
+    )
+    assert signal_of(moving, 0).unit == "m/s²"
+    signal = signal_of(stiff, 0)
+    assert signal.unit == "N"
+    for state in stiff.states:
+        rms = np.sqrt(0.5 * (signal.lines(state)[1:] ** 2).sum())
+        assert rms == pytest.approx(state.force.std(), rel=1e-3)
 
 
 def test_multipliers_by_an_executor_are_the_same():

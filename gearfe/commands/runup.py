@@ -90,6 +90,7 @@ def _told(summary: dict[str, Any]) -> list[str]:
     for peak in summary["peaks"][:6]:
         lines.append(
             f"critical speed {peak['speed_rad_per_s']:.6g} rad/s: {peak['order']} at {peak['frequency_Hz']:.0f} Hz "
-            f"meets {peak['mode']}, {peak['mode_frequency_Hz']:.0f} Hz; dynamic factor {peak['dynamic_factor']:.3g}"
+            f"meets {peak['mode']}, {peak['mode_frequency_Hz']:.0f} Hz; dynamic factor {peak['dynamic_factor']:.3g} in "
+            f"{peak['mesh']}"
         )
     return lines

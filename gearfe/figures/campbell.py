@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,11 +12,15 @@ import numpy as np
 from ..runup.instability import InstabilityMap
 from ..runup.modes import STRONG, CoupledModes, Crossing
 from ..runup.report import orders, waterfall
+from ..runup.results import SteadyState
 from ..runup.run_up import RunUp
+from ..typing import Array
 from .style import BLUE, COLOURS, GREY, RED, new_figure, save, tidy
 
 #: Reference of the levels of accelerations (m/s2), ISO 1683.
 REFERENCE = 1e-6
+#: Width of an order's name, in parts of the axis.
+ROOM = 0.045
 
 
 class OrderLine(NamedTuple):
@@ -26,21 +31,43 @@ class OrderLine(NamedTuple):
     mesh: int
 
 
+class Signal(NamedTuple):
+    """What pictures of orders show: its name, unit, reference of levels with its name, and amplitudes of a state."""
+
+    name: str
+    unit: str
+    reference: float
+    level: str
+    lines: Callable[[SteadyState], Array]  # (K + 1,)
+
+
+def signal_of(run: RunUp, bore: int) -> Signal:
+    """Acceleration at an attachment; in a housing that does not move, the contact force of the first mesh."""
+    if any(s.acceleration.any() for s in run.states):
+        name = f"Normal acceleration at attachment {run.train.model.bores[bore]}"
+        level = "level of the acceleration  (dB re 1 µm/s²)"
+        return Signal(name, "m/s²", REFERENCE, level, lambda s: np.abs(s.acceleration[:, bore]))
+    name = f"Contact force of mesh 1 ({run.train.model.meshes[0].name})"
+    return Signal(name, "N", 1.0, "level of the force  (dB re 1 N)", lambda s: np.abs(s.lines(s.force[:, 0])))
+
+
 def draw_waterfall(path: Path, run: RunUp, multiples: int, bore: int, title: str) -> None:
-    """Spectra of one attachment over the speed of a slow run-up: coloured tracks, the meshes' orders named."""
+    """Spectra over the speed of a slow run-up: coloured tracks, the meshes' orders named."""
     from matplotlib.collections import LineCollection
 
     swept = sorted(run.sweep(), key=lambda s: s.speed)
     made = waterfall(run, swept)
     frequency = 1e-3 * made["frequency_Hz"]
-    size = np.maximum(made["acceleration_m_per_s2"][..., bore], 1e-12)  # not-a-number stays
-    level = 20.0 * np.log10(size / math.sqrt(2.0) / REFERENCE)
+    signal, size = signal_of(run, bore), np.full(frequency.shape, np.nan)
+    for row, state in enumerate(swept):
+        found, lines = np.isfinite(frequency[row]), signal.lines(state)
+        size[row, found] = lines[[state.numbers[tuple(k)] for k in made["harmonic"][found].tolist()]]
+    level = 20.0 * np.log10(np.maximum(size, 1e-12) / math.sqrt(2.0) / signal.reference)
     speed, highest = np.array([s.speed for s in swept]), 1e-3 * run.band_hz
-    name = run.train.model.bores[bore]
     figure = new_figure(10.5, 6.4)
     axes = figure.add_subplot()
-    axes.set_title(f"Normal acceleration at attachment {name} in steady running\n{title}", fontsize=11, loc="left")
-    top = float(np.nanmax(level[:, 1:], initial=0.0))
+    axes.set_title(f"{signal.name} in steady running\n{title}", fontsize=11, loc="left")
+    top = float(np.nanmax(level[:, 1:], initial=-240.0))
     segments, values = [], []
     for k in range(1, frequency.shape[1]):
         points = np.stack([speed, frequency[:, k]], axis=1)
@@ -55,12 +82,11 @@ def draw_waterfall(path: Path, run: RunUp, multiples: int, bore: int, title: str
     axes.add_collection(tracks)
     axes.set_xlim(float(speed[0]), float(speed[-1]))
     axes.set_ylim(0.0, highest)
-    for line in order_lines(run, multiples):
-        _label_order(axes, line, float(speed[0]), float(speed[-1]), highest, "black")
+    _label_orders(axes, order_lines(run, multiples), float(speed[0]), float(speed[-1]), highest, ["black"] * 99)
     axes.set_xlabel("speed of the drive  (rad/s)")
     axes.set_ylabel("frequency  (kHz)")
     _rpm(axes)
-    figure.colorbar(tracks, ax=axes, pad=0.09, label="level of the acceleration  (dB re 1 µm/s²)")
+    figure.colorbar(tracks, ax=axes, pad=0.09, label=signal.level)
     save(figure, path)
 
 
@@ -93,7 +119,7 @@ def draw_campbell(path: Path, run: RunUp, modes: CoupledModes, met: list[Crossin
             )  # fmt: skip
     for line in order_lines(run, multiples):
         axes.plot([low, high], [line.slope * low, line.slope * high], color=COLOURS[1 + line.mesh], linewidth=1.0)
-        _label_order(axes, line, low, high, highest, COLOURS[1 + line.mesh])
+    _label_orders(axes, order_lines(run, multiples), low, high, highest, COLOURS[1:])
     if crossings:
         axes.plot(*np.array(crossings).T, "o", color=RED, markersize=4.0, markerfacecolor="white", zorder=5)
     axes.set_xlim(low, high)
@@ -130,17 +156,24 @@ def order_lines(run: RunUp, multiples: int) -> list[OrderLine]:
     return made
 
 
-def _label_order(axes: Any, line: OrderLine, low: float, high: float, highest: float, colour: str) -> None:
-    """Name of an order where its line leaves the picture."""
-    end = min(high, highest / line.slope)
-    if end <= low:
-        return
-    above = line.slope * high > highest
-    y = 0.985 * highest if above else line.slope * (high - 0.01 * (high - low))
-    axes.annotate(
-        line.label, (y / line.slope, y), (-4, 0) if above else (0, 3), textcoords="offset points", fontsize=7.5,
-        color=colour, ha="right", va="top" if above else "bottom",
-    )  # fmt: skip
+def _label_orders(
+    axes: Any, lines: Sequence[OrderLine], low: float, high: float, highest: float, colours: Sequence[str]
+) -> None:
+    """Names of orders where their lines leave the picture; one that would stand on another's is left out."""
+    from matplotlib.patheffects import withStroke
+
+    taken = -math.inf
+    for line in sorted(lines, key=lambda line: -line.slope):
+        end, above = min(high, highest / line.slope), line.slope * high > highest
+        if end <= low or (above and end < taken + ROOM * (high - low)):
+            continue
+        taken = end if above else taken
+        y = 0.985 * highest if above else line.slope * (high - 0.01 * (high - low))
+        axes.annotate(
+            line.label, (y / line.slope, y), (-4, 0) if above else (0, 3), textcoords="offset points", fontsize=7.5,
+            color=colours[line.mesh], ha="right", va="top" if above else "bottom",
+            path_effects=[withStroke(linewidth=2.5, foreground="white")],
+        )  # fmt: skip
 
 
 def _rpm(axes: Any) -> None:

@@ -13,10 +13,9 @@ import numpy as np
 from ..runup.instability import InstabilityMap
 from ..runup.modes import CoupledModes, Crossing
 from ..runup.report import dynamic_factors, iso_dynamic_factors, orders
-from ..runup.results import SteadyState
 from ..runup.run_up import RunUp
 from ..typing import Array, IntArray
-from .campbell import draw_campbell, draw_instability, draw_waterfall
+from .campbell import draw_campbell, draw_instability, draw_waterfall, signal_of
 from .style import COLOURS, GREY, new_figure, save, tidy
 
 #: Label of the axis of dynamic factors.
@@ -53,19 +52,23 @@ class Pieces(NamedTuple):
 
 
 def draw_orders(path: Path, run: RunUp, multiples: int, bore: int, title: str) -> None:
-    """Order cuts of one attachment and its rms, on all branches."""
-    cut = orders(run, multiples)
+    """Order cuts of a signal and its rms, on all branches."""
+    signal, cut = signal_of(run, bore), orders(run, multiples)
+    lines = [signal.lines(s) for s in run.states]
     size: dict[str, Pieces] = {}
     for one in cut:
-        values = [_line(s, one.waves, bore) for s in run.states]
+        numbers = [s.numbers.get(one.waves) for s in run.states]
+        values = [math.nan if k is None else float(x[k]) for k, x in zip(numbers, lines, strict=True)]
         size[f"{one.order:.4g} ({one.names[0]})"] = _pieces(run, values)
     top = {name: float(np.nanmax(np.where(p.branch % 2 == 0, p.value, np.nan))) for name, p in size.items()}
     loudest = sorted(size, key=lambda name: -top[name])[:4]
-    name = run.train.model.bores[bore]
-    rms = {f"rms below {1e-3 * run.band_hz:g} kHz": _pieces(run, [s.rms(run.band_hz)[bore] for s in run.states])}
-    panels = [("amplitude  (m/s²)", {n: size[n] for n in size if n in loudest}), ("rms  (m/s²)", rms)]
-    head = f"Normal acceleration at attachment {name}: orders of the drive, and rms\n{title}"
-    save(_curves(run, panels, head, logarithmic=True), path)
+    inside = [(s.frequency > 0.0) & (s.frequency <= run.band_hz) for s in run.states]
+    rms = [math.sqrt(0.5 * float((x[i] ** 2).sum())) for x, i in zip(lines, inside, strict=True)]
+    panels = [
+        (f"amplitude  ({signal.unit})", {n: size[n] for n in size if n in loudest}),
+        (f"rms  ({signal.unit})", {f"rms below {1e-3 * run.band_hz:g} kHz": _pieces(run, rms)}),
+    ]
+    save(_curves(run, panels, f"{signal.name}: orders of the drive, and rms\n{title}", logarithmic=True), path)
 
 
 def draw_forces(path: Path, run: RunUp, title: str) -> None:
@@ -93,7 +96,7 @@ def forces_picture(run: RunUp, title: str = "") -> Any:
     for i, colour in zip(range(len(lines)), _cycle(), strict=False):
         label = f"mesh {i + 1}, ISO 6336-1 B"
         axes.plot(run.speeds, iso_dynamic_factors(run, i), color=colour, linewidth=1.0, dashes=(1, 1.5), label=label)
-    axes.legend(fontsize=8, frameon=False, ncols=4, loc="upper left")
+    _legend_above(axes)
     return figure
 
 
@@ -139,19 +142,28 @@ def _curves(
         positive = any((curve.value > 0.0).any() for curve in curves.values())
         if logarithmic and positive:
             axes.set_yscale("log")
+            _plain_decades(axes)
         axes.set_ylabel(label)
-        axes.legend(fontsize=8, frameon=False, ncols=min(6, max(1, len(curves))), loc="upper left")
+        _legend_above(axes)
         axes.margins(x=0.0)
-        if not (logarithmic and positive):
-            low, high = axes.get_ylim()
-            axes.set_ylim(low, high + 0.12 * (high - low))
     axes.set_xlabel("speed of the drive  (rad/s)")
     return figure
 
 
-def _line(state: SteadyState, waves: tuple[int, ...], bore: int) -> float:
-    number = state.numbers.get(waves)
-    return math.nan if number is None else float(np.abs(state.acceleration[number, bore]))
+def _legend_above(axes: Any) -> None:
+    """Names of the curves above the panel, where none of them runs."""
+    axes.legend(fontsize=8, frameon=False, ncols=6, loc="lower left", bbox_to_anchor=(0.0, 0.99), borderaxespad=0.0)
+
+
+def _plain_decades(axes: Any) -> None:
+    """Numbers without powers of ten where an axis spans few decades, with 2 and 5 of each."""
+    from matplotlib.ticker import FuncFormatter, LogLocator
+
+    low, high = axes.get_ylim()
+    if high < 300.0 * low and low > 1e-3 and high < 1e5:
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+        axes.yaxis.set_minor_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def _pieces(run: RunUp, values: Sequence[float] | Array) -> Pieces:

@@ -204,7 +204,7 @@ class Linear:
 
     @cached_property
     def _excited(self) -> tuple[Array, Array]:
-        """Numerators (p, 4 n) of the parts of pairs, first what counts s times, and modal coordinates (2 n, n) for parts.
+        """Numerators (p, 4 n) of the pairs' parts, first what counts s times, and modal coordinates (2 n, n) for parts.
 
         With the vectors i and o of a pole, conjugate ones have the parts of Re o and Im o, real ones those of each o.
         """
@@ -212,8 +212,9 @@ class Linear:
         (i1, i2), (o1, o2) = ((x[..., pairs.one], x[..., pairs.two]) for x in (poles.into.T, poles.out))
         first, second, plane = poles.values[pairs.one], poles.values[pairs.two], pairs.conjugate
         rates = np.where(plane, i1 + i2, i1), np.where(plane, 1j * (i1 - i2), i2)
-        values = np.where(plane, i1 * second + i2 * first, i1 * second), np.where(
-            plane, 1j * (i1 * second - i2 * first), i2 * first
+        values = (
+            np.where(plane, i1 * second + i2 * first, i1 * second),
+            np.where(plane, 1j * (i1 * second - i2 * first), i2 * first),
         )
         into = np.hstack([*rates, *(-x for x in values)]).real
         shapes = np.hstack([o1.real, np.where(plane, o1.imag, o2.real)]).T

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gearfe.rigid.compiled import available
 from gearfe.tables.laws import LAWS
 
 from ..script import answered
@@ -150,6 +151,24 @@ def test_equations_for_other_programs_are_those_of_the_mechanisms():
     pull = (out[2] / math.cos(theta), out[3] / math.cos(theta))
     assert pull[0] == pytest.approx(pull[1])  # what is left lies along the closure's gradient
     np.testing.assert_allclose(out[[0, 1, 4, 5]], 0.0, atol=1e-12)
+
+
+@pytest.mark.skipif(not available(), reason="numba is not installed")
+def test_compiled_equations_of_the_train_for_other_programs_are_the_plain_ones():
+    import dataclasses
+
+    from gearfe.train import build_train
+
+    from ..test_runup_train import loaded, smooth
+    from .peers.train_transient import compiled_rhs, plain_rhs
+
+    model = build_train(loaded([(20, 30), (20, 30)], smooth, backlash=30e-6, flexible=False))
+    modal = dataclasses.replace(model.modal, damping=np.diag(np.diagonal(model.modal.damping)))
+    y = 1e-5 * np.random.default_rng(3).normal(size=2 * len(modal.eigenvalues))
+    plain, compiled = np.empty_like(y), np.empty_like(y)
+    plain_rhs(modal)(1e-3, y, plain)
+    compiled_rhs(modal, model.forces)(1e-3, y, compiled)
+    assert compiled == pytest.approx(plain, rel=1e-12, abs=1e-12 * np.abs(plain).max())
 
 
 def test_meshes_for_other_programs_have_fine_teeth_where_they_touch():

@@ -13,13 +13,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gearfe.rigid.kernel_rows import time_series
-from gearfe.rigid.tables import time_arrays
-from gearfe.train.arrays import curve_arrays
+from gearfe.rigid.packed import Packed
+from gearfe.rigid.tables import Times, time_arrays
+from gearfe.train.arrays import Curves, curve_arrays
 
 from ..subject import train_model, train_times
 from ..timing import measured
@@ -27,6 +28,34 @@ from .process import PeerError, serve
 
 Rhs = Callable[[float, Any, Any], None]
 States = tuple[np.ndarray, np.ndarray]
+
+
+class Law(NamedTuple):
+    """Functions of time with the directions of the torques, flanks and their curves, gyroscopic moments."""
+
+    times: Times
+    now: np.ndarray
+    torques: np.ndarray
+    flanks: np.ndarray
+    curves: Curves
+    gyros: np.ndarray
+
+
+class Equations(NamedTuple):
+    """A right-hand side and the state that it is asked for at."""
+
+    eigenvalues: np.ndarray
+    diagonal: np.ndarray
+    constant: np.ndarray
+    W: np.ndarray
+    offset: np.ndarray
+    law: Law
+    t: np.ndarray  # (1,)
+    y: np.ndarray
+    dy: np.ndarray
+    u: np.ndarray
+    du: np.ndarray
+    out: np.ndarray
 
 
 def answer(task: dict[str, Any]) -> dict[str, Any]:
@@ -78,17 +107,23 @@ def compiled_rhs(modal: Any, forces: Any) -> Rhs:
     diagonal = np.diagonal(modal.damping).copy()
     if not np.array_equal(modal.damping, np.diag(diagonal)):
         raise PeerError("the damping of the shipped train is modal")
+    state, rate, now = np.zeros(2 * len(diagonal)), np.zeros(2 * len(diagonal)), np.zeros(1)
     u, du, out = (np.zeros(len(W)) for _ in range(3))
-    fixed = (modal.eigenvalues, diagonal, modal.constant, W, offset, law_parameters(forces))
+    eigenvalues, push = np.ascontiguousarray(modal.eigenvalues), np.ascontiguousarray(modal.constant)
+    law = law_parameters(forces)
+    made = Equations(eigenvalues, diagonal, push, W, np.ascontiguousarray(offset), law, now, state, rate, u, du, out)
+    packed = Packed(made)
 
     def rhs(t: float, y: Any, dy: Any) -> None:
-        kernels.modal_rhs(*fixed, t, np.asarray(y), np.asarray(dy), u, du, out)
+        now[0], state[:] = t, y
+        kernels.modal_rhs(packed)
+        dy[:] = rate
 
     return rhs
 
 
-def law_parameters(forces: Any) -> tuple[Any, ...]:
-    """Functions of time with the directions of the torques, flanks and their curves, gyroscopic moments."""
+def law_parameters(forces: Any) -> Law:
+    """Those of a train whose meshes have stiffness curves."""
     if len(forces.curves) < len(forces.flanks):
         raise PeerError("peers know stiffness curves only")
     names = ("direction", "turn", "ratio", "sense", "phase", "mean", "gap", "parts")
@@ -97,12 +132,12 @@ def law_parameters(forces: Any) -> tuple[Any, ...]:
     functions = [forces.angle, *(torque for _, torque in forces.torques)]
     torques = np.array([direction for direction, _ in forces.torques], dtype=np.int64)
     curves = curve_arrays([flank.curve for flank in forces.curves])
-    return time_arrays(functions), np.zeros((len(functions), 2)), torques, flanks, curves, gyros
+    return Law(time_arrays(functions), np.zeros((len(functions), 2)), torques, flanks, curves, gyros)
 
 
-def train_law(t, u, du, parameters, out):  # type: ignore[no-untyped-def]
+def train_law(t, u, du, law, out):  # type: ignore[no-untyped-def]
     """Forces along all directions into `out`: the equations of `gearfe.train.forces`, written out for one time."""
-    times, now, torques, flanks, curves, gyros = parameters
+    times, now, torques, flanks, curves, gyros = law.times, law.now, law.torques, law.flanks, law.curves, law.gyros
     time_series(times, t, True, 2, now)
     for i in range(out.shape[0]):
         out[i] = 0.0
@@ -134,8 +169,10 @@ def train_law(t, u, du, parameters, out):  # type: ignore[no-untyped-def]
         out[d + 1] += momentum * du[d]
 
 
-def modal_rhs(eigenvalues, diagonal, constant, W, offset, parameters, t, y, dy, u, du, out):  # type: ignore[no-untyped-def]
+def modal_rhs(at):  # type: ignore[no-untyped-def]
     """dy of the state y = (coordinates, velocities); four directions at a time, so that y is read once for all."""
+    eigenvalues, diagonal, constant, W, offset = at.eigenvalues, at.diagonal, at.constant, at.W, at.offset
+    y, dy, u, du, out = at.y, at.dy, at.u, at.du, at.out
     n = eigenvalues.shape[0]
     rows = W.shape[0]
     p = 0
@@ -158,7 +195,7 @@ def modal_rhs(eigenvalues, diagonal, constant, W, offset, parameters, t, y, dy, 
         p += 4
     for k in range(rows):
         u[k] += offset[k]
-    train_law(t, u, du, parameters, out)
+    train_law(at.t[0], u, du, at.law, out)
     for i in range(n):
         dy[i] = y[n + i]
         dy[n + i] = constant[i] - eigenvalues[i] * y[i] - diagonal[i] * y[n + i]
@@ -172,6 +209,7 @@ def modal_rhs(eigenvalues, diagonal, constant, W, offset, parameters, t, y, dy, 
         for i in range(n):
             dy[n + i] += W[p, i] * f0 + W[q1, i] * f1 + W[q2, i] * f2 + W[q3, i] * f3
         p += 4
+    return 0
 
 
 def _sundials(task: dict[str, Any], modal: Any, rhs: Rhs, start: np.ndarray, times: np.ndarray) -> States:
