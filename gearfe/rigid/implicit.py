@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -106,8 +106,6 @@ def run_implicit(
         if not made.converged:
             control.fail(Status.NOT_SOLVED, NOT_SOLVED_SHARE)
             continue
-        assert made.stages is not None
-        assert made.speeds is not None
         error = max(made.error, _gap_between(system, here, h, made, active) / tolerance)
         path = collocated_path(h, (here.q, here.v, *made.stages, made.q, made.v), made.speeds)
         if error <= TRUSTED and corners.cut(here.t, h, path):
@@ -136,7 +134,7 @@ def run_implicit(
 def _gap_between(system: System, here: State, h: float, made: Step, active: np.ndarray) -> float:
     """Largest gap of a constraint in the middle of a step, in its unit: where joints prescribe the motion, the error of
     what they leave free says nothing about the curve between the stages."""
-    if not active.any() or made.stages is None:
+    if not active.any():
         return 0.0
     middle = MIDDLE @ np.stack([here.q, h * here.v, *made.stages, made.q, h * made.v])
     gap = system.residual(here.t + 0.5 * h, middle)[active] / system.row_units[active]
@@ -160,6 +158,11 @@ def in_modes(modal: ModalCoordinates, start: Start) -> tuple[System, Start]:
     return System(elements), replace(start, q=q, v=v, active=np.zeros(0, dtype=bool), excess=np.zeros(0))
 
 
+def no_values() -> Array:
+    """Of a step that did not converge."""
+    return np.zeros((0, 0))
+
+
 @dataclass(frozen=True)
 class Step:
     """One trial step."""
@@ -169,9 +172,11 @@ class Step:
     error: float
     iterations: int
     converged: bool
-    stages: Array | None = None  # (2, n) coordinates of the first two
-    forces: Array | None = None  # (3, all rows and stresses) at the stages
-    speeds: Array | None = None  # (4, n) coefficients of powers of the time (s) since the step's end, lowest first
+    # of a step that converged: coordinates (2, n) of the first two stages, forces (3, all rows and stresses) at all
+    # three, speeds (4, n) as coefficients of powers of the time (s) since the step's end, lowest first
+    stages: Array = field(default_factory=no_values)
+    forces: Array = field(default_factory=no_values)
+    speeds: Array = field(default_factory=no_values)
 
 
 def radau_step(

@@ -19,6 +19,7 @@ from .carried import loose_link
 from .choice import Choice, Way, joined, joined_statistics
 from .dense import Dense
 from .elimination import is_linear, modal_coordinates
+from .linkage import Linkage
 from .modal import series_force
 from .series import tape_program
 from .start import Start, consistent_start
@@ -164,9 +165,11 @@ def ways_of(
     system: System, start: Start, times: Array, method: str, backend: str, options: dict[str, Any], runs: float = 1.0
 ) -> list[Way]:
     """Ways to integrate that `method` and `backend` leave open, the one to begin with first."""
-    planar = system.linkage is not None
+    linkage = system.linkage
     trial = IMPLICIT_TRIAL + (0.0 if "scipy.linalg" in sys.modules else LOADING_LINALG)
-    rate = partial(_rate, system) if planar or is_linear(system) else None  # it does not see all other elements
+    rate = (
+        partial(_rate, system) if linkage is not None or is_linear(system) else None
+    )  # it does not see all other elements
     implicit = Way("implicit", "", partial(_implicit, system, options), trial, rate=rate)
     auto = method == "auto"
     stuck = auto and (any(e.stiff for e in system.elements) or _hopeless(system, start, times))
@@ -174,14 +177,14 @@ def ways_of(
     explicit = Way("explicit", "", partial(_explicit, system, backend, options), PLAIN_TRIAL, cure=cure)
     if stuck or method in ("implicit", "explicit"):
         return [explicit] if method == "explicit" else [implicit]
-    if not planar:
+    if linkage is None:
         ways = _other_ways(system, auto, backend, options, explicit, runs)
         return [*ways, implicit] if auto else ways
-    plain = Way("taylor", "plain", partial(_taylor, system, False, options), PLAIN_TRIAL, cure=cure)
+    plain = Way("taylor", "plain", partial(_taylor, linkage, False, options), PLAIN_TRIAL, cure=cure)
     if not use_compiled(backend):
         return [plain, implicit] if auto else [plain]
     loading = taylor.KERNELS.seconds / runs
-    quick = Way("taylor", "compiled", partial(_taylor, system, True, options), loading, loading, COMPILED_FASTER)
+    quick = Way("taylor", "compiled", partial(_taylor, linkage, True, options), loading, loading, COMPILED_FASTER)
     if backend == "compiled" or loading <= _PLAIN_SPENT[0]:
         return [quick, implicit] if auto else [quick]
     return [plain, quick, implicit] if auto else [plain, quick]
@@ -275,10 +278,8 @@ def _implicit(
 
 
 def _taylor(
-    system: System, jit: bool, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
+    linkage: Linkage, jit: bool, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
 ) -> Run:
-    linkage = system.linkage
-    assert linkage is not None  # `ways_of` asks before
     local = max(LOCAL_SHARE * options["tolerance"], 5e-16)
     order = taylor.order_for(local)
     if jit and not taylor.KERNELS.ready:

@@ -67,12 +67,8 @@ def write_linkage(linkage: Linkage, tape: Tape, places: IntArray) -> bool:
         return made
 
     def vector(k: int) -> tuple[Affine, Affine]:
-        made: tuple[Affine, Affine] | None = None
-        for side in range(2):
-            weight, x, y = (float(e) for e in vectors.end[k, side])
-            made = bodies.point(int(vectors.bodies[k, side]), weight, x, y, made)
-        assert made is not None
-        return made
+        (one, two), ((w, x, y), (v, a, b)) = vectors.bodies[k].tolist(), vectors.end[k].tolist()
+        return bodies.point(two, v, a, b, bodies.point(one, w, x, y))
 
     for r in range(linkage.rows):
         held, products = form(r), []
