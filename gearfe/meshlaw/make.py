@@ -186,9 +186,15 @@ def _nodes(pair: HalfPlanePair, reach: float) -> tuple[Array, int]:
     geometry = pair.pair
     cycle = geometry.mesh_cycle
     step = 0.1 * cycle / CELLS
-    wide = step * np.arange(-30.0 * CELLS, 30 * CELLS + 1)
-    bears = np.flatnonzero(touch_curve(pair, wide).value < BEYOND * reach)
-    low, high = wide[bears[0]] - step, wide[bears[-1]] + step
+
+    def bearing(places: Array) -> Array:
+        """Angles at which a pair touches, of these numbers of steps."""
+        return step * places[touch_curve(pair, step * places).value < BEYOND * reach]
+
+    found = bearing(10.0 * np.arange(-3.0 * CELLS, 3 * CELLS + 1))
+    ends = np.round(found[[0, -1]] / step)[:, None] + np.arange(-10.0, 11.0)
+    close = bearing(ends.ravel())
+    low, high = close.min() - step, close.max() + step
     slots = math.ceil((high - low) / cycle)
     begin = 0.5 * (low + high - slots * cycle)
     width = cycle / CELLS
