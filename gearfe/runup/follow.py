@@ -182,7 +182,7 @@ class _Walk:
 
     def _onward(self, speed: float, halvings: int = HALVINGS) -> Orbit | None:
         """Orbit at a speed by extrapolation, where needed over speeds between."""
-        if len(self.back) < 2:
+        if len(self.back) < (2 if self.turns else 1):  # one orbit behind a turning point does not tell its side
             return None
         made = self._extrapolated(speed)
         if made is not None or not halvings:
