@@ -81,7 +81,9 @@ def test_flank_coarsen_leaves_the_rest_alone():
 
 
 def test_flanks_alone_converge():
-    """On one mesh of the bodies the torque nears that of much finer flanks."""
+    """On one mesh of the bodies the torque nears that of much finer flanks: ten times finer, an order of accuracy. At
+    the coarsest the contacts are as wide as an element, and the error swings with the nodes (that step alone is 2.4 to
+    3.6 with 24 to 72 edges round the bore)."""
     gears = pair(20, 30, tip_round=0.1e-3)
     angles = np.linspace(0.0, gears.mesh_cycle, 5)[:-1]
     given = {"twist": 4e-3, "angles": angles, "law": "nitsche"}
@@ -89,7 +91,8 @@ def test_flanks_alone_converge():
         sweep_stiffness(gears, flank_coarsen=f, **given).torque_wheel for f in (6.0, 2.0, 0.6, 0.2)
     )
     off = [np.abs(torque / limit - 1).max() for torque in (one, two, three)]
-    assert off[0] > 3 * off[1] > 9 * off[2]
+    assert off[0] > off[1] > 3 * off[2]
+    assert off[0] > 10 * off[2]
     assert off[2] < 1e-4
 
 

@@ -107,6 +107,11 @@ class GearBody:
         """Young's modulus seen per area of contact (Pa): a gear wider than its contact is stiffer by that ratio."""
         return self.material.youngs_modulus * self.thickness / self.width
 
+    @property
+    def contact_compliance(self) -> float:
+        """1/E' (1/Pa) per width of the contact: a body wider than that counts with the ratio."""
+        return self.material.contact_compliance(self.plane) * self.width / self.thickness
+
 
 def gear_body(
     mesh: SectorMesh,
@@ -253,14 +258,6 @@ class MeshingPair:
     def bodies(self) -> tuple[GearBody, GearBody]:
         """Pinion and wheel."""
         return self.pinion, self.wheel
-
-    @property
-    def contact_compliances(self) -> tuple[float, float]:
-        """1/E' of both gears (1/Pa); a plane body of its own face width w_i carries the load of the common width and
-        counts with w/w_i.
-        """
-        one, two = (b.material.contact_compliance(b.plane) * self.width / b.thickness for b in self.bodies)
-        return one, two
 
     @property
     def pitch_angle(self) -> float:

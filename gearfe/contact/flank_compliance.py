@@ -32,9 +32,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..gear.flank_curve import FlankCurve, flank_curve
-from ..gear.pair import GearPair
+from ..gear.spur_gear import Gear
 from ..typing import Array
-from .compliance import GearBody, MeshingPair
+from .compliance import GearBody
 from .flank import Flank, edge_shapes, gauss_rule
 from .panels import ELLIPSE_W, ELLIPSE_X, mean_log, wedge_tensor
 
@@ -180,29 +180,9 @@ def _slopes(h: Array, d: Array) -> Array:
     return np.linalg.solve(matrix, right)
 
 
-def flank_compliances(pair: GearPair, elastic: MeshingPair) -> tuple[FlankCompliance, FlankCompliance]:
-    """Of pinion and wheel."""
-    pinion, wheel = (
-        flank_compliance(body, flank_curve(gear), inverse, elastic.width, pair.pinion.module)
-        for body, gear, inverse in zip(
-            elastic.bodies, (pair.pinion, pair.wheel), elastic.contact_compliances, strict=True
-        )
-    )
-    return pinion, wheel
-
-
-def flank_compliance(
-    body: GearBody, curve: FlankCurve, inverse_modulus: float, width: float, module: float
-) -> FlankCompliance:
-    """Reduce the finite-element flank of a gear to its stations.
-
-    Parameters
-    ----------
-    inverse_modulus
-        1/E' (1/Pa) per width of the contact.
-    width
-        Width of the contact (m).
-    """
+def flank_compliance(gear: Gear, body: GearBody) -> FlankCompliance:
+    """Reduce the finite-element flank of a gear to its stations."""
+    curve, inverse_modulus, module = flank_curve(gear), body.contact_compliance, gear.module
     offset = body.flank.arc_at(float(curve.face.radii[0]))
     corner, wedge = corner_of(curve)
     stations, bumps, nodal = _stations(body.flank, offset + curve.low, module)
@@ -210,7 +190,7 @@ def flank_compliance(
     modes = loads @ body.far.flank
     smooth = {step: modes @ (driven @ loads.T) for step, driven in body.far.driven.items()}
     made = FlankCompliance(curve, inverse_modulus, corner, wedge, stations - offset, bumps, smooth, offset)
-    smooth[0] = smooth[0] + loads @ body.own @ loads.T + inverse_modulus / width * _local(made)
+    smooth[0] = smooth[0] + loads @ body.own @ loads.T + inverse_modulus / body.width * _local(made)
     return made
 
 
@@ -254,10 +234,10 @@ def _stations(flank: Flank, start: float, module: float) -> tuple[Array, Array, 
         if a >= TOO_NEAR * here and not (kept and s - kept[-1][0] < SPACING * a):
             kept.append((s, a))
     s, a = np.array(kept).T
-    return s, a, _bumps(flank, s[:, None], a[:, None])
+    return s, a, bumps(flank, s[:, None], a[:, None])
 
 
-def _bumps(flank: Flank, s: Array, a: Array) -> Array:
+def bumps(flank: Flank, s: Array, a: Array) -> Array:
     """Shares on the nodes of elliptic unit forces of half widths a about arc lengths s (m), both of shape (k, 1)."""
     # with the place s - a cos t the pressure is smooth in t
     t0, t1 = (np.arccos(np.clip((s - at) / a, -1.0, 1.0)) for at in (flank.ends[:-1], flank.ends[1:]))

@@ -30,7 +30,7 @@ from ..gear.tooth_flanks import ToothFlanks
 from ..gear.touching import Flanks
 from ..typing import Array, ComplexArray, IntArray
 from .compliance import MeshingPair
-from .flank_compliance import FlankCompliance, Shapes, corner_of, flank_compliances, shapes_of
+from .flank_compliance import FlankCompliance, Shapes, corner_of, flank_compliance, shapes_of
 from .panels import Couplings, log_integral, mean_log
 
 #: Even places along a flank for `Finely`; places at which both faces of a contact are compared where they have no
@@ -223,7 +223,8 @@ def half_plane_pair(
     `deviations` None: those of `elastic`.
     """
     teeth = ToothFlanks(pair, elastic.deviations if deviations is None else deviations)
-    return HalfPlanePair(pair, teeth, flank_compliances(pair, elastic), elastic.width)
+    pinion, wheel = flank_compliance(pair.pinion, elastic.pinion), flank_compliance(pair.wheel, elastic.wheel)
+    return HalfPlanePair(pair, teeth, (pinion, wheel), elastic.width)
 
 
 #: Distance (m) of two contacts that is none.

@@ -6,7 +6,11 @@ import math
 from dataclasses import replace
 
 from ..gear.pair import GearPair
-from .tooth_sector import MINIMUM_BORE_EDGES, SectorRecipe
+from .tooth_sector import SectorRecipe
+
+#: Edges round the bore. A gear of 12 teeth with a bore of a tenth of its pitch diameter, near which most of its twist
+#: is, was 0.5 % too stiff with 24 of them, 0.03 % with 48.
+BORE_EDGES = 48
 
 
 def sector_recipes(
@@ -31,7 +35,7 @@ def sector_recipes(
             back=0.16 * module,
             root=0.12 * module,
             body=0.6 * module,
-            bore=math.pi * gear.bore_diameter / MINIMUM_BORE_EDGES,
+            bore=math.pi * gear.bore_diameter / BORE_EDGES,
         )
         recipe = recipe.scaled(coarsen)
         made.append(replace(recipe, flank=flank_coarsen * recipe.flank, strip=flank_coarsen * recipe.strip))

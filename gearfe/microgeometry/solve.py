@@ -12,11 +12,9 @@ from ..contact.half_plane_step import HalfPlanePair
 from ..contact.position import Positions, taken
 from ..errors import InputError
 from ..gear.deviation import ToothDeviations
-from ..gear.iso6336 import mesh_stiffness
-from ..gear.validity import MOST_YIELD
 from ..loadmap.root_stress import PairRoots
 from ..stiffness.contact_pressure import BLUNTING
-from ..stiffness.positions import HalfPlaneSolver, Progress, at_torques
+from ..stiffness.positions import HalfPlaneSolver, Progress, at_torques, check_torque
 from ..threads import one_thread
 from ..typing import Array, IntArray
 from .loaded_mesh import BACK, LoadedMesh, PairLoads, full_period
@@ -70,11 +68,7 @@ def load_mesh(
     if len(goals) == 0 or not (np.isfinite(goals).all() and goals[0] > 0):
         raise InputError("torques", torques, "must be finite and > 0 N m", "give torques at the wheel's hub")
     pair = law.pair
-    stiffness = mesh_stiffness(pair, *(1 / law.inverse_modulus)) * law.width
-    most = MOST_YIELD * pair.pinion.module * stiffness * pair.wheel.base_radius
-    if goals[-1] > most:
-        problem = f"must be <= {most:.3g} N m: the teeth would yield by more than {MOST_YIELD:g} modules"
-        raise InputError("torques", float(goals[-1]), problem, "linear elasticity does not reach so far; give less")
+    check_torque(law, float(goals[-1]), "torques")
     if angles is None:
         alike = all(one.alike for one in law.teeth.deviations)
         cycles = mesh_cycles if mesh_cycles is not None else 1 if alike else full_period(pair)

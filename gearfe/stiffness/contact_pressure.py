@@ -61,7 +61,7 @@ def contact_pressures(solver: PositionSolver, found: Positions) -> dict[str, Arr
     several = np.unique(pairs[known], return_inverse=True, return_counts=True)
     bears[several[2][several[1]] > 1] = _ROUNDED  # not where the rigid flanks touch first, nor with one ellipse
     bears[~flat] = _SINGULAR  # it touches at the corner itself, however narrow the contact
-    hertz = np.sqrt(force / sum(elastic.contact_compliances) * np.where(flat, curvature, 0.0) / math.pi)
+    hertz = np.sqrt(force / solver.law.inverse_modulus.sum() * np.where(flat, curvature, 0.0) / math.pi)
     blunted = 2 * force / (math.pi * np.hypot(width, BLUNTING * solver.pair.pinion.module))
     off = np.abs(width * math.pi * hertz / (2 * force) - 1)
     if elastic.deviations != NOMINAL:  # waves shorter than the contact say nothing of its pressure; its width does

@@ -31,7 +31,8 @@ from typing import Any
 import numpy as np
 
 from ..contact.compliance import GearBody, MeshingPair, sector_displacements, turn
-from ..contact.flank import Flank, edge_nodes, edge_shapes
+from ..contact.flank import edge_nodes, edge_shapes
+from ..contact.flank_compliance import BUMP_ELEMENTS, bumps
 from ..contact.half_plane_result import PairContacts
 from ..contact.panels import EDGES
 from ..contact.position import FlankLoads, Positions
@@ -40,8 +41,6 @@ from ..meshing.whole_gear import WholeGear, whole_gear
 from ..typing import Array, IntArray
 from .contact_pressure import flank_pressures
 
-#: Half width of a bump in elements.
-BUMP_ELEMENTS = 2.0
 #: Shares of an elliptic pressure on the panels `EDGES`.
 _SHARES = np.diff(EDGES * np.sqrt(1 - EDGES**2) + np.arcsin(EDGES)) / np.pi
 
@@ -86,7 +85,7 @@ def bumped(body: GearBody, position: Positions, gear: int) -> tuple[FlankLoads, 
             continue
         nodal = force[k].view(complex)
         total = nodal.sum()
-        nodal[:] = total * _nodal_shares(flank, centre + half * 0.5 * (EDGES[1:] + EDGES[:-1]))
+        nodal[:] = total * bumps(flank, np.array([[centre]]), np.array([[half]]))[0]
         line = abs(total) / body.thickness
         way = 1 if gear == 0 else -1  # the panels run against the wheel's flank
         places = way * contacts.x[k][::way]
@@ -99,14 +98,6 @@ def bumped(body: GearBody, position: Positions, gear: int) -> tuple[FlankLoads, 
         stress[2] = -stress[2]  # y out of the material
         local.append((int(loads.tooth[k]), _turned(stress, tangent.real, tangent.imag)))
     return replace(loads, force=force), local
-
-
-def _nodal_shares(flank: Flank, arcs: Array) -> Array:
-    """Shares of an elliptic pressure's force on the nodes of a flank, shape (f,)."""
-    edge, xi = flank.place(arcs)
-    made = np.zeros(len(flank.nodes))
-    np.add.at(made, edge_nodes(edge), edge_shapes(xi)[0] * _SHARES[:, None])
-    return made
 
 
 def _frame(body: GearBody, centre: float) -> tuple[Array, Array, complex]:

@@ -116,6 +116,7 @@ class ElementSolver:
     def __init__(self, pair: GearPair, elastic: MeshingPair, *, resolved_only: bool = True) -> None:
         self.pair, self.elastic, self.resolved_only = pair, elastic, resolved_only
         self.half_plane = HalfPlaneSolver(half_plane_pair(pair, elastic), elastic)
+        self.law = self.half_plane.law
         self.curves = self.half_plane.curves
         self.touching, self.touching_twists = self.half_plane.touching, self.half_plane.touching_twists
         self.first_touch = self.half_plane.first_touch
@@ -126,7 +127,7 @@ class ElementSolver:
         loaded = expected.status == "converged"
         thin = loaded & self.resolved_only & (self.elements_per_contact(expected) < 1.0)
         contacts = expected.contacts
-        first = first_contacts(self.half_plane.law.sides, taken(contacts, ~thin[contacts.position]))
+        first = first_contacts(self.law.sides, taken(contacts, ~thin[contacts.position]))
         found = solve_elements(self.elastic, expected.pinion_angle, expected.twist, first)
         status = np.where(thin, "under_resolved", np.where(loaded, found.status, expected.status))
         iterations = np.where(loaded & ~thin, found.iterations, expected.iterations)
@@ -138,7 +139,7 @@ class ElementSolver:
         """
         contacts = found.contacts
         sizes = np.zeros(len(contacts))
-        for gear, (side, body) in enumerate(zip(self.half_plane.law.sides, self.elastic.bodies, strict=True)):
+        for gear, (side, body) in enumerate(zip(self.law.sides, self.elastic.bodies, strict=True)):
             edge, _ = body.flank.place(contacts.arc[:, gear] + side.offset)
             sizes = np.maximum(sizes, body.flank.sizes[edge])
         weights = contacts.force, contacts.force * sizes / (2 * contacts.half_width)
@@ -178,15 +179,14 @@ def at_twists(
     return with_shares(found, finite_strain_shares(solver.elastic, found)) if finite else found
 
 
-def check_torque(solver: PositionSolver, torque: float) -> None:
+def check_torque(law: HalfPlanePair, torque: float, name: str = "torque") -> None:
     """Raise `InputError` for a torque (N m) that small strain is not meant for."""
-    pair, elastic = solver.pair, solver.elastic
-    moduli = [body.material.youngs_modulus for body in elastic.bodies]
-    stiffness = mesh_stiffness(pair, moduli[0], moduli[1]) * elastic.width
+    pair = law.pair
+    stiffness = mesh_stiffness(pair, *(1 / law.inverse_modulus)) * law.width
     most = MOST_YIELD * pair.pinion.module * stiffness * pair.wheel.base_radius
     if torque > most:
         problem = f"must be <= {most:.3g} N m: the teeth would yield by more than {MOST_YIELD:g} modules"
-        raise InputError("torque", torque, problem, "linear elasticity does not reach so far; give less")
+        raise InputError(name, torque, problem, "linear elasticity does not reach so far; give less")
 
 
 def at_torques(

@@ -147,7 +147,7 @@ def sweep_stiffness(
     solved_angles, source = (asked, np.arange(len(asked))) if solve_all else distinct_angles(asked, pair.mesh_cycle)
     solver = position_solver(pair, elastic)
     if torque is not None:
-        check_torque(solver, load)
+        check_torque(solver.law, load)
     with watch.stage("unloaded flanks"):
         solver.touching(solved_angles)
     with watch.stage("positions"), one_thread():
