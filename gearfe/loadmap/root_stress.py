@@ -103,9 +103,12 @@ def root_size(gear: Gear) -> float:
 
 
 def root_recipe(recipe: SectorRecipe, gear: Gear, factor: float) -> SectorRecipe:
-    """Sizes of a mesh with a fine fillet and a coarse flank; `factor` multiplies every size."""
+    """Sizes of a mesh with a fine fillet, a coarse flank and half as many edges round the bore, whose stiffness does
+    not matter here; `factor` multiplies every size.
+    """
     flank = FLANK_SIZE * gear.module
-    sizes = replace(recipe, flank=flank, strip=flank, back=max(recipe.back, flank), root=root_size(gear))
+    back, bore = max(recipe.back, flank), 2 * recipe.bore
+    sizes = replace(recipe, flank=flank, strip=flank, back=back, root=root_size(gear), bore=bore)
     return sizes.scaled(factor)
 
 
