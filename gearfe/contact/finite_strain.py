@@ -22,7 +22,8 @@ from ..typing import Array
 from .compliance import GearBody, MeshingPair, sector_displacements
 from .position import TORQUES, Positions
 
-#: Sectors on either side of a loaded tooth that take part: the effect is cubic in the strain and dies out fast.
+#: Sectors on either side of a loaded tooth that take part: the effect is cubic in the strain. Six instead of one change
+#: the torque of the shipped pair by 2.4e-4 at 0.5 deg, and by less than 5e-5 at 0.05 deg.
 NEIGHBOURS = 1
 #: Positions whose fields are in memory together, and numbers (of displacement gradients) worked on at a time.
 TOGETHER = 24
