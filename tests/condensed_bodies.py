@@ -18,7 +18,8 @@ from gearfe.contact.flank import flank_of, normal_stress_rows
 from gearfe.contact.laws import ContactLaw
 from gearfe.contact.model import PairModel
 from gearfe.contact.position import Positions
-from gearfe.verification.bodies import Bodies, ElasticBody
+
+from .verification.bodies import Bodies, ElasticBody
 
 Array = NDArray[Any]
 

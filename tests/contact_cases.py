@@ -12,7 +12,8 @@ from gearfe.elasticity import Material, Plane
 from gearfe.gear.pair import Gear, GearPair, TipRelief
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import SectorMesh, sector_mesh
-from gearfe.verification.whole_pair import ElasticGear, WholePair
+
+from .verification.whole_pair import ElasticGear, WholePair
 
 WIDTH = 10e-3
 STEEL = Material(200e9, 0.30)

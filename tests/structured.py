@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearfe.elasticity import Material
-from gearfe.verification.bodies import ElasticBody
+
+from .verification.bodies import ElasticBody
 
 Array = NDArray[np.float64]
 

@@ -8,13 +8,13 @@ import pytest
 from gearfe.contact.laws import ElementLaw, Penalty
 from gearfe.elasticity import Material
 from gearfe.errors import InputError
-from gearfe.verification import forms
-from gearfe.verification.bodies import Bodies
-from gearfe.verification.contact_state import contact_at
-from gearfe.verification.laws import Exact, Nitsche, theta_of
-from gearfe.verification.problem import ContactProblem, contact_problem
 
 from .structured import block
+from .verification import forms
+from .verification.bodies import Bodies
+from .verification.contact_state import contact_at
+from .verification.laws import Exact, Nitsche, theta_of
+from .verification.problem import ContactProblem, contact_problem
 
 LAWS = [
     Nitsche(sides="pinion"),

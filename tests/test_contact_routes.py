@@ -9,10 +9,10 @@ from scipy.sparse import coo_matrix
 from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
 from gearfe.elasticity import element_stiffness
 from gearfe.meshing.whole_gear import whole_gear
-from gearfe.verification.monolithic import solve_monolithic
 
 from .contact_cases import STEEL, WIDTH, condensed, gears, meshes, whole
 from .solving import peak_pressure, solve_position
+from .verification.monolithic import solve_monolithic
 
 COARSE = 5.0
 

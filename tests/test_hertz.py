@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 
 from gearfe.contact.laws import ElementLaw, Penalty
 from gearfe.elasticity import Material
-from gearfe.verification.bodies import Bodies, ElasticBody
-from gearfe.verification.laws import Exact, Nitsche
-from gearfe.verification.newton import solve_contact
-from gearfe.verification.problem import ContactProblem, contact_problem
 
 from .structured import mapped_grid
+from .verification.bodies import Bodies, ElasticBody
+from .verification.laws import Exact, Nitsche
+from .verification.newton import solve_contact
+from .verification.problem import ContactProblem, contact_problem
 
 Array = NDArray[np.float64]
 

@@ -22,11 +22,11 @@ from gearfe.microgeometry.loaded_mesh import BACK, full_period
 from gearfe.microgeometry.solve import load_mesh
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 from gearfe.tables.microgeometry import MicrogeometryTable
-from gearfe.verification.laws import Nitsche
-from gearfe.verification.monolithic import solve_monolithic
-from gearfe.verification.whole_pair import ElasticGear, WholePair
 
 from .gears import pair as gear_pair
+from .verification.laws import Nitsche
+from .verification.monolithic import solve_monolithic
+from .verification.whole_pair import ElasticGear, WholePair
 
 PAIR = gear_pair(tip_round=1e-4)
 PINION, WHEEL = PAIR.pinion, PAIR.wheel

@@ -16,13 +16,13 @@ from gearfe.elasticity import Material
 from gearfe.gear.pair import Gear, GearPair
 from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh
-from gearfe.verification.laws import Nitsche
-from gearfe.verification.monolithic import solve_monolithic
-from gearfe.verification.whole_pair import ElasticGear, WholePair
 
 from .contact_cases import whole
 from .solving import solve_positions
 from .test_patch import PRESS, two_blocks
+from .verification.laws import Nitsche
+from .verification.monolithic import solve_monolithic
+from .verification.whole_pair import ElasticGear, WholePair
 
 
 def test_tangent_is_the_derivative_of_the_forces() -> None:

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from gearfe.contact.laws import ElementLaw, Penalty
 from gearfe.elasticity import Material
 from gearfe.errors import InputError
-from gearfe.verification.bodies import Bodies
-from gearfe.verification.laws import Exact, Nitsche, theta_of
-from gearfe.verification.newton import ContactSolution, solve_contact
-from gearfe.verification.problem import ContactProblem, contact_problem
 
 from .structured import block, quarter_ring
+from .verification.bodies import Bodies
+from .verification.laws import Exact, Nitsche, theta_of
+from .verification.newton import ContactSolution, solve_contact
+from .verification.problem import ContactProblem, contact_problem
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ the gap in place of its negative)
 
 The part :math:`\Gamma_C` is the contact surface (round of the tip included) of the gears on the law's `sides`; with
 both gears on it, each takes half of the integral. The variants theta = 1 and -1, and exact multipliers, are laws of the
-whole-gear route alone (`gearfe.verification.laws`).
+tests' whole-gear route alone (`tests.verification.laws`).
 
 **On half-planes** (half_plane): `gearfe.contact.half_plane`, without contact elements.
 

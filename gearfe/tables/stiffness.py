@@ -40,11 +40,11 @@ class StiffnessTable:
         ),
         "law_sides": (
             "is gone: the law fixes the flanks that it is integrated on (nitsche both, penalty the nearer tip's)",
-            "leave it out; other sides are in Python: gearfe.contact.laws, gearfe.verification.laws",
+            "leave it out; other sides are in Python: gearfe.contact.laws",
         ),
         "nitsche_theta": (
-            "is gone: sweeps have theta = 0; 1 and -1 are variants of the verification route",
-            "leave it out; in Python: gearfe.verification.laws.Nitsche(theta=...)",
+            "is gone: theta is 0",
+            "leave it out",
         ),
     }
 

@@ -127,8 +127,8 @@ def verification(record: Record) -> None:
         return {"error": found["error"], "setup_cpu_s": setup.cpu_s, "position_cpu_s": cost.cpu_s / len(at)}
 
     def whole(coarsen: float) -> Mapping[str, Any]:
-        from gearfe.verification.laws import Nitsche
-        from gearfe.verification.monolithic import solve_monolithic
+        from ..verification.laws import Nitsche
+        from ..verification.monolithic import solve_monolithic
 
         gears, setup = measured(lambda: whole_pair(pair, coarsen), runs=1)
         solved, cost = measured(lambda: [solve_monolithic(gears, Nitsche(), a, TWIST) for a in at], runs=1)
@@ -148,7 +148,8 @@ def verification(record: Record) -> None:
 def whole_pair(pair: GearPair, coarsen: float) -> Any:
     """Both whole gears, assembled (plane strain, steel)."""
     from gearfe.elasticity import Material
-    from gearfe.verification.whole_pair import ElasticGear, WholePair
+
+    from ..verification.whole_pair import ElasticGear, WholePair
 
     made = [
         ElasticGear(sector_mesh(gear, recipe), Material(), "strain", gear.face_width)

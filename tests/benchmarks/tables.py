@@ -150,7 +150,7 @@ SECTIONS: tuple[Section, ...] = (
         "sweep_verification",
         "Mesh stiffness: the verification route",
         "One position at small strain on gears condensed to their flanks, and on whole gears with all unknowns at "
-        "once (`gearfe.verification`), the same elements.",
+        "once (`tests.verification`), the same elements.",
         {
             "model": ("model", PLAIN),
             "coarsen": ("`coarsen`", digits),

@@ -19,8 +19,8 @@ from typing import Literal
 
 import numpy as np
 
-from ..contact.flank import gauss_rule
-from ..typing import Array, IntArray
+from gearfe.contact.flank import gauss_rule
+from gearfe.typing import Array, IntArray
 
 Quadrature = Literal["points", "segments"]
 

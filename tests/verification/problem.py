@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.closest import nearest_places, project
-from ..contact.laws import ElementLaw
-from ..errors import InputError
-from ..typing import Array, IntArray
+from gearfe.contact.closest import nearest_places, project
+from gearfe.contact.laws import ElementLaw
+from gearfe.errors import InputError
+from gearfe.typing import Array, IntArray
+
 from .bodies import Bodies, Value, edge_lengths, edge_points, edge_tangents
 from .constitution import Kinematics, SaintVenantKirchhoff, SmallStrain, linear_stress_rate
 from .forms import stress_term

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from skfem import CellBasis, ElementTriP2, ElementVector, MeshTri2
 
-from ..contact.flank import edge_shapes, gauss_rule
-from ..elasticity import Material, Plane, stiffness_form, triangle_rule
-from ..errors import InputError, unknown_name
-from ..typing import Array, IntArray
+from gearfe.contact.flank import edge_shapes, gauss_rule
+from gearfe.elasticity import Material, Plane, stiffness_form, triangle_rule
+from gearfe.errors import InputError, unknown_name
+from gearfe.typing import Array, IntArray
 
 #: A prescribed displacement (m) or traction (Pa): a number, or a function of places, shape (n, 2), with values (n,).
 Value = float | Callable[[Array], Array]

@@ -10,8 +10,9 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from skfem import DiscreteField
 
-from ..contact.closest import Projection, nearest_places, project
-from ..typing import Array, ComplexArray, IntArray
+from gearfe.contact.closest import Projection, nearest_places, project
+from gearfe.typing import Array, ComplexArray, IntArray
+
 from . import forms
 from .bodies import edge_points, edge_tangents
 from .laws import theta_of
@@ -37,7 +38,7 @@ class ContactState:
     on : ndarray of int, shape (k,)
         Points that act: all that face the mate with the exact law, else those under pressure.
     pairs, fields
-        scikit-fem basis of these with their closest points, and what `gearfe.verification.forms` takes there.
+        scikit-fem basis of these with their closest points, and what `tests.verification.forms` takes there.
     contact, stress_loads : ndarray
         Nodal forces (N) of p n . [v] and of theta/gamma p sigma_n(v).
     multipliers : ndarray, shape (m,)

@@ -27,7 +27,8 @@ import numpy as np
 from skfem import BilinearForm, LinearForm
 from skfem.helpers import ddot, dot, eye, grad, mul, prod, trace, transpose
 
-from ..typing import Array
+from gearfe.typing import Array
+
 from .bodies import Bodies
 
 Kinematics = Literal["small", "finite"]
@@ -43,11 +44,11 @@ class SmallStrain:
         """Internal forces (N)."""
         return np.asarray(self.stiffness @ u)
 
-    def tangent(self, u: Array) -> Any:  # noqa: ARG002 (that of the other)
+    def tangent(self, u: Array) -> Any:
         """Their derivative, sparse (N/m)."""
         return self.stiffness
 
-    def surface_stress(self, h: Array, n: Array, n0: Array, lam: Array, mu: Array) -> tuple[Array, Array]:  # noqa: ARG002
+    def surface_stress(self, h: Array, n: Array, n0: Array, lam: Array, mu: Array) -> tuple[Array, Array]:
         """sigma_n = n0 . sigma n0 at points of the surface, and P with delta sigma_n = P : grad v.
 
         Parameters

@@ -9,11 +9,12 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.spatial import KDTree
 
-from ..contact.laws import ElementLaw
-from ..elasticity import Material, Plane
-from ..meshing.tooth_sector import SectorMesh
-from ..meshing.whole_gear import WholeGear, whole_gear
-from ..typing import Array
+from gearfe.contact.laws import ElementLaw
+from gearfe.elasticity import Material, Plane
+from gearfe.meshing.tooth_sector import SectorMesh
+from gearfe.meshing.whole_gear import WholeGear, whole_gear
+from gearfe.typing import Array
+
 from .bodies import Bodies, ElasticBody
 from .constitution import Kinematics
 from .problem import ContactProblem, Surface
@@ -43,7 +44,7 @@ class WholePair:
     width
         Common face width (m).
     points_per_edge, quadrature, kinematics
-        As in `gearfe.verification.problem.ContactProblem`.
+        As in `tests.verification.problem.ContactProblem`.
     """
 
     pinion: ElasticGear

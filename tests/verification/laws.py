@@ -1,6 +1,6 @@
 r"""Contact laws of the oracle: what the pressure is, given gap and stress.
 
-**Laws at points.** :math:`p = \max(0, -\gamma g - s\,\sigma_n)` in the weak form of `gearfe.verification.forms`:
+**Laws at points.** :math:`p = \max(0, -\gamma g - s\,\sigma_n)` in the weak form of `tests.verification.forms`:
 those of `gearfe.contact.laws` with theta = 0, and Nitsche's family with s = 1 and theta = 1, 0 or -1 (Chouly, Mlika &
 Renard, *Numer. Math.* 139, 2018, written with the gap g in place of its negative). For theta = 1 it is the derivative
 of the energy :math:`\tfrac12 a(u,u) + \int (p^2 - \sigma_n^2)/(2 \gamma)`, convex only for gamma0 above a bound (some
@@ -27,10 +27,10 @@ from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
-from ..contact import laws
-from ..contact.laws import ElementLaw, Penalty, Sides, carrying, check_sides
-from ..errors import InputError
-from ..typing import Array
+from gearfe.contact import laws
+from gearfe.contact.laws import ElementLaw, Penalty, Sides, carrying, check_sides
+from gearfe.errors import InputError
+from gearfe.typing import Array
 
 __all__ = ["Exact", "Nitsche", "Penalty", "shares_of", "theta_of"]
 

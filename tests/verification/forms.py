@@ -1,7 +1,7 @@
 r"""The contact's weak form as scikit-fem forms on pairs of points.
 
 A contact point x_s of one body and its closest point x_m on the deformed mate, :math:`x_s - x_m(\xi) = g\,n(\xi)`, form
-a pair; fields of the first carry the index s, those of the second m. For all v (`gearfe.verification.laws`)
+a pair; fields of the first carry the index s, those of the second m. For all v (`tests.verification.laws`)
 
 .. math::
     a(u, v) - \int \frac{\theta}{\gamma}\,\sigma_n(u)\,\sigma_n(v)
@@ -19,7 +19,7 @@ are (Laursen, *Computational Contact and Impact Mechanics*, 2002, ch. 5, in two 
 
 The normal is blended between edges (`gearfe.contact.closest`), hence the small n . a; its kinks are left out of the
 last formula. In the forms `w` holds, at each pair: g, n, a, kappa; X_xi = dX/dxi of the mate's undeformed edge; gamma,
-s and theta; stress_rate P, with which delta sigma_n = P : grad v_s (`gearfe.verification.constitution`); p; active,
+s and theta; stress_rate P, with which delta sigma_n = P : grad v_s (`tests.verification.constitution`); p; active,
 H(p); and share, the part of a point's stretch of surface that faces the mate, which changes with xi at its sharp end.
 """
 
@@ -82,7 +82,7 @@ def pressure_work(v_s: Any, v_m: Any, w: Any) -> Any:
 
 
 @LinearForm
-def stress_work(v_s: Any, v_m: Any, w: Any) -> Any:  # noqa: ARG001 (both fields of a pair come)
+def stress_work(v_s: Any, v_m: Any, w: Any) -> Any:
     """theta/gamma p sigma_n(v)."""
     return w.share * w.p * w.theta / w.gamma * normal_stress_rate(v_s, w)
 

@@ -1,6 +1,6 @@
 r"""Contact of elastic bodies in all unknowns at once, by a semi-smooth Newton method with a backtracking line search.
 
-The weak form and its derivative are in `gearfe.verification.forms`. The exact law adds an equation for each of its
+The weak form and its derivative are in `tests.verification.forms`. The exact law adds an equation for each of its
 multipliers, with the mean gap :math:`\bar g_i = \int\psi_i g / \int\psi_i` and any c > 0,
 
 .. math:: \lambda_i = \max(0,\; \lambda_i - c\,\bar g_i),
@@ -18,7 +18,8 @@ import numpy as np
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
-from ..typing import Array, IntArray
+from gearfe.typing import Array, IntArray
+
 from .contact_state import ContactState, contact_at, multiplier_basis
 from .forms import gap_change, unit_pressure_work
 from .problem import ContactProblem

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..contact.laws import ElementLaw
-from ..typing import Array
+from gearfe.contact.laws import ElementLaw
+from gearfe.typing import Array
+
 from .contact_state import contact_at
 from .newton import TOLERANCE, ContactSolution, solve_contact
 from .problem import ContactProblem
