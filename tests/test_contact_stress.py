@@ -60,7 +60,9 @@ def test_beside_contacts_as_on_a_fine_flank() -> None:
     contacts = position.contacts
     assert isinstance(contacts, PairContacts)
     for gear in (0, 1):
-        stress = LinearNDInterpolator(fine[gear].points, fine[gear].stress)
+        # so far that triangles reach across to the next tooth: places just outside of the fine flank lie in them
+        beside = np.abs(fine[gear].points @ [[1], [1j]] - contacts.point).min(axis=1) < 8e-3
+        stress = LinearNDInterpolator(fine[gear].points[beside], fine[gear].stress[beside])
         assert len(bumped(elastic.bodies[gear], position, gear)[1]) == len(contacts) == 2
         for k in range(2):
             away = np.abs(fields[gear].points @ [1, 1j] - contacts.point[k])

@@ -42,7 +42,7 @@ def test_tangent_is_the_derivative_of_the_forces() -> None:
 def test_moments_balance_in_the_deformed_place() -> None:
     """Finite strain fulfils the balance of moments where the bodies are: the reactions at the bore carry the moment of
     the contact forces. Small strain fulfils it in the undeformed place only."""
-    pair = whole("modified", 5.0, "strain")
+    pair = whole("modified", 10.0, "strain")
     place = math.radians(10.0), math.radians(0.3)
     small = solve_monolithic(pair, Nitsche(), *place)
     finite = solve_monolithic(replace(pair, kinematics="finite"), Nitsche(), *place, tolerance=1e-9)

@@ -26,13 +26,18 @@ NAMES = {"scipy_ivp": "scipy", "sundials": "SUNDIALS", "calculix": "CalculiX", "
 
 
 def draw_all(folder: Path) -> list[str]:
-    """Draw every table of the folder that has a picture; returns the names of the files."""
+    """Draw every table of the folder that has a picture, unless it is newer than its table and this module; returns the
+    names of the files.
+    """
     made = []
     for name, draw in PICTURES.items():
-        table = folder / f"{name}.csv"
-        if table.exists():
-            draw_one(folder / f"{name}.png", read_rows(table), draw)
-            made.append(f"{name}.png")
+        table, picture = folder / f"{name}.csv", folder / f"{name}.png"
+        if not table.exists():
+            continue
+        changed = max(path.stat().st_mtime_ns for path in (table, Path(__file__)))
+        if not (picture.exists() and picture.stat().st_mtime_ns >= changed):
+            draw_one(picture, read_rows(table), draw)
+        made.append(picture.name)
     return made
 
 

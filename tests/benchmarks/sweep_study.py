@@ -26,8 +26,8 @@ from .subject import off_changes, shipped_pair
 from .timing import measured
 
 #: `coarsen` of the converged run, and the sizes that are measured.
-REFERENCE, QUICK_REFERENCE = 0.35, 1.0
-SIZES, QUICK_SIZES = (2.8, 2.0, 1.4, 1.0, 0.7, 0.5), (2.0, 1.4)
+REFERENCE, QUICK_REFERENCE = 0.35, 1.4
+SIZES, QUICK_SIZES = (2.8, 2.0, 1.4, 1.0, 0.7, 0.5), (2.8, 2.0)
 #: Numbers of distinct positions in one mesh cycle.
 POSITIONS, QUICK_POSITIONS = (18, 40, 400, 4000), (3, 6)
 #: Twists (deg).

@@ -58,10 +58,10 @@ def test_the_stated_error_covers_the_exact_motion() -> None:
 
 @pytest.mark.parametrize("tolerance", [1e-10, 1e-12, 1e-13])
 def test_the_stated_error_covers_rounding(tolerance: float) -> None:
-    """The exact angle to 20 digits, where a finer run has the same rounding."""
+    """The exact angle to 20 digits over the first 4 s, where a finer run has the same rounding."""
     exact = np.genfromtxt(
         ROOT / "tests" / "data" / "slider_crank_reference.csv", delimiter=",", names=True, skip_header=1
-    )
+    )[:81]
     mechanism = load_mechanism(ROOT / "geometry" / "slider_crank.toml")
     start = mechanism.start()
     options = {"tolerance": tolerance, "start": start, "method": "taylor", "backend": "plain"}
