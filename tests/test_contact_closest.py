@@ -7,8 +7,10 @@ parameter keep it one: there are no kinks between edges, and blended and own nor
 import numpy as np
 import pytest
 
-from gearfe.contact.closest import OFF_END, Projection, nearest_places, project
+from gearfe.contact.closest import OFF_END, Projection, project
 from gearfe.contact.flank import edge_nodes, edge_shapes
+
+from .verification.problem import nearest_places
 
 EDGES = 4
 STEP = 1e-5

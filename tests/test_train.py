@@ -17,6 +17,7 @@ from gearfe.train.inertia import outline_moments
 from gearfe.train.kinematics import rolling, steady_forces
 from gearfe.train.states import train_states
 
+from .full_model import full_model
 from .trains import ALPHA, SHIPPED, SPEED, TORQUE, base_radius, braking, changed, curve, elastic, gear, train
 
 PERIOD = 0.15 * 2 * math.pi / SPEED  # common mesh period of two 20/30 stages
@@ -308,7 +309,7 @@ def test_reduced_against_full_housing_in_the_coupled_transient() -> None:
         base, shafts=shafts, housing=body, rigid_bores={}, drive=Drive("s0", "1", constant(SPEED)),
         loads=(Load("s2", "5", braking(2)),), damping=Damping(beta=1.6e-6, gyroscopic=False),
     )  # fmt: skip
-    model, full, step = build_train(gear_train), housing.full_model(), 5e-6
+    model, full, step = build_train(gear_train), full_model(housing), 5e-6
     options = {"beta": 1.6e-6, "step": step, "steps": 1400}
     _, force, acceleration = coupled_transient(model, full.mass, full.stiffness, **options)
     _, less_force, less = coupled_transient(model, body.mass, body.stiffness, **options)

@@ -71,15 +71,6 @@ class Projection:
         return self.gap < OFF_END
 
 
-def nearest_places(points: ComplexArray, chain: ComplexArray) -> Array:
-    """Starting places on a chain of 2 e + 1 nodes: the nearest node of each point, shape (n,)."""
-    nearest = np.empty(len(points))
-    for first in range(0, len(points), 256):  # blocks that stay in the cache
-        part = slice(first, first + 256)
-        nearest[part] = 0.5 * np.argmin(np.abs(points[part, None] - chain), axis=1)
-    return nearest
-
-
 def project(
     slave: ComplexArray,
     nodes: ComplexArray,

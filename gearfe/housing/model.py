@@ -25,7 +25,6 @@ from .attachments import (
     interface_matrix,
     plane_nodes,
 )
-from .full import FullModel, full_model
 from .mesh_checks import checked_mesh
 from .meshes import Outer, Prisms, Tetrahedra
 from .surface import Surface, nodal_normals
@@ -293,10 +292,6 @@ class Housing(Facts):
         metric = body.stiffness + (body.mass * slow if len(self.fixed) == 0 else 0.0)
         share = np.linalg.pinv(fields.T @ metric @ fields, rcond=DEPENDENT, hermitian=True) @ (fields.T @ metric)
         return replace(body, softening=np.asarray(share.T @ lost @ share))
-
-    def full_model(self, solver: str = "auto") -> FullModel:
-        """The same body without reduction, over [attachments | all internal unknowns]."""
-        return full_model(self.partition(self.matrices()), held=len(self.fixed) > 0, solver=solver)
 
     def partition(self, matrices: SolidMatrices) -> Partition:
         """The matrices over the attachments' coordinates and the internal unknowns."""

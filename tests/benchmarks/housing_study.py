@@ -17,6 +17,7 @@ from gearfe.housing.model import Housing
 from gearfe.reduction.craig_bampton import Partition, reduce_model
 from gearfe.reduction.sparse_solver import installed_solvers
 
+from ..full_model import full_model
 from ..newmark import newmark, smooth_ramp
 from .peers.process import missing, run_python
 from .record import Record
@@ -100,7 +101,7 @@ def reductions(record: Record) -> None:
     @lru_cache(maxsize=1)
     def truth() -> tuple[Housing, Any]:
         housing = housing_of(size, small=record.quick)
-        full = housing.full_model()
+        full = full_model(housing)
         return housing, newmark(
             full.mass, BETA * full.stiffness, full.stiffness, load, step=step, steps=steps, watch=range(rows)
         )

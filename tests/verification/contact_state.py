@@ -10,13 +10,13 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from skfem import DiscreteField
 
-from gearfe.contact.closest import Projection, nearest_places, project
+from gearfe.contact.closest import Projection, project
 from gearfe.typing import Array, ComplexArray, IntArray
 
 from . import forms
 from .bodies import edge_points, edge_tangents
 from .laws import theta_of
-from .problem import ContactProblem, Points
+from .problem import ContactProblem, Points, nearest_places
 
 PLANE = np.array([1.0, 1.0j])
 

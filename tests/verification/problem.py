@@ -9,16 +9,25 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.contact.closest import nearest_places, project
+from gearfe.contact.closest import project
 from gearfe.contact.laws import ElementLaw
 from gearfe.errors import InputError
-from gearfe.typing import Array, IntArray
+from gearfe.typing import Array, ComplexArray, IntArray
 
 from .bodies import Bodies, Value, edge_lengths, edge_points, edge_tangents
 from .constitution import Kinematics, SaintVenantKirchhoff, SmallStrain, linear_stress_rate
 from .forms import stress_term
 from .laws import shares_of, theta_of
 from .segments import Quadrature, segments, whole_edges
+
+
+def nearest_places(points: ComplexArray, chain: ComplexArray) -> Array:
+    """Starting places on a chain of 2 e + 1 nodes: the nearest node of each point, shape (n,)."""
+    nearest = np.empty(len(points))
+    for first in range(0, len(points), 256):  # blocks that stay in the cache
+        part = slice(first, first + 256)
+        nearest[part] = 0.5 * np.argmin(np.abs(points[part, None] - chain), axis=1)
+    return nearest
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ..errors import InputError
-from ..reduction.craig_bampton import Partition, rigid_shift
-from ..reduction.lanczos import lowest_modes
-from ..reduction.sparse_solver import factorize
-from ..threads import one_thread
-from ..typing import Array
+from gearfe.errors import InputError
+from gearfe.housing.model import Housing
+from gearfe.reduction.craig_bampton import rigid_shift
+from gearfe.reduction.lanczos import lowest_modes
+from gearfe.reduction.sparse_solver import factorize
+from gearfe.threads import one_thread
+from gearfe.typing import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +70,9 @@ class FullModel:
         return np.asarray((self.transform @ q).reshape(-1, 3))
 
 
-def full_model(parts: Partition, *, held: bool, solver: str) -> FullModel:
-    """Model over all unknowns of a body that is split into interfaces and internal rows."""
+def full_model(housing: Housing, solver: str = "auto") -> FullModel:
+    """The body of a housing over [attachments | all internal unknowns]."""
+    parts = housing.partition(housing.matrices())
     k, m = (
         sparse.csr_array(sparse.block_array([[bb, ib.T], [ib, ii]]))
         for bb, ib, ii in ((parts.k_bb, parts.k_ib, parts.k_ii), (parts.m_bb, parts.m_ib, parts.m_ii))
@@ -78,4 +80,4 @@ def full_model(parts: Partition, *, held: bool, solver: str) -> FullModel:
     count, rows = len(parts.internal), len(parts.boundary)
     unit = sparse.csc_array((np.ones(count), (parts.internal, np.arange(count))), shape=(rows, count))
     transform = sparse.hstack([sparse.csc_array(parts.boundary), unit], format="csc")
-    return FullModel(m, k, transform, parts.boundary.shape[1], held, solver)
+    return FullModel(m, k, transform, parts.boundary.shape[1], len(housing.fixed) > 0, solver)
