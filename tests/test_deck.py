@@ -75,6 +75,7 @@ def test_the_command_names_contact_boundaries_and_draws(tmp_path, capsys):
         assert main(["mesh", job, "--out", str(out), *wrong]) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
 def test_calculix_runs_the_deck_and_finds_the_torque(tmp_path, capsys):
     """Another program, another contact, finite strain: the torque within 1 % on a coarse mesh (0.02 % at coarsen 2)."""

@@ -21,7 +21,7 @@ job, crank, out = sys.argv[1:]
 coarse = ["--coarsen", "4", "--angles", "0", "9", "9", "--no-estimate", "--no-pictures"]
 assert main(["stiffness", job, "--out", out + "/pair", "--fields", "0", *coarse]) == 0
 assert main(["mechanism", crank, "--out", out + "/crank", "--until", "0.05", "--no-pictures"]) == 0
-print(draw_apart("gearfe.figures.housing", out + "/x.png", {{}}, seconds=1.0))
+print(draw_apart("gearfe.figures.housing", {{out + "/x.png": {{}}}}, seconds=1.0))
 """
 
 

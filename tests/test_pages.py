@@ -32,6 +32,7 @@ SHORTER = {
     "positions = 12": "positions = 4",
     "rounds=40": "rounds=2",
     "range(10)": "range(2)",
+    "jobs=2": "jobs=1",
 }
 PLACES = {"angles": np.zeros(3), "approaches": np.full(3, 1e-5)}
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)

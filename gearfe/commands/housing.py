@@ -216,7 +216,7 @@ def _write(
 def _draw(folder: Path, body: ModalBody, fields: Any) -> str:
     import numpy as np
 
-    from ..figures.housing import draw_modes
+    from ..figures.housing import draw_bodies, picture_of_bodies
     from ..housing.mesh_checks import boundary_faces
 
     faces = boundary_faces(body.elements)
@@ -230,7 +230,7 @@ def _draw(folder: Path, body: ModalBody, fields: Any) -> str:
         marked["seagreen"] = np.flatnonzero(~np.any(body.shapes.reshape(len(body.nodes), -1), axis=1))
     named = {f"bore {name}": place for name, place in zip(body.attachment_names, body.attachment_points, strict=True)}
     title = f"bores (red){', held (green)' if body.held else ''}; mass {body.rigid_mass[0, 0]:.3g} kg"
-    problem = draw_modes(folder / "housing.png", body.nodes, faces, still, [title], marked=marked, labels=named)
-    if problem or not titles:
-        return problem
-    return draw_modes(folder / "modes.png", body.nodes, faces, fields[list(chosen)], titles)
+    pictures = {"housing.png": picture_of_bodies(body.nodes, faces, still, [title], marked=marked, labels=named)}
+    if titles:
+        pictures["modes.png"] = picture_of_bodies(body.nodes, faces, fields[list(chosen)], titles)
+    return draw_bodies({folder / name: picture for name, picture in pictures.items()})

@@ -7,7 +7,6 @@ a picture and a message, not the results.
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +16,7 @@ import numpy as np
 from ..output.arrays import load_arrays
 from ..output.files import whole_file
 from ..typing import Array, IntArray
-from .offscreen import draw_apart
+from .offscreen import draw_all, draw_apart
 from .style import new_figure, save
 
 if TYPE_CHECKING:
@@ -34,8 +33,7 @@ ZOOM = 1.15
 _SECONDS = 120.0
 
 
-def draw_modes(
-    path: str | Path,
+def picture_of_bodies(
     points: Array,
     faces: IntArray,
     fields: Array,
@@ -43,13 +41,11 @@ def draw_modes(
     *,
     marked: Mapping[str, IntArray] | None = None,
     labels: Mapping[str, Array] | None = None,
-) -> str:
-    """Draw deformed surfaces side by side into one picture.
+) -> dict[str, Array]:
+    """What `draw_bodies` draws: deformed surfaces side by side.
 
     Parameters
     ----------
-    path
-        Picture to write (``.png``).
     points : (n, 3)
         Coordinates (m).
     faces : (f, 3) or (f, 6)
@@ -62,15 +58,10 @@ def draw_modes(
         Colour -> numbers of points to mark with it.
     labels
         Name -> place (m), for the attachments.
-
-    Returns
-    -------
-    str
-        Empty when the picture was drawn, else why not.
     """
     used, renumbered = np.unique(faces, return_inverse=True)
     named = {} if labels is None else dict(labels)
-    arrays = {
+    return {
         "points": points[used],
         "faces": renumbered.reshape(faces.shape),
         "fields": fields[:, used],
@@ -80,7 +71,11 @@ def draw_modes(
         "names": np.array(list(named)),
         "places": np.array(list(named.values())).reshape(-1, 3),
     }
-    return draw_apart(__name__, path, arrays, seconds=_SECONDS)
+
+
+def draw_bodies(pictures: Mapping[str | Path, Mapping[str, Array]]) -> str:
+    """Write pictures (``.png``) of `picture_of_bodies`; return an empty text, or why there are none."""
+    return draw_apart(__name__, pictures, seconds=_SECONDS)
 
 
 def _draw(job: Path, target: Path) -> None:
@@ -178,4 +173,4 @@ def mac_figure(path: str | Path, made: Comparison, name: str) -> None:
 
 
 if __name__ == "__main__":
-    _draw(Path(sys.argv[1]), Path(sys.argv[2]))
+    draw_all(_draw)

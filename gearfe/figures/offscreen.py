@@ -11,7 +11,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from ..output.arrays import save_arrays
@@ -21,26 +21,30 @@ from ..typing import Array
 MISSING = "pyvista is not installed: pip install 'gearfe[fields]'"
 
 
-def draw_apart(module: str, path: str | Path, arrays: Mapping[str, Array], *, seconds: float) -> str:
-    """Run ``python -m module JOB PATH`` on stored arrays; return an empty text, or why nothing was drawn.
+def draw_apart(module: str, pictures: Mapping[str | Path, Mapping[str, Array]], *, seconds: float) -> str:
+    """Run ``python -m module JOB PATH JOB PATH ...`` on stored arrays; return an empty text, or what was not drawn.
 
     Parameters
     ----------
     module
-        Drawing module; run as a program it takes the file of arrays and the picture to write.
+        Drawing module; run as a program it takes files of arrays and the picture to write for each.
+    pictures
+        Path of a picture -> what it shows.
     seconds
-        How long it may take.
+        How long all may take.
     """
     if importlib.util.find_spec("pyvista") is None:
         return MISSING
     with tempfile.TemporaryDirectory() as folder:
-        job = Path(folder) / "job.npz"
-        save_arrays(job, arrays)
+        command = [sys.executable, "-m", module]
+        for number, (path, arrays) in enumerate(pictures.items()):
+            job = Path(folder) / f"{number}.npz"
+            save_arrays(job, arrays)
+            command += [str(job), str(path)]
         environment = dict(os.environ)
         if sys.platform.startswith("linux"):
             environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
         environment["PYTHONPATH"] = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
-        command = [sys.executable, "-m", module, str(job), str(path)]
         try:
             done = subprocess.run(
                 command, env=environment, capture_output=True, text=True, errors="replace", timeout=seconds, check=False
@@ -51,3 +55,10 @@ def draw_apart(module: str, path: str | Path, arrays: Mapping[str, Array], *, se
         last = done.stderr.strip().splitlines()[-1:] or [f"the drawing process ended with code {done.returncode}"]
         return f"{last[0]} (off-screen drawing needs EGL or Mesa: apt-get install libegl1 libgl1)"
     return ""
+
+
+def draw_all(draw: Callable[[Path, Path], None]) -> None:
+    """Draw each pair of job and picture of the command line: what a drawing module does as a program."""
+    paths = [Path(name) for name in sys.argv[1:]]
+    for job, target in zip(paths[::2], paths[1::2], strict=True):
+        draw(job, target)

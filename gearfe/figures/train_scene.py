@@ -7,7 +7,6 @@ a picture and a message, not the results. The animation is a GIF, put together b
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from ..output.arrays import load_arrays
 from ..output.files import whole_file
 from ..typing import Array, IntArray
-from .offscreen import draw_apart
+from .offscreen import draw_all, draw_apart
 
 _SECONDS = 300.0
 #: Milliseconds a frame.
@@ -43,7 +42,7 @@ def draw_scene(path: str | Path, arrays: Mapping[str, Array], title: str, most: 
         Empty when it was drawn, else why not.
     """
     chosen = {} if most is None else {"range": np.array(most)}
-    return draw_apart(__name__, path, {**arrays, **chosen, "title": np.array(title)}, seconds=_SECONDS)
+    return draw_apart(__name__, {path: {**arrays, **chosen, "title": np.array(title)}}, seconds=_SECONDS)
 
 
 def _draw(job: Path, target: Path) -> None:
@@ -176,4 +175,4 @@ def _cells(table: IntArray) -> IntArray:
 
 
 if __name__ == "__main__":
-    _draw(Path(sys.argv[1]), Path(sys.argv[2]))
+    draw_all(_draw)
