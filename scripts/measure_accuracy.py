@@ -20,9 +20,8 @@ from pathlib import Path
 import numpy as np
 
 from gearfe import GearPair, sweep_stiffness
-from gearfe.contact.model import DEFAULT_MODEL
-from gearfe.meshing.recipe import sector_recipes
-from gearfe.meshing.tooth_sector import sector_mesh
+from gearfe.contact.laws import DEFAULT_MODEL
+from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
 from gearfe.stiffness.job import read_stiffness_job
 from gearfe.tables.laws import LAWS
 

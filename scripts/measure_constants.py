@@ -32,12 +32,12 @@ CONSTANTS: dict[str, dict[str, tuple[Any, Any]]] = {
     "contact.half_plane": {
         "HELD_STEPS": (2, 6), "MOVED": (0.05, 0.2), "NEAR": (1e-5, 4e-5), "TOLERANCE": (5e-7, 2e-6),
         "WIDENED_BELOW": (2.5e-3, 1e-2), "SEARCHES": (6, 24), "AHEAD": (5e-4, 2e-3), "STEPS": (20, 60),
+        "SHARPEST": (0.01, 0.04),
     },
-    "contact.half_plane_start": {"SHARPEST": (0.01, 0.04)},
-    "contact.moved_faces": {"NEAR": (5e-4, 2e-3), "STEEPEST": (0.1, 0.4)},
+    "gear.flank_curve": {"NEAR": (5e-4, 2e-3), "STEEPEST": (0.1, 0.4)},
     "contact.elements": {"AHEAD": (5e-5, 2e-4), "SETTLED": (5e-6, 2e-5)},
     "contact.element_newton": {"BESIDE": (3, 10), "STEPS": (30, 80)},
-    "stiffness.torque_control": {"STEEP": (5.0, 20.0), "JUMP": (5e-4, 2e-3), "MAX_FAILURES": (2, 6)},
+    "stiffness.positions": {"STEEP": (5.0, 20.0), "JUMP": (5e-4, 2e-3), "MAX_FAILURES": (2, 6)},
 }  # fmt: skip
 #: Modules whose constants the condensed gears depend on.
 OF_GEARS = ("contact.flank_compliance",)

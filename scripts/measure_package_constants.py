@@ -149,7 +149,7 @@ def curves() -> Answers:
     pair, law = coarse_pair(), HalfPlane()
     curve = sweep_stiffness(pair, torque=80.0, law=law, coarsen=3.0, estimate_error=True)
     loads = sweep_loads(pair, [20.0, 80.0, 200.0], law=law, coarsen=3.0, root_stress=True)
-    error = float(curve.error.worst)
+    error = curve.worst_error
     return {
         "stiffness": (curve.k_mesh, error),
         "pressure": (np.nan_to_num(curve.peak_pressure), 0.02),
@@ -187,7 +187,7 @@ ROOMS: dict[str, tuple[Callable[[], Answers], tuple[str, ...]]] = {
     "meshing.housing_mesh": (housings, ()),
     "gear": (gears, ("pitch_errors", "modifications", "deviation", "flank_curve", "iso6336", "validity", "LARGEST")),
     "gear.flank_curve": (curves, ()),
-    "stiffness": (curves, ("torque_control", "SIDE_BY_SIDE", "report")),
+    "stiffness": (curves, ("SIDE_BY_SIDE", "report")),
     "loadmap": (curves, ("MOST_CELLS",)),
     "meshing.tooth_sector": (curves, ("RECIPE",)),
 }

@@ -33,8 +33,8 @@ CAPABILITIES = {
         mechanisms/sweep.py mechanisms/tables.py tables/beam.py
     """,
     "extruded housing meshes, compiled kernels kept": """
-        prisms.py housing/prism_error.py housing/meshes.py rigid/packed* rigid/parts.py versions.py meshing/*recipe.py
-        housing/body.py
+        prisms.py housing/prism_error.py housing/meshes.py rigid/packed* rigid/parts.py versions.py
+        meshing/housing_recipe.py housing/body.py
     """,
     "own housings, exchange, reports, analyses of records": """
         housing/own_mesh.py housing/nastran_files.py housing/superelement.py housing/dmig.py housing/modal_test.py

@@ -15,8 +15,7 @@ from gearfe.contact.compliance import REACH, FarField, GearBody, MeshingPair, tu
 from gearfe.contact.element_batch import FirstContacts
 from gearfe.contact.elements import solve_elements
 from gearfe.contact.flank import flank_of, normal_stress_rows
-from gearfe.contact.laws import ContactLaw
-from gearfe.contact.model import PairModel
+from gearfe.contact.laws import ContactLaw, PairModel
 from gearfe.contact.position import Positions
 
 from .verification.bodies import Bodies, ElasticBody

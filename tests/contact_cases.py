@@ -6,12 +6,10 @@ import math
 from functools import cache
 
 from gearfe.contact.compliance import GearBody, MeshingPair, gear_body
-from gearfe.contact.laws import ContactLaw
-from gearfe.contact.model import PairModel
+from gearfe.contact.laws import ContactLaw, PairModel
 from gearfe.elasticity import Material, Plane
 from gearfe.gear.pair import Gear, GearPair, TipRelief
-from gearfe.meshing.recipe import sector_recipes
-from gearfe.meshing.tooth_sector import SectorMesh, sector_mesh
+from gearfe.meshing.tooth_sector import SectorMesh, sector_mesh, sector_recipes
 
 from .verification.whole_pair import ElasticGear, WholePair
 

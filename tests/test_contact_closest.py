@@ -7,8 +7,7 @@ parameter keep it one: there are no kinks between edges, and blended and own nor
 import numpy as np
 import pytest
 
-from gearfe.contact.closest import OFF_END, Projection, project
-from gearfe.contact.flank import edge_nodes, edge_shapes
+from gearfe.contact.flank import OFF_END, Projection, edge_nodes, edge_shapes, project
 
 from .verification.problem import nearest_places
 

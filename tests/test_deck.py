@@ -14,7 +14,7 @@ import pytest
 
 from gearfe.cli import main
 from gearfe.meshing.deck import deck_torque
-from gearfe.meshing.recipe import sector_recipes
+from gearfe.meshing.tooth_sector import sector_recipes
 from gearfe.meshing.whole_gear import mixed_gear, teeth_in_mesh
 from gearfe.tables.examples import job_file
 

@@ -13,7 +13,7 @@ from gearfe.cli import main
 from gearfe.contact.compliance import MeshingPair
 from gearfe.gear.pair import TipRelief
 from gearfe.loadmap.sweep import sweep_loads
-from gearfe.meshing.recipe import sector_recipes
+from gearfe.meshing.tooth_sector import sector_recipes
 from gearfe.stiffness.positions import ElementSolver, position_solver
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 

@@ -12,8 +12,7 @@ from gearfe.contact.compliance import MeshingPair, gear_body
 from gearfe.contact.elements import first_contacts, solve_elements
 from gearfe.contact.finite_strain import finite_strain_shares
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
-from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
-from gearfe.contact.model import PairModel
+from gearfe.contact.laws import ContactLaw, Nitsche, PairModel, Penalty
 from gearfe.contact.position import Positions
 
 from .contact_cases import IRON, STEEL, WIDTH, condensed, gears, meshes

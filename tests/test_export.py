@@ -8,9 +8,8 @@ import pytest
 
 from gearfe.errors import InputError
 from gearfe.meshing.export import MeshPart, export_mesh
-from gearfe.meshing.recipe import sector_recipes
 from gearfe.meshing.session import gmsh_session
-from gearfe.meshing.tooth_sector import sector_mesh
+from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
 from gearfe.meshing.whole_gear import whole_gear
 
 from .gears import pair

@@ -12,13 +12,11 @@ import pytest
 
 from gearfe.contact import finite_strain
 from gearfe.contact.compliance import MeshingPair, gear_body, sector_displacements
-from gearfe.contact.laws import Nitsche
-from gearfe.contact.model import PairModel
+from gearfe.contact.laws import Nitsche, PairModel
 from gearfe.contact.position import Positions
 from gearfe.elasticity import Material, physical_gradients, triangle_shapes
 from gearfe.gear.pair import Gear, GearPair
-from gearfe.meshing.recipe import sector_recipes
-from gearfe.meshing.tooth_sector import sector_mesh
+from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
 from gearfe.stiffness.positions import at_torques, at_twists, position_solver
 from gearfe.stiffness.sweep import sweep_stiffness
 

@@ -9,8 +9,7 @@ import pytest
 
 from gearfe.errors import InputError
 from gearfe.gear.mesh_geometry import MeshGeometry
-from gearfe.gear.pair import Gear, GearPair, TipRelief
-from gearfe.gear.pair_checks import tip_penetration
+from gearfe.gear.pair import Gear, GearPair, TipRelief, tip_penetration
 
 NM = 1e-12  # 1e-9 mm (m)
 

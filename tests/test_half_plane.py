@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearfe.contact.half_plane import NEAR, change, half_plane_pair, solve_half_plane
-from gearfe.contact.half_plane_start import first_state
+from gearfe.contact.half_plane import NEAR, change, first_state, half_plane_pair, solve_half_plane
 from gearfe.contact.half_plane_step import step
 from gearfe.elasticity import Material
 from gearfe.gear.pair import GearPair

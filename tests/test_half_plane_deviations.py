@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
-from gearfe.contact.moved_faces import Faces
 from gearfe.gear.deviation import Deviation, ToothDeviations
+from gearfe.gear.flank_curve import Faces
 from gearfe.gear.pair import TipRelief
 from gearfe.gear.touching import face_of
 from gearfe.stiffness.sweep import elastic_pair

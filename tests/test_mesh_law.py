@@ -11,8 +11,7 @@ import pytest
 from gearfe import Gear, GearPair
 from gearfe.cache import entries
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
-from gearfe.contact.laws import law_named
-from gearfe.contact.model import PairModel
+from gearfe.contact.laws import PairModel, law_named
 from gearfe.elasticity import Material
 from gearfe.errors import InputError
 from gearfe.meshlaw.law import MeshLaw

@@ -16,8 +16,7 @@ from gearfe.gear.deviation import NOMINAL, ToothDeviations
 from gearfe.gear.deviation_job import deviations_of
 from gearfe.gear.modifications import FlankModification, Relief, Waviness, tooth_deviations
 from gearfe.gear.pair import GearPair, TipRelief
-from gearfe.meshing.recipe import sector_recipes
-from gearfe.meshing.tooth_sector import sector_mesh
+from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
 from gearfe.microgeometry.loaded_mesh import BACK, full_period
 from gearfe.microgeometry.solve import load_mesh
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness

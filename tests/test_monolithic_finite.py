@@ -11,11 +11,10 @@ import pytest
 from gearfe.contact import laws
 from gearfe.contact.compliance import MeshingPair, gear_body
 from gearfe.contact.finite_strain import NEIGHBOURS, finite_strain_shares
-from gearfe.contact.model import PairModel
+from gearfe.contact.laws import PairModel
 from gearfe.elasticity import Material
 from gearfe.gear.pair import Gear, GearPair
-from gearfe.meshing.recipe import sector_recipes
-from gearfe.meshing.tooth_sector import sector_mesh
+from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
 
 from .contact_cases import whole
 from .solving import solve_positions

@@ -13,8 +13,7 @@ import pytest
 
 from gearfe import InputError, sweep_stiffness
 from gearfe.cli import main
-from gearfe.contact.laws import Penalty, law_named
-from gearfe.contact.model import PairModel
+from gearfe.contact.laws import PairModel, Penalty, law_named
 from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.stiffness.curve_cache import curve_key
 from gearfe.stiffness.job import read_stiffness_job

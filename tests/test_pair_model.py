@@ -2,8 +2,7 @@
 
 import pytest
 
-from gearfe.contact.laws import HalfPlane, Nitsche
-from gearfe.contact.model import PairModel
+from gearfe.contact.laws import HalfPlane, Nitsche, PairModel
 from gearfe.elasticity import Material
 from gearfe.errors import InputError
 from gearfe.gear.deviation import NOMINAL, ToothDeviations

@@ -10,8 +10,7 @@ from gearfe.contact.flank import flank_of
 from gearfe.contact.position import FlankLoads
 from gearfe.elasticity import element_stiffness
 from gearfe.loadmap.root_stress import fillet_radius, pair_roots, peaks, root_mesh, root_recipe, spread_of
-from gearfe.meshing.recipe import sector_recipes
-from gearfe.meshing.tooth_sector import sector_mesh
+from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
 from gearfe.meshing.whole_gear import whole_gear
 from gearfe.stiffness.fields import gear_recovery
 from gearfe.stiffness.sweep import elastic_pair

@@ -53,7 +53,7 @@ def loaded_after(code, **environment):
 def test_one_sector_instead_of_the_gears(gears, monkeypatch):
     """The whole gear is never built; that both routes agree is shown by tests/test_contact_routes.py."""
     # the modules that use it first: they must not meet the stand-in when they are imported
-    for room in ("stiffness.fields", "verification.whole_pair", "meshing.whole_gear"):
+    for room in ("stiffness.fields", "meshing.whole_gear"):
         monkeypatch.setattr(f"gearfe.{room}.whole_gear", touched)
     elastic = elastic_pair(gears, coarsen=COARSE)
     curve = sweep_stiffness(gears, twist=TWIST, angles=[0.0, 0.1], elastic=elastic)
@@ -136,7 +136,7 @@ def test_modes_above_the_band_are_not_sought(monkeypatch):
 def test_cached_meshes_start_no_mesher(tmp_path):
     """Nor do they load it; the second mesh is the first one."""
     sector = f"""
-from gearfe.meshing.recipe import sector_recipes
+from gearfe.meshing.tooth_sector import sector_recipes
 from gearfe.meshing.tooth_sector import sector_mesh
 from tests.benchmarks.subject import shipped_pair
 pair = shipped_pair()

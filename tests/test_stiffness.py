@@ -374,11 +374,13 @@ def test_the_error_estimate_finds_the_error(gears, elastic):
     curve = at(gears, angles, elastic, estimate_error=True, coarsen=COARSE)
     fine = at(gears, angles, coarsen=0.5 * COARSE)
     true = np.median(np.abs(curve.k_mesh / fine.k_mesh - 1))
-    assert true < curve.error.typical < 10 * true
-    assert curve.error.worst >= curve.error.typical > 0
+    assert true < curve.typical_error < 10 * true
+    assert curve.worst_error >= curve.typical_error > 0
     assert curve.timings["error estimate"] > 0
-    assert len(curve.error.relative) == len(curve.error.pinion_angle) == len(angles)
-    assert at(gears, angles[:1], elastic).error is None
+    assert np.isfinite(curve.relative_error).all()
+    bare = at(gears, angles[:1], elastic)
+    assert math.isnan(bare.worst_error)
+    assert set(curve.table()) - set(bare.table()) == {"k_mesh_relative_error"}
 
 
 def test_progress_counts_up(gears, elastic):

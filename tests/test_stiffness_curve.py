@@ -8,7 +8,7 @@ import pytest
 
 from gearfe import StiffnessCurve
 from gearfe.errors import InputError
-from gearfe.stiffness.curve_csv import from_text, to_text
+from gearfe.stiffness.curve import from_text, to_text
 
 #: The first columns of the file, in the order that is promised to readers.
 PROMISED = (

@@ -10,8 +10,8 @@ from gearfe.config import build
 from gearfe.contact.position import no_contact
 from gearfe.gear.pair import GearPair
 from gearfe.stiffness.job import StiffnessJob
+from gearfe.stiffness.positions import twists_for_torque
 from gearfe.stiffness.sweep import sweep_stiffness
-from gearfe.stiffness.torque_control import twists_for_torque
 from gearfe.tables.pair import PairTable
 from gearfe.tables.stiffness import StiffnessTable
 

@@ -101,7 +101,7 @@ def test_error_estimates_are_outputs(tmp_path):
     pair = GearPair.from_table(tables["pair"])
     one = StiffnessJob(tables["pair"], tables["stiffness"], pair, tables["microgeometry"])
     curve = sweep.sweep_stiffness(pair, one.model, estimate_error=True, **one.sweep)
-    assert made.output("worst")[0] == pytest.approx(curve.error.worst, rel=1e-12)
+    assert made.output("worst")[0] == pytest.approx(curve.worst_error, rel=1e-12)
     assert made.output("worst")[0] > 0.0
 
 

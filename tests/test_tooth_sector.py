@@ -13,8 +13,7 @@ from gearfe.errors import InputError
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.meshing import tooth_sector
 from gearfe.meshing.curved_triangles import least_jacobian
-from gearfe.meshing.recipe import sector_recipes
-from gearfe.meshing.tooth_sector import sector_mesh
+from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
 
 from .gears import pair
 

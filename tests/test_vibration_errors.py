@@ -14,7 +14,7 @@ import pytest
 from gearfe.cli import main
 from gearfe.record_spectrum import finer
 from gearfe.rigid import constant
-from gearfe.stiffness.curve import ErrorEstimate, StiffnessCurve
+from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.train import GearTrain, build_train, simulate
 from gearfe.vibration.errors import FORCES, PEAKS, STARTS, Run, with_errors
 from gearfe.vibration.follow import follow
@@ -137,21 +137,19 @@ def known_curve(error: float) -> StiffnessCurve:
     angle = cycle * np.arange(count) / count
     k = 1.2e8 * (1.0 + 0.15 * np.cos(20.0 * angle))
     numbers = {f.name: np.ones(count) for f in dataclasses.fields(StiffnessCurve) if f.type == "Array"}
-    numbers |= {"pinion_angle": angle, "k_mesh": k}
+    numbers |= {"pinion_angle": angle, "k_mesh": k, "relative_error": np.full(count, 0.5 * error)}
     words = {"status": np.full(count, "converged")}
     whole = {f.name: np.ones(count, dtype=int) for f in dataclasses.fields(StiffnessCurve) if f.type == "IntArray"}
-    estimate = ErrorEstimate(angle, np.full(count, 0.5 * error), 1.6, 1.0)
     shares = {"load_share": np.ones((count, 1))}
     known = {f.name for f in dataclasses.fields(StiffnessCurve)}
-    made = {**numbers, **words, **whole, **shares, "mesh_cycle": cycle, "base_radius": 0.03, "error": estimate}
+    made = {**numbers, **words, **whole, **shares, "mesh_cycle": cycle, "base_radius": 0.03}
     return StiffnessCurve(**{name: value for name, value in made.items() if name in known})
 
 
 def test_error_of_the_curve_is_that_of_a_stiffer_one() -> None:
     gear_train = train([(20, 30)])
     given = known_curve(0.01)
-    assert given.error is not None
-    assert given.error.worst == pytest.approx(0.01)
+    assert given.worst_error == pytest.approx(0.01)
     gear_train = dataclasses.replace(gear_train, meshes=(dataclasses.replace(gear_train.meshes[0], stiffness=given),))
     run, summary, again = estimated(gear_train)
     assert set(summary["headline_error_parts"]) == {"curve", "integration"}

@@ -117,8 +117,7 @@ def _check(args: argparse.Namespace) -> None:
 
 def _parts(args: argparse.Namespace, job: StiffnessJob, wheel_angle: float) -> dict[str, MeshPart]:
     """The meshes in their places, the wheel turned by `wheel_angle` (rad) from where a space faces the pinion."""
-    from ..meshing.recipe import sector_recipes
-    from ..meshing.tooth_sector import sector_mesh
+    from ..meshing.tooth_sector import sector_mesh, sector_recipes
 
     pair, table = job.pair, job.table
     recipes = sector_recipes(pair, coarsen=table.coarsen, flank_coarsen=table.flank_coarsen)

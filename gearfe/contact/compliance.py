@@ -32,8 +32,7 @@ from ..meshing.tooth_sector import SectorMesh
 from ..typing import Array, IntArray
 from .dissection import Condensed, condense
 from .flank import Flank, flank_of, normal_stress_rows
-from .laws import ContactLaw, uses_stress
-from .model import DEFAULT_MODEL, PairModel
+from .laws import DEFAULT_MODEL, ContactLaw, PairModel, uses_stress
 from .position import FlankLoads
 
 

@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..typing import Array, BoolArray, ComplexArray, IntArray
-from .closest import Projection, project
 from .compliance import GearBody, MeshingPair
+from .flank import Projection, project
 from .laws import carrying, on_elements, uses_stress
 from .position import ranges
 

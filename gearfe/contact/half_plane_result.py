@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..gear.flank_curve import WAY
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .compliance import MeshingPair
 from .flank import Flank, edge_shapes
 from .flank_compliance import FlankCompliance
 from .half_plane_pair import HalfPlanePair
 from .half_plane_step import Setting, State, Step, cross
-from .moved_faces import WAY
 from .panels import PANELS
 from .position import FlankLoads, taken
 

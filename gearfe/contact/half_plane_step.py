@@ -7,11 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ..gear.flank_curve import FlankTables
+from ..gear.flank_curve import LOOK, WAY, Faces, FlankTables, windows
 from ..gear.touching import Touching
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .half_plane_pair import HalfPlanePair, opened, panel_influence, sideways, widths_in_smooth
-from .moved_faces import LOOK, WAY, Faces, windows
 from .panels import MIDDLES, PANELS, WIDTHS, Couplings, Panels, Pressed, couplings, first_guess, influence, pressed
 from .position import taken
 

@@ -220,6 +220,8 @@ class Positions:
         return replace(self, loads=tuple(_among(one, kept) for one in self.loads), points=points)
 
 
+#: Rounding of the gears' angles (rad) below which no twist can be told apart.
+ANGLE_ROUNDING = 2e-15
 #: Type of the names of statuses.
 STATUS = "<U18"
 #: Numbers of a position that are moments about the hubs, or their rate.

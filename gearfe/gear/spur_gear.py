@@ -11,8 +11,7 @@ from functools import cached_property
 from numbers import Real
 
 from ..errors import InputError
-from .involute import ToothProfile, inv, tooth_profile
-from .tooth_root import half_tooth_angle
+from .involute import ToothProfile, half_tooth_angle, inv, tooth_profile
 from .validity import check_rim, check_teeth
 
 #: Least tip round that is not a sharp corner, times module: meshers need seconds for less, and elements degenerate.

@@ -21,12 +21,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact.position import ANGLE_ROUNDING
 from ..errors import InputError
 from ..output.files import write_csv
 from ..shown import ShownTable
-from ..stiffness import curve_csv
-from ..stiffness.curve import COLUMNS, WHOLE, StiffnessCurve
-from ..stiffness.torque_control import ANGLE_ROUNDING
+from ..stiffness.curve import COLUMNS, WHOLE, StiffnessCurve, numbers, to_text
+from ..textfile import read_csv
 from ..typing import Array, BoolArray
 from .root_map import RootMap, root_columns, root_of
 
@@ -195,7 +195,7 @@ class LoadMap(ShownTable):
             status=status,
             peak_pressure_error=self.quantity("peak_pressure_error")[pair].max(axis=0),
             edge=np.where(np.isfinite(smooth["edge_pressure"]), self.quantity("edge")[after], "none"),
-            error=None,
+            relative_error=np.zeros(0),
             timings={},
             **made,
         )
@@ -247,12 +247,12 @@ class LoadMap(ShownTable):
         columns: dict[str, list[str]] = {TORQUE: []}
         columns.update({name: [] for name in names})
         for torque, one in zip(self.torque, tables, strict=True):
-            columns[TORQUE] += [curve_csv.to_text(torque, TORQUE)] * rows
+            columns[TORQUE] += [to_text(torque, TORQUE)] * rows
             for name in names:
                 columns[name] += one.get(name, ["0"] * rows)  # a share of a pair that this torque does not know
         if self.root is not None:
             for name, values in root_columns(self.root).items():
-                columns[name] = [curve_csv.to_text(v, name) for v in values.ravel()]
+                columns[name] = [to_text(v, name) for v in values.ravel()]
         return columns
 
     def to_csv(self, path: str | Path) -> None:
@@ -268,11 +268,11 @@ class LoadMap(ShownTable):
         InputError
             When the file is not such a table.
         """
-        columns = curve_csv.read_columns(path)
+        columns = read_csv(path, "stiffness curve")
         if TORQUE not in columns:
             cure = "write one with gearfe loadmap"
             raise InputError("load map", str(path), f"has no column {TORQUE}", cure)
-        torque = curve_csv.numbers(columns, TORQUE, path)
+        torque = numbers(columns, TORQUE, path)
         starts = np.flatnonzero(np.concatenate([[True], torque[1:] != torque[:-1]]))
         counts = np.diff(np.append(starts, len(torque)))
         if len(set(counts.tolist())) > 1 or not (np.diff(torque[starts]) > 0).all():

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..stiffness import curve_csv
+from ..stiffness.curve import numbers
 from ..typing import Array
 
 GEARS = ("pinion", "wheel")
@@ -59,7 +59,7 @@ def root_of(columns: Mapping[str, Sequence[str]], shape: tuple[int, int], path: 
         return None
 
     def read(name: str) -> Array:
-        return np.stack([curve_csv.numbers(columns, name.format(g), path).reshape(shape) for g in GEARS], axis=2)
+        return np.stack([numbers(columns, name.format(g), path).reshape(shape) for g in GEARS], axis=2)
 
     count = 0
     while f"root_stress_{GEARS[0]}_{count + 1}_MPa" in columns:

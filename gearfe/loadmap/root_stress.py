@@ -29,8 +29,7 @@ from ..contact.compliance import GearBody, MeshingPair, gear_body
 from ..contact.flank import Flank, edge_nodes, edge_shapes
 from ..contact.position import FlankLoads, Positions
 from ..gear.pair import Gear, GearPair
-from ..meshing.recipe import sector_recipes
-from ..meshing.tooth_sector import SectorRecipe, sector_mesh
+from ..meshing.tooth_sector import SectorRecipe, sector_mesh, sector_recipes
 from ..typing import Array, IntArray
 from .root_map import RootMap
 

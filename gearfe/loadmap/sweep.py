@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..contact.compliance import MeshingPair
-from ..contact.model import DEFAULT_MODEL, PairModel
+from ..contact.laws import DEFAULT_MODEL, PairModel
 from ..contact.position import Positions, joined, together
 from ..errors import InputError
 from ..gear.pair import GearPair

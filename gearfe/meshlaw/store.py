@@ -15,8 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ..cache import cached_arrays
-from ..contact.laws import HalfPlane
-from ..contact.model import PairModel
+from ..contact.laws import HalfPlane, PairModel
 from ..errors import InputError
 from ..gear.pair import GearPair
 from ..output.arrays import load_arrays, save_arrays

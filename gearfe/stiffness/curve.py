@@ -6,28 +6,97 @@ d cos(alpha)/2),
 .. math::
     k_\mathrm{torsional} = T/\vartheta, \quad k_\mathrm{mesh} = T/(\vartheta r_b^2), \quad
     k_\mathrm{tangent} = (dT/d\vartheta)/r_b^2, \quad \mathrm{TE} = \vartheta r_b .
+
+Tables hold units of their columns' names. Numbers are scaled in decimal arithmetic, so 17 significant digits in the
+file's unit bring back the same double in SI.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from decimal import Context, Decimal
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError, shown, unknown_name
 from ..output.files import write_csv
 from ..shown import ShownTable
+from ..textfile import read_csv
 from ..typing import Array, BoolArray, IntArray
-from . import curve_csv
 from .periodic import PeriodicInterpolant, ValueAndSlope, periodic_interpolant
+
+#: Far more digits than any double needs, so that a product is rounded once.
+_EXACT = Context(prec=50)
+_PI = Decimal("3.14159265358979323846264338327950288419716939937510582")
+#: Suffix of a column name -> factor from SI to that unit; other columns are in SI.
+_FACTORS: dict[str, Decimal] = {
+    "_deg": _EXACT.divide(Decimal(180), _PI),
+    "_um": Decimal(10) ** 6,
+    "_mm": Decimal(10) ** 3,
+    "_MPa": Decimal(10) ** -6,
+}
+
+
+def factor_of(column: str) -> Decimal:
+    """Factor from SI to the unit in a column's name."""
+    return next((f for suffix, f in _FACTORS.items() if column.endswith(suffix)), Decimal(1))
+
+
+def to_text(value: float, column: str) -> str:
+    """Decimal text of an SI value in the column's unit: `from_text` gives the same double back."""
+    if not np.isfinite(value):
+        return "nan"
+    exact = _EXACT.multiply(Decimal(float(value)), factor_of(column))
+    short = _plain(Context(prec=15).plus(exact).normalize())  # where 15 digits are enough: 0.5 reads 0.5
+    return short if from_text(short, column) == value else _plain(Context(prec=17).plus(exact))
+
+
+def _plain(number: Decimal) -> str:
+    """Without an exponent for numbers of everyday size."""
+    return f"{number:f}" if -5 <= number.adjusted() < 17 else f"{number:e}"
+
+
+def from_text(text: str, column: str) -> float:
+    """SI value of a cell; an empty cell is not a number.
+
+    Raises
+    ------
+    ValueError
+        When the cell holds no number.
+    """
+    text = text.strip()
+    if text.lower() in ("", "nan"):
+        return float("nan")
+    try:
+        value = float(_EXACT.divide(Decimal(text), factor_of(column)))
+    except (ArithmeticError, ValueError) as error:
+        raise ValueError(text) from error
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value
+
+
+def numbers(columns: Mapping[str, Sequence[str]], name: str, path: str | Path) -> Array:
+    """Column `name` in SI; all not-a-number where the file has no such column."""
+    if name not in columns:
+        return np.full(len(next(iter(columns.values()))), np.nan)
+    try:
+        return np.array([from_text(cell, name) for cell in columns[name]])
+    except ValueError as error:
+        problem = f"column {name} holds {shown(str(error))}, which is no finite number"
+        raise InputError("stiffness curve", str(path), problem, "write a number, or leave the cell empty") from None
+
 
 #: Statuses that stand for a result; every other one marks a failed position, whose numbers are not-a-number.
 SOLVED = ("converged", "no_contact")
 
+#: Column that a table has where there are estimates.
+ESTIMATE = "k_mesh_relative_error"
 #: Column of the CSV file -> field, in order; a field of whole numbers has -1 where the file has ``nan``.
 COLUMNS: dict[str, str] = {
     "pinion_angle_deg": "pinion_angle",
@@ -51,6 +120,7 @@ COLUMNS: dict[str, str] = {
     "edge_pressure_MPa": "edge_pressure",
     "edge": "edge",
     "beyond_validity": "beyond_validity",
+    ESTIMATE: "relative_error",
 }
 #: Constants of the curve, repeated on every row so that the file stands alone.
 CONSTANTS: dict[str, str] = {
@@ -60,44 +130,15 @@ CONSTANTS: dict[str, str] = {
 }
 #: Columns of words.
 WORDS = ("status", "law", "edge")
+#: Numbers that a curve need not have.
+UNKNOWN = ("peak_pressure_error", "edge_pressure", "relative_error")
 WHOLE = ("teeth_in_contact", "iterations", "beyond_validity")
 SHARE = "load_share_"
 
 
 #: Largest estimate of a curve's positions -> its worst error: 97 % of 78 curves of random pairs were within it (94 %
-#: of them without it).
+#: of them without it), as each covers 19 of 20 positions only.
 OUTLIER = 2.0
-
-
-@dataclass(frozen=True)
-class ErrorEstimate:
-    """Discretisation error of a curve, from coarser meshes: see `gearfe.stiffness.curve_error`.
-
-    Attributes
-    ----------
-    pinion_angle : ndarray, shape (m,)
-        Positions that have an estimate (rad).
-    relative : ndarray, shape (m,)
-        Estimated relative error of k_mesh there (-): covers the true error at about 19 of 20 positions.
-        Not-a-number where nothing converged on the coarser mesh.
-    coarsening, order
-        Factor c between the meshes and assumed order of convergence p.
-    """
-
-    pinion_angle: Array
-    relative: Array
-    coarsening: float
-    order: float
-
-    @property
-    def typical(self) -> float:
-        """Median over the positions (-)."""
-        return float(np.nanmedian(self.relative)) if np.isfinite(self.relative).any() else float("nan")
-
-    @property
-    def worst(self) -> float:
-        """Of the position that errs most (-): `OUTLIER` times the largest, as each covers 19 of 20 positions only."""
-        return OUTLIER * float(np.nanmax(self.relative)) if np.isfinite(self.relative).any() else float("nan")
 
 
 @dataclass(frozen=True, repr=False)
@@ -157,8 +198,9 @@ class StiffnessCurve(ShownTable):
         Contact law with its parameters; empty where unknown.
     timings
         Seconds by stage; not in the CSV file.
-    error
-        Estimate of the discretisation error, when asked for; not in the CSV file.
+    relative_error
+        Estimated discretisation error of k_mesh (-), which covers the true one at about 19 of 20 positions, see
+        `gearfe.stiffness.curve_error`; not-a-number where there is none.
     """
 
     pinion_angle: Array
@@ -183,16 +225,16 @@ class StiffnessCurve(ShownTable):
     lost_motion: float = 0.0
     contact_law: str = ""
     timings: Mapping[str, float] = field(default_factory=dict)
-    error: ErrorEstimate | None = None
     law: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=np.str_))
     peak_pressure_error: Array = field(default_factory=lambda: np.zeros(0))
     edge_pressure: Array = field(default_factory=lambda: np.zeros(0))
     edge: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=np.str_))
     beyond_validity: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    relative_error: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        unknown = {"law": "", "peak_pressure_error": np.nan, "edge_pressure": np.nan, "edge": "", "beyond_validity": -1}
-        for name, value in unknown.items():
+        unknown = {"law": "", "edge": "", "beyond_validity": -1}
+        for name, value in {**unknown, **dict.fromkeys(UNKNOWN, np.nan)}.items():
             if len(getattr(self, name)) != len(self.pinion_angle):
                 object.__setattr__(self, name, np.full(len(self.pinion_angle), value))
 
@@ -203,6 +245,18 @@ class StiffnessCurve(ShownTable):
     def failed(self) -> BoolArray:
         """Positions without a solution."""
         return ~np.isin(self.status, SOLVED)
+
+    @property
+    def typical_error(self) -> float:
+        """Median of the estimates (-); not-a-number where there are none."""
+        known = self.relative_error[np.isfinite(self.relative_error)]
+        return float(np.median(known)) if len(known) else math.nan
+
+    @property
+    def worst_error(self) -> float:
+        """Estimated error of the position that errs most (-): `OUTLIER` times the largest; or not-a-number."""
+        known = self.relative_error[np.isfinite(self.relative_error)]
+        return OUTLIER * float(known.max()) if len(known) else math.nan
 
     def interpolant(self, quantity: str = "k_mesh", *, method: str = "cubic") -> PeriodicInterpolant:
         """Periodic interpolant of a quantity over the pinion angle; failed positions are left out and named in it.
@@ -254,10 +308,12 @@ class StiffnessCurve(ShownTable):
     def table(self) -> dict[str, list[str]]:
         """Columns of the CSV file as text."""
         columns = {name: self._cells(name, attribute) for name, attribute in COLUMNS.items()}
+        if math.isnan(self.worst_error):
+            del columns[ESTIMATE]
         for j in range(self.load_share.shape[1]):
-            columns[f"{SHARE}{j + 1}"] = [curve_csv.to_text(v, SHARE) for v in self.load_share[:, j]]
+            columns[f"{SHARE}{j + 1}"] = [to_text(v, SHARE) for v in self.load_share[:, j]]
         for name, attribute in CONSTANTS.items():
-            columns[name] = [curve_csv.to_text(getattr(self, attribute), name)] * len(self)
+            columns[name] = [to_text(getattr(self, attribute), name)] * len(self)
         columns["contact_law"] = [self.contact_law] * len(self)
         return columns
 
@@ -267,7 +323,7 @@ class StiffnessCurve(ShownTable):
             return [str(v) for v in values]
         if attribute in WHOLE:
             return [str(int(v)) if v >= 0 else "nan" for v in values]
-        return [curve_csv.to_text(v, name) for v in values]
+        return [to_text(v, name) for v in values]
 
     def to_csv(self, path: str | Path) -> None:
         """Write the table; `from_csv` gives back every number exactly."""
@@ -289,7 +345,7 @@ class StiffnessCurve(ShownTable):
         InputError
             When the file is not such a table, or says nothing of the mesh cycle.
         """
-        return cls.from_columns(curve_csv.read_columns(path), path, mesh_cycle=mesh_cycle, base_radius=base_radius)
+        return cls.from_columns(read_csv(path, "stiffness curve"), path, mesh_cycle=mesh_cycle, base_radius=base_radius)
 
     @classmethod
     def from_columns(
@@ -307,7 +363,7 @@ class StiffnessCurve(ShownTable):
         given: dict[str, Any] = {"mesh_cycle": mesh_cycle, "base_radius": base_radius, "lost_motion": None}
         values: dict[str, Any] = {}
         for name, attribute in CONSTANTS.items():
-            stored = float(curve_csv.numbers(columns, name, path)[0])
+            stored = float(numbers(columns, name, path)[0])
             values[attribute] = stored if given[attribute] is None else float(given[attribute])
         if not (np.isfinite(values["mesh_cycle"]) and values["mesh_cycle"] > 0):
             cure = "add a column mesh_cycle_deg (360 deg/pinion teeth), or give mesh_cycle"
@@ -318,9 +374,9 @@ class StiffnessCurve(ShownTable):
             if attribute in WORDS:
                 values[attribute] = np.array([cell.strip() for cell in columns.get(name, [""] * rows)])
                 continue
-            found = curve_csv.numbers(columns, name, path)
+            found = numbers(columns, name, path)
             values[attribute] = np.nan_to_num(found, nan=-1).astype(np.int64) if attribute in WHOLE else found
-        shares = [curve_csv.numbers(columns, name, path) for name in columns if name.startswith(SHARE)]
+        shares = [numbers(columns, name, path) for name in columns if name.startswith(SHARE)]
         values["load_share"] = np.stack(shares, axis=1) if shares else np.zeros((rows, 0))
         values["contact_law"] = columns.get("contact_law", [""])[0].strip()
         if "status" not in columns:

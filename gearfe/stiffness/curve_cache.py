@@ -8,10 +8,9 @@ versions of numpy, scipy and gmsh, and the text of this package's own rooms that
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 import sys
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,12 +19,11 @@ import numpy as np
 
 from .. import __version__
 from ..cache import cache_key, kept
-from ..contact.model import PairModel
+from ..contact.laws import PairModel
 from ..errors import InputError
 from ..gear.pair import GearPair
-from ..output.files import write_json
 from ..stopwatch import Stopwatch
-from .curve import ErrorEstimate, StiffnessCurve
+from .curve import StiffnessCurve
 
 #: Rooms whose text decides a curve, beside `gearfe.elasticity`.
 ROOMS = ("contact", "gear", "meshing", "stiffness")
@@ -53,15 +51,14 @@ def cached_curve(
     watch, progress
         See `sweep_stiffness`.
     estimate_error
-        Whether the curve carries an estimate of its error, which is kept in a file beside it.
+        Whether the curve carries an estimate of its error.
     """
 
     def read(path: Path) -> StiffnessCurve | None:
         found = _stored(path, pair)
-        if found is None or not estimate_error:
-            return found
-        error = _stored_error(path)
-        return None if error is None else replace(found, error=error)
+        if found is None or (estimate_error and math.isnan(found.worst_error)):
+            return None
+        return found if estimate_error else replace(found, relative_error=np.zeros(0))
 
     def make() -> StiffnessCurve:
         from .sweep import elastic_pair, sweep_stiffness
@@ -74,11 +71,8 @@ def cached_curve(
         return curve
 
     def write(curve: StiffnessCurve, path: Path) -> None:
-        if curve.failed.any():
-            return
-        curve.to_csv(path)
-        if curve.error is not None:
-            write_json(path.with_suffix(".error.json"), asdict(curve.error))
+        if not curve.failed.any():
+            curve.to_csv(path)
 
     return kept("curve", curve_key(pair, model, sweep), read=read, make=make, write=write, suffix=".csv")
 
@@ -107,16 +101,6 @@ def _stored(path: Path, pair: GearPair) -> StiffnessCurve | None:
         return None
     whole = math.isclose(curve.mesh_cycle, pair.mesh_cycle, rel_tol=1e-12) and not curve.failed.any()
     return curve if whole else None
-
-
-def _stored_error(path: Path) -> ErrorEstimate | None:
-    """The estimate beside a stored curve; null stands for not-a-number."""
-    try:
-        found = json.loads(path.with_suffix(".error.json").read_text(encoding="utf-8"))
-        arrays = {name: np.array(found[name], dtype=float) for name in ("pinion_angle", "relative")}
-        return ErrorEstimate(**arrays, coarsening=float(found["coarsening"]), order=float(found["order"]))
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
 
 
 @cache

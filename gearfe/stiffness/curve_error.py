@@ -40,13 +40,11 @@ from ..contact.compliance import MeshingPair
 from ..contact.half_plane_pair import HalfPlanePair, half_plane_pair
 from ..contact.half_plane_result import PairContacts
 from ..contact.half_plane_step import SIGN, smooth_influence
-from ..contact.model import COARSENING
+from ..contact.laws import COARSENING
 from ..contact.panels import Couplings, couplings
-from ..contact.position import Positions
+from ..contact.position import ANGLE_ROUNDING, Positions
 from ..typing import Array, BoolArray, ComplexArray, IntArray
-from .curve import ErrorEstimate
 from .positions import HalfPlaneSolver, PositionSolver, at_twists, position_solver
-from .torque_control import ANGLE_ROUNDING
 
 #: Assumed order of convergence p, share of the meshes' common error at the default sizes, and largest number of
 #: positions solved twice.
@@ -57,22 +55,24 @@ COVERAGE = 2.0
 AHEAD = 1e-4
 
 
-def curve_error(solver: PositionSolver, coarse: MeshingPair, solved: Positions, *, finite: bool) -> ErrorEstimate:
-    """Error of solved positions from the coarser gears `coarse`: of all of them by the influence function of these, of
-    some by a law on the mesh, which solves them again, resolved there or not.
+def curve_error(solver: PositionSolver, coarse: MeshingPair, solved: Positions, *, finite: bool) -> Array:
+    """Estimated relative error of n solved positions from the coarser gears `coarse`, shape (n,): of all of them by the
+    influence function of these, of some by a law on the mesh, which solves them again, resolved there or not.
     """
     elastic, good = solver.elastic, solved.status == "converged"
-    chosen = solved.take(np.flatnonzero(good) if isinstance(solver, HalfPlaneSolver) else solved_twice(good))
-    # a twist of some bits of the gears' angles is not what the gears are turned by
-    rounding = ANGLE_ROUNDING * np.abs(chosen.tangent / chosen.torque_wheel)
+    numbers = np.flatnonzero(good) if isinstance(solver, HalfPlaneSolver) else solved_twice(good)
+    chosen, made = solved.take(numbers), np.full(len(solved), np.nan)
     if isinstance(solver, HalfPlaneSolver):
-        changes = torque_changes(solver.law, half_plane_pair(solver.pair, coarse), chosen)
-        return influence_estimate(chosen.pinion_angle, changes, unseen=rounding)
-    again = position_solver(solver.pair, coarse, resolved_only=False)
-    there = at_twists(again, chosen.pinion_angle, chosen.twist, None, finite=finite)
-    other = np.where(there.status == "converged", there.torque_wheel, np.nan)
-    coarsen = elastic.model.coarsen * max(1.0, elastic.model.flank_coarsen)
-    return error_estimate(chosen.pinion_angle, chosen.torque_wheel, other, coarsen=coarsen, unseen=rounding)
+        found = influence_estimate(torque_changes(solver.law, half_plane_pair(solver.pair, coarse), chosen))
+    else:
+        again = position_solver(solver.pair, coarse, resolved_only=False)
+        there = at_twists(again, chosen.pinion_angle, chosen.twist, None, finite=finite)
+        other = np.where(there.status == "converged", there.torque_wheel, np.nan)
+        coarsen = elastic.model.coarsen * max(1.0, elastic.model.flank_coarsen)
+        found = error_estimate(chosen.torque_wheel, other, coarsen=coarsen)
+    # a twist of some bits of the gears' angles is not what the gears are turned by
+    made[numbers] = found + ANGLE_ROUNDING * np.abs(chosen.tangent / chosen.torque_wheel)
+    return made
 
 
 def solved_twice(converged: BoolArray) -> IntArray:
@@ -83,47 +83,32 @@ def solved_twice(converged: BoolArray) -> IntArray:
     return good[np.unique(np.linspace(0, len(good) - 1, min(len(good), POSITIONS)).round().astype(np.int64))]
 
 
-def influence_estimate(angles: Array, changes: Array, *, unseen: Array | float = 0.0) -> ErrorEstimate:
-    """Estimated relative error of positions of the half-plane law.
-
-    Parameters
-    ----------
-    angles, changes : ndarray, shape (m,)
-        Pinion angles (rad), and the relative changes of the torque by the influence function of coarser gears.
-    unseen
-        What no mesh shows: the rounding of the gears' angles.
+def influence_estimate(changes: Array) -> Array:
+    """Estimated relative error of m positions of the half-plane law, shape (m,), from the relative `changes` of their
+    torques by the influence function of coarser gears.
     """
     single = np.abs(changes) / (COARSENING**ORDER - 1)
-    usual = COVERAGE * float(np.sqrt(np.mean(single**2))) if len(single) else 0.0
-    return ErrorEstimate(angles, np.maximum(single, usual) + unseen, COARSENING, ORDER)
+    return np.maximum(single, COVERAGE * np.sqrt(np.mean(single**2)) if len(single) else 0.0)
 
 
-def error_estimate(
-    angles: Array, torque: Array, coarse: Array, *, coarsen: float = 1.0, unseen: Array | float = 0.0
-) -> ErrorEstimate:
-    """Estimated relative error at the positions solved twice.
+def error_estimate(torque: Array, coarse: Array, *, coarsen: float = 1.0) -> Array:
+    """Estimated relative error at the m positions solved twice, shape (m,).
 
     Parameters
     ----------
-    angles : ndarray, shape (m,)
-        Pinion angles (rad).
     torque, coarse : ndarray, shape (m,)
         Torque of the curve there and on the coarser mesh (N m); not-a-number where that one failed. Such a position
         gets the largest error of the others.
     coarsen
         The curve's own factor on the default element sizes, that of the flanks where it is larger.
-    unseen : ndarray, shape (m,)
-        What no mesh shows: the rounding of the gears' angles.
     """
     single = np.abs(coarse / torque - 1) / (COARSENING**ORDER - 1)
-    known = np.isfinite(single)
-    relative = np.full(len(single), np.nan)
-    if known.any():
-        count = int(known.sum())
-        usual = (1 + 1 / count) * float(np.sqrt(np.mean(single[known] ** 2)))
-        relative = np.where(known, np.maximum(single, usual), max(usual, float(single[known].max())))
-        relative = relative + COMMON * coarsen**ORDER + unseen
-    return ErrorEstimate(angles, relative, COARSENING, ORDER)
+    known = single[np.isfinite(single)]
+    if len(known) == 0:
+        return np.full(len(single), np.nan)
+    usual = (1 + 1 / len(known)) * np.sqrt(np.mean(known**2))
+    relative = np.where(np.isfinite(single), np.maximum(single, usual), max(usual, known.max()))
+    return np.asarray(relative + COMMON * coarsen**ORDER)
 
 
 def torque_changes(law: HalfPlanePair, other: HalfPlanePair, found: Positions) -> Array:

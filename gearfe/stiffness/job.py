@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..config import load_job
-from ..contact.laws import ContactLaw, law_named
-from ..contact.model import PairModel
+from ..contact.laws import ContactLaw, PairModel, law_named
 from ..elasticity import Material
 from ..errors import InputError
 from ..gear.deviation import NOMINAL, ToothDeviations
@@ -20,7 +19,7 @@ from ..gear.pair import GearPair
 from ..tables.microgeometry import MicrogeometryTable
 from ..tables.pair import MaterialTable, PairTable
 from ..tables.stiffness import StiffnessTable
-from .curve_csv import from_text
+from .curve import from_text
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact.laws import COARSENING
 from ..errors import InputError
 from ..gear.derived import derived_geometry, iso_values
 from ..gear.deviation_job import GEARS
@@ -18,6 +19,7 @@ from ..gear.validity import overlaps, told_overlaps
 from ..versions import versions
 from .contact_pressure import largest_pressures
 from .curve import StiffnessCurve
+from .curve_error import ORDER
 from .job import StiffnessJob
 
 #: Allowable contact stress of case-hardened steel for unlimited life (Pa): ISO 6336-5, material quality MQ.
@@ -54,7 +56,6 @@ def load_statistics(job: StiffnessJob, curve: StiffnessCurve) -> dict[str, Any]:
 def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, float]) -> dict[str, Any]:
     """Content of summary.json."""
     moduli = [material.youngs_modulus for material in job.materials]
-    error = curve.error
     failed = np.degrees(curve.pinion_angle[curve.failed])
     return {
         "job": job.tables,
@@ -63,16 +64,7 @@ def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, floa
         "warnings": list(job.pair.warnings),
         "iso_6336": iso_values(job.pair, moduli[0], moduli[1]),
         "mesh_stiffness": cycle_statistics(curve, job.table.interpolation),
-        "error_estimate": None
-        if error is None
-        else {
-            "typical_relative": error.typical,
-            "worst_relative": error.worst,
-            "mesh_coarsening": error.coarsening,
-            "assumed_order": error.order,
-            "pinion_angle_deg": np.degrees(error.pinion_angle),
-            "relative": error.relative,
-        },
+        "error_estimate": _error_summary(curve),
         "load": load_statistics(job, curve),
         "contact_pressure": _pressure_summary(curve),
         "contact_law": curve.contact_law,
@@ -115,13 +107,26 @@ def report_lines(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
         f"c_gamma times width = {1e-6 * iso['c_gamma_times_width_N_per_m']:.4g} N/um"
     )
     lines += pressure_lines(curve)
-    if curve.error is not None and math.isfinite(curve.error.worst):
-        e = curve.error
+    if math.isfinite(curve.worst_error):
         lines.append(
-            f"discretisation error, estimated on a mesh {e.coarsening:g} times coarser (order {e.order:g} assumed): "
-            f"typically {100 * e.typical:.2g} %, at worst {100 * e.worst:.2g} %"
+            f"discretisation error, estimated on a mesh {COARSENING:g} times coarser (order {ORDER:g} assumed): "
+            f"typically {100 * curve.typical_error:.2g} %, at worst {100 * curve.worst_error:.2g} %"
         )
     return lines
+
+
+def _error_summary(curve: StiffnessCurve) -> dict[str, Any] | None:
+    if math.isnan(curve.worst_error):
+        return None
+    known = np.isfinite(curve.relative_error)
+    return {
+        "typical_relative": curve.typical_error,
+        "worst_relative": curve.worst_error,
+        "mesh_coarsening": COARSENING,
+        "assumed_order": ORDER,
+        "pinion_angle_deg": np.degrees(curve.pinion_angle[known]),
+        "relative": curve.relative_error[known],
+    }
 
 
 def _pressure_summary(curve: StiffnessCurve) -> dict[str, Any]:

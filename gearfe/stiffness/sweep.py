@@ -19,19 +19,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..contact.compliance import MeshingPair, gear_body
-from ..contact.laws import law_text, uses_stress
-from ..contact.model import COARSENING, DEFAULT_MODEL, PairModel
+from ..contact.laws import COARSENING, DEFAULT_MODEL, PairModel, law_text, uses_stress
 from ..contact.position import Positions
 from ..errors import InputError
 from ..gear.pair import GearPair
 from ..gear.validity import MOST_OVERLAP, overlaps
-from ..meshing.recipe import sector_recipes
-from ..meshing.tooth_sector import sector_mesh
+from ..meshing.tooth_sector import sector_mesh, sector_recipes
 from ..stopwatch import Stopwatch
 from ..threads import one_thread
 from ..typing import Array, IntArray
 from .contact_pressure import EDGES, contact_pressures
-from .curve import SOLVED, ErrorEstimate, StiffnessCurve
+from .curve import SOLVED, StiffnessCurve
 from .curve_error import curve_error
 from .periodic import wrapped_phase
 from .positions import (
@@ -45,7 +43,7 @@ from .positions import (
     position_solver,
 )
 
-__all__ = ["ErrorEstimate", "StiffnessCurve", "elastic_pair", "sweep_stiffness"]
+__all__ = ["StiffnessCurve", "elastic_pair", "sweep_stiffness"]
 
 
 #: Positions in one mesh cycle where no angles are given.
@@ -156,12 +154,12 @@ def sweep_stiffness(
         else:
             goals = np.full(len(solved_angles), load)
             solved = at_torques(solver, solved_angles, goals, finite=finite, progress=progress)
-    error = None
+    curve = assembled_curve(solver, asked, source, solved, searched=torque is not None)
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
             error = curve_error(solver, coarser(pair, elastic), solved, finite=finite)
-    curve = assembled_curve(solver, asked, source, solved, searched=torque is not None)
-    return replace(curve, timings=dict(watch.seconds), error=error)
+        curve = replace(curve, relative_error=error[source])
+    return replace(curve, timings=dict(watch.seconds))
 
 
 def asked_positions(pair: GearPair, angles: ArrayLike | None, count: int, kinematics: str) -> tuple[Array, bool]:

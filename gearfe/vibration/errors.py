@@ -210,9 +210,9 @@ def _stiffer(train: GearTrain) -> GearTrain | None:
         if isinstance(curve, MeshLaw) and math.isfinite(curve.error):
             meshes.append(replace(mesh, stiffness=curve.stiffer(curve.error)))
             changed = True
-        elif isinstance(curve, StiffnessCurve) and curve.error is not None:
-            worst = curve.error.worst
-            meshes.append(replace(mesh, stiffness=replace(curve, k_mesh=(1.0 + worst) * curve.k_mesh)))
+        elif isinstance(curve, StiffnessCurve) and math.isfinite(curve.worst_error):
+            stiffer = replace(curve, k_mesh=(1.0 + curve.worst_error) * curve.k_mesh)
+            meshes.append(replace(mesh, stiffness=stiffer))
             changed = True
         else:
             meshes.append(mesh)

@@ -183,7 +183,7 @@ def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) 
         sweep = {"torque": most / ROOM, "angles": angles, "kinematics": "small"}
         curve = cached_curve(pair, model, sweep, estimate_error=True)
     fit = max(side.error for side in law.sides)
-    return replace(law, error=math.nan if curve.error is None else fit + curve.error.worst)
+    return replace(law, error=fit + curve.worst_error)
 
 
 def _deviations(

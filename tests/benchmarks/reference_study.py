@@ -176,8 +176,7 @@ def iso(coarsen: float, which: str) -> Found:
 
 def patch(which: str) -> Found:
     """Elements with inner nodes anywhere: a linear displacement on the boundary is met inside, to rounding."""
-    from gearfe.meshing.recipe import sector_recipes
-    from gearfe.meshing.tooth_sector import sector_mesh
+    from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
 
     pair = reference_pair()
     mesh = sector_mesh(pair.pinion, sector_recipes(pair, coarsen=4.0)[0])

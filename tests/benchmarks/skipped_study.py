@@ -141,8 +141,7 @@ def modes_above(quick: bool) -> tuple[float, float, str]:
 
 def cached_meshes(_quick: bool) -> tuple[float, float, str]:
     """Both tooth sectors from the cache, and from gmsh."""
-    from gearfe.meshing.recipe import sector_recipes
-    from gearfe.meshing.tooth_sector import sector_mesh
+    from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
 
     pair = shipped_pair()
     each = list(zip((pair.pinion, pair.wheel), sector_recipes(pair), strict=True))

@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.contact.model import DEFAULT_MODEL
+from gearfe.contact.laws import DEFAULT_MODEL
 from gearfe.gear.pair import GearPair
-from gearfe.meshing.recipe import sector_recipes
-from gearfe.meshing.tooth_sector import sector_mesh
+from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
 from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 from gearfe.tables.laws import DEFAULT_LAW, LAWS

@@ -98,10 +98,10 @@ def _run_curve(case: Case, job_path: Path) -> Found:
     options = {**job.sweep, "angles": angles}
     curve = sweep_stiffness(job.pair, job.model, estimate_error=True, **options)
     truth = sweep_stiffness(job.pair, job.model, coarsen=max(0.2, FINER * job.table.coarsen), **options)
-    if curve.error is None or not math.isfinite(curve.error.worst) or (truth.status != "converged").any():
+    if not math.isfinite(curve.worst_error) or (truth.status != "converged").any():
         return "the curve has no estimate, or the finer one did not converge everywhere"
     off = np.abs(curve.torque_wheel / truth.torque_wheel - 1)
-    return float(np.nanmax(off)), curve.error.worst, "relative"
+    return float(np.nanmax(off)), curve.worst_error, "relative"
 
 
 def _draw_trajectory(random: np.random.Generator, number: int, kind: str) -> Case:

@@ -26,9 +26,8 @@ from gearfe.contact.position import Positions
 from gearfe.gear.pair import GearPair
 from gearfe.stiffness.curve import SOLVED
 from gearfe.stiffness.job import read_stiffness_job
-from gearfe.stiffness.positions import PositionSolver, position_solver
+from gearfe.stiffness.positions import ANGLE_ROUNDING, PositionSolver, position_solver
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
-from gearfe.stiffness.torque_control import ANGLE_ROUNDING
 from gearfe.tables.laws import DEFAULT_LAW, LAWS
 
 from .campaign import Campaign, Case

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from skfem import DiscreteField
 
-from gearfe.contact.closest import Projection, project
+from gearfe.contact.flank import Projection, project
 from gearfe.typing import Array, ComplexArray, IntArray
 
 from . import forms

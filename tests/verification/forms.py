@@ -17,7 +17,7 @@ are (Laursen, *Computational Contact and Impact Mechanics*, 2002, ch. 5, in two 
     \Delta(n\cdot[v]) = \frac{g}{a\cdot a} N_\Delta N_\delta - \Bigl(1 - \frac{g\kappa}{a\cdot a}\Bigr)
     (N_\Delta\,\delta\xi + N_\delta\,\Delta\xi + \kappa\,\delta\xi\,\Delta\xi) .
 
-The normal is blended between edges (`gearfe.contact.closest`), hence the small n . a; its kinks are left out of the
+The normal is blended between edges (`gearfe.contact.flank`), hence the small n . a; its kinks are left out of the
 last formula. In the forms `w` holds, at each pair: g, n, a, kappa; X_xi = dX/dxi of the mate's undeformed edge; gamma,
 s and theta; stress_rate P, with which delta sigma_n = P : grad v_s (`tests.verification.constitution`); p; active,
 H(p); and share, the part of a point's stretch of surface that faces the mate, which changes with xi at its sharp end.

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.contact.closest import project
+from gearfe.contact.flank import project
 from gearfe.contact.laws import ElementLaw
 from gearfe.errors import InputError
 from gearfe.typing import Array, ComplexArray, IntArray

@@ -80,7 +80,7 @@ def breaks(slave: Array, mate: Array) -> tuple[IntArray, Array]:
 
 
 def _vertex_normals(chain: Array) -> Array:
-    """Normals at the vertices of a chain, blended as `gearfe.contact.closest` does, shape (f + 1, 2)."""
+    """Normals at the vertices of a chain, blended as `gearfe.contact.flank` does, shape (f + 1, 2)."""
     x0, x1, x2 = chain[:-2:2], chain[1:-1:2], chain[2::2]
     at_start, at_end = _normal(4 * x1 - 3 * x0 - x2), _normal(x0 - 4 * x1 + 3 * x2)
     mean = at_end[:-1] + at_start[1:]

@@ -9,7 +9,7 @@ import numpy as np
 
 from gearfe.gear.pair import GearPair
 from gearfe.meshing.export import MeshPart
-from gearfe.meshing.recipe import sector_recipes
+from gearfe.meshing.tooth_sector import sector_recipes
 from gearfe.meshing.whole_gear import mixed_gear
 
 #: Teeth on either side of the line of centres that are fine.
