@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import shutil
@@ -63,6 +64,16 @@ def test_universal_files_leave_out_gaps_and_know_time_and_acceleration(tmp_path)
     np.testing.assert_array_equal(made["x"], time[np.isfinite(signal)])
     np.testing.assert_array_equal(made["data"], signal[np.isfinite(signal)])
     assert (made["func_type"], made["abscissa_spec_data_type"], made["ordinate_spec_data_type"]) == (1, 17, 12)
+
+
+def test_texts_with_commas_and_quotes_stand_in_one_cell(tmp_path):
+    """RFC 4180, read by Python's own reader and by ours; names of modes and expressions have commas."""
+    texts = ["mode 1: 99 % in housing, moving", 'a "quoted" one', "plain", ""]
+    write_csv(tmp_path / "t.csv", {"max(a, b)": [1.0, 2.0, 3.0, 4.0], "name": texts})
+    with (tmp_path / "t.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.reader(stream))
+    assert rows == [["max(a, b)", "name"], *([f"{k + 1}", text] for k, text in enumerate(texts))]
+    assert read_csv(tmp_path / "t.csv")["name"].tolist() == texts
 
 
 def test_long_names_stay_apart_in_matlab(tmp_path):

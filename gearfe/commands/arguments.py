@@ -164,7 +164,7 @@ def add_job(parser: argparse.ArgumentParser, dest: str, help_: str) -> None:
         default=[],
         dest="changes",
         metavar="KEY=VALUE",
-        help="another value for a key of the file, as pair.pinion.teeth=21; may stand several times",
+        help="another value for a key of the file, as table.key=21; may stand several times",
     )
 
 

@@ -29,9 +29,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--window", metavar="NAME", help="none, hann, hamming, blackman or flattop (default: [spectrum], or none)"
     )
     parser.add_argument(
-        "--spectrum-from-ms", type=float, metavar="T", help="begin of the spectrum's record (default: [spectrum], or 0)"
+        "--spectrum-from-ms",
+        type=float,
+        metavar="T",
+        help="begin of the spectrum's record (ms; default: [spectrum], or 0)",
     )
-    parser.add_argument("--spectrum-ms", type=float, metavar="T", help="its duration (default: to the end)")
+    parser.add_argument("--spectrum-ms", type=float, metavar="T", help="its duration (ms; default: to the end)")
     parser.add_argument(
         "--band", nargs=2, type=float, metavar=("LOW", "HIGH"), help="frequencies of the pictures' spectra (Hz)"
     )
@@ -43,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fields", action="store_true", help="write housing and gears over time (VTKHDF), a picture and an animation"
     )
-    parser.add_argument("--picture-ms", type=float, metavar="T", help="time of the fields' picture (default: 4.55)")
+    parser.add_argument("--picture-ms", type=float, metavar="T", help="time of the fields' picture (ms; default: 4.55)")
     parser.add_argument("--no-animation", action="store_true", help="leave out the animation of --fields")
 
 

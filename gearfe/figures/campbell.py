@@ -169,9 +169,10 @@ def _label_orders(
             continue
         taken = end if above else taken
         y = 0.985 * highest if above else line.slope * (high - 0.01 * (high - low))
+        right = above and end < low + ROOM * (high - low)  # left of the line it would leave the picture
         axes.annotate(
-            line.label, (y / line.slope, y), (-4, 0) if above else (0, 3), textcoords="offset points", fontsize=7.5,
-            color=colours[line.mesh], ha="right", va="top" if above else "bottom",
+            line.label, (y / line.slope, y), (4 if right else -4, 0) if above else (0, 3), textcoords="offset points",
+            fontsize=7.5, color=colours[line.mesh], ha="left" if right else "right", va="top" if above else "bottom",
             path_effects=[withStroke(linewidth=2.5, foreground="white")],
         )  # fmt: skip
 

@@ -228,6 +228,7 @@ def relief_picture(made: ReliefResult, compared: Mapping[str, Array]) -> Any:
     third.set_title("the same within tolerances" if wide else "no tolerances given", loc="left", fontsize=9.5)
     if wide:
         third.legend(fontsize=8, frameon=False)
+        third.set_xlabel("peak to peak (µm)")
     else:
         third.set_xticks([])
     return figure

@@ -97,7 +97,7 @@ class FunctionTable:
     origin_s: float = quantity(0.0, doc="origin of the polynomial in s")
     step: float | None = quantity(None, doc="height of a smoothed step 10x^3 - 15x^4 + 6x^5")
     step_centre_s: float = quantity(0.0, doc="time at the middle of the step in s")
-    step_width_s: float | None = quantity(None, above=0.0, doc="duration of the step in s, > 0")
+    step_width_s: float | None = quantity(None, above=0.0, doc="duration of the step (s)")
     sine: float | None = quantity(None, doc="amplitude of a sine term")
     frequency_hz: float = quantity(0.0, low=0.0, doc="frequency of the sine in Hz")
     phase_deg: float = quantity(0.0, doc="phase of the sine in degrees")
@@ -175,7 +175,7 @@ class ForceTable:
     acceleration_m_per_s2: Pair | None = quantity(None, doc="gravity [x, y] in m/s2")
     stiffness: float = quantity(0.0, low=0.0, doc="stiffness in N/m, or N m/rad on an angle, >= 0")
     damping: float = quantity(0.0, low=0.0, doc="damping in N s/m, or N m s/rad on an angle, >= 0")
-    free_length_m: float = quantity(0.0, low=0.0, doc="length of the spring without force in m, >= 0")
+    free_length_m: float = quantity(0.0, low=0.0, doc="length of the spring without force (m)")
     tension_N: str | None = quantity(None, doc="further tension of a spring in N, by length and length_rate (m, m/s)")
     coordinate: str | None = quantity(None, choices=("angle", "x", "y"), doc="coordinate that the spring acts on")
     reference: float = quantity(0.0, doc="coordinate at which the spring is free, in m or rad")
@@ -225,8 +225,8 @@ class PathTable:
 class RunTable:
     """[run]"""
 
-    end_s: float = quantity(above=0.0, doc="end of the run in s, > 0")
-    step_s: float = quantity(above=0.0, doc="distance of the output times in s, > 0")
+    end_s: float = quantity(above=0.0, doc="end of the run (s)")
+    step_s: float = quantity(above=0.0, doc="distance of the output times (s)")
     tolerance: float | None = quantity(
         None,
         low=1e-13,
