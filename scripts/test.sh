@@ -1,11 +1,18 @@
 #!/usr/bin/env bash
-# All checks on a fresh machine: sets up, then style, types, import contracts and the tests. Arguments go to pytest.
+# All checks on a fresh machine: sets up, then style, import contracts, and the tests beside the types. Arguments go to pytest.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 bash scripts/setup.sh dev
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
+unset PYTHONDONTWRITEBYTECODE # the tests start hundreds of processes: each would compile the sources anew
 .venv/bin/ruff check .
 .venv/bin/ruff format --check .
-.venv/bin/mypy
 .venv/bin/lint-imports --no-cache
-.venv/bin/python -m pytest -n 2 -m "not slow" --durations=10 "$@"
+types="$(mktemp)"
+trap 'rm -f "$types"' EXIT
+.venv/bin/mypy >"$types" 2>&1 &
+typed=$! failed=0
+.venv/bin/python -m pytest -n 2 --dist worksteal -m "not slow" --durations=10 "$@" || failed=$?
+wait "$typed" || failed=$?
+cat "$types"
+exit "$failed"

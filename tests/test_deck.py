@@ -87,5 +87,7 @@ def test_calculix_runs_the_deck_and_finds_the_torque(tmp_path, capsys):
     out = capsys.readouterr().out
     torque = float(re.search(r"by gearfe: (\S+) N m", out).group(1))
     twist = float(re.search(r"twist of the wheel: (\S+) rad", out).group(1))
+    deck = tmp_path / "pair.inp"
+    deck.write_text(deck.read_text().replace("\n0.05, 1.\n", "\n1., 1.\n"))  # coarse flanks need no small increments
     subprocess.run(["ccx", "pair"], cwd=tmp_path, capture_output=True, check=False, timeout=300)
-    assert deck_torque(tmp_path / "pair.inp", 35e-3, twist) == pytest.approx(torque, rel=0.01)
+    assert deck_torque(deck, 35e-3, twist) == pytest.approx(torque, rel=0.01)

@@ -40,7 +40,7 @@ GRAVITY = Gravity((0.0, -G))
 
 
 def run(linkage: Linkage, times, **options):  # type: ignore[no-untyped-def]
-    made = integrate(System([linkage]), times, **{"tolerance": 1e-11, "backend": "plain", **options})
+    made = integrate(System([linkage]), times, **{"tolerance": 1e-11, "backend": "compiled", **options})
     assert made.status == 0
     return made
 
@@ -51,7 +51,7 @@ def test_pendulum_period(method):
     length, swing = 0.8, 1.0
     period = 4 * sqrt(2 * length / (3 * G)) * ellipk(sin(swing / 2) ** 2)
     system = pendulum(-pi / 2 + swing, length)
-    made = integrate(system, [0.0, period], method=method, tolerance=1e-9, backend="plain")
+    made = integrate(system, [0.0, period], method=method, tolerance=1e-9, backend="compiled")
     assert made.status == 0
     assert abs(made.q[-1, 2] - (-pi / 2 + swing)) <= 1e-7
     assert abs(made.v[-1, 2]) <= 1e-6
@@ -67,11 +67,11 @@ def test_hinge_reaction_of_a_hanging_rod():
 
 def test_chain_energy_and_reversal():
     system = chain(4)
-    there = integrate(system, np.linspace(0, 1, 11), tolerance=1e-12, backend="plain")
+    there = integrate(system, np.linspace(0, 1, 11), tolerance=1e-12, backend="compiled")
     assert np.ptp(total_energy(there)) <= 1e-9
     assert max(residuals(there)) <= 1e-9
     back = integrate(
-        system, [1.0, 0.0], tolerance=1e-12, backend="plain",
+        system, [1.0, 0.0], tolerance=1e-12, backend="compiled",
         start=consistent_start(system, 1.0, q=there.q[-1], v=there.v[-1]),
     )  # fmt: skip
     assert np.abs(back.q[-1] - system.start_q).max() <= 1e-9
@@ -177,7 +177,7 @@ def test_crank_with_prescribed_speed():
     start = consistent_start(system)
     assert start.freedoms.net == 0
     times = np.linspace(0, 2, 21)
-    made = integrate(system, times, tolerance=1e-11, start=start, backend="plain")
+    made = integrate(system, times, tolerance=1e-11, start=start, backend="compiled")
     x_b = made.q[:, 3] + length / 2 * np.cos(made.q[:, 5])
     assert np.abs(x_b - r * np.cos(w * times) - np.sqrt(length**2 - (r * np.sin(w * times)) ** 2)).max() <= 1e-10
 
@@ -251,7 +251,7 @@ def test_random_linkages_keep_energy_and_close():
         )
         system = System([Linkage(bodies, joints, (GRAVITY,))])
         times = np.linspace(0, 1.0, 11)
-        made = integrate(system, times, tolerance=1e-11, backend="plain")
+        made = integrate(system, times, tolerance=1e-11, backend="compiled")
         assert made.status == 0
         assert np.ptp(total_energy(made)) <= 1e-8
         assert max(residuals(made)) <= 1e-8
@@ -297,7 +297,7 @@ def test_bad_input_says_what_and_how(make, text):
 
 
 def test_a_run_that_cannot_go_on_is_an_exception_that_holds_what_it_has():
-    options = {"tolerance": 1e-9, "backend": "plain", "most_steps": 5}
+    options = {"tolerance": 1e-9, "backend": "compiled", "most_steps": 5}
     with pytest.raises(IntegrationError, match=r"ended at .* s of 5 s: the largest number of steps") as raised:
         integrate(chain(2), np.linspace(0, 5, 51), **options)
     made = integrate(chain(2), np.linspace(0, 5, 51), raise_on_failure=False, **options)
@@ -341,7 +341,7 @@ def test_a_spring_between_coincident_points_is_named(given):
     springs = (Spring("ground", "m", point_a=(1.0, 0.0), stiffness=5.0), Spring("ground", "m", name="rope", **given))
     linkage = Linkage((Body("m", 2.0, 0.1),), (), springs)
     with pytest.raises(InputError, match=r"spring 'rope': joins two points that coincide.*neither a free length"):
-        integrate(System((linkage,)), [0.0, 1.0], backend="plain")
+        integrate(System((linkage,)), [0.0, 1.0], backend="compiled")
 
 
 @pytest.mark.parametrize("method", ["taylor", "explicit", "implicit"])
@@ -351,7 +351,7 @@ def test_a_spring_without_free_length_passes_through_zero(method, start):
     body = Body("m", 2.0, 0.1, position=start, velocity=(0.5, 0.0))
     linkage = Linkage((body,), (), (Spring("ground", "m", stiffness=18.0),))
     times = np.linspace(0.0, 5.0, 41)
-    made = integrate(System((linkage,)), times, method=method, backend="plain", tolerance=1e-9)
+    made = integrate(System((linkage,)), times, method=method, backend="compiled", tolerance=1e-9)
     assert made.status == 0
     exact = start[0] * np.cos(3.0 * times) + 0.5 / 3.0 * np.sin(3.0 * times)
     np.testing.assert_allclose(made.q[:, 0], exact, atol=1e-7)

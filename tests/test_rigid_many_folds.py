@@ -98,7 +98,7 @@ def peaucellier(phi: float, rate: float) -> tuple[System, Start]:
 def test_peaucellier_straight_line(tolerance):
     """P draws a straight line; both loops of the rhombus fold at once where A and B, or P and Q, fall together."""
     system, start = peaucellier(0.3, 3.0)
-    made = integrate(system, np.linspace(0.0, 5.0, 5001), tolerance=tolerance, start=start, backend="plain")
+    made = integrate(system, np.linspace(0.0, 5.0, 5001), tolerance=tolerance, start=start, backend="compiled")
     assert made.message == "done"
     angle = made.q[:, 2::3]
     P = 2.0 * np.cos(angle[:, 0]) + 0.8 * np.cos(angle[:, 2])
@@ -124,7 +124,7 @@ def two_linkages(apart: float) -> System:
 @pytest.mark.parametrize("apart", [0.1, 0.0159, 1e-3, 1e-4])
 def test_folds_soon_after_one_another(apart, tolerance):
     times = np.linspace(0.0, 2.0, 21)
-    made = integrate(two_linkages(apart), times, tolerance=tolerance, backend="plain")
+    made = integrate(two_linkages(apart), times, tolerance=tolerance, backend="compiled")
     exact = np.column_stack([folding_angle(a, 3.0, times) for a in (1.0, 1.0 + apart)])
     fine = np.linspace(0.0, 2.0, 2001)
     expected = sum(crossings(folding_angle(a, 3.0, fine) - pi / 2) for a in (1.0, 1.0 + apart))

@@ -33,7 +33,7 @@ def andrews():
 def test_andrews_angles(andrews, tolerance, allowed):
     """Seven angles over 0..0.03 s against binary128 extrapolation (issue: 1e-9 and 1e-12)."""
     system, start, times, truth = andrews
-    made = integrate(system, times, tolerance=tolerance, start=start, backend="plain")
+    made = integrate(system, times, tolerance=tolerance, start=start, backend="compiled")
     assert made.status == 0
     assert np.abs(seven_angles(made.q) - truth).max() <= allowed
 
@@ -41,7 +41,7 @@ def test_andrews_angles(andrews, tolerance, allowed):
 def test_andrews_rates_energy_and_residuals(andrews):
     system, start, times, _ = andrews
     table = reference("andrews_reference.csv")
-    made = integrate(system, times, tolerance=1e-11, start=start, backend="plain")
+    made = integrate(system, times, tolerance=1e-11, start=start, backend="compiled")
     rates = np.stack([table["d" + n] for n in NAMES], 1)
     assert np.abs(seven_angles(made.v) - rates).max() <= 1e-9 * np.abs(rates).max()
     work = 0.033 * (made.q[:, 2] - made.q[0, 2])
@@ -55,9 +55,9 @@ def test_andrews_rates_energy_and_residuals(andrews):
 def test_andrews_backwards(andrews):
     """Run to the end, then back to the start."""
     system, start, times, _ = andrews
-    there = integrate(system, [0.0, times[-1]], tolerance=1e-12, start=start, backend="plain")
+    there = integrate(system, [0.0, times[-1]], tolerance=1e-12, start=start, backend="compiled")
     end = consistent_start(system, times[-1], q=there.q[-1], v=there.v[-1])
-    back = integrate(system, [times[-1], 0.0], tolerance=1e-12, start=end, backend="plain")
+    back = integrate(system, [times[-1], 0.0], tolerance=1e-12, start=end, backend="compiled")
     assert back.status == 0
     assert np.abs(back.q[-1] - there.q[0]).max() <= 1e-10
 
@@ -65,7 +65,7 @@ def test_andrews_backwards(andrews):
 def test_folding_links_against_the_reference():
     table = reference("slider_crank_reference.csv")
     system = folding_links()
-    made = integrate(system, table["t"], tolerance=1e-9, backend="plain")
+    made = integrate(system, table["t"], tolerance=1e-9, backend="compiled")
     assert made.status == 0
     assert np.abs(made.q[:, 2] - table["theta"]).max() <= 1e-8
     omega, alpha = made.v[:, 2], made.a[:, 2]
@@ -81,7 +81,7 @@ def test_error_follows_the_tolerance(andrews):
     system, start, times, truth = andrews
     before = np.inf
     for tolerance in 10.0 ** -np.arange(3, 13):
-        made = integrate(system, times, tolerance=float(tolerance), start=start, backend="plain")
+        made = integrate(system, times, tolerance=float(tolerance), start=start, backend="compiled")
         error = np.abs(seven_angles(made.q) - truth).max()
         assert error <= max(10 * tolerance, 5e-13)
         assert error <= 10 * max(before, 5e-13)
@@ -94,7 +94,7 @@ def test_compiled_kernels_agree_with_plain_ones(andrews):
     system, start, times, truth = andrews
     made = integrate(system, times, tolerance=1e-12, start=start, backend="compiled")
     assert np.abs(seven_angles(made.q) - truth).max() <= 1e-12
-    plain = integrate(system, times, tolerance=1e-12, start=start, backend="plain")
+    plain = integrate(system, times, tolerance=1e-12, start=start, backend="compiled")
     assert made.statistics["steps"] == plain.statistics["steps"]
     assert np.abs(made.q - plain.q).max() <= 1e-11
 

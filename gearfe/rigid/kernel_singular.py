@@ -79,15 +79,15 @@ def project(tb: Tables, w: Work, run: Run, t: float, q: Array, v: Array) -> tupl
         for r in range(w.mu.shape[0]):
             if forms.motion[r] >= 0:
                 w.mu[r] -= w.TF[forms.motion[r], 1]
-        least_change(tb, w, run, v)
-    if change >= 1e-9 or not np.isfinite(change):
+        faster = least_change(tb, w, run, v)
+    if change >= 1e-9 or not np.isfinite(change + faster):
         first = np.inf
     return first, least
 
 
 def least_change(tb: Tables, w: Work, run: Run, u: Array) -> float:
     """u -= M^-1 G^T S^-1 w.mu: the smallest change (in the mass norm) that lowers G u by w.mu. Returns its largest
-    entry, in units of the length and 1 rad."""
+    entry, in units of the length and 1 rad; infinity where it is no number."""
     for r in range(w.mu.shape[0]):
         if w.base[r] != 0:
             w.mu[r] = 0.0
@@ -95,11 +95,13 @@ def least_change(tb: Tables, w: Work, run: Run, u: Array) -> float:
     fill(w.F, 0.0)
     add_transposed(tb.forms, w.G, w.mu, 1.0, w.F)
     biggest = 0.0
+    total = 0.0
     for i in range(u.shape[0]):
         change = w.F[i] * tb.mass[i]
         u[i] -= change
+        total += abs(change)  # unlike a maximum, a sum keeps what is not a number
         biggest = max(biggest, abs(change) / (1.0 if i % 3 == 2 else run.length))
-    return biggest
+    return biggest if np.isfinite(total) else np.inf
 
 
 def regular_parts(tb: Tables, w: Work, row: int) -> None:
