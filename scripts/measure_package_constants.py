@@ -74,7 +74,7 @@ def laws() -> Answers:
     from gearfe.contact.laws import HalfPlane
     from gearfe.meshlaw.make import mesh_law
 
-    law = mesh_law(half_plane_pair(coarse_pair(), coarse_gears(HalfPlane())), 2000.0)
+    law = mesh_law(half_plane_pair(coarse_gears(HalfPlane())), 2000.0)
     angle, depth = np.tile(law.cycle * np.linspace(0.0, 1.0, 40), 3), np.repeat([0.7e-6, 5e-6, 20e-6], 40)
     found = law(angle, law.touching(angle) + depth)
     return {

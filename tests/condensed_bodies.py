@@ -81,7 +81,8 @@ def pressed_pair(lower: GearBody, upper: GearBody, law: ContactLaw, overlap: flo
     centre = left + np.array([CENTRES * size, 0.0])
     pinion = turned(lower, 0.0, left)
     wheel = turned(upper, np.pi - np.pi / TEETH, centre + np.array([0.0, overlap]))
-    return MeshingPair(pinion, wheel, CENTRES * size, lower.thickness, PairModel(law=law))
+    gears: Any = SimpleNamespace(working_centre_distance=CENTRES * size)
+    return MeshingPair(gears, pinion, wheel, PairModel(law=law))
 
 
 def pressed(pair: MeshingPair, low: float, high: float, pressure: Callable[[Array], Array]) -> Positions:

@@ -58,7 +58,7 @@ def bodies(name: str, coarsen: float, plane: Plane, points: int = 4) -> tuple[Ge
 def condensed(name: str, coarsen: float, plane: Plane, law: ContactLaw, points: int = 4) -> MeshingPair:
     """The pair on the condensed route."""
     pinion, wheel = bodies(name, coarsen, plane, points)
-    return MeshingPair(pinion, wheel, gears(name).working_centre_distance, WIDTH, PairModel(law=law))
+    return MeshingPair(gears(name), pinion, wheel, PairModel(law=law))
 
 
 @cache

@@ -24,7 +24,7 @@ PAIRS = {
 
 @lru_cache
 def law_of(name: str, flank_coarsen: float = 4.0) -> HalfPlanePair:
-    return half_plane_pair(PAIRS[name], elastic_pair(PAIRS[name], law="penalty", flank_coarsen=flank_coarsen))
+    return half_plane_pair(elastic_pair(PAIRS[name], law="penalty", flank_coarsen=flank_coarsen))
 
 
 def angles_of(pair: GearPair, count: int) -> np.ndarray:

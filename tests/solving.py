@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearfe import GearPair
 from gearfe.contact.compliance import MeshingPair
 from gearfe.contact.position import Positions
 from gearfe.stiffness.positions import position_solver
 
 
-def solve_positions(gears: GearPair, elastic: MeshingPair, angles, twists) -> Positions:
+def solve_positions(elastic: MeshingPair, angles, twists) -> Positions:
     """At pinion angles and twists (rad), with what fields need."""
     angles = np.atleast_1d(np.asarray(angles, dtype=float))
-    solver = position_solver(gears, elastic, resolved_only=False)
+    solver = position_solver(elastic, resolved_only=False)
     return solver.solve(angles, np.broadcast_to(twists, angles.shape), kept=np.arange(len(angles)))
 
 
-def solve_position(gears: GearPair, elastic: MeshingPair, angle: float, twist: float) -> Positions:
+def solve_position(elastic: MeshingPair, angle: float, twist: float) -> Positions:
     """At one."""
-    return solve_positions(gears, elastic, [angle], twist)[0]
+    return solve_positions(elastic, [angle], twist)[0]
 
 
 def nodal(elastic: MeshingPair, position: Positions, angle: float, twist: float):

@@ -10,7 +10,7 @@ from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
 from gearfe.elasticity import element_stiffness
 from gearfe.meshing.whole_gear import whole_gear
 
-from .contact_cases import STEEL, WIDTH, condensed, gears, meshes, whole
+from .contact_cases import STEEL, WIDTH, condensed, meshes, whole
 from .solving import peak_pressure, solve_position
 from .verification.monolithic import solve_monolithic
 
@@ -36,7 +36,7 @@ def test_both_routes_give_the_same_position(
     name: str, plane: str, law: ContactLaw, angle: float, twist: float, pairs: int
 ) -> None:
     place = math.radians(angle), math.radians(twist)
-    small = solve_position(gears(name), condensed(name, COARSE, plane, law), *place)  # type: ignore[arg-type]
+    small = solve_position(condensed(name, COARSE, plane, law), *place)  # type: ignore[arg-type]
     full = solve_monolithic(whole(name, COARSE, plane), law, *place)
     assert small.status == full.status == "converged"
     assert np.count_nonzero(small.contacts.torque_wheel > 1e-3 * small.torque_wheel) == pairs
@@ -47,9 +47,7 @@ def test_both_routes_give_the_same_position(
 
 def test_without_twist_nothing_touches_on_either_route() -> None:
     apart = math.radians(5.0), math.radians(-0.05)
-    assert (
-        solve_position(gears("sharp"), condensed("sharp", COARSE, "strain", Nitsche()), *apart).status == "no_contact"
-    )
+    assert solve_position(condensed("sharp", COARSE, "strain", Nitsche()), *apart).status == "no_contact"
     assert solve_monolithic(whole("sharp", COARSE, "strain"), Nitsche(), *apart).status == "no_contact"
 
 

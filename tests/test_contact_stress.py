@@ -54,7 +54,7 @@ def test_beside_contacts_as_on_a_fine_flank() -> None:
     found = []
     for law, options in (("half_plane", {}), ("nitsche", {"flank_coarsen": 0.5})):
         elastic = elastic_pair(PAIR, law=law, **options)
-        position = solve_position(PAIR, elastic, angle, twist)
+        position = solve_position(elastic, angle, twist)
         found.append((elastic, position, pair_recovery(elastic).at(position)))
     (elastic, position, fields), (_, _, fine) = found
     contacts = position.contacts
@@ -76,7 +76,7 @@ def test_beside_contacts_as_on_a_fine_flank() -> None:
 
 def test_a_bump_has_the_force_that_it_replaces() -> None:
     elastic = elastic_pair(PAIR)
-    position = solve_position(PAIR, elastic, math.radians(5.0), math.radians(0.02))
+    position = solve_position(elastic, math.radians(5.0), math.radians(0.02))
     for gear, body in enumerate(elastic.bodies):
         loads, local = bumped(body, position, gear)
         assert local

@@ -37,7 +37,7 @@ def test_a_wider_gear_is_one_of_the_common_width_and_a_higher_modulus(law):
     given = {"law": law, "coarsen": 2.0}
     one = elastic_pair(wide, materials=(Material(200e9, 0.3), Material(110e9, 0.3)), **given)
     other = elastic_pair(same, materials=(Material(600e9, 0.3), Material(110e9, 0.3)), **given)
-    made = [solve_positions(*both, angles, twist) for both in ((wide, one), (same, other))]
+    made = [solve_positions(elastic, angles, twist) for elastic in (one, other)]
     found = [[p.torque_wheel for p in positions] for positions in made]
     np.testing.assert_allclose(found[0], found[1], rtol=1e-8)
 

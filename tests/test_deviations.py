@@ -25,7 +25,7 @@ def layer(height: float) -> Deviation:
 
 @pytest.fixture(scope="module")
 def law():
-    return half_plane_pair(PAIR, elastic_pair(PAIR))
+    return half_plane_pair(elastic_pair(PAIR))
 
 
 # ---- one deviation -------------------------------------------------------------------------------------------------

@@ -97,7 +97,7 @@ def test_a_mesh_law_has_the_transmission_error_of_its_flanks() -> None:
     """Approach under a force against contact solutions at that torque; a kink is a corner of the law."""
     start = PAIR.pinion.profile.tip_roll - 2.5e-3
     relieved = tooth_deviations(PAIR.pinion, FlankModification(tip_relief=Relief(15e-6, start)))
-    law = half_plane_pair(PAIR, elastic_pair(PAIR, deviations=(relieved, NOMINAL[1]), coarsen=2.0))
+    law = half_plane_pair(elastic_pair(PAIR, deviations=(relieved, NOMINAL[1]), coarsen=2.0))
     made = mesh_law(law, 2000.0)
     torque, radius = 60.0, PAIR.wheel.base_radius
     found = load_mesh(law, [torque], positions=40)
@@ -181,7 +181,7 @@ def test_a_train_takes_the_flanks_that_drive(tmp_path) -> None:
     torque = float(found["right"].torque_wheel[0])
     gear = PAIR.pinion
     own = tooth_deviations(gear, FlankModification(tip_relief=Relief(20e-6, gear.profile.tip_roll - 3e-3)))
-    law = half_plane_pair(PAIR, elastic_pair(PAIR, coarsen=2.0)).deviated((own, NOMINAL[1]))
+    law = half_plane_pair(elastic_pair(PAIR, coarsen=2.0)).deviated((own, NOMINAL[1]))
     expected = load_mesh(law, [torque], positions=8)
     assert found["right"].twist == pytest.approx(expected.twist[0], rel=1e-5)
     assert np.abs(found["right"].twist / found["none"].twist - 1).max() > 0.1
@@ -204,7 +204,7 @@ def test_a_train_takes_the_pitch_errors_of_its_teeth(sign, tmp_path) -> None:
     train = job_train(job, train_curves(job))
     assert job.microgeometry is not None
     side = "left" if sign > 0 else "right"
-    law = half_plane_pair(PAIR, elastic_pair(PAIR, coarsen=2.0))
+    law = half_plane_pair(elastic_pair(PAIR, coarsen=2.0))
     law = law.deviated(deviations_of(job.microgeometry, PAIR, tmp_path, flank=side))
     found = load_mesh(law, [torque], positions=5)
     assert len(found.pinion_angle) == 5 * 60
@@ -230,7 +230,7 @@ def test_back_flanks_have_their_own_microgeometry(tmp_path) -> None:
     pair = replace(
         PAIR, pinion=replace(PAIR.pinion, tooth_thinning=50e-6), wheel=replace(PAIR.wheel, tooth_thinning=50e-6)
     )
-    law = half_plane_pair(pair, elastic_pair(pair, coarsen=2.0))
+    law = half_plane_pair(elastic_pair(pair, coarsen=2.0))
     for load, side, sign in ((-torque, "right", 1.0), (torque, "left", -1.0)):  # drive and so load turn against y
         (one,) = train.loads
         assert job.microgeometry is not None

@@ -23,18 +23,14 @@ TWIST = math.radians(0.05)
 ON_PATH = np.radians([1.0, 3.0, 5.0, 7.0, 12.0, 14.0, 16.0])
 
 
-def solve(name: str, pair: MeshingPair, angles, twists) -> Positions:
-    return solve_positions(gears(name), pair, angles, twists)
-
-
-def solve_one(name: str, pair: MeshingPair, angle: float, twist: float) -> Positions:
-    found = solve(name, pair, [angle], twist)[0]
+def solve_one(pair: MeshingPair, angle: float, twist: float) -> Positions:
+    found = solve_positions(pair, [angle], twist)[0]
     assert found.status == "converged"
     return found
 
 
 def torques(coarsen: float, law: ContactLaw) -> np.ndarray:
-    found = solve("reference", condensed("reference", coarsen, "strain", law), ON_PATH, TWIST)
+    found = solve_positions(condensed("reference", coarsen, "strain", law), ON_PATH, TWIST)
     assert all(p.status == "converged" for p in found)
     return np.array([p.torque_wheel for p in found])
 
@@ -47,7 +43,7 @@ def torques(coarsen: float, law: ContactLaw) -> np.ndarray:
 def test_forces_and_torques_are_in_equilibrium(law: ContactLaw, name: str, degrees: float, twist: float) -> None:
     """Both resultants cancel; so do the moments, T_wheel + T_pinion = a F_y, about current places."""
     pair, place = condensed(name, 2.0, "strain", law), (math.radians(degrees), math.radians(twist))
-    found = solve_one(name, pair, *place)
+    found = solve_one(pair, *place)
     parts = list(nodal(pair, found, *place))
     force = np.array([f.sum() for *_, f in parts])
     on_wheel = sum(f for (gear, *_), f in zip(parts, force, strict=True) if gear == 1)
@@ -62,7 +58,7 @@ def test_forces_and_torques_are_in_equilibrium(law: ContactLaw, name: str, degre
 @pytest.mark.parametrize("degrees", [4.0, 14.0])
 def test_on_the_path_the_torques_are_in_the_ratio_of_the_teeth(degrees: float) -> None:
     pair = condensed("reference", 1.0, "strain", Nitsche())
-    found = solve_one("reference", pair, math.radians(degrees), TWIST)
+    found = solve_one(pair, math.radians(degrees), TWIST)
     assert found.torque_wheel / found.torque_pinion == pytest.approx(1.5, rel=5e-4)
 
 
@@ -75,7 +71,7 @@ def test_tangent_and_rates_are_derivatives(law: ContactLaw, name: str, degrees: 
     """Differences of whole solutions: the torque's, and the forces' by their moments about the wheel's centre."""
     pair, angle, at = condensed(name, 2.0, "strain", law), math.radians(degrees), math.radians(twist)
     step = 1e-4 * at
-    before, here, after = (solve_one(name, pair, angle, at + s * step) for s in (-1, 0, 1))
+    before, here, after = (solve_one(pair, angle, at + s * step) for s in (-1, 0, 1))
     slope = (after.torque_wheel - before.torque_wheel) / (2 * step)
     assert here.tangent == pytest.approx(slope, rel=5e-4)
     rates = replace(here, loads=tuple(replace(one, force=one.rate) for one in here.loads))
@@ -91,10 +87,10 @@ def test_tangent_and_rates_are_derivatives(law: ContactLaw, name: str, degrees: 
 def test_company_does_not_matter() -> None:
     """A position alone, among others, in another order: the same numbers."""
     pair = condensed("sharp", 2.0, "strain", Nitsche())
-    angles = (np.arange(9) + 0.37) * pair.pitch_angle / 9
-    together = solve("sharp", pair, angles, TWIST)
-    backwards = solve("sharp", pair, angles[::-1], TWIST).take(slice(None, None, -1))
-    alone = [solve("sharp", pair, angles[i : i + 1], TWIST)[0] for i in range(0, 9, 4)]
+    angles = (np.arange(9) + 0.37) * pair.gears.mesh_cycle / 9
+    together = solve_positions(pair, angles, TWIST)
+    backwards = solve_positions(pair, angles[::-1], TWIST).take(slice(None, None, -1))
+    alone = [solve_positions(pair, angles[i : i + 1], TWIST)[0] for i in range(0, 9, 4)]
     for one, other in [
         *zip(together, backwards, strict=True),
         *zip(together.take(slice(None, None, 4)), alone, strict=True),
@@ -109,7 +105,7 @@ def test_company_does_not_matter() -> None:
 def test_where_it_starts_does_not_matter(law: ContactLaw) -> None:
     """From pressures half as large on a third of the width, half of that beside the place: the same solution."""
     pair, angles = condensed("modified", 2.0, "strain", law), np.radians([2.0, 9.0, 20.0])
-    half_plane = half_plane_pair(gears("modified"), pair)
+    half_plane = half_plane_pair(pair)
     contacts = solve_half_plane(half_plane, angles, 3 * TWIST).contacts
     first = first_contacts(half_plane.sides, contacts)
     middle = first.arc.mean(axis=2, keepdims=True)
@@ -127,11 +123,11 @@ def test_sharp_tips_dig_in_over_a_mesh_cycle(law: ContactLaw) -> None:
     name = "reference"
     pair, angles = condensed(name, 1.5, "strain", law), np.linspace(0, gears(name).mesh_cycle, 12)
     twist = 0.08 * gears(name).wheel.module / gears(name).wheel.base_radius
-    found = solve(name, pair, angles, twist)
+    found = solve_positions(pair, angles, twist)
     assert {p.status for p in found} == {"converged"}
     made = np.array([p.torque_wheel for p in found])
     assert made[-1] == pytest.approx(made[0], rel=1e-7)
-    other = solve_half_plane(half_plane_pair(gears(name), pair), angles, twist).torque_wheel
+    other = solve_half_plane(half_plane_pair(pair), angles, twist).torque_wheel
     assert np.abs(made / other - 1).max() < 6e-3
 
 
@@ -140,9 +136,7 @@ def test_sharp_tips_dig_in_over_a_mesh_cycle(law: ContactLaw) -> None:
 
 def test_penalty_tends_to_the_stiff_limit_with_the_inverse_of_its_stiffness_and_that_is_nitsches() -> None:
     def torque(law: ContactLaw) -> float:
-        return solve_one(
-            "reference", condensed("reference", 1.0, "strain", law), math.radians(14.0), TWIST
-        ).torque_wheel
+        return solve_one(condensed("reference", 1.0, "strain", law), math.radians(14.0), TWIST).torque_wheel
 
     limit, stiffness = torque(Penalty(1e18)), np.array([1e14, 3e14, 1e15, 3e15, 1e16])
     softness = limit / np.array([torque(Penalty(s)) for s in stiffness]) - 1
@@ -171,7 +165,7 @@ def test_which_side_is_integrated_does_not_matter(law) -> None:
 def test_peak_pressure_is_hertzs(law: ContactLaw, degrees: float) -> None:
     """p0 = sqrt(F E*/(pi rho w)), 1/rho = 1/s1 + 1/s2 with the roll lengths s at the contact (Johnson, ch. 4)."""
     pair, place = gears("reference"), math.radians(degrees)
-    found = solve_one("reference", condensed("reference", 1.0, "strain", law), place, math.radians(0.1))
+    found = solve_one(condensed("reference", 1.0, "strain", law), place, math.radians(0.1))
     assert len(found.contacts.pair) == 1
     roll = pair.pinion_roll_at(place + found.contacts.pair[0] * pair.mesh_cycle)
     radius = 1 / (1 / roll + 1 / (pair.tangent_length - roll))
@@ -189,9 +183,9 @@ def test_where_a_sharp_corner_bears_calculix_agrees(law: ContactLaw, degrees: fl
     """CalculiX 2.20, surface to surface, NLGEOM, corner strips of 0.01 mm: see docs/development/verification.md."""
     pair = gears("reference")
     elastic = [gear_body(mesh, STEEL, "strain", WIDTH) for mesh in meshes("reference", 1.0)]
-    both = MeshingPair(elastic[0], elastic[1], pair.working_centre_distance, WIDTH, PairModel(law=law))
-    found = solve_one("reference", both, math.radians(degrees), TWIST)
-    share = float(finite_strain_shares(both, solve("reference", both, [math.radians(degrees)], TWIST))[0])
+    both = MeshingPair(pair, elastic[0], elastic[1], PairModel(law=law))
+    found = solve_one(both, math.radians(degrees), TWIST)
+    share = float(finite_strain_shares(both, solve_positions(both, [math.radians(degrees)], TWIST))[0])
     k_mesh = found.torque_wheel * (1 + share) / TWIST / pair.wheel.base_radius**2
     assert k_mesh == pytest.approx(stiffness, rel=4e-3)
 
@@ -201,7 +195,7 @@ def test_a_sharp_corner_pushes_along_the_normal_of_the_flank_it_bears_on(degrees
     """Frictionless: the force on an involute passes its base circle, wherever a corner touches it."""
     gear_pair, angle = gears("reference"), math.radians(degrees)
     pair = condensed("reference", 1.0, "strain", Nitsche(sides=corner_of))
-    found = solve_one("reference", pair, angle, TWIST)
+    found = solve_one(pair, angle, TWIST)
     assert len(found.contacts.pair) == 2
     smooth = 0 if corner_of == "wheel" else 1
     number = found.contacts.pair[

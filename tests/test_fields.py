@@ -40,7 +40,7 @@ def elastic(gears):
 
 @pytest.fixture(scope="module")
 def position(gears, elastic):
-    return solve_position(gears, elastic, ANGLE, TWIST)
+    return solve_position(elastic, ANGLE, TWIST)
 
 
 @pytest.fixture(scope="module")
@@ -184,7 +184,7 @@ def test_the_pressure_carries_the_load(gears, elastic, position, fields):
 def test_a_one_sided_law_presses_on_both_flanks(gears):
     """Penalty with points on the pinion alone: the wheel's pressure is the pinion's, on the other flank."""
     elastic = elastic_pair(gears, coarsen=3.0, law=Penalty(sides="pinion"))
-    position = solve_position(gears, elastic, ANGLE, TWIST)
+    position = solve_position(elastic, ANGLE, TWIST)
     found = flank_pressures(elastic, position)
     assert {one.gear for one in found} == {0, 1}
     for pair_number in {one.pair for one in found}:
@@ -196,7 +196,7 @@ def test_the_series_and_the_table_of_pressures(gears, elastic, tmp_path):
     h5py = pytest.importorskip("h5py")
     curve = sweep_stiffness(gears, twist=TWIST, angles=np.radians([1.0, 2.0]), elastic=elastic)
     drawn = []
-    pressures = write_fields(tmp_path, gears, elastic, curve, None, draw=lambda position, fields: drawn.append(fields))
+    pressures = write_fields(tmp_path, elastic, curve, None, draw=lambda position, fields: drawn.append(fields))
     assert sorted(p.name for p in tmp_path.iterdir()) == ["fields.vtkhdf", "pressure.csv"]
     assert [angle for angle, _ in pressures] == pytest.approx([1.0, 2.0])
     assert len(drawn) == 1  # the most stressed one
@@ -240,9 +240,9 @@ def turn3(angle):
 def test_an_animation_is_one_whole_file(gears, elastic, tmp_path, monkeypatch):
     image = pytest.importorskip("PIL.Image")
     curve = sweep_stiffness(gears, twist=TWIST, angles=np.arange(5) * gears.mesh_cycle / 5, elastic=elastic)
-    frames = stress.frames_of(gears, elastic, curve, 3)
+    frames = stress.frames_of(elastic, curve, 3)
     np.testing.assert_allclose([f.angle for f in frames], np.degrees(gears.mesh_cycle) * np.arange(3) / 3)
-    stress.stress_animation(tmp_path / "a.gif", gears, elastic, curve, 3)
+    stress.stress_animation(tmp_path / "a.gif", elastic, curve, 3)
     with image.open(tmp_path / "a.gif") as made:
         assert made.n_frames == 3
         assert made.info["loop"] == 0
@@ -258,7 +258,7 @@ def test_an_animation_is_one_whole_file(gears, elastic, tmp_path, monkeypatch):
 
     monkeypatch.setattr(image.Image, "save", broken)
     with pytest.raises(OSError, match="no space"):
-        stress.stress_animation(tmp_path / "b.gif", gears, elastic, curve, 3)
+        stress.stress_animation(tmp_path / "b.gif", elastic, curve, 3)
     assert [p.name for p in tmp_path.iterdir()] == ["a.gif"]
 
 

@@ -25,7 +25,7 @@ from .solving import solve_position, solve_positions
 REFERENCE = Path(__file__).parent / "data" / "gear_pair_20_30.csv"
 
 
-def meshing_pair(coarsen: float) -> tuple[GearPair, MeshingPair]:
+def meshing_pair(coarsen: float) -> MeshingPair:
     """The 20/30 pair of the reference data: sharp tips, bores of 0.35 times the pitch diameter, 10 mm wide."""
     form = {"module": 2.5e-3, "pressure_angle": math.radians(25), "face_width": 10e-3}
     pinion = Gear(teeth=20, bore_diameter=17.5e-3, **form)
@@ -35,7 +35,7 @@ def meshing_pair(coarsen: float) -> tuple[GearPair, MeshingPair]:
         gear_body(sector_mesh(gear, recipe, cache=False), Material(), "strain", gear.face_width)
         for gear, recipe in zip((pinion, wheel), sector_recipes(pair, coarsen=coarsen), strict=True)
     ]
-    return pair, MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, 10e-3, PairModel(law=Nitsche()))
+    return MeshingPair(pair, bodies[0], bodies[1], PairModel(law=Nitsche()))
 
 
 def extra_energy(pair: MeshingPair, position: Positions) -> float:
@@ -62,19 +62,19 @@ def extra_energy(pair: MeshingPair, position: Positions) -> float:
 @pytest.mark.parametrize("angle_deg", [4.0, 13.0])
 def test_share_is_the_rate_of_the_extra_energy(angle_deg: float) -> None:
     """Delta T = d(W_SVK - W_linear)/d twist, by central differences, with every sector taken along."""
-    gears, pair = meshing_pair(coarsen=2.0)
+    pair = meshing_pair(coarsen=2.0)
     angle, twist = math.radians(angle_deg), math.radians(0.05)
     step = 0.02 * twist
-    energies = [extra_energy(pair, solve_position(gears, pair, angle, twist + sign * step)) for sign in (-1, 1)]
-    found = solve_positions(gears, pair, [angle], twist)
+    energies = [extra_energy(pair, solve_position(pair, angle, twist + sign * step)) for sign in (-1, 1)]
+    found = solve_positions(pair, [angle], twist)
     share = finite_strain.finite_strain_shares(pair, found, neighbours=15)
     assert share * found.torque_wheel == pytest.approx((energies[1] - energies[0]) / (2 * step), rel=3e-3)
 
 
 def test_few_neighbours_suffice() -> None:
     """The effect is cubic in the strain: the loaded teeth and their neighbours carry all but a few parts in 1e5."""
-    gears, pair = meshing_pair(coarsen=2.0)
-    found = solve_positions(gears, pair, [math.radians(13)], math.radians(0.05))
+    pair = meshing_pair(coarsen=2.0)
+    found = solve_positions(pair, [math.radians(13)], math.radians(0.05))
     near = finite_strain.finite_strain_shares(pair, found)
     assert near == pytest.approx(finite_strain.finite_strain_shares(pair, found, neighbours=15), abs=5e-5)
 
@@ -82,13 +82,13 @@ def test_few_neighbours_suffice() -> None:
 @pytest.mark.parametrize("law", ["half_plane", "nitsche"])
 def test_curves_take_the_share_of_every_position(law: str) -> None:
     """At pair changes, too, where the share jumps with the load sharing: 0.5 deg, as the energy's rate has it there."""
-    gears, pair = meshing_pair(coarsen=2.0)
+    pair = meshing_pair(coarsen=2.0)
     if law == "half_plane":
         pair = replace(pair, model=PairModel())
-    angles, twist = np.linspace(0, pair.pitch_angle, 25)[:-1], math.radians(0.5)
-    shares = finite_strain.finite_strain_shares(pair, solve_positions(gears, pair, angles, twist))
+    angles, twist = np.linspace(0, pair.gears.mesh_cycle, 25)[:-1], math.radians(0.5)
+    shares = finite_strain.finite_strain_shares(pair, solve_positions(pair, angles, twist))
     small, finite = (
-        sweep_stiffness(gears, elastic=pair, twist=twist, angles=angles, kinematics=kinematics)
+        sweep_stiffness(pair.gears, elastic=pair, twist=twist, angles=angles, kinematics=kinematics)
         for kinematics in ("small", "finite")
     )
     solved = small.status == "converged"
@@ -99,11 +99,11 @@ def test_curves_take_the_share_of_every_position(law: str) -> None:
 @pytest.mark.parametrize("torque", [100.0, 1000.0])
 def test_torques_with_finite_strain_are_met(torque: float) -> None:
     """The twist found for a torque carries it, but for what is of the second order in the share."""
-    gears, pair = meshing_pair(coarsen=2.0)
+    pair = meshing_pair(coarsen=2.0)
     pair = replace(pair, model=PairModel())
-    solver, angles = position_solver(gears, pair), np.linspace(0, pair.pitch_angle, 7)[:-1]
+    solver, angles = position_solver(pair), np.linspace(0, pair.gears.mesh_cycle, 7)[:-1]
     found = at_torques(solver, angles, np.full(6, torque), finite=True)
-    share = finite_strain.finite_strain_shares(pair, solve_positions(gears, pair, angles, found.twist))
+    share = finite_strain.finite_strain_shares(pair, solve_positions(pair, angles, found.twist))
     again = at_twists(solver, angles, found.twist, finite=True)
     assert np.abs(again.torque_wheel / torque - 1).max() < max(1e-7, float((share**2).max()))
 
@@ -111,14 +111,14 @@ def test_torques_with_finite_strain_are_met(torque: float) -> None:
 def test_against_a_finite_strain_program() -> None:
     """On the path, small strain plus its share meets the finite-strain curve of GetFEM within its trust and our mesh's
     0.1 %, at 0.05 deg and at ten times that load, where the share alone is ten times larger (about 1 %)."""
-    gears, pair = meshing_pair(coarsen=1.0)
+    pair = meshing_pair(coarsen=1.0)
     rows = [row for row in csv.DictReader(REFERENCE.open()) if row["plane_state"] == "plane_strain"]
     for twist_deg, angles in ((0.05, (2.0, 4.0, 6.0, 12.0, 13.0, 15.0)), (0.5, (4.0, 6.0))):
         expected = {float(r["pinion_angle_deg"]): r for r in rows if float(r["twist_deg"]) == twist_deg}
         twist = math.radians(twist_deg)
-        positions = solve_positions(gears, pair, np.radians(angles), twist)
+        positions = solve_positions(pair, np.radians(angles), twist)
         shares = finite_strain.finite_strain_shares(pair, positions)
         for angle, position, share in zip(angles, positions, shares, strict=True):
-            stiffness = position.torque_wheel * (1 + share) / twist / gears.wheel.base_radius**2
+            stiffness = position.torque_wheel * (1 + share) / twist / pair.gears.wheel.base_radius**2
             trust = float(expected[angle]["trust_percent"]) / 100
             assert stiffness == pytest.approx(float(expected[angle]["k_mesh_N_per_m"]), rel=trust + 1e-3)

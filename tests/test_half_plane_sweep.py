@@ -54,7 +54,7 @@ def test_curve_beside_nitsches(kinematics: str) -> None:
 @pytest.mark.parametrize("other", [0, 4])
 def test_positions_with_loads_take_one_that_is_solved_again_without(other: int) -> None:
     """As where a torque changes a little at a position whose loads nobody asks for."""
-    solver, twists = position_solver(PAIR, elastic_of("half_plane")), np.full(5, math.radians(0.3))
+    solver, twists = position_solver(elastic_of("half_plane")), np.full(5, math.radians(0.3))
     kept = np.array([1, 3])
     found, again = solver.solve(ANGLES, twists, kept), solver.solve(ANGLES[[other]], twists[[other]])
     made = found.replaced(np.array([other]), again)
@@ -67,16 +67,16 @@ def test_positions_with_loads_take_one_that_is_solved_again_without(other: int) 
 def test_share_of_finite_strain() -> None:
     """From the forces and their rates on a coarse flank as from Nitsche's on a fine one."""
     twist = math.radians(0.4)
-    solver = position_solver(PAIR, elastic_of("half_plane"))
+    solver = position_solver(elastic_of("half_plane"))
     found = finite_strain_shares(solver.elastic, solver.solve(ANGLES, np.full(5, twist), np.arange(5)))
     fine = elastic_of("nitsche")
-    expected = finite_strain_shares(fine, solve_positions(PAIR, fine, ANGLES, twist))
+    expected = finite_strain_shares(fine, solve_positions(fine, ANGLES, twist))
     assert found == pytest.approx(expected, rel=0.03)
 
 
 def test_nodal_loads_have_the_moments_of_the_contacts() -> None:
     """What fields are recovered from: forces on both gears cancel and make the reactions at the wheel's bore."""
-    solver = position_solver(PAIR, elastic_of("half_plane"))
+    solver = position_solver(elastic_of("half_plane"))
     for position, angle in zip(solver.solve(ANGLES, np.full(5, 2e-3), np.arange(5)), ANGLES, strict=True):
         total, wheel = 0j, 0.0
         for gear, body in enumerate(solver.elastic.bodies):
@@ -91,7 +91,7 @@ def test_nodal_loads_have_the_moments_of_the_contacts() -> None:
 
 
 def test_rates_are_those_of_differences() -> None:
-    solver = position_solver(PAIR, elastic_of("half_plane"))
+    solver = position_solver(elastic_of("half_plane"))
     twist, step = 3e-3, 1e-5
     low, middle, high = (solver.solve(ANGLES, np.full(5, twist + k * step), np.arange(5)) for k in (-1, 0, 1))
     for one, two, three in zip(low, middle, high, strict=True):
@@ -124,7 +124,7 @@ def test_load_map() -> None:
 def test_no_other_solver_takes_it() -> None:
     with pytest.raises(InputError, match=r"gearfe.contact.half_plane solves it"):
         on_elements(HalfPlane())
-    assert isinstance(position_solver(PAIR, elastic_of("half_plane")), HalfPlaneSolver)
+    assert isinstance(position_solver(elastic_of("half_plane")), HalfPlaneSolver)
     assert isinstance(elastic_of("half_plane").law, HalfPlane)
 
 
@@ -169,7 +169,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(("degrees", "bound"), [(0.01, 0.08), (0.1, 0.3)])
 def test_another_influence_function_by_the_energy(degrees: float, bound: float) -> None:
     """The change of the torque to first order, from the energy, against positions solved again with that function."""
-    own, other = (half_plane_pair(PAIR, elastic_pair(PAIR, coarsen=c)) for c in (1.0, 2.5))
+    own, other = (half_plane_pair(elastic_pair(PAIR, coarsen=c)) for c in (1.0, 2.5))
     found, again = (solve_half_plane(law, ANGLES, math.radians(degrees)) for law in (own, other))
     exact = again.torque_wheel / found.torque_wheel - 1
     assert np.abs(exact).max() > 1e-4

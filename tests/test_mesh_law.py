@@ -28,7 +28,7 @@ STEEL = Material(200e9, 0.3)
 
 @pytest.fixture(scope="module")
 def solver():
-    return half_plane_pair(PAIR, elastic_pair(PAIR, materials=(STEEL, STEEL), law=law_named("half_plane"), coarsen=2.0))
+    return half_plane_pair(elastic_pair(PAIR, materials=(STEEL, STEEL), law=law_named("half_plane"), coarsen=2.0))
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +112,7 @@ def test_pairs_that_touch_beyond_the_reach_yield_where_they_are_pressed():
     """
     form = {"module": 2.5e-3, "pressure_angle": math.radians(20), "face_width": 15e-3}
     pair = GearPair(Gear(29, bore_diameter=12e-3, **form), Gear(59, bore_diameter=12e-3, **form))
-    law = mesh_law(half_plane_pair(pair, elastic_pair(pair, law=law_named("half_plane"), coarsen=4.0)), 3000.0)
+    law = mesh_law(half_plane_pair(elastic_pair(pair, law=law_named("half_plane"), coarsen=4.0)), 3000.0)
     assert law.touch[..., 0].max() > 3.0 * law.reach
     z = np.linspace(0.0, 1.0, 5)[:, None] * np.diff(law.nodes)
     for part, width in enumerate(np.diff(law.forces)):

@@ -33,7 +33,7 @@ def laws() -> tuple[MeshLaw, MeshLaw]:
     """The law of a pair, and that of the same gears where the wheel drives: other contact solutions."""
     one, two = (
         mesh_law(
-            half_plane_pair(p, elastic_pair(p, materials=(STEEL, STEEL), law=law_named("half_plane"), coarsen=2.0)),
+            half_plane_pair(elastic_pair(p, materials=(STEEL, STEEL), law=law_named("half_plane"), coarsen=2.0)),
             5 * DESIGN,
         )
         for p in (PAIR, EXCHANGED)

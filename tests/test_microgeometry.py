@@ -33,7 +33,7 @@ PINION, WHEEL = PAIR.pinion, PAIR.wheel
 
 @pytest.fixture(scope="module")
 def law():
-    return half_plane_pair(PAIR, elastic_pair(PAIR))
+    return half_plane_pair(elastic_pair(PAIR))
 
 
 def test_a_pitch_error_sine_is_the_unloaded_error(law) -> None:
@@ -97,7 +97,7 @@ def test_gears_exchanged(law) -> None:
     # the wheel's tooth -1, between the centres with the pinion's tooth 0, is its tooth 0 as a pinion
     as_pinion = tooth_deviations(WHEEL, relief[1], np.roll(turns[1], 1))
     as_wheel = tooth_deviations(PINION, relief[0], np.roll(turns[0], -1))
-    there = half_plane_pair(other_pair, elastic_pair(other_pair), deviations=(as_pinion, as_wheel))
+    there = half_plane_pair(elastic_pair(other_pair), deviations=(as_pinion, as_wheel))
     angles, twist = np.linspace(0, 3, 12), np.full(12, math.radians(0.05))
     one = solve_half_plane(here, angles, twist)
     turned = -angles / PAIR.gear_ratio - math.pi / 30 + twist
@@ -189,7 +189,7 @@ def test_the_room_behind_the_teeth(flank) -> None:
     pair = gear_pair(tip_round=1e-4, tooth_thinning=40e-6)
     backlash, cosine = pair.normal_backlash, math.cos(pair.pinion.pressure_angle)
     assert backlash > 60e-6
-    law = half_plane_pair(pair, elastic_pair(pair, coarsen=3.0))
+    law = half_plane_pair(elastic_pair(pair, coarsen=3.0))
 
     def room(left: dict, right: dict, angles) -> tuple[np.ndarray, np.ndarray]:
         table = build(MicrogeometryTable, {"flank": flank, "pinion": {"left": left, "right": right}}, "microgeometry")
@@ -220,7 +220,7 @@ def test_gears_that_jam_have_no_numbers() -> None:
     pair = gear_pair(tip_round=1e-4, tooth_thinning=5e-6)
     cosine = math.cos(pair.pinion.pressure_angle)
     thick = 1e-6 * 10.0 * cosine
-    law = half_plane_pair(pair, elastic_pair(pair, coarsen=3.0))
+    law = half_plane_pair(elastic_pair(pair, coarsen=3.0))
     table = build(MicrogeometryTable, {"pinion": {"pitch_um": [10.0] * 20}}, "microgeometry")
     own, back = (deviations_of(table, pair, flank=side) for side in ("left", "right"))
     angles = (np.arange(5) + 0.3) * pair.mesh_cycle / 5

@@ -63,11 +63,11 @@ def both_routes(angle_deg: float, twist_deg: float, neighbours: int = NEIGHBOURS
     ]
     steel, width = Material(), 10e-3
     bodies = [gear_body(mesh, steel, "strain", width) for mesh in meshes]
-    condensed = MeshingPair(bodies[0], bodies[1], pair.working_centre_distance, width, PairModel(law=laws.Nitsche()))
+    condensed = MeshingPair(pair, bodies[0], bodies[1], PairModel(law=laws.Nitsche()))
     pinion, wheel = (ElasticGear(mesh, steel, "strain", width) for mesh in meshes)
     full = WholePair(pinion, wheel, pair.working_centre_distance, width, kinematics="finite")
     place = math.radians(angle_deg), math.radians(twist_deg)
-    found = solve_positions(pair, condensed, [place[0]], place[1])
+    found = solve_positions(condensed, [place[0]], place[1])
     finite = solve_monolithic(full, Nitsche(), *place, tolerance=1e-8)
     assert finite.status == "converged"
     share = finite_strain_shares(condensed, found, neighbours)[0]

@@ -30,7 +30,7 @@ LENGTH = Variable("tip_relief.length", 1e-3, 4.5e-3, tolerance=0.2e-3)
 @pytest.fixture(scope="module")
 def problem() -> ReliefProblem:
     pair = gear_pair(tip_round=1e-4)
-    law = half_plane_pair(pair, elastic_pair(pair))
+    law = half_plane_pair(elastic_pair(pair))
     return ReliefProblem(law, (FlankModification(), FlankModification()), (AMOUNT, LENGTH), (100.0,), positions=6)
 
 

@@ -66,8 +66,8 @@ def test_the_stress_converges(gears, elastic):
 def test_the_estimate_covers_the_error(form):
     gears = pair(18, 27, **form)
     elastic = elastic_pair(gears, law="nitsche", coarsen=3.0)
-    solved = solve_positions(gears, elastic, math.radians(2.0), math.radians(0.05))
-    found, exact = (pair_roots(gears, elastic, coarsen=c).at(solved) for c in (1.0, 0.5))
+    solved = solve_positions(elastic, math.radians(2.0), math.radians(0.05))
+    found, exact = (pair_roots(elastic, coarsen=c).at(solved) for c in (1.0, 0.5))
     assert (np.abs(found.stress / exact.stress - 1) < np.maximum(1.5 * found.error, 1e-3)).all()
     assert (found.error < 0.01).all()
 
@@ -181,9 +181,9 @@ def test_iso_6336_3_is_near(z1, z2, angle):
     gears = pair(z1, z2, pressure_angle=angle, bore=0.5)
     elastic = elastic_pair(gears, law="nitsche", coarsen=2.0)
     point = gears.path["D"]  # the next pair comes into contact: the pinion's outer point of single contact
-    solved = solve_positions(gears, elastic, point.pinion_angle - 0.06 * gears.mesh_cycle, 1.5e-4)
+    solved = solve_positions(elastic, point.pinion_angle - 0.06 * gears.mesh_cycle, 1.5e-4)
     assert (solved.contacts.torque_wheel > 0).sum() == 1
-    roots = pair_roots(gears, elastic).at(solved)
+    roots = pair_roots(elastic).at(solved)
     alpha, m = math.radians(angle), 2.5e-3
     roll = gears.pinion_roll_at(point.pinion_angle - 0.06 * gears.mesh_cycle)
     d_en = 2 * math.hypot(gears.pinion.base_radius, roll) / m

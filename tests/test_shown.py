@@ -61,7 +61,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         pair,
         loads.curves[0],
         loads,
-        load_mesh(half_plane_pair(pair, elastic), torques, positions=4),
+        load_mesh(half_plane_pair(elastic), torques, positions=4),
         simulate(model, np.linspace(0.0, 1e-4, 5)),
         steady.housing,
         run_up(model, [500.0, 510.0, 520.0], tolerance=1e-2),
@@ -70,7 +70,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         amplitude_spectrum(np.column_stack([tone, 2.0 * tone]), 1e-3),
         optimise_relief(
             ReliefProblem(
-                half_plane_pair(pair, elastic),
+                half_plane_pair(elastic),
                 (FlankModification(), FlankModification()),
                 (Variable("tip_relief.amount", 0.0, 3e-5, tolerance=2e-6),),
                 torques=(100.0,),

@@ -79,7 +79,7 @@ def test_the_hub_torques_are_in_equilibrium(gears):
     """Moments about the origin: T_pinion - a F_y - T_wheel = 0 with F the force on the wheel, and its signs."""
     on_elements = elastic_pair(gears, law="nitsche", coarsen=COARSE)
     for angle in (0.05, 0.2):
-        p = solve_position(gears, on_elements, angle, TWIST)
+        p = solve_position(on_elements, angle, TWIST)
         forces = [(gear, f.sum()) for gear, _, _, f in nodal(on_elements, p, angle, TWIST)]
         on_pinion, on_wheel = (sum(f for of, f in forces if of == gear) for gear in (0, 1))
         assert abs(on_wheel + on_pinion) < 1e-10 * abs(on_wheel)

@@ -28,7 +28,7 @@ CASES = Path(__file__).parent / "campaigns" / "kept" / "gears"
 
 @lru_cache
 def law_of(waves: float, amplitude: float) -> HalfPlanePair:
-    return half_plane_pair(PAIR, elastic_pair(PAIR), deviations=(wave(PAIR.pinion, waves, amplitude), PLAIN))
+    return half_plane_pair(elastic_pair(PAIR), deviations=(wave(PAIR.pinion, waves, amplitude), PLAIN))
 
 
 def most_zones(found: Positions) -> int:
@@ -127,9 +127,9 @@ def test_a_tip_along_a_root() -> None:
     job = read_stiffness_job(CASES / "tip_along_a_root.toml")
     pair, twist = job.pair, job.sweep["twist"] + job.pair.contact_twist
     angles = np.radians([3.09, 6.18, 9.27, 15.4])
-    found = solve_half_plane(half_plane_pair(pair, elastic_pair(pair)), angles, twist)
+    found = solve_half_plane(half_plane_pair(elastic_pair(pair)), angles, twist)
     assert set(found.status) == {"converged"}
-    reference = solve_positions(pair, elastic_pair(pair, law="nitsche", coarsen=0.7), angles, twist)
+    reference = solve_positions(elastic_pair(pair, law="nitsche", coarsen=0.7), angles, twist)
     assert set(reference.status) == {"converged"}
     assert found.torque_wheel == pytest.approx(reference.torque_wheel, rel=1e-3)
     pairs = found.contacts.pair[found.contacts.position == 1]

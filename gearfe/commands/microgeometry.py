@@ -45,7 +45,7 @@ def condensed(job: StiffnessJob, root_stress: bool, watch: Stopwatch) -> tuple[M
     if not root_stress:
         return elastic, None
     with watch.stage("root meshes"), one_thread():
-        return elastic, pair_roots(job.pair, elastic)
+        return elastic, pair_roots(elastic)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
     folder = output_folder(args.out)
     elastic, roots = condensed(job, table.root_stress, watch)
     with watch.stage("positions"):
-        law = half_plane_pair(pair, elastic, deviations=deviations)
+        law = half_plane_pair(elastic, deviations=deviations)
         made = load_mesh(
             law,
             torques,

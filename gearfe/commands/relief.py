@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     job = StiffnessJob(tables["pair"], with_keys(args, tables.get("stiffness", StiffnessTable()), "coarsen"), pair)
     folder = output_folder(args.out)
     elastic, roots = condensed(job, bool(table.root_stress_weight), watch)
-    law = half_plane_pair(pair, elastic)
+    law = half_plane_pair(elastic)
     problem = relief_problem(table, base, pair, Path(args.job).parent, law, roots)
     with watch.stage("search"), ExitStack() as stack:
         executor = None

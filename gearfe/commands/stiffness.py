@@ -119,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
             with watch.stage("animation"):
                 from ..figures.stress import stress_animation
 
-                stress_animation(made / "stress.gif", job.pair, elastic, curve, args.animation, count)
+                stress_animation(made / "stress.gif", elastic, curve, args.animation, count)
         if not args.no_pictures:
             with watch.stage("picture"):
                 from ..figures.stiffness import stiffness_figure
@@ -142,7 +142,7 @@ def _fields(
     def draw(position: Any, fields: Any) -> None:
         stress_figure(folder, job.pair, position, fields, most)
 
-    pressures = write_fields(folder, job.pair, elastic, curve, angles_deg, draw=draw, progress=count)
+    pressures = write_fields(folder, elastic, curve, angles_deg, draw=draw, progress=count)
     if pressures:
         pressure_figure(folder / "pressure.png", job.pair, pressures)
 

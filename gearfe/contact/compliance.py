@@ -28,11 +28,12 @@ from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 from ..elasticity import Material, Plane, element_stiffness
 from ..errors import InputError
 from ..gear.deviation import ToothDeviations
+from ..gear.pair import GearPair
 from ..meshing.tooth_sector import SectorMesh
 from ..typing import Array, IntArray
 from .dissection import Condensed, condense
 from .flank import Flank, flank_of, normal_stress_rows
-from .laws import DEFAULT_MODEL, ContactLaw, PairModel, uses_stress
+from .laws import DEFAULT_MODEL, ContactLaw, PairModel
 from .position import FlankLoads
 
 
@@ -221,27 +222,34 @@ class MeshingPair:
 
     Parameters
     ----------
+    gears
+        Their geometry.
     pinion, wheel
-        Elastic gears.
-    centre_distance
-        a (m).
-    width
-        Common face width (m).
+        Elastic gears, for contacts of one width.
     model
         What they were made with.
     """
 
+    gears: GearPair
     pinion: GearBody
     wheel: GearBody
-    centre_distance: float
-    width: float
     model: PairModel = DEFAULT_MODEL
 
     def __post_init__(self) -> None:
         widths = [body.width for body in self.bodies]
-        if uses_stress(self.law) and widths != [self.width, self.width]:
-            problem = f"the gears' surface stresses are made for contacts {widths} m wide"
-            raise InputError("width", self.width, problem, "make the gears with it: gear_body(..., width=...)")
+        if widths[0] != widths[1]:
+            problem = f"the gears are made for contacts {widths} m wide"
+            raise InputError("width", widths[1], problem, "make both with the same: gear_body(..., width=...)")
+
+    @property
+    def width(self) -> float:
+        """Width of the contact (m)."""
+        return self.pinion.width
+
+    @property
+    def centre_distance(self) -> float:
+        """a (m)."""
+        return self.gears.working_centre_distance
 
     @property
     def law(self) -> ContactLaw:
@@ -258,20 +266,12 @@ class MeshingPair:
         """Pinion and wheel."""
         return self.pinion, self.wheel
 
-    @property
-    def pitch_angle(self) -> float:
-        """Mesh cycle in terms of the pinion's rotation (rad)."""
-        return 2 * np.pi / self.pinion.teeth
-
-    def wheel_angle(self, pinion_angle: Any, twist: Any) -> Any:
-        """Wheel rotation (rad): -pinion angle z1/z2 + twist."""
-        return -pinion_angle * self.pinion.teeth / self.wheel.teeth + twist
-
     def tooth_angle(self, gear: int, tooth: Any, pinion_angle: Any, twist: Any) -> Any:
         """Angle (rad) of the frame of a tooth of the pinion (gear 0) or wheel (gear 1); numbers or arrays."""
+        z1, z2 = self.pinion.teeth, self.wheel.teeth
         if gear == 0:
-            return pinion_angle + 2 * np.pi * tooth / self.pinion.teeth
-        return self.wheel_angle(pinion_angle, twist) + np.pi + (2 * tooth + 1) * np.pi / self.wheel.teeth
+            return pinion_angle + 2 * np.pi * tooth / z1
+        return -pinion_angle * z1 / z2 + twist + np.pi + (2 * tooth + 1) * np.pi / z2
 
     def centre(self, gear: int) -> Array:
         """Centre of the pinion (0) or wheel (1), shape (2,) (m)."""

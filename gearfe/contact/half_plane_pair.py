@@ -216,12 +216,13 @@ class HalfPlanePair:
 
 
 def half_plane_pair(
-    pair: GearPair, elastic: MeshingPair, *, deviations: tuple[ToothDeviations, ToothDeviations] | None = None
+    elastic: MeshingPair, *, deviations: tuple[ToothDeviations, ToothDeviations] | None = None
 ) -> HalfPlanePair:
     """Prepare the law for meshed and condensed gears; their flanks may be coarse (a tenth of a module).
 
     `deviations` None: those of `elastic`.
     """
+    pair = elastic.gears
     teeth = ToothFlanks(pair, elastic.deviations if deviations is None else deviations)
     pinion, wheel = flank_compliance(pair.pinion, elastic.pinion), flank_compliance(pair.wheel, elastic.wheel)
     return HalfPlanePair(pair, teeth, (pinion, wheel), elastic.width)

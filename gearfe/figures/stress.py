@@ -113,13 +113,11 @@ def _draw_rim(axes: Any, points: Array, triangles: IntArray) -> None:
     axes.plot(x, y, color="#111827", linewidth=0.7, solid_capstyle="round")
 
 
-def frames_of(
-    pair: GearPair, elastic: MeshingPair, curve: StiffnessCurve, count: int, progress: Progress | None = None
-) -> list[Frame]:
+def frames_of(elastic: MeshingPair, curve: StiffnessCurve, count: int, progress: Progress | None = None) -> list[Frame]:
     """Frames of `stress_animation`."""
     angles = np.arange(count) * curve.mesh_cycle / count
     twists = curve.interpolant("twist")(angles).value + curve.lost_motion
-    recovery, solver, place = pair_recovery(elastic), position_solver(pair, elastic), zone(pair, modules=1.5)
+    recovery, solver, place = pair_recovery(elastic), position_solver(elastic), zone(elastic.gears, modules=1.5)
     frames: list[Frame] = []
     with one_thread():
         for position in solved_positions(solver, angles, twists):
@@ -131,12 +129,7 @@ def frames_of(
 
 
 def stress_animation(
-    path: str | Path,
-    pair: GearPair,
-    elastic: MeshingPair,
-    curve: StiffnessCurve,
-    count: int,
-    progress: Progress | None = None,
+    path: str | Path, elastic: MeshingPair, curve: StiffnessCurve, count: int, progress: Progress | None = None
 ) -> None:
     """Write the von Mises stress in the meshing zone over one mesh cycle as an endless GIF of `count` frames.
 
@@ -150,7 +143,7 @@ def stress_animation(
     """
     from PIL import Image
 
-    frames = frames_of(pair, elastic, curve, count, progress)
+    pair, frames = elastic.gears, frames_of(elastic, curve, count, progress)
     if not frames:
         return
     zoom, top = zone(pair, modules=1.5), max(color_limit(frame.parts) for frame in frames)

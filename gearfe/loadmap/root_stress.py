@@ -28,7 +28,7 @@ import numpy as np
 from ..contact.compliance import GearBody, MeshingPair, gear_body
 from ..contact.flank import Flank, edge_nodes, edge_shapes
 from ..contact.position import FlankLoads, Positions
-from ..gear.pair import Gear, GearPair
+from ..gear.pair import Gear
 from ..meshing.tooth_sector import SectorRecipe, sector_mesh, sector_recipes
 from ..typing import Array, IntArray
 from .root_map import RootMap
@@ -211,19 +211,17 @@ class PairRoots:
         return ToothRoots(position, pair, stress, 2 * radius, error)
 
 
-def pair_roots(gears: GearPair, pair: MeshingPair, *, coarsen: float = 1.0) -> PairRoots:
+def pair_roots(pair: MeshingPair, *, coarsen: float = 1.0) -> PairRoots:
     """Mesh and condense the fillets of both gears of a pair.
 
     Parameters
     ----------
-    gears
-        Geometry.
     pair
         The elastic pair whose contact forces will be given.
     coarsen
         Factor on the element sizes of both meshes.
     """
-    made = []
+    made, gears = [], pair.gears
     for gear, body, recipe in zip((gears.pinion, gears.wheel), pair.bodies, sector_recipes(gears), strict=True):
         both = [root_mesh(gear, body, root_recipe(recipe, gear, c)) for c in (coarsen, 0.5 * coarsen)]
         made.append((both[0], both[1]))

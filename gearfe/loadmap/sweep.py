@@ -83,7 +83,7 @@ def sweep_loads(
     if len(goals) * len(solved_angles) > MOST_CELLS:
         problem = f"makes more than {MOST_CELLS} cells with {len(solved_angles)} angles"
         raise InputError("torques", len(goals), problem, "use fewer torques or angles")
-    solver = position_solver(pair, elastic)
+    solver = position_solver(elastic)
     with watch.stage("unloaded flanks"):
         solver.touching(solved_angles)
     roots = None
@@ -91,7 +91,7 @@ def sweep_loads(
         from .root_stress import pair_roots
 
         with watch.stage("root meshes"), one_thread():
-            roots = pair_roots(pair, elastic)
+            roots = pair_roots(elastic)
     with watch.stage("cells"), one_thread():
         found, at_roots = _cells(solver, solved_angles, goals, roots, progress, finite=finite)
     n = len(solved_angles)

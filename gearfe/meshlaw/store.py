@@ -96,7 +96,7 @@ def cached_law(pair: GearPair, model: PairModel, force: float) -> MeshLaw:
         from .make import mesh_law
 
         with stage("mesh law"):
-            return law_arrays(mesh_law(half_plane_pair(pair, elastic_pair(pair, own)), force))
+            return law_arrays(mesh_law(half_plane_pair(elastic_pair(pair, own)), force))
 
     recipe = [curve_key(pair, own, {"force": force}), _source()]
     return law_of_arrays(cached_arrays("mesh-law", recipe, made))

@@ -63,9 +63,9 @@ def curve_error(solver: PositionSolver, coarse: MeshingPair, solved: Positions, 
     numbers = np.flatnonzero(good) if isinstance(solver, HalfPlaneSolver) else solved_twice(good)
     chosen, made = solved.take(numbers), np.full(len(solved), np.nan)
     if isinstance(solver, HalfPlaneSolver):
-        found = influence_estimate(torque_changes(solver.law, half_plane_pair(solver.pair, coarse), chosen))
+        found = influence_estimate(torque_changes(solver.law, half_plane_pair(coarse), chosen))
     else:
-        again = position_solver(solver.pair, coarse, resolved_only=False)
+        again = position_solver(coarse, resolved_only=False)
         there = at_twists(again, chosen.pinion_angle, chosen.twist, None, finite=finite)
         other = np.where(there.status == "converged", there.torque_wheel, np.nan)
         coarsen = elastic.model.coarsen * max(1.0, elastic.model.flank_coarsen)

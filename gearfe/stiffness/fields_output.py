@@ -62,7 +62,6 @@ def angle_numbers(known_deg: Array, angles_deg: Sequence[float]) -> IntArray:
 
 def write_fields(
     folder: Path,
-    pair: GearPair,
     elastic: MeshingPair,
     curve: StiffnessCurve,
     angles_deg: Sequence[float] | None,
@@ -91,7 +90,7 @@ def write_fields(
     chosen = chosen_positions(curve, angles_deg)
     if len(chosen) == 0:
         return []
-    recovery, solver = pair_recovery(elastic), position_solver(pair, elastic)
+    recovery, solver = pair_recovery(elastic), position_solver(elastic)
     worst: tuple[float, Positions, tuple[GearField, GearField]] | None = None
     pressures: list[tuple[float, list[FlankPressure]]] = []
     with VtkHdfSeries(folder / "fields.vtkhdf") as series, one_thread():
@@ -109,7 +108,7 @@ def write_fields(
                 progress(done, len(chosen), "fields")
     if draw is not None and worst is not None:
         draw(*worst[1:])
-    write_csv(folder / "pressure.csv", pressure_table(pair, pressures))
+    write_csv(folder / "pressure.csv", pressure_table(elastic.gears, pressures))
     return pressures
 
 

@@ -28,7 +28,6 @@ from ..contact.position import ANGLE_ROUNDING, TORQUES, Positions, joined, of_po
 from ..errors import InputError
 from ..gear.deviation import NOMINAL
 from ..gear.iso6336 import mesh_stiffness
-from ..gear.pair import GearPair
 from ..gear.touching import Touching
 from ..gear.validity import MOST_YIELD
 from ..typing import Array, IntArray
@@ -117,11 +116,11 @@ def twists_for_torque(
 NONE: IntArray = np.zeros(0, dtype=np.int64)
 
 
-def position_solver(pair: GearPair, elastic: MeshingPair, *, resolved_only: bool = True) -> PositionSolver:
+def position_solver(elastic: MeshingPair, *, resolved_only: bool = True) -> PositionSolver:
     """The solver of the elastic pair's law; see `ElementSolver` for `resolved_only`."""
     if isinstance(elastic.law, HalfPlane):
-        return HalfPlaneSolver(half_plane_pair(pair, elastic), elastic)
-    return ElementSolver(pair, elastic, resolved_only=resolved_only)
+        return HalfPlaneSolver(half_plane_pair(elastic), elastic)
+    return ElementSolver(elastic, resolved_only=resolved_only)
 
 
 #: Pinion angles of a mesh cycle at which flanks with deviations are looked at for their first touch.
@@ -202,9 +201,9 @@ class ElementSolver:
         False solves what the elements do not resolve, too: to measure the error that this makes.
     """
 
-    def __init__(self, pair: GearPair, elastic: MeshingPair, *, resolved_only: bool = True) -> None:
-        self.pair, self.elastic, self.resolved_only = pair, elastic, resolved_only
-        self.half_plane = HalfPlaneSolver(half_plane_pair(pair, elastic), elastic)
+    def __init__(self, elastic: MeshingPair, *, resolved_only: bool = True) -> None:
+        self.pair, self.elastic, self.resolved_only = elastic.gears, elastic, resolved_only
+        self.half_plane = HalfPlaneSolver(half_plane_pair(elastic), elastic)
         self.law = self.half_plane.law
         self.curves = self.half_plane.curves
         self.touching, self.touching_twists = self.half_plane.touching, self.half_plane.touching_twists

@@ -77,12 +77,12 @@ def elastic_pair(
             gear_body(mesh, material, model.plane, gear.face_width, width=width, **options)
             for mesh, material, gear in zip(meshes, model.materials, gears, strict=True)
         )
-    return MeshingPair(one, two, pair.working_centre_distance, width, model)
+    return MeshingPair(pair, one, two, model)
 
 
-def coarser(pair: GearPair, elastic: MeshingPair) -> MeshingPair:
+def coarser(elastic: MeshingPair) -> MeshingPair:
     """The same gears on meshes `COARSENING` times coarser."""
-    return elastic_pair(pair, elastic.model, coarsen=COARSENING * elastic.model.coarsen)
+    return elastic_pair(elastic.gears, elastic.model, coarsen=COARSENING * elastic.model.coarsen)
 
 
 def sweep_stiffness(
@@ -143,7 +143,7 @@ def sweep_stiffness(
     if elastic is None:
         elastic = elastic_pair(pair, model, watch=watch, **changes)
     solved_angles, source = (asked, np.arange(len(asked))) if solve_all else distinct_angles(asked, pair.mesh_cycle)
-    solver = position_solver(pair, elastic)
+    solver = position_solver(elastic)
     if torque is not None:
         check_torque(solver.law, load)
     with watch.stage("unloaded flanks"):
@@ -157,7 +157,7 @@ def sweep_stiffness(
     curve = assembled_curve(solver, asked, source, solved, searched=torque is not None)
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
-            error = curve_error(solver, coarser(pair, elastic), solved, finite=finite)
+            error = curve_error(solver, coarser(elastic), solved, finite=finite)
         curve = replace(curve, relative_error=error[source])
     return replace(curve, timings=dict(watch.seconds))
 

@@ -115,8 +115,8 @@ def _microgeometry(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Ans
     elastic = _elastic(job, model, shared)
     roots, key = None, _key(job, model)
     if table.root_stress:
-        roots = shared.get(key, "roots", lambda: pair_roots(job.pair, elastic))
-    law = shared.get(key, "law", lambda: half_plane_pair(job.pair, elastic)).deviated(deviations)
+        roots = shared.get(key, "roots", lambda: pair_roots(elastic))
+    law = shared.get(key, "law", lambda: half_plane_pair(elastic)).deviated(deviations)
     made = load_mesh(law, torques, positions=table.positions, mesh_cycles=table.mesh_cycles, roots=roots, back=back)
     rows: dict[str, Any] = {
         "microgeometry": cell_table(made),

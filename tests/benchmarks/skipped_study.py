@@ -82,7 +82,7 @@ def neighbours(quick: bool) -> tuple[float, float, str]:
 
     pair = shipped_pair()
     elastic = elastic_pair(pair, coarsen=4.0 if quick else 1.0)
-    solver = position_solver(pair, elastic)
+    solver = position_solver(elastic)
     short = _cpu(lambda: solver.solve(np.array([0.1]), np.array([TWIST])))
     every = sum(body.teeth * body.own.shape[0] for body in elastic.bodies)
     size = min(every, 500 if quick else 4000)
@@ -98,7 +98,7 @@ def fields(quick: bool) -> tuple[float, float, str]:
     elastic = elastic_pair(pair, coarsen=5.0 if quick else 1.0)
     at = pair.mesh_cycle * np.arange(1 if quick else 8) / 8
     short = _cpu(lambda: sweep_stiffness(pair, twist=TWIST, angles=at, elastic=elastic))
-    solved = position_solver(pair, elastic).solve(at, np.full(len(at), TWIST), np.arange(len(at)))
+    solved = position_solver(elastic).solve(at, np.full(len(at), TWIST), np.arange(len(at)))
 
     def recovered() -> None:
         recovery = pair_recovery(elastic)

@@ -106,7 +106,7 @@ def run(case: Case, folder: Path) -> Finding:
     measures["iterations"] = int(curve.iterations.max(initial=0))
     if len(loaded):
         checks.append(Check("tangent", float((~(curve.k_tangent[loaded] > 0)).sum()), 0.5))
-        solver = position_solver(job.pair, elastic)
+        solver = position_solver(elastic)
         found = solver.solve(curve.pinion_angle[loaded], total[loaded], np.arange(len(loaded)))
         places = zip(found, curve.pinion_angle[loaded].tolist(), total[loaded].tolist(), strict=True)
         balances = [c for c in (balance(elastic, *place) for place in places) if c is not None]
@@ -193,11 +193,11 @@ def swap_checks(here: PositionSolver, angles: Any, twists: Any, found: Positions
     law: Any = elastic.law if sides == other_side else replace(elastic.law, sides=other_side)  # type: ignore[type-var]
     mirrored = GearPair(pair.wheel, pair.pinion, pair.centre_distance)
     model = elastic.model.changed(law=law, materials=elastic.model.materials[::-1])
-    other = MeshingPair(elastic.wheel, elastic.pinion, elastic.centre_distance, elastic.width, model)
-    turned = elastic.wheel_angle(angles, twists) + math.pi / elastic.wheel.teeth
+    other = MeshingPair(mirrored, elastic.wheel, elastic.pinion, model)
+    turned = (twists - angles * elastic.pinion.teeth / elastic.wheel.teeth) + math.pi / elastic.wheel.teeth
     turns = twists * elastic.wheel.teeth / elastic.pinion.teeth
     checks = []
-    for p, q in zip(found, position_solver(mirrored, other).solve(turned, turns), strict=True):
+    for p, q in zip(found, position_solver(other).solve(turned, turns), strict=True):
         if p.status == q.status == "converged":
             apart = float(max(abs(q.torque_pinion / p.torque_wheel - 1), abs(q.torque_wheel / p.torque_pinion - 1)))
             checks.append(Check("swap", apart, max(SWAP, _rounding(p))))

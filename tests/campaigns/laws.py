@@ -141,7 +141,7 @@ def run(case: Case, folder: Path) -> Finding:
 
 def _torques(job: StiffnessJob, elastic: MeshingPair, angles: Any, twist: float) -> tuple[Any, Any, Counter]:
     """Torques (N m), iterations and statuses, also where the elements do not resolve the contact."""
-    found = position_solver(job.pair, elastic, resolved_only=False).solve(angles, np.full(len(angles), twist))
+    found = position_solver(elastic, resolved_only=False).solve(angles, np.full(len(angles), twist))
     torque = np.where(found.status == "converged", found.torque_wheel, np.nan)
     return torque, found.iterations, Counter(found.status.tolist())
 
