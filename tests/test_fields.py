@@ -15,7 +15,7 @@ from gearfe.elasticity import element_stiffness
 from gearfe.errors import InputError
 from gearfe.figures import stress
 from gearfe.figures.stress import color_limit
-from gearfe.gear.drawing import path_place
+from gearfe.gear.derived import path_place
 from gearfe.meshing.whole_gear import whole_gear
 from gearfe.stiffness.contact_pressure import flank_pressures
 from gearfe.stiffness.fields import gear_recovery, pair_recovery, straight_triangles

@@ -95,7 +95,7 @@ def _export(path: Path, pair: GearPair, table: MicrogeometryTable | None, folder
     """A gear in the form that the suffix names; its deviations are looked for in `folder`."""
     import numpy as np
 
-    from ..gear.drawing import gear_outline
+    from ..gear.derived import gear_outline
     from ..gear.outline import outline_columns
     from ..meshing.gear_solid import write_solid
     from ..output.dxf import write_dxf

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..progress import count
-from ..tables.laws import check_law
 from ..tables.loadmap import LoadMapTable
-from ..tables.stiffness import StiffnessTable
+from ..tables.stiffness import StiffnessTable, check_law
 from .arguments import add_job, add_keys, add_removed, check_option, with_keys
 from .common import add_folder, tell
 

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..config import check_range
 from ..progress import announce, count
-from ..tables.laws import check_law
-from ..tables.stiffness import StiffnessTable
+from ..tables.stiffness import StiffnessTable, check_law
 from .arguments import add_job, add_keys, add_removed, check_option, number, with_keys
 from .common import add_folder, tell
 

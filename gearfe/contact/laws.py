@@ -14,9 +14,9 @@ tests' whole-gear route alone (`tests.verification.laws`).
 
 **On half-planes** (half_plane): `gearfe.contact.half_plane`, without contact elements.
 
-A law is a frozen dataclass whose fields are its parameters, and a line that names it (`gearfe.tables.laws`; for another
-package an entry point); nothing else needs to be touched to add it. It has a ``name``, the text that selects it. One
-that derives from `HalfPlane` is solved as that is. One on the elements (`ElementLaw`) provides besides:
+A law is a frozen dataclass whose fields are its parameters, and a line that names it (`gearfe.tables.stiffness`; for
+another package an entry point); nothing else needs to be touched to add it. It has a ``name``, the text that selects
+it. One that derives from `HalfPlane` is solved as that is. One on the elements (`ElementLaw`) provides besides:
 
 1. ``uses_stress``: s above (0 or 1); with 1 the bodies keep the stress rows of their flanks;
 2. ``parameter(youngs_modulus, sizes)``: gamma at the edges of a flank, from the body's modulus (Pa) and its edge
@@ -38,8 +38,7 @@ from ..config import fields_of
 from ..elasticity import Material, Plane
 from ..errors import InputError
 from ..gear.deviation import NOMINAL, ToothDeviations
-from ..tables.laws import law_class
-from ..tables.stiffness import check_flank_coarsen
+from ..tables.stiffness import check_flank_coarsen, law_class
 from ..typing import Array, BoolArray
 
 Sides = Literal["both", "pinion", "wheel", "tip"]
@@ -170,7 +169,7 @@ class HalfPlane:
 
 
 def law_named(name: str, **parameters: Any) -> ContactLaw:
-    """The law called `name` (`gearfe.tables.laws`) with the parameters given, the others by default."""
+    """The law called `name` (`gearfe.tables.stiffness`) with the parameters given, the others by default."""
     kind = law_class(name)
     known = list(fields_of(kind))
     for key, value in parameters.items():

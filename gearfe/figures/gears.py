@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..gear.drawing import gear_outline, path_place, zone
+from ..gear.derived import gear_outline, path_place, zone
 from ..gear.pair import GearPair
 from ..typing import Array
 from .style import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..gear.derived import iso_values
-from ..gear.drawing import single_pair_stretches
+from ..gear.derived import iso_values, single_pair_stretches
 from ..gear.pair import GearPair
 from ..stiffness.contact_pressure import FlankPressure
 from ..stiffness.curve import StiffnessCurve

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..contact.compliance import MeshingPair
 from ..contact.position import Positions
-from ..gear.drawing import zone
+from ..gear.derived import zone
 from ..gear.pair import GearPair
 from ..output.files import whole_file
 from ..stiffness.curve import StiffnessCurve

@@ -22,7 +22,6 @@ from ..cache import cache_key, kept
 from ..contact.laws import PairModel
 from ..errors import InputError
 from ..gear.pair import GearPair
-from ..stopwatch import Stopwatch
 from .curve import StiffnessCurve
 
 #: Rooms whose text decides a curve, beside `gearfe.elasticity`.
@@ -34,7 +33,6 @@ def cached_curve(
     model: PairModel,
     sweep: dict[str, Any],
     *,
-    watch: Stopwatch | None = None,
     progress: Any = None,
     estimate_error: bool = False,
 ) -> StiffnessCurve:
@@ -48,7 +46,7 @@ def cached_curve(
         Of the pair.
     sweep
         Other keyword arguments of `sweep_stiffness`, such as those of `gearfe.stiffness.job.StiffnessJob`.
-    watch, progress
+    progress
         See `sweep_stiffness`.
     estimate_error
         Whether the curve carries an estimate of its error.
@@ -61,14 +59,9 @@ def cached_curve(
         return found if estimate_error else replace(found, relative_error=np.zeros(0))
 
     def make() -> StiffnessCurve:
-        from .sweep import elastic_pair, sweep_stiffness
+        from .sweep import sweep_stiffness
 
-        elastic = elastic_pair(pair, model, watch=watch)
-        curve = sweep_stiffness(pair, elastic=elastic, progress=progress, estimate_error=estimate_error, **sweep)
-        if watch is not None:
-            for stage, seconds in curve.timings.items():
-                watch.seconds[stage] = watch.seconds.get(stage, 0.0) + seconds
-        return curve
+        return sweep_stiffness(pair, model, progress=progress, estimate_error=estimate_error, **sweep)
 
     def write(curve: StiffnessCurve, path: Path) -> None:
         if not curve.failed.any():

@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..errors import InputError
-from ..gear.drawing import gear_outline
+from ..gear.derived import gear_outline
 from ..gear.pair import Gear
 from ..typing import Array
 from .gear_train import Shaft, ShaftGear

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..gear.drawing import gear_outline
+from ..gear.derived import gear_outline
 from ..gear.spur_gear import Gear
 from ..output.vtkhdf import VtkHdfSeries
 from ..reduction.modal_body import ModalBody
