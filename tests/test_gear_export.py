@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from gearfe.cli import main
-from gearfe.gear.outline import tooth_outline
+from gearfe.gear.deviation import Deviation, ToothDeviations
+from gearfe.gear.outline import tooth_outline, whole_outline
 from gearfe.gear.pair import Gear
 from gearfe.meshing.gear_solid import write_solid
 from gearfe.meshing.session import gmsh_session
@@ -51,8 +52,11 @@ def test_pieces_of_a_tooth_join_and_have_outward_normals():
 def test_solids_have_the_volume_and_the_flanks_of_the_gear(suffix, form, tmp_path):
     made = gear(13, **FORMS[form])
     path = tmp_path / f"gear.{suffix}"
-    write_solid(path, made)
-    flank = 1e3 * made.profile.points_of_roll(np.linspace(made.profile.form_roll, made.profile.round_roll, 37))
+    heights = [0.0, 0.0, -20e-6] if form == "rounded" else [0.0, 0.0, 0.0]
+    rolls = [made.profile.form_roll, 0.5 * (made.profile.form_roll + made.profile.tip_roll), made.profile.tip_roll]
+    own = ToothDeviations((Deviation.straight(rolls, heights),))
+    write_solid(path, made, (own, own))
+    flank = 1e3 * displaced(made, np.linspace(made.profile.form_roll, made.profile.round_roll, 37), own, 0)
     with gmsh_session() as gmsh:
         gmsh.model.occ.importShapes(str(path))
         gmsh.model.occ.synchronize()
@@ -63,7 +67,10 @@ def test_solids_have_the_volume_and_the_flanks_of_the_gear(suffix, form, tmp_pat
         for _, face in gmsh.model.getEntities(2):
             found, _ = gmsh.model.getClosestPoint(2, face, places)
             off = np.minimum(off, np.abs(found - places).reshape(-1, 3).max(axis=1))
-    assert volume == pytest.approx(area(made) * 1e3 * made.face_width, rel=1e-5)
+    # what the reliefs take away: h along the flank's arc, ds = (s / r_b) d(roll), of 13 teeth with two flanks
+    roll = np.linspace(rolls[0], made.profile.round_roll, 2001)
+    taken = 26 * 1e9 * made.face_width * np.trapezoid(own.profiles[0].at(roll)[0] * roll / made.base_radius, roll)
+    assert volume == pytest.approx(area(made) * 1e3 * made.face_width + taken, rel=2e-4 if taken else 1e-5)
     assert off.max() < 1e-5  # mm
 
 
@@ -98,7 +105,7 @@ def test_deviations_stand_in_the_table(tmp_path, capsys):
     )
     line = ["gear", str(tmp_path / "pair.toml"), "--out", str(tmp_path / "out"), "--no-pictures", "--export"]
     assert main([*line, "csv"]) == 0
-    assert "without [microgeometry]" not in capsys.readouterr().err
+    assert "flanks with the deviations of [microgeometry]" in capsys.readouterr().out
     table = read_csv(tmp_path / "out" / "pinion.csv")
     pinion = pair(20, 30, tip_round=1e-4).pinion
     low, high = pinion.form_roll, pinion.profile.tip_roll
@@ -107,8 +114,52 @@ def test_deviations_stand_in_the_table(tmp_path, capsys):
         x = (np.sqrt((1e-3 * table["radius_mm"][there]) ** 2 - pinion.base_radius**2) - low) / (high - low) - 0.5
         assert table["deviation_um"][there] == pytest.approx(-16.0 * x**2 + slope * x, abs=1e-6)
     assert np.isnan(table["deviation_um"][table["piece"] == "tip_left"]).all()
-    assert main([*line, "step"]) == 0
-    assert "pinion.step, wheel.step: flanks of [pair] alone, without [microgeometry]" in capsys.readouterr().err
+
+
+def displaced(made: Gear, roll: np.ndarray, own: ToothDeviations, tooth: int) -> np.ndarray:
+    """Points (m) of a left flank: the involute's, moved by h along its normal (s e_r + r_b e_phi)/r, and turned."""
+    points = made.profile.points_of_roll(roll)
+    out = points / np.hypot(*points.T)[:, None]
+    round_ = np.column_stack([-out[:, 1], out[:, 0]])
+    normal = (roll[:, None] * out + made.base_radius * round_) / np.hypot(roll, made.base_radius)[:, None]
+    height = own.profiles[int(own.profile_of(np.array(tooth)))].at(roll)[0]
+    moved = points + height[:, None] * normal
+    turn = np.exp(1j * (float(own.turn_of(np.array(tooth))) + 2.0 * math.pi * tooth / made.teeth))
+    turned = (moved[:, 0] + 1j * moved[:, 1]) * turn
+    return np.column_stack([turned.real, turned.imag])
+
+
+@pytest.mark.parametrize("form", list(FORMS))
+def test_outlines_have_relief_and_pitch_errors_on_their_own_flanks(form):
+    """Left flanks of two teeth moved along their normals; right ones are their mirror images."""
+    made = gear(13, **FORMS[form])
+    form_roll, tip = made.profile.form_roll, made.profile.tip_roll
+    start = 0.5 * (form_roll + tip)
+    relieved = Deviation.straight([form_roll, start, tip], [0.0, 0.0, -20e-6])
+    crowned = Deviation.straight([form_roll, start, tip], [-5e-6, 2e-6, -10e-6])
+    own = ToothDeviations((relieved, crowned), (0, 1) + (0,) * 11, (0.0, 3e-4) + (0.0,) * 11)
+    teeth = whole_outline(made, (own, ToothDeviations()), per_piece=200)
+    line = np.concatenate([piece.points for tooth in teeth for piece in tooth])
+    assert np.hypot(*np.diff(np.vstack([line, line[:1]]), axis=0).T).max() < 0.2e-3  # closed
+    radius = np.hypot(*line.T)
+    assert radius.max() == pytest.approx(made.tip_radius, rel=1e-12)
+    assert radius.min() == pytest.approx(made.root_radius, rel=1e-12)
+    roll = np.linspace(form_roll, made.profile.round_roll, 41)[1:-1]
+    for tooth in (0, 1):
+        flank = [piece.points for piece in teeth[tooth] if piece.name == "involute_left"]
+        assert distance(displaced(made, roll, own, tooth), np.concatenate(flank)) < 1e-8
+    back = whole_outline(made, (ToothDeviations(), own), per_piece=200)
+    for one, two in zip(teeth[0], reversed(back[0]), strict=True):
+        np.testing.assert_allclose(one.points, two.points[::-1] * [1.0, -1.0], rtol=0, atol=1e-15)
+
+
+def distance(points: np.ndarray, line: np.ndarray) -> float:
+    """Largest distance of points from a polygon."""
+    a, b = line[:-1], line[1:]
+    along = b - a
+    share = ((points[:, None] - a) * along).sum(axis=2) / np.maximum((along**2).sum(axis=1), 1e-300)
+    nearest = a + np.clip(share, 0.0, 1.0)[:, :, None] * along
+    return float(np.hypot(*np.moveaxis(points[:, None] - nearest, 2, 0)).min(axis=1).max())
 
 
 def test_a_drawing_in_layers(tmp_path):

@@ -12,7 +12,8 @@ from .arguments import add_job, check_option
 from .common import add_folder, tell
 
 if TYPE_CHECKING:
-    from ..gear.pair import GearPair
+    from ..gear.deviation import ToothDeviations
+    from ..gear.pair import Gear, GearPair
     from ..tables.microgeometry import MicrogeometryTable
 
 #: Forms of ``--export``, and the files that they are.
@@ -71,10 +72,9 @@ def run(args: argparse.Namespace) -> int:
         names = sorted(path.name for path in made.iterdir())
     _show(geometry)
     _show({"iso_6336": iso})
-    solid = [name for name in exports if not name.endswith(".csv")]
-    lacking = f"{', '.join(solid)}: flanks of [pair] alone, without [microgeometry]; csv has its deviations"
-    told = (lacking,) if solid and "microgeometry" in tables else ()
-    tell((), folder, names, {}, (*pair.warnings, *told))
+    if exports and "microgeometry" in tables:
+        print("flanks with the deviations of [microgeometry]: dxf, step and brep all teeth, csv tooth 0")
+    tell((), folder, names, {}, pair.warnings)
     return 0
 
 
@@ -95,40 +95,56 @@ def _export(path: Path, pair: GearPair, table: MicrogeometryTable | None, folder
     """A gear in the form that the suffix names; its deviations are looked for in `folder`."""
     import numpy as np
 
-    from ..gear.derived import gear_outline
-    from ..gear.outline import outline_columns
+    from ..gear.outline import outline_columns, whole_outline
     from ..meshing.gear_solid import write_solid
     from ..output.dxf import write_dxf
     from ..output.files import write_csv
 
     gear = pair.pinion if path.stem == "pinion" else pair.wheel
+    sides = _deviations(pair, path.stem, table, folder)
     if path.suffix == ".csv":
         columns = outline_columns(gear)
-        write_csv(path, columns if table is None else _with_deviations(columns, pair, path.stem, table, folder))
+        write_csv(path, columns if table is None else _with_deviations(columns, gear, sides))
     elif path.suffix == ".dxf":
         circles = {"bore": gear.bore_diameter, "reference_circle": gear.pitch_diameter}
         radii = {name: 0.5e3 * diameter for name, diameter in circles.items()}
         radii["base_circle"] = 1e3 * gear.base_radius
-        write_dxf(path, {"outline": np.asarray(gear_outline(gear, 0.0, (0.0, 0.0), per_segment=100))[:-1]}, radii)
+        teeth = whole_outline(gear, sides, per_piece=100)
+        write_dxf(path, {"outline": 1e3 * np.concatenate([p.points[:-1] for tooth in teeth for p in tooth])}, radii)
     else:
-        write_solid(path, gear)
+        write_solid(path, gear, sides)
+
+
+def _deviations(
+    pair: GearPair, name: str, table: MicrogeometryTable | None, folder: Path
+) -> tuple[ToothDeviations, ToothDeviations]:
+    """Deviations of the left and the right flanks of a gear."""
+    from ..gear.deviation import NOMINAL
+    from ..gear.deviation_job import GEARS, active_rolls, flank_deviations
+
+    if table is None:
+        return NOMINAL
+    number = GEARS.index(name)
+    gear, active = (pair.pinion, pair.wheel)[number], active_rolls(pair)[number]
+    left, right = (
+        flank_deviations(
+            getattr(table, name).flank(side), gear, active, f"microgeometry.{name}", folder, wheel=number == 1
+        )
+        for side in ("left", "right")
+    )
+    return left, right
 
 
 def _with_deviations(
-    columns: dict[str, Any], pair: GearPair, name: str, table: MicrogeometryTable, folder: Path
+    columns: dict[str, Any], gear: Gear, sides: tuple[ToothDeviations, ToothDeviations]
 ) -> dict[str, Any]:
     """The outline with the deviations of tooth 0 on its involutes, along the normals (um)."""
     import numpy as np
 
-    from ..gear.deviation_job import GEARS, active_rolls, flank_deviations
-
-    number = GEARS.index(name)
-    gear, active = (pair.pinion, pair.wheel)[number], active_rolls(pair)[number]
     roll = 1e-3 * np.sqrt(np.maximum(columns["radius_mm"] ** 2 - (1e3 * gear.base_radius) ** 2, 0.0))
     made = np.full(len(roll), np.nan)
-    for side in ("left", "right"):
-        of = getattr(table, name).flank(side)
-        curve = flank_deviations(of, gear, active, f"microgeometry.{name}", folder, wheel=number == 1).profiles[0]
+    for side, own in zip(("left", "right"), sides, strict=True):
+        curve = own.profiles[own.profile[0]]
         there = columns["piece"] == f"involute_{side}"
         made[there] = 0.0 if curve is None else 1e6 * curve.at(roll[there])[0]
     return {**columns, "deviation_um": made}

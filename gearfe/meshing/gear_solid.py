@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 from collections.abc import Iterator
@@ -10,20 +9,23 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..gear.outline import Piece, tooth_outline
+from ..gear.deviation import NOMINAL, ToothDeviations
+from ..gear.outline import Piece, whole_outline
 from ..gear.pair import Gear
 from .session import gmsh_session
 
 
-def write_solid(path: Path, gear: Gear) -> None:
+def write_solid(path: Path, gear: Gear, deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL) -> None:
     """Write the gear with its bore, extruded over the face width, its middle plane at z = 0, tooth 0 on +x.
+
+    Left and right flanks have their deviations.
 
     Arcs are arcs, other pieces cubic splines through 49 points of the exact curve (within 1e-5 mm of it).
     """
     with gmsh_session("gear solid") as gmsh:
         occ = gmsh.model.occ
         width = 1e3 * gear.face_width
-        loop = occ.addCurveLoop(_outline(occ, gear, -0.5 * width))
+        loop = occ.addCurveLoop(_outline(occ, whole_outline(gear, deviations), -0.5 * width))
         bore = occ.addCurveLoop([occ.addCircle(0.0, 0.0, -0.5 * width, 0.5e3 * gear.bore_diameter)])
         occ.extrude([(2, occ.addPlaneSurface([loop, bore]))], 0.0, 0.0, width)
         occ.synchronize()
@@ -46,28 +48,22 @@ def _without_words() -> Iterator[None]:
         os.close(nowhere)
 
 
-def _outline(occ: Any, gear: Gear, z: float) -> list[int]:
+def _outline(occ: Any, teeth: list[list[Piece]], z: float) -> list[int]:
     """Curves round the gear, each beginning at the point where the one before ends."""
-    pieces = tooth_outline(gear)
-    turns = [2.0 * math.pi * k / gear.teeth for k in range(gear.teeth)]
-    starts = [[occ.addPoint(*_placed(piece.points[0], turn, z)) for piece in pieces] for turn in turns]
-    around = [tag for tooth in starts for tag in tooth]
-    curves = []
-    for k, turn in enumerate(turns):
-        for i, piece in enumerate(pieces):
-            number = k * len(pieces) + i
-            curves.append(_curve(occ, piece, turn, z, around[number], around[(number + 1) % len(around)]))
-    return curves
+    pieces = [piece for tooth in teeth for piece in tooth]
+    starts = [occ.addPoint(*_placed(piece.points[0], z)) for piece in pieces]
+    return [
+        _curve(occ, piece, z, start, end)
+        for piece, start, end in zip(pieces, starts, [*starts[1:], starts[0]], strict=True)
+    ]
 
 
-def _curve(occ: Any, piece: Piece, turn: float, z: float, start: int, end: int) -> int:
+def _curve(occ: Any, piece: Piece, z: float, start: int, end: int) -> int:
     if piece.arc is not None:
-        return int(occ.addCircleArc(start, occ.addPoint(*_placed(piece.arc[0], turn, z)), end))
-    inner = [occ.addPoint(*_placed(point, turn, z)) for point in piece.points[1:-1]]
+        return int(occ.addCircleArc(start, occ.addPoint(*_placed(piece.arc[0], z)), end))
+    inner = [occ.addPoint(*_placed(point, z)) for point in piece.points[1:-1]]
     return int(occ.addSpline([start, *inner, end]))
 
 
-def _placed(point: Any, turn: float, z: float) -> tuple[float, float, float]:
-    c, s = math.cos(turn), math.sin(turn)
-    x, y = 1e3 * float(point[0]), 1e3 * float(point[1])
-    return c * x - s * y, s * x + c * y, z
+def _placed(point: Any, z: float) -> tuple[float, float, float]:
+    return 1e3 * float(point[0]), 1e3 * float(point[1]), z
