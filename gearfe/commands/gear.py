@@ -51,7 +51,8 @@ def run(args: argparse.Namespace) -> int:
 
     pair = GearPair.from_table(tables["pair"])  # gears that cannot run together: NumPy alone tells
 
-    from ..figures.gears import pair_figure
+    from ..figures.gears import pair_picture
+    from ..figures.style import save
     from ..gear.derived import derived_geometry, iso_values
     from ..output.files import output_folder, whole_set, write_json
     from ..stiffness.job import StiffnessJob
@@ -67,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
                 _export(made / name, pair, tables.get("microgeometry"), Path(args.job).parent)
         if not args.no_pictures:
             with stage("drawing"):
-                pair_figure(made / "gear_pair.png", pair, math.radians(args.angle_deg), _notes(geometry))
+                save(pair_picture(pair, math.radians(args.angle_deg), _notes(geometry)), made / "gear_pair.png")
         write_json(made / "gear_pair.json", {**geometry, "iso_6336": iso, "warnings": list(pair.warnings)})
         names = sorted(path.name for path in made.iterdir())
     _show(geometry)

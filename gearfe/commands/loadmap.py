@@ -74,10 +74,14 @@ def run(args: argparse.Namespace) -> int:
             made_map.to_csv(made / "loadmap.csv")
             write_csv(made / "loadmap_torques.csv", torque_table(made_map))
         if not args.no_pictures:
-            from ..figures.load_map import load_map_figure
+            from ..figures.load_map import load_map_picture
+            from ..figures.style import save
 
             with watch.stage("picture"):
-                load_map_figure(made / "loadmap.png", job, made_map)
+                title = (
+                    f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, plane {job.table.plane}, law {job.table.law}"
+                )
+                save(load_map_picture(made_map, title), made / "loadmap.png", dpi=110)
         watch.seconds["total"] = time.perf_counter() - started
         write_json(made / "loadmap.json", summary(job, table, made_map, watch.seconds))
         names = sorted(path.name for path in made.iterdir())

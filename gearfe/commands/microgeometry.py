@@ -106,11 +106,12 @@ def run(args: argparse.Namespace) -> int:
             write_csv(place / "microgeometry_pairs.csv", pair_table(made))
             write_csv(place / "microgeometry_orders.csv", order_table(made))
         if not args.no_pictures:
-            from ..figures.microgeometry import flank_figure, microgeometry_figure
+            from ..figures.microgeometry import flank_figure, microgeometry_picture
+            from ..figures.style import save
 
             with watch.stage("pictures"):
                 flank_figure(place / "microgeometry_flanks.png", table, pair, beside)
-                microgeometry_figure(place / "microgeometry.png", made)
+                save(microgeometry_picture(made), place / "microgeometry.png", dpi=110)
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "microgeometry.json", summary(job, table, made, deviations, watch.seconds))
         names = sorted(path.name for path in place.iterdir())

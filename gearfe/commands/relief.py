@@ -91,10 +91,11 @@ def run(args: argparse.Namespace) -> int:
         write_csv(place / "relief_map.csv", map_table(table, made))
         write_csv(place / "relief_torques.csv", compared)
         if not args.no_pictures:
-            from ..figures.microgeometry import relief_figure
+            from ..figures.microgeometry import relief_picture
+            from ..figures.style import save
 
             with watch.stage("picture"):
-                relief_figure(place / "relief.png", made, compared)
+                save(relief_picture(made, compared), place / "relief.png", dpi=110)
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "relief.json", summary(job, base, table, made, errors, watch.seconds))
         names = sorted(path.name for path in place.iterdir())

@@ -20,12 +20,7 @@ if TYPE_CHECKING:
 PINION_FILL, WHEEL_FILL = "#dbe7f3", "#f3e6d8"
 
 
-def pair_figure(path: str | Path, pair: GearPair, pinion_angle: float, notes: str = "") -> None:
-    """Write `pair_picture`."""
-    save(pair_picture(pair, pinion_angle, notes), path)
-
-
-def pair_picture(pair: GearPair, pinion_angle: float, notes: str = "") -> Any:
+def pair_picture(pair: GearPair, pinion_angle: float = 0.0, notes: str = "") -> Any:
     """Meshed pair: the whole gears, and the meshing zone with line of action and path of contact.
 
     Parameters

@@ -2,34 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..gear.deviation_job import GEARS
 from ..loadmap.load_map import LoadMap
-from ..stiffness.job import StiffnessJob
 from ..typing import Array
-from .style import BLUE, ORANGE, new_figure, save, tidy
+from .style import BLUE, ORANGE, labelled, new_figure, shades, some_of
 
 #: Lines of a panel; of more torques, so many are drawn.
 MOST_LINES = 24
 
 
-def load_map_figure(path: str | Path, job: StiffnessJob, made: LoadMap) -> None:
-    """Write `load_map_picture`."""
-    pair, model = job.pair, job.table
-    title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, plane {model.plane}, law {model.law}"
-    save(load_map_picture(made, title), path, dpi=110)
-
-
 def load_map_picture(made: LoadMap, title: str = "") -> Any:
     """Panels over the pinion angle coloured by torque, and mean stiffness and transmission error over the torque."""
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import LogNorm, Normalize
-
     angle, torque, panels = _over_the_cycle(made)
     count = len(panels) + 2
     columns = -(-count // 2)
@@ -37,36 +24,27 @@ def load_map_picture(made: LoadMap, title: str = "") -> Any:
     every: list[Any] = figure.subplots(2, columns, squeeze=False).ravel().tolist()
     logarithmic = len(torque) > 2 and torque[-1] / torque[0] > 10 and _is_geometric(torque)
     low, high = float(torque[0]), float(torque[-1] if len(torque) > 1 else 1.01 * torque[0])
-    norm = LogNorm(low, high) if logarithmic else Normalize(low, high)
-    colors = colormaps["viridis"]
-    shown = np.unique(np.linspace(0, len(torque) - 1, min(len(torque), MOST_LINES)).round().astype(int))
+    colour, scale = shades(low, high, logarithmic=logarithmic)
+    shown = some_of(len(torque), MOST_LINES)
     marker = "." if len(angle) < 60 else ""
     for axes, (label, values) in zip(every, panels.items(), strict=False):
-        tidy(axes)
+        labelled(axes, label, "pinion angle (deg)")
         for row in shown:
-            axes.plot(
-                angle, values[row], marker=marker, markersize=3, linewidth=1.1, color=colors(0.95 * norm(torque[row]))
-            )
+            axes.plot(angle, values[row], marker=marker, markersize=3, linewidth=1.1, color=colour(torque[row]))
         axes.set_xlim(angle[0], angle[-1])
-        axes.set_title(label, loc="left", fontsize=9.5)
-        axes.set_xlabel("pinion angle (deg)", fontsize=9)
-        axes.tick_params(labelsize=8.5)
     over = {
         "mean stiffness  (N/µm)": 1e-6 * made.quantity("k_mesh").mean(axis=1),
         "transmission error, peak to peak  (µm)": 1e6 * made.peak_to_peak,
     }
     for axes, (label, values), color in zip(every[len(panels) :], over.items(), (BLUE, ORANGE), strict=False):
-        tidy(axes)
+        labelled(axes, label, "torque at the wheel (N m)")
         axes.plot(torque, values, "o-", color=color, markersize=3.5, linewidth=1.4)
-        axes.set_title(label, loc="left", fontsize=9.5)
-        axes.set_xlabel("torque at the wheel (N m)", fontsize=9)
-        axes.tick_params(labelsize=8.5)
         if logarithmic:
             axes.set_xscale("log")
             _plain_ticks(axes.xaxis)
     for axes in every[count:]:
         axes.set_visible(False)
-    bar = figure.colorbar(ScalarMappable(norm, colors), ax=every, shrink=0.85, aspect=35, pad=0.015)
+    bar = figure.colorbar(scale, ax=every, shrink=0.85, aspect=35, pad=0.015)
     if logarithmic:
         _plain_ticks(bar.ax.yaxis)
     bar.set_label("torque at the wheel (N m)")

@@ -14,9 +14,10 @@ from ..gear.deviation_job import GEARS, active_rolls, flank_deviations
 from ..gear.pair import GearPair
 from ..microgeometry.loaded_mesh import LoadedMesh
 from ..microgeometry.relief import ReliefResult
+from ..microgeometry.relief_job import comparison
 from ..tables.microgeometry import VARIABLES, MicrogeometryTable
 from ..typing import Array
-from .style import BLUE, GREY, ORANGE, RED, new_figure, save, tidy
+from .style import BLUE, GREY, ORANGE, RED, labelled, new_figure, save, shades, some_of, tidy
 
 #: Lines of a panel; of more torques or profiles, so many are drawn.
 MOST_LINES = 24
@@ -80,7 +81,7 @@ def flank_figure(path: str | Path, table: MicrogeometryTable, pair: GearPair, fo
             middle = np.mean(lines, axis=0)
             edges = (middle - chart.band, middle + chart.band)
             axes.fill_betweenx(chart.roll, *edges, color="#e5e7eb")
-        for i in np.unique(np.linspace(0, len(lines) - 1, min(len(lines), MOST_LINES)).round().astype(int)):
+        for i in some_of(len(lines), MOST_LINES):
             axes.plot(lines[i], chart.roll, color=BLUE, linewidth=1.4 if len(lines) == 1 else 0.7)
         for end in chart.active:
             axes.axhline(end, color=GREY, linewidth=0.9, linestyle=(0, (4, 3)))
@@ -105,17 +106,8 @@ def flank_figure(path: str | Path, table: MicrogeometryTable, pair: GearPair, fo
     save(figure, path, dpi=110)
 
 
-def microgeometry_figure(path: str | Path, made: LoadedMesh) -> None:
-    """Write `microgeometry_picture`."""
-    save(microgeometry_picture(made), path, dpi=110)
-
-
 def microgeometry_picture(made: LoadedMesh) -> Any:
     """Harris map, peak-to-peak error, pressure and load share along the path, and the orders of the error."""
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
     pair, own, torque = made.pair, made.pairs, made.torque
     cycles, mesh_order = made.pinion_angle / pair.mesh_cycle, pair.pinion.teeth
     error, error_unloaded = 1e6 * made.transmission_error, 1e6 * made.transmission_error_unloaded
@@ -126,14 +118,11 @@ def microgeometry_picture(made: LoadedMesh) -> Any:
     grid = figure.add_gridspec(2, 3, width_ratios=(1.5, 1, 1.3))
     places = (grid[0, 0], grid[0, 1], grid[:, 2], grid[1, 0], grid[1, 1])
     harris, peak, spectrum_axes, share, pressure = (figure.add_subplot(place) for place in places)
-    norm = Normalize(float(torque[0]), float(torque[-1] if len(torque) > 1 else 1.01 * torque[0]))
-    colors = colormaps["viridis"]
-    shown = np.unique(np.linspace(0, len(torque) - 1, min(len(torque), MOST_LINES)).round().astype(int))
-    tidy(harris)
+    colour, scale = shades(float(torque[0]), float(torque[-1] if len(torque) > 1 else 1.01 * torque[0]))
     marker = "." if len(cycles) < 60 else ""
     harris.plot(cycles, error_unloaded, color=RED, linewidth=1.2, marker=marker, markersize=3, label="unloaded")
-    for i in shown:
-        color = colors(0.95 * norm(torque[i]))
+    for i in some_of(len(torque), MOST_LINES):
+        color = colour(torque[i])
         harris.plot(cycles, error[i], color=color, linewidth=1.1, marker=marker, markersize=3)
         rows = np.flatnonzero(own.torque == i)
         rows = rows[np.argsort(roll[rows])]
@@ -142,11 +131,9 @@ def microgeometry_picture(made: LoadedMesh) -> Any:
         pressure.plot(roll[smooth], stress[smooth], ".", markersize=2.5, color=color)
         pressure.plot(roll[sharp], stress[sharp], "x", markersize=4, color=color)
     harris.legend(fontsize=8, frameon=False)
-    tidy(peak)
     peak.plot(torque, np.ptp(error, axis=1), "o-", color=BLUE, markersize=3.5)
     peak.axhline(np.ptp(error_unloaded), color=RED, linewidth=1, linestyle=(0, (4, 3)))
     peak.set_ylim(bottom=0)
-    tidy(spectrum_axes)
     last = min(len(order) - 1, int(np.searchsorted(order, 4.5 * mesh_order)))
     bars = slice(1, last + 1)
     spectrum_axes.vlines(order[bars], 0, spectrum_unloaded[bars], color=RED, linewidth=3, alpha=0.35, label="unloaded")
@@ -162,30 +149,23 @@ def microgeometry_picture(made: LoadedMesh) -> Any:
         (share, "load share of a tooth pair (–)", "roll length of the pinion (mm)"),
         (pressure, "pressure (MPa); x: beside an edge", "roll length of the pinion (mm)"),
     ):
-        tidy(axes)
-        axes.set_title(text, loc="left", fontsize=9.5)
-        axes.set_xlabel(below, fontsize=9)
-        axes.tick_params(labelsize=8.5)
-    bar = figure.colorbar(ScalarMappable(norm, colors), ax=pressure, shrink=0.95, aspect=25, pad=0.02)
+        labelled(axes, text, below)
+    bar = figure.colorbar(scale, ax=pressure, shrink=0.95, aspect=25, pad=0.02)
     bar.set_label("torque at the wheel (N m)")
     title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, {made.span}"
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
     return figure
 
 
-def relief_figure(path: str | Path, made: ReliefResult, compared: Mapping[str, Array]) -> None:
-    """Write `relief_picture`."""
-    save(relief_picture(made, compared), path, dpi=110)
-
-
-def relief_picture(made: ReliefResult, compared: Mapping[str, Array]) -> Any:
+def relief_picture(made: ReliefResult, compared: Mapping[str, Array] | None = None) -> Any:
     """Map of the objective over one or two variables, error against torque of the best one, and its sensitivity.
 
     Parameters
     ----------
     compared
-        Of `gearfe.microgeometry.relief_job.comparison`.
+        Of `gearfe.microgeometry.relief_job.comparison`, where it is there already.
     """
+    compared = comparison(made) if compared is None else compared
     problem, value = made.problem, made.best.value
     keys = {quantity: (key, factor) for key, (quantity, factor) in VARIABLES.items()}
     names = [_in_words(keys[one.quantity][0], one.gear) for one in problem.variables]

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .style import BLUE, COLOURS, GREY, ORANGE, RED, new_figure, tidy
+from .style import BLUE, CYCLE, GREY, ORANGE, RED, legend_beside, new_figure, tidy
 
 if TYPE_CHECKING:
-    from ..gear.pair import GearPair
-    from ..loadmap.load_map import LoadMap
-    from ..microgeometry.loaded_mesh import LoadedMesh
-    from ..microgeometry.relief import ReliefResult
     from ..reduction.modal_body import ModalBody
     from ..rigid.trajectory import Trajectory
-    from ..runup.run_up import RunUp
     from ..spectrum import Spectrum
     from ..stiffness.curve import StiffnessCurve
-    from ..study.statistics import StudyResult
     from ..train.response import TrainResponse
 
 #: Faces of a body that are drawn at most.
@@ -28,14 +22,8 @@ MOST_FACES = 30_000
 
 def picture(result: Any) -> Any:
     """The picture of a result, as a matplotlib figure."""
-    return PICTURES[type(result).__name__](result)
-
-
-def pair_plot(pair: GearPair) -> Any:
-    """The gears in mesh."""
-    from .gears import pair_picture
-
-    return pair_picture(pair, 0.0)
+    module, _, function = PICTURES[type(result).__name__].partition(":")
+    return getattr(import_module(f".{module}", __package__), function)(result)
 
 
 def curve_plot(curve: StiffnessCurve) -> Any:
@@ -55,54 +43,23 @@ def curve_plot(curve: StiffnessCurve) -> Any:
     return figure
 
 
-def map_plot(made: LoadMap) -> Any:
-    """Stiffness, transmission error, load share, pressure, root stress."""
-    from .load_map import load_map_picture
-
-    return load_map_picture(made)
-
-
-def mesh_plot(made: LoadedMesh) -> Any:
-    """Harris map, load share, pressure, orders."""
-    from .microgeometry import microgeometry_picture
-
-    return microgeometry_picture(made)
-
-
-def relief_plot(made: ReliefResult) -> Any:
-    """Map of the objective, error against torque, tolerances."""
-    from ..microgeometry.relief_job import comparison
-    from .microgeometry import relief_picture
-
-    return relief_picture(made, comparison(made))
-
-
 def response_plot(response: TrainResponse) -> Any:
     """Contact forces, and accelerations of the attachments, over time."""
     figure = new_figure(9.0, 5.2)
     upper, lower = figure.subplots(2, 1, sharex=True)
     time = 1e3 * response.time
-    for colour, name, force in zip(COLOURS * 8, response.mesh_names, 1e-3 * response.contact_force.T, strict=False):
+    for colour, name, force in zip(CYCLE, response.mesh_names, 1e-3 * response.contact_force.T, strict=False):
         upper.plot(time, force, color=colour, linewidth=1.2, label=name)
     upper.set_ylabel("contact force  (kN)")
-    for colour, name, values in zip(
-        COLOURS * 8, response.attachment_names, response.attachment_acceleration.T, strict=False
-    ):
+    for colour, name, values in zip(CYCLE, response.attachment_names, response.attachment_acceleration.T, strict=False):
         lower.plot(time, values, color=colour, linewidth=1.0, label=f"attachment {name}")
     lower.set_ylabel("acceleration  (m/s²)")
     lower.set_xlabel("time  (ms)")
     for axes in (upper, lower):
         tidy(axes)
         axes.margins(x=0.0)
-        axes.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        legend_beside(axes)
     return figure
-
-
-def runup_plot(run: RunUp) -> Any:
-    """Dynamic transmission error and dynamic factor of all meshes over the speed."""
-    from .runup import forces_picture
-
-    return forces_picture(run)
 
 
 def trajectory_plot(run: Trajectory) -> Any:
@@ -117,11 +74,11 @@ def trajectory_plot(run: Trajectory) -> Any:
     panels = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (group, members) in zip(panels, groups.items(), strict=True):
         tidy(axes)
-        for colour, i in zip(COLOURS * 8, members, strict=False):
+        for colour, i in zip(CYCLE, members, strict=False):
             axes.plot(run.time, run.q[:, i], color=colour, linewidth=1.2, label=names[i].removeprefix(f"{group}_"))
         axes.set_ylabel(group, fontsize=9)
         axes.margins(x=0.0)
-        axes.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        legend_beside(axes)
     panels[-1].set_xlabel("time  (s)")
     return figure
 
@@ -150,39 +107,32 @@ def body_plot(body: ModalBody) -> Any:
     return figure
 
 
-def study_plot(result: StudyResult) -> Any:
-    """Every output against every parameter."""
-    from .study import study_picture
-
-    return study_picture(result)
-
-
 def spectrum_plot(made: Spectrum) -> Any:
     """Amplitudes of all signals over the frequency, as lines."""
     figure = new_figure(8.5, 3.6)
     axes = figure.subplots()
     tidy(axes)
     signals = made.amplitude.reshape(len(made.frequency), -1).T
-    for number, (colour, values) in enumerate(zip(COLOURS * 8, signals, strict=False), start=1):
+    for number, (colour, values) in enumerate(zip(CYCLE, signals, strict=False), start=1):
         axes.plot(1e-3 * made.frequency, values, color=colour, linewidth=1.2, label=f"signal {number}")
     if made.value.ndim > 1:
-        axes.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        legend_beside(axes)
     axes.set(xlabel="frequency  (kHz)", ylabel="amplitude")
     axes.margins(x=0.0)
     return figure
 
 
-#: Class of a result -> its picture. Names, so that one picture loads none of the other results.
-PICTURES: dict[str, Callable[[Any], Any]] = {
-    "GearPair": pair_plot,
-    "LoadMap": map_plot,
-    "LoadedMesh": mesh_plot,
-    "ModalBody": body_plot,
-    "ReliefResult": relief_plot,
-    "RunUp": runup_plot,
-    "Spectrum": spectrum_plot,
-    "StiffnessCurve": curve_plot,
-    "StudyResult": study_plot,
-    "TrainResponse": response_plot,
-    "Trajectory": trajectory_plot,
+#: Class of a result -> module and function of its picture: names, so that one picture loads no other results.
+PICTURES = {
+    "GearPair": "gears:pair_picture",
+    "LoadMap": "load_map:load_map_picture",
+    "LoadedMesh": "microgeometry:microgeometry_picture",
+    "ModalBody": "results:body_plot",
+    "ReliefResult": "microgeometry:relief_picture",
+    "RunUp": "runup:forces_picture",
+    "Spectrum": "results:spectrum_plot",
+    "StiffnessCurve": "results:curve_plot",
+    "StudyResult": "study:study_picture",
+    "TrainResponse": "results:response_plot",
+    "Trajectory": "results:trajectory_plot",
 }

@@ -16,7 +16,7 @@ from ..runup.report import dynamic_factors, iso_dynamic_factors, orders
 from ..runup.run_up import RunUp
 from ..typing import Array, IntArray
 from .campbell import draw_campbell, draw_instability, draw_waterfall, signal_of
-from .style import COLOURS, GREY, new_figure, save, tidy
+from .style import CYCLE, GREY, new_figure, save, tidy
 
 #: Label of the axis of dynamic factors.
 FACTOR = "dynamic factor $K_v$"
@@ -35,7 +35,7 @@ class RunUpPictures:
         draw_waterfall(folder / "waterfall.png", run, multiples, bore, self.title)
         draw_campbell(folder / "campbell.png", run, modes, met, multiples, self.title)
         draw_orders(folder / "orders.png", run, multiples, bore, self.title)
-        draw_forces(folder / "meshes.png", run, self.title)
+        save(forces_picture(run, self.title), folder / "meshes.png")
 
     def instability(self, path: Path, made: InstabilityMap) -> None:
         """The map of parametric instability."""
@@ -71,11 +71,6 @@ def draw_orders(path: Path, run: RunUp, multiples: int, bore: int, title: str) -
     save(_curves(run, panels, f"{signal.name}: orders of the drive, and rms\n{title}", logarithmic=True), path)
 
 
-def draw_forces(path: Path, run: RunUp, title: str) -> None:
-    """Write `forces_picture`."""
-    save(forces_picture(run, title), path)
-
-
 def forces_picture(run: RunUp, title: str = "") -> Any:
     """Dynamic transmission error, dynamic factor, and share without contact of all meshes."""
     lines = run.train.model.meshes
@@ -93,7 +88,7 @@ def forces_picture(run: RunUp, title: str = "") -> Any:
         panels.append(("without contact  (% of the time)", open_))
     figure = _curves(run, panels, f"Meshes in steady running\n{title}")
     (axes,) = (axes for axes in figure.axes if axes.get_ylabel() == FACTOR)
-    for i, colour in zip(range(len(lines)), _cycle(), strict=False):
+    for i, colour in zip(range(len(lines)), CYCLE, strict=False):
         label = f"mesh {i + 1}, ISO 6336-1 B"
         axes.plot(run.speeds, iso_dynamic_factors(run, i), color=colour, linewidth=1.0, dashes=(1, 1.5), label=label)
     _legend_above(axes)
@@ -115,7 +110,7 @@ def _curves(
     for number, (label, curves) in enumerate(panels):
         axes = figure.add_subplot(len(panels), 1, number + 1)
         tidy(axes)
-        for colour, (name, curve) in zip(_cycle(), curves.items(), strict=False):
+        for colour, (name, curve) in zip(CYCLE, curves.items(), strict=False):
             first = True
             for branch in dict.fromkeys(curve.branch.tolist()):
                 at = np.flatnonzero(curve.branch == branch)
@@ -171,7 +166,3 @@ def _pieces(run: RunUp, values: Sequence[float] | Array) -> Pieces:
     branch = np.array([s.branch for s in run.states], dtype=np.int64)
     stable = np.array([s.branch % 2 == 0 if s.stable is None else s.stable for s in run.states])
     return Pieces(speed, np.asarray(values, dtype=float), branch, stable)
-
-
-def _cycle() -> list[str]:
-    return list(COLOURS) * 4

@@ -18,7 +18,7 @@ from ..stiffness.job import StiffnessJob
 from ..stiffness.periodic import wrapped_phase
 from ..stiffness.report import cycle_statistics
 from ..typing import Array, IntArray
-from .style import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save, tidy
+from .style import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save, shades, some_of, tidy
 
 #: Positions in the picture of the pressures at most.
 MOST_LINES = 12
@@ -122,16 +122,11 @@ def pressure_figure(path: str | Path, pair: GearPair, pressures: Sequence[tuple[
     pressures
         For each position its pinion angle (deg) and the pressures along its flanks.
     """
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
-    pick = np.unique(np.linspace(0, len(pressures) - 1, min(len(pressures), MOST_LINES)).round().astype(int))
+    pick = some_of(len(pressures), MOST_LINES)
     lines = [(pressures[i][0], flank) for i in pick for flank in pressures[i][1] if len(flank.shown)]
     angles = [angle for angle, _ in lines] or [0.0]
     several = max(angles) > min(angles)
-    norm = Normalize(min(angles), max(angles) if several else min(angles) + 1.0)
-    colors = colormaps["viridis"]
+    shade, scale = shades(min(angles), max(angles) if several else min(angles) + 1.0)
     figure = new_figure(10.5, 4.2)
     both: Any = figure.subplots(1, 2, sharey=True)
     for axes, name in zip(both, ("pinion", "wheel"), strict=True):
@@ -139,7 +134,7 @@ def pressure_figure(path: str | Path, pair: GearPair, pressures: Sequence[tuple[
         axes.set_title(name, loc="left", fontsize=10)
         axes.set_xlabel("diameter (mm)")
     for angle, flank in lines:
-        color = colors(0.95 * norm(angle))
+        color = shade(angle)
         for run in _contacts(flank):
             diameter, pressure = 2e3 * flank.radius[run], 1e-6 * flank.pressure[run]
             both[flank.gear].plot(diameter, pressure, ".", markersize=3.0, color=color)
@@ -150,7 +145,7 @@ def pressure_figure(path: str | Path, pair: GearPair, pressures: Sequence[tuple[
     title = f"{teeth}, pressure along the flanks (points; lines: ellipses of the same force and width)"
     figure.suptitle(title + ("" if several else f" at {angles[0]:g}°"), x=0.01, ha="left", fontsize=11)
     if several:
-        bar = figure.colorbar(ScalarMappable(norm, colors), ax=list(both), pad=0.015, aspect=30)
+        bar = figure.colorbar(scale, ax=list(both), pad=0.015, aspect=30)
         bar.set_label("pinion angle (deg)")
     save(figure, path, dpi=120)
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..study.statistics import StudyResult
-from ..typing import Array, BoolArray, IntArray
+from ..typing import Array
 from .style import BLUE, GREY, ORANGE, RED, new_figure, save, tidy
 
 #: Parameters and outputs that a picture shows at most, and cases of which every one is drawn.
@@ -31,23 +31,11 @@ def study_figures(folder: Path, result: StudyResult, summary: Mapping[str, Any],
         return
     if numbers:
         save(study_picture(result, title), folder / "study.png")
-        columns = {**numbers, **outputs}
-        parallel_figure(folder / "study_lines.png", title=title, columns=columns, colour=next(iter(outputs)))
-        sobol = {name: (summary["outputs"][name].get("sobol") or {}).get("total_order", {}) for name in outputs}
-        morris = {name: _sizes(summary["outputs"][name].get("morris") or {}) for name in outputs}
-        whole = all(sobol.values())
-        effects = {name: summary["outputs"][name]["effects"]["change"] for name in outputs}
-        effects = sobol if whole else morris if all(morris.values()) else effects
-        if any(effects.values()):
-            what = "Sobol's total index of" if whole else "change over the parameter's range:"
-            what = "mean size of the elementary effects on" if effects is morris else what
-            notes = {name: f"{what} {name}" for name in outputs}
-            tornado_figure(folder / "study_tornado.png", title=title, effects=effects, notes=notes)
+        _lines(folder / "study_lines.png", title, {**numbers, **outputs}, next(iter(outputs)))
+        _tornado(folder / "study_tornado.png", title, {name: summary["outputs"][name] for name in outputs})
     aims = [*table.minimise, *table.maximise]
     if len(aims) == 2 and all(name in outputs for name in aims):
-        pair = [(name, outputs[name]) for name in aims]
-        best, good = result.pareto(), result.good
-        pareto_figure(folder / "study_pareto.png", title=title, first=pair[0], second=pair[1], best=best, good=good)
+        _pareto(folder / "study_pareto.png", title, result, aims)
 
 
 def _outputs(result: StudyResult) -> dict[str, Array]:
@@ -57,32 +45,12 @@ def _outputs(result: StudyResult) -> dict[str, Array]:
 
 
 def study_picture(result: StudyResult, title: str = "") -> Any:
-    """Every output against every parameter; against the number of the case where no parameter is a number."""
-    numbers = result.numbers() or {"case": np.array([float(cell) for cell in result.columns["case"]])}
-    limits = {name: (limit.low, limit.high) for name, limit in result.table.limits.items()}
-    return scatter_figure(title=title, parameters=numbers, outputs=_outputs(result), limits=limits)
+    """Every output against every parameter, a point for each case; limits as lines.
 
-
-def _sizes(effects: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
-    return {name: one["mean_size"] for name, one in effects.items()}
-
-
-def scatter_figure(
-    *,
-    title: str,
-    parameters: Mapping[str, Array],
-    outputs: Mapping[str, Array],
-    limits: Mapping[str, tuple[float | None, float | None]],
-) -> Any:
-    """Every output against every parameter, a point for each case.
-
-    Parameters
-    ----------
-    parameters, outputs
-        Name -> values of the cases, (n,).
-    limits
-        Output -> lower and upper end of good values.
+    Without a parameter that is a number: against the number of the case.
     """
+    parameters = result.numbers() or {"case": np.array([float(cell) for cell in result.columns["case"]])}
+    outputs, limits = _outputs(result), result.table.limits
     names, rows = list(parameters)[:MOST], list(outputs)[:MOST]
     figure = new_figure(1.2 + 2.6 * len(names), 0.9 + 2.1 * len(rows))
     axes = figure.subplots(len(rows), len(names), squeeze=False, sharex="col", sharey="row")
@@ -92,7 +60,7 @@ def scatter_figure(
             part = axes[i, j]
             tidy(part)
             part.plot(parameters[name][some], outputs[row][some], ".", color=BLUE, markersize=6, alpha=0.6, mew=0)
-            for end in limits.get(row, ()):
+            for end in (limits[row].low, limits[row].high) if row in limits else ():
                 if end is not None:
                     part.axhline(end, color=RED, linewidth=1.0, dashes=(5, 3))
             if i == len(rows) - 1:
@@ -102,16 +70,8 @@ def scatter_figure(
     return figure
 
 
-def parallel_figure(path: str | Path, *, title: str, columns: Mapping[str, Array], colour: str) -> None:
-    """Every case as a line over its parameters and outputs, each scaled to its range.
-
-    Parameters
-    ----------
-    columns
-        Name -> values of the cases, (n,).
-    colour
-        Column that colours the lines.
-    """
+def _lines(path: Path, title: str, columns: Mapping[str, Array], colour: str) -> None:
+    """Every case as a line over its parameters and outputs, each scaled to its range; a column colours the lines."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection
     from matplotlib.colors import Normalize
@@ -145,66 +105,47 @@ def parallel_figure(path: str | Path, *, title: str, columns: Mapping[str, Array
     save(figure, path)
 
 
-def tornado_figure(
-    path: str | Path, *, title: str, effects: Mapping[str, Mapping[str, float]], notes: Mapping[str, str]
-) -> None:
-    """How much each parameter changes each output, the largest on top.
-
-    Parameters
-    ----------
-    effects
-        Output -> parameter -> change of the output, or Sobol's total index.
-    notes
-        Output -> label of its axis.
-    """
-    rows = {name: found for name, found in effects.items() if found}
-    rows = dict(list(rows.items())[:MOST])
+def _tornado(path: Path, title: str, outputs: Mapping[str, Mapping[str, Any]]) -> None:
+    """How much each parameter changes each output (what the summary says of it), the largest on top."""
+    sobol = {name: (one.get("sobol") or {}).get("total_order", {}) for name, one in outputs.items()}
+    morris = {n: {p: e["mean_size"] for p, e in (one.get("morris") or {}).items()} for n, one in outputs.items()}
+    effects, what = {n: one["effects"]["change"] for n, one in outputs.items()}, "change over the parameter's range:"
+    if all(sobol.values()):
+        effects, what = sobol, "Sobol's total index of"
+    elif all(morris.values()):
+        effects, what = morris, "mean size of the elementary effects on"
+    rows = dict([(name, found) for name, found in effects.items() if found][:MOST])
+    if not rows:
+        return
     figure = new_figure(8.0, 0.8 + sum(0.75 + 0.28 * min(len(found), 10) for found in rows.values()))
-    parts = figure.subplots(max(1, len(rows)), 1, squeeze=False)[:, 0]
+    parts = figure.subplots(len(rows), 1, squeeze=False)[:, 0]
     for part, (name, found) in zip(parts, rows.items(), strict=False):
         tidy(part)
         largest = sorted(found.items(), key=lambda item: abs(item[1]))[-10:]
         sizes = [value for _, value in largest]
         part.barh([_short(n, " ") for n, _ in largest], sizes, color=[BLUE if v >= 0 else ORANGE for v in sizes])
         part.axvline(0.0, color="#374151", linewidth=0.9)
-        part.set_xlabel(notes.get(name, name), fontsize=8.5)
+        part.set_xlabel(f"{what} {name}", fontsize=8.5)
         part.tick_params(labelsize=8.5)
     figure.suptitle(title, fontsize=11, x=0.01, ha="left")
     save(figure, path)
 
 
-def pareto_figure(
-    path: str | Path,
-    *,
-    title: str,
-    first: tuple[str, Array],
-    second: tuple[str, Array],
-    best: IntArray,
-    good: BoolArray,
-) -> None:
-    """Two outputs of all cases, and the cases that no other one beats.
-
-    Parameters
-    ----------
-    first, second
-        Name and values of the cases, (n,).
-    best
-        Cases of the Pareto set.
-    good
-        (n,) cases that keep all limits.
-    """
+def _pareto(path: Path, title: str, result: StudyResult, aims: list[str]) -> None:
+    """Two outputs of all cases, and the cases that no other one beats."""
+    outputs, best, good = _outputs(result), result.pareto(), result.good
+    x, y = (outputs[name] for name in aims)
     figure = new_figure(6.4, 5.0)
     axes = figure.add_subplot()
     tidy(axes)
-    (one, x), (two, y) = first, second
     axes.plot(x[~good], y[~good], ".", color=GREY, alpha=0.5, mew=0, label="beyond a limit" if (~good).any() else None)
     axes.plot(x[good], y[good], ".", color=BLUE, alpha=0.7, mew=0, label="cases")
     order = best[np.argsort(x[best])]
     axes.plot(x[order], y[order], "o-", color=RED, markersize=5, linewidth=1.0, label="Pareto set")
     for number in order[:: -(-len(order) // 8) or 1]:
         axes.annotate(str(number), (x[number], y[number]), (5, 4), textcoords="offset points", fontsize=8, color=RED)
-    axes.set_xlabel(one)
-    axes.set_ylabel(two)
+    axes.set_xlabel(aims[0])
+    axes.set_ylabel(aims[1])
     axes.set_title(title, fontsize=11, loc="left")
     axes.legend(fontsize=8.5, frameon=False)
     save(figure, path)

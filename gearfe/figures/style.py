@@ -1,4 +1,4 @@
-"""What all pictures share: a canvas, colours, axes; files are written whole as PNG (or PDF, SVG: the suffix decides).
+"""What pictures share: canvas, colours, axes, legends; files are written whole as PNG (or PDF, SVG: by the suffix).
 
 Drawn on matplotlib's `Figure` with the Agg canvas: no window system, no global state. matplotlib is imported when the
 first picture is drawn.
@@ -6,13 +6,19 @@ first picture is drawn.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..output.files import whole_file
+from ..typing import IntArray
 
 BLUE, ORANGE, GREEN, RED, GREY = "#1f5a99", "#d9730d", "#3a8c5c", "#b3261e", "#6b7280"
 COLOURS = (BLUE, ORANGE, GREEN, RED, "#6d4c9f", "#0f766e", "#8a5a2b")
+#: The same again and again, for any number of curves.
+CYCLE = COLOURS * 8
 DPI = 130
 
 
@@ -61,3 +67,32 @@ def panel(axes: Any, ylabel: str, letter: str, title: str) -> Any:
     if title:
         axes.set_title(f"({letter})  {title}", fontsize=10.5, loc="left")
     return axes
+
+
+def labelled(axes: Any, title: str, below: str) -> Any:
+    """The axes of one panel among several: light grid, small title and label."""
+    tidy(axes)
+    axes.set_title(title, loc="left", fontsize=9.5)
+    axes.set_xlabel(below, fontsize=9)
+    axes.tick_params(labelsize=8.5)
+    return axes
+
+
+def legend_beside(axes: Any) -> None:
+    """Names of the curves to the right of the panel."""
+    axes.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def some_of(count: int, most: int) -> IntArray:
+    """Numbers of the curves that are drawn of so many: all, or `most` evenly spread ones."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
+
+
+def shades(low: float, high: float, *, logarithmic: bool = False) -> tuple[Callable[[float], Any], Any]:
+    """Colour of a value between two, and what a colour bar is drawn of."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LogNorm, Normalize
+
+    norm, colours = (LogNorm if logarithmic else Normalize)(low, high), colormaps["viridis"]
+    return lambda value: colours(0.95 * norm(value)), ScalarMappable(norm, colours)

@@ -20,7 +20,7 @@ from ..vibration.report import attachment_acceleration
 from ..vibration.spectra import TrainSpectra
 from .short_time import draw_measured, draw_spectrogram, draw_tracks
 from .spectra import draw_power, draw_spectrum
-from .style import BLUE, COLOURS, GREY, RED, fixed, panel, save_fixed
+from .style import BLUE, COLOURS, CYCLE, GREY, RED, fixed, panel, save_fixed
 from .train_scene import draw_scene
 
 #: First and last place of stretches.
@@ -86,7 +86,7 @@ def draw_response(path: Path, response: TrainResponse, attachment: str, title: s
     figure.suptitle(title, fontsize=12, x=0.012, y=0.985, ha="left")
     grid = figure.add_gridspec(2, 2, left=0.062, right=0.985, top=0.905, bottom=0.068, hspace=0.3, wspace=0.16)
     axes = [panel(figure.add_subplot(grid[0, 0]), "contact force  (kN)", "a", "contact forces")]
-    for colour, name, values, level in zip(_cycle(), names, forces, mean, strict=False):
+    for colour, name, values, level in zip(CYCLE, names, forces, mean, strict=False):
         axes[0].plot(angle, values, color=colour, linewidth=1.3, label=name)
         if np.isfinite(level):
             axes[0].axhline(1e-3 * level, color=colour, linewidth=0.9, dashes=(6, 4))
@@ -95,7 +95,7 @@ def draw_response(path: Path, response: TrainResponse, attachment: str, title: s
     top, low = float(forces.max()), min(0.0, float(forces.min()))
     axes[0].set_ylim(low - 0.04 * (top - low), top + 0.22 * (top - low))
     rows = grid[0, 1].subgridspec(len(speeds), 1, hspace=0.35)
-    for number, (colour, label, values) in enumerate(zip(_cycle(), labels, speeds, strict=False)):
+    for number, (colour, label, values) in enumerate(zip(CYCLE, labels, speeds, strict=False)):
         part = figure.add_subplot(rows[number])
         panel(part, "", "b" if number == 0 else "", "shaft speeds" if number == 0 else "")
         part.plot(angle, values, color=colour, linewidth=1.2)
@@ -108,7 +108,7 @@ def draw_response(path: Path, response: TrainResponse, attachment: str, title: s
             part.set_ylabel("speed  (rad/s)")
         axes.append(part)
     turning = panel(figure.add_subplot(grid[1, 0]), "angular acceleration  (1000 rad/s²)", "c", "angular accelerations")
-    for colour, label, values in zip(_cycle(), labels, accelerations, strict=False):
+    for colour, label, values in zip(CYCLE, labels, accelerations, strict=False):
         turning.plot(angle, values, color=colour, linewidth=1.1, label=label)
     turning.legend(fontsize=8.5, frameon=False, ncols=max(1, min(4, len(accelerations))), loc="upper right")
     turning.margins(y=0.14)
@@ -139,7 +139,7 @@ def draw_transmission(path: Path, train: GearTrain, response: TrainResponse, tit
     figure.suptitle(head, fontsize=12, x=0.012, y=0.985, ha="left")
     room = {"top": 1.0 - 0.75 / tall, "bottom": 0.55 / tall, "hspace": 0.32}
     grid = figure.add_gridspec(len(elastic), 1, left=0.062, right=0.985, **room)
-    for number, (colour, i) in enumerate(zip(_cycle(), elastic, strict=False)):
+    for number, (colour, i) in enumerate(zip(CYCLE, elastic, strict=False)):
         name, still = f"mesh {i + 1}, {response.mesh_names[i]}", static[i]
         axes = panel(figure.add_subplot(grid[number]), "approach  (µm)", "abcdefgh"[number % 8], name)
         moving = 1e6 * response.transmission_error[:, i]
@@ -189,7 +189,3 @@ def _bars(axes: Any, apart: Sequence[Spans]) -> None:
 
 def _span(axes: Any, angle: Array) -> None:
     axes.set_xlim(float(angle[0]), float(angle[-1]) if angle[-1] > angle[0] else float(angle[0]) + 1.0)
-
-
-def _cycle() -> Sequence[str]:
-    return COLOURS * 8
