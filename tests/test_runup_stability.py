@@ -77,7 +77,7 @@ def test_a_sum_resonance_of_two_modes():
 
     system = Oscillator(Linear(squares, damping, places, np.zeros(2)), forces, (1.0,), np.ones(1))
     speed = 3.3
-    orbit, _ = settled(system, *solve(system, speed, np.zeros((9, 1), dtype=complex), 1e-6), 1e-6)
+    orbit = settled(system, *solve(system, speed, np.zeros((9, 1), dtype=complex), 1e-6), 1e-6)
 
     def rhs(t, y):  # type: ignore[no-untyped-def]
         push = -e * math.cos(speed * t) * (places[:, 0] @ y[:2])

@@ -11,27 +11,30 @@ one; Schilder, Vogt, Schreiber & Osinga, Int. J. Numer. Meth. Eng. 67, 2006; Gus
 for the first K harmonics of `gearfe.runup.torus`.
 
 Forces are sampled over the phases and transformed (alternating frequency/time; Cameron & Griffin, J. Appl. Mech. 56,
-1989). Newton's method takes their derivatives from the same samples: with the Fourier coefficients g of df/du,
+1989). Newton's method takes their derivatives from the same samples: a change of the amplitudes is made a motion, times
+the derivatives a change of the forces, and transformed back,
 
-.. math:: \delta\hat f_k = \sum_l g_{k-l}\,\delta\hat u_l + g_{k+l}\,\overline{\delta\hat u_l} .
+.. math:: \delta r = \delta\hat u - H\,\mathcal F\Big[\frac{\partial f}{\partial u}\,\delta u
+    + \frac{\partial f}{\partial\dot u}\,\delta\dot u\Big] .
 
-Amplitudes that change and follow others little through the forces are no unknowns of Newton's method but are found by
-substitution, which converges there by itself. The error is estimated from what is left of the equations with twice the
-harmonics and four times the samples.
+H falls with the frequency, so this is the identity and a compact part, for which the method of generalised minimal
+residuals converges in a few products without a matrix (`gearfe.runup.krylov`). The error is estimated from what is left
+of the equations with twice the harmonics and four times the samples.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
 
-from ..typing import Array, ComplexArray, IntArray
+from ..typing import Array, ComplexArray
 from . import torus
+from .krylov import gmres
 from .linear import Linear
 from .torus import Lattice
 
@@ -42,19 +45,19 @@ FOUND = 3e-2
 #: Where Newton's method goes to and fro over a touch of flanks that falls on a sample, this many steps without halving
 #: what is left end it; less than this is left to the error estimate to judge, which asks for more samples.
 IDLE, LEFT = 8, 1e-4
-#: A step that leaves more than this of the residual asks for a new Jacobian.
-SLOW = 0.2
-#: Amplitudes are unknowns of Newton's method where a change of them comes back larger than this through the forces, and
-#: their harmonic is larger than this part of the scale.
-COMES_BACK, PRESENT = 0.1, 1e-7
+#: What a step of Newton's method leaves of the linear equations, and of those for the error estimate.
+INEXACT, ROUGH = 0.03, 0.1
+#: A step from within the range of convergence leaves less than this part (Deuflhard, Newton Methods for Nonlinear
+#: Problems, 2004, Sec. 5.1: continuation with contractions of a half).
+CONTRACTS = 0.5
 #: The error estimate is multiplied by this.
 SAFETY = 2.0
 #: Where the estimate misses the tolerance, harmonics grow by this factor.
 GROWTH = 1.5
 #: Harmonics to begin with, at most, where there are several phases.
 PLENTY = 256
-#: Most harmonics (half as many with two phases, a quarter with three: these take more samples), and unknown amplitudes.
-MOST_HARMONICS, MOST_UNKNOWN = 4096, 800
+#: Most harmonics: a bound on time and memory, not on the error, whose estimate stays.
+MOST_HARMONICS = 8192
 
 
 class Pushes(NamedTuple):
@@ -123,7 +126,7 @@ class Oscillator:
 
     def rounded(self, harmonics: float) -> int:
         """Number whose samples transform quickly, at least as many as asked for but for the most."""
-        return min(8 * math.ceil(harmonics / 8), MOST_HARMONICS >> len(self.turns) - 1)
+        return min(8 * math.ceil(harmonics / 8), MOST_HARMONICS)
 
     def flexibility(self, speed: float, count: int) -> ComplexArray:
         """H at harmonics 0 to `count`, (count + 1, m, m)."""
@@ -167,39 +170,6 @@ class Orbit:
         return widened(self.places, count)
 
 
-class Unknowns(NamedTuple):
-    """Amplitudes that Newton's method finds: (u,) numbers of harmonics, rising, and of freedoms."""
-
-    lines: IntArray
-    freedoms: IntArray
-
-    def packed(self, amplitudes: ComplexArray, scale: Array) -> Array:
-        """Real unknowns in parts of the scale: all real parts, then the imaginary ones but those of the constant."""
-        a = amplitudes[self.lines, self.freedoms] / scale[self.freedoms]
-        return np.concatenate([a.real, a[self.lines > 0].imag])
-
-    def unpacked(self, x: Array, scale: Array) -> ComplexArray:
-        """(u,) amplitudes: the reverse of `packed`."""
-        u = len(self.lines)
-        made = x[:u].astype(complex)
-        made[self.lines > 0] += 1j * x[u:]
-        return np.asarray(made * scale[self.freedoms])
-
-
-class Newton(NamedTuple):
-    """The Jacobian of some unknowns, factorised."""
-
-    unknowns: Unknowns
-    factors: tuple[Array, Array]
-
-    def step(self, residual: ComplexArray, scale: Array) -> ComplexArray:
-        """Change of all amplitudes: that of Newton's method, and by substitution where they are no unknowns."""
-        made, at = -residual, self.unknowns
-        found = lu_solve(self.factors, at.packed(residual, scale), check_finite=False)
-        made[at.lines, at.freedoms] = -at.unpacked(found, scale)
-        return made
-
-
 class Evaluated(NamedTuple):
     """The equations at some amplitudes."""
 
@@ -235,73 +205,36 @@ def moved(system: Oscillator, flexibility: ComplexArray, forces: ComplexArray) -
     return np.asarray(made)
 
 
-def jacobian(system: Oscillator, speed: float, unknowns: Unknowns, at: Evaluated, flexibility: ComplexArray) -> Array:
-    """Derivative of the residual of the unknowns with these, in parts of the scale, over `packed` ones."""
-    pushes, samples, scale = at.pushes, len(at.pushes.value), system.scale
-    lines, freedoms, u = unknowns.lines, unknowns.freedoms, len(unknowns.lines)
-    residue, turning = at.lattice.residue[lines], 1j * system.omega(speed, int(lines.max()))[lines]
-    half = np.where(lines == 0, 0.5, 1.0)
-    plus, minus = np.empty((u, u), dtype=complex), np.empty((u, u), dtype=complex)
-    for j in np.unique(freedoms):
-        by = np.flatnonzero(freedoms == j)
-        near, far = (residue[:, None] - residue[by]) % samples, (residue[:, None] + residue[by]) % samples
-        A, B = np.zeros(near.shape, dtype=complex), np.zeros(near.shape, dtype=complex)
-        for i in range(len(scale)):
-            H = (half * flexibility[lines, freedoms, i] * scale[j] / scale[freedoms])[:, None]
-            place, rate = pushes.by_place[:, i, j], None if pushes.by_rate is None else pushes.by_rate[:, i, j]
-            if place.any():
-                g = np.fft.fft(place) / samples
-                A += H * g[near]
-                B += H * g[far]
-            if rate is not None and rate.any():
-                g = np.fft.fft(rate) / samples
-                A += H * g[near] * turning[by]
-                B -= H * g[far] * turning[by]
-        plus[:, by], minus[:, by] = A + B, A - B
-    wave = lines > 0
-    made = np.empty((u + wave.sum(), u + wave.sum()))
-    made[:u, :u], made[:u, u:] = -plus.real, minus[:, wave].imag
-    made[u:, :u], made[u:, u:] = -plus[wave].imag, -minus[np.ix_(wave, wave)].real
-    made[np.diag_indices(len(made))] += 1.0
-    return made
+def packed(amplitudes: ComplexArray, scale: Array) -> Array:
+    """Real vector of amplitudes in parts of the scale."""
+    return np.ascontiguousarray(amplitudes / scale).view(float).ravel()
+
+
+def unpacked(x: Array, scale: Array) -> ComplexArray:
+    """(K + 1, m) amplitudes: the reverse of `packed`."""
+    return np.asarray(x.view(complex).reshape(-1, len(scale)) * scale)
+
+
+def product(system: Oscillator, speed: float, at: Evaluated, flexibility: ComplexArray) -> Callable[[Array], Array]:
+    """Change of the residual for a change of the amplitudes, both `packed`: the Jacobian, without a matrix."""
+    lattice, scale, count = at.lattice, system.scale, len(at.residual)
+    by, rate = at.pushes.by_place, at.pushes.by_rate
+    turning = 1j * system.omega(speed, count - 1)[:, None]
+    if rate is not None:
+        by = np.concatenate([by, rate], axis=2)
+
+    def changed(x: Array) -> Array:
+        change = unpacked(x, scale)
+        moves = lattice.synthesis(change if rate is None else np.hstack([change, turning * change]))
+        forces = lattice.analysis(np.matmul(by, moves[..., None])[..., 0])[:count]
+        return x - packed((flexibility @ forces[..., None])[..., 0], scale)
+
+    return changed
 
 
 def flexibility_of(system: Oscillator, speed: float, count: int) -> ComplexArray:
     """H at harmonics 0 to `count`, made at once up to where `error_of` asks for it."""
     return system.flexibility(speed, 2 * count)[: count + 1]
-
-
-def unknowns_of(
-    system: Oscillator, speed: float, places: ComplexArray, at: Evaluated, flexibility: ComplexArray,
-    least: float = COMES_BACK,
-) -> Unknowns:  # fmt: skip
-    """Amplitudes that need Newton's method: those whose change comes back by more than this part through the forces,
-    those that follow others by more, of harmonics that are there; and the constant of all freedoms.
-
-    One that follows and is no unknown lags a step behind: what is left of the equations then grows in a good step.
-    """
-    ratio = system.scale[None, :] / system.scale[:, None]
-    strength = np.abs(at.pushes.by_place).mean(axis=0) * ratio
-    if at.pushes.by_rate is not None:
-        omega = system.omega(speed, len(places) - 1)[:, None, None]
-        strength = strength + omega * np.abs(at.pushes.by_rate).mean(axis=0) * ratio
-    back = (np.abs(flexibility) * ratio) @ strength  # (K + 1, m, m)
-    acts = (back.sum(axis=1) > least).any(axis=0)
-    size = np.abs(places / system.scale).max(axis=1, keepdims=True)
-    gain = back[:, acts].sum(axis=1) * (size > PRESENT)
-    follows = back[:, :, acts].sum(axis=2) * (size > PRESENT)
-    taken = (gain > least) | (follows > least)
-    if taken.sum() > MOST_UNKNOWN:
-        taken = taken & (gain * size >= np.sort((gain * size)[taken])[-MOST_UNKNOWN])
-    taken[0] = True
-    lines, freedoms = np.nonzero(taken)
-    return Unknowns(lines, freedoms)
-
-
-def newton(system: Oscillator, speed: float, unknowns: Unknowns, at: Evaluated, flexibility: ComplexArray) -> Newton:
-    """Factorised Jacobian."""
-    J = jacobian(system, speed, unknowns, at, flexibility)
-    return Newton(unknowns, lu_factor(J, overwrite_a=True, check_finite=False))
 
 
 def size_of(amplitudes: ComplexArray, scale: Array) -> float:
@@ -310,15 +243,9 @@ def size_of(amplitudes: ComplexArray, scale: Array) -> float:
 
 
 def solve(
-    system: Oscillator,
-    speed: float,
-    guess: ComplexArray,
-    tolerance: float,
-    before: Newton | None = None,
-    *,
-    steps: int = STEPS,
-) -> tuple[Orbit, Newton | None]:
-    """Periodic motion at a speed, from a guess; without an error estimate.
+    system: Oscillator, speed: float, guess: ComplexArray, tolerance: float, *, near: bool = False
+) -> tuple[Orbit, Evaluated]:
+    """Steady motion at a speed, from a guess, without an error estimate; and the equations there.
 
     Parameters
     ----------
@@ -326,72 +253,63 @@ def solve(
         Amplitudes to begin with.
     tolerance
         Of the error in the end, in parts of the scale.
-    before
-        A Jacobian to begin with, such as that of a neighbouring speed; a new one is made where it is too slow.
+    near
+        Only a motion in the guess's own range of convergence: one step that contracts too little ends the search.
     """
     count = len(guess) - 1
     H, lattice, scale = flexibility_of(system, speed, count), system.lattice(count), system.scale
     places = guess.copy()
     places[0] = places[0].real
     at = evaluate(system, speed, places, lattice, H)
-    size, fresh, taken = size_of(at.residual, scale), False, 0
-    best, idle = (size, places, at.forces), 0
-    if before is not None and before.unknowns.lines[-1] > count:
-        before = None
+    size, taken = size_of(at.residual, scale), 0
+    best, idle = (size, places, at), 0
     enough = FOUND * tolerance
-    while size >= enough and taken < steps and idle < IDLE and math.isfinite(size):
-        if before is None:
-            before = newton(system, speed, unknowns_of(system, speed, places, at, H), at, H)
-            fresh = True
+    while size >= enough and taken < STEPS and idle < IDLE and math.isfinite(size):
         taken += 1
-        step = before.step(at.residual, scale)
+        step = -unpacked(gmres(product(system, speed, at, H), packed(at.residual, scale), INEXACT), scale)
         part = 1.0
-        for _ in range(HALVINGS if fresh else 1):
+        for _ in range(HALVINGS):
             new = evaluate(system, speed, places + part * step, lattice, H)
             left = size_of(new.residual, scale)
             if left <= (1.0 - 0.1 * part) * size:
                 break
             part *= 0.5
-        else:
-            if not fresh:  # this was another motion's Jacobian
-                before = None
-                continue
-        if left > SLOW * size:
-            before = None
-        places, at, size, fresh = places + part * step, new, left, False
+            if near:
+                break
+        if near and left > CONTRACTS * size:
+            break
+        places, at, size = places + part * step, new, left
         idle = 0 if size < 0.5 * best[0] else idle + 1
         if size < best[0]:
-            best = size, places, at.forces
+            best = size, places, at
     found = best[0] < (enough if idle < IDLE else max(enough, LEFT))
-    return Orbit(speed, best[1], best[2], math.nan, bool(found), taken), before
+    return Orbit(speed, best[1], best[2].forces, math.nan, bool(found), taken), best[2]
 
 
-def error_of(system: Oscillator, orbit: Orbit, before: Newton | None) -> tuple[float, ComplexArray]:
+def error_of(system: Oscillator, orbit: Orbit, at: Evaluated) -> tuple[float, ComplexArray]:
     """Error estimate of an orbit, and the amplitudes that twice the harmonics would make at once.
 
-    What is left of the equations on four times the samples is taken to a change of the unknowns by the Jacobian; the
-    other harmonics change by it themselves.
+    What is left of the equations on four times the samples is taken to a change of the orbit's harmonics by the
+    Jacobian; the others change by it themselves.
     """
-    count = 2 * orbit.harmonics
-    H = system.flexibility(orbit.speed, count)
+    count, speed, scale = 2 * orbit.harmonics, orbit.speed, system.scale
+    H = system.flexibility(speed, count)
     places = orbit.with_harmonics(count)
-    left = evaluate(system, orbit.speed, places, system.lattice(2 * count), H)
-    if before is None:
-        before = newton(system, orbit.speed, unknowns_of(system, orbit.speed, places, left, H), left, H)
-    step = before.step(left.residual, system.scale)
-    return SAFETY * size_of(step, system.scale), places + step
+    left = evaluate(system, speed, places, system.lattice(2 * count), H).residual
+    step, inner = -left, orbit.harmonics + 1
+    step[:inner] = -unpacked(gmres(product(system, speed, at, H[:inner]), packed(left[:inner], scale), ROUGH), scale)
+    return SAFETY * size_of(step, scale), places + step
 
 
-def settled(system: Oscillator, orbit: Orbit, before: Newton | None, tolerance: float) -> tuple[Orbit, Newton | None]:
+def settled(system: Oscillator, orbit: Orbit, at: Evaluated, tolerance: float) -> Orbit:
     """An orbit with as many harmonics as its error estimate needs to meet a tolerance."""
     while orbit.found:
-        error, guess = error_of(system, orbit, before)
+        error, guess = error_of(system, orbit, at)
         orbit = replace(orbit, error=error)
         more = system.rounded(GROWTH * orbit.harmonics)
         if error <= tolerance or more <= orbit.harmonics:
             break
-        guess = guess[: more + 1]
         steps = orbit.steps
-        orbit, before = solve(system, orbit.speed, guess, tolerance, before)
+        orbit, at = solve(system, orbit.speed, guess[: more + 1], tolerance)
         orbit = replace(orbit, steps=steps + orbit.steps)
-    return orbit, before
+    return orbit

@@ -1,13 +1,13 @@
 r"""Along the periodic motions of an oscillator over the speed, round turning points (pseudo-arclength).
 
-With the unknown harmonics x in parts of their scale and :math:`\sigma = \Omega/\Omega_u`, the curve of solutions of
+With the harmonics x in parts of their scale and :math:`\sigma = \Omega/\Omega_u`, the curve of solutions of
 :math:`r(x, \sigma) = 0` has the tangent t of :math:`[r_x\; r_\sigma]\,t = 0`; a step s along it ends on
 
 .. math:: t_x\cdot(x - x_0) + t_\sigma(\sigma - \sigma_0) = s
 
 (Keller 1977; Nayfeh & Balachandran, Applied Nonlinear Dynamics, Sec. 6.1). Where the curve goes on smoothly from one
 asked speed to the next, extrapolation of the forces (which know nothing of the resonances behind them) and Newton's
-method at that speed do; the two agree or the short steps decide.
+method at that speed do, as long as each of its steps contracts; else the short steps decide.
 """
 
 from __future__ import annotations
@@ -18,45 +18,43 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
 
 from ..typing import Array, ComplexArray
 from .balance import (
+    CONTRACTS,
     FOUND,
+    INEXACT,
     Evaluated,
-    Newton,
     Orbit,
     Oscillator,
-    Unknowns,
     evaluate,
     flexibility_of,
-    jacobian,
     moved,
+    packed,
+    product,
     settled,
     size_of,
     solve,
-    unknowns_of,
+    unpacked,
     widened,
 )
+from .krylov import gmres
 
-#: Newton steps of a corrector; a step is kept where the correction is smaller than this part of it.
-CORRECTIONS, CLOSE = 20, 0.35
-#: An extrapolation this near to what is found (in parts of the scale) is on the same curve.
-NEAR = 0.2
+#: Newton steps of a corrector, and of one that lets the next step be longer.
+CORRECTIONS, QUICK = 20, 5
 #: Steps along the curve, in parts of the scale: first, least, largest; growth from one to the next.
 FIRST, LEAST, LARGEST, GROWTH = 0.05, 1e-5, 0.4, 1.6
 #: Cosine of the largest angle (60 degrees) between tangents a step apart, and how far an arc of that angle ends beside
 #: its first tangent, in parts of the step: tan 30 degrees.
 ALIGNED, BENT = 0.5, 1.0 / math.sqrt(3.0)
-#: A tangent has all harmonics of which this part of a change comes back through the forces: it sees no others.
-ALONG = 0.05
+#: What is left of the equations of a tangent.
+TANGENT = 1e-3
 #: A step this long at most leads round a turning point.
 TURNING = 0.1
 #: Steps along the curve between two asked speeds, at most.
 MOST = 400
-#: Extrapolation takes so many speeds before, Newton's method then so many steps; else the speeds between are halved so
-#: many times.
-BACK, STEPS, HALVINGS = 3, 10, 3
+#: Extrapolation takes so many speeds before; where it misses, speeds between are halved so many times.
+BACK, HALVINGS = 3, 3
 #: An error below this part of the tolerance lets so many of the harmonics go on.
 EASY, FEWER = 0.4, 0.8
 #: Change of the speed, relative, for a derivative.
@@ -96,8 +94,7 @@ class _Place(NamedTuple):
     """A point of the curve with its tangent."""
 
     orbit: Orbit
-    unknowns: Unknowns
-    along: Array  # t_x, packed
+    along: ComplexArray  # t_x, (K + 1, m) in parts of the scale
     rising: float  # t_sigma
 
 
@@ -133,7 +130,6 @@ class _Walk:
         self.branch: list[int] = []
         self.turns: list[Turn] = []
         self.back: list[Orbit] = []  # on this branch, to extrapolate from
-        self.before: Newton | None = None
         self.number = 0  # of the asked speed that was reached
         self.heading = 1
 
@@ -149,11 +145,10 @@ class _Walk:
                 progress(self.number, len(self.speeds) - 1)
             target = float(self.speeds[self.number + self.heading])
             made = self._onward(target) if self.heading > 0 else None
-            if made is not None:
-                made, self.before = settled(self.system, made, self.before, self.tolerance)
-            if made is not None and made.found:
+            passes = None if made is None else settled(self.system, *made, self.tolerance)
+            if passes is not None and passes.found:
                 self.number += 1
-                orbit = self._kept(made)
+                orbit = self._kept(passes)
                 continue
             found = self._stepwise(orbit)
             if isinstance(found, str):
@@ -180,8 +175,8 @@ class _Walk:
             self.system.rounded(FEWER * orbit.harmonics if fewer else orbit.harmonics),
         )
 
-    def _onward(self, speed: float, halvings: int = HALVINGS) -> Orbit | None:
-        """Orbit at a speed by extrapolation, where needed over speeds between."""
+    def _onward(self, speed: float, halvings: int = HALVINGS) -> tuple[Orbit, Evaluated] | None:
+        """Orbit at a speed by extrapolation, where needed over speeds between, and the equations there."""
         if len(self.back) < (2 if self.turns else 1):  # one orbit behind a turning point does not tell its side
             return None
         made = self._extrapolated(speed)
@@ -191,22 +186,18 @@ class _Walk:
             return None
         return self._onward(speed, halvings - 1)
 
-    def _extrapolated(self, speed: float) -> Orbit | None:
-        """Orbit at a speed from those before on this branch, where both agree."""
+    def _extrapolated(self, speed: float) -> tuple[Orbit, Evaluated] | None:
+        """Orbit at a speed in the range of convergence of the extrapolation from those before on this branch."""
         back, system = self.back[-BACK:], self.system
         count = self._count(speed, back[-1])
         known = np.array([widened(o.forces, count) for o in back])
         forces = _lagrange(np.array([o.speed for o in back]), known, speed)
         places = moved(system, flexibility_of(system, speed, count), forces)
-        orbit, self.before = solve(system, speed, places, self.tolerance, self.before, steps=STEPS)
+        orbit, at = solve(system, speed, places, self.tolerance, near=True)
         if not orbit.found:
             return None
-        step = size_of(places - back[-1].with_harmonics(count), system.scale)
-        off = size_of(orbit.places - places, system.scale)
-        if off > max(CLOSE * step, NEAR):
-            return None
         self.back.append(orbit)
-        return orbit
+        return orbit, at
 
     def _stepwise(self, orbit: Orbit) -> Orbit | str:
         """Short steps along the curve until it passes the next asked speed, up or down."""
@@ -279,76 +270,69 @@ class _Walk:
         return evaluate(self.system, orbit.speed, orbit.places, self.system.lattice(orbit.harmonics), H), H
 
     def _tangent(self, orbit: Orbit, last: _Place | None, sign: float) -> _Place | None:
-        at, H = self._equations(orbit)
-        unknowns = unknowns_of(self.system, orbit.speed, orbit.places, at, H, ALONG)
-        M = self._bordered(orbit, unknowns, at, H)
-        if last is None:
-            M[-1, -1] = sign
-        else:
-            M[-1, :-1], M[-1, -1] = _moved(last, unknowns), last.rising
-        right = np.zeros(len(M))
+        along, rising = np.zeros_like(orbit.places), sign
+        if last is not None:
+            along, rising = widened(last.along, orbit.harmonics), last.rising
+        right = np.zeros(2 * along.size + 1)
         right[-1] = 1.0
-        try:
-            t = np.linalg.solve(M, right)
-        except np.linalg.LinAlgError:
+        t = self._solved(orbit, *self._equations(orbit), _Place(orbit, along, rising), right, TANGENT)
+        size = float(np.linalg.norm(t))
+        if not (0.0 < size < math.inf):
             return None
-        t /= np.linalg.norm(t)
-        return _Place(orbit, unknowns, t[:-1], float(t[-1]))
+        t /= size
+        return _Place(orbit, unpacked(t[:-1], np.ones(along.shape[1])), float(t[-1]))
 
-    def _bordered(self, orbit: Orbit, unknowns: Unknowns, at: Evaluated, H: ComplexArray) -> Array:
-        """[r_x r_sigma] with an empty last row."""
-        J = jacobian(self.system, orbit.speed, unknowns, at, H)
-        M = np.zeros((len(J) + 1, len(J) + 1))
-        M[:-1, :-1] = J
+    def _solved(
+        self, orbit: Orbit, at: Evaluated, H: ComplexArray, beside: _Place, right: Array, part: float
+    ) -> Array:  # fmt: skip
+        """Solution of ``[r_x r_sigma; t_x t_sigma] x = right`` with the tangent beside."""
+        system, scale = self.system, self.system.scale
+        changed = product(system, orbit.speed, at, H)
         other = replace(orbit, speed=orbit.speed * (1.0 + NUDGE))
-        change = (self._equations(other)[0].residual - at.residual) / (NUDGE * orbit.speed / self.unit)
-        M[:-1, -1] = unknowns.packed(change, self.system.scale)
-        return M
+        by_speed = (self._equations(other)[0].residual - at.residual) / (NUDGE * orbit.speed / self.unit)
+        column, row = packed(by_speed, scale), packed(beside.along, np.ones(len(scale)))
+
+        def bordered(x: Array) -> Array:
+            return np.append(changed(x[:-1]) + column * x[-1], row @ x[:-1] + beside.rising * x[-1])
+
+        return gmres(bordered, right, part)
 
     def _corrected(self, place: _Place, step: float) -> tuple[_Place | None, bool]:
         """Next point of the curve, and whether it was found easily."""
-        system, unknowns = self.system, place.unknowns
         speed = place.orbit.speed + step * place.rising * self.unit
-        guess = place.orbit.with_harmonics(max(self._count(speed, place.orbit), int(unknowns.lines[-1])))
-        guess[unknowns.lines, unknowns.freedoms] += unknowns.unpacked(step * place.along, system.scale)
+        guess = place.orbit.with_harmonics(self._count(speed, place.orbit))
+        guess += step * widened(place.along, len(guess) - 1) * self.system.scale
         made = self._newton(Orbit(speed, guess, np.zeros_like(guess), math.nan, False, 0), place, step)
         if made is None or made.steps > CORRECTIONS:
             return None, False
         new = self._tangent(made, place, 1.0)
         if new is None:
             return None, False
-        aligned = _moved(place, new.unknowns) @ new.along + new.rising * place.rising
-        if aligned < ALIGNED or abs(made.speed - speed) > BENT * step * self.unit:  # round a bend, or on another curve
+        if _cosine(place, new) < ALIGNED or abs(made.speed - speed) > BENT * step * self.unit:  # a bend, another curve
             return None, False
-        return new, made.steps <= 8
+        return new, made.steps <= QUICK
 
     def _newton(self, orbit: Orbit, place: _Place, step: float) -> Orbit | None:
-        unknowns, scale = place.unknowns, self.system.scale
-        begin = unknowns.packed(place.orbit.places, scale)
-        factors = None
+        scale, count = self.system.scale, orbit.harmonics
+        beside = place._replace(along=widened(place.along, count))
+        begin, row = packed(place.orbit.with_harmonics(count), scale), packed(beside.along, np.ones(len(scale)))
         size = math.inf
         for taken in range(1, CORRECTIONS + 1):
             at, H = self._equations(orbit)
             last = (
-                place.along @ (unknowns.packed(orbit.places, scale) - begin)
+                row @ (packed(orbit.places, scale) - begin)
                 + place.rising * (orbit.speed - place.orbit.speed) / self.unit
                 - step
             )
             found = math.hypot(size_of(at.residual, scale), last)
             if found < FOUND * self.tolerance:
                 return replace(orbit, forces=at.forces, found=True, steps=taken)
-            if not math.isfinite(found) or found > 10.0 * size:
+            if not found <= CONTRACTS * size:
                 return None
-            if factors is None or found > 0.2 * size:
-                M = self._bordered(orbit, unknowns, at, H)
-                M[-1, :-1], M[-1, -1] = place.along, place.rising
-                factors = lu_factor(M, check_finite=False)
             size = found
-            change = lu_solve(factors, np.append(unknowns.packed(at.residual, scale), last), check_finite=False)
-            places = orbit.places - at.residual
-            where = unknowns.lines, unknowns.freedoms
-            places[where] = orbit.places[where] - unknowns.unpacked(change[:-1], scale)
-            orbit = replace(orbit, speed=orbit.speed - change[-1] * self.unit, places=places)
+            change = self._solved(orbit, at, H, beside, np.append(packed(at.residual, scale), last), INEXACT)
+            places = orbit.places - unpacked(change[:-1], scale)
+            orbit = replace(orbit, speed=orbit.speed - float(change[-1]) * self.unit, places=places)
         return None
 
     def _landed(self, one: _Place, two: _Place, speed: float) -> Orbit | None:
@@ -357,19 +341,15 @@ class _Walk:
         part = (speed - a.speed) / (b.speed - a.speed)
         count = max(a.harmonics, b.harmonics)
         guess = (1.0 - part) * a.with_harmonics(count) + part * b.with_harmonics(count)
-        orbit, newton = solve(self.system, speed, guess, self.tolerance)
-        if not orbit.found:
-            return None
-        orbit, self.before = settled(self.system, orbit, newton, self.tolerance)
+        orbit = settled(self.system, *solve(self.system, speed, guess, self.tolerance), self.tolerance)
         return orbit if orbit.found else None
 
 
-def _moved(place: _Place, unknowns: Unknowns) -> Array:
-    """A tangent over other unknowns, 0 where it had none."""
-    one = np.ones(int(max(unknowns.freedoms.max(), place.unknowns.freedoms.max())) + 1)
-    made = np.zeros((int(max(unknowns.lines[-1], place.unknowns.lines[-1])) + 1, len(one)), dtype=complex)
-    made[place.unknowns.lines, place.unknowns.freedoms] = place.unknowns.unpacked(place.along, one)
-    return unknowns.packed(made, one)
+def _cosine(one: _Place, two: _Place) -> float:
+    """Of the angle between the tangents of two places."""
+    count = max(len(one.along), len(two.along)) - 1
+    a, b = (widened(place.along, count) for place in (one, two))
+    return float(np.vdot(a, b).real) + one.rising * two.rising
 
 
 def _lagrange(x: Array, values: ComplexArray, at: float) -> ComplexArray:
@@ -382,8 +362,7 @@ def _turning(a: _Place, b: _Place, step: float, unit: float) -> float:
     """Speed (rad/s) at which the cubic turns that has the speeds and rises of two points, a step along the first's
     tangent apart.
     """
-    turned = _moved(a, b.unknowns) @ b.along + a.rising * b.rising
-    one, two, rise = step * unit * a.rising, step * unit * b.rising / turned, b.orbit.speed - a.orbit.speed
+    one, two, rise = step * unit * a.rising, step * unit * b.rising / _cosine(a, b), b.orbit.speed - a.orbit.speed
     cubic = np.polynomial.Polynomial([a.orbit.speed, one, 3.0 * rise - 2.0 * one - two, one + two - 2.0 * rise])
     ends = np.real(cubic.deriv().roots())
     return float(cubic(ends[(ends >= 0.0) & (ends <= 1.0)][0]))

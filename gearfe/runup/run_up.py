@@ -226,8 +226,7 @@ def _first(train: CondensedTrain, speed: float, guess: Orbit | None, tolerance: 
         else:
             places = np.zeros((count + 1, system.linear.size), dtype=complex)
             places[0] = system.linear.rest
-        orbit, newton = solve(system, away, places, tolerance)
-        orbit, _ = settled(system, orbit, newton, tolerance)
+        orbit = settled(system, *solve(system, away, places, tolerance), tolerance)
         if not orbit.found:
             continue
         if number == 0:

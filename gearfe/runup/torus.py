@@ -13,8 +13,8 @@ of rank 1 (Sloan & Joe, Lattice Methods for Multiple Integration, 1994),
 
 .. math:: \theta_j = 2\pi j g / S ,\qquad e^{ik\cdot\theta_j} = e^{2\pi i j (k\cdot g) / S} ,
 
-so one Fourier transform of length S holds them all. S and g keep each of the K harmonics apart from all others of less
-than three times their order w; with one phase these are four samples for each harmonic.
+so one Fourier transform of length S holds them all: four samples for each harmonic at least, and with several phases as
+many more as keep each of the K harmonics apart from all others of them.
 """
 
 from __future__ import annotations
@@ -30,8 +30,6 @@ from ..typing import Array, BoolArray, ComplexArray, IntArray
 
 #: Samples for each harmonic, at least; least harmonics that are so sampled.
 SAMPLES, LEAST = 4, 16
-#: Samples keep a harmonic apart from those of less than this many times its order.
-APART = 3.0
 #: Steps g that are tried for a number of samples, and factor to the next number.
 TRIED, MORE = 50, 1.1
 #: Orders nearer to each other, relatively, are one.
@@ -79,9 +77,13 @@ def below(periods: tuple[float, ...], order: float) -> Harmonics:
     if len(periods) == 1:
         rising = np.arange(math.ceil(order * (1.0 - ROUND_OFF)))
         return Harmonics(rising[:, None], rising.astype(float))
-    axes = [np.arange(-math.floor(order * b), math.floor(order * b) + 1) for b in periods]
-    waves = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(periods))
-    w = np.sqrt(np.abs(waves) / np.array(periods)).sum(axis=1) ** 2
+    waves, roots = np.zeros((1, 0), dtype=int), np.zeros(1)  # axis by axis, what is left of the order for the next
+    for period in periods:
+        most = np.floor(period * np.maximum(math.sqrt(order) - roots, 0.0) ** 2).astype(int)
+        before = np.repeat(np.arange(len(roots)), 2 * most + 1)
+        k = np.arange(len(before)) - (np.cumsum(2 * most + 1) - most - 1)[before]
+        waves, roots = np.column_stack([waves[before], k]), roots[before] + np.sqrt(np.abs(k) / period)
+    w = roots**2
     frequency, first = (waves / np.array(periods)).sum(axis=1), np.argmax(waves != 0, axis=1)
     none = np.abs(frequency) <= ROUND_OFF * w
     kept = (w < order * (1.0 - ROUND_OFF)) & np.where(none, waves[np.arange(len(waves)), first] >= 0, frequency > 0.0)
@@ -128,18 +130,15 @@ def lattice(periods: tuple[float, ...], count: int) -> Lattice:
 
 @lru_cache(maxsize=64)
 def _searched(periods: tuple[float, ...], count: int) -> Lattice:
-    waves, w = harmonics(periods, count)
-    others = below(periods, APART * float(w[-1])).waves
-    near, every = np.concatenate([waves, -waves[1:]]), np.concatenate([others, -others[1:]])
-    samples = round(SAMPLES * max(count, LEAST) * APART ** (len(periods) - 1))
+    waves, _ = harmonics(periods, count)
+    every = np.concatenate([waves, -waves[1:]])
+    samples = SAMPLES * max(count, LEAST)
     while True:
         rng = np.random.default_rng(samples)  # the same in each run
         for factor in rng.integers(1, samples, TRIED if len(periods) > 1 else 1).tolist():
             step = np.array([pow(factor, p, samples) for p in range(len(periods))])
-            residue = (waves @ step) % samples
-            if np.bincount((near @ step) % samples).max() > 1:  # quickly told
-                continue
-            if (np.bincount((every @ step) % samples, minlength=samples)[residue] == 1).all():
+            if np.bincount((every @ step) % samples).max() == 1:
+                residue = (waves @ step) % samples
                 theta = 2.0 * math.pi * ((np.arange(samples)[:, None] * step) % samples) / samples
                 conjugate = 2 * residue > samples
                 return Lattice(theta, residue, np.where(conjugate, samples - residue, residue), conjugate)
