@@ -1,36 +1,19 @@
-r"""Sparse symmetric positive definite systems ``A x = b``: one small interface, several factorisations behind it.
+r"""Sparse symmetric positive definite systems ``A x = b``: one small interface, two factorisations behind it.
 
-==================  =====================================================  ============  ===========================
-name                what it is                                             licence       needs
-==================  =====================================================  ============  ===========================
-``multifrontal``    Cholesky on dense fronts, nested dissection by METIS   permissive    pymetis
-``cholmod``         supernodal Cholesky                                    GPL-3         kvxopt
-``pardiso``         PARDISO for positive definite matrices (mtype 2)       MKL's own     pypardiso (x86 only)
-``superlu``         SuperLU, symmetric mode, minimum degree                permissive    nothing (scipy)
-==================  =====================================================  ============  ===========================
+``multifrontal`` is the Cholesky factorisation of `gearfe.reduction.multifrontal`, in the order of METIS, wherever
+pymetis is installed; ``superlu`` that of scipy alone (SuperLU, symmetric mode, minimum degree), far slower on large
+meshes. Measured, second-order elasticity in three dimensions (processor seconds on one core; factor, then one
+right-hand side out of a block of eight): 45,000 unknowns 1.0 s and 9 ms, SuperLU in METIS' order 1.9 s and 11 ms;
+108,000 unknowns 3.6 s and 24 ms, 8.6 s and 51 ms. CHOLMOD and PARDISO factorise as fast and solve two to three times
+slower, and a reduction to some tens of modes solves for 200 right-hand sides (72,000 unknowns: 7.7 s, 13.1 s, 15.9 s).
 
-``auto`` takes the first that is installed. The order was measured (processor seconds on one core of a busy machine,
-second-order elasticity in three dimensions; factor, then one right-hand side out of a block of eight):
-
-==============  ===============  ===============
-unknowns        45k              108k
-==============  ===============  ===============
-multifrontal    1.0 s,  9 ms     3.6 s, 24 ms
-cholmod         0.9 s, 20 ms     3.3 s, 64 ms
-pardiso         1.4 s, 28 ms     4.2 s, 71 ms
-SuperLU, METIS  1.9 s, 11 ms     8.6 s, 51 ms
-==============  ===============  ===============
-
-A reduction to some tens of modes solves for 200 right-hand sides: of 72,000 unknowns it took 7.7 s with the first,
-13.1 s with the second, 15.9 s with the third. The unknowns of a mesh node stay together: orderings are found on the
-graph of nodes, a third of the size.
+The unknowns of a mesh node stay together: orderings are found on the graph of nodes, a third of the size.
 """
 
 from __future__ import annotations
 
 import importlib
 import importlib.util
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -41,20 +24,11 @@ from scipy import sparse
 from ..errors import InputError, MissingLibraryError
 from ..typing import Array, IntArray
 
-#: Extra of the package that brings each solver.
-EXTRAS = {"multifrontal": "fast", "cholmod": "cholmod", "pardiso": "pardiso"}
 #: Names of the solvers, best first; each needs the package on the right (``None``: scipy alone).
-PACKAGES: dict[str, str | None] = {
-    "multifrontal": "pymetis",
-    "cholmod": "kvxopt",
-    "pardiso": "pypardiso",
-    "superlu": None,
-}
+PACKAGES: dict[str, str | None] = {"multifrontal": "pymetis", "superlu": None}
 #: Response to a random load, against the stiffest unknown's, above which a body counts as free to move. Bodies that are
 #: held, slender ones too, stay below 1e10; rounding alone holds a free one at 1e13 and more.
 UNBOUNDED = 1e12
-#: Environment variable that names the solver to use instead of ``auto``.
-SOLVER_VARIABLE = "GEARFE_SPARSE_SOLVER"
 
 
 @dataclass(frozen=True)
@@ -83,17 +57,13 @@ def installed_solvers() -> tuple[str, ...]:
 
 def choose_solver(solver: str = "auto") -> str:
     """Name of the solver that `factorize` will use."""
-    if solver == "auto":
-        solver = os.environ.get(SOLVER_VARIABLE, "auto") or "auto"
     here = installed_solvers()
     if solver == "auto":
         return here[0]
     if solver not in PACKAGES:
         raise InputError("solver", solver, "must be auto, " + ", ".join(PACKAGES), "choose one of these")
     if solver not in here:
-        raise MissingLibraryError(
-            f"the sparse solver {solver!r} needs the package {PACKAGES[solver]}: pip install 'gearfe[{EXTRAS[solver]}]'"
-        )
+        raise MissingLibraryError(f"the sparse solver {solver!r} needs pymetis: pip install 'gearfe[fast]'")
     return solver
 
 
@@ -105,7 +75,7 @@ def factorize(matrix: Any, *, solver: str = "auto", block: int = 3) -> Factoriza
     matrix : (n, n) sparse
         Both triangles stored.
     solver
-        ``auto`` or a name of the table above.
+        ``auto`` (the first that is installed), ``multifrontal`` or ``superlu``.
     block
         Unknowns that belong to one mesh node and stand together (used for the ordering where it divides n).
 
@@ -121,14 +91,7 @@ def factorize(matrix: Any, *, solver: str = "auto", block: int = 3) -> Factoriza
     if matrix.shape[0] == 0:
         return Factorization("none", 0, lambda b: np.array(b, dtype=float))
     name = choose_solver(solver)
-    if name == "multifrontal":
-        solve = _multifrontal(matrix, block)
-    elif name == "pardiso":
-        solve = _pardiso(matrix)
-    elif name == "cholmod":
-        solve = _cholmod(matrix)
-    else:
-        solve = _superlu(matrix)
+    solve = _multifrontal(matrix, block) if name == "multifrontal" else _superlu(matrix)
     _check_definite(matrix, solve)
     return Factorization(name, matrix.shape[0], solve)
 
@@ -176,59 +139,6 @@ def _superlu(matrix: Any) -> Callable[[Array], Array]:
     except RuntimeError as error:
         raise _not_definite() from error
     return lambda b: np.asarray(lu.solve(np.asfortranarray(b, dtype=float)))
-
-
-def _pardiso(matrix: Any) -> Callable[[Array], Array]:
-    pypardiso: Any = importlib.import_module("pypardiso")
-
-    upper = sparse.csr_matrix(sparse.triu(matrix, format="csr"))
-    solver = pypardiso.PyPardisoSolver(mtype=2)
-    limit = getattr(solver.libmkl, "MKL_Set_Num_Threads", None)
-    if limit is not None:
-        limit(1)  # two threads on two busy cores were slower
-    try:
-        solver.factorize(upper)
-    except Exception as error:
-        raise _not_definite() from error
-
-    def solve(b: Array) -> Array:
-        solver.set_phase(33)
-        x = solver._call_pardiso(upper, np.asfortranarray(b, dtype=float))
-        return np.asarray(x).reshape(b.shape, order="F")
-
-    return solve
-
-
-def _cholmod(matrix: Any) -> Callable[[Array], Array]:
-    kvxopt: Any = importlib.import_module("kvxopt")
-    cholmod: Any = importlib.import_module("kvxopt.cholmod")
-
-    lower = sparse.tril(matrix, format="coo")
-    spread = kvxopt.spmatrix(
-        kvxopt.matrix(np.ascontiguousarray(lower.data, dtype=float)),
-        kvxopt.matrix(lower.row.astype(np.int64)),
-        kvxopt.matrix(lower.col.astype(np.int64)),
-        lower.shape,
-    )
-    before = cholmod.options.get("supernodal")
-    cholmod.options["supernodal"] = 2
-    try:
-        factor = cholmod.symbolic(spread)
-        cholmod.numeric(spread, factor)
-    except ArithmeticError as error:
-        raise _not_definite() from error
-    finally:
-        if before is None:
-            cholmod.options.pop("supernodal", None)
-        else:
-            cholmod.options["supernodal"] = before
-
-    def solve(b: Array) -> Array:
-        x = kvxopt.matrix(np.asarray(b, dtype=float).reshape(len(b), -1))
-        cholmod.solve(factor, x)
-        return np.array(x).reshape(b.shape)
-
-    return solve
 
 
 def _check_definite(matrix: Any, solve: Callable[[Array], Array]) -> None:

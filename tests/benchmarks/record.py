@@ -27,7 +27,7 @@ from gearfe.output.files import output_folder, write_csv, write_json
 
 #: Packages whose versions are recorded.
 PACKAGES = (
-    "numpy", "scipy", "numba", "scikit-fem", "gmsh", "pymetis", "pypardiso", "kvxopt", "exudyn", "scikit-sundae",
+    "numpy", "scipy", "numba", "scikit-fem", "gmsh", "pymetis", "exudyn", "scikit-sundae",
 )  # fmt: skip
 #: Programs that are no packages: what tells their version, and where it stands in the answer.
 PROGRAMS = {
