@@ -24,11 +24,12 @@ from .studies import rows_of, written
 pytest.importorskip("distributed")
 
 
-@pytest.fixture
-def cluster(tmp_path):
-    """A scheduler and a worker with two processes: the scheduler's process and its address."""
-    place = tmp_path / "scheduler.json"
-    common = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    """A scheduler and a worker with two processes, for all tests: the scheduler's process and its address."""
+    folder = tmp_path_factory.mktemp("cluster")
+    place = folder / "scheduler.json"
+    common = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder}
     dask = [sys.executable, "-m", "dask"]
     address = ["--scheduler-file", str(place), "--no-dashboard"]
     scheduler = subprocess.Popen([*dask, "scheduler", *address, "--host", "127.0.0.1", "--port", "0"], **common)
@@ -80,7 +81,33 @@ def test_the_page_on_clusters_runs(cluster, tmp_path, monkeypatch):
         shutil.rmtree(tmp_path / "out")
 
 
+@pytest.mark.slow
+def test_a_dask_worker_that_is_killed_loses_nothing(cluster, tmp_path):
+    """Its nanny starts another one; every case is a row, once, with the value of its parameters."""
+    from dask.distributed import Client
+
+    path = written(tmp_path, cases=3000)
+    command = [sys.executable, "-m", "gearfe", "study", str(path), "--out", str(tmp_path / "out"), "--no-pictures"]
+    run = subprocess.Popen([*command, "--dask", cluster[1]], stdout=subprocess.DEVNULL)
+    table = tmp_path / "out" / "study.csv"
+    limit = time.monotonic() + 60.0
+    while not (table.exists() and table.stat().st_size > 2000) and time.monotonic() < limit:
+        time.sleep(0.02)
+    with Client(cluster[1], timeout=30) as client:
+        victim = next(iter(client.run(os.getpid).values()))
+    os.kill(victim, signal.SIGKILL)
+    assert run.wait(timeout=180.0) == 0
+    rows = rows_of(tmp_path / "out")[1:]
+    assert [row[0] for row in rows] == [str(n) for n in range(3000)]
+    assert {row[5] for row in rows} == {"done"}
+    for row in rows:
+        x1, x2, x3, y = map(float, row[1:5])
+        known = math.sin(x1) + 7 * math.sin(x2) ** 2 + 0.1 * x3**4 * math.sin(x1)
+        assert y == pytest.approx(known, rel=1e-12, abs=1e-12)
+
+
 def test_a_scheduler_that_goes_away_is_told_and_rows_are_kept(cluster, tmp_path):
+    """The last one that needs the cluster: it ends the scheduler."""
     scheduler, at = cluster
     path = written(tmp_path, cases=100_000)
     command = [sys.executable, "-m", "gearfe", "study", str(path), "--out", str(tmp_path / "out"), "--dask", at]
@@ -112,28 +139,3 @@ def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch, capsys):
     assert "does not answer" in capsys.readouterr().err
     assert main([*run, "nonsense"]) == 2
     assert "--dask = 'nonsense'" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_a_dask_worker_that_is_killed_loses_nothing(cluster, tmp_path):
-    """Its nanny starts another one; every case is a row, once, with the value of its parameters."""
-    from dask.distributed import Client
-
-    path = written(tmp_path, cases=3000)
-    command = [sys.executable, "-m", "gearfe", "study", str(path), "--out", str(tmp_path / "out"), "--no-pictures"]
-    run = subprocess.Popen([*command, "--dask", cluster[1]], stdout=subprocess.DEVNULL)
-    table = tmp_path / "out" / "study.csv"
-    limit = time.monotonic() + 60.0
-    while not (table.exists() and table.stat().st_size > 2000) and time.monotonic() < limit:
-        time.sleep(0.02)
-    with Client(cluster[1], timeout=30) as client:
-        victim = next(iter(client.run(os.getpid).values()))
-    os.kill(victim, signal.SIGKILL)
-    assert run.wait(timeout=180.0) == 0
-    rows = rows_of(tmp_path / "out")[1:]
-    assert [row[0] for row in rows] == [str(n) for n in range(3000)]
-    assert {row[5] for row in rows} == {"done"}
-    for row in rows:
-        x1, x2, x3, y = map(float, row[1:5])
-        known = math.sin(x1) + 7 * math.sin(x2) ** 2 + 0.1 * x3**4 * math.sin(x1)
-        assert y == pytest.approx(known, rel=1e-12, abs=1e-12)
