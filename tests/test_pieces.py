@@ -88,7 +88,7 @@ def test_the_files_of_pieces(model, tmp_path, small_pieces):
         (tmp_path / folder).mkdir()
 
     def written(name, parts):
-        planned = TrainRun(model.train, outputs, lambda _: parts, every)
+        planned = TrainRun(model, outputs, lambda _: parts, every)
         return write_run(tmp_path / name, planned, OutputChoice(), watch=Stopwatch())
 
     one, two = written("one", pieces), written("two", [joined(pieces)])
@@ -115,7 +115,7 @@ def test_a_long_run_needs_the_memory_of_a_piece(model, tmp_path, small_pieces):
 
         gc.collect()
         tracemalloc.start()
-        write_run(tmp_path, TrainRun(model.train, outputs, pieces, every), OutputChoice(), watch=Stopwatch())
+        write_run(tmp_path, TrainRun(model, outputs, pieces, every), OutputChoice(), watch=Stopwatch())
         most = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return most
@@ -137,7 +137,7 @@ def test_a_run_that_ends_early_is_made_again(tmp_path, model):
         return [replace(whole.at(np.arange(121)), status=status, time_reached=float(whole.time[120]))]
 
     choice = OutputChoice(spectrum_start=6e-3)
-    written = write_run(tmp_path, TrainRun(model.train, whole.time, pieces), choice, watch=Stopwatch())
+    written = write_run(tmp_path, TrainRun(model, whole.time, pieces), choice, watch=Stopwatch())
     assert asked == [201, 121]
     assert written.response.status == "diverged"
     assert written.spectra.spectrum.resolution == pytest.approx(1 / (120 * 35e-6))

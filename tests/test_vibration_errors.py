@@ -16,6 +16,7 @@ from gearfe.record_spectrum import finer
 from gearfe.rigid import constant
 from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.train import GearTrain, build_train, simulate
+from gearfe.train.model import TrainModel
 from gearfe.vibration.errors import FORCES, PEAKS, STARTS, Run, with_errors
 from gearfe.vibration.follow import follow
 from gearfe.vibration.report import train_summary
@@ -26,19 +27,24 @@ from tests.trains import SHIPPED, curve, elastic, train
 TIMES = 20e-6 * np.arange(301)
 
 
-def ran(gear_train: GearTrain, times: np.ndarray, every: int, **options: Any) -> Run:
+def ran(model: TrainModel, times: np.ndarray, every: int, **options: Any) -> Run:
     """Summary and spectra of a train."""
-    response = simulate(build_train(gear_train), times, tolerance=1e-8, **options)
+    response = simulate(model, times, tolerance=1e-8, **options)
     made = follow([response], TIMES, every, record=TrainRecord(TIMES, every))
     return Run(train_summary(made, {}), made.spectra)
 
 
 def estimated(gear_train: GearTrain) -> tuple[Run, dict[str, Any], Any]:
     """A run, its summary with errors, and how to repeat it."""
-    highest = float(build_train(gear_train).coupled_frequencies_hz.max())
+    model = build_train(gear_train)
+    highest = float(model.coupled_frequencies_hz.max())
     times, every = finer(TIMES, 1.2 * highest)
-    run = ran(gear_train, times, every, estimate=True)
-    return run, with_errors(run, gear_train, lambda one: ran(one, times, every)), lambda one: ran(one, times, every)
+    run = ran(model, times, every, estimate=True)
+    return (
+        run,
+        with_errors(run, model, lambda one: ran(one, times, every)),
+        lambda one: ran(build_train(one), times, every),
+    )
 
 
 def softened(gear_train: GearTrain, part: float | None, seed: int = 0) -> GearTrain:
@@ -96,7 +102,9 @@ def alternating(gear_train: GearTrain) -> Run:
 def test_modes_that_cancel_while_they_soften_together_are_covered() -> None:
     gear_train = softened(elastic(train([(20, 30)]), uneven=0.2, skew=0.3), 0.0)
     run = alternating(gear_train)
-    told = with_errors(run, gear_train, alternating)["headline_errors"]["largest_contact_forces_N"][0]
+    told = with_errors(run, build_train(gear_train), lambda one: alternating(one.train))["headline_errors"][
+        "largest_contact_forces_N"
+    ][0]
     together = alternating(softened(gear_train, 1.0)).summary[FORCES[2]][0] - run.summary[FORCES[2]][0]
     true = [
         alternating(softened(gear_train, None, k)).summary[FORCES[2]][0] - run.summary[FORCES[2]][0] for k in range(40)

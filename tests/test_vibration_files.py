@@ -17,7 +17,7 @@ from gearfe.housing.attachments import Attachment
 from gearfe.housing.model import Housing
 from gearfe.rigid import constant
 from gearfe.stopwatch import Stopwatch
-from gearfe.train import Drive, GearMesh, GearTrain, Shaft, ShaftGear
+from gearfe.train import Drive, GearMesh, GearTrain, Shaft, ShaftGear, build_train
 from gearfe.train.kinematics import rolling
 from gearfe.vibration.fields import (
     frames,
@@ -57,7 +57,12 @@ def train():
         ShaftGear("gear4", "output", -2e-3, gears.wheel),
     )
     meshes = (GearMesh("gear1", "gear2", 1e8), GearMesh("gear3", "gear4", 1e8, phase=0.1))
-    return GearTrain(shafts, on, meshes, Drive("drive", "1", constant(600.0)))
+    bores = {
+        bore: (*shaft.point[:1], y, 0.0)
+        for shaft in shafts
+        for bore, y in zip(shaft.bores, (-0.041, 0.041), strict=True)
+    }
+    return GearTrain(shafts, on, meshes, Drive("drive", "1", constant(600.0)), rigid_bores=bores)
 
 
 # ---- files of a known response ---------------------------------------------------------------------------------------
@@ -67,7 +72,7 @@ def write_all(folder, train, response, choice, **options):
     """The files of a response at hand."""
     if response.status != "done":
         choice = replace(choice, spectrum_start=0.0, spectrum_length=None)
-    planned = TrainRun(train, response.time, lambda _: [response])
+    planned = TrainRun(build_train(train), response.time, lambda _: [response])
     return write_run(folder, planned, choice, watch=Stopwatch(), **options)
 
 

@@ -106,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
         folder = output_folder(args.out)
     chosen = {"floquet": not args.no_floquet, "estimate": not args.no_estimate}
     planned = simulated(job, args.curve, watch=watch, progress=count, **chosen)
-    train, every = planned.train, planned.every
+    train, every = planned.model.train, planned.every
     start = record_start(job, train, every, args.spectrum_from_ms, watch.stage)
     choice = replace(choice, spectrum_start=start)
     check_choice(choice, job.times, bores)

@@ -139,9 +139,9 @@ def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
     if job.table.method == "auto":
         job = replace(job, table=replace(job.table, method="taylor" if use_compiled("auto") else "explicit"))
     planned = simulated(job, (), watch=watch, floquet=False, estimate=estimate)
-    start = record_start(job, planned.train, planned.every, None, watch.stage)
+    start = record_start(job, planned.model.train, planned.every, None, watch.stage)
     choice = OutputChoice(spectrum_start=start, **options(job.spectrum, None, None))
-    beside = Analysis(job, planned.train, planned.every, start)
+    beside = Analysis(job, planned.model.train, planned.every, start)
     with TemporaryDirectory() as name:  # a response may be longer than memory
         folder = Path(name)
         made = write_run(folder, planned, choice, watch=watch, beside=beside)

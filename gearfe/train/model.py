@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import InputError
+from ..reduction.modal_body import ModalBody
 from ..rigid import Element, LinearJoint, LocalForce, ModalBlocks, Start, System, TimeFunction, consistent_start
 from ..rigid.elimination import ModalCoordinates, modal_coordinates
 from ..shown import Facts
@@ -129,6 +130,16 @@ def build_train(train: GearTrain) -> TrainModel:
         For the first thing in the train that does not fit, with the cure.
     """
     check_train(train)
+    return _assembled(train)
+
+
+def on_body(model: TrainModel, body: ModalBody) -> TrainModel:
+    """The same train on another body with as many coordinates, such as a softened one: its meshes stay as they are."""
+    return _assembled(replace(model.train, housing=body), model.meshes)
+
+
+def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel:
+    """The model of a train that is checked; `lines` are its meshes where they are known."""
     kinematics = rolling(train)
     frame = train.frame
     angle = train.driven.speed.integral(0.0, 0.0)
@@ -146,14 +157,8 @@ def build_train(train: GearTrain) -> TrainModel:
     bodies: list[Element] = [*shafts] if housing is None else [housing, *shafts]
     first = np.array([0 if housing is None else housing.size] + [6] * (len(shafts) - 1)).cumsum()
     size = sum(b.size for b in bodies)
-    senses = driving_senses(train)
-    places, speed = tooth_places(train, senses), fastest(train.driven.speed)
     placed = Shafts(shafts, first, tuple(ratios), size)
-    points = (
-        OperatingPoint(sense, phase, float(force), speed, pair_shifts(train, mesh, sense, places))
-        for mesh, sense, phase, force in zip(train.meshes, senses, places.phases, steady_forces(train), strict=True)
-    )
-    lines = tuple(mesh_line(train, mesh, placed, point) for mesh, point in zip(train.meshes, points, strict=True))
+    lines = lines or _mesh_lines(train, placed)
     torques = _torques(train, placed, angle)
     forces, directions = _forces(train, lines, torques, angle, placed)
     series = train_series(forces)
@@ -180,6 +185,16 @@ def build_train(train: GearTrain) -> TrainModel:
         axial=_axial(train, size),
         bores=_used_bores(train),
     )
+
+
+def _mesh_lines(train: GearTrain, placed: Shafts) -> tuple[MeshLine, ...]:
+    senses = driving_senses(train)
+    places, speed = tooth_places(train, senses), fastest(train.driven.speed)
+    points = (
+        OperatingPoint(sense, phase, float(force), speed, pair_shifts(train, mesh, sense, places))
+        for mesh, sense, phase, force in zip(train.meshes, senses, places.phases, steady_forces(train), strict=True)
+    )
+    return tuple(mesh_line(train, mesh, placed, point) for mesh, point in zip(train.meshes, points, strict=True))
 
 
 def _torques(train: GearTrain, shafts: Shafts, angle: TimeFunction) -> tuple[tuple[Array, TimeFunction], ...]:

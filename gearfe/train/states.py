@@ -64,7 +64,7 @@ def train_states(model: TrainModel, trajectory: Trajectory) -> TrainStates:
     multipliers = joint_multipliers(model, q, v, a, acting)
     drive = model.train.driven
     if drive.stiffness is None:
-        push = -multipliers["drive"][:, 0]
+        push = -multipliers["drive"]
     else:
         row = model.spin_reference[[s.name for s in model.train.shafts].index(drive.shaft)]
         push = -drive.stiffness * (q @ row) - drive.damping * (v @ row)
@@ -88,7 +88,7 @@ def contact_forces(
     found = iter(flanks)
     for i, line in enumerate(model.meshes):
         if line.rigid:
-            out[:, i] = multipliers[f"mesh {line.name}"][:, 0]
+            out[:, i] = multipliers[f"mesh {line.name}"]
             continue
         apart[:, i] = not line.pulls
         for side in (1.0,) if line.backlash is None else (1.0, -1.0):
@@ -104,16 +104,14 @@ def contact_forces(
 
 
 def joint_multipliers(model: TrainModel, q: Array, v: Array, a: Array, acting: Array) -> dict[str, Array]:
-    """Multipliers of each joint, (n, rows): the least ones where joints are redundant; `acting` are the forces of the
-    train on the coordinates, (n, size).
+    """Multipliers (n,) of the joints with one row, the rigid drive and rigid meshes: the least ones where joints are
+    redundant; `acting` are the forces of the train on the coordinates, (n, size).
 
     From ``M a = f - G^T lambda``, so the force on the coordinates is ``-G^T lambda``.
     """
     system = model.system
-    left = acting - v @ system.damping.T - q @ system.stiffness - a @ system.mass
-    multipliers = left @ model.multipliers_of_forces
-    found, at = {}, 0
-    for element, _ in system.joints:
-        found[element.name] = multipliers[:, at : at + element.rows]
-        at += element.rows
-    return found
+    rows = np.cumsum([0, *(element.rows for element, _ in system.joints)])
+    single = {element.name: row for (element, _), row in zip(system.joints, rows, strict=False) if element.rows == 1}
+    P = model.multipliers_of_forces[:, list(single.values())]
+    found = acting @ P - v @ (system.damping.T @ P) - q @ (system.stiffness @ P) - a @ (system.mass @ P)
+    return dict(zip(single, found.T, strict=True))

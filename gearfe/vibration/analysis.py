@@ -13,6 +13,7 @@ import numpy as np
 from ..output.files import write_csv
 from ..spectrum import Waterfall
 from ..tables.spectrum import STEADY, SpectrumTable
+from ..train import build_train
 from ..train.gear_train import GearTrain
 from ..train.kinematics import rolling
 from ..train.response import TrainResponse
@@ -197,7 +198,7 @@ def steady_start(job: TrainJob, train: GearTrain, every: int) -> float:
         When it is not steady for its last quarter.
     """
     tracked, period = Tracked(every, 1e-6 * job.table.step_us), None
-    for piece in repeater(job, every)(train, job.table.method)(job.times):
+    for piece in repeater(job, every)(build_train(train), job.table.method)(job.times):
         tracked.add(piece)
         period = piece.common_period_s
     time, _, values = tracked.finished()

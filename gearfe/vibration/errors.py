@@ -31,6 +31,7 @@ from ..reduction.modal_body import ModalBody
 from ..stiffness.curve import StiffnessCurve
 from ..train import build_train
 from ..train.gear_train import GearTrain
+from ..train.model import TrainModel, on_body
 from ..typing import Array
 from .spectra import TrainSpectra
 
@@ -52,7 +53,7 @@ class Run:
 
 
 def with_errors(
-    run: Run, train: GearTrain, again: Callable[[GearTrain], Run], *, band_hz: float = 5000.0
+    run: Run, model: TrainModel, again: Callable[[TrainModel], Run], *, band_hz: float = 5000.0
 ) -> dict[str, Any]:
     """The summary of a run with an estimate of the error beside each number that it is read for.
 
@@ -60,7 +61,7 @@ def with_errors(
     ----------
     run
         The run; its summary holds the estimates of integration and reduction.
-    train
+    model
         Its train.
     again
         Repeats it with a changed train.
@@ -77,7 +78,7 @@ def with_errors(
     if summary.get("status") != "done" or FORCES[0] not in summary:
         return summary
     base = _numbers(run, run)
-    parts = _parts(run, train, again, base, band_hz)
+    parts = _parts(run, model, again, base, band_hz)
     total = {name: np.sum([part[name] for part in parts.values()], axis=0) for name in base}
     summary["headline_errors"] = _named(total, summary)
     summary["headline_error_parts"] = {source: _named(part, summary) for source, part in parts.items()}
@@ -91,18 +92,18 @@ def with_errors(
 
 
 def _parts(
-    run: Run, train: GearTrain, again: Callable[[GearTrain], Run], base: dict[str, Array], band_hz: float
+    run: Run, model: TrainModel, again: Callable[[TrainModel], Run], base: dict[str, Array], band_hz: float
 ) -> dict[str, dict[str, Array]]:
     """Source -> number -> its share of the error."""
     estimates = run.summary["error_estimates"]
-    body = train.housing
+    body = model.train.housing
     parts = {}
     if body is not None:
-        softer = [_numbers(again(replace(train, housing=half)), run) for half in _halves(body)]
+        softer = [_numbers(again(on_body(model, half)), run) for half in _halves(body)]
         parts["mesh"] = {
             name: 2.0 * np.max([abs(abs(x[name]) - abs(base[name])) for x in softer], axis=0) for name in base
         }
-        softest = build_train(replace(train, housing=body.softened())).coupled_frequencies_hz  # these fall all the way
+        softest = on_body(model, body.softened()).coupled_frequencies_hz  # these fall all the way
         parts["mesh"]["coupled_frequencies_Hz"] = base["coupled_frequencies_Hz"] - softest
         _forget(parts["mesh"], run, body.highest_hz)
         if not body.softening.any():  # no estimate is not no error
@@ -110,9 +111,9 @@ def _parts(
         parts["reduction"] = _reduction(run, body, base, band_hz)
         parts["start"] = {name: np.zeros(values.shape) for name, values in base.items()}
         parts["start"][PEAKS] = np.array(list(run.summary[STARTS].values()), dtype=float)
-    stiffer = _stiffer(train)
+    stiffer = _stiffer(model.train)
     if stiffer is not None:
-        changed = _numbers(again(stiffer), run)
+        changed = _numbers(again(build_train(stiffer)), run)
         parts["curve"] = {name: np.abs(changed[name] - base[name]) for name in base}
     parts["integration"] = {
         name: float(estimates.get("integration", math.nan)) * scale for name, scale in _largest(run, base).items()

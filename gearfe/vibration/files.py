@@ -14,6 +14,7 @@ from ..errors import InputError, given
 from ..output.files import whole_set, write_csv, write_json
 from ..stopwatch import Stopwatch
 from ..train.gear_train import GearTrain
+from ..train.model import TrainModel
 from ..train.response import TrainResponse
 from ..typing import Array, IntArray
 from . import analysis
@@ -131,7 +132,7 @@ def write_run(
     beside
         What [spectrum] asks for beside the spectrum.
     """
-    train, times, every = planned.train, planned.times, planned.every
+    train, times, every = planned.model.train, planned.times, planned.every
     radiation = train.housing.radiation if train.housing is not None and train.housing.has_mesh else None
     problems: list[str] = []
     with whole_set(folder, MAY_WRITE) as target:
@@ -148,7 +149,7 @@ def write_run(
             options: dict[str, Any] = {"window": choice.window, "start": first, "length": duration, "folder": folder}
             return TrainRecord(times, every, radiation, **options) if len(times) > 2 else None
 
-        def repeated(changed: GearTrain) -> Run:
+        def repeated(changed: TrainModel) -> Run:
             again = given(planned.again, "again")
             method = str(response.statistics["method"])
             found = follow(again(changed, method)(times), times, every, record=recorded(times, choice))
@@ -167,7 +168,7 @@ def write_run(
         run = Run(train_summary(made, {}, **planned.further), spectra)
         if planned.again is not None:
             with watch.stage("error estimates"):
-                run = Run(with_errors(run, train, repeated, band_hz=planned.band_hz), spectra)
+                run = Run(with_errors(run, planned.model, repeated, band_hz=planned.band_hz), spectra)
         with watch.stage("tables"):
             if spectra is not None:
                 write_csv(target / "spectrum.csv", spectra.columns())

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..output.files import csv_table
-from ..train.gear_train import GearTrain
+from ..train.model import TrainModel
 from ..train.response import TrainResponse, joined
 from ..typing import Array, IntArray
 from .spectra import TrainRecord, TrainSpectra, response_columns
@@ -29,7 +29,7 @@ class TrainRun:
 
     Attributes
     ----------
-    train
+    model
         The train.
     times : (n,)
         Output times (s).
@@ -44,12 +44,12 @@ class TrainRun:
         Upper end of the band (Hz) in which the reduction's error is told.
     """
 
-    train: GearTrain
+    model: TrainModel
     times: Array
     pieces: Callable[[Array], Iterable[TrainResponse]]
     every: int = 1
     further: Mapping[str, Any] = field(default_factory=dict)
-    again: Callable[[GearTrain, str], Callable[[Array], Iterable[TrainResponse]]] | None = None
+    again: Callable[[TrainModel, str], Callable[[Array], Iterable[TrainResponse]]] | None = None
     band_hz: float = 5000.0
 
 

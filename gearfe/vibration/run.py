@@ -11,6 +11,7 @@ from ..record_spectrum import finer, subdivided
 from ..train import build_train
 from ..train.gear_train import GearTrain
 from ..train.kinematics import driving_senses
+from ..train.model import TrainModel
 from ..train.phases import tooth_places
 from ..train.response import TrainResponse
 from ..train.simulate import simulate_in_pieces
@@ -43,7 +44,7 @@ def simulated(
 
     every = finer(job.times, highest)[1]
     again = repeater(job, every) if estimate else None
-    return TrainRun(train, job.times, pieces, every, described(job, train), again, band(job))
+    return TrainRun(model, job.times, pieces, every, described(job, train), again, band(job))
 
 
 def band(job: TrainJob) -> float:
@@ -51,13 +52,12 @@ def band(job: TrainJob) -> float:
     return 5000.0 if job.housing is None else job.housing.reduction.band_Hz
 
 
-def repeater(job: TrainJob, every: int) -> Callable[[GearTrain, str], Callable[[Any], Iterator[TrainResponse]]]:
+def repeater(job: TrainJob, every: int) -> Callable[[TrainModel, str], Callable[[Any], Iterator[TrainResponse]]]:
     """The same run with another train by a method, as many samples in an output step; differences of runs need fewer
     digits.
     """
 
-    def again(train: GearTrain, method: str) -> Callable[[Any], Iterator[TrainResponse]]:
-        model = build_train(train)
+    def again(model: TrainModel, method: str) -> Callable[[Any], Iterator[TrainResponse]]:
         options: dict[str, Any] = {"tolerance": max(job.table.tolerance, ROUGH), "method": method}
         return lambda times: simulate_in_pieces(model, subdivided(times, every), **options)
 
