@@ -105,6 +105,8 @@ def test_curves(tmp_path, capsys, raw, message):
         (None, "there is no such file"),
         (b"t,a\n0,1\n1,x\n", "is no table of numbers"),
         (b"t,b\n0,1\n", "has no column 'a'"),
+        (b"time_s,b\n0,1\n", "has no column 'a'"),
+        (b"zeit,a\n0,1\n", "has no column 't' or 'time_s'"),
     ],
 )
 def test_a_reference_is_read_before_the_run(tmp_path, capsys, monkeypatch, raw, message):

@@ -194,8 +194,8 @@ def test_broken_meshes_are_named(change: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("bore", "message"),
     [
-        (((0, 0, 0), (1, 0, 0), 0.01, (0.0, 0.06)), "no node lies within.*nearest node there is 0.02"),
-        (((0, 0, 0), (1, 0, 0), 0.02, (0.5, 0.6)), "the mesh lies between"),
+        (((0, 0, 0), (1, 0, 0), 0.01, (0.0, 0.06)), "no node lies within.*nearest node there is 20"),
+        (((0, 0, 0), (1, 0, 0), 0.02, (0.5, 0.6)), "those within its radius lie between"),
         (((0, 0, 0), (0, 0, 0), 0.02, (0.0, 0.06)), "direction"),
         (((0, 0, 0), (1, 0, 0), -0.02, (0.0, 0.06)), "radius"),
         (((0, 0, 0), (1, 0, 0), 0.02, (0.06, 0.0)), "begin < end"),

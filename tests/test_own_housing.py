@@ -226,6 +226,10 @@ def test_groups_without_names_are_told_with_their_places(formats) -> None:
         ({"bores": [{"group": "bore_5"}]}, r"bores\[0\]\.group = 'bore_5': there is no such group.*feet.*bore_"),
         ({"bores": [{"group": "feet"}]}, r"bores\[0\]\.group = 'feet': .*are no cylinder: they lie in a plane"),
         ({"bores": [{"point_mm": [0, 0, 0], "radius_mm": 5}]}, r"bores\[0\] = '1': no node lies within"),
+        (
+            {"bores": [{"point_mm": [0, 0, 0], "radius_mm": 10, "range_mm": [100, 120]}]},
+            "from 100 to 120 mm along the axis, counted from its point: .* between -35 and 35 mm",
+        ),
         ({"held": [{"point_mm": [0, 0, -61]}]}, r"held\[0\] = \[0\.0, 0\.0, -61\.0\]: no node lies on this plane"),
         ({"held": [{"group": "foot"}]}, r"held\[0\]\.group = 'foot': there is no such group.*feet"),
         ({"mesh": {"file": "box.msh", "unit": "m"}, "held": [{"point_mm": [0, 0, -60]}]}, "unit of the mesh"),

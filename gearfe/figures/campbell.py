@@ -115,7 +115,8 @@ def draw_campbell(path: Path, run: RunUp, modes: CoupledModes, met: list[Crossin
             axes.annotate(
                 f"{mode + 1}: {where}, {100.0 * damping[mode]:.2g} % damping", (high, float(frequency[-1, mode])),
                 (high + 0.03 * (high - low), taken[-1]), fontsize=7.5, color=BLUE if strong else GREY, va="center",
-                annotation_clip=False, arrowprops={"arrowstyle": "-", "color": "#b6c2d1", "linewidth": 0.5},
+                annotation_clip=False,
+                arrowprops={"arrowstyle": "-", "color": "#b6c2d1", "linewidth": 0.5, "relpos": (0.0, 0.5)},
             )  # fmt: skip
     for line in order_lines(run, multiples):
         axes.plot([low, high], [line.slope * low, line.slope * high], color=COLOURS[1 + line.mesh], linewidth=1.0)
@@ -160,8 +161,6 @@ def _label_orders(
     axes: Any, lines: Sequence[OrderLine], low: float, high: float, highest: float, colours: Sequence[str]
 ) -> None:
     """Names of orders where their lines leave the picture; one that would stand on another's is left out."""
-    from matplotlib.patheffects import withStroke
-
     taken = -math.inf
     for line in sorted(lines, key=lambda line: -line.slope):
         end, above = min(high, highest / line.slope), line.slope * high > highest
@@ -173,7 +172,7 @@ def _label_orders(
         axes.annotate(
             line.label, (y / line.slope, y), (4 if right else -4, 0) if above else (0, 3), textcoords="offset points",
             fontsize=7.5, color=colours[line.mesh], ha="left" if right else "right", va="top" if above else "bottom",
-            path_effects=[withStroke(linewidth=2.5, foreground="white")],
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6}, zorder=5,
         )  # fmt: skip
 
 

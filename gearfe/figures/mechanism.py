@@ -73,6 +73,10 @@ def draw_animation(folder: Path, mechanism: Mechanism, trajectory: Trajectory) -
     figure = fixed(4.8, 4.2)
     figure.set_dpi(80)
     axes = figure.add_axes((0.16, 0.12, 0.8, 0.8))
+    frame(axes, mechanism, trajectory.q)
+    height = float(np.clip(4.0 * np.ptp(axes.get_ylim()) / np.ptp(axes.get_xlim()), 1.2, 4.0))
+    figure.set_size_inches(4.8, height + 0.8)
+    axes.set_position((0.14, 0.5 / (height + 0.8), 0.84, height / (height + 0.8)))
     writer = PillowWriter(fps=25)
     with whole_file(folder / "animation.gif") as temporary, writer.saving(figure, str(temporary), dpi=80):
         for done, (time, q) in enumerate(zip(times, states, strict=True)):

@@ -17,6 +17,8 @@ from .style import COLOURS, GREY
 MOST_NAMES = 20
 #: Zigzags of a spring, and its half width in parts of the picture's size.
 COILS, COIL_WIDTH = 9, 0.016
+#: Width of a letter of a name (points), at most.
+WIDTH = 6.0
 Point = tuple[float, float]
 
 
@@ -109,6 +111,9 @@ def frame(axes: Any, mechanism: Mechanism, q: Array) -> None:
         places = plate.exaggerated(q, mechanism.file.figure.magnification)
         x += [places.real.min(), places.real.max()]
         y += [places.imag.min(), places.imag.max()]
+    for a, b in _coupled(mechanism, q):
+        x += [a.min(), a.max()]
+        y += [b.min(), b.max()]
     ground = mechanism.file.ground.points_m.values()
     x += [place[0] for place in ground]
     y += [place[1] for place in ground]
@@ -120,6 +125,19 @@ def frame(axes: Any, mechanism: Mechanism, q: Array) -> None:
     axes.set_axisbelow(True)
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
+
+
+def _coupled(mechanism: Mechanism, q: Array) -> list[tuple[Array, Array]]:
+    """Places of the ends of springs and distance joints."""
+    linkage = mechanism.linkage
+    turned = np.append(q[:, : 3 * len(linkage.bodies)], np.zeros((len(q), 3)), axis=1)  # the ground stands still
+    parts = [*linkage.forces, *linkage.joints]
+    return [
+        _place(turned, linkage.body_index[body], linkage.frames.arm(body, at))
+        for part in parts
+        if isinstance(part, (Spring, Distance))
+        for body, at in ((part.a, part.point_a), (part.b, part.point_b))
+    ]
 
 
 def _points(mechanism: Mechanism) -> list[tuple[str, int, dict[str, Point]]]:
@@ -199,8 +217,19 @@ def _name(axes: Any, text: str, place: Array, colour: str, weight: str = "normal
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=2.5, foreground="white")]
-    offset = (8, -6) if weight == "bold" else (5, 5)
-    look = {"fontsize": 8, "color": colour, "weight": weight, "path_effects": halo, "annotation_clip": True}
+    offset = (8.0, -6.0) if weight == "bold" else (5.0, 5.0)
+    low, high = axes.get_xlim()
+    room = 72.0 * axes.bbox.width / axes.figure.dpi * (high - place[0]) / (high - low)  # points to the frame's end
+    if offset[0] + WIDTH * len(text) > room:  # to the left, or it would leave the frame
+        offset = (-offset[0], offset[1])
+    look = {
+        "ha": "left" if offset[0] > 0.0 else "right",
+        "fontsize": 8,
+        "color": colour,
+        "weight": weight,
+        "path_effects": halo,
+        "annotation_clip": True,
+    }
     axes.annotate(text, place, xytext=offset, textcoords="offset points", **look)
 
 

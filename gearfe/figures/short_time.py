@@ -16,14 +16,18 @@ from .style import BLUE, COLOURS, ORANGE, new_figure, save, tidy
 
 #: Reference of the levels of accelerations (m/s2), ISO 1683, and how far below the largest one a level is drawn (dB).
 REFERENCE, RANGE_DB = 1e-6, 70.0
+#: Frequencies (Hz) from and to which is drawn; None: all.
+Band = tuple[float, float] | None
 
 
-def draw_spectrogram(path: Path, made: Analysed, attachment: str, title: str) -> None:
+def draw_spectrogram(path: Path, made: Analysed, attachment: str, title: str, band: Band = None) -> None:
     """Acceleration at an attachment over time and frequency, and its average beside."""
     name = f"attachment_{attachment}_acceleration_m_per_s2"
     fall, average = made.falls[made.names.index(name)], made.average[:, made.names.index(name)]
     level = _level(fall.amplitude)
-    top = float(level[:, 1:].max(initial=-300.0))
+    low, high = band or (0.0, float(fall.frequency[-1]))
+    seen = (fall.frequency > 0.0) & (fall.frequency >= low) & (fall.frequency <= high)
+    top = float(level[:, seen].max(initial=-300.0))
     figure = new_figure(11.5, 5.6)
     axes, side = figure.subplots(1, 2, sharey=True, width_ratios=(4.0, 1.0))
     figure.suptitle(
@@ -31,10 +35,11 @@ def draw_spectrogram(path: Path, made: Analysed, attachment: str, title: str) ->
     )
     shown = axes.pcolormesh(
         1e3 * fall.time, 1e-3 * fall.frequency, level.T,
-        cmap="inferno", vmin=top - RANGE_DB, vmax=top, shading="nearest", rasterized=True,
+        cmap="magma_r", vmin=top - RANGE_DB, vmax=top, shading="nearest", rasterized=True,
     )  # fmt: skip
     axes.set_xlabel("time  (ms)")
     axes.set_ylabel("frequency  (kHz)")
+    axes.set_ylim(1e-3 * low, 1e-3 * high)
     bar = figure.colorbar(shown, ax=axes, pad=0.01)
     bar.set_label("level  (dB re 1 µm/s²)")
     tidy(side)
@@ -68,7 +73,7 @@ def draw_tracks(path: Path, made: Analysed, tracks: OrderTracks, attachment: str
     save(figure, path)
 
 
-def draw_measured(path: Path, made: Analysed, spectra: TrainSpectra | None, title: str) -> None:
+def draw_measured(path: Path, made: Analysed, spectra: TrainSpectra | None, title: str, band: Band = None) -> None:
     """Measured spectra over the computed one, a panel for each attachment."""
     places = list(dict.fromkeys(one.attachment for one in made.measured))
     figure = new_figure(10.5, 1.4 + 3.2 * len(places))
@@ -88,6 +93,8 @@ def draw_measured(path: Path, made: Analysed, spectra: TrainSpectra | None, titl
         axes.set_ylabel("amplitude  (m/s²)")
         axes.set_title(f"attachment {place}", fontsize=10, loc="left")
         axes.legend(fontsize=8.5, frameon=False, ncols=3)
+        if band is not None:
+            axes.set_xlim(1e-3 * band[0], 1e-3 * band[1])
     panels[-1].set_xlabel("frequency  (kHz)")
     save(figure, path)
 

@@ -58,11 +58,11 @@ class TrainPictures:
     def analysis(self, folder: Path, made: Analysed, spectra: TrainSpectra | None, attachment: str) -> None:
         """``spectrogram.png``, ``order_tracks.png``, ``measured.png``, those that there is something for."""
         if made.falls:
-            draw_spectrogram(folder / "spectrogram.png", made, attachment, self.title)
+            draw_spectrogram(folder / "spectrogram.png", made, attachment, self.title, self.band)
         if made.tracks is not None:
             draw_tracks(folder / "order_tracks.png", made, made.tracks, attachment, self.title)
         if made.measured:
-            draw_measured(folder / "measured.png", made, spectra, self.title)
+            draw_measured(folder / "measured.png", made, spectra, self.title, self.band)
 
     def fields(self, path: Path, train: GearTrain, response: TrainResponse, steps: IntArray) -> str:
         """Fields at some output times; returns an empty text, or why nothing was drawn."""

@@ -110,12 +110,19 @@ def bore_attachment(bore: Bore | Sequence[Any], number: int, nodes: Array) -> tu
     within = (height >= first - slack) & (height <= last + slack)
     chosen = np.flatnonzero(within & (radial <= made.radius * (1.0 + RADIUS_TOLERANCE)))
     if not len(chosen):
-        nearest = (
-            f"the nearest node there is {radial[within].min():.6g} m from the axis"
-            if within.any()
-            else (f"the mesh lies between {height.min():.6g} and {height.max():.6g} m along the axis")
-        )
-        problem = f"no node lies within {made.radius:g} m of the axis: {nearest}"
+        near = radial <= made.radius * (1.0 + RADIUS_TOLERANCE)
+        if near.any():
+            reach = f"{1e3 * height[near].min():.6g} and {1e3 * height[near].max():.6g} mm"
+            problem = (
+                f"no node lies in its range from {1e3 * first:.6g} to {1e3 * last:.6g} mm along the axis, counted from "
+                f"its point: those within its radius lie between {reach}"
+            )
+        elif within.any():
+            nearest = f"the nearest node there is {1e3 * radial[within].min():.6g} mm from the axis"
+            problem = f"no node lies within {1e3 * made.radius:g} mm of the axis: {nearest}"
+        else:
+            reach = f"the mesh lies between {1e3 * height.min():.6g} and {1e3 * height.max():.6g} mm along the axis"
+            problem = f"no node lies within {1e3 * made.radius:g} mm of the axis: {reach}, counted from its point"
         raise InputError(field, None, problem, "check point, direction, radius and range (metres)")
     deep = radial[chosen] < 0.8 * made.radius  # nodes on chords of six edges a circle stand at 0.87 of it
     if deep.any():

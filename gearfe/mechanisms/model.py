@@ -339,7 +339,12 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
         if output.name in outputs or output.name == "time_s":
             raise InputError(f"outputs[{i}].name", output.name, "is used twice", "rename the column")
         node = parse(output.value, f"outputs[{i}].value", tables)
-        made.values(quantities(node), zero, zero, zero)  # names exist
+        try:
+            made.values(quantities(node), zero, zero, zero)  # names exist
+        except InputError as error:
+            place = error.field.removeprefix("expression").strip()
+            problem = f"{place}: {error.problem}" if place else error.problem
+            raise InputError(f"outputs[{i}].value", output.value, problem, error.cure) from None
         outputs[output.name] = node
     for path_table in file.paths:
         if isinstance(path_table.point, str):

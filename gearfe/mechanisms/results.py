@@ -199,7 +199,10 @@ def reference_table(mechanism: Mechanism) -> dict[str, Array] | None:
         made = {name: np.array([float(row[name]) for row in rows]) for name in (rows[0] if rows else {})}
     except (ValueError, TypeError, csv.Error) as error:
         raise InputError("figure.reference", str(source), f"is no table of numbers ({error})", "mend it") from None
+    if "time_s" in made:  # as trajectory.csv has it
+        made.setdefault("t", made["time_s"])
     for name in ("t", *table.reference_columns.values()):
         if name not in made:
-            raise InputError("figure.reference", str(source), f"has no column {name!r}", "check its header")
+            problem = "has no column 't' or 'time_s' (s)" if name == "t" else f"has no column {name!r}"
+            raise InputError("figure.reference", str(source), problem, "check its header")
     return made

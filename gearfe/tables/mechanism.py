@@ -260,7 +260,9 @@ class FigureTable:
     """[figure]: curves over time, with markers from a reference table."""
 
     curves: tuple[str, ...] = quantity((), doc="names of outputs to draw (default: all)")
-    reference: str | None = quantity(None, doc="CSV file with a column t and reference columns, beside the job file")
+    reference: str | None = quantity(
+        None, doc="CSV file with a column t or time_s (s) and reference columns, beside the job file"
+    )
     reference_columns: dict[str, str] = quantity(dict, doc="output name = column of the reference file")
     every: int = quantity(10, low=1, doc="draw each so manyth reference point")
     magnification: float = quantity(1.0, low=0.0, doc="factor of the deflections of flexible links in pictures")
