@@ -59,7 +59,7 @@ class Display:
         self._lock = threading.RLock()
         self._over = threading.Event()
         self._line = ""  # on the terminal now
-        self._told: tuple[str, ...] = ()  # stages of the last line that stays
+        self._reported: tuple[str, ...] = ()  # stages of the last line that stays
         self._next = 0.0  # when they are told again
         self._wait = AGAIN
         self._thread = threading.Thread(target=self._look, name="progress", daemon=True)
@@ -124,8 +124,8 @@ class Display:
                 self._line = line
             return
         path = tuple(s.name for s in stages)
-        if path != self._told[: len(path)]:  # back in the outer stage is nothing new
-            self._told, self._wait, self._next = path, AGAIN, now + AGAIN
+        if path != self._reported[: len(path)]:  # back in the outer stage is nothing new
+            self._reported, self._wait, self._next = path, AGAIN, now + AGAIN
         elif now < self._next:
             return
         else:

@@ -48,10 +48,10 @@ def read_text(path: str | Path, field: str) -> str:
     try:
         return raw.removeprefix(codecs.BOM_UTF8).decode()
     except UnicodeDecodeError as error:
-        raise InputError(field, str(path), *_told(raw, error.start)) from None
+        raise InputError(field, str(path), *_encoding_problem(raw, error.start)) from None
 
 
-def _told(raw: bytes, at: int) -> tuple[str, str]:
+def _encoding_problem(raw: bytes, at: int) -> tuple[str, str]:
     """What bytes that are no UTF-8 are, and the cure; the first wrong one stands at `at`."""
     line = raw.count(b"\n", 0, at) + 1
     # Latin-1 has control characters where Windows-1252 has letters and quotes

@@ -19,7 +19,7 @@ from gearfe.gear.derived import path_place
 from gearfe.meshing.whole_gear import whole_gear
 from gearfe.stiffness.contact_pressure import flank_pressures
 from gearfe.stiffness.fields import gear_recovery, pair_recovery, straight_triangles
-from gearfe.stiffness.fields_output import chosen_positions, fields_size, told_size, write_fields
+from gearfe.stiffness.fields_output import chosen_positions, fields_size, size_note, write_fields
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 
 from .gears import pair
@@ -285,10 +285,10 @@ def test_the_size_is_told_before(elastic):
     teeth = elastic.bodies[0].teeth
     whole = np.arange(1.0, 41.0)
     one = int(np.ceil(360 / teeth - 1e-9))
-    said = told_size(elastic, whole, None)
+    said = size_note(elastic, whole, None)
     assert said.startswith(
         f"fields of 40 positions take {fields_size(elastic, 40) / 1e6:.3g} MB; less: --fields 1 ... "
     )
     assert f"the {one} angles of one mesh cycle, take {fields_size(elastic, one) / 1e6:.3g} MB" in said
-    assert told_size(elastic, whole, [3.0]) == f"fields of 1 position take {fields_size(elastic, 1) / 1e6:.3g} MB"
-    assert "fewer: --fields 1 3" in told_size(elastic, whole[:4], None)
+    assert size_note(elastic, whole, [3.0]) == f"fields of 1 position take {fields_size(elastic, 1) / 1e6:.3g} MB"
+    assert "fewer: --fields 1 3" in size_note(elastic, whole[:4], None)

@@ -135,12 +135,12 @@ def test_drawn_gears_are_as_bad_as_the_class_and_come_again() -> None:
     allowed = pitch_errors.tolerances(PINION, 7)
     reached = []
     for seed in range(12):
-        index = pitch_errors.drawn(PINION, 7, seed)
-        assert (index == pitch_errors.drawn(PINION, 7, seed)).all()
+        index = pitch_errors.sampled(PINION, 7, seed)
+        assert (index == pitch_errors.sampled(PINION, 7, seed)).all()
         shares = np.ptp(index) / allowed.cumulative, np.abs(pitch_errors.single_of(index)).max() / allowed.single
         reached.append(max(shares))
     assert reached == pytest.approx([1.0] * 12)
-    assert (pitch_errors.drawn(PINION, 7, 0) != pitch_errors.drawn(PINION, 7, 1)).all()
+    assert (pitch_errors.sampled(PINION, 7, 0) != pitch_errors.sampled(PINION, 7, 1)).all()
 
 
 def test_single_pitch_deviations() -> None:

@@ -55,9 +55,9 @@ def _commands() -> dict[str, tuple[str, list[Any]]]:
     from .program import command_module, parser_of
 
     found = {}
-    for name, told in COMMANDS.items():
-        actions = parser_of(command_module(name), f"gearfe {name}", *told)._actions  # argparse offers no other way
-        found[name] = (told[0], [a for a in actions if a.option_strings and a.help != argparse.SUPPRESS])
+    for name, texts in COMMANDS.items():
+        actions = parser_of(command_module(name), f"gearfe {name}", *texts)._actions  # argparse offers no other way
+        found[name] = (texts[0], [a for a in actions if a.option_strings and a.help != argparse.SUPPRESS])
     return found
 
 
@@ -90,8 +90,6 @@ def _fish() -> str:
             long = action.option_strings[-1].removeprefix("--")
             words = _choices(action)
             takes = f" -x -a {shlex.quote(' '.join(words))}" if words else "" if action.nargs == 0 else " -r"
-            told_option = shlex.quote((action.help or "").replace("%%", "%"))
-            lines.append(
-                f"complete -c gearfe -n '__fish_seen_subcommand_from {name}' -l {long}{takes} -d {told_option}"
-            )
+            described = shlex.quote((action.help or "").replace("%%", "%"))
+            lines.append(f"complete -c gearfe -n '__fish_seen_subcommand_from {name}' -l {long}{takes} -d {described}")
     return "\n".join(lines)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 #: Why a frequency has no estimate.
 _COARSE, _FEW = "the mesh is too coarse for one", "keep more modes (modes_below_Hz)"
-_UNTOLD = "matrices tell none"
+_UNKNOWN = "matrices tell none"
 #: Modes drawn.
 _DRAWN = 6
 
@@ -123,10 +123,10 @@ def _report(body: ModalBody, errors: dict[str, Any], mesh: MeshError, left_out: 
         frequency = body.coupled.frequencies_hz[number]
         said = f"<= {100.0 * estimate:5.2f} %   (reduction {100.0 * errors['reduction'][number]:.1e} %)"
         if not math.isfinite(estimate):
-            said = "unknown: " + (_UNTOLD if not body.has_mesh else _COARSE if number < body.modes else _FEW)
+            said = "unknown: " + (_UNKNOWN if not body.has_mesh else _COARSE if number < body.modes else _FEW)
         print(f"  {number + 1:3d} {frequency:10.2f} Hz   {said}")
     bound = mesh.response + left_out.response
-    why = "keep more modes" if body.has_mesh else _UNTOLD
+    why = "keep more modes" if body.has_mesh else _UNKNOWN
     text = f"<= {100.0 * bound:.2g} % rms" if math.isfinite(bound) else f"unknown: {why}"
     part = f" (mesh {100.0 * mesh.response:.2g} %, reduction {100.0 * left_out.response:.2g} %)"
     text += part if math.isfinite(bound) else ""

@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     draw = None if args.no_pictures else RunUpPictures(title(job.table, driven=False))
     choice, further = RunUpChoice(table.multiples, args.attachment, args.fields), described(job, table)
     summary, names = write_runup(folder, made, choice, draw=draw, watch=watch, further=further, unstable=unstable)
-    tell(_told(summary), folder, names, watch.seconds, summary["warnings"])
+    tell(_report_lines(summary), folder, names, watch.seconds, summary["warnings"])
     return 0 if summary["speeds_reached"] == summary["speeds"] else 1
 
 
@@ -67,7 +67,7 @@ def _own_table(job: str) -> RunUpTable:
     return found
 
 
-def _told(summary: dict[str, Any]) -> list[str]:
+def _report_lines(summary: dict[str, Any]) -> list[str]:
     """Lines for the terminal."""
     lines = [
         f"{summary['speeds_reached']} of {summary['speeds']} speeds, {summary['steady_states']} steady states; largest "

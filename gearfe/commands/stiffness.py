@@ -102,9 +102,9 @@ def run(args: argparse.Namespace) -> int:
     folder = output_folder(args.out)
     elastic = elastic_pair(job.pair, model, watch=watch)
     if chosen is not None:
-        from ..stiffness.fields_output import told_size
+        from ..stiffness.fields_output import size_note
 
-        announce(told_size(elastic, np.degrees(sweep["angles"]), None if isinstance(chosen, str) else chosen))
+        announce(size_note(elastic, np.degrees(sweep["angles"]), None if isinstance(chosen, str) else chosen))
     curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=not args.no_estimate, progress=count, **sweep)
     for stage, seconds in curve.timings.items():
         watch.seconds[stage] = watch.seconds.get(stage, 0.0) + seconds

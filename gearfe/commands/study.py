@@ -13,8 +13,8 @@ from ..progress import count
 from .arguments import add_job
 from .common import add_folder, tell
 
-#: How long a scheduler has to answer.
-PATIENCE_S = 20
+#: Seconds that a scheduler has to answer.
+TIMEOUT_S = 20
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -74,8 +74,8 @@ def run(args: argparse.Namespace) -> int:
     bad, warnings = int((~made.done).sum()), []
     if bad:
         first = next(i for i, good in enumerate(made.done) if not good)
-        told_first = f"case {made.columns['case'][first]}: {made.columns['message'][first]}"
-        warnings.append(f"{bad} of {len(made.done)} cases are not solved wholly; {told_first}")
+        example = f"case {made.columns['case'][first]}: {made.columns['message'][first]}"
+        warnings.append(f"{bad} of {len(made.done)} cases are not solved wholly; {example}")
     tell(report_lines(summary), folder, names, watch.seconds, warnings)
     return 1 if bad else 0
 
@@ -91,7 +91,7 @@ def _cluster(address: str, stack: ExitStack) -> dict[str, Any]:
     logging.disable(logging.CRITICAL)  # of a lost connection `check` tells
     stack.callback(logging.disable, logging.NOTSET)
     try:
-        client = stack.enter_context(Client(address, timeout=PATIENCE_S))
+        client = stack.enter_context(Client(address, timeout=TIMEOUT_S))
     except (OSError, ValueError, TimeoutError) as error:
         problem = f"does not answer ({type(error).__name__})"
         raise InputError("--dask", address, problem, "is the scheduler running there?") from None

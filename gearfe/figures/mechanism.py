@@ -190,9 +190,9 @@ def _plates(path: Path, mechanism: Mechanism, results: Results) -> None:
         )
         axes.set_aspect("equal")
         figure.colorbar(drawn, ax=axes, label="von Mises (MPa)", shrink=0.9)
-        told = "" if factor == 1.0 else f", displacements x {factor:g}"
+        note = "" if factor == 1.0 else f", displacements x {factor:g}"
         time = results.trajectory.time[when]
-        axes.set_title(f"{name} at {time:.4g} s, when its stress is largest{told}", fontsize=9, loc="left")
+        axes.set_title(f"{name} at {time:.4g} s, when its stress is largest{note}", fontsize=9, loc="left")
         axes.set_xlabel("x (m)")
         axes.set_ylabel("y (m)")
     save_fixed(figure, path)

@@ -87,9 +87,9 @@ def _frequency_axes(
     """Axes between two frequencies (kHz) with the meshes' lines and multiples, and orders of the first shaft on top."""
     axes = figure.add_axes((0.062, 0.175, 0.925, 0.615))
     panel(axes, "", "", "")
-    head, _, scene = title.partition("\n")
+    head, _, below = title.partition("\n")
     figure.text(0.062, 0.945, head, fontsize=11)
-    figure.text(0.062, 0.9, scene, fontsize=8.5, color="#374151")
+    figure.text(0.062, 0.9, below, fontsize=8.5, color="#374151")
     axes.set_xlim(*ends)
     axes.set_xlabel("frequency  (kHz)")
     first = {f"mesh {i + 1}": f for i, f in enumerate(response.mesh_frequencies_Hz)}

@@ -202,7 +202,7 @@ def _index_deviations(table: FlankTable, gear: Gear, where: str, folder: Path) -
         order = _teeth(columns["tooth"], gear, field, table.pitch_csv)
         given = 1e-6 * columns["pitch_um"][order]
     elif table.pitch_class is not None:
-        given = pitch_errors.drawn(gear, table.pitch_class, table.pitch_seed)
+        given = pitch_errors.sampled(gear, table.pitch_class, table.pitch_seed)
     if given is None:
         return made
     if len(given) != gear.teeth:

@@ -61,8 +61,8 @@ def span_teeth(gear: Gear) -> int:
     The plates touch where the roll length is half the span: W_k^2 = d_v^2 - d_b^2, solved for k.
     """
     diameter = gear.pitch_diameter + 2.0 * gear.profile_shift * gear.module
-    wanted = math.sqrt(max(0.0, diameter**2 - (2.0 * gear.base_radius) ** 2))
-    return max(2, round(1.0 + (wanted - span_size(gear, 1)) / gear.base_pitch))
+    span = math.sqrt(max(0.0, diameter**2 - (2.0 * gear.base_radius) ** 2))
+    return max(2, round(1.0 + (span - span_size(gear, 1)) / gear.base_pitch))
 
 
 def _span(z: int, x: float, angle: float, k: int) -> float:

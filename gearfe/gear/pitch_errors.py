@@ -117,7 +117,7 @@ def sine(teeth: int, amplitude: float, phase: float = 0.0) -> Array:
     return amplitude * np.sin(2 * math.pi * np.arange(teeth) / teeth + phase)
 
 
-def drawn(gear: Gear, class_: int, seed: int) -> Array:
+def sampled(gear: Gear, class_: int, seed: int) -> Array:
     """Index deviations (m) drawn at random, as large as the class allows.
 
     A sine of one turn with a range of F_pT and a random phase, and independent errors of the teeth of standard

@@ -66,7 +66,7 @@ def overlaps(pair: GearPair, twist: ArrayLike) -> Array:
     return np.asarray(twist, dtype=float) * pair.wheel.base_radius / pair.pinion.module
 
 
-def told_overlaps(beyond: IntArray, largest: float) -> list[str]:
+def overlap_warnings(beyond: IntArray, largest: float) -> list[str]:
     """What is said of the positions flagged as beyond validity, `largest` (modules) the largest of their overlaps."""
     count = int(np.count_nonzero(beyond == 1))
     if not count:

@@ -25,7 +25,7 @@ LOW, HIGH = 0.5, 0.85
 #: Part of the mean motion of a point below which noise decides.
 STILL = 0.2
 #: Points that are told at most.
-TOLD = 6
+LISTED = 6
 
 
 def point_columns(made: Comparison) -> dict[str, Array]:
@@ -60,8 +60,8 @@ def point_lines(made: Comparison) -> list[str]:
                 explained |= {p, q}
     left = [names[p] for p in bad if p not in explained]
     if left:
-        more = f" and {len(left) - TOLD} more" if len(left) > TOLD else ""
-        lines.append("other points that do not move as the model: " + "; ".join(left[:TOLD]) + more + " (points.csv)")
+        more = f" and {len(left) - LISTED} more" if len(left) > LISTED else ""
+        lines.append("other points that do not move as the model: " + "; ".join(left[:LISTED]) + more + " (points.csv)")
     return lines
 
 

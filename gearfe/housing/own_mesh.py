@@ -34,7 +34,7 @@ def own_housing(table: HousingTable, folder: Path, material: SolidMaterial) -> H
     found = read_mesh_file(folder / given(table.mesh.file, field), field, table.mesh.size_mm)
     mesh = found._replace(nodes=_turned(UNITS[table.mesh.unit] * found.nodes, table.mesh))
     used = np.unique(mesh.tets)
-    notes = [told_size(mesh.nodes[used])]
+    notes = [size_note(mesh.nodes[used])]
     attachments = []
     for i, bore in enumerate(table.bores):
         made, remarks = _attachment(bore, i, mesh, used)
@@ -67,7 +67,7 @@ def _turned(nodes: Array, table: HousingMeshTable) -> Array:
     return np.asarray((nodes - 1e-3 * np.array(table.origin_mm))[:, places] * signs)
 
 
-def told_size(nodes: Array) -> str:
+def size_note(nodes: Array) -> str:
     """How large a mesh is: a unit that is wrong shows there."""
     x, y, z = 1e3 * np.ptp(nodes, axis=0)
     return f"the mesh is {x:.4g} x {y:.4g} x {z:.4g} mm"
@@ -142,9 +142,9 @@ def _attachment(bore: MeshBoreTable, i: int, mesh: MeshFile, used: IntArray) -> 
     foot, axis, radius, off = fitted_cylinder(at) if len(at) >= 6 else (at[0], at[0], 0.0, np.inf)
     if not (off <= RADIUS_TOLERANCE * radius and radius <= np.linalg.norm(np.ptp(at, axis=0))):  # else a flat patch
         flat = np.linalg.svd(at - at.mean(axis=0), compute_uv=False)[2] if len(at) > 3 else 0.0
-        off_told = f"they are up to {1e3 * off:.3g} mm off the nearest one"
-        off_told = "they lie in a plane" if flat < 1e-3 * np.linalg.norm(np.ptp(at, axis=0)) else off_told
-        problem = f"its {len(nodes)} nodes are no cylinder: {off_told}"
+        distance = f"they are up to {1e3 * off:.3g} mm off the nearest one"
+        distance = "they lie in a plane" if flat < 1e-3 * np.linalg.norm(np.ptp(at, axis=0)) else distance
+        problem = f"its {len(nodes)} nodes are no cylinder: {distance}"
         cure = "give point_mm, the point that the attachment is referred to, beside the group"
         raise InputError(f"{field}.group", bore.group, problem, cure)
     height = (at - foot) @ axis

@@ -58,7 +58,9 @@ class MeshFile(NamedTuple):
             Where there is none of this name, or none of its nodes belongs to an element.
         """
         if name not in self.groups:
-            listed = ", ".join(itertools.starmap(self._told, itertools.islice(self.groups.items(), LISTED))) or "none"
+            listed = (
+                ", ".join(itertools.starmap(self._text_of, itertools.islice(self.groups.items(), LISTED))) or "none"
+            )
             more = f" and {len(self.groups) - LISTED} more" if len(self.groups) > LISTED else ""
             problem = f"there is no such group in the mesh; it has: {listed}{more}"
             cure = "name groups in the mesher, or tell the place by point_mm in place of group"
@@ -68,7 +70,7 @@ class MeshFile(NamedTuple):
             raise InputError(field, name, "none of its nodes belongs to a tetrahedron", "take another group")
         return nodes
 
-    def _told(self, name: str, nodes: IntArray) -> str:
+    def _text_of(self, name: str, nodes: IntArray) -> str:
         """A group; one that has a number in place of a name with its place."""
         if not name.isdigit():
             return name

@@ -133,8 +133,10 @@ def optimise_relief(
     values = np.array([one.value for one in found])
     if not np.isfinite(values).any():
         name = variables[0].name
-        told = f"no gear between the bounds is valid; the first one (SI): {found[0].problem or 'its positions failed'}"
-        raise InputError(name, (variables[0].low, variables[0].high), told, "change the bounds")
+        reason = (
+            f"no gear between the bounds is valid; the first one (SI): {found[0].problem or 'its positions failed'}"
+        )
+        raise InputError(name, (variables[0].low, variables[0].high), reason, "change the bounds")
     first = np.array(grid[int(np.argmin(values))])
     best, value = first, float(values.min())
     if generations:

@@ -13,7 +13,7 @@ from ..gear import pitch_errors
 from ..gear.deviation import ToothDeviations
 from ..gear.deviation_job import GEARS
 from ..gear.pair import GearPair
-from ..gear.validity import overlaps, told_overlaps
+from ..gear.validity import overlap_warnings, overlaps
 from ..stiffness.job import StiffnessJob
 from ..tables.microgeometry import MicrogeometryTable
 from ..typing import Array
@@ -176,7 +176,7 @@ def report_lines(made: LoadedMesh) -> list[str]:
 def warnings(pair: GearPair, made: LoadedMesh) -> list[str]:
     """Sentences about what deserves a look."""
     said, beyond = list(pair.warnings), made.beyond_validity
-    said += told_overlaps(beyond, overlaps(pair, made.twist[beyond == 1]).max(initial=0.0))
+    said += overlap_warnings(beyond, overlaps(pair, made.twist[beyond == 1]).max(initial=0.0))
     room, jammed = made.back_clearance, made.status == BACK
     if room is not None and jammed.any():
         i, j = np.unravel_index(int(np.nanargmin(room)), room.shape)
@@ -188,11 +188,11 @@ def warnings(pair: GearPair, made: LoadedMesh) -> list[str]:
         )
     lost = made.failed & ~jammed
     if lost.any():
-        told = ", ".join(
+        statuses = ", ".join(
             f"{count} {status}" for status, count in made.statuses.items() if status not in (BACK, "converged")
         )
         cure = "rough flanks may not settle; take smoother ones, or other torques"
-        said.append(f"{int(lost.sum())} positions have no numbers ({told}): {cure}")
+        said.append(f"{int(lost.sum())} positions have no numbers ({statuses}): {cure}")
     return said
 
 

@@ -133,7 +133,7 @@ def write_uff(path: Path, tables: Tables) -> None:
             known = np.zeros(0, dtype=bool) if y.dtype.kind == "U" else np.isfinite(y)  # the format has no gaps
             if known.sum() < 2:
                 continue
-            data_type, label = next((told for end, told in ORDINATES.items() if name.endswith(end)), (0, ""))
+            data_type, label = next((known for end, known in ORDINATES.items() if name.endswith(end)), (0, ""))
             made = pyuff.prepare_58(
                 binary=1, id1=name, id2=f"gearfe {table}.csv over {first}", func_type=kind, rsp_node=len(sets) + 1,
                 rsp_dir=0, ref_node=0, ref_dir=0, data=y[known], x=x[known], abscissa_spacing=int(_even(x[known])),

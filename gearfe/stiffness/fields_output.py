@@ -123,7 +123,7 @@ def fields_size(elastic: MeshingPair, positions: int) -> int:
     return positions * (56 * nodes + elements) + 57 * elements
 
 
-def told_size(elastic: MeshingPair, known_deg: Array, angles_deg: Sequence[float] | None) -> str:
+def size_note(elastic: MeshingPair, known_deg: Array, angles_deg: Sequence[float] | None) -> str:
     """How large the fields become, and what makes them smaller."""
     count = len(known_deg) if angles_deg is None else len(angles_deg)
     text = f"fields of {count} position{'s' if count > 1 else ''} take {fields_size(elastic, count) / 1e6:.3g} MB"

@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..gear.derived import derived_geometry, iso_values
 from ..gear.deviation_job import GEARS
 from ..gear.modifications import CHECKED, ends_of
-from ..gear.validity import overlaps, told_overlaps
+from ..gear.validity import overlap_warnings, overlaps
 from ..versions import versions
 from .contact_pressure import largest_pressures
 from .curve import StiffnessCurve
@@ -200,7 +200,7 @@ def warnings(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
         cure = ' (twist_from = "contact" counts it from where the flanks touch)' if centred else ""
         said.append(sentence + cure)
     beyond = curve.beyond_validity
-    said += told_overlaps(beyond, overlaps(job.pair, curve.twist[beyond == 1]).max(initial=0.0))
+    said += overlap_warnings(beyond, overlaps(job.pair, curve.twist[beyond == 1]).max(initial=0.0))
     if curve.failed.any():
         angles = ", ".join(f"{a:.6g}" for a in np.degrees(curve.pinion_angle[curve.failed])[:8])
         more = " ..." if curve.failed.sum() > 8 else ""

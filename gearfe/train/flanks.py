@@ -41,7 +41,7 @@ def check_flanks(train: GearTrain) -> None:
     if wrong.any():
         at = int(np.argmin(np.where(wrong, loads, np.inf).min(axis=0)))
         mesh = int(np.argmin(np.where(wrong[:, at], loads[:, at], np.inf)))
-        raise _told(train, mesh, float(times[at]), senses)
+        raise _back_flank_error(train, mesh, float(times[at]), senses)
 
 
 def one_sided(train: GearTrain) -> BoolArray:
@@ -68,7 +68,7 @@ def _inertia(train: GearTrain, times: Array) -> Array:
     return -np.outer(np.multiply(polar, ratios), push)
 
 
-def _told(train: GearTrain, number: int, time: float, senses: tuple[float, ...]) -> InputError:
+def _back_flank_error(train: GearTrain, number: int, time: float, senses: tuple[float, ...]) -> InputError:
     """The load that does most to press the back flanks of a mesh, and what to change."""
     mesh = train.meshes[number]
     alone = [

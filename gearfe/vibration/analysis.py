@@ -210,11 +210,11 @@ def steady_start(job: TrainJob, train: GearTrain, every: int) -> float:
 
 
 def record_start(
-    job: TrainJob, train: GearTrain, every: int, asked_ms: float | None, watch: Callable[[str], Any]
+    job: TrainJob, train: GearTrain, every: int, option_ms: float | None, watch: Callable[[str], Any]
 ) -> float:
     """Begin of the spectrum's record (s): the option's, or that of [spectrum]; "steady" is looked for."""
-    if asked_ms is not None:
-        return 1e-3 * asked_ms
+    if option_ms is not None:
+        return 1e-3 * option_ms
     given = job.spectrum.spectrum_from
     if given != STEADY:
         return 1e-3 * float(given)

@@ -183,8 +183,8 @@ def steady_from(time: Array, groups: list[Array], period: float | None) -> float
             low = round((start - time[0]) / step)
             some = values[low : low + max(2, round(part / step))]
             mean[i], rms[i] = some.mean(axis=0), some.std(axis=0)
-        tail = max(1, count // 4)
-        last = [level[-tail:].mean(axis=0) for level in (mean, rms)]
+        quarter = max(1, count // 4)
+        last = [level[-quarter:].mean(axis=0) for level in (mean, rms)]
         # what is little beside its group, or beside what it was at the start, need not come to rest
         least = STILL * np.maximum(rms.max(axis=0), last[1].max(initial=0.0))
         for level, end, floor in ((mean, last[0], np.maximum(least, last[1])), (rms, last[1], least)):
