@@ -12,6 +12,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from gearfe.rigid import constant, integrate
+from gearfe.runup.run_up import steady_state
 from gearfe.train import Damping, Load, TrainModel, build_train
 from gearfe.train.floquet import Linearised, multipliers, train_multipliers
 from gearfe.train.monodromy import flow, kick_times, monodromy
@@ -128,6 +129,9 @@ def test_multipliers_are_those_of_the_train_that_is_integrated(method: str, damp
     assert np.sort(np.abs(found))[::-1] == pytest.approx(np.sort(np.abs(expected))[::-1], abs=2e-6)
     if damping.beta == 0.0:
         assert np.abs(found).max() > 1.0 + 2e-5
+    # harmonic balance, without damping and with one mode exactly at five times the mesh frequency
+    balanced = steady_state(model, 600.0, tolerance=1e-4).multipliers
+    assert np.sort(np.abs(balanced)) == pytest.approx(np.sort(np.abs(expected)), abs=2e-4)
 
 
 def test_a_critically_damped_mode_has_no_eigenvectors_of_its_own() -> None:

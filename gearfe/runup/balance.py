@@ -260,7 +260,8 @@ def solve(
     H, lattice, scale = flexibility_of(system, speed, count), system.lattice(count), system.scale
     places = guess.copy()
     places[0] = places[0].real
-    at = evaluate(system, speed, places, lattice, H)
+    with np.errstate(invalid="ignore"):  # at the resonance of an undamped mode
+        at = evaluate(system, speed, places, lattice, H)
     size, taken = size_of(at.residual, scale), 0
     best, idle = (size, places, at), 0
     enough = FOUND * tolerance

@@ -127,13 +127,16 @@ class Linear:
     def _own(self, omega: Array) -> ComplexArray:
         """Flexibility of all freedoms without gyroscopic moments, (k, p, p)."""
         numerators = self._pairs.numerators
-        with np.errstate(invalid="ignore"):
-            real, imaginary = (part @ numerators for part in self._over(omega))
+        over = self._over(omega)
+        real, imaginary = (part @ numerators for part in over)
         k, p = len(omega), self.size + self.tilts.shape[1]
         count, w = numerators.shape[1] // 2, omega[:, None]
         values = np.empty((k, count), dtype=complex)
         values.real = real[:, count:] - w * imaginary[:, :count]
         values.imag = imaginary[:, count:] + w * real[:, :count]
+        for line, pair in zip(*np.nonzero((over[0] == 0.0) & (over[1] == 0.0)), strict=True):
+            reached = np.abs(numerators[pair]) > np.finfo(float).eps * np.abs(numerators).max(axis=0)
+            values[line, reached[:count] | reached[count:]] = np.inf  # an undamped mode at its resonance, where the freedoms reach it
         made: ComplexArray = values[:, self._entries].reshape(k, p, p)
         return made
 
@@ -195,12 +198,12 @@ class Linear:
         return made
 
     def _over(self, omega: Array) -> tuple[Array, Array]:
-        """Real and imaginary parts (k, n) of one over the denominators of all pairs."""
+        """Real and imaginary parts (k, n) of one over the denominators of all pairs; 0 exactly at an undamped pole."""
         sums = self._pairs.sums
-        with np.errstate(divide="ignore", invalid="ignore"):  # infinite at the resonance of an undamped mode
-            real, imaginary = sums[:, 1] - (omega**2)[:, None], -omega[:, None] * sums[:, 0]
-            size = 1.0 / (real**2 + imaginary**2)
-            return real * size, -imaginary * size
+        real, imaginary = sums[:, 1] - (omega**2)[:, None], -omega[:, None] * sums[:, 0]
+        size = real**2 + imaginary**2
+        size = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
+        return real * size, -imaginary * size
 
     @cached_property
     def _excited(self) -> tuple[Array, Array]:
