@@ -136,7 +136,7 @@ class Linear:
         values.imag = imaginary[:, count:] + w * real[:, :count]
         for line, pair in zip(*np.nonzero((over[0] == 0.0) & (over[1] == 0.0)), strict=True):
             reached = np.abs(numerators[pair]) > np.finfo(float).eps * np.abs(numerators).max(axis=0)
-            values[line, reached[:count] | reached[count:]] = np.inf  # an undamped mode at its resonance, where the freedoms reach it
+            values[line, reached[:count] | reached[count:]] = np.inf  # a resonance without damping
         made: ComplexArray = values[:, self._entries].reshape(k, p, p)
         return made
 
