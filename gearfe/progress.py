@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TextIO
 
 #: Seconds after which a run tells what it does, between two looks at it, and of a count before its rate is told.
@@ -206,3 +206,27 @@ def say(text: str) -> None:
     """Tell something once, on a line that stays."""
     if _displays and threading.current_thread() is threading.main_thread():
         _displays[-1].say(text)
+
+
+@dataclass
+class Stopwatch:
+    """Seconds by stage.
+
+    Attributes
+    ----------
+    begun
+        When the whole began, of `time.perf_counter`.
+    """
+
+    seconds: dict[str, float] = field(default_factory=dict)
+    begun: float = field(default_factory=time.perf_counter)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Add the time spent inside to the stage `name`."""
+        start = time.perf_counter()
+        try:
+            with stage(name):
+                yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start

@@ -18,7 +18,7 @@ def main(job_file: str = "geometry/gear_train.toml", out: str = "stiffness.csv")
     job = read_stiffness_job(job_file)
     curve = sweep_stiffness(job.pair, job.model, **job.sweep)
     curve.to_csv(out)
-    for row in zip(*(curve.table()[name] for name in ("pinion_angle_deg", "k_mesh_N_per_m", "status")), strict=True):
+    for row in zip(*(curve.columns()[name] for name in ("pinion_angle_deg", "k_mesh_N_per_m", "status")), strict=True):
         print("{:>8} deg  {:.10} N/m  {}".format(*row))
     print(f"written to {Path(out)}")
     return int(curve.failed.any())

@@ -29,7 +29,7 @@ def test_relief_as_a_deviation() -> None:
             roll = np.linspace(flank.start, flank.end, 400)
             deviations.append(ToothDeviations((Deviation.sampled(flank.relief, roll).scaled(-1.0),)))
         elastic = elastic_pair(plain, law="half_plane")
-        found = half_plane_pair(elastic, deviations=(deviations[0], deviations[1]))
+        found = half_plane_pair(elastic).deviated((deviations[0], deviations[1]))
         without = half_plane_pair(elastic)
         expected = half_plane_pair(elastic_pair(relieved, law="half_plane"))
         angles = angles_of(plain, 16)
@@ -51,7 +51,7 @@ def test_an_even_deviation_turns_the_wheel() -> None:
     layer = ToothDeviations((Deviation.straight([flank.start, flank.end], [height, height]),))
     plain = law_of("rounded")
     elastic = elastic_pair(pair, law="half_plane")
-    law = half_plane_pair(elastic, deviations=(layer, ToothDeviations()))
+    law = half_plane_pair(elastic).deviated((layer, ToothDeviations()))
     angles = angles_of(pair, 7)
     found, expected = law.flanks.touching(angles), plain.flanks.touching(angles)
     on_path = ((expected.place > 0.05) & (expected.place < 0.95)).all(axis=1)
@@ -71,7 +71,7 @@ def test_heights_are_those_of_the_flank_across_the_begin_of_a_relief() -> None:
     flank = face_of(pair.pinion).flank
     kink = flank.start + 0.55 * (flank.end - flank.start)
     relief = ToothDeviations((Deviation.straight([flank.start, kink, flank.end], [0.0, 0.0, -30e-6]),))
-    law = half_plane_pair(elastic_pair(pair, law="half_plane"), deviations=(relief, ToothDeviations()))
+    law = half_plane_pair(elastic_pair(pair, law="half_plane")).deviated((relief, ToothDeviations()))
     tables = law.tables.of(np.array([[0, 1]]))
     low, high = tables.low[0, 0, 0], tables.high[0, 0, 0]
     arcs = np.linspace(low + 0.2 * (high - low), high - 0.2 * (high - low), 4001)

@@ -97,7 +97,7 @@ def test_gears_exchanged(law) -> None:
     # the wheel's tooth -1, between the centres with the pinion's tooth 0, is its tooth 0 as a pinion
     as_pinion = tooth_deviations(WHEEL, relief[1], np.roll(turns[1], 1))
     as_wheel = tooth_deviations(PINION, relief[0], np.roll(turns[0], -1))
-    there = half_plane_pair(elastic_pair(other_pair), deviations=(as_pinion, as_wheel))
+    there = half_plane_pair(elastic_pair(other_pair)).deviated((as_pinion, as_wheel))
     angles, twist = np.linspace(0, 3, 12), np.full(12, math.radians(0.05))
     one = solve_half_plane(here, angles, twist)
     turned = -angles / PAIR.gear_ratio - math.pi / 30 + twist

@@ -10,8 +10,7 @@ import pytest
 
 from gearfe import progress
 from gearfe.cli import main
-from gearfe.progress import Display, _Stage, count, shown, stage
-from gearfe.stopwatch import Stopwatch
+from gearfe.progress import Display, Stopwatch, _Stage, count, shown, stage
 from gearfe.tables.examples import job_file
 
 

@@ -380,8 +380,8 @@ def test_the_error_estimate_finds_the_error(gears, elastic):
     assert np.isfinite(curve.relative_error).all()
     bare = at(gears, angles[:1], elastic)
     assert math.isnan(bare.worst_error)
-    assert "k_mesh_relative_error" in curve.table()
-    assert "k_mesh_relative_error" not in bare.table()
+    assert "k_mesh_relative_error" in curve.columns()
+    assert "k_mesh_relative_error" not in bare.columns()
 
 
 def test_progress_counts_up(gears, elastic):

@@ -28,7 +28,7 @@ CASES = Path(__file__).parent / "campaigns" / "kept" / "gears"
 
 @lru_cache
 def law_of(waves: float, amplitude: float) -> HalfPlanePair:
-    return half_plane_pair(elastic_pair(PAIR), deviations=(wave(PAIR.pinion, waves, amplitude), PLAIN))
+    return half_plane_pair(elastic_pair(PAIR)).deviated((wave(PAIR.pinion, waves, amplitude), PLAIN))
 
 
 def most_zones(found: Positions) -> int:

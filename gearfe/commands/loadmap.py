@@ -49,9 +49,9 @@ def run(args: argparse.Namespace) -> int:
     from ..loadmap.report import report_lines, summary, torque_table, warnings
     from ..loadmap.sweep import sweep_loads
     from ..output.files import output_folder, whole_set, write_csv, write_json
+    from ..progress import Stopwatch
     from ..stiffness.job import StiffnessJob
     from ..stiffness.report import deviation_lines
-    from ..stopwatch import Stopwatch
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("geometry"):

@@ -17,8 +17,8 @@ from .loadmap import add_loads, with_loads
 if TYPE_CHECKING:
     from ..contact.compliance import MeshingPair
     from ..loadmap.root_stress import PairRoots
+    from ..progress import Stopwatch
     from ..stiffness.job import StiffnessJob
-    from ..stopwatch import Stopwatch
 
 
 #: Files that a run can leave.
@@ -76,8 +76,8 @@ def run(args: argparse.Namespace) -> int:
     )
     from ..microgeometry.solve import load_mesh
     from ..output.files import output_folder, whole_set, write_csv, write_json
+    from ..progress import Stopwatch
     from ..stiffness.job import StiffnessJob
-    from ..stopwatch import Stopwatch
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     job = StiffnessJob(tables["pair"], with_keys(args, tables.get("stiffness", StiffnessTable()), "coarsen"), pair)
@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
     folder = output_folder(args.out)
     elastic, roots = condensed(job, table.root_stress, watch)
     with watch.stage("positions"):
-        law = half_plane_pair(elastic, deviations=deviations)
+        law = half_plane_pair(elastic).deviated(deviations)
         made = load_mesh(
             law,
             torques,

@@ -58,8 +58,8 @@ def run(args: argparse.Namespace) -> int:
     )
     from ..microgeometry.report import law_remarks
     from ..output.files import output_folder, whole_set, write_csv, write_json
+    from ..progress import Stopwatch
     from ..stiffness.job import StiffnessJob
-    from ..stopwatch import Stopwatch
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     job = StiffnessJob(tables["pair"], with_keys(args, tables.get("stiffness", StiffnessTable()), "coarsen"), pair)

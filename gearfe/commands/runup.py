@@ -40,9 +40,9 @@ def run(args: argparse.Namespace) -> int:
 
     from ..figures.runup import RunUpPictures
     from ..output.files import output_folder
+    from ..progress import Stopwatch
     from ..runup.files import RunUpChoice, write_runup
     from ..runup.job import described, solved
-    from ..stopwatch import Stopwatch
     from ..vibration.job import train_job
 
     watch = Stopwatch({"program start": time.perf_counter() - started})

@@ -84,10 +84,10 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from ..output.files import output_folder, whole_set, write_json
+    from ..progress import Stopwatch
     from ..stiffness.job import StiffnessJob
     from ..stiffness.report import report_lines, summary, warnings
     from ..stiffness.sweep import elastic_pair, sweep_stiffness
-    from ..stopwatch import Stopwatch
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("geometry"):

@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
         return _write_case(study, args.row, Path(args.write))
 
     from ..output.files import output_folder, whole_set, write_json
-    from ..stopwatch import Stopwatch
+    from ..progress import Stopwatch
     from ..study.report import report_lines
 
     watch = Stopwatch({"program start": time.perf_counter() - started})

@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..figures.train import TrainPictures
     from ..output.files import output_folder
-    from ..stopwatch import Stopwatch
+    from ..progress import Stopwatch
     from ..vibration.analysis import Analysis, options, record_start
     from ..vibration.files import OutputChoice, check_choice, write_run
     from ..vibration.job import train_job

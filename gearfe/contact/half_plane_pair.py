@@ -215,17 +215,11 @@ class HalfPlanePair:
         return HalfPlanePair(self.pair, ToothFlanks(self.pair, deviations), self.sides, self.width)
 
 
-def half_plane_pair(
-    elastic: MeshingPair, *, deviations: tuple[ToothDeviations, ToothDeviations] | None = None
-) -> HalfPlanePair:
-    """Prepare the law for meshed and condensed gears; their flanks may be coarse (a tenth of a module).
-
-    `deviations` None: those of `elastic`.
-    """
+def half_plane_pair(elastic: MeshingPair) -> HalfPlanePair:
+    """Prepare the law for meshed and condensed gears; their flanks may be coarse (a tenth of a module)."""
     pair = elastic.gears
-    teeth = ToothFlanks(pair, elastic.deviations if deviations is None else deviations)
     pinion, wheel = flank_compliance(pair.pinion, elastic.pinion), flank_compliance(pair.wheel, elastic.wheel)
-    return HalfPlanePair(pair, teeth, (pinion, wheel), elastic.width)
+    return HalfPlanePair(pair, ToothFlanks(pair, elastic.deviations), (pinion, wheel), elastic.width)
 
 
 #: Distance (m) of two contacts that is none.

@@ -236,12 +236,8 @@ class LoadMap(ShownTable):
         }
 
     def columns(self) -> dict[str, list[str]]:
-        """Those of the CSV file."""
-        return self.table()
-
-    def table(self) -> dict[str, list[str]]:
         """Columns of the CSV file as text, one row per cell: torque by torque, angle by angle."""
-        tables = [curve.table() for curve in self.curves]
+        tables = [curve.columns() for curve in self.curves]
         names = list(dict.fromkeys(name for one in tables for name in one))
         rows = len(self.pinion_angle)
         columns: dict[str, list[str]] = {TORQUE: []}
@@ -257,7 +253,7 @@ class LoadMap(ShownTable):
 
     def to_csv(self, path: str | Path) -> None:
         """Write the table; `from_csv` gives back every number exactly."""
-        write_csv(path, self.table())
+        write_csv(path, self.columns())
 
     @classmethod
     def from_csv(cls, path: str | Path) -> LoadMap:

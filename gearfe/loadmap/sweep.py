@@ -17,9 +17,9 @@ from ..contact.laws import DEFAULT_MODEL, PairModel
 from ..contact.position import Positions, joined, together
 from ..errors import InputError
 from ..gear.pair import GearPair
+from ..progress import Stopwatch
 from ..stiffness.positions import PositionSolver, Progress, at_torques, position_solver
 from ..stiffness.sweep import asked_positions, assembled_curve, distinct_angles, elastic_pair
-from ..stopwatch import Stopwatch
 from ..threads import one_thread
 from ..typing import Array
 from .load_map import LoadMap

@@ -302,10 +302,6 @@ class StiffnessCurve(ShownTable):
         }
 
     def columns(self) -> dict[str, list[str]]:
-        """Those of the CSV file."""
-        return self.table()
-
-    def table(self) -> dict[str, list[str]]:
         """Columns of the CSV file as text."""
         columns = {name: self._cells(name, attribute) for name, attribute in COLUMNS.items()}
         if math.isnan(self.worst_error):
@@ -327,7 +323,7 @@ class StiffnessCurve(ShownTable):
 
     def to_csv(self, path: str | Path) -> None:
         """Write the table; `from_csv` gives back every number exactly."""
-        write_csv(path, self.table())
+        write_csv(path, self.columns())
 
     @classmethod
     def from_csv(

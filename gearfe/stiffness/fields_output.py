@@ -20,9 +20,7 @@ from ..typing import Array, IntArray
 from .contact_pressure import FlankPressure, flank_pressures
 from .curve import StiffnessCurve
 from .fields import GearField, pair_recovery
-from .positions import PositionSolver, position_solver
-
-Progress = Callable[[int, int, str], None]
+from .positions import PositionSolver, Progress, position_solver
 
 GEARS = ("pinion", "wheel")
 #: Positions solved side by side.

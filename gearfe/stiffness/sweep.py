@@ -25,7 +25,7 @@ from ..errors import InputError
 from ..gear.pair import GearPair
 from ..gear.validity import MOST_OVERLAP, overlaps
 from ..meshing.tooth_sector import sector_mesh, sector_recipes
-from ..stopwatch import Stopwatch
+from ..progress import Stopwatch
 from ..threads import one_thread
 from ..typing import Array, IntArray
 from .contact_pressure import EDGES, contact_pressures

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..config import build, job_tables
 from ..gear.deviation import NOMINAL
-from ..stopwatch import Stopwatch
+from ..progress import Stopwatch
 from ..tables.loadmap import LoadMapTable
 from ..tables.stiffness import StiffnessTable
 from ..textfile import read_csv
@@ -75,7 +75,7 @@ def _stiffness(raw: Raw, path: Path, shared: Shared, estimate: bool) -> Answer:
     sweep = job.sweep
     elastic = _elastic(job, job.model, shared)
     curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=estimate, **sweep)
-    return Answer({"stiffness": curve.table()}, summary(job, curve, {}), _positions(curve.failed))
+    return Answer({"stiffness": curve.columns()}, summary(job, curve, {}), _positions(curve.failed))
 
 
 def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
@@ -95,7 +95,7 @@ def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
         kinematics=job.table.kinematics,
         elastic=_elastic(job, model, shared),
     )
-    rows: dict[str, Any] = {"loadmap": made.table(), "torques": torque_table(made)}
+    rows: dict[str, Any] = {"loadmap": made.columns(), "torques": torque_table(made)}
     return Answer(rows, summary(job, table, made, {}), _positions(made.failed))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InputError, given
 from ..output.files import whole_set, write_csv, write_json
-from ..stopwatch import Stopwatch
+from ..progress import Stopwatch
 from ..train.gear_train import GearTrain
 from ..train.model import TrainModel
 from ..train.response import TrainResponse
