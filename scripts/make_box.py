@@ -68,7 +68,7 @@ def write_box(folder: Path) -> None:
     meshio.write(folder / "box.inp", made, float_fmt=".12g")
     text = (folder / "box.inp").read_text(encoding="utf-8")
     text = text.replace("C3D10MH", "C3D10")  # the same nodes; every solver knows this name
-    (folder / "box.inp").write_text(text, encoding="utf-8")
+    (folder / "box.inp").write_text(text, encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

@@ -53,7 +53,7 @@ def replace(page: Path, lines: list[str]) -> None:
     """Put lines between the marks of a page."""
     before, _, rest = page.read_text(encoding="utf-8").partition(START)
     _, _, after = rest.partition(END)
-    page.write_text("\n".join([f"{before}{START}", *lines, f"{END}{after}"]), encoding="utf-8")
+    page.write_text("\n".join([f"{before}{START}", *lines, f"{END}{after}"]), encoding="utf-8", newline="\n")
 
 
 def main() -> None:

@@ -99,5 +99,5 @@ def _cell(text: str) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(reference_page(), encoding="utf-8")
+    PAGE.write_text(reference_page(), encoding="utf-8", newline="\n")
     print(f"written: {PAGE}")

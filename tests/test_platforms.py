@@ -68,6 +68,8 @@ def check_calls(tree: ast.AST) -> None:
             assert "b" in default or "encoding" in keywords, source
         if name in ("read_text", "write_text") and isinstance(call.func, ast.Attribute):
             assert "encoding" in keywords, source
+        if name == "write_text" or (name == "open" and mode(call)[0] in "wax" and "b" not in mode(call)):
+            assert "newline" in keywords, f"{source}: other ends of line on Windows"
         if name in ("writer", "DictWriter") and "csv" in source:
             assert "lineterminator" in keywords, f"{source}: two ends of line on Windows"
         if name in ("ProcessPoolExecutor", "Process", "Pool"):
@@ -101,6 +103,13 @@ import matplotlib.backends.backend_agg, matplotlib.font_manager, matplotlib.pypl
 import scipy.interpolate, scipy.sparse, scipy.sparse.linalg
 import scipy.linalg, scipy.optimize, scipy.signal, scipy.stats, subprocess, sys, tempfile, gmsh, numpy, types
 import threadpoolctl
+taken = set()
+def locking(handle, mode, size):  # as the library reference has it: an OSError where the bytes are locked
+    place = os.fstat(handle).st_ino
+    if mode != 2 or place in taken:
+        raise PermissionError(13, "Permission denied")
+    taken.add(place)
+sys.modules["msvcrt"] = types.SimpleNamespace(LK_NBLCK=2, locking=locking)
 threadpoolctl.sys = types.SimpleNamespace(**vars(sys))  # it would look for libraries of Windows
 sys.platform = "win32"
 for name in ("fcntl", "resource", "pwd", "grp", "termios"):
@@ -117,6 +126,8 @@ assert main(["new", "mechanism", crank]) == 0
 assert main(["mechanism", crank, "--until", "0.05", "--format", "mat,h5"]) == 0
 assert main(["study", study, "--out", "aus/study", "--jobs", "1"]) == 0
 assert main(["cache"]) == 0
+os.remove("aus/study/study.csv")  # its lock is still there in this process: a second writer
+assert main(["study", study, "--out", "aus/study", "--jobs", "1"]) == 2
 """
 
 
@@ -133,6 +144,7 @@ def test_commands_without_what_windows_lacks(tmp_path: Path) -> None:
     line = [sys.executable, "-c", WINDOWS, "getriebe ψ.toml", "kurbel.toml", "study.toml"]
     done = subprocess.run(line, cwd=folder, env={**environment, **settings}, capture_output=True, check=False)
     assert done.returncode == 0, done.stderr.decode("cp1252", "replace")
+    assert b"is being written by another study" in done.stderr
     assert b"getriebe \\u" in done.stdout  # the letter that is not there
     assert (folder / "out" / "getriebe ψ" / "stiffness" / "report.html").exists()
     assert (tmp_path / "AppData" / "gearfe").is_dir()

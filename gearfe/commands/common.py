@@ -164,9 +164,8 @@ def _keep(
                 pictures=[folder / name for name in names if Path(name).suffix in PICTURES],
                 job=("", "") if job is None else (str(job), Path(job).read_text(encoding="utf-8-sig")),
             )
-            (made / REPORT).write_text(
-                report_page(page, time.strftime("%Y-%m-%d %H:%M")), encoding="utf-8", errors="backslashreplace"
-            )
+            text = report_page(page, time.strftime("%Y-%m-%d %H:%M"))
+            (made / REPORT).write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
         return sorted(path.name for path in made.iterdir())
 
 

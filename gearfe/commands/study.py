@@ -119,7 +119,7 @@ def _write_case(study: Any, number: int, path: Path) -> int:
     head = f"# Case {number} of the study {study.path.name}: " + ", ".join(f"{k} = {v!r}" for k, v in values.items())
     raw = job_beside(study.task.tables(study.cases[number]), study.task.path.parent, path.absolute().parent)
     with whole_file(path) as temporary:
-        temporary.write_text(f"{head}\n\n{toml_document(raw)}", encoding="utf-8")
+        temporary.write_text(f"{head}\n\n{toml_document(raw)}", encoding="utf-8", newline="\n")
     print(f"written: {path}")
     print(f"run it:  gearfe {study.table.job} {path} --out out/{path.stem}")
     return 0

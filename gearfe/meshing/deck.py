@@ -74,7 +74,7 @@ def write_deck(path: str | Path, deck: Deck) -> None:
     lines += ["*NODE PRINT, NSET=N_wheel_bore, FREQUENCY=999", "RF"]
     lines += ["*NODE FILE, FREQUENCY=999", "U", "*EL FILE, FREQUENCY=999", "S", "*END STEP"]
     with whole_file(path) as temporary:
-        temporary.write_text("\n".join(lines) + "\n", encoding="ascii", errors="replace")
+        temporary.write_text("\n".join(lines) + "\n", encoding="ascii", errors="replace", newline="\n")
 
 
 def _mesh(deck: Deck) -> list[str]:

@@ -138,4 +138,4 @@ def _write_abaqus(
     for name, nodes in edges.items():
         lines.append(f"*SURFACE, NAME=S_{name}, TYPE=ELEMENT")
         lines += [f"{e + 1}, S{side + 1}" for e, side in (middle[int(node)] for node in nodes[:, 1])]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

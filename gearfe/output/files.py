@@ -151,7 +151,9 @@ def _listed(values: Any) -> Sequence[Any]:
 def write_json(path: str | Path, content: Mapping[str, Any]) -> None:
     """Write a summary file; numpy scalars and arrays become plain numbers and lists, not-a-number becomes null."""
     with whole_file(path) as temporary:
-        temporary.write_text(json.dumps(_plain(content), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        temporary.write_text(
+            json.dumps(_plain(content), indent=2, allow_nan=False) + "\n", encoding="utf-8", newline="\n"
+        )
 
 
 def _cell(value: Any) -> str:

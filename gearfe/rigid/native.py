@@ -127,7 +127,10 @@ def write(path: Path, code: ObjectCode) -> None:
     with suppress(OSError):
         with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
             file.write(hashlib.sha256(content).digest() + content)
-        os.replace(file.name, path)
+        try:
+            os.replace(file.name, path)
+        except OSError:  # Windows, while another program reads the old one
+            os.unlink(file.name)
 
 
 def _digest(text: bytes) -> str:

@@ -7,6 +7,7 @@ stand as they came; `finish` sorts them.
 from __future__ import annotations
 
 import csv
+import importlib
 import io
 import json
 import os
@@ -25,27 +26,26 @@ except ImportError:  # of POSIX alone
     fcntl = None  # type: ignore[assignment]
 
 TABLE, HEAD = "study.csv", "study.json"
+#: File of the folder that Windows locks; elsewhere the folder itself is locked.
+LOCK = ".study.lock"
 #: Columns beside parameters and outputs.
 FIRST, LAST = ("case",), ("status", "message", "seconds")
 
 
 @contextmanager
 def only_writer(folder: Path) -> Iterator[None]:
-    """Hold the folder; however the program ends, the system gives it free (flock(2), where system and disk have it).
+    """Hold the folder; however the program ends, the system gives it free (flock(2), or _locking of Windows).
 
     Raises
     ------
     InputError
         When another program holds it.
     """
-    if fcntl is None:
-        yield
-        return
-    handle = os.open(folder, os.O_RDONLY)
+    handle = os.open(folder, os.O_RDONLY) if fcntl is not None else os.open(folder / LOCK, os.O_RDWR | os.O_CREAT)
     try:
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+            _lock(handle)
+        except (BlockingIOError, PermissionError):  # as POSIX, as Windows has it
             problem, cure = "is being written by another study", "wait for its end, or choose another --out"
             raise InputError("--out", str(folder), problem, cure) from None
         except OSError:  # a file system without locks
@@ -53,6 +53,15 @@ def only_writer(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
+
+
+def _lock(handle: int) -> None:
+    """Lock what is open, or raise at once where another program has."""
+    if fcntl is not None:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    else:
+        windows: Any = importlib.import_module("msvcrt")
+        windows.locking(handle, windows.LK_NBLCK, 1)
 
 
 @contextmanager
@@ -107,7 +116,7 @@ class Journal:
         else:
             write_json(folder / HEAD, made)
             with whole_file(self.path) as temporary:
-                temporary.write_text(_line(self.columns), encoding="utf-8")
+                temporary.write_text(_line(self.columns), encoding="utf-8", newline="\n")
 
     def _same(self, path: Path, head: dict[str, Any]) -> dict[str, Any]:
         cure = "choose another --out, or give --restart to begin anew"
