@@ -5,9 +5,11 @@ from __future__ import annotations
 import codecs
 import csv
 import io
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-from .errors import InputError
+from .errors import InputError, unknown_name
 
 #: More than any job file or table has (bytes).
 LARGEST = 2**28
@@ -77,3 +79,37 @@ def read_csv(path: str | Path, field: str) -> dict[str, list[str]]:
             problem = f"line {number} has {len(row)} cells, the header {len(names)}"
             raise InputError(field, str(path), problem, "mend that line")
     return {name: [row[i] for row in rows[1:]] for i, name in enumerate(names)}
+
+
+def read_numbers(
+    path: Path, field: str, needed: Sequence[str], optional: Sequence[str] = (), *, others: bool = True
+) -> dict[str, Any]:
+    """Columns of finite numbers of a CSV file as arrays, by name; `others` tells whether more may stand beside them.
+
+    Raises
+    ------
+    InputError
+        When the file is missing or unreadable, a column is missing or unknown, a cell holds no finite number.
+    """
+    import numpy as np  # job files are read without it
+
+    rows = list(csv.reader(io.StringIO(read_text(path, field))))
+    header, known = [name.strip() for name in rows[0]] if rows else [], (*needed, *optional)
+    for name in () if others else header:
+        if name not in known:
+            raise unknown_name(f"{field} {path.name}, column", name, known)
+    for name in needed:
+        if name not in header:
+            raise InputError(field, path.name, f"has no column {name}", "its first line names the columns")
+    body = [row for row in rows[1:] if any(cell.strip() for cell in row)]
+    place = {name: i for i, name in enumerate(header) if name in known}
+    made = np.empty((len(body), len(place)))
+    for number, row in enumerate(body):
+        try:
+            made[number] = [float(row[i]) for i in place.values()]
+        except (ValueError, IndexError):
+            made[number] = np.nan
+        if len(row) != len(header) or not np.isfinite(made[number]).all():
+            problem = f"row {number + 1} must have {len(header)} numbers, all finite"
+            raise InputError(field, path.name, problem, "mend that row")
+    return dict(zip(place, made.T, strict=True))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError
 from ..tables.microgeometry import ENDS, STARTS, FlankTable, MicrogeometryTable
-from ..textfile import read_text
+from ..textfile import read_numbers
 from ..typing import Array, IntArray
 from . import pitch_errors
 from .deviation import Deviation, ToothDeviations
@@ -198,7 +196,7 @@ def _index_deviations(table: FlankTable, gear: Gear, where: str, folder: Path) -
         given = pitch_errors.from_single(1e-6 * np.array(table.single_pitch_um))
     elif table.pitch_csv is not None:
         field = f"{where}.pitch_csv"
-        columns = _columns(table.pitch_csv, folder, field, ("tooth", "pitch_um"))
+        columns = read_numbers(folder / table.pitch_csv, field, ("tooth", "pitch_um"), others=False)
         order = _teeth(columns["tooth"], gear, field, table.pitch_csv)
         given = 1e-6 * columns["pitch_um"][order]
     elif table.pitch_class is not None:
@@ -214,7 +212,8 @@ def _index_deviations(table: FlankTable, gear: Gear, where: str, folder: Path) -
 
 def _measured(name: str, gear: Gear, active: tuple[float, float], field: str, folder: Path) -> list[Deviation]:
     """One deviation, or one a tooth."""
-    columns = _columns(name, folder, field, ("deviation_um",), ("roll_length_mm", "diameter_mm", "tooth"))
+    optional = ("roll_length_mm", "diameter_mm", "tooth")
+    columns = read_numbers(folder / name, field, ("deviation_um",), optional, others=False)
     if "roll_length_mm" in columns:
         roll = 1e-3 * columns["roll_length_mm"]
     elif "diameter_mm" in columns:
@@ -254,30 +253,6 @@ def _teeth(numbers: Array, gear: Gear, field: str, name: str) -> IntArray:
         problem = f"must have the teeth 0 to {gear.teeth - 1}, each once: it has {len(numbers)}"
         raise InputError(field, name, problem, "list all teeth; tooth 0 stands on the line of centres at angle 0")
     return order
-
-
-def _columns(
-    name: str, folder: Path, field: str, needed: Sequence[str], optional: Sequence[str] = ()
-) -> dict[str, Array]:
-    """Columns of numbers of a CSV file."""
-    rows = list(csv.reader(io.StringIO(read_text(folder / name, field))))
-    header = [one.strip() for one in rows[0]] if rows else []
-    for one in header:
-        if one not in (*needed, *optional):
-            raise unknown_name(f"{field} {name}, column", one, (*needed, *optional))
-    for one in needed:
-        if one not in header:
-            raise InputError(field, name, f"has no column {one}", "its first line names the columns")
-    body = [row for row in rows[1:] if any(cell.strip() for cell in row)]
-    made = np.empty((len(body), len(header)))
-    for i, row in enumerate(body):
-        try:
-            made[i] = [float(cell) for cell in row]
-        except ValueError:
-            raise InputError(field, name, f"row {i + 1} must have {len(header)} numbers", "mend that row") from None
-    if not np.isfinite(made).all():
-        raise InputError(field, name, "holds numbers that are none", "mend it")
-    return dict(zip(header, made.T, strict=True))
 
 
 def _named(error: InputError, where: str) -> InputError:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..gear.derived import derived_geometry
+from ..gear.deviation_job import GEARS
 from ..gear.validity import overlap_warnings, overlaps
 from ..stiffness.contact_pressure import largest_pressures
 from ..stiffness.job import StiffnessJob
@@ -18,7 +19,6 @@ from ..tables.loadmap import LoadMapTable
 from ..typing import Array
 from ..versions import versions
 from .load_map import LoadMap
-from .root_map import GEARS
 
 
 def torque_table(made: LoadMap) -> dict[str, list[float]]:

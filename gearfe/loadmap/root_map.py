@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..gear.deviation_job import GEARS
 from ..stiffness.curve import numbers
 from ..typing import Array
-
-GEARS = ("pinion", "wheel")
 
 
 @dataclass(frozen=True)

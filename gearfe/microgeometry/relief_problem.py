@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..contact.half_plane_step import HalfPlanePair
 from ..errors import InputError
+from ..gear.deviation_job import GEARS
 from ..gear.modifications import FlankModification, Relief, ends_of, tooth_deviations
 from ..gear.pair import Gear
 from ..loadmap.root_stress import PairRoots
@@ -20,7 +21,6 @@ from .loaded_mesh import LoadedMesh
 from .solve import load_mesh
 
 QUANTITIES = ("tip_relief.amount", "tip_relief.length", "root_relief.amount", "root_relief.length", "crowning", "slope")
-GEARS = ("pinion", "wheel")
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError, unknown_name
 from ..spectrum import amplitude_spectrum, uniform_step
 from ..tables.spectrum import MeasuredTable
-from ..textfile import read_csv, read_text
+from ..textfile import read_numbers, read_text
 from ..typing import Array
 from .job import TrainJob
 
@@ -55,16 +55,12 @@ def _read(one: MeasuredTable, where: str, folder: Path) -> tuple[Array, Array, b
     """Abscissa, accelerations, and whether they are over the time."""
     if Path(one.file).suffix.lower() in (".uff", ".unv", ".uf58"):
         return read_universal(read_text(folder / one.file, where), one.number, where)
-    columns = read_csv(folder / one.file, where)
+    columns = read_numbers(folder / one.file, where, (VALUE,), ("time_s", "frequency_Hz"))
     over = next((name for name in ("time_s", "frequency_Hz") if name in columns), None)
-    if over is None or VALUE not in columns:
+    if over is None:
         cure = f"its first line names the columns: time_s (or frequency_Hz) and {VALUE}"
-        raise InputError(where, one.file, f"has no column {VALUE if over else 'time_s or frequency_Hz'}", cure)
-    try:
-        x, y = (np.array([float(cell) for cell in columns[name]]) for name in (over, VALUE))
-    except ValueError as error:
-        raise InputError(where, one.file, f"holds a cell that is no number ({error})", "mend it") from None
-    return _checked(x, y, over == "time_s", where)
+        raise InputError(where, one.file, "has no column time_s or frequency_Hz", cure)
+    return _checked(columns[over], columns[VALUE], over == "time_s", where)
 
 
 def _checked(x: Array, y: Array, over_time: bool, where: str) -> tuple[Array, Array, bool]:

@@ -17,7 +17,7 @@ from numpy.polynomial import chebyshev
 from ..errors import InputError
 from ..rigid import TimeFunction, constant, sine, smoothed_step
 from ..tables.timefunction import TrainFunctionTable, check_rising
-from ..textfile import read_csv
+from ..textfile import read_numbers
 from ..typing import Array
 
 #: Degree of a piece, its error in parts of the largest value, the same at kinks, halvings, and pieces at most.
@@ -81,16 +81,8 @@ def _through(points: Array, interpolation: str) -> TimeFunction:
 
 def _table(name: str, where: str, folder: Path) -> Array:
     """Points of a CSV file with the columns time_ms and value, (n, 2)."""
-    columns = read_csv(folder / name, where)
-    for one in ("time_ms", "value"):
-        if one not in columns:
-            raise InputError(where, name, f"has no column {one}", "its first line names the columns: time_ms,value")
-    try:
-        points = np.array([[float(cell) for cell in columns[one]] for one in ("time_ms", "value")]).T
-    except ValueError as error:
-        raise InputError(where, name, f"holds a cell that is no number ({error})", "mend it") from None
-    if not np.isfinite(points).all():
-        raise InputError(where, name, "holds numbers that are not finite", "mend it")
+    columns = read_numbers(folder / name, where, ("time_ms", "value"))
+    points = np.column_stack([columns["time_ms"], columns["value"]])
     check_rising(f"{where} time_ms", tuple(points[:, 0].tolist()))
     return points
 
