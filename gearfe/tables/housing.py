@@ -208,7 +208,9 @@ class HousingReductionTable:
     least_modes: int = quantity(40, low=0, high=2000, doc="modes kept at least when they are chosen by frequency")
     quasi_static_levels: int = quantity(1, low=0, high=6, doc="levels of quasi-static corrections; 0 for none")
     band_Hz: float = quantity(5000.0, above=0.0, doc="highest frequency of interest, for the error estimate (Hz)")
-    solver: str = quantity("auto", doc="sparse solver: auto, multifrontal, superlu")
+    solver: str = quantity(
+        "auto", doc="sparse solver: auto (the first that is installed)", choices=("auto", "multifrontal", "superlu")
+    )
 
 
 @dataclass(frozen=True)
