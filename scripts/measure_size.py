@@ -27,7 +27,7 @@ CAPABILITIES = {
     "run-up, steady states": "runup/* */runup.py figures/campbell.py",
     "flexible links, couplings, loads, analyses of mechanisms": """
         rigid/beam* rigid/belt.py rigid/cam.py rigid/gear_ratio.py rigid/rack.py rigid/rolling.py rigid/turning.py
-        rigid/equilibrium.py rigid/inverse.py rigid/modes.py rigid/statefunctions.py rigid/collocated.py
+        rigid/equilibrium.py rigid/inverse.py rigid/modes.py rigid/statefunctions.py rigid/collocation.py
         rigid/*tape* rigid/*quadratic* rigid/series.py rigid/corners.py mechanisms/load_series.py
         mechanisms/link* mechanisms/loads.py mechanisms/rest.py mechanisms/sensitivity.py mechanisms/solve.py
         mechanisms/sweep.py mechanisms/tables.py tables/beam.py

@@ -23,9 +23,9 @@ from gearfe.rigid import (
     integrate,
     taylor,
 )
+from gearfe.rigid.collocation import GAUSS, RADAU, scheme
 from gearfe.rigid.compiled import available
-from gearfe.rigid.explicit import on_constraints
-from gearfe.rigid.implicit import State, radau_step
+from gearfe.rigid.implicit import Stepper
 from gearfe.rigid.stiffness_estimate import fastest_rate
 
 from .rigid_cases import pendulum
@@ -215,23 +215,24 @@ def test_convergence_order_of_the_explicit_method():
     assert slope(steps, errors) >= 7.3
 
 
-def test_convergence_order_of_the_implicit_method():
-    """Fixed steps of the index-3 method with the projection after each: order 5 in the positions."""
+@pytest.mark.parametrize(("family", "order"), [(RADAU, 5), (GAUSS, 6)])
+def test_convergence_order_of_collocation(family, order):
+    """Three stages, fixed steps of the index-3 method with the projection after each: 2s - 1 and 2s."""
     system = pendulum(0.7, 1.0, 1.0)
     start = consistent_start(system)
     fine = integrate(system, [0.0, 1.0], tolerance=1e-13, start=start, backend="plain").q[-1, 2]
     errors = []
     steps = np.array([20, 28, 40])
     for count in steps:
+        step = Stepper(system, start, scheme(family, 3))
+        step.restart(system.acceleration(0.0, start.q, start.v)[0])
         q, v = start.q, start.v
         for k in range(count):
-            here = State(k / count, q, v, *system.acceleration(k / count, q, v))
-            made = radau_step(system, here, 1 / count, np.full(3, 1e-7), start.active)
-            assert made.converged
-            state = on_constraints(system, (k + 1) / count, made.q, made.v, start.active)
-            q, v = state[:3], state[3:]
+            assert step(k / count, 1 / count, q, v, np.full(3, 1e-9)) > 0
+            step.keep(1 / count)
+            q, v = step.w.qn.copy(), step.w.vn.copy()
         errors.append(abs(q[2] - fine))
-    assert slope(steps, errors) >= 4.5
+    assert slope(steps, errors) >= order - 0.5
 
 
 def test_stiff_system_takes_the_implicit_method():

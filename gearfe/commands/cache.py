@@ -70,6 +70,7 @@ def _compile() -> None:
     for forces in ((), (TurningFrame(1.0),)):  # the second with a load that depends on the state
         system = System([Linkage((rod,), (hinge,), forces)])
         integrate(system, [0.0, 1e-3], method="taylor", backend="compiled")
+    integrate(system, [0.0, 1e-3], method="implicit", backend="compiled")
 
 
 def _size(count: int) -> str:

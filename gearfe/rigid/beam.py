@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -30,6 +30,9 @@ from .contract import Element
 from .forces import Weight
 from .linkage import Linkage
 from .turning import TurningFrame
+
+if TYPE_CHECKING:
+    from .tape import Tape
 
 #: Gauss points of an element on -1..1 with their weights.
 GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(3)
@@ -146,6 +149,19 @@ class Beam(Element):
             for total, part in zip(whole, self._turning, strict=True):
                 total[np.ix_(self.places, self.places)] += part
         return Tangent(self, law, *whole)
+
+    def write(self, tape: Tape, places: IntArray) -> bool:
+        """Its points, weight and turning frame on a tape."""
+        own = places[self.places]
+        tape.constant[own] += self._weight
+        if self._turning is not None:
+            tape.blocks[1][np.ix_(own, own)] -= self._turning[0]
+            tape.blocks[0][np.ix_(own, own)] -= self._turning[1]
+        N, D = self.shapes(self.points)
+        nodes = 3 * np.repeat(np.arange(len(self.link.ends) - 1), len(GAUSS))[:, None] + np.arange(4)
+        shape, slope = (np.take_along_axis(values, nodes, axis=1) for values in (N, D))
+        tape.bars(own[3 * nodes], shape, slope, self.weights, self.stiffness, self.link.damping)
+        return True
 
     def stress(self, q: Array, v: Array) -> Array:
         """Axial force (N), shear force (N) and bending moment (N m) at the Gauss points, shape (points, 3)."""

@@ -14,7 +14,6 @@ from collections.abc import Callable
 import numpy as np
 
 from ..typing import Array
-from .collocated import QUINTIC
 from .steps import Status, StepControl
 from .system import System
 
@@ -22,6 +21,8 @@ from .system import System
 LOOKS, HALVINGS, PASSING = 8, 45, 1e-3
 #: A force that grows so many times from each of these distances (shares of the step) to the next has a pole.
 POLE, POLE_AT = 20.0, (1e-3, 1e-6, 1e-9)
+#: A run ends at this share of its length before a pole; until then steps go this part of the way.
+POLE_SHARE, POLE_NEARER = 1e-3, 0.7
 #: Steps with larger errors (over the tolerance) do not tell where corners are.
 TRUSTED = 1e3
 #: (q, q') at a share of a step.
@@ -65,11 +66,14 @@ class Corners:
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             low, high = (low, middle) if left(middle) else (middle, high)
+        distance = low * abs(h)
         if self._pole(t, h, path, low):
+            if distance > POLE_SHARE * self.control.span:  # goes on up to it
+                self.control.end_at(t + POLE_NEARER * low * h)
+                return True
             self.control.fail(Status.NOT_FINITE, 1.0)
             self.control.status = Status.NOT_FINITE
             return True
-        distance = low * abs(h)
         goal = distance - 0.5 * self.near if distance > self.near else 2.0 * self.near
         if goal >= abs(h):
             return False
@@ -91,12 +95,11 @@ class Corners:
         return True
 
 
-def collocated_path(h: float, known: tuple[Array, ...], speeds: Array) -> Path:
+def collocated_path(h: float, powers: Array, speeds: Array) -> Path:
     """Path of a step of the implicit method.
 
-    `known` are q, q' at its begin, q at the first two stages, q, q' at its end; `speeds` coefficients of powers of the
-    time since its end (velocities from the coordinates would be their rounding over the step).
+    `powers` are coefficients of powers of the share x of the step, `speeds` of powers of the time since its end
+    (velocities from the coordinates would be their rounding over the step).
     """
-    q0, v0, one, two, q1, v1 = known
-    powers = QUINTIC @ np.stack([q0, h * v0, one, two, q1, h * v1])
-    return lambda x: (x ** np.arange(6.0) @ powers, (x * h - h) ** np.arange(4.0) @ speeds)
+    p, r = np.arange(float(len(powers))), np.arange(float(len(speeds)))
+    return lambda x: (x**p @ powers, (x * h - h) ** r @ speeds)

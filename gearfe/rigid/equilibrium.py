@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import InputError
 from ..typing import Array
 from .carried import free_motions
-from .implicit import joint_stiffness
+from .numpy_equations import joint_stiffness
 from .start import Start
 from .system import System
 

@@ -22,15 +22,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..typing import Array
+from ..typing import Array, IntArray
 from .contract import Element
 from .forces import Weight
 from .linkage import Linkage
 from .quadratic import QuadraticJoint
 from .turning import TurningFrame
+
+if TYPE_CHECKING:
+    from .tape import Tape
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +143,15 @@ class Floating(Element):
         eta = self.shares(q)
         bent = self.body.quadratic @ eta
         return (self.body.linear + 0.5 * bent) @ eta, (self.body.linear + bent) @ self._slope(q)
+
+    def write(self, tape: Tape, places: IntArray) -> bool:
+        """Its strains, weight and turning frame on a tape."""
+        tape.constant[places] += self._weight
+        if self._turning is not None:
+            tape.blocks[1][np.ix_(places, places)] -= self._turning[0]
+            tape.blocks[0][np.ix_(places, places)] -= self._turning[1]
+        tape.floating(int(places[0]), self.body.linear, self.body.quadratic, self.body.damping)
+        return True
 
     def stress(self, q: Array, v: Array) -> Array:
         """e + tau e', shape (s,)."""

@@ -1,72 +1,89 @@
-"""Radau IIA of order 5 on the index-3 equations, for stiff and flexible systems.
+"""Implicit integration by collocation: Radau IIA for stiff and flexible systems, Gauss where energy counts.
 
-Three collocation stages of  M A = f(t, Q, V) - G^T Lambda,  g(t, Q) = 0  (Hairer & Wanner II, Secs. IV.8, VI.1, VII.4;
-the positions converge with order 5). After every step the velocities are projected onto G v = -dg/dt, and the
-multipliers
-follow from the accelerations, which restores the order of both. With Z = Q - q0 - c h v0 the stage accelerations are
-A^-2 Z / h^2, so Newton needs one real and one complex matrix of the size of the index-3 system:
-
-    [ mu^2/h^2 M - mu/h df/dv - df/dq + d(G^T Lambda)/dq    G^T ]
-    [ G                                                      0  ]
+Steps of `kernel_collocation`, compiled where the system can be written on a tape and numba is there, else in NumPy;
+this module chooses their lengths and keeps what they pass through. The order goes with the tolerance.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from ..typing import Array
-from .collocated import MIDDLE, C, collocated
+from . import (
+    kernel_collocation,
+    kernel_elastic,
+    kernel_equations,
+    kernel_matrices,
+    kernel_quadratic,
+    kernel_rows,
+    kernel_saddle,
+    kernel_stages,
+    kernel_tape,
+    numpy_equations,
+)
+from .collocation import RADAU, Collocated, Scheme, path_matrix, powers_of_path, scheme
+from .compiled import Kernels, bind
 from .contract import Element, LocalForce, ModalBlocks
 from .corners import TRUSTED, Corners, collocated_path
-from .dense import Polynomials, hermite
+from .dense import Polynomials
 from .elimination import ModalCoordinates, is_linear, modal_coordinates
-from .explicit import on_constraints
+from .kernel_collocation import Stages
+from .kernel_equations import Band, Equations, Scratch
+from .numpy_equations import SystemEquations
+from .ordering import narrow_order
+from .packed import Packed
 from .start import Start
 from .steps import Status, StepControl, StepLaw, Watch, first_step
 from .system import System
+from .tape import Program
 
-ROOT6 = math.sqrt(6.0)
-A = np.array(
-    [
-        [(88 - 7 * ROOT6) / 360, (296 - 169 * ROOT6) / 1800, (-2 + 3 * ROOT6) / 225],
-        [(296 + 169 * ROOT6) / 1800, (88 + 7 * ROOT6) / 360, (-2 - 3 * ROOT6) / 225],
-        [(16 - ROOT6) / 36, (16 + ROOT6) / 36, 1 / 9],
-    ]
+FUNCTIONS = (
+    kernel_rows.fill,
+    kernel_rows.copy,
+    kernel_rows.time_series,
+    *kernel_tape.FUNCTIONS,
+    kernel_quadratic.trigonometry_order,
+    kernel_quadratic.row_orders,
+    kernel_quadratic.gradients,
+    *kernel_saddle.FUNCTIONS,
+    *kernel_elastic.FUNCTIONS,
+    *kernel_equations.FUNCTIONS,
+    *kernel_matrices.FUNCTIONS,
+    *kernel_stages.FUNCTIONS,
+    kernel_collocation.collocation_step,
 )
-INVERSE = np.linalg.inv(A)
-MU, BASIS = np.linalg.eig(INVERSE)
-ORDER = np.argsort(np.abs(MU.imag))  # the real one first, then a conjugate pair
-MU, BASIS = MU[ORDER], BASIS[:, ORDER]
-BACK = np.linalg.inv(BASIS)
-ERROR = np.array([-13 - 7 * ROOT6, -13 + 7 * ROOT6, -1.0]) / 3
-#: Cubic through values at 0, C: its powers of x - 1, lowest first.
-CUBIC = np.linalg.inv(np.vander(np.append(0.0, C) - 1.0, increasing=True))
-MOST_NEWTON = 10
-LAW = StepLaw(exponent=0.25, growth=5.0, least_error=1e-8, predictive=True)
+HOT = ("fill", "copy", "cauchy", "weighted", "magnitude", "bar_strains", "coordinate", "turned")
+KERNELS = Kernels(
+    FUNCTIONS,
+    {**kernel_rows.GLOBALS, **kernel_tape.NAMES, **kernel_collocation.NAMES},
+    ("collocation_step",),
+    HOT,
+    making=14.0,
+)
+#: Stages of a step (measured: five and nine take as long for the same error).
+STAGES = 7
 #: Share of a step that is tried after Newton did not converge.
 NOT_SOLVED_SHARE = 0.3
+#: Rate of Newton's changes with which the next step is as long as the last; it grows with the step.
+EASY = 0.25
 #: Asked tolerance -> that of steps in modal coordinates: accelerations weigh the fast modes more than the state does.
-MODES_SHARE = 0.03
+MODES_SHARE = 0.01
 
 
-class State(NamedTuple):
-    """Where a step begins."""
-
-    t: float
-    q: Array
-    v: Array
-    a: Array
-    multipliers: Array
+@lru_cache(maxsize=1)
+def _plain() -> Any:
+    functions = (*numpy_equations.FUNCTIONS, kernel_collocation.collocation_step)
+    return bind(functions, {**numpy_equations.NAMES, **kernel_collocation.NAMES}, compiled=False).collocation_step
 
 
 def run_implicit(
     system: System, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
-    watch: Watch | None = None,
+    watch: Watch | None = None, family: str = RADAU, program: Program | None = None,
 ) -> tuple[Polynomials, Status, dict[str, Any]]:  # fmt: skip
     """Integrate; returns (dense output, status, statistics). Linear constant constraints are eliminated before."""
     options: dict[str, Any] = {"longest": longest, "most": most}
@@ -78,67 +95,211 @@ def run_implicit(
         def watch_modes(t: float, steps: int, state: Callable[[], tuple[Array, Array]]) -> bool:
             return watch is None or watch(t, steps, lambda: (modal.origin + modal.T @ state()[0], modal.T @ state()[1]))
 
-        within, status, statistics = run_implicit(inner, begin, times, tolerance=local, watch=watch_modes, **options)
+        within, status, statistics = run_implicit(
+            inner, begin, times, tolerance=local, watch=watch_modes, family=family, **options
+        )
         coefficients = within.coefficients @ modal.T.T
         coefficients[:, 0] += modal.origin
         return Polynomials(within.times, coefficients), status, {**statistics, "free_coordinates": inner.size}
-    active, units = start.active, system.units
-    pair = system.acceleration(start.time, start.q, start.v, active, start.excess)
-    here = State(start.time, start.q.copy(), start.v.copy(), *pair)
-    span = (start.time, float(times[-1]))
-    first = first_step(here.q / units, here.v / units, here.a / units, abs(span[1] - span[0]))
-    control = StepControl(LAW, span, first, breaks=system.breaks, watch=watch, **options)
-    corners = Corners(system, control, tolerance)
-    reach = np.maximum(np.abs(here.q), 1e-300)
-    record: list[State] = [here]
-    stages, forces = [], []
-    newton = 0
-    last: Array | None = None
-
-    def state() -> tuple[Array, Array]:
-        return here.q, here.v
-
-    while (h := control.next_step(state)) is not None:
-        least = 1e-3 * units * max(float((reach / units).max()), 1e-12)
-        limit = tolerance * np.maximum(np.maximum(reach, abs(h) * np.abs(here.v)), least)
-        made = radau_step(system, here, h, limit, active, last)
-        newton += made.iterations
-        if not made.converged:
-            control.fail(Status.NOT_SOLVED, NOT_SOLVED_SHARE)
-            continue
-        error = max(made.error, _gap_between(system, here, h, made, active) / tolerance)
-        path = collocated_path(h, (here.q, here.v, *made.stages, made.q, made.v), made.speeds)
-        if error <= TRUSTED and corners.cut(here.t, h, path):
-            continue
-        if error > 1.0:
-            control.reject(error)
-            continue
-        t = control.accept(error)
-        q, v = np.split(on_constraints(system, t, made.q, made.v, active, start.excess), 2)
-        here = State(t, q, v, *system.acceleration(t, q, v, active, start.excess))
-        reach, last = np.maximum(reach, np.abs(q)), None if corners.passing(h) else made.speeds
-        record.append(here)
-        stages.append(made.stages)
-        forces.append(made.forces)
-    # accelerations of stiff links at the steps' ends are the rounding of their strains; those of others are exact
-    dense: Polynomials
-    if system.stressed and stages:
-        ends, q, v = (np.array([r[k] for r in record]) for k in range(3))
-        dense = collocated(ends, q, v, np.array(stages), np.array(forces))
-    else:
-        dense = hermite(*(np.array([r[k] for r in record]) for k in range(4)))
-    counts = {"scheme": "Radau IIA of order 5", "steps": control.accepted}
-    return dense, control.status, {**counts, "newton_iterations": newton, "rejected": control.rejected}
+    step = Stepper(system, start, scheme(family, STAGES), program)
+    return step.run(system, start, float(times[-1]), tolerance, watch, options)
 
 
-def _gap_between(system: System, here: State, h: float, made: Step, active: np.ndarray) -> float:
-    """Largest gap of a constraint in the middle of a step, in its unit: where joints prescribe the motion, the error of
-    what they leave free says nothing about the curve between the stages."""
-    if not active.any():
-        return 0.0
-    middle = MIDDLE @ np.stack([here.q, h * here.v, *made.stages, made.q, h * made.v])
-    gap = system.residual(here.t + 0.5 * h, middle)[active] / system.row_units[active]
-    return float(np.abs(gap).max())
+class Stepper:
+    """Trial steps of one run, compiled or not.
+
+    Parameters
+    ----------
+    system, start
+        What moves.
+    tab : Scheme
+        Stages.
+    program : Program or None
+        The system on a tape without its redundant rows, for compiled steps.
+    """
+
+    def __init__(self, system: System, start: Start, tab: Scheme, program: Program | None = None) -> None:
+        self.tab = tab
+        plain = SystemEquations(system, start)
+        s, n, m = len(tab.c), system.size, int(start.active.sum())
+        self.w = work(s, n, m, plain.stresses, tab.inner + 4)
+        self.compile_seconds = 0.0
+        if program is None:
+            self._step: Callable[[], int] = lambda: _plain()(plain, self.w, tab)
+        else:
+            handed = Packed(equations(program, s, plain.stresses)), Packed(self.w), Packed(tab)
+            advance = KERNELS.compiled.collocation_step
+            self.w.now[1] = self.w.limit[0] = 1.0
+            self.compile_seconds = KERNELS.load(lambda: advance(*handed))
+            self._step = lambda: advance(*handed)
+        self._powers = np.arange(s + 1.0)
+
+    def restart(self, a: Array) -> None:
+        """The next step begins with a constant acceleration."""
+        self.w.speeds[:] = 0.0
+        self.w.speeds[1] = a
+
+    def keep(self, h: float) -> None:
+        """The step just made is the one before the next."""
+        w, tab = self.w, self.tab
+        found = tab.ahead @ np.vstack([w.v, w.V[:-1]])
+        w.speeds[: len(found)] = found / h ** self._powers[: len(found), None]
+        w.multipliers[:] = w.L[-2]
+
+    def __call__(self, t: float, h: float, q: Array, v: Array, limit: Array) -> int:
+        """See `kernel_collocation.collocation_step`."""
+        w, p = self.w, self._powers[1:]
+        w.now[:], w.q[:], w.v[:], w.limit[:] = (t, h), q, v, limit
+        w.guess[:, 1:] = (self.tab.c * h)[:, None] ** (p + 1.0) / (p + 1.0)
+        return self._step()
+
+    def run(
+        self, system: System, start: Start, end: float, tolerance: float, watch: Watch | None, options: dict[str, Any]
+    ) -> tuple[Polynomials, Status, dict[str, Any]]:
+        """From the start to the end, by steps whose errors stay below the tolerance."""
+        w, tab, units = self.w, self.tab, system.units
+        q, v, t = start.q.copy(), start.v.copy(), start.time
+        a, multipliers = system.acceleration(t, q, v, start.active, start.excess)
+        w.multipliers[:] = multipliers[start.active]
+        self.restart(a)
+        first = first_step(q / units, v / units, a / units, abs(end - t))
+        law = StepLaw(exponent=1.0 / (len(tab.c) + 1), growth=5.0, least_error=1e-8, predictive=True)
+        control = StepControl(law, (t, end), first, breaks=system.breaks, watch=watch, **options)
+        corners = Corners(system, control, tolerance)
+        reach = np.maximum(np.abs(q), 1e-300)
+        ends, known, forces, accelerations, newton = [t], [], [], [a], 0
+
+        def state() -> tuple[Array, Array]:
+            return q, v
+
+        while (h := control.next_step(state)) is not None:
+            least = 1e-3 * units * max(float((reach / units).max()), 1e-12)
+            limit = tolerance * np.maximum(np.maximum(reach, abs(h) * np.abs(v)), least)
+            count = self(t, h, q, v, limit)
+            newton += abs(count)
+            if count <= 0:
+                control.fail(Status.NOT_SOLVED, NOT_SOLVED_SHARE)
+                continue
+            error = max(float(w.told[0]), float(w.told[1]) / tolerance)
+            if corners.system is not None and error <= TRUSTED:
+                speeds = (tab.speed @ np.vstack([w.v, w.V[:-1]])) / h ** self._powers[:, None]
+                if corners.cut(t, h, collocated_path(h, powers_of_path(tab.path, w.known, tab.inner), speeds)):
+                    continue
+            if not error <= 1.0:
+                control.reject(error)
+                continue
+            t = control.accept(error)
+            control.trial = min(control.trial, abs(h) * EASY / max(float(w.told[2]), 1e-3))
+            known.append(w.known.copy())
+            forces.append(np.hstack([w.L[:-1], w.S[:-1]]))
+            ends.append(t)
+            self.keep(h)
+            q, v = w.qn.copy(), w.vn.copy()
+            if corners.passing(h) or not system.stressed:
+                accelerations.append(system.acceleration(t, q, v, start.active, start.excess)[0])
+            if corners.passing(h):
+                self.restart(accelerations[-1])
+            reach = np.maximum(reach, np.abs(q))
+        dense = self._dense(system, start, np.array(ends), known, forces, accelerations)
+        counts = {"scheme": f"{'Radau IIA' if tab.inner < len(tab.c) else 'Gauss'} of {len(tab.c)} stages"}
+        return dense, control.status, {
+            **counts, "steps": control.accepted, "newton_iterations": newton, "rejected": control.rejected,
+        }  # fmt: skip
+
+    def _dense(
+        self, system: System, start: Start, times: Array, known: list[Array], forces: list[Array],
+        accelerations: list[Array],
+    ) -> Polynomials:  # fmt: skip
+        """Polynomials through the stages of every step and the states at its ends.
+
+        Accelerations of stiff links at the ends are the rounding of their strains; those of others are exact and in it.
+        """
+        whole, inner = np.array(known), self.tab.inner
+        if not known:
+            return Polynomials(times, np.zeros((0, *self.w.known.shape)))
+        h = np.diff(times)[:, None, None]
+        path = self.tab.path if system.stressed else path_matrix(self.tab.c[:inner], accelerations=True)
+        if not system.stressed:
+            a = np.array(accelerations)[:, None, :]
+            whole = np.concatenate([whole, h**2 * a[:-1], h**2 * a[1:]], axis=1)
+        coefficients = powers_of_path(path, whole, inner) / h ** np.arange(len(path))[:, None]
+        if not system.stressed:
+            return Polynomials(times, coefficients)
+        s, m = len(self.tab.c), int(start.active.sum())
+        found = np.array(forces)
+        every = np.zeros((len(found), s, system.rows + found.shape[2] - m))
+        every[:, :, np.flatnonzero(start.active)] = found[:, :, :m]
+        every[:, :, system.rows :] = found[:, :, m:]
+        parts = self.tab.force @ every / h ** np.arange(s)[:, None]
+        return Collocated(times, coefficients, forces=Polynomials(times, parts))
+
+
+def work(s: int, n: int, m: int, k: int, known: int) -> Stages:
+    """Arrays of a step."""
+    shapes = [
+        (2,), (3,), (n,), (n,), (m,), (s, s + 1), (s + 1, n), (n,), (s, n), (s + 1, n), (s + 1, n), (s + 1, n),
+        (s + 1, m), (s + 1, k), (s + 1, n), (s + 1, m), (s, n), (s, m), (s, n), (s, m), (known, n), (n,), (n,),
+    ]  # fmt: skip
+    return Stages(*(np.zeros(shape) for shape in shapes))
+
+
+def equations(program: Program, s: int, stresses: int) -> Equations:
+    """A program with the order of its unknowns and work arrays."""
+    n, m, z = len(program.mass), len(program.rows.constant), len(program.mass) + 2 * len(program.angle)
+    N, r = n + m, (s - 1) // 2
+    held = np.argwhere(program.mass != 0.0)
+    band = _band(program, held)
+    place = program.floats.place
+    widest = int(max([4, *place[:, 1], *place[:, 2]]))
+    width = int(max([4, *(2 * place[:, 1] + 4)]))
+
+    def whole(*shape: int) -> Any:
+        return np.zeros(shape, dtype=np.int64)
+
+    own = Scratch(
+        P=np.zeros((z, 3)), R=np.zeros((len(program.code.op), 3)), TF=np.zeros((len(program.times.first) - 1, 4)),
+        pieces=whole(len(program.switches.register)), H=np.zeros(z), F=np.zeros(n), D=np.zeros((m, z)),
+        G=np.zeros((m, n)), K=np.zeros((n, n)), C=np.zeros((n, n)), B=np.zeros((2, N, N)),
+        A=np.zeros((r, N, N), dtype=complex), pivot=whole(r + 2, N), first=whole(r + 2, N), last=whole(r + 2, N),
+        x=np.zeros(N), y=np.zeros(N, dtype=complex), scale=np.zeros(r + 2), law=np.zeros((stresses, width)),
+        z=np.zeros((2, 4)), slope=np.zeros((3, 4)), by=np.zeros((2, 4, 4)), shapes=np.zeros((3, widest)),
+        blocks=np.zeros((widest, width)),
+    )  # fmt: skip
+    return Equations(program, band, own)
+
+
+def _band(program: Program, held: np.ndarray) -> Band:
+    """Which entries of the matrices may not vanish, and an order of the unknowns in which they lie in a narrow band."""
+    n, m = len(program.mass), len(program.rows.constant)
+
+    def coordinate(variables: np.ndarray) -> np.ndarray:
+        turning = program.angle[np.maximum(variables - n, 0) // 2] if len(program.angle) else variables
+        return np.where(variables < n, variables, turning)
+
+    rows, code = program.rows, program.code
+    filled = np.zeros((n, n), dtype=bool)
+    filled[tuple(held.T)] = True
+    filled[tuple(program.block.T)] = True
+    filled[program.angle, program.angle] = True
+    pairs = coordinate(rows.pair[:, 1:])
+    filled[pairs[:, 0], pairs[:, 1]] = filled[pairs[:, 1], pairs[:, 0]] = True
+    for nodes in program.bars.place:
+        own = (nodes[:, None] + np.arange(3)).ravel()
+        filled[np.ix_(own, own)] = True
+    for first, modes in program.floats.place[:, :2]:
+        own = first + np.arange(2 * modes + 4)
+        filled[np.ix_(own, own)] = True
+    acting = np.unique(coordinate(code.variable))
+    pushed = np.unique(coordinate(code.push[:, 1]))
+    filled[np.ix_(pushed, acting)] = True
+    graph = np.zeros((n + m, n + m), dtype=bool)
+    graph[:n, :n] = filled | filled.T
+    for row, at in ((rows.place[:, 0], coordinate(rows.place[:, 1])), *((rows.pair[:, 0], p) for p in pairs.T)):
+        graph[n + row, at] = graph[at, n + row] = True
+    place = np.empty(n + m, dtype=np.int64)
+    place[narrow_order(graph)] = np.arange(n + m)
+    entries = np.ascontiguousarray(np.argwhere(filled).astype(np.int64))
+    return Band(place, entries, np.ascontiguousarray(held.astype(np.int64)), program.mass[tuple(held.T)], acting)
 
 
 def in_modes(modal: ModalCoordinates, start: Start) -> tuple[System, Start]:
@@ -156,177 +317,3 @@ def in_modes(modal: ModalCoordinates, start: Start) -> tuple[System, Start]:
     elements.append(LocalForce((body,), modal.constant[:, None], lambda *_: np.ones(1)))
     q, v = modal.reduce(start.q, start.v)
     return System(elements), replace(start, q=q, v=v, active=np.zeros(0, dtype=bool), excess=np.zeros(0))
-
-
-def no_values() -> Array:
-    """Of a step that did not converge."""
-    return np.zeros((0, 0))
-
-
-@dataclass(frozen=True)
-class Step:
-    """One trial step."""
-
-    q: Array
-    v: Array
-    error: float
-    iterations: int
-    converged: bool
-    # of a step that converged: coordinates (2, n) of the first two stages, forces (3, all rows and stresses) at all
-    # three, speeds (4, n) as coefficients of powers of the time (s) since the step's end, lowest first
-    stages: Array = field(default_factory=no_values)
-    forces: Array = field(default_factory=no_values)
-    speeds: Array = field(default_factory=no_values)
-
-
-def radau_step(
-    system: System, here: State, h: float, limit: Array, active: np.ndarray, last: Array | None = None
-) -> Step:
-    """Simplified Newton on the three stages, and the embedded error estimate against `limit`.
-
-    `last`: the speeds of the step before, whose continuation is the first guess (Hairer & Wanner II, Sec. IV.8).
-    """
-    t, q, v, a, multipliers = here
-    n, m = system.size, int(active.sum())
-    at = np.append(C, 0.5) * h
-    if last is None:
-        ahead, speed = 0.5 * at[:, None] ** 2 * a, v + h / 2 * a
-    else:
-        powers = at[:, None] ** np.arange(1, 4)
-        ahead, speed = (at[:, None] * powers / np.arange(2, 5)) @ last[1:], v + powers[3] @ last[1:]
-    middle, middle_q, middle_v = t + h / 2, q + h / 2 * v + ahead[3], speed
-    by_q, by_v = system.force_jacobian(middle, middle_q, middle_v, stressed=False)
-    stresses, tangents = [], []
-    for element, index in system.stressed:
-        stress = element.stress(q[index], v[index])
-        tangent = element.tangent(middle_q[index], middle_v[index], stress)
-        by_q[np.ix_(index, index)] += tangent.by_q
-        by_v[np.ix_(index, index)] += tangent.by_v
-        tangents.append(tangent)
-        stresses.append([stress, stress, stress])
-    curvature = joint_stiffness(system, middle, middle_q, multipliers)
-    G = system.jacobian(middle, middle_q)[active]
-    M = system.mass
-    if not all(np.isfinite(x).all() for x in (middle_q, by_q, by_v, curvature, G)):
-        return Step(q, v, math.inf, 0, False)
-    solves = []
-    for mu in MU[:2]:
-        factor = mu.real if abs(mu.imag) < 1e-12 else mu
-        top = factor**2 / h**2 * M - factor / h * by_v - by_q + curvature
-        solves.append(saddle_solver(top, G, system.units, system.row_units[active]))
-    Z = ahead[:3]
-    L = np.tile(multipliers[active], (3, 1))
-    moved = math.inf
-    converged = False
-    iterations = 0
-    while iterations < MOST_NEWTON:
-        iterations += 1
-        V = v + INVERSE @ Z / h
-        acceleration = INVERSE @ (INVERSE @ Z) / h**2
-        rest, gaps = np.empty((3, n)), np.empty((3, m))
-        for i in range(3):
-            Q = q + C[i] * h * v + Z[i]
-            ti = t + C[i] * h
-            Gi = system.jacobian(ti, Q)[active]
-            force = system.force(ti, Q, V[i], stressed=False)
-            for k, (_, index) in enumerate(system.stressed):
-                pull, lacks = tangents[k].force(Q[index], V[i][index], stresses[k][i])
-                force[index] += pull
-                stresses[k][i] = stresses[k][i] + lacks
-            rest[i] = M @ acceleration[i] - force + Gi.T @ L[i]
-            gaps[i] = system.residual(ti, Q)[active]
-        r, g = BACK @ rest, BACK @ gaps
-        dz0, dl0 = solves[0](-r[0].real, -g[0].real)
-        dz1, dl1 = solves[1](-r[1], -g[1])
-        dZ = np.real(np.outer(BASIS[:, 0], dz0)) + 2 * np.real(np.outer(BASIS[:, 1], dz1))
-        dL = np.real(np.outer(BASIS[:, 0], dl0)) + 2 * np.real(np.outer(BASIS[:, 1], dl1))
-        Z, L = Z + dZ, L + dL
-        dV = INVERSE @ dZ / h
-        for k, (_, index) in enumerate(system.stressed):
-            for i in range(3):
-                stresses[k][i] = stresses[k][i] + tangents[k].change(dZ[i][index], dV[i][index])
-        size = float(np.abs(dZ / limit).max())
-        if not math.isfinite(size):
-            break
-        if size < 1e-3 or (size < 0.1 and moved < math.inf and size * size / max(moved, 1e-300) < 1e-3):
-            converged = True
-            break
-        if size > 2.0 * moved:
-            break
-        moved = size
-    if not converged:
-        return Step(q, v, math.inf, iterations, False)
-    new_q, new_v = q + h * v + Z[2], v + (INVERSE @ Z)[2] / h
-    first = v + ERROR @ (Z + np.outer(C, h * v)) / h
-    second = M @ (a + ERROR @ (INVERSE @ Z) / h**2)
-    mu = MU[0].real
-    off, _ = solves[0](second + (mu / h * M - by_v) @ first, np.zeros(m))
-    pulls = np.zeros((3, system.rows))
-    pulls[:, active] = L
-    speeds = np.vstack([v, v + INVERSE @ Z / h])
-    return Step(
-        new_q,
-        new_v,
-        float(np.sqrt(np.mean((off.real / limit) ** 2))),
-        iterations,
-        True,
-        stages=q + (C * h)[:2, None] * v + Z[:2],
-        forces=np.hstack([pulls, *(np.reshape(stress, (3, -1)) for stress in stresses)]),
-        speeds=(CUBIC @ speeds) / h ** np.arange(4)[:, None],
-    )
-
-
-def joint_stiffness(system: System, t: float, q: Array, multipliers: Array) -> Array:
-    """d(G^T lambda)/dq; closed form for the linkage, central differences otherwise."""
-    full = np.zeros((system.size, system.size))
-    at = 0
-    for element, index in system.joints:
-        part = multipliers[at : at + element.rows]
-        at += element.rows
-        if element.constant_jacobian or not part.any():
-            continue
-        own: Any = getattr(element, "curvature", None)
-        if own is not None:
-            full[np.ix_(index, index)] += own(q[index], part)
-            continue
-        local = q[index]
-        for j in range(len(index)):
-            step = 1e-6 * max(1.0, abs(local[j]))
-            ends = []
-            for sign in (1.0, -1.0):
-                moved = local.copy()
-                moved[j] += sign * step
-                ends.append(element.jacobian(t, moved).T @ part)  # type: ignore[attr-defined]
-            full[index, index[j]] += (ends[0] - ends[1]) / (2 * step)
-    return full
-
-
-def saddle_solver(
-    top: Array, G: Array, units: Array, row_units: Array
-) -> Callable[[Array, Array], tuple[Array, Array]]:
-    """Solver of [[top, G^T], [G, 0]], scaled by the units of coordinates and rows; sparse when it is large."""
-    n, m = len(top), len(G)
-    top, G = top * np.outer(units, units), G * units / row_units[:, None]
-    scale = 1.0 / max(1e-300, float(np.abs(np.diagonal(top)).max()))
-    matrix = np.zeros((n + m, n + m), dtype=top.dtype)
-    matrix[:n, :n] = top * scale
-    matrix[:n, n:] = G.T
-    matrix[n:, :n] = G
-    if n + m > 150:
-        from scipy.sparse import csc_matrix
-        from scipy.sparse.linalg import splu
-
-        solve: Callable[[Array], Array] = splu(csc_matrix(matrix)).solve
-    else:
-        from scipy.linalg import lu_factor, lu_solve
-
-        factor = lu_factor(matrix, check_finite=False)
-
-        def solve(b: Array) -> Array:
-            return lu_solve(factor, b, check_finite=False)
-
-    def apply(force: Array, gap: Array) -> tuple[Array, Array]:
-        x = solve(np.concatenate([force * units * scale, gap / row_units]).astype(matrix.dtype))
-        return x[:n] * units, x[n:] / scale / row_units
-
-    return apply

@@ -40,8 +40,11 @@ IMPLICIT_TRIAL, LOADING_LINALG, PLAIN_TRIAL = 0.02, 0.25, 0.01
 HOPELESS = 1e12
 #: How many times as fast as plain steps compiled ones are (measured: 170 with one body, 200 with seven).
 COMPILED_FASTER = 180.0
-#: Seconds that plain steps have cost in this process: from the price of the kernels on, these would have paid.
-_PLAIN_SPENT = [0.0]
+#: The same of the implicit method, for a link of four beam elements (measured).
+IMPLICIT_FASTER = 30.0
+#: Seconds that plain steps of each method have cost in this process: from the price of its kernels on, these would have
+#: paid.
+_PLAIN_SPENT = dict.fromkeys(METHODS, 0.0)
 COMPILING = "compiling the kernels once, about a quarter of a minute; backend='plain' does without"
 MISSING_NUMBA = "numba would make it some hundred times as fast: pip install 'gearfe[fast]'"
 
@@ -72,9 +75,10 @@ def integrate(
         "taylor": Taylor series, of the index-3 equations for planar linkages, in modal coordinates (compiled) where the
         constraints are linear and the only force has a law with a series: gear trains; else on a tape (compiled) where
         rows and forces can be written on one: loads by expression, frames in vectors. "explicit": any smooth system,
-        Runge-Kutta of order 8, with projection where constraints are not linear. "implicit": Radau IIA of order 5,
-        index 3, for stiff ones. "auto" takes the one of "taylor" (else "explicit") and "implicit" that is
-        predicted to take the fewest seconds, and changes over when that proves wrong (`gearfe.rigid.choice`).
+        Runge-Kutta of order 8, with projection where constraints are not linear. "implicit": Radau IIA of 7 stages, for
+        stiff ones, compiled where rows and forces can be written on a tape. "auto" takes the one of "taylor" (else
+        "explicit") and "implicit" that is predicted to take the fewest seconds, and changes over when that proves wrong
+        (`gearfe.rigid.choice`).
     tolerance : float
         Accuracy asked for, relative to 1 rad and to the size of the mechanism; 1e-13 to 0.1.
     start : Start, optional
@@ -119,7 +123,9 @@ def integrate(
         else:
             choice = Choice(ways, start, output_times, most=most_steps)
             legs = choice.run()
-            _PLAIN_SPENT[0] += sum(leg.seconds for leg in legs if leg.way.backend == "plain")
+            for leg in legs:
+                if leg.way.backend == "plain":
+                    _PLAIN_SPENT[leg.way.method] += leg.seconds
             statistics = joined_statistics(legs, choice.said)
             used = {leg.way.method for leg in legs}
             chosen, status = used.pop() if len(used) == 1 else "auto", legs[-1].status
@@ -170,24 +176,30 @@ def ways_of(
     rate = (
         partial(_rate, system) if linkage is not None or is_linear(system) else None
     )  # it does not see all other elements
-    implicit = Way("implicit", "", partial(_implicit, system, options), trial, rate=rate)
+    implicit = _implicit_ways(
+        system,
+        backend,
+        options,
+        Way("implicit", "plain", partial(_implicit, system, False, options), trial, rate=rate),
+        runs,
+    )
     auto = method == "auto"
     stuck = auto and (any(e.stiff for e in system.elements) or _hopeless(system, start, times))
     cure = _cure(system, backend)
     explicit = Way("explicit", "", partial(_explicit, system, backend, options), PLAIN_TRIAL, cure=cure)
     if stuck or method in ("implicit", "explicit"):
-        return [explicit] if method == "explicit" else [implicit]
+        return [explicit] if method == "explicit" else implicit
     if linkage is None:
         ways = _other_ways(system, auto, backend, options, explicit, runs)
-        return [*ways, implicit] if auto else ways
+        return [*ways, *implicit] if auto else ways
     plain = Way("taylor", "plain", partial(_taylor, linkage, False, options), PLAIN_TRIAL, cure=cure)
     if not use_compiled(backend):
-        return [plain, implicit] if auto else [plain]
+        return [plain, *implicit] if auto else [plain]
     loading = taylor.KERNELS.seconds / runs
     quick = Way("taylor", "compiled", partial(_taylor, linkage, True, options), loading, loading, COMPILED_FASTER)
-    if backend == "compiled" or loading <= _PLAIN_SPENT[0]:
-        return [quick, implicit] if auto else [quick]
-    return [plain, quick, implicit] if auto else [plain, quick]
+    if backend == "compiled" or loading <= _PLAIN_SPENT["taylor"]:
+        return [quick, *implicit] if auto else [quick]
+    return [plain, quick, *implicit] if auto else [plain, quick]
 
 
 def _other_ways(
@@ -205,7 +217,7 @@ def _other_ways(
         return [way]
     if not use_compiled(backend) or tape_program(system) is None:
         return [explicit]
-    return [way] if backend == "compiled" or loading / runs <= _PLAIN_SPENT[0] else [explicit, way]
+    return [way] if backend == "compiled" or loading / runs <= _PLAIN_SPENT["explicit"] else [explicit, way]
 
 
 def _tape_taylor(
@@ -269,12 +281,29 @@ def _modal_taylor(
     return run_modal_taylor(modal_coordinates(system), start, times, most=most, watch=watch, **options)
 
 
+def _implicit_ways(system: System, backend: str, options: dict[str, Any], plain: Way, runs: float) -> list[Way]:
+    """The implicit method plain, compiled, or the first and the second where that must be compiled now."""
+    if not use_compiled(backend) or series.written(system) is None:
+        return [replace(plain, backend="")]
+    from .implicit import KERNELS
+
+    loading = KERNELS.seconds / runs
+    quick = replace(
+        plain, backend="compiled", run=partial(_implicit, system, True, options), trial=IMPLICIT_TRIAL + loading
+    )
+    if backend == "compiled" or KERNELS.ready or loading <= _PLAIN_SPENT["implicit"]:
+        return [quick]
+    return [plain, replace(quick, loading=loading, ratio=IMPLICIT_FASTER)]
+
+
 def _implicit(
-    system: System, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
+    system: System, jit: bool, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
 ) -> Run:
     from .implicit import run_implicit
 
-    return run_implicit(system, start, times, most=most, watch=watch, **options)
+    program = series.written(system) if jit else None
+    held = None if program is None else series.without_redundant(program, start.active)
+    return run_implicit(system, start, times, most=most, watch=watch, program=held, **options)
 
 
 def _taylor(

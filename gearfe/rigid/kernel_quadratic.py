@@ -21,6 +21,7 @@ from .kernel_rows import fill, time_series
 from .kernel_tape import cauchy, tape_order, weighted
 
 if TYPE_CHECKING:
+    from .kernel_equations import Scratch
     from .kernel_steps import Run
     from .series import Work
     from .tape import Program
@@ -54,7 +55,7 @@ def row_orders(tb: Program, Z: Array, TF: Array, k: int, out: Array) -> None:
         out[rows.pair[p, 0]] += rows.weight[p] * cauchy(Z, rows.pair[p, 1], Z, rows.pair[p, 2], k)
 
 
-def gradients(tb: Program, Z: Array, w: Work) -> None:
+def gradients(tb: Program, Z: Array, w: Work | Scratch) -> None:
     """w.G := dg/dq where the variables are Z[:, 0]."""
     rows, G, D = tb.rows, w.G, w.D
     n = tb.mass.shape[0]

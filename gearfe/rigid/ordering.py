@@ -115,3 +115,33 @@ def _minimum_degree(rows: list[tuple[int, tuple[int, int]]], n_bodies: int) -> l
             near[other] -= {other, joint}
             heapq.heappush(heap, (len(near[other]), other))
     return order
+
+
+def narrow_order(graph: NDArray[np.bool_]) -> list[int]:
+    """Order of the unknowns of a symmetric pattern in which entries lie near the diagonal.
+
+    Reverse Cuthill-McKee from an unknown at the rim (George & Liu, Computer Solution of Large Sparse Positive Definite
+    Systems, Prentice-Hall 1981, ch. 4).
+    """
+    near = [np.flatnonzero(row) for row in graph]
+    degree = graph.sum(axis=1)
+    left = set(range(len(graph)))
+    order: list[int] = []
+
+    def walk(first: int) -> list[int]:
+        seen, found = {first}, [first]
+        for i in found:
+            for j in sorted(near[i].tolist(), key=lambda k: degree[k]):
+                if j in left and j not in seen:
+                    seen.add(j)
+                    found.append(j)
+        return found
+
+    while left:
+        begin = min(left, key=lambda k: degree[k])
+        for _ in range(3):  # the last one reached lies at the rim
+            begin = walk(begin)[-1]
+        part = walk(begin)
+        order += part
+        left -= set(part)
+    return order[::-1]

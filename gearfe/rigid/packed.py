@@ -14,12 +14,12 @@ import numpy as np
 
 #: Each member: type and number of axes of an array ("d", 2), a number ("d", -1), or the members of a named tuple.
 Layout = tuple[tuple[str, Any], ...]
-#: Types of elements: float64, int64, uint64.
-ELEMENTS = "dlL"
+#: Types of elements: float64, int64, uint64, complex128.
+ELEMENTS = "dlLD"
 
 
 class Packed:
-    """A named tuple of C-contiguous float64 and int64 arrays, floats, and of such tuples, as one block of words.
+    """A named tuple of C-contiguous arrays of those types, floats, and of such tuples, as one block of words.
 
     Parameters
     ----------

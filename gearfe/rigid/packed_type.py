@@ -16,7 +16,7 @@ from numba.np import arrayobj
 
 from .packed import Layout
 
-NUMBERS = {"d": types.float64, "l": types.int64, "L": types.uint64}
+NUMBERS = {"d": types.float64, "l": types.int64, "L": types.uint64, "D": types.complex128}
 
 
 class PackedType(types.Type):
@@ -82,9 +82,10 @@ def _get(context: Any, builder: Any, kind: Any, block: Any, name: str) -> Any:
     array_type = kind_of(inner)
     array = arrayobj.make_array(array_type)(context, builder)
     shape = [load(1 + axis) for axis in range(inner[1])]
-    strides = [word(8)]
+    size = word(16 if inner[0] == "D" else 8)
+    strides = [size]
     for length in reversed(shape[1:]):
         strides.insert(0, builder.mul(length, strides[0]))
     data = builder.inttoptr(load(0), context.get_value_type(array_type.dtype).as_pointer())
-    arrayobj.populate_array(array, data=data, shape=shape, strides=strides, itemsize=word(8), meminfo=None)
+    arrayobj.populate_array(array, data=data, shape=shape, strides=strides, itemsize=size, meminfo=None)
     return array._getvalue()

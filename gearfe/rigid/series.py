@@ -60,6 +60,12 @@ class Work(NamedTuple):
 
 
 def tape_program(system: System) -> Program | None:
+    """The system on a tape; None where an element has no series."""
+    program = written(system)
+    return None if program is None or len(program.bars.place) or len(program.floats.place) else program
+
+
+def written(system: System) -> Program | None:
     """The system on a tape; None where an element cannot be written."""
     known: dict[str, Program | None] = system.__dict__
     if "_program" not in known:
@@ -79,7 +85,7 @@ def _program(system: System) -> Program | None:
     return tape.program(system.mass, system.damping, system.stiffness, system.units)
 
 
-def _active(program: Program, active: np.ndarray) -> Program:
+def without_redundant(program: Program, active: np.ndarray) -> Program:
     """Without the rows that are redundant."""
     if active.all():
         return program
@@ -128,7 +134,7 @@ def run_series(
     """Integrate; returns (dense output, status, statistics). `local` is the tolerance of the last terms."""
     program = tape_program(system)
     assert program is not None  # the caller asks before
-    program = _active(program, start.active)
+    program = without_redundant(program, start.active)
     order, end, t = order_for(local), float(times[-1]), start.time
     sign = 1.0 if end >= t else -1.0
     run = kernel_steps.Run(t, end, sign, order, local, float(longest), system.breaks)

@@ -121,9 +121,10 @@ class StepControl:
     def accept(self, error: float) -> float:
         """The step is made; the time reached."""
         law = self.law
+        error = max(error, law.least_error)
         self.t = self.goals[0] if self._cut else self.t + self.sign * self._step
-        factor = SAFETY * max(error, law.least_error) ** -law.exponent
-        if law.predictive and self._before > 0.0 and error > 0.0:
+        factor = SAFETY * error**-law.exponent
+        if law.predictive and self._before > 0.0:
             factor = min(factor, factor * (self._before / error) ** law.exponent)
         self._before = error
         grown = self._step * min(law.growth, max(LEAST, factor))

@@ -63,6 +63,27 @@ class Switches(NamedTuple):
     above: IntArray  # (s,) for a denominator the register above it, -1 for none
 
 
+class Bars(NamedTuple):
+    """Gauss points of beams, p in all, each among four nodes."""
+
+    place: IntArray  # (p, 4) coordinate x of the nodes, y and angle follow it
+    shape: Array  # (p, 4) shape functions, and their derivatives by the arc length
+    slope: Array  # (p, 4)
+    weight: Array  # (p,)
+    stiffness: Array  # (p, 3) axial, shear, bending
+    damping: Array  # (p,) Kelvin and Voigt's time
+    stress: IntArray  # (p,) number of the first of its three stresses
+
+
+class Floats(NamedTuple):
+    """Bodies in floating frames."""
+
+    place: IntArray  # (b, 6) first coordinate, modes, strains, where its linear and quadratic begin, first stress
+    linear: Array
+    quadratic: Array
+    damping: Array  # (b,)
+
+
 class Program(NamedTuple):
     """Everything that the kernels need, for n coordinates and m rows."""
 
@@ -77,6 +98,8 @@ class Program(NamedTuple):
     code: Code
     switches: Switches
     times: Times
+    bars: Bars
+    floats: Floats
 
 
 class Tape:
@@ -100,6 +123,26 @@ class Tape:
         self._pushes: list[tuple[int, int, float]] = []
         self._switches: list[tuple[int, Array, Array, float, int]] = []
         self._known: dict[tuple[object, ...], int] = {}
+        self._bars: list[tuple[Array, ...]] = []
+        self._floats: list[tuple[tuple[int, ...], Array, Array, float]] = []
+        self.blocks = np.zeros((2, size, size))
+        self.stresses = 0
+
+    def bars(
+        self, place: IntArray, shape: Array, slope: Array, weight: Array, stiffness: Array, damping: float
+    ) -> None:
+        """Gauss points of a beam, as `Bars` has them; the stiffness, shape (3,), is that of all."""
+        count = len(place)
+        numbers = self.stresses + 3 * np.arange(count)
+        self._bars.append(
+            (place, shape, slope, weight, np.tile(stiffness, (count, 1)), np.full(count, damping), numbers)
+        )
+        self.stresses += 3 * count
+
+    def floating(self, first: int, linear: Array, quadratic: Array, damping: float) -> None:
+        """A body in a floating frame whose coordinates begin at `first`; L and Q of `floating.FloatingBody`."""
+        self._floats.append(((first, *linear.shape[::-1], self.stresses), linear, quadratic, damping))
+        self.stresses += len(linear)
 
     def turn(self, angle: int) -> tuple[int, int]:
         """Variables that are cosine and sine of the coordinate `angle`."""
@@ -281,12 +324,28 @@ class Tape:
             np.array([s[3] for s in self._switches], dtype=float),
             np.array([s[4] for s in self._switches], dtype=np.int64),
         )
+        damping, stiffness = damping + self.blocks[0], stiffness + self.blocks[1]
         block = np.argwhere((damping != 0.0) | (stiffness != 0.0)).astype(np.int64)
         at = tuple(block.T)
         return Program(
             np.ascontiguousarray(mass), np.ascontiguousarray(block), damping[at], stiffness[at], self.constant, unit,
             np.array(list(self.angles), dtype=np.int64), rows, code, switches, time_arrays(self._functions),
+            self._bar_arrays(), self._float_arrays(),
         )  # fmt: skip
+
+    def _bar_arrays(self) -> Bars:
+        whole, numbers = np.zeros((0, 4), dtype=np.int64), np.zeros(0, dtype=np.int64)
+        none = whole, np.zeros((0, 4)), np.zeros((0, 4)), np.zeros(0), np.zeros((0, 3)), np.zeros(0), numbers
+        return Bars(*(np.ascontiguousarray(np.concatenate(parts)) for parts in zip(none, *self._bars, strict=True)))
+
+    def _float_arrays(self) -> Floats:
+        place, linear, quadratic = [], [np.zeros(0)], [np.zeros(0)]
+        for (first, r, s, stress), L, Q, _ in self._floats:
+            place.append((first, r, s, sum(map(len, linear)), sum(map(len, quadratic)), stress))
+            linear.append(L.ravel())
+            quadratic.append(Q.ravel())
+        damping = np.array([part[3] for part in self._floats], dtype=float)
+        return Floats(_ints(place, 6), np.concatenate(linear), np.concatenate(quadratic), damping)
 
 
 def _ints(values: Sequence[Sequence[int]], width: int) -> IntArray:

@@ -1,0 +1,109 @@
+"""Collocation of second-order systems at the points of Radau IIA or of Gauss: coefficients for odd numbers of stages.
+
+With stages at c_1 .. c_s of the step h and A_ij = int_0^{c_i} l_j of Lagrange's polynomials l, positions q + c h v + Z
+have the velocities v + A^-1 Z / h and the accelerations A^-2 Z / h^2. Radau's points (c_s = 1) give the order 2s - 1
+and damp what is faster than the steps, Gauss's the order 2s and keep the energy (Hairer & Wanner II, Secs. IV.5, IV.8;
+Hairer, Lubich & Wanner, Geometric Numerical Integration, Sec. VI.4).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from ..typing import Array
+from .dense import Polynomials
+
+RADAU, GAUSS = "Radau IIA", "Gauss"
+#: Degree of the polynomial through the speeds of a step that guesses those of the next: more would swing beyond it.
+AHEAD = 4
+
+
+class Scheme(NamedTuple):
+    """Coefficients of s stages, r = (s - 1)/2 pairs of complex eigenvalues of A^-1."""
+
+    c: Array  # (s,) places of the stages in the step
+    inverse: Array  # (s, s) A^-1
+    twice: Array  # (s, s) A^-2
+    ends: Array  # (2, s) changes of q - h v and of h v at the step's end by Z
+    defect: Array  # (s,) from values at the stages to that of their polynomial at the begin
+    values: Array  # (r + 1, 2) eigenvalues, the real one first: real and imaginary parts
+    back: Array  # (s, s) to their components: of the real one, then real and imaginary part for each pair
+    basis: Array  # (s, s) its inverse
+    level: int  # derivative of the constraints that the stages hold
+    inner: int  # stages before the step's end
+    central: int  # stage next to the middle
+    path: Array  # (k, k) coefficients of powers of x from (q, h v, inner stages, q and h v at the end), k = inner + 4
+    middles: Array  # (s,) places between the stages
+    between: Array  # (s, k) from the same values to them
+    speed: Array  # (s + 1, s + 1) coefficients of powers of x - 1 from values at 0, c
+    ahead: Array  # (d + 1, s + 1) the same of the polynomial of degree d < s next to them
+    force: Array  # (s, s) coefficients of powers of x from values at the stages
+
+
+@lru_cache(maxsize=16)
+def scheme(family: str, stages: int) -> Scheme:
+    """Coefficients of a family with an odd number of stages."""
+    series = np.zeros(stages + 1)
+    series[stages], series[stages - 1] = 1.0, -1.0 if family == RADAU else 0.0
+    c = 0.5 + 0.5 * np.sort(np.real(np.polynomial.legendre.legroots(series)))
+    inner = stages
+    if family == RADAU:
+        c[-1], inner = 1.0, stages - 1
+    powers = np.arange(stages)
+    force = np.linalg.inv(c[:, None] ** powers)
+    A = (c[:, None] ** (powers + 1) / (powers + 1)) @ force
+    inverse = np.linalg.inv(A)
+    values, vectors = np.linalg.eig(inverse)
+    order = np.argsort(np.abs(values.imag))
+    kept = [order[0], *(k for k in order[1:] if values[k].imag > 0.0)]
+    columns = [np.real(vectors[:, kept[0]])]
+    for k in kept[1:]:
+        columns += [2.0 * np.real(vectors[:, k]), -2.0 * np.imag(vectors[:, k])]
+    basis = np.column_stack(columns)
+    b = (1.0 / (powers + 1)) @ force
+    p = np.arange(inner + 4.0)
+    path = path_matrix(c[:inner])
+    middles = 0.5 * (np.append(0.0, c[:-1]) + c)
+    between = middles[:, None] ** p @ path
+    between[:, 0] = 1.0 - between[:, 2:-1].sum(axis=1)  # not 1e-10 off, which the joints would see
+    before = np.vander(np.append(0.0, c) - 1.0, increasing=True)
+    return Scheme(
+        c=c, inverse=inverse, twice=inverse @ inverse, ends=np.stack([b @ inverse, b @ inverse @ inverse]),
+        defect=force[0].copy(), values=np.array([[values[k].real, values[k].imag] for k in kept]),
+        back=np.linalg.inv(basis), basis=basis, level=int(family == GAUSS), inner=inner,
+        central=int(np.abs(c - 0.5).argmin()),
+        path=path, middles=middles, between=between,
+        speed=np.linalg.inv(before), ahead=np.linalg.pinv(before[:, : min(AHEAD, stages - 1) + 1]), force=force,
+    )  # fmt: skip
+
+
+def path_matrix(c: Array, accelerations: bool = False) -> Array:
+    """Coefficients of powers of x from q, h v at 0, q at the places c, q, h v at 1, and from h^2 q'' at 0 and 1."""
+    p = np.arange(len(c) + (6.0 if accelerations else 4.0))
+    rows = [p == 0, p == 1, *c[:, None] ** p, np.ones_like(p), p]
+    return np.linalg.inv(np.array([*rows, *([2.0 * (p == 2), p * (p - 1.0)] if accelerations else [])], dtype=float))
+
+
+@dataclass(frozen=True)
+class Collocated(Polynomials):
+    """Dense output through the stages; `forces`: multipliers of all rows, then stresses of the elements that have some.
+
+    Both are unknowns of the stages. From the coordinates between them they would be as far off as the stiffness times
+    the error of a strain, which is that of the coordinates.
+    """
+
+    forces: Polynomials | None = None
+
+
+def powers_of_path(path: Array, known: Array, inner: int) -> Array:
+    """Coefficients of powers of x, the lowest first, from (..., k, n) as `path_matrix` has them."""
+    moved = known.copy()
+    for k in (*range(2, inner + 3), 0):
+        moved[..., k, :] -= known[..., 0, :]  # differences round less
+    made: Array = path @ moved
+    made[..., 0, :] += known[..., 0, :]
+    return made

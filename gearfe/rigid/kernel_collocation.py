@@ -1,0 +1,121 @@
+"""One step by collocation of  M a = f(t, q, v) - G^T lambda,  g(t, q) = 0:  simplified Newton on all stages.
+
+Radau's stages hold the constraints (index 3), Gauss's their rates (index 2: positions would cost its order; Ascher &
+Petzold, SIAM J. Numer. Anal. 28 (1991) 1097-1120). Stresses S of stiff links are unknowns beside the coordinates. With
+the matrices of one stage and the eigenvalues mu of A^-1 (`collocation`) the changes follow from one system of the size
+of the mechanism for each mu,
+
+    [ mu^2/h^2 M - mu/h df/dv - df/dq + d(G^T lambda)/dq    G^T ]
+    [ G                                                      0  ].
+
+The error is that of the stages' polynomials at the step's begin, v - V(0) and M (a - A(0)), filtered by the matrix of
+the real eigenvalue (Hairer & Wanner II, Secs. IV.8, VI.1, VII.4). The end is projected onto the constraints of
+positions and velocities by the least changes in the mass norm.
+
+The functions that this one calls are compiled loops on a `tape.Program` (`kernel_equations`, `kernel_matrices`,
+`kernel_stages`) or NumPy on any `System` (`numpy_equations`); both have these names.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..typing import Array
+
+if TYPE_CHECKING:
+    from .collocation import Scheme
+    from .kernel_equations import linearise, stage
+    from .kernel_matrices import factorise, solve
+    from .kernel_rows import copy, fill
+    from .kernel_stages import change, combine, defect, end_state, gap_between, keep_path, project
+
+#: Changes relative to the tolerance at which Newton's method ends, and at which its rate is trusted to tell the rest.
+SOLVED, TRUSTED_CHANGE, MOST_NEWTON = 1e-3, 0.3, 12
+
+
+class Stages(NamedTuple):
+    """State and unknowns of a step: s stages, and row s for its begin; n coordinates, m rows, k stresses."""
+
+    now: Array  # (2,) time at the begin and step (s)
+    told: Array  # (3,) error over the tolerance, gap of the rows between the stages, mean rate of Newton's changes
+    q: Array  # (n,) state at the begin
+    v: Array
+    multipliers: Array  # (m,) first guess
+    guess: Array  # (s, s + 1) from coefficients of the speeds before to Z
+    speeds: Array  # (s + 1, n) of powers of the time since the begin
+    limit: Array  # (n,) allowed errors of coordinates
+    Z: Array  # (s, n) positions less q + c h v
+    Q: Array  # (s + 1, n) positions, velocities, accelerations
+    V: Array
+    A: Array
+    L: Array  # (s + 1, m) multipliers
+    S: Array  # (s + 1, k) stresses
+    rest: Array  # (s + 1, n) what is left of the equations
+    gap: Array  # (s + 1, m)
+    r: Array  # (s, n) the same in components of the eigenvalues, then changes
+    g: Array  # (s, m)
+    dZ: Array  # (s, n) changes
+    dL: Array  # (s, m)
+    known: Array  # (inner + 4, n) as `Scheme.path` has them
+    qn: Array  # (n,) state at the end
+    vn: Array
+
+
+def collocation_step(eq: Any, w: Stages, tab: Scheme) -> int:
+    """One trial step; the number of Newton's iterations, its negative where they did not converge."""
+    s = tab.c.shape[0]
+    t = w.now[0]
+    h = w.now[1]
+    copy(w.q, w.Q[s])
+    copy(w.v, w.V[s])
+    fill(w.A[s], 0.0)
+    fill(w.L[s], 0.0)
+    stage(eq, w, tab, s, t)  # the stresses become those of the coordinates
+    stage(eq, w, tab, s, t)
+    combine(w.guess, w.speeds, w.Z)
+    for i in range(s):
+        copy(w.S[s], w.S[i])
+        copy(w.multipliers, w.L[i])
+    change(eq, w, tab, h, False)
+    if not linearise(eq, w, tab.central, t + tab.c[tab.central] * h):
+        return 0
+    for k in range(tab.values.shape[0]):
+        if not factorise(eq, w, tab, k, h):
+            return 0
+    moved = np.inf
+    started = 0.0
+    count = 0
+    solved = False
+    while count < MOST_NEWTON and not solved:
+        count += 1
+        for i in range(s):
+            stage(eq, w, tab, i, t + tab.c[i] * h)
+        combine(tab.back, w.rest, w.r)
+        combine(tab.back, w.gap, w.g)
+        for k in range(tab.values.shape[0]):
+            solve(eq, w, tab, k)
+        combine(tab.basis, w.r, w.dZ)
+        combine(tab.basis, w.g, w.dL)
+        size = change(eq, w, tab, h, True)
+        solved = size < SOLVED or (
+            size < TRUSTED_CHANGE and moved < np.inf and size * size / max(moved, 1e-300) < SOLVED
+        )
+        if count == 1:
+            started = size
+        if not size < 2.0 * moved:  # not a number, too
+            break
+        moved = size
+    if not solved:
+        return -count
+    w.told[0] = defect(eq, w, tab, h)
+    end_state(w, tab, h)
+    project(eq, w, t + h)
+    keep_path(w, h)
+    w.told[1] = gap_between(eq, w, tab, t, h)
+    w.told[2] = (moved / started) ** (1.0 / (count - 1.0)) if count > 2 and moved > 0.0 else 0.0
+    return count
+
+
+NAMES = {"SOLVED": SOLVED, "TRUSTED_CHANGE": TRUSTED_CHANGE, "MOST_NEWTON": MOST_NEWTON}

@@ -1,0 +1,163 @@
+"""Collocation: coefficients, and the kernels' loops against NumPy on the same step."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gearfe.config import build
+from gearfe.mechanisms.model import make_mechanism
+from gearfe.rigid import (
+    Body,
+    Gravity,
+    Hinge,
+    Linkage,
+    Prescribed,
+    QuadraticJoint,
+    Spring,
+    System,
+    consistent_start,
+    smoothed_step,
+)
+from gearfe.rigid.beam import Beam
+from gearfe.rigid.beam_link import BeamLink, Section
+from gearfe.rigid.collocation import GAUSS, RADAU, path_matrix, scheme
+from gearfe.rigid.floating import Floating, FloatingBody, frame_joint
+from gearfe.rigid.implicit import KERNELS, Stepper, equations
+from gearfe.rigid.ordering import narrow_order
+from gearfe.rigid.series import without_redundant, written
+from gearfe.rigid.start import Start
+from gearfe.rigid.turning import TurningFrame
+from gearfe.tables.mechanism import MechanismFile
+
+
+@pytest.mark.parametrize(("family", "order"), [(RADAU, 9), (GAUSS, 10)])
+def test_coefficients_integrate_polynomials(family: str, order: int) -> None:
+    """Five stages: t^k at the end up to the order; at the stages up to s (Hairer & Wanner II, Sec. IV.5)."""
+    tab = scheme(family, 5)
+    A = np.linalg.inv(tab.inverse)
+    b = tab.ends[0] @ A
+    for k in range(order):
+        assert b @ tab.c**k == pytest.approx(1.0 / (k + 1), abs=1e-13)
+    assert abs(b @ tab.c**order - 1.0 / (order + 1)) > 1e-7
+    for k in range(5):
+        np.testing.assert_allclose(A @ tab.c**k, tab.c ** (k + 1) / (k + 1), atol=1e-13)
+    mu = tab.values @ [1.0, 1j]
+    for k in range(2):
+        y = tab.back[2 * k + 1] + 1j * tab.back[2 * k + 2]
+        np.testing.assert_allclose(y @ tab.inverse, mu[k + 1] * y, atol=1e-10)
+
+
+def test_paths_go_through_what_they_are_given() -> None:
+    """A polynomial of degree 7, also by its second derivatives at both ends."""
+    made = np.polynomial.Polynomial(np.arange(1.0, 9.0))
+    c = scheme(RADAU, 3).c[:2]
+    known = [
+        made(0.0),
+        made.deriv()(0.0),
+        *made(c),
+        made(1.0),
+        made.deriv()(1.0),
+        made.deriv(2)(0.0),
+        made.deriv(2)(1.0),
+    ]
+    np.testing.assert_allclose(path_matrix(c, accelerations=True) @ known, made.coef, atol=1e-9)
+
+
+def test_a_narrow_order_of_a_shuffled_chain() -> None:
+    """Next to each other again: the band of a chain is 1."""
+    shuffled = np.random.default_rng(3).permutation(40)
+    graph = np.zeros((40, 40), dtype=bool)
+    for i, j in itertools.pairwise(shuffled):
+        graph[i, j] = graph[j, i] = True
+    order = narrow_order(graph)
+    place = np.argsort(order)
+    assert sorted(order) == list(range(40))
+    assert all(abs(place[i] - place[j]) == 1 for i, j in np.argwhere(graph))
+
+
+def bent_rod() -> System:
+    """A damped beam, hinged and driven, in a turning frame, with a spring to a body that slides on a quadratic row."""
+    link = BeamLink("rod", 1.0, Section.rectangle(0.05, 0.05), 1e9, 1000.0, elements=2, damping=1e-3)
+    bob = Body("bob", 2.0, 0.3, (0.1, 0.0), position=(1.2, 0.5), rate=0.4)
+    joints = (Hinge("rod", "ground"), Prescribed("rod", "rate", smoothed_step(0.1, 0.2, 2.0)))
+    spring = Spring(link.node_names[-1], "bob", point_b=(0.0, 0.1), stiffness=300.0, damping=2.0, free_length=0.3)
+    linkage = Linkage((*link.nodes(), bob), joints, (Gravity(), spring, TurningFrame(0.7)))
+    k = linkage.size
+    linear = np.zeros((1, k + 2))
+    linear[0, k - 3] = 1.0  # x cos(theta) + x = constant
+    row = QuadraticJoint((linkage,), linear, ((0, k - 3, k, 1.0),), np.array([-2.4]), angles=(k - 1,))
+    return System([linkage, Beam(linkage, link), row])
+
+
+def floating_bar() -> System:
+    """A body in a floating frame with two modes, hinged at its first interface, a rigid one fixed to its second."""
+    rng = np.random.default_rng(5)
+    N = rng.standard_normal((6, 4)) + 1j * rng.standard_normal((6, 4))
+    quadratic = rng.standard_normal((3, 2, 2))
+    body = FloatingBody(
+        N.conj().T @ N + 4.0 * np.eye(4), 40.0 * rng.standard_normal((3, 2)), quadratic + quadratic.transpose(0, 2, 1),
+        np.array([0.0, 1.0 + 0.0j]), np.array([[0.0, 0.0], [0.1 + 0.02j, 0.3j]]), np.array([[0.0, 0.0], [0.1j, 0.4j]]),
+        1e-3, 1.0,
+    )  # fmt: skip
+    ends = (Body("first", 0.0, 0.0), Body("last", 1.0, 0.2, position=(1.0, 0.0)))
+    linkage = Linkage(ends, (Hinge("first", "ground"),), (Gravity(), TurningFrame(0.5)))
+    element = Floating(body, linkage, "bar", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    return System([element, linkage, frame_joint(element, linkage, ("first", "last"))])
+
+
+def expression_load() -> System:
+    """A double pendulum whose motor brakes, with a stop by max()."""
+    raw: dict[str, Any] = {
+        "run": {"end_s": 1.0, "step_s": 0.1},
+        "bodies": {
+            name: {
+                "mass_kg": 1.0, "inertia_kg_m2": 0.2, "centre_m": [0.5, 0.0], "position_m": [x, 0.0],
+                "points_m": {"tip": [1.0, 0.0]}, "rate_rad_per_s": 0.5,
+            }
+            for name, x in (("one", 0.0), ("two", 1.0))
+        },
+        "joints": {
+            "O": {"type": "hinge", "body": "one"},
+            "P": {"type": "hinge", "body": "two", "to": "one", "to_point": "tip"},
+        },
+        "forces": {
+            "weight": {"type": "gravity", "acceleration_m_per_s2": [0.0, -9.81]},
+            "motor": {
+                "type": "moment", "body": "two",
+                "moment_N_m": "3*sin(angle(one)) - rate(two)*vx(two.tip) + max(0, 2 - y(two.tip)*time)",
+            },
+        },
+    }  # fmt: skip
+    return make_mechanism(build(MechanismFile, raw, "")).system
+
+
+@pytest.mark.parametrize("family", [RADAU, GAUSS])
+@pytest.mark.parametrize("make", [bent_rod, floating_bar, expression_load])
+def test_kernels_step_as_numpy_does(make: Any, family: str) -> None:
+    """Three steps of three stages: states, multipliers, stresses, errors; the loops run uncompiled here."""
+    system = make()
+    start: Start = consistent_start(system, 0.02)
+    tab = scheme(family, 3)
+    one, two = Stepper(system, start, tab), Stepper(system, start, tab)
+    program = written(system)
+    assert program is not None
+    eq = equations(without_redundant(program, start.active), 3, one.w.S.shape[1])
+    two._step = lambda: KERNELS.plain.collocation_step(eq, two.w, tab)
+    q, v, limit = start.q, start.v, np.full(system.size, 1e-9)
+    for step in (one, two):
+        step.restart(system.acceleration(0.02, q, v, start.active, start.excess)[0])
+    for k in range(3):
+        counts = [step(0.02 + 0.002 * k, 0.002, q, v, limit) for step in (one, two)]
+        assert counts[0] == counts[1] > 0
+        for name in ("qn", "vn", "Z", "V", "S", "L", "known"):
+            mine, other = getattr(one.w, name), getattr(two.w, name)
+            size = np.abs(mine).max(initial=0.0)
+            np.testing.assert_allclose(other, mine, rtol=1e-7, atol=1e-8 * size, err_msg=name)
+        assert two.w.told[0] == pytest.approx(one.w.told[0], rel=1e-3)
+        for step in (one, two):
+            step.keep(0.002)
+        q, v = one.w.qn.copy(), one.w.vn.copy()
