@@ -73,6 +73,9 @@ def test_the_command_names_contact_boundaries_and_draws(tmp_path, capsys):
     assert out.with_suffix(".png").stat().st_size > 20000
     for wrong in (["--teeth", "0"], ["--teeth", "2", "--sector"], ["--deck"]):
         assert main(["mesh", job, "--out", str(out), *wrong]) == 2
+    line = ["mesh", job, "--out", str(tmp_path / "pair.inp"), "--deck", "--teeth", "1", *COARSE]
+    assert main(line) == 2  # two pairs bear at 0 deg
+    assert "give 2 or more" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
+from gearfe.figures.campbell import OrderLine, _label_orders
 from gearfe.figures.spectra import label_lines
 from gearfe.figures.stiffness import ellipse
 from gearfe.figures.style import fixed
@@ -32,6 +33,23 @@ def test_labels_keep_apart(seed):
         assert not ((tips[:, 0] > own.x0) & (tips[:, 0] < own.x1) & (tips[:, 1] > own.y0)).any()
         for other in axes.texts[:number]:
             assert not own.overlaps(Text.get_window_extent(other))
+
+
+@pytest.mark.parametrize("slope", [3.2e-3, 16.5e-3])
+def test_names_of_orders_stay_in_the_picture_and_apart(slope):
+    """From few orders, whose names stand at the right end, to many that leave at the top, close to the left end."""
+    figure = fixed(8.0, 4.0)
+    axes = figure.add_axes((0.1, 0.1, 0.85, 0.8))
+    axes.set_xlim(300.0, 1200.0)
+    axes.set_ylim(0.0, 5.0)
+    _label_orders(axes, [OrderLine(f"{k}×m1", k * slope, 0) for k in range(1, 7)], 300.0, 1200.0, 5.0, ["k"])
+    figure.canvas.draw()
+    frame, boxes = axes.get_window_extent(), [Text.get_window_extent(text) for text in axes.texts]
+    assert (len(boxes) > 3) == (slope < 0.01)
+    for number, own in enumerate(boxes):
+        assert frame.x0 <= own.x0 <= own.x1 <= frame.x1
+        assert own.y1 <= frame.y1
+        assert not any(own.overlaps(other) for other in boxes[:number])
 
 
 def test_the_ellipse_of_a_hertzian_pressure_is_itself():

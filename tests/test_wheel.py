@@ -34,7 +34,7 @@ stiffness pair.toml --fields 5 --angles 1 4 9 --coarsen 3 --report --format npz,
 loadmap map.toml --positions 4 --set stiffness.coarsen=3 --set stiffness.torque_Nm=50
 microgeometry micro.toml --set stiffness.coarsen=3 --set microgeometry.torques_Nm=[50]
 relief micro.toml --no-pictures
-mesh pair.toml --deck --teeth 1 --coarsen 4
+mesh pair.toml --deck --teeth 2 --coarsen 4
 mechanism crank.toml --until 0.2 --report
 housing box.toml --json
 vibration gearbox.toml --set train.housing=rigid --set train.duration_ms=1.0

@@ -168,12 +168,16 @@ def _deck(args: argparse.Namespace, job: StiffnessJob) -> tuple[dict[str, MeshPa
     from ..meshing.deck import Deck, write_deck
     from ..stiffness.sweep import sweep_stiffness
 
-    args.teeth = DECK_TEETH if args.teeth is None else args.teeth
     sweep = {**job.sweep, "angles": np.array([math.radians(args.angle_deg)])}
     curve = sweep_stiffness(job.pair, job.model, **sweep)
     twist, torque = float(curve.twist[0]), float(curve.torque_wheel[0])
     if not math.isfinite(torque) or twist <= 0.0:
         raise InputError("--deck", None, f"the position has no solution here ({curve.status[0]})", "try another load")
+    least = max(2, int(np.sum(curve.load_share[0] > 0.0)))  # of one tooth each, the two may be of different pairs
+    args.teeth = max(DECK_TEETH, least) if args.teeth is None else args.teeth
+    if args.teeth < least:
+        problem = "leaves tooth pairs that bear without a contact boundary: the deck would not find equilibrium"
+        raise InputError("--teeth", args.teeth, problem, f"give {least} or more, or leave it out ({DECK_TEETH})")
     parts = _parts(args, job, wheel_angle=float(curve.wheel_angle[0]) - twist)
     pair = job.pair
     width = min(pair.pinion.face_width, pair.wheel.face_width)

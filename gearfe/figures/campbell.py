@@ -160,18 +160,20 @@ def order_lines(run: RunUp, multiples: int) -> list[OrderLine]:
 def _label_orders(
     axes: Any, lines: Sequence[OrderLine], low: float, high: float, highest: float, colours: Sequence[str]
 ) -> None:
-    """Names of orders where their lines leave the picture; one that would stand on another's is left out."""
-    taken = -math.inf
+    """Names of orders where their lines leave the picture.
+
+    One that would stand on another's, or left of the picture, is left out.
+    """
+    taken = low  # no label leaves the picture
     for line in sorted(lines, key=lambda line: -line.slope):
         end, above = min(high, highest / line.slope), line.slope * high > highest
         if end <= low or (above and end < taken + ROOM * (high - low)):
             continue
         taken = end if above else taken
         y = 0.985 * highest if above else line.slope * (high - 0.01 * (high - low))
-        right = above and end < low + ROOM * (high - low)  # left of the line it would leave the picture
         axes.annotate(
-            line.label, (y / line.slope, y), (4 if right else -4, 0) if above else (0, 3), textcoords="offset points",
-            fontsize=7.5, color=colours[line.mesh], ha="left" if right else "right", va="top" if above else "bottom",
+            line.label, (y / line.slope, y), (-4, 0) if above else (0, 3), textcoords="offset points",
+            fontsize=7.5, color=colours[line.mesh], ha="right", va="top" if above else "bottom",
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6}, zorder=5,
         )  # fmt: skip
 
