@@ -132,6 +132,7 @@ class _Walk:
         self.back: list[Orbit] = []  # on this branch, to extrapolate from
         self.number = 0  # of the asked speed that was reached
         self.heading = 1
+        self.step = FIRST  # along the curve, from one asked speed to the next
 
     def run(self, start: Orbit, progress: Callable[[int, int], None] | None) -> Curve:
         orbit, note = self._kept(start), ""
@@ -147,7 +148,7 @@ class _Walk:
             made = self._onward(target) if self.heading > 0 else None
             passes = None if made is None else settled(self.system, *made, self.tolerance)
             if passes is not None and passes.found:
-                self.number += 1
+                self.number, self.step = self.number + 1, FIRST
                 orbit = self._kept(passes)
                 continue
             found = self._stepwise(orbit)
@@ -206,7 +207,7 @@ class _Walk:
         if place is None:
             return f"no direction of the curve at {orbit.speed:.6g} rad/s"
         place = self._toward(orbit, place)
-        step, speeds = FIRST, self.speeds
+        step, speeds = self.step, self.speeds
         for _ in range(MOST):
             new, quick = self._corrected(place, step)
             if new is None:
@@ -237,7 +238,7 @@ class _Walk:
                 if landed is None:
                     return f"no motion was found at {speeds[passed[0]]:.6g} rad/s on this branch"
                 self.number = passed[0]
-                self.last = new if turned else place
+                self.last, self.step = new if turned else place, step
                 return self._kept(landed)
             if off:
                 self.number = -1 if self.heading < 0 else len(speeds)
