@@ -30,6 +30,7 @@ from gearfe.rigid.implicit import KERNELS, Stepper, equations
 from gearfe.rigid.ordering import narrow_order
 from gearfe.rigid.series import without_redundant, written
 from gearfe.rigid.start import Start
+from gearfe.rigid.steps import Status, StepControl, StepLaw
 from gearfe.rigid.turning import TurningFrame
 from gearfe.tables.mechanism import MechanismFile
 
@@ -161,3 +162,14 @@ def test_kernels_step_as_numpy_does(make: Any, family: str) -> None:
         for step in (one, two):
             step.keep(0.002)
         q, v = one.w.qn.copy(), one.w.vn.copy()
+
+
+def test_a_run_that_comes_within_rounding_of_its_end_is_done() -> None:
+    """Ten steps of 0.1 from 0 end at 0.9999999999999999."""
+    control = StepControl(StepLaw(0.25, 1.0, 1e-8), (0.0, 1.0), 0.1, breaks=np.zeros(0), longest=0.1)
+    for _ in range(10):
+        assert control.next_step(lambda: (np.zeros(0), np.zeros(0))) is not None
+        control.accept(0.0)
+    assert control.t < 1.0
+    assert control.next_step(lambda: (np.zeros(0), np.zeros(0))) is None
+    assert control.status is Status.DONE

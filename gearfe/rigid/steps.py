@@ -98,7 +98,8 @@ class StepControl:
 
     def next_step(self, state: Callable[[], tuple[Array, Array]]) -> float | None:
         """The next step to try, with the sign of time; None when the run has ended, `status` then says why."""
-        if self.status is not Status.DONE or self.sign * (self.end - self.t) <= 0.0:
+        rounding = ROUNDING * max(abs(self.t), self.span)
+        if self.status is not Status.DONE or self.sign * (self.end - self.t) <= rounding:
             return None
         if self.accepted >= self.most:
             self.status = Status.MOST_STEPS
@@ -106,7 +107,6 @@ class StepControl:
         if self.watch is not None and not self.watch(self.t, self.accepted, state):
             self.status = Status.STOPPED
             return None
-        rounding = ROUNDING * max(abs(self.t), self.span)
         while self.sign * (self.goals[0] - self.t) <= rounding:
             self.goals.pop(0)
             self._added = False
