@@ -123,7 +123,7 @@ class Stepper:
         plain = SystemEquations(system, start)
         s, n, m = len(tab.c), system.size, int(start.active.sum())
         self.w = work(s, n, m, plain.stresses, tab.inner + 4)
-        self.compile_seconds = 0.0
+        self.compiled, self.compile_seconds = program is not None, 0.0
         if program is None:
             self._step: Callable[[], int] = lambda: _plain()(plain, self.w, tab)
         else:
@@ -201,7 +201,11 @@ class Stepper:
                 self.restart(accelerations[-1])
             reach = np.maximum(reach, np.abs(q))
         dense = self._dense(system, start, np.array(ends), known, forces, accelerations)
-        counts = {"scheme": f"{'Radau IIA' if tab.inner < len(tab.c) else 'Gauss'} of {len(tab.c)} stages"}
+        counts: dict[str, Any] = {
+            "scheme": f"{'Radau IIA' if tab.inner < len(tab.c) else 'Gauss'} of {len(tab.c)} stages"
+        }
+        if self.compiled:
+            counts |= {"backend": "compiled", "compile_seconds": self.compile_seconds}
         return dense, control.status, {
             **counts, "steps": control.accepted, "newton_iterations": newton, "rejected": control.rejected,
         }  # fmt: skip
