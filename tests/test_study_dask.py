@@ -133,7 +133,7 @@ def test_dask_that_is_missing_is_named(tmp_path, monkeypatch, capsys):
 def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch, capsys):
     from gearfe.commands import study as command
 
-    monkeypatch.setattr(command, "PATIENCE_S", 1)
+    monkeypatch.setattr(command, "TIMEOUT_S", 1)
     run = ["study", str(written(tmp_path)), "--out", str(tmp_path / "out"), "--dask"]
     assert main([*run, "tcp://127.0.0.1:9"]) == 2
     assert "does not answer" in capsys.readouterr().err
