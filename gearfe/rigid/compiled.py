@@ -45,10 +45,7 @@ def cache_folder(functions: Iterable[Callable[..., Any]]) -> Path | None:
 
     Where the user names no folder and has none that can be written, a temporary one of this user serves.
     """
-    text = _text(functions)
-    for root in _roots():
-        key = "\n".join((str(root), *_made_by(), text))
-        folder = root / ("kernels-" + hashlib.sha256(key.encode()).hexdigest()[:16])
+    for folder in _folders(functions):
         try:
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)
             if hasattr(os, "getuid") and folder.stat().st_uid != os.getuid():
@@ -58,6 +55,20 @@ def cache_folder(functions: Iterable[Callable[..., Any]]) -> Path | None:
         except OSError:
             continue
     return None
+
+
+def _folders(functions: Iterable[Callable[..., Any]]) -> Iterator[Path]:
+    """Where the compiled forms of `functions` may be, best first; they need not exist."""
+    options = tuple(f"{k}={v}" for k, v in sorted(os.environ.items()) if k.startswith("NUMBA_"))
+    for root in _roots():
+        yield root / ("kernels-" + _key(str(root), tuple(functions), options))
+
+
+@lru_cache(maxsize=64)
+def _key(root: str, functions: tuple[Callable[..., Any], ...], options: tuple[str, ...]) -> str:
+    """What decides compiled code, as a name; neither sources nor the machine change while a program runs."""
+    key = "\n".join((root, *_made_by(), *options, _text(functions)))
+    return hashlib.sha256(key.encode()).hexdigest()[:16]
 
 
 def _text(functions: Iterable[Callable[..., Any]]) -> str:
@@ -90,7 +101,6 @@ def _made_by() -> Iterator[str]:
         found = importlib.util.find_spec(name)
         place = Path(found.origin).parent / "_version.py" if found is not None and found.origin else None
         yield place.read_text(encoding="utf-8") if place is not None and place.exists() else ""
-    yield from (f"{k}={v}" for k, v in sorted(os.environ.items()) if k.startswith("NUMBA_"))
     yield f"{platform.system()} {platform.machine()} {os.environ.get('PROCESSOR_IDENTIFIER', '')}"
     try:
         with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
@@ -105,7 +115,7 @@ def _made_by() -> Iterator[str]:
 
 def is_cached(functions: Iterable[Callable[..., Any]], entry: str) -> bool:
     """Whether a compiled form of the function named `entry` waits in the cache, for this machine and these sources."""
-    folder = cache_folder(functions)
+    folder = next((f for f in _folders(functions) if f.is_dir()), None)
     return folder is not None and any(folder.glob(f"{entry}-*.o"))
 
 

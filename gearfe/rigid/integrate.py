@@ -176,14 +176,11 @@ def ways_of(
     rate = (
         partial(_rate, system) if linkage is not None or is_linear(system) else None
     )  # it does not see all other elements
-    implicit = _implicit_ways(
-        system,
-        backend,
-        options,
-        Way("implicit", "plain", partial(_implicit, system, False, options), trial, rate=rate),
-        runs,
-    )
     auto = method == "auto"
+    implicit: list[Way] = []
+    if auto or method == "implicit":
+        slow = Way("implicit", "plain", partial(_implicit, system, False, options), trial, rate=rate)
+        implicit = _implicit_ways(system, backend, options, slow, runs)
     stuck = auto and (any(e.stiff for e in system.elements) or _hopeless(system, start, times))
     cure = _cure(system, backend)
     explicit = Way("explicit", "", partial(_explicit, system, backend, options), PLAIN_TRIAL, cure=cure)
@@ -191,15 +188,15 @@ def ways_of(
         return [explicit] if method == "explicit" else implicit
     if linkage is None:
         ways = _other_ways(system, auto, backend, options, explicit, runs)
-        return [*ways, *implicit] if auto else ways
+        return [*ways, *implicit]
     plain = Way("taylor", "plain", partial(_taylor, linkage, False, options), PLAIN_TRIAL, cure=cure)
     if not use_compiled(backend):
-        return [plain, *implicit] if auto else [plain]
+        return [plain, *implicit]
     loading = taylor.KERNELS.seconds / runs
     quick = Way("taylor", "compiled", partial(_taylor, linkage, True, options), loading, loading, COMPILED_FASTER)
     if backend == "compiled" or loading <= _PLAIN_SPENT["taylor"]:
-        return [quick, *implicit] if auto else [quick]
-    return [plain, quick, *implicit] if auto else [plain, quick]
+        return [quick, *implicit]
+    return [plain, quick, *implicit]
 
 
 def _other_ways(
