@@ -172,8 +172,8 @@ def assemble_prisms(
         masses.append((material.density * flat["00"] * m).ravel())
     found, place = np.unique(np.concatenate(keys), return_inverse=True)
     used, rows = np.unique(found // size, return_inverse=True)
-    columns = np.searchsorted(used, found % size)
-    starts = np.searchsorted(rows, np.arange(len(used) + 1))
+    columns = np.searchsorted(used, found % size).astype(np.int32)  # half the memory of the masses' numbers
+    starts = np.searchsorted(rows, np.arange(len(used) + 1)).astype(np.int32)
     mass, blocks = np.zeros(len(found)), np.zeros((len(found), 3, 3))
     for here in reversed(np.split(place, np.cumsum([len(one) for one in masses])[:-1])):
         mass[here] += masses.pop()  # the entries of one set are different ones

@@ -231,7 +231,8 @@ class Housing(Facts):
             Whether the body carries an estimate of the mesh's error (`ModalBody.softening`).
         """
         matrices, motions = self.matrices(), rigid_motions(self.nodes)
-        parts, momenta = self.partition(matrices), np.asarray(matrices.mass @ motions)
+        parts = self.partition(matrices)
+        momenta = (matrices.nodal_mass @ motions.reshape(len(self.nodes), -1)).reshape(motions.shape)
         del matrices  # a quarter of the peak of memory
         found = reduce_model(
             parts,
@@ -242,6 +243,7 @@ class Housing(Facts):
             free=len(self.fixed) == 0,
             solver=solver,
         )
+        del parts
         if len(found.mass) == 0:
             raise InputError("modes", modes, "leaves no coordinate: there is no attachment either", "keep a mode")
         count = len(self.attachments)

@@ -115,7 +115,9 @@ def lowest_modes(
         if exhausted or (inside < done and bool(np.all(found[:inside])) and bool(near[inside])):
             inside = min(inside, done)
             following = float(eigenvalues[inside]) if inside < done else math.inf
-            return Modes(eigenvalues[:inside].copy(), basis.vectors[:, :done] @ s[:, :inside], following, columns)
+            vectors = basis.vectors[:, :done]
+            del basis  # its products with M, while the modes are made
+            return Modes(eigenvalues[:inside].copy(), vectors @ s[:, :inside], following, columns)
 
 
 class _Basis:
