@@ -16,9 +16,10 @@ from typing import Any
 
 from ..config import set_key
 from ..errors import InputError
+from ..expressions import syntax
 from ..threads import one_thread
 from .answer import Answer
-from .expressions import parse, value_of
+from .expressions import value_of
 from .kinds import Shared, solve
 
 #: Of a row: solved; solved in part, the message says what failed; refused, as the job's command would; an error of
@@ -62,7 +63,7 @@ class Task:
 
     def expressions(self) -> dict[str, ast.expr]:
         """Outputs, parsed."""
-        return {name: parse(text, f"study.outputs.{name}") for name, text in self.outputs.items()}
+        return {name: syntax(text, f"study.outputs.{name}") for name, text in self.outputs.items()}
 
 
 @dataclass(frozen=True)

@@ -50,23 +50,6 @@ _OPERATORS: dict[type, Callable[[Any, Any], Any]] = {
     ast.USub: lambda x, _: -x,
     ast.UAdd: lambda x, _: x,
 }
-_LONGEST = 2000
-
-
-def parse(text: str, label: str) -> ast.expr:
-    """Syntax tree of an output.
-
-    Raises
-    ------
-    InputError
-        When it is no expression.
-    """
-    if len(text) > _LONGEST:
-        raise InputError(label, None, f"is longer than {_LONGEST} characters", "split it into several outputs")
-    try:
-        return ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise InputError(label, text, f"cannot be read ({type(error).__name__})", "write it as in Python") from None
 
 
 def value_of(tree: ast.expr, answer: Answer, label: str) -> float:
