@@ -232,7 +232,10 @@ def test_groups_without_names_are_told_with_their_places(formats) -> None:
         ),
         ({"held": [{"point_mm": [0, 0, -61]}]}, r"held\[0\] = \[0\.0, 0\.0, -61\.0\]: no node lies on this plane"),
         ({"held": [{"group": "foot"}]}, r"held\[0\]\.group = 'foot': there is no such group.*feet"),
-        ({"mesh": {"file": "box.msh", "unit": "m"}, "held": [{"point_mm": [0, 0, -60]}]}, "unit of the mesh"),
+        (
+            {"mesh": {"file": "box.msh", "unit": "m"}},
+            r"mesh\.unit = 'm': the mesh is 1\.51e\+05 x .* 2 mm to 50 m; write mesh = \{ file = \.\.\., unit",
+        ),
         ({"bores": [*BORES, {"group": "bore_1"}]}, "box.msh.*overlaps attachment '1'"),
     ],
 )
@@ -245,6 +248,68 @@ def test_mistakes_in_files(keys, told, tmp_path) -> None:
     meshio.write(tmp_path / "bricks.vtu", meshio.Mesh(corners, [("hexahedron", [list(range(8))])]))
     with pytest.raises(InputError, match=told):
         housing_from_table(table(**keys), tmp_path)
+
+
+#: Four corners and six midside nodes, reals as Nastran's programs write them, properties told and left blank.
+BULK = """SOL 103
+CEND
+BEGIN BULK
+$ comment
+GRID           1               0     0.0      0.
+GRID*                  2                            2.+1               0       $ 20
+*                -1.5-13
+grid,3,,.0,2.0D1,0.0
+GRID,4,0,-0,0,2.E+1
+GRID           5             10.       0       0
+GRID           6            1.+1    1.+1       0
+GRID           7               0    1.+1       0
+GRID           8               0       0    1.+1
+GRID           9            1.+1       0    1.+1
+GRID          10               0    1.+1    1.+1
+CTETRA         7{:>8}       1       2       3       4       5       6+A
++A             7       8       9      10
+CTRIA6,20,5,1,2,3,5,6,7
+ENDDATA
+"""
+
+
+@pytest.mark.parametrize(("property_number", "groups"), [("", {"5"}), ("12", {"5", "12"})])
+def test_numbers_and_properties_of_nastran(property_number, groups, tmp_path) -> None:
+    """gmsh reads 2.+1 as 2, and takes the first node for a property that is left blank."""
+    (tmp_path / "one.bdf").write_text(BULK.format(property_number))
+    mesh = read_mesh_file(tmp_path / "one.bdf", "housing.mesh", 1.0)
+    corners = np.array([[0, 0, 0], [20, 0, 0], [0, 20, 0], [0, 0, 20.0]])
+    middles = [(corners[a] + corners[b]) / 2 for a, b in ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))]
+    np.testing.assert_allclose(mesh.nodes[mesh.tets[0]], [*corners, *middles], atol=1e-12)
+    assert set(mesh.groups) == groups
+    np.testing.assert_array_equal(np.sort(mesh.groups["5"]), [0, 1, 2, 4, 5, 6])
+
+
+def test_meshio_writes_nastran(tmp_path) -> None:
+    """Its elements have no property."""
+    found = read_mesh_file(MESHES / "box.msh", "mesh", 1.0)
+    points = found.nodes.round(4)
+    meshio.write(tmp_path / "box.bdf", meshio.Mesh(points, [("tetra10", found.tets)]))
+    mesh = read_mesh_file(tmp_path / "box.bdf", "mesh", 1.0)
+    np.testing.assert_allclose(mesh.nodes[mesh.tets], points[found.tets], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("GRID,1,,0.,0.,0.\nGRID,2,5,1.,0.,0.\n", r"node 2 \(line 2\) stands in coordinate system 5; write"),
+        ("GRID,1,,0.,0.,x\n", "the entry GRID of line 1 cannot be read; mend that line"),
+        ("GRID,1,,0.,0.,0.\nCTETRA,1,1,1,1,1\n", "the entry CTETRA of line 2 cannot be read"),
+        ("GRID,1,,0.,0.,0.\nCTETRA,1,1,1,2,3,4\n", "has the node 2, which the file does not tell"),
+        ("GRID,1,,0.,0.,0.\nCHEXA,1,1,1,1,1,1,1,1,\n,1,1\n", "tetrahedra of one order only, but it has 1 hexahedron"),
+        ("INCLUDE 'a.bdf'\n", "line 1 includes another file; write all into one"),
+        ("hello\n", r"has no nodes \(GRID\); is it whole"),
+    ],
+)
+def test_mistakes_in_bulk_data(text, told, tmp_path) -> None:
+    (tmp_path / "a.bdf").write_text(text)
+    with pytest.raises(InputError, match=told):
+        read_mesh_file(tmp_path / "a.bdf", "housing.mesh", 1.0)
 
 
 @pytest.mark.parametrize(

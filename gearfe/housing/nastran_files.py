@@ -19,8 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..meshing.nastran import number
 from ..typing import Array
-from .dmig import Entries, number
+from .dmig import Entries
 
 #: Matrices by name: values, or single entries with node and freedom.
 Matrices = dict[str, Array | Entries]

@@ -21,6 +21,9 @@ from ..typing import Array, BoolArray, IntArray
 from .attachments import RADIUS_TOLERANCE, Attachment, Bore, Plane, bore_attachment, plane_nodes
 from .model import Housing
 
+#: Extent of a housing (mm): a mesh beyond it is in another unit than the job tells.
+SIZES_MM = (2.0, 50e3)
+
 
 def own_housing(table: HousingTable, folder: Path, material: SolidMaterial) -> Housing:
     """Housing of the mesh file that a [housing] table names; files are looked for in `folder`.
@@ -34,7 +37,7 @@ def own_housing(table: HousingTable, folder: Path, material: SolidMaterial) -> H
     found = read_mesh_file(folder / given(table.mesh.file, field), field, table.mesh.size_mm)
     mesh = found._replace(nodes=_turned(UNITS[table.mesh.unit] * found.nodes, table.mesh))
     used = np.unique(mesh.tets)
-    notes = [size_note(mesh.nodes[used])]
+    notes = [size_note(mesh.nodes[used], table.mesh.unit)]
     attachments = []
     for i, bore in enumerate(table.bores):
         made, remarks = _attachment(bore, i, mesh, used)
@@ -67,10 +70,22 @@ def _turned(nodes: Array, table: HousingMeshTable) -> Array:
     return np.asarray((nodes - 1e-3 * np.array(table.origin_mm))[:, places] * signs)
 
 
-def size_note(nodes: Array) -> str:
-    """How large a mesh is: a unit that is wrong shows there."""
-    x, y, z = 1e3 * np.ptp(nodes, axis=0)
-    return f"the mesh is {x:.4g} x {y:.4g} x {z:.4g} mm"
+def size_note(nodes: Array, unit: str) -> str:
+    """How large a mesh is: a unit that is wrong shows there.
+
+    Raises
+    ------
+    InputError
+        When no housing is of this size.
+    """
+    sizes = 1e3 * np.ptp(nodes, axis=0)
+    x, y, z = sizes
+    note = f"the mesh is {x:.4g} x {y:.4g} x {z:.4g} mm"
+    if not SIZES_MM[0] <= sizes.max() <= SIZES_MM[1]:
+        problem = f"{note} in this unit; a housing has {SIZES_MM[0]:g} mm to {SIZES_MM[1] / 1e3:g} m"
+        cure = f"write mesh = {{ file = ..., unit = ... }}, one of {', '.join(UNITS)}"
+        raise InputError("housing.mesh.unit", unit, problem, cure)
+    return note
 
 
 def fingerprint(path: Path, field: str) -> str:

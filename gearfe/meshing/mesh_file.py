@@ -5,20 +5,23 @@ from __future__ import annotations
 import contextlib
 import io
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import InputError, nearest
+from ..textfile import read_text
 from ..typing import Array, IntArray
+from .nastran import read_bulk_mesh
 from .session import gmsh_session
 
 #: Formats of CAD programs, which have no mesh yet.
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
-#: Formats of which gmsh reads more than meshio, as decks without BEGIN BULK; and surfaces, which have no inside.
-BY_GMSH = (".unv", ".bdf", ".nas", ".med", ".mesh")
+#: Formats of which gmsh reads more than meshio; of Nastran, which both misread; and surfaces, which have no inside.
+BY_GMSH = (".unv", ".med", ".mesh")
+NASTRAN = (".bdf", ".nas", ".fem")
 SURFACES = (".stl", ".ply", ".off", ".obj", ".wkt", ".svg")
 #: Arrays of whole numbers by which formats tell groups that have no name.
 NUMBERED = ("gmsh:physical", "medit:ref", "nastran:ref", "ref", "cell_tags", "point_tags", "avsucd:material")
@@ -104,7 +107,7 @@ def read_mesh_file(path: str | Path, field: str, size: float) -> MeshFile:
         return _meshed(path, field, size)
     if path.suffix.lower() in SURFACES:
         raise InputError(field, path.name, "is a surface, which has no tetrahedra", INSIDE)
-    mesh = _by_gmsh(path, field) if path.suffix.lower() in BY_GMSH else _read(path, field)
+    mesh = _reader(path)(path, field)
     points = np.asarray(mesh.points, dtype=float)
     if points.ndim != 2 or points.shape[1] != 3:
         raise InputError(field, path.name, "is a plane mesh: its nodes have no z", "bring a mesh of solid elements")
@@ -131,6 +134,18 @@ def read_mesh_file(path: str | Path, field: str, size: float) -> MeshFile:
     return MeshFile(points, tets, {name: nodes for name, nodes in whole.items() if len(nodes)})
 
 
+def _reader(path: Path) -> Callable[[Path, str], Any]:
+    ending = path.suffix.lower()
+    return _by_gmsh if ending in BY_GMSH else _nastran if ending in NASTRAN else _read
+
+
+def _nastran(path: Path, field: str) -> Any:
+    import meshio
+
+    mesh = read_bulk_mesh(read_text(path, field), path, field)
+    return meshio.Mesh(mesh.points, list(mesh.cells.items()), point_sets=mesh.properties)
+
+
 def _read(path: Path, field: str) -> Any:
     import meshio
     from meshio.abaqus._abaqus import abaqus_to_meshio_type
@@ -142,7 +157,7 @@ def _read(path: Path, field: str) -> Any:
             return meshio.read(path)
     except (Exception, SystemExit) as error:
         if path.suffix.lower() not in meshio.extension_to_filetypes:
-            known = ", ".join(sorted({*meshio.extension_to_filetypes, *CAD, *BY_GMSH} - {*SURFACES}))
+            known = ", ".join(sorted({*meshio.extension_to_filetypes, *CAD, *BY_GMSH, *NASTRAN} - {*SURFACES}))
             raise InputError(field, path.name, f"has an ending that is not known: {known}", "convert it") from None
         lines = [line.strip() for line in [*said.getvalue().splitlines(), str(error)] if line.strip()]
         reason = next(
