@@ -1,6 +1,6 @@
 """Bulk data of Nastran: its entries, and the nodes, solids and faces of a mesh (NX/MSC Nastran Quick Reference Guide).
 
-An entry is a name and data fields, eight a line, 8 characters wide, 16 in large format (``GRID*``), or parted by commas.
+An entry is a name and data fields, eight a line, 8 characters wide, 16 in large format (``GRID*``), or with commas.
 Reals may leave out the E of their exponent (2.5+3), and a property that is left blank has the element's number:
 gmsh's reader knows neither.
 """
