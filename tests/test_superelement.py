@@ -143,6 +143,8 @@ def test_units_and_abaqus_matrix_input(unit, force, length, bodies, tmp_path) ->
         ("rotations first", {}, "these cost some|differs by direction|motions"),
         ("negative mass", {}, "is not positive"),
         ("negative stiffness", {}, "is not positive"),
+        ("exchanged", {}, r"mass = 'M\.mtx': .* are stiffness and mass exchanged"),
+        ("massless", {}, r"mass = 'M\.mtx': is not positive: .* is all mass there"),
         ("lost rows", {}, r"has \d+ motions of the attachments without energy"),
         ("", {"stiffness": "none.mtx"}, "there is no such file"),
         ("", {"stiffness": "text.mtx"}, "neither Matrix Market nor Abaqus' matrix input nor DMIG: line 1 is 'hello'"),
@@ -168,11 +170,41 @@ def test_mistakes(change, keys, told, bodies, tmp_path) -> None:
         K[:B, :B] *= -1
     elif change == "lost rows":
         K[:7], K[:, :7] = 0.0, 0.0
+    elif change == "exchanged":
+        K, M = M, K
+    elif change == "massless":
+        M[:] = 0.0
     write(tmp_path, K, M)
     (tmp_path / "text.mtx").write_text("hello\n")
     (tmp_path / "cut.mtx").write_text("%%MatrixMarket matrix array real general\n3 3\n1\n")
     with pytest.raises(InputError, match=told):
         superelement(table(**keys), tmp_path)
+
+
+@pytest.mark.parametrize(("unit", "length"), [("mm", 1.0), ("m", 1e-3)])
+def test_a_held_body_in_a_wrong_unit(unit, length, bodies, tmp_path) -> None:
+    """Matrices in m read as mm have rotations without energy; in mm read as m a length a thousand times too large."""
+    body = bodies["held"]
+    to = np.concatenate([np.tile([length] * 3 + [1.0] * 3, 4), np.ones(body.size - B)])
+    write(tmp_path, *(A * np.outer(to, to) / length for A in (body.stiffness, body.mass)))
+    told = "unit = 'm': rotational by translational stiffness .* tells a length of .* mm, their points .* 88.* mm"
+    with pytest.raises(InputError, match=told if unit == "m" else "motions .* without energy: .* check the unit"):
+        superelement(table(unit=unit), tmp_path)
+
+
+def test_exchanged_matrices_of_a_held_body(bodies, tmp_path) -> None:
+    """Both are positive; their frequencies are 1 / (4 pi^2 f)."""
+    write(tmp_path, bodies["held"].mass, bodies["held"].stiffness)
+    with pytest.raises(InputError, match=r"no natural frequency above .*e-\d+ Hz .* are stiffness and mass exchanged"):
+        superelement(table(), tmp_path)
+
+
+def test_a_free_body_by_the_command(bodies, tmp_path) -> None:
+    """Six modes of no frequency have no error to tell: no column holds what is infinite."""
+    write(tmp_path, bodies["free"].stiffness, bodies["free"].mass)
+    points = "".join(f"[[housing.superelement.attachments]]\npoint_mm = {list(point)}\n" for point in POINTS)
+    (tmp_path / "free.toml").write_text('[housing.superelement]\nstiffness = "K.mtx"\nmass = "M.mtx"\n' + points)
+    assert main(["housing", str(tmp_path / "free.toml"), "--out", str(tmp_path / "out")]) == 0
 
 
 def test_commands(bodies, tmp_path, capsys) -> None:

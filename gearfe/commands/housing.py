@@ -94,7 +94,7 @@ def _frequency_errors(body: ModalBody, shown: int, mesh: MeshError) -> dict[str,
     highest = body.coupled.frequencies_hz[shown - 1] * (1.0 + 1e-9)
     known = reduction_error(body, max(min(highest, 0.999 * body.next_hz), 1e-9), points=1).frequency_errors[:shown]
     reduction = np.full(shown, np.nan)
-    reduction[: len(known)] = known
+    reduction[: len(known)] = np.where(np.isfinite(known), known, np.nan)
     own = np.where(np.isfinite(mesh.frequency_errors), mesh.frequency_errors, np.nan)[:shown]
     return {"mesh": own, "reduction": reduction, "all": own + reduction}
 

@@ -32,6 +32,11 @@ from .nastran_files import read_nastran
 SYMMETRIC, NO_ENERGY, SAME_MASS = 1e-6, 1e-7, 1e-3
 #: Part of the largest square of a period below which a coordinate has no mass.
 MASSLESS = 1e-12
+#: Bounds on the length that rotational and translational stiffness tell, in parts of the span of the attachments; a
+#: unit of mm in place of m makes a thousand.
+LENGTHS = (1 / 300, 100.0)
+#: Eigenvalue of a mass matrix of unit diagonal that is none; highest frequency of no housing (Hz).
+NO_MASS, LEAST_HZ = 1e-13, 0.01
 NO_ESTIMATE = "matrices of another program: nothing tells the error of their mesh and reduction"
 MOTIONS = ("x", "y", "z", "rotation about x", "rotation about y", "rotation about z")
 
@@ -250,6 +255,7 @@ def _body(k: Array, m: Array, points: Array, table: SuperelementTable, field: st
             listed = ", ".join(f"{mass:.6g}" for mass in masses)
             problem = f"differs by direction: {listed} kg along x, y, z"
             raise InputError(f"{field}.mass", table.mass, problem, "check the order of rows and the unit")
+    _check_mass(K, M, table, field)
     a = len(points)
     shapes = np.zeros((3 * a, len(K)))
     for i in range(a):
@@ -298,6 +304,7 @@ def _is_free(stiffness: Array, rigid: Array, points: Array, table: SuperelementT
         raise InputError(f"{field}.stiffness", table.stiffness, problem, "check its sign")
     idle = int((values < NO_ENERGY * values[-1]).sum())
     if idle == 0:
+        _check_length(stiffness, points, table, field)
         return False
     energy = np.einsum("ik,ij,jk->k", rigid, stiffness, rigid)
     costs = energy * np.array([1.0] * 3 + [1 / size**2] * 3) > NO_ENERGY * values[-1] * len(points)
@@ -315,6 +322,34 @@ def _is_free(stiffness: Array, rigid: Array, points: Array, table: SuperelementT
         problem,
         "check the unit, and that all six coordinates of each attachment are there, in the order that rows tell",
     )
+
+
+def _check_mass(stiffness: Array, mass: Array, table: SuperelementTable, field: str) -> None:
+    from scipy.linalg import eigh
+
+    cure = "are stiffness and mass exchanged, is all mass there?"
+    diagonal = np.diag(mass)
+    own = np.linalg.eigvalsh(mass / np.sqrt(np.outer(diagonal, diagonal))) if (diagonal > 0.0).all() else np.zeros(1)
+    if not own[0] > NO_MASS:
+        problem = "is not positive: an attachment can move without mass, or gives energy"
+        raise InputError(f"{field}.mass", table.mass, problem, cure)
+    highest = math.sqrt(max(float(eigh(stiffness, mass, eigvals_only=True)[-1]), 0.0)) / (2 * math.pi)
+    if highest < LEAST_HZ:
+        problem = f"gives no natural frequency above {highest:.2g} Hz with this stiffness"
+        raise InputError(f"{field}.mass", table.mass, problem, cure)
+
+
+def _check_length(stiffness: Array, points: Array, table: SuperelementTable, field: str) -> None:
+    """Refuse a held body whose unit cannot be: it has no rigid motion by which points and matrices were compared."""
+    span = float(np.linalg.norm(np.ptp(points, axis=0)))
+    diagonal = np.diag(stiffness).reshape(-1, 6)
+    length = math.sqrt(diagonal[:, 3:].sum() / diagonal[:, :3].sum())
+    if span and not LENGTHS[0] * span < length < LENGTHS[1] * span:
+        problem = (
+            f"rotational by translational stiffness of the attachments tells a length of {1e3 * length:.3g} mm, "
+            f"their points lie within {1e3 * span:.3g} mm"
+        )
+        raise InputError(f"{field}.unit", table.unit, problem, f"one of {', '.join(FORCES)}: that of the matrices")
 
 
 def write_matrix(path: Path, matrix: Array) -> None:
