@@ -28,7 +28,7 @@ from gearfe.vibration.fields import (
     write_housing,
 )
 from gearfe.vibration.files import OutputChoice, write_run
-from gearfe.vibration.follow import RunningMean, TrainRun
+from gearfe.vibration.follow import RunningMean, Stability, TrainRun
 from gearfe.vibration.spectra import response_columns, spectra
 
 from .gears import pair
@@ -72,7 +72,8 @@ def write_all(folder, train, response, choice, **options):
     """The files of a response at hand."""
     if response.status != "done":
         choice = replace(choice, spectrum_start=0.0, spectrum_length=None)
-    planned = TrainRun(build_train(train), response.time, lambda _: [response])
+    stability = Stability(np.array([0.98 + 0.05j, 0.98 - 0.05j]), response.common_period_s or 0.0)
+    planned = TrainRun(build_train(train), response.time, lambda _: [response], stability=stability)
     return write_run(folder, planned, choice, watch=Stopwatch(), **options)
 
 

@@ -69,8 +69,6 @@ def made_up(**changes: Any) -> TrainResponse:
         "shaft_frequencies_Hz": drive * np.array([1.0, 2 / 3, 4 / 9]),
         "common_period_s": 1 / (20 * drive / 3),
         "coupled_frequencies_Hz": np.array([560.0, 1990.0, 13_000.0]),
-        "floquet": np.array([0.98 + 0.05j, 0.98 - 0.05j]),
-        "floquet_note": "",
         "status": "done",
         "time_reached": float(time[-1]),
         "load_end_s": 1e-3,

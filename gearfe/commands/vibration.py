@@ -8,7 +8,7 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..progress import count
+from ..progress import count, stage
 from ..tables.train import TrainTable, value_text
 from .arguments import add_job, add_keys, with_keys
 from .common import add_folder, tell
@@ -104,8 +104,12 @@ def run(args: argparse.Namespace) -> int:
         bores = tuple(str(a) for s in job.table.shafts for a in s.attachments)
         check_choice(choice, job.times, bores)
         folder = output_folder(args.out)
-    chosen = {"floquet": not args.no_floquet, "estimate": not args.no_estimate}
-    planned = simulated(job, args.curve, watch=watch, progress=count, **chosen)
+    planned = simulated(job, args.curve, watch=watch, progress=count, estimate=not args.no_estimate)
+    if not args.no_floquet:
+        from ..runup.train_stability import train_stability
+
+        with watch.stage("stability"), stage("stability of the steady motion"):
+            planned = replace(planned, stability=train_stability(planned.model))
     train, every = planned.model.train, planned.every
     start = record_start(job, train, every, args.spectrum_from_ms, watch.stage)
     choice = replace(choice, spectrum_start=start)
@@ -195,10 +199,11 @@ def report_lines(response: TrainResponse, train: GearTrain, written: Written, ch
         f"({statistics.get('method', '')}: {statistics.get('scheme', '')}), {statistics.get('seconds', 0.0):.3f} s; "
         f"{statistics.get('free_coordinates', '?')} unknowns"
     )
-    if response.floquet is not None:
-        lines.append(f"largest Floquet multiplier over the common period: {abs(response.floquet[0]):.6g}")
-    elif response.floquet_note:
-        lines.append(f"Floquet multipliers: {response.floquet_note}")
+    floquet = summary["floquet"]
+    if floquet["largest_multiplier"] is not None:
+        lines.append(f"largest Floquet multiplier over the common period: {floquet['largest_multiplier']:.6g}")
+    elif floquet["note"]:
+        lines.append(f"Floquet multipliers: {floquet['note']}")
     for name, value in response.estimates.items():
         lines.append(f"error estimate, {name}: " + (f"{value:.2g}" if math.isfinite(value) else "unknown"))
     if written.spectra is not None:

@@ -5,7 +5,7 @@ Small motions beside it feel the forces' derivatives along it,
 .. math:: \ddot y + D\dot y + \Lambda y = P\,[A(t)\,P^T y + B(t)\,P^T\dot y] + \Omega\,G\dot y ,
 
 so it is stable where all multipliers, eigenvalues of the map of (y, y') over a time T after which A and B repeat, have
-a modulus below 1 (Nayfeh & Balachandran, Applied Nonlinear Dynamics, Sec. 3.2). `gearfe.train.monodromy` integrates the
+a modulus below 1 (Nayfeh & Balachandran, Applied Nonlinear Dynamics, Sec. 3.2). `gearfe.runup.monodromy` integrates the
 map. Modes that the forces reach little are not in it: they yield as they do at rest, and have the multipliers of free
 decay. A mode counts where its share in the forces' change, beside its damping, is more than `REACHED`.
 
@@ -22,17 +22,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..train.monodromy import KICKS, PLACES, flow, kick_times, monodromy
 from ..typing import Array, BoolArray, ComplexArray
 from . import torus
 from .balance import Orbit, Oscillator
 from .linear import Linear
+from .monodromy import KICKS, PLACES, flow, kick_times, monodromy
 
 #: Least strength of the forces on a mode, in parts of its damping.
 REACHED = 0.01
 #: Steps, of seven kicks each: of a period at least, and of a mesh cycle; most in parts of the first number. Where the
 #: forces' derivatives jump they are doubled until the largest modulus stands still to this part.
 STEPS, OF_CYCLE, MOST, SETTLED = 64, 16, 4, 3e-3
+#: Most steps where an accuracy is asked for.
+MOST_STEPS = 1 << 14
 #: Change of a stiffness from one kick to the next, in parts of that of the whole system, that is a jump.
 JUMP = 0.5
 #: Imaginary part of a multiplier, in parts of its modulus, that is none.
@@ -79,20 +81,30 @@ def window(system: Oscillator) -> Window:
     return Window(whole, half, float(most * whole))
 
 
-def multipliers(
-    system: Oscillator, orbit: Orbit, *, reached: float = REACHED, steps: int | None = None
-) -> ComplexArray:
+def multipliers(system: Oscillator, orbit: Orbit, accuracy: float | None = None) -> ComplexArray:
     """Floquet multipliers of an orbit over `window`, largest modulus first, (2 n,); (1,) not-a-number where they do not
     tell whether it is stable.
+
+    Parameters
+    ----------
+    accuracy
+        Steps are doubled until no modulus changes by more than this part of the largest, and all modes are integrated.
+        None, and where phases are nearly back only: until the largest changes by `SETTLED`, without the modes that the
+        forces reach little.
     """
     span = window(system)
-    first = steps = steps or steps_of(span)
+    quick = accuracy is None or span.half is not None
+    reached, accuracy = (REACHED, SETTLED) if accuracy is None or quick else (0.0, accuracy)
+    steps = steps_of(span)
+    most = MOST * steps if quick else MOST_STEPS
     made, jumps = _multipliers(system, orbit, span, reached, steps)
-    while jumps and steps < MOST * first:
-        steps *= 2
-        before = abs(made[0])
+    while (jumps or not quick) and steps < most:
+        steps, before = 2 * steps, made
         made, _ = _multipliers(system, orbit, span, reached, steps)
-        if abs(abs(made[0]) - before) <= SETTLED * abs(made[0]):
+        compared = slice(1 if quick else None)
+        with np.errstate(invalid="ignore"):  # both infinite
+            off = np.abs(np.abs(made[compared]) - np.abs(before[compared])).max()
+        if off <= accuracy * abs(made[0]):
             break
     return made
 
@@ -111,7 +123,7 @@ def _multipliers(
     order = np.argsort(kick_times(np.linspace(0.0, 1.0, steps + 1)).ravel(), kind="stable")  # kicks step back, too
     changes = np.abs(np.diff(A[order], axis=0)).max(axis=0)
     jumps = bool((np.diag(changes) * np.diag(system.linear.statics) > JUMP).any())
-    kept = strengths(system.linear, A) > reached * np.diag(system.linear.damping) / np.sqrt(system.linear.squares)
+    kept = strengths(system.linear, A) >= reached * np.diag(system.linear.damping) / np.sqrt(system.linear.squares)
     made = around(system, orbit.speed, A, B, kept, span)
     return made, jumps
 
@@ -182,7 +194,7 @@ def around(
 
 def _sorted(X: Array, free: tuple[Array, Array], time: float) -> ComplexArray:
     """Eigenvalues of a map over a time (s), and multipliers of modes that are free, largest modulus first."""
-    made = np.linalg.eigvals(X) if np.isfinite(X).all() else np.array([np.inf])
+    made = np.linalg.eigvals(X) if np.isfinite(X).all() else np.full(len(X), np.inf)
     made = np.concatenate([made, _free(*free, time)]).astype(complex)
     return np.asarray(made[np.argsort(-np.abs(made), kind="stable")])
 

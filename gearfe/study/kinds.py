@@ -138,7 +138,7 @@ def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
     job, watch = train_job(path, train_tables(raw, path)), Stopwatch()
     if job.table.method == "auto":
         job = replace(job, table=replace(job.table, method="taylor" if use_compiled("auto") else "explicit"))
-    planned = simulated(job, (), watch=watch, floquet=False, estimate=estimate)
+    planned = simulated(job, (), watch=watch, estimate=estimate)
     start = record_start(job, planned.model.train, planned.every, None, watch.stage)
     choice = OutputChoice(spectrum_start=start, **options(job.spectrum, None, None))
     beside = Analysis(job, planned.model.train, planned.every, start)

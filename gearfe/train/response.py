@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..shown import ShownTable
-from ..typing import Array, BoolArray, ComplexArray, IntArray
+from ..typing import Array, BoolArray, IntArray
 
 #: What has a row for each output time.
 SAMPLED = (
@@ -83,9 +83,6 @@ class TrainResponse(ShownTable):
         Shortest time after which all meshes are in phase again; None when there is none within reason.
     coupled_frequencies_Hz : (c,)
         Natural frequencies of the whole system with the mean mesh stiffnesses, without damping and gyroscopic terms.
-    floquet : ndarray of complex, or None
-        Multipliers over the common period, largest first; None when not computed, `floquet_note` says why.
-    floquet_note : str
     status : str
         ``done``, ``diverged``, or what stopped the integration.
     time_reached : float
@@ -128,8 +125,6 @@ class TrainResponse(ShownTable):
     shaft_frequencies_Hz: Array
     common_period_s: float | None
     coupled_frequencies_Hz: Array
-    floquet: ComplexArray | None
-    floquet_note: str
     status: str
     time_reached: float
     load_end_s: float

@@ -17,7 +17,6 @@ from ..record_spectrum import FASTEST, OVERSAMPLING
 from ..rigid import IntegrationError, Start, Status, Trajectory, integrate
 from ..typing import Array
 from .flanks import NONE
-from .floquet import train_multipliers
 from .kinematics import steady_forces
 from .model import TrainModel
 from .parting import Parting, apart_in_steps, beyond_law, parted
@@ -28,8 +27,6 @@ from .states import TrainStates, train_states
 SAFETY = 1.5
 #: An approach or a bore's displacement beyond this part of the module means that nothing holds any more.
 DIVERGED = 0.25
-#: A multiplier beyond this is an instability, not round-off.
-STABLE = 1.0 + 1e-6
 #: A piece holds so many numbers of the state (4 MB) and is evaluated in some ten times that memory ...
 PIECE_NUMBERS = 500_000
 #: ... but has so many samples at least.
@@ -44,7 +41,6 @@ def simulate(
     *,
     tolerance: float = 1e-6,
     method: str = "auto",
-    floquet: bool = False,
     estimate: bool = False,
     band_hz: float = 5000.0,
     backend: str = "auto",
@@ -62,8 +58,6 @@ def simulate(
         Of the integration, relative to each coordinate's largest value.
     method
         ``auto``, ``taylor``, ``explicit`` or ``implicit``, see `gearfe.rigid.integrate`.
-    floquet
-        Compute the multipliers over the common mesh period.
     estimate
         Estimate the errors: of the integration from a second run with a hundredth of the tolerance and shorter steps,
         and of the housing's reduction up to `band_hz` (Hz).
@@ -85,7 +79,6 @@ def simulate(
     options: dict[str, Any] = {
         "tolerance": tolerance,
         "method": method,
-        "floquet": floquet,
         "estimate": estimate,
         "band_hz": band_hz,
     }
@@ -101,7 +94,6 @@ def simulate_in_pieces(
     *,
     tolerance: float = 1e-6,
     method: str = "auto",
-    floquet: bool = False,
     estimate: bool = False,
     band_hz: float = 5000.0,
     backend: str = "auto",
@@ -109,18 +101,18 @@ def simulate_in_pieces(
     """What `simulate` does, handed over piece by piece, so that a long run needs no more memory than a short one.
 
     The pieces follow each other without gaps; the status of the last one says whether the run reached its end. What is
-    no sample (status, statistics, estimates, warnings, multipliers) holds for the whole run in the last piece.
+    no sample (status, statistics, estimates, warnings) holds for the whole run in the last piece.
     """
     t = np.atleast_1d(np.asarray(times, dtype=float))
     if t.size < 2 or not np.isfinite(t).all() or t[0] != 0.0 or not (np.diff(t) > 0).all():
         raise InputError(
             "times", None, "must be at least two rising numbers that begin with 0", "give the output times in s"
         )
-    return _pieces(model, t, tolerance, method, floquet, band_hz if estimate else None, backend)
+    return _pieces(model, t, tolerance, method, band_hz if estimate else None, backend)
 
 
 def _pieces(
-    model: TrainModel, t: Array, tolerance: float, method: str, floquet: bool, band_hz: float | None, backend: str
+    model: TrainModel, t: Array, tolerance: float, method: str, band_hz: float | None, backend: str
 ) -> Iterator[TrainResponse]:
     so_far, begin, start = _SoFar(), 0, model.start
     finer = None if band_hz is None else _Finer(max(1e-2 * tolerance, 1e-13), method, model.start)
@@ -146,7 +138,6 @@ def _pieces(
                 so_far,
                 finer,
                 f"of {1e3 * float(t[-1]):.6g} ms: {response.status}{why}",
-                floquet,
                 band_hz,
             )
             return
@@ -284,7 +275,6 @@ def _whole(
     so_far: _SoFar,
     finer: _Finer | None,
     ended: str,
-    floquet: bool,
     band_hz: float | None,
 ) -> TrainResponse:
     """The last piece with what holds for the whole run."""
@@ -298,14 +288,7 @@ def _whole(
             from ..reduction.error import reduction_error
 
             estimates["reduction"] = reduction_error(model.train.housing, band_hz).response
-    multipliers, note = (None, "not computed") if not floquet else train_multipliers(model)
-    if multipliers is not None and abs(multipliers[0]) > STABLE:
-        growth, period = abs(multipliers[0]) - 1.0, float(response.common_period_s or 0.0)
-        warnings.append(
-            f"the train is parametrically unstable: its vibration grows by {100 * growth:.3g} % in each common mesh "
-            f"period of {1e3 * period:.4g} ms; add damping, or change the speed"
-        )
-    return replace(response, floquet=multipliers, floquet_note=note, estimates=estimates, warnings=tuple(warnings))
+    return replace(response, estimates=estimates, warnings=tuple(warnings))
 
 
 def _loose(model: TrainModel) -> list[str]:
@@ -356,7 +339,7 @@ def _cut(moved: TrainStates, first: int, keep: int) -> TrainStates:
 def response_of(
     model: TrainModel, moved: TrainStates, status: str, reached: float, statistics: dict[str, Any]
 ) -> TrainResponse:
-    """A motion as a response, without multipliers and estimates."""
+    """A motion as a response, without estimates."""
     train, t = model.train, moved.time
     spin = [int(i) + 5 for i in model.first]
     rate, push = (model.angle(t, k)[:, None] * model.ratios for k in (1, 2))
@@ -391,8 +374,6 @@ def response_of(
         shaft_frequencies_Hz=np.abs(model.ratios) * speed / (2 * math.pi),
         common_period_s=float(common) * 2 * math.pi / speed if common and speed and steady else None,
         coupled_frequencies_Hz=model.coupled_frequencies_hz,
-        floquet=None,
-        floquet_note="not computed",
         status=status,
         time_reached=reached,
         load_end_s=model.load_end,

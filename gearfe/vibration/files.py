@@ -165,7 +165,7 @@ def write_run(
             watch.seconds["transient"] -= compiling
             watch.seconds["compiling"] = compiling
         spectra = made.spectra
-        run = Run(train_summary(made, {}, **planned.further), spectra)
+        run = Run(train_summary(made, {}, planned.stability, **planned.further), spectra)
         if planned.again is not None:
             with watch.stage("error estimates"):
                 run = Run(with_errors(run, planned.model, repeated, band_hz=planned.band_hz), spectra)

@@ -14,13 +14,45 @@ from ..errors import InputError
 from ..output.files import csv_table
 from ..train.model import TrainModel
 from ..train.response import TrainResponse, joined
-from ..typing import Array, IntArray
+from ..typing import Array, ComplexArray, IntArray
 from .spectra import TrainRecord, TrainSpectra, response_columns
 
 #: Parts of the curves in a picture: more than it has columns of pixels.
 DRAWN = 4000
+#: A multiplier's modulus beyond 1 by less than this is no instability.
+ROUND_OFF = 1e-6
 #: Samples that a spline through a piece shares with the piece before.
 _SHARED = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Stability:
+    """Whether small motions beside the steady one of a train die out.
+
+    Attributes
+    ----------
+    multipliers : (2 modes,) or None
+        Floquet multipliers, largest modulus first; None where there are none, `note` says why.
+    time
+        Over which they are made (s): the common period of the meshes.
+    note
+        Why there are none, or nothing.
+    """
+
+    multipliers: ComplexArray | None = None
+    time: float = 0.0
+    note: str = ""
+
+    @property
+    def warnings(self) -> list[str]:
+        """A sentence where the motion is unstable."""
+        growth = 0.0 if self.multipliers is None else abs(self.multipliers[0]) - 1.0
+        if growth <= ROUND_OFF:
+            return []
+        return [
+            f"the train is parametrically unstable: its vibration grows by {100 * growth:.3g} % every "
+            f"{1e3 * self.time:.4g} ms; add damping, or change the speed"
+        ]
 
 
 @dataclass(frozen=True)
@@ -42,6 +74,8 @@ class TrainRun:
         of their errors.
     band_hz
         Upper end of the band (Hz) in which the reduction's error is told.
+    stability
+        Of the steady motion.
     """
 
     model: TrainModel
@@ -51,6 +85,7 @@ class TrainRun:
     further: Mapping[str, Any] = field(default_factory=dict)
     again: Callable[[TrainModel, str], Callable[[Array], Iterable[TrainResponse]]] | None = None
     band_hz: float = 5000.0
+    stability: Stability = Stability(note="not computed")
 
 
 @dataclass(frozen=True, eq=False)

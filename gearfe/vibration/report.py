@@ -16,7 +16,7 @@ from ..train.kinematics import steady_forces
 from ..train.mesh_element import LEAST_REFERENCE, PHASES
 from ..train.response import TrainResponse
 from ..typing import Array
-from .follow import Followed
+from .follow import Followed, Stability
 from .spectra import TrainSpectra
 
 #: Lines that the summary names for each signal.
@@ -54,15 +54,18 @@ def dominant(spectra: TrainSpectra, response: TrainResponse, name: str) -> list[
     return found
 
 
-def train_summary(followed: Followed, timings: Mapping[str, float], **further: Any) -> dict[str, Any]:
+def train_summary(
+    followed: Followed, timings: Mapping[str, float], stability: Stability | None = None, **further: Any
+) -> dict[str, Any]:
     """Content of summary.json; `further` entries are put after the status."""
     response, made = followed.response, followed.spectra
-    period, floquet = response.common_period_s, response.floquet
+    period, stability = response.common_period_s, stability or Stability()
+    floquet = stability.multipliers
     summary: dict[str, Any] = {
         "status": response.status,
         "time_reached_s": response.time_reached,
         **further,
-        "warnings": list(response.warnings),
+        "warnings": [*response.warnings, *stability.warnings],
         "shafts": list(response.shaft_names),
         "meshes": list(response.mesh_names),
         "shaft_frequencies_Hz": response.shaft_frequencies_Hz,
@@ -72,7 +75,7 @@ def train_summary(followed: Followed, timings: Mapping[str, float], **further: A
         "floquet": {
             "largest_multiplier": None if floquet is None else float(np.abs(floquet).max()),
             "multipliers_abs": None if floquet is None else np.abs(floquet)[:12],
-            "note": response.floquet_note,
+            "note": stability.note,
         },
     }
     if followed.outputs >= 2:

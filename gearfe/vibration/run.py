@@ -25,9 +25,7 @@ from .report import stiffness_ranges
 ROUGH = 1e-3
 
 
-def simulated(
-    job: TrainJob, curves: Sequence[str], *, watch: Any, progress: Any = None, floquet: bool, estimate: bool
-) -> TrainRun:
+def simulated(job: TrainJob, curves: Sequence[str], *, watch: Any, progress: Any = None, estimate: bool) -> TrainRun:
     """The run of a job, its curves and housing each from the cache where it can be."""
     with watch.stage("curves"):
         stiffness = train_curves(job, curves, progress=progress, estimate=estimate)
@@ -40,7 +38,7 @@ def simulated(
     options: dict[str, Any] = {"tolerance": job.table.tolerance, "method": job.table.method, "band_hz": band(job)}
 
     def pieces(times: Any) -> Iterator[TrainResponse]:
-        return simulate_in_pieces(model, finer(times, highest)[0], floquet=floquet, estimate=estimate, **options)
+        return simulate_in_pieces(model, finer(times, highest)[0], estimate=estimate, **options)
 
     every = finer(job.times, highest)[1]
     again = repeater(job, every) if estimate else None

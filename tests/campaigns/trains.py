@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 
 from gearfe.rigid import integrate
+from gearfe.runup.train_stability import train_stability
 from gearfe.train import TrainModel, TrainResponse, build_train, simulate
-from gearfe.train.floquet import train_multipliers
 from gearfe.train.kinematics import steady_forces
 from gearfe.train.states import train_states
 from gearfe.vibration.job import job_train, read_train_job, train_body
@@ -78,7 +78,7 @@ def run(case: Case, folder: Path) -> Finding:
     measures |= {"method": made.statistics.get("method", ""), "steps": made.statistics.get("steps", "")}
     measures |= {"tolerance": table.tolerance, **{f"estimate_{k}": v for k, v in made.estimates.items()}}
     if made.status != "done":
-        found, _ = train_multipliers(model)
+        found = train_stability(model).multipliers
         told = "" if found is None else f", largest multiplier {abs(found[0]):.4g}"
         return Finding("stopped", f"{made.status} at {made.time_reached:.4g} s{told}", (), measures)
     checks = []
@@ -174,12 +174,11 @@ def _symmetry(made: TrainResponse, reflect: Any) -> list[Check]:
 
 
 def _floquet(model: TrainModel, measures: dict[str, Any]) -> Finding:
-    found, note = train_multipliers(model)
-    if found is None:
-        return Finding("refused", f"no multipliers: {note}", (), measures)
+    made = train_stability(model)
+    found, turns = made.multipliers, model.rolling.common_turns
+    if found is None or turns is None:
+        return Finding("refused", f"no multipliers: {made.note or model.rolling.note}", (), measures)
     largest = abs(found[0])
-    turns = model.rolling.common_turns
-    assert turns is not None
     period = float(turns) * 2 * math.pi / abs(model.steady_speed)
     times = period * np.arange(PERIODS + 1)
     options: dict[str, Any] = {
