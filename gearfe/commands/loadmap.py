@@ -38,41 +38,30 @@ def run(args: argparse.Namespace) -> int:
     tables = load_job(args.job, ("pair",), ("stiffness", "loadmap", "microgeometry"))
     tables["stiffness"] = _overridden_model(tables.get("stiffness", StiffnessTable()), args)
     table = with_loads(args, tables.get("loadmap", LoadMapTable()))
-    torques = table.torques()
+    table.torques()
 
     from ..gear.pair import GearPair
 
     pair = GearPair.from_table(tables["pair"])  # gears that cannot run together: NumPy alone tells
 
-    import numpy as np
-
-    from ..loadmap.report import report_lines, summary, torque_table, warnings
-    from ..loadmap.sweep import sweep_loads
-    from ..output.files import output_folder, whole_set, write_csv, write_json
+    from ..loadmap.report import report_lines, summary, warnings
+    from ..loadmap.report import tables as map_tables
+    from ..loadmap.sweep import job_map
+    from ..output.files import output_folder, whole_set, write_csvs, write_json
     from ..progress import Stopwatch
-    from ..stiffness.job import StiffnessJob
+    from ..stiffness.job import stiffness_job
     from ..stiffness.report import deviation_lines
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("geometry"):
-        beside = Path(args.job).parent
-        job = StiffnessJob(tables["pair"], tables["stiffness"], pair, tables.get("microgeometry"), beside)
-        model = job.model
+        job = stiffness_job(tables, Path(args.job).parent, pair)
+        deviations = deviation_lines(job)  # those that cannot be are told before the folder is made
     folder = output_folder(args.out)
-    made_map = sweep_loads(
-        job.pair,
-        torques,
-        model,
-        angles=np.arange(table.positions) * job.pair.mesh_cycle / table.positions,
-        root_stress=table.root_stress,
-        kinematics=job.table.kinematics,
-        progress=count,
-    )
+    made_map = job_map(job, table, progress=count)
     watch.seconds.update(made_map.timings)
     with whole_set(folder) as made:
         with watch.stage("table"):
-            made_map.to_csv(made / "loadmap.csv")
-            write_csv(made / "loadmap_torques.csv", torque_table(made_map))
+            write_csvs(made, map_tables(made_map))
         if not args.no_pictures:
             from ..figures.load_map import load_map_picture
             from ..figures.style import save
@@ -85,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(made / "loadmap.json", summary(job, table, made_map, watch.seconds))
         names = sorted(path.name for path in made.iterdir())
-    tell([*report_lines(made_map), *deviation_lines(job)], folder, names, watch.seconds, warnings(job, made_map))
+    tell([*report_lines(made_map), *deviations], folder, names, watch.seconds, warnings(job, made_map))
     return 1 if made_map.failed.any() else 0
 
 

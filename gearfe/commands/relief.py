@@ -12,7 +12,6 @@ from ..tables.microgeometry import MicrogeometryTable, ReliefTable
 from ..tables.stiffness import StiffnessTable
 from .arguments import add_job, add_keys, with_keys
 from .common import add_folder, tell
-from .microgeometry import condensed
 
 #: Files that a run can leave.
 FILES = ("relief*.csv", "relief.png", "relief.json")
@@ -45,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
 
     pair = GearPair.from_table(tables["pair"])
 
-    from ..contact.half_plane import half_plane_pair
+    from ..microgeometry.job import condensed
     from ..microgeometry.relief import optimise_relief
     from ..microgeometry.relief_job import (
         comparison,
@@ -64,8 +63,7 @@ def run(args: argparse.Namespace) -> int:
     watch = Stopwatch({"program start": time.perf_counter() - started})
     job = StiffnessJob(tables["pair"], with_keys(args, tables.get("stiffness", StiffnessTable()), "coarsen"), pair)
     folder = output_folder(args.out)
-    elastic, roots = condensed(job, bool(table.root_stress_weight), watch)
-    law = half_plane_pair(elastic)
+    law, roots = condensed(job, root_stress=bool(table.root_stress_weight), watch=watch)
     problem = relief_problem(table, base, pair, Path(args.job).parent, law, roots)
     with watch.stage("search"), ExitStack() as stack:
         executor = None

@@ -85,15 +85,13 @@ def run(args: argparse.Namespace) -> int:
 
     from ..output.files import output_folder, whole_set, write_json
     from ..progress import Stopwatch
-    from ..stiffness.job import StiffnessJob
+    from ..stiffness.job import stiffness_job
     from ..stiffness.report import report_lines, summary, warnings
     from ..stiffness.sweep import elastic_pair, sweep_stiffness
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("geometry"):
-        job = StiffnessJob(
-            tables["pair"], tables["stiffness"], pair, tables.get("microgeometry"), Path(args.job).parent
-        )
+        job = stiffness_job(tables, Path(args.job).parent, pair)
         sweep, model = job.sweep, job.model
         if isinstance(chosen, list):
             from ..stiffness.fields_output import angle_numbers

@@ -43,6 +43,11 @@ def torque_table(made: LoadMap) -> dict[str, list[float]]:
     return {name: values.tolist() for name, values in table.items()}
 
 
+def tables(made: LoadMap) -> dict[str, Mapping[str, Any]]:
+    """All tables of a map, the main one first."""
+    return {"loadmap": made.columns(), "torques": torque_table(made)}
+
+
 def summary(job: StiffnessJob, table: LoadMapTable, made: LoadMap, timings: Mapping[str, float]) -> dict[str, Any]:
     """Content of loadmap.json."""
     missed = made.interpolation_error()

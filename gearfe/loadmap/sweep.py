@@ -18,8 +18,10 @@ from ..contact.position import Positions, joined, together
 from ..errors import InputError
 from ..gear.pair import GearPair
 from ..progress import Stopwatch
+from ..stiffness.job import Keep, StiffnessJob
 from ..stiffness.positions import PositionSolver, Progress, at_torques, position_solver
 from ..stiffness.sweep import asked_positions, assembled_curve, distinct_angles, elastic_pair
+from ..tables.loadmap import LoadMapTable
 from ..threads import one_thread
 from ..typing import Array
 from .load_map import LoadMap
@@ -103,6 +105,23 @@ def sweep_loads(
 
         root = root_map(at_roots, (len(goals), n), source)
     return LoadMap(goals, curves, root, dict(watch.seconds))
+
+
+def job_map(
+    job: StiffnessJob, table: LoadMapTable, *, keep: Keep | None = None, progress: Progress | None = None
+) -> LoadMap:
+    """The map of a job file: torques and angles of [loadmap], the model of [stiffness]; see `StiffnessJob.elastic`."""
+    watch = Stopwatch()
+    made = sweep_loads(
+        job.pair,
+        table.torques(),
+        angles=np.arange(table.positions) * job.pair.mesh_cycle / table.positions,
+        root_stress=table.root_stress,
+        kinematics=job.table.kinematics,
+        elastic=job.elastic(keep, watch),
+        progress=progress,
+    )
+    return replace(made, timings={**watch.seconds, **made.timings})
 
 
 def _cells(

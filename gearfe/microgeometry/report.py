@@ -109,6 +109,12 @@ def _largest(values: Array) -> Array:
     return np.where(np.isfinite(made), made, np.nan)
 
 
+def tables(made: LoadedMesh) -> dict[str, Mapping[str, Any]]:
+    """All tables of a loaded mesh, the main one first."""
+    main, torques, pairs, orders = cell_table(made), torque_table(made), pair_table(made), order_table(made)
+    return {"microgeometry": main, "torques": torques, "pairs": pairs, "orders": orders}
+
+
 def summary(
     job: StiffnessJob,
     table: MicrogeometryTable,

@@ -90,6 +90,13 @@ def write_csv(path: str | Path, columns: Columns, *, gaps: bool = True) -> list[
     return table.warnings
 
 
+def write_csvs(folder: Path, tables: Mapping[str, Columns]) -> None:
+    """Write several tables: the first as ``NAME.csv``, the others as ``NAME_OTHER.csv``."""
+    main = next(iter(tables), "")
+    for name, columns in tables.items():
+        write_csv(folder / (f"{main}.csv" if name == main else f"{main}_{name}.csv"), columns)
+
+
 @dataclass(frozen=True)
 class Table:
     """A table under way: what writes its next rows, given as columns, and what its numbers are warned of at the end."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +21,13 @@ from ..tables.microgeometry import MicrogeometryTable
 from ..tables.pair import MaterialTable, PairTable
 from ..tables.stiffness import StiffnessTable
 from .curve import from_text
+
+if TYPE_CHECKING:
+    from ..contact.compliance import MeshingPair
+    from ..progress import Stopwatch
+
+#: Gives what a function makes, or what was made under that name before.
+Keep = Callable[[str, Callable[[], Any]], Any]
 
 
 @dataclass(frozen=True)
@@ -78,6 +86,18 @@ class StiffnessJob:
         sizes = t.coarsen, t.flank_coarsen, t.points_per_edge
         return PairModel(self.materials, t.plane, self.law, *sizes, self.deviations)
 
+    def elastic(self, keep: Keep | None = None, watch: Stopwatch | None = None, **changes: Any) -> MeshingPair:
+        """The condensed gears, some fields of the model changed; kept without deviations, which cost nothing."""
+        from .sweep import elastic_pair
+
+        model = self.model.changed(**changes)
+
+        def make() -> MeshingPair:
+            return elastic_pair(self.pair, replace(model, deviations=NOMINAL), watch=watch)
+
+        made: MeshingPair = make() if keep is None else keep("elastic", make)
+        return replace(made, model=model)
+
     @property
     def sweep(self) -> dict[str, Any]:
         """Keyword arguments of `gearfe.stiffness.sweep.sweep_stiffness` beside `model`.
@@ -116,6 +136,19 @@ def _material(table: MaterialTable) -> Material:
     return Material(table.youngs_modulus_GPa * 1e9, table.poisson_ratio, density=table.density_kg_per_m3)
 
 
+def stiffness_job(tables: Mapping[str, Any], folder: Path, pair: GearPair | None = None) -> StiffnessJob:
+    """The job of tables that are read, with the defaults of [stiffness] where they have none; `pair`: its gears.
+
+    Raises
+    ------
+    InputError
+        For gears that cannot run together.
+    """
+    pair = GearPair.from_table(tables["pair"]) if pair is None else pair
+    table = tables.get("stiffness", StiffnessTable())
+    return StiffnessJob(tables["pair"], table, pair, tables.get("microgeometry"), folder)
+
+
 def read_stiffness_job(path: str | Path) -> StiffnessJob:
     """Read a job file; without a [stiffness] table its defaults hold.
 
@@ -124,7 +157,4 @@ def read_stiffness_job(path: str | Path) -> StiffnessJob:
     InputError
         For every mistake in the file, and for gears that cannot run together.
     """
-    tables = load_job(path, ("pair",), ("stiffness", "microgeometry"))
-    table = tables.get("stiffness", StiffnessTable())
-    pair = GearPair.from_table(tables["pair"])
-    return StiffnessJob(tables["pair"], table, pair, tables.get("microgeometry"), Path(path).parent)
+    return stiffness_job(load_job(path, ("pair",), ("stiffness", "microgeometry")), Path(path).parent)

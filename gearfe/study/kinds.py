@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,9 +20,11 @@ from ..config import build, job_tables
 from ..gear.deviation import NOMINAL
 from ..progress import Stopwatch
 from ..tables.loadmap import LoadMapTable
-from ..tables.stiffness import StiffnessTable
 from ..textfile import read_csv
 from .answer import Answer
+
+if TYPE_CHECKING:
+    from ..stiffness.job import Keep
 
 #: Tables of a job as parsed from TOML.
 Raw = dict[str, Any]
@@ -72,59 +75,30 @@ def _stiffness(raw: Raw, path: Path, shared: Shared, estimate: bool) -> Answer:
     from ..stiffness.sweep import sweep_stiffness
 
     job = _pair_job(job_tables(raw, path, ("pair",), ("stiffness", "microgeometry")), path)
-    sweep = job.sweep
-    elastic = _elastic(job, job.model, shared)
+    sweep, elastic = job.sweep, job.elastic(_kept(job, shared))
     curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=estimate, **sweep)
     return Answer({"stiffness": curve.columns()}, summary(job, curve, {}), _positions(curve.failed))
 
 
 def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
-    from ..loadmap.report import summary, torque_table
-    from ..loadmap.sweep import sweep_loads
+    from ..loadmap.report import summary, tables
+    from ..loadmap.sweep import job_map
 
-    tables = job_tables(raw, path, ("pair",), ("stiffness", "microgeometry", "loadmap"))
-    table = tables.get("loadmap", LoadMapTable())
-    torques = table.torques()
-    job = _pair_job(tables, path)
-    model = job.model
-    made = sweep_loads(
-        job.pair,
-        torques,
-        angles=np.arange(table.positions) * job.pair.mesh_cycle / table.positions,
-        root_stress=table.root_stress,
-        kinematics=job.table.kinematics,
-        elastic=_elastic(job, model, shared),
-    )
-    rows: dict[str, Any] = {"loadmap": made.columns(), "torques": torque_table(made)}
-    return Answer(rows, summary(job, table, made, {}), _positions(made.failed))
+    read = job_tables(raw, path, ("pair",), ("stiffness", "microgeometry", "loadmap"))
+    table, job = read.get("loadmap", LoadMapTable()), _pair_job(read, path)
+    made = job_map(job, table, keep=_kept(job, shared))
+    return Answer(tables(made), summary(job, table, made, {}), _positions(made.failed))
 
 
 def _microgeometry(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
-    from ..contact.half_plane import half_plane_pair
-    from ..gear.deviation_job import deviations_of
-    from ..loadmap.root_stress import pair_roots
-    from ..microgeometry.report import cell_table, order_table, pair_table, summary, torque_table
-    from ..microgeometry.solve import load_mesh
+    from ..microgeometry.job import both_flanks, solved
+    from ..microgeometry.report import summary, tables
 
-    tables = job_tables(raw, path, ("pair", "microgeometry"), ("stiffness",))
-    table, job = tables["microgeometry"], _pair_job({**tables, "microgeometry": None}, path)
-    torques = table.torques()
-    deviations = deviations_of(table, job.pair, path.parent)
-    back = deviations_of(table, job.pair, path.parent, flank={"left": "right", "right": "left"}[table.flank])
-    model = job.model.changed(law="half_plane")
-    elastic = _elastic(job, model, shared)
-    roots, key = None, _key(job, model)
-    if table.root_stress:
-        roots = shared.get(key, "roots", lambda: pair_roots(elastic))
-    law = shared.get(key, "law", lambda: half_plane_pair(elastic)).deviated(deviations)
-    made = load_mesh(law, torques, positions=table.positions, mesh_cycles=table.mesh_cycles, roots=roots, back=back)
-    rows: dict[str, Any] = {
-        "microgeometry": cell_table(made),
-        "torques": torque_table(made),
-        "pairs": pair_table(made),
-        "orders": order_table(made),
-    }
-    return Answer(rows, summary(job, table, made, deviations, {}), _positions(made.failed))
+    read = job_tables(raw, path, ("pair", "microgeometry"), ("stiffness",))
+    table, job = read["microgeometry"], _pair_job({**read, "microgeometry": None}, path)
+    flanks = both_flanks(job, table)
+    made = solved(job, table, flanks, watch=Stopwatch(), keep=_kept(job, shared, law="half_plane"))
+    return Answer(tables(made), summary(job, table, made, flanks[0], {}), _positions(made.failed))
 
 
 def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
@@ -185,25 +159,14 @@ def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
 
 
 def _pair_job(tables: dict[str, Any], path: Path) -> Any:
-    from ..gear.pair import GearPair
-    from ..stiffness.job import StiffnessJob
+    from ..stiffness.job import stiffness_job
 
-    pair = GearPair.from_table(tables["pair"])
-    table = tables.get("stiffness", StiffnessTable())
-    return StiffnessJob(tables["pair"], table, pair, tables.get("microgeometry"), path.parent)
+    return stiffness_job(tables, path.parent)
 
 
-def _elastic(job: Any, model: Any, shared: Shared) -> Any:
-    """Condensed gears with the deviations of the job: these cost nothing, so the gears are shared without them."""
-    from ..stiffness.sweep import elastic_pair
-
-    made = shared.get(_key(job, model), "elastic", lambda: elastic_pair(job.pair, replace(model, deviations=NOMINAL)))
-    return replace(made, model=model)
-
-
-def _key(job: Any, model: Any) -> str:
-    """What decides the condensed gears."""
-    return repr((job.pair_table, replace(model, deviations=NOMINAL)))
+def _kept(job: Any, shared: Shared, **changes: Any) -> Keep:
+    """What decides the condensed gears is the key of all that cases share."""
+    return partial(shared.get, repr((job.pair_table, replace(job.model.changed(**changes), deviations=NOMINAL))))
 
 
 def _positions(failed: Any) -> str:
