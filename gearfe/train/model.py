@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 
@@ -114,6 +115,13 @@ class TrainModel(Facts):
     def coupled_frequencies_hz(self) -> Array:
         """Natural frequencies with mean mesh stiffness (Hz)."""
         return np.sqrt(np.maximum(self.modal.eigenvalues, 0.0)) / (2.0 * math.pi)
+
+    @cached_property
+    def sides(self) -> tuple[tuple[Flank, ...], ...]:
+        """Flanks of each mesh: none of a rigid one, else the driving ones, and the back ones behind a backlash."""
+        left = iter(self.forces.flanks)
+        counts = (0 if line.rigid else 1 if line.backlash is None else 2 for line in self.meshes)
+        return tuple(tuple(islice(left, count)) for count in counts)
 
     @cached_property
     def multipliers_of_forces(self) -> Array:

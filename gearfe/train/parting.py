@@ -59,9 +59,7 @@ def apart_in_steps(model: TrainModel, trajectory: Trajectory, until: float) -> t
     middle = 0.5 * (u[:-1] + u[1:]) + 0.125 * h * (du[:-1] - du[1:])
     angle = model.angle(0.5 * (ends[:-1] + ends[1:]))
     apart = np.zeros((len(angle), len(model.meshes)), dtype=bool)
-    flanks = iter(model.forces.flanks)
-    for i, line in enumerate(model.meshes):
-        sides = [] if line.rigid else [next(flanks)] + ([] if line.backlash is None else [next(flanks)])
+    for i, sides in enumerate(model.sides):
         if sides:
             apart[:, i] = ~np.any([flank.bears(*flank.place(angle, middle)) for flank in sides], axis=0)
     return ends, apart
@@ -84,9 +82,8 @@ def parted(parting: Sequence[Parting], never: Sequence[bool]) -> dict[str, list[
 def beyond_law(model: TrainModel, moved: TrainStates) -> tuple[int, str] | None:
     """The first sample at which a mesh goes beyond what its law is known for, and what to ask for."""
     first: tuple[int, str] | None = None
-    flanks, u = iter(model.forces.flanks), moved.q @ model.directions
-    for i, line in enumerate(model.meshes):
-        sides = [] if line.rigid else [next(flanks)] + ([] if line.backlash is None else [next(flanks)])
+    u = moved.q @ model.directions
+    for i, (line, sides) in enumerate(zip(model.meshes, model.sides, strict=True)):
         for flank in sides:
             if not isinstance(flank, LawFlank):
                 continue

@@ -35,25 +35,12 @@ LEAST_SAMPLES = 256
 COUNTED = ("steps", "evaluations", "orders", "newton_iterations", "rejected", "compile_seconds")
 
 
-def simulate(
-    model: TrainModel,
-    times: ArrayLike,
-    *,
-    tolerance: float = 1e-6,
-    method: str = "auto",
-    estimate: bool = False,
-    band_hz: float = 5000.0,
-    backend: str = "auto",
-    raise_on_failure: bool = True,
-) -> TrainResponse:
-    """Integrate a train and evaluate it at the asked times.
+@dataclass(frozen=True)
+class TransientOptions:
+    """How a train is integrated, and what is evaluated beside its response.
 
-    Parameters
+    Attributes
     ----------
-    model
-        From `gearfe.train.build_train`.
-    times : array_like, shape (n,)
-        Output times (s), rising from 0; the steps of the integration do not depend on them.
     tolerance
         Of the integration, relative to each coordinate's largest value.
     method
@@ -63,41 +50,41 @@ def simulate(
         and of the housing's reduction up to `band_hz` (Hz).
     backend
         ``compiled``, ``plain`` or ``auto``.
+    """
 
+    tolerance: float = 1e-6
+    method: str = "auto"
+    estimate: bool = False
+    band_hz: float = 5000.0
+    backend: str = "auto"
+
+
+def simulate(model: TrainModel, times: ArrayLike, *, raise_on_failure: bool = True, **options: Any) -> TrainResponse:
+    """Integrate a train and evaluate it at the asked times.
+
+    Parameters
+    ----------
+    model
+        From `gearfe.train.build_train`.
+    times : array_like, shape (n,)
+        Output times (s), rising from 0; the steps of the integration do not depend on them.
     raise_on_failure
         Raise where the end is not reached; without it the response as far as it came is returned, with its status.
-
-    Returns
-    -------
-    TrainResponse
+    options
+        Of `TransientOptions`: ``tolerance``, ``method``, ``estimate``, ``band_hz``, ``backend``.
 
     Raises
     ------
     IntegrationError
         For a run that ended early; its ``result`` is the response.
     """
-    options: dict[str, Any] = {
-        "tolerance": tolerance,
-        "method": method,
-        "estimate": estimate,
-        "band_hz": band_hz,
-    }
-    made = joined(list(simulate_in_pieces(model, times, backend=backend, **options)))
+    made = joined(list(simulate_in_pieces(model, times, **options)))
     if raise_on_failure and made.status != "done":
         raise IntegrationError(made, made.status, made.time_reached, float(np.max(times)))
     return made
 
 
-def simulate_in_pieces(
-    model: TrainModel,
-    times: ArrayLike,
-    *,
-    tolerance: float = 1e-6,
-    method: str = "auto",
-    estimate: bool = False,
-    band_hz: float = 5000.0,
-    backend: str = "auto",
-) -> Iterator[TrainResponse]:
+def simulate_in_pieces(model: TrainModel, times: ArrayLike, **options: Any) -> Iterator[TrainResponse]:
     """What `simulate` does, handed over piece by piece, so that a long run needs no more memory than a short one.
 
     The pieces follow each other without gaps; the status of the last one says whether the run reached its end. What is
@@ -108,20 +95,21 @@ def simulate_in_pieces(
         raise InputError(
             "times", None, "must be at least two rising numbers that begin with 0", "give the output times in s"
         )
-    return _pieces(model, t, tolerance, method, band_hz if estimate else None, backend)
+    return _pieces(model, t, TransientOptions(**options))
 
 
-def _pieces(
-    model: TrainModel, t: Array, tolerance: float, method: str, band_hz: float | None, backend: str
-) -> Iterator[TrainResponse]:
+def _pieces(model: TrainModel, t: Array, options: TransientOptions) -> Iterator[TrainResponse]:
     so_far, begin, start = _SoFar(), 0, model.start
-    finer = None if band_hz is None else _Finer(max(1e-2 * tolerance, 1e-13), method, model.start)
+    finer = None
+    if options.estimate:
+        finer = _Finer(replace(options, tolerance=max(1e-2 * options.tolerance, 1e-13), backend="auto"), model.start)
+    now = options
     for end in _ends(model, t):
         if begin or end < len(t) - 1:
             count(begin, len(t) - 1, "times")
         clocked = clock.perf_counter()
         with np.errstate(over="ignore", invalid="ignore"):
-            trajectory, moved = _run(model, t[begin : end + 1], tolerance, method, backend, start)
+            trajectory, moved = _run(model, t[begin : end + 1], now, start)
             status, keep, why = _ended(model, trajectory, moved)
         kept = _cut(moved, min(1, begin), keep)
         so_far.add(model, trajectory, kept, clock.perf_counter() - clocked)
@@ -132,23 +120,17 @@ def _pieces(
         if last:
             if begin:
                 count(0, 0)  # what follows is no part of the count
-            yield _whole(
-                model,
-                response,
-                so_far,
-                finer,
-                f"of {1e3 * float(t[-1]):.6g} ms: {response.status}{why}",
-                band_hz,
-            )
+            ended = f"of {1e3 * float(t[-1]):.6g} ms: {response.status}{why}"
+            yield _whole(model, response, so_far, finer, ended, options)
             return
         yield response
         begin, start = end, replace(start, time=float(t[end]), q=moved.q[-1].copy(), v=moved.v[-1].copy())
-        method = _chosen(method, trajectory)
+        now = _chosen(now, trajectory)
 
 
-def _chosen(method: str, trajectory: Trajectory) -> str:
-    """Method of the next piece: the one that the choice took for this one, unless it took several."""
-    return trajectory.method if method == "auto" else method
+def _chosen(options: TransientOptions, trajectory: Trajectory) -> TransientOptions:
+    """Options of the next piece: with the method that the choice took for this one, unless it took several."""
+    return replace(options, method=trajectory.method) if options.method == "auto" else options
 
 
 def _ends(model: TrainModel, t: Array) -> Iterator[int]:
@@ -164,13 +146,18 @@ def _ends(model: TrainModel, t: Array) -> Iterator[int]:
 
 
 def _run(
-    model: TrainModel, t: Array, tolerance: float, method: str, backend: str, start: Start, longest: float = np.inf
+    model: TrainModel, t: Array, options: TransientOptions, start: Start, longest: float = np.inf
 ) -> tuple[Trajectory, TrainStates]:
-    if not len(model.modal.eigenvalues):
-        method = "explicit"  # nothing is left to integrate
-    options: dict[str, Any] = {"tolerance": tolerance, "start": start, "backend": backend, "longest": longest}
-    options["raise_on_failure"] = False  # a response has a status of its own
-    trajectory = integrate(model.system, t, method=method, **options)
+    trajectory = integrate(
+        model.system,
+        t,
+        method=options.method if len(model.modal.eigenvalues) else "explicit",  # nothing is left to integrate
+        tolerance=options.tolerance,
+        start=start,
+        backend=options.backend,
+        longest=longest,
+        raise_on_failure=False,  # a response has a status of its own
+    )
     return trajectory, train_states(model, trajectory)
 
 
@@ -237,8 +224,7 @@ class _SoFar:
 class _Finer:
     """A second run beside the first, with a hundredth of the tolerance and steps half as long."""
 
-    tolerance: float
-    method: str
+    options: TransientOptions
     start: Start
     off: Array = field(default_factory=lambda: np.zeros(0))
     size: Array = field(default_factory=lambda: np.zeros(0))
@@ -249,7 +235,7 @@ class _Finer:
         # where the corners of the curves set the steps, a tolerance alone would repeat them
         longest = 0.5 * float(t[-1] - t[0]) / max(1, steps)
         with np.errstate(over="ignore", invalid="ignore"):
-            trajectory, finer = _run(model, t, self.tolerance, self.method, "auto", self.start, longest)
+            trajectory, finer = _run(model, t, self.options, self.start, longest)
             one = np.hstack([kept.contact_force, kept.a @ model.axial.T])
             two = np.hstack([finer.contact_force, finer.a @ model.axial.T])
         shared, places = np.searchsorted(finer.time, kept.time), np.arange(len(kept.time))
@@ -259,7 +245,7 @@ class _Finer:
             self.off = self.size = np.zeros(one.shape[1])
         self.off = np.maximum(self.off, np.abs(one - two).max(axis=0, initial=0.0))
         self.size = np.maximum(self.size, np.abs(two).max(axis=0, initial=0.0))
-        self.method = _chosen(self.method, trajectory)
+        self.options = _chosen(self.options, trajectory)
         if len(finer.time) == len(t):
             self.start = replace(self.start, time=float(t[-1]), q=finer.q[-1].copy(), v=finer.v[-1].copy())
 
@@ -275,19 +261,19 @@ def _whole(
     so_far: _SoFar,
     finer: _Finer | None,
     ended: str,
-    band_hz: float | None,
+    options: TransientOptions,
 ) -> TrainResponse:
     """The last piece with what holds for the whole run."""
     warnings = so_far.pulls(model) + _loose(model)
     if response.status != "done":
         warnings.append(f"the run ended at {1e3 * response.time_reached:.6g} ms {ended}")
     estimates: dict[str, float] = {}
-    if finer is not None and band_hz is not None:
+    if finer is not None:
         estimates["integration"] = finer.error
         if model.train.housing is not None:
             from ..reduction.error import reduction_error
 
-            estimates["reduction"] = reduction_error(model.train.housing, band_hz).response
+            estimates["reduction"] = reduction_error(model.train.housing, options.band_hz).response
     return replace(response, estimates=estimates, warnings=tuple(warnings))
 
 
