@@ -83,7 +83,7 @@ def test_gears_are_condensed_once_for_the_cases_that_share_them(tmp_path, monkey
     (tmp_path / "study.toml").write_text((PAIR + LOADMAP).replace("face_width_mm = 10.0", "face_width_mm = 11.0"))
     study = read_study(tmp_path / "study.toml")
     condensed, elastic_pair = [], sweep.elastic_pair
-    monkeypatch.setattr(sweep, "elastic_pair", lambda *given: condensed.append(given) or elastic_pair(*given))
+    monkeypatch.setattr(sweep, "elastic_pair", lambda *a, **more: condensed.append(a) or elastic_pair(*a, **more))
     assert [case[1] for case in study.cases] == [0.0, 0.1, 0.0, 0.1]
     run_study(study, tmp_path / "out", jobs=1)
     assert len(condensed) == 3
