@@ -16,13 +16,10 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from .solid import SolidMaterial, SolidMatrices
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from .typing import Array, BoolArray, IntArray
 
 #: Order of the elements in the plane and along y.
 ORDER = 3
@@ -38,13 +35,13 @@ class TriangleRule(NamedTuple):
     """The ten functions of a triangle of order 3 at the ``p`` points of a quadrature rule."""
 
     #: (2, p)
-    points: Floats
+    points: Array
     #: (10, p)
-    values: Floats
+    values: Array
     #: (10, p, 2)
-    slopes: Floats
+    slopes: Array
     #: (p,)
-    weights: Floats
+    weights: Array
 
 
 @cache
@@ -64,7 +61,7 @@ def triangle_rule() -> TriangleRule:
     return TriangleRule(points, values, np.stack(slopes, axis=-1), weights)
 
 
-def _monomials(powers: Ints, points: Floats) -> Floats:
+def _monomials(powers: IntArray, points: Array) -> Array:
     """(powers, points) values of x^i y^j."""
     return np.asarray(points[0] ** powers[:, :1] * points[1] ** powers[:, 1:])
 
@@ -73,33 +70,33 @@ class TriangleMaps(NamedTuple):
     """Maps of ``m`` triangles at the points of the rule."""
 
     #: (m, p) area that belongs to a point (m2)
-    areas: Floats
+    areas: Array
     #: (m, p, 2, 2) gradient of the inverse map, [reference axis, x or z]
-    inverse: Floats
+    inverse: Array
 
 
-def triangle_maps(points: Floats, triangles: Ints) -> TriangleMaps:
+def triangle_maps(points: Array, triangles: IntArray) -> TriangleMaps:
     """Maps of triangles (m, 10) with nodes at `points` (n, 2) (m)."""
     rule = triangle_rule()
     forward = np.einsum("eak,apm->epkm", points[triangles], rule.slopes, optimize=True)
     return TriangleMaps(np.abs(np.linalg.det(forward)) * rule.weights, np.asarray(np.linalg.inv(forward)))
 
 
-def volume_ratios(points: Floats, triangles: Ints) -> Floats:
+def volume_ratios(points: Array, triangles: IntArray) -> Array:
     """(m,) smallest volume ratio of each triangle at the points of the rule, against its mean: 1 of a straight one."""
     det = np.linalg.det(np.einsum("eak,apm->epkm", points[triangles], triangle_rule().slopes, optimize=True))
     mean = det.mean(axis=1)
     return np.asarray((det * np.sign(mean)[:, None]).min(axis=1) / np.maximum(np.abs(mean), 1e-300))
 
 
-def plane_parts(maps: TriangleMaps, values: Floats, slopes: Floats) -> dict[str, Floats]:
+def plane_parts(maps: TriangleMaps, values: Array, slopes: Array) -> dict[str, Array]:
     """(m, a, p) of functions with `values` (a, p) and reference `slopes` (a, p, 2): d/dx, d/dz, and themselves."""
     gradient = np.einsum("apm,epmk->eapk", slopes, maps.inverse, optimize=True)
     whole = np.broadcast_to(values, gradient.shape[:3])
     return {"x": gradient[..., 0], "z": gradient[..., 1], "0": whole}
 
 
-def plane_integrals(points: Floats, triangles: Ints) -> dict[str, Floats]:
+def plane_integrals(points: Array, triangles: IntArray) -> dict[str, Array]:
     """(m, 10, 10) integrals over the triangles by the names of `PAIRS`."""
     rule, maps = triangle_rule(), triangle_maps(points, triangles)
     parts = plane_parts(maps, rule.values, rule.slopes)
@@ -119,12 +116,12 @@ class PrismMatrices(NamedTuple):
     """Matrices over the nodes that solid elements use."""
 
     #: (n,) number ``point * levels + level`` of each node
-    used: Ints
+    used: IntArray
     matrices: SolidMatrices
 
 
 def assemble_prisms(
-    points: Floats, triangles: Ints, levels: Floats, solid: NDArray[np.bool_], material: SolidMaterial
+    points: Array, triangles: IntArray, levels: Array, solid: BoolArray, material: SolidMaterial
 ) -> PrismMatrices:
     """Stiffness and consistent mass as sums of (plane matrix) x (line matrix), one term for each set of solid faces.
 
@@ -144,9 +141,9 @@ def assemble_prisms(
     plane = plane_integrals(points, triangles)
     count = len(levels)
     size = len(points) * count
-    keys: list[Ints] = []
-    terms: list[Floats] = []
-    masses: list[Floats] = []
+    keys: list[IntArray] = []
+    terms: list[Array] = []
+    masses: list[Array] = []
     sets, which = np.unique(solid, axis=0, return_inverse=True)
     for number, active in enumerate(sets):
         if not active.any():
@@ -183,7 +180,7 @@ def assemble_prisms(
     return PrismMatrices(used, SolidMatrices(stiffness, sparse.csr_array((mass, columns, starts), shape=(n, n))))
 
 
-def isotropic_blocks(products: list[list[Floats]], material: SolidMaterial) -> Floats:
+def isotropic_blocks(products: list[list[Array]], material: SolidMaterial) -> Array:
     """(..., 3, 3) stiffness of isotropic elasticity between two functions.
 
     With ``P_ij`` (...) the integral of d_i (row's function) times d_j (column's), entry (i, j) is
@@ -198,7 +195,7 @@ def isotropic_blocks(products: list[list[Floats]], material: SolidMaterial) -> F
     return blocks
 
 
-def _line_integrals(levels: Floats, layers: Ints) -> dict[str, Floats]:
+def _line_integrals(levels: Array, layers: IntArray) -> dict[str, Array]:
     """(l, l) integrals over the chosen layers: mass, slope (of the row's function), stiffness; which levels touch."""
     x, w = np.polynomial.legendre.leggauss(ORDER + 1)
     functions = lagrange()

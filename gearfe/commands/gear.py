@@ -121,18 +121,12 @@ def _deviations(
 ) -> tuple[ToothDeviations, ToothDeviations]:
     """Deviations of the left and the right flanks of a gear."""
     from ..gear.deviation import NOMINAL
-    from ..gear.deviation_job import GEARS, active_rolls, flank_deviations
+    from ..gear.deviation_job import GEARS, FlankOf, flank_deviations
 
     if table is None:
         return NOMINAL
     number = GEARS.index(name)
-    gear, active = (pair.pinion, pair.wheel)[number], active_rolls(pair)[number]
-    left, right = (
-        flank_deviations(
-            getattr(table, name).flank(side), gear, active, f"microgeometry.{name}", folder, wheel=number == 1
-        )
-        for side in ("left", "right")
-    )
+    left, right = (flank_deviations(FlankOf(table, pair, number, side, folder)) for side in ("left", "right"))
     return left, right
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..gear import pitch_errors
-from ..gear.deviation_job import GEARS, active_rolls, flank_deviations
+from ..gear.deviation_job import GEARS, FlankOf, flank_deviations
 from ..gear.pair import GearPair
 from ..microgeometry.loaded_mesh import LoadedMesh
 from ..microgeometry.relief import ReliefResult
@@ -48,17 +48,17 @@ class _Chart:
 
 
 def _chart(table: MicrogeometryTable, pair: GearPair, g: int, side: str, folder: Path) -> _Chart:
-    name, gear, active = GEARS[g], (pair.pinion, pair.wheel)[g], active_rolls(pair)[g]
+    one = FlankOf(table, pair, g, side, folder)
+    gear, active = one.gear, one.active
     ends = gear.form_roll, gear.profile.tip_roll
     roll = np.unique(np.concatenate([np.linspace(*ends, 400), active]))
-    of = getattr(table, name).flank(side)
-    own = flank_deviations(of, gear, active, f"microgeometry.{name}", folder, wheel=g == 1)
+    own = flank_deviations(one)
     index, band = 1e6 * np.array(own.turn) * gear.reference_radius, None
     if table.tolerance_class is not None:
         allowed = pitch_errors.tolerances(gear, table.tolerance_class)
         band = 1e6 * (0.5 * allowed.form + allowed.slope * ((roll - ends[0]) / (ends[1] - ends[0])))
     return _Chart(
-        title=f"{name}, {side} flanks{', driving' if side == table.flank else ''}",
+        title=f"{GEARS[g]}, {side} flanks{', driving' if side == table.flank else ''}",
         roll=1e3 * roll,
         active=tuple(1e3 * s for s in active),
         lines=[np.zeros(len(roll)) if one is None else 1e6 * one.at(roll)[0] for one in own.profiles],

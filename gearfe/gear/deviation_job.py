@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -47,20 +48,62 @@ def deviations_of(
     """
     side = flank or table.flank
     driver, driven = (
-        flank_deviations(
-            getattr(table, name).flank(side),
-            gear,
-            active,
-            f"microgeometry.{name}",
-            Path(folder),
-            mirrored=side == "right",
-            wheel=g == 1,
-        )
+        flank_deviations(FlankOf(table, pair, g, side, Path(folder), name, mirrored=side == "right"))
         if name
         else ToothDeviations()
-        for g, (name, gear, active) in enumerate(zip(gears, (pair.pinion, pair.wheel), active_rolls(pair), strict=True))
+        for g, name in enumerate(gears)
     )
     return driver, driven
+
+
+@dataclass(frozen=True)
+class FlankOf:
+    """One side of the teeth of a pair's gear.
+
+    Attributes
+    ----------
+    table, pair
+        [microgeometry], and the gears.
+    number
+        0 for the pinion, 1 for the wheel.
+    side
+        ``left`` or ``right``.
+    folder
+        Of the files that the table names.
+    name
+        Table of the gear; empty: its own.
+    mirrored
+        Whether the pair is seen from the other side, where right flanks are left ones.
+    """
+
+    table: MicrogeometryTable
+    pair: GearPair
+    number: int
+    side: str
+    folder: Path
+    name: str = ""
+    mirrored: bool = False
+
+    @property
+    def own(self) -> FlankTable:
+        """The flank's own table."""
+        found: FlankTable = getattr(self.table, self.name or GEARS[self.number]).flank(self.side)
+        return found
+
+    @property
+    def gear(self) -> Gear:
+        """The gear."""
+        return (self.pair.pinion, self.pair.wheel)[self.number]
+
+    @property
+    def where(self) -> str:
+        """Name of the table in messages."""
+        return f"microgeometry.{self.name or GEARS[self.number]}"
+
+    @property
+    def active(self) -> tuple[float, float]:
+        """Roll lengths (m) between which it touches the mate."""
+        return active_rolls(self.pair)[self.number]
 
 
 def active_rolls(pair: GearPair) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -69,26 +112,17 @@ def active_rolls(pair: GearPair) -> tuple[tuple[float, float], tuple[float, floa
     return (start, end), (pair.tangent_length - end, pair.tangent_length - start)
 
 
-def flank_deviations(
-    table: FlankTable,
-    gear: Gear,
-    active: tuple[float, float],
-    where: str,
-    folder: Path,
-    *,
-    mirrored: bool = False,
-    wheel: bool = False,
-) -> ToothDeviations:
+def flank_deviations(one: FlankOf) -> ToothDeviations:
     """Deviations of one side of a gear's teeth."""
-    made = modification(table, gear, active, where, folder, mirrored=mirrored, wheel=wheel)
+    made = modification(one)
     try:
-        index = _index_deviations(table, gear, where, folder)
-        turn = pitch_errors.turns(gear, index) if index.any() else (0.0,)
-        if mirrored and len(turn) > 1:
-            turn = _mirrored(turn, wheel)
-        return tooth_deviations(gear, made, turn)
+        index = _index_deviations(one.own, one.gear, one.where, one.folder)
+        turn = pitch_errors.turns(one.gear, index) if index.any() else (0.0,)
+        if one.mirrored and len(turn) > 1:
+            turn = _mirrored(turn, one.number == 1)
+        return tooth_deviations(one.gear, made, turn)
     except InputError as error:
-        raise _named(error, where) from None
+        raise _named(error, one.where) from None
 
 
 def pitch_errors_of(
@@ -119,28 +153,20 @@ def _mirrored(values: Sequence[Any], wheel: bool) -> tuple[Any, ...]:
     return tuple(values[(-j - wheel) % len(values)] for j in range(len(values)))
 
 
-def modification(
-    table: FlankTable,
-    gear: Gear,
-    active: tuple[float, float],
-    where: str,
-    folder: Path,
-    *,
-    mirrored: bool = False,
-    wheel: bool = False,
-) -> FlankModification:
+def modification(one: FlankOf) -> FlankModification:
     """Modifications of one side of a gear's teeth, in SI."""
+    table, gear, active, where = one.own, one.gear, one.active, one.where
     extra: list[Deviation] = []
     measured: tuple[Deviation, ...] = ()
     if table.points:
         s, h = np.array(table.points).T
         extra.append(_covering(1e-3 * s, 1e-6 * h, active, f"{where}.points", straight=True))
     if table.measured_csv is not None:
-        found = _measured(table.measured_csv, gear, active, f"{where}.measured_csv", folder)
+        found = _measured(table.measured_csv, gear, active, f"{where}.measured_csv", one.folder)
         if len(found) == 1:
             extra += found
         else:
-            measured = _mirrored(found, wheel) if mirrored else tuple(found)
+            measured = _mirrored(found, one.number == 1) if one.mirrored else tuple(found)
     return FlankModification(
         tip_relief=_relief(table, gear, where, "tip"),
         root_relief=_relief(table, gear, where, "root"),

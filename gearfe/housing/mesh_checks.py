@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import InputError
 from ..solid import EDGES, FACES, jacobian_determinants, unfolded
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from ..typing import Array, IntArray
 
 #: A midside node further than this part of its edge's length from the edge's middle belongs to another edge.
 _FAR = 0.35
@@ -24,10 +21,10 @@ _FLAT = 1e-9
 class CheckedMesh(NamedTuple):
     """A mesh whose nodes are all used, with midside nodes in this project's order."""
 
-    nodes: Floats
-    tets: Ints
+    nodes: Array
+    tets: IntArray
     #: (used,) number that each node had before
-    original: Ints
+    original: IntArray
     notes: tuple[str, ...]
 
 
@@ -73,7 +70,7 @@ def checked_mesh(nodes: object, tets: object) -> CheckedMesh:
     return CheckedMesh(points, cells, original, tuple(notes))
 
 
-def boundary_faces(cells: Ints) -> Ints:
+def boundary_faces(cells: IntArray) -> IntArray:
     """(f, 3) or (f, 6) faces that belong to one cell only, anticlockwise seen from outside.
 
     Cells are tetrahedra of four or ten nodes, or wedges of six, whose quadrilateral faces become two triangles each.
@@ -90,7 +87,7 @@ def boundary_faces(cells: Ints) -> Ints:
 WEDGE_ENDS, WEDGE_SIDES = np.array([[0, 1, 2], [3, 5, 4]]), np.array([[1, 0, 3, 4], [2, 1, 4, 5], [0, 2, 5, 3]])
 
 
-def _only_once(faces: Ints) -> Ints:
+def _only_once(faces: IntArray) -> IntArray:
     """Faces that no other has the first three nodes (of a quadrilateral: all but the largest number) in common with."""
     known = np.sort(faces[:, : 4 if faces.shape[1] == 4 else 3], axis=1)[:, :3]
     n = int(faces.max(initial=0)) + 1
@@ -99,7 +96,7 @@ def _only_once(faces: Ints) -> Ints:
     return faces[np.sort(first[count == 1])]
 
 
-def _ordered(nodes: Floats, tets: Ints) -> Ints:
+def _ordered(nodes: Array, tets: IntArray) -> IntArray:
     """Midside nodes in the order of `EDGES`, told by where they lie: VTK's, Abaqus' and gmsh's orders are known."""
     middles = 0.5 * (nodes[tets[:, EDGES[:, 0]]] + nodes[tets[:, EDGES[:, 1]]])
     lengths = np.linalg.norm(nodes[tets[:, EDGES[:, 0]]] - nodes[tets[:, EDGES[:, 1]]], axis=2)
@@ -112,7 +109,7 @@ def _ordered(nodes: Floats, tets: Ints) -> Ints:
     raise InputError("tets", worst, problem, "order them by edges 01, 12, 02, 03, 13, 23 (VTK) or as gmsh does")
 
 
-def _check_volumes(nodes: Floats, tets: Ints) -> None:
+def _check_volumes(nodes: Array, tets: IntArray) -> None:
     volume = jacobian_determinants(nodes, tets[:, :4])[:, 0]
     scale = float(np.abs(volume).mean())
     bad = np.flatnonzero(volume <= _FLAT * scale)
@@ -125,7 +122,7 @@ def _check_volumes(nodes: Floats, tets: Ints) -> None:
     raise InputError("tets", None, f"{len(bad)} inverted or collapsed elements ({shown})", cure)
 
 
-def _check_connected(nodes: Floats, tets: Ints) -> None:
+def _check_connected(nodes: Array, tets: IntArray) -> None:
     faces = np.sort(tets[:, FACES[:, :3]].reshape(-1, 3), axis=1)
     element = np.repeat(np.arange(len(tets)), 4)
     order = np.lexsort(faces.T)

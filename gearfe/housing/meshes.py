@@ -10,21 +10,19 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from ..meshing.housing_mesh import REVERSED, Extrusion
 from ..prisms import ORDER, assemble_prisms, lagrange, triangle_rule
 from ..solid import MassRule, SolidMaterial, SolidMatrices, assemble
+from ..typing import Array, BoolArray, IntArray
 from .mesh_checks import boundary_faces
 from .mesh_error import energy_lost
 from .prism_error import prism_energy_lost
 from .surface import Surface, SurfaceQuadrature, normal_velocity, surface_quadrature
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 #: Which faces are outside, told by their centres (f, 3) in m.
-Outer = Callable[[Floats], NDArray[np.bool_]]
+Outer = Callable[[Array], BoolArray]
 
 #: Triangles between the ten nodes of one, in its own sense.
 _SPLIT = np.array([[0, 3, 8], [3, 4, 9], [4, 1, 5], [8, 9, 7], [9, 5, 6], [7, 6, 2], [3, 9, 8], [4, 5, 9], [9, 6, 7]])
@@ -44,21 +42,21 @@ class Tetrahedra:
         Integration of the mass.
     """
 
-    nodes: Floats
-    cells: Ints
+    nodes: Array
+    cells: IntArray
     mass_rule: MassRule = "exact"
 
     def assemble(self, material: SolidMaterial) -> SolidMatrices:
         """Stiffness and mass."""
         return assemble(self.nodes, self.cells, material, mass_rule=self.mass_rule)
 
-    def surface(self, without: list[Ints], outer: Outer | None = None) -> Surface:
+    def surface(self, without: list[IntArray], outer: Outer | None = None) -> Surface:
         """Surface but for faces that lie wholly within one of the sets of nodes, or are not `outer`."""
         faces = boundary_faces(self.cells)
         faces = faces[_chosen(self.nodes, faces, faces[:, :3], without, outer)]
         return Surface(faces, normal_velocity(surface_quadrature(self.nodes, faces), faces, len(self.nodes)))
 
-    def energy_lost(self, material: SolidMaterial, fields: Floats, eigenvalues: Floats, rigid: list[Ints]) -> Floats:
+    def energy_lost(self, material: SolidMaterial, fields: Array, eigenvalues: Array, rigid: list[IntArray]) -> Array:
         """See `gearfe.housing.mesh_error.energy_lost`."""
         return energy_lost(self.nodes, self.cells, material, fields, eigenvalues, rigid)
 
@@ -70,17 +68,17 @@ class Prisms:
     extrusion: Extrusion
 
     @cached_property
-    def used(self) -> Ints:
+    def used(self) -> IntArray:
         """(n,) number ``point * levels + level`` of each node."""
         return np.unique(self._numbers)
 
     @cached_property
-    def nodes(self) -> Floats:
+    def nodes(self) -> Array:
         """(n, 3) coordinates (m)."""
         return self._places(self.used)
 
     @cached_property
-    def cells(self) -> Ints:
+    def cells(self) -> IntArray:
         """(m, 6) linear wedges between the nodes, 27 an element: what is shown."""
         low, high = self._numbers[:, _SPLIT, :-1], self._numbers[:, _SPLIT, 1:]
         wedges = np.concatenate([low, high], axis=2)  # (elements, 9, 6, 3 layers)
@@ -90,7 +88,7 @@ class Prisms:
         """Stiffness and mass."""
         return assemble_prisms(*self.extrusion, material).matrices
 
-    def surface(self, without: list[Ints], outer: Outer | None = None) -> Surface:
+    def surface(self, without: list[IntArray], outer: Outer | None = None) -> Surface:
         """Surface but for faces that lie wholly within one of the sets of nodes, or are not `outer`."""
         mesh, levels, ends, sides = self.extrusion, len(self.extrusion.levels), [], []
         none = np.zeros_like(mesh.solid[:1])
@@ -113,28 +111,30 @@ class Prisms:
             velocities.append(normal_velocity(quadrature(self.nodes[faces]), faces, len(self.nodes)))
         return Surface(np.concatenate(triangles), sparse.csr_array(sparse.vstack(velocities)))
 
-    def energy_lost(self, material: SolidMaterial, fields: Floats, eigenvalues: Floats, rigid: list[Ints]) -> Floats:
+    def energy_lost(self, material: SolidMaterial, fields: Array, eigenvalues: Array, rigid: list[IntArray]) -> Array:
         """See `gearfe.housing.prism_error.prism_energy_lost`."""
         return prism_energy_lost(self.extrusion, self.used, material, fields, eigenvalues, rigid)
 
     @cached_property
-    def _numbers(self) -> Ints:
+    def _numbers(self) -> IntArray:
         """(elements, 10, 4) numbers of their nodes."""
         mesh = self.extrusion
         layer, triangle = np.nonzero(mesh.solid)
         level = ORDER * layer[:, None, None] + np.arange(ORDER + 1)
         return np.asarray(mesh.triangles[triangle][:, :, None] * len(mesh.levels) + level)
 
-    def _renumbered(self, numbers: Ints) -> Ints:
+    def _renumbered(self, numbers: IntArray) -> IntArray:
         return np.searchsorted(self.used, numbers)
 
-    def _places(self, numbers: Ints) -> Floats:
+    def _places(self, numbers: IntArray) -> Array:
         mesh, levels = self.extrusion, len(self.extrusion.levels)
         x, z = mesh.points[numbers // levels].T
         return np.column_stack([x, mesh.levels[numbers % levels], z])
 
 
-def _chosen(nodes: Floats, faces: Ints, corners: Ints, without: list[Ints], outer: Outer | None) -> NDArray[np.bool_]:
+def _chosen(
+    nodes: Array, faces: IntArray, corners: IntArray, without: list[IntArray], outer: Outer | None
+) -> BoolArray:
     """(f,) whether faces lie within none of the sets of nodes and are outer ones by the mean of their `corners`."""
     keep = np.ones(len(faces), dtype=bool) if outer is None else outer(nodes[corners].mean(axis=1))
     keep = np.asarray(keep, dtype=bool)
@@ -145,14 +145,14 @@ def _chosen(nodes: Floats, faces: Ints, corners: Ints, without: list[Ints], oute
     return keep
 
 
-def _outline(triangles: Ints) -> Ints:
+def _outline(triangles: IntArray) -> IntArray:
     """(e, 4) edges of only one of the triangles, in its sense: ends, then the nodes between."""
     edges = np.concatenate([triangles[:, [0, 1, 3, 4]], triangles[:, [1, 2, 5, 6]], triangles[:, [2, 0, 7, 8]]])
     _, first, times = np.unique(np.sort(edges[:, :2], axis=1), axis=0, return_index=True, return_counts=True)
     return np.asarray(edges[first[times == 1]])
 
 
-def _side_split() -> Ints:
+def _side_split() -> IntArray:
     """(18, 3) triangles between the sixteen nodes of a side: an edge's four (ends first) times four levels."""
     along = np.array([0, 2, 3, 1])
     made = []
@@ -163,14 +163,14 @@ def _side_split() -> Ints:
     return np.array(made)
 
 
-def _end_quadrature(place: Floats) -> SurfaceQuadrature:
+def _end_quadrature(place: Array) -> SurfaceQuadrature:
     """Functions and area vectors of plane triangles with nodes at `place` (f, 10, 3)."""
     rule = triangle_rule()
     one, two = (np.einsum("fak,ap->fpk", place, rule.slopes[..., axis]) for axis in range(2))
     return SurfaceQuadrature(rule.values.T, np.cross(one, two) * rule.weights[:, None])
 
 
-def _side_quadrature(place: Floats) -> SurfaceQuadrature:
+def _side_quadrature(place: Array) -> SurfaceQuadrature:
     """The same of faces (f, 16, 3) over an edge, its four nodes ends first, times four levels."""
     x, w = np.polynomial.legendre.leggauss(ORDER + 1)
     line = lagrange()
@@ -178,7 +178,7 @@ def _side_quadrature(place: Floats) -> SurfaceQuadrature:
     along, level = np.array([[one(x) for one in functions] for functions in (edge, line)])
     d_along, d_level = np.array([[one.deriv()(x) for one in functions] for functions in (edge, line)])
 
-    def product(one: Floats, two: Floats) -> Floats:
+    def product(one: Array, two: Array) -> Array:
         return np.einsum("as,bt->abst", one, two).reshape(len(one) * len(two), -1)
 
     one, two = (

@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..progress import stage
@@ -16,6 +15,7 @@ from ..reduction.craig_bampton import Partition, partition, reduce_model
 from ..reduction.modal_body import ModalBody
 from ..shown import Facts
 from ..solid import MassRule, SolidMaterial, SolidMatrices
+from ..typing import Array, IntArray
 from .attachments import (
     Attachment,
     Bore,
@@ -28,9 +28,6 @@ from .attachments import (
 from .mesh_checks import checked_mesh
 from .meshes import Outer, Prisms, Tetrahedra
 from .surface import Surface, nodal_normals
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Said whenever linear tetrahedra are chosen.
 LINEAR_NOTE = (
@@ -68,10 +65,10 @@ class Housing(Facts):
 
     mesh: Tetrahedra | Prisms
     attachments: tuple[Attachment, ...]
-    fixed: Ints
+    fixed: IntArray
     material: SolidMaterial
     surface: Surface
-    original: Ints
+    original: IntArray
     notes: tuple[str, ...] = ()
 
     def facts(self) -> dict[str, str]:
@@ -149,7 +146,7 @@ class Housing(Facts):
         cls,
         mesh: Tetrahedra | Prisms,
         bores: Sequence[Bore | Sequence[Any]],
-        fixed: Ints,
+        fixed: IntArray,
         *,
         material: SolidMaterial = STEEL,
         attachments: Sequence[Attachment] = (),
@@ -175,7 +172,7 @@ class Housing(Facts):
         )
 
     @property
-    def nodes(self) -> Floats:
+    def nodes(self) -> Array:
         """(n, 3) coordinates (m)."""
         return self.mesh.nodes
 
@@ -185,7 +182,7 @@ class Housing(Facts):
             return self.mesh.assemble(self.material)
 
     @cached_property
-    def internal(self) -> Ints:
+    def internal(self) -> IntArray:
         """Rows that are neither held nor in an attachment, ``3 node + axis``."""
         free = np.ones(len(self.nodes), dtype=bool)
         free[self.fixed] = False
@@ -301,7 +298,7 @@ class Housing(Facts):
         return partition(matrices.stiffness, matrices.mass, interface, self.internal)
 
 
-def rigid_motions(nodes: Floats) -> Floats:
+def rigid_motions(nodes: Array) -> Array:
     """(3 n, 6) nodal displacement for unit translations and small rotations about the origin."""
     motions = np.zeros((len(nodes), 3, 6))
     motions[:, range(3), range(3)] = 1.0
@@ -312,7 +309,7 @@ def rigid_motions(nodes: Floats) -> Floats:
     return motions.reshape(-1, 6)
 
 
-def _fixed_nodes(fixed: Any, nodes: Floats, new_number: Ints) -> Ints:
+def _fixed_nodes(fixed: Any, nodes: Array, new_number: IntArray) -> IntArray:
     """Held nodes from a plane, a pair (point, normal), node numbers or a mask."""
     if fixed is None:
         return np.zeros(0, dtype=np.int64)
@@ -324,7 +321,7 @@ def _fixed_nodes(fixed: Any, nodes: Floats, new_number: Ints) -> Ints:
     return _renumbered("fixed", given, new_number)
 
 
-def _renumbered(field: str, chosen: Any, new_number: Ints) -> Ints:
+def _renumbered(field: str, chosen: Any, new_number: IntArray) -> IntArray:
     """Node numbers of the given mesh (or a mask) as numbers of the checked one."""
     given = np.asarray(chosen)
     n = len(new_number)

@@ -14,20 +14,18 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from ..meshing.housing_mesh import Extrusion
 from ..prisms import ORDER, isotropic_blocks, lagrange, plane_parts, triangle_maps, triangle_rule
 from ..solid import SolidMaterial
+from ..typing import Array, BoolArray, IntArray
 
 #: Error over what the next order's functions take one by one.
 FACTOR = 4.0
 #: Elements whose matrices are made at a time: they stay in the processor's cache.
 ELEMENTS = 32
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Ends of a triangle's edges.
 _EDGES = np.array([[0, 1], [1, 2], [2, 0]])
@@ -38,8 +36,8 @@ _ALL, _FOURTH = slice(0, 5), slice(4, 5)
 
 
 def prism_energy_lost(
-    mesh: Extrusion, used: Ints, material: SolidMaterial, fields: Floats, eigenvalues: Floats, rigid: list[Ints]
-) -> Floats:
+    mesh: Extrusion, used: IntArray, material: SolidMaterial, fields: Array, eigenvalues: Array, rigid: list[IntArray]
+) -> Array:
     """Estimated energy that the mesh keeps fields from giving up, a quadratic form over them: (k, k), N m.
 
     Parameters
@@ -97,7 +95,7 @@ def prism_energy_lost(
     return np.asarray(FACTOR * lost)
 
 
-def _taken(residual: Floats, stiffness: Floats, acting: NDArray[np.bool_]) -> Floats:
+def _taken(residual: Array, stiffness: Array, acting: BoolArray) -> Array:
     """(k, k) energy that functions take, each by itself."""
     chosen = np.flatnonzero(acting & (np.trace(stiffness, axis1=1, axis2=2) > 0.0))
     upright = np.linalg.inv(np.linalg.cholesky(stiffness[chosen]))
@@ -109,11 +107,11 @@ class _Numbers(NamedTuple):
     """Numbers of plane functions in the mesh."""
 
     #: (m, s)
-    place: Ints
+    place: IntArray
     #: (m, s) sign that makes a function the same in all its triangles
-    signs: Floats
+    signs: Array
     #: (count,) a node of the mesh on the corner or edge, or in the triangle, that the function belongs to
-    node: Ints
+    node: IntArray
 
 
 class _Group(NamedTuple):
@@ -143,7 +141,7 @@ def _number(mesh: Extrusion) -> _BothNumbers:
     return _BothNumbers(new, _Numbers(place, signs, np.concatenate([np.arange(n), on_edge, on_edge, centre])))
 
 
-def _acting(numbers: _Numbers, level: int, levels: int, still: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _acting(numbers: _Numbers, level: int, levels: int, still: BoolArray) -> BoolArray:
     """Whether functions may act: those of a corner, edge or face that lies within no rigid set, told by one node."""
     return np.asarray(~still[numbers.node * levels + level].any(axis=1))
 
@@ -152,10 +150,10 @@ class _Plane(NamedTuple):
     """Derivatives at the points of the rule, with the areas that belong to these."""
 
     #: ``x``, ``z``, ``0`` of the added and lower functions: (m, 15, p), times the areas; of their own (m, 10, p)
-    added: dict[str, Floats]
-    own: dict[str, Floats]
+    added: dict[str, Array]
+    own: dict[str, Array]
     #: (m, p)
-    areas: Floats
+    areas: Array
 
 
 def _plane(mesh: Extrusion) -> _Plane:
@@ -166,13 +164,13 @@ def _plane(mesh: Extrusion) -> _Plane:
 
 
 @cache
-def _triangle_functions() -> tuple[Floats, Floats]:
+def _triangle_functions() -> tuple[Array, Array]:
     """Values (15, p), slopes (15, p, 2): edges and inside of degree 4, then corners, edges and inside below it."""
     x, y = triangle_rule().points
     corner = np.array([1.0 - x - y, x, y])
     slope = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])[:, None, :]
 
-    def product(*factors: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    def product(*factors: tuple[Array, Array]) -> tuple[Array, Array]:
         value, gradient = np.ones_like(x), np.zeros((len(x), 2))
         for one, d_one in factors:
             value, gradient = value * one, gradient * one[:, None] + value[:, None] * d_one
@@ -195,11 +193,11 @@ def _triangle_functions() -> tuple[Floats, Floats]:
 class _Line(NamedTuple):
     """Integrals over -1..1 of line functions (5 rows) times an element's own (4 columns), and with themselves."""
 
-    mass: Floats
-    row_slope: Floats
-    column_slope: Floats
-    stiffness: Floats
-    own: tuple[Floats, Floats, Floats]
+    mass: Array
+    row_slope: Array
+    column_slope: Array
+    stiffness: Array
+    own: tuple[Array, Array, Array]
 
 
 @cache
@@ -224,13 +222,13 @@ class _Elements(NamedTuple):
     """Matrices of elements between added functions, (plane s) x (line j), and their own, (plane 10) x (line 4)."""
 
     #: (m, s j 3, 120) stiffness (N/m)
-    stiffness: Floats
+    stiffness: Array
     #: (m, s j, 40) mass of one axis (kg)
-    mass: Floats
+    mass: Array
     #: (m, s, j, 3, 3) stiffness of each added function with itself
-    own: Floats
+    own: Array
 
-    def residual(self, values: Floats, eigenvalues: Floats) -> Floats:
+    def residual(self, values: Array, eigenvalues: Array) -> Array:
         """(m, s, j, 3, k) forces that nodal displacements (m, 10, 4, 3, k) leave unbalanced."""
         m, count = len(values), len(eigenvalues)
         shape = (*self.own.shape[:4], count)
@@ -241,7 +239,7 @@ class _Elements(NamedTuple):
 
 
 def _elements(
-    plane: _Plane, line: _Line, group: _Group, chosen: Ints, half: float, material: SolidMaterial
+    plane: _Plane, line: _Line, group: _Group, chosen: IntArray, half: float, material: SolidMaterial
 ) -> _Elements:
     """Matrices of the chosen triangles' elements in a layer of half the thickness `half`."""
     added = {name: part[chosen][:, group.plane] for name, part in plane.added.items()}
@@ -250,7 +248,7 @@ def _elements(
         factor * part[group.line] for factor, part in zip((half, 1.0, 1.0, 1.0 / half), line[:4], strict=True)
     )
 
-    def product(row: str, column: str, along: Floats) -> Floats:
+    def product(row: str, column: str, along: Array) -> Array:
         return np.asarray((added[row] @ lower[column])[:, :, None, :, None] * along[:, None, :])
 
     # derivative of the added function, of the field; y lies between x and z
@@ -261,7 +259,7 @@ def _elements(
     )  # fmt: skip
     areas = np.maximum(plane.areas[chosen][:, None], 1e-300)
 
-    def with_itself(one: str, two: str, along: Floats) -> Floats:
+    def with_itself(one: str, two: str, along: Array) -> Array:
         return np.asarray(np.sum(added[one] * added[two] / areas, axis=2)[:, :, None] * along)
 
     m_own, s_own, k_own = (part[group.line] for part in line.own)

@@ -9,23 +9,21 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from ..typing import Array, IntArray
 
 
 class SurfaceQuadrature(NamedTuple):
     """Values at the quadrature points of ``f`` faces, ``p`` points each."""
 
     #: (p, a) shape functions
-    values: Floats
+    values: Array
     #: (f, p, 3) outward normals times the area that belongs to the point (m2)
-    areas: Floats
+    areas: Array
 
 
-def surface_quadrature(nodes: Floats, faces: Ints) -> SurfaceQuadrature:
+def surface_quadrature(nodes: Array, faces: IntArray) -> SurfaceQuadrature:
     """Shape functions and area vectors of (f, 3) or (f, 6) faces, curved or flat; exact for squares on flat faces."""
     from skfem import ElementTriP1, ElementTriP2
     from skfem.quadrature import get_quadrature_tri
@@ -39,7 +37,7 @@ def surface_quadrature(nodes: Floats, faces: Ints) -> SurfaceQuadrature:
     return SurfaceQuadrature(values, np.cross(first, second) * weights[:, None])
 
 
-def nodal_normals(nodes: Floats, faces: Ints) -> Floats:
+def nodal_normals(nodes: Array, faces: IntArray) -> Array:
     """(n, 3) outward unit normals at the nodes of the faces, weighted by area; zero at all other nodes."""
     quadrature = surface_quadrature(nodes, faces)
     total = np.zeros_like(nodes)
@@ -51,7 +49,7 @@ def nodal_normals(nodes: Floats, faces: Ints) -> Floats:
     return np.divide(total, length, out=np.zeros_like(total), where=length > 0.0)
 
 
-def normal_velocity(quadrature: SurfaceQuadrature, faces: Ints, n: int) -> sparse.csr_array:
+def normal_velocity(quadrature: SurfaceQuadrature, faces: IntArray, n: int) -> sparse.csr_array:
     """(f p, 3 n) matrix G with ``|G v|^2`` the integral of the squared normal velocity over the faces (m4/s2)."""
     size = np.linalg.norm(quadrature.areas, axis=2)
     scaled = quadrature.areas / np.sqrt(np.maximum(size, 1e-300))[..., None]
@@ -66,11 +64,11 @@ class Surface(NamedTuple):
     """Outer surface of a mesh."""
 
     #: (f, 3) or (f, 6) triangles, anticlockwise seen from outside
-    faces: Ints
+    faces: IntArray
     #: (rows, 3 n) G with ``|G v|^2`` the integral of the squared normal velocity, v the nodal velocities
     normal_velocity: sparse.csr_array
 
-    def radiation(self, shapes: Floats) -> Floats:
+    def radiation(self, shapes: Array) -> Array:
         """(N, N) matrix R with ``qdot^T R qdot`` that integral for the field ``shapes @ qdot`` (m4/s2)."""
         rows = self.normal_velocity @ shapes
         return np.asarray(rows.T @ rows)

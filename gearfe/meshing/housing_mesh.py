@@ -14,18 +14,15 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..cache import cached_arrays
 from ..errors import InputError
 from ..prisms import ORDER, volume_ratios
 from ..progress import stage
 from ..tables.housing import HousingTable, ShaftAxisTable
+from ..typing import Array, BoolArray, IntArray
 from .housing_recipe import RECIPE
 from .session import gmsh_session
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: gmsh's type of triangles of order 3; its anisotropic mesher, and the one that adds no points within a face.
 _TRIANGLE, _BAMG, _NO_POINTS_INSIDE = 21, 7.0, 3
@@ -51,13 +48,13 @@ class Extrusion(NamedTuple):
     """Plane triangles, levels along y, and what is solid."""
 
     #: (n, 2) x and z (m)
-    points: Floats
+    points: Array
     #: (m, 10) nodes in gmsh's order, anticlockwise in the plane of x and z
-    triangles: Ints
+    triangles: IntArray
     #: (l,) y of the levels (m), ORDER to a layer
-    levels: Floats
+    levels: Array
     #: (layers, m) whether a triangle is solid in a layer
-    solid: NDArray[np.bool_]
+    solid: BoolArray
 
 
 def sizes(size_mm: float) -> Sizes:
@@ -118,7 +115,7 @@ def extruded(table: HousingTable, sizes: Sizes) -> Extrusion:
     return Extrusion(1e-3 * points[kept], triangles.reshape(-1, 10), 1e-3 * np.array(levels), solid)
 
 
-def _plane_mesh(table: HousingTable, sizes: Sizes) -> tuple[Floats, Ints]:
+def _plane_mesh(table: HousingTable, sizes: Sizes) -> tuple[Array, IntArray]:
     """Points (mm) and triangles.
 
     Raises
@@ -199,7 +196,7 @@ def _steps(length: float, first: bool, last: bool, sizes: Sizes) -> list[float]:
     return [*one, *([left / count] * count), *two[::-1]]
 
 
-def _solid(table: HousingTable, place: Floats, y: float) -> NDArray[np.bool_]:
+def _solid(table: HousingTable, place: Array, y: float) -> BoolArray:
     """(n,) whether points (x, z) are in the material at height y: the same parts as the product's geometry."""
     x, z = place.T
     (x0, x1), (z0, z1), half = table.wall_x_mm, table.wall_z_mm, 0.5 * table.inner_gap_mm
@@ -207,7 +204,7 @@ def _solid(table: HousingTable, place: Floats, y: float) -> NDArray[np.bool_]:
     bottom, feet = z0 - table.base_thickness_mm, table.feet
     first, last = table.end_wall_thickness_mm
 
-    def box(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> NDArray[np.bool_]:
+    def box(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> BoolArray:
         return (a[0] < x) & (x < a[1]) & (b[0] < y < b[1]) & (c[0] < z) & (z < c[1])
 
     found = box((x0, x1), (half, high), (z0, z1)) | box((x0, x1), (low, -half), (z0, z1))

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..contact.half_plane_step import HalfPlanePair
 from ..errors import InputError
-from ..gear.deviation_job import GEARS, active_rolls, deviations_of, modification
+from ..gear.deviation_job import FlankOf, deviations_of, modification
 from ..gear.pair import GearPair
 from ..loadmap.root_stress import PairRoots
 from ..stiffness.job import StiffnessJob
@@ -41,18 +41,7 @@ def relief_problem(
     roots: PairRoots | None,
 ) -> ReliefProblem:
     """The search that a job file asks for, of gears without pitch errors."""
-    made = [
-        modification(
-            getattr(base, name).flank(base.flank),
-            getattr(pair, name),
-            active_rolls(pair)[g],
-            f"microgeometry.{name}",
-            folder,
-            mirrored=base.flank == "right",
-            wheel=g == 1,
-        )
-        for g, name in enumerate(GEARS)
-    ]
+    made = [modification(FlankOf(base, pair, g, base.flank, folder, mirrored=base.flank == "right")) for g in (0, 1)]
     variables = []
     for one in table.variables:
         quantity, factor = VARIABLES[one.key]

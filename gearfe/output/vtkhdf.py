@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..typing import Array
 from .files import whole_file
 
 #: VTK's numbers of the cell types used here, and how many points each has.
@@ -87,7 +88,7 @@ class VtkHdfSeries:
     def add(
         self,
         time: float,
-        points: NDArray[np.float64] | None = None,
+        points: Array | None = None,
         cells: Mapping[str, NDArray[Any]] | None = None,
         *,
         point_data: Fields | None = None,
@@ -133,7 +134,7 @@ class VtkHdfSeries:
             for name, values in (fields or {}).items():
                 self._add_field(group, name, np.asarray(values), count)
 
-    def _add_points(self, points: NDArray[np.float64]) -> None:
+    def _add_points(self, points: Array) -> None:
         coordinates = np.asarray(points, dtype=float)
         if coordinates.ndim != 2 or coordinates.shape[1] not in (2, 3):
             raise InputError("points", coordinates.shape, "must have the shape (n, 2) or (n, 3)", "")
@@ -222,7 +223,7 @@ class VtkHdfSeries:
 
 def write_vtkhdf(
     path: str | Path,
-    points: NDArray[np.float64],
+    points: Array,
     cells: Mapping[str, NDArray[Any]],
     *,
     point_data: Fields | None = None,

@@ -21,14 +21,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError, unknown_name
 from ..output.arrays import load_arrays, save_arrays
 from ..shown import Shown
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from ..typing import Array, IntArray
 
 #: Written to files; a file of another format is refused with a message.
 FORMAT = 4
@@ -83,26 +80,26 @@ class ModalBody(Shown):
         What the user should know about how it was made.
     """
 
-    mass: Floats
-    damping: Floats
-    stiffness: Floats
+    mass: Array
+    damping: Array
+    stiffness: Array
     attachment_names: tuple[str, ...]
-    attachment_points: Floats
-    attachment_axes: Floats
-    internal_hz: Floats
+    attachment_points: Array
+    attachment_axes: Array
+    internal_hz: Array
     modes: int
-    nodes: Floats
-    elements: Ints
-    shapes: Floats
-    faces: Ints
-    normals: Floats
-    radiation: Floats
-    momentum: Floats
-    rigid_mass: Floats
-    truncation: Floats
+    nodes: Array
+    elements: IntArray
+    shapes: Array
+    faces: IntArray
+    normals: Array
+    radiation: Array
+    momentum: Array
+    rigid_mass: Array
+    truncation: Array
     corrections: int
     next_hz: float
-    softening: Floats
+    softening: Array
     held: bool
     solver: str
     notes: tuple[str, ...] = ()
@@ -118,7 +115,7 @@ class ModalBody(Shown):
         return len(self.elements) > 0
 
     @property
-    def cells(self) -> dict[str, Ints]:
+    def cells(self) -> dict[str, IntArray]:
         """The elements by their name in `gearfe.output.vtkhdf`."""
         return {{4: "tetra", 6: "wedge", 10: "tetra10"}[self.elements.shape[1]]: self.elements}
 
@@ -157,7 +154,7 @@ class ModalBody(Shown):
             "mesh": f"{len(self.nodes)} nodes" if len(self.elements) else "none",
         }
 
-    def reconstruct(self, q: Floats) -> Floats:
+    def reconstruct(self, q: Array) -> Array:
         """Nodal field of coordinates: displacement from q, velocity from its rate, acceleration from its second rate.
 
         Parameters
@@ -174,11 +171,11 @@ class ModalBody(Shown):
         field = self.shapes @ q if q.ndim == 1 else (self.shapes @ q.T).T
         return np.asarray(field.reshape(*q.shape[:-1], len(self.nodes), 3))
 
-    def normal_component(self, q: Floats) -> Floats:
+    def normal_component(self, q: Array) -> Array:
         """Nodal field's component along the outward normal: (n,) or (steps, n), zero off the outer surface."""
         return np.asarray(np.einsum("...nk,nk->...n", self.reconstruct(q), self.normals))
 
-    def with_damping(self, *, ratio: float | Floats | None = None, alpha: float = 0.0, beta: float = 0.0) -> ModalBody:
+    def with_damping(self, *, ratio: float | Array | None = None, alpha: float = 0.0, beta: float = 0.0) -> ModalBody:
         """The same body with another damping block.
 
         Parameters
@@ -201,7 +198,7 @@ class ModalBody(Shown):
             damping = damping + (weighted * (2.0 * per_mode * omega)) @ weighted.T
         return dataclasses.replace(self, damping=0.5 * (damping + damping.T))
 
-    def softened(self, part: float | Floats = 1.0) -> ModalBody:
+    def softened(self, part: float | Array = 1.0) -> ModalBody:
         r"""The body as soft as the estimate of the mesh's error allows, or a `part` of the way there.
 
         In the modes with free attachments, squares of their circular frequencies L, the stiffness L becomes
@@ -263,5 +260,5 @@ class CoupledModes:
         Mode shapes in the body's coordinates, one a column, of unit modal mass.
     """
 
-    frequencies_hz: Floats
-    vectors: Floats
+    frequencies_hz: Array
+    vectors: Array

@@ -24,9 +24,7 @@ from ..train.gear_train import GearTrain, ShaftGear
 from ..train.kinematics import driving_senses, rolling
 from ..train.phases import tooth_places
 from ..train.response import TrainResponse
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from ..typing import Array, IntArray
 
 #: Steps whose fields are in memory at a time.
 _AT_ONCE = 25
@@ -52,11 +50,11 @@ class Solid:
 
     gear: int
     points: Array
-    quads: Ints
-    triangles: Ints
+    quads: IntArray
+    triangles: IntArray
 
 
-def gear_surface(gear: Gear, angle: float, *, per_segment: int = 3) -> tuple[Array, Ints]:
+def gear_surface(gear: Gear, angle: float, *, per_segment: int = 3) -> tuple[Array, IntArray]:
     """Surface of a gear about its own axis (the third coordinate): points (4 k, 3) in m and quadrilaterals.
 
     Parameters
@@ -77,7 +75,7 @@ def gear_surface(gear: Gear, angle: float, *, per_segment: int = 3) -> tuple[Arr
     return np.concatenate(rings), np.concatenate(quads)
 
 
-def cylinder_surface(radius: float, low: float, high: float) -> tuple[Array, Ints, Ints]:
+def cylinder_surface(radius: float, low: float, high: float) -> tuple[Array, IntArray, IntArray]:
     """Cylinder about the third axis: points, quadrilaterals, triangles of the ends."""
     angle = 2.0 * np.pi * np.arange(_ROUND) / _ROUND
     circle = radius * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -133,7 +131,7 @@ def _turned(arm: Array, axis: Array, angle: float) -> Array:
     return np.asarray(along + np.cos(angle) * (arm - along) + np.sin(angle) * np.cross(axis, arm))
 
 
-def write_gears(path: Path, train: GearTrain, response: TrainResponse, steps: Sequence[int] | Ints) -> None:
+def write_gears(path: Path, train: GearTrain, response: TrainResponse, steps: Sequence[int] | IntArray) -> None:
     """VTKHDF series of the gears and shafts: places, displacement from the start and from rolling (m), number."""
     parts, frame = solids(train, response), train.frame
     starts = np.cumsum([0, *(len(part.points) for part in parts)])
@@ -156,7 +154,7 @@ def write_housing(
     path: Path,
     body: ModalBody,
     response: TrainResponse,
-    steps: Sequence[int] | Ints,
+    steps: Sequence[int] | IntArray,
     *,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> None:
@@ -182,7 +180,7 @@ def write_housing(
 
 
 def frames(
-    train: GearTrain, response: TrainResponse, steps: Sequence[int] | Ints, *, exaggeration: float | None = None
+    train: GearTrain, response: TrainResponse, steps: Sequence[int] | IntArray, *, exaggeration: float | None = None
 ) -> dict[str, NDArray[np.generic]]:
     """Arrays that `gearfe.figures.train_scene` draws: surfaces in all `steps`, in m, and their colours.
 
