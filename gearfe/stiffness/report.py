@@ -78,7 +78,7 @@ def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, floa
 def deviation_lines(job: StiffnessJob) -> list[str]:
     """A line about the deviations of the flanks, where there are any."""
     most = []
-    for gear, own in zip((job.pair.pinion, job.pair.wheel), job.deviations, strict=True):
+    for gear, own in zip((job.pair.pinion, job.pair.wheel), job.model.deviations, strict=True):
         roll = np.linspace(*ends_of(gear), CHECKED)
         most.append(max(0.0 if one is None else float(np.abs(one.at(roll)[0]).max()) for one in own.profiles))
     if not any(most):
