@@ -129,13 +129,13 @@ def compiled(node: Node, names: Sequence[tuple[str, str | None]]) -> Evaluate:
     return applied
 
 
-def corners(node: Node, names: Sequence[tuple[str, str | None]]) -> list[Callable[[Sequence[float]], int]]:
-    """Numbers of the pieces that `abs`, `min`, `max` and tables are on, and sides of poles, by the quantities."""
+def corners(node: Node, names: Sequence[tuple[str, str | None]]) -> list[Callable[[Sequence[float]], int | None]]:
+    """Numbers of the pieces that `abs`, `min`, `max` and tables are on, None beyond a table, and sides of poles."""
     found = [corner for part in node.parts for corner in corners(part, names)]
     parts = [compiled(part, names) for part in node.parts]
     if node.kind == "table":
         table: ValueTable = node.value[1]
-        found.append(lambda values: table.piece(parts[0](values)[0]))
+        found.append(lambda values: table.place(parts[0](values)[0]))
     elif node.kind == "call" and node.value == "abs":
         found.append(lambda values: int(parts[0](values)[0] >= 0.0))
     elif node.kind == "call" and node.value in ("min", "max"):
@@ -158,11 +158,11 @@ def _may_vanish(node: Node) -> Node | None:
     return base if base is not None and quantities(base) else None
 
 
-def _pieces(found: list[Callable[[Sequence[float]], int]], values: Sequence[float]) -> tuple[int, ...]:
+def _pieces(found: list[Callable[[Sequence[float]], int | None]], values: Sequence[float]) -> tuple[int | None, ...]:
     try:
         return tuple(corner(values) for corner in found)
     except (Trouble, OverflowError, ZeroDivisionError, ValueError):
-        return ()
+        return (None,)
 
 
 class ExpressionLoad(StateFunction):
@@ -240,8 +240,8 @@ class ExpressionLoad(StateFunction):
         """Expression, time and value."""
         return f"{self.label} = {self.text!r} at {t:.6g} s: grows beyond {value:.0e} (a division by zero)"
 
-    def pieces(self, t: float, q: Array, v: Array) -> tuple[int, ...]:
-        """Pieces of all corners; none where there is no value."""
+    def pieces(self, t: float, q: Array, v: Array) -> tuple[int | None, ...]:
+        """Pieces of all corners; None where there is no value."""
         values = [self._quantity(k, w, t, q, v) for k, w in self.places] if self.corners else []
         return _pieces(self.corners, values)
 
@@ -296,8 +296,8 @@ class ExpressionTension(SpanFunction):
             return 0.0, 0.0  # the value says so
         return float(by_length), float(by_rate)
 
-    def pieces(self, t: float, length: float, rate: float) -> tuple[int, ...]:
-        """Pieces of all corners; none where there is no value."""
+    def pieces(self, t: float, length: float, rate: float) -> tuple[int | None, ...]:
+        """Pieces of all corners; None where there is no value."""
         return _pieces(self.corners, [float(t), length, rate])
 
     def write(self, tape: Tape, length: int, rate: int) -> int:

@@ -73,6 +73,10 @@ class ValueTable:
             x = float(self.x[0] + (x - self.x[0]) % (self.x[-1] - self.x[0]))
         return min(max(int(np.searchsorted(self.x, x, side="right")) - 1, 0), len(self.x) - 2)
 
+    def place(self, x: float) -> int | None:
+        """Number of the piece that holds x; None beyond the table."""
+        return self.piece(x) if self.covers(x) else None
+
     def _at(self, x: float) -> tuple[float, Array]:
         k = self.piece(x)
         if self.kind == "periodic":

@@ -2,7 +2,7 @@
 
 A step that crosses a corner has an error that no estimate sees as it is. Such a step is made again, up to just before
 the corner; from there a short one goes over it, and the method begins anew behind it. Jumps are passed like this, too;
-poles are not.
+poles and ends of tables are not.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ POLE, POLE_AT = 20.0, (1e-3, 1e-6, 1e-9)
 POLE_SHARE, POLE_NEARER = 1e-3, 0.7
 #: Steps with larger errors (over the tolerance) do not tell where corners are.
 TRUSTED = 1e3
+#: Rounding of the speed of a stage, relative to positions over the step: 1e-16 by the inverse of the stages' integrals.
+ROUNDING = 1e-14
 #: (q, q') at a share of a step.
 Path = Callable[[float], tuple[Array, Array]]
 
@@ -51,34 +53,51 @@ class Corners:
 
     def cut(self, t: float, h: float, path: Path) -> bool:
         """Whether the step h from t is not to stand: the control then knows that the next ends before a corner."""
-        if self.system is None or self.passing(h):
+        found = None if self.system is None or self.passing(h) else self._corner(t, h, path)
+        if found is None:
             return False
+        low, high, ends = found
+        distance = low * abs(h)
+        if self._pole(t, h, path, low):
+            goal, room = POLE_NEARER * distance, POLE_SHARE * self.control.span
+        elif ends:
+            goal, room = distance, self.near
+        else:
+            goal, room = (distance - 0.5 * self.near if distance > self.near else 2.0 * self.near), -1.0
+        if distance <= room:
+            self._end(t + high * h, path(high))
+        elif goal < abs(h):
+            self.control.end_at(t + math.copysign(goal, h))
+        else:
+            return False
+        return True
+
+    def _corner(self, t: float, h: float, path: Path) -> tuple[float, float, bool] | None:
+        """Shares of the step just before and behind the first corner, and whether loads have no value behind it."""
+        assert self.system is not None
         pieces = self.system.pieces
         before = pieces(t, *path(0.0))
+        if None in before:
+            return 0.0, 0.0, True
 
         def left(x: float) -> bool:
             return pieces(t + x * h, *path(x)) != before
 
         high = next((k / LOOKS for k in range(1, LOOKS + 1) if left(k / LOOKS)), None)
         if high is None:
-            return False
+            return None
         low = high - 1.0 / LOOKS
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             low, high = (low, middle) if left(middle) else (middle, high)
-        distance = low * abs(h)
-        if self._pole(t, h, path, low):
-            if distance > POLE_SHARE * self.control.span:  # goes on up to it
-                self.control.end_at(t + POLE_NEARER * low * h)
-                return True
-            self.control.fail(Status.NOT_FINITE, 1.0)
-            self.control.status = Status.NOT_FINITE
-            return True
-        goal = distance - 0.5 * self.near if distance > self.near else 2.0 * self.near
-        if goal >= abs(h):
-            return False
-        self.control.end_at(t + math.copysign(goal, h))
-        return True
+        return low, high, None in pieces(t + high * h, *path(high))
+
+    def _end(self, t: float, state: tuple[Array, Array]) -> None:
+        """The run ends; a load that has no value there says so."""
+        assert self.system is not None
+        self.system.blame(t, *state)
+        self.control.fail(Status.NOT_FINITE, 1.0)
+        self.control.status = Status.NOT_FINITE
 
     def _pole(self, t: float, h: float, path: Path, x: float) -> bool:
         """Whether the forces have a pole at the share x of the step; their loads then say so."""
@@ -93,6 +112,16 @@ class Corners:
             return False
         self.system.blame(*there)
         return True
+
+
+def quiet_speeds(c: Array, v: Array, V: Array, vn: Array, scale: Array) -> Array:
+    """Speeds V (s, n) at the shares c of a step, those on the line from v to vn that are off it by rounding alone.
+
+    They are differences of positions over the step: with short ones no more than rounding. Those of the ends keep the
+    constraints. `scale` (n,) is the size of positions over the step's length.
+    """
+    line = v + c[:, None] * (vn - v)
+    return np.where(np.abs(V - line) < ROUNDING * scale, line, V)
 
 
 def collocated_path(h: float, powers: Array, speeds: Array) -> Path:

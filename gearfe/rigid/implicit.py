@@ -29,7 +29,7 @@ from . import (
 from .collocation import RADAU, Collocated, Scheme, path_matrix, powers_of_path, scheme
 from .compiled import Kernels, bind
 from .contract import Element, LocalForce, ModalBlocks
-from .corners import TRUSTED, Corners, collocated_path
+from .corners import TRUSTED, Corners, collocated_path, quiet_speeds
 from .dense import Polynomials
 from .elimination import ModalCoordinates, is_linear, modal_coordinates
 from .kernel_collocation import Stages
@@ -182,7 +182,8 @@ class Stepper:
                 continue
             error = max(float(w.told[0]), float(w.told[1]) / tolerance)
             if corners.system is not None and error <= TRUSTED:
-                speeds = (tab.speed @ np.vstack([w.v, w.V[:-1]])) / h ** self._powers[:, None]
+                quiet = quiet_speeds(tab.c, w.v, w.V[:-1], w.vn, units * float((reach / units).max()) / abs(h))
+                speeds = (tab.speed @ np.vstack([w.v, quiet])) / h ** self._powers[:, None]
                 if corners.cut(t, h, collocated_path(h, powers_of_path(tab.path, w.known, tab.inner), speeds)):
                     continue
             if not error <= 1.0:

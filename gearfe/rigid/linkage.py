@@ -108,7 +108,7 @@ class Linkage(Element):
         if largest is not None and value > POLE:
             largest.complaint = largest.complaint or largest.pole(t, value)
 
-    def pieces(self, t: float, q: Array, v: Array) -> tuple[int, ...]:
+    def pieces(self, t: float, q: Array, v: Array) -> tuple[int | None, ...]:
         """Numbers of the smooth pieces that loads and laws of springs are on."""
         found = [piece for _, load in self.assembly.state_loads for piece in load.pieces(t, q, v)]
         if self.assembly.tension_laws:

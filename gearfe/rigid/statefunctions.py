@@ -34,7 +34,7 @@ class StateFunction(ABC):
         """What is to be said where it grows beyond all bounds."""
         return f"a load grows beyond {value:.1g} at {t:.6g} s"
 
-    def pieces(self, t: float, q: Array, v: Array) -> tuple[int, ...]:  # noqa: ARG002
+    def pieces(self, t: float, q: Array, v: Array) -> tuple[int | None, ...]:  # noqa: ARG002
         """Numbers of the smooth pieces that it is on."""
         return ()
 
@@ -56,7 +56,7 @@ class SpanFunction(ABC):
     def slopes(self, t: float, length: float, rate: float) -> tuple[float, float]:
         """(dT/dL, dT/dL')."""
 
-    def pieces(self, t: float, length: float, rate: float) -> tuple[int, ...]:  # noqa: ARG002
+    def pieces(self, t: float, length: float, rate: float) -> tuple[int | None, ...]:  # noqa: ARG002
         """Numbers of the smooth pieces that it is on."""
         return ()
 

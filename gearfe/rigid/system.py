@@ -155,7 +155,7 @@ class System:
         """Whether forces may have corners."""
         return any(getattr(element, "pieced", False) for element in self.elements)
 
-    def pieces(self, t: float, q: Array, v: Array) -> tuple[int, ...]:
+    def pieces(self, t: float, q: Array, v: Array) -> tuple[int | None, ...]:
         """Numbers of the smooth pieces that the forces are on."""
         parts = [(e, i) for e, i in zip(self.elements, self.index, strict=True) if getattr(e, "pieced", False)]
         return tuple(piece for e, i in parts for piece in e.pieces(t, q[i], v[i]))  # type: ignore[attr-defined]
