@@ -53,65 +53,60 @@ class Corners:
 
     def cut(self, t: float, h: float, path: Path) -> bool:
         """Whether the step h from t is not to stand: the control then knows that the next ends before a corner."""
-        found = None if self.system is None or self.passing(h) else self._corner(t, h, path)
-        if found is None:
+        system = self.system
+        if system is None or self.passing(h) or (found := _corner(system, t, h, path)) is None:
             return False
         low, high, ends = found
         distance = low * abs(h)
-        if self._pole(t, h, path, low):
+        if _pole(system, t, h, path, low):
             goal, room = POLE_NEARER * distance, POLE_SHARE * self.control.span
         elif ends:
             goal, room = distance, self.near
         else:
             goal, room = (distance - 0.5 * self.near if distance > self.near else 2.0 * self.near), -1.0
         if distance <= room:
-            self._end(t + high * h, path(high))
+            system.blame(t + high * h, *path(high))  # a load that has no value there says so
+            self.control.fail(Status.NOT_FINITE, 1.0)
+            self.control.status = Status.NOT_FINITE
         elif goal < abs(h):
             self.control.end_at(t + math.copysign(goal, h))
         else:
             return False
         return True
 
-    def _corner(self, t: float, h: float, path: Path) -> tuple[float, float, bool] | None:
-        """Shares of the step just before and behind the first corner, and whether loads have no value behind it."""
-        assert self.system is not None
-        pieces = self.system.pieces
-        before = pieces(t, *path(0.0))
-        if None in before:
-            return 0.0, 0.0, True
 
-        def left(x: float) -> bool:
-            return pieces(t + x * h, *path(x)) != before
+def _corner(system: System, t: float, h: float, path: Path) -> tuple[float, float, bool] | None:
+    """Shares of the step just before and behind the first corner, and whether loads have no value behind it."""
+    pieces = system.pieces
+    before = pieces(t, *path(0.0))
+    if None in before:
+        return 0.0, 0.0, True
 
-        high = next((k / LOOKS for k in range(1, LOOKS + 1) if left(k / LOOKS)), None)
-        if high is None:
-            return None
-        low = high - 1.0 / LOOKS
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if left(middle) else (middle, high)
-        return low, high, None in pieces(t + high * h, *path(high))
+    def left(x: float) -> bool:
+        return pieces(t + x * h, *path(x)) != before
 
-    def _end(self, t: float, state: tuple[Array, Array]) -> None:
-        """The run ends; a load that has no value there says so."""
-        assert self.system is not None
-        self.system.blame(t, *state)
-        self.control.fail(Status.NOT_FINITE, 1.0)
-        self.control.status = Status.NOT_FINITE
+    high = next((k / LOOKS for k in range(1, LOOKS + 1) if left(k / LOOKS)), None)
+    if high is None:
+        return None
+    low = high - 1.0 / LOOKS
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if left(middle) else (middle, high)
+    return low, high, None in pieces(t + high * h, *path(high))
 
-    def _pole(self, t: float, h: float, path: Path, x: float) -> bool:
-        """Whether the forces have a pole at the share x of the step; their loads then say so."""
-        assert self.system is not None
-        side = -x if x > 0.5 else 1.0 - x
-        sizes = []
-        for distance in POLE_AT:
-            place = x + distance * side
-            there = (t + place * h, *path(place))
-            sizes.append(float(np.abs(self.system.force(*there)).max()))
-        if not all(near > POLE * far for far, near in itertools.pairwise(sizes)):
-            return False
-        self.system.blame(*there)
-        return True
+
+def _pole(system: System, t: float, h: float, path: Path, x: float) -> bool:
+    """Whether the forces have a pole at the share x of the step; their loads then say so."""
+    side = -x if x > 0.5 else 1.0 - x
+    sizes = []
+    for distance in POLE_AT:
+        place = x + distance * side
+        there = (t + place * h, *path(place))
+        sizes.append(float(np.abs(system.force(*there)).max()))
+    if not all(near > POLE * far for far, near in itertools.pairwise(sizes)):
+        return False
+    system.blame(*there)
+    return True
 
 
 def quiet_speeds(c: Array, v: Array, V: Array, vn: Array, scale: Array) -> Array:
