@@ -31,7 +31,7 @@ CONSTANTS: dict[str, dict[str, tuple[Any, Any]]] = {
     },
     "contact.half_plane": {
         "HELD_STEPS": (2, 6), "MOVED": (0.05, 0.2), "NEAR": (1e-5, 4e-5), "TOLERANCE": (5e-7, 2e-6),
-        "WIDENED_BELOW": (2.5e-3, 1e-2), "SEARCHES": (6, 24), "AHEAD": (5e-4, 2e-3), "STEPS": (20, 60),
+        "WIDENED_BELOW": (5e-4, 2e-3), "SEARCHES": (6, 24), "AHEAD": (5e-4, 2e-3), "STEPS": (20, 60),
         "SHARPEST": (0.01, 0.04),
     },
     "gear.flank_curve": {"NEAR": (5e-4, 2e-3), "STEEPEST": (0.1, 0.4)},

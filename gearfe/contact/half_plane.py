@@ -175,8 +175,8 @@ ROUNDS = 10
 STEPS, NEAR = 30, 2e-5
 #: What moves of contacts by their width count as changes of force: they are of second order there (see above).
 MOVED = 0.1
-#: Change from which on windows grow that cut a pressure.
-WIDENED_BELOW = 5e-3
+#: Change from which on windows grow that cut a pressure: sooner, what a pressure reaches on its way would decide.
+WIDENED_BELOW = 1e-3
 #: Steps in which windows are searched for: where the pressure moves by what one panel makes of its end, a window that
 #: follows it might do so for ever.
 SEARCHES = 12
