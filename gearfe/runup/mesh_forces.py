@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..train.arrays import cubics
 from ..train.forces import CurveFlank, LawFlank
 from ..train.friction import Sliding, smooth_sign
 from ..typing import Array, BoolArray, IntArray
@@ -106,16 +105,11 @@ class MeshForces:
         phase = flank.sense * (flank.ratio * (theta @ self.turns[number]) + u[:, turn]) + flank.phase
         approach = u[:, along] - flank.gap
         if isinstance(flank, CurveFlank):
-            return self._curve(number, flank, phase, approach)
+            return self._curve(flank, phase, approach)
         return self._law(number, flank, phase, approach, speed, du[:, [along, across, spin]])
 
-    def _curve(self, number: int, flank: CurveFlank, phase: Array, approach: Array) -> FlankForces:
-        nodes, table = flank.curve.nodes, self._tables[number]
-        x = phase - np.floor((phase - nodes[0]) / flank.curve.period) * flank.curve.period
-        cell = np.minimum(np.searchsorted(nodes[1:], x, side="right"), len(nodes) - 2)
-        c, x = table[cell].T, x - nodes[cell]
-        k = c[0] + x * (c[1] + x * (c[2] + x * c[3]))
-        slope = c[1] + x * (2.0 * c[2] + 3.0 * x * c[3])
+    def _curve(self, flank: CurveFlank, phase: Array, approach: Array) -> FlankForces:
+        k, slope = flank.curve(phase)
         bears = (approach > 0.0) | (not flank.parts)
         force = np.where(bears, k * approach, 0.0)
         cross = np.where(bears, slope * approach, 0.0)
@@ -147,13 +141,7 @@ class MeshForces:
 
     @cached_property
     def _tables(self) -> list[Any]:
-        made: list[Any] = []
-        for flank in self.flanks:
-            if isinstance(flank, CurveFlank):
-                made.append(cubics(flank.curve))
-                continue
-            made.append(law_tables(flank.law))
-        return made
+        return [law_tables(flank.law) if isinstance(flank, LawFlank) else None for flank in self.flanks]
 
     def __call__(self, theta: Array, speed: float, u: Array, du: Array) -> Pushes:
         """Forces at the freedoms, what the linear part has taken off."""

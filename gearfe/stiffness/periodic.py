@@ -33,7 +33,7 @@ class ValueAndSlope(NamedTuple):
 
 @dataclass(frozen=True)
 class PeriodicInterpolant:
-    """Interpolant through (phase, value) nodes, repeated with a period.
+    """Piecewise cubic over a phase, repeated with a period.
 
     Parameters
     ----------
@@ -41,38 +41,36 @@ class PeriodicInterpolant:
         Length of one cycle, in the unit of the phase.
     nodes : ndarray, shape (n + 1,)
         Rising phases; the last is the first plus the period.
-    values, slopes : ndarray, shape (n + 1,)
-        Values and, for the cubic, derivatives there.
-    method
-        ``cubic`` or ``linear``.
+    cubics : ndarray, shape (n, 4)
+        ``c0 + c1 x + c2 x2 + c3 x3`` of the phase x from each node but the last.
     left_out : ndarray
         Phases that were asked for but have no value, for the record.
     """
 
     period: float
     nodes: Array
-    values: Array
-    slopes: Array
-    method: str
+    cubics: Array
     left_out: Array
+
+    @property
+    def values(self) -> Array:
+        """Values at the nodes but the last, shape (n,)."""
+        return np.asarray(self.cubics[:, 0])
+
+    @property
+    def mean(self) -> float:
+        """Mean over the period."""
+        h = np.diff(self.nodes)
+        return float(h @ (self.cubics * h[:, None] ** np.arange(4)) @ (1.0 / np.arange(1, 5)) / self.period)
 
     def __call__(self, phase: ArrayLike) -> ValueAndSlope:
         """Value and slope at any phase; both have the shape of `phase`."""
-        phase = np.asarray(phase, dtype=float)
-        start = self.nodes[0]
-        place = start + np.mod(phase - start, self.period)
-        k = np.clip(np.searchsorted(self.nodes, place, side="right") - 1, 0, len(self.nodes) - 2)
-        h = self.nodes[k + 1] - self.nodes[k]
-        t = (place - self.nodes[k]) / h
-        low, high = self.values[k], self.values[k + 1]
-        rise = high - low
-        if self.method == "linear":
-            return ValueAndSlope(low + t * rise, rise / h)
-        a, b = h * self.slopes[k], h * self.slopes[k + 1]
-        # Hermite: low + t a + t^2 (3 rise - 2 a - b) + t^3 (a + b - 2 rise)
-        square, cube = 3 * rise - 2 * a - b, a + b - 2 * rise
-        value = low + t * (a + t * (square + t * cube))
-        return ValueAndSlope(value, (a + t * (2 * square + 3 * t * cube)) / h)
+        phase, nodes = np.asarray(phase, dtype=float), self.nodes
+        place = phase - np.floor((phase - nodes[0]) / self.period) * self.period
+        cell = np.minimum(np.searchsorted(nodes[1:], place, side="right"), len(nodes) - 2)
+        c, x = self.cubics[cell], place - nodes[cell]
+        c0, c1, c2, c3 = (c[..., i] for i in range(4))
+        return ValueAndSlope(c0 + x * (c1 + x * (c2 + x * c3)), c1 + x * (2.0 * c2 + x * 3.0 * c3))
 
 
 def periodic_interpolant(
@@ -116,10 +114,15 @@ def periodic_interpolant(
         )
         raise InputError("stiffness curve", None, problem, "ask for angles over a whole cycle, or for smaller steps")
     at = values[order]
-    slopes = _monotone_slopes(gaps, at) if method == "cubic" else np.zeros(len(at))
     missing = np.setdiff1d(np.round(wrapped[~known], 12), np.round(nodes, 12))
+    secant, bends = (np.roll(at, -1) - at) / gaps, np.zeros((2, len(at)))
+    slopes = secant
+    if method == "cubic":
+        slopes = _monotone_slopes(gaps, secant)
+        end = np.roll(slopes, -1)
+        bends = np.stack([(3 * secant - 2 * slopes - end) / gaps, (slopes + end - 2 * secant) / gaps**2])
     return PeriodicInterpolant(
-        period, np.append(nodes, nodes[0] + period), np.append(at, at[0]), np.append(slopes, slopes[0]), method, missing
+        period, np.append(nodes, nodes[0] + period), np.stack([at, slopes, *bends], axis=1), missing
     )
 
 
@@ -130,11 +133,10 @@ def wrapped_phase(phase: Array, period: float) -> Array:
     return wrapped
 
 
-def _monotone_slopes(intervals: Array, values: Array) -> Array:
-    secants = (np.roll(values, -1) - values) / intervals
+def _monotone_slopes(intervals: Array, secants: Array) -> Array:
     before_h, before = np.roll(intervals, 1), np.roll(secants, 1)
     w1, w2 = 2 * intervals + before_h, intervals + 2 * before_h
     same = before * secants > 0
-    slopes = np.zeros(len(values))
+    slopes = np.zeros(len(secants))
     slopes[same] = (w1 + w2)[same] / (w1[same] / before[same] + w2[same] / secants[same])
     return slopes

@@ -37,21 +37,8 @@ def curve_arrays(curves: Sequence[PeriodicInterpolant]) -> Curves:
     return Curves(
         np.cumsum([0, *(len(curve.nodes) for curve in curves)]).astype(np.int64),
         np.concatenate([np.zeros(0), *(curve.nodes for curve in curves)]),
-        np.concatenate([np.zeros((0, 4)), *(cubics(curve) for curve in curves)]),
+        np.concatenate([np.zeros((0, 4)), *(np.vstack([curve.cubics, np.zeros(4)]) for curve in curves)]),
     )
-
-
-def cubics(curve: PeriodicInterpolant) -> Array:
-    """``c0 + c1 x + c2 x2 + c3 x3`` from each node of a curve on, (nodes, 4); nothing from the last."""
-    h = np.diff(curve.nodes)
-    low, high = curve.values[:-1], curve.values[1:]
-    secant = (high - low) / h
-    if curve.method == "linear":
-        made = np.stack([low, secant, 0 * h, 0 * h], axis=1)
-    else:
-        a, b = curve.slopes[:-1], curve.slopes[1:]
-        made = np.stack([low, a, (3 * secant - 2 * a - b) / h, (a + b - 2 * secant) / h**2], axis=1)
-    return np.vstack([made, np.zeros(4)])
 
 
 def law_arrays(laws: Sequence[MeshLaw]) -> Laws:

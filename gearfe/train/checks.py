@@ -236,9 +236,8 @@ def interpolant(mesh: GearMesh) -> PeriodicInterpolant:
             raise InputError(f"mesh {mesh.name!r} stiffness", error.value, error.problem, error.cure) from None
     assert not isinstance(curve, MeshLaw)
     flat = 0.0 if curve is None else float(curve)
-    nothing = np.zeros(0)
     return PeriodicInterpolant(
-        2 * math.pi, np.array([0.0, 2 * math.pi]), np.full(2, flat), np.zeros(2), "linear", nothing
+        2 * math.pi, np.array([0.0, 2 * math.pi]), np.array([[flat, 0.0, 0.0, 0.0]]), np.zeros(0)
     )
 
 

@@ -33,7 +33,6 @@ from ..meshlaw.law import MeshLaw
 from ..rigid.timefunctions import TimeFunction
 from ..stiffness.periodic import PeriodicInterpolant
 from ..typing import Array, BoolArray
-from .arrays import cubics
 from .friction import Sliding, smooth_sign
 
 
@@ -102,20 +101,12 @@ class CurveFlank(Flank):
     def forces(self, angle: Array, rate: Array, u: Array, du: Array) -> FlankForces:  # noqa: ARG002
         """Forces at rotations of the drive (rad) and their rates, (n,), u and du of shape (n, directions)."""
         phase, approach = self.place(angle, u)
-        nodes, table = self.curve.nodes, self._cubics
-        place = phase - np.floor((phase - nodes[0]) / self.curve.period) * self.curve.period
-        cell = np.minimum(np.searchsorted(nodes[1:], place, side="right"), len(nodes) - 2)
-        c, x = table[cell].T, place - nodes[cell]
-        force = (c[0] + x * (c[1] + x * (c[2] + x * c[3]))) * approach
+        force = self.curve(phase).value * approach
         return FlankForces(np.maximum(force, 0.0) if self.parts else force)
 
     def bears(self, phase: Array, approach: Array) -> BoolArray:  # noqa: ARG002
         """Whether its teeth touch at phases (rad) and approaches beyond the gap (m), (n,)."""
         return np.asarray((approach > 0.0) | (not self.parts))
-
-    @cached_property
-    def _cubics(self) -> Array:
-        return cubics(self.curve)
 
 
 @dataclass(frozen=True, eq=False)

@@ -248,7 +248,7 @@ def mesh_line(train: GearTrain, mesh: GearMesh, shafts: Shafts, running: Operati
             backlash = law.backlash
     elif mesh.stiffness is not None:
         curve = interpolant(mesh)
-        mean = mean_value(curve)
+        mean = curve.mean
     turn[first[i] + 5] += 1.0
     if mesh.stiffness is not None:
         rayleigh = train.damping.beta * mean
@@ -281,12 +281,3 @@ def mean_tangent(law: MeshLaw, force: float) -> float:
     """Mean over a mesh cycle of the law's dF/d approach (N/m) under a constant force (N)."""
     angles = law.nodes[0] + law.cycle * (np.arange(PHASES) + 0.5) / PHASES
     return float(law(angles, law.approach(angles, force)).tangent.mean())
-
-
-def mean_value(curve: PeriodicInterpolant) -> float:
-    """Mean of a curve over its period: the trapezium rule, and for cubics its correction with the slopes."""
-    h = np.diff(curve.nodes)
-    area = 0.5 * h @ (curve.values[:-1] + curve.values[1:])
-    if curve.method == "cubic":
-        area += (h * h / 12.0) @ (curve.slopes[:-1] - curve.slopes[1:])
-    return float(area / curve.period)

@@ -19,7 +19,6 @@ from ..progress import stage
 from ..stiffness.curve import StiffnessCurve
 from ..train.gear_train import GearMesh, GearTrain
 from ..train.kinematics import driving_senses, steady_forces
-from ..train.mesh_element import mean_value
 from .job import Stiffness, TrainJob, job_train
 
 if TYPE_CHECKING:
@@ -74,7 +73,7 @@ def train_curves(
         else:
             curve = _computed_curve(job, train, number, progress, estimate)
             linear = (mesh.law or job.table.curves.law) == "linear"
-            found.append(mean_value(curve.interpolant("k_mesh", method="cubic")) if linear else curve)
+            found.append(curve.interpolant("k_mesh", method="cubic").mean if linear else curve)
     return tuple(found)
 
 
