@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from .errors import MissingLibraryError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from .typing import Array
 
 
 class Facts:
@@ -62,7 +65,7 @@ class ShownTable(Shown):
         MissingLibraryError
             Where pandas is not installed.
         """
-        return library("pandas").DataFrame({name: numbers(cells) for name, cells in self.columns().items()})
+        return library("pandas").DataFrame({name: as_numbers(cells) for name, cells in self.columns().items()})
 
     def to_xarray(self) -> Any:
         """The table as an `xarray.Dataset` over `AXES`; needs pandas, too."""
@@ -71,13 +74,17 @@ class ShownTable(Shown):
         return (frame.set_index(list(self.AXES)) if self.AXES else frame.rename_axis("row")).to_xarray()
 
 
-def numbers(cells: Iterable[Any]) -> list[Any]:
-    """The cells of a column as numbers where all of them are, else as they stand."""
-    cells = list(cells)
-    try:
-        return [float(cell) for cell in cells]
-    except ValueError:
-        return cells
+def as_numbers(cells: Iterable[Any]) -> Array:
+    """The cells of a column as an array: of numbers where all of them are, whole ones where they can be."""
+    import numpy as np
+
+    values = np.asarray(list(cells))
+    if values.dtype.kind != "U":
+        return values
+    for kind in (np.int64, np.float64):
+        with suppress(ValueError):
+            return values.astype(kind)
+    return values.astype(object)
 
 
 def library(name: str, extra: str = "study") -> Any:

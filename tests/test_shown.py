@@ -29,7 +29,7 @@ from gearfe.gear.modifications import FlankModification
 from gearfe.mechanisms import load_mechanism
 from gearfe.microgeometry.relief_problem import ReliefProblem, Variable
 from gearfe.rigid import constant, integrate
-from gearfe.shown import Shown, numbers
+from gearfe.shown import Shown, as_numbers
 from gearfe.spectrum import amplitude_spectrum
 from gearfe.stiffness.sweep import elastic_pair
 from gearfe.train import Damping, Load
@@ -139,8 +139,8 @@ def test_tables_of_run_ups_studies_and_spectra(results: dict[str, Any]) -> None:
 
 
 def test_columns_of_numbers_and_of_words() -> None:
-    assert numbers(["1", "nan"])[0] == 1.0
-    assert numbers(["1", "converged"]) == ["1", "converged"]
+    assert as_numbers(["1", "nan"])[0] == 1.0
+    assert as_numbers(["1", "converged"]).tolist() == ["1", "converged"]
 
 
 def test_a_missing_library_is_named_with_its_line(results: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,16 +5,14 @@ What solves contacts loads only for a law that was not made before.
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from ..cache import cached_arrays
+from ..cache import cached_arrays, source_hash
 from ..contact.laws import HalfPlane, PairModel
 from ..errors import InputError
 from ..gear.pair import GearPair
@@ -98,12 +96,5 @@ def cached_law(pair: GearPair, model: PairModel, force: float) -> MeshLaw:
         with stage("mesh law"):
             return law_arrays(mesh_law(half_plane_pair(elastic_pair(pair, own)), force))
 
-    recipe = [curve_key(pair, own, {"force": force}), _source()]
+    recipe = [curve_key(pair, own, {"force": force}), source_hash("meshlaw")]
     return law_of_arrays(cached_arrays("mesh-law", recipe, made))
-
-
-@cache
-def _source() -> str:
-    """Hash of the text of this room."""
-    files = sorted(Path(__file__).parent.glob("*.py"))
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()

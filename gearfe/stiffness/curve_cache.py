@@ -18,14 +18,14 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..cache import cache_key, kept
+from ..cache import cache_key, kept, source_hash
 from ..contact.laws import PairModel
 from ..errors import InputError
 from ..gear.pair import GearPair
 from .curve import StiffnessCurve
 
-#: Rooms whose text decides a curve, beside `gearfe.elasticity`.
-ROOMS = ("contact", "gear", "meshing", "stiffness")
+#: Rooms and modules whose text decides a curve.
+ROOMS = ("elasticity", "contact", "gear", "meshing", "reduction", "stiffness")
 
 
 def cached_curve(
@@ -74,7 +74,12 @@ def curve_key(pair: GearPair, model: PairModel, sweep: dict[str, Any]) -> str:
     """Hash (hex) of all that decides a curve."""
     import scipy
 
-    versions = {"numpy": np.__version__, "scipy": scipy.__version__, "gearfe": __version__, "source": _source()}
+    versions = {
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "gearfe": __version__,
+        "source": source_hash(*ROOMS),
+    }
     kind = type(model.law)
     versions["law"] = f"{kind.__module__}:{kind.__qualname__} {_text_of(kind.__module__)}"
     return cache_key("curve", {"pair": pair, "model": model, "sweep": sweep, "versions": versions})
@@ -94,14 +99,3 @@ def _stored(path: Path, pair: GearPair) -> StiffnessCurve | None:
         return None
     whole = math.isclose(curve.mesh_cycle, pair.mesh_cycle, rel_tol=1e-12) and not curve.failed.any()
     return curve if whole else None
-
-
-@cache
-def _source() -> str:
-    """Hash of the text of the rooms that compute curves."""
-    package = Path(__file__).parents[1]
-    files = [package / "elasticity.py", *(file for room in ROOMS for file in sorted((package / room).glob("*.py")))]
-    text = hashlib.sha256()
-    for file in files:
-        text.update(file.name.encode() + file.read_bytes())
-    return text.hexdigest()

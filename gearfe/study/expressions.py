@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, unknown_name
+from ..shown import as_numbers
 from .answer import Answer
 
 #: Functions of numbers and columns; gaps of a column (not-a-number) are left out.
@@ -89,7 +90,7 @@ def _value(node: ast.expr, answer: Answer, label: str) -> Any:  # noqa: PLR0911 
         if isinstance(within, Mapping):
             return _named(within, str(index), label)
         where = int(index) if isinstance(index, float) else np.asarray(index, dtype=bool)
-        return _column(within)[where]
+        return as_numbers(within)[where]
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
         function = _named(FUNCTIONS, node.func.id, label)
         return function(*(_value(part, answer, label) for part in node.args))
@@ -115,15 +116,4 @@ def _named(known: Mapping[str, Any], name: str, label: str) -> Any:
     if name not in known:
         raise unknown_name(label, name, known)
     value = known[name]
-    return _column(value) if isinstance(value, (list, tuple)) else value
-
-
-def _column(values: Any) -> Any:
-    """Numbers where all of them are, else texts."""
-    made = np.asarray(values)
-    if made.dtype.kind in "US":
-        try:
-            return made.astype(float)
-        except ValueError:
-            return made
-    return made
+    return as_numbers(value) if isinstance(value, (list, tuple)) else value

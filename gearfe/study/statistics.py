@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..output.files import whole_file
-from ..shown import Shown, library
+from ..shown import Shown, as_numbers, library
 from ..tables.study import LimitTable, StudyTable
 from ..typing import Array, BoolArray, IntArray
 from .case import DONE
@@ -65,15 +65,8 @@ class StudyResult(Shown):
 
     def numbers(self) -> dict[str, Array]:
         """(n,) values of the parameters that are numbers and vary."""
-        made = {}
-        for name in self.parameters:
-            try:
-                values = np.array([float(cell) for cell in self.columns[name]])
-            except ValueError:
-                continue
-            if len(values) and np.ptp(values) > 0.0:
-                made[name] = values
-        return made
+        every = {name: as_numbers(self.columns[name]) for name in self.parameters}
+        return {name: x.astype(float) for name, x in every.items() if x.dtype != object and x.size and np.ptp(x) > 0}
 
     @property
     def good(self) -> BoolArray:
@@ -200,30 +193,18 @@ class StudyResult(Shown):
 
     def to_pandas(self) -> Any:
         """The rows as a `pandas.DataFrame`: numbers where all cells of a column are."""
-        return library("pandas").DataFrame({name: _numbers(cells) for name, cells in self.columns.items()})
+        return library("pandas").DataFrame({name: as_numbers(cells) for name, cells in self.columns.items()})
 
     def to_xarray(self) -> Any:
         """The rows as an `xarray.Dataset` over the dimension ``case``."""
-        made = {name: ("case", _numbers(cells)) for name, cells in self.columns.items() if name != "case"}
-        return library("xarray").Dataset(made, coords={"case": _numbers(self.columns["case"])})
+        made = {name: ("case", as_numbers(cells)) for name, cells in self.columns.items() if name != "case"}
+        return library("xarray").Dataset(made, coords={"case": as_numbers(self.columns["case"])})
 
     def to_parquet(self, path: str | Path) -> None:
         """Write the rows as an Apache Parquet file, whole or not at all."""
         pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
         with whole_file(path) as temporary:
-            parquet.write_table(pyarrow.table({n: _numbers(cells) for n, cells in self.columns.items()}), temporary)
-
-
-def _numbers(cells: Sequence[str]) -> Any:
-    """Numbers where all cells are, else texts."""
-    try:
-        return np.array([int(cell) for cell in cells])
-    except ValueError:
-        pass
-    try:
-        return np.array([float(cell) for cell in cells])
-    except ValueError:
-        return np.array(cells, dtype=object)
+            parquet.write_table(pyarrow.table({n: as_numbers(cells) for n, cells in self.columns.items()}), temporary)
 
 
 def _number(cell: str) -> float:
