@@ -81,16 +81,25 @@ def energy_lost(
             own = _residual if bent else _straight_residual
             found, block = own(made, material, det, inverse, field[tets[part]], eigenvalues)
             found *= numbers.signs[part][:, :, None, None]
-            place, column = np.unique(numbers.place[part], return_inverse=True)
-            entries = (np.ones(column.size), (column.ravel(), np.arange(column.size)))
-            gather = sparse.csr_array(entries, shape=(len(place), column.size))
-            residual[place] += gather @ found.reshape(column.size, -1)
-            stiffness[place] += gather @ block.reshape(column.size, 9)
-    blocks = stiffness.reshape(-1, 3, 3)
-    acting = numbers.acting & (np.trace(blocks, axis1=1, axis2=2) > 0.0)
-    upright = np.linalg.inv(np.linalg.cholesky(blocks[acting]))
-    scaled = np.matmul(upright, residual[acting].reshape(-1, 3, count)).reshape(-1, count)
-    return np.asarray(FACTOR * (scaled.T @ scaled))
+            add_up(numbers.place[part], (found, residual), (block, stiffness))
+    return FACTOR * energy_taken(residual.reshape(-1, 3, count), stiffness.reshape(-1, 3, 3), numbers.acting)
+
+
+def add_up(place: IntArray, *parts: tuple[Array, Array]) -> None:
+    """Add what elements give to functions numbered `place` (m, s): parts (m, s, ...) to totals (functions, ...)."""
+    rows, column = np.unique(place, return_inverse=True)
+    entries = (np.ones(column.size), (column.ravel(), np.arange(column.size)))
+    gather = sparse.csr_array(entries, shape=(len(rows), column.size))
+    for part, total in parts:
+        total[rows] += (gather @ part.reshape(column.size, -1)).reshape(len(rows), *total.shape[1:])
+
+
+def energy_taken(residual: Array, stiffness: Array, acting: BoolArray) -> Array:
+    """Energy (k, k) that functions take, each by itself: residuals (n, 3, k), stiffnesses (n, 3, 3)."""
+    chosen = np.flatnonzero(acting & (np.trace(stiffness, axis1=1, axis2=2) > 0.0))
+    upright = np.linalg.inv(np.linalg.cholesky(stiffness[chosen]))
+    scaled = np.matmul(upright, residual[chosen]).reshape(-1, residual.shape[-1])
+    return np.asarray(scaled.T @ scaled)
 
 
 class _Functions(NamedTuple):

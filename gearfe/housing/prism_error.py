@@ -14,12 +14,12 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
 
 from ..meshing.housing_mesh import Extrusion
 from ..prisms import ORDER, isotropic_blocks, lagrange, plane_parts, triangle_maps, triangle_rule
 from ..solid import SolidMaterial
 from ..typing import Array, BoolArray, IntArray
+from .mesh_error import add_up, energy_taken
 
 #: Error over what the next order's functions take one by one.
 FACTOR = 4.0
@@ -77,30 +77,18 @@ def prism_energy_lost(
                 found = elements.residual(field[own[part]], eigenvalues)
                 place, signs = group.numbers.place[chosen[part]], group.numbers.signs[chosen[part]]
                 found *= signs[:, :, None, None, None]
-                rows, inverse = np.unique(place, return_inverse=True)
-                entries = (np.ones(place.size), (inverse.ravel(), np.arange(place.size)))
-                gather = sparse.csr_array(entries, shape=(len(rows), place.size))
-                residual[rows] += (gather @ found.reshape(place.size, -1)).reshape(-1, lines, 3, count)
-                stiffness[rows] += (gather @ elements.own.reshape(place.size, -1)).reshape(-1, lines, 3, 3)
+                add_up(place, (found, residual), (elements.own, stiffness))
             inside = _acting(group.numbers, ORDER * layer + 1, levels, still)
             for j in range(residual.shape[1]):
                 if group.line == _ALL and j == 0:
                     below = (below[0] + residual[:, j], below[1] + stiffness[:, j])
-                    lost += _taken(*below, _acting(group.numbers, ORDER * layer, levels, still))
+                    lost += energy_taken(*below, _acting(group.numbers, ORDER * layer, levels, still))
                 elif group.line == _ALL and j == 1:
                     below = (residual[:, j], stiffness[:, j])
                 else:
-                    lost += _taken(residual[:, j], stiffness[:, j], inside)
-    lost += _taken(*below, _acting(numbers.new, levels - 1, levels, still))
+                    lost += energy_taken(residual[:, j], stiffness[:, j], inside)
+    lost += energy_taken(*below, _acting(numbers.new, levels - 1, levels, still))
     return np.asarray(FACTOR * lost)
-
-
-def _taken(residual: Array, stiffness: Array, acting: BoolArray) -> Array:
-    """(k, k) energy that functions take, each by itself."""
-    chosen = np.flatnonzero(acting & (np.trace(stiffness, axis1=1, axis2=2) > 0.0))
-    upright = np.linalg.inv(np.linalg.cholesky(stiffness[chosen]))
-    scaled = np.matmul(upright, residual[chosen]).reshape(-1, residual.shape[-1])
-    return np.asarray(scaled.T @ scaled)
 
 
 class _Numbers(NamedTuple):
