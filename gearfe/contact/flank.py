@@ -273,7 +273,9 @@ def _edges(nodes: ComplexArray, counts: IntArray) -> tuple[IntArray, IntArray, C
     linear, quadratic = 4 * x1 - 3 * x0 - x2, 2 * (x0 - 2 * x1 + x2)
     at_start, at_end = (1j * a / np.abs(a) for a in (linear, linear + 2 * quadratic))
     added = np.zeros((2, len(node)), dtype=complex)
-    left = np.setdiff1d(np.arange(len(node)), first[1:] - 1)
+    inner = np.ones(len(node), dtype=bool)
+    inner[first[1:] - 1] = False
+    left = np.flatnonzero(inner)
     mean = at_end[left] + at_start[left + 1]
     mean /= np.abs(mean)
     added[1, left], added[0, left + 1] = mean - at_end[left], mean - at_start[left + 1]
