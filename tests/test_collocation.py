@@ -158,7 +158,7 @@ def test_kernels_step_as_numpy_does(make: Any, family: str) -> None:
             mine, other = getattr(one.w, name), getattr(two.w, name)
             size = np.abs(mine).max(initial=0.0)
             np.testing.assert_allclose(other, mine, rtol=1e-7, atol=1e-8 * size, err_msg=name)
-        assert two.w.told[0] == pytest.approx(one.w.told[0], rel=1e-3)
+        assert two.w.measures[0] == pytest.approx(one.w.measures[0], rel=1e-3)
         for step in (one, two):
             step.keep(0.002)
         q, v = one.w.qn.copy(), one.w.vn.copy()

@@ -85,10 +85,10 @@ def carrying(law: ElementLaw, to_tip: Array) -> BoolArray:
 
 def law_text(law: ContactLaw) -> str:
     """Name and parameters in one line without commas, for tables and reports."""
-    told = {name: getattr(law, name) for name in fields_of(type(law))}
+    parameters = {name: getattr(law, name) for name in fields_of(type(law))}
     if isinstance(law, Penalty):
-        told["stiffness"] = "300E/h" if law.stiffness is None else f"{law.stiffness * 1e-9:.12g}N/mm3"
-    texts = {name: f"{v:.12g}" if isinstance(v, float) else str(v).replace(",", "") for name, v in told.items()}
+        parameters["stiffness"] = "300E/h" if law.stiffness is None else f"{law.stiffness * 1e-9:.12g}N/mm3"
+    texts = {name: f"{v:.12g}" if isinstance(v, float) else str(v).replace(",", "") for name, v in parameters.items()}
     return " ".join([law.name, *(f"{name}={text}" for name, text in texts.items())])
 
 

@@ -20,7 +20,7 @@ from ..gear.pair import GearPair
 from ..progress import Stopwatch
 from ..stiffness.job import Keep, StiffnessJob
 from ..stiffness.positions import PositionSolver, Progress, at_torques, position_solver
-from ..stiffness.sweep import asked_positions, assembled_curve, distinct_angles, elastic_pair
+from ..stiffness.sweep import assembled_curve, distinct_angles, elastic_pair, requested_angles
 from ..tables.loadmap import LoadMapTable
 from ..threads import one_thread
 from ..typing import Array
@@ -74,14 +74,14 @@ def sweep_loads(
     InputError
         For torques or angles out of range.
     """
-    asked, finite = asked_positions(pair, angles, ANGLES, kinematics)
+    requested, finite = requested_angles(pair, angles, ANGLES, kinematics)
     goals = np.unique(np.atleast_1d(np.asarray(torques, dtype=float)))
     if goals.ndim != 1 or len(goals) == 0 or not (np.isfinite(goals).all() and goals[0] > 0):
         raise InputError("torques", torques, "must be finite and > 0 N m", "give torques at the wheel's hub")
     watch = Stopwatch()
     if elastic is None:
         elastic = elastic_pair(pair, model, watch=watch, **changes)
-    solved_angles, source = distinct_angles(asked, pair.mesh_cycle)
+    solved_angles, source = distinct_angles(requested, pair.mesh_cycle)
     if len(goals) * len(solved_angles) > MOST_CELLS:
         problem = f"makes more than {MOST_CELLS} cells with {len(solved_angles)} angles"
         raise InputError("torques", len(goals), problem, "use fewer torques or angles")
@@ -98,7 +98,7 @@ def sweep_loads(
         found, at_roots = _cells(solver, solved_angles, goals, roots, progress, finite=finite)
     n = len(solved_angles)
     levels = [found.take(slice(row * n, (row + 1) * n)) for row in range(len(goals))]
-    curves = tuple(assembled_curve(solver, asked, source, level, searched=True) for level in levels)
+    curves = tuple(assembled_curve(solver, requested, source, level, searched=True) for level in levels)
     root = None
     if at_roots is not None:
         from .root_stress import root_map

@@ -133,12 +133,12 @@ def write_tables(folder: Path, mechanism: Mechanism, results: Results, with_reac
     time: Any = results.trajectory.time
     outputs: dict[str, Any] = {**results.outputs}
     energy: dict[str, Any] = {**results.energy}
-    told = write_csv(folder / "trajectory.csv", {"time_s": time, **outputs}, gaps=False)
-    told += write_csv(folder / "energy.csv", {"time_s": time, **energy}, gaps=False)
+    warned = write_csv(folder / "trajectory.csv", {"time_s": time, **outputs}, gaps=False)
+    warned += write_csv(folder / "energy.csv", {"time_s": time, **energy}, gaps=False)
     if with_reactions:
         forces: dict[str, Any] = {**reactions(mechanism, results.trajectory)}
-        told += write_csv(folder / "reactions.csv", {"time_s": time, **forces})
-    return told
+        warned += write_csv(folder / "reactions.csv", {"time_s": time, **forces})
+    return warned
 
 
 def summarise(
@@ -250,19 +250,19 @@ def write_elastic(folder: Path, mechanism: Mechanism, trajectory: Trajectory) ->
         write_plates(folder, mechanism, trajectory)
 
 
-def _told_error(error: dict[str, Any]) -> str:
+def _error_line(error: dict[str, Any]) -> str:
     largest = error["coordinates_m_or_rad"]
     if not math.isfinite(largest):
         return "error estimate: none, a finer run did not reach as far"
     return f"error estimate from finer runs: {largest:.2g} (m or rad) at worst"
 
 
-def _told_link(link: dict[str, Any]) -> str:
-    told = f"flexible link {link['name']}: deflection up to {link['largest_deflection_m']:.3g} m"
+def _link_line(link: dict[str, Any]) -> str:
+    line = f"flexible link {link['name']}: deflection up to {link['largest_deflection_m']:.3g} m"
     for kind, key in (("edge stress", "largest_edge_stress_Pa"), ("von Mises' stress", "largest_von_mises_Pa")):
         if key in link:
-            told += f", {kind} up to {1e-6 * link[key]:.3g} MPa"
-    return told
+            line += f", {kind} up to {1e-6 * link[key]:.3g} MPa"
+    return line
 
 
 def _text(summary: dict[str, Any]) -> str:
@@ -271,9 +271,9 @@ def _text(summary: dict[str, Any]) -> str:
         f"{f['bodies']} bodies, {f['coordinates']} coordinates - {f['constraints']} constraints"
         f" + {f['redundant']} redundant = {f['net']} free",
         *(f"redundant: {name}" for name in f["redundant_constraints"]),
-        *(_told_link(link) for link in summary["flexible_links"]),
+        *(_link_line(link) for link in summary["flexible_links"]),
         f"{summary['method']}: {summary['status']} at {summary['reached_s']:g} s in {summary['steps']} steps,"
         f" {summary['timings']['integrate_s']:.3f} s; singular passages: {summary['singular_passages']['count']}",
-        *([_told_error(summary["error_estimate"])] if summary["error_estimate"] else []),
+        *([_error_line(summary["error_estimate"])] if summary["error_estimate"] else []),
     ]
     return "\n".join(lines)

@@ -77,8 +77,8 @@ class Mechanism:
     @property
     def tolerance(self) -> float:
         """Tolerance of the run: asked for, or 1e-9, with flexible links 1e-5."""
-        asked = self.file.run.tolerance
-        return asked if asked is not None else (1e-5 if self.elastic else 1e-9)
+        tolerance = self.file.run.tolerance
+        return tolerance if tolerance is not None else (1e-5 if self.elastic else 1e-9)
 
     def point(self, where: str, label: str = "point") -> tuple[int, Point]:
         """Body number and coordinates relative to the mass centre of ``body.point``, ``body.centre`` or ``body``."""
@@ -105,14 +105,14 @@ class Mechanism:
         return index[body], (at[0] - centre[0], at[1] - centre[1])
 
     def values(
-        self, wanted: set[tuple[str, str | None]], q: Any, v: Any = None, a: Any = None, sections: Any = None
+        self, needed: set[tuple[str, str | None]], q: Any, v: Any = None, a: Any = None, sections: Any = None
     ) -> Any:
         """Quantities of bodies, joints and points for states of shape (n, size).
 
         `sections`: link -> forces at its nodes, shape (n, nodes, 3); from the states where not given.
         """
         found = {}
-        for kind, what in wanted:
+        for kind, what in needed:
             if kind in PLAIN:
                 continue
             where = given(what, f"expression {kind}")
@@ -243,27 +243,27 @@ class Mechanism:
     def _forced(self, text: str, target: float, level: int) -> Forced:
         label = f"start.{('positions', 'velocities')[level]} {text!r}"
         node = parse(text, label)
-        wanted = quantities(node)
+        needed = quantities(node)
         allowed = (("angle", "x", "y"), ("rate", "vx", "vy"))[level]
-        for kind, _ in wanted:
+        for kind, _ in needed:
             if kind not in allowed:
                 problem = f"uses {kind}; only {', '.join(allowed)} can be forced here"
                 raise InputError(label, None, problem, "use one of these")
 
         def position(q: Array) -> float:
-            return float(np.asarray(compute(node, self.values(wanted, q[None, :]))).reshape(-1)[0])
+            return float(np.asarray(compute(node, self.values(needed, q[None, :]))).reshape(-1)[0])
 
         def slope(q: Array) -> Array:
             steps = 1e-6 * np.diag(self.system.units)
             states = np.concatenate([q + steps, q - steps])
-            ends = np.broadcast_to(compute(node, self.values(wanted, states)), len(states))
+            ends = np.broadcast_to(compute(node, self.values(needed, states)), len(states))
             return (ends[: len(q)] - ends[len(q) :]) / (2e-6 * self.system.units)
 
         def rate_slope(q: Array) -> Array:
             n = len(q)
             states = np.broadcast_to(q, (n + 1, n))
             made = np.broadcast_to(
-                compute(node, self.values(wanted, states, np.vstack([np.eye(n), np.zeros(n)]))), n + 1
+                compute(node, self.values(needed, states, np.vstack([np.eye(n), np.zeros(n)]))), n + 1
             )
             return made[:n] - made[n]
 
@@ -275,16 +275,16 @@ class Mechanism:
             raise InputError(label, None, problem, "force another expression, or give other start poses")
         if level == 0:
             return Forced(text, target, position, slope)
-        offset = self._offset(node, wanted, label)
+        offset = self._offset(node, needed, label)
         return Forced(text, target - offset, position, rate_slope)
 
-    def _offset(self, node: Node, wanted: set[tuple[str, str | None]], label: str) -> float:
+    def _offset(self, node: Node, needed: set[tuple[str, str | None]], label: str) -> float:
         """What the expression of a velocity adds to its linear part; refuses one that is not linear."""
         random = np.random.default_rng(2)
         q = np.broadcast_to(self.system.start_q, (5, self.system.size))
         v = random.standard_normal((5, self.system.size)) * self.system.units
         v[0], v[3], v[4] = 0.0, 2.0 * v[1] - 3.0 * v[2], -v[1]
-        at = np.broadcast_to(compute(node, self.values(wanted, q, v)), 5)
+        at = np.broadcast_to(compute(node, self.values(needed, q, v)), 5)
         part = at - at[0]
         rest = max(abs(part[3] - 2.0 * part[1] + 3.0 * part[2]), abs(part[4] + part[1]))
         if not np.isfinite(at).all() or rest > 1e-9 * float(np.abs(at).max()):

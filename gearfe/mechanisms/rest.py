@@ -44,10 +44,10 @@ def run_rest(
     with stage("equilibrium"):
         rest = equilibrium(mechanism.system, start)
     results = evaluate(mechanism, at_rest(mechanism, start, rest))
-    asked = mechanism.file.run.analysis == "modes"
-    found = modes(mechanism.system, start, rest, mechanism.file.run.modes) if asked else None
+    with_modes = mechanism.file.run.analysis == "modes"
+    found = modes(mechanism.system, start, rest, mechanism.file.run.modes) if with_modes else None
     with whole_set(folder, MAY_WRITE) as made:
-        told = write_csv(made / "equilibrium.csv", dict(results.outputs), gaps=False) if results.outputs else []
+        warned = write_csv(made / "equilibrium.csv", dict(results.outputs), gaps=False) if results.outputs else []
         write_csv(made / "bodies.csv", _poses(mechanism, rest.q))
         write_csv(made / "reactions.csv", dict(reactions(mechanism, results.trajectory)))
         if found is not None:
@@ -59,9 +59,9 @@ def run_rest(
             draw(made, results, found)
         summary = summarise_rest(mechanism, start, rest, results, found)
         summary["timings"] = {"whole_s": clock.perf_counter() - began}
-        summary["warnings"] = list(told)
+        summary["warnings"] = list(warned)
         write_json(made / "summary.json", summary)
-    return Outcome(not told, _text(summary), summary, tuple(told))
+    return Outcome(not warned, _text(summary), summary, tuple(warned))
 
 
 def at_rest(mechanism: Mechanism, start: Start, rest: Equilibrium) -> Trajectory:

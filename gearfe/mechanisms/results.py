@@ -46,15 +46,15 @@ class Results:
 def evaluate(mechanism: Mechanism, trajectory: Trajectory) -> Results:
     """Outputs and energies at the times of the trajectory."""
     energy = energies(mechanism, trajectory)
-    wanted = set().union(*(quantities(node) for node in mechanism.outputs.values())) if mechanism.outputs else set()
-    needs = {kind for kind, _ in wanted}
+    needed = set().union(*(quantities(node) for node in mechanism.outputs.values())) if mechanism.outputs else set()
+    needs = {kind for kind, _ in needed}
     v = trajectory.v if needs - {"angle", "x", "y", *PLAIN} else None
     a = trajectory.a if needs & {"angular_acceleration", "ax", "ay"} else None
     sections = {
         name: link.beam.at_nodes(trajectory.stress_at(link.beam, trajectory.time))
         for name, link in mechanism.links.items()
     } | {name: trajectory.stress_at(link.element, trajectory.time) for name, link in mechanism.plates.items()}
-    values = mechanism.values(wanted, trajectory.q, v, a, sections)
+    values = mechanism.values(needed, trajectory.q, v, a, sections)
     values["time", None] = trajectory.time
     for name in ("kinetic", "potential", "work", "total"):
         values[name, None] = energy[f"{name}_J"]

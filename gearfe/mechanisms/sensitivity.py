@@ -121,10 +121,10 @@ def sensitivities(
     for k, (name, h) in enumerate(steps.items()):
         around = made[1 + 2 * STEPS * k : 1 + 2 * STEPS * (k + 1)]
         for output, base in outputs.items():
-            told = [_columns(case)[1][output] for case in around]
-            if any(len(column) != len(base) for column in told):
+            shifted = [_columns(case)[1][output] for case in around]
+            if any(len(column) != len(base) for column in shifted):
                 raise InputError(name, values[name], f"changes how many values {output} has", "leave it out")
-            differences = [(told[2 * j] - told[2 * j + 1]) * 2**j / (2.0 * h) for j in range(STEPS)]
+            differences = [(shifted[2 * j] - shifted[2 * j + 1]) * 2**j / (2.0 * h) for j in range(STEPS)]
             slopes[name, output], error = extrapolated(differences)
             sharp = [_columns(case)[1][output] for case in finer[2 * k : 2 * k + 2]]
             integrated = np.abs((sharp[0] - sharp[1]) / (2.0 * h) - differences[0]).max(initial=0.0)

@@ -50,7 +50,7 @@ def number(text: str) -> float:
 
 def entries(text: str, names: Iterable[str]) -> Iterator[tuple[int, list[str]]]:
     """Line number and fields of each entry of these names, with those of its continuation lines in their order."""
-    wanted = set(names)
+    chosen = set(names)
     card: list[str] = []
     begun = 0
     for line_number, whole in enumerate(text.splitlines(), start=1):
@@ -65,7 +65,7 @@ def entries(text: str, names: Iterable[str]) -> Iterator[tuple[int, list[str]]]:
             yield begun, card
         words = first.split()
         name = words[0] if words and words[0] == "INCLUDE" else first.rstrip("_")  # meshio writes CTETRA_
-        card, begun = ([name, *_fields(line)] if name in wanted else []), line_number
+        card, begun = ([name, *_fields(line)] if name in chosen else []), line_number
     if card:
         yield begun, card
 

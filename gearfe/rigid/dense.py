@@ -118,12 +118,12 @@ def within_run(run: Array, times: ArrayLike) -> Array:
     InputError
         When a time lies outside: the polynomials of the steps say nothing there.
     """
-    asked = np.atleast_1d(np.asarray(times, dtype=float))
+    given = np.atleast_1d(np.asarray(times, dtype=float))
     low, high = min(run[0], run[-1]), max(run[0], run[-1])
     slack = SLACK * (high - low) + 1e-12 * max(abs(low), abs(high))
-    outside = ~((asked >= low - slack) & (asked <= high + slack))
+    outside = ~((given >= low - slack) & (given <= high + slack))
     if outside.any():
         problem = f"lies outside of the run, which goes from {run[0]:.9g} to {run[-1]:.9g} s"
         cure = "ask for times within it, or integrate further"
-        raise InputError("times", float(asked[np.argmax(outside)]), problem, cure)
-    return np.clip(asked, low, high)
+        raise InputError("times", float(given[np.argmax(outside)]), problem, cure)
+    return np.clip(given, low, high)

@@ -180,7 +180,7 @@ class Stepper:
             if count <= 0:
                 control.fail(Status.NOT_SOLVED, NOT_SOLVED_SHARE)
                 continue
-            error = max(float(w.told[0]), float(w.told[1]) / tolerance)
+            error = max(float(w.measures[0]), float(w.measures[1]) / tolerance)
             if corners.system is not None and error <= TRUSTED:
                 quiet = quiet_speeds(tab.c, w.v, w.V[:-1], w.vn, units * float((reach / units).max()) / abs(h))
                 speeds = (tab.speed @ np.vstack([w.v, quiet])) / h ** self._powers[:, None]
@@ -190,7 +190,7 @@ class Stepper:
                 control.reject(error)
                 continue
             t = control.accept(error)
-            control.trial = min(control.trial, abs(h) * EASY / max(float(w.told[2]), 1e-3))
+            control.trial = min(control.trial, abs(h) * EASY / max(float(w.measures[2]), 1e-3))
             known.append(w.known.copy())
             forces.append(np.hstack([w.L[:-1], w.S[:-1]]))
             ends.append(t)

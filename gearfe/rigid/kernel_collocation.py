@@ -39,7 +39,7 @@ class Stages(NamedTuple):
     """State and unknowns of a step: s stages, and row s for its begin; n coordinates, m rows, k stresses."""
 
     now: Array  # (2,) time at the begin and step (s)
-    told: Array  # (3,) error over the tolerance, gap of the rows between the stages, mean rate of Newton's changes
+    measures: Array  # (3,) error over the tolerance, gap of the rows between the stages, mean rate of Newton's changes
     q: Array  # (n,) state at the begin
     v: Array
     multipliers: Array  # (m,) first guess
@@ -109,12 +109,12 @@ def collocation_step(eq: Any, w: Stages, tab: Scheme) -> int:
         moved = size
     if not solved:
         return -count
-    w.told[0] = defect(eq, w, tab, h)
+    w.measures[0] = defect(eq, w, tab, h)
     end_state(w, tab, h)
     project(eq, w, t + h)
     keep_path(w, h)
-    w.told[1] = gap_between(eq, w, tab, t, h)
-    w.told[2] = (moved / started) ** (1.0 / (count - 1.0)) if count > 2 and moved > 0.0 else 0.0
+    w.measures[1] = gap_between(eq, w, tab, t, h)
+    w.measures[2] = (moved / started) ** (1.0 / (count - 1.0)) if count > 2 and moved > 0.0 else 0.0
     return count
 
 

@@ -263,10 +263,10 @@ class Samples(NamedTuple):
     out: Array  # (t, c) coordinates, or that derivative of them
 
 
-def sample(asked: Samples) -> int:
+def sample(samples: Samples) -> int:
     """Coordinates or a derivative of them from the pieces of `integrate_series`; returns 0."""
     T, C, sign, times, derivative, out = (
-        asked.ends, asked.coefficients, asked.sign, asked.times, asked.derivative, asked.out,
+        samples.ends, samples.coefficients, samples.sign, samples.times, samples.derivative, samples.out,
     )  # fmt: skip
     piece = 0
     last = C.shape[0] - 1

@@ -150,11 +150,11 @@ class SeriesRun:
         rates = np.sqrt(np.abs(modal.eigenvalues).max(initial=0.0)) + np.abs(diagonal).max(initial=0.0)
         now = np.array([t0, t1, 5.0 / max(rates, 1.0 / max(abs(t1 - t0), 1e-300))])
         counts, orders = np.zeros(3, dtype=np.int64), [0]
-        ends, states, asked = [np.array([t0])], [y0[None, :]], np.ascontiguousarray(output_times)
+        ends, states, outputs = [np.array([t0])], [y0[None, :]], np.ascontiguousarray(output_times)
         run, scratch, advance = Packed(equations), Packed(work), self._bound.compiled.modal_steps
 
         def fill(room: int) -> tuple[int, float, int]:
-            out = kernel_modal.Output(now, counts, asked, found, np.empty(room), np.empty((room, 2 * n)))
+            out = kernel_modal.Output(now, counts, outputs, found, np.empty(room), np.empty((room, 2 * n)))
             status, count = advance(run, scratch, Packed(out)), int(counts[0])
             orders[0] += int(counts[2])
             ends.append(out.ends[:count])

@@ -216,9 +216,9 @@ class _Walk:
                     return f"no motion was found beyond {place.orbit.speed:.6g} rad/s on this branch"
                 continue
             turned = new.rising * place.rising < 0.0
-            asked = [k for k in (self.number - 1, self.number, self.number + 1) if 0 <= k < len(speeds)]
+            near = [k for k in (self.number - 1, self.number, self.number + 1) if 0 <= k < len(speeds)]
             a, b = place.orbit.speed, new.orbit.speed
-            passed = [k for k in asked if (a - speeds[k]) * (b - speeds[k]) <= 0.0 and a != speeds[k]]
+            passed = [k for k in near if (a - speeds[k]) * (b - speeds[k]) <= 0.0 and a != speeds[k]]
             if turned and step > (2.0 * LEAST if passed else TURNING):  # in which order, and where: shorter steps tell
                 step *= 0.5
                 continue

@@ -58,14 +58,14 @@ def instability_map(
     InputError
         For factors that are not positive, meshes that carry no force, and those that share no period within `LONGEST`.
     """
-    asked, factors = np.asarray(speeds, dtype=float), np.asarray(loads, dtype=float)
+    requested, factors = np.asarray(speeds, dtype=float), np.asarray(loads, dtype=float)
     if not (factors > 0.0).all():
         raise InputError("instability_loads", factors.tolist(), "must be > 0", "without a load no flank bears")
     if (train.steady <= 0.0).any():
         problem = "carries no force on its driving flanks, so its stiffness under load is open"
         name = train.model.meshes[int(np.argmin(train.steady))].name
         raise InputError(f"mesh {name!r}", None, problem, "give the train a load that presses them")
-    made = np.zeros((len(factors), len(asked)), dtype=complex)
+    made = np.zeros((len(factors), len(requested)), dtype=complex)
     system, span = train.system, window(train.system)
     if span.half is not None:
         problem = f"are asked for, but the meshes share no period of up to {LONGEST} mesh cycles"
@@ -75,12 +75,12 @@ def instability_map(
         for i, factor in enumerate(factors):
             A = _tangents(train, theta, float(factor))
             kept = strengths(system.linear, A) > REACHED
-            for j, speed in enumerate(asked):
+            for j, speed in enumerate(requested):
                 made[i, j] = around(system, float(speed), A, None, kept, span, damped=False)[0]
                 if progress is not None:
-                    progress(i * len(asked) + j + 1, made.size)
-    periods = 2.0 * math.pi * span.turns / np.abs(asked)
-    return InstabilityMap(asked, factors, made, np.log(np.abs(made)) / periods)
+                    progress(i * len(requested) + j + 1, made.size)
+    periods = 2.0 * math.pi * span.turns / np.abs(requested)
+    return InstabilityMap(requested, factors, made, np.log(np.abs(made)) / periods)
 
 
 def _tangents(train: CondensedTrain, theta: Array, factor: float) -> Array:

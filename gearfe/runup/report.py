@@ -420,12 +420,12 @@ def warnings(run: RunUp) -> list[str]:
     return found
 
 
-def attachment_to_draw(run: RunUp, asked: str | None) -> int:
+def attachment_to_draw(run: RunUp, chosen: str | None) -> int:
     """Number of the attachment in the pictures: the asked one, else the bore that carries the load's reaction."""
     names = run.train.model.bores
-    if asked is not None:
-        if asked not in names:
-            raise unknown_name("--attachment", asked, names)
-        return names.index(asked)
+    if chosen is not None:
+        if chosen not in names:
+            raise unknown_name("--attachment", chosen, names)
+        return names.index(chosen)
     loaded = [load.bore for load in run.train.model.train.loads if load.bore in names]
     return names.index(loaded[0]) if loaded and loaded[0] is not None else len(names) - 1

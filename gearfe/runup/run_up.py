@@ -87,8 +87,8 @@ class RunUp(ShownTable):
         known the first of all is taken, whose `stable` says so.
         """
         found: dict[float, list[SteadyState]] = {}
-        asked = set(self.speeds.tolist())
-        for state in (s for s in self.states if s.speed in asked):
+        given = set(self.speeds.tolist())
+        for state in (s for s in self.states if s.speed in given):
             found.setdefault(state.speed, []).append(state)
         made = []
         for speed in sorted(found, key=abs):
@@ -158,15 +158,15 @@ def run_up(
     InputError
         For speeds that contain zero or change sign, and trains without a steady state.
     """
-    asked = _checked(model, speeds)
+    given = _checked(model, speeds)
     train, notes = condense(model), []
     orbits: list[tuple[Orbit, int]] = []
     turns: list[float] = []
-    left = asked
+    left = given
     with one_thread():
         while len(left):
             if progress is not None:
-                progress(len(asked) - len(left), len(asked) - 1)
+                progress(len(given) - len(left), len(given) - 1)
             start = _first(train, float(left[0]), None, tolerance, band_hz)
             if start is None:
                 notes.append(f"no periodic motion was found at {left[0]:.6g} rad/s")
@@ -191,7 +191,7 @@ def run_up(
             found = list(ways(partial(multipliers, train.system), [orbit for orbit, _ in orbits]))
     states = tuple(steady_result(train, *orbit, each) for orbit, each in zip(orbits, found, strict=True))
     changes = _bifurcations(states, turns)
-    return RunUp(train, asked, states, np.array(turns), changes, tuple(notes), tolerance, band_hz)
+    return RunUp(train, given, states, np.array(turns), changes, tuple(notes), tolerance, band_hz)
 
 
 def _numbered(curve: Curve, before: Sequence[tuple[Orbit, int]], turns: int) -> list[tuple[Orbit, int]]:
@@ -239,16 +239,16 @@ def _first(train: CondensedTrain, speed: float, guess: Orbit | None, tolerance: 
 
 
 def _checked(model: TrainModel, speeds: ArrayLike | Sequence[float]) -> Array:
-    asked = np.atleast_1d(np.asarray(speeds, dtype=float))
-    sizes = np.abs(asked)
-    if not len(asked) or not np.isfinite(asked).all() or (sizes == 0.0).any() or np.ptp(np.sign(asked)) > 0.0:
-        shown = f"{asked.min():.6g} to {asked.max():.6g}" if len(asked) else "none"
+    given = np.atleast_1d(np.asarray(speeds, dtype=float))
+    sizes = np.abs(given)
+    if not len(given) or not np.isfinite(given).all() or (sizes == 0.0).any() or np.ptp(np.sign(given)) > 0.0:
+        shown = f"{given.min():.6g} to {given.max():.6g}" if len(given) else "none"
         problem = f"contain zero, change sign or are not finite: {shown} rad/s"
         raise InputError("speeds", None, problem, "ask for speeds of one sense; a train at rest has no orders")
-    if len(asked) > 1 and not ((np.diff(sizes) > 0.0).all() or (np.diff(sizes) < 0.0).all()):
+    if len(given) > 1 and not ((np.diff(sizes) > 0.0).all() or (np.diff(sizes) < 0.0).all()):
         raise InputError("speeds", None, "do not rise or fall all the way", "sort them, each once")
     sense = drive_sense(model.train.driven.speed)
-    if sense * asked[0] < 0.0:
+    if sense * given[0] < 0.0:
         problem = "turns against the drive of the model, whose driving flanks are others"
-        raise InputError("speeds", float(asked[0]), problem, "build the model with a drive of this sense")
-    return asked
+        raise InputError("speeds", float(given[0]), problem, "build the model with a drive of this sense")
+    return given

@@ -289,11 +289,11 @@ class StiffnessCurve(ShownTable):
     def facts(self) -> dict[str, str]:
         """Positions, stiffness, transmission error and torque."""
         angle, solved = np.degrees(self.pinion_angle), ~self.failed
-        told = {"positions": f"{len(self)}, {solved.sum()} solved"}
+        counts = {"positions": f"{len(self)}, {solved.sum()} solved"}
         if not solved.any():
-            return told
+            return counts
         k, error, torque = 1e-6 * self.k_mesh, 1e6 * self.transmission_error, self.torque_wheel
-        return told | {
+        return counts | {
             "pinion angle": f"{angle.min():.4g} to {angle.max():.4g} deg",
             "mesh stiffness": f"{np.nanmin(k):.4g} to {np.nanmax(k):.4g} N/um, mean {np.nanmean(k):.4g}",
             "transmission error": f"{np.nanmean(error):.4g} um, peak to peak {np.ptp(error[solved]):.3g}",

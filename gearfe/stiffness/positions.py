@@ -84,18 +84,18 @@ def twists_for_torque(
     open_ = np.arange(len(goal))
     found = made = solve(open_, twist)
     for count in range(1, MAX_SOLUTIONS + 1):
-        at, touch, asked = twist[open_], touching[open_], goal[open_]
+        at, touch, target = twist[open_], touching[open_], goal[open_]
         torque, tangent = made.torque_wheel, np.nan_to_num(made.tangent)
         solved, failed, clear = (made.status == s for s in ("converged", "not_converged", "no_contact"))
         iterations[open_] += made.iterations
         failures[open_] += failed
-        reached[open_] = solved & (np.abs(torque - asked) <= np.maximum(tolerance * asked, ANGLE_ROUNDING * tangent))
-        less = (solved | clear) & (torque < asked)
+        reached[open_] = solved & (np.abs(torque - target) <= np.maximum(tolerance * target, ANGLE_ROUNDING * tangent))
+        less = (solved | clear) & (torque < target)
         more = np.where(failed, little[open_] > 0, solved & ~less)  # before, first guesses are low rather than high
         low[open_[less]], little[open_[less]] = at[less], torque[less]
         high[open_[more]], much[open_[more]] = at[more], torque[more]
         below, above = low[open_], high[open_]
-        tried = newton_twist(at, touch, torque, tangent, asked)
+        tried = newton_twist(at, touch, torque, tangent, target)
         halved = np.where(np.isfinite(above), 0.5 * (below + above), 2 * at - touch)
         tried = np.where(solved & (below < tried) & (tried < above), tried, halved)
         twist[open_] = np.minimum(tried, most)
@@ -149,8 +149,8 @@ class HalfPlaneSolver:
         found = solve_half_plane(self.law, angles, twists, touching=self.touching(angles))
         if len(kept) == 0:
             return found
-        wanted = taken(found.contacts, np.isin(found.contacts.position, kept))
-        loads = flank_loads(self.law.sides, self.elastic, wanted, found.pinion_angle, found.twist)
+        loaded = taken(found.contacts, np.isin(found.contacts.position, kept))
+        loads = flank_loads(self.law.sides, self.elastic, loaded, found.pinion_angle, found.twist)
         return replace(found, loads=loads)
 
     def touching_twists(self, angles: Array) -> Array:

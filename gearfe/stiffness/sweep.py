@@ -139,10 +139,12 @@ def sweep_stiffness(
         For neither or both of twist and torque, or values out of range.
     """
     load, watch = _checked_load(pair, twist, torque, twist_from), Stopwatch()
-    asked, finite = asked_positions(pair, angles, ANGLES, kinematics)
+    requested, finite = requested_angles(pair, angles, ANGLES, kinematics)
     if elastic is None:
         elastic = elastic_pair(pair, model, watch=watch, **changes)
-    solved_angles, source = (asked, np.arange(len(asked))) if solve_all else distinct_angles(asked, pair.mesh_cycle)
+    solved_angles, source = (
+        (requested, np.arange(len(requested))) if solve_all else distinct_angles(requested, pair.mesh_cycle)
+    )
     solver = position_solver(elastic)
     if torque is not None:
         check_torque(solver.law, load)
@@ -154,7 +156,7 @@ def sweep_stiffness(
         else:
             goals = np.full(len(solved_angles), load)
             solved = at_torques(solver, solved_angles, goals, finite=finite, progress=progress)
-    curve = assembled_curve(solver, asked, source, solved, searched=torque is not None)
+    curve = assembled_curve(solver, requested, source, solved, searched=torque is not None)
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
             error = curve_error(solver, coarser(elastic), solved, finite=finite)
@@ -162,14 +164,16 @@ def sweep_stiffness(
     return replace(curve, timings=dict(watch.seconds))
 
 
-def asked_positions(pair: GearPair, angles: ArrayLike | None, count: int, kinematics: str) -> tuple[Array, bool]:
+def requested_angles(pair: GearPair, angles: ArrayLike | None, count: int, kinematics: str) -> tuple[Array, bool]:
     """Pinion angles (rad), by default `count` over one mesh cycle, and whether finite strain counts."""
     if kinematics not in ("small", "finite"):
         raise InputError("kinematics", kinematics, "must be small or finite")
-    asked = np.arange(count) * pair.mesh_cycle / count if angles is None else np.atleast_1d(np.asarray(angles, float))
-    if asked.ndim != 1 or len(asked) == 0 or not np.isfinite(asked).all():
+    requested = (
+        np.arange(count) * pair.mesh_cycle / count if angles is None else np.atleast_1d(np.asarray(angles, float))
+    )
+    if requested.ndim != 1 or len(requested) == 0 or not np.isfinite(requested).all():
         raise InputError("angles", angles, "must be a list of finite angles (rad)", "give at least one angle")
-    return asked, kinematics == "finite"
+    return requested, kinematics == "finite"
 
 
 def _checked_load(pair: GearPair, twist: float | None, torque: float | None, twist_from: str) -> float:
@@ -203,7 +207,7 @@ def distinct_angles(angles: Array, cycle: float) -> tuple[Array, IntArray]:
 
 
 def assembled_curve(
-    solver: PositionSolver, asked: Array, source: IntArray, solved: Positions, *, searched: bool
+    solver: PositionSolver, requested: Array, source: IntArray, solved: Positions, *, searched: bool
 ) -> StiffnessCurve:
     """The curve at all asked angles.
 
@@ -222,7 +226,7 @@ def assembled_curve(
     twist, torque = total - lost, solved.torque_wheel
     deflection = total - solver.first_touch(solved.pinion_angle)
     stiffness = np.divide(torque, deflection, out=np.zeros_like(torque), where=torque != 0.0)  # not-a-number stays
-    cycles = np.round((asked - solved.pinion_angle[source]) / pair.mesh_cycle).astype(np.int64)
+    cycles = np.round((requested - solved.pinion_angle[source]) / pair.mesh_cycle).astype(np.int64)
     leading, shares = load_shares(solved)
     pressures = contact_pressures(solver, solved)
     edge = np.where(failed, 0, pressures.pop("edge"))
@@ -245,8 +249,8 @@ def assembled_curve(
         **pressures,
     }
     return StiffnessCurve(
-        pinion_angle=asked,
-        wheel_angle=pair.wheel_angle_at(asked, total[source]),
+        pinion_angle=requested,
+        wheel_angle=pair.wheel_angle_at(requested, total[source]),
         leading_pair=leading[source] - cycles,
         law=np.full(len(source), law.name),
         contact_law=law_text(law),
