@@ -170,8 +170,8 @@ class ToothProfile:
         Roll length (m) where the relief starts; `tip_roll` without relief.
     undercut
         True when trochoid and involute cross instead of touching.
-    tip_half_angle, tip_land_half_angle
-        Polar angles (rad) of the flank's end on the tip circle if it were not rounded, and where the tip arc begins.
+    tip_half_angle
+        Polar angle (rad) of the flank's end on the tip circle if it were not rounded.
     """
 
     segments: tuple[Segment, ...]
@@ -182,7 +182,6 @@ class ToothProfile:
     tip_roll: float
     undercut: bool
     tip_half_angle: float
-    tip_land_half_angle: float
 
     def segment(self, name: str) -> Segment:
         """The segment called `name`; KeyError when the profile has none."""
@@ -256,7 +255,6 @@ def tooth_profile(gear: ToothForm) -> ToothProfile:
         tip_roll=tip_roll,
         undercut=undercut,
         tip_half_angle=tip_half_angle,
-        tip_land_half_angle=land,
     )
 
 

@@ -70,8 +70,6 @@ class Reduction:
         Square of ``w_next``; infinite when no mode is left out.
     solver
         Name of the sparse solver.
-    solved_columns
-        Right-hand sides solved for.
     """
 
     mass: Array
@@ -83,7 +81,6 @@ class Reduction:
     corrections: int
     next_eigenvalue: float
     solver: str
-    solved_columns: int
 
 
 @dataclass(frozen=True)
@@ -183,7 +180,7 @@ def reduce_model(
         modes = lowest_modes(
             factor.solve, m_ii, count=count, limit=limit, at_least=at_least if count is None else 0, shift=shift
         )
-    added, left, columns = _corrections(factor, m_ii, modes.vectors, coupling, corrections if m else 0)
+    added, left = _corrections(factor, m_ii, modes.vectors, coupling, corrections if m else 0)
     inner = np.concatenate([modes.vectors, added], axis=1)
     # principal axes of the whole inner space: the projection is exact whatever the modes' last digits are
     eigenvalues, axes = np.linalg.eigh(_symmetric(inner.T @ (k_ii @ inner)))
@@ -213,14 +210,11 @@ def reduce_model(
         corrections=corrections,
         next_eigenvalue=modes.next_eigenvalue,
         solver=factor.solver,
-        solved_columns=m + modes.columns + columns,
     )
 
 
-def _corrections(
-    factor: Factorization, m_ii: Any, modes: Array, coupling: Array, levels: int
-) -> tuple[Array, Array, int]:
-    """M-orthonormal correction vectors, ``V^T M K^-1 M V`` of the last level's, and the number of right-hand sides.
+def _corrections(factor: Factorization, m_ii: Any, modes: Array, coupling: Array, levels: int) -> tuple[Array, Array]:
+    """M-orthonormal correction vectors, and ``V^T M K^-1 M V`` of the last level's.
 
     ``X_1 = K^-1 b``, ``X_l = K^-1 M X_{l-1}``: all freed of the modes. Without corrections ``X_1^T b`` comes second.
     """
@@ -232,13 +226,12 @@ def _corrections(
         return np.asarray(x - modes @ (m_modes.T @ x))
 
     x = solved(coupling)
-    columns, left = coupling.shape[1], _symmetric(x.T @ coupling)
+    left = _symmetric(x.T @ coupling)
     for number in range(1, levels + 1):
         mx = np.asarray(m_ii @ x)
         if number > 1:
             x = solved(mx)
             mx = np.asarray(m_ii @ x)
-            columns += coupling.shape[1]
         scale = np.maximum(np.sqrt(np.einsum("ij,ij->j", x, mx)), 1e-300)
         new, m_new = x / scale, mx / scale
         for again in (True, False):
@@ -251,8 +244,7 @@ def _corrections(
         if number == levels:
             m_new = np.asarray(m_ii @ new)
             left = _symmetric(solved(m_new).T @ m_new)
-            columns += m_new.shape[1]
-    return np.concatenate([np.zeros((len(modes), 0)), *found[1:]], axis=1), left, columns
+    return np.concatenate([np.zeros((len(modes), 0)), *found[1:]], axis=1), left
 
 
 def _symmetric(matrix: Array) -> Array:

@@ -40,14 +40,11 @@ class Modes:
         M-orthonormal.
     next_eigenvalue
         Estimate, from above, of the first eigenvalue that is left out; infinite when none is.
-    columns
-        Number of right-hand sides that were solved for.
     """
 
     eigenvalues: Array
     vectors: Array
     next_eigenvalue: float
-    columns: int
 
 
 def lowest_modes(
@@ -82,19 +79,16 @@ def lowest_modes(
     n = mass.shape[0]
     needed = n if count is None else min(count, n)
     if needed == 0 or n == 0:
-        return Modes(np.zeros(0), np.zeros((n, 0)), math.inf, 0)
+        return Modes(np.zeros(0), np.zeros((n, 0)), math.inf)
     p = max(1, min(block, n))
     basis = _Basis(n, mass, capacity=min(n, 4 * min(needed, 60) + 4 * p), width=p)
     start = solve(np.asarray(mass @ np.random.default_rng(SEED).standard_normal((n, p))))
-    columns = p
     basis.append(start)
     projected = np.zeros((0, 0))
     done = 0
     while True:
         first, last = done, basis.size
-        width = last - first
         new = solve(basis.mass_times(first, last))
-        columns += width
         coefficients, spill = basis.append(new)
         done = last
         grown = np.zeros((done, done))
@@ -117,7 +111,7 @@ def lowest_modes(
             following = float(eigenvalues[inside]) if inside < done else math.inf
             vectors = basis.vectors[:, :done]
             del basis  # its products with M, while the modes are made
-            return Modes(eigenvalues[:inside].copy(), vectors @ s[:, :inside], following, columns)
+            return Modes(eigenvalues[:inside].copy(), vectors @ s[:, :inside], following)
 
 
 class _Basis:
