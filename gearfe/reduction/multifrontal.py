@@ -57,74 +57,26 @@ class MultifrontalFactor:
         Number in the matrix of each unknown in the order of elimination.
     fronts
         In the order of elimination.
-    schur : (r, r)
-        What is left of the matrix on the last r unknowns of `order`, which were kept: ``A_rr - A_re A_ee^-1 A_er``.
     """
 
     order: IntArray
     fronts: tuple[_Front, ...]
-    schur: Array
-
-    @property
-    def eliminated(self) -> int:
-        """How many unknowns are not kept."""
-        return len(self.order) - len(self.schur)
 
     def solve(self, b: Array) -> Array:
-        """(n,) or (n, p) right-hand sides to solutions of the same shape; several at a time are much cheaper.
-
-        For a factor that keeps nothing.
-        """
+        """(n,) or (n, p) right-hand sides to solutions of the same shape; several at a time are much cheaper."""
         x = np.ascontiguousarray(np.reshape(b, (len(self.order), -1))[self.order], dtype=float)
         # rows of x are contiguous: x[a:b].T is in Fortran order, and BLAS changes it in place
         for front in self.fronts:
             own = x[front.begin : front.end]
             dtrsm(1.0, front.pivot, own.T, side=1, lower=1, trans_a=1, overwrite_b=1)
             x[front.outer] -= front.coupling @ own
-        return self._backwards(x).reshape(np.shape(b))
-
-    def recover(self, values: Array) -> Array:
-        """(n, p) solution without loads on what was eliminated, from the (r, p) values of what was kept."""
-        x = np.zeros((len(self.order), values.shape[1]))
-        x[self.eliminated :] = values
-        return self._backwards(x)
-
-    def _backwards(self, x: Array) -> Array:
-        """Solve with the transposed factor, from the order of elimination to that of the matrix."""
         for front in reversed(self.fronts):
             own = x[front.begin : front.end]
             own -= front.coupling.T @ x[front.outer]
             dtrsm(1.0, front.pivot, own.T, side=1, lower=1, overwrite_b=1)
         result = np.empty_like(x)
         result[self.order] = x
-        return result
-
-    def on_kept(self, rows: Array, unknowns: IntArray) -> Array:
-        """What gives linear forms of the solution from what was kept alone: ``B_r - B_e A_ee^-1 A_er``, (m, r).
-
-        Parameters
-        ----------
-        rows, unknowns : (m, a)
-            Coefficients of m forms, and the unknowns that they belong to.
-        """
-        number = np.empty(len(self.order), dtype=np.int64)
-        number[self.order] = np.arange(len(self.order))
-        unknowns = number[unknowns]
-        seen, fronts = np.zeros(len(self.order), dtype=bool), []
-        seen[unknowns], seen[self.eliminated :] = True, True
-        for front in self.fronts:
-            if seen[front.begin : front.end].any():
-                seen[front.begin : front.end], seen[front.outer] = True, True
-                fronts.append(front)
-        place = np.cumsum(seen) - 1
-        forms = np.zeros((place[-1] + 1, len(rows)))
-        np.add.at(forms, (place[unknowns], np.arange(len(rows))[:, None]), rows)
-        for front in fronts:
-            own = forms[place[front.begin] : place[front.begin] + front.end - front.begin]
-            met = np.flatnonzero(own.any(axis=0))  # few forms look into a small front
-            solved = dtrsm(1.0, front.pivot, own[:, met], lower=1)
-            forms[np.ix_(place[front.outer], met)] -= front.coupling @ solved
-        return np.ascontiguousarray(forms[len(forms) - len(self.schur) :].T)
+        return result.reshape(np.shape(b))
 
 
 @dataclass(frozen=True)
@@ -149,9 +101,7 @@ class _Tree:
     children: list[list[int]]
 
 
-def multifrontal(
-    matrix: Any, graph: Any, order: IntArray, *, kept: int = 0, leaf_nodes: int = LEAF_NODES
-) -> MultifrontalFactor:
+def multifrontal(matrix: Any, graph: Any, order: IntArray, *, leaf_nodes: int = LEAF_NODES) -> MultifrontalFactor:
     """Factorise a symmetric positive definite matrix.
 
     Parameters
@@ -162,8 +112,6 @@ def multifrontal(
         Which nodes, of b unknowns each, are coupled; no diagonal.
     order : (n / b,)
         Numbers of the nodes in an order with little fill.
-    kept
-        How many of the last nodes are not eliminated.
     leaf_nodes
         Nodes in a subtree that becomes one front.
 
@@ -173,17 +121,16 @@ def multifrontal(
     """
     nodes = graph.shape[0]
     width = matrix.shape[0] // nodes
-    tree = _fronts(graph, order, kept, leaf_nodes)
+    tree = _fronts(graph, order, leaf_nodes)
     number = np.empty(nodes, dtype=np.int64)
     number[tree.order] = np.arange(nodes)
     blocks = sparse.bsr_array(matrix, blocksize=(width, width))
     rows, columns = number[np.repeat(np.arange(nodes), np.diff(blocks.indptr))], number[blocks.indices]
-    half = np.flatnonzero(columns >= rows)  # the upper triangle, by rows, with the place of its blocks as values
-    upper = sparse.csr_array((half, (rows[half], columns[half])), shape=graph.shape)
+    kept = np.flatnonzero(columns >= rows)  # the upper triangle, by rows, with the place of its blocks as values
+    upper = sparse.csr_array((kept, (rows[kept], columns[kept])), shape=graph.shape)
     place = np.empty(nodes, dtype=np.int64)
     updates: dict[int, tuple[IntArray, Array]] = {}
     fronts = []
-    schur = np.zeros((0, 0))
     begin = 0
     for here, (end, outer) in enumerate(zip(tree.ends.tolist(), tree.outer, strict=True)):
         own, size = end - begin, end - begin + len(outer)
@@ -201,9 +148,6 @@ def multifrontal(
             split = int(np.searchsorted(index, own * width))
             _add(panel, index[:split], index, update)
             _add(rest, index[split:] - own * width, index[split:] - own * width, update[split:, split:])
-        if end > nodes - kept:
-            schur = np.triu(panel) + np.triu(panel, 1).T
-            break
         pivot, failed = dpotrf(np.array(panel[:, : own * width]).T, lower=1, clean=0, overwrite_a=1)
         if failed:
             raise NotPositiveDefinite
@@ -213,7 +157,7 @@ def multifrontal(
             updates[here] = outer, dsyrk(-1.0, coupling, beta=1.0, c=rest.T, lower=1, overwrite_c=1).T
         fronts.append(_Front(begin * width, end * width, _unknowns(outer, width), pivot, coupling))
         begin = end
-    return MultifrontalFactor(_unknowns(tree.order, width), tuple(fronts), schur)
+    return MultifrontalFactor(_unknowns(tree.order, width), tuple(fronts))
 
 
 def _unknowns(nodes: IntArray, width: int) -> IntArray:
@@ -234,10 +178,8 @@ def _add(target: Array, rows: IntArray, columns: IntArray, values: Array) -> Non
         target[rows[first:last]] += part
 
 
-def _fronts(graph: Any, order: IntArray, kept: int, leaf_nodes: int) -> _Tree:
-    """Elimination tree, its postorder, and its runs: subtrees of `leaf_nodes`, chains without larger branches, and at
-    the end the nodes that are kept.
-    """
+def _fronts(graph: Any, order: IntArray, leaf_nodes: int) -> _Tree:
+    """Elimination tree, its postorder, and its runs: subtrees of `leaf_nodes`, and chains without larger branches."""
     parent = _elimination_tree(graph[order][:, order])
     nodes = len(parent)
     size = [1] * nodes
@@ -248,9 +190,8 @@ def _fronts(graph: Any, order: IntArray, kept: int, leaf_nodes: int) -> _Tree:
     branches = np.bincount(above[large & (above >= 0)], minlength=nodes)
     # the last node of a front: top of a small subtree, or a large one whose parent has several large children, or none
     goes_on = (above >= 0) & np.where(large, branches[above] == 1, ~large[above])
-    goes_on &= above < nodes - kept
-    top = list(range(nodes - kept)) + [nodes - 1] * kept
-    for j in range(nodes - kept - 1, -1, -1):
+    top = list(range(nodes))
+    for j in range(nodes - 1, -1, -1):
         if goes_on[j]:
             top[j] = top[parent[j]]
     # nodes by the last one of their front: what a node depends on has come before

@@ -25,7 +25,7 @@ from ..gear.pair import GearPair
 from .curve import StiffnessCurve
 
 #: Rooms and modules whose text decides a curve.
-ROOMS = ("elasticity", "contact", "gear", "meshing", "reduction", "stiffness")
+ROOMS = ("elasticity", "contact", "gear", "meshing", "stiffness")
 
 
 def cached_curve(
