@@ -24,7 +24,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.fft import next_fast_len
 
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 
@@ -130,6 +129,8 @@ def lattice(periods: tuple[float, ...], count: int) -> Lattice:
 
 @lru_cache(maxsize=64)
 def _searched(periods: tuple[float, ...], count: int) -> Lattice:
+    from scipy.fft import next_fast_len  # a train without steady motion needs no transforms
+
     waves, _ = harmonics(periods, count)
     every = np.concatenate([waves, -waves[1:]])
     samples = SAMPLES * max(count, LEAST)
