@@ -20,6 +20,11 @@ PAIRS = {
     ),
     "relieved": gear_pair(25, 25, pressure_angle=20.0, tip_relief=TipRelief(20e-6, 1.5e-3, 2.0), tip_round=5e-5),
 }
+#: Pairs whose contacts reach a corner that goes on as another face.
+KINKED = {
+    "kinked": gear_pair(18, 24, pressure_angle=20.0, tip_relief=TipRelief(60e-6, 1.5e-3, 1.0), tip_round=5e-5),
+    "undercut": gear_pair(12, 51, module=1.5e-3, pressure_angle=20.0, width=6e-3, bore=0.25),
+}
 
 
 @lru_cache

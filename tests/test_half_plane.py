@@ -16,7 +16,7 @@ from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import gear
 from .gears import pair as gear_pair
-from .half_plane_pairs import PAIRS, angles_of, law_of
+from .half_plane_pairs import KINKED, PAIRS, angles_of, law_of
 from .solving import solve_positions
 
 # ---- identities ----------------------------------------------------------------------------------------------------
@@ -34,6 +34,18 @@ def test_torque_is_the_derivative_of_the_energy(name: str, degrees: float) -> No
     slope = (high.torque_wheel - low.torque_wheel) / (2 * share * twist)
     # within the range of the differences pairs come and go at one or two angles
     assert np.median(np.abs(middle.tangent / slope - 1)) < 1e-3
+
+
+@pytest.mark.parametrize(("name", "bound"), [("kinked", 3e-4), ("undercut", 1e-3)])
+def test_torque_is_the_derivative_of_the_energy_beside_kinks(name: str, bound: float) -> None:
+    """Wherever the start of a steep relief or the edge of an undercut (its tips are sharp) stands among the panels."""
+    pair = KINKED[name]
+    law = half_plane_pair(elastic_pair(pair))
+    angles, twist = angles_of(pair, 60), 0.02 * pair.pinion.module / pair.wheel.base_radius
+    low, middle, high = (solve_half_plane(law, angles, twist * f) for f in (1 - 1e-4, 1.0, 1 + 1e-4))
+    assert {"kinked": "relief", "undercut": "undercut"}[name] in middle.contacts.mark
+    rate = (high.energy - low.energy) / (2e-4 * twist)
+    assert np.abs(rate / middle.torque_wheel - 1).max() < bound
 
 
 @pytest.mark.parametrize("name", ["rounded", "sharp", "shifted"])

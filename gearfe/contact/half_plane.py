@@ -21,6 +21,9 @@ that is at O now, and so on until F stays.
 order with the arcs at which H is taken; with n the mean normal under p, it does not change with n either. What is left
 is the work of the twist, so that the torque F times lever is the derivative of the energy (a test).
 
+The gap of a panel is that at its middle; where a kink of a face lies in it (start of a linear relief, edge of an
+undercut) it is the mean over the panel.
+
 The faces' displacement is taken at O with its slope. Across n it includes the wedge's part; along n that is in the
 equation above. The influence at the stations is a mean over bumps and the contact has a width of its own: together they
 add :math:`(\langle x^2\rangle - a^2/4)\,H_{ss}`.

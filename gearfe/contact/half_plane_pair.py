@@ -36,6 +36,8 @@ from .panels import Couplings, log_integral, mean_log
 #: Even places along a flank for `Finely`; places at which both faces of a contact are compared where they have no
 #: deviations, and besides for each piece of a deviation.
 FINELY, PLACES, PER_PIECE = 128, 32, 2
+#: Distance (m) from a kink at which its sides' tangents are taken.
+BESIDE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -168,6 +170,19 @@ class HalfPlanePair:
                 found += [(name, flank, float(curve.arc_at(at))) for at in places]
         names, flanks, arcs = zip(*found, strict=True)
         return np.array(names, dtype="<U8"), np.array(flanks), np.array(arcs)
+
+    @cached_property
+    def kinks(self) -> tuple[Array, Array]:
+        """Arc lengths (m) of the kinks of each flank, the edge of an undercut among them, and by how much its normal
+        turns away there (rad), both of shape (f, k); no kink lies at infinity.
+        """
+        places = [curve.arc_at([*([0.0] if curve.face.undercut else []), *curve.face.kinks]) for curve in self.curves]
+        arcs, angles = np.zeros((2, len(places), max(map(len, places))))
+        arcs[:] = np.inf
+        for i, (curve, at) in enumerate(zip(self.curves, places, strict=True)):
+            before, after = (curve.at(at + side)[1] for side in (-BESIDE, BESIDE))
+            arcs[i, : len(at)], angles[i, : len(at)] = at, np.angle(before / after)
+        return arcs, angles
 
     @cached_property
     def finely(self) -> Finely:

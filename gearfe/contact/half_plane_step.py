@@ -271,6 +271,8 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     arc, height = arcs[:, :, PANELS], 0.5 * (heights[:, 0, PANELS] + heights[:, 1, PANELS])
     x, width, arcs, heights = x[:, :PANELS], half[:, None] * WIDTHS, arcs[:, :, :PANELS], heights[:, :, :PANELS]
     gap = heights[:, 1] - heights[:, 0]
+    if law.kinks[0].shape[1]:
+        gap += _mean_over_kinks(setting, arcs, width)
     y = np.maximum(np.abs(points[:, :, :PANELS] - corner[:, :, None]), LEAST_DISTANCE)
     along = law.inverse_modulus * (tension + shear.real)
     edges = np.log(y[:, :, :, None] + y[:, :, None, :]) * (-along[:, :, None, None] * width[:, None, None, :])
@@ -304,6 +306,15 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
         place, slope = np.where(loaded, place, found.nearest), np.where(loaded, slope, found.mean_slope)
         outgrown = ((p[:, 0] > 0) & (low > reach[0])) | ((p[:, -1] > 0) & (high < reach[1]))
     return Step(solution, low, high, outgrown, x, width, arcs, arc, height, place, spread, slope, energy)
+
+
+def _mean_over_kinks(setting: Setting, arcs: Array, width: Array) -> Array:
+    """How much larger the mean gap of a panel is than that at its middle where a kink of a face lies in it, (m), shape
+    (p, n): with the gap at the middle, pressures would swing with the places of the kinks among the panels.
+    """
+    places, angles = (values[setting.found.flank][:, :, None] for values in setting.law.kinks)
+    inside = np.maximum(0.5 * width[:, None, :, None] - np.abs(arcs[..., None] - places), 0.0)
+    return np.asarray((angles * inside**2).sum(axis=(1, 3)) / (2 * width))
 
 
 def _distances(setting: Setting, arc: Array) -> tuple[Array, Array]:
