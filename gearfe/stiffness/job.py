@@ -55,7 +55,7 @@ class StiffnessJob:
     @property
     def materials(self) -> tuple[Material, Material]:
         """Materials of pinion and wheel."""
-        return _material(self.pair_table.material_of("pinion")), _material(self.pair_table.material_of("wheel"))
+        return material_of(self.pair_table.material_of("pinion")), material_of(self.pair_table.material_of("wheel"))
 
     @property
     def law(self) -> ContactLaw:
@@ -132,7 +132,8 @@ def _radians(degrees: float) -> float:
     return from_text(repr(degrees), "_deg")
 
 
-def _material(table: MaterialTable) -> Material:
+def material_of(table: MaterialTable) -> Material:
+    """The material that a table describes."""
     return Material(table.youngs_modulus_GPa * 1e9, table.poisson_ratio, density=table.density_kg_per_m3)
 
 

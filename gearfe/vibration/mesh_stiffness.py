@@ -220,12 +220,9 @@ def _deviations(
 
 
 def _materials(job: TrainJob, mesh: GearMesh) -> Any:
-    from ..elasticity import Material
+    from ..stiffness.job import material_of
 
     pair = given(job.pair, "pair")
     sides = {g.name: g.gear for g in job.table.gears}
-    made = []
-    for name in (mesh.driver, mesh.driven):
-        table = pair.material_of(sides[name]) if sides[name] else pair.material
-        made.append(Material(table.youngs_modulus_GPa * 1e9, table.poisson_ratio, density=table.density_kg_per_m3))
-    return tuple(made)
+    names = (sides[mesh.driver], sides[mesh.driven])
+    return tuple(material_of(pair.material_of(name) if name else pair.material) for name in names)
