@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from gearfe.contact.compliance import REACH, FarField, GearBody, MeshingPair, turn
-from gearfe.contact.element_windows import FirstContacts
+from gearfe.contact.element_batch import FirstContacts
 from gearfe.contact.elements import solve_elements
 from gearfe.contact.flank import flank_of, normal_stress_rows
 from gearfe.contact.laws import ContactLaw, PairModel

@@ -1,4 +1,4 @@
-r"""Contact of one position: Newton's method on the pressures at the points of finite-element flanks.
+r"""Contact of a batch of positions: Newton's method on the pressures at the points of finite-element flanks.
 
 With the rows :math:`G = n\cdot D` of the gaps' variation at the present state u, the areas W, the compliance C of the
 flanks and the stress rows S, a step solves
@@ -15,13 +15,14 @@ The matrix of the first step serves all. A position has converged when its press
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ..typing import Array, BoolArray, ComplexArray, IntArray
-from .element_windows import Windows
+from .element_batch import Batch
 from .position import taken
 
 #: Steps after which a position has not converged.
@@ -36,7 +37,7 @@ EXCHANGES, CHANCES = 60, 3
 
 @dataclass(frozen=True)
 class State:
-    """Pressures at the contact points and what they cause.
+    """Pressures at the contact points and what they cause, for all positions of a batch.
 
     Attributes
     ----------
@@ -55,7 +56,7 @@ class State:
 
 @dataclass(frozen=True)
 class Seen:
-    """Contact points as they lie to their mates in a state.
+    """Contact points of some positions as they lie to their mates in a state.
 
     Attributes
     ----------
@@ -93,27 +94,27 @@ class Seen:
         return np.asarray((self.normal.conj() * displacement[self.nodes]).real.sum(axis=1))
 
 
-def seen(windows: Windows, state: State, turn: ComplexArray, points: IntArray) -> Seen:
+def seen(batch: Batch, state: State, turn: ComplexArray, points: IntArray) -> Seen:
     """The contact points `points` in a state, with the windows turned by `turn`, shape (W,)."""
-    found = windows.project(windows.placed(state.displacement, turn), points, state.place[points])
+    found = batch.project(batch.placed(state.displacement, turn), points, state.place[points])
     normal = found.normal
-    own, mate = windows.owner[points], windows.facing[points]
+    own, mate = batch.owner[points], batch.facing[points]
     rows = np.concatenate(
         [
-            windows.slave_shapes[points] * (normal * turn[own].conj())[:, None],
+            batch.slave_shapes[points] * (normal * turn[own].conj())[:, None],
             -found.shapes * (normal * turn[mate].conj())[:, None],
         ],
         axis=1,
     )
     reached = found.reached
-    trial = np.maximum(-windows.parameter[points] * found.gap - state.stress[points], 0.0)
+    trial = np.maximum(-batch.parameter[points] * found.gap - state.stress[points], 0.0)
     return Seen(
         points=points,
-        nodes=np.concatenate([windows.slave_nodes[points], found.edge[:, None] + np.arange(3)], axis=1),
+        nodes=np.concatenate([batch.slave_nodes[points], found.edge[:, None] + np.arange(3)], axis=1),
         normal=rows,
         place=found.place,
         gap=found.gap,
-        area=np.where(reached, windows.areas(found.place, points), 0.0),
+        area=np.where(reached, batch.areas(found.place, points), 0.0),
         reached=reached,
         trial=np.where(reached, trial, 0.0),
     )
@@ -121,7 +122,7 @@ def seen(windows: Windows, state: State, turn: ComplexArray, points: IntArray) -
 
 @dataclass
 class Equations:
-    """M = I + (gamma G C + S) G^T W on the points that may bear; the others change as it is solved.
+    """M = I + (gamma G C + S) G^T W of one position, on the points that may bear; the others change as it is solved.
 
     Attributes
     ----------
@@ -177,20 +178,20 @@ class Equations:
         return np.maximum(pressure, 0.0)
 
 
-def equations_of(windows: Windows, rows: Seen, asks: BoolArray) -> Equations:
-    """Those on the points `rows`, of which those that ask for pressure bear at first."""
+def equations_of(batch: Batch, b: int, rows: Seen, asks: BoolArray) -> Equations:
+    """Those of position b on the points `rows`, of which those that ask for pressure bear at first."""
     points, count = rows.points, len(rows.points)
     nodes, column = np.unique(rows.nodes, return_inverse=True)
     G = np.zeros((count, len(nodes)), dtype=complex)
     G[np.arange(count)[:, None], column.reshape(-1, 6)] = rows.normal
     matrix = np.eye(count)
-    for block in windows.blocks:
+    for block in batch.blocks[2 * b : 2 * b + 2]:
         own = slice(*np.searchsorted(nodes, [block.nodes.start, block.nodes.stop]))
         unknowns = (2 * (nodes[own] - block.nodes.start)[:, None] + np.arange(2)).ravel()
         opening = np.ascontiguousarray(G[:, own]).view(float)
         loads = (opening * rows.area[:, None]).T
         columns = block.matrix.take(unknowns, axis=1)
-        matrix += windows.parameter[points, None] * (opening @ (columns.take(unknowns, axis=0) @ loads))
+        matrix += batch.parameter[points, None] * (opening @ (columns.take(unknowns, axis=0) @ loads))
         if len(block.matrix) > block.matrix.shape[1]:
             mine = np.flatnonzero((points >= block.points.start) & (points < block.points.stop))
             stress = block.matrix.shape[1] + points[mine] - block.points.start
@@ -198,116 +199,175 @@ def equations_of(windows: Windows, rows: Seen, asks: BoolArray) -> Equations:
     return Equations(points, matrix, asks)
 
 
-def step(windows: Windows, state: State, rows: Seen, equations: Equations, *, held: bool = False) -> State:
-    """One step with the contact points `rows`, among which are those of the `equations`.
+def step(batch: Batch, state: State, rows: Seen, equations: dict[int, Equations], *, held: bool = False) -> State:
+    """One step of the positions whose contact points `rows` are; the others stay.
 
-    These need not be made of these very rows: the residual is.
+    Their `equations` need not be made of these very rows: the residual is.
     """
-    points, size = rows.points, len(windows.points)
-    now, mine = state.pressure[points], np.searchsorted(rows.points, equations.points)
-    guess, stress = windows.respond(rows.forces(now, size))
+    points, size = rows.points, len(batch.points)
+    at = batch.at[points]
+    live, first = np.unique(at, return_index=True)
+    pressure = state.pressure[points]
+    guess, stress = batch.respond(rows.forces(pressure, size), live.tolist())
     opened = rows.gap + rows.closing(guess - state.displacement)
-    trial = -windows.parameter[points] * opened - stress[points]
-    right = trial[mine] - now[mine] + equations.matrix @ now[mine]
-    pressure = np.zeros(len(state.pressure))
-    pressure[equations.points] = equations.solve(right, rows.reached[mine], held=held)
-    forces = rows.forces(pressure[points], size)
-    displacement, stress = windows.respond(forces)
-    return State(pressure, stress, state.place, forces, displacement)
+    trial = -batch.parameter[points] * opened - stress[points]
+    for b, (start, end) in zip(live.tolist(), itertools.pairwise([*first.tolist(), len(at)]), strict=True):
+        own = equations[b]
+        mine = start + np.searchsorted(points[start:end], own.points)
+        right = trial[mine] - pressure[mine] + own.matrix @ pressure[mine]
+        pressure[start:end] = 0.0
+        pressure[mine] = own.solve(right, rows.reached[mine], held=held)
+    forces = rows.forces(pressure, size)
+    displacement, stress = batch.respond(forces, live.tolist())
+    moves = np.zeros(batch.size, dtype=bool)
+    moves[live] = True
+    of_nodes, of_points = moves[batch.node_position], moves[batch.at]
+    return State(
+        pressure=np.where(of_points, _spread(pressure, points, len(of_points)), state.pressure),
+        stress=np.where(of_points, stress, state.stress),
+        place=state.place,
+        forces=np.where(of_nodes, forces, state.forces),
+        displacement=np.where(of_nodes, displacement, state.displacement),
+    )
 
 
-def _mixed(past: list[tuple[Array, Array]], old: State, new: State) -> State:
-    """The new state mixed with those of the steps before, so that their changes cancel best.
+def _mix(batch: Batch, b: int, past: list[tuple[Array, Array]], old: State, new: State) -> None:
+    """Mix the new state of position b with those of the steps before, so that their changes cancel best.
 
     (Anderson's method: Walker & Ni, *SIAM J. Numer. Anal.* 49, 2011.)
     """
-    before, here = (
-        np.concatenate([one.forces.view(float), one.displacement.view(float), one.pressure, one.stress])
-        for one in (old, new)
-    )
-    past.append((here, here[: 2 * len(new.forces)] - before[: 2 * len(new.forces)]))
+    blocks = batch.blocks[2 * b : 2 * b + 2]
+    nodes = slice(blocks[0].nodes.start, blocks[1].nodes.stop)
+    points = slice(blocks[0].points.start, blocks[1].points.stop)
+    parts = [
+        [state.forces.view(float)[2 * nodes.start : 2 * nodes.stop],
+         state.displacement.view(float)[2 * nodes.start : 2 * nodes.stop], state.pressure[points], state.stress[points]]
+        for state in (old, new)
+    ]  # fmt: skip
+    here = np.concatenate(parts[1])
+    past.append((here, parts[1][0] - parts[0][0]))
     del past[: -DEPTH - 1]
     if len(past) == 1:
-        return new
+        return
     reached, change = (np.array(part) for part in zip(*past, strict=True))
     share = np.linalg.lstsq(np.diff(change, axis=0).T, change[-1], rcond=1e-10)[0]
-    n, q = 2 * len(new.forces), len(new.pressure)
-    forces, moved, pressure, stress = np.split(here - share @ np.diff(reached, axis=0), [n, 2 * n, 2 * n + q])
-    return State(pressure, stress, new.place, forces.view(complex), moved.view(complex))
+    mixed = here - share @ np.diff(reached, axis=0)
+    ends = np.cumsum([len(part) for part in parts[1]])[:-1]
+    for part, values in zip(parts[1], np.split(mixed, ends), strict=True):
+        part[:] = values
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """End of the iteration.
+    """End of the iteration of a batch.
 
     Attributes
     ----------
     state
-        Last state.
+        Last states.
     equations
-        The last ones; None where it has not converged.
-    iterations
+        Those of the converged positions.
+    iterations : ndarray, shape (B,)
         Steps.
     """
 
     state: State
-    equations: Equations | None
-    iterations: int
+    equations: dict[int, Equations]
+    iterations: IntArray
+
+    @property
+    def points(self) -> IntArray:
+        """Contact points of those equations."""
+        return np.concatenate([np.zeros(0, dtype=np.int64), *(own.points for own in self.equations.values())])
 
 
-def solve(windows: Windows, state: State, tolerance: float) -> Outcome:
-    """Solve a position from a first state, whose pressures choose the points that bear at first."""
-    equations: Equations | None = None
-    past: list[tuple[Array, Array]] = []
+def solve(batch: Batch, state: State, tolerance: float) -> Outcome:
+    """Solve all positions of a batch from a first state, whose pressures choose the points that bear at first."""
+    live, iterations = np.ones(batch.size, dtype=bool), np.zeros(batch.size, dtype=np.int64)
+    equations: dict[int, Equations] = {}
+    past: list[list[tuple[Array, Array]]] = [[] for _ in range(batch.size)]
+    done: set[int] = set()
     for number in range(STEPS + 1):
-        found = seen(windows, state, windows.turn, np.arange(len(windows.owner)))
-        state = replace(state, place=found.place)
-        if number and _error(windows, state, found) < max(tolerance, _rounding(windows, found)):
-            return Outcome(state, equations, number)
-        bears = state.pressure > 0
+        found = seen(batch, state, batch.turn, np.flatnonzero(live[batch.at]))
+        state = replace(state, place=_spread(found.place, found.points, state.place))
+        if number:
+            converged = live & (_error(batch, state, found) < np.maximum(tolerance, _rounding(batch, found)))
+            done |= set(np.flatnonzero(converged).tolist())
+            live &= ~converged
+        at, bears = batch.at[found.points], state.pressure[found.points] > 0
         asks = found.trial > 0 if number else bears
-        if not asks.any():  # mixing may open all gaps by the overlap of a stiff law: go on with the points that bear
-            asks = bears
-        if number == STEPS or not asks.any():
+        # mixing may open all gaps by the overlap of a stiff law: then the points that bear are where to go on
+        asks = asks | (bears & (np.bincount(at[asks], minlength=batch.size) == 0)[at])
+        live &= np.bincount(at[asks], minlength=batch.size) > 0
+        if number == STEPS or not live.any():
             break
-        if equations is None or np.count_nonzero(asks[equations.points]) < np.count_nonzero(asks):
-            beside = np.convolve(asks, np.ones(2 * BESIDE + 1))[BESIDE:-BESIDE] > 0
-            may = np.flatnonzero(beside & found.reached)
-            equations = equations_of(windows, taken(found, may), asks[may])
-        state = _mixed(past, state, step(windows, state, found, equations))
-    return Outcome(state, None, number)
+        iterations[live] = number + 1
+        old = state
+        for b in np.flatnonzero(live).tolist():
+            mine = slice(*np.searchsorted(at, [b, b + 1]).tolist())
+            if b not in equations or not np.isin(found.points[mine][asks[mine]], equations[b].points).all():
+                beside = np.convolve(asks[mine], np.ones(2 * BESIDE + 1))[BESIDE:-BESIDE] > 0
+                may = mine.start + np.flatnonzero(beside & found.reached[mine])
+                equations[b] = equations_of(batch, b, taken(found, may), asks[may])
+        state = step(batch, old, taken(found, live[at]), equations)
+        for b in np.flatnonzero(live).tolist():
+            _mix(batch, b, past[b], old, state)
+    return Outcome(state, {b: equations[b] for b in sorted(done)}, iterations)
 
 
-def turned(windows: Windows, state: State, equations: Equations, turn: ComplexArray, tolerance: float) -> State:
-    """A converged state with its windows turned on to `turn`, shape (W,), and the same points bearing.
+def turned(batch: Batch, outcome: Outcome, turn: ComplexArray, tolerance: float) -> State:
+    """The converged positions with their windows turned on to `turn`, shape (W,), and the same points bearing.
 
     Parameters
     ----------
     tolerance
-        Accuracy of the forces relative to their change; without it there are none.
+        Accuracy of the forces relative to their change; a position that does not reach it gets not-a-number.
     """
-    points, past = equations.points, list[tuple[Array, Array]]()
-    forces = seen(windows, state, windows.turn, points).forces(state.pressure[points], len(windows.points))
+    start, of = outcome.state, batch.node_position
+    points = outcome.points
+    rows = seen(batch, start, batch.turn, points)
+    forces = rows.forces(start.pressure[points], len(of))
+    state, open_ = start, np.isin(np.arange(batch.size), list(outcome.equations))
+    past: dict[int, list[tuple[Array, Array]]] = {b: [] for b in outcome.equations}
     for _ in range(STEPS):
-        made = step(windows, state, seen(windows, state, turn, points), equations, held=True)
-        moved, last = (np.abs(made.forces - before).sum() for before in (forces, state.forces))
-        if not last > tolerance * moved:
-            return made
-        state = _mixed(past, state, made)
-    return replace(state, forces=np.full_like(forces, np.nan))
+        if not open_.any():
+            break
+        old = state
+        state = step(batch, old, seen(batch, old, turn, points[open_[batch.at[points]]]), outcome.equations, held=True)
+        moved, last = (np.bincount(of, np.abs(state.forces - f), batch.size) for f in (forces, old.forces))
+        open_ &= last > tolerance * moved
+        for b in np.flatnonzero(open_).tolist():
+            _mix(batch, b, past[b], old, state)
+    return replace(state, forces=np.where(open_[of], np.nan, state.forces))
 
 
-def _error(windows: Windows, state: State, found: Seen) -> float:
-    """How far the pressures are from what the law asks or the forces from those of the pressures at the places
-    reached, the larger, relative to their sums.
+def _spread(values: Array, points: IntArray, whole: Array | int) -> Array:
+    """`values` at `points` of `whole`, or of so many zeros."""
+    made = np.zeros(whole) if isinstance(whole, int) else whole.copy()
+    made[points] = values
+    return made
+
+
+def _error(batch: Batch, state: State, found: Seen) -> Array:
+    """Of each position how far its pressures are from what the law asks or its forces from those of its pressures at
+    the places reached, the larger, relative to their sums, shape (B,).
     """
-    off = (found.area * np.abs(state.pressure - found.trial)).sum() / max((found.area * found.trial).sum(), 1e-300)
-    now = found.forces(state.pressure, len(windows.points))
-    return float(max(off, np.abs(state.forces - now).sum() / max(np.abs(now).sum(), 1e-300)))
+    at, pressure = batch.at[found.points], state.pressure[found.points]
+
+    def total(values: Array) -> Array:
+        return np.bincount(at, values, batch.size)
+
+    off = total(found.area * np.abs(pressure - found.trial)) / np.maximum(total(found.area * found.trial), 1e-300)
+    now = found.forces(pressure, len(batch.points))
+    of = batch.node_position
+    turned = np.bincount(of, np.abs(state.forces - now), batch.size)
+    return np.maximum(off, turned / np.maximum(np.bincount(of, np.abs(now), batch.size), 1e-300))
 
 
-def _rounding(windows: Windows, found: Seen) -> float:
-    """Smallest error that rounding lets the law reach: gamma times the last bit of a coordinate."""
-    stiff = (found.area * (found.trial > 0) * windows.parameter).sum()
-    extent = windows.elastic.centre_distance
-    return float(np.finfo(float).eps * extent * stiff / max((found.area * found.trial).sum(), 1e-300))
+def _rounding(batch: Batch, found: Seen) -> Array:
+    """Smallest error that rounding lets the law reach in each position: gamma times the last bit of a coordinate."""
+    at, bears = batch.at[found.points], found.trial > 0
+    stiff = np.bincount(at, found.area * bears * batch.parameter[found.points], batch.size)
+    load = np.bincount(at, found.area * found.trial, batch.size)
+    extent = batch.elastic.centre_distance
+    return np.asarray(np.finfo(float).eps * extent * stiff / np.maximum(load, 1e-300))
