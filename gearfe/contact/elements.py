@@ -98,7 +98,7 @@ def _start(batch: Batch, first: FirstContacts) -> State:
     """Pressures at the contact points and forces on the nodes from those at the samples of the first contacts."""
     pressure, place = np.zeros(len(batch.owner)), np.zeros(len(batch.owner))
     forces = np.zeros(len(batch.points), dtype=complex)
-    flanks = [body.flank for body in batch.elastic.bodies]
+    width, flanks = batch.elastic.width, [body.flank for body in batch.elastic.bodies]
     ends = [flank.ends for flank in flanks]
     bounds = np.searchsorted(batch.owner, np.arange(len(batch.gear) + 1))
     for w, (m, g) in enumerate(zip(batch.couple.tolist(), batch.gear.tolist(), strict=True)):
@@ -106,7 +106,7 @@ def _start(batch: Batch, first: FirstContacts) -> State:
         edge, xi = flanks[g].place(arc)
         on, shapes = np.flatnonzero(load > 0), edge_shapes(xi)[0]
         nodes = batch.first_node[w] + 2 * (edge[on, None] - batch.first_edge[w]) + np.arange(3)
-        along = batch.elastic.width * (2 * g - 1) * first.normal[m] * batch.turn[w].conj()
+        along = width * (2 * g - 1) * first.normal[m] * batch.turn[w].conj()
         np.add.at(forces, nodes, shapes[on] * (along * load[on])[:, None])
         mine = slice(bounds[w], bounds[w + 1])
         if mine.start == mine.stop:
