@@ -8,7 +8,7 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..progress import count, stage
+from ..progress import count
 from ..tables.train import TrainTable, value_text
 from .arguments import add_job, add_keys, with_keys
 from .common import add_folder, tell
@@ -108,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.no_floquet:
         from ..runup.train_stability import train_stability
 
-        with watch.stage("stability"), stage("stability of the steady motion"):
+        with watch.stage("stability of the steady motion"):
             planned = replace(planned, stability=train_stability(planned.model))
     train, every = planned.model.train, planned.every
     start = record_start(job, train, every, args.spectrum_from_ms, watch.stage)
