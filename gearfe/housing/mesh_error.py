@@ -63,6 +63,25 @@ def energy_lost(
     rigid
         Sets of nodes that are held or move as a rigid thing: no function acts within one.
     """
+    numbers, residual, stiffness = _unbalanced(nodes, tets, material, fields, eigenvalues, rigid)
+    return FACTOR * energy_taken(residual, stiffness, numbers.acting)
+
+
+def energy_lost_by_element(
+    nodes: Array, tets: IntArray, material: SolidMaterial, fields: Array, eigenvalues: Array, rigid: list[IntArray]
+) -> Array:
+    """(m, k) the same of each field alone, element by element: each function's in equal parts to those around it."""
+    numbers, residual, stiffness = _unbalanced(nodes, tets, material, fields, eigenvalues, rigid)
+    chosen, taken = _taken(residual, stiffness, numbers.acting)
+    energy = np.zeros((numbers.total, fields.shape[1]))
+    energy[chosen] = (taken**2).sum(axis=1) / np.bincount(numbers.place.ravel(), minlength=numbers.total)[chosen, None]
+    return np.asarray(FACTOR * energy[numbers.place].sum(axis=1))
+
+
+def _unbalanced(
+    nodes: Array, tets: IntArray, material: SolidMaterial, fields: Array, eigenvalues: Array, rigid: list[IntArray]
+) -> tuple[_Numbers, Array, Array]:
+    """Numbers of the added functions, their residuals (n, 3, k) and stiffnesses (n, 3, 3)."""
     made, count = _functions(tets.shape[1]), fields.shape[1]
     numbers = _number(nodes, tets, rigid)
     curved = curved_elements(nodes, tets)
@@ -82,7 +101,7 @@ def energy_lost(
             found, block = own(made, material, det, inverse, field[tets[part]], eigenvalues)
             found *= numbers.signs[part][:, :, None, None]
             add_up(numbers.place[part], (found, residual), (block, stiffness))
-    return FACTOR * energy_taken(residual.reshape(-1, 3, count), stiffness.reshape(-1, 3, 3), numbers.acting)
+    return numbers, residual.reshape(-1, 3, count), stiffness.reshape(-1, 3, 3)
 
 
 def add_up(place: IntArray, *parts: tuple[Array, Array]) -> None:
@@ -96,10 +115,15 @@ def add_up(place: IntArray, *parts: tuple[Array, Array]) -> None:
 
 def energy_taken(residual: Array, stiffness: Array, acting: BoolArray) -> Array:
     """Energy (k, k) that functions take, each by itself: residuals (n, 3, k), stiffnesses (n, 3, 3)."""
+    taken = _taken(residual, stiffness, acting)[1].reshape(-1, residual.shape[-1])
+    return np.asarray(taken.T @ taken)
+
+
+def _taken(residual: Array, stiffness: Array, acting: BoolArray) -> tuple[IntArray, Array]:
+    """Numbers (c,) of the functions that act, and (c, 3, k) whose squares are the energies that they take."""
     chosen = np.flatnonzero(acting & (np.trace(stiffness, axis1=1, axis2=2) > 0.0))
     upright = np.linalg.inv(np.linalg.cholesky(stiffness[chosen]))
-    scaled = np.matmul(upright, residual[chosen]).reshape(-1, residual.shape[-1])
-    return np.asarray(scaled.T @ scaled)
+    return chosen, np.matmul(upright, residual[chosen])
 
 
 class _Functions(NamedTuple):

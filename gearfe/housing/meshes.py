@@ -17,7 +17,7 @@ from ..prisms import ORDER, assemble_prisms, lagrange, triangle_rule
 from ..solid import MassRule, SolidMaterial, SolidMatrices, assemble
 from ..typing import Array, BoolArray, IntArray
 from .mesh_checks import boundary_faces
-from .mesh_error import energy_lost
+from .mesh_error import energy_lost, energy_lost_by_element
 from .prism_error import prism_energy_lost
 from .surface import Surface, SurfaceQuadrature, normal_velocity, surface_quadrature
 
@@ -59,6 +59,12 @@ class Tetrahedra:
     def energy_lost(self, material: SolidMaterial, fields: Array, eigenvalues: Array, rigid: list[IntArray]) -> Array:
         """See `gearfe.housing.mesh_error.energy_lost`."""
         return energy_lost(self.nodes, self.cells, material, fields, eigenvalues, rigid)
+
+    def energy_lost_by_element(
+        self, material: SolidMaterial, fields: Array, eigenvalues: Array, rigid: list[IntArray]
+    ) -> Array:
+        """See `gearfe.housing.mesh_error.energy_lost_by_element`."""
+        return energy_lost_by_element(self.nodes, self.cells, material, fields, eigenvalues, rigid)
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ from ..tables.housing import UNITS, HeldTable, HousingMeshTable, HousingTable, M
 from ..typing import Array, BoolArray, IntArray
 from .attachments import RADIUS_TOLERANCE, Attachment, Bore, Plane, bore_attachment, plane_nodes
 from .model import Housing
+from .refinement import refined
 
 #: Extent of a housing (mm): a mesh beyond it is in another unit than the job tells.
 SIZES_MM = (2.0, 50e3)
@@ -58,9 +59,12 @@ def own_housing(table: HousingTable, folder: Path, material: SolidMaterial) -> H
             attachments=attachments,
             outer=outer,
         )
+        housing = dataclasses.replace(housing, notes=(*notes, *housing.notes))
+        if table.mesh.refine_to_unknowns is not None:
+            housing = refined(housing, table.mesh.refine_to_unknowns, outer)
     except InputError as error:
         raise InputError(f"{field} {table.mesh.file}, {error.field}", error.value, error.problem, error.cure) from None
-    return dataclasses.replace(housing, notes=(*notes, *housing.notes))
+    return housing
 
 
 def _turned(nodes: Array, table: HousingMeshTable) -> Array:

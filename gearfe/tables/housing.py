@@ -85,9 +85,18 @@ class HousingMeshTable:
     inner_box_mm: tuple[tuple[float, float, float], tuple[float, float, float]] | None = quantity(
         None, doc="lowest and highest corner of a box (mm) in which faces bound the inside: they radiate no sound"
     )
+    refine_to_unknowns: int | None = quantity(
+        None,
+        low=1000,
+        high=2_000_000,
+        doc="refine the file's tetrahedra where they err most, up to so many unknowns (three a node); left out: not",
+    )
 
     def check(self, where: str) -> None:
-        """Raise `InputError` for axes that are no rotation."""
+        """Raise `InputError` for axes that are no rotation, and for a refinement of what is no file."""
+        if self.refine_to_unknowns is not None and self.file is None:
+            problem = "refines a mesh of the user's own; the housing of walls and feet is meshed by size"
+            raise InputError(f"{where}.refine_to_unknowns", self.refine_to_unknowns, problem, "take a smaller size_mm")
         names = "".join(self.axes)
         letters = names.replace("-", "")
         even = letters in ("xyz", "yzx", "zxy")
