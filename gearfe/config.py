@@ -130,7 +130,9 @@ def set_key(tables: dict[str, Any], name: str, value: Any, field: str) -> None:
         else:
             place = place.setdefault(part, {})
         if not last and not isinstance(place, (dict, list)):
-            raise InputError(field, None, f"{part} is a value in the job, not a table", "name that key")
+            rest = ".".join(parts[i + 1 :])
+            cure = f"name that key, or write all of it as a table, {part} = {{ ..., {rest} = ... }}"
+            raise InputError(field, None, f"{part} is the value {place!r} in the job, not a table", cure)
 
 
 @functools.cache

@@ -268,7 +268,7 @@ def test_any_key_of_a_job_can_be_set(tmp_path):
         ("pear.pinion.teeth=21", "unknown name 'pear'"),
         ("pair.pinion.teeth=many", "must be a number"),
         ("pair.pinion.teeth", "must be a key and its value"),
-        ("pair.pinion.teeth.x=1", "teeth is a value in the job"),
+        ("pair.pinion.teeth.x=1", "teeth is the value 20 in the job, not a table; name that key"),
         ("train.meshes.9.backlash_um=1", "has 2 entries in the job"),
     ],
 )

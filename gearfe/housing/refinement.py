@@ -54,7 +54,8 @@ def refined(housing: Housing, unknowns: int, outer: Outer | None = None) -> Hous
         if found is not None:
             mesh = replace(mesh, nodes=unfolded(found.nodes, found.tets).nodes, cells=found.tets)
             housing, rounds = _on(housing, mesh, found, outer), rounds + 1
-    note = f"the mesh was refined from {first} to {housing.unknowns} unknowns in {rounds} rounds, where it erred most"
+    times = f"{rounds} round{'s' * (rounds != 1)}"
+    note = f"the mesh was refined from {first} to {housing.unknowns} unknowns in {times}, where it erred most"
     return replace(housing, notes=(*housing.notes, note))
 
 
