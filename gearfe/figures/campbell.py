@@ -15,7 +15,7 @@ from ..runup.report import orders, waterfall
 from ..runup.results import SteadyState
 from ..runup.run_up import RunUp
 from ..typing import Array
-from .style import BLUE, COLOURS, GREY, RED, new_figure, save, tidy
+from .style import BLUE, COLOURS, GREY, RED, new_figure, on_white, save, tidy
 
 #: Reference of the levels of accelerations (m/s2), ISO 1683.
 REFERENCE = 1e-6
@@ -76,8 +76,9 @@ def draw_waterfall(path: Path, run: RunUp, multiples: int, bore: int, title: str
         values += [0.5 * (level[i, k] + level[i + 1, k]) for i in np.flatnonzero(both)]
     order = np.argsort(values)  # loud ones on top
     tracks = LineCollection(
-        [segments[i] for i in order], array=np.array(values)[order], cmap="YlOrRd", linewidths=2.6, capstyle="butt"
-    )
+        [segments[i] for i in order], array=np.array(values)[order], cmap=on_white("YlOrRd", 0.15, 1.0),
+        linewidths=2.6, capstyle="butt",
+    )  # fmt: skip
     tracks.set_clim(top - 70.0, top)
     axes.add_collection(tracks)
     axes.set_xlim(float(speed[0]), float(speed[-1]))

@@ -127,7 +127,7 @@ def _draw(job: Path, target: Path) -> None:
                     text_color="crimson", shape_color="white", shape_opacity=0.85, show_points=False,
                     always_visible=True,
                 )  # fmt: skip
-        plotter.add_text(str(title), font_size=9, color="black")
+        plotter.add_text(str(title), position=(0.02, 0.95), viewport=True, font_size=7, color="black")
         centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
         plotter.camera_position = [centre + size * np.array([0.75, 1.25, 0.75]), centre, (0.0, 0.0, 1.0)]
         plotter.reset_camera()  # the whole body, long or compact

@@ -122,6 +122,7 @@ def _curves(path: Path, mechanism: Mechanism, results: Results) -> None:
         axes.set_ylabel(name, fontsize=8)
         tidy(axes)
     all_axes[-1, 0].set_xlabel("time (s)")
+    figure.align_ylabels(all_axes[:, 0])
     save_fixed(figure, path)
 
 
@@ -158,9 +159,9 @@ def _links(path: Path, mechanism: Mechanism, results: Results) -> None:
         for ax, value, label in zip(
             axes, values, ("deflection (mm)", "axial force (N)", "bending moment (N m)"), strict=True
         ):
-            ax.fill_between(s, value.min(axis=0), value.max(axis=0), alpha=0.25, label="over the run")
-            ax.plot(s, value[-1], lw=1.4, label=f"at {results.trajectory.time[-1]:.4g} s")
-            ax.set_title(f"{name}: {label}", fontsize=9)
+            ax.fill_between(s, value.min(axis=0), value.max(axis=0), color=BLUE, alpha=0.25, label="over the run")
+            ax.plot(s, value[-1], color=BLUE, lw=1.4, label=f"at {results.trajectory.time[-1]:.4g} s")
+            ax.set_title(f"{name}: {label}", fontsize=9, loc="left")
             tidy(ax)
         axes[0].legend(fontsize=7)
     for ax in rows[-1]:

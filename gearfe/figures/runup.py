@@ -106,7 +106,9 @@ def _curves(
         Label of the axis, and name -> curve.
     """
     figure = new_figure(10.5, 1.0 + 3.0 * len(panels))
-    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
+    marks = ["dashed: unstable"] if any((~c.stable).any() for _, curves in panels for c in curves.values()) else []
+    marks += ["dotted: turning points"] if len(run.turning_speeds) else []
+    figure.suptitle("; ".join([title, *marks]), fontsize=11, x=0.01, ha="left")
     for number, (label, curves) in enumerate(panels):
         axes = figure.add_subplot(len(panels), 1, number + 1)
         tidy(axes)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..study.statistics import StudyResult
 from ..typing import Array
-from .style import BLUE, GREY, ORANGE, RED, new_figure, save, tidy
+from .style import BLUE, GREY, ORANGE, RED, new_figure, save, shades, tidy
 
 #: Parameters and outputs that a picture shows at most, and cases of which every one is drawn.
 MOST, DRAWN = 6, 4000
@@ -66,15 +66,14 @@ def study_picture(result: StudyResult, title: str = "") -> Any:
             if i == len(rows) - 1:
                 part.set_xlabel(_short(name), fontsize=8.5)
         axes[i, 0].set_ylabel(row, fontsize=8.5)
-    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
+    limited = "; dashed: limits" if any(name in limits for name in rows) else ""
+    figure.suptitle(title + limited, fontsize=11, x=0.01, ha="left")
     return figure
 
 
 def _lines(path: Path, title: str, columns: Mapping[str, Array], colour: str) -> None:
     """Every case as a line over its parameters and outputs, each scaled to its range; a column colours the lines."""
-    from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection
-    from matplotlib.colors import Normalize
 
     values = np.stack(list(columns.values()), axis=1)
     values = values[np.isfinite(values).all(axis=1)]
@@ -86,15 +85,15 @@ def _lines(path: Path, title: str, columns: Mapping[str, Array], colour: str) ->
         span = np.where(high > low, high - low, 1.0)
         scaled = np.where(high > low, (values - low) / span, 0.5)
         of = values[:, list(columns).index(colour)]
-        norm = Normalize(float(of.min()), float(of.max()) if np.ptp(of) > 0.0 else float(of.min()) + 1.0)
+        _, scale = shades(float(of.min()), float(of.max()) if np.ptp(of) > 0.0 else float(of.min()) + 1.0)
         places = np.arange(values.shape[1])
         lines = np.stack([np.broadcast_to(places, scaled.shape), scaled], axis=2)
-        axes.add_collection(LineCollection(list(lines), array=of, cmap="viridis", norm=norm, linewidth=0.9, alpha=0.6))
+        axes.add_collection(LineCollection(list(lines), colors=scale.to_rgba(of), linewidth=0.9, alpha=0.6))
         for place, (a, b) in enumerate(zip(low, high, strict=True)):
             axes.axvline(place, color=GREY, linewidth=0.8)
             axes.text(place, 1.03, f"{b:.4g}", ha="center", fontsize=8)
             axes.text(place, -0.03, f"{a:.4g}", ha="center", va="top", fontsize=8)
-        figure.colorbar(ScalarMappable(norm, "viridis"), ax=axes, label=colour, shrink=0.9)
+        figure.colorbar(scale, ax=axes, label=colour, shrink=0.9)
     axes.set_xticks(range(values.shape[1]), [_short(name) for name in columns], fontsize=8.5)
     axes.tick_params(axis="x", length=0, pad=16)
     axes.set_yticks([])

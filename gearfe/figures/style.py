@@ -90,9 +90,16 @@ def some_of(count: int, most: int) -> IntArray:
 
 def shades(low: float, high: float, *, logarithmic: bool = False) -> tuple[Callable[[float], Any], Any]:
     """Colour of a value between two, and what a colour bar is drawn of."""
-    from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm, Normalize
 
-    norm, colours = (LogNorm if logarithmic else Normalize)(low, high), colormaps["viridis"]
-    return lambda value: colours(0.95 * norm(value)), ScalarMappable(norm, colours)
+    norm, colours = (LogNorm if logarithmic else Normalize)(low, high), on_white("viridis", 0.0, 0.82)
+    return lambda value: colours(norm(value)), ScalarMappable(norm, colours)
+
+
+def on_white(name: str, low: float, high: float) -> Any:
+    """A part of matplotlib's colour map: what is left out is too light for lines on white."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(colormaps[name](np.linspace(low, high, 256)))

@@ -91,7 +91,7 @@ def _draw(job: Path, target: Path) -> None:
             surface.points = points[step]
             if values is not None:
                 surface[name] = values[step]
-        _caption(plotter, stored, step, 9 * large)
+        _caption(plotter, stored, step, 8 * large)
         plotter.render()
         pictures.append(plotter.screenshot(return_img=True))
     plotter.close()
@@ -144,7 +144,9 @@ def _caption(plotter: Any, stored: Mapping[str, Any], step: int, size: int) -> N
     factor = float(stored["exaggeration"])
     scale = "" if factor == 1.0 else f", vibration drawn {factor:g} times"
     text = f"{stored['title']}\nt = {1e3 * float(stored['time'][step]):.3f} ms{scale}"
-    plotter.add_text(text.replace("−", "-"), font_size=size, color="black", name="caption", position="upper_left")
+    plotter.add_text(
+        text.replace("−", "-"), position=(0.02, 0.93), viewport=True, font_size=size, color="black", name="caption"
+    )
 
 
 def _write(target: Path, pictures: list[NDArray[np.uint8]]) -> None:

@@ -124,7 +124,7 @@ def report_lines(table: ReliefTable, made: ReliefResult, errors: PitchErrors | N
     lines.append(f"objective {made.best.value:.4g}, without {made.without.value:.4g}")
     for name, one, low, high in zip(names_of(table), table.variables, made.low, made.high, strict=True):
         if one.tolerance > 0.0:
-            lines.append(f"  {one.tolerance:g} less and more of {name}: {low:.4g} and {high:.4g}")
+            lines.append(f"  {name} less by {one.tolerance:g}: {low:.4g}, more by {one.tolerance:g}: {high:.4g}")
     if any(one.tolerance > 0.0 for one in table.variables):
         lines.append(f"  at the worst corner of all tolerances: {made.worst:.4g}")
     if errors is not None:

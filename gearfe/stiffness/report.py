@@ -161,8 +161,8 @@ def pressure_lines(curve: StiffnessCurve) -> list[str]:
             largest = 1e-6 * np.nanmax(curve.edge_pressure[curve.edge == kind])
             edge = {"singular": "a sharp edge or the kink of a linear relief", "rounded": "a rounded edge"}[kind]
             lines.append(
-                f"{found[kind]} positions with {edge} bearing: {why}; blunted by a hundredth of a module, up to "
-                f"{largest:.4g} MPa (column edge_pressure_MPa)"
+                f"{found[kind]} position{'s' if found[kind] > 1 else ''} with {edge} bearing: {why}; blunted by a "
+                f"hundredth of a module, up to {largest:.4g} MPa (column edge_pressure_MPa)"
             )
     return lines
 

@@ -14,13 +14,12 @@ from gearfe.output.files import whole_file
 from .record import Row, read_rows
 
 Draw = Callable[[Any, list[Row]], None]
-#: Curves above which a legend stands below the axes, where it covers none.
-MANY = 6
 #: Colours of programs, by their names in tables; marks and dashes of the lines of one program.
 COLOURS = {
     "gearfe": "#1f5a99", "exudyn": "#d9730d", "scipy_ivp": "#3a8c5c", "sundials": "#b3261e", "calculix": "#6d4c9f",
     "getfem": "#0f766e",
 }  # fmt: skip
+OTHERS = ("#1f5a99", "#d9730d", "#3a8c5c", "#b3261e", "#6d4c9f")
 MARKERS, STYLES = "os^vDP*X<>", ("-", "--", ":", "-.")
 NAMES = {"scipy_ivp": "scipy", "sundials": "SUNDIALS", "calculix": "CalculiX", "getfem": "GetFEM"}
 
@@ -77,14 +76,14 @@ def curves(axes: Any, rows: dict[str, list[Row]], x: str, y: str, parameter: str
             continue
         program = str(own[0].get("program", ""))
         nth = taken[program] = taken.get(program, -1) + 1
-        colour, look = (COLOURS[program], nth) if program in COLOURS else (f"C{number % 10}", number // 10)
+        colour, look = (COLOURS[program], nth) if program in COLOURS else (OTHERS[number % 5], number // 5)
         a, b, told = zip(*sorted(points, key=lambda point: point[:2]), strict=True)
         marker, dashes = MARKERS[look % len(MARKERS)], STYLES[look % len(STYLES)]
         axes.loglog(a, b, dashes, color=colour, marker=marker, ms=4, lw=1.2, label=label)
         for place, height, value in zip(a, b, told, strict=True):
             if isinstance(value, (int, float)):
                 axes.annotate(
-                    f"{value:g}", (place, height), (3, 3), textcoords="offset points", fontsize=5.5, color=colour
+                    f"{value:g}", (place, height), (3, 3), textcoords="offset points", fontsize=7, color=colour
                 )
 
 
@@ -111,11 +110,12 @@ def over(x: str, y: str, labels: tuple[str, str], title: str, by: tuple[str, ...
 
     def draw(figure: Any, rows: list[Row]) -> None:
         axes = figure.subplots()
+        found = {}
         for label, own in groups(rows, *by).items():
-            text = label
-            if fit and len([r for r in own if _positive(r.get(y))]) > 1:
-                text = f"{label} (exponent {exponent(own, x, y):.2f})".strip()
-            curves(axes, {text: own}, x, y)
+            several = fit and len([r for r in own if _positive(r.get(y))]) > 1
+            slope = f", exponent {exponent(own, x, y):.2f}" if several else ""
+            found[f"{label}{slope}".removeprefix(", ")] = own
+        curves(axes, found, x, y)
         axes.set(xlabel=labels[0], ylabel=labels[1], title=title)
         _finish(axes)
 
@@ -130,14 +130,21 @@ def exponent(rows: list[Row], x: str, y: str) -> float:
 
 
 def _finish(axes: Any) -> None:
+    from matplotlib.ticker import LogLocator
+
+    axes.margins(x=0.08)
+    axes.xaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))  # names of all would meet
     axes.grid(visible=True, which="both", alpha=0.25)
-    handles, labels = axes.get_legend_handles_labels()
-    if any(labels):
-        if len(labels) > MANY:
-            axes.legend(handles, labels, fontsize=7, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.12))
-            axes.figure.set_figheight(6.2)
-        else:
-            axes.legend(handles, labels, fontsize=8)
+    labels = axes.get_legend_handles_labels()[1]
+    if any(labels):  # below the axes, where it covers no point
+        axes.legend(fontsize=7.5, ncols=2, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.14))
+        axes.figure.set_figheight(4.6 + 0.18 * -(-len(labels) // 2))
+    axes.figure.draw_without_rendering()
+    kept: list[Any] = []
+    for text in axes.texts:  # a parameter that would cover another one is left out
+        box = text.get_window_extent()
+        text.set_visible(not any(box.overlaps(other) for other in kept))
+        kept += [box] * text.get_visible()
 
 
 def _mechanisms(figure: Any, rows: list[Row]) -> None:
@@ -177,7 +184,7 @@ def bars(label: str, value: str, axis: str, title: str) -> Draw:
     def draw(figure: Any, rows: list[Row]) -> None:
         axes = figure.subplots()
         own = [r for r in rows if _positive(r.get(value))]
-        axes.barh([str(r[label]) for r in own], [r[value] for r in own])
+        axes.barh([str(r[label]) for r in own], [r[value] for r in own], color=OTHERS[0])
         axes.invert_yaxis()
         axes.set(xlabel=axis, title=title)
         axes.grid(visible=True, axis="x", alpha=0.25)
@@ -189,7 +196,9 @@ PICTURES: Mapping[str, Draw] = {
     "sweep_sizes": time_error(
         ("law",), "stiffness, 40 positions at 0.05 deg: element size (coarsen) and law", parameter="coarsen"
     ),
-    "sweep_verification": time_error(("model",), "one position: condensed and whole gears", time="position_cpu_s"),
+    "sweep_verification": time_error(
+        ("model",), "one position: condensed and whole gears", time="position_cpu_s", parameter="coarsen"
+    ),
     "sweep_peers": _sweep_peers,
     "sweep_stages": bars("stage", "wall_s", "seconds", "stages of a default sweep of 40 positions"),
     "sweep_positions": over("positions", "cpu_s", ("positions", "processor time (s)"), "distinct positions", fit=True),
@@ -197,7 +206,12 @@ PICTURES: Mapping[str, Draw] = {
     "mechanism_tolerance": _mechanisms,
     "mechanism_chains": over("bodies", "us_a_step", ("bodies", "microseconds a step"), "chain of bodies", fit=True),
     "housing_sizes": _housing_sizes,
-    "housing_reductions": time_error(("levels",), "housing: modes and correction levels", error="largest_error"),
+    "housing_reductions": time_error(
+        ("levels",),
+        "housing: modes (numbers) and correction levels (colours)",
+        error="largest_error",
+        parameter="modes",
+    ),
     "housing_solvers": over(
         "unknowns", "cpu_s", ("unknowns", "processor time (s)"), "sparse solvers", ("solver",), fit=True
     ),
@@ -205,7 +219,7 @@ PICTURES: Mapping[str, Draw] = {
         ("variant", "program", "method"), "gear train, 7 ms: largest error of all signals", parameter="tolerance"
     ),
     "runup_peers": time_error(
-        ("variant", "program", "method"), "gear train in steady running, one speed", parameter="tolerance"
+        ("variant", "speed", "program", "method"), "gear train in steady running, one speed", parameter="tolerance"
     ),
     "transient_modes": over("modes", "acceleration_error", ("modes", "error below 5 kHz"), "modes of the housing"),
 }
