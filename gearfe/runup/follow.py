@@ -133,6 +133,7 @@ class _Walk:
         self.number = 0  # of the asked speed that was reached
         self.heading = 1
         self.step = FIRST  # along the curve, from one asked speed to the next
+        self.last: _Place | None = None  # before the orbit that it led to
 
     def run(self, start: Orbit, progress: Callable[[int, int], None] | None) -> Curve:
         orbit, note = self._kept(start), ""
@@ -148,7 +149,7 @@ class _Walk:
             made = self._onward(target) if self.heading > 0 else None
             passes = None if made is None else settled(self.system, *made, self.tolerance)
             if passes is not None and passes.found:
-                self.number, self.step = self.number + 1, FIRST
+                self.number, self.step, self.last = self.number + 1, FIRST, None
                 orbit = self._kept(passes)
                 continue
             found = self._stepwise(orbit)
@@ -203,10 +204,9 @@ class _Walk:
     def _stepwise(self, orbit: Orbit) -> Orbit | str:
         """Short steps along the curve until it passes the next asked speed, up or down."""
         sign = 1.0 if self.speeds[-1] >= self.speeds[0] else -1.0
-        place = self._tangent(orbit, None, sign * self.heading)
+        place = self._tangent(orbit, self.last, sign * self.heading)
         if place is None:
             return f"no direction of the curve at {orbit.speed:.6g} rad/s"
-        place = self._toward(orbit, place)
         step, speeds = self.step, self.speeds
         for _ in range(MOST):
             new, quick = self._corrected(place, step)
@@ -255,16 +255,6 @@ class _Walk:
         if size_of(orbit.places, self.system.scale) <= self.system.limit:
             return ""
         return f"the motion grows beyond all that holds at {orbit.speed:.6g} rad/s: too little damping at a resonance"
-
-    last: _Place | None = None
-
-    def _toward(self, orbit: Orbit, place: _Place) -> _Place:
-        """The tangent in the direction in which the curve was followed."""
-        last = self.last
-        if last is None or abs(last.orbit.speed - orbit.speed) > self.unit:
-            return place
-        made = self._tangent(orbit, last, 1.0)
-        return place if made is None else made
 
     def _equations(self, orbit: Orbit) -> tuple[Evaluated, ComplexArray]:
         H = self.system.flexibility(orbit.speed, orbit.harmonics)
