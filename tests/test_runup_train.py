@@ -155,9 +155,9 @@ def test_the_jets_of_a_law_are_its_derivatives():
     rng = np.random.default_rng(5)
     phase, approach = rng.uniform(-2.0, 2.0, 300), rng.uniform(-2e-6, 5e-5, 300)
 
-    def made(phase):  # type: ignore[no-untyped-def]
+    def made(phase, begin=0.0):  # type: ignore[no-untyped-def]
         out = np.zeros((300, RESULTS))
-        work, pairs = np.zeros((ROWS + 2 * law.slots, law.slots)), np.zeros((300, law.slots))
+        work, pairs = np.zeros((ROWS + 2 * law.slots, law.slots)), begin * rng.uniform(0.0, 2e3, (300, law.slots))
         evaluate_law(tables, Jets(phase, approach, pairs, np.zeros((2, *pairs.shape)), work, out))
         return out
 
@@ -165,6 +165,7 @@ def test_the_jets_of_a_law_are_its_derivatives():
     assert np.allclose(out[:, FORCE], true.force, rtol=1e-8, atol=1e-8)
     assert np.allclose(out[:, MOMENT], true.moment, rtol=1e-8, atol=1e-10)
     assert np.allclose(out[:, TANGENT], true.tangent, rtol=1e-7, atol=1.0)
+    assert np.allclose(made(phase, 1.0)[:, FORCE], true.force, rtol=1e-8, atol=1e-8)  # whatever it begins with
     above, below = made(phase + h), made(phase - h)
     for value, slope in ((FORCE, CROSS), (MOMENT, BEND)):
         off = np.abs((above[:, value] - below[:, value]) / (2 * h) - out[:, slope])
@@ -252,7 +253,7 @@ def test_a_resonance_without_damping_is_told():
 
 
 def test_motions_that_turn_back_out_of_the_range_are_told_and_the_rest_is_found(monkeypatch):
-    """As if the curve of the first motion left the range where it began."""
+    """As if the curve of the first motion left the range where it began; the way back of the next meets it there."""
     from gearfe.runup import run_up as module
 
     real, calls = module.follow, []
@@ -267,11 +268,31 @@ def test_motions_that_turn_back_out_of_the_range_are_told_and_the_rest_is_found(
     speeds = np.array([400.0, 450.0, 500.0])
     made = run_up(build_train(loaded([(20, 30)], smooth, ratio=0.05, flexible=False)), speeds)
     assert {s.speed for s in made.states} == set(speeds.tolist())
-    assert calls == [400.0, 450.0]
+    assert calls == [400.0, 450.0, 450.0]
+    assert [s.speed for s in made.states] == speeds.tolist()
     assert made.notes == (
         "the motions from 400 rad/s on turn back and leave the range where they began; others were looked for from "
         "450 rad/s on",
     )
+
+
+@needs_numba
+def test_a_light_load_within_a_resonance_is_found_on_all_its_branches():
+    """Small motion from below, three motions at a time within, the large one alone above."""
+    law = hertzian_law(2 * math.pi / 28, relief=4e-6)
+    model = build_train(loaded([(28, 32)], lambda teeth: law, speed=340.0, torque=4.0, ratio=0.066, flexible=False))
+    run = run_up(model, np.linspace(340.0, 460.0, 7))
+    assert run.notes == ()
+    found = {speed: [s for s in run.states if s.speed == speed] for speed in run.speeds.tolist()}
+    assert [len(found[speed]) for speed in (340.0, 400.0, 460.0)] == [1, 3, 1]
+    for speed, states in found.items():
+        assert [s.stable for s in states] == [True, False, True][: len(states)]
+        assert [bool(s.apart[0] > 0.4) for s in states] == (
+            [speed > 450.0] if len(states) == 1 else [False, True, True]
+        )
+    force, error, _ = settled_transient(model, found[340.0][0], 40)  # from rest
+    assert np.ptp(found[340.0][0].force, axis=0) == pytest.approx(np.ptp(force, axis=0), rel=2e-3)
+    assert np.ptp(found[340.0][0].transmission_error) == pytest.approx(np.ptp(error), rel=2e-3)
 
 
 RUNUP = """

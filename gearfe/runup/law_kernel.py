@@ -127,7 +127,7 @@ def law_jets(law: LawTables, at: Jets) -> int:
                 change = max(change, abs(new - pairs[i, k]))
                 largest = max(largest, new)
                 pairs[i, k] = new
-            if change <= SETTLED * largest or largest == 0.0:
+            if change <= SETTLED * largest:  # none bears on the way to others
                 settled = True
                 break
         if not settled:

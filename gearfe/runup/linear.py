@@ -184,7 +184,7 @@ class Linear:
         return self._turning(omega, speed)[0]
 
     def modal(self, omega: Array, speed: float, forces: ComplexArray) -> ComplexArray:
-        """Modal coordinates (k, n) under forces (k, m) at the freedoms, the constant force included at omega = 0."""
+        """Modal coordinates (k, n) under forces (k, m) at the freedoms; at the first omega, 0, the constant one too."""
         _, moments = self._turning(omega, speed)
         every = np.concatenate([forces, (moments @ forces[..., None])[..., 0]], axis=1)
         into, shapes = self._excited
@@ -194,7 +194,8 @@ class Linear:
         parts *= np.tile(real + 1j * imaginary, 2)
         made = real_times(parts, shapes)
         still = omega == 0.0
-        made[still] = (forces[still] @ self.places.T + self.constant) / self.squares
+        made[still] = forces[still] @ self.places.T / self.squares
+        made[0] += self.constant / self.squares
         return made
 
     def _over(self, omega: Array) -> tuple[Array, Array]:

@@ -7,9 +7,9 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,14 +20,11 @@ from ..threads import one_thread
 from ..train.kinematics import drive_sense
 from ..train.model import TrainModel
 from ..typing import Array, ComplexArray
-from .balance import Orbit, settled, solve
+from .balance import Orbit, begun, settled, size_of, solve
 from .condensed import CondensedTrain, condense
-from .follow import Curve, follow
+from .follow import Curve, Turn, follow
 from .results import SteadyState, steady_result
 from .stability import Bifurcation, kind_of, multipliers
-
-#: Where no motion is found at the first speed, others are tried so many times as far away, each a part of it farther.
-TRIES, AWAY = 6, 0.01
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -159,50 +156,94 @@ def run_up(
         For speeds that contain zero or change sign, and trains without a steady state.
     """
     given = _checked(model, speeds)
-    train, notes = condense(model), []
-    orbits: list[tuple[Orbit, int]] = []
-    turns: list[float] = []
-    left = given
+    train = condense(model)
+    made = _Curves([], [], [])
+    lost: list[float] = []
     with one_thread():
-        while len(left):
+        begin = 0
+        while begin < len(given):
             if progress is not None:
-                progress(len(given) - len(left), len(given) - 1)
-            start = _first(train, float(left[0]), None, tolerance, band_hz)
+                progress(begin, len(given) - 1)
+            start = _first(train, float(given[begin]), None, tolerance, band_hz)
             if start is None:
-                notes.append(f"no periodic motion was found at {left[0]:.6g} rad/s")
-                left = left[1:]
+                lost.append(float(given[begin]))
+                begin += 1
                 continue
-            highest = 2.0 * math.pi * band_hz
-            curve = follow(train.system, left, start, tolerance=tolerance, highest=highest, progress=progress)
-            first = len(turns)
-            orbits += _numbered(curve, orbits, first)
-            turns += [turn.speed for turn in curve.turns]
-            reached = max(range(len(left)), key=lambda k: any(o.speed == left[k] for o in curve.orbits) * (k + 1))
-            missing = left[reached + 1 :]
+            options: dict[str, Any] = {"tolerance": tolerance, "highest": 2.0 * math.pi * band_hz}
+            back = follow(train.system, given[begin::-1], start, **options) if begin else None
+            curve = follow(train.system, given[begin:], start, **options, progress=progress)
+            made.join(back, curve, train.system.scale)
+            passed = {o.speed for o in curve.orbits}
+            reached = max(k for k in range(begin, len(given)) if given[k] in passed)
             if curve.note:
-                notes.append(curve.note)
-            elif len(missing):
-                back = f"the motions from {left[0]:.6g} rad/s on turn back and leave the range where they began"
-                notes.append(f"{back}; others were looked for from {missing[0]:.6g} rad/s on")
-            left = missing
+                made.notes.append(curve.note)
+            elif reached + 1 < len(given):
+                turned = f"the motions from {given[begin]:.6g} rad/s on turn back and leave the range where they began"
+                made.notes.append(f"{turned}; others were looked for from {given[reached + 1]:.6g} rad/s on")
+            begin = reached + 1
+        orbits = made.orbits
         found: list[ComplexArray | None] = [None] * len(orbits)
         if stability:
             ways = map if executor is None else executor.map
             found = list(ways(partial(multipliers, train.system), [orbit for orbit, _ in orbits]))
     states = tuple(steady_result(train, *orbit, each) for orbit, each in zip(orbits, found, strict=True))
-    changes = _bifurcations(states, turns)
-    return RunUp(train, given, states, np.array(turns), changes, tuple(notes), tolerance, band_hz)
+    missing = [speed for speed in lost if all(orbit.speed != speed for orbit, _ in orbits)]
+    notes = [*made.notes, *([_unfound(missing)] if missing else [])]
+    turning = np.array([turn.speed for turn in made.turns])
+    return RunUp(train, given, states, turning, _bifurcations(states, made.turns), tuple(notes), tolerance, band_hz)
 
 
-def _numbered(curve: Curve, before: Sequence[tuple[Orbit, int]], turns: int) -> list[tuple[Orbit, int]]:
-    """Orbits with the numbers of their branches, going on from a curve before; a gap is no turning point."""
-    first = turns + turns % 2 if before else 0
-    return [(orbit, first + branch) for orbit, branch in zip(curve.orbits, curve.branch, strict=True)]
+def _unfound(speeds: Sequence[float]) -> str:
+    """Speeds without a motion that was found."""
+    many = f"{len(speeds)} speeds, {speeds[0]:.6g} to " if len(speeds) > 1 else ""
+    return (
+        f"no motion with the periods of the meshes was found at {many}{speeds[-1]:.6g} rad/s: what runs there may "
+        "never repeat; look at a transient"
+    )
 
 
-def _bifurcations(states: Sequence[SteadyState], turns: Sequence[float]) -> tuple[Bifurcation, ...]:
+class _Curves(NamedTuple):
+    """What was found so far: orbits with the numbers of their branches, turning points with the branch before."""
+
+    orbits: list[tuple[Orbit, int]]
+    turns: list[Bifurcation]
+    notes: list[str]
+
+    def join(self, back: Curve | None, ahead: Curve, scale: Array) -> None:
+        """Add a curve that was followed both ways from one orbit; what its way back meets of those before is left out.
+
+        Branches with even numbers rise, so numbers of a curve may begin one farther; a gap is no turning point.
+        """
+        behind, turns = ([], ()) if back is None else self._new(back, scale)
+        first = (max(b for _, b in self.orbits) if self.orbits else 0) + len(turns)
+        first += first % 2
+        ends = [(turns[j].speed, first - j - 1) for j in reversed(range(len(turns)))]
+        ends += [(turn.speed, first + j) for j, turn in enumerate(ahead.turns)]
+        self.turns.extend(Bifurcation(speed, "turning point", branch) for speed, branch in ends)
+        self.orbits.extend((orbit, first - branch) for orbit, branch in reversed(behind))
+        self.orbits.extend((orbit, first + branch) for orbit, branch in zip(ahead.orbits, ahead.branch, strict=True))
+
+    def _new(self, back: Curve, scale: Array) -> tuple[list[tuple[Orbit, int]], Sequence[Turn]]:
+        """Orbits of a way back behind its first, up to one that is known, and the turning points among them."""
+        found: list[tuple[Orbit, int]] = []
+        for orbit, branch in zip(back.orbits[1:], back.branch[1:], strict=True):
+            if any(_same(orbit, known, scale) for known, _ in self.orbits):
+                break
+            found.append((orbit, branch))
+        return found, [turn for turn in back.turns if turn.number <= len(found)]
+
+
+def _same(one: Orbit, two: Orbit, scale: Array) -> bool:
+    """Whether two orbits at a speed differ by no more than their errors."""
+    count = max(one.harmonics, two.harmonics)
+    return one.speed == two.speed and bool(
+        size_of(one.with_harmonics(count) - two.with_harmonics(count), scale) <= one.error + two.error
+    )
+
+
+def _bifurcations(states: Sequence[SteadyState], turns: Sequence[Bifurcation]) -> tuple[Bifurcation, ...]:
     """Turning points, and where a branch's largest multiplier passes the unit circle."""
-    found = [Bifurcation(speed, "turning point", branch) for branch, speed in enumerate(turns)]
+    found = list(turns)
     for one, two in itertools.pairwise(s for s in states if not math.isnan(s.error)):  # without those at turning points
         if one.branch != two.branch or None in (one.stable, two.stable) or one.stable == two.stable:
             continue
@@ -216,26 +257,15 @@ def _bifurcations(states: Sequence[SteadyState], turns: Sequence[float]) -> tupl
 
 
 def _first(train: CondensedTrain, speed: float, guess: Orbit | None, tolerance: float, band_hz: float) -> Orbit | None:
-    """Orbit at a speed from a guess, from rest, or along the curve from a speed nearby."""
-    system, highest = train.system, 2.0 * math.pi * band_hz
-    for number in range(1 if guess is not None else TRIES):
-        away = speed * (1.0 + AWAY * number * (-1.0) ** number)
-        count = system.harmonics(away, highest)
-        if guess is not None:
-            places = guess.with_harmonics(max(count, guess.harmonics))
-        else:
-            places = np.zeros((count + 1, system.linear.size), dtype=complex)
-            places[0] = system.linear.rest
-        orbit = settled(system, *solve(system, away, places, tolerance), tolerance)
-        if not orbit.found:
-            continue
-        if number == 0:
-            return orbit
-        made = follow(system, [away, speed], orbit, tolerance=tolerance, highest=highest)
-        there = [o for o in made.orbits if o.speed == speed]
-        if there:
-            return replace(there[0])
-    return None
+    """Orbit at a speed from a guess, or out of the state without vibration."""
+    system = train.system
+    count = system.harmonics(speed, 2.0 * math.pi * band_hz)
+    if guess is None:
+        made = begun(system, speed, count, tolerance)
+    else:
+        made = solve(system, speed, guess.with_harmonics(max(count, guess.harmonics)), tolerance)
+    orbit = settled(system, *made, tolerance)
+    return orbit if orbit.found else None
 
 
 def _checked(model: TrainModel, speeds: ArrayLike | Sequence[float]) -> Array:
