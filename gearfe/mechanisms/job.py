@@ -74,7 +74,7 @@ def run_mechanism(
     read = clock.perf_counter()
     times = output_times(end, run.step_s)
     method = run.method if method is None else method
-    if mechanism.elastic and method not in ("auto", "implicit"):
+    if mechanism.elastic and method in ("taylor", "explicit"):
         problem = "would follow the axial waves of flexible links with steps of next to no length"
         raise InputError("run.method", method, problem, "leave it out: they take the implicit method")
     if tolerance is None:

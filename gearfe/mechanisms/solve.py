@@ -76,8 +76,6 @@ def _moved(mechanism: Mechanism, start: Start) -> Trajectory:
         stiff = any(element.stiff for element in system.elements)
         series = system.linkage is not None or (backend == "compiled" and tape_program(system) is not None)
         method = "implicit" if stiff else "taylor" if series else "explicit"
-    if method != "taylor":
-        backend = "plain"
     options: dict[str, Any] = {"start": start, "tolerance": mechanism.tolerance, "raise_on_failure": False}
     with np.errstate(over="ignore", invalid="ignore"):
         made = integrate(system, times, method=method, backend=backend, **options)

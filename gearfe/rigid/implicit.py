@@ -6,6 +6,7 @@ this module chooses their lengths and keeps what they pass through. The order go
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
@@ -32,7 +33,7 @@ from .contract import Element, LocalForce, ModalBlocks
 from .corners import TRUSTED, Corners, collocated_path, quiet_speeds
 from .dense import Polynomials
 from .elimination import ModalCoordinates, is_linear, modal_coordinates
-from .kernel_collocation import Stages
+from .kernel_collocation import SOLVED, Stages
 from .kernel_equations import Band, Equations, Scratch
 from .numpy_equations import SystemEquations
 from .ordering import narrow_order
@@ -102,7 +103,7 @@ def run_implicit(
         coefficients[:, 0] += modal.origin
         return Polynomials(within.times, coefficients), status, {**statistics, "free_coordinates": inner.size}
     step = Stepper(system, start, scheme(family, STAGES), program)
-    return step.run(system, start, float(times[-1]), tolerance, watch, options)
+    return step.run(system, start, times, tolerance, watch, options)
 
 
 class Stepper:
@@ -123,6 +124,7 @@ class Stepper:
         plain = SystemEquations(system, start)
         s, n, m = len(tab.c), system.size, int(start.active.sum())
         self.w = work(s, n, m, plain.stresses, tab.inner + 4)
+        self.w.now[2] = SOLVED
         self.compiled, self.compile_seconds = program is not None, 0.0
         if program is None:
             self._step: Callable[[], int] = lambda: _plain()(plain, self.w, tab)
@@ -149,38 +151,50 @@ class Stepper:
     def __call__(self, t: float, h: float, q: Array, v: Array, limit: Array) -> int:
         """See `kernel_collocation.collocation_step`."""
         w, p = self.w, self._powers[1:]
-        w.now[:], w.q[:], w.v[:], w.limit[:] = (t, h), q, v, limit
+        w.now[:2], w.q[:], w.v[:], w.limit[:] = (t, h), q, v, limit
         w.guess[:, 1:] = (self.tab.c * h)[:, None] ** (p + 1.0) / (p + 1.0)
         return self._step()
 
+    def error(self, tolerance: float) -> float:
+        """Of the step just made, over the tolerance."""
+        return max(float(self.w.measures[0]), float(self.w.measures[1]) / tolerance)
+
     def run(
-        self, system: System, start: Start, end: float, tolerance: float, watch: Watch | None, options: dict[str, Any]
+        self, system: System, start: Start, times: Array, tolerance: float, watch: Watch | None, options: dict[str, Any]
     ) -> tuple[Polynomials, Status, dict[str, Any]]:
-        """From the start to the end, by steps whose errors stay below the tolerance."""
+        """From the start to the last time, by steps whose errors stay below the tolerance."""
         w, tab, units = self.w, self.tab, system.units
-        q, v, t = start.q.copy(), start.v.copy(), start.time
+        q, v, t, end = start.q.copy(), start.v.copy(), start.time, float(times[-1])
         a, multipliers = system.acceleration(t, q, v, start.active, start.excess)
         w.multipliers[:] = multipliers[start.active]
         self.restart(a)
+        law = StepLaw(
+            exponent=1.0 / (len(tab.c) + 1), growth=5.0, least_error=1e-8, predictive=True, steady=tab.level == 1
+        )
+        reach = np.maximum(np.abs(q), 1e-300)
+
+        def limit(h: float) -> Array:
+            least = 1e-3 * units * max(float((reach / units).max()), 1e-12)
+            return tolerance * np.maximum(np.maximum(reach, abs(h) * np.abs(v)), least)
+
         first = first_step(q / units, v / units, a / units, abs(end - t))
-        law = StepLaw(exponent=1.0 / (len(tab.c) + 1), growth=5.0, least_error=1e-8, predictive=True)
+        if law.steady:
+            w.now[2] = 0.0  # to rounding: what Newton's method leaves is a force at random, which the energy follows
+            first = self._steady_step(first, tolerance, (t, float(times[1]) - t, q, v), limit, options["longest"])
         control = StepControl(law, (t, end), first, breaks=system.breaks, watch=watch, **options)
         corners = Corners(system, control, tolerance)
-        reach = np.maximum(np.abs(q), 1e-300)
         ends, known, forces, accelerations, newton = [t], [], [], [a], 0
 
         def state() -> tuple[Array, Array]:
             return q, v
 
         while (h := control.next_step(state)) is not None:
-            least = 1e-3 * units * max(float((reach / units).max()), 1e-12)
-            limit = tolerance * np.maximum(np.maximum(reach, abs(h) * np.abs(v)), least)
-            count = self(t, h, q, v, limit)
+            count = self(t, h, q, v, limit(h))
             newton += abs(count)
             if count <= 0:
                 control.fail(Status.NOT_SOLVED, NOT_SOLVED_SHARE)
                 continue
-            error = max(float(w.measures[0]), float(w.measures[1]) / tolerance)
+            error = self.error(tolerance)
             if corners.system is not None and error <= TRUSTED:
                 quiet = quiet_speeds(tab.c, w.v, w.V[:-1], w.vn, units * float((reach / units).max()) / abs(h))
                 speeds = (tab.speed @ np.vstack([w.v, quiet])) / h ** self._powers[:, None]
@@ -190,7 +204,8 @@ class Stepper:
                 control.reject(error)
                 continue
             t = control.accept(error)
-            control.trial = min(control.trial, abs(h) * EASY / max(float(w.measures[2]), 1e-3))
+            if not law.steady:
+                control.trial = min(control.trial, abs(h) * EASY / max(float(w.measures[2]), 1e-3))
             known.append(w.known.copy())
             forces.append(np.hstack([w.L[:-1], w.S[:-1]]))
             ends.append(t)
@@ -210,6 +225,21 @@ class Stepper:
         return dense, control.status, {
             **counts, "steps": control.accepted, "newton_iterations": newton, "rejected": control.rejected,
         }  # fmt: skip
+
+    def _steady_step(
+        self, first: float, tolerance: float, begin: tuple[float, float, Array, Array],
+        limit: Callable[[float], Array], longest: float,
+    ) -> float:  # fmt: skip
+        """A part of the distance of the output times, about the longest step that the start allows."""
+        t, distance, q, v = begin
+        longest = min(longest, abs(distance))
+        while first < longest:
+            h = math.copysign(first, distance)
+            if self(t, h, q, v, limit(h)) <= 0 or self.error(tolerance) > 1.0:
+                first *= 0.5
+                break
+            first *= 2.0
+        return abs(distance) / math.ceil(abs(distance) / min(first, longest))
 
     def _dense(
         self, system: System, start: Start, times: Array, known: list[Array], forces: list[Array],
@@ -242,7 +272,7 @@ class Stepper:
 def work(s: int, n: int, m: int, k: int, known: int) -> Stages:
     """Arrays of a step."""
     shapes = [
-        (2,), (3,), (n,), (n,), (m,), (s, s + 1), (s + 1, n), (n,), (s, n), (s + 1, n), (s + 1, n), (s + 1, n),
+        (3,), (3,), (n,), (n,), (m,), (s, s + 1), (s + 1, n), (n,), (s, n), (s + 1, n), (s + 1, n), (s + 1, n),
         (s + 1, m), (s + 1, k), (s + 1, n), (s + 1, m), (s, n), (s, m), (s, n), (s, m), (known, n), (n,), (n,),
     ]  # fmt: skip
     return Stages(*(np.zeros(shape) for shape in shapes))

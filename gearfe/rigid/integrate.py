@@ -17,6 +17,7 @@ from ..typing import Array
 from . import compiled, series, taylor
 from .carried import loose_link
 from .choice import Choice, Way, joined, joined_statistics
+from .collocation import GAUSS, RADAU
 from .dense import Dense
 from .elimination import is_linear, modal_coordinates
 from .linkage import Linkage
@@ -29,7 +30,9 @@ from .tables import carrying
 from .trajectory import IntegrationError, Trajectory
 
 Run = tuple[Dense, Status, dict[str, Any]]
-METHODS = ("auto", "taylor", "explicit", "implicit")
+#: Points of the implicit methods.
+COLLOCATION = {"implicit": RADAU, "symplectic": GAUSS}
+METHODS = ("auto", "taylor", "explicit", *COLLOCATION)
 #: Asked tolerance -> largest last term of a Taylor step. The benchmark mechanisms amplify local errors some
 #: hundred times.
 LOCAL_SHARE = 5e-4
@@ -71,14 +74,15 @@ def integrate(
         Bodies, joints and forces.
     times : array_like
         Times at which results are wanted (s), rising or falling; the first is the start.
-    method : {"auto", "taylor", "explicit", "implicit"}
+    method : {"auto", "taylor", "explicit", "implicit", "symplectic"}
         "taylor": Taylor series, of the index-3 equations for planar linkages, in modal coordinates (compiled) where the
         constraints are linear and the only force has a law with a series: gear trains; else on a tape (compiled) where
         rows and forces can be written on one: loads by expression, frames in vectors. "explicit": any smooth system,
         Runge-Kutta of order 8, with projection where constraints are not linear. "implicit": Radau IIA of 7 stages, for
         stiff ones, compiled where rows and forces can be written on a tape. "auto" takes the one of "taylor" (else
         "explicit") and "implicit" that is predicted to take the fewest seconds, and changes over when that proves wrong
-        (`gearfe.rigid.choice`).
+        (`gearfe.rigid.choice`). "symplectic": the implicit method with Gauss's points in steps of one length, which
+        keeps the energy where nothing takes any.
     tolerance : float
         Accuracy asked for, relative to 1 rad and to the size of the mechanism; 1e-13 to 0.1.
     start : Start, optional
@@ -178,13 +182,15 @@ def ways_of(
     )  # it does not see all other elements
     auto = method == "auto"
     implicit: list[Way] = []
-    if auto or method == "implicit":
-        slow = Way("implicit", "plain", partial(_implicit, system, False, options), trial, rate=rate)
-        implicit = _implicit_ways(system, backend, options, slow, runs)
+    if auto or method in COLLOCATION:
+        kind = "implicit" if auto else method
+        held = options | {"family": COLLOCATION[kind]}
+        slow = Way(kind, "plain", partial(_implicit, system, False, held), trial, rate=rate)
+        implicit = _implicit_ways(system, backend, held, slow, runs)
     stuck = auto and (any(e.stiff for e in system.elements) or _hopeless(system, start, times))
     cure = _cure(system, backend)
     explicit = Way("explicit", "", partial(_explicit, system, backend, options), PLAIN_TRIAL, cure=cure)
-    if stuck or method in ("implicit", "explicit"):
+    if stuck or method in ("explicit", *COLLOCATION):
         return [explicit] if method == "explicit" else implicit
     if linkage is None:
         ways = _other_ways(system, auto, backend, options, explicit, runs)
@@ -288,7 +294,7 @@ def _implicit_ways(system: System, backend: str, options: dict[str, Any], plain:
     quick = replace(
         plain, backend="compiled", run=partial(_implicit, system, True, options), trial=IMPLICIT_TRIAL + loading
     )
-    if backend == "compiled" or KERNELS.ready or loading <= _PLAIN_SPENT["implicit"]:
+    if backend == "compiled" or KERNELS.ready or loading <= _PLAIN_SPENT[plain.method]:
         return [quick]
     return [plain, replace(quick, loading=loading, ratio=IMPLICIT_FASTER)]
 

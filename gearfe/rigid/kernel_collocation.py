@@ -31,14 +31,14 @@ if TYPE_CHECKING:
     from .kernel_rows import copy, fill
     from .kernel_stages import change, combine, defect, end_state, gap_between, keep_path, project
 
-#: Changes relative to the tolerance at which Newton's method ends, and at which its rate is trusted to tell the rest.
+#: Changes relative to the tolerance below which a step counts, and at which Newton's rate is trusted to tell the rest.
 SOLVED, TRUSTED_CHANGE, MOST_NEWTON = 1e-3, 0.3, 12
 
 
 class Stages(NamedTuple):
     """State and unknowns of a step: s stages, and row s for its begin; n coordinates, m rows, k stresses."""
 
-    now: Array  # (2,) time at the begin and step (s)
+    now: Array  # (3,) time at the begin and step (s), change over the limit at which Newton's method ends
     measures: Array  # (3,) error over the tolerance, gap of the rows between the stages, mean rate of Newton's changes
     q: Array  # (n,) state at the begin
     v: Array
@@ -85,6 +85,7 @@ def collocation_step(eq: Any, w: Stages, tab: Scheme) -> int:
         if not factorise(eq, w, tab, k, h):
             return 0
     moved = np.inf
+    size = np.inf
     started = 0.0
     count = 0
     solved = False
@@ -99,15 +100,15 @@ def collocation_step(eq: Any, w: Stages, tab: Scheme) -> int:
         combine(tab.basis, w.r, w.dZ)
         combine(tab.basis, w.g, w.dL)
         size = change(eq, w, tab, h, True)
-        solved = size < SOLVED or (
-            size < TRUSTED_CHANGE and moved < np.inf and size * size / max(moved, 1e-300) < SOLVED
+        solved = size < w.now[2] or (
+            size < TRUSTED_CHANGE and moved < np.inf and size * size / max(moved, 1e-300) < w.now[2]
         )
         if count == 1:
             started = size
-        if not size < 2.0 * moved:  # not a number, too
+        if not size < 2.0 * moved or (size < SOLVED and size > 0.5 * moved):  # not a number, or rounding
             break
         moved = size
-    if not solved:
+    if not (solved or size < SOLVED):
         return -count
     w.measures[0] = defect(eq, w, tab, h)
     end_state(w, tab, h)

@@ -46,12 +46,15 @@ class StepLaw:
         Below it an error is rounding.
     predictive
         Gustafsson's rule: the last two errors tell the trend.
+    steady
+        Steps keep their length, or halve it: changes of it give energy to vibrations that are faster than the steps.
     """
 
     exponent: float
     growth: float
     least_error: float
     predictive: bool = False
+    steady: bool = False
 
 
 class StepControl:
@@ -128,14 +131,15 @@ class StepControl:
             factor = min(factor, factor * (self._before / error) ** law.exponent)
         self._before = error
         grown = self._step * min(law.growth, max(LEAST, factor))
-        self.trial = max(self.trial, self._step) if self._cut and error <= CUT else grown
+        if not law.steady:
+            self.trial = max(self.trial, self._step) if self._cut and error <= CUT else grown
         self.accepted += 1
         return self.t
 
     def reject(self, error: float) -> None:
         """The step is not made: its error is above 1."""
         self.rejected += 1
-        self.trial = self._step * max(LEAST, SAFETY * error**-self.law.exponent)
+        self.trial = self._step * (0.5 if self.law.steady else max(LEAST, SAFETY * error**-self.law.exponent))
 
     def end_at(self, t: float) -> None:
         """The step is not made: one that ends at the time t, within it, is next."""
@@ -148,7 +152,7 @@ class StepControl:
     def fail(self, status: Status, share: float = LEAST) -> None:
         """The step is not made, and its error has no size: `share` of it is next, or the run ends with `status`."""
         self.rejected += 1
-        self.trial = share * self._step
+        self.trial = (0.5 if self.law.steady else share) * self._step
         if self._step < NO_SIZE * max(1e-300, self.span):
             self.status = status
 

@@ -234,7 +234,9 @@ class RunTable:
         doc="accuracy relative to 1 rad and the mechanism's size (default: 1e-9, with flexible links 1e-5)",
     )
     method: str = quantity(
-        "auto", choices=("auto", "taylor", "explicit", "implicit"), doc="integrator (auto: quickest)"
+        "auto",
+        choices=("auto", "taylor", "explicit", "implicit", "symplectic"),
+        doc="integrator (auto: quickest; symplectic: keeps the energy)",
     )
     analysis: str = quantity(
         "transient",
