@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -94,7 +93,7 @@ def test_involute_normals_touch_the_base_circle(one):
     profile = one.profile
     end = min(profile.round_roll, profile.relief_roll)
     s = np.linspace(profile.form_roll, end, 50)
-    points, normals = profile.points_of_roll(s), profile.normals_of_roll(s)
+    points, normals = profile.points_of_roll(s), profile.flank.normal_at(s)
     lever = points[:, 0] * normals[:, 1] - points[:, 1] * normals[:, 0]
     np.testing.assert_allclose(lever, one.base_radius, rtol=1e-13)
     # the tangent from the base circle has the length s, and unrolls from the base circle
@@ -202,7 +201,7 @@ def test_tip_relief_is_taken_off_along_the_involute_normal(exponent):
     tip = plain.profile.tip_roll
     s = np.linspace(tip - 1.5 * length, tip, 31)
     moved = relieved.profile.points_of_roll(s) - plain.profile.points_of_roll(s)
-    normal = plain.profile.normals_of_roll(s)
+    normal = plain.profile.flank.normal_at(s)
     expected = amount * np.maximum(0.0, (s - (tip - length)) / length) ** exponent
     np.testing.assert_allclose(moved, -expected[:, None] * normal, atol=1e-17)
     assert expected[-1] == pytest.approx(amount)
@@ -235,12 +234,18 @@ def test_waist_of_a_severely_undercut_tooth():
     """
     form = {"module": 1e-3, "pressure_angle": math.radians(14.5), "addendum": 1.0, "dedendum": 1.25}
     form |= dict.fromkeys(("rack_tip_radius", "tip_round", "tip_shortening", "tooth_thinning"), 0.0)
-    form["tip_relief"] = None  # gears have 8 teeth at least, profiles have not
-    whole = tooth_profile(SimpleNamespace(teeth=7, profile_shift=-0.6, **form))
+    form["tip_relief"] = None
+
+    def unchecked(**values) -> Gear:  # gears have 8 teeth at least, profiles have not
+        made = object.__new__(Gear)
+        vars(made).update(values)
+        return made
+
+    whole = tooth_profile(unchecked(teeth=7, profile_shift=-0.6, **form))
     points = whole.segment("trochoid").points(np.linspace(0.0, 1.0, 4001))
     assert np.arctan2(points[:, 1], points[:, 0]).min() == pytest.approx(0.00196, abs=5e-6)
     with pytest.raises(ValueError, match="cuts the tooth through"):
-        tooth_profile(SimpleNamespace(teeth=6, profile_shift=-0.5, **form))
+        tooth_profile(unchecked(teeth=6, profile_shift=-0.5, **form))
 
 
 def test_zero_length_segments_are_left_out():

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,85 +19,32 @@ from ..typing import Array
 from .curves import Arc, Flank, Point, Segment, Trochoid, bisect, inv, inverse_inv
 from .deviation import Deviation
 
-__all__ = ["Segment", "ToothForm", "ToothProfile", "inv", "inverse_inv", "tooth_profile"]
+if TYPE_CHECKING:
+    from .spur_gear import Gear
+
+__all__ = ["Segment", "ToothProfile", "inv", "inverse_inv", "tooth_profile"]
 
 #: Arcs of a smaller polar angle (rad) are taken for none: below 1e-9 mm on a gear of 1 m radius.
 NIL_ANGLE = 1e-12
 
 
-class Relief(Protocol):
-    """Tip relief amount * ((s - s0)/length)^exponent (m, m, -)."""
-
-    @property
-    def amount(self) -> float: ...
-    @property
-    def length(self) -> float: ...
-    @property
-    def exponent(self) -> float: ...
-
-
-class ToothForm(Protocol):
-    """What of a gear decides its profile; units as in `gearfe.gear.pair.Gear`."""
-
-    @property
-    def teeth(self) -> int: ...
-    @property
-    def module(self) -> float: ...
-    @property
-    def pressure_angle(self) -> float: ...
-    @property
-    def profile_shift(self) -> float: ...
-    @property
-    def addendum(self) -> float: ...
-    @property
-    def dedendum(self) -> float: ...
-    @property
-    def rack_tip_radius(self) -> float: ...
-    @property
-    def tip_round(self) -> float: ...
-    @property
-    def tip_shortening(self) -> float: ...
-    @property
-    def tip_relief(self) -> Relief | None: ...
-    @property
-    def tooth_thinning(self) -> float: ...
-
-
-def half_tooth_angle(gear: ToothForm) -> float:
-    """Half the angular tooth thickness at the reference circle (rad).
-
-    psi = pi/(2z) + 2 x tan(alpha)/z - thinning/(2r).
-    """
-    z = gear.teeth
-    return (
-        math.pi / (2 * z)
-        + 2.0 * gear.profile_shift * math.tan(gear.pressure_angle) / z
-        - gear.tooth_thinning / (z * gear.module)
-    )
-
-
-def largest_rack_tip_radius(gear: ToothForm) -> float:
+def largest_rack_tip_radius(gear: Gear) -> float:
     """Rack tip radius (times module) at which the land of the rack's tip vanishes; beyond it no such rack exists."""
     alpha = gear.pressure_angle
     land = math.pi / 4 + 0.5 * gear.tooth_thinning / gear.module - gear.dedendum * math.tan(alpha)
     return land * math.cos(alpha) / (1.0 - math.sin(alpha))
 
 
-def tip_radius(gear: ToothForm) -> float:
-    """Tip radius r_a = r + (h_aP + x - k) m (m)."""
-    return gear.module * (gear.teeth / 2 + gear.addendum + gear.profile_shift - gear.tip_shortening)
-
-
-def least_shift(gear: ToothForm) -> float:
+def least_shift(gear: Gear) -> float:
     """Profile shift coefficient from which on the rack does not undercut: h_F/m - z sin^2(alpha)/2 (-)."""
     sine = math.sin(gear.pressure_angle)
     return gear.dedendum - gear.rack_tip_radius * (1.0 - sine) - 0.5 * gear.teeth * sine**2
 
 
-def tooth_root(gear: ToothForm) -> tuple[Trochoid, float, bool]:
+def tooth_root(gear: Gear) -> tuple[Trochoid, float, bool]:
     """Trochoid up to the involute, roll length (m) of the form point, and whether it is undercut."""
     m, alpha = gear.module, gear.pressure_angle
-    r, rho = 0.5 * m * gear.teeth, gear.rack_tip_radius * m
+    r, rho = gear.reference_radius, gear.rack_tip_radius * m
     depth = gear.dedendum * m - rho
     largest = largest_rack_tip_radius(gear)
     if gear.rack_tip_radius > largest * (1.0 + 1e-12):
@@ -124,16 +71,15 @@ def tooth_root(gear: ToothForm) -> tuple[Trochoid, float, bool]:
     return cut, form_roll, True
 
 
-def _crossing(gear: ToothForm, root: Trochoid) -> tuple[float, float]:
+def _crossing(gear: Gear, root: Trochoid) -> tuple[float, float]:
     """Normal angle (rad) and roll length (m) where an undercutting trochoid leaves the tooth through the involute."""
-    base = root.reference_radius * math.cos(gear.pressure_angle)
-    base_angle = half_tooth_angle(gear) + inv(gear.pressure_angle)
+    base, base_angle = gear.base_radius, gear.base_angle
 
     def radius(g: float) -> float:
         return float(np.hypot(*root.at(np.array(g))))
 
     def roll(g: float) -> float:
-        return math.sqrt(max(0.0, (radius(g) - base) * (radius(g) + base)))
+        return gear.roll_length(radius(g))
 
     def outside(g: float) -> float:
         x, y = root.at(np.array(g))
@@ -198,10 +144,6 @@ class ToothProfile:
         """Flank points (m) at roll lengths s (m), shape (n, 2)."""
         return self.flank.at(np.asarray(s, dtype=float))
 
-    def normals_of_roll(self, s: Array) -> Array:
-        """Outward unit normals of the flank at roll lengths s (m), shape (n, 2)."""
-        return self.flank.normal_at(np.asarray(s, dtype=float))
-
     def polyline(self, per_segment: int = 40) -> Array:
         """Points (m) of the half profile, equally spaced in arc length on each segment, shape (n, 2)."""
         parts: list[Array] = []
@@ -211,7 +153,7 @@ class ToothProfile:
         return np.concatenate(parts)
 
 
-def tooth_profile(gear: ToothForm) -> ToothProfile:
+def tooth_profile(gear: Gear) -> ToothProfile:
     """Exact left half profile of a tooth.
 
     Raises
@@ -221,7 +163,7 @@ def tooth_profile(gear: ToothForm) -> ToothProfile:
     """
     root, form_roll, undercut = tooth_root(gear)
     flank, tip_roll = _flank(gear, form_roll)
-    end_roll = bisect(lambda s: _radius(flank, s) - tip_radius(gear), tip_roll, tip_roll + 2.0 * flank.amount)
+    end_roll = bisect(lambda s: _radius(flank, s) - gear.tip_radius, tip_roll, tip_roll + 2.0 * flank.amount)
     tip_half_angle = _angle(flank, end_roll)
     if tip_half_angle <= 0.0:
         peak = flank.base_radius / math.cos(inverse_inv(flank.base_angle))
@@ -232,11 +174,10 @@ def tooth_profile(gear: ToothForm) -> ToothProfile:
     flank = Flank(flank.base_radius, flank.base_angle, form_roll, round_roll, *_relief_numbers(flank))
 
     pieces: list[tuple[str, Arc | Trochoid | Flank]] = []
-    root_radius = gear.module * (gear.teeth / 2 + gear.profile_shift - gear.dedendum)
     space = math.pi / gear.teeth
     land_angle = root.offset / root.reference_radius
     if land_angle > 0.0:
-        pieces.append(("root_circle", Arc((0.0, 0.0), root_radius, space, space - land_angle)))
+        pieces.append(("root_circle", Arc((0.0, 0.0), gear.root_radius, space, space - land_angle)))
     if root.radius > 0.0 or root.depth != 0.0:
         pieces.append(("trochoid", root))
     pieces.append(("involute", flank))
@@ -245,7 +186,7 @@ def tooth_profile(gear: ToothForm) -> ToothProfile:
         arc, land = _tip_arc(gear, flank, round_roll)
         pieces.append(("tip_round", arc))
     if land > NIL_ANGLE:
-        pieces.append(("tip", Arc((0.0, 0.0), tip_radius(gear), land, 0.0)))
+        pieces.append(("tip", Arc((0.0, 0.0), gear.tip_radius, land, 0.0)))
     return ToothProfile(
         segments=_joined(pieces, flank),
         flank=flank,
@@ -271,12 +212,9 @@ def _relief_numbers(flank: Flank) -> tuple[float, float, float, float]:
     return flank.amount, flank.relief_start, flank.length, flank.exponent
 
 
-def _flank(gear: ToothForm, form_roll: float) -> tuple[Flank, float]:
+def _flank(gear: Gear, form_roll: float) -> tuple[Flank, float]:
     """Flank from the form point, end still open, and the roll length (m) of the tip circle."""
-    base = 0.5 * gear.module * gear.teeth * math.cos(gear.pressure_angle)
-    base_angle = half_tooth_angle(gear) + inv(gear.pressure_angle)
-    tip = tip_radius(gear)
-    tip_roll = math.sqrt(max(0.0, (tip - base) * (tip + base)))
+    base, base_angle, tip_roll = gear.base_radius, gear.base_angle, gear.roll_length(gear.tip_radius)
     if tip_roll <= form_roll:
         lowest = _addendum_to(gear, math.hypot(base, form_roll))
         problem = f"the tip circle lies below the start of the involute: must be > {lowest:.5g}"
@@ -298,15 +236,15 @@ def _flank(gear: ToothForm, form_roll: float) -> tuple[Flank, float]:
     return Flank(base, base_angle, form_roll, tip_roll, relief.amount, start, relief.length, relief.exponent), tip_roll
 
 
-def _round_centre(gear: ToothForm, flank: Flank, s: float) -> Point:
+def _round_centre(gear: Gear, flank: Flank, s: float) -> Point:
     at = np.array(s)
     x, y = flank.at(at) - gear.tip_round * flank.normal_at(at)
     return float(x), float(y)
 
 
-def _round_start(gear: ToothForm, flank: Flank, tip_roll: float, end_roll: float) -> float:
+def _round_start(gear: Gear, flank: Flank, tip_roll: float, end_roll: float) -> float:
     """Roll length (m) where the tip round, tangent to flank and tip circle, begins; the flank's end without one."""
-    rho, tip = gear.tip_round, tip_radius(gear)
+    rho, tip = gear.tip_round, gear.tip_radius
     if rho == 0.0:
         return end_roll
     inner = tip - rho
@@ -328,9 +266,9 @@ def _round_start(gear: ToothForm, flank: Flank, tip_roll: float, end_roll: float
     return start
 
 
-def _largest_round(gear: ToothForm, flank: Flank) -> float:
+def _largest_round(gear: Gear, flank: Flank) -> float:
     """Largest tip round (m) that begins above the form point and leaves a tip land; relief not counted."""
-    tip, base = tip_radius(gear), flank.base_radius
+    tip, base = gear.tip_radius, flank.base_radius
 
     def too_large(rho: float) -> float:
         roll = math.sqrt((tip - rho - base) * (tip - rho + base))
@@ -340,14 +278,14 @@ def _largest_round(gear: ToothForm, flank: Flank) -> float:
     return bisect(too_large, 0.0, tip - base)
 
 
-def deviated(gear: ToothForm, profile: ToothProfile, deviation: Deviation) -> tuple[Flank, Arc | None]:
+def deviated(gear: Gear, profile: ToothProfile, deviation: Deviation) -> tuple[Flank, Arc | None]:
     """Flank of a profile with a deviation of micrometres, and its tip round fitted anew.
 
     The flank starts at the same radius and ends on the same tip circle; its round is tangent to both as before.
     """
     from scipy.optimize import brentq  # only flanks with deviations need it
 
-    flank, tip, rho = replace(profile.flank, deviation=deviation), tip_radius(gear), gear.tip_round
+    flank, tip, rho = replace(profile.flank, deviation=deviation), gear.tip_radius, gear.tip_round
 
     def roll_at(radius: float) -> float:
         forward = math.sqrt((radius - flank.base_radius) * (radius + flank.base_radius))
@@ -367,12 +305,12 @@ def deviated(gear: ToothForm, profile: ToothProfile, deviation: Deviation) -> tu
     return flank, _tip_arc(gear, flank, end)[0]
 
 
-def _addendum_to(gear: ToothForm, radius: float) -> float:
+def _addendum_to(gear: Gear, radius: float) -> float:
     """Addendum coefficient with which the tip circle has the given radius (m)."""
     return radius / gear.module - gear.teeth / 2 - gear.profile_shift + gear.tip_shortening
 
 
-def _tip_arc(gear: ToothForm, flank: Flank, round_roll: float) -> tuple[Arc, float]:
+def _tip_arc(gear: Gear, flank: Flank, round_roll: float) -> tuple[Arc, float]:
     """Tip round and the half angle (rad) of the tip land that it leaves."""
     centre = _round_centre(gear, flank, round_roll)
     x, y = flank.normal_at(np.array(round_roll))

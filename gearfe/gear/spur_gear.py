@@ -11,7 +11,7 @@ from functools import cached_property
 from numbers import Real
 
 from ..errors import InputError
-from .involute import ToothProfile, half_tooth_angle, inv, tooth_profile
+from .involute import ToothProfile, inv, tooth_profile
 from .validity import check_rim, check_teeth
 
 #: Least tip round that is not a sharp corner, times module: meshers need seconds for less, and elements degenerate.
@@ -152,8 +152,16 @@ class Gear:
 
     @cached_property
     def half_thickness_angle(self) -> float:
-        """Half the angular tooth thickness psi at the reference circle (rad)."""
-        return half_tooth_angle(self)
+        """Half the angular tooth thickness at the reference circle (rad).
+
+        psi = pi/(2z) + 2 x tan(alpha)/z - thinning/(2r).
+        """
+        z = self.teeth
+        return (
+            math.pi / (2 * z)
+            + 2.0 * self.profile_shift * math.tan(self.pressure_angle) / z
+            - self.tooth_thinning / (z * self.module)
+        )
 
     @cached_property
     def base_angle(self) -> float:
