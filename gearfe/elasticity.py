@@ -9,11 +9,13 @@ form is a plain scikit-fem form; `element_stiffness` is the same in one batch of
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
+from .errors import InputError
 from .typing import Array
 
 Plane = Literal["strain", "stress"]
@@ -28,22 +30,29 @@ class Material:
     youngs_modulus
         E (Pa).
     poisson_ratio
-        nu (-), below 0.5.
+        nu (-), between -1 and 0.5.
     density
         rho (kg/m3).
     """
 
     youngs_modulus: float = 200e9
     poisson_ratio: float = 0.30
-    density: float = field(default=7850.0, kw_only=True)
+    density: float = 7850.0
+
+    def __post_init__(self) -> None:
+        ranges = {"youngs_modulus": (0.0, math.inf), "poisson_ratio": (-1.0, 0.5), "density": (0.0, math.inf)}
+        for name, (low, high) in ranges.items():
+            value = getattr(self, name)
+            if not low < value < high:
+                raise InputError(name, value, f"must lie between {low:g} and {high:g} (both excluded)", "use SI units")
 
     @property
     def shear_modulus(self) -> float:
         """mu = E / (2 (1 + nu)) (Pa)."""
         return self.youngs_modulus / (2 * (1 + self.poisson_ratio))
 
-    def lame(self, plane: Plane) -> tuple[float, float]:
-        """(lambda, mu) (Pa) of the two-dimensional law in the given plane state."""
+    def lame(self, plane: Plane = "strain") -> tuple[float, float]:
+        """(lambda, mu) (Pa) of the solid and of plane strain, or of the two-dimensional law of plane stress."""
         mu, nu = self.shear_modulus, self.poisson_ratio
         lam = 2 * mu * nu / (1 - 2 * nu)
         return (lam, mu) if plane == "strain" else (2 * lam * mu / (lam + 2 * mu), mu)

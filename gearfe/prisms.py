@@ -18,7 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from .solid import SolidMaterial, SolidMatrices
+from .elasticity import Material
+from .solid import SolidMatrices
 from .typing import Array, BoolArray, IntArray
 
 #: Order of the elements in the plane and along y.
@@ -121,7 +122,7 @@ class PrismMatrices(NamedTuple):
 
 
 def assemble_prisms(
-    points: Array, triangles: IntArray, levels: Array, solid: BoolArray, material: SolidMaterial
+    points: Array, triangles: IntArray, levels: Array, solid: BoolArray, material: Material
 ) -> PrismMatrices:
     """Stiffness and consistent mass as sums of (plane matrix) x (line matrix), one term for each set of solid faces.
 
@@ -180,13 +181,13 @@ def assemble_prisms(
     return PrismMatrices(used, SolidMatrices(stiffness, sparse.csr_array((mass, columns, starts), shape=(n, n))))
 
 
-def isotropic_blocks(products: list[list[Array]], material: SolidMaterial) -> Array:
+def isotropic_blocks(products: list[list[Array]], material: Material) -> Array:
     """(..., 3, 3) stiffness of isotropic elasticity between two functions.
 
     With ``P_ij`` (...) the integral of d_i (row's function) times d_j (column's), entry (i, j) is
     ``lambda P_ij + mu P_ji``, and mu times the trace of P more on the diagonal.
     """
-    lam, mu = material.lame_lambda, material.shear_modulus
+    lam, mu = material.lame()
     blocks = np.empty((*products[0][0].shape, 3, 3))
     trace = mu * (products[0][0] + products[1][1] + products[2][2])
     for i in range(3):

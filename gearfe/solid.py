@@ -14,7 +14,6 @@ the check of the fast route, go through scikit-fem's forms. Nodes carry three un
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cache
 from typing import Literal, NamedTuple
@@ -23,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from .errors import InputError
+from .elasticity import Material
 from .typing import Array, BoolArray, IntArray
 
 MassRule = Literal["exact", "4-point"]
@@ -36,47 +35,6 @@ FACES = np.array([[0, 2, 1, 6, 5, 4], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [0
 STRAIGHT = 1e-9
 #: Degree of the quadrature rule for the stiffness of curved elements (14 points, all weights positive).
 CURVED_DEGREE = 5
-
-
-@dataclass(frozen=True)
-class SolidMaterial:
-    """Isotropic linear elastic solid.
-
-    Parameters
-    ----------
-    youngs_modulus
-        Young's modulus E (Pa).
-    poisson_ratio
-        Poisson's ratio nu, between -1 and 0.5.
-    density
-        Density rho (kg/m3).
-    """
-
-    youngs_modulus: float = 200e9
-    poisson_ratio: float = 0.3
-    density: float = 7850.0
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("youngs_modulus", 0.0, math.inf),
-            ("poisson_ratio", -1.0, 0.5),
-            ("density", 0.0, math.inf),
-        ):
-            value = getattr(self, name)
-            if not low < value < high:
-                raise InputError(name, value, f"must lie between {low:g} and {high:g} (both excluded)", "use SI units")
-
-    @property
-    def lame_lambda(self) -> float:
-        """First Lame constant (Pa)."""
-        return (
-            self.youngs_modulus * self.poisson_ratio / ((1.0 + self.poisson_ratio) * (1.0 - 2.0 * self.poisson_ratio))
-        )
-
-    @property
-    def shear_modulus(self) -> float:
-        """Shear modulus mu = G (Pa)."""
-        return self.youngs_modulus / (2.0 * (1.0 + self.poisson_ratio))
 
 
 class SolidMatrices(NamedTuple):
@@ -98,7 +56,7 @@ def expand_nodal(nodal: sparse.csr_array) -> sparse.csr_array:
     return sparse.kron(nodal, sparse.eye_array(3), format="csr")
 
 
-def assemble(nodes: Array, tets: IntArray, material: SolidMaterial, *, mass_rule: MassRule = "exact") -> SolidMatrices:
+def assemble(nodes: Array, tets: IntArray, material: Material, *, mass_rule: MassRule = "exact") -> SolidMatrices:
     """Stiffness and consistent mass of a tetrahedral mesh.
 
     Parameters
@@ -247,7 +205,7 @@ class _Blocks:
         return np.asarray(self.density @ self.products)
 
 
-def _by_blocks(nodes: Array, tets: IntArray, material: SolidMaterial, mass_rule: MassRule) -> _Blocks:
+def _by_blocks(nodes: Array, tets: IntArray, material: Material, mass_rule: MassRule) -> _Blocks:
     """Factors of the element matrices of elements that are all straight or all curved.
 
     With J the gradient of the inverse map, ``d phi_a/d x_i = J[m, i] d phi_a/d xi_m``, block (i, j) of the element
@@ -263,13 +221,13 @@ def _by_blocks(nodes: Array, tets: IntArray, material: SolidMaterial, mass_rule:
     else:
         products = np.einsum("amp,bnp,p->mnab", gradients, gradients, weights).reshape(-1, a * a)
         det, inverse = maps(nodes, tets[:, :4], shape_functions(4, 1)[1])
-    c = np.empty((len(tets), 3, 3, det.shape[1], 3, 3))
+    (lam, mu), c = material.lame(), np.empty((len(tets), 3, 3, det.shape[1], 3, 3))
     total = np.einsum("epmk,epnk->epmn", inverse, inverse)
     for i in range(3):
         for j in range(3):
             direct = np.einsum("epm,epn->epmn", inverse[..., i], inverse[..., j])
-            c[:, i, j] = material.lame_lambda * direct + material.shear_modulus * direct.swapaxes(-1, -2)
-        c[:, i, i] += material.shear_modulus * total
+            c[:, i, j] = lam * direct + mu * direct.swapaxes(-1, -2)
+        c[:, i, i] += mu * total
     c *= det[:, None, None, :, None, None]
     phi, slopes, weights = shape_functions(a, 2 if mass_rule == "4-point" else (7 if curved else 6))
     if curved:

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gearfe.elasticity import Material
 from gearfe.errors import InputError
 from gearfe.housing.attachments import Attachment, Bore, Plane, interface_matrix
 from gearfe.housing.model import Housing
 from gearfe.meshing.session import gmsh_session
-from gearfe.solid import SolidMaterial, curved_elements, jacobian_determinants
+from gearfe.solid import curved_elements, jacobian_determinants
 from tests.housing_meshes import box, second_order
 
 
@@ -59,7 +60,7 @@ def test_housing_from_arrays() -> None:
     assert body.size == 6 + 3 + 6
     mask = np.zeros(len(nodes), dtype=bool)
     mask[outside] = True
-    same = Housing.from_arrays(nodes, tets, [Bore(*AXIS, name="main")], mask, material=SolidMaterial())  # type: ignore[arg-type]
+    same = Housing.from_arrays(nodes, tets, [Bore(*AXIS, name="main")], mask, material=Material())  # type: ignore[arg-type]
     np.testing.assert_array_equal(same.fixed, housing.fixed)
     assert same.attachments[0].name == "main"
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gearfe.elasticity import Material
 from gearfe.housing.model import Housing
-from gearfe.solid import SolidMaterial
 
 from .full_model import full_model
 from .newmark import newmark, smooth_ramp
@@ -36,7 +36,7 @@ def reference_housing(mass: Any = "exact") -> Housing:
     # the base's underside lies in the same plane as the bottoms of the feet, which stand outboard of its ends
     bottom = np.abs(nodes[:, 2] - (p["z0"] - p["tb"])) < 1e-9
     feet = bottom & ((nodes[:, 0] < p["x0"] + 1e-9) | (nodes[:, 0] > p["x1"] - 1e-9))
-    material = SolidMaterial(p["E"], p["nu"], p["rho"])
+    material = Material(p["E"], p["nu"], p["rho"])
     return Housing.from_arrays(nodes, tets, bores, feet, material=material, mass=mass)
 
 

@@ -12,6 +12,7 @@ from skfem import Basis, BilinearForm, ElementTetP1, ElementTetP2, ElementVector
 from skfem.assembly import Dofs
 from skfem.helpers import ddot, div, sym_grad
 
+from gearfe.elasticity import Material
 from gearfe.errors import InputError
 from gearfe.housing.mesh_checks import boundary_faces
 from gearfe.housing.meshes import Tetrahedra
@@ -20,14 +21,13 @@ from gearfe.reduction.lanczos import lowest_modes
 from gearfe.reduction.sparse_solver import factorize
 from gearfe.solid import (
     CURVED_DEGREE,
-    SolidMaterial,
     assemble,
     curved_elements,
     jacobian_determinants,
 )
 from tests.housing_meshes import box, surface_area
 
-STEEL = SolidMaterial()
+STEEL = Material()
 RNG = np.random.default_rng(7)
 
 
@@ -61,7 +61,7 @@ def general_element_matrices(nodes: np.ndarray, tets: np.ndarray, rule: str) -> 
 
     The exact mass of a curved second-order element needs degree 7 (4 from the product, 3 from the volume ratio).
     """
-    lam, mu = STEEL.lame_lambda, STEEL.shear_modulus
+    lam, mu = STEEL.lame()
 
     @BilinearForm
     def stiffness(u: Any, v: Any, _: Any) -> Any:
@@ -136,7 +136,7 @@ def test_patch_test(order: int, bent: bool) -> None:
     assert np.abs(force[inside]).max() < (1e-3 if bent and order == 2 else 1e-12) * np.abs(force).max()
     if not bent:
         strain = 0.5 * (gradient + gradient.T)
-        lam, mu = STEEL.lame_lambda, STEEL.shear_modulus
+        lam, mu = STEEL.lame()
         density = lam * np.trace(strain) ** 2 + 2 * mu * np.sum(strain**2)
         assert u @ force.ravel() == pytest.approx(density * 1.0, rel=1e-12)
 
@@ -199,7 +199,7 @@ def test_lame_ring_with_its_rate() -> None:
 
 def bar_frequency(cells: int, order: int) -> float:
     """First longitudinal frequency (Hz) of a free bar, nu = 0: exactly c / (2 L) in three dimensions too."""
-    material = SolidMaterial(200e9, 0.0, 7850.0)
+    material = Material(200e9, 0.0, 7850.0)
     nodes, tets = box((cells, 1, 1), (1.0, 0.1, 0.1), order=order)
     found = assemble(nodes, tets, material)
     # motion along x only, constant over the section, is what the mode is: project on it
@@ -234,7 +234,7 @@ def test_clamped_square_plate() -> None:
     found = []
     for cells in (10, 16, 24):
         nodes, tets = box((cells, cells, 1), (a, a, h))
-        body = assemble(nodes, tets, SolidMaterial(e, nu, rho))
+        body = assemble(nodes, tets, Material(e, nu, rho))
         edge = (np.minimum(nodes[:, :2], a - nodes[:, :2]) < 1e-9).any(axis=1)
         free = (3 * np.flatnonzero(~edge)[:, None] + np.arange(3)).ravel()
         k, m = body.stiffness.tocsr()[free][:, free], body.nodal_mass[free[::3] // 3][:, free[::3] // 3]
@@ -266,4 +266,4 @@ def test_outer_surface_of_a_box() -> None:
 )
 def test_impossible_materials_are_named(values: tuple[float, float, float], name: str) -> None:
     with pytest.raises(InputError, match=name):
-        SolidMaterial(*values)
+        Material(*values)

@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+from gearfe.elasticity import Material
 from gearfe.housing.attachments import Attachment
 from gearfe.housing.build import housing_from_table
 from gearfe.housing.mesh_error import energy_lost
@@ -15,12 +16,12 @@ from gearfe.housing.model import Housing, rigid_motions
 from gearfe.reduction.error import accelerances, mesh_error
 from gearfe.reduction.lanczos import lowest_modes
 from gearfe.reduction.sparse_solver import factorize
-from gearfe.solid import SolidMaterial, assemble
+from gearfe.solid import assemble
 from gearfe.tables.housing import FeetTable, HousingMeshTable, HousingTable, ShaftAxisTable
 from tests.housing_meshes import box
 from tests.test_housing_reference import REFERENCE, reference_housing
 
-STEEL = SolidMaterial()
+STEEL = Material()
 
 
 def clamped(cells: tuple[int, int, int], size: tuple[float, float, float], order: int = 2) -> tuple[np.ndarray, ...]:

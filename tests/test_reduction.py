@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
+from gearfe.elasticity import Material
 from gearfe.errors import InputError
 from gearfe.housing.attachments import Attachment, Plane
 from gearfe.housing.model import Housing
 from gearfe.reduction.craig_bampton import reduce_model
 from gearfe.reduction.error import reduction_error
 from gearfe.reduction.modal_body import ModalBody
-from gearfe.solid import SolidMaterial
 from tests.housing_meshes import box
 
 from .full_model import full_model
@@ -40,7 +40,7 @@ def beam(nu: float = 0.3, cells: tuple[int, int, int] = (6, 2, 2), *, ends: int 
         for name, x in zip(names, places, strict=True)
     ]
     fixed = None if free or ends == 2 else Plane((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return Housing.from_arrays(nodes, tets, (), fixed, material=SolidMaterial(E, nu, RHO), attachments=attachments)
+    return Housing.from_arrays(nodes, tets, (), fixed, material=Material(E, nu, RHO), attachments=attachments)
 
 
 @pytest.fixture(scope="module")

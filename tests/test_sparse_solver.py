@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from gearfe.elasticity import Material
 from gearfe.errors import InputError, MissingLibraryError
 from gearfe.reduction import sparse_solver
 from gearfe.reduction.lanczos import lowest_modes
 from gearfe.reduction.sparse_solver import PACKAGES, choose_solver, factorize, installed_solvers
-from gearfe.solid import SolidMaterial, assemble
+from gearfe.solid import assemble
 from tests.housing_meshes import box
 
 
 def cantilever() -> tuple[sparse.csr_array, sparse.csr_array]:
     nodes, tets = box((5, 2, 2), (0.5, 0.1, 0.1))
-    found = assemble(nodes, tets, SolidMaterial())
+    found = assemble(nodes, tets, Material())
     free = (3 * np.flatnonzero(nodes[:, 0] > 1e-9)[:, None] + np.arange(3)).ravel()
     return found.stiffness.tocsr()[free][:, free], found.mass[free][:, free]
 
@@ -55,7 +56,7 @@ def test_two_factorisations_do_not_disturb_each_other(name: str) -> None:
 def test_a_body_that_can_move_is_refused(name: str) -> None:
     if name not in installed_solvers():
         pytest.skip(f"{PACKAGES[name]} is not installed")
-    free = assemble(*box((2, 1, 1), (0.2, 0.1, 0.1)), SolidMaterial()).stiffness
+    free = assemble(*box((2, 1, 1), (0.2, 0.1, 0.1)), Material()).stiffness
     for matrix in (free, -cantilever()[0]):
         with pytest.raises(InputError, match="positive definite"):
             factorize(matrix, solver=name)
@@ -103,7 +104,7 @@ def test_lanczos_by_limit_and_to_the_last_mode() -> None:
     from scipy.linalg import eigh
 
     nodes, tets = box((2, 1, 1), (0.2, 0.1, 0.1))
-    body = assemble(nodes, tets, SolidMaterial())
+    body = assemble(nodes, tets, Material())
     free = (3 * np.flatnonzero(nodes[:, 0] > 1e-9)[:, None] + np.arange(3)).ravel()
     k, m = body.stiffness.tocsr()[free][:, free], body.mass[free][:, free]
     truth = eigh(k.toarray(), m.toarray(), eigvals_only=True)

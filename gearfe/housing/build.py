@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from ..config import load_job
+from ..elasticity import Material
 from ..errors import InputError
 from ..meshing.housing_mesh import bore_ranges, housing_mesh
 from ..progress import stage
 from ..reduction.modal_body import ModalBody
-from ..solid import SolidMaterial
 from ..tables.housing import HousingReductionTable, HousingTable
 from .attachments import PLACE_TOLERANCE, Bore
 from .meshes import Prisms
@@ -46,10 +46,10 @@ def housing_from_table(table: HousingTable, folder: str | Path = ".") -> Housing
     )
 
 
-def material(table: HousingTable) -> SolidMaterial:
+def material(table: HousingTable) -> Material:
     """The housing's material in SI units."""
     given = table.material
-    return SolidMaterial(1e9 * given.youngs_modulus_GPa, given.poisson_ratio, given.density_kg_per_m3)
+    return Material(1e9 * given.youngs_modulus_GPa, given.poisson_ratio, given.density_kg_per_m3)
 
 
 def bores(table: HousingTable) -> list[Bore]:

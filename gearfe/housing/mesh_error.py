@@ -31,7 +31,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from ..solid import EDGES, SolidMaterial, curved_elements, maps, shape_functions
+from ..elasticity import Material
+from ..solid import EDGES, curved_elements, maps, shape_functions
 from ..typing import Array, BoolArray, IntArray
 
 #: Error over what the next order's functions take one by one: 1.7 by theory, at most 2.5 measured.
@@ -48,7 +49,7 @@ _CHUNK = 1000
 
 
 def energy_lost(
-    nodes: Array, tets: IntArray, material: SolidMaterial, fields: Array, eigenvalues: Array, rigid: list[IntArray]
+    nodes: Array, tets: IntArray, material: Material, fields: Array, eigenvalues: Array, rigid: list[IntArray]
 ) -> Array:
     """Estimated energy that the mesh keeps fields from giving up, a quadratic form over them: (k, k), N m.
 
@@ -205,7 +206,7 @@ def _number(nodes: Array, tets: IntArray, rigid: list[IntArray]) -> _Numbers:
 
 
 def _straight_residual(
-    made: _Functions, material: SolidMaterial, det: Array, inverse: Array, field: Array, eigenvalues: Array
+    made: _Functions, material: Material, det: Array, inverse: Array, field: Array, eigenvalues: Array
 ) -> tuple[Array, Array]:
     """(m, s, 3, k) residuals and (m, s, 3, 3) stiffnesses of straight elements, one map each."""
     weight, inverse = det[:, 0], inverse[:, 0]
@@ -223,10 +224,10 @@ def _straight_residual(
 
 
 def _residual(
-    made: _Functions, material: SolidMaterial, det: Array, inverse: Array, field: Array, eigenvalues: Array
+    made: _Functions, material: Material, det: Array, inverse: Array, field: Array, eigenvalues: Array
 ) -> tuple[Array, Array]:
     """The same of curved elements, point by point."""
-    lam, mu = material.lame_lambda, material.shear_modulus
+    lam, mu = material.lame()
     volume = det * made.weights
     slopes = np.einsum("amp,epmj->epaj", made.slopes, inverse)
     added = np.einsum("smp,epmj->epsj", made.added_slopes, inverse)
@@ -243,10 +244,11 @@ def _residual(
     return residual, stiffness.transpose(0, 3, 1, 2)
 
 
-def _stiffness(material: SolidMaterial, gradients: Array) -> Array:
+def _stiffness(material: Material, gradients: Array) -> Array:
     """(m, 3, 3, ...) blocks of the stiffness from the integrals of d/dx_i of one function times d/dx_j of the other."""
-    blocks = material.lame_lambda * gradients + material.shear_modulus * gradients.swapaxes(1, 2)
-    total = material.shear_modulus * np.trace(gradients, axis1=1, axis2=2)
+    lam, mu = material.lame()
+    blocks = lam * gradients + mu * gradients.swapaxes(1, 2)
+    total = mu * np.trace(gradients, axis1=1, axis2=2)
     for i in range(3):
         blocks[:, i, i] += total
     return np.asarray(blocks)

@@ -12,9 +12,10 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
+from ..elasticity import Material
 from ..meshing.housing_mesh import REVERSED, Extrusion
 from ..prisms import ORDER, assemble_prisms, lagrange, triangle_rule
-from ..solid import MassRule, SolidMaterial, SolidMatrices, assemble
+from ..solid import MassRule, SolidMatrices, assemble
 from ..typing import Array, BoolArray, IntArray
 from .mesh_checks import boundary_faces
 from .mesh_error import energy_lost, energy_lost_by_element
@@ -46,7 +47,7 @@ class Tetrahedra:
     cells: IntArray
     mass_rule: MassRule = "exact"
 
-    def assemble(self, material: SolidMaterial) -> SolidMatrices:
+    def assemble(self, material: Material) -> SolidMatrices:
         """Stiffness and mass."""
         return assemble(self.nodes, self.cells, material, mass_rule=self.mass_rule)
 
@@ -56,7 +57,7 @@ class Tetrahedra:
         faces = faces[_chosen(self.nodes, faces, faces[:, :3], without, outer)]
         return Surface(faces, normal_velocity(surface_quadrature(self.nodes, faces), faces, len(self.nodes)))
 
-    def energy_lost(self, material: SolidMaterial, fields: Array, eigenvalues: Array, rigid: list[IntArray]) -> Array:
+    def energy_lost(self, material: Material, fields: Array, eigenvalues: Array, rigid: list[IntArray]) -> Array:
         """See `gearfe.housing.mesh_error.energy_lost`."""
         return energy_lost(self.nodes, self.cells, material, fields, eigenvalues, rigid)
 
@@ -90,7 +91,7 @@ class Prisms:
         wedges = np.concatenate([low, high], axis=2)  # (elements, 9, 6, 3 layers)
         return self._renumbered(wedges.transpose(0, 1, 3, 2).reshape(-1, 6))
 
-    def assemble(self, material: SolidMaterial) -> SolidMatrices:
+    def assemble(self, material: Material) -> SolidMatrices:
         """Stiffness and mass."""
         return assemble_prisms(*self.extrusion, material).matrices
 
@@ -117,7 +118,7 @@ class Prisms:
             velocities.append(normal_velocity(quadrature(self.nodes[faces]), faces, len(self.nodes)))
         return Surface(np.concatenate(triangles), sparse.csr_array(sparse.vstack(velocities)))
 
-    def energy_lost(self, material: SolidMaterial, fields: Array, eigenvalues: Array, rigid: list[IntArray]) -> Array:
+    def energy_lost(self, material: Material, fields: Array, eigenvalues: Array, rigid: list[IntArray]) -> Array:
         """See `gearfe.housing.prism_error.prism_energy_lost`."""
         return prism_energy_lost(self.extrusion, self.used, material, fields, eigenvalues, rigid)
 

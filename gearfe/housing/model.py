@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from ..elasticity import Material
 from ..errors import InputError
 from ..progress import stage
 from ..reduction.craig_bampton import Partition, partition, reduce_model
 from ..reduction.modal_body import ModalBody
 from ..shown import Facts
-from ..solid import MassRule, SolidMaterial, SolidMatrices
+from ..solid import MassRule, SolidMatrices
 from ..typing import Array, IntArray
 from .attachments import (
     Attachment,
@@ -34,7 +35,7 @@ LINEAR_NOTE = (
     "linear tetrahedra are far too stiff: natural frequencies 15-45 % too high at usual sizes; take second-order ones"
 )
 FREE_NOTE = "nothing is fixed: the housing is free and has six rigid-body modes"
-STEEL = SolidMaterial()
+STEEL = Material()
 #: Part of the largest energy below which a field is contained in the others.
 DEPENDENT = 1e-10
 #: Part of the square of the highest frequency below which a mode is a rigid motion.
@@ -66,7 +67,7 @@ class Housing(Facts):
     mesh: Tetrahedra | Prisms
     attachments: tuple[Attachment, ...]
     fixed: IntArray
-    material: SolidMaterial
+    material: Material
     surface: Surface
     original: IntArray
     notes: tuple[str, ...] = ()
@@ -88,7 +89,7 @@ class Housing(Facts):
         bores: Sequence[Bore | Sequence[Any]] = (),
         fixed: Any = None,
         *,
-        material: SolidMaterial = STEEL,
+        material: Material = STEEL,
         attachments: Sequence[Attachment] = (),
         mass: MassRule = "exact",
         outer: Outer | None = None,
@@ -148,7 +149,7 @@ class Housing(Facts):
         bores: Sequence[Bore | Sequence[Any]],
         fixed: IntArray,
         *,
-        material: SolidMaterial = STEEL,
+        material: Material = STEEL,
         attachments: Sequence[Attachment] = (),
         outer: Outer | None = None,
     ) -> Housing:

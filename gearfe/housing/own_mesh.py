@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..elasticity import Material
 from ..errors import InputError, given
 from ..meshing.mesh_file import MeshFile, read_mesh_file
-from ..solid import SolidMaterial
 from ..tables.housing import UNITS, HeldTable, HousingMeshTable, HousingTable, MeshBoreTable
 from ..typing import Array, BoolArray, IntArray
 from .attachments import RADIUS_TOLERANCE, Attachment, Bore, Plane, bore_attachment, plane_nodes
@@ -26,7 +26,7 @@ from .refinement import refined
 SIZES_MM = (2.0, 50e3)
 
 
-def own_housing(table: HousingTable, folder: Path, material: SolidMaterial) -> Housing:
+def own_housing(table: HousingTable, folder: Path, material: Material) -> Housing:
     """Housing of the mesh file that a [housing] table names; files are looked for in `folder`.
 
     Raises

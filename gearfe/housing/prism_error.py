@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..elasticity import Material
 from ..meshing.housing_mesh import Extrusion
 from ..prisms import ORDER, isotropic_blocks, lagrange, plane_parts, triangle_maps, triangle_rule
-from ..solid import SolidMaterial
 from ..typing import Array, BoolArray, IntArray
 from .mesh_error import add_up, energy_taken
 
@@ -36,7 +36,7 @@ _ALL, _FOURTH = slice(0, 5), slice(4, 5)
 
 
 def prism_energy_lost(
-    mesh: Extrusion, used: IntArray, material: SolidMaterial, fields: Array, eigenvalues: Array, rigid: list[IntArray]
+    mesh: Extrusion, used: IntArray, material: Material, fields: Array, eigenvalues: Array, rigid: list[IntArray]
 ) -> Array:
     """Estimated energy that the mesh keeps fields from giving up, a quadratic form over them: (k, k), N m.
 
@@ -227,7 +227,7 @@ class _Elements(NamedTuple):
 
 
 def _elements(
-    plane: _Plane, line: _Line, group: _Group, chosen: IntArray, half: float, material: SolidMaterial
+    plane: _Plane, line: _Line, group: _Group, chosen: IntArray, half: float, material: Material
 ) -> _Elements:
     """Matrices of the chosen triangles' elements in a layer of half the thickness `half`."""
     added = {name: part[chosen][:, group.plane] for name, part in plane.added.items()}

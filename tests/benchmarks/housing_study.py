@@ -160,7 +160,7 @@ def reference_housing(mass: Any = "4-point") -> Housing:
     """The stored mesh of `tests/data/gearbox_housing_mesh.npz` with its six bores and clamped feet."""
     import json
 
-    from gearfe.solid import SolidMaterial
+    from gearfe.elasticity import Material
 
     p = json.loads(given_file(DATA / "gearbox_housing.json").read_text(encoding="utf-8"))["params"]
     with np.load(given_file(DATA / "gearbox_housing_mesh.npz")) as stored:
@@ -171,7 +171,7 @@ def reference_housing(mass: Any = "4-point") -> Housing:
         bores += [((x, 0.0, z), (0.0, 1.0, 0.0), p["rb"], side) for side in ((inner, outer), (-outer, -inner))]
     bottom = np.abs(nodes[:, 2] - (p["z0"] - p["tb"])) < 1e-9
     feet = bottom & ((nodes[:, 0] < p["x0"] + 1e-9) | (nodes[:, 0] > p["x1"] - 1e-9))
-    return Housing.from_arrays(nodes, tets, bores, feet, material=SolidMaterial(p["E"], p["nu"], p["rho"]), mass=mass)
+    return Housing.from_arrays(nodes, tets, bores, feet, material=Material(p["E"], p["nu"], p["rho"]), mass=mass)
 
 
 def others(record: Record) -> None:
