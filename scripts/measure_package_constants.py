@@ -127,7 +127,7 @@ def gears() -> Answers:
     from gearfe.gear.iso6336 import mesh_stiffness
     from gearfe.gear.pair import Gear, GearPair
     from gearfe.gear.spur_gear import TipRelief
-    from gearfe.train.inertia import outline_moments
+    from gearfe.train.elements import outline_moments
 
     form: dict[str, Any] = {"module": 2.5e-3, "pressure_angle": np.radians(20.0), "face_width": 10e-3}
     form |= {"tip_round": 1e-4, "tip_relief": TipRelief(2e-5, 2e-3)}

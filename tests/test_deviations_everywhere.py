@@ -23,7 +23,7 @@ from gearfe.meshlaw.make import mesh_law
 from gearfe.microgeometry.solve import load_mesh
 from gearfe.rigid import constant
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
-from gearfe.train.static_error import static_errors
+from gearfe.train.statics import static_errors
 from gearfe.vibration.job import job_train, read_train_job
 from gearfe.vibration.mesh_stiffness import train_curves
 

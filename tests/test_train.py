@@ -14,7 +14,7 @@ from gearfe.errors import InputError
 from gearfe.rigid import IntegrationError, constant, integrate, smoothed_step
 from gearfe.runup.train_stability import train_stability
 from gearfe.train import Bearing, Damping, Drive, GearMesh, Load, build_train, simulate
-from gearfe.train.inertia import outline_moments
+from gearfe.train.elements import outline_moments
 from gearfe.train.kinematics import rolling, steady_forces
 from gearfe.train.states import train_states
 

@@ -14,7 +14,7 @@ from gearfe.rigid import TimeFunction, constant, integrate, smoothed_step
 from gearfe.rigid.compiled import available
 from gearfe.train import Damping, Drive, Load, build_train, simulate
 from gearfe.train.states import train_states
-from gearfe.train.static_error import static_errors
+from gearfe.train.statics import static_errors
 
 from .mesh_laws import hertzian_law
 from .trains import base_radius, curve, train

@@ -18,7 +18,7 @@ from gearfe.train.forces import LawFlank
 from gearfe.train.kinematics import driving_senses
 from gearfe.train.model import TrainModel
 from gearfe.train.phases import tooth_places
-from gearfe.train.static_error import static_errors
+from gearfe.train.statics import static_errors
 
 from .mesh_laws import hertzian_law
 from .test_train_contact import free_energy, free_pair, pair

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..train.gear_train import GearTrain
 from ..train.response import TrainResponse
-from ..train.static_error import static_errors
+from ..train.statics import static_errors
 from ..typing import Array, IntArray
 from ..vibration.analysis import Analysed
 from ..vibration.fields import frames

@@ -32,8 +32,10 @@ cubic, with continuous slope), so the law has Taylor series.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -288,3 +290,38 @@ def _at(law: MeshLaw, cell: IntArray, z: Array, F: Array) -> _Pairs:
         e[1] + f * (2 * e[2] + f * (3 * e[3] + f * 4 * e[4])),
         2 * e[2] + f * (6 * e[3] + f * 12 * e[4]),
     )
+
+
+class Laws(NamedTuple):
+    """l mesh laws, filled up to the largest, for compiled recurrences: see `MeshLaw`."""
+
+    cells: IntArray  # (l,) cells of the phase
+    parts: IntArray  # (l,) cells of the pair force
+    nodes: Array  # (l, n + 1)
+    forces: Array  # (l, m + 1)
+    touch: Array  # (l, s, n, 4)
+    energies: Array  # (l, s, n, m, 5, 4)
+    coupling: Array  # (l, s s, n, 4) lower slot times s plus upper slot
+
+
+def stacked_laws(laws: Sequence[MeshLaw]) -> Laws:
+    """Arrays of mesh laws, side by side."""
+    count, sizes = len(laws), [(law.slots, len(law.nodes) - 1, len(law.forces) - 1) for law in laws]
+    slots, cells, parts = (max((size[i] for size in sizes), default=1) for i in range(3))
+    made = Laws(
+        np.array([size[1] for size in sizes], dtype=np.int64),
+        np.array([size[2] for size in sizes], dtype=np.int64),
+        np.zeros((count, cells + 1)),
+        np.zeros((count, parts + 1)),
+        np.zeros((count, slots, cells, 4)),
+        np.zeros((count, slots, cells, parts, 5, 4)),
+        np.zeros((count, slots * slots, cells, 4)),
+    )
+    made.touch[..., 0] = NEVER
+    for i, (law, (s, n, m)) in enumerate(zip(laws, sizes, strict=True)):
+        made.nodes[i, : n + 1], made.forces[i, : m + 1] = law.nodes, law.forces
+        made.touch[i, :s, :n], made.energies[i, :s, :n, :m] = law.touch, law.energies.swapaxes(3, 4)
+        for low in range(s - 1):
+            for up in range(low + 1, s):
+                made.coupling[i, low * slots + up, :n] = law.coupling[up - low - 1, low]
+    return made

@@ -16,10 +16,9 @@ from functools import lru_cache
 from types import SimpleNamespace
 from typing import NamedTuple
 
-from ..meshlaw.law import MeshLaw
+from ..meshlaw.law import MeshLaw, stacked_laws
 from ..rigid import compiled
 from ..rigid.packed import Packed
-from ..train.arrays import law_arrays
 from ..typing import Array
 
 #: Newton steps for the pair forces, their relative change in the last one: what is left is of the order of its square.
@@ -34,7 +33,7 @@ ROWS = PART + 5
 
 
 class LawTables(NamedTuple):
-    """A mesh law, see `gearfe.train.arrays.Laws`, and its reach (m)."""
+    """A mesh law, see `gearfe.meshlaw.law.Laws`, and its reach (m)."""
 
     nodes: Array
     forces: Array
@@ -57,7 +56,7 @@ class Jets(NamedTuple):
 
 def law_tables(law: MeshLaw) -> LawTables | Packed:
     """What `law_jets` gets of a law, compiled or not."""
-    laws = law_arrays([law])
+    laws = stacked_laws([law])
     made = LawTables(laws.nodes[0], laws.forces[0], laws.touch[0], laws.energies[0], laws.coupling[0], law.reach)
     return Packed(made) if compiled.available() else made
 

@@ -11,6 +11,7 @@ where both secants have the same sign, and 0 elsewhere: no overshoot between nod
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..typing import Array
+from ..typing import Array, IntArray
 
 #: Names of the methods of interpolation.
 METHODS = ("cubic", "linear")
@@ -71,6 +72,23 @@ class PeriodicInterpolant:
         c, x = self.cubics[cell], place - nodes[cell]
         c0, c1, c2, c3 = (c[..., i] for i in range(4))
         return ValueAndSlope(c0 + x * (c1 + x * (c2 + x * c3)), c1 + x * (2.0 * c2 + x * 3.0 * c3))
+
+
+class Curves(NamedTuple):
+    """Periodic interpolants one after the other, for compiled recurrences."""
+
+    first: IntArray  # (c + 1,) first node of each
+    nodes: Array  # (all nodes,) rising phases; the last of each is its first plus the period
+    cubics: Array  # (all nodes, 4) value over the phase from each node but the last
+
+
+def curve_arrays(curves: Sequence[PeriodicInterpolant]) -> Curves:
+    """Arrays of periodic interpolants."""
+    return Curves(
+        np.cumsum([0, *(len(curve.nodes) for curve in curves)]).astype(np.int64),
+        np.concatenate([np.zeros(0), *(curve.nodes for curve in curves)]),
+        np.concatenate([np.zeros((0, 4)), *(np.vstack([curve.cubics, np.zeros(4)]) for curve in curves)]),
+    )
 
 
 def periodic_interpolant(

@@ -10,13 +10,12 @@ import numpy as np
 from ..errors import InputError, unknown_name
 from ..gear.pair import GearPair
 from ..meshlaw.law import MeshLaw
-from ..stiffness.curve import StiffnessCurve
 from ..stiffness.periodic import PeriodicInterpolant
-from .flanks import check_flanks
 from .friction import check_friction
 from .gear_train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
 from .kinematics import driving_senses
 from .phases import tooth_places
+from .statics import check_flanks
 
 #: Agreement of lengths and angles that count as equal (relative).
 SAME = 1e-6
@@ -205,7 +204,7 @@ def check_curve(mesh: GearMesh, teeth: int) -> None:
             problem = f"has a law of the back flanks with a period of {math.degrees(curve.sides[1].cycle):.9g} deg"
             raise InputError(label, None, problem, "take that of the same gears, seen from behind")
         return
-    table = interpolant(mesh)
+    table = mesh.interpolant()
     gaps = np.diff(table.nodes)
     widest = float(gaps.max()) / table.period
     if widest > max(WIDEST_GAP, 1.5 * float(np.median(gaps)) / table.period):
@@ -216,23 +215,6 @@ def check_curve(mesh: GearMesh, teeth: int) -> None:
         raise InputError(
             label, float(table.values.min()), "must be > 0 N/m everywhere", "look for positions without contact"
         )
-
-
-def interpolant(mesh: GearMesh) -> PeriodicInterpolant:
-    """The mesh's stiffness over the driver's rotation; a constant becomes a flat curve."""
-    curve = mesh.stiffness
-    if isinstance(curve, PeriodicInterpolant):
-        return curve
-    if isinstance(curve, StiffnessCurve):
-        try:
-            return curve.interpolant("k_mesh", method=mesh.interpolation)
-        except InputError as error:
-            raise InputError(f"mesh {mesh.name!r} stiffness", error.value, error.problem, error.cure) from None
-    assert not isinstance(curve, MeshLaw)
-    flat = 0.0 if curve is None else float(curve)
-    return PeriodicInterpolant(
-        2 * math.pi, np.array([0.0, 2 * math.pi]), np.array([[flat, 0.0, 0.0, 0.0]]), np.zeros(0)
-    )
 
 
 def shaft_distance(train: GearTrain, one: str, two: str) -> float:

@@ -5,6 +5,7 @@ All shafts are parallel to one unit vector `axis`; angles, speeds and torques co
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -127,6 +128,21 @@ class GearMesh:
     def name(self) -> str:
         """``driver-driven``."""
         return f"{self.driver}-{self.driven}"
+
+    def interpolant(self) -> PeriodicInterpolant:
+        """Stiffness over the driver's rotation, of a mesh without a law; a constant becomes a flat curve."""
+        curve = self.stiffness
+        if isinstance(curve, StiffnessCurve):
+            try:
+                return curve.interpolant("k_mesh", method=self.interpolation)
+            except InputError as error:
+                raise InputError(f"mesh {self.name!r} stiffness", error.value, error.problem, error.cure) from None
+        if isinstance(curve, float | int):
+            flat = np.array([[float(curve), 0.0, 0.0, 0.0]])
+            return PeriodicInterpolant(2 * math.pi, np.array([0.0, 2 * math.pi]), flat, np.zeros(0))
+        if not isinstance(curve, PeriodicInterpolant):
+            raise InputError(f"mesh {self.name!r} stiffness", None, "is no curve", "ask its law, or give it a curve")
+        return curve
 
 
 @dataclass(frozen=True)

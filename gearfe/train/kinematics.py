@@ -82,6 +82,11 @@ def rolling(train: GearTrain) -> Rolling:
     return Rolling(tuple(known[s.name] for s in train.shafts), cycles, common, note)
 
 
+def shaft_ratios(train: GearTrain) -> dict[str, Fraction]:
+    """Shaft -> its speed for unit speed of the drive."""
+    return dict(zip((s.name for s in train.shafts), rolling(train).ratios, strict=True))
+
+
 def mesh_phases(cycles: Sequence[Fraction], most: int) -> list[tuple[Fraction, list[int]]]:
     """Meshes in groups that are each in phase again after no more than `most` cycles of their fastest.
 
@@ -164,7 +169,7 @@ def driving_senses(train: GearTrain) -> tuple[float, ...]:
 
     Where the drive stands still, the loads tell it.
     """
-    ratios = dict(zip((s.name for s in train.shafts), rolling(train).ratios, strict=True))
+    ratios = shaft_ratios(train)
     made = tuple(math.copysign(1.0, ratios[train.gear(mesh.driver).shaft]) for mesh in train.meshes)
     sense = drive_sense(train.driven.speed)
     if sense == 0.0:

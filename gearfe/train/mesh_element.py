@@ -33,7 +33,6 @@ from ..meshlaw.law import MeshLaw
 from ..rigid import Element, LinearJoint
 from ..stiffness.periodic import PeriodicInterpolant
 from ..typing import Array, IntArray
-from .checks import interpolant
 from .elements import LinearForce, RigidShaft
 from .forces import CurveFlank, Flank, LawFlank
 from .friction import CREEP, NEAR, Lubrication, Sliding
@@ -247,7 +246,7 @@ def mesh_line(train: GearTrain, mesh: GearMesh, shafts: Shafts, running: Operati
         if backlash is None and law.backlash > 0.0:
             backlash = law.backlash
     elif mesh.stiffness is not None:
-        curve = interpolant(mesh)
+        curve = mesh.interpolant()
         mean = curve.mean
     turn[first[i] + 5] += 1.0
     if mesh.stiffness is not None:

@@ -22,10 +22,9 @@ from ..rigid.elimination import ModalCoordinates, modal_coordinates
 from ..shown import Facts
 from ..typing import Array, IntArray
 from .checks import check_train
-from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge
+from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge, rotor
 from .forces import Flank, Gyro, TrainForces, derivative
 from .gear_train import Drive, GearTrain
-from .inertia import rotor
 from .kinematics import Rolling, driving_senses, fastest, load_end, rolling, steady_forces
 from .mesh_element import MeshLine, OperatingPoint, Shafts, mesh_line
 from .phases import pair_shifts, tooth_places
@@ -149,14 +148,13 @@ def on_body(model: TrainModel, body: ModalBody) -> TrainModel:
 def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel:
     """The model of a train that is checked; `lines` are its meshes where they are known."""
     kinematics = rolling(train)
-    frame = train.frame
     angle = train.driven.speed.integral(0.0, 0.0)
     housing = _housing(train)
     ratios = [float(r) for r in kinematics.ratios]
     begin = float(train.driven.speed(0.0))
     shafts = tuple(
         RigidShaft(
-            rotor(shaft, tuple(g for g in train.gears if g.shaft == shaft.name), frame[2]),
+            rotor(train, shaft),
             0.0 if shaft.initial_speed is None else shaft.initial_speed - g * begin,
             name=f"shaft {shaft.name}",
         )

@@ -17,9 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..meshlaw.law import Laws, stacked_laws
 from ..rigid.tables import Times, time_arrays
+from ..stiffness.periodic import Curves, curve_arrays
 from ..typing import Array, IntArray
-from .arrays import Curves, Laws, curve_arrays, law_arrays
 from .forces import CurveFlank, Flank, LawFlank, TrainForces
 
 Row = tuple[tuple[int, ...], tuple[float, ...]]
@@ -165,7 +166,7 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
             made.after.append(Operation(row, A=momentum, B=rate))
             made.force(tilt, row, sign)
     laws = {id(flank.law): flank.law for flank in forces.contacts}
-    tables = law_arrays(list(laws.values()))
+    tables = stacked_laws(list(laws.values()))
     first, rows, pieces = [], [], []
     slides: list[int] = []
     flanks: tuple[Flank, ...] = (*forces.curves, *forces.contacts)

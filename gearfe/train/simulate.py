@@ -16,12 +16,12 @@ from ..progress import count, stage
 from ..record_spectrum import FASTEST, OVERSAMPLING
 from ..rigid import IntegrationError, Start, Status, Trajectory, integrate
 from ..typing import Array
-from .flanks import NONE
 from .kinematics import steady_forces
 from .model import TrainModel
 from .parting import Parting, apart_in_steps, beyond_law, parted
 from .response import TrainResponse, joined
 from .states import TrainStates, train_states
+from .statics import NONE
 
 #: The finer run shares a little of the error; with this factor the estimate covers it.
 SAFETY = 1.5

@@ -93,11 +93,10 @@ class Analysis:
         self.table, self.train, self.every, self.start = job.spectrum, train, every, start
         self._step = 1e-6 * job.table.step_us
         self.measured = read_measured(job)
-        ratios = dict(zip((s.name for s in train.shafts), rolling(train).ratios, strict=True))
+        turning = rolling(train)
         #: turns of the first shaft for one of the drive
-        self.ratio = float(ratios[train.shafts[0].name])
-        cycles = [abs(ratios[train.gear(m.driver).shaft]) * train.gear(m.driver).gear.teeth for m in train.meshes]
-        self.mesh_orders = np.array([float(c) for c in cycles]) / abs(self.ratio)
+        self.ratio = float(turning.ratios[0])
+        self.mesh_orders = np.array([float(c) for c in turning.cycles]) / abs(self.ratio)
         self._tracked: Tracked | None = None
         if self.table.short_time_ms is not None:  # told before the long computation
             check_part(1e-3 * self.table.short_time_ms, self._step, float(job.times[-1]))

@@ -21,7 +21,7 @@ from ..gear.spur_gear import Gear
 from ..output.vtkhdf import VtkHdfSeries
 from ..reduction.modal_body import ModalBody
 from ..train.gear_train import GearTrain, ShaftGear
-from ..train.kinematics import driving_senses, rolling
+from ..train.kinematics import driving_senses, shaft_ratios
 from ..train.phases import tooth_places
 from ..train.response import TrainResponse
 from ..typing import Array, IntArray
@@ -117,8 +117,7 @@ def moved(solid: Solid, response: TrainResponse, frame: Array, step: int, exagge
 
 def rolled(solid: Solid, train: GearTrain, response: TrainResponse, step: int) -> Array:
     """(n, 3) points of a surface at an output step, had all shafts only rolled with the drive: no vibration."""
-    shafts = [shaft.name for shaft in train.shafts]
-    ratio = float(rolling(train).ratios[shafts.index(train.gears[solid.gear].shaft)])
+    ratio = float(shaft_ratios(train)[train.gears[solid.gear].shaft])
     centre = response.gear_centres[solid.gear]
     return np.asarray(
         centre + _turned(solid.points - centre, train.frame[2], ratio * float(response.drive_angle[step]))

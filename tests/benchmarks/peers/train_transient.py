@@ -20,7 +20,7 @@ import numpy as np
 from gearfe.rigid.kernel_rows import time_series
 from gearfe.rigid.packed import Packed
 from gearfe.rigid.tables import Times, time_arrays
-from gearfe.train.arrays import Curves, curve_arrays
+from gearfe.stiffness.periodic import Curves, curve_arrays
 
 from ..subject import train_model, train_times
 from ..timing import measured

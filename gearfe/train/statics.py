@@ -1,12 +1,15 @@
-"""Which flanks bear: the loads of a train must press the driving flanks of every mesh together.
+"""Statics of a train: which flanks bear, and the static transmission error.
 
-A mesh has the curve of its driving flanks only. By statics at each time, inertia of the rolling shafts included, a mesh
-force below 0 means that the back flanks bear: a torque of the wrong sign, or a mesh whose driven gear drives.
+The loads must press the driving flanks of every mesh together, for a mesh has the curve of its driving flanks only. By
+statics at each time, inertia of the rolling shafts included, a mesh force below 0 means that the back flanks bear: a
+torque of the wrong sign, or a mesh whose driven gear drives. The static transmission error is the approach of a mesh
+that carries its steady force while the gears roll slowly.
 """
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -14,9 +17,18 @@ import numpy as np
 from ..errors import InputError
 from ..meshlaw.law import MeshLaw
 from ..typing import Array, BoolArray
-from .gear_train import GearTrain
-from .inertia import rotor
-from .kinematics import balanced_forces, drive_sense, driving_senses, load_torques, rolling
+from .elements import rotor
+from .gear_train import GearMesh, GearTrain
+from .kinematics import (
+    balanced_forces,
+    drive_sense,
+    driving_senses,
+    load_torques,
+    rolling,
+    shaft_ratios,
+    steady_forces,
+)
+from .phases import pair_shifts, tooth_places
 
 #: Times looked at in each piece of the loads and of the drive.
 LOOKS = 64
@@ -62,10 +74,8 @@ def _times(train: GearTrain) -> Array:
 def _inertia(train: GearTrain, times: Array) -> Array:
     """Torque of inertia of each shaft as it rolls with the drive (N m), shape (shafts, times)."""
     push = replace(train.driven.speed, sines=())(times, 1)
-    axis = train.frame[2]
-    polar = [rotor(s, tuple(g for g in train.gears if g.shaft == s.name), axis).polar for s in train.shafts]
-    ratios = [float(r) for r in rolling(train).ratios]
-    return -np.outer(np.multiply(polar, ratios), push)
+    polar = [rotor(train, shaft).polar for shaft in train.shafts]
+    return -np.outer(np.multiply(polar, [float(r) for r in rolling(train).ratios]), push)
 
 
 def _back_flank_error(train: GearTrain, number: int, time: float, senses: tuple[float, ...]) -> InputError:
@@ -77,8 +87,7 @@ def _back_flank_error(train: GearTrain, number: int, time: float, senses: tuple[
     ]
     load = train.loads[int(np.argmin(alone))]
     torque = float(replace(load.torque, sines=())(time))
-    ratios = dict(zip((s.name for s in train.shafts), rolling(train).ratios, strict=True))
-    speed = float(ratios[load.shaft]) * drive_sense(train.driven.speed)
+    speed = float(shaft_ratios(train)[load.shaft]) * drive_sense(train.driven.speed)
     when = f" at {1e3 * time:.4g} ms" if time > 0.0 else ""
     force = f"by statics the force of mesh {mesh.name!r} is {min(alone):.6g} N{when}"
     flanks = f"it would press the back flanks, whose stiffness is not known: {force}"
@@ -92,3 +101,50 @@ def _back_flank_error(train: GearTrain, number: int, time: float, senses: tuple[
         problem = f"brakes, but gear {mesh.driven!r} drives gear {mesh.driver!r}; {flanks}"
         cure = f"exchange driver and driven of mesh {mesh.name!r}, or change the sign of the torque"
     return InputError(f"load on {load.shaft!r} torque_Nm", torque, problem, cure)
+
+
+def static_errors(train: GearTrain, angle: Array) -> tuple[Array | None, ...]:
+    """Approach of each mesh (m) at rotations of the drive (rad), bodies rolling rigidly; None where nothing yields.
+
+    A force that presses the back flanks makes the mirrored approach behind the backlash. None also where a force is
+    beyond what a law is known for, or presses flanks of which nothing is known.
+    """
+    senses, ratios = driving_senses(train), shaft_ratios(train)
+    places = tooth_places(train, senses)
+    made: list[Array | None] = []
+    for mesh, sense, phase, force in zip(
+        train.meshes, senses, places.phases, steady_forces(train).tolist(), strict=True
+    ):
+        ratio = float(ratios[train.gear(mesh.driver).shaft])
+        shifts = pair_shifts(train, mesh, sense, places)
+        made.append(_approach(mesh, force, sense * ratio * angle + phase, shifts))
+    return tuple(made)
+
+
+def _approach(mesh: GearMesh, force: float, phase: Array, shifts: tuple[Array, Array]) -> Array | None:
+    law, gap = mesh.stiffness, mesh.backlash
+    if law is None:
+        return None
+    if isinstance(law, MeshLaw):
+        gap = law.backlash or None if gap is None else gap
+        if force < 0.0 and gap is None:
+            return None
+        side = 0 if force >= 0.0 else 1
+        acting, own = law.sides[side], shifts[side]
+
+        def late(x: Array) -> Array:
+            return np.asarray(own[acting.pair_numbers(x) % len(own)])
+
+        place = phase if force >= 0.0 else -phase
+        if (abs(force) > acting.most(place, late(place))).any():
+            return None
+        return _side(lambda x: acting.approach(x, abs(force), late(x)), phase, force, gap)
+    curve = mesh.interpolant()
+    if gap is None:  # a spring that acts both ways
+        return force / np.asarray(curve(phase).value)
+    return _side(lambda x: abs(force) / np.asarray(curve(x).value), phase, force, gap)
+
+
+def _side(approach: Callable[[Array], Array], phase: Array, force: float, gap: float | None) -> Array:
+    """The approach of the flanks that the force presses."""
+    return approach(phase) if force >= 0.0 or gap is None else -gap - approach(-phase)
