@@ -87,8 +87,8 @@ def as_numbers(cells: Iterable[Any]) -> Array:
     return values.astype(object)
 
 
-def library(name: str, extra: str = "study") -> Any:
-    """A library of an extra.
+def library(name: str) -> Any:
+    """A library of the extra ``study``.
 
     Raises
     ------
@@ -98,4 +98,4 @@ def library(name: str, extra: str = "study") -> Any:
     try:
         return importlib.import_module(name)
     except ImportError:
-        raise MissingLibraryError(f"{name} is not installed: pip install 'gearfe[{extra}]'") from None
+        raise MissingLibraryError(f"{name} is not installed: pip install 'gearfe[study]'") from None

@@ -12,10 +12,10 @@ from . import __version__
 PACKAGES = ("numpy", "scipy", "gmsh")
 
 
-def versions() -> dict[str, str]:
-    """Versions of this program, of Python and of the packages that decide the numbers."""
+def versions(packages: tuple[str, ...] = PACKAGES) -> dict[str, str]:
+    """Versions of this program, of Python and of packages, by default those that decide the numbers."""
     found = {"gearfe": __version__, "python": platform.python_version()}
-    return found | {name: _version(name) for name in PACKAGES}
+    return found | {name: _version(name) for name in packages}
 
 
 @functools.cache  # looks through all packages

@@ -13,7 +13,7 @@ import pytest
 from gearfe import LoadMap, StiffnessCurve, sweep_loads, sweep_stiffness
 from gearfe.cli import main
 from gearfe.errors import InputError
-from gearfe.loadmap.root_map import RootMap
+from gearfe.loadmap.load_map import RootMap
 from gearfe.stiffness.sweep import elastic_pair
 from gearfe.vibration.job import read_train_job
 from gearfe.vibration.mesh_stiffness import train_curves

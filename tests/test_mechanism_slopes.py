@@ -14,7 +14,7 @@ from gearfe.cli import main
 from gearfe.errors import InputError
 from gearfe.mechanisms import sensitivities, sweep
 from gearfe.mechanisms.sensitivity import extrapolated
-from gearfe.study.answer import Answer
+from gearfe.study.expressions import Answer
 from gearfe.study.kinds import Shared, solve
 from gearfe.tables.mechanism import RunTable
 

@@ -92,7 +92,7 @@ def test_the_report_holds_the_run_and_opens_offline(tmp_path, capsys):
     assert page.count("<img") == 1
     assert not re.search(r"(?:src|href)=\"(?!data:|#)", page)
     first = out.splitlines()[0]
-    for part in (first, "pair.face_width_mm=12", "[pair.pinion]", "k_mesh_N_per_m", "numpy", "Python"):
+    for part in (first, "pair.face_width_mm=12", "[pair.pinion]", "k_mesh_N_per_m", "numpy", "python"):
         assert part in page, part
     # a later run that asks for no report leaves no old one beside its tables
     told(capsys, "stiffness", JOB, "--out", str(tmp_path), *COARSE, "--no-pictures")

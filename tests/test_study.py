@@ -13,9 +13,8 @@ from scipy.stats import norm, qmc, sobol_indices, truncnorm
 from gearfe.config import build, read_toml, set_key
 from gearfe.errors import InputError
 from gearfe.expressions import syntax
-from gearfe.study.answer import Answer
 from gearfe.study.design import saltelli, study_cases
-from gearfe.study.expressions import value_of
+from gearfe.study.expressions import Answer, value_of
 from gearfe.study.job import read_study, run_study
 from gearfe.study.parameters import read_parameters
 from gearfe.study.statistics import pareto_set, proportion, spread

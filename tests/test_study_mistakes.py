@@ -122,7 +122,7 @@ def test_texts_of_a_job_need_not_be_names_of_files(tmp_path):
     path, base = written(tmp_path, cases=2), tmp_path / "base.toml"
     base.write_text(base.read_text().replace('"x(a)"', '"x(a)' + " + 0.0" * 60 + '"'))
     made = run_study(read_study(path), tmp_path / "out", jobs=1)
-    assert list(made.columns["status"]) == ["done", "done"]
+    assert list(made.cells["status"]) == ["done", "done"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="locks of a folder are POSIX")

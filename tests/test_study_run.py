@@ -139,10 +139,10 @@ def test_cases_without_an_answer_are_rows(tmp_path):
     text = path.read_text().replace("bodies.a.position_m.1 = {", "bodies.a.mass_kg = {")  # negative in half the cases
     path.write_text(text)
     made = run_study(read_study(path), tmp_path, jobs=1)
-    bad = [i for i, status in enumerate(made.columns["status"]) if status == "invalid"]
-    masses = np.array([float(cell) for cell in made.columns["bodies.a.mass_kg"]])
+    bad = [i for i, status in enumerate(made.cells["status"]) if status == "invalid"]
+    masses = np.array([float(cell) for cell in made.cells["bodies.a.mass_kg"]])
     assert bad == np.flatnonzero(masses <= 0.0).tolist() != []
-    assert all("bodies.a.mass_kg" in made.columns["message"][i] for i in bad)
+    assert all("bodies.a.mass_kg" in made.cells["message"][i] for i in bad)
     assert np.isnan(made.output("y")[bad]).all()
 
 
@@ -219,7 +219,7 @@ def test_a_train_in_a_rigid_housing(tmp_path):
     raw["study"]["outputs"] = {"force": "max(contact_force_1_N)"}
     (tmp_path / "study.toml").write_text(toml_document(raw))
     short = run_study(read_study(tmp_path / "study.toml"), tmp_path, jobs=1, restart=True)
-    assert list(short.columns["status"]) == ["done", "done"]
+    assert list(short.cells["status"]) == ["done", "done"]
 
 
 def test_command_leaves_tables_and_pictures(tmp_path, capsys):

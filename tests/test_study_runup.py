@@ -37,7 +37,7 @@ def test_a_run_up_in_a_study(tmp_path):
     job = tmp_path / "study.toml"
     job.write_text(SMALL.replace("stiffness_N_per_m = 1e8", 'curve = "k.csv"') + STUDY)
     made = run_study(read_study(job), tmp_path, jobs=1)
-    assert list(made.columns["status"]) == ["done", "done"]
+    assert list(made.cells["status"]) == ["done", "done"]
     out = tmp_path / "out"
     keys = ["--set", "train.damping.ratio=0.05"]
     assert main(["runup", str(job), "--out", str(out), "--no-pictures", *keys]) == 0

@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..output.files import output_folder, whole_set, write_json
     from ..progress import Stopwatch
-    from ..study.report import report_lines
+    from ..study.statistics import report_lines
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     folder = output_folder(args.out)
@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     bad, warnings = int((~made.done).sum()), []
     if bad:
         first = next(i for i, good in enumerate(made.done) if not good)
-        example = f"case {made.columns['case'][first]}: {made.columns['message'][first]}"
+        example = f"case {made.cells['case'][first]}: {made.cells['message'][first]}"
         warnings.append(f"{bad} of {len(made.done)} cases are not solved wholly; {example}")
     tell(report_lines(summary), folder, names, watch.seconds, warnings)
     return 1 if bad else 0

@@ -49,7 +49,7 @@ def study_picture(result: StudyResult, title: str = "") -> Any:
 
     Without a parameter that is a number: against the number of the case.
     """
-    parameters = result.numbers() or {"case": np.array([float(cell) for cell in result.columns["case"]])}
+    parameters = result.numbers() or {"case": np.array([float(cell) for cell in result.cells["case"]])}
     outputs, limits = _outputs(result), result.table.limits
     names, rows = list(parameters)[:MOST], list(outputs)[:MOST]
     figure = new_figure(1.2 + 2.6 * len(names), 0.9 + 2.1 * len(rows))

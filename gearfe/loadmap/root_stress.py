@@ -31,7 +31,7 @@ from ..contact.position import FlankLoads, Positions
 from ..gear.pair import Gear
 from ..meshing.tooth_sector import SectorRecipe, sector_mesh, sector_recipes
 from ..typing import Array, IntArray
-from .root_map import RootMap
+from .load_map import RootMap
 
 #: Element size of the coarser mesh: times the smallest radius of curvature of the fillet, and at most times the module.
 SIZE_OF_RADIUS, SIZE_OF_MODULE = 0.25, 0.06

@@ -8,14 +8,14 @@ import math
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from ..typing import Array
+from ..versions import versions
 
-#: Libraries whose versions decide numbers.
-LIBRARIES = ("gearfe", "numpy", "scipy", "scikit-fem", "gmsh", "meshio", "numba", "h5py", "matplotlib", "pyvista")
+#: Libraries whose versions are told.
+LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "meshio", "numba", "h5py", "matplotlib", "pyvista")
 #: Rows that are shown of a table, entries of a list, and pictures' kinds.
 ROWS, ENTRIES = 10, 12
 PICTURES = {".png": "image/png", ".gif": "image/gif", ".svg": "image/svg+xml"}
@@ -80,7 +80,7 @@ def report_page(report: Report, made: str) -> str:
         "Numbers": _mapping(report.summary),
         "Tables": "".join(_table(name, columns) for name, columns in report.tables.items()),
         "Job": f"<p>{html.escape(report.job[0])}</p><pre>{html.escape(report.job[1])}</pre>" if report.job[1] else "",
-        "Versions": _mapping(versions()),
+        "Versions": _mapping({**versions(LIBRARIES), "system": f"{platform.system()} {platform.machine()}"}),
     }
     parts = {name: text for name, text in parts.items() if text}
     links = "".join(f'<a href="#{name.lower()}">{name}</a>' for name in parts)
@@ -92,17 +92,6 @@ def report_page(report: Report, made: str) -> str:
         f'<p class="under">{html.escape(made)} &middot; <code>{html.escape(report.command)}</code></p>'
         f"<nav>{links}</nav>\n{body}</body></html>\n"
     )
-
-
-def versions() -> dict[str, str]:
-    """Versions of what computed, and the machine."""
-    found = {}
-    for name in LIBRARIES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "not installed"
-    return {**found, "Python": platform.python_version(), "system": f"{platform.system()} {platform.machine()}"}
 
 
 def _figure(path: Path) -> str:

@@ -18,8 +18,7 @@ from ..config import set_key
 from ..errors import InputError
 from ..expressions import syntax
 from ..threads import one_thread
-from .answer import Answer
-from .expressions import value_of
+from .expressions import Answer, value_of
 from .kinds import Shared, solve
 
 #: Of a row: solved; solved in part, the message says what failed; refused, as the job's command would; an error of

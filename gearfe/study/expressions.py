@@ -1,4 +1,4 @@
-"""Outputs of a study: arithmetic over the columns and the summary of a job, parsed here and never run as code.
+"""What one case of a study gives, and outputs: arithmetic over its columns and its summary, never run as code.
 
 The syntax is Python's: names of columns of the job's main table, ``table.column`` for the others, ``summary.key.key``,
 numbers, ``+ - * / **``, comparisons, ``&`` and ``|`` between them, ``[...]`` with a number, a text or a comparison, and
@@ -10,13 +10,13 @@ from __future__ import annotations
 import ast
 import operator
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, unknown_name
 from ..shown import as_numbers
-from .answer import Answer
 
 #: Functions of numbers and columns; gaps of a column (not-a-number) are left out.
 FUNCTIONS: dict[str, Callable[..., Any]] = {
@@ -51,6 +51,30 @@ _OPERATORS: dict[type, Callable[[Any, Any], Any]] = {
     ast.USub: lambda x, _: -x,
     ast.UAdd: lambda x, _: x,
 }
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Tables and summary of a job, as its command writes them.
+
+    Attributes
+    ----------
+    tables
+        Name -> column -> values; the first one is the main table.
+    summary
+        Content of the job's summary.
+    problem
+        What did not work though the job has an answer: positions that failed, a run that ended early; else empty.
+    """
+
+    tables: Mapping[str, Mapping[str, Any]]
+    summary: Mapping[str, Any]
+    problem: str = ""
+
+    def names(self) -> dict[str, Any]:
+        """Everything that an output may name: columns of the main table, tables, summary."""
+        main = next(iter(self.tables.values()), {})
+        return {**main, **self.tables, "summary": self.summary}
 
 
 def value_of(tree: ast.expr, answer: Answer, label: str) -> float:

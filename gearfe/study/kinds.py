@@ -21,7 +21,7 @@ from ..gear.deviation import NOMINAL
 from ..progress import Stopwatch
 from ..tables.loadmap import LoadMapTable
 from ..textfile import read_csv
-from .answer import Answer
+from .expressions import Answer
 
 if TYPE_CHECKING:
     from ..stiffness.job import Keep

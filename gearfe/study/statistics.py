@@ -1,4 +1,4 @@
-"""What many cases say: quantiles, yield, sensitivities, Sobol's indices, the Pareto set."""
+"""What many cases say: quantiles, yield, sensitivities, Sobol's indices, the Pareto set; and the lines to print."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..output.files import whole_file
-from ..shown import Shown, as_numbers, library
+from ..shown import ShownTable, as_numbers, library
 from ..tables.study import LimitTable, StudyTable
 from ..typing import Array, BoolArray, IntArray
 from .case import DONE
@@ -22,26 +22,32 @@ QUANTILES, CONFIDENCE = (0.05, 0.25, 0.5, 0.75, 0.95), 0.95
 
 
 @dataclass(frozen=True, repr=False)
-class StudyResult(Shown):
+class StudyResult(ShownTable):
     """Rows of a study, sorted by case.
 
     Attributes
     ----------
     table
         [study].
-    columns
+    cells
         Column -> its cells as text, as in ``study.csv``.
     base
         Outputs of the base job.
     """
 
     table: StudyTable
-    columns: Mapping[str, Sequence[str]]
+    cells: Mapping[str, Sequence[str]]
     base: Mapping[str, float]
+
+    AXES = ("case",)
+
+    def columns(self) -> Mapping[str, Sequence[str]]:
+        """The rows as they stand in ``study.csv``."""
+        return self.cells
 
     def facts(self) -> dict[str, str]:
         """Cases, and what they say of each output."""
-        made = {"cases": f"{len(self.columns['case'])}, {int(self.done.sum())} solved"}
+        made = {"cases": f"{len(self.cells['case'])}, {int(self.done.sum())} solved"}
         made["parameters"] = ", ".join(self.parameters)
         for name in self.table.outputs:
             found = self.output(name)[self.done]
@@ -52,20 +58,20 @@ class StudyResult(Shown):
     @property
     def parameters(self) -> tuple[str, ...]:
         """Dotted names of the parameters."""
-        return tuple(self.columns)[1 : -3 - len(self.table.outputs)]
+        return tuple(self.cells)[1 : -3 - len(self.table.outputs)]
 
     @property
     def done(self) -> BoolArray:
         """(n,) cases that were solved wholly."""
-        return np.array([status == DONE for status in self.columns["status"]])
+        return np.array([status == DONE for status in self.cells["status"]])
 
     def output(self, name: str) -> Array:
         """(n,) values of an output, not-a-number where a case has none."""
-        return np.array([float(cell) for cell in self.columns[name]])
+        return np.array([float(cell) for cell in self.cells[name]])
 
     def numbers(self) -> dict[str, Array]:
         """(n,) values of the parameters that are numbers and vary."""
-        every = {name: as_numbers(self.columns[name]) for name in self.parameters}
+        every = {name: as_numbers(self.cells[name]) for name in self.parameters}
         return {name: x.astype(float) for name, x in every.items() if x.dtype != object and x.size and np.ptp(x) > 0}
 
     @property
@@ -102,9 +108,9 @@ class StudyResult(Shown):
                 outputs[name]["morris"] = self.morris(name)
         made: dict[str, Any] = {
             "cases": len(done),
-            "statuses": dict(Counter(self.columns["status"])),
+            "statuses": dict(Counter(self.cells["status"])),
             "outputs": outputs,
-            "seconds_of_all_cases": float(sum(float(cell) for cell in self.columns["seconds"])),
+            "seconds_of_all_cases": float(sum(float(cell) for cell in self.cells["seconds"])),
         }
         if self.table.limits:
             made["yield"] = proportion(int(self.good.sum()), int(done.sum()))
@@ -175,7 +181,7 @@ class StudyResult(Shown):
         d, values = len(self.parameters), self.output(name)
         if not (self.done & np.isfinite(values)).all():
             return None
-        cells = np.array([self.columns[one] for one in self.parameters], dtype=object).T.reshape(-1, d + 1, d)
+        cells = np.array([self.cells[one] for one in self.parameters], dtype=object).T.reshape(-1, d + 1, d)
         changes = np.diff(values.reshape(-1, d + 1), axis=1)
         moved = cells[:, 1:] != cells[:, :-1]  # (trajectories, steps, parameters): one each
         numbers = [_number(cell) for cell in cells.ravel()]
@@ -191,20 +197,11 @@ class StudyResult(Shown):
             }
         return entries
 
-    def to_pandas(self) -> Any:
-        """The rows as a `pandas.DataFrame`: numbers where all cells of a column are."""
-        return library("pandas").DataFrame({name: as_numbers(cells) for name, cells in self.columns.items()})
-
-    def to_xarray(self) -> Any:
-        """The rows as an `xarray.Dataset` over the dimension ``case``."""
-        made = {name: ("case", as_numbers(cells)) for name, cells in self.columns.items() if name != "case"}
-        return library("xarray").Dataset(made, coords={"case": as_numbers(self.columns["case"])})
-
     def to_parquet(self, path: str | Path) -> None:
         """Write the rows as an Apache Parquet file, whole or not at all."""
         pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
         with whole_file(path) as temporary:
-            parquet.write_table(pyarrow.table({n: as_numbers(cells) for n, cells in self.columns.items()}), temporary)
+            parquet.write_table(pyarrow.table({n: as_numbers(cells) for n, cells in self.cells.items()}), temporary)
 
 
 def _number(cell: str) -> float:
@@ -283,3 +280,51 @@ def pareto_set(values: Array) -> IntArray:
         if not kept or not ((others <= values[row]).all(axis=1) & (others < values[row]).any(axis=1)).any():
             kept.append(int(row))
     return np.array(sorted(kept), dtype=np.int64)
+
+
+def report_lines(summary: Mapping[str, Any]) -> list[str]:
+    """What the command tells of a study."""
+    statuses = ", ".join(f"{n} {status}" for status, n in summary["statuses"].items())
+    lines = [f"{summary['cases']} cases: {statuses}; {summary['seconds_of_all_cases']:.3g} s of work"]
+    for name, one in summary["outputs"].items():
+        if not one["solved"]:
+            lines.append(f"{name}: no case has a value")
+            continue
+        low, middle, high = (one["quantiles"][key]["value"] for key in ("5 %", "50 %", "95 %"))
+        lines.append(f"{name}: base {one['base']:.5g}; median {middle:.5g}, 90 % of the cases {low:.5g} to {high:.5g}")
+        if "yield" in one:
+            lines.append(f"  within its limits: {_share(one['yield'])}")
+        lines += _effects(one)
+    if "yield" in summary:
+        lines.append(f"within all limits: {_share(summary['yield'])}")
+    if "pareto_cases" in summary:
+        cases = summary["pareto_cases"]
+        shown = ", ".join(map(str, cases[:12])) + (" ..." if len(cases) > 12 else "")
+        lines.append(f"Pareto set: {len(cases)} cases ({shown})")
+    return lines
+
+
+def _effects(one: Mapping[str, Any]) -> list[str]:
+    morris = one.get("morris")
+    if morris:
+        sizes = sorted(morris.items(), key=lambda item: -item[1]["mean_size"])
+        parts = [f"{name} {e['mean_size']:.3g} (deviation {e['deviation']:.2g})" for name, e in sizes[:4]]
+        return ["  elementary effects, mean size: " + ", ".join(parts)]
+    sobol, change = one.get("sobol"), one["effects"]["change"]
+    if sobol:
+        totals = sorted(sobol["total_order"].items(), key=lambda item: -item[1])
+        parts = [f"{name} {sobol['first_order'][name]:.2g} ({total:.2g})" for name, total in totals[:4]]
+        return ["  Sobol's indices, first order (total): " + ", ".join(parts)]
+    if not change:
+        return []
+    largest = sorted(change.items(), key=lambda item: -abs(item[1]))[:4]
+    parts = [f"{name} {value:+.3g}" for name, value in largest]
+    return [f"  change over a parameter's range: {', '.join(parts)} (linear, R2 {one['effects']['explained']:.2f})"]
+
+
+def _share(found: Mapping[str, Any]) -> str:
+    if found["share"] is None:
+        return "no case is solved"
+    low, high = found["interval"]
+    share = f"{found['good']} of {found['cases']}, {100 * found['share']:.3g} %"
+    return f"{share} (95 % interval {100 * low:.3g} to {100 * high:.3g} %)"
