@@ -15,10 +15,8 @@ from ..runup.report import orders, waterfall
 from ..runup.results import SteadyState
 from ..runup.run_up import RunUp
 from ..typing import Array
-from .style import BLUE, COLOURS, GREY, RED, new_figure, on_white, save, tidy
+from .style import BLUE, COLOURS, GREY, RANGE_DB, RED, REFERENCE, level, new_figure, on_white, save, single
 
-#: Reference of the levels of accelerations (m/s2), ISO 1683.
-REFERENCE = 1e-6
 #: Width of an order's name, in parts of the axis.
 ROOM = 0.045
 
@@ -45,8 +43,8 @@ def signal_of(run: RunUp, bore: int) -> Signal:
     """Acceleration at an attachment; in a housing that does not move, the contact force of the first mesh."""
     if any(s.acceleration.any() for s in run.states):
         name = f"Normal acceleration at attachment {run.train.model.bores[bore]}"
-        level = "level of the acceleration  (dB re 1 µm/s²)"
-        return Signal(name, "m/s²", REFERENCE, level, lambda s: np.abs(s.acceleration[:, bore]))
+        label = "level of the acceleration  (dB re 1 µm/s²)"
+        return Signal(name, "m/s²", REFERENCE, label, lambda s: np.abs(s.acceleration[:, bore]))
     name = f"Contact force of mesh 1 ({run.train.model.meshes[0].name})"
     return Signal(name, "N", 1.0, "level of the force  (dB re 1 N)", lambda s: np.abs(s.lines(s.force[:, 0])))
 
@@ -62,24 +60,24 @@ def draw_waterfall(path: Path, run: RunUp, multiples: int, bore: int, title: str
     for row, state in enumerate(swept):
         found, lines = np.isfinite(frequency[row]), signal.lines(state)
         size[row, found] = lines[[state.numbers[tuple(k)] for k in made["harmonic"][found].tolist()]]
-    level = 20.0 * np.log10(np.maximum(size, 1e-12) / math.sqrt(2.0) / signal.reference)
+    loud = level(size, signal.reference)
     speed, highest = np.array([s.speed for s in swept]), 1e-3 * run.band_hz
     figure = new_figure(10.5, 6.4)
     axes = figure.add_subplot()
     axes.set_title(f"{signal.name} in steady running\n{title}", fontsize=11, loc="left")
-    top = float(np.nanmax(level[:, 1:], initial=-240.0))
+    top = float(np.nanmax(loud[:, 1:], initial=-240.0))
     segments, values = [], []
     for k in range(1, frequency.shape[1]):
         points = np.stack([speed, frequency[:, k]], axis=1)
         both = np.isfinite(points[:-1, 1]) & np.isfinite(points[1:, 1])
         segments += [points[i : i + 2] for i in np.flatnonzero(both)]
-        values += [0.5 * (level[i, k] + level[i + 1, k]) for i in np.flatnonzero(both)]
+        values += [0.5 * (loud[i, k] + loud[i + 1, k]) for i in np.flatnonzero(both)]
     order = np.argsort(values)  # loud ones on top
     tracks = LineCollection(
         [segments[i] for i in order], array=np.array(values)[order], cmap=on_white("YlOrRd", 0.15, 1.0),
         linewidths=2.6, capstyle="butt",
     )  # fmt: skip
-    tracks.set_clim(top - 70.0, top)
+    tracks.set_clim(top - RANGE_DB, top)
     axes.add_collection(tracks)
     axes.set_xlim(float(speed[0]), float(speed[-1]))
     axes.set_ylim(0.0, highest)
@@ -97,12 +95,8 @@ def draw_campbell(path: Path, run: RunUp, modes: CoupledModes, met: list[Crossin
     rising, highest = np.argsort(modes.speeds), 1e-3 * run.band_hz
     speed, frequency, damping = modes.speeds[rising], 1e-3 * modes.frequency[rising], modes.damping_ratio[rising[-1]]
     crossings = [(c.speed, 1e-3 * c.frequency) for c in met if share[c.mode] >= STRONG]
-    figure = new_figure(10.5, 6.4)
-    axes = figure.add_subplot()
-    tidy(axes)
-    axes.set_title(
-        f"Natural frequencies of the coupled train and orders of its meshes\n{title}", fontsize=11, loc="left"
-    )
+    head = f"Natural frequencies of the coupled train and orders of its meshes\n{title}"
+    figure, axes = single(10.5, 6.4, head)
     low, high = float(speed[0]), float(speed[-1])
     taken: list[float] = []
     for mode in range(frequency.shape[1]):

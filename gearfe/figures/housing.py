@@ -16,7 +16,7 @@ import numpy as np
 from ..output.arrays import load_arrays
 from ..output.files import whole_file
 from ..typing import Array, IntArray
-from .offscreen import draw_all, draw_apart
+from .offscreen import corner_triangles, draw_all, draw_apart, vtk_cells
 from .style import new_figure, save
 
 if TYPE_CHECKING:
@@ -84,11 +84,7 @@ def _draw(job: Path, target: Path) -> None:
 
     stored: dict[str, Any] = load_arrays(job)
     points, faces, fields = stored["points"], stored["faces"], stored["fields"]
-    corners = faces[:, :3]
-    if faces.shape[1] == 6:
-        a, b, c, ab, bc, ca = faces.T
-        corners = np.concatenate([np.column_stack(t) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
-    cells = np.column_stack([np.full(len(corners), 3), corners]).ravel()
+    cells = vtk_cells(corner_triangles(faces))
     size = float(np.ptp(points, axis=0).max())
     columns = min(3, len(fields))
     rows = math.ceil(len(fields) / columns)

@@ -9,7 +9,7 @@ import numpy as np
 from ..gear.deviation_job import GEARS
 from ..loadmap.load_map import LoadMap
 from ..typing import Array
-from .style import BLUE, ORANGE, labelled, new_figure, shades, some_of
+from .style import BLUE, ORANGE, headed, labelled, new_figure, shades, some_of
 
 #: Lines of a panel; of more torques, so many are drawn.
 MOST_LINES = 24
@@ -48,7 +48,7 @@ def load_map_picture(made: LoadMap, title: str = "") -> Any:
     if logarithmic:
         _plain_ticks(bar.ax.yaxis)
     bar.set_label("torque at the wheel (N m)")
-    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    headed(figure, title)
     return figure
 
 

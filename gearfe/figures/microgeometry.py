@@ -17,7 +17,7 @@ from ..microgeometry.relief import ReliefResult
 from ..microgeometry.relief_job import comparison
 from ..tables.microgeometry import VARIABLES, MicrogeometryTable
 from ..typing import Array
-from .style import BLUE, GREY, ORANGE, RED, labelled, new_figure, save, shades, some_of, tidy
+from .style import BLUE, GREY, ORANGE, RED, headed, labelled, new_figure, save, shades, some_of, tidy
 
 #: Lines of a panel; of more torques or profiles, so many are drawn.
 MOST_LINES = 24
@@ -102,7 +102,7 @@ def flank_figure(path: str | Path, table: MicrogeometryTable, pair: GearPair, fo
     allowed = f"; grey: profile tolerances, ISO 1328-1 class {table.tolerance_class}"
     grey = "" if table.tolerance_class is None else allowed
     title = "Deviations of the flanks; dashed: ends of the path of contact" + grey
-    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    headed(figure, title)
     save(figure, path, dpi=110)
 
 
@@ -153,7 +153,7 @@ def microgeometry_picture(made: LoadedMesh) -> Any:
     bar = figure.colorbar(scale, ax=pressure, shrink=0.95, aspect=25, pad=0.02)
     bar.set_label("torque at the wheel (N m)")
     title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, {made.span}"
-    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    headed(figure, title)
     return figure
 
 

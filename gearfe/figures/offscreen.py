@@ -14,8 +14,10 @@ import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import numpy as np
+
 from ..output.arrays import save_arrays
-from ..typing import Array
+from ..typing import Array, IntArray
 
 #: Why nothing is drawn where the extra is not installed.
 MISSING = "pyvista is not installed: pip install 'gearfe[fields]'"
@@ -62,3 +64,16 @@ def draw_all(draw: Callable[[Path, Path], None]) -> None:
     paths = [Path(name) for name in sys.argv[1:]]
     for job, target in zip(paths[::2], paths[1::2], strict=True):
         draw(job, target)
+
+
+def corner_triangles(faces: IntArray) -> IntArray:
+    """Corner triangles; a face with six nodes becomes four."""
+    if faces.shape[1] == 3:
+        return faces
+    a, b, c, ab, bc, ca = faces.T
+    return np.concatenate([np.column_stack(t) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+
+
+def vtk_cells(table: IntArray) -> IntArray:
+    """Cells (m, k) as VTK has them: the number of points before each."""
+    return np.column_stack([np.full(len(table), table.shape[1]), table]).ravel()

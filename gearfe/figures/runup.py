@@ -16,7 +16,7 @@ from ..runup.report import dynamic_factors, iso_dynamic_factors, orders
 from ..runup.run_up import RunUp
 from ..typing import Array, IntArray
 from .campbell import draw_campbell, draw_instability, draw_waterfall, signal_of
-from .style import CYCLE, GREY, new_figure, save, tidy
+from .style import CYCLE, GREY, headed, new_figure, save, tidy
 
 #: Label of the axis of dynamic factors.
 FACTOR = "dynamic factor $K_v$"
@@ -108,7 +108,7 @@ def _curves(
     figure = new_figure(10.5, 1.0 + 3.0 * len(panels))
     marks = ["dashed: unstable"] if any((~c.stable).any() for _, curves in panels for c in curves.values()) else []
     marks += ["dotted: turning points"] if len(run.turning_speeds) else []
-    figure.suptitle("; ".join([title, *marks]), fontsize=11, x=0.01, ha="left")
+    headed(figure, "; ".join([title, *marks]))
     for number, (label, curves) in enumerate(panels):
         axes = figure.add_subplot(len(panels), 1, number + 1)
         tidy(axes)

@@ -1,4 +1,6 @@
-"""Pictures of a gear train's spectra: acceleration at an attachment, radiated power; labels that keep apart."""
+"""Pictures of a gear train's spectra: acceleration at an attachment, radiated power, over short times, orders over the
+speed, measured ones; labels that keep apart.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,31 @@ import numpy as np
 from ..spectrum import nearest_line, peaks
 from ..train.response import TrainResponse
 from ..typing import Array
+from ..vibration.analysis import Analysed
 from ..vibration.radiation import RadiatedPower
 from ..vibration.report import lines_of
+from ..vibration.short_time import OrderTracks
 from ..vibration.spectra import TrainSpectra
-from .style import BLUE, GREEN, GREY, ORANGE, RED, fixed, panel, save_fixed
+from .style import (
+    BLUE,
+    COLOURS,
+    GREEN,
+    GREY,
+    ORANGE,
+    RANGE_DB,
+    RED,
+    Band,
+    fixed,
+    headed,
+    level,
+    new_figure,
+    panel,
+    save,
+    save_fixed,
+    single,
+    tidy,
+)
 
-#: Frequencies (Hz) between which a spectrum is drawn; None: from 0 to where the lines end.
-Band = tuple[float, float] | None
 #: Lines that a picture shows at most: more than it has columns of pixels.
 _DRAWN = 2000
 #: Lines that are named in the picture of a spectrum, and the least amplitude of such a line in parts of the largest.
@@ -65,17 +85,17 @@ def draw_power(
     """Level of the equivalent radiated power of each line; the housing is elastic."""
     found = peaks(power.frequency, _inside(power.frequency, power.power, band), 3)
     lowest, highest = _ends(response, made, [1e-3 * p.frequency for p in found], band)
-    frequency, level = largest_lines(1e-3 * power.frequency, power.level, highest)
+    frequency, loud = largest_lines(1e-3 * power.frequency, power.level, highest)
     figure = fixed(10.5, 4.6)
     axes = _frequency_axes(
         figure, f"Equivalent radiated power of the housing\n{title}", response, made, (lowest, highest)
     )
     _note(figure, f"mean power {power.mean_level:.1f} dB, resolution {made.spectrum.resolution:.1f} Hz")
-    shown = (frequency <= highest) & (frequency > lowest) & np.isfinite(level)
-    top = float(level[shown].max(initial=-300.0)) if shown.any() else 0.0
-    bottom = max(top - 60.0, float(level[shown].min(initial=300.0)) - 3.0) if shown.any() else -10.0
+    shown = (frequency <= highest) & (frequency > lowest) & np.isfinite(loud)
+    top = float(loud[shown].max(initial=-300.0)) if shown.any() else 0.0
+    bottom = max(top - 60.0, float(loud[shown].min(initial=300.0)) - 3.0) if shown.any() else -10.0
     width = 0.72 * float(np.median(np.diff(frequency)))
-    axes.bar(frequency[shown], level[shown] - bottom, width=width, bottom=bottom, color=BLUE, linewidth=0)
+    axes.bar(frequency[shown], loud[shown] - bottom, width=width, bottom=bottom, color=BLUE, linewidth=0)
     axes.set_ylim(bottom, top + 0.18 * (top - bottom) + 1.0)
     axes.set_ylabel("radiated power level  (dB re 1 pW)")
     save_fixed(figure, path)
@@ -158,6 +178,88 @@ def _ends(response: TrainResponse, made: TrainSpectra, lines: list[float], band:
     top = 1e-3 * float(made.spectrum.frequency[-1])
     meshes = 1e-3 * float(np.max(np.abs(response.mesh_frequencies_Hz), initial=0.0))
     return 0.0, min(top, max([_MESH_MULTIPLES * meshes, *(1.08 * f for f in lines)]) or top)
+
+
+def draw_spectrogram(path: Path, made: Analysed, attachment: str, title: str, band: Band = None) -> None:
+    """Acceleration at an attachment over time and frequency, and its average beside."""
+    name = f"attachment_{attachment}_acceleration_m_per_s2"
+    fall, average = made.falls[made.names.index(name)], made.average[:, made.names.index(name)]
+    loud = level(fall.amplitude)
+    low, high = band or (0.0, float(fall.frequency[-1]))
+    seen = (fall.frequency > 0.0) & (fall.frequency >= low) & (fall.frequency <= high)
+    top = float(loud[:, seen].max(initial=-300.0))
+    figure = new_figure(11.5, 5.6)
+    axes, side = figure.subplots(1, 2, sharey=True, width_ratios=(4.0, 1.0))
+    headed(figure, f"Normal acceleration at attachment {attachment} over short times\n{title}")
+    shown = axes.pcolormesh(
+        1e3 * fall.time, 1e-3 * fall.frequency, loud.T,
+        cmap="magma_r", vmin=top - RANGE_DB, vmax=top, shading="nearest", rasterized=True,
+    )  # fmt: skip
+    axes.set_xlabel("time  (ms)")
+    axes.set_ylabel("frequency  (kHz)")
+    axes.set_ylim(1e-3 * low, 1e-3 * high)
+    bar = figure.colorbar(shown, ax=axes, pad=0.01)
+    bar.set_label("level  (dB re 1 µm/s²)")
+    tidy(side)
+    side.plot(level(average)[1:], 1e-3 * fall.frequency[1:], color=BLUE, linewidth=1.0)
+    side.set_xlim(top - RANGE_DB, top + 3.0)
+    side.set_xlabel("level  (dB)")
+    side.set_title(f"mean of {made.parts} parts\nfrom {1e3 * made.start:.4g} ms on", fontsize=9)
+    save(figure, path)
+
+
+def draw_tracks(path: Path, made: Analysed, tracks: OrderTracks, attachment: str, title: str) -> None:
+    """Amplitudes of the orders at an attachment, over the speed where it goes one way, else over the time."""
+    values = np.abs(tracks.amplitude[:, :, made.names.index(f"attachment_{attachment}_acceleration_m_per_s2")])
+    change = np.diff(tracks.speed)
+    over_speed = len(change) > 0 and bool((change > 0.0).all() or (change < 0.0).all())
+    place = tracks.speed if over_speed else 1e3 * tracks.time
+    figure, axes = single(10.5, 5.4, f"Orders of the normal acceleration at attachment {attachment}\n{title}")
+    for i, order in enumerate(tracks.orders):
+        axes.plot(
+            place, values[:, i], color=COLOURS[i % len(COLOURS)], linewidth=1.4, label=_named(order, made.mesh_orders)
+        )
+    if np.isfinite(values).any() and np.nanmax(values) > 0.0:
+        axes.set_yscale("log")
+        axes.set_ylim(bottom=max(0.7 * float(np.nanmin(values)), 1e-4 * float(np.nanmax(values))))
+    axes.set_xlabel("speed of the first shaft  (rad/s)" if over_speed else "time  (ms)")
+    axes.set_ylabel("amplitude  (m/s²)")
+    axes.legend(fontsize=8.5, frameon=False, ncols=2)
+    save(figure, path)
+
+
+def draw_measured(path: Path, made: Analysed, spectra: TrainSpectra | None, title: str, band: Band = None) -> None:
+    """Measured spectra over the computed one, a panel for each attachment."""
+    places = list(dict.fromkeys(one.attachment for one in made.measured))
+    figure = new_figure(10.5, 1.4 + 3.2 * len(places))
+    panels: Any = figure.subplots(len(places), 1, squeeze=False)[:, 0]
+    headed(figure, f"Measured and computed normal accelerations\n{title}")
+    for axes, place in zip(panels, places, strict=True):
+        tidy(axes)
+        if spectra is not None:
+            computed = spectra.amplitude(f"attachment_{place}_acceleration_m_per_s2")
+            axes.plot(1e-3 * spectra.spectrum.frequency[1:], computed[1:], color=BLUE, linewidth=1.2, label="computed")
+        for colour, one in zip(
+            (ORANGE, *COLOURS[2:]), (m for m in made.measured if m.attachment == place), strict=False
+        ):
+            lines = one.frequency > 0.0
+            axes.plot(1e-3 * one.frequency[lines], one.amplitude[lines], color=colour, linewidth=1.0, label=one.name)
+        axes.set_yscale("log")
+        axes.set_ylabel("amplitude  (m/s²)")
+        axes.set_title(f"attachment {place}", fontsize=10, loc="left")
+        axes.legend(fontsize=8.5, frameon=False, ncols=3)
+        if band is not None:
+            axes.set_xlim(1e-3 * band[0], 1e-3 * band[1])
+    panels[-1].set_xlabel("frequency  (kHz)")
+    save(figure, path)
+
+
+def _named(order: float, meshes: Array) -> str:
+    for i, mesh in enumerate(meshes):
+        multiple = order / mesh
+        if abs(multiple - round(multiple)) < 1e-6 * multiple and round(multiple) >= 1:
+            return f"{order:.5g}: {round(multiple)} × mesh {i + 1}"
+    return f"{order:.5g}"
 
 
 #: Places that are tried: sideways in parts of a text's width, upwards in its heights.

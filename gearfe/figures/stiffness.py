@@ -18,7 +18,7 @@ from ..stiffness.job import StiffnessJob
 from ..stiffness.periodic import wrapped_phase
 from ..stiffness.report import cycle_statistics
 from ..typing import Array, IntArray
-from .style import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save, shades, some_of, tidy
+from .style import BLUE, GREEN, GREY, ORANGE, RED, headed, new_figure, save, shades, some_of, tidy
 
 #: Positions in the picture of the pressures at most.
 MOST_LINES = 12
@@ -143,7 +143,7 @@ def pressure_figure(path: str | Path, pair: GearPair, pressures: Sequence[tuple[
     both[0].set_ylabel("contact pressure (MPa)")
     teeth = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}"
     title = f"{teeth}, pressure along the flanks (points; lines: ellipses of the same force and width)"
-    figure.suptitle(title + ("" if several else f" at {angles[0]:g}°"), x=0.01, ha="left", fontsize=11)
+    headed(figure, title + ("" if several else f" at {angles[0]:g}°"))
     if several:
         bar = figure.colorbar(scale, ax=list(both), pad=0.015, aspect=30)
         bar.set_label("pinion angle (deg)")

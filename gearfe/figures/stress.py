@@ -14,14 +14,13 @@ from ..contact.compliance import MeshingPair
 from ..contact.position import Positions
 from ..gear.derived import zone
 from ..gear.pair import GearPair
-from ..output.files import whole_file
 from ..stiffness.curve import StiffnessCurve
 from ..stiffness.fields import GearField, pair_recovery, straight_triangles
 from ..stiffness.fields_output import solved_positions
 from ..stiffness.positions import position_solver
 from ..threads import one_thread
 from ..typing import Array, IntArray
-from .style import new_figure, save
+from .style import new_figure, save, write_film
 
 Progress = Callable[[int, int, str], None]
 #: Points, shape (n, 2) (mm), straight triangles, shape (m, 3), and stress at the points (MPa) of one gear.
@@ -162,22 +161,12 @@ def stress_animation(
             figure.canvas.draw()
             figure.set_layout_engine("none")  # no frame may move the axes
         figure.canvas.draw()
-        picture = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3].copy())
-        pictures.append(picture)
+        pictures.append(np.asarray(figure.canvas.buffer_rgba())[..., :3].copy())
         if progress is not None:
             progress(done, len(frames), "frames drawn")
     palette = Image.new("P", (1, 1))
     palette.putpalette(_palette())
-    indexed = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
-    with whole_file(path) as temporary:
-        indexed[0].save(
-            temporary,
-            save_all=True,
-            append_images=indexed[1:],
-            duration=FRAME_MS,
-            loop=0,
-            optimize=False,
-        )
+    write_film(path, pictures, palette, ms=FRAME_MS, dither=False)
 
 
 def _palette() -> list[int]:

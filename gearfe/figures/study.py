@@ -10,7 +10,7 @@ import numpy as np
 
 from ..study.statistics import StudyResult
 from ..typing import Array
-from .style import BLUE, GREY, ORANGE, RED, new_figure, save, shades, tidy
+from .style import BLUE, GREY, ORANGE, RED, headed, new_figure, save, shades, single, tidy
 
 #: Parameters and outputs that a picture shows at most, and cases of which every one is drawn.
 MOST, DRAWN = 6, 4000
@@ -67,7 +67,7 @@ def study_picture(result: StudyResult, title: str = "") -> Any:
                 part.set_xlabel(_short(name), fontsize=8.5)
         axes[i, 0].set_ylabel(row, fontsize=8.5)
     limited = "; dashed: limits" if any(name in limits for name in rows) else ""
-    figure.suptitle(title + limited, fontsize=11, x=0.01, ha="left")
+    headed(figure, title + limited)
     return figure
 
 
@@ -126,7 +126,7 @@ def _tornado(path: Path, title: str, outputs: Mapping[str, Mapping[str, Any]]) -
         part.axvline(0.0, color="#374151", linewidth=0.9)
         part.set_xlabel(f"{what} {name}", fontsize=8.5)
         part.tick_params(labelsize=8.5)
-    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
+    headed(figure, title)
     save(figure, path)
 
 
@@ -134,9 +134,7 @@ def _pareto(path: Path, title: str, result: StudyResult, aims: list[str]) -> Non
     """Two outputs of all cases, and the cases that no other one beats."""
     outputs, best, good = _outputs(result), result.pareto(), result.good
     x, y = (outputs[name] for name in aims)
-    figure = new_figure(6.4, 5.0)
-    axes = figure.add_subplot()
-    tidy(axes)
+    figure, axes = single(6.4, 5.0, title)
     axes.plot(x[~good], y[~good], ".", color=GREY, alpha=0.5, mew=0, label="beyond a limit" if (~good).any() else None)
     axes.plot(x[good], y[good], ".", color=BLUE, alpha=0.7, mew=0, label="cases")
     order = best[np.argsort(x[best])]
@@ -145,7 +143,6 @@ def _pareto(path: Path, title: str, result: StudyResult, aims: list[str]) -> Non
         axes.annotate(str(number), (x[number], y[number]), (5, 4), textcoords="offset points", fontsize=8, color=RED)
     axes.set_xlabel(aims[0])
     axes.set_ylabel(aims[1])
-    axes.set_title(title, fontsize=11, loc="left")
     axes.legend(fontsize=8.5, frameon=False)
     save(figure, path)
 

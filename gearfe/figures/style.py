@@ -6,20 +6,26 @@ first picture is drawn.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..output.files import whole_file
-from ..typing import IntArray
+from ..typing import Array, IntArray
 
 BLUE, ORANGE, GREEN, RED, GREY = "#1f5a99", "#d9730d", "#3a8c5c", "#b3261e", "#6b7280"
 COLOURS = (BLUE, ORANGE, GREEN, RED, "#6d4c9f", "#0f766e", "#8a5a2b")
 #: The same again and again, for any number of curves.
 CYCLE = COLOURS * 8
 DPI = 130
+#: Frequencies (Hz) from and to which is drawn; None: all.
+Band = tuple[float, float] | None
+#: Reference of the levels of accelerations (m/s2), ISO 1683, and how far below the largest one a level is drawn (dB).
+REFERENCE, RANGE_DB = 1e-6, 70.0
 
 
 def new_figure(width: float, height: float) -> Any:
@@ -36,6 +42,35 @@ def save(figure: Any, path: str | Path, *, dpi: int = DPI) -> None:
     """Write a figure whole."""
     with whole_file(path) as temporary:
         figure.savefig(temporary, dpi=dpi)
+
+
+def write_film(path: str | Path, pictures: Sequence[NDArray[np.uint8]], palette: Any, *, ms: int, dither: bool) -> None:
+    """Write pictures (h, w, 3) as an endless GIF in the colours of a palette (Pillow image), `ms` milliseconds each."""
+    from PIL import Image
+
+    how = Image.Dither.FLOYDSTEINBERG if dither else Image.Dither.NONE
+    first, *rest = (Image.fromarray(picture).quantize(palette=palette, dither=how) for picture in pictures)
+    with whole_file(path) as temporary:
+        first.save(temporary, save_all=True, append_images=rest, duration=ms, loop=0, optimize=False)
+
+
+def level(amplitude: Array, reference: float = REFERENCE) -> Array:
+    """Level of the rms of sines of these amplitudes (dB), by default of accelerations."""
+    return np.asarray(20.0 * np.log10(np.maximum(np.abs(amplitude), 1e-12) / math.sqrt(2.0) / reference))
+
+
+def headed(figure: Any, title: str) -> None:
+    """Write a title above all panels."""
+    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
+
+
+def single(width: float, height: float, title: str) -> tuple[Any, Any]:
+    """Figure (inches) with one panel under a title, and its axes with a light grid."""
+    figure = new_figure(width, height)
+    axes = figure.add_subplot()
+    tidy(axes)
+    axes.set_title(title, fontsize=11, loc="left")
+    return figure, axes
 
 
 def tidy(axes: Any) -> None:

@@ -18,8 +18,7 @@ from ..vibration.fields import frames
 from ..vibration.follow import Followed
 from ..vibration.report import attachment_acceleration
 from ..vibration.spectra import TrainSpectra
-from .short_time import draw_measured, draw_spectrogram, draw_tracks
-from .spectra import draw_power, draw_spectrum
+from .spectra import draw_measured, draw_power, draw_spectrogram, draw_spectrum, draw_tracks
 from .style import BLUE, COLOURS, CYCLE, GREY, RED, fixed, panel, save_fixed
 from .train_scene import draw_scene
 

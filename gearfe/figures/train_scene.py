@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from ..output.arrays import load_arrays
 from ..output.files import whole_file
 from ..typing import Array, IntArray
-from .offscreen import draw_all, draw_apart
+from .offscreen import corner_triangles, draw_all, draw_apart, vtk_cells
+from .style import write_film
 
 _SECONDS = 300.0
 #: Milliseconds a frame.
@@ -62,16 +63,16 @@ def _draw(job: Path, target: Path) -> None:
         values, name = stored["housing_values"], "normal acceleration (m/s2)"
         most = float(np.quantile(np.abs(values[values != 0.0]), 0.97)) if values.any() else 1.0
         most = float(stored.get("range", _round(most)))
-        faces = _flat(stored["housing_faces"]) if count == 1 else stored["housing_faces"][:, :3]
-        housing = pyvista.PolyData(stored["housing_points"][0], _cells(faces))
+        faces = corner_triangles(stored["housing_faces"]) if count == 1 else stored["housing_faces"][:, :3]
+        housing = pyvista.PolyData(stored["housing_points"][0], vtk_cells(faces))
         housing[name] = values[0]
-        outline = pyvista.PolyData(stored["housing_points"][0], lines=_cells(sharp_edges(housing.points, faces)))
+        outline = pyvista.PolyData(stored["housing_points"][0], lines=vtk_cells(sharp_edges(housing.points, faces)))
         near = bar | {"title": "housing: normal acceleration (m/s²)\n", "position_x": 0.06}
         look = {"cmap": "RdBu_r", "clim": (-most, most), "opacity": 0.62, "ambient": 0.3, "scalar_bar_args": near}
         plotter.add_mesh(housing, smooth_shading=False, **look)
         plotter.add_mesh(outline, color="#374151", line_width=1.3 * large)
         surfaces += [(housing, stored["housing_points"], values, name), (outline, stored["housing_points"], None, "")]
-    cells = np.concatenate([_cells(stored["gear_quads"]), _cells(stored["gear_triangles"])])
+    cells = np.concatenate([vtk_cells(stored["gear_quads"]), vtk_cells(stored["gear_triangles"])])
     values, name = stored["gear_values"], "vibration (um)"
     gears = pyvista.PolyData(stored["gear_points"][0], cells)
     gears[name] = values[0]
@@ -153,27 +154,14 @@ def _write(target: Path, pictures: list[NDArray[np.uint8]]) -> None:
     """One picture at half its size, several as a film with one palette."""
     from PIL import Image
 
-    images = [Image.fromarray(picture) for picture in pictures]
-    with whole_file(target) as temporary:
-        if len(images) == 1:
-            images[0].resize((_STILL[0] // 2, _STILL[1] // 2), Image.Resampling.LANCZOS).save(temporary)
-            return
-        some = np.concatenate(pictures[:: max(1, len(pictures) // 5)])
-        palette = Image.fromarray(some).quantize(255, method=Image.Quantize.MAXCOVERAGE)
-        made = [image.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG) for image in images]
-        made[0].save(temporary, save_all=True, append_images=made[1:], duration=_FRAME, loop=0, optimize=False)
-
-
-def _flat(faces: IntArray) -> IntArray:
-    """Corner triangles; a face with six nodes becomes four."""
-    if faces.shape[1] == 3:
-        return faces
-    a, b, c, ab, bc, ca = faces.T
-    return np.concatenate([np.column_stack(t) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
-
-
-def _cells(table: IntArray) -> IntArray:
-    return np.column_stack([np.full(len(table), table.shape[1]), table]).ravel()
+    if len(pictures) == 1:
+        small = Image.fromarray(pictures[0]).resize((_STILL[0] // 2, _STILL[1] // 2), Image.Resampling.LANCZOS)
+        with whole_file(target) as temporary:
+            small.save(temporary)
+        return
+    some = np.concatenate(pictures[:: max(1, len(pictures) // 5)])
+    palette = Image.fromarray(some).quantize(255, method=Image.Quantize.MAXCOVERAGE)
+    write_film(target, pictures, palette, ms=_FRAME, dither=True)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -61,13 +61,6 @@ class Analysed:
     tracks: OrderTracks | None
     mesh_orders: Array
     measured: tuple[Measured, ...]
-
-
-class AnalysisPictures(Protocol):
-    """Who draws an analysis: `gearfe.figures.short_time.draw_analysis`."""
-
-    def __call__(self, folder: Path, made: Analysed, spectra: TrainSpectra | None, attachment: str) -> None:
-        """Draw into a folder."""
 
 
 class Analysis:
@@ -150,7 +143,11 @@ class Analysis:
         return np.unique(np.outer(self.mesh_orders, np.arange(1, MULTIPLES + 1)).round(9))
 
     def write(
-        self, folder: Path, spectra: TrainSpectra | None, attachment: str, draw: AnalysisPictures | None
+        self,
+        folder: Path,
+        spectra: TrainSpectra | None,
+        attachment: str,
+        draw: Callable[[Path, Analysed, TrainSpectra | None, str], None] | None,
     ) -> dict[str, Any]:
         """Write tables and pictures into a folder; entries of the summary."""
         made = self.made()
