@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gearfe.config import build
+from gearfe.elasticity import Material
 from gearfe.errors import InputError
 from gearfe.housing.bisection import bisected
 from gearfe.housing.build import housing_from_table
@@ -16,7 +17,7 @@ from gearfe.housing.mesh_checks import boundary_faces, checked_mesh
 from gearfe.housing.model import Housing
 from gearfe.housing.refinement import refined
 from gearfe.reduction.error import mesh_error
-from gearfe.solid import EDGES, FACES, SolidMaterial, assemble
+from gearfe.solid import EDGES, FACES, assemble
 from gearfe.tables.housing import HousingTable
 from tests.housing_meshes import box, second_order, surface_area
 
@@ -42,7 +43,7 @@ def test_cut_elements_fill_the_same_body_and_meet_face_to_face() -> None:
     flat = box((3, 2, 2), (1.0, 0.5, 0.5))[0]
     members = np.array([flat[:, 0] < 1e-9, flat[:, 2] < 1e-9])
     generator = np.random.default_rng(3)
-    steel, quality = SolidMaterial(), shape(nodes, tets)
+    steel, quality = Material(), shape(nodes, tets)
     mass = assemble(nodes, tets, steel).nodal_mass.sum()
     area = surface_area(nodes, boundary_faces(tets))
     held = surface_area(nodes, faces_within(tets, members[0]))

@@ -69,7 +69,7 @@ def energy_lost(
 
 
 def energy_lost_by_element(
-    nodes: Array, tets: IntArray, material: SolidMaterial, fields: Array, eigenvalues: Array, rigid: list[IntArray]
+    nodes: Array, tets: IntArray, material: Material, fields: Array, eigenvalues: Array, rigid: list[IntArray]
 ) -> Array:
     """(m, k) the same of each field alone, element by element: each function's in equal parts to those around it."""
     numbers, residual, stiffness = _unbalanced(nodes, tets, material, fields, eigenvalues, rigid)
@@ -80,7 +80,7 @@ def energy_lost_by_element(
 
 
 def _unbalanced(
-    nodes: Array, tets: IntArray, material: SolidMaterial, fields: Array, eigenvalues: Array, rigid: list[IntArray]
+    nodes: Array, tets: IntArray, material: Material, fields: Array, eigenvalues: Array, rigid: list[IntArray]
 ) -> tuple[_Numbers, Array, Array]:
     """Numbers of the added functions, their residuals (n, 3, k) and stiffnesses (n, 3, 3)."""
     made, count = _functions(tets.shape[1]), fields.shape[1]

@@ -62,7 +62,7 @@ class Tetrahedra:
         return energy_lost(self.nodes, self.cells, material, fields, eigenvalues, rigid)
 
     def energy_lost_by_element(
-        self, material: SolidMaterial, fields: Array, eigenvalues: Array, rigid: list[IntArray]
+        self, material: Material, fields: Array, eigenvalues: Array, rigid: list[IntArray]
     ) -> Array:
         """See `gearfe.housing.mesh_error.energy_lost_by_element`."""
         return energy_lost_by_element(self.nodes, self.cells, material, fields, eigenvalues, rigid)
