@@ -178,12 +178,21 @@ def build(cls: type[T], table: Any, where: str) -> T:
         if name in table:
             values[name] = _convert(hints[name], table[name], label, spec.metadata)
         elif spec.default is MISSING and spec.default_factory is MISSING:
-            raise InputError(label, None, "is required", f"add it ({spec.metadata.get('doc', '')})")
+            doc = spec.metadata.get("doc", "")
+            raise InputError(label, None, "is required", f"add {_written(hints[name], label)} ({doc})")
     made = cls(**values)
     check = getattr(made, "check", None)
     if check is not None:
         check(where)
     return made
+
+
+def _written(hint: Any, label: str) -> str:
+    """How a missing key is written: a table, one of several, or as its neighbours."""
+    inner = typing.get_args(hint)[0] if typing.get_origin(hint) is tuple else hint
+    if not dataclasses.is_dataclass(inner):
+        return "it"
+    return f"[{label}]" if inner is hint else f"[[{label}]]"
 
 
 def _joined(where: str, name: str) -> str:
@@ -212,7 +221,8 @@ def job_tables(
             raise unknown_name(f"job file {Path(path).name}", name, TABLES)
     for name in needed:
         if name not in raw:
-            raise InputError(f"[{name}]", None, f"is missing in {Path(path).name}", f"add a table [{name}]")
+            cure = f"add a table [{name}] (see gearfe new)"
+            raise InputError(f"[{name}]", None, f"is missing in {Path(path).name}", cure)
     made = {}
     for name, table in raw.items():
         value: Any = build(table_class(name), table, name)

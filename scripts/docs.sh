@@ -7,4 +7,4 @@ bash scripts/setup.sh dev
 export NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true
 if [ "${1:-}" = serve ]; then exec .venv/bin/mkdocs serve; fi
 .venv/bin/mkdocs build --quiet
-echo "written: out/site/index.html"
+echo "written: out/site/index.html (its search needs a server: bash scripts/docs.sh serve)"

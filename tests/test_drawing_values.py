@@ -8,6 +8,7 @@ import pytest
 
 from gearfe.config import build
 from gearfe.errors import InputError
+from gearfe.gear.derived import derived_geometry
 from gearfe.gear.drawing_values import span_size, span_teeth
 from gearfe.gear.pair import Gear, GearPair
 from gearfe.tables.pair import PairTable
@@ -49,6 +50,7 @@ def test_drawing_values_are_the_gears() -> None:
     assert 2e3 * pair.pinion.tip_radius == pytest.approx(79.9, abs=1e-12)
     assert 2e3 * pair.pinion.root_radius == pytest.approx(66.5, abs=1e-12)
     assert 1e3 * span_size(pair.pinion, 3) == pytest.approx(23.6, abs=1e-12)
+    assert derived_geometry(pair, (3, None))["pinion"]["span_mm"] == pytest.approx(23.6, abs=1e-12)
     assert pair.wheel.addendum == 1.1
     # thinner teeth by what the span lacks, seen along the base tangent
     whole = made()

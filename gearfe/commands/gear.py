@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
 
     job = StiffnessJob(tables["pair"], tables.get("stiffness", StiffnessTable()), pair)
     folder = output_folder(args.out)
-    geometry = derived_geometry(pair)
+    geometry = derived_geometry(pair, (tables["pair"].pinion.span_teeth, tables["pair"].wheel.span_teeth))
     moduli = [material.youngs_modulus for material in job.materials]
     iso = iso_values(pair, moduli[0], moduli[1])
     with whole_set(folder, ("gear_pair.png", *FILES)) as made:

@@ -80,7 +80,8 @@ def draw_response(path: Path, response: TrainResponse, attachment: str, title: s
     means = [f", mean {m / 1e3:.4g} kN" if np.isfinite(m) else "" for m in mean]
     names = [f"mesh {i + 1}{text}" for i, text in enumerate(means)]
     angle, forces = np.degrees(response.drive_angle) * drive, 1e-3 * response.contact_force.T
-    speeds, accelerations = (response.speed * signs).T, 1e-3 * (response.acceleration * signs).T
+    speeds, accelerations = (response.speed * signs).T, (response.acceleration * signs).T
+    scale, unit = (1e-3, "1000") if np.abs(accelerations).max(initial=0.0) < 1e6 else (1e-6, "10⁶")
     figure = fixed(11.5, 7.6)
     figure.suptitle(title, fontsize=12, x=0.012, y=0.985, ha="left")
     grid = figure.add_gridspec(2, 2, left=0.062, right=0.985, top=0.905, bottom=0.068, hspace=0.3, wspace=0.16)
@@ -106,8 +107,10 @@ def draw_response(path: Path, response: TrainResponse, attachment: str, title: s
         if number == len(speeds) // 2:
             part.set_ylabel("speed  (rad/s)")
         axes.append(part)
-    turning = panel(figure.add_subplot(grid[1, 0]), "angular acceleration  (1000 rad/s²)", "c", "angular accelerations")
-    for colour, label, values in zip(CYCLE, labels, accelerations, strict=False):
+    turning = panel(
+        figure.add_subplot(grid[1, 0]), f"angular acceleration  ({unit} rad/s²)", "c", "angular accelerations"
+    )
+    for colour, label, values in zip(CYCLE, labels, scale * accelerations, strict=False):
         turning.plot(angle, values, color=colour, linewidth=1.1, label=label)
     turning.legend(fontsize=8.5, frameon=False, ncols=max(1, min(4, len(accelerations))), loc="upper right")
     turning.margins(y=0.14)

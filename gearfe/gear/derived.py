@@ -16,8 +16,14 @@ from .pair import GearPair
 from .spur_gear import Gear
 
 
-def derived_geometry(pair: GearPair) -> dict[str, Any]:
-    """Derived geometry of the pair and both gears: name with unit -> number."""
+def derived_geometry(pair: GearPair, spans: tuple[int | None, int | None] = (None, None)) -> dict[str, Any]:
+    """Derived geometry of the pair and both gears: name with unit -> number.
+
+    Parameters
+    ----------
+    spans
+        Numbers of teeth that span sizes of pinion and wheel are over; None: as many as touch nearest to d + 2 x m.
+    """
     return {
         "gear_ratio": pair.gear_ratio,
         "centre_distance_mm": 1e3 * pair.working_centre_distance,
@@ -39,13 +45,13 @@ def derived_geometry(pair: GearPair) -> dict[str, Any]:
             }
             for name, point in pair.path.items()
         },
-        "pinion": _of_gear(pair.pinion, pair.pinion_working_radius),
-        "wheel": _of_gear(pair.wheel, pair.wheel_working_radius),
+        "pinion": _of_gear(pair.pinion, pair.pinion_working_radius, spans[0]),
+        "wheel": _of_gear(pair.wheel, pair.wheel_working_radius, spans[1]),
     }
 
 
-def _of_gear(gear: Gear, working_radius: float) -> dict[str, Any]:
-    spanned = span_teeth(gear)
+def _of_gear(gear: Gear, working_radius: float, span: int | None) -> dict[str, Any]:
+    spanned = span_teeth(gear) if span is None else span
     return {
         "teeth": gear.teeth,
         "module_mm": 1e3 * gear.module,
