@@ -152,7 +152,8 @@ def build(cls: type[T], table: Any, where: str) -> T:
 
     Understands ``int``, ``float``, ``bool``, ``str``, ``X | None``, ``tuple[X, ...]``, fixed tuples, ``dict[str, X]``,
     and nested dataclasses. A dataclass may define ``check(self, where)`` for rules that join several fields, and
-    ``SHORT``: the key that a text in place of the table stands for.
+    ``REMOVED``: key that was -> what became of it, and what to write instead; and ``SHORT``: the key that a text in
+    place of the table stands for.
 
     Raises
     ------
@@ -170,6 +171,8 @@ def build(cls: type[T], table: Any, where: str) -> T:
         if spec.metadata.get("choices") and name in table:
             _convert(hints[name], table[name], _joined(where, name), spec.metadata)
     for key in table:
+        if key in getattr(cls, "REMOVED", ()):
+            raise InputError(_joined(where, key), table[key], *kind.REMOVED[key])
         if key not in fields:
             raise unknown_name(where or "job file", key, fields)
     values: dict[str, Any] = {}

@@ -131,3 +131,28 @@ def test_a_housing_without_bores_has_no_reduction_error():
     made = reduction_error(body, 1.01 * float(body.coupled.frequencies_hz[0]))
     assert made.response == 0.0
     assert (made.frequency_errors == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('route = "direct"', "stiffness.route = 'direct': is gone"),
+        ('law_sides = "pinion"', "stiffness.law_sides = 'pinion': is gone"),
+        ("nitsche_theta = -1", "stiffness.nitsche_theta = -1: is gone: theta is 0; leave it out"),
+        ('law = "exact"', "stiffness.law = 'exact': is a law of the tests' whole-gear route alone; use half_plane"),
+    ],
+)
+def test_keys_that_are_gone_say_what_to_write_instead(tmp_path, capsys, line, said):
+    text = (
+        SHIPPED.read_text().replace('\nlaw = "nitsche" ', "\n#").replace("\n[stiffness]\n", f"\n[stiffness]\n{line}\n")
+    )
+    (tmp_path / "job.toml").write_text(text)
+    for command in ("stiffness", "loadmap"):
+        assert main([command, str(tmp_path / "job.toml"), "--out", str(tmp_path / "out")]) == 2
+        told = capsys.readouterr().err
+        assert said in told
+        key, _, value = line.partition(" = ")
+        option = ["--" + key.replace("_", "-"), value.strip('"')]
+        assert main([command, str(SHIPPED), "--out", str(tmp_path / "out"), *option]) == 2
+        assert option[0] in (told := capsys.readouterr().err)
+        assert said.partition(": ")[2] in told

@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import re
 import typing
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -189,6 +189,23 @@ def with_keys(args: argparse.Namespace, table: Table, *keys: str, **renamed: str
 
 def _option(name: str) -> str:
     return "--" + name.replace("_", "-")
+
+
+class _Removed(argparse.Action):
+    """Option of a key that is gone: what to write instead."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, instead: tuple[str, str]) -> None:
+        super().__init__(option_strings, dest, nargs="?", help=argparse.SUPPRESS)
+        self.instead = instead
+
+    def __call__(self, _parser: Any, _namespace: Any, values: Any, option_string: str | None = None) -> None:
+        raise InputError(str(option_string), values, *self.instead)
+
+
+def add_removed(parser: argparse.ArgumentParser, removed: Mapping[str, tuple[str, str]]) -> None:
+    """Options of keys that are gone, which the help does not show; see ``REMOVED`` in `gearfe.config.build`."""
+    for key, instead in removed.items():
+        parser.add_argument("--" + key.replace("_", "-"), action=_Removed, instead=instead)
 
 
 def number(option: str, text: str) -> float:

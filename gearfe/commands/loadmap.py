@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from ..progress import count
 from ..tables.loadmap import LoadMapTable
 from ..tables.stiffness import StiffnessTable, check_law
-from .arguments import add_job, add_keys, check_option, with_keys
+from .arguments import add_job, add_keys, add_removed, check_option, with_keys
 from .common import add_folder, tell
 
 Loads = TypeVar("Loads", bound=LoadMapTable)
@@ -26,6 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_folder(parser)
     add_loads(parser)
     add_keys(parser, StiffnessTable, *MODEL)
+    add_removed(parser, StiffnessTable.REMOVED)
 
 
 def run(args: argparse.Namespace) -> int:

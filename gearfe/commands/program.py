@@ -21,6 +21,13 @@ if TYPE_CHECKING:
 
 USAGE = "gearfe COMMAND ... ('gearfe COMMAND --help' tells a command's options)"
 
+
+#: Commands that were, and where they went.
+MOVED = {
+    "benchmark": "in a copy of the repository: python scripts/benchmark.py",
+    "stress": "in a copy of the repository: python scripts/stress.py",
+}
+
 #: Exit code where the reader of the output went away, as the shell's other tools give it (128 + SIGPIPE).
 CLOSED = 141
 
@@ -74,6 +81,8 @@ def _run(arguments: list[str]) -> int:
     if arguments[0] in ("-V", "--version"):
         print(f"gearfe {__version__}")
         return 0
+    if arguments[0] in MOVED:
+        raise InputError("command", None, f"unknown name {arguments[0]!r}", MOVED[arguments[0]])
     if arguments[0] not in COMMANDS:
         raise unknown_name("command", arguments[0], COMMANDS)
     return run_command(command_module(arguments[0]), f"gearfe {arguments[0]}", *COMMANDS[arguments[0]], arguments[1:])

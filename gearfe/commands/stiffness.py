@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..config import check_range
 from ..progress import announce, count
 from ..tables.stiffness import StiffnessTable, check_law
-from .arguments import add_job, add_keys, check_option, number, with_keys
+from .arguments import add_job, add_keys, add_removed, check_option, number, with_keys
 from .common import add_folder, tell
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar=("NAME", "X"),
         help="parameter of a law of another package; may stand several times",
     )
+    add_removed(parser, {**StiffnessTable.REMOVED, "animate": ("has another name", "write --animation")})
     parser.add_argument("--no-estimate", action="store_true", help="leave out the error estimate")
     parser.add_argument(
         "--range", type=float, metavar="X", help="end of the colours in the pictures of --fields (MPa; default: chosen)"

@@ -11,7 +11,7 @@ from __future__ import annotations
 import importlib
 from dataclasses import dataclass
 from importlib import metadata
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from ..config import quantity
 from ..errors import InputError, nearest
@@ -26,6 +26,8 @@ LAWS: dict[str, str] = {
 }
 #: Group of entry points in which other packages name theirs.
 GROUP = "gearfe.laws"
+#: Names of laws that were, and what to write instead.
+REMOVED = {"exact": ("is a law of the tests' whole-gear route alone", "use half_plane")}
 
 
 def known_laws() -> dict[str, str]:
@@ -37,6 +39,8 @@ def check_law(label: str, name: str) -> None:
     """Raise `InputError` unless there is a law called `name`; `label` names the key or option in the message."""
     if name in LAWS:
         return
+    if name in REMOVED:
+        raise InputError(label, name, *REMOVED[name])
     known = known_laws()
     if name not in known:
         problem = "must be one of " + ", ".join([*LAWS, *sorted(known.keys() - LAWS)])
@@ -77,6 +81,22 @@ def check_flank_coarsen(coarsen: float, flank_coarsen: float, field: str) -> Non
 @dataclass(frozen=True)
 class StiffnessTable:
     """Load, positions, model and mesh of a rotation sweep."""
+
+    #: Keys that were: what became of them, and what to write instead.
+    REMOVED: ClassVar[dict[str, tuple[str, str]]] = {
+        "route": (
+            "is gone: one law answers every load",
+            'leave it out; law = "half_plane" (the default) needs no mesh that resolves the contact',
+        ),
+        "law_sides": (
+            "is gone: the law fixes the flanks that it is integrated on (nitsche both, penalty the nearer tip's)",
+            "leave it out; other sides are in Python: gearfe.contact.laws",
+        ),
+        "nitsche_theta": (
+            "is gone: theta is 0",
+            "leave it out",
+        ),
+    }
 
     twist_deg: float | None = quantity(
         None, doc="twist of the wheel against the pinion (deg), or give torque_Nm", above=0.0, below=36.0
