@@ -62,6 +62,15 @@ def _encoding_problem(raw: bytes, at: int) -> tuple[str, str]:
     return f"is not UTF-8 but, it seems, {name}: line {line} has {letter!r} as byte {raw[at]:#x}", "save it as UTF-8"
 
 
+def _rows(path: str | Path, field: str) -> list[list[str]]:
+    """Cells of a CSV file; semicolons or tabs between them, as spreadsheets of some countries write, are told."""
+    rows = list(csv.reader(io.StringIO(read_text(path, field))))
+    if rows and len(rows[0]) == 1 and any(mark in rows[0][0] for mark in ";\t"):
+        cure = "write commas between cells and points in numbers"
+        raise InputError(field, str(path), "has other marks than commas between its cells", cure)
+    return rows
+
+
 def read_csv(path: str | Path, field: str) -> dict[str, list[str]]:
     """Columns of a CSV file as text, by name; `field` names the file in messages.
 
@@ -70,7 +79,7 @@ def read_csv(path: str | Path, field: str) -> dict[str, list[str]]:
     InputError
         When the file is missing, unreadable or not a rectangular table with a header.
     """
-    rows = [row for row in csv.reader(io.StringIO(read_text(path, field))) if row]
+    rows = [row for row in _rows(path, field) if row]
     if len(rows) < 2:
         raise InputError(field, str(path), "has no rows", "give a CSV file with a header line and rows")
     names = [name.strip() for name in rows[0]]
@@ -93,7 +102,7 @@ def read_numbers(
     """
     import numpy as np  # job files are read without it
 
-    rows = list(csv.reader(io.StringIO(read_text(path, field))))
+    rows = _rows(path, field)
     header, known = [name.strip() for name in rows[0]] if rows else [], (*needed, *optional)
     for name in () if others else header:
         if name not in known:

@@ -11,6 +11,7 @@ import pytest
 
 from gearfe.config import build, load_job, quantity, read_toml
 from gearfe.errors import InputError
+from gearfe.textfile import read_csv, read_numbers
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,15 @@ def test_a_misspelt_key_of_another_job_is_an_error_too(tmp_path):
     job.write_text("[pair]\nmodul_mm = 2\n")
     with pytest.raises(InputError, match="did you mean 'module_mm'"):
         load_job(job, ())
+
+
+@pytest.mark.parametrize("text", ["time_s;torque_Nm\r\n0;1,5\r\n1;2\r\n", "\ufefftime_s\ttorque_Nm\n0\t1.5\n"])
+def test_tables_of_other_countries_are_told(tmp_path, text):
+    path = tmp_path / "table.csv"
+    path.write_text(text, encoding="utf-8", newline="")
+    for read in (lambda: read_csv(path, "table"), lambda: read_numbers(path, "table", ["time_s"])):
+        with pytest.raises(InputError, match=r"other marks than commas.*write commas between cells"):
+            read()
 
 
 def test_errors_survive_another_process():

@@ -150,3 +150,17 @@ def test_commands_without_what_windows_lacks(tmp_path: Path) -> None:
     assert (tmp_path / "AppData" / "gearfe").is_dir()
     table = (folder / "out" / "getriebe ψ" / "stiffness" / "stiffness.csv").read_bytes()
     assert b"\r" not in table
+
+
+def test_a_case_that_is_written_on_another_drive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No path leads from one drive of Windows to another: files beside the job are then named from the root."""
+    from gearfe.study.case import job_beside
+
+    def another_drive(path: str, start: str) -> str:
+        raise ValueError(f"path is on mount {path!r}, start on mount {start!r}")
+
+    (tmp_path / "curve.csv").write_text("x\n", encoding="utf-8")
+    raw = {"train": {"meshes": [{"curve": "curve.csv", "law": "curve"}]}}
+    monkeypatch.setattr(os.path, "relpath", another_drive)
+    (mesh,) = job_beside(raw, tmp_path, tmp_path / "elsewhere")["train"]["meshes"]
+    assert mesh == {"curve": (tmp_path / "curve.csv").resolve().as_posix(), "law": "curve"}

@@ -118,8 +118,12 @@ def job_beside(raw: Any, folder: Path, place: Path) -> Any:
         return {key: job_beside(value, folder, place) for key, value in raw.items()}
     if isinstance(raw, (list, tuple)):
         return [job_beside(value, folder, place) for value in raw]
-    named = _names_file(raw, folder) and not Path(raw).is_absolute()
-    return Path(os.path.relpath(folder / raw, place)).as_posix() if named else raw
+    if not _names_file(raw, folder) or Path(raw).is_absolute():
+        return raw
+    try:
+        return Path(os.path.relpath(folder / raw, place)).as_posix()
+    except ValueError:  # on another drive of Windows
+        return (folder / raw).resolve().as_posix()
 
 
 def files_named(raw: Any, folder: Path) -> set[str]:

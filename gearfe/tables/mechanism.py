@@ -350,9 +350,11 @@ def read_mechanism_file(path: str | Path) -> MechanismFile:
 
 def _check_keys(table: JointTable | ForceTable, where: str, kind: Kind, what: str) -> None:
     """No keys of other types, and all that this one needs."""
+    docs = {spec.name: spec.metadata.get("doc", "") for spec in fields(table)}
+    own = "remove it; its keys are " + ", ".join(name for name in docs if name in kind.fields)
     for spec in fields(table):
         if spec.name not in kind.fields and spec.name != "type" and getattr(table, spec.name) != spec.default:
-            raise InputError(f"{where}.{spec.name}", None, f"does not belong to type {table.type!r}", "remove it")
+            raise InputError(f"{where}.{spec.name}", None, f"does not belong to type {table.type!r}", own)
     for key in kind.required:
         if getattr(table, key) is None:
-            raise InputError(f"{where}.{key}", None, f"is required by {what}", "add it")
+            raise InputError(f"{where}.{key}", None, f"is required by {what}", f"add it: {docs[key]}")
