@@ -20,7 +20,8 @@ from gearfe.runup.balance import Orbit, Oscillator, Pushes, settled, solve
 from gearfe.runup.condensed import CondensedTrain, condense
 from gearfe.runup.instability import instability_map
 from gearfe.runup.linear import Linear
-from gearfe.runup.report import order_columns, orders, phases, warnings, waterfall
+from gearfe.runup.orders import order_columns, orders
+from gearfe.runup.report import phases, warnings, waterfall
 from gearfe.runup.results import SteadyState, steady_result
 from gearfe.runup.run_up import run_up, steady_state
 from gearfe.runup.stability import multipliers, window

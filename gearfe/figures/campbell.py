@@ -11,7 +11,8 @@ import numpy as np
 
 from ..runup.instability import InstabilityMap
 from ..runup.modes import STRONG, CoupledModes, Crossing
-from ..runup.report import orders, waterfall
+from ..runup.orders import orders
+from ..runup.report import waterfall
 from ..runup.results import SteadyState
 from ..runup.run_up import RunUp
 from ..typing import Array

@@ -12,7 +12,8 @@ import numpy as np
 
 from ..runup.instability import InstabilityMap
 from ..runup.modes import CoupledModes, Crossing
-from ..runup.report import dynamic_factors, iso_dynamic_factors, orders
+from ..runup.orders import orders
+from ..runup.report import dynamic_factors, iso_dynamic_factors
 from ..runup.run_up import RunUp
 from ..typing import Array, IntArray
 from .campbell import draw_campbell, draw_instability, draw_waterfall, signal_of

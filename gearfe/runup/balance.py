@@ -56,8 +56,6 @@ SAFETY = 2.0
 GROWTH = 1.5
 #: Harmonics to begin with, at most, where there are several phases.
 PLENTY = 256
-#: Least step of the part that swings on the way to a first motion.
-LEAST_PART = 1e-3
 #: Most harmonics: a bound on time and memory, not on the error, whose estimate stays.
 MOST_HARMONICS = 8192
 
@@ -73,7 +71,7 @@ class Pushes(NamedTuple):
 class SteadyForces(Protocol):
     """What is not linear, or not constant."""
 
-    def __call__(self, theta: Array, speed: float, u: Array, du: Array) -> Pushes:
+    def __call__(self, theta: Array, speed: float, u: Array, du: Array, /) -> Pushes:
         """Forces at phases theta (S, n), the freedoms and their rates (1/s) being u and du, (S, m)."""
 
 
@@ -246,7 +244,7 @@ def size_of(amplitudes: ComplexArray, scale: Array) -> float:
 
 
 def solve(
-    system: Oscillator, speed: float, guess: ComplexArray, tolerance: float, *, near: bool = False, swings: float = 1.0
+    system: Oscillator, speed: float, guess: ComplexArray, tolerance: float, *, near: bool = False
 ) -> tuple[Orbit, Evaluated]:
     """Steady motion at a speed, from a guess, without an error estimate; and the equations there.
 
@@ -258,13 +256,9 @@ def solve(
         Of the error in the end, in parts of the scale.
     near
         Only a motion in the guess's own range of convergence: one step that contracts too little ends the search.
-    swings
-        This part of what swings, see `begun`.
     """
     count = len(guess) - 1
     H, lattice, scale = flexibility_of(system, speed, count), system.lattice(count), system.scale
-    if swings < 1.0:
-        H = np.concatenate([H[:1], swings * H[1:]])
     places = guess.copy()
     places[0] = places[0].real
     with np.errstate(invalid="ignore"):  # at the resonance of an undamped mode
@@ -292,28 +286,6 @@ def solve(
             best = size, places, at
     found = best[0] < (enough if idle < IDLE else max(enough, LEFT))
     return Orbit(speed, best[1], best[2].forces, math.nan, bool(found), taken), best[2]
-
-
-def begun(system: Oscillator, speed: float, count: int, tolerance: float) -> tuple[Orbit, Evaluated]:
-    """Steady motion at a speed, with so many harmonics, that grows out of the state without vibration.
-
-    A part s of the flexibility for all that swings, ``s H(ik.omega)``, is led from 0 to 1 as fast as Newton's method
-    contracts (Allgower & Georg, Introduction to Numerical Continuation Methods, 2003, Sec. 1.1). Where that way has a
-    turning point, Newton's method goes on from there at once.
-    """
-    places = np.zeros((count + 1, system.linear.size), dtype=complex)
-    places[0] = system.linear.rest
-    places = solve(system, speed, places, tolerance, swings=0.0)[0].places
-    part, step = 0.0, 1.0
-    while step > LEAST_PART:
-        orbit, at = solve(system, speed, places, tolerance, near=True, swings=part + step)
-        if not orbit.found:
-            step *= 0.5
-        elif part + step == 1.0:
-            return orbit, at
-        else:
-            part, places, step = part + step, orbit.places, min(2.0 * step, 1.0 - part - step)
-    return solve(system, speed, places, tolerance)
 
 
 def error_of(system: Oscillator, orbit: Orbit, at: Evaluated) -> tuple[float, ComplexArray]:

@@ -57,8 +57,8 @@ MOST = 400
 BACK, HALVINGS = 3, 3
 #: An error below this part of the tolerance lets so many of the harmonics go on.
 EASY, FEWER = 0.4, 0.8
-#: Change of the speed, relative, for a derivative.
-NUDGE = 1e-6
+#: Change of the speed for a derivative, in parts of its unit.
+NUDGE = 1e-5
 
 
 class Turn(NamedTuple):
@@ -231,12 +231,15 @@ class _Walk:
                 self.heading = -self.heading
             off = self._left(b) or self._beyond(new.orbit)
             if passed:
-                landed = self._landed(place, new, float(speeds[passed[0]]))
-                if landed is None and step > 4.0 * LEAST:  # from nearer
+                speed = float(speeds[passed[0]])
+                between, at = self._between(place, new, speed)
+                if not between.found and step > 4.0 * LEAST:  # from nearer
                     step *= 0.25
                     continue
-                if landed is None:
-                    return f"no motion was found at {speeds[passed[0]]:.6g} rad/s on this branch"
+                landed = settled(self.system, between, at, self.tolerance)
+                if not landed.found:
+                    why = "with as many harmonics as its error needs" if between.found else "on this branch"
+                    return f"no motion was found at {speed:.6g} rad/s {why}"
                 self.number = passed[0]
                 self.last, self.step = new if turned else place, step
                 return self._kept(landed)
@@ -279,8 +282,8 @@ class _Walk:
         """Solution of ``[r_x r_sigma; t_x t_sigma] x = right`` with the tangent beside."""
         system, scale = self.system, self.system.scale
         changed = product(system, orbit.speed, at, H)
-        other = replace(orbit, speed=orbit.speed * (1.0 + NUDGE))
-        by_speed = (self._equations(other)[0].residual - at.residual) / (NUDGE * orbit.speed / self.unit)
+        other = replace(orbit, speed=orbit.speed + NUDGE * self.unit)
+        by_speed = (self._equations(other)[0].residual - at.residual) / NUDGE
         column, row = packed(by_speed, scale), packed(beside.along, np.ones(len(scale)))
 
         def bordered(x: Array) -> Array:
@@ -326,14 +329,13 @@ class _Walk:
             orbit = replace(orbit, speed=orbit.speed - float(change[-1]) * self.unit, places=places)
         return None
 
-    def _landed(self, one: _Place, two: _Place, speed: float) -> Orbit | None:
-        """Orbit at a speed between two points of the curve."""
+    def _between(self, one: _Place, two: _Place, speed: float) -> tuple[Orbit, Evaluated]:
+        """Orbit at a speed between two points of the curve, in the range of convergence."""
         a, b = one.orbit, two.orbit
         part = (speed - a.speed) / (b.speed - a.speed)
         count = max(a.harmonics, b.harmonics)
         guess = (1.0 - part) * a.with_harmonics(count) + part * b.with_harmonics(count)
-        orbit = settled(self.system, *solve(self.system, speed, guess, self.tolerance), self.tolerance)
-        return orbit if orbit.found else None
+        return solve(self.system, speed, guess, self.tolerance, near=True)
 
 
 def _cosine(one: _Place, two: _Place) -> float:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from ..vibration.radiation import power_level
 from . import torus
 from .instability import InstabilityMap
 from .modes import CoupledModes, Crossing, coupled_modes, crossings
+from .orders import order_columns, orders
 from .results import SteadyState
 from .run_up import RunUp
 
@@ -121,71 +121,6 @@ def power_in_band(state: SteadyState, band_hz: float) -> float:
     """Equivalent radiated power up to a frequency (W)."""
     assert state.power is not None
     return float(state.power[(state.frequency > 0.0) & (state.frequency <= band_hz)].sum())
-
-
-class OrderCut(NamedTuple):
-    """A harmonic that is a multiple of a mesh frequency, or a combination of those of meshes of different phases."""
-
-    waves: tuple[int, ...]  # k
-    order: float  # of the drive's turns
-    names: tuple[str, ...]  # such as "2 x mesh 1", "1 x mesh 1 + 1 x mesh 2"
-    mesh: int | None  # the first of which it is a multiple; None for a combination
-
-
-def orders(run: RunUp, multiples: int) -> list[OrderCut]:
-    """Multiples of the mesh frequencies and their combinations, of so many multiples in all, by rising frequency."""
-    system = run.train.system
-    ways: list[list[tuple[int, int]]] = [[(0, 0)] for _ in system.turns]
-    for mesh, cycles in enumerate(system.orders):
-        ways[int(np.argmax(cycles))] += [(sign * a, mesh) for a in range(1, multiples + 1) for sign in (1, -1)]
-    found: dict[tuple[int, ...], list[tuple[int, str, int | None]]] = {}
-    for taken in itertools.product(*ways):
-        parts = [(a, mesh) for a, mesh in taken if a]
-        waves = np.sum([a * np.array(system.orders[mesh]) for a, mesh in parts], axis=0, dtype=int)
-        size = sum(abs(a) for a, _ in parts)
-        if parts and size <= multiples and waves @ (1.0 / np.array(system.turns)) > 0.0:
-            alone = parts[0][1] if len(parts) == 1 else None
-            found.setdefault(tuple(waves.tolist()), []).append((size, _combined(parts), alone))
-    made = []
-    for k, met in found.items():
-        rising = sorted(met, key=lambda x: x[0])
-        order = float(np.sum(np.array(k) / np.array(system.turns)))
-        made.append(OrderCut(k, order, tuple(name for _, name, _ in rising), rising[0][2]))
-    return sorted(made, key=lambda cut: cut.order)
-
-
-def _combined(parts: Sequence[tuple[int, int]]) -> str:
-    """``2 x mesh 1 - 1 x mesh 2``; what is added stands first."""
-    said = ""
-    for a, mesh in sorted(parts, key=lambda part: part[0] < 0):
-        said += (" - " if a < 0 else " + " if said else "") + f"{abs(a)} x mesh {mesh + 1}"
-    return said
-
-
-def order_columns(run: RunUp, multiples: int) -> dict[str, Any]:
-    """Columns of orders.csv: each order of each steady state with the amplitudes of all signals."""
-    states, model = run.states, run.train.model
-    spectra = [(np.abs(s.lines(s.force)), np.abs(s.lines(s.transmission_error))) for s in states]
-    rows = [
-        (cut, i, k) for cut in orders(run, multiples) for i, s in enumerate(states)
-        if (k := s.numbers.get(cut.waves)) is not None
-    ]  # fmt: skip
-    made: dict[str, Any] = {
-        "order": np.array([states[i].order[k] for _, i, k in rows]),
-        "meets": [" = ".join(cut.names) for cut, _, _ in rows],
-        "speed_rad_per_s": np.array([states[i].speed for _, i, _ in rows]),
-        "branch": np.array([states[i].branch for _, i, _ in rows], dtype=int),
-        "frequency_Hz": np.array([states[i].frequency[k] for _, i, k in rows]),
-    }
-    forces, errors = (np.array([spectra[i][which][k] for _, i, k in rows]) for which in (0, 1))
-    moved = np.abs([states[i].acceleration[k] for _, i, k in rows])
-    made |= {f"contact_force_{i + 1}_N": forces[:, i] for i in range(len(model.meshes))}
-    made |= {f"transmission_error_{i + 1}_um": 1e6 * errors[:, i] for i in range(len(model.meshes))}
-    made |= {f"acceleration_{name}_m_per_s2": moved[:, j] for j, name in enumerate(model.bores)}
-    if model.train.housing is not None:
-        power = [states[i].power for _, i, _ in rows]
-        made["radiated_power_W"] = np.array([p[k] for p, (_, _, k) in zip(power, rows, strict=True) if p is not None])
-    return made
 
 
 def waterfall(run: RunUp, states: Sequence[SteadyState] | None = None) -> dict[str, Array]:

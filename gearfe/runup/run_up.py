@@ -20,8 +20,9 @@ from ..threads import one_thread
 from ..train.kinematics import drive_sense
 from ..train.model import TrainModel
 from ..typing import Array, ComplexArray
-from .balance import Orbit, begun, settled, size_of, solve
+from .balance import Orbit, settled, size_of, solve
 from .condensed import CondensedTrain, condense
+from .first import first_motion
 from .follow import Curve, Turn, follow
 from .results import SteadyState, steady_result
 from .stability import Bifurcation, kind_of, multipliers
@@ -123,8 +124,13 @@ def steady_state(
     train = condense(model)
     _checked(model, [speed])
     with one_thread():
-        made = _first(train, float(speed), None if guess is None else guess.orbit, tolerance, band_hz)
-    if made is None:
+        highest = 2.0 * math.pi * band_hz
+        if guess is None:
+            made = first_motion(train.system, float(speed), tolerance=tolerance, highest=highest)
+        else:
+            places = guess.orbit.with_harmonics(max(train.system.harmonics(speed, highest), guess.orbit.harmonics))
+            made = settled(train.system, *solve(train.system, float(speed), places, tolerance), tolerance)
+    if made is None or not made.found:
         problem = "has no periodic motion that was found"
         cure = "give a guess from a neighbouring speed (run_up finds them), more damping, or look at a transient"
         raise InputError("speed", float(speed), problem, cure)
@@ -159,17 +165,17 @@ def run_up(
     train = condense(model)
     made = _Curves([], [], [])
     lost: list[float] = []
+    options: dict[str, Any] = {"tolerance": tolerance, "highest": 2.0 * math.pi * band_hz}
     with one_thread():
         begin = 0
         while begin < len(given):
             if progress is not None:
                 progress(begin, len(given) - 1)
-            start = _first(train, float(given[begin]), None, tolerance, band_hz)
+            start = first_motion(train.system, float(given[begin]), **options)
             if start is None:
                 lost.append(float(given[begin]))
                 begin += 1
                 continue
-            options: dict[str, Any] = {"tolerance": tolerance, "highest": 2.0 * math.pi * band_hz}
             back = follow(train.system, given[begin::-1], start, **options) if begin else None
             curve = follow(train.system, given[begin:], start, **options, progress=progress)
             made.join(back, curve, train.system.scale)
@@ -254,18 +260,6 @@ def _bifurcations(states: Sequence[SteadyState], turns: Sequence[Bifurcation]) -
         kind = kind_of(one.multipliers, two.multipliers) if math.isfinite(one.period) else "loss of stability"
         found.append(Bifurcation(float(speed), kind, one.branch))
     return tuple(sorted(found, key=lambda b: b.branch))
-
-
-def _first(train: CondensedTrain, speed: float, guess: Orbit | None, tolerance: float, band_hz: float) -> Orbit | None:
-    """Orbit at a speed from a guess, or out of the state without vibration."""
-    system = train.system
-    count = system.harmonics(speed, 2.0 * math.pi * band_hz)
-    if guess is None:
-        made = begun(system, speed, count, tolerance)
-    else:
-        made = solve(system, speed, guess.with_harmonics(max(count, guess.harmonics)), tolerance)
-    orbit = settled(system, *made, tolerance)
-    return orbit if orbit.found else None
 
 
 def _checked(model: TrainModel, speeds: ArrayLike | Sequence[float]) -> Array:

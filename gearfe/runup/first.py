@@ -1,0 +1,51 @@
+r"""A first motion at a speed, without a guess: it grows out of the state without vibration.
+
+Of the flexibility for all that swings a part s is taken, :math:`s\,H(ik\cdot\omega)` for :math:`k \ne 0`. Without it
+only the mean forces are in balance; from there the curve of solutions over s, followed round its turning points, leads
+to s = 1: it can neither end before nor, as damping bounds the motions, go to infinity (homotopy; Allgower & Georg,
+Introduction to Numerical Continuation Methods, 2003, Ch. 11).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..typing import Array, ComplexArray
+from .balance import Orbit, Oscillator, Pushes, solve
+from .follow import follow
+
+
+@dataclass(frozen=True, eq=False)
+class Growing(Oscillator):
+    """An oscillator at one speed; the part s of what swings stands in the speed's place."""
+
+    speed: float = 0.0
+
+    def omega(self, _part: float, count: int) -> Array:
+        return super().omega(self.speed, count)
+
+    def harmonics(self, _part: float, highest: float) -> int:
+        return super().harmonics(self.speed, highest)
+
+    def flexibility(self, part: float, count: int) -> ComplexArray:
+        whole = self.linear.flexibility(self.omega(part, count), self.speed)
+        return np.concatenate([whole[:1], part * whole[1:]])
+
+
+def first_motion(system: Oscillator, speed: float, *, tolerance: float, highest: float) -> Orbit | None:
+    """Steady motion at a speed, or None where none was found; parameters as of `gearfe.runup.follow.follow`."""
+
+    def forces(theta: Array, _part: float, u: Array, du: Array) -> Pushes:
+        return system.forces(theta, speed, u, du)
+
+    grows = Growing(system.linear, forces, system.turns, system.scale, system.orders, system.limit, speed)
+    places = np.zeros((grows.harmonics(0.0, highest) + 1, system.linear.size), dtype=complex)
+    places[0] = system.linear.rest
+    start, _ = solve(grows, 0.0, places, tolerance)
+    if not start.found:
+        return None
+    curve = follow(grows, [0.0, 1.0], start, tolerance=tolerance, highest=highest)
+    ends = [orbit for orbit in curve.orbits if orbit.speed == 1.0]
+    return replace(ends[0], speed=speed) if ends else None
