@@ -2,7 +2,10 @@
 
 import argparse
 import re
+import runpy
 from pathlib import Path
+
+import pytest
 
 from gearfe.commands import stiffness
 from gearfe.stiffness.curve import COLUMNS, CONSTANTS
@@ -41,3 +44,23 @@ def test_scripts_pages_and_pictures_exist():
     for page in (ROOT / "docs").rglob("*.md"):
         for name in re.findall(r"\]\(([\w./]+\.(?:md|png))", page.read_text(encoding="utf-8")):
             assert (page.parent / name).exists(), (page.name, name)
+
+
+def test_an_index_of_packages_finds_links_and_pictures(monkeypatch):
+    pytest.importorskip("hatchling", reason="pip install 'gearfe[dev]'")
+    hook = runpy.run_path(str(ROOT / "scripts" / "package_metadata.py"))["Addresses"](str(ROOT), {})
+    metadata = {}
+    monkeypatch.delenv("GEARFE_URL", raising=False)
+    hook.update(metadata)
+    assert metadata == {"readme": {"content-type": "text/markdown", "text": README}}
+    monkeypatch.setenv("GEARFE_URL", "https://example.org/gearfe/")
+    hook.update(metadata)
+    assert metadata["urls"]["Source"] == "https://example.org/gearfe"
+    text = metadata["readme"]["text"]
+    links = re.findall(r"\]\(([^)]*)\)", text)
+    assert "https://example.org/gearfe/raw/HEAD/docs/stiffness.png" in links
+    for link in links:
+        kind, _, name = link.removeprefix("https://example.org/gearfe/").partition("/HEAD/")
+        assert kind == ("raw" if name.endswith(".png") else "blob"), link
+        assert (ROOT / name.partition("#")[0]).is_file(), link
+    assert re.sub(r"https://example.org/gearfe/(raw|blob)/HEAD/", "", text) == README
