@@ -135,10 +135,9 @@ def shapes_of(stations: Sequence[Array]) -> Shapes:
 def cubic_spline(at: Array) -> Array:
     """Cubic splines of the unit vectors, their third derivative continuous at the last station but one at both ends.
 
-    Written out, since the interpolation of a library costs a third of a second to load: the slopes m of the pieces of
-    lengths h and divided differences d satisfy ``m[i-1]/h[i-1] + 2 m[i] (1/h[i-1] + 1/h[i]) + m[i+1]/h[i] =
-    3 (d[i-1]/h[i-1] + d[i]/h[i])``; at the ends the two pieces are one cubic (C. de Boor, A Practical Guide to Splines,
-    1978, chapter IV, "not a knot"). Through fewer than four stations runs their polynomial, which that leaves open.
+    Their slopes at the stations follow from continuous second derivatives (C. de Boor, A Practical Guide to Splines,
+    1978, chapter IV, "not a knot"). Through fewer than four stations runs the polynomial. Written out, since the
+    interpolation of a library costs a third of a second to load.
 
     Parameters
     ----------
@@ -151,33 +150,15 @@ def cubic_spline(at: Array) -> Array:
         Coefficients of the rising powers of the distance from the beginning of the piece: piece, vector, power.
     """
     h, eye = np.diff(at)[:, None], np.eye(len(at))
-    d = np.diff(eye, axis=0) / h
-    m = _slopes(h, d) if len(at) > 3 else _polynomial_slopes(at)
-    curved = (3.0 * d - 2.0 * m[:-1] - m[1:]) / h
-    twisted = (m[:-1] + m[1:] - 2.0 * d) / h**2
-    return np.stack([eye[:-1], m[:-1], curved, twisted], axis=-1)
-
-
-def _polynomial_slopes(at: Array) -> Array:
-    """Slopes at the stations of the polynomials that are one at a station and zero at the others."""
-    powers, t = np.arange(len(at)), (at - at[0])[:, None] / at[-1]
-    slope = powers * t ** np.maximum(powers - 1, 0) / at[-1]
-    return np.asarray(slope @ np.linalg.inv(t**powers))
-
-
-def _slopes(h: Array, d: Array) -> Array:
-    """The slopes m of `cubic_spline` at all stations."""
-    k, inverse = len(h) + 1, 1.0 / h[:, 0]
-    matrix, right = np.zeros((k, k)), np.zeros((k, k))
-    inside = np.arange(1, k - 1)
-    matrix[inside, inside - 1], matrix[inside, inside + 1] = inverse[:-1], inverse[1:]
-    matrix[inside, inside] = 2.0 * (inverse[:-1] + inverse[1:])
-    right[inside] = 3.0 * (d[:-1] / h[:-1] + d[1:] / h[1:])
-    for end, inner, first, second in ((0, 1, 0, 1), (k - 1, k - 2, k - 2, k - 3)):
-        a, b = h[first, 0], h[second, 0]
-        matrix[end, end], matrix[end, inner] = 1.0 / a, 1.0 / a + 1.0 / b  # as large as the rows inside
-        right[end] = ((3.0 + 2.0 * b / a) * d[first] + a / b * d[second]) / (a + b)
-    return np.linalg.solve(matrix, right)
+    d, begin, end = np.diff(eye, axis=0) / h, eye[:-1], eye[1:]
+    # the last two coefficients of each piece: what the slopes and what the values do to them
+    square = np.stack([-(2 * begin + end), 3 * d]) / h
+    cube = np.stack([begin + end, -2 * d]) / h**2
+    kinks, jumps = square[:, :-1] + 3 * h[:-1] * cube[:, :-1] - square[:, 1:], np.diff(cube, axis=1) * h[1:]
+    few = np.concatenate([jumps, cube[:, :1] * h[0], square[:, :1]], axis=1)[:, :2]
+    of_slopes, of_values = np.concatenate([kinks, jumps[:, [0, -1]] if len(at) > 3 else few], axis=1)
+    m = -np.linalg.solve(of_slopes, of_values)
+    return np.stack([begin, m[:-1], square[0] @ m + square[1], cube[0] @ m + cube[1]], axis=-1)
 
 
 def flank_compliance(gear: Gear, body: GearBody) -> FlankCompliance:
