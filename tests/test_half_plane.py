@@ -12,6 +12,7 @@ from gearfe.contact.half_plane import NEAR, change, first_state, half_plane_pair
 from gearfe.contact.half_plane_step import step
 from gearfe.elasticity import Material
 from gearfe.gear.pair import GearPair
+from gearfe.stiffness.contact_pressure import reached_marks
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import gear
@@ -43,7 +44,7 @@ def test_torque_is_the_derivative_of_the_energy_beside_kinks(name: str, bound: f
     law = half_plane_pair(elastic_pair(pair))
     angles, twist = angles_of(pair, 60), 0.02 * pair.pinion.module / pair.wheel.base_radius
     low, middle, high = (solve_half_plane(law, angles, twist * f) for f in (1 - 1e-4, 1.0, 1 + 1e-4))
-    assert {"kinked": "relief", "undercut": "undercut"}[name] in middle.contacts.mark
+    assert {"kinked": "relief", "undercut": "undercut"}[name] in reached_marks(law, middle.contacts)
     rate = (high.energy - low.energy) / (2e-4 * twist)
     assert np.abs(rate / middle.torque_wheel - 1).max() < bound
 
@@ -107,7 +108,7 @@ def test_hertz_at_the_pitch_point(name: str, degrees: float) -> None:
     u = (roll - face.flank.start) / (face.flank.end - face.flank.start)
     angle = touching.angle[np.argmin(np.abs(touching.place[:, 0] - u))]
     contacts = solve_half_plane(law, angle, math.radians(degrees)).contacts
-    k = int(np.argmin(np.abs(contacts.parameter[:, 0] - u)))
+    k = int(np.argmin(np.abs(law.sides[0].curve.parameter_at(contacts.arc[:, 0]) - u)))
     one, two = (one.base_radius * math.tan(pair.working_pressure_angle) for one in (pair.pinion, pair.wheel))
     radius = one * two / (one + two)
     steel = Material()
@@ -115,9 +116,8 @@ def test_hertz_at_the_pitch_point(name: str, degrees: float) -> None:
     line = contacts.force[k] / law.width
     b = math.sqrt(4 * line * radius / (math.pi * modulus))
     assert contacts.half_width[k] == pytest.approx(b, rel=5e-3)
-    assert contacts.hertz_pressure[k] == pytest.approx(2 * line / (math.pi * b), rel=5e-3)
     assert contacts.pressure[k].max() == pytest.approx(2 * line / (math.pi * b), rel=5e-3)
-    assert not contacts.marked[k]
+    assert reached_marks(law, contacts)[k] == ""
 
 
 # ---- finite elements -----------------------------------------------------------------------------------------------
@@ -165,7 +165,7 @@ def test_no_kinks_in_the_angle(name: str) -> None:
     found = solve_half_plane(law, angles, twist)
     c = found.contacts
     single = np.bincount(c.position, minlength=240) == 1
-    single &= ~np.isin(np.arange(240), c.position[c.marked])
+    single &= ~np.isin(np.arange(240), c.position[reached_marks(law, c) != ""])
     kinks = np.abs(np.convolve(found.torque_wheel, [1, -4, 6, -4, 1], mode="valid")) / 16 / found.torque_wheel[2:-2]
     inner = np.convolve(single, np.ones(13), mode="valid") == 13
     assert inner.sum() > 40
@@ -177,13 +177,14 @@ def test_marks_are_told() -> None:
     for name, mark in (("sharp", "tip"), ("rounded", "round")):
         law = law_of(name)
         contacts = solve_half_plane(law, angles_of(law.pair, 30), math.radians(0.2)).contacts
-        ends = np.abs(contacts.parameter - 1.0).min(axis=1) < 1e-6
-        assert set(contacts.mark) == {"", mark}
+        u = np.stack([law.sides[g].curve.parameter_at(contacts.arc[:, g]) for g in (0, 1)], axis=1)
+        marks, ends = reached_marks(law, contacts), np.abs(u - 1.0).min(axis=1) < 1e-6
+        assert set(marks) == {"", mark}
         if name == "sharp":
-            assert (contacts.mark[ends] == mark).all()
-        middle = (contacts.parameter > 0.4).all(axis=1) & (contacts.parameter < 0.7).all(axis=1)
+            assert (marks[ends] == mark).all()
+        middle = (u > 0.4).all(axis=1) & (u < 0.7).all(axis=1)
         assert middle.any()
-        assert not contacts.marked[middle].any()
+        assert (marks[middle] == "").all()
 
 
 def test_no_contact_and_no_position() -> None:
@@ -243,7 +244,7 @@ def test_an_undercuts_edge_on_a_nearly_flat_mate() -> None:
     for module_share in (0.002, 0.008, 0.03):
         found = solve_half_plane(law, angles, module_share * sharp.wheel.module / sharp.wheel.base_radius)
         assert set(found.status) == {"converged"}
-        assert "undercut" in found.contacts.mark
+        assert "undercut" in reached_marks(law, found.contacts)
     reference = solve_positions(elastic_pair(sharp, law="nitsche"), angles[::8], found.twist[0])
     assert found.torque_wheel[::8] == pytest.approx([p.torque_wheel for p in reference], rel=2e-3)
 

@@ -359,8 +359,8 @@ def _finished(setting: Setting, start: State, twists: Array) -> _Ended:
     sums["tangent"] = couples.total(of_both["torque_wheel"][on] - of_pairs["torque_wheel"]) / ahead
     right = couples.total(~one[1].solution.settled) == 0
     settled = right & (changed <= TOLERANCE) & (sums["tangent"] > 0)
-    known = {name: of_pairs[name] for name in ("torque_wheel", "torque_pinion")}
-    known |= contact_rates(setting.law, one, two, ahead[couples.position])
+    known = contact_rates(setting.law, one, two, ahead[couples.position])
+    known["torque_wheel"] = of_pairs["torque_wheel"]
     contacts = contacts_of(setting, *one, known)
     whole = completed(setting, *one)
     if whole is None:

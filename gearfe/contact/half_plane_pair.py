@@ -109,13 +109,6 @@ class HalfPlanePair:
             made[flank == i] = self.curves[i].arc_at(parameter[flank == i])
         return made
 
-    def parameter_at(self, flank: IntArray, arc: Array) -> Array:
-        """Parameters u of arc lengths (m) on the flanks `flank`, both of shape (p, 2)."""
-        made = np.empty(np.shape(arc))
-        for i in np.unique(flank):
-            made[flank == i] = self.curves[i].parameter_at(arc[flank == i])
-        return made
-
     @cached_property
     def shapes(self) -> Shapes:
         """Shape functions of the stations."""
@@ -154,10 +147,13 @@ class HalfPlanePair:
 
     @cached_property
     def marks(self) -> tuple[NDArray[np.str_], IntArray, Array]:
-        """Names, flanks and arc lengths (m) of the flanks' marks, see `half_plane_result.PairContacts`, by rising rank;
-        first a mark of no flank without a name.
+        """Marks of the flanks beside which a pressure is not elliptic, by rising rank: names, flanks, and first and
+        last arc lengths (m), shape (2, k).
+
+        ``undercut`` (its edge), ``relief`` (kink of a linear relief), ``round`` (from the start of a tip round on),
+        ``tip`` (a sharp end).
         """
-        found = [("", -1, 0.0)]
+        found = []
         for name in ("undercut", "relief", "round", "tip"):
             for flank, curve in enumerate(self.curves):
                 face = curve.face
@@ -167,9 +163,10 @@ class HalfPlanePair:
                     "round": [] if face.sharp else [1.0],
                     "tip": [face.end] if face.sharp else [],
                 }[name]
-                found += [(name, flank, float(curve.arc_at(at))) for at in places]
-        names, flanks, arcs = zip(*found, strict=True)
-        return np.array(names, dtype="<U8"), np.array(flanks), np.array(arcs)
+                found += [(name, flank, at, face.end if name == "round" else at) for at in places]
+        names, flanks, *ends = zip(*found, strict=True)
+        numbers = np.array(flanks)
+        return np.array(names, dtype="<U8"), numbers, np.stack([self.arc_at(numbers, np.array(end)) for end in ends])
 
     @cached_property
     def kinks(self) -> tuple[Array, Array]:

@@ -7,10 +7,9 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..gear.flank_curve import WAY
-from ..typing import Array, BoolArray, ComplexArray, IntArray
+from ..typing import Array, ComplexArray, IntArray
 from .compliance import MeshingPair
 from .flank import Flank, edge_shapes
 from .flank_compliance import FlankCompliance
@@ -41,20 +40,14 @@ class PairContacts:
         d force/d twist (N/rad), the normal's rotation per twist (-), and d ln b/d twist (1/rad).
     arc_rate : ndarray, shape (m, 2)
         d arc/d twist (m/rad).
-    torque_wheel, torque_pinion : ndarray, shape (m,)
-        Moments of the force about the hubs (N m), at the deformed place.
+    torque_wheel : ndarray, shape (m,)
+        Moment of the force about the wheel's hub (N m), at the deformed place.
     point, normal : ndarray of complex, shape (m,)
         Centre of pressure (m) and common normal out of the pinion, global axes.
-    arc, parameter : ndarray, shape (m, 2)
-        The material there on pinion and wheel: arc length from the start of the working flank (m), and parameter u of
-        the `gearfe.gear.touching.Face` (in [0, 1] involute, above tip round, below 0 root).
+    arc : ndarray, shape (m, 2)
+        The material there on pinion and wheel: arc length from the start of the working flank (m).
     half_width : ndarray, shape (m,)
         b = 2 sqrt(variance of the pressure about its mean) (m): Hertz's where the pressure is elliptic.
-    hertz_pressure : ndarray, shape (m,)
-        Peak of the elliptic pressure with the same force and half width, 2 F / (pi b L) (Pa).
-    mark : ndarray of str, shape (m,)
-        Mark of a face that the pressure reaches: ``tip`` (a sharp end), ``round`` (start of a tip round), ``relief``
-        (kink of a linear relief), ``undercut`` (edge of an undercut), of several the first in this order, or nothing.
     x, width, pressure : ndarray, shape (m, n)
         Panels: middles along the tangent -i n from the centre of pressure, widths (m), and pressures (Pa).
     panel_arc, panel_radius : ndarray, shape (m, 2, n)
@@ -69,14 +62,10 @@ class PairContacts:
     growth: Array
     arc_rate: Array
     torque_wheel: Array
-    torque_pinion: Array
     point: ComplexArray
     normal: ComplexArray
     arc: Array
-    parameter: Array
     half_width: Array
-    hertz_pressure: Array
-    mark: NDArray[np.str_]
     x: Array
     width: Array
     pressure: Array
@@ -91,28 +80,20 @@ class PairContacts:
         here = by[self.position]
         force = np.maximum(self.force + self.force_rate * here, 0.0)
         scale = np.divide(force, self.force, out=np.ones(len(force)), where=self.force > 0)
-        wider = np.exp(self.growth * here)
         return replace(
             self,
             force=force,
             torque_wheel=self.torque_wheel * scale,
-            torque_pinion=self.torque_pinion * scale,
-            half_width=self.half_width * wider,
-            hertz_pressure=self.hertz_pressure * scale / wider,
+            half_width=self.half_width * np.exp(self.growth * here),
         )
-
-    @property
-    def marked(self) -> BoolArray:
-        """Whether the pressure reaches a mark, beside which it is not elliptic, shape (m,)."""
-        return np.asarray(self.mark != "")
 
 
 def no_contacts() -> PairContacts:
     """None."""
-    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(("arc", "parameter", "arc_rate"), (0, 2))
+    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(("arc", "arc_rate"), (0, 2))
     shapes |= dict.fromkeys(("x", "width", "pressure"), (0, PANELS))
     shapes |= dict.fromkeys(("panel_arc", "panel_radius"), (0, 2, PANELS))
-    kinds: dict[str, Any] = {"position": np.int64, "pair": np.int64, "point": complex, "normal": complex, "mark": "<U8"}
+    kinds: dict[str, Any] = {"position": np.int64, "pair": np.int64, "point": complex, "normal": complex}
     names = [f.name for f in fields(PairContacts)]
     return PairContacts(**{name: np.zeros(shapes.get(name, (0,)), kinds.get(name, float)) for name in names})
 
@@ -141,27 +122,22 @@ def _material(made: Step) -> Array:
 
 
 def contacts_of(setting: Setting, state: State, made: Step, known: dict[str, Array]) -> PairContacts:
-    """The contacts of a step that carry load; `known` are the torques of all, and what `contact_rates` gives."""
+    """The contacts of a step that carry load; `known`, of all: the wheel's torques, and what `contact_rates` gives."""
     law, index = setting.law, np.flatnonzero(made.solution.force > 0)
     if len(index) < len(setting.found):
         setting, state, made = setting.take(index), taken(state, index), taken(made, index)
     found = setting.found
-    force, pressure, width = made.solution.force, made.solution.pressure, made.width
-    arc, half_width = _material(made), 2 * np.sqrt(made.spread)
     return PairContacts(
         position=found.position,
         pair=found.pair,
-        force=force * law.width,
+        force=made.solution.force * law.width,
         point=_centres(state, made),
         normal=state.normal,
-        arc=arc,
-        parameter=law.parameter_at(found.flank, arc),
-        half_width=half_width,
-        hertz_pressure=2 * force / (np.pi * half_width),
-        mark=_reached(law, found.flank, made.arcs, pressure, width),
+        arc=_material(made),
+        half_width=2 * np.sqrt(made.spread),
         x=made.x - made.place[:, None],
-        width=width,
-        pressure=pressure,
+        width=made.width,
+        pressure=made.solution.pressure,
         panel_arc=made.arcs,
         panel_radius=np.abs(setting.tables.at(made.arcs)[0]),
         **{name: values[index] for name, values in known.items()},
@@ -180,16 +156,6 @@ def contact_rates(
         "growth": 0.5 * (wider - 1) / by,
         "arc_rate": (_material(two) - _material(one)) / by[:, None],
     }
-
-
-def _reached(law: HalfPlanePair, flank: IntArray, arcs: Array, pressure: Array, width: Array) -> NDArray[np.str_]:
-    """Mark that each pressure reaches, see `PairContacts`: it ends within a panel beside the middle of the last one."""
-    bears = (pressure > 0)[:, None]
-    low = np.where(bears, arcs - width[:, None], np.inf).min(axis=2, keepdims=True)
-    high = np.where(bears, arcs + width[:, None], -np.inf).max(axis=2, keepdims=True)
-    names, of, at = law.marks
-    met = ((flank[:, :, None] == of) & (low <= at) & (at <= high)).any(axis=1)
-    return np.asarray(names[(met * np.arange(len(names))).max(axis=1)])  # what comes later wins
 
 
 def flank_loads(

@@ -114,8 +114,8 @@ class Smooth:
 
     Attributes
     ----------
-    values, bends : ndarray, shape (p, 2, k)
-        Shape functions of the stations at the arcs, and their curvatures (1/m2).
+    values : ndarray, shape (p, 2, k)
+        Shape functions of the stations at the arcs.
     moved : ndarray of complex, shape (c, 2, 3)
         Displacement, its slope and curvature of the first face of each couple by a unit force per width on the second,
         tooth axes (m2/N, m/N, 1/N).
@@ -124,7 +124,6 @@ class Smooth:
     """
 
     values: Array
-    bends: Array
     moved: ComplexArray
     compliance: Array
 
@@ -182,7 +181,7 @@ def smooth_influence(law: HalfPlanePair, normal: ComplexArray, arc: Array, coupl
     at_stations = answers(law, values, normal, couples)
     moved = (shapes.take(couples.first, axis=0) @ at_stations.view(float)).view(complex)[..., 0]
     compliance = (moved[:, :, 0] * normal.take(couples.first, axis=0).conj()).real.sum(axis=1)
-    return Smooth(values, shapes[:, :, 2], moved, compliance)
+    return Smooth(values, moved, compliance)
 
 
 def answers(law: HalfPlanePair, values: Array, normal: ComplexArray, couples: Couplings) -> ComplexArray:

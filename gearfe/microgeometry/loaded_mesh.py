@@ -45,7 +45,7 @@ class PairLoads:
         Half width (m), and peak pressure of the elliptic contact of that force and half width (Pa); where an edge bears
         (`mark`) the blunted figure of `gearfe.stiffness.contact_pressure`.
     mark : ndarray of str, shape (q,)
-        Edge that the pressure reaches, see `gearfe.contact.half_plane_result.PairContacts`, or nothing.
+        Edge that the pressure reaches, see `gearfe.contact.half_plane_pair.HalfPlanePair.marks`, or nothing.
     """
 
     torque: IntArray

@@ -13,7 +13,7 @@ from ..contact.position import Positions, taken
 from ..errors import InputError
 from ..gear.deviation import ToothDeviations
 from ..loadmap.root_stress import PairRoots
-from ..stiffness.contact_pressure import BLUNTING
+from ..stiffness.contact_pressure import BLUNTING, reached_marks
 from ..stiffness.positions import HalfPlaneSolver, Progress, at_torques, check_torque
 from ..threads import one_thread
 from ..typing import Array, IntArray
@@ -136,14 +136,15 @@ def _pair_loads(law: HalfPlanePair, made: Positions, numbers: IntArray, n: int) 
     own = taken(own, np.flatnonzero(own.force > 0))
     cell = numbers[own.position]
     force, width = own.force, law.width
-    blunted = 2 * force / (math.pi * width * np.hypot(own.half_width, BLUNTING * law.pair.pinion.module))
+    mark = reached_marks(law, own)
+    blunting = np.where(mark != "", BLUNTING * law.pair.pinion.module, 0.0)
     flank = law.teeth.flank(own.pair)
     roll = np.full((len(own), 2), np.nan)
-    for i, face in enumerate(law.teeth.faces):
-        rows = (flank == i) & (own.parameter >= 0) & (own.parameter <= 1)
-        roll[rows] = face.flank.roll(own.parameter[rows])
+    for i, curve in enumerate(law.curves):
+        u = np.where(flank == i, curve.parameter_at(own.arc), np.nan)
+        rows = (u >= 0) & (u <= 1)
+        roll[rows] = curve.face.flank.roll(u[rows])
     total = np.bincount(own.position, own.torque_wheel, len(numbers))
-    mark = np.where((own.mark == "") & (own.parameter > 1).any(axis=1), "round", own.mark)  # beyond its start
     return PairLoads(
         torque=cell // n,
         angle=cell % n,
@@ -152,7 +153,7 @@ def _pair_loads(law: HalfPlanePair, made: Positions, numbers: IntArray, n: int) 
         share=own.torque_wheel / total[own.position],
         roll=roll,
         half_width=own.half_width,
-        pressure=np.where(mark != "", blunted, own.hertz_pressure),
+        pressure=2 * force / (math.pi * width * np.hypot(own.half_width, blunting)),
         mark=mark,
     )
 

@@ -26,14 +26,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..contact.compliance import MeshingPair
 from ..contact.flank import Flank, edge_nodes, edge_shapes
+from ..contact.half_plane_pair import HalfPlanePair
 from ..contact.half_plane_result import PairContacts
 from ..contact.position import Positions
 from ..gear.deviation import NOMINAL
-from ..gear.flank_curve import FlankCurve
-from ..typing import Array, IntArray
+from ..typing import Array, BoolArray, IntArray
 from .positions import PositionSolver
 
 #: What bears besides smooth flanks, by number: nothing; a rounded tip edge; a sharp edge, under which the pressure of
@@ -57,7 +58,10 @@ def contact_pressures(solver: PositionSolver, found: Positions) -> dict[str, Arr
     k, position, width = k[known], contacts.position[known], contacts.half_width[known]
     force = contacts.torque_wheel[known] / (touching.arm[k, 1] * elastic.width)
     curvature, flat = touching.curvature[k], np.isfinite(touching.curvature[k])
-    bears = np.maximum(*(_bearing(curve, touching.place[k, g], width) for g, curve in enumerate(solver.curves)))
+    middle, half = solver.law.arc_at(touching.flank[k], touching.place[k])[:, :, None], width[:, None, None]
+    met = marks_met(solver.law, touching.flank[k], middle - half, middle + half)
+    rounded = solver.law.marks[0] == "round"
+    bears = np.where(met[:, ~rounded].any(axis=1), _SINGULAR, np.where(met[:, rounded].any(axis=1), _ROUNDED, 0))
     several = np.unique(pairs[known], return_inverse=True, return_counts=True)
     bears[several[2][several[1]] > 1] = _ROUNDED  # not where the rigid flanks touch first, nor with one ellipse
     bears[~flat] = _SINGULAR  # it touches at the corner itself, however narrow the contact
@@ -94,13 +98,25 @@ def largest_pressures(curve: Any) -> dict[str, Any]:
     }
 
 
-def _bearing(curve: FlankCurve, u: Array, half: Array) -> IntArray:
-    """Places in `EDGES` of what contacts of the half widths `half` (m) about the parameters u of a flank reach."""
-    face, s = curve.face, curve.arc_at(u)
-    sharp = curve.arc_at([*([0.0] if face.undercut else []), *face.kinks, *([face.end] if face.sharp else [])])
-    reached = (np.abs(sharp - s[:, None]) <= half[:, None]).any(axis=1)
-    rounded = ~np.array(face.sharp) & (s + half > curve.arc_at(1.0))
-    return np.where(reached, _SINGULAR, np.where(rounded, _ROUNDED, 0))
+def marks_met(law: HalfPlanePair, flank: IntArray, low: Array, high: Array) -> BoolArray:
+    """Which of `HalfPlanePair.marks` lie between the arcs low and high (m), shape (m, 2, 1), of contacts on the flanks
+    `flank`, shape (m, 2): shape (m, k).
+    """
+    _, of, (first, last) = law.marks
+    return np.asarray(((flank[:, :, None] == of) & (low <= last) & (high >= first)).any(axis=1))
+
+
+def reached_marks(law: HalfPlanePair, contacts: PairContacts) -> NDArray[np.str_]:
+    """The highest of the marks that the pressure of each contact reaches, or nothing, shape (m,).
+
+    A pressure ends within a panel beside the middle of its last one.
+    """
+    bears = (contacts.pressure > 0)[:, None]
+    low = np.where(bears, contacts.panel_arc - contacts.width[:, None], np.inf).min(axis=2, keepdims=True)
+    high = np.where(bears, contacts.panel_arc + contacts.width[:, None], -np.inf).max(axis=2, keepdims=True)
+    met = marks_met(law, law.teeth.flank(contacts.pair), low, high)
+    names = np.append("", law.marks[0])
+    return np.asarray(names[(met * np.arange(1, len(names))).max(axis=1)])
 
 
 @dataclass(frozen=True)

@@ -134,7 +134,6 @@ class HalfPlaneSolver:
 
     def __init__(self, law: HalfPlanePair, elastic: MeshingPair | None = None) -> None:
         self.pair, self._elastic, self.law = law.pair, elastic, law
-        self.curves = [self.law.curves[flank] for flank in self.law.teeth.flank(np.zeros(1, dtype=np.int64))[0]]
         self._angles = np.zeros(0)
         self._known = self.law.teeth.touching(self._angles)
 
@@ -205,7 +204,6 @@ class ElementSolver:
         self.pair, self.elastic, self.resolved_only = elastic.gears, elastic, resolved_only
         self.half_plane = HalfPlaneSolver(half_plane_pair(elastic), elastic)
         self.law = self.half_plane.law
-        self.curves = self.half_plane.curves
         self.touching, self.touching_twists = self.half_plane.touching, self.half_plane.touching_twists
         self.first_touch = self.half_plane.first_touch
 
