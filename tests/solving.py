@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gearfe.contact.compliance import MeshingPair
+from gearfe.contact.elements import first_contacts, solve_elements
+from gearfe.contact.laws import HalfPlane
 from gearfe.contact.position import Positions
 from gearfe.stiffness.positions import position_solver
 
@@ -12,8 +14,11 @@ from gearfe.stiffness.positions import position_solver
 def solve_positions(elastic: MeshingPair, angles, twists) -> Positions:
     """At pinion angles and twists (rad), with what fields need."""
     angles = np.atleast_1d(np.asarray(angles, dtype=float))
-    solver = position_solver(elastic, resolved_only=False)
-    return solver.solve(angles, np.broadcast_to(twists, angles.shape), kept=np.arange(len(angles)))
+    solver, twists = position_solver(elastic), np.broadcast_to(twists, angles.shape)
+    if isinstance(elastic.law, HalfPlane):
+        return solver.solve(angles, twists, kept=np.arange(len(angles)))
+    contacts = solver.half_plane.solve(angles, twists).contacts
+    return solve_elements(elastic, angles, twists, first_contacts(solver.law.sides, contacts))
 
 
 def solve_position(elastic: MeshingPair, angle: float, twist: float) -> Positions:

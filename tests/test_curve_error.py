@@ -10,13 +10,6 @@ import pytest
 from gearfe import sweep_stiffness
 from gearfe.contact.laws import Nitsche, Penalty
 from gearfe.elasticity import Material
-from gearfe.stiffness.curve_error import (
-    COARSENING,
-    COMMON,
-    ORDER,
-    error_estimate,
-    solved_twice,
-)
 from gearfe.stiffness.sweep import elastic_pair
 
 from . import gears
@@ -45,36 +38,28 @@ def test_a_wider_gear_is_one_of_the_common_width_and_a_higher_modulus(law):
 # ---- the estimate ----------------------------------------------------------------------------------------------------
 
 
-def test_one_position_that_agrees_by_chance_is_not_believed():
-    fine = np.full(10, 100.0)
-    coarse = fine * (1 + 1e-3 * np.array([1, -1, 0, 1, -1, 1, -1, 1, -1, 1]))
-    assert error_estimate(fine, coarse).min() > 0.9e-3
+def test_a_law_on_the_elements_is_as_far_off_as_from_the_half_plane_law_and_that_from_the_truth():
+    """At the same twists, so that at a given torque, too, the difference is that of torques."""
+    angles = np.radians([3.0, 5.0, 12.0, 14.0])
+    curve = sweep_stiffness(SHARP, torque=100.0, angles=angles, law="nitsche", coarsen=2.0, estimate_error=True)
+    elastic = elastic_pair(SHARP, law="half_plane", coarsen=2.0, flank_coarsen=0.25)  # the same meshes
+    given = {"elastic": elastic, "estimate_error": True}
+    known = [sweep_stiffness(SHARP, twist=t, angles=[a], **given) for t, a in zip(curve.twist, angles, strict=True)]
+    apart = np.abs(100.0 / np.array([one.torque_wheel[0] for one in known]) - 1)
+    assert (curve.relative_error > apart).all()
+    single = np.array([one.relative_error[0] for one in known])  # twice that of one position
+    rest = curve.relative_error - apart
+    np.testing.assert_allclose(rest, np.maximum(single / 2, np.sqrt(np.mean(single**2))), rtol=1e-3)
 
 
-def test_a_position_that_failed_on_the_coarse_mesh_gets_the_largest_error():
-    fine = np.full(4, 100.0)
-    estimate = error_estimate(fine, np.array([100.1, np.nan, 101.0, 100.2]))
-    assert estimate[1] == estimate[2] == estimate.max()
-    assert np.isnan(error_estimate(fine[:2], np.full(2, np.nan))).all()
-
-
-def test_the_estimate_is_exact_plus_what_meshes_share_for_an_error_of_its_order():
-    """T(h) = T (1 + C h^p) at every position: d is the fine mesh's error, up to its own square."""
-    size, count = 0.3, 20
-    true = 0.01 * size**ORDER
-    fine, coarse = 1 + true, 1 + 0.01 * (COARSENING * size) ** ORDER
-    found = error_estimate(np.full(count, fine), np.full(count, coarse), coarsen=size)
-    expected = (1 + 1 / count) * true / fine + COMMON * size**ORDER
-    np.testing.assert_allclose(found, expected, rtol=1e-12)
-
-
-def test_positions_solved_twice_have_converged_and_span_the_sweep():
-    converged = np.arange(100) % 3 != 0
-    chosen = solved_twice(converged)
-    assert len(chosen) == 20
-    assert converged[chosen].all()
-    assert (chosen[0], chosen[-1]) == (1, 98)
-    assert len(solved_twice(np.zeros(3, dtype=bool))) == 0
+def test_the_softness_of_a_penalty_is_in_its_error():
+    given = {"twist": math.radians(0.05), "angles": np.radians([3.0, 12.0]), "estimate_error": True}
+    soft = sweep_stiffness(SHARP, law=Penalty(1e15), **given)
+    exact = sweep_stiffness(SHARP, **given)
+    true = np.abs(soft.k_mesh / exact.k_mesh - 1)
+    assert (true > 0.005).all()
+    assert (soft.relative_error > true).all()
+    assert (soft.relative_error < 1.2 * true).all()
 
 
 @pytest.mark.parametrize("twist_deg", [0.06, pytest.param(0.2, marks=pytest.mark.slow)])

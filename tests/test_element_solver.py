@@ -14,10 +14,11 @@ from gearfe.contact.compliance import MeshingPair
 from gearfe.gear.pair import TipRelief
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.meshing.tooth_sector import sector_recipes
-from gearfe.stiffness.positions import ElementSolver, position_solver
+from gearfe.stiffness.positions import position_solver
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 
 from .gears import pair as gear_pair
+from .solving import solve_positions
 
 PAIR = gear_pair(tip_round=1e-4)
 JOB = Path(__file__).parents[1] / "geometry" / "gear_train.toml"
@@ -35,7 +36,7 @@ def elastic_of(law: str) -> MeshingPair:
 
 def test_elements_in_a_contact_are_hertzs_width_over_the_flanks_element() -> None:
     """2 b = 2 sqrt(4 F rho/(pi E* w)) (Johnson, eq. 4.43), with the radii of the involutes on the line of action."""
-    solver = ElementSolver(elastic_of("nitsche"))
+    solver = position_solver(elastic_of("nitsche"))
     size = max(recipe.flank for recipe in sector_recipes(PAIR))
     for degrees in (NARROW, TWO):
         found = solver.half_plane.solve(MIDDLE, np.full(5, math.radians(degrees)))
@@ -52,7 +53,7 @@ def test_elements_in_a_contact_are_hertzs_width_over_the_flanks_element() -> Non
 @pytest.mark.parametrize(("law", "bound"), [("nitsche", 6e-3), ("penalty", 1e-2)])
 def test_resolved_positions_are_near_the_half_plane_law(law: str, bound: float) -> None:
     """Beyond one element the error is below the documented bound, and falls as the contact gets wider."""
-    solver, known = ElementSolver(elastic_of(law)), position_solver(elastic_of("half_plane"))
+    solver, known = position_solver(elastic_of(law)), position_solver(elastic_of("half_plane"))
     worst = []
     for degrees in (ONE, TWO, WIDE):
         twists = np.full(len(EVERYWHERE), math.radians(degrees))
@@ -79,7 +80,7 @@ def test_a_load_that_the_elements_do_not_resolve_has_no_numbers(law: str) -> Non
     for name in ("torque_wheel", "torque_pinion", "k_mesh", "k_tangent", "peak_pressure", "load_share"):
         assert np.isnan(getattr(curve, name)).all(), name
     assert set(curve.law) == {law}
-    every = ElementSolver(elastic, resolved_only=False).solve(EVERYWHERE, np.full(len(EVERYWHERE), twist))
+    every = solve_positions(elastic, EVERYWHERE, twist)
     assert "converged" in {p.status for p in every}
 
 
@@ -131,7 +132,6 @@ def test_flanks_of_a_few_points_have_an_answer() -> None:
     gears = gear_pair(20, 30)
     elastic = elastic_pair(gears, law="penalty", coarsen=5.0, flank_coarsen=10.0, points_per_edge=2)
     assert [body.flank.edges for body in elastic.bodies] == [5, 5]
-    twists, angles = np.full(12, math.radians(0.3)), gears.mesh_cycle * np.arange(12) / 12
-    found = ElementSolver(elastic, resolved_only=False).solve(angles, twists)
+    found = solve_positions(elastic, gears.mesh_cycle * np.arange(12) / 12, math.radians(0.3))
     assert set(found.status) == {"converged"}
     assert (found.torque_wheel > 0.0).all()

@@ -116,11 +116,10 @@ def twists_for_torque(
 NONE: IntArray = np.zeros(0, dtype=np.int64)
 
 
-def position_solver(elastic: MeshingPair, *, resolved_only: bool = True) -> PositionSolver:
-    """The solver of the elastic pair's law; see `ElementSolver` for `resolved_only`."""
-    if isinstance(elastic.law, HalfPlane):
-        return HalfPlaneSolver(half_plane_pair(elastic), elastic)
-    return ElementSolver(elastic, resolved_only=resolved_only)
+def position_solver(elastic: MeshingPair) -> PositionSolver:
+    """The solver of the elastic pair's law."""
+    half_plane = HalfPlaneSolver(half_plane_pair(elastic), elastic)
+    return half_plane if isinstance(elastic.law, HalfPlane) else ElementSolver(half_plane)
 
 
 #: Pinion angles of a mesh cycle at which flanks with deviations are looked at for their first touch.
@@ -193,25 +192,19 @@ class ElementSolver:
 
     with the longer of both flanks' elements there, :math:`h_k`, the contact is narrower than an element. The torque
     then swings with the place of the nodes (docs/contact_laws.md), and the position is ``under_resolved``.
-
-    Parameters
-    ----------
-    resolved_only
-        False solves what the elements do not resolve, too: to measure the error that this makes.
     """
 
-    def __init__(self, elastic: MeshingPair, *, resolved_only: bool = True) -> None:
-        self.pair, self.elastic, self.resolved_only = elastic.gears, elastic, resolved_only
-        self.half_plane = HalfPlaneSolver(half_plane_pair(elastic), elastic)
-        self.law = self.half_plane.law
-        self.touching, self.touching_twists = self.half_plane.touching, self.half_plane.touching_twists
-        self.first_touch = self.half_plane.first_touch
+    def __init__(self, half_plane: HalfPlaneSolver) -> None:
+        self.half_plane, self.elastic = half_plane, half_plane.elastic
+        self.pair, self.law = half_plane.pair, half_plane.law
+        self.touching, self.touching_twists = half_plane.touching, half_plane.touching_twists
+        self.first_touch = half_plane.first_touch
 
     def solve(self, angles: Array, twists: Array, kept: IntArray = NONE) -> Positions:
         """Positions at pinion angles and twists (rad), both of shape (n,); those numbered `kept` with loads."""
         expected = self.half_plane.solve(angles, twists)
         loaded = expected.status == "converged"
-        thin = loaded & self.resolved_only & (self.elements_per_contact(expected) < 1.0)
+        thin = loaded & (self.elements_per_contact(expected) < 1.0)
         contacts = expected.contacts
         first = first_contacts(self.law.sides, taken(contacts, ~thin[contacts.position]))
         found = solve_elements(self.elastic, expected.pinion_angle, expected.twist, first)

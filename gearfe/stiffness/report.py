@@ -16,6 +16,7 @@ from ..gear.derived import derived_geometry, iso_values
 from ..gear.deviation_job import GEARS
 from ..gear.modifications import CHECKED, ends_of
 from ..gear.validity import overlap_warnings, overlaps
+from ..tables.stiffness import DEFAULT_LAW
 from ..versions import versions
 from .contact_pressure import largest_pressures
 from .curve import StiffnessCurve
@@ -108,9 +109,10 @@ def report_lines(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
     )
     lines += pressure_lines(curve)
     if math.isfinite(curve.worst_error):
+        against = "" if job.law.name == DEFAULT_LAW else "the half-plane law and "
         lines.append(
-            f"discretisation error, estimated on a mesh {COARSENING:g} times coarser (order {ORDER:g} assumed): "
-            f"typically {100 * curve.typical_error:.2g} %, at worst {100 * curve.worst_error:.2g} %"
+            f"discretisation error, estimated by {against}meshes {COARSENING:g} times coarser (order {ORDER:g} "
+            f"assumed): typically {100 * curve.typical_error:.2g} %, at worst {100 * curve.worst_error:.2g} %"
         )
     return lines
 

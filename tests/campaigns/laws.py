@@ -20,9 +20,9 @@ import numpy as np
 from gearfe.contact.compliance import MeshingPair
 from gearfe.contact.laws import HalfPlane, Nitsche
 from gearfe.stiffness.job import StiffnessJob, read_stiffness_job
-from gearfe.stiffness.positions import position_solver
 from gearfe.stiffness.sweep import elastic_pair
 
+from ..solving import solve_positions
 from .campaign import Campaign, Case, Columns
 from .outcome import Finding, Outcome
 from .pairs import LARGEST_OVERLAP, log_uniform, running_pair, twist_of_overlap
@@ -141,7 +141,7 @@ def run(case: Case, folder: Path) -> Finding:
 
 def _torques(job: StiffnessJob, elastic: MeshingPair, angles: Any, twist: float) -> tuple[Any, Any, Counter]:
     """Torques (N m), iterations and statuses, also where the elements do not resolve the contact."""
-    found = position_solver(elastic, resolved_only=False).solve(angles, np.full(len(angles), twist))
+    found = solve_positions(elastic, angles, twist)
     torque = np.where(found.status == "converged", found.torque_wheel, np.nan)
     return torque, found.iterations, Counter(found.status.tolist())
 
