@@ -10,7 +10,7 @@ from scipy.interpolate import LinearNDInterpolator
 
 from gearfe.contact.half_plane_result import PairContacts
 from gearfe.contact.panels import EDGES, MIDDLES
-from gearfe.stiffness.fields import bumped, half_plane_stress, pair_recovery
+from gearfe.stiffness.fields import bumped, field_recovery, half_plane_stress
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import pair as gear_pair
@@ -55,7 +55,7 @@ def test_beside_contacts_as_on_a_fine_flank() -> None:
     for law, options in (("half_plane", {}), ("nitsche", {"flank_coarsen": 0.5})):
         elastic = elastic_pair(PAIR, law=law, **options)
         position = solve_position(elastic, angle, twist)
-        found.append((elastic, position, pair_recovery(elastic).at(position)))
+        found.append((elastic, position, field_recovery(elastic)(position)))
     (elastic, position, fields), (_, _, fine) = found
     contacts = position.contacts
     assert isinstance(contacts, PairContacts)

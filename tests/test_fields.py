@@ -18,7 +18,7 @@ from gearfe.figures.stress import color_limit
 from gearfe.gear.derived import path_place
 from gearfe.meshing.whole_gear import whole_gear
 from gearfe.stiffness.contact_pressure import flank_pressures
-from gearfe.stiffness.fields import gear_recovery, pair_recovery, straight_triangles
+from gearfe.stiffness.fields import GearRecovery, field_recovery, straight_triangles
 from gearfe.stiffness.fields_output import chosen_positions, fields_size, size_note, write_fields
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 
@@ -45,7 +45,7 @@ def position(gears, elastic):
 
 @pytest.fixture(scope="module")
 def fields(elastic, position):
-    return pair_recovery(elastic).at(position)
+    return field_recovery(elastic)(position)
 
 
 def test_a_whole_gear_is_closed(elastic, gears):
@@ -112,7 +112,7 @@ def test_a_uniform_strain_gives_its_stress(gears, plane):
     body = elastic_pair(gears, coarsen=3.0, plane=plane, law="penalty").pinion
     gradient = 1e-4 * np.array([[1.0, 0.7], [-0.2, -0.5]])
     moved = (body.mesh.points @ gradient.T).ravel()
-    sums = (gear_recovery(body).stress_rows @ moved).reshape(-1, 3)
+    sums = (GearRecovery(body).stress_rows @ moved).reshape(-1, 3)
     e, nu = 200e9, 0.3
     xx, yy, shear = gradient[0, 0], gradient[1, 1], gradient[0, 1] + gradient[1, 0]
     if plane == "strain":
@@ -127,10 +127,7 @@ def test_a_uniform_strain_gives_its_stress(gears, plane):
 
 def test_turning_the_whole_picture_changes_nothing(elastic, position, fields):
     """The same loads on a gear drawn at another angle: stresses turn with it, von Mises stays."""
-    recovery = pair_recovery(elastic).gears[0]
-    from gearfe.stiffness.fields import gear_field
-
-    turned = gear_field(recovery, elastic, replace(position, pinion_angle=ANGLE + 0.4), 0)
+    turned = GearRecovery(elastic.pinion).at(elastic, 0, replace(position, pinion_angle=ANGLE + 0.4))
     np.testing.assert_allclose(turned.von_mises, fields[0].von_mises, rtol=1e-9)
     np.testing.assert_allclose(turned.displacement, fields[0].displacement @ turn(0.4).T, atol=1e-15)
 
@@ -219,7 +216,7 @@ def test_the_series_and_the_table_of_pressures(gears, elastic, tmp_path):
     assert (two >= three).all()
     # points turn with the gears (1 deg here), the displacement is the elastic one: microns, and nothing at the bore
     turned = points[:count] @ turn3(math.radians(1.0)).T
-    pinion = len(gear_recovery(elastic.pinion).whole.points)
+    pinion = len(GearRecovery(elastic.pinion).whole.points)
     np.testing.assert_allclose(points[count : count + pinion], turned[:pinion], atol=1e-12)
     assert 0 < np.abs(data["displacement_m"]).max() < 1e-4
     with open(tmp_path / "pressure.csv") as stream:

@@ -12,7 +12,7 @@ from gearfe.elasticity import element_stiffness
 from gearfe.loadmap.root_stress import fillet_radius, pair_roots, peaks, root_mesh, root_recipe, spread_of
 from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
 from gearfe.meshing.whole_gear import whole_gear
-from gearfe.stiffness.fields import gear_recovery
+from gearfe.stiffness.fields import GearRecovery
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import gear, pair
@@ -95,7 +95,7 @@ def test_a_plain_solution_of_the_whole_gear_has_the_same_root_stress(gears, elas
     free = np.setdiff1d(np.arange(size), held)
     moved = np.zeros(size)
     moved[free] = splu(stiffness[free][:, free].tocsc()).solve(load.ravel()[free])
-    recovery = gear_recovery(body)
+    recovery = GearRecovery(body)
     for tooth in (0, 1):  # the loaded one, and its neighbour, which feels it through the body
         local = moved.reshape(-1, 2)[whole.numbers[tooth]]
         c, s = np.cos(2 * np.pi * tooth / 30), np.sin(2 * np.pi * tooth / 30)

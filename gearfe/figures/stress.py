@@ -15,7 +15,7 @@ from ..contact.position import Positions
 from ..gear.derived import zone
 from ..gear.pair import GearPair
 from ..stiffness.curve import StiffnessCurve
-from ..stiffness.fields import GearField, pair_recovery, straight_triangles
+from ..stiffness.fields import GearField, field_recovery, straight_triangles
 from ..stiffness.fields_output import solved_positions
 from ..stiffness.positions import position_solver
 from ..threads import one_thread
@@ -116,11 +116,11 @@ def frames_of(elastic: MeshingPair, curve: StiffnessCurve, count: int, progress:
     """Frames of `stress_animation`."""
     angles = np.arange(count) * curve.mesh_cycle / count
     twists = curve.interpolant("twist")(angles).value + curve.lost_motion
-    recovery, solver, place = pair_recovery(elastic), position_solver(elastic), zone(elastic.gears, modules=1.5)
+    recovered, solver, place = field_recovery(elastic), position_solver(elastic), zone(elastic.gears, modules=1.5)
     frames: list[Frame] = []
     with one_thread():
         for position in solved_positions(solver, angles, twists):
-            parts = [_cut_out(field, place) for field in recovery.at(position)]
+            parts = [_cut_out(field, place) for field in recovered(position)]
             frames.append(Frame(math.degrees(position.pinion_angle), parts))
             if progress is not None:
                 progress(len(frames), count, "frames solved")

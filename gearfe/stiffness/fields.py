@@ -25,7 +25,9 @@ changed.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -160,104 +162,78 @@ class GearField:
 
 @dataclass(frozen=True)
 class GearRecovery:
-    """What recovering fields of one gear needs beyond its body.
-
-    Attributes
-    ----------
-    body
-        The elastic gear.
-    whole
-        Its whole mesh.
-    stress_rows : sparse matrix, shape (3 s, 2 s)
-        Sums over the elements at each sector node of the stresses xx, yy, xy (Pa/m).
-    elements : ndarray, shape (n,)
-        Number of elements that meet at each node of the whole gear.
-    """
+    """Fields of one elastic gear; `at` gives them for one position."""
 
     body: GearBody
-    whole: WholeGear
-    stress_rows: Any
-    elements: IntArray
+
+    @cached_property
+    def whole(self) -> WholeGear:
+        """Its whole mesh."""
+        return whole_gear(self.body.mesh)
+
+    @cached_property
+    def elements(self) -> IntArray:
+        """Number of elements that meet at each node of the whole gear, shape (n,)."""
+        return np.bincount(self.whole.triangles.ravel(), minlength=len(self.whole.points))
+
+    @cached_property
+    def stress_rows(self) -> Any:
+        """Sums over the elements at each sector node of the stresses xx, yy, xy (Pa/m), sparse, shape (3 s, 2 s)."""
+        from scipy.sparse import csr_array
+
+        mesh = self.body.mesh
+        lam, mu = self.body.material.lame(self.body.plane)
+        r = np.array([0.0, 1.0, 0.0, 0.5, 0.5, 0.0])
+        s = np.array([0.0, 0.0, 1.0, 0.0, 0.5, 0.5])
+        gradients, _ = physical_gradients(mesh.points[mesh.triangles], triangle_shapes(r, s)[1])  # (m, 6 places, 6, 2)
+        x, y = gradients[..., 0], gradients[..., 1]
+        rows = np.zeros((*x.shape[:2], 3, 6, 2))
+        rows[:, :, 0, :, 0], rows[:, :, 0, :, 1] = (lam + 2 * mu) * x, lam * y
+        rows[:, :, 1, :, 0], rows[:, :, 1, :, 1] = lam * x, (lam + 2 * mu) * y
+        rows[:, :, 2, :, 0], rows[:, :, 2, :, 1] = mu * y, mu * x
+        row = 3 * mesh.triangles[:, :, None, None, None] + np.arange(3)[:, None, None]
+        column = 2 * mesh.triangles[:, None, None, :, None] + np.arange(2)
+        row, column = np.broadcast_arrays(row, column)
+        size = len(mesh.points)
+        return csr_array((rows.ravel(), (row.ravel(), column.ravel())), shape=(3 * size, 2 * size))
+
+    def at(self, pair: MeshingPair, gear: int, position: Positions) -> GearField:
+        """Fields at a converged position of the pair whose pinion (0) or wheel (1) it is."""
+        body, whole = self.body, self.whole
+        angle = pair.tooth_angle(gear, 0, position.pinion_angle, position.twist)
+        teeth = body.teeth
+        every = np.arange(teeth)
+        local = sector_displacements(body, position.loads[gear], np.zeros_like(every), every)  # (s, 2, z)
+        turns = angle + 2 * np.pi * np.arange(teeth) / teeth
+        c, s = np.cos(turns), np.sin(turns)
+        x, y = local[:, 0], local[:, 1]
+        displacement = np.empty((len(whole.points), 2))
+        displacement[whole.numbers.T] = np.stack([c * x - s * y, s * x + c * y], axis=-1)
+        loads, beside = bumped(body, position, gear)
+        if beside:
+            local = sector_displacements(body, loads, np.zeros_like(every), every)
+        sums = (self.stress_rows @ local.reshape(-1, teeth)).reshape(-1, 3, teeth)
+        counts = self.elements[whole.numbers]
+        for tooth, stress in beside:
+            sums[:, :, tooth % teeth] += counts[tooth % teeth][:, None] * stress.T
+        turned = _turned(sums.swapaxes(0, 1), c, s)
+        numbers = whole.numbers.T.ravel()
+        total = [np.bincount(numbers, part.ravel(), len(whole.points)) / self.elements for part in turned]
+        held = body.material.poisson_ratio if body.plane == "strain" else 0.0
+        points = whole.points @ turn(angle).T + pair.centre(gear)
+        stress = np.stack([total[0], total[1], held * (total[0] + total[1]), total[2]], axis=1)
+        pressure = np.zeros(len(points))
+        for one in flank_pressures(pair, position):
+            if one.gear == gear:
+                nodes = whole.numbers[one.tooth % teeth][body.flank.nodes]
+                pressure[nodes] = np.maximum(pressure[nodes], one.at_nodes(len(nodes)))
+        return GearField(points, whole.triangles, displacement, stress, pressure)
 
 
-def gear_recovery(body: GearBody) -> GearRecovery:
-    """Prepare the recovery of fields for one gear."""
-    whole = whole_gear(body.mesh)
-    counts = np.bincount(whole.triangles.ravel(), minlength=len(whole.points))
-    return GearRecovery(body, whole, _stress_rows(body), counts)
-
-
-def _stress_rows(body: GearBody) -> Any:
-    from scipy.sparse import csr_array
-
-    mesh = body.mesh
-    lam, mu = body.material.lame(body.plane)
-    r = np.array([0.0, 1.0, 0.0, 0.5, 0.5, 0.0])
-    s = np.array([0.0, 0.0, 1.0, 0.0, 0.5, 0.5])
-    gradients, _ = physical_gradients(mesh.points[mesh.triangles], triangle_shapes(r, s)[1])  # (m, 6 places, 6, 2)
-    x, y = gradients[..., 0], gradients[..., 1]
-    stiff = lam + 2 * mu
-    rows = np.stack(
-        [np.stack([stiff * x, lam * y], -1), np.stack([lam * x, stiff * y], -1), np.stack([mu * y, mu * x], -1)], axis=2
-    )  # (m, 6 places, 3 stresses, 6 nodes, 2)
-    size = len(mesh.points)
-    node = mesh.triangles
-    row = 3 * node[:, :, None, None, None] + np.arange(3)[:, None, None]
-    column = 2 * node[:, None, None, :, None] + np.arange(2)
-    row, column = np.broadcast_arrays(row, column)
-    return csr_array((rows.ravel(), (row.ravel(), column.ravel())), shape=(3 * size, 2 * size))
-
-
-def gear_field(recovery: GearRecovery, pair: MeshingPair, position: Positions, gear: int) -> GearField:
-    """Fields of one gear (0 pinion, 1 wheel) at a converged position."""
-    body, whole = recovery.body, recovery.whole
-    angle = pair.tooth_angle(gear, 0, position.pinion_angle, position.twist)
-    teeth = body.teeth
-    every = np.arange(teeth)
-    local = sector_displacements(body, position.loads[gear], np.zeros_like(every), every)  # (s, 2, z)
-    turns = angle + 2 * np.pi * np.arange(teeth) / teeth
-    c, s = np.cos(turns), np.sin(turns)
-    x, y = local[:, 0], local[:, 1]
-    displacement = np.empty((len(whole.points), 2))
-    displacement[whole.numbers.T] = np.stack([c * x - s * y, s * x + c * y], axis=-1)
-    loads, beside = bumped(body, position, gear)
-    if beside:
-        local = sector_displacements(body, loads, np.zeros_like(every), every)
-    sums = (recovery.stress_rows @ local.reshape(-1, teeth)).reshape(-1, 3, teeth)
-    counts = recovery.elements[whole.numbers]
-    for tooth, stress in beside:
-        sums[:, :, tooth % teeth] += counts[tooth % teeth][:, None] * stress.T
-    turned = _turned(sums.swapaxes(0, 1), c, s)
-    numbers = whole.numbers.T.ravel()
-    total = [np.bincount(numbers, part.ravel(), len(whole.points)) / recovery.elements for part in turned]
-    across = body.material.poisson_ratio * (total[0] + total[1]) if body.plane == "strain" else np.zeros(len(total[0]))
-    points = whole.points @ turn(angle).T + pair.centre(gear)
-    stress = np.stack([total[0], total[1], across, total[2]], axis=1)
-    pressure = np.zeros(len(points))
-    for one in flank_pressures(pair, position):
-        if one.gear == gear:
-            nodes = whole.numbers[one.tooth % teeth][body.flank.nodes]
-            pressure[nodes] = np.maximum(pressure[nodes], one.at_nodes(len(nodes)))
-    return GearField(points, whole.triangles, displacement, stress, pressure)
-
-
-@dataclass(frozen=True)
-class PairRecovery:
-    """Fields on both gears of a pair; `at` gives them for one position."""
-
-    pair: MeshingPair
-    gears: tuple[GearRecovery, GearRecovery]
-
-    def at(self, position: Positions) -> tuple[GearField, GearField]:
-        """Fields of pinion and wheel at a converged position."""
-        pinion, wheel = (gear_field(self.gears[gear], self.pair, position, gear) for gear in (0, 1))
-        return pinion, wheel
-
-
-def pair_recovery(pair: MeshingPair) -> PairRecovery:
-    """Prepare the recovery of fields for a pair."""
-    pinion, wheel = (gear_recovery(body) for body in pair.bodies)
-    return PairRecovery(pair, (pinion, wheel))
+def field_recovery(pair: MeshingPair) -> Callable[[Positions], tuple[GearField, GearField]]:
+    """What gives the fields of pinion and wheel at a converged position."""
+    pinion, wheel = (GearRecovery(body) for body in pair.bodies)
+    return lambda position: (pinion.at(pair, 0, position), wheel.at(pair, 1, position))
 
 
 def straight_triangles(triangles: IntArray) -> IntArray:

@@ -19,7 +19,7 @@ from ..threads import one_thread
 from ..typing import Array, IntArray
 from .contact_pressure import FlankPressure, flank_pressures
 from .curve import StiffnessCurve
-from .fields import GearField, pair_recovery
+from .fields import GearField, field_recovery
 from .positions import PositionSolver, Progress, position_solver
 
 GEARS = ("pinion", "wheel")
@@ -88,13 +88,13 @@ def write_fields(
     chosen = chosen_positions(curve, angles_deg)
     if len(chosen) == 0:
         return []
-    recovery, solver = pair_recovery(elastic), position_solver(elastic)
+    recovered, solver = field_recovery(elastic), position_solver(elastic)
     worst: tuple[float, Positions, tuple[GearField, GearField]] | None = None
     pressures: list[tuple[float, list[FlankPressure]]] = []
     with VtkHdfSeries(folder / "fields.vtkhdf") as series, one_thread():
         places = curve.pinion_angle[chosen], curve.twist[chosen] + curve.lost_motion
         for done, position in enumerate(solved_positions(solver, *places), start=1):
-            angle, fields = math.degrees(position.pinion_angle), recovery.at(position)
+            angle, fields = math.degrees(position.pinion_angle), recovered(position)
             pressures.append((angle, flank_pressures(elastic, position)))
             _add(series, angle, fields, first=done == 1)
             peak = max(float(f.von_mises.max()) for f in fields)

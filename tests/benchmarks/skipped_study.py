@@ -92,7 +92,7 @@ def neighbours(quick: bool) -> tuple[float, float, str]:
 
 def fields(quick: bool) -> tuple[float, float, str]:
     """A sweep without fields; with displacement and stress of the whole gears at every position."""
-    from gearfe.stiffness.fields import pair_recovery
+    from gearfe.stiffness.fields import field_recovery
 
     pair = shipped_pair()
     elastic = elastic_pair(pair, coarsen=5.0 if quick else 1.0)
@@ -101,9 +101,9 @@ def fields(quick: bool) -> tuple[float, float, str]:
     solved = position_solver(elastic).solve(at, np.full(len(at), TWIST), np.arange(len(at)))
 
     def recovered() -> None:
-        recovery = pair_recovery(elastic)
+        fields_at = field_recovery(elastic)
         for position in solved:
-            recovery.at(position)
+            fields_at(position)
 
     return short, short + _cpu(recovered, 1), f"{len(at)} positions"
 
