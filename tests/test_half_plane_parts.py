@@ -15,7 +15,6 @@ from gearfe.contact.panels import (
     ELLIPSE_X,
     MIDDLES,
     WIDTHS,
-    Panels,
     couplings,
     first_guess,
     influence,
@@ -80,7 +79,7 @@ def test_panels_give_hertz() -> None:
     alone = couplings(np.array([0]), np.array([0]), 1)
     width = half[:, None] * WIDTHS
     K, between, T, nothing = influence(half, compliance), np.zeros((0, 1, 1)), np.zeros(1), np.zeros(1)
-    found = pressed(Panels(K, between, gap, width), T, nothing, alone, bearing=first_guess(gap))
+    found = pressed(K, between, gap, width, T, nothing, alone, bearing=first_guess(gap))
     assert found.settled.all()
     assert found.force[0] == pytest.approx(force, rel=1e-3)
     inside = np.abs(x[0]) < 0.9 * b

@@ -11,7 +11,7 @@ import pytest
 
 from gearfe.contact.elements import first_contacts, solve_elements
 from gearfe.contact.half_plane import HalfPlanePair, half_plane_pair, solve_half_plane
-from gearfe.contact.panels import MIDDLES, PANELS, WIDTHS, Panels, couplings, influence, log_integral, pressed
+from gearfe.contact.panels import MIDDLES, PANELS, WIDTHS, couplings, influence, log_integral, pressed
 from gearfe.contact.position import Positions
 from gearfe.gear.deviation import ToothDeviations
 from gearfe.stiffness.job import read_stiffness_job
@@ -50,7 +50,7 @@ def test_two_windows_side_by_side_are_one() -> None:
     between = -compliance * (log_integral(z + width[:, None] / 2) - log_integral(z - width[:, None] / 2))
     pair = couplings(np.zeros(2, dtype=np.int64), np.zeros(2, dtype=np.int64), 1)
     nothing = np.zeros((2, PANELS), dtype=bool)
-    found = pressed(Panels(influence(half, compliance), between, gap, width), np.zeros(4), np.zeros(2), pair, nothing)
+    found = pressed(influence(half, compliance), between, gap, width, np.zeros(4), np.zeros(2), pair, nothing)
     assert found.settled.all()
     assert found.force == pytest.approx([force / 2, force / 2], rel=1e-3)
     inside = np.abs(x) < 0.9 * b

@@ -9,16 +9,7 @@ both neighbours' at each vertex: it is then continuous along the whole chain, an
 edge's own normal a point that faces a vertex jumps between two solutions and Newton's method cycles.) The contact force
 acts along n at both points, so it is in equilibrium with itself whatever the blending.
 
-With :math:`D = \delta x_s - \delta x_m` and :math:`N = n\cdot\delta x_m'` at fixed :math:`\xi`, :math:`m = a\cdot a`,
-and :math:`\kappa = -a\cdot n'` the normal's own turning,
-
-.. math::
-    \delta g = n\cdot D - (n\cdot a)\,\delta\xi, \qquad \delta\xi = \frac{a\cdot D + g N}{m - g\kappa}, \qquad
-    \Delta(n\cdot D) = -(1 - g\kappa/m)(N_\Delta\,\delta\xi + N_\delta\,\Delta\xi + \kappa\,\delta\xi\,\Delta\xi)
-    + \frac{g}{m} N_\Delta N_\delta
-
-(Laursen, *Computational Contact and Impact Mechanics*, 2002, ch. 5, written out for two dimensions; the last two take
-the normal's turning from the point's own edge).
+With :math:`a = x_m'`, :math:`\kappa = -a\cdot n'` is the normal's own turning.
 """
 
 from __future__ import annotations

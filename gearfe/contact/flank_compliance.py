@@ -36,12 +36,10 @@ from ..gear.spur_gear import Gear
 from ..typing import Array
 from .compliance import GearBody
 from .flank import Flank, edge_shapes, gauss_rule
-from .panels import ELLIPSE_W, ELLIPSE_X, mean_log, wedge_tensor
+from .panels import ELLIPSE_W, ELLIPSE_X, LEAST_DISTANCE, mean_log, wedge_tensor
 
 #: Half width of a bump, in elements and at least in modules; distance of two stations in half widths.
 BUMP_ELEMENTS, BUMP_MODULES, SPACING = 2.0, 0.2, 0.8
-#: Distance (m) that is none.
-TINY = 1e-12
 #: Nearer to an end of the flank than this share of an element there is no station.
 TOO_NEAR = 0.75
 
@@ -80,7 +78,7 @@ class FlankCompliance:
     def distance(self, s: Array) -> Array:
         """Distance y (m) of the flank at arc lengths s (m) from the corner."""
         here = np.maximum(s, self.curve.low)
-        return np.maximum(np.abs(self.curve.at(here)[0] - self.corner), 1e-9) + (here - s)
+        return np.maximum(np.abs(self.curve.at(here)[0] - self.corner), LEAST_DISTANCE) + (here - s)
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ from ..gear.touching import Flanks
 from ..typing import Array, ComplexArray, IntArray
 from .compliance import MeshingPair
 from .flank_compliance import FlankCompliance, Shapes, corner_of, flank_compliance, shapes_of
-from .panels import Couplings, log_integral, mean_log
+from .panels import LEAST_DISTANCE, Couplings, log_integral, mean_log
 
 #: Even places along a flank for `Finely`; places at which both faces of a contact are compared where they have no
 #: deviations, and besides for each piece of a deviation.
@@ -232,10 +232,6 @@ def half_plane_pair(elastic: MeshingPair) -> HalfPlanePair:
     pair = elastic.gears
     pinion, wheel = flank_compliance(pair.pinion, elastic.pinion), flank_compliance(pair.wheel, elastic.wheel)
     return HalfPlanePair(pair, ToothFlanks(pair, elastic.deviations), (pinion, wheel), elastic.width)
-
-
-#: Distance (m) of two contacts that is none.
-LEAST_DISTANCE = 1e-9
 
 
 def sideways(law: HalfPlanePair, couples: Couplings, normal: ComplexArray, arc: Array, y: Array) -> ComplexArray:

@@ -11,7 +11,18 @@ from ..gear.flank_curve import LOOK, WAY, Faces, FlankTables, windows
 from ..gear.touching import Touching
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .half_plane_pair import HalfPlanePair, opened, panel_influence, sideways, widths_in_smooth
-from .panels import MIDDLES, PANELS, WIDTHS, Couplings, Panels, Pressed, couplings, first_guess, influence, pressed
+from .panels import (
+    LEAST_DISTANCE,
+    MIDDLES,
+    PANELS,
+    WIDTHS,
+    Couplings,
+    Pressed,
+    couplings,
+    first_guess,
+    influence,
+    pressed,
+)
 from .position import taken
 
 #: Gap at the window's ends in units of that at the ends of Hertz's contact of the same force, and what it grows by
@@ -22,8 +33,6 @@ LEAST_FORCE, LEAST_WIDTH = 1e-4, 1e-6
 #: Half width (modules) of Hertz's contacts whose approach first forces are made with: a length, as T in them is what
 #: the logarithms of lengths in metres leave.
 REFERENCE_WIDTH = 0.01
-#: Distance (m) from an edge that is none.
-LEAST_DISTANCE = 1e-9
 #: Directions of the forces of a contact on pinion and wheel along n.
 SIGN = np.array([-1.0, 1.0])
 #: Distances of the panels' middles in a window of half width 1.
@@ -208,16 +217,6 @@ def reference_approach(law: HalfPlanePair) -> float:
     return float(law.compliance * (0.5 - np.log(0.5 * REFERENCE_WIDTH * law.pair.pinion.module)))
 
 
-def least_force(law: HalfPlanePair) -> float:
-    """Force per width (N/m) below which windows are not made smaller."""
-    return float(LEAST_WIDTH**2 * law.pair.pinion.module / (0.2 * law.compliance))
-
-
-def reference_width(law: HalfPlanePair, force: Array) -> Array:
-    """Half width (m) of a usual contact that carries forces per width (N/m)."""
-    return np.asarray(np.sqrt(0.2 * law.compliance * law.pair.pinion.module * force))
-
-
 def step(setting: Setting, state: State, *, search: bool = True, held: bool = False) -> Step:
     """Solve the panels of all contacts with the faces displaced by the state's forces.
 
@@ -254,8 +253,10 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
 
     low, high, found = state.low, state.high, None
     if search:
-        floor = np.maximum(force, LEAST_FORCE * couples.total(force)[couples.position] + least_force(law))
-        scale, reach = reference_width(law, floor), faces.range(tables, state.ends)
+        module, softness = law.pair.pinion.module, 0.2 * law.compliance  # half width squared of a usual contact
+        least = LEAST_FORCE * couples.total(force)[couples.position] + LEAST_WIDTH**2 * module / softness
+        floor = np.maximum(force, least)
+        scale, reach = np.sqrt(softness * module * floor), faces.range(tables, state.ends)
         look = np.minimum(np.maximum(scale[:, None] * LOOK, reach[0][:, None]), reach[1][:, None])
         arcs, heights, _ = faces.heights(tables, look)
         gap = heights[:, 1] - heights[:, 0]
@@ -279,7 +280,7 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     shared = panel_influence(law, couples, normal, arcs, width, y)
     bearing = state.bearing if state.bearing.any() else first_guess(gap)
     both = shared[:, 0] + shared[:, 1]
-    solution = pressed(Panels(K, both, gap, width), smooth.compliance, force, couples, bearing, held=held)
+    solution = pressed(K, both, gap, width, smooth.compliance, force, couples, bearing, held=held)
 
     p, loaded = solution.pressure, solution.force > 0
     shares = p * width / np.where(loaded, solution.force, 1.0)[:, None]

@@ -68,6 +68,8 @@ def log_integral(z: Array) -> Array:
     return z * np.log(np.where(z != 0, np.abs(z), 1.0)) - z
 
 
+#: Distance (m) of two places that is none.
+LEAST_DISTANCE = 1e-9
 #: Panels of a window, and changes of the set of panels that bear before a solution is given up.
 PANELS, CHANGES = 28, 40
 #: Edges of the panels on a window of half width 1 (closer at its ends, where the pressure is steep); middles; widths.
@@ -242,11 +244,21 @@ def _groups(K: Array, between: Array, couples: Couplings) -> list[_Group]:
     return made
 
 
-@dataclass(frozen=True)
-class Panels:
-    """Panels of p contacts, n each.
+def pressed(
+    K: Array,
+    between: Array,
+    gap: Array,
+    widths: Array,
+    T: Array,
+    carried: Array,
+    couples: Couplings,
+    bearing: BoolArray,
+    *,
+    held: bool = False,
+) -> Pressed:
+    """Solve the unilateral problem of p contacts with n panels each.
 
-    Attributes
+    Parameters
     ----------
     K : ndarray, shape (p, n, n)
         Approach of the panels' middles for pressures on the panels of the same contact (m/Pa).
@@ -254,21 +266,6 @@ class Panels:
         The same between contacts of one tooth pair, in the order of `Couplings.neighbours`.
     gap, widths : ndarray, shape (p, n)
         Gap at the panels' middles and widths of the panels (m).
-    """
-
-    K: Array
-    between: Array
-    gap: Array
-    widths: Array
-
-
-def pressed(
-    panels: Panels, T: Array, carried: Array, couples: Couplings, bearing: BoolArray, *, held: bool = False
-) -> Pressed:
-    """Solve the unilateral problem.
-
-    Parameters
-    ----------
     T : ndarray, shape (c,)
         Compliance between the contacts (m2/N), by couple.
     carried : ndarray, shape (p,)
@@ -278,8 +275,7 @@ def pressed(
     held
         Whether that is no guess but what bears.
     """
-    gap, widths, n = panels.gap, panels.widths, panels.gap.shape[1]
-    groups, on, responses = _groups(panels.K, panels.between, couples), bearing, []
+    n, groups, on, responses = gap.shape[1], _groups(K, between, couples), bearing, []
     y0 = -couples.times(T, carried)
     pressure, approach, free, stiffness = np.empty_like(gap), np.empty_like(gap), np.empty(len(gap)), np.zeros(len(T))
     changed: BoolArray = np.zeros(0, dtype=bool)

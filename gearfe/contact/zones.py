@@ -29,15 +29,13 @@ from ..gear.flank_curve import WAY, Faces
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .half_plane_pair import HalfPlanePair
 from .half_plane_step import SIGN, WIDER, WINDOW, Setting, State, Step, answers, reference_approach
-from .panels import EDGES, log_integral, mean_log
+from .panels import EDGES, LEAST_DISTANCE, log_integral, mean_log
 from .position import joined, taken
 
 #: Force, in units of that of the position, up to which a missing contact is none.
 MISSED = 1e-5
 #: Rim of a window that counts as its own, in units of its width.
 RIM = 0.02
-#: Distance (m) that is none.
-LEAST_DISTANCE = 1e-9
 
 
 class Seen(NamedTuple):
