@@ -287,6 +287,12 @@ def test_mesh(tmp_path, capsys, suffix):
     assert path.stat().st_size > 10_000
 
 
+def test_mesh_into_a_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["mesh", str(JOB), "--out", ".", "--coarsen", "4", "--sector", "--no-pictures"]) == 0
+    assert (tmp_path / "gears.msh").stat().st_size > 10_000
+
+
 def test_mesh_mistakes(tmp_path, capsys):
     assert main(["mesh", str(JOB), "--out", str(tmp_path / "gears.step")]) == 2
     assert "must end in one of .msh, .vtu, .inp" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""``gearfe mesh JOB.toml --out FILE``: the meshes of a gear pair for another program, or a deck that runs there."""
+"""``gearfe mesh JOB.toml``: the meshes of a gear pair for another program, or a deck that runs there."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_job(parser, "job", "job file with the table [pair]")
     parser.add_argument(
         "--out",
-        metavar="FILE",
-        help="file to write; its suffix chooses the format (default: out/JOB/mesh/gears.msh, .inp of a deck)",
+        metavar="DIR|FILE",
+        help="folder for gears.msh (a deck: gears.inp), or a file of any format, by its suffix (default: out/JOB/mesh)",
     )
     parser.add_argument(
         "--gear",
@@ -58,7 +58,8 @@ def run(args: argparse.Namespace) -> int:
     """Write the file and name its groups."""
     from ..config import load_job
 
-    args.out = args.out or str(Path("out") / Path(args.job).stem / "mesh" / ("gears.inp" if args.deck else "gears.msh"))
+    out = Path(args.out) if args.out else Path("out") / Path(args.job).stem / "mesh"
+    args.out = str(out if out.suffix else out / ("gears.inp" if args.deck else "gears.msh"))
     # a mistake in the file is told before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness",))
     table = with_keys(args, tables.get("stiffness", StiffnessTable()), "coarsen", "flank_coarsen")
