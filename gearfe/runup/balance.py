@@ -114,13 +114,13 @@ class Oscillator:
         """Places at which so many harmonics are sampled."""
         return torus.lattice(self.periods, count)
 
-    def harmonics(self, speed: float, highest: float) -> int:
-        """Number of harmonics: multiples up to an angular frequency (rad/s), eight of each mesh at least.
+    def harmonics(self, speed: float, highest: float, multiples: int = 8) -> int:
+        """Number of harmonics: multiples up to an angular frequency (rad/s), so many of each mesh at least.
 
         With several phases they reach less far where that would be more than `PLENTY`: the error estimate adds to them.
         """
         periods = self.periods
-        order = max(8 * cycles / b for mesh in self.orders for cycles, b in zip(mesh, periods, strict=True))
+        order = max(multiples * cycles / b for mesh in self.orders for cycles, b in zip(mesh, periods, strict=True))
         most = torus.harmonics(periods, MOST_HARMONICS if len(periods) == 1 else PLENTY).order[-1]
         band = min(highest * self.turns[0] / abs(speed), float(most))
         return self.rounded(torus.count_below(periods, max(order, band)))

@@ -8,13 +8,16 @@ Introduction to Numerical Continuation Methods, 2003, Ch. 11).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..typing import Array, ComplexArray
-from .balance import Orbit, Oscillator, Pushes, solve
+from .balance import Orbit, Oscillator, Pushes, settled, solve
 from .follow import follow
+
+#: Multiples of each mesh frequency on the way; the error estimate and the band add to them in the end.
+FEW = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +29,8 @@ class Growing(Oscillator):
     def omega(self, _part: float, count: int) -> Array:
         return super().omega(self.speed, count)
 
-    def harmonics(self, _part: float, highest: float) -> int:
-        return super().harmonics(self.speed, highest)
+    def harmonics(self, _part: float, _highest: float, multiples: int = FEW) -> int:
+        return super().harmonics(self.speed, 0.0, multiples)
 
     def flexibility(self, part: float, count: int) -> ComplexArray:
         whole = self.linear.flexibility(self.omega(part, count), self.speed)
@@ -41,11 +44,15 @@ def first_motion(system: Oscillator, speed: float, *, tolerance: float, highest:
         return system.forces(theta, speed, u, du)
 
     grows = Growing(system.linear, forces, system.turns, system.scale, system.orders, system.limit, speed)
-    places = np.zeros((grows.harmonics(0.0, highest) + 1, system.linear.size), dtype=complex)
+    places = np.zeros((grows.harmonics(0.0, 0.0) + 1, system.linear.size), dtype=complex)
     places[0] = system.linear.rest
     start, _ = solve(grows, 0.0, places, tolerance)
     if not start.found:
         return None
     curve = follow(grows, [0.0, 1.0], start, tolerance=tolerance, highest=highest)
     ends = [orbit for orbit in curve.orbits if orbit.speed == 1.0]
-    return replace(ends[0], speed=speed) if ends else None
+    if not ends:
+        return None
+    count = max(ends[0].harmonics, system.harmonics(speed, highest))
+    orbit = settled(system, *solve(system, speed, ends[0].with_harmonics(count), tolerance), tolerance)
+    return orbit if orbit.found else None
