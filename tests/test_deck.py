@@ -15,7 +15,7 @@ import pytest
 from gearfe.cli import main
 from gearfe.meshing.deck import deck_torque
 from gearfe.meshing.tooth_sector import sector_recipes
-from gearfe.meshing.whole_gear import mixed_gear, teeth_in_mesh
+from gearfe.meshing.whole_gear import mixed_gear, teeth_near
 from gearfe.tables.examples import job_file
 
 from .gears import pair
@@ -53,14 +53,49 @@ def test_fine_and_coarse_teeth_are_one_gear():
 
 def test_teeth_in_mesh_are_those_nearest_to_the_mate():
     gear = pair(20, 30).pinion
-    assert teeth_in_mesh(gear, 0.0, 0.0, 3) == {19, 0, 1}
-    assert teeth_in_mesh(gear, math.radians(20.0), 0.0, 1) == {19}
-    assert teeth_in_mesh(gear, math.radians(90.0), math.pi, 1) == {5}
+    assert teeth_near(gear, 0.0, 0.0, 3) == {19, 0, 1}
+    assert teeth_near(gear, math.radians(20.0), 0.0, 1) == {19}
+    assert teeth_near(gear, math.radians(90.0), math.pi, 1) == {5}
 
 
 def write_job(folder: Path) -> str:
     (folder / "pair.toml").write_text(job_file("stiffness"))
     return str(folder / "pair.toml")
+
+
+@pytest.mark.parametrize(("angle", "touching"), [("0", 2), ("-13", 2), ("-4", 1), ("4", 2), ("133", 2)])
+def test_fine_teeth_are_those_that_touch(tmp_path, angle, touching):
+    """As many as the path of contact has there: A is -17.5, B -10.0, D 0.5, E 8.0 deg; at 0 a pair is 0.5 deg off A."""
+    out = tmp_path / "gears.msh"
+    line = [
+        "mesh",
+        write_job(tmp_path),
+        "--out",
+        str(out),
+        "--teeth",
+        str(touching),
+        "--angle-deg",
+        angle,
+        "--no-pictures",
+    ]
+    assert main(line) == 0
+    mesh = meshio.read(out)
+    contact = [
+        np.unique(
+            np.concatenate(
+                [
+                    c.data[mesh.cell_data["gmsh:physical"][k] == mesh.field_data[f"{name}_contact"][0]].ravel()
+                    for k, c in enumerate(mesh.cells)
+                    if c.type == "line3"
+                ]
+            )
+        )
+        for name in ("pinion", "wheel")
+    ]
+    pinion, wheel = (mesh.points[nodes, :2] for nodes in contact)
+    near = np.linalg.norm(pinion[:, None] - wheel, axis=2).min(axis=1) < 0.03
+    places = np.sort(pinion[near][:, 1])
+    assert 1 + np.sum(np.diff(places) > 2.0) == touching
 
 
 def test_the_command_names_contact_boundaries_and_draws(tmp_path, capsys):

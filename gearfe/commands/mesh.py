@@ -131,9 +131,9 @@ def _parts(args: argparse.Namespace, job: StiffnessJob, wheel_angle: float) -> d
                 if args.teeth is None:
                     made = _uniform(sector_mesh(gear, recipes[number]), sector=args.sector)
                 else:
-                    from ..meshing.whole_gear import mixed_gear, teeth_in_mesh
+                    from ..meshing.whole_gear import in_mesh, mixed_gear, teeth_near
 
-                    fine = teeth_in_mesh(gear, turned[number], math.pi * number, min(args.teeth, gear.teeth))
+                    fine = teeth_near(gear, turned[number], in_mesh(pair)[number], min(args.teeth, gear.teeth))
                     made = mixed_gear(gear, recipes[number], fine)
             parts[name] = _placed(made, turned[number], pair.working_centre_distance * number)
     return parts
@@ -174,7 +174,7 @@ def _deck(args: argparse.Namespace, job: StiffnessJob) -> tuple[dict[str, MeshPa
     twist, torque = float(curve.twist[0]), float(curve.torque_wheel[0])
     if not math.isfinite(torque) or twist <= 0.0:
         raise InputError("--deck", None, f"the position has no solution here ({curve.status[0]})", "try another load")
-    least = max(2, int(np.sum(curve.load_share[0] > 0.0)))  # of one tooth each, the two may be of different pairs
+    least = int(np.sum(curve.load_share[0] > 0.0))
     args.teeth = max(DECK_TEETH, least) if args.teeth is None else args.teeth
     if args.teeth < least:
         problem = "leaves tooth pairs that bear without a contact boundary: the deck would not find equilibrium"

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..gear.pair import Gear
+from ..gear.pair import Gear, GearPair
 from ..typing import Array, IntArray
 from .export import MeshPart
 from .tooth_sector import SectorMesh, SectorRecipe, sector_mesh
@@ -94,7 +94,16 @@ def mixed_gear(gear: Gear, recipe: SectorRecipe, fine: Collection[int]) -> MeshP
     return joined([mesh, _coarse(gear, recipe, mesh)], [0 if k in fine else 1 for k in range(gear.teeth)], fine)
 
 
-def teeth_in_mesh(gear: Gear, turned: float, towards: float, count: int) -> set[int]:
+def in_mesh(pair: GearPair) -> tuple[float, float]:
+    """Directions (rad) of a pair of teeth, pinion's and wheel's, that touch in the middle of the path of contact.
+
+    The driving flank is the left one: the wheel's tooth stands half a pitch before the space that faces the pinion's.
+    """
+    middle = 0.5 * (pair.path["A"].pinion_angle + pair.path["E"].pinion_angle)
+    return middle, math.pi - (math.pi / pair.wheel.teeth + middle / pair.gear_ratio)
+
+
+def teeth_near(gear: Gear, turned: float, towards: float, count: int) -> set[int]:
     """Numbers of the `count` teeth nearest to the direction `towards` (rad) when tooth 0 stands at `turned` (rad)."""
     step = 2.0 * math.pi / gear.teeth
     off = {k: abs(math.remainder(turned + k * step - towards, 2.0 * math.pi)) for k in range(gear.teeth)}
