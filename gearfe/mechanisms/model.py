@@ -62,6 +62,11 @@ class Mechanism:
     known_until: float = math.inf  # end of the tables that are functions of time (s)
     unbent: bool = False  # made for the start of one with flexible links: nothing in it need be free to move
 
+    def __repr__(self) -> str:
+        tables = {name: ", ".join(getattr(self.file, name)) for name in ("bodies", "joints", "forces")}
+        kept = "\n".join(f"  {name}: {listed}" for name, listed in tables.items() if listed)
+        return f"Mechanism of {self.system.size} coordinates, {self.system.rows} constraints\n{kept}"
+
     @property
     def linkage(self) -> Linkage:
         """Bodies, joints and forces: the first element of the system."""

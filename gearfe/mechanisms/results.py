@@ -116,7 +116,7 @@ def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
     at = (0.5 * (time[1:] + time[:-1])[:, None] + half[:, None] * nodes).ravel()
     states = trajectory.dense(at, 0), trajectory.dense(at, 1)
     planar = [state[:, : linkage.size] for state in states]
-    power = np.array([linkage.power(t, q, v) for t, q, v in zip(at, *planar, strict=True)])
+    power = linkage.power(at, *planar)
     for link in damped:
         power = power - np.array([link.loss(q, v) for q, v in zip(*states, strict=True)])
     if linkage.driven:

@@ -40,7 +40,7 @@ class Scheme(NamedTuple):
     middles: Array  # (s,) places between the stages
     between: Array  # (s, k) from the same values to them
     speed: Array  # (s + 1, s + 1) coefficients of powers of x - 1 from values at 0, c
-    ahead: Array  # (d + 1, s + 1) the same of the polynomial of degree d < s next to them
+    ahead: Array  # (d + 1, s + 1) the same of the polynomial of degree d < s next to values at c, 0
     force: Array  # (s, s) coefficients of powers of x from values at the stages
 
 
@@ -71,13 +71,14 @@ def scheme(family: str, stages: int) -> Scheme:
     between = middles[:, None] ** p @ path
     between[:, 0] = 1.0 - between[:, 2:-1].sum(axis=1)  # not 1e-10 off, which the joints would see
     before = np.vander(np.append(0.0, c) - 1.0, increasing=True)
+    next_to = np.linalg.pinv(before[:, : min(AHEAD, stages - 1) + 1])
     return Scheme(
         c=c, inverse=inverse, twice=inverse @ inverse, ends=np.stack([b @ inverse, b @ inverse @ inverse]),
         defect=force[0].copy(), values=np.array([[values[k].real, values[k].imag] for k in kept]),
         back=np.linalg.inv(basis), basis=basis, level=int(family == GAUSS), inner=inner,
         central=int(np.abs(c - 0.5).argmin()),
         path=path, middles=middles, between=between,
-        speed=np.linalg.inv(before), ahead=np.linalg.pinv(before[:, : min(AHEAD, stages - 1) + 1]), force=force,
+        speed=np.linalg.inv(before), ahead=np.roll(next_to, -1, axis=1).copy(), force=force,
     )  # fmt: skip
 
 

@@ -37,7 +37,12 @@ LOAD_SECONDS = 0.05
 
 def available() -> bool:
     """Whether numba can be imported (it is not imported here)."""
-    return os.environ.get("GEARFE_NO_NUMBA", "") in ("", "0") and importlib.util.find_spec("numba") is not None
+    return os.environ.get("GEARFE_NO_NUMBA", "") in ("", "0") and _installed()
+
+
+@lru_cache(maxsize=1)
+def _installed() -> bool:
+    return importlib.util.find_spec("numba") is not None
 
 
 def cache_folder(functions: Iterable[Callable[..., Any]]) -> Path | None:

@@ -16,7 +16,7 @@ from .contract import Element
 from .forces import Force
 from .forms import Frames
 from .joints import Joint
-from .planar import Body, body_numbers
+from .planar import Body, body_numbers, over, turned, with_ground
 from .tables import Assembly, assemble
 
 if TYPE_CHECKING:
@@ -138,19 +138,19 @@ class Linkage(Element):
         return self._known[1]
 
     def _pose(self, q: Array) -> Pose:
-        full = np.append(q, np.zeros(3)).reshape(-1, 3)
-        row = np.column_stack([full, np.cos(full[:, 2]), np.sin(full[:, 2])])
-        ends, at = self._vectors.end, row[self._vectors.bodies]
-        c, s = at[:, :, 3], at[:, :, 4]
+        full = with_ground(q)
+        row = np.concatenate([full, np.cos(full[..., 2:]), np.sin(full[..., 2:])], axis=-1)
+        ends, at = self._vectors.end, row[..., self._vectors.bodies, :]
+        c, s = at[..., 3], at[..., 4]
         arm = np.stack([c * ends[:, :, 1] - s * ends[:, :, 2], s * ends[:, :, 1] + c * ends[:, :, 2]], axis=-1)
-        return Pose(row, (ends[:, :, :1] * at[:, :, :2] + arm).sum(axis=1), arm)
+        return Pose(row, (ends[:, :, :1] * at[..., :2] + arm).sum(axis=-2), arm)
 
     def _motion(self, pose: Pose, v: Array) -> Rates:
-        row = np.append(v, np.zeros(3)).reshape(-1, 3)
-        at = row[self._vectors.bodies]
-        spin = at[:, :, 2]
-        ends = self._vectors.end[:, :, :1] * at[:, :, :2] + spin[:, :, None] * turned(pose.arm)
-        return Rates(row, ends.sum(axis=1), spin)
+        row = with_ground(v)
+        at = row[..., self._vectors.bodies, :]
+        spin = at[..., 2]
+        ends = self._vectors.end[:, :, :1] * at[..., :2] + spin[..., None] * turned(pose.arm)
+        return Rates(row, ends.sum(axis=-2), spin)
 
     def _vector_jacobian(self, pose: Pose) -> Array:
         """J_V = dV/d(x, y, theta) of both bodies, shape (v, 2 components, 2 bodies, 3)."""
@@ -169,13 +169,14 @@ class Linkage(Element):
 
     def _affine(self, pose: Pose) -> Array:
         """Values of the affine parts of all forms."""
-        return np.einsum("rbk,rbk->r", self._forms.factor, pose.row[self._forms.bodies]) + self._forms.constant
+        at = pose.row[..., self._forms.bodies, :]
+        return np.einsum("rbk,...rbk->...r", self._forms.factor, at) + self._forms.constant
 
     def _affine_gradients(self, pose: Pose) -> Array:
         """Gradients of the affine parts of all forms, shape (r, 2, 3)."""
-        factor, at = self._forms.factor, pose.row[self._forms.bodies]
-        out = factor[:, :, :3].copy()
-        out[:, :, 2] += factor[:, :, 4] * at[:, :, 3] - factor[:, :, 3] * at[:, :, 4]
+        factor, at = self._forms.factor, pose.row[..., self._forms.bodies, :]
+        out = np.broadcast_to(factor[:, :, :3], (*at.shape[:-1], 3)).copy()
+        out[..., 2] += factor[:, :, 4] * at[..., 3] - factor[:, :, 3] * at[..., 4]
         return out
 
     def _affine_bend(self, pose: Pose) -> Array:
@@ -327,13 +328,13 @@ class Linkage(Element):
                 np.add.at(total[:, :n], along.places[k], np.outer(along.gradient[k], slope))
         return by_q[:n, :n], by_v[:n, :n]
 
-    def power(self, t: float, q: Array, v: Array) -> float:
-        """Power of applied moments and point forces less the loss in dampers (W)."""
-        pose = self.pose(q)
+    def power(self, t: Array, q: Array, v: Array) -> Array:
+        """Power of applied moments and point forces less the loss in dampers (W), at times (k,) of states (k, n)."""
+        pose = self._pose(q)
         motion = self._motion(pose, v)
         springs, along = self._springs(t, pose, motion), self._along(t, pose, motion)
-        losses = self._forces.spring[:, 1] @ springs.rate**2 + self._forces.along[:, 1] @ along.rate**2
-        return float(along.given @ along.rate - springs.given @ springs.rate - losses)
+        losses = springs.rate**2 @ self._forces.spring[:, 1] + along.rate**2 @ self._forces.along[:, 1]
+        return (along.given * along.rate).sum(axis=-1) - (springs.given * springs.rate).sum(axis=-1) - losses
 
     def potential(self, q: Array) -> float:
         """Energy of gravity (datum x = y = 0) and of all springs (J)."""
@@ -344,37 +345,41 @@ class Linkage(Element):
         elastic = 0.5 * (self._forces.spring[:, 0] @ stretch**2 + self._forces.along[:, 0] @ moved**2)
         return float(elastic - self._forces.weight[: self.size] @ q)
 
-    def _along(self, t: float, pose: Pose, motion: Rates) -> _Along:
+    def _along(self, t: float | Array, pose: Pose, motion: Rates) -> _Along:
         """Forces along forms."""
-        bodies = self._forms.bodies[self.rows :]
-        gradient = self._affine_gradients(pose)[self.rows :].reshape(-1, 6)
+        bodies, lead = self._forms.bodies[self.rows :], pose.row.shape[:-2]
+        gradient = self._affine_gradients(pose)[..., self.rows :, :, :].reshape(*lead, -1, 6)
         places = (3 * bodies[:, :, None] + np.arange(3)).reshape(-1, 6)
-        rate = (gradient * motion.row.ravel()[places]).sum(axis=1)
+        rate = (gradient * motion.row.reshape(*lead, -1)[..., places]).sum(axis=-1)
         stiffness, damping = self._forces.along.T
-        functions = self.assembly.functions
-        given = np.array([0.0 if k < 0 else float(functions[k](t)) for k in self._forms.motion[self.rows :]])
+        given = np.zeros(rate.shape)
+        for i, k in enumerate(self._forms.motion[self.rows :]):
+            if k >= 0:
+                given[..., i] = self.assembly.functions[k](t)
+        q, v = (x[..., :-1, :3].reshape(*lead, -1) for x in (pose.row, motion.row))
         for k, load in self.assembly.state_loads:
-            given[k] = load.value(t, pose.row[:-1, :3].ravel(), motion.row[:-1].ravel())
-        value = -stiffness * self._affine(pose)[self.rows :] - damping * rate
+            given[..., k] = over(load.value, t, q, v)
+        value = -stiffness * self._affine(pose)[..., self.rows :] - damping * rate
         return _Along(gradient, places, rate, value, given)
 
-    def _springs(self, t: float, pose: Pose, motion: Rates) -> _Springs:
+    def _springs(self, t: float | Array, pose: Pose, motion: Rates) -> _Springs:
         """Spans, lengths, directions, rates of the lengths, and tensions over lengths."""
         stiffness, damping, free = self._forces.spring.T
-        span, speed = pose.vector[: len(free)], motion.vector[: len(free)]
-        length = np.hypot(*span.T)
+        span, speed = pose.vector[..., : len(free), :], motion.vector[..., : len(free), :]
+        length = np.hypot(span[..., 0], span[..., 1])
         pointless = (length == 0.0) & ((damping > 0.0) | (free > 0.0) | self._lawful)
         if pointless.any():
             problem = "joins two points that coincide, so its force has no direction"
             cure = "move its points apart, or give it neither a free length nor damping"
-            raise InputError(self.assembly.spring_label[int(pointless.argmax())], None, problem, cure)
-        over = np.where(length > 0.0, length, 1.0)
-        unit = span / over[:, None]
-        rate = (unit * speed).sum(axis=1)
-        given = np.zeros(len(free))
+            first = int(pointless.any(axis=tuple(range(pointless.ndim - 1))).argmax())
+            raise InputError(self.assembly.spring_label[first], None, problem, cure)
+        divisor = np.where(length > 0.0, length, 1.0)
+        unit = span / divisor[..., None]
+        rate = (unit * speed).sum(axis=-1)
+        given = np.zeros(rate.shape)
         for i, law in self.assembly.tension_laws:
-            given[i] = law.value(t, float(length[i]), float(rate[i]))
-        pull = stiffness * (1.0 - np.where(free > 0.0, free / over, 0.0)) + (damping * rate + given) / over
+            given[..., i] = over(law.value, t, length[..., i], rate[..., i])
+        pull = stiffness * (1.0 - np.where(free > 0.0, free / divisor, 0.0)) + (damping * rate + given) / divisor
         return _Springs(span, length, unit, rate, given, pull)
 
 
@@ -393,8 +398,3 @@ class _Springs(NamedTuple):
     rate: Array  # of the length
     given: Array  # tension of the laws
     pull: Array  # tension / length
-
-
-def turned(vectors: Array) -> Array:
-    """A quarter turn ahead: the derivatives of turning vectors by the angle."""
-    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)

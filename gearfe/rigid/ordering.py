@@ -123,22 +123,21 @@ def narrow_order(graph: NDArray[np.bool_]) -> list[int]:
     Reverse Cuthill-McKee from an unknown at the rim (George & Liu, Computer Solution of Large Sparse Positive Definite
     Systems, Prentice-Hall 1981, ch. 4).
     """
-    near = [np.flatnonzero(row) for row in graph]
-    degree = graph.sum(axis=1)
+    degree = graph.sum(axis=1).tolist()
+    near = [sorted(np.flatnonzero(row).tolist(), key=degree.__getitem__) for row in graph]
     left = set(range(len(graph)))
     order: list[int] = []
 
     def walk(first: int) -> list[int]:
-        seen, found = {first}, [first]
-        for i in found:
-            for j in sorted(near[i].tolist(), key=lambda k: degree[k]):
-                if j in left and j not in seen:
-                    seen.add(j)
-                    found.append(j)
-        return found
+        found, queue = {first}, [first]
+        for i in queue:
+            new = [j for j in near[i] if j not in found]
+            found.update(new)
+            queue += new
+        return queue
 
     while left:
-        begin = min(left, key=lambda k: degree[k])
+        begin = min(left, key=degree.__getitem__)
         for _ in range(3):  # the last one reached lies at the rim
             begin = walk(begin)[-1]
         part = walk(begin)

@@ -7,9 +7,14 @@ the position of the frame's origin and its angle. The ground is the body named `
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from ..errors import InputError, shown, unknown_name
+from ..typing import Array
 from .forces import Force
 from .forms import GROUND, Point
 from .joints import Joint
@@ -100,3 +105,20 @@ def body_numbers(bodies: tuple[Body, ...], joints: tuple[Joint, ...], forces: tu
             cure = "name two different bodies (or the ground)"
             raise InputError(label, used[0], "joins a body to itself", cure)
     return index
+
+
+def with_ground(x: Array) -> Array:
+    """(..., n) by bodies, (..., n/3 + 1, 3): the ground is the last."""
+    return np.concatenate([x, np.zeros((*x.shape[:-1], 3))], axis=-1).reshape(*x.shape[:-1], -1, 3)
+
+
+def over(value: Callable[..., float], t: float | Array, *states: Array) -> Any:
+    """A function of a state, or of those at several times; its numbers are `float`, whose divisions by zero raise."""
+    if np.ndim(t) == 0:
+        return value(t, *(x if np.ndim(x) else float(x) for x in states))
+    return [over(value, *one) for one in zip(np.asarray(t), *states, strict=True)]
+
+
+def turned(vectors: Array) -> Array:
+    """A quarter turn ahead: the derivatives of turning vectors by the angle."""
+    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
