@@ -150,7 +150,7 @@ for step in range(2):
 def test_a_failed_position_is_told_and_in_the_table(tmp_path, capsys, monkeypatch):
     def weak(pair, angles, twists, first):
         made = solve_elements(pair, angles, twists, first)
-        return made.stated(np.where(np.abs(angles - math.radians(4)) < 1e-9, "not_converged", made.status))
+        return made.with_status(np.where(np.abs(angles - math.radians(4)) < 1e-9, "not_converged", made.status))
 
     monkeypatch.setattr("gearfe.stiffness.positions.solve_elements", weak)
     code = main(["stiffness", str(JOB), "--out", str(tmp_path), "--twist-deg", "0.3", *QUICK, "--law", "nitsche"])
@@ -342,7 +342,7 @@ def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
     def one_fails(pair, angles, twists, first):
         made = solve_elements(pair, angles, twists, first)
         bad = np.isclose(np.degrees(angles), 6.0)
-        return made.stated(np.where(bad, "not_converged", made.status))
+        return made.with_status(np.where(bad, "not_converged", made.status))
 
     monkeypatch.setattr("gearfe.stiffness.positions.solve_elements", one_fails)
     options = ("--twist-deg", "0.3", "--angles", "3", "3", "9", "--fields", "9", "6", "3", "--no-pictures")

@@ -253,7 +253,7 @@ def test_a_torque_beyond_reach_is_flagged(gears, elastic, monkeypatch):
 
     def weak(self, angles, twists, kept=()):
         made = solve(self, angles, twists, kept)
-        return made.stated(np.where(made.torque_wheel > 60, "not_converged", made.status))
+        return made.with_status(np.where(made.torque_wheel > 60, "not_converged", made.status))
 
     monkeypatch.setattr(HalfPlaneSolver, "solve", weak)
     fine = at(gears, [0.1], elastic, twist=None, torque=50.0)

@@ -55,7 +55,7 @@ class State:
 
 
 @dataclass(frozen=True)
-class Seen:
+class ProjectedPoints:
     """Contact points of some positions as they lie to their mates in a state.
 
     Attributes
@@ -94,7 +94,7 @@ class Seen:
         return np.asarray((self.normal.conj() * displacement[self.nodes]).real.sum(axis=1))
 
 
-def seen(batch: Batch, state: State, turn: ComplexArray, points: IntArray) -> Seen:
+def projected(batch: Batch, state: State, turn: ComplexArray, points: IntArray) -> ProjectedPoints:
     """The contact points `points` in a state, with the windows turned by `turn`, shape (W,)."""
     found = batch.project(batch.placed(state.displacement, turn), points, state.place[points])
     normal = found.normal
@@ -108,7 +108,7 @@ def seen(batch: Batch, state: State, turn: ComplexArray, points: IntArray) -> Se
     )
     reached = found.reached
     trial = np.maximum(-batch.parameter[points] * found.gap - state.stress[points], 0.0)
-    return Seen(
+    return ProjectedPoints(
         points=points,
         nodes=np.concatenate([batch.slave_nodes[points], found.edge[:, None] + np.arange(3)], axis=1),
         normal=rows,
@@ -178,7 +178,7 @@ class Equations:
         return np.maximum(pressure, 0.0)
 
 
-def equations_of(batch: Batch, b: int, rows: Seen, asks: BoolArray) -> Equations:
+def equations_of(batch: Batch, b: int, rows: ProjectedPoints, asks: BoolArray) -> Equations:
     """Those of position b on the points `rows`, of which those that ask for pressure bear at first."""
     points, count = rows.points, len(rows.points)
     nodes, column = np.unique(rows.nodes, return_inverse=True)
@@ -199,7 +199,9 @@ def equations_of(batch: Batch, b: int, rows: Seen, asks: BoolArray) -> Equations
     return Equations(points, matrix, asks)
 
 
-def step(batch: Batch, state: State, rows: Seen, equations: dict[int, Equations], *, held: bool = False) -> State:
+def step(
+    batch: Batch, state: State, rows: ProjectedPoints, equations: dict[int, Equations], *, held: bool = False
+) -> State:
     """One step of the positions whose contact points `rows` are; the others stay.
 
     Their `equations` need not be made of these very rows: the residual is.
@@ -223,7 +225,7 @@ def step(batch: Batch, state: State, rows: Seen, equations: dict[int, Equations]
     moves[live] = True
     of_nodes, of_points = moves[batch.node_position], moves[batch.at]
     return State(
-        pressure=np.where(of_points, _spread(pressure, points, len(of_points)), state.pressure),
+        pressure=np.where(of_points, _scattered(pressure, points, len(of_points)), state.pressure),
         stress=np.where(of_points, stress, state.stress),
         place=state.place,
         forces=np.where(of_nodes, forces, state.forces),
@@ -288,8 +290,8 @@ def solve(batch: Batch, state: State, tolerance: float) -> Outcome:
     past: list[list[tuple[Array, Array]]] = [[] for _ in range(batch.size)]
     done: set[int] = set()
     for number in range(STEPS + 1):
-        found = seen(batch, state, batch.turn, np.flatnonzero(live[batch.at]))
-        state = replace(state, place=_spread(found.place, found.points, state.place))
+        found = projected(batch, state, batch.turn, np.flatnonzero(live[batch.at]))
+        state = replace(state, place=_scattered(found.place, found.points, state.place))
         if number:
             converged = live & (_error(batch, state, found) < np.maximum(tolerance, _rounding(batch, found)))
             done |= set(np.flatnonzero(converged).tolist())
@@ -325,7 +327,7 @@ def turned(batch: Batch, outcome: Outcome, turn: ComplexArray, tolerance: float)
     """
     start, of = outcome.state, batch.node_position
     points = outcome.points
-    rows = seen(batch, start, batch.turn, points)
+    rows = projected(batch, start, batch.turn, points)
     forces = rows.forces(start.pressure[points], len(of))
     state, open_ = start, np.isin(np.arange(batch.size), list(outcome.equations))
     past: dict[int, list[tuple[Array, Array]]] = {b: [] for b in outcome.equations}
@@ -333,7 +335,9 @@ def turned(batch: Batch, outcome: Outcome, turn: ComplexArray, tolerance: float)
         if not open_.any():
             break
         old = state
-        state = step(batch, old, seen(batch, old, turn, points[open_[batch.at[points]]]), outcome.equations, held=True)
+        state = step(
+            batch, old, projected(batch, old, turn, points[open_[batch.at[points]]]), outcome.equations, held=True
+        )
         moved, last = (np.bincount(of, np.abs(state.forces - f), batch.size) for f in (forces, old.forces))
         open_ &= last > tolerance * moved
         for b in np.flatnonzero(open_).tolist():
@@ -341,14 +345,14 @@ def turned(batch: Batch, outcome: Outcome, turn: ComplexArray, tolerance: float)
     return replace(state, forces=np.where(open_[of], np.nan, state.forces))
 
 
-def _spread(values: Array, points: IntArray, whole: Array | int) -> Array:
+def _scattered(values: Array, points: IntArray, whole: Array | int) -> Array:
     """`values` at `points` of `whole`, or of so many zeros."""
     made = np.zeros(whole) if isinstance(whole, int) else whole.copy()
     made[points] = values
     return made
 
 
-def _error(batch: Batch, state: State, found: Seen) -> Array:
+def _error(batch: Batch, state: State, found: ProjectedPoints) -> Array:
     """Of each position how far its pressures are from what the law asks or its forces from those of its pressures at
     the places reached, the larger, relative to their sums, shape (B,).
     """
@@ -364,7 +368,7 @@ def _error(batch: Batch, state: State, found: Seen) -> Array:
     return np.maximum(off, turned / np.maximum(np.bincount(of, np.abs(now), batch.size), 1e-300))
 
 
-def _rounding(batch: Batch, found: Seen) -> Array:
+def _rounding(batch: Batch, found: ProjectedPoints) -> Array:
     """Smallest error that rounding lets the law reach in each position: gamma times the last bit of a coordinate."""
     at, bears = batch.at[found.points], found.trial > 0
     stiff = np.bincount(at, found.area * bears * batch.parameter[found.points], batch.size)

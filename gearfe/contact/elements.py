@@ -14,7 +14,7 @@ import numpy as np
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .compliance import MeshingPair
 from .element_batch import Batch, FirstContacts, batch_of, windows_of
-from .element_newton import Outcome, State, seen, solve, turned
+from .element_newton import Outcome, State, projected, solve, turned
 from .flank import edge_shapes
 from .flank_compliance import FlankCompliance
 from .half_plane_result import PairContacts
@@ -140,7 +140,7 @@ def _at_rims(batch: Batch, state: State) -> BoolArray:
 def _positions(batch: Batch, outcome: Outcome, places: Positions) -> Positions:
     """The solved positions, with derivatives by the same equations at a slightly larger twist."""
     here, of = outcome.state, batch.node_position
-    rows = seen(batch, here, batch.turn, outcome.points)
+    rows = projected(batch, here, batch.turn, outcome.points)
     forces = rows.forces(here.pressure[rows.points], len(batch.points))
     one, of_windows = _torques(batch, here, forces, batch.turn)
     work = np.bincount(of, (forces.conj() * here.displacement).real, batch.size)
@@ -166,7 +166,7 @@ def _positions(batch: Batch, outcome: Outcome, places: Positions) -> Positions:
         energy=0.5 * work,
         **one,
     )
-    return made.stated(np.where(solved, "converged", "not_converged"))
+    return made.with_status(np.where(solved, "converged", "not_converged"))
 
 
 def _loads(batch: Batch, windows: IntArray, forces: ComplexArray, rate: ComplexArray) -> FlankLoads:

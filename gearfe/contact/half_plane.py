@@ -86,7 +86,7 @@ def unloaded(law: HalfPlanePair, numbers: IntArray, twists: Array, found: Touchi
         arc=law.arc_at(found.flank, found.place),
         ends=law.tables.ends[found.flank],
         force=nothing,
-        spread=nothing,
+        variance=nothing,
         low=nothing,
         high=nothing,
         bearing=np.zeros((count, PANELS), dtype=bool),
@@ -133,7 +133,7 @@ def first_state(law: HalfPlanePair, twists: Array, found: Touching) -> tuple[Set
     force = np.maximum(overlap, 0.0) / reference_approach(law)
     for _ in range(FORCE_ROUNDS):
         force = forces_of_overlaps(overlap, yields.at(force), T, setting.couples)
-    return setting, replace(state, force=force, spread=0.25 * yields.half_width(force) ** 2)
+    return setting, replace(state, force=force, variance=0.25 * yields.half_width(force) ** 2)
 
 
 def expected_twists(law: HalfPlanePair, torques: Array, touching: Touching) -> Array:
@@ -245,9 +245,9 @@ def change(setting: Setting, state: State, made: Step) -> Array:
     """What a step changed, shape (m,): the forces in units of their sum, and weighted by them the places and widths of
     the contacts, in units of these.
     """
-    new, spread, couples = made.solution.force, made.spread, setting.couples
-    safe = np.where(spread > 0, spread, 1.0)
-    moved = (spread > 0) * (0.5 * np.abs(made.place) / np.sqrt(safe) + np.abs(1 - state.spread / safe))
+    new, variance, couples = made.solution.force, made.variance, setting.couples
+    safe = np.where(variance > 0, variance, 1.0)
+    moved = (variance > 0) * (0.5 * np.abs(made.place) / np.sqrt(safe) + np.abs(1 - state.variance / safe))
     all_ = np.abs(new - state.force) + MOVED * new * moved
     return couples.total(all_) / np.maximum(couples.total(new), TINY)
 

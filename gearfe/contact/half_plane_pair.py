@@ -33,15 +33,15 @@ from .compliance import MeshingPair
 from .flank_compliance import FlankCompliance, Shapes, corner_of, flank_compliance, shapes_of
 from .panels import LEAST_DISTANCE, Couplings, log_integral, mean_log
 
-#: Even places along a flank for `Finely`; places at which both faces of a contact are compared where they have no
+#: Even places along a flank for `FineFlanks`; places at which both faces of a contact are compared where they have no
 #: deviations, and besides for each piece of a deviation.
-FINELY, PLACES, PER_PIECE = 128, 32, 2
+FINE_PLACES, PLACES, PER_PIECE = 128, 32, 2
 #: Distance (m) from a kink at which its sides' tangents are taken.
 BESIDE = 1e-9
 
 
 @dataclass(frozen=True)
-class Finely:
+class FineFlanks:
     """Flanks of pinion and wheel at m even places.
 
     Attributes
@@ -182,13 +182,13 @@ class HalfPlanePair:
         return arcs, angles
 
     @cached_property
-    def finely(self) -> Finely:
+    def fine_flanks(self) -> FineFlanks:
         """Shape functions between the stations."""
         ends = np.array([[side.curve.low, side.curve.high] for side in self.sides])
-        arcs = ends[:, :1] + np.diff(ends) * np.linspace(0.0, 1.0, FINELY)
+        arcs = ends[:, :1] + np.diff(ends) * np.linspace(0.0, 1.0, FINE_PLACES)
         distance = np.stack([side.distance(at) for side, at in zip(self.sides, arcs, strict=True)])
         values = self.shapes.at(arcs.T)[:, :, 0].transpose(1, 2, 0)
-        return Finely(ends[:, :1], (FINELY - 1) / np.diff(ends), values, distance)
+        return FineFlanks(ends[:, :1], (FINE_PLACES - 1) / np.diff(ends), values, distance)
 
     @cached_property
     def looked_at(self) -> Array:
@@ -290,9 +290,9 @@ def opened(
     contacts
         Arcs (m), shape (p, 2), forces per width (N/m) and variances of the pressures (m2), shape (p,).
     """
-    arc, force, spread = contacts
+    arc, force, variance = contacts
     i, j = couples.first[couples.neighbours], couples.second[couples.neighbours]
-    half = np.maximum(2 * np.sqrt(spread[j]), LEAST_DISTANCE)[:, None, None]
+    half = np.maximum(2 * np.sqrt(variance[j]), LEAST_DISTANCE)[:, None, None]
     turned = (normal[i] * normal[j].conj()).real * law.inverse_modulus * force[j][:, None]
     made = np.zeros((len(arcs), arcs.shape[2]))
     far = mean_log(arcs[i] - arc[j][:, :, None], half) * turned[:, :, None]

@@ -134,7 +134,7 @@ def contacts_of(setting: Setting, state: State, made: Step, known: dict[str, Arr
         point=_centres(state, made),
         normal=state.normal,
         arc=_material(made),
-        half_width=2 * np.sqrt(made.spread),
+        half_width=2 * np.sqrt(made.variance),
         x=made.x - made.place[:, None],
         width=made.width,
         pressure=made.solution.pressure,
@@ -149,7 +149,7 @@ def contact_rates(
 ) -> dict[str, Array]:
     """Rates of `PairContacts` for all contacts, from the same step at twists larger by `by` (rad), shape (p,)."""
     (state, one), (state_on, two) = here, ahead
-    wider = np.divide(two.spread, one.spread, out=np.ones(len(by)), where=one.spread > 0)
+    wider = np.divide(two.variance, one.variance, out=np.ones(len(by)), where=one.variance > 0)
     return {
         "force_rate": (two.solution.force - one.solution.force) * law.width / by,
         "normal_rate": np.angle(state_on.normal / state.normal) / by,

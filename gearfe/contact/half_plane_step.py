@@ -95,7 +95,7 @@ class State:
     ends : ndarray, shape (p, 2, 2)
         First and last arc (m) of both flanks that may belong to the contact: all of the wheel's, and of the pinion's
         the stretch up to the next contacts of the tooth pair.
-    force, spread : ndarray, shape (p,)
+    force, variance : ndarray, shape (p,)
         Force per width (N/m) that displaces the faces, and the variance of its pressure (m2).
     low, high : ndarray, shape (p,)
         Ends of the windows along the tangent from O (m).
@@ -110,7 +110,7 @@ class State:
     arc: Array
     ends: Array
     force: Array
-    spread: Array
+    variance: Array
     low: Array
     high: Array
     bearing: BoolArray
@@ -155,7 +155,7 @@ class Step:
         Arc lengths of the panels' middles (m).
     arc, height : ndarray, shape (p, 2), (p,)
         The material at O, and the height of the faces' middle there (m).
-    place, spread : ndarray, shape (p,)
+    place, variance : ndarray, shape (p,)
         Mean place of the pressure (m) and its variance about it (m2).
     slope : ndarray, shape (p,)
         Mean slope of the deformed faces under the pressure (-).
@@ -173,7 +173,7 @@ class Step:
     arc: Array
     height: Array
     place: Array
-    spread: Array
+    variance: Array
     slope: Array
     energy: Array
 
@@ -237,7 +237,7 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     displaced = np.add.reduceat(smooth.moved * (force.take(couples.second)[:, None] * SIGN)[..., None], couples.starts)
     # the contact's own width, and that of the bumps
     bend = smooth.moved[couples.own, :, 2] * load
-    excess = state.spread[:, None] - np.einsum("pgk,gk->pg", smooth.values, law.bump_squares)
+    excess = state.variance[:, None] - np.einsum("pgk,gk->pg", smooth.values, law.bump_squares)
     wider = excess * bend
     # across n the wedge moves the faces as a whole: n W along the tangent -i n
     edge = law.inverse_modulus * shear.imag * np.log(2 * y) * load * (-1j * normal)
@@ -261,7 +261,7 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
         arcs, heights, _ = faces.heights(tables, look)
         gap = heights[:, 1] - heights[:, 0]
         if len(beside):
-            gap += opened(law, couples, normal, (state.arc, force, state.spread), arcs)
+            gap += opened(law, couples, normal, (state.arc, force, state.variance), arcs)
         found = windows(look, heights, gap, state.reach * law.compliance * floor)
         low, high = found.low, np.maximum(found.high, found.low + 2e-4 * scale)
     half = 0.5 * (high - low)
@@ -285,7 +285,7 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     p, loaded = solution.pressure, solution.force > 0
     shares = p * width / np.where(loaded, solution.force, 1.0)[:, None]
     place = (shares * x).sum(axis=1)
-    spread = (shares * ((x - place[:, None]) ** 2 + width**2 / 12)).sum(axis=1)
+    variance = (shares * ((x - place[:, None]) ** 2 + width**2 / 12)).sum(axis=1)
     between = 0.5 * (p[:, 1:] + p[:, :-1])
     # both deformed faces have the same slope; the one further from its edges changes less with where it is taken
     into = (edges @ p[:, None, :, None])[..., 0]
@@ -305,7 +305,7 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     else:
         place, slope = np.where(loaded, place, found.nearest), np.where(loaded, slope, found.mean_slope)
         outgrown = ((p[:, 0] > 0) & (low > reach[0])) | ((p[:, -1] > 0) & (high < reach[1]))
-    return Step(solution, low, high, outgrown, x, width, arcs, arc, height, place, spread, slope, energy)
+    return Step(solution, low, high, outgrown, x, width, arcs, arc, height, place, variance, slope, energy)
 
 
 def _mean_over_kinks(setting: Setting, arcs: Array, width: Array) -> Array:
@@ -340,7 +340,7 @@ def moved_on(setting: Setting, state: State, made: Step, *, near: BoolArray | bo
         arc=np.minimum(np.maximum(arc, setting.tables.low[:, :, 0]), setting.tables.high[:, :, 0]),
         ends=state.ends,
         force=solution.force,
-        spread=made.spread,
+        variance=made.variance,
         low=made.low - place,
         high=made.high - place,
         bearing=solution.pressure > 0,

@@ -30,7 +30,7 @@ def taken(record: Dataclass, index: Any) -> Dataclass:
 
 
 def joined(parts: Sequence[Dataclass]) -> Dataclass:
-    """Dataclasss of one kind put one after the other."""
+    """Records of one kind, one after the other."""
     if len(parts) == 1:
         return parts[0]
     made: dict[str, Any] = {}
@@ -206,18 +206,18 @@ class Positions:
         index[places] = len(self) + np.arange(len(others))
         return together([self, others]).take(index)
 
-    def stated(self, status: NDArray[np.str_]) -> Positions:
+    def with_status(self, status: NDArray[np.str_]) -> Positions:
         """These with another status: what has not converged has no contacts, loads and numbers."""
         good = status == "converged"
         none = np.where(status == "no_contact", 0.0, np.nan)
         names = (*TORQUES, "energy")
         numbers: dict[str, Any] = {name: np.where(good, getattr(self, name), none) for name in names}
-        return replace(self.with_loads(good), status=status, contacts=_among(self.contacts, good), **numbers)
+        return replace(self.with_loads(good), status=status, contacts=_of_kept(self.contacts, good), **numbers)
 
     def with_loads(self, kept: BoolArray) -> Positions:
         """These with loads and point pressures of some alone, shape (n,)."""
-        points = None if self.points is None else _among(self.points, kept)
-        return replace(self, loads=tuple(_among(one, kept) for one in self.loads), points=points)
+        points = None if self.points is None else _of_kept(self.points, kept)
+        return replace(self, loads=tuple(_of_kept(one, kept) for one in self.loads), points=points)
 
 
 #: Rounding of the gears' angles (rad) below which no twist can be told apart.
@@ -228,7 +228,7 @@ STATUS = "<U18"
 TORQUES = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "tangent")
 
 
-def _among(record: Any, kept: BoolArray) -> Any:
+def _of_kept(record: Any, kept: BoolArray) -> Any:
     """The entries of the positions that are kept, shape (n,)."""
     return taken(record, kept[record.position])
 

@@ -38,7 +38,7 @@ MISSED = 1e-5
 RIM = 0.02
 
 
-class Seen(NamedTuple):
+class Stretch(NamedTuple):
     """Both faces over the stretch of flank of a contact: places (m), arcs and heights, (2, m), and deformed gap (m)."""
 
     x: Array
@@ -67,7 +67,7 @@ def completed(setting: Setting, state: State, made: Step) -> tuple[Setting, Stat
         exact = gap[i] + _beside_ellipse(setting.law, state, made, i, x[i])
         bound = -MISSED * reference_approach(setting.law) * total[couples.position[i]]
         if i not in cut and (outside[i] & (exact < bound)).any():
-            cut[i] = _added(setting, state, made, i, Seen(x[i], arcs[i], heights[i], exact), bound)
+            cut[i] = _added(setting, state, made, i, Stretch(x[i], arcs[i], heights[i], exact), bound)
     if not cut:
         return None
     rest = np.setdiff1d(np.arange(len(state.force)), list(cut))
@@ -101,7 +101,7 @@ def _split(state: State, made: Step, i: int) -> State:
     parts = _copies(state, i, edges[first] + half)
     ends = parts.ends.copy()
     ends[1:, 0, 0] = ends[:-1, 0, 1] = state.arc[i, 0] + 0.5 * (edges[end[:-1]] + edges[first[1:]])
-    return replace(parts, ends=ends, force=force, spread=0.25 * half**2, low=-half, high=half)
+    return replace(parts, ends=ends, force=force, variance=0.25 * half**2, low=-half, high=half)
 
 
 def _copies(state: State, i: int, place: Array) -> State:
@@ -146,7 +146,7 @@ def _gaps(setting: Setting, state: State) -> tuple[Array, Array, Array, Array]:
 
 
 def _half_widths(state: State) -> Array:
-    return np.maximum(2 * np.sqrt(state.spread), LEAST_DISTANCE)
+    return np.maximum(2 * np.sqrt(state.variance), LEAST_DISTANCE)
 
 
 def _beside_ellipse(law: HalfPlanePair, state: State, made: Step, i: int, x: Array) -> Array:
@@ -165,7 +165,7 @@ def _smooth(setting: Setting, state: State, normal: ComplexArray, arcs: Array) -
     each = answers(law, law.shapes.at(state.arc)[:, :, 0], normal, couples)[..., 0]
     load = state.force[couples.second][:, None] * SIGN
     at_stations = np.add.reduceat(each * load[:, :, None], couples.starts)
-    fine = law.finely
+    fine = law.fine_flanks
     t = np.minimum(np.maximum((arcs - fine.start) * fine.per_length, 0.0), fine.count - 1.0)
     moved = np.matmul(at_stations.swapaxes(0, 1), fine.values).swapaxes(0, 1)
     left = np.minimum(t.astype(np.int64), fine.count - 2)
@@ -175,36 +175,36 @@ def _smooth(setting: Setting, state: State, normal: ComplexArray, arcs: Array) -
     return lower + part * (upper - lower), near + part * (far - near)
 
 
-def _added(setting: Setting, state: State, made: Step, i: int, seen: Seen, bound: float) -> State:
+def _added(setting: Setting, state: State, made: Step, i: int, stretch: Stretch, bound: float) -> State:
     """The contact i, and others where the faces overlap most beyond either end of its window, if they are clear of
     each other in between; else its window is to be wider.
     """
     law = setting.law
     own, ends, reach = taken(state, [i]), state.ends[[i]].copy(), state.reach[[i]]
     parts = []
-    for way, side in enumerate(_beyond(taken(made, [i]), seen.x[None])[:, 0]):
+    for way, side in enumerate(_beyond(taken(made, [i]), stretch.x[None])[:, 0]):
         beyond = np.flatnonzero(side)
-        if len(beyond) == 0 or seen.gap[beyond].min() >= bound:
+        if len(beyond) == 0 or stretch.gap[beyond].min() >= bound:
             continue
-        k = int(beyond[np.argmin(seen.gap[beyond])])
+        k = int(beyond[np.argmin(stretch.gap[beyond])])
         between = beyond[beyond < k] if way else beyond[beyond > k]
-        if len(between) == 0 or seen.gap[between].max() <= 0:
+        if len(between) == 0 or stretch.gap[between].max() <= 0:
             reach = WIDER * state.reach[[i]]
             continue
-        cut = seen.arcs[0, between[np.argmax(seen.gap[between])]]
-        tangent = law.tables.of(setting.found.flank[i]).at(seen.arcs[:, k, None])[1][:, 0] * setting.turn[i]
+        cut = stretch.arcs[0, between[np.argmax(stretch.gap[between])]]
+        tangent = law.tables.of(setting.found.flank[i]).at(stretch.arcs[:, k, None])[1][:, 0] * setting.turn[i]
         along = 1j * (tangent[0] - tangent[1])
-        new, limits, nothing = _copies(own, 0, seen.x[[k]]), state.ends[[i]].copy(), np.zeros(1)
+        new, limits, nothing = _copies(own, 0, stretch.x[[k]]), state.ends[[i]].copy(), np.zeros(1)
         limits[0, 0, 1 - way] = ends[0, 0, way] = cut
         parts.append(
             replace(
                 new,
-                centre=new.centre + new.normal * seen.heights[:, k].mean(),
+                centre=new.centre + new.normal * stretch.heights[:, k].mean(),
                 normal=along[None] / np.abs(along),
-                arc=seen.arcs[None, :, k],
+                arc=stretch.arcs[None, :, k],
                 ends=limits,
-                force=-seen.gap[[k]] / reference_approach(law),
-                spread=nothing,
+                force=-stretch.gap[[k]] / reference_approach(law),
+                variance=nothing,
                 low=nothing,
                 high=nothing,
                 reach=np.array([WINDOW]),

@@ -102,11 +102,11 @@ def torque_changes(law: HalfPlanePair, other: HalfPlanePair, found: Positions) -
 
 
 def _energy(
-    law: HalfPlanePair, couples: Couplings, force: Array, arc: Array, normal: ComplexArray, spread: Array
+    law: HalfPlanePair, couples: Couplings, force: Array, arc: Array, normal: ComplexArray, variance: Array
 ) -> Array:
     """Energy (J) of the smooth displacements of each position, shape (n,), for forces (N)."""
     smooth = smooth_influence(law, normal, arc, couples)
     own = smooth.moved[couples.own, :, 2] * SIGN * force[:, None]
-    excess = spread[:, None] - np.einsum("pgk,gk->pg", smooth.values, law.bump_squares)
+    excess = variance[:, None] - np.einsum("pgk,gk->pg", smooth.values, law.bump_squares)
     wider = ((own * normal.conj()).real * SIGN * excess).sum(axis=1)
     return couples.total(0.5 * force * (couples.times(smooth.compliance, force) + wider)) / law.width

@@ -110,7 +110,7 @@ def twists_for_torque(
         found = found.replaced(open_, made)
     given_up = ~reached & np.isin(found.status, ("converged", "no_contact"))
     status = np.where(given_up, NOT_REACHED, found.status)
-    return replace(found.stated(status), iterations=iterations)
+    return replace(found.with_status(status), iterations=iterations)
 
 
 NONE: IntArray = np.zeros(0, dtype=np.int64)
@@ -210,7 +210,9 @@ class ElementSolver:
         found = solve_elements(self.elastic, expected.pinion_angle, expected.twist, first)
         status = np.where(thin, "under_resolved", np.where(loaded, found.status, expected.status))
         iterations = np.where(loaded & ~thin, found.iterations, expected.iterations)
-        return replace(found.stated(status), iterations=iterations).with_loads(np.isin(np.arange(len(found)), kept))
+        return replace(found.with_status(status), iterations=iterations).with_loads(
+            np.isin(np.arange(len(found)), kept)
+        )
 
     def elements_per_contact(self, found: Positions) -> Array:
         """Elements that see the contact of positions of `half_plane`, shape (n,): harmonic means, by force, over their
@@ -350,7 +352,7 @@ def checked_contact(solver: PositionSolver, found: Positions) -> Positions:
     """Mark positions without contact whose exact rigid flanks overlap, and take all numbers off failed ones."""
     touching = solver.touching_twists(found.pinion_angle)
     overlap = (found.status == "no_contact") & (found.twist > touching + ANGLE_ROUNDING)
-    return found.stated(np.where(overlap, "not_converged", found.status))
+    return found.with_status(np.where(overlap, "not_converged", found.status))
 
 
 def load_shares(found: Positions) -> tuple[Array, Array]:
