@@ -18,14 +18,9 @@ from ..typing import Array, BoolArray, Dataclass, IntArray
 
 
 def taken(record: Dataclass, index: Any) -> Dataclass:
-    """The entries `index` of every array, of records within the record likewise; None stays."""
-    made: dict[str, Any] = {}
-    for field in fields(record):
-        value = getattr(record, field.name)
-        if isinstance(value, np.ndarray):
-            made[field.name] = value[index]
-        else:
-            made[field.name] = None if value is None else taken(value, index)
+    """The entries `index` of every array, of records within the record likewise."""
+    own = {field.name: getattr(record, field.name) for field in fields(record)}
+    made = {name: value[index] if isinstance(value, np.ndarray) else taken(value, index) for name, value in own.items()}
     return type(record)(**made)
 
 
@@ -33,13 +28,11 @@ def joined(parts: Sequence[Dataclass]) -> Dataclass:
     """Records of one kind, one after the other."""
     if len(parts) == 1:
         return parts[0]
-    made: dict[str, Any] = {}
-    for field in fields(parts[0]):
-        values = [getattr(part, field.name) for part in parts]
-        if isinstance(values[0], np.ndarray):
-            made[field.name] = np.concatenate(values)
-        else:
-            made[field.name] = None if values[0] is None else joined(values)
+    own = {field.name: [getattr(part, field.name) for part in parts] for field in fields(parts[0])}
+    made: dict[str, Any] = {
+        name: np.concatenate(values) if isinstance(values[0], np.ndarray) else joined(values)
+        for name, values in own.items()
+    }
     return type(parts[0])(**made)
 
 
