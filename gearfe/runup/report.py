@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -92,10 +93,15 @@ def stability_columns(run: RunUp) -> dict[str, Array]:
     }
 
 
+def largest_force(state: SteadyState, mesh: int) -> float:
+    """Largest size of a mesh's force (N)."""
+    return float(np.abs(state.force[:, mesh]).max())
+
+
 def dynamic_factors(run: RunUp, mesh: int) -> Array:
     """Largest size of a mesh's force over the steady one, of all states."""
     steady = abs(float(run.train.steady[mesh]))
-    largest = np.array([np.abs(s.force[:, mesh]).max() for s in run.states])
+    largest = np.array([largest_force(s, mesh) for s in run.states])
     return np.asarray(largest / steady) if steady > 0.0 else np.full(len(largest), np.nan)
 
 
@@ -217,13 +223,16 @@ def critical_columns(modes: CoupledModes, met: list[Crossing]) -> dict[str, Any]
 
 
 def peaks_of(run: RunUp, modes: CoupledModes, multiples: int) -> list[dict[str, Any]]:
-    """Peaks of the dynamic factors over the speed, highest first, each with the order and mode that meet there."""
-    swept = run.sweep()
+    """Peaks of the dynamic factors over the speed, highest first, each with the order and mode that meet there: of the
+    larger one of the motions that a slow run-up and a slow run-down meet.
+    """
+    both = list(zip(run.sweep(), run.sweep(up=False), strict=True))
     cut = orders(run, multiples)
     found = []
     for mesh, line in enumerate(run.train.model.meshes):
         steady = abs(float(run.train.steady[mesh]))
-        values = np.array([np.abs(s.force[:, mesh]).max() for s in swept]) / max(steady, 1e-300)
+        swept = [max(two, key=partial(largest_force, mesh=mesh)) for two in both]
+        values = np.array([largest_force(s, mesh) for s in swept]) / max(steady, 1e-300)
         for at in _tops(values):
             state = swept[at]
             size, there = np.abs(state.lines(state.force[:, mesh])), [c for c in cut if c.waves in state.numbers]

@@ -43,7 +43,7 @@ class RunUp(ShownTable):
         turning point on branch 1 back, after the next one on branch 2 upwards again; and one next to each turning
         point, as the last of its branch.
     turning_speeds : (turns,)
-        Speeds of the turning points (rad/s), between branch 0 and 1, 1 and 2, ...
+        Speeds of the turning points (rad/s) in the order in which the curves pass them; `bifurcations` tell branches.
     bifurcations
         Where motions change their stability: turning points, period doubling, Neimark-Sacker; only turning points where
         no multipliers were asked for.
