@@ -21,7 +21,7 @@ CAPABILITIES = {
         */microgeometry.py commands/relief.py
     """,
     "mesh law, contact loss, friction": """
-        meshlaw/* train/friction.py train/parting.py train/flanks.py train/phases.py train/static_error.py
+        meshlaw/* train/friction.py train/parting.py train/statics.py train/phases.py
         train/corners.py train/program.py
     """,
     "run-up, steady states": "runup/* */runup.py figures/campbell.py",
@@ -31,14 +31,18 @@ CAPABILITIES = {
         rigid/*tape* rigid/*quadratic* rigid/series.py rigid/corners.py mechanisms/load_series.py
         mechanisms/link* mechanisms/loads.py mechanisms/rest.py mechanisms/sensitivity.py mechanisms/solve.py
         mechanisms/sweep.py mechanisms/tables.py tables/beam.py
+        mechanisms/plate* meshing/plate_mesh.py tables/plate.py rigid/floating.py rigid/kernel_elastic.py
+        rigid/kernel_collocation.py rigid/kernel_equations.py rigid/kernel_matrices.py rigid/kernel_stages.py
+        rigid/numpy_equations.py
     """,
     "extruded housing meshes, compiled kernels kept": """
-        prisms.py housing/prism_error.py housing/meshes.py rigid/packed* rigid/parts.py versions.py
+        prisms.py housing/prism_error.py housing/meshes.py rigid/packed* rigid/parts.py rigid/native.py versions.py
         meshing/housing_recipe.py housing/body.py
     """,
     "own housings, exchange, reports, analyses of records": """
-        housing/own_mesh.py housing/nastran_files.py housing/superelement.py housing/dmig.py housing/modal_test.py
-        meshing/mesh_file.py meshing/deck.py meshing/gear_solid.py gear/outline.py output/formats.py
+        housing/own_mesh.py housing/nastran_files.py housing/superelement.py housing/dmig.py housing/modal_*.py
+        housing/bisection.py housing/refinement.py meshing/nastran.py gear/drawing_values.py meshing/mesh_file.py
+        meshing/deck.py meshing/gear_solid.py gear/outline.py output/formats.py
         output/report_page.py output/dxf.py shown.py figures/results.py
         */short_time.py commands/completion.py vibration/analysis.py
         vibration/measured.py vibration/timefunctions.py tables/spectrum.py tables/timefunction.py

@@ -88,7 +88,7 @@ def optimise_relief(
     executor: Executor | None = None,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> ReliefResult:
-    """Search for the best choice of the variables.
+    """Search for the best choice of the variables: a map, differential evolution from its best point, Nelder-Mead.
 
     Parameters
     ----------
@@ -108,88 +108,18 @@ def optimise_relief(
     InputError
         Where the bounds contain no valid gear.
     """
-    from scipy.optimize import differential_evolution, minimize
-
     variables = problem.variables
-    low, high = (np.array([getattr(v, end) for v in variables]) for end in ("low", "high"))
-    size = POPULATION * len(variables)
-    total = map_points ** min(2, len(variables)) + size * (generations + 1)
-    done = 0
-
-    def each(points: Iterable[Any], function: Callable[[Any], Any]) -> list[Any]:
-        nonlocal done
-        made = []
-        for one in (map if executor is None else executor.map)(function, points):
-            made.append(one)
-            done += 1
-            if progress is not None:
-                progress(min(done, total), total, "evaluations")
-        return made
-
+    total = map_points ** min(2, len(variables)) + POPULATION * len(variables) * (generations + 1)
+    evaluations = _Evaluations(problem, executor, progress, total)
     axes = tuple(np.linspace(v.low, v.high, map_points) for v in variables[:2])
-    middle = 0.5 * (low + high)
-    grid = [(*point, *middle[len(axes) :]) for point in itertools.product(*axes)]
-    found = each(grid, problem.evaluate)
-    values = np.array([one.value for one in found])
-    if not np.isfinite(values).any():
-        name = variables[0].name
-        reason = (
-            f"no gear between the bounds is valid; the first one (SI): {found[0].problem or 'its positions failed'}"
-        )
-        raise InputError(name, (variables[0].low, variables[0].high), reason, "change the bounds")
-    first = np.array(grid[int(np.argmin(values))])
-    best, value = first, float(values.min())
+    best, values = _best_of_map(evaluations, axes)
+    value = float(values.min())
     if generations:
-        searched = differential_evolution(
-            problem.value,
-            list(zip(low, high, strict=True)),
-            maxiter=generations,
-            popsize=POPULATION,
-            rng=np.random.default_rng(seed),
-            polish=False,
-            updating="deferred",
-            workers=lambda function, points: each(points, function),
-            x0=first,
-        )
-        if searched.fun < value:
-            best, value = searched.x, float(searched.fun)
-    scale = high - low
-
-    def scaled(u: Array) -> float:
-        nonlocal done
-        done += 1
-        return problem.value(low + u * scale)
-
-    start = (best - low) / scale
-    simplex = np.tile(start, (len(start) + 1, 1))
-    for i in range(len(start)):
-        simplex[i + 1, i] += 0.03 if start[i] < 0.5 else -0.03
-    ended = minimize(
-        scaled,
-        start,
-        method="Nelder-Mead",
-        bounds=[(0.0, 1.0)] * len(start),
-        options={
-            "initial_simplex": simplex,
-            "xatol": LAST_STEP,
-            "fatol": LAST_CHANGE * value,
-            "maxfev": 40 * len(start),
-        },
-    )
-    if ended.fun < value:
-        best = low + ended.x * scale
-    ends = np.array([v.tolerance for v in variables])
-    least = np.array([0.0 if v.quantity.endswith(".amount") else -math.inf for v in variables])
-    beside = [
-        np.maximum(best + sign * np.eye(len(best))[i] * ends, least) for i in range(len(best)) for sign in (-1, 1)
-    ]
-    corners = []
-    if ends.any() and len(best) <= CORNERS:
-        corners = [
-            np.maximum(best + np.array(signs) * ends, least) for signs in itertools.product((-1, 1), repeat=len(best))
-        ]
-    base = tuple(v.absent for v in variables)
-    made = each([best, base, *beside, *corners], problem.evaluate)
+        best, value = _evolved(evaluations, best, value, generations, seed)
+    best = _polished(evaluations, best, value)
+    beside, corners = _tolerance_points(problem, best)
+    absent = tuple(v.absent for v in variables)
+    made = evaluations.each([best, absent, *beside, *corners], problem.evaluate)
     around = np.array([one.value for one in made[2 : 2 + len(beside)]]).reshape(-1, 2)
     return ReliefResult(
         problem=problem,
@@ -201,5 +131,106 @@ def optimise_relief(
         low=around[:, 0],
         high=around[:, 1],
         worst=max((one.value for one in made[2:]), default=made[0].value),
-        evaluations=done,
+        evaluations=evaluations.done,
     )
+
+
+class _Evaluations:
+    """Evaluations of a problem here or on an executor, counted."""
+
+    def __init__(
+        self,
+        problem: ReliefProblem,
+        executor: Executor | None,
+        progress: Callable[[int, int, str], None] | None,
+        total: int,
+    ) -> None:
+        self.problem, self.done = problem, 0
+        self._map = map if executor is None else executor.map
+        self._progress, self._total = progress, total
+
+    def each(self, points: Iterable[Any], function: Callable[[Any], Any]) -> list[Any]:
+        """What a function gives at each point, in their order."""
+        made = []
+        for one in self._map(function, points):
+            made.append(one)
+            self.done += 1
+            if self._progress is not None:
+                self._progress(min(self.done, self._total), self._total, "evaluations")
+        return made
+
+    def value(self, x: Array) -> float:
+        """Objective at one point, here."""
+        self.done += 1
+        return self.problem.value(x)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and largest values of the variables (m)."""
+        low, high = (np.array([getattr(v, end) for v in self.problem.variables]) for end in ("low", "high"))
+        return low, high
+
+
+def _best_of_map(evaluations: _Evaluations, axes: tuple[Array, ...]) -> tuple[Array, Array]:
+    """Best point of a map over the first variables, the others in the middle of their bounds, and all objectives."""
+    low, high = evaluations.bounds
+    middle = 0.5 * (low + high)
+    grid = [(*point, *middle[len(axes) :]) for point in itertools.product(*axes)]
+    found = evaluations.each(grid, evaluations.problem.evaluate)
+    values = np.array([one.value for one in found])
+    if not np.isfinite(values).any():
+        first = evaluations.problem.variables[0]
+        reason = (
+            f"no gear between the bounds is valid; the first one (SI): {found[0].problem or 'its positions failed'}"
+        )
+        raise InputError(first.name, (first.low, first.high), reason, "change the bounds")
+    return np.array(grid[int(np.argmin(values))]), values
+
+
+def _evolved(evaluations: _Evaluations, best: Array, value: float, generations: int, seed: int) -> tuple[Array, float]:
+    """Best point and objective by differential evolution; at least as good as those given."""
+    from scipy.optimize import differential_evolution
+
+    searched = differential_evolution(
+        evaluations.problem.value,
+        list(zip(*evaluations.bounds, strict=True)),
+        maxiter=generations,
+        popsize=POPULATION,
+        rng=np.random.default_rng(seed),
+        polish=False,
+        updating="deferred",
+        workers=lambda function, points: evaluations.each(points, function),
+        x0=best,
+    )
+    return (searched.x, float(searched.fun)) if searched.fun < value else (best, value)
+
+
+def _polished(evaluations: _Evaluations, best: Array, value: float) -> Array:
+    """Best point by Nelder's and Mead's method over the bounds scaled to 0..1; at least as good as the one given."""
+    from scipy.optimize import minimize
+
+    low, high = evaluations.bounds
+    scale = high - low
+    start = (best - low) / scale
+    simplex = np.tile(start, (len(start) + 1, 1))
+    for i in range(len(start)):
+        simplex[i + 1, i] += 0.03 if start[i] < 0.5 else -0.03
+    options = {"initial_simplex": simplex, "xatol": LAST_STEP, "fatol": LAST_CHANGE * value, "maxfev": 40 * len(start)}
+    ended = minimize(
+        lambda u: evaluations.value(low + u * scale),
+        start,
+        method="Nelder-Mead",
+        bounds=[(0.0, 1.0)] * len(start),
+        options=options,
+    )
+    return np.asarray(low + ended.x * scale) if ended.fun < value else best
+
+
+def _tolerance_points(problem: ReliefProblem, best: Array) -> tuple[list[Array], list[Array]]:
+    """Points with one variable at an end of its tolerance (low and high of the first, ...), and with all at theirs."""
+    ends = np.array([v.tolerance for v in problem.variables])
+    least = np.array([0.0 if v.quantity.endswith(".amount") else -math.inf for v in problem.variables])
+    signs = [sign * unit for unit in np.eye(len(best)) for sign in (-1, 1)]
+    corners = itertools.product((-1, 1), repeat=len(best)) if ends.any() and len(best) <= CORNERS else ()
+    beside, far = ([np.maximum(best + np.array(s) * ends, least) for s in some] for some in (signs, corners))
+    return beside, far
