@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import math
 import time
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..progress import count
 from ..tables.train import TrainTable, value_text
@@ -147,50 +148,14 @@ def title(table: TrainTable, *, driven: bool = True) -> str:
 
 def report_lines(response: TrainResponse, train: GearTrain, written: Written, choice: OutputChoice) -> list[str]:
     """Lines for the terminal."""
-    from ..vibration.errors import with_error
-    from ..vibration.report import attachment_to_draw
-
     summary = written.summary
-    stiffness = summary["mesh_stiffness_N_per_m"]
-    errors = summary.get("headline_errors", {})
-
-    def off(name: str, number: int) -> str:
-        return with_error(errors[name][number]) if name in errors else ""
-
-    lines = []
-    for i, (name, frequency) in enumerate(zip(response.mesh_names, response.mesh_frequencies_Hz, strict=True)):
-        low, high = stiffness[name]
-        k = "rigid" if low is None else f"k {low / 1e6:.4g} to {high / 1e6:.4g} N/um"
-        mean = summary.get("mean_contact_forces_N")
-        force = (
-            ""
-            if mean is None or not math.isfinite(mean[i])
-            else f", mean contact force {mean[i]:.1f}{off('mean_contact_forces_N', i)} N"
-        )
-        lines.append(f"mesh {i + 1} ({name}): {_frequency(train, response, float(frequency))}, {k}{force}")
-    contact = summary.get("contact", {})
-    for i, share in enumerate(contact.get("share_without_contact", ())):
-        if share is not None:
-            lost, factor = contact["contacts_lost"][i], contact["dynamic_factors"][i]
-            parts = (
-                f"no contact in {100 * share:.3g} % of the time, contacts lost: {lost}" if lost else "always in contact"
-            )
-            most = "" if factor is None else f"; largest force {factor:.3g} times the steady one"
-            lines.append(f"mesh {i + 1}: {contact['flanks'][i]}; {parts}{most}")
-    friction = summary.get("friction", {})
-    for i, coefficient in enumerate(friction.get("coefficients", ())):
-        if coefficient > 0.0:
-            share = friction["efficiency"][i]
-            efficiency = "" if share is None else f", efficiency {100 * share:.4g} %"
-            lines.append(
-                f"mesh {i + 1}: friction {coefficient:.4g}, loss {friction['mean_loss_W'][i]:.4g} W{efficiency}"
-            )
+    lines = [*_mesh_lines(response, train, summary), *_contact_lines(summary)]
     if response.common_period_s:
         count = summary.get("mean_over_common_periods", 0)
         means = f"over the last {count} of them" if count else "over all times under load, which are fewer"
         lines.append(f"common period of the meshes {1e3 * response.common_period_s:.4g} ms; means are {means}")
     frequencies = enumerate(response.coupled_frequencies_Hz[:10])
-    shown = ", ".join(f"{f:.0f}{off('coupled_frequencies_Hz', i)}" for i, f in frequencies)
+    shown = ", ".join(f"{f:.0f}{_error(summary, 'coupled_frequencies_Hz', i)}" for i, f in frequencies)
     more = f"{shown} Hz ..." if shown else "none, nothing is left to vibrate"
     lines.append(f"natural frequencies of the coupled system: {more}")
     statistics = response.statistics
@@ -206,21 +171,70 @@ def report_lines(response: TrainResponse, train: GearTrain, written: Written, ch
         lines.append(f"Floquet multipliers: {floquet['note']}")
     for name, value in response.estimates.items():
         lines.append(f"error estimate, {name}: " + (f"{value:.2g}" if math.isfinite(value) else "unknown"))
-    if written.spectra is not None:
-        made = written.spectra
-        lines.append(
-            f"spectrum: resolution {made.spectrum.resolution:.4g} Hz, up to {made.spectrum.frequency[-1]:.6g} Hz, "
-            f"from samples every {1e6 * made.step / made.every:.3g} us"
-        )
-        loaded = next((load.bore for load in train.loads if load.bore is not None), None)
-        attachment = attachment_to_draw(response, choice.attachment, loaded)
-        found = summary["dominant_lines"][f"attachment_{attachment}_acceleration_m_per_s2"][:4]
-        texts = [f"{x['frequency_Hz']:.0f} Hz {x['amplitude']:.3g}{with_error(x.get('error_estimate'))}" for x in found]
-        lines += [f"normal acceleration at attachment {attachment} (m/s2): " + ", ".join(texts)] if texts else []
-        if made.power is not None:
-            part = errors.get("radiated_power_mean_W")
-            decibels = None if part is None else 10.0 * math.log10(1.0 + float(part) / max(made.power.mean, 1e-300))
-            lines.append(f"radiated power: mean {made.power.mean_level:.1f}{with_error(decibels)} dB re 1e-12 W")
+    return lines if written.spectra is None else [*lines, *_spectrum_lines(response, train, written, choice)]
+
+
+def _error(summary: Mapping[str, Any], name: str, number: int) -> str:
+    """Error of one entry of a number of the summary, where errors were estimated."""
+    from ..vibration.errors import with_error
+
+    errors = summary.get("headline_errors", {})
+    return with_error(errors[name][number]) if name in errors else ""
+
+
+def _mesh_lines(response: TrainResponse, train: GearTrain, summary: Mapping[str, Any]) -> list[str]:
+    """Frequency, stiffness and mean force of each mesh."""
+    lines, mean = [], summary.get("mean_contact_forces_N")
+    for i, (name, frequency) in enumerate(zip(response.mesh_names, response.mesh_frequencies_Hz, strict=True)):
+        low, high = summary["mesh_stiffness_N_per_m"][name]
+        k = "rigid" if low is None else f"k {low / 1e6:.4g} to {high / 1e6:.4g} N/um"
+        force = ""
+        if mean is not None and math.isfinite(mean[i]):
+            force = f", mean contact force {mean[i]:.1f}{_error(summary, 'mean_contact_forces_N', i)} N"
+        lines.append(f"mesh {i + 1} ({name}): {_frequency(train, response, float(frequency))}, {k}{force}")
+    return lines
+
+
+def _contact_lines(summary: Mapping[str, Any]) -> list[str]:
+    """Of each mesh which flanks bear and when they part; friction."""
+    lines, contact, friction = [], summary.get("contact", {}), summary.get("friction", {})
+    for i, share in enumerate(contact.get("share_without_contact", ())):
+        if share is not None:
+            lost, factor = contact["contacts_lost"][i], contact["dynamic_factors"][i]
+            parts = (
+                f"no contact in {100 * share:.3g} % of the time, contacts lost: {lost}" if lost else "always in contact"
+            )
+            most = "" if factor is None else f"; largest force {factor:.3g} times the steady one"
+            lines.append(f"mesh {i + 1}: {contact['flanks'][i]}; {parts}{most}")
+    for i, coefficient in enumerate(friction.get("coefficients", ())):
+        if coefficient > 0.0:
+            share = friction["efficiency"][i]
+            efficiency = "" if share is None else f", efficiency {100 * share:.4g} %"
+            lines.append(
+                f"mesh {i + 1}: friction {coefficient:.4g}, loss {friction['mean_loss_W'][i]:.4g} W{efficiency}"
+            )
+    return lines
+
+
+def _spectrum_lines(response: TrainResponse, train: GearTrain, written: Written, choice: OutputChoice) -> list[str]:
+    """Resolution, the largest lines at the attachment of the pictures, radiated power."""
+    from ..errors import given
+    from ..vibration.errors import with_error
+    from ..vibration.report import attachment_to_draw
+
+    made, summary = given(written.spectra, "spectra"), written.summary
+    lines = [
+        f"spectrum: resolution {made.spectrum.resolution:.4g} Hz, up to {made.spectrum.frequency[-1]:.6g} Hz, "
+        f"from samples every {1e6 * made.step / made.every:.3g} us"
+    ]
+    attachment = attachment_to_draw(response, choice.attachment, train)
+    found = summary["dominant_lines"][f"attachment_{attachment}_acceleration_m_per_s2"][:4]
+    texts = [f"{x['frequency_Hz']:.0f} Hz {x['amplitude']:.3g}{with_error(x.get('error_estimate'))}" for x in found]
+    lines += [f"normal acceleration at attachment {attachment} (m/s2): " + ", ".join(texts)] if texts else []
+    if made.power is not None:
+        part = summary.get("headline_errors", {}).get("radiated_power_mean_W")
+        decibels = None if part is None else 10.0 * math.log10(1.0 + float(part) / max(made.power.mean, 1e-300))
+        lines.append(f"radiated power: mean {made.power.mean_level:.1f}{with_error(decibels)} dB re 1e-12 W")
     return lines
 
 

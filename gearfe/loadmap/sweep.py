@@ -75,10 +75,7 @@ def sweep_loads(
         For torques or angles out of range.
     """
     requested, finite = requested_angles(pair, angles, ANGLES, kinematics)
-    goals = np.unique(np.atleast_1d(np.asarray(torques, dtype=float)))
-    if goals.ndim != 1 or len(goals) == 0 or not (np.isfinite(goals).all() and goals[0] > 0):
-        raise InputError("torques", torques, "must be finite and > 0 N m", "give torques at the wheel's hub")
-    watch = Stopwatch()
+    goals, watch = rising_torques(torques), Stopwatch()
     if elastic is None:
         elastic = elastic_pair(pair, model, watch=watch, **changes)
     solved_angles, source = distinct_angles(requested, pair.mesh_cycle)
@@ -105,6 +102,20 @@ def sweep_loads(
 
         root = root_map(at_roots, (len(goals), n), source)
     return LoadMap(goals, curves, root, dict(watch.seconds))
+
+
+def rising_torques(torques: ArrayLike) -> Array:
+    """Torques at the wheel's hub (N m), each once and rising, shape (m,).
+
+    Raises
+    ------
+    InputError
+        For none, and for one that is not finite or not > 0.
+    """
+    made = np.unique(np.asarray(torques, dtype=float))
+    if len(made) == 0 or not (np.isfinite(made).all() and made[0] > 0):
+        raise InputError("torques", torques, "must be finite and > 0 N m", "give torques at the wheel's hub")
+    return made
 
 
 def job_map(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
@@ -55,11 +55,6 @@ class PairForces:
     force: Array
     share: Array
     approach: Array
-
-
-def joined(parts: Sequence[PairForces]) -> PairForces:
-    """All of them."""
-    return PairForces(*(np.concatenate([getattr(one, f.name) for one in parts]) for f in fields(PairForces)))
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,11 @@ from ..contact.half_plane import (
     coupling_compliances,
     solve_half_plane,
 )
-from ..contact.position import Positions
+from ..contact.position import Positions, joined
 from ..errors import InputError
 from ..gear.touching import Touching
 from ..typing import Array, IntArray
-from .fit import Couple, PairForces, TouchCurve, fit_law, joined, touch_cubics
+from .fit import Couple, PairForces, TouchCurve, fit_law, touch_cubics
 from .law import NEVER, MeshLaw
 
 #: Cells of the phase in a mesh cycle to begin with, and places in each (parts of its width) where contacts are solved.

@@ -9,14 +9,15 @@ from numpy.typing import ArrayLike
 
 from ..contact.half_plane_result import PairContacts
 from ..contact.half_plane_step import HalfPlanePair
-from ..contact.position import Positions, taken
+from ..contact.position import Positions, joined, taken
 from ..errors import InputError
 from ..gear.deviation import ToothDeviations
 from ..loadmap.root_stress import PairRoots
+from ..loadmap.sweep import rising_torques
 from ..stiffness.contact_pressure import BLUNTING, reached_marks
 from ..stiffness.positions import HalfPlaneSolver, Progress, at_torques, check_torque
 from ..threads import one_thread
-from ..typing import Array, IntArray
+from ..typing import Array, BoolArray, IntArray
 from .loaded_mesh import BACK, LoadedMesh, PairLoads, full_period
 
 #: Cells solved at once, and most in all.
@@ -64,70 +65,87 @@ def load_mesh(
     InputError
         For torques out of range, too many cells, and tooth pairs that carry nothing on their whole path.
     """
-    goals = np.unique(np.atleast_1d(np.asarray(torques, dtype=float)))
-    if len(goals) == 0 or not (np.isfinite(goals).all() and goals[0] > 0):
-        raise InputError("torques", torques, "must be finite and > 0 N m", "give torques at the wheel's hub")
-    pair = law.pair
+    goals, pair = rising_torques(torques), law.pair
     check_torque(law, float(goals[-1]), "torques")
-    if angles is None:
-        alike = all(one.alike for one in law.teeth.deviations)
-        cycles = mesh_cycles if mesh_cycles is not None else 1 if alike else full_period(pair)
-        n = positions * cycles
-    else:
-        cycles, n = 0, len(np.atleast_1d(np.asarray(angles)))
-    count = len(goals) * n
-    if count > MOST_CELLS:
-        problem = f"makes {count} cells with {len(goals)} torques and {n} angles: must be <= {MOST_CELLS}"
-        raise InputError("mesh_cycles", cycles, problem, "state a part of the period, fewer positions or torques")
-    given = np.arange(n) * (pair.mesh_cycle / positions) if angles is None else angles
-    place: Array = np.atleast_1d(np.asarray(given, dtype=np.float64))
-    solver = HalfPlaneSolver(law, None if roots is None else roots.pair)
+    place, cycles = _pinion_angles(law, positions, mesh_cycles, angles)
+    if len(goals) * len(place) > MOST_CELLS:
+        many = f"{len(goals) * len(place)} cells with {len(goals)} torques and {len(place)} angles"
+        cure = "state a part of the period, fewer positions or torques"
+        raise InputError("mesh_cycles", cycles, f"makes {many}: must be <= {MOST_CELLS}", cure)
+    solver, lost = HalfPlaneSolver(law, None if roots is None else roots.pair), pair.contact_twist
     touch, behind = solver.touching_twists(place), None
     if back is not None:  # seen from the other side the pinion turns the other way
-        behind = HalfPlaneSolver(law.deviated(back)).touching_twists(-place)
-    stress = None if roots is None else np.full((count, 2), np.nan)
-    cells: list[dict[str, Array]] = []
-    pairs: list[PairLoads] = []
+        behind = HalfPlaneSolver(law.deviated(back)).touching_twists(-place) - lost
     with one_thread():
-        for start in range(0, count, AT_ONCE):
-            numbers = np.arange(start, min(start + AT_ONCE, count))
-            angle, goal = numbers % n, goals[numbers // n]
-            made = at_torques(solver, place[angle], goal, kept=np.arange(0 if roots is None else len(goal)))
-            if stress is not None and roots is not None:
-                stress[numbers] = _root_stress(made, roots)
-            pairs.append(_pair_loads(law, made, numbers, n))
-            cells.append({name: getattr(made, name) for name in CELL})  # not the panels of the contacts
-            if progress is not None:
-                progress(int(numbers[-1]) + 1, count, "cells")
-    shape, lost = (len(goals), n), pair.contact_twist
-    whole = {name: np.concatenate([one[name] for one in cells]).reshape(shape) for name in CELL}
-    loads = {name: np.concatenate([getattr(one, name) for one in pairs]) for name in PairLoads.__annotations__}
-    whole["twist"], room = whole["twist"] - lost, None
+        cells, loads, stress = _solve_cells(solver, law, place, goals, roots, progress)
+    cells["twist"], room = cells["twist"] - lost, None
     if behind is not None:
-        room = pair.normal_backlash + pair.wheel.base_radius * (behind - lost + whole["twist"])
-        jammed = room < 0.0
-        whole["status"] = np.where(jammed, BACK, whole["status"])
-        for name in ("twist", "torque_pinion", "tangent"):
-            whole[name] = np.where(jammed, np.nan, whole[name])
-        if stress is not None:
-            stress[jammed.ravel()] = np.nan
-        bears = ~jammed[loads["torque"], loads["angle"]]
-        loads = {name: values[bears] for name, values in loads.items()}
+        room = pair.normal_backlash + pair.wheel.base_radius * (behind + cells["twist"])
+        loads = _without_jammed(room < 0.0, cells, loads, stress)
     found = LoadedMesh(
         torque=goals,
         pinion_angle=place,
         mesh_cycles=cycles,
         twist_unloaded=touch - lost,
-        twist_unloaded_back=None if behind is None else behind - lost,
+        twist_unloaded_back=behind,
         back_clearance=room,
-        pairs=PairLoads(**loads),
-        root_stress=None if stress is None else stress.reshape(*shape, 2),
+        pairs=loads,
+        root_stress=stress,
         pair=pair,
-        **whole,
+        **cells,
     )
     met = solver.touching(place)
     _check_contact(found, law, met.pair, met.position, met.twist - lost)
     return found
+
+
+def _pinion_angles(
+    law: HalfPlanePair, positions: int, mesh_cycles: int | None, angles: ArrayLike | None
+) -> tuple[Array, int]:
+    """Pinion angles (rad), and the mesh cycles that they divide into equal steps; 0 for given angles."""
+    if angles is not None:
+        return np.atleast_1d(np.asarray(angles, dtype=np.float64)), 0
+    alike = all(one.alike for one in law.teeth.deviations)
+    cycles = mesh_cycles if mesh_cycles is not None else 1 if alike else full_period(law.pair)
+    return np.arange(positions * cycles) * (law.pair.mesh_cycle / positions), cycles
+
+
+def _solve_cells(
+    solver: HalfPlaneSolver,
+    law: HalfPlanePair,
+    place: Array,
+    goals: Array,
+    roots: PairRoots | None,
+    progress: Progress | None,
+) -> tuple[dict[str, Array], PairLoads, Array | None]:
+    """`CELL` of all torques and angles, shape (m, n), their loaded tooth pairs, and root stresses, shape (m, n, 2)."""
+    n, count = len(place), len(goals) * len(place)
+    stress = None if roots is None else np.full((count, 2), np.nan)
+    cells: list[dict[str, Array]] = []
+    pairs: list[PairLoads] = []
+    for start in range(0, count, AT_ONCE):
+        numbers = np.arange(start, min(start + AT_ONCE, count))
+        angle, goal = numbers % n, goals[numbers // n]
+        made = at_torques(solver, place[angle], goal, kept=np.arange(0 if roots is None else len(goal)))
+        if stress is not None and roots is not None:
+            stress[numbers] = _root_stress(made, roots)
+        pairs.append(_pair_loads(law, made, numbers, n))
+        cells.append({name: getattr(made, name) for name in CELL})  # not the panels of the contacts
+        if progress is not None:
+            progress(int(numbers[-1]) + 1, count, "cells")
+    shape = (len(goals), n)
+    whole = {name: np.concatenate([one[name] for one in cells]).reshape(shape) for name in CELL}
+    return whole, joined(pairs), None if stress is None else stress.reshape(*shape, 2)
+
+
+def _without_jammed(jammed: BoolArray, cells: dict[str, Array], loads: PairLoads, stress: Array | None) -> PairLoads:
+    """Mark the cells whose back flanks would bear, which lose their numbers; the loaded pairs of the others."""
+    cells["status"] = np.where(jammed, BACK, cells["status"])
+    for name in ("twist", "torque_pinion", "tangent"):
+        cells[name] = np.where(jammed, np.nan, cells[name])
+    if stress is not None:
+        stress[jammed] = np.nan
+    return taken(loads, np.flatnonzero(~jammed[loads.torque, loads.angle]))
 
 
 def _pair_loads(law: HalfPlanePair, made: Positions, numbers: IntArray, n: int) -> PairLoads:

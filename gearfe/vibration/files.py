@@ -132,56 +132,28 @@ def write_run(
     beside
         What [spectrum] asks for beside the spectrum.
     """
-    train, times, every = planned.model.train, planned.times, planned.every
-    radiation = train.housing.radiation if train.housing is not None and train.housing.has_mesh else None
+    train, times = planned.model.train, planned.times
     problems: list[str] = []
     with whole_set(folder, MAY_WRITE) as target:
-
-        def followed(times: Array, choice: OutputChoice) -> Followed:
-            table, keep = target / "response.csv", field_steps(times, choice) if choice.fields else None
-            with watch.stage("transient"):
-                run = _timed(planned.pieces(times) if beside is None else beside.watching(planned.pieces(times)), watch)
-                record = recorded(times, choice)
-                return follow(run, times, every, table=table, radiation=radiation, record=record, keep=keep)
-
-        def recorded(times: Array, choice: OutputChoice) -> TrainRecord | None:
-            first, duration = choice.spectrum_start, choice.spectrum_length
-            options: dict[str, Any] = {"window": choice.window, "start": first, "length": duration, "folder": folder}
-            return TrainRecord(times, every, radiation, **options) if len(times) > 2 else None
-
-        def repeated(changed: TrainModel) -> Run:
-            again = given(planned.again, "again")
-            method = str(response.statistics["method"])
-            found = follow(again(changed, method)(times), times, every, record=recorded(times, choice))
-            return Run(train_summary(found, {}), found.spectra)
-
-        made = followed(times, choice)
-        response = made.response
-        if response.status != "done" and 2 <= made.outputs < len(times):
-            shorter = followed(times[: made.outputs], replace(choice, spectrum_start=0.0, spectrum_length=None))
-            made = replace(shorter, response=response)
-        compiling = float(response.statistics.get("compile_seconds", 0.0))
-        if compiling > 0.0:
-            watch.seconds["transient"] -= compiling
-            watch.seconds["compiling"] = compiling
-        spectra = made.spectra
+        passes = _Passes(planned, folder, target / "response.csv", watch, beside)
+        made = passes.to_the_end(choice)
+        response, spectra = made.response, made.spectra
         run = Run(train_summary(made, {}, planned.stability, **planned.further), spectra)
         if planned.again is not None:
             with watch.stage("error estimates"):
+                repeated = passes.repeated(choice, str(response.statistics["method"]))
                 run = Run(with_errors(run, planned.model, repeated, band_hz=planned.band_hz), spectra)
-        with watch.stage("tables"):
-            if spectra is not None:
+        if spectra is not None:
+            with watch.stage("tables"):
                 write_csv(target / "spectrum.csv", spectra.columns())
-        loaded = next((load.bore for load in train.loads if load.bore is not None), None)
         if draw is not None and spectra is not None:
             with watch.stage("pictures"):
-                attachment = attachment_to_draw(made.curves, choice.attachment, loaded)
-                draw.curves(target, train, made, spectra, attachment)
+                draw.curves(target, train, made, spectra, attachment_to_draw(made.curves, choice.attachment, train))
         if beside is not None and beside.requested and response.status != "done":
             problems.append("spectra over time and measured ones are left out: the run ended early")
         elif beside is not None and beside.requested:
             with watch.stage("spectra over time"):
-                attachment = attachment_to_draw(made.curves, choice.attachment, loaded)
+                attachment = attachment_to_draw(made.curves, choice.attachment, train)
                 analysed = beside.write(target, spectra, attachment, None if draw is None else draw.analysis)
             run = Run({**run.summary, **analysed}, spectra)
         if choice.fields and made.outputs:
@@ -192,6 +164,80 @@ def write_run(
         write_json(target / "summary.json", summary)
         names = tuple(sorted(path.name for path in target.iterdir()))
     return Written(names, response, spectra, tuple(problems), summary)
+
+
+@dataclass(frozen=True)
+class _Passes:
+    """Passes of a planned run: the one whose response is written, and those that estimate its errors.
+
+    Attributes
+    ----------
+    folder, table
+        For temporary files; ``response.csv``.
+    beside
+        Watches the pieces of the written one.
+    """
+
+    planned: TrainRun
+    folder: Path
+    table: Path
+    watch: Stopwatch
+    beside: analysis.Analysis | None
+
+    def to_the_end(self, choice: OutputChoice) -> Followed:
+        """The run with its table; one that ended early is made once more up to where it came."""
+        times = self.planned.times
+        made = self._followed(times, choice)
+        response = made.response
+        if response.status != "done" and 2 <= made.outputs < len(times):
+            whole = replace(choice, spectrum_start=0.0, spectrum_length=None)
+            made = replace(self._followed(times[: made.outputs], whole), response=response)
+        compiling = float(response.statistics.get("compile_seconds", 0.0))
+        if compiling > 0.0:
+            self.watch.seconds["transient"] -= compiling
+            self.watch.seconds["compiling"] = compiling
+        return made
+
+    def repeated(self, choice: OutputChoice, method: str) -> Callable[[TrainModel], Run]:
+        """The numbers of the run with another train."""
+        times, every = self.planned.times, self.planned.every
+        again = given(self.planned.again, "again")
+
+        def run(changed: TrainModel) -> Run:
+            found = follow(again(changed, method)(times), times, every, record=self._record(times, choice))
+            return Run(train_summary(found, {}), found.spectra)
+
+        return run
+
+    @property
+    def _radiation(self) -> Array | None:
+        """Surface matrix of the housing, where it is known."""
+        housing = self.planned.model.train.housing
+        return housing.radiation if housing is not None and housing.has_mesh else None
+
+    def _followed(self, times: Array, choice: OutputChoice) -> Followed:
+        keep = field_steps(times, choice) if choice.fields else None
+        with self.watch.stage("transient"):
+            pieces = self.planned.pieces(times)
+            run = _timed(pieces if self.beside is None else self.beside.watching(pieces), self.watch)
+            record = self._record(times, choice)
+            return follow(
+                run, times, self.planned.every, table=self.table, radiation=self._radiation, record=record, keep=keep
+            )
+
+    def _record(self, times: Array, choice: OutputChoice) -> TrainRecord | None:
+        """What makes the spectra; None for too short a run."""
+        if len(times) <= 2:
+            return None
+        return TrainRecord(
+            times,
+            self.planned.every,
+            self._radiation,
+            window=choice.window,
+            start=choice.spectrum_start,
+            length=choice.spectrum_length,
+            folder=self.folder,
+        )
 
 
 def _timed(pieces: Iterable[TrainResponse], watch: Stopwatch) -> Iterator[TrainResponse]:

@@ -178,14 +178,13 @@ def stiffness_ranges(train: GearTrain) -> dict[str, tuple[float | None, float | 
     return found
 
 
-def attachment_to_draw(response: TrainResponse, chosen: str | None, loaded: str | None) -> str:
-    """Name of the attachment in the pictures: the asked one, else the bore that carries the load's reaction."""
+def attachment_to_draw(response: TrainResponse, chosen: str | None, train: GearTrain) -> str:
+    """Name of the attachment in the pictures: the chosen one, else the bore that carries the load's reaction."""
     names = response.attachment_names
     if chosen is not None and chosen not in names:
         raise unknown_name("--attachment", chosen, names)
-    if chosen is not None:
-        return chosen
-    return loaded if loaded is not None and loaded in names else names[-1]
+    loaded = next((load.bore for load in train.loads if load.bore is not None), None)
+    return chosen or (loaded if loaded is not None and loaded in names else names[-1])
 
 
 def attachment_acceleration(response: TrainResponse, attachment: str) -> Array:
